@@ -1,0 +1,8 @@
+//! What every stage speaks: particles, meshes, signed distance, sampling, wave-maker motion.
+
+pub mod bounds;
+pub mod mesh;
+pub mod motion;
+pub mod particles;
+pub mod sampling;
+pub mod signed_distance;

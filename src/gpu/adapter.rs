@@ -1,0 +1,201 @@
+//! Finding an adapter and opening a device on it.
+
+use std::sync::{Arc, Mutex};
+
+use wgpu::{Adapter, AdapterInfo, Backends, Device, Features, Instance, Limits, Queue};
+
+/// What goes wrong between the program and the device.
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    /// No adapter at all.
+    #[error(
+        "no GPU adapter found; install a Vulkan driver (software: Debian and Ubuntu `mesa-vulkan-drivers`, \
+         Fedora `mesa-vulkan-drivers`, Arch `vulkan-swrast`)"
+    )]
+    NoAdapter,
+    /// `--adapter` matches nothing.
+    #[error("no adapter matches `{request}`; this machine has {}", available.join(", "))]
+    NoSuchAdapter {
+        /// What was asked for.
+        request: String,
+        /// What there is.
+        available: Vec<String>,
+    },
+    /// The adapter refused to open.
+    #[error("adapter {adapter} refused a device: {message}")]
+    Open {
+        /// Adapter name.
+        adapter: String,
+        /// The driver's words.
+        message: String,
+    },
+    /// The device was lost or reported an error that no one can answer.
+    #[error("device lost: {0}")]
+    Lost(String),
+    /// A shader of ours does not compose or does not compile.
+    #[error("shader {name}: {message}")]
+    Shader {
+        /// Shader path.
+        name: String,
+        /// Where and what.
+        message: String,
+    },
+    /// A buffer is larger than the adapter binds.
+    #[error(
+        "buffer `{buffer}` needs {needed} bytes, and {adapter} allows {allowed} ({limit}); use fewer particles or a coarser spacing"
+    )]
+    TooLarge {
+        /// Buffer name in the plan.
+        buffer: String,
+        /// Bytes wanted.
+        needed: u64,
+        /// Bytes allowed.
+        allowed: u64,
+        /// Name of the limit.
+        limit: &'static str,
+        /// Adapter name.
+        adapter: String,
+    },
+}
+
+/// An open device.
+#[derive(Clone, Debug)]
+pub struct Context {
+    /// The logical device.
+    pub device: Device,
+    /// Its queue.
+    pub queue: Queue,
+    /// Name, driver, backend.
+    pub info: AdapterInfo,
+    /// What the device was opened with: the adapter's own limits.
+    pub limits: Limits,
+    /// Whether passes can be timed on the device.
+    pub has_timestamps: bool,
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+fn instance() -> Instance {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    descriptor.backends &= Backends::VULKAN | Backends::METAL | Backends::DX12;
+    Instance::new(descriptor)
+}
+
+/// Every adapter of this machine, in the driver's order, which `--adapter` indexes.
+pub fn enumerate() -> Vec<Adapter> {
+    pollster::block_on(instance().enumerate_adapters(Backends::all()))
+}
+
+fn choose(mut adapters: Vec<Adapter>, request: Option<&str>) -> Result<Adapter, GpuError> {
+    if adapters.is_empty() {
+        return Err(GpuError::NoAdapter);
+    }
+    let Some(request) = request else {
+        // A real GPU before the software adapter; the order within a kind is the driver's.
+        adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
+            wgpu::DeviceType::DiscreteGpu => 0,
+            wgpu::DeviceType::IntegratedGpu => 1,
+            wgpu::DeviceType::VirtualGpu => 2,
+            wgpu::DeviceType::Cpu | wgpu::DeviceType::Other => 3,
+        });
+        return Ok(adapters.swap_remove(0));
+    };
+    let names: Vec<String> = adapters
+        .iter()
+        .map(|adapter| adapter.get_info().name)
+        .collect();
+    let found = request
+        .parse::<usize>()
+        .ok()
+        .filter(|&index| index < names.len())
+        .or_else(|| {
+            names
+                .iter()
+                .position(|name| name.to_lowercase().contains(&request.to_lowercase()))
+        });
+    match found {
+        Some(index) => Ok(adapters.swap_remove(index)),
+        None => Err(GpuError::NoSuchAdapter {
+            request: request.to_owned(),
+            available: names
+                .iter()
+                .enumerate()
+                .map(|(index, name)| format!("{index}: {name}"))
+                .collect(),
+        }),
+    }
+}
+
+impl Context {
+    /// Opens the adapter that `request` names (an index, or part of a name), or the best there is.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`], [`GpuError::NoSuchAdapter`], [`GpuError::Open`].
+    pub fn open(request: Option<&str>) -> Result<Self, GpuError> {
+        let adapter = choose(enumerate(), request)?;
+        let info = adapter.get_info();
+        let limits = adapter.limits();
+        let wanted = Features::TIMESTAMP_QUERY | Features::FLOAT32_FILTERABLE;
+        let features = adapter.features() & wanted;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("swell"),
+            required_features: features,
+            required_limits: limits.clone(),
+            ..Default::default()
+        };
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
+                GpuError::Open {
+                    adapter: info.name.clone(),
+                    message: error.to_string(),
+                }
+            })?;
+        let fault = Arc::new(Mutex::new(None));
+        let lost = Arc::clone(&fault);
+        device.set_device_lost_callback(move |reason, message| {
+            record(&lost, format!("{reason:?}: {message}"))
+        });
+        let uncaptured = Arc::clone(&fault);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            record(&uncaptured, error.to_string())
+        }));
+        let has_timestamps = features.contains(Features::TIMESTAMP_QUERY);
+        Ok(Self {
+            device,
+            queue,
+            info,
+            limits,
+            has_timestamps,
+            fault,
+        })
+    }
+
+    /// Fails when the device was lost or has reported an error since it was opened.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`] with the first message.
+    pub fn check(&self) -> Result<(), GpuError> {
+        match self.fault.lock() {
+            Ok(fault) => fault
+                .clone()
+                .map_or(Ok(()), |message| Err(GpuError::Lost(message))),
+            Err(_) => Err(GpuError::Lost("the error handler panicked".into())),
+        }
+    }
+
+    /// Waits until everything submitted is done.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn wait(&self) -> Result<(), GpuError> {
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|error| GpuError::Lost(error.to_string()))?;
+        self.check()
+    }
+}
+
+fn record(fault: &Mutex<Option<String>>, message: String) {
+    if let Ok(mut fault) = fault.lock() {
+        fault.get_or_insert(message);
+    }
+}

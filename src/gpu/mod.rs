@@ -1,0 +1,4 @@
+//! Everything that touches the device and knows nothing of fluids.
+
+pub mod adapter;
+pub mod shader;

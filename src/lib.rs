@@ -1,0 +1,25 @@
+//! swell bakes ocean-wave shots to particle caches and renders them.
+//!
+//! Data flows one way, and stages share nothing but files:
+//!
+//! ```text
+//! scene.toml -> scene -> stage::bake -> solve (GPU) -> cache -> stage::render -> render (GPU) -> images
+//! ```
+//!
+//! - [`domain`]: what every stage speaks: particles, meshes, signed distance, wave-maker motion.
+//! - [`scene`]: scene and look files, validated, and the plan of passes and buffers.
+//! - [`gpu`]: adapter, shader composition, passes recorded as data, scan and sort.
+//! - [`solve`]: the particle solvers on the GPU.
+//! - [`cache`]: frames, ledger, manifest on disk.
+//! - [`render`]: screen-space fluid rendering.
+//! - [`stage`]: wires the rooms into jobs; no terminal.
+//! - [`cli`]: arguments in, terminal out.
+
+pub mod cache;
+pub mod cli;
+pub mod domain;
+pub mod gpu;
+pub mod render;
+pub mod scene;
+pub mod solve;
+pub mod stage;
