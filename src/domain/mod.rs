@@ -6,3 +6,5 @@ pub mod motion;
 pub mod particles;
 pub mod sampling;
 pub mod signed_distance;
+pub mod solver;
+pub mod sph;

@@ -9,3 +9,16 @@ pub enum Motion {
         velocity: f64,
     },
 }
+
+impl Motion {
+    /// Metres.
+    pub fn displacement(&self, t: f64) -> f64 {
+        let Self::ConstantVelocity { velocity } = self;
+        velocity * t
+    }
+    /// m/s.
+    pub fn peak_speed(&self, _t0: f64, _t1: f64) -> f64 {
+        let Self::ConstantVelocity { velocity } = self;
+        velocity.abs()
+    }
+}

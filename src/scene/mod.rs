@@ -1,10 +1,15 @@
 //! Scene and look files, parsed into validated types, and the plan that follows from them.
 
+pub mod effects;
+pub mod plan;
+
 use std::path::PathBuf;
 
 use glam::{DAffine3, DVec3};
 
 use crate::domain::{bounds::Bounds, mesh::TriangleMesh, motion::Motion};
+
+pub use effects::Effects;
 
 /// A validated scene: SI units, every default settled, every file read.
 #[derive(Clone, Debug)]
@@ -129,13 +134,4 @@ pub enum Stop {
         /// Upper bound.
         max_iterations: u32,
     },
-}
-
-/// Effects that a scene names.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Effects {
-    /// XSPH viscosity, c (Macklin and Müller 2013, eq. 17).
-    pub viscosity: Option<f64>,
-    /// Vorticity confinement strength ε (eq. 16).
-    pub vorticity_confinement: Option<f64>,
 }
