@@ -10,15 +10,16 @@ override XSPH: f32;
 @group(0) @binding(11) var<storage, read> velocity: array<vec4f>;
 @group(0) @binding(12) var<storage, read_write> viscosity_change: array<vec4f>;
 
+var<private> own_position: vec3f;
 var<private> own_velocity: vec3f;
 var<private> change: vec3f;
 
-fn visit(xi: vec3f, i: u32, j: u32) {
-    if j >= params.particle_count {
+fn visit(i: u32, j: u32) {
+    if j >= fluid_count {
         return;
     }
-    let d = xi - position[j].xyz;
-    let p = max(1.0 - dot(d, d) / (params.support_radius * params.support_radius), 0.0);
+    let d = own_position - position[j].xyz;
+    let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
     change += (velocity[j].xyz - own_velocity) * (p * p * p);
 }
 
@@ -35,6 +36,8 @@ fn main(
     let i = phase_particle(thread);
     own_velocity = velocity[i].xyz;
     change = vec3f(0.0);
-    for_each_neighbor(position[i].xyz, i);
+    own_position = position[i].xyz;
+    begin_phase();
+    for_each_neighbor(own_position, i);
     viscosity_change[i] = vec4f(XSPH * params.density_scale * change, 0.0);
 }

@@ -8,16 +8,17 @@
 @group(0) @binding(11) var<storage, read> velocity: array<vec4f>;
 @group(0) @binding(12) var<storage, read_write> vorticity: array<vec4f>;
 
+var<private> own_position: vec3f;
 var<private> own_velocity: vec3f;
 var<private> curl: vec3f;
 
-fn visit(xi: vec3f, i: u32, j: u32) {
-    if j >= params.particle_count {
+fn visit(i: u32, j: u32) {
+    if j >= fluid_count {
         return;
     }
-    let d = xi - position[j].xyz;
+    let d = own_position - position[j].xyz;
     let r = length(d);
-    let s = max(1.0 - r / params.support_radius, 0.0);
+    let s = max(1.0 - r * inverse_h, 0.0);
     // ∇_j W points from j to i.
     let gradient = d * (params.gradient_scale * s * s / max(r, 1e-15));
     curl += cross(velocity[j].xyz - own_velocity, gradient);
@@ -36,6 +37,8 @@ fn main(
     let i = phase_particle(thread);
     own_velocity = velocity[i].xyz;
     curl = vec3f(0.0);
-    for_each_neighbor(position[i].xyz, i);
+    own_position = position[i].xyz;
+    begin_phase();
+    for_each_neighbor(own_position, i);
     vorticity[i] = vec4f(curl, length(curl));
 }

@@ -10,16 +10,17 @@ override STRENGTH: f32;
 @group(0) @binding(11) var<storage, read> vorticity: array<vec4f>;
 @group(0) @binding(12) var<storage, read_write> velocity: array<vec4f>;
 
+var<private> own_position: vec3f;
 var<private> own_strength: f32;
 var<private> slope: vec3f;
 
-fn visit(xi: vec3f, i: u32, j: u32) {
-    if j >= params.particle_count {
+fn visit(i: u32, j: u32) {
+    if j >= fluid_count {
         return;
     }
-    let d = xi - position[j].xyz;
+    let d = own_position - position[j].xyz;
     let r = length(d);
-    let s = max(1.0 - r / params.support_radius, 0.0);
+    let s = max(1.0 - r * inverse_h, 0.0);
     slope -= d * ((vorticity[j].w - own_strength) * params.gradient_scale * s * s / max(r, 1e-15));
 }
 
@@ -37,7 +38,9 @@ fn main(
     let own = vorticity[i];
     own_strength = own.w;
     slope = vec3f(0.0);
-    for_each_neighbor(position[i].xyz, i);
+    own_position = position[i].xyz;
+    begin_phase();
+    for_each_neighbor(own_position, i);
     let steepness = length(slope);
     // Below rounding of |ω| over h the direction is noise.
     if steepness * params.support_radius < 1e-5 * own.w || own.w == 0.0 {

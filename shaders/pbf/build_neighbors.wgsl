@@ -10,9 +10,23 @@
 #ifdef SOLIDS
 @group(0) @binding(3) var<storage, read> boundary_cell_start: array<u32>;
 #endif
-@group(0) @binding(4) var<storage, read_write> neighbor_list: array<u32>;
+@group(0) @binding(4) var<storage, read_write> neighbor_list: array<vec4u>;
 @group(0) @binding(5) var<storage, read_write> neighbor_count: array<u32>;
 @group(0) @binding(10) var<storage, read_write> counters: array<atomic<u32>>;
+
+var<private> word: u32;
+var<private> four: vec4u;
+var<private> count: u32;
+
+// A word is written when it is full: stores are as dear as loads.
+fn append(j: u32) {
+    four = vec4u(j, four.xyz);
+    count++;
+    if (count & 3u) == 0u && count <= LIST_CAPACITY {
+        neighbor_list[word] = four;
+        word += LIST_STRIDE;
+    }
+}
 
 @compute @workgroup_size(64)
 fn main(
@@ -27,12 +41,14 @@ fn main(
     let i = phase_particle(thread);
     let xi = predicted[i].xyz;
     let h2 = params.support_radius * params.support_radius;
+    let fluid_end = params.particle_count;
     let dims = vec3i(params.grid_dims);
     let centre = cell_coordinate(xi);
     let low = max(centre - 1, vec3i(0));
     let high = min(centre + 1, dims - 1);
-    let base = list_base(i);
-    var count = 0u;
+    word = list_base(i);
+    four = vec4u(params.nobody);
+    count = 0u;
     for (var z = low.z; z <= high.z; z++) {
         for (var y = low.y; y <= high.y; y++) {
             let row = (z * dims.y + y) * dims.x;
@@ -42,25 +58,24 @@ fn main(
             for (var j = cell_start[first]; j < end; j++) {
                 let d = xi - predicted[j].xyz;
                 if dot(d, d) < h2 && j != i {
-                    if count < LIST_CAPACITY {
-                        neighbor_list[base + count * LIST_STRIDE] = j;
-                    }
-                    count++;
+                    append(j);
                 }
             }
 #ifdef SOLIDS
             let boundary_end = boundary_cell_start[last];
             for (var b = boundary_cell_start[first]; b < boundary_end; b++) {
-                let d = xi - predicted[2u * params.particle_count + b].xyz;
+                let d = xi - predicted[2u * fluid_end + b].xyz;
                 if dot(d, d) < h2 {
-                    if count < LIST_CAPACITY {
-                        neighbor_list[base + count * LIST_STRIDE] = params.particle_count + b;
-                    }
-                    count++;
+                    append(fluid_end + b);
                 }
             }
 #endif
         }
+    }
+    if (count & 3u) != 0u && count < LIST_CAPACITY {
+        // The newest stands first; the rest of the word is nobody or repeats of a full word before.
+        let held = count & 3u;
+        neighbor_list[word] = select(vec4u(params.nobody), four, vec4u(0u, 1u, 2u, 3u) < vec4u(held));
     }
     neighbor_count[i] = count;
     if count > LIST_CAPACITY {

@@ -6,30 +6,30 @@
 #import "shared/neighbors.wgsl"
 #import "shared/walls.wgsl"
 
-@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
-@group(0) @binding(10) var<storage, read_write> lambda: array<f32>;
+// λ goes into w. Others read this particle's w meanwhile, but only its sign, which λ ≤ 0 does not change.
+@group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
 #ifdef DENSITY
 @group(0) @binding(11) var<storage, read_write> density: array<f32>;
 #endif
 
+var<private> own_position: vec3f;
 var<private> kernel_sum: f32;
 var<private> gradient_sum: vec3f;
 var<private> gradient_squares: f32;
 
-fn visit(xi: vec3f, i: u32, j: u32) {
+fn visit(i: u32, j: u32) {
     let other = predicted[stored_index(j)];
-    let d = xi - other.xyz;
-    let inverse_h = 1.0 / params.support_radius;
+    let d = own_position - other.xyz;
     let r2 = dot(d, d);
-    let q2 = r2 * inverse_h * inverse_h;
-    let p = max(1.0 - q2, 0.0);
-    kernel_sum += other.w * p * p * p;
+    let p = max(1.0 - r2 * inverse_h * inverse_h, 0.0);
+    let mass = weight(other.w);
+    kernel_sum += mass * p * p * p;
     let inverse_r = inverseSqrt(max(r2, 1e-30));
     let s = max(1.0 - r2 * inverse_r * inverse_h, 0.0);
-    let slope = other.w * s * s;
+    let slope = mass * s * s;
     gradient_sum += d * (slope * inverse_r);
     // A solid's samples do not move: they have no gradient of their own.
-    gradient_squares += select(slope * slope, 0.0, j >= params.particle_count);
+    gradient_squares += select(slope * slope, 0.0, other.w > 0.0);
 }
 
 @compute @workgroup_size(64)
@@ -43,7 +43,10 @@ fn main(
         return;
     }
     let i = phase_particle(thread);
-    let xi = predicted[stored_index(i)].xyz;
+    begin_phase();
+    let slot = stored_index(i);
+    let xi = predicted[slot].xyz;
+    own_position = xi;
     kernel_sum = 1.0;
     gradient_sum = vec3f(0.0);
     gradient_squares = 0.0;
@@ -52,7 +55,7 @@ fn main(
     let relative_density = params.density_scale * kernel_sum + wall.density;
     let own = wall.gradient - params.gradient_scale * gradient_sum;
     let squares = dot(own, own) + params.gradient_scale * params.gradient_scale * gradient_squares;
-    lambda[i] = -max(relative_density - 1.0, 0.0) / (squares + params.regularization);
+    predicted[slot].w = -max(relative_density - 1.0, 0.0) / (squares + params.regularization);
 #ifdef DENSITY
     density[i] = relative_density;
 #endif

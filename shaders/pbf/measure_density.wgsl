@@ -9,13 +9,14 @@
 @group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
 @group(0) @binding(10) var<storage, read_write> density: array<f32>;
 
+var<private> own_position: vec3f;
 var<private> kernel_sum: f32;
 
-fn visit(xi: vec3f, i: u32, j: u32) {
+fn visit(i: u32, j: u32) {
     let other = predicted[stored_index(j)];
-    let d = xi - other.xyz;
-    let p = max(1.0 - dot(d, d) / (params.support_radius * params.support_radius), 0.0);
-    kernel_sum += other.w * p * p * p;
+    let d = own_position - other.xyz;
+    let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
+    kernel_sum += weight(other.w) * p * p * p;
 }
 
 @compute @workgroup_size(64)
@@ -28,7 +29,9 @@ fn main(
     if thread >= params.particle_count {
         return;
     }
+    begin_phase();
     let xi = predicted[thread].xyz;
+    own_position = xi;
     kernel_sum = 1.0;
     search_neighbors(xi, thread);
     density[thread] = params.density_scale * kernel_sum + wall_term(xi).density;

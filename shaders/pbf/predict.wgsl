@@ -21,5 +21,5 @@ fn main(
     let step = params.time_step * (velocity[thread].xyz + params.velocity_step);
     let shorten = min(1.0, params.max_displacement / max(length(step), 1e-30));
     let x = confine(position[thread].xyz + shorten * step);
-    predicted[params.particle_count + thread] = vec4f(x, 1.0);
+    predicted[params.particle_count + thread] = vec4f(x, 0.0);
 }

@@ -1,6 +1,7 @@
 // What a substep knows. Lengths in metres, positions relative to the domain's least corner.
 struct Params {
-    domain_size: vec3f,
+    // Gravity times time_step.
+    velocity_step: vec3f,
     particle_count: u32,
     grid_dims: vec3u,
     max_correction: f32,
@@ -9,9 +10,10 @@ struct Params {
     time_step: f32,
     wall_max: vec3f,
     inverse_time_step: f32,
-    // gravity * time_step
-    velocity_step: vec3f,
     support_radius: f32,
+    inverse_support_radius: f32,
+    // Index of a particle that is far from everything: what fills up a list.
+    nobody: u32,
     // Kernel values that make the bulk lattice have density 1: see domain::sph.
     density_scale: f32,
     gradient_scale: f32,
@@ -24,12 +26,13 @@ struct Params {
     max_displacement: f32,
     // k of s_corr times lambda's natural scale, m²
     artificial_pressure: f32,
+    padding: f32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 
 // Cells have the edge h; x is fastest, so the three cells of a row are one run.
 fn cell_coordinate(x: vec3f) -> vec3i {
-    let cell = vec3i(floor(x / params.support_radius));
+    let cell = vec3i(floor(x * params.inverse_support_radius));
     return clamp(cell, vec3i(0), vec3i(params.grid_dims) - 1);
 }
 

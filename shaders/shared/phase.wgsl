@@ -16,12 +16,35 @@ struct Phase {
 }
 @group(0) @binding(6) var<uniform> phase: Phase;
 
+// Copies of uniforms that inner loops read: llvmpipe does not hoist uniform loads out of a loop.
+var<private> even_half: u32;
+var<private> odd_half: u32;
+var<private> fluid_count: u32;
+var<private> inverse_h: f32;
+
+fn begin_phase() {
+    even_half = phase.read_even;
+    odd_half = phase.read_odd;
+    fluid_count = params.particle_count;
+    inverse_h = params.inverse_support_radius;
+}
+
 fn phase_particle(thread: u32) -> u32 {
     return phase.first + thread * phase.stride + phase.colour;
 }
 
-// Boundary samples follow both halves; their index counts on from the particles'.
+// Where j stands in `predicted`. Boundary samples follow both halves; their index counts on from the
+// particles'.
 fn stored_index(j: u32) -> u32 {
-    let half = select(phase.read_even, phase.read_odd, (j & 1u) == 1u);
-    return j + select(half, params.particle_count, j >= params.particle_count);
+    let half = select(even_half, odd_half, (j & 1u) == 1u);
+    return j + select(half, fluid_count, j >= fluid_count);
+}
+
+// w of `predicted`: λ ≤ 0 of a particle, or the weight > 0 of a boundary sample in particles' worth.
+fn weight(w: f32) -> f32 {
+#ifdef SOLIDS
+    return select(1.0, w, w > 0.0);
+#else
+    return 1.0;
+#endif
 }

@@ -1,4 +1,4 @@
-// Calls the pass's own visit(xi, i, j) for every particle and boundary sample j in the cells about xi,
+// Calls the pass's own visit(i, j) for every particle and boundary sample j in the cells about xi,
 // i itself apart. Hoetzlein 2014: nine runs of three cells.
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 #ifdef SOLIDS
@@ -18,13 +18,13 @@ fn search_neighbors(xi: vec3f, i: u32) {
             let end = cell_start[last];
             for (var j = cell_start[first]; j < end; j++) {
                 if j != i {
-                    visit(xi, i, j);
+                    visit(i, j);
                 }
             }
 #ifdef SOLIDS
             let boundary_end = boundary_cell_start[last];
             for (var b = boundary_cell_start[first]; b < boundary_end; b++) {
-                visit(xi, i, params.particle_count + b);
+                visit(i, fluid_count + b);
             }
 #endif
         }

@@ -247,13 +247,13 @@ impl Plan {
         self.add_uniform("phases", PHASE_BYTES * self.phase_slots(), "pbf");
         self.add_buffer(
             "predicted",
-            16 * (2 * n + self.counts.boundary_samples as u64),
+            16 * (2 * n + self.counts.boundary_samples as u64 + 1),
             "pbf",
         );
         for name in ["position", "velocity", "start_position"] {
             self.add_buffer(name, 16 * n, "pbf");
         }
-        for name in ["id", "sorted_id", "lambda", "density"] {
+        for name in ["id", "sorted_id", "density"] {
             self.add_buffer(name, 4 * n, "pbf");
         }
         self.add_buffer("counters", 16, "pbf");

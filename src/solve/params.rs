@@ -22,8 +22,8 @@ macro_rules! mirror {
 mirror!(
     /// `Params` of shared/pbf_params.wgsl; lengths in metres, positions relative to the domain's least corner.
     Params {
-        /// Edge lengths of the domain.
-        domain_size: [f32; 3],
+        /// Gravity times time step, m/s.
+        velocity_step: [f32; 3],
         /// Fluid particles.
         particle_count: u32,
         /// Cells of edge h along each axis.
@@ -38,10 +38,12 @@ mirror!(
         wall_max: [f32; 3],
         /// 1/s; 0 with a time step of 0.
         inverse_time_step: f32,
-        /// Gravity times time step, m/s.
-        velocity_step: [f32; 3],
         /// h.
         support_radius: f32,
+        /// 1/h.
+        inverse_support_radius: f32,
+        /// Index of a particle that is far from everything.
+        nobody: u32,
         /// As in `domain::sph`.
         density_scale: f32,
         /// As in `domain::sph`.
@@ -58,6 +60,8 @@ mirror!(
         max_displacement: f32,
         /// k times λ's natural scale, m².
         artificial_pressure: f32,
+        /// Unused.
+        padding: f32,
     }
 );
 

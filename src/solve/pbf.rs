@@ -35,6 +35,9 @@ const CAP: f64 = 2.0;
 /// ε of λ's denominator over the bulk's Σ|∇C|². As large as that sum it doubles the iterations (measured).
 const REGULARIZATION: f64 = 1e-3;
 
+/// Far from everything, and still finite when squared.
+const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
+
 /// PBF on a device.
 pub struct Pbf {
     program: Program,
@@ -84,6 +87,8 @@ impl Pbf {
             &sort::scan_lengths(cell_count(&plan)),
         );
         program.upload("element_count", 0, &[particles as u32, 0, 0, 0]);
+        let last = 2 * particles + counts.boundary_samples;
+        program.upload("predicted", 16 * last as u64, &[NOBODY]);
         boundary.upload(&program, scene, &plan, &calibration);
         Ok(Self {
             timer: if is_timed { Timer::new(context) } else { None },
@@ -175,7 +180,7 @@ impl Pbf {
         }
         let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
         Params {
-            domain_size: size.as_vec3().to_array(),
+            velocity_step: (self.scene.water.gravity * step).as_vec3().to_array(),
             particle_count: self.plan.counts.particles as u32,
             grid_dims: self.plan.grid_dims,
             max_correction: (MAX_CORRECTION * pbf.particle_spacing) as f32,
@@ -183,8 +188,9 @@ impl Pbf {
             time_step: step as f32,
             wall_max: high.as_vec3().to_array(),
             inverse_time_step: if step > 0.0 { (1.0 / step) as f32 } else { 0.0 },
-            velocity_step: (self.scene.water.gravity * step).as_vec3().to_array(),
             support_radius: calibration.support_radius as f32,
+            inverse_support_radius: (1.0 / calibration.support_radius) as f32,
+            nobody: (self.plan.counts.particles + self.plan.counts.boundary_samples) as u32,
             density_scale: calibration.density_scale as f32,
             gradient_scale: calibration.gradient_scale as f32,
             wall_density_scale: calibration.wall_density_scale as f32,
@@ -193,6 +199,7 @@ impl Pbf {
             contact_distance: (CONTACT * pbf.particle_spacing) as f32,
             max_displacement: (CAP * pbf.cfl * pbf.particle_spacing) as f32,
             artificial_pressure: (pbf.artificial_pressure * natural_lambda) as f32,
+            padding: 0.0,
         }
     }
 
