@@ -34,7 +34,7 @@ pub(super) fn write_whole<T>(
     fill: impl FnOnce(&mut File) -> io::Result<T>,
 ) -> Result<T, CacheError> {
     let partial = temporary(path);
-    let mut create = || {
+    let create = || {
         let mut file = File::create(&partial)?;
         let filled = fill(&mut file)?;
         file.sync_all()?;
@@ -50,14 +50,27 @@ pub(super) fn write_whole<T>(
 }
 
 /// Flushes the directory that holds `path`, without which a rename may not outlive a power cut.
-pub(super) fn sync_parent(path: &Path) -> Result<(), CacheError> {
+fn sync_parent(path: &Path) -> Result<(), CacheError> {
+    match path.parent() {
+        Some(parent) if parent.as_os_str().is_empty() => sync_directory(Path::new(".")),
+        Some(parent) => sync_directory(parent),
+        None => Ok(()),
+    }
+}
+
+/// Flushes the names in a directory.
+pub(super) fn sync_directory(dir: &Path) -> Result<(), CacheError> {
     // Windows opens no directory as a file; NTFS journals the rename itself.
-    if cfg!(unix)
-        && let Some(parent) = path.parent()
-    {
-        File::open(parent).and_then(|d| d.sync_all()).at(parent)?;
+    if cfg!(unix) {
+        File::open(dir).and_then(|d| d.sync_all()).at(dir)?;
     }
     Ok(())
+}
+
+/// Makes a directory that outlives a power cut, with those above it.
+pub(super) fn create_directory(dir: &Path) -> Result<(), CacheError> {
+    fs::create_dir_all(dir).at(dir)?;
+    sync_parent(dir)
 }
 
 /// Takes the writer's lock. The file stays behind when the lock goes: removing it would let two

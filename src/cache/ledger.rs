@@ -146,9 +146,8 @@ impl Ledger {
 
     fn take(&mut self, dir: &Path, manifest: &Manifest, line: &[u8]) -> Result<(), CacheError> {
         let number = self.entries.len() + 1;
-        let damaged = |what: &str| {
-            CacheError::damaged(dir.join(FILE), format!("line {number}: {what}"))
-        };
+        let damaged =
+            |what: &str| CacheError::damaged(dir.join(FILE), format!("line {number}: {what}"));
         let entry: Entry =
             serde_json::from_slice(line).map_err(|error| damaged(&error.to_string()))?;
         let (contents, tail) = line.split_at(line.len().saturating_sub(CHAIN_LEN));

@@ -227,7 +227,15 @@ mod tests {
         for good in ["city.obj", "meshes/city.obj", "wave 1.csv"] {
             assert!(is_relative(good), "{good}");
         }
-        for bad in ["", "/etc/passwd", "../a", "a/../../b", "a//b", "a\\..\\b", "a/"] {
+        for bad in [
+            "",
+            "/etc/passwd",
+            "../a",
+            "a/../../b",
+            "a//b",
+            "a\\..\\b",
+            "a/",
+        ] {
             assert!(!is_relative(bad), "{bad}");
         }
         for good in ["wave-city", "v1.2_a"] {
