@@ -205,3 +205,52 @@ pub(super) fn append(path: &Path, length: u64, line: &[u8]) -> Result<(), CacheE
             let _ = file.set_len(length);
         })
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn line(time: f64, report: &Value) -> Result<Vec<u8>, CacheError> {
+        let contents = Contents {
+            frame: 1,
+            file: "frames/a.0001.ply",
+            bytes: 1,
+            blake3: "",
+            particles: 1,
+            manifest: None,
+            clock: Clock {
+                time,
+                ..Clock::default()
+            },
+            report,
+        };
+        contents.to_line(&blake3::hash(b"")).map(|(line, _)| line)
+    }
+
+    proptest! {
+        /// serde_json reads floats to the last bit with its feature `float_roundtrip` alone; without
+        /// it a resumed bake would start from another clock.
+        #[test]
+        fn the_clock_comes_back_to_the_last_bit(bits in any::<u64>()) {
+            let time = f64::from_bits(bits);
+            match line(time, &Value::Null) {
+                Err(_) => prop_assert!(!time.is_finite()),
+                Ok(line) => {
+                    let entry: Entry = serde_json::from_slice(&line).unwrap();
+                    prop_assert_eq!(entry.clock.time.to_bits(), bits);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_is_one_line_whatever_the_report_says() {
+        let report = serde_json::json!({ "note": "a\nb\",\"chain\":\"x", "list": [1, null] });
+        let line = line(0.5, &report).unwrap();
+        assert_eq!(line.iter().filter(|&&b| b == b'\n').count(), 1);
+        let entry: Entry = serde_json::from_slice(&line).unwrap();
+        assert_eq!(entry.report, report);
+    }
+}
