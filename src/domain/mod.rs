@@ -1,6 +1,7 @@
 //! What every stage speaks: particles, meshes, signed distance, sampling, wave-maker motion.
 
 pub mod bounds;
+pub mod frame_range;
 pub mod mesh;
 pub mod motion;
 pub mod particles;
