@@ -1,7 +1,9 @@
 //! What every stage speaks: particles, meshes, signed distance, sampling, wave-maker motion.
 
 pub mod bounds;
+pub mod bvh;
 pub mod mesh;
+pub mod mesh_file;
 pub mod motion;
 pub mod particles;
 pub mod sampling;
