@@ -1,8 +1,10 @@
 //! What every stage speaks: particles, meshes, signed distance, sampling, wave-maker motion.
 
 pub mod bounds;
+pub mod bvh;
 pub mod frame_range;
 pub mod mesh;
+pub mod mesh_file;
 pub mod motion;
 pub mod particles;
 pub mod sampling;

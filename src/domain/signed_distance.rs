@@ -1,14 +1,403 @@
-//! Signed distance.
+//! Signed distance to a mesh on a node-centred grid.
+//!
+//! Distance and sign both come from one tree over the triangles: every node gets the exact
+//! distance, not only a band that a sweep then carries outward. The node before in the row bounds
+//! the search, so that this costs no more than a sweep and runs on every core. Exact distances
+//! also say where the sign cannot change: between two nodes whose distances add up to more than
+//! the way from one to the other there is no surface. Only where they do not, and everywhere
+//! around an open mesh, is the winding number asked.
+
 use glam::DVec3;
-/// Grid.
+use rayon::prelude::*;
+
+use super::{
+    bounds::Bounds,
+    bvh::Bvh,
+    mesh::{NoInside, TriangleMesh},
+};
+
+/// Most nodes in a grid: 4 GiB of values.
+pub const MAX_NODES: usize = 1 << 30;
+
+/// Distances on the nodes of a grid, metres; negative inside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SignedDistance {
-    /// m
+    /// The first node.
     pub origin: DVec3,
-    /// m
+    /// Between nodes, metres.
     pub spacing: f64,
-    /// nodes
+    /// Nodes along x, y, z; at least two each.
     pub dims: [usize; 3],
-    /// m
+    /// One value a node, x fastest.
     pub values: Vec<f32>,
+}
+
+/// Why there is no signed distance.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SignedDistanceError {
+    /// The mesh bounds nothing.
+    #[error(transparent)]
+    NoInside(#[from] NoInside),
+    /// Too fine a grid, or a box that is none.
+    #[error(
+        "a grid over {size} m at a spacing of {spacing} m has about {nodes:.3e} nodes; allowed \
+         are up to {MAX_NODES}"
+    )]
+    Grid {
+        /// Edge lengths asked for, metres.
+        size: DVec3,
+        /// Metres.
+        spacing: f64,
+        /// What that would take.
+        nodes: f64,
+    },
+    /// Grids that do not lie on each other.
+    #[error("cannot unite signed distances on different grids")]
+    GridsDiffer,
+}
+
+impl SignedDistance {
+    /// Samples the distance to `mesh` at the nodes of a grid that starts at `bounds.min` and
+    /// covers `bounds`, `spacing` metres apart.
+    ///
+    /// The sign is that of a generalised winding number beyond ½ in either direction, so that a
+    /// mesh with small holes, and one turned inside out, have their inside where one sees it.
+    ///
+    /// # Errors
+    /// A mesh without inside, or a grid over [`MAX_NODES`].
+    pub fn from_mesh(
+        mesh: &TriangleMesh,
+        bounds: &Bounds,
+        spacing: f64,
+    ) -> Result<Self, SignedDistanceError> {
+        mesh.check_inside()?;
+        let dims = grid_dims(bounds, spacing)?;
+        let bvh = Bvh::new(mesh);
+        let is_closed = mesh.open_edges().is_empty();
+        let origin = bounds.min;
+        let mut values = vec![0.0f32; dims[0] * dims[1] * dims[2]];
+        values
+            .par_chunks_mut(dims[0])
+            .enumerate()
+            .for_each(|(row, values)| {
+                let (j, k) = (row % dims[1], row / dims[1]);
+                let mut bound = f64::INFINITY;
+                let mut before: Option<(f64, bool)> = None;
+                for (i, value) in values.iter_mut().enumerate() {
+                    let p = origin + spacing * DVec3::new(i as f64, j as f64, k as f64);
+                    let distance = bvh.nearest(p, bound).map_or(bound, |(d, _)| d);
+                    // The next node is one spacing away, and so at most that much farther.
+                    bound = (distance + spacing) * (1.0 + 1e-9);
+                    let is_inside = match before {
+                        Some((d, is_inside))
+                            if is_closed && d + distance > spacing * (1.0 + 1e-6) =>
+                        {
+                            is_inside
+                        }
+                        _ => bvh.winding_number(p).abs() > 0.5,
+                    };
+                    before = Some((distance, is_inside));
+                    *value = if is_inside { -distance } else { distance } as f32;
+                }
+            });
+        Ok(Self {
+            origin,
+            spacing,
+            dims,
+            values,
+        })
+    }
+
+    /// The union of several solids; `None` for none.
+    ///
+    /// # Errors
+    /// Those of [`Self::from_mesh`].
+    pub fn from_meshes<'a>(
+        meshes: impl IntoIterator<Item = &'a TriangleMesh>,
+        bounds: &Bounds,
+        spacing: f64,
+    ) -> Result<Option<Self>, SignedDistanceError> {
+        let mut all: Option<Self> = None;
+        for mesh in meshes {
+            let one = Self::from_mesh(mesh, bounds, spacing)?;
+            all = Some(match all {
+                None => one,
+                Some(all) => all.union(&one)?,
+            });
+        }
+        Ok(all)
+    }
+
+    /// The distance to the union of two solids: the lesser of both. Exact outside, a bound within.
+    ///
+    /// # Errors
+    /// [`SignedDistanceError::GridsDiffer`].
+    pub fn union(mut self, other: &Self) -> Result<Self, SignedDistanceError> {
+        if (self.origin, self.spacing, self.dims) != (other.origin, other.spacing, other.dims) {
+            return Err(SignedDistanceError::GridsDiffer);
+        }
+        for (value, other) in self.values.iter_mut().zip(&other.values) {
+            *value = value.min(*other);
+        }
+        Ok(self)
+    }
+
+    /// The value at node `(i, j, k)`.
+    pub fn node(&self, i: usize, j: usize, k: usize) -> f64 {
+        f64::from(self.values[i + self.dims[0] * (j + self.dims[1] * k)])
+    }
+
+    /// Trilinear interpolation at `p`, metres. Beyond the grid: the value at the nearest point of
+    /// the grid plus the way there.
+    pub fn sample(&self, p: DVec3) -> f64 {
+        let (cell, u, beyond) = self.locate(p);
+        let c = self.corners(cell);
+        let along_x = |j: usize, k: usize| {
+            let at = 2 * j + 4 * k;
+            c[at] + u.x * (c[at + 1] - c[at])
+        };
+        let along_y = |k: usize| along_x(0, k) + u.y * (along_x(1, k) - along_x(0, k));
+        along_y(0) + u.z * (along_y(1) - along_y(0)) + beyond
+    }
+
+    /// Gradient of the trilinear interpolation, pointing away from the solid; its length is one
+    /// up to the grid's error, less at edges of the medial axis. Constant beyond the grid.
+    pub fn gradient(&self, p: DVec3) -> DVec3 {
+        let (cell, u, _) = self.locate(p);
+        let c = self.corners(cell);
+        let slope = |axis: usize| {
+            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+            let mut sum = 0.0;
+            for corner in 0..4 {
+                let (ia, ib) = (corner & 1, corner >> 1);
+                let weight = |i: usize, u: f64| if i == 0 { 1.0 - u } else { u };
+                let low = (ia << a) | (ib << b);
+                sum += weight(ia, u[a]) * weight(ib, u[b]) * (c[low | (1 << axis)] - c[low]);
+            }
+            sum / self.spacing
+        };
+        DVec3::new(slope(0), slope(1), slope(2))
+    }
+
+    /// The cell around `p` (clamped to the grid), the place within it in `[0, 1]³`, and how far
+    /// `p` is from the grid.
+    fn locate(&self, p: DVec3) -> ([usize; 3], DVec3, f64) {
+        let local = (p - self.origin) / self.spacing;
+        let last = DVec3::from_array(self.dims.map(|n| (n - 1) as f64));
+        let inside = local.clamp(DVec3::ZERO, last);
+        let cell = [0, 1, 2].map(|a| (inside[a] as usize).min(self.dims[a] - 2));
+        let u = inside - DVec3::from_array(cell.map(|c| c as f64));
+        (cell, u, (local - inside).length() * self.spacing)
+    }
+
+    /// The eight values of a cell, x fastest.
+    fn corners(&self, [i, j, k]: [usize; 3]) -> [f64; 8] {
+        std::array::from_fn(|c| self.node(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)))
+    }
+}
+
+/// Nodes needed to cover `bounds`.
+fn grid_dims(bounds: &Bounds, spacing: f64) -> Result<[usize; 3], SignedDistanceError> {
+    let size = bounds.size();
+    // A box that is a whole number of spacings up to round-off gets no further node.
+    let counts = (size / spacing - DVec3::splat(1e-6)).ceil().max(DVec3::ONE) + DVec3::ONE;
+    let nodes = counts.x * counts.y * counts.z;
+    let is_sound = spacing > 0.0 && size.cmpge(DVec3::ZERO).all() && nodes <= MAX_NODES as f64;
+    if !is_sound {
+        return Err(SignedDistanceError::Grid {
+            size,
+            spacing,
+            nodes,
+        });
+    }
+    Ok(counts.to_array().map(|n| n as usize))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::tests::{box_mesh, cube, sphere};
+    use super::*;
+
+    fn around(mesh: &TriangleMesh, margin: f64) -> Bounds {
+        mesh.bounds().expect("not empty").grown(margin)
+    }
+
+    fn nodes(field: &SignedDistance) -> impl Iterator<Item = (DVec3, f64)> {
+        let [nx, ny, nz] = field.dims;
+        (0..nx * ny * nz).map(move |n| {
+            let (i, j, k) = (n % nx, n / nx % ny, n / (nx * ny));
+            let p = field.origin + field.spacing * DVec3::new(i as f64, j as f64, k as f64);
+            (p, field.node(i, j, k))
+        })
+    }
+
+    fn box_distance(p: DVec3, bounds: &Bounds) -> f64 {
+        let centre = 0.5 * (bounds.min + bounds.max);
+        let q = (p - centre).abs() - 0.5 * bounds.size();
+        q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
+    }
+
+    #[test]
+    fn a_box_has_its_analytic_distance_at_every_node() {
+        let bounds = Bounds {
+            min: DVec3::new(-0.3, 0.0, 0.1),
+            max: DVec3::new(0.9, 0.77, 2.0),
+        };
+        let mesh = box_mesh(bounds);
+        let field = SignedDistance::from_mesh(&mesh, &around(&mesh, 0.6), 0.13).expect("closed");
+        for (p, value) in nodes(&field) {
+            // Stored as f32: 6e-8 of at most two metres.
+            assert!(
+                (value - box_distance(p, &bounds)).abs() < 2e-7,
+                "{p} {value}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_sphere_is_as_good_as_its_mesh_and_its_gradient_points_outward() {
+        let (centre, radius, rings) = (DVec3::new(0.1, 0.2, 0.3), 1.0, 40);
+        let mesh = sphere(centre, radius, rings);
+        let field = SignedDistance::from_mesh(&mesh, &around(&mesh, 0.5), 0.1).expect("closed");
+        // Chords of π/40 rad stay within R(1 − cos(π/80)) ≈ 8e-4 R, twice that across a quad.
+        let sagitta = 2.0 * radius * (1.0 - (std::f64::consts::PI / 80.0).cos());
+        for (p, value) in nodes(&field) {
+            let exact = (p - centre).length() - radius;
+            assert!((value - exact).abs() < sagitta, "{p} {value} {exact}");
+        }
+        for p in [DVec3::new(1.3, 0.2, 0.3), DVec3::new(0.5, -0.4, 0.9)] {
+            let outward = (p - centre).normalize();
+            let gradient = field.gradient(p);
+            assert!((gradient - outward).length() < 0.1, "{gradient} {outward}");
+            // Trilinear interpolation: 3/8 · spacing² · curvature 1/R.
+            let exact = (p - centre).length() - radius;
+            assert!((field.sample(p) - exact).abs() < 4e-3 + sagitta);
+        }
+    }
+
+    #[test]
+    fn the_gradient_is_the_derivative_of_the_interpolation() {
+        let mesh = sphere(DVec3::ZERO, 1.0, 8);
+        let field = SignedDistance::from_mesh(&mesh, &around(&mesh, 0.5), 0.2).expect("closed");
+        let step = 1e-6;
+        for p in [DVec3::new(0.33, 0.41, -0.72), DVec3::new(-1.01, 0.07, 0.11)] {
+            let gradient = field.gradient(p);
+            for axis in 0..3 {
+                let d = step * DVec3::AXES[axis];
+                let difference = (field.sample(p + d) - field.sample(p - d)) / (2.0 * step);
+                // The interpolation is linear along an axis within a cell: round-off alone.
+                assert!((difference - gradient[axis]).abs() < 1e-8, "{p} {axis}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_slightly_open_box_keeps_its_inside_and_a_turned_one_too() {
+        let bounds = Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::ONE,
+        };
+        // One of 1 520 triangles is missing: the rest must be right away from the hole.
+        let mut open = sphere(DVec3::splat(0.5), 0.5, 20);
+        open.triangles.remove(300);
+        let grid = bounds.grown(0.2);
+        let field = SignedDistance::from_mesh(&open, &grid, 0.05).expect("nearly closed");
+        for (p, value) in nodes(&field) {
+            let exact = (p - DVec3::splat(0.5)).length() - 0.5;
+            if exact.abs() > 0.05 {
+                assert_eq!(value < 0.0, exact < 0.0, "{p} {value} {exact}");
+            }
+        }
+
+        let mut turned = cube();
+        turned.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        let field = SignedDistance::from_mesh(&turned, &grid, 0.11).expect("closed");
+        for (p, value) in nodes(&field) {
+            assert!((value - box_distance(p, &bounds)).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn halfway_between_two_near_surfaces_is_outside() {
+        // Hard case 29: two boxes 0.04 apart on a grid of 0.1.
+        let left = box_mesh(Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::new(0.48, 1.0, 1.0),
+        });
+        let right = box_mesh(Bounds {
+            min: DVec3::new(0.52, 0.0, 0.0),
+            max: DVec3::ONE,
+        });
+        let grid = Bounds {
+            min: DVec3::splat(-0.2),
+            max: DVec3::splat(1.2),
+        };
+        let field = SignedDistance::from_meshes([&left, &right], &grid, 0.1)
+            .expect("closed")
+            .expect("two solids");
+        assert!((field.sample(DVec3::new(0.5, 0.5, 0.5)) - 0.02).abs() < 1e-6);
+        assert!(field.sample(DVec3::new(0.3, 0.5, 0.5)) < 0.0);
+        // Control: joined, the middle is inside.
+        let joined = SignedDistance::from_mesh(&cube(), &grid, 0.1).expect("closed");
+        assert!(joined.sample(DVec3::new(0.5, 0.5, 0.5)) < -0.4);
+    }
+
+    #[test]
+    fn beyond_the_grid_the_way_there_counts() {
+        let mesh = cube();
+        let field = SignedDistance::from_mesh(&mesh, &around(&mesh, 0.5), 0.25).expect("closed");
+        assert!((field.sample(DVec3::new(4.0, 0.5, 0.5)) - 3.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn sheets_and_absurd_grids_are_refused() {
+        let mut sheet = cube();
+        sheet.triangles.truncate(2);
+        let bounds = around(&sheet, 0.5);
+        assert!(matches!(
+            SignedDistance::from_mesh(&sheet, &bounds, 0.1),
+            Err(SignedDistanceError::NoInside(NoInside::Open { .. }))
+        ));
+        for spacing in [1e-5, 0.0, -1.0, f64::NAN] {
+            assert!(matches!(
+                SignedDistance::from_mesh(&cube(), &bounds, spacing),
+                Err(SignedDistanceError::Grid { .. })
+            ));
+        }
+        let coarse = SignedDistance::from_mesh(&cube(), &bounds, 0.5).expect("closed");
+        let fine = SignedDistance::from_mesh(&cube(), &bounds, 0.25).expect("closed");
+        assert_eq!(coarse.union(&fine), Err(SignedDistanceError::GridsDiffer));
+    }
+
+    #[test]
+    fn a_city_takes_seconds_at_most() {
+        // 200 towers of 12 triangles on the grid of the city scene.
+        let towers = (0..200u32).map(|t| {
+            let (i, j) = (f64::from(t % 10), f64::from(t / 10));
+            let min = DVec3::new(16.0 + 0.85 * i, 0.0, 0.5 + 0.7 * j);
+            box_mesh(Bounds {
+                min,
+                max: min + DVec3::new(0.6, 1.0 + 0.5 * ((3 * t) % 11) as f64, 0.5),
+            })
+        });
+        let mut city = TriangleMesh::default();
+        for tower in towers {
+            let base = city.vertices.len() as u32;
+            city.vertices.extend(tower.vertices);
+            city.triangles
+                .extend(tower.triangles.iter().map(|t| t.map(|v| v + base)));
+        }
+        let domain = Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::new(25.0, 12.6, 15.0),
+        };
+        let start = std::time::Instant::now();
+        let field = SignedDistance::from_mesh(&city, &domain, 0.2).expect("closed");
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{} nodes in {seconds:.2} s", field.values.len());
+        // Measured 1.8 s on two cores in use; the bound only tells a lost tree from a busy machine.
+        assert!(seconds < 20.0);
+        let inside = field.values.iter().filter(|v| **v < -1e-6).count();
+        assert!(inside > 1000, "{inside}");
+    }
 }
