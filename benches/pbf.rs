@@ -74,9 +74,17 @@ fn main() {
             }
         }
         let count = p.len();
+        let plan = plan::Plan::new(
+            &s,
+            plan::Counts {
+                particles: count,
+                ..Default::default()
+            },
+            swell::solve::pbf::device_limits(&context),
+        );
         for timed in [false, true] {
             let mut solver =
-                Pbf::new(&context, &s, count, &Boundary::default(), timed).expect("solver");
+                Pbf::new(&context, &s, plan.clone(), &Boundary::default(), timed).expect("solver");
             solver.load(0, &p).expect("load");
             for frame in 0..8 {
                 let t = Instant::now();

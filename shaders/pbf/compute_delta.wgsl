@@ -7,8 +7,11 @@
 #import "shared/walls.wgsl"
 #import "shared/confine.wgsl"
 #import "shared/hash.wgsl"
+#import "shared/finite.wgsl"
 
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
+// 3: values that are not finite, which clamping would hide.
+@group(0) @binding(11) var<storage, read_write> counters: array<atomic<u32>>;
 #ifdef ARTIFICIAL_PRESSURE
 // W at Δq = 0.2 h over W(0): (1 − 0.04)³.
 const REFERENCE_KERNEL = 0.884736;
@@ -66,6 +69,9 @@ fn main(
     }
     delta = -params.gradient_scale * delta + own_lambda * wall_term(current.xyz).gradient;
     delta *= params.relaxation;
+    if !is_finite(delta) {
+        atomicAdd(&counters[3], 1u);
+    }
     delta *= min(1.0, params.max_correction / max(length(delta), 1e-30));
     predicted[phase.write + i] = vec4f(confine(current.xyz + delta), current.w);
 }

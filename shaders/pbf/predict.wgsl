@@ -1,12 +1,16 @@
 // Explicit step of the external forces (Macklin and Müller 2013, algorithm 1, lines 1–4), into the
-// second half of `predicted`; the sort moves it to the first.
+// second half of `predicted`; the sort moves it to the first. What walls and solids take of the way is taken
+// from the velocity.
 #import "shared/thread.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/confine.wgsl"
+#import "shared/finite.wgsl"
 
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
 @group(0) @binding(10) var<storage, read> position: array<vec4f>;
-@group(0) @binding(11) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
+// 3: values that are not finite, which clamping would hide.
+@group(0) @binding(12) var<storage, read_write> counters: array<atomic<u32>>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -18,8 +22,13 @@ fn main(
     if thread >= params.particle_count {
         return;
     }
-    let step = params.time_step * (velocity[thread].xyz + params.velocity_step);
-    let shorten = min(1.0, params.max_displacement / max(length(step), 1e-30));
-    let x = confine(position[thread].xyz + shorten * step);
+    var v = velocity[thread].xyz + params.velocity_step;
+    if !is_finite(v) || !is_finite(position[thread].xyz) {
+        atomicAdd(&counters[3], 1u);
+    }
+    v *= min(1.0, params.max_displacement / max(params.time_step * length(v), 1e-30));
+    let free = position[thread].xyz + params.time_step * v;
+    let x = confine(free);
     predicted[params.particle_count + thread] = vec4f(x, 0.0);
+    velocity[thread] = vec4f(v + (x - free) * params.inverse_time_step, 0.0);
 }

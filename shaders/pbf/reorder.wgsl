@@ -4,10 +4,11 @@
 
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
 @group(0) @binding(10) var<storage, read> order: array<u32>;
-@group(0) @binding(11) var<storage, read> position: array<vec4f>;
+@group(0) @binding(11) var<storage, read> velocity: array<vec4f>;
 @group(0) @binding(12) var<storage, read> id: array<u32>;
 @group(0) @binding(13) var<storage, read_write> start_position: array<vec4f>;
-@group(0) @binding(14) var<storage, read_write> sorted_id: array<u32>;
+@group(0) @binding(14) var<storage, read_write> sorted_velocity: array<vec4f>;
+@group(0) @binding(15) var<storage, read_write> sorted_id: array<u32>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -20,7 +21,9 @@ fn main(
         return;
     }
     let source = order[thread];
-    predicted[thread] = predicted[params.particle_count + source];
-    start_position[thread] = position[source];
+    let x = predicted[params.particle_count + source];
+    predicted[thread] = x;
+    start_position[thread] = x;
+    sorted_velocity[thread] = velocity[source];
     sorted_id[thread] = id[source];
 }

@@ -32,6 +32,8 @@ pub struct DeviceLimits {
     pub binding: u64,
     /// Largest buffer.
     pub buffer: u64,
+    /// What neighbour lists may take in all; 0 goes without them.
+    pub list_budget: u64,
 }
 
 /// How much there is of everything.
@@ -147,7 +149,7 @@ impl Plan {
         let bytes_each = 4 * u64::from(LIST_CAPACITY);
         let total = (particles as u64).next_multiple_of(LIST_BLOCK) * bytes_each;
         let window = limits.binding.min(limits.buffer) / (bytes_each * LIST_BLOCK) * LIST_BLOCK;
-        self.has_lists = total <= LIST_BUDGET && window > 0;
+        self.has_lists = total <= limits.list_budget && window > 0;
         let step = if self.has_lists {
             window as usize
         } else {
@@ -250,7 +252,7 @@ impl Plan {
             16 * (2 * n + self.counts.boundary_samples as u64 + 1),
             "pbf",
         );
-        for name in ["position", "velocity", "start_position"] {
+        for name in ["position", "velocity", "start_position", "sorted_velocity"] {
             self.add_buffer(name, 16 * n, "pbf");
         }
         for name in ["id", "sorted_id", "density"] {

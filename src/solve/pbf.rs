@@ -16,7 +16,7 @@ use crate::{
     },
     scene::{
         Scene, Stop,
-        plan::{Counts, DeviceLimits, Plan, SHARED_CONSTANTS},
+        plan::{DeviceLimits, LIST_BUDGET, Plan, SHARED_CONSTANTS},
     },
 };
 
@@ -52,22 +52,19 @@ pub struct Pbf {
 }
 
 impl Pbf {
-    /// Builds what the plan for `scene` with `particles` particles names, and nothing more.
+    /// Builds what `plan` names, and nothing more. It must have been made for `scene` and `boundary`.
     ///
     /// # Errors
     /// A buffer over the adapter's limits, with the figures; a shader or the device at fault.
     pub fn new(
         context: &Context,
         scene: &Scene,
-        particles: usize,
+        plan: Plan,
         boundary: &Boundary,
         is_timed: bool,
     ) -> Result<Self, SolveError> {
-        let counts = Counts {
-            particles,
-            ..boundary.counts()
-        };
-        let plan = Plan::new(scene, counts, device_limits(context));
+        let counts = plan.counts;
+        let particles = counts.particles;
         let buffers: Vec<_> = plan
             .buffers
             .iter()
@@ -111,6 +108,11 @@ impl Pbf {
     /// Names of the passes that a substep and a frame's measurement run, in order.
     pub fn recorded_passes(&self) -> Vec<&'static str> {
         self.substep.passes().chain(self.measure.passes()).collect()
+    }
+
+    /// Names of the passes and buffers that exist on the device, sorted.
+    pub fn built(&self) -> (Vec<&str>, Vec<&str>) {
+        self.program.names()
     }
 
     /// The named buffer's first `count` values, such as `lambda` or `density`, in sorted order.
@@ -294,9 +296,16 @@ impl Solver for Pbf {
         for k in 1..=substeps {
             self.run_substep(start + f64::from(k) * step, step)?;
         }
-        let (density, [capped, searched, adaptive_iterations, _]) =
+        let (density, [capped, searched, adaptive_iterations, not_finite]) =
             self.read_state(start + length)?;
         self.frame += 1;
+        if not_finite > 0 {
+            let what = format!("{not_finite} values that are not finite in {substeps} substeps");
+            return Err(SolveError::Numbers {
+                frame: self.frame,
+                what,
+            });
+        }
         check_finite(self.frame, &self.state, &density)?;
         if self.scene.domain.min != DVec3::ZERO {
             // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
@@ -332,6 +341,7 @@ pub fn device_limits(context: &Context) -> DeviceLimits {
     DeviceLimits {
         binding: context.limits.max_storage_buffer_binding_size,
         buffer: context.limits.max_buffer_size,
+        list_budget: LIST_BUDGET,
     }
 }
 

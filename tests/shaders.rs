@@ -1,0 +1,280 @@
+//! What can be said of shaders and rooms without a GPU.
+#![allow(missing_docs, reason = "tests")]
+
+use std::{fs, path::Path};
+
+use swell::{
+    gpu::{
+        reflect::{Access, Layout, reflect},
+        shader,
+    },
+    solve::params::{Params, Phase, SolidGrid},
+};
+
+/// Conditions that a plan can set; every pass must compose under each.
+const VARIANTS: [&[&str]; 5] = [
+    &[],
+    &["SOLIDS"],
+    &["NEIGHBOR_LIST"],
+    &[
+        "NEIGHBOR_LIST",
+        "SOLIDS",
+        "DENSITY",
+        "ADAPTIVE",
+        "ARTIFICIAL_PRESSURE",
+    ],
+    &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
+];
+
+fn compute_passes() -> Vec<String> {
+    shader::pass_files()
+        .into_iter()
+        .filter(|name| !name.starts_with("ssfr/"))
+        .collect()
+}
+
+/// `neighbor_list` holds lists, so build_neighbors has no form without them.
+fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
+    pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST")
+}
+
+#[test]
+fn every_pass_validates_in_every_variant() {
+    let passes = compute_passes();
+    assert!(passes.len() >= 18, "{passes:?}");
+    for pass in &passes {
+        for defines in VARIANTS
+            .iter()
+            .filter(|defines| is_meaningful(pass, defines))
+        {
+            let text = shader::compose(pass, defines).unwrap();
+            let reflection =
+                reflect(pass, &text).unwrap_or_else(|error| panic!("{pass} {defines:?}: {error}"));
+            let [x, y, z] = reflection.workgroup_size;
+            assert!(
+                [64, 256].contains(&x) && (y, z) == (1, 1),
+                "{pass}: {:?}",
+                reflection.workgroup_size
+            );
+            let storage = reflection
+                .bindings
+                .iter()
+                .filter(|binding| binding.access != Access::Uniform)
+                .count();
+            assert!(
+                storage <= 10,
+                "{pass}: {storage} storage buffers, and WebGPU's common maximum is 10"
+            );
+            let mut indices: Vec<u32> = reflection
+                .bindings
+                .iter()
+                .map(|binding| binding.index)
+                .collect();
+            indices.dedup();
+            assert_eq!(
+                indices.len(),
+                reflection.bindings.len(),
+                "{pass}: a binding index twice"
+            );
+        }
+    }
+}
+
+fn check(
+    layouts: &[Layout],
+    name: &str,
+    size: usize,
+    members: &[(String, u32)],
+) -> Result<bool, String> {
+    let Some(layout) = layouts.iter().find(|layout| layout.name == name) else {
+        return Ok(false);
+    };
+    if layout.size as usize != size {
+        return Err(format!(
+            "{name}: {} bytes in WGSL, {size} in Rust",
+            layout.size
+        ));
+    }
+    if layout.members != members {
+        return Err(format!(
+            "{name}: {:?} in WGSL, {members:?} in Rust",
+            layout.members
+        ));
+    }
+    Ok(true)
+}
+
+#[test]
+fn mirrors_match_naga() {
+    let mut found = [0; 3];
+    for pass in compute_passes() {
+        let text = shader::compose(&pass, &["SOLIDS", "NEIGHBOR_LIST"]).unwrap();
+        let layouts = reflect(&pass, &text).unwrap().layouts;
+        let seen = [
+            check(&layouts, "Params", size_of::<Params>(), &Params::members()),
+            check(&layouts, "Phase", size_of::<Phase>(), &Phase::members()),
+            check(
+                &layouts,
+                "SolidGrid",
+                size_of::<SolidGrid>(),
+                &SolidGrid::members(),
+            ),
+        ];
+        for (count, result) in found.iter_mut().zip(seen) {
+            *count += usize::from(result.unwrap_or_else(|message| panic!("{pass}: {message}")));
+        }
+    }
+    assert!(
+        found.iter().all(|&count| count > 0),
+        "a mirror without its struct: {found:?}"
+    );
+
+    // Negative controls: a member out of place and a wrong size are seen.
+    let text = shader::compose("pbf/predict", &[]).unwrap();
+    let layouts = reflect("pbf/predict", &text).unwrap().layouts;
+    let mut spoiled = Params::members();
+    spoiled.swap(1, 2);
+    check(&layouts, "Params", size_of::<Params>(), &spoiled).unwrap_err();
+    check(
+        &layouts,
+        "Params",
+        size_of::<Params>() + 4,
+        &Params::members(),
+    )
+    .unwrap_err();
+}
+
+#[test]
+fn composition_faults_name_their_place() {
+    let fault = shader::compose("pbf/no_such_pass", &[])
+        .unwrap_err()
+        .to_string();
+    assert!(fault.contains("pbf/no_such_pass.wgsl"), "{fault}");
+    let fault = reflect(
+        "test",
+        "@compute @workgroup_size(1) fn main() { let x: u32 = 1.5; }",
+    )
+    .unwrap_err()
+    .to_string();
+    assert!(fault.contains("test"), "{fault}");
+}
+
+/// Rooms that each room may import; `stage` and `cli` stand above them all.
+const MAY_IMPORT: [(&str, &[&str]); 8] = [
+    ("domain", &[]),
+    ("gpu", &[]),
+    // The plan's rows are gpu's own plain descriptions: a copy of them would have to be kept in step.
+    ("scene", &["domain", "gpu"]),
+    ("cache", &["domain"]),
+    ("solve", &["gpu", "domain", "scene"]),
+    ("render", &["gpu", "domain", "scene"]),
+    (
+        "stage",
+        &["domain", "gpu", "scene", "cache", "solve", "render"],
+    ),
+    ("cli", &["stage", "scene", "domain"]),
+];
+
+/// Crates that only some rooms name.
+const CRATES: [(&str, &[&str]); 2] = [
+    ("wgpu", &["gpu", "solve", "render"]),
+    ("clap", &["cli", "main"]),
+];
+
+fn sources(dir: &Path, out: &mut Vec<std::path::PathBuf>) {
+    for entry in fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, out);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            out.push(path);
+        }
+    }
+}
+
+/// Rooms and crates that a text names in a path, comments aside.
+fn breaches(room: &str, text: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let code: String = text
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .collect::<Vec<_>>()
+        .join("\n");
+    let allowed = MAY_IMPORT
+        .iter()
+        .find(|(name, _)| *name == room)
+        .map_or(&[][..], |(_, rooms)| rooms);
+    for (other, _) in MAY_IMPORT {
+        if other != room && !allowed.contains(&other) && names_room(&code, other) {
+            found.push(format!("{room} imports {other}"));
+        }
+    }
+    for (name, rooms) in CRATES {
+        let named = code.contains(&format!("{name}::")) || code.contains(&format!("use {name};"));
+        if named && !rooms.contains(&room) {
+            found.push(format!("{room} names {name}"));
+        }
+    }
+    found
+}
+
+/// `crate::room`, or `room` inside the braces of a `use crate::{..}`.
+fn names_room(code: &str, room: &str) -> bool {
+    if code.contains(&format!("crate::{room}")) {
+        return true;
+    }
+    code.split("use crate::{").skip(1).any(|rest| {
+        let block = rest.split(";\n").next().unwrap_or("");
+        let mut depth = 0;
+        let mut top = String::new();
+        for c in block.chars() {
+            match c {
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                _ if depth == 0 => top.push(c),
+                _ => {}
+            }
+        }
+        top.split(',')
+            .any(|item| item.trim().split("::").next() == Some(room))
+    })
+}
+
+#[test]
+fn rooms_import_what_they_may() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let mut found = Vec::new();
+    for file in &files {
+        let relative = file.strip_prefix(&root).unwrap();
+        let room = relative
+            .iter()
+            .next()
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .trim_end_matches(".rs");
+        if room == "lib" {
+            continue;
+        }
+        for breach in breaches(room, &fs::read_to_string(file).unwrap()) {
+            found.push(format!("{}: {breach}", relative.display()));
+        }
+    }
+    assert!(files.len() > 20);
+    assert!(found.is_empty(), "{found:#?}");
+
+    // Negative controls.
+    assert_eq!(breaches("domain", "use crate::gpu::adapter;").len(), 1);
+    assert_eq!(
+        breaches(
+            "cache",
+            "use crate::{domain::mesh, solve::{pbf, params}};\n"
+        )
+        .len(),
+        1
+    );
+    assert_eq!(breaches("scene", "use wgpu::Device;").len(), 1);
+    assert!(breaches("solve", "use crate::{domain::mesh, gpu::adapter};\n").is_empty());
+}

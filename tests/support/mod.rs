@@ -1,0 +1,140 @@
+//! What GPU tests share.
+#![allow(
+    dead_code,
+    missing_docs,
+    unreachable_pub,
+    reason = "each test binary uses its part"
+)]
+
+use glam::DVec3;
+use swell::{
+    domain::{bounds::Bounds, particles::Particles, solver::Solver, solver::StepReport},
+    gpu::adapter::Context,
+    scene::{
+        Effects, Iteration, Pbf as Settings, Scene, Shot, Solver as SolverSettings, Stop, Water,
+        plan::*,
+    },
+    solve::{boundary::Boundary, pbf},
+};
+
+pub const D: f64 = 0.1;
+
+pub fn context() -> Context {
+    Context::open(None).expect("tests need a Vulkan adapter; tools/test installs one")
+}
+
+/// A box with water settings that tests change where they need.
+pub fn scene(size: [f64; 3]) -> Scene {
+    Scene {
+        shot: Shot {
+            name: "test".into(),
+            frames: 10,
+            frames_per_second: 100.0,
+        },
+        domain: Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::from_array(size),
+        },
+        water: Water {
+            rest_density: 1000.0,
+            gravity: DVec3::new(0.0, -9.81, 0.0),
+            blocks: Vec::new(),
+            meshes: Vec::new(),
+        },
+        solids: Vec::new(),
+        wave_makers: Vec::new(),
+        solver: SolverSettings {
+            pbf: Settings {
+                particle_spacing: D,
+                support_ratio: 2.0,
+                iteration: Iteration::RedBlack,
+                stop: Stop::Iterations(4),
+                cfl: 1.0,
+                relaxation: 1.0,
+                artificial_pressure: 0.0,
+                max_substeps: 32,
+            },
+        },
+        effects: Effects::default(),
+    }
+}
+
+/// `counts` particles on a lattice of spacing `spacing` from `corner`, ids in x-fastest order.
+pub fn lattice(corner: [f64; 3], counts: [usize; 3], spacing: [f64; 3]) -> Particles {
+    let mut particles = Particles::default();
+    for z in 0..counts[2] {
+        for y in 0..counts[1] {
+            for x in 0..counts[0] {
+                let at = |axis: usize, k: usize| {
+                    (corner[axis] + (k as f64 + 0.5) * spacing[axis]) as f32
+                };
+                particles.position.push([at(0, x), at(1, y), at(2, z)]);
+                particles.velocity.push([0.0; 3]);
+                particles.id.push(particles.id.len() as u32);
+            }
+        }
+    }
+    particles
+}
+
+/// A hash of `k` in −1..1.
+pub fn noise(k: u64) -> f64 {
+    let mut z = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// Shifts each coordinate by at most `amount` metres.
+pub fn jitter(particles: &mut Particles, amount: f64) {
+    for (k, position) in particles.position.iter_mut().enumerate() {
+        for (axis, x) in position.iter_mut().enumerate() {
+            *x += (amount * noise(3 * k as u64 + axis as u64)) as f32;
+        }
+    }
+}
+
+pub fn plan(context: &Context, scene: &Scene, particles: usize, boundary: &Boundary) -> Plan {
+    let counts = Counts {
+        particles,
+        ..boundary.counts()
+    };
+    Plan::new(scene, counts, pbf::device_limits(context))
+}
+
+pub fn solver(
+    context: &Context,
+    scene: &Scene,
+    particles: &Particles,
+    boundary: &Boundary,
+) -> pbf::Pbf {
+    let plan = plan(context, scene, particles.len(), boundary);
+    let mut solver = pbf::Pbf::new(context, scene, plan, boundary, false).unwrap();
+    solver.load(0, particles).unwrap();
+    solver
+}
+
+/// State and report after `frames` frames.
+pub fn run(
+    context: &Context,
+    scene: &Scene,
+    particles: &Particles,
+    frames: u32,
+) -> (Particles, StepReport) {
+    let mut solver = solver(context, scene, particles, &Boundary::default());
+    let mut last = None;
+    for _ in 0..frames {
+        last = Some(solver.advance().unwrap());
+    }
+    last.unwrap()
+}
+
+/// Largest distance between positions of the same id.
+pub fn max_distance(a: &Particles, b: &Particles) -> f64 {
+    assert_eq!(a.id, b.id);
+    a.position
+        .iter()
+        .zip(&b.position)
+        .map(|(a, b)| glam::Vec3::from_array(*a).distance(glam::Vec3::from_array(*b)) as f64)
+        .fold(0.0, f64::max)
+}
