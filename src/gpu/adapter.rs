@@ -85,6 +85,11 @@ pub fn enumerate() -> Vec<Adapter> {
     pollster::block_on(instance().enumerate_adapters(Backends::all()))
 }
 
+/// Whether passes can be timed on an adapter.
+pub fn has_timestamps(adapter: &Adapter) -> bool {
+    adapter.features().contains(Features::TIMESTAMP_QUERY)
+}
+
 fn choose(mut adapters: Vec<Adapter>, request: Option<&str>) -> Result<Adapter, GpuError> {
     if adapters.is_empty() {
         return Err(GpuError::NoAdapter);

@@ -1,0 +1,267 @@
+//! `bake`: a scene to a particle cache.
+
+use std::{
+    fs,
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
+
+use serde_json::{Value, json};
+
+use crate::{
+    cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, Manifest},
+    domain::{
+        frame_range::FrameRange,
+        particles::Particles,
+        signed_distance::SignedDistanceError,
+        solver::{Solver, StepReport},
+    },
+    gpu::adapter::{Context, GpuError},
+    scene::{self, Scene, SceneError},
+    solve::{
+        SolveError,
+        pbf::{Pbf, device_limits},
+    },
+};
+
+use super::prepare::Start;
+
+/// What to bake, and where to.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Validated scene.
+    pub scene: Scene,
+    /// Cache directory.
+    pub directory: PathBuf,
+    /// Frames wanted; the whole shot where `None`.
+    pub frames: Option<FrameRange>,
+    /// Whether to go on with a bake that stands there.
+    pub resume: bool,
+    /// Index or part of the name of an adapter.
+    pub adapter: Option<String>,
+    /// Whether passes are timed on the device, which runs them one by one.
+    pub time_passes: bool,
+}
+
+/// What a bake has to tell while it runs.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The device is open and the scene filled.
+    Ready {
+        /// Adapter and driver.
+        device: String,
+        /// Particles at the start.
+        particles: usize,
+        /// Left out because a solid is there.
+        removed: usize,
+        /// Samples on solids.
+        boundary_samples: usize,
+        /// GPU memory in all and for neighbour lists.
+        bytes: (u64, u64),
+        /// First frame that will be computed.
+        first: u32,
+        /// Last one.
+        last: u32,
+    },
+    /// A frame was computed.
+    Frame {
+        /// Its number.
+        frame: u32,
+        /// What its steps did.
+        report: StepReport,
+        /// Wall clock for it.
+        seconds: f64,
+    },
+}
+
+/// How a bake ended.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Last frame in the cache.
+    pub last_frame: u32,
+    /// Frames computed now.
+    pub frames: u32,
+    /// Bytes of frames written now.
+    pub bytes: u64,
+    /// Seconds that the solver waited for the disk.
+    pub waited: f64,
+    /// Whether a signal ended it before the last frame.
+    pub interrupted: bool,
+    /// Seconds and runs by pass, where measured.
+    pub passes: Vec<(&'static str, f64, u64)>,
+}
+
+/// Why a bake failed.
+#[derive(Debug, thiserror::Error)]
+pub enum BakeError {
+    /// The scene and its meshes.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A solid without inside, or too large a grid.
+    #[error(transparent)]
+    Solid(#[from] SignedDistanceError),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The solver.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The cache.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// The bake in the cache began from other physics.
+    #[error("{directory} was baked from another scene: {difference}; choose another -o", directory = .directory.display())]
+    OtherPhysics {
+        /// Cache directory.
+        directory: PathBuf,
+        /// Key and both values.
+        difference: String,
+    },
+    /// Frames that a bake cannot compute.
+    #[error("--frames {0}")]
+    Frames(String),
+    /// A mesh file changed or went between loading and caching.
+    #[error("{file}: {what}", file = .file.display())]
+    Asset {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
+}
+
+/// Runs a bake; `tell` hears of progress, and `stop` ends it after the current frame.
+///
+/// # Errors
+/// [`BakeError`]; frames that were finished before are in the cache.
+pub fn bake(request: &Request, stop: &AtomicBool, tell: &mut dyn FnMut(Event)) -> Result<Outcome, BakeError> {
+    let scene = &request.scene;
+    let start = Start::of(scene)?;
+    let context = Context::open(request.adapter.as_deref())?;
+    let plan = start.plan(scene, device_limits(&context));
+    let bytes = plan.bytes();
+    let mut solver = Pbf::new(&context, scene, plan, &start.boundary, request.time_passes)?;
+    let last = last_frame(request)?;
+    let (mut writer, mut clock, state) = open_cache(request, &context, &start)?;
+    let first = clock.frame + 1;
+    if let Some(frames) = &request.frames
+        && frames.first() > first
+    {
+        let what = format!("{frames} begins after frame {first}, which has not been baked");
+        return Err(BakeError::Frames(what));
+    }
+    tell(Event::Ready {
+        device: describe(&context),
+        particles: start.particles.len(),
+        removed: start.removed,
+        boundary_samples: start.boundary.samples.len(),
+        bytes,
+        first,
+        last,
+    });
+    solver.load(clock.frame, &state)?;
+    let mut failed = None;
+    let mut interrupted = false;
+    while clock.frame < last {
+        interrupted = stop.load(Ordering::Relaxed);
+        if interrupted {
+            break;
+        }
+        let begin = Instant::now();
+        let (particles, report) = match solver.advance() {
+            Ok(result) => result,
+            Err(error) => {
+                failed = Some(error);
+                break;
+            }
+        };
+        let seconds = begin.elapsed().as_secs_f64();
+        clock.frame += 1;
+        clock.time = f64::from(clock.frame) / scene.shot.frames_per_second;
+        clock.substeps = report.substeps;
+        clock.steps += u64::from(report.substeps);
+        writer.submit(clock, particles, to_json(&report), json!({ "seconds": seconds }))?;
+        tell(Event::Frame { frame: clock.frame, report, seconds });
+    }
+    // What was computed before a failure is kept.
+    let summary = writer.finish()?;
+    if let Some(error) = failed {
+        return Err(error.into());
+    }
+    Ok(Outcome {
+        last_frame: summary.last_frame,
+        frames: summary.frames,
+        bytes: summary.bytes,
+        waited: summary.waiting.as_secs_f64(),
+        interrupted,
+        passes: solver.timings(),
+    })
+}
+
+fn to_json(report: &StepReport) -> Value {
+    serde_json::to_value(report).unwrap_or(Value::Null)
+}
+
+fn describe(context: &Context) -> String {
+    let info = &context.info;
+    format!("{} ({} {}, {})", info.name, info.driver, info.driver_info, info.backend)
+}
+
+fn last_frame(request: &Request) -> Result<u32, BakeError> {
+    let Some(frames) = &request.frames else { return Ok(request.scene.shot.frames) };
+    let whole = FrameRange::inclusive(frames.first(), frames.last());
+    if whole.as_ref() != Some(frames) {
+        return Err(BakeError::Frames(format!("{frames} leaves frames out, and each frame of a bake needs the one before")));
+    }
+    Ok(frames.last())
+}
+
+/// A new cache, or one to go on with: the writer, where its clock stands, and the state there.
+fn open_cache(request: &Request, context: &Context, start: &Start) -> Result<(CacheWriter, Clock, Particles), BakeError> {
+    let scene = &request.scene;
+    let text = scene.to_toml(&scene::asset_path);
+    let manifest = Manifest {
+        format_version: Manifest::FORMAT_VERSION,
+        program: env!("CARGO_PKG_NAME").into(),
+        program_version: env!("CARGO_PKG_VERSION").into(),
+        shot: scene.shot.name.clone(),
+        scene_hash: scene::physics_hash(scene),
+        solver: "pbf".into(),
+        device: context.info.name.clone(),
+        driver: format!("{} {}", context.info.driver, context.info.driver_info),
+        backend: context.info.backend.to_string(),
+        frames_per_second: scene.shot.frames_per_second,
+        particle_spacing: scene.solver.pbf.particle_spacing,
+        rest_density: scene.water.rest_density,
+        attributes: Vec::new(),
+        start_particles: 0,
+        files: Vec::new(),
+    };
+    let directory = &request.directory;
+    if crate::cache::exists(directory) && request.resume {
+        let cached = CacheReader::open(directory)?;
+        if let Some(difference) = scene::physics_difference(cached.scene_toml(), &text)? {
+            return Err(BakeError::OtherPhysics { directory: directory.clone(), difference });
+        }
+        let (writer, entry, state) = CacheWriter::resume(directory, &manifest)?;
+        return Ok((writer, entry.clock, state));
+    }
+    let assets = assets(scene)?;
+    let writer = CacheWriter::create(directory, manifest, &text, &assets, &start.particles)?;
+    Ok((writer, Clock::default(), start.particles.clone()))
+}
+
+/// The scene's mesh files as the cache keeps them.
+fn assets(scene: &Scene) -> Result<Vec<Asset>, BakeError> {
+    let read = |(file, hash): (PathBuf, String)| {
+        let fault = |what: String| BakeError::Asset { file: file.clone(), what };
+        let bytes = fs::read(&file).map_err(|error| fault(error.to_string()))?;
+        if blake3::hash(&bytes).to_hex().as_str() != hash {
+            return Err(fault("changed since the scene was loaded".into()));
+        }
+        let path = scene::asset_path(&file, &hash);
+        Ok(Asset { name: path.trim_start_matches("assets/").to_owned(), bytes })
+    };
+    scene.mesh_files().into_iter().map(read).collect()
+}

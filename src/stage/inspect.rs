@@ -1,0 +1,102 @@
+//! `inspect`: adapters, a scene's plan, a cache's frames.
+
+use std::path::Path;
+
+use crate::{
+    cache::{CacheError, CacheReader},
+    domain::signed_distance::SignedDistanceError,
+    gpu::adapter::{Context, GpuError, enumerate},
+    scene::{
+        Scene,
+        plan::{DeviceLimits, LIST_BUDGET, Plan},
+    },
+    solve::pbf::device_limits,
+};
+
+use super::prepare::Start;
+
+pub use crate::cache::{Entry, Manifest};
+
+/// One adapter of this machine.
+#[derive(Clone, Debug)]
+pub struct Adapter {
+    /// As `--adapter` takes it.
+    pub index: usize,
+    /// Name.
+    pub name: String,
+    /// Backend and kind.
+    pub kind: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// Limits that bear on scenes and pictures: name, value.
+    pub limits: Vec<(&'static str, u64)>,
+    /// Whether passes can be timed on it.
+    pub has_timestamps: bool,
+}
+
+/// All adapters.
+///
+/// # Errors
+/// [`GpuError::NoAdapter`].
+pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
+    let found: Vec<Adapter> = enumerate()
+        .iter()
+        .enumerate()
+        .map(|(index, adapter)| {
+            let (info, limits) = (adapter.get_info(), adapter.limits());
+            Adapter {
+                index,
+                name: info.name,
+                kind: format!("{}, {:?}", info.backend, info.device_type),
+                driver: format!("{} {}", info.driver, info.driver_info),
+                limits: vec![
+                    ("max_storage_buffer_binding_size", limits.max_storage_buffer_binding_size),
+                    ("max_buffer_size", limits.max_buffer_size),
+                    ("max_compute_workgroups_per_dimension", limits.max_compute_workgroups_per_dimension.into()),
+                    ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage.into()),
+                    ("max_texture_dimension_2d", limits.max_texture_dimension_2d.into()),
+                ],
+                has_timestamps: crate::gpu::adapter::has_timestamps(adapter),
+            }
+        })
+        .collect();
+    if found.is_empty() { Err(GpuError::NoAdapter) } else { Ok(found) }
+}
+
+/// A scene's plan, and for which limits it was made.
+#[derive(Clone, Debug)]
+pub struct ScenePlan {
+    /// Passes and buffers.
+    pub plan: Plan,
+    /// Left out of the water because a solid is there.
+    pub removed: usize,
+    /// The adapter whose limits were used; `None` where the machine has none.
+    pub adapter: Option<String>,
+}
+
+/// Limits that every Vulkan adapter of the last years has, for machines without any.
+const COMMON_LIMITS: DeviceLimits = DeviceLimits { binding: 128 << 20, buffer: 256 << 20, list_budget: LIST_BUDGET };
+
+/// Plans a scene without allocating or compiling anything.
+///
+/// # Errors
+/// A solid without inside, or too large a grid.
+pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, SignedDistanceError> {
+    let start = Start::of(scene)?;
+    let context = Context::open(adapter).ok();
+    let limits = context.as_ref().map_or(COMMON_LIMITS, device_limits);
+    Ok(ScenePlan {
+        plan: start.plan(scene, limits),
+        removed: start.removed,
+        adapter: context.map(|context| context.info.name),
+    })
+}
+
+/// A cache's manifest and ledger.
+///
+/// # Errors
+/// [`CacheError`].
+pub fn cache(directory: &Path) -> Result<(Manifest, Vec<Entry>), CacheError> {
+    let reader = CacheReader::open(directory)?;
+    Ok((reader.manifest().clone(), reader.entries().to_vec()))
+}
