@@ -86,10 +86,7 @@ const TABLE: &[(&str, &str)] = &[
         "wave_maker.motion.kind",
         "\"constant_velocity\", \"sine\", \"solitary\" or \"table\"",
     ),
-    (
-        "wave_maker.motion.velocity",
-        "a number above 0, m/s inward",
-    ),
+    ("wave_maker.motion.velocity", "a number above 0, m/s inward"),
     ("wave_maker.motion.until", "a number above 0, seconds"),
     ("wave_maker.motion.stroke", "a number above 0, metres"),
     ("wave_maker.motion.period", "a number above 0, seconds"),
@@ -135,10 +132,7 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.pbf.cfl", "a number above 0, up to 5"),
     ("solver.pbf.relaxation", "a number above 0, up to 1.5"),
     ("solver.pbf.artificial_pressure", "a number from 0 to 10"),
-    (
-        "solver.pbf.max_substeps",
-        "a whole number from 1 to 10000",
-    ),
+    ("solver.pbf.max_substeps", "a whole number from 1 to 10000"),
     (
         "effects",
         "a table with viscosity, vorticity_confinement, or neither",

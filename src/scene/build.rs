@@ -205,11 +205,7 @@ fn iteration(doc: &Document<'_>, spec: &Option<Spanned<String>>) -> Result<Itera
 }
 
 fn stop(doc: &Document<'_>, spec: &PbfSpec) -> Result<Stop> {
-    match (
-        &spec.iterations,
-        &spec.density_error,
-        &spec.max_iterations,
-    ) {
+    match (&spec.iterations, &spec.density_error, &spec.max_iterations) {
         (None, None, None) => Ok(Stop::Iterations(4)),
         (Some(iterations), None, None) => Ok(Stop::Iterations(whole(doc, iterations, 10_000)?)),
         (None, Some(density_error), Some(max_iterations)) => Ok(Stop::DensityError {
@@ -313,12 +309,7 @@ fn water(
     })
 }
 
-fn water_block(
-    doc: &Document<'_>,
-    spec: &BoxSpec,
-    domain: &Bounds,
-    pbf: &Pbf,
-) -> Result<Bounds> {
+fn water_block(doc: &Document<'_>, spec: &BoxSpec, domain: &Bounds, pbf: &Pbf) -> Result<Bounds> {
     let block = bounds(doc, spec)?;
     if !fits(&block, domain) {
         let starts_inside = fits(
@@ -445,9 +436,7 @@ fn placed_mesh(doc: &Document<'_>, base_dir: &Path, spec: &MeshSpec<'_>) -> Resu
     let file = base_dir.join(spec.path.get_ref());
     let bytes = MeshFormat::of(&file)
         .and_then(|format| Ok((format, mesh_file::read_bytes(&file)?)))
-        .and_then(|(format, bytes)| {
-            Ok((TriangleMesh::from_bytes(&bytes, format, &file)?, bytes))
-        });
+        .and_then(|(format, bytes)| Ok((TriangleMesh::from_bytes(&bytes, format, &file)?, bytes)));
     let (in_file, bytes) = bytes.map_err(|error| fail(chain(&error)))?;
     let file_hash = blake3::hash(&bytes).to_hex().to_string();
     if let Some(expected) = spec.blake3

@@ -13,8 +13,10 @@ use toml::{
 
 use super::error::{Fault, Place, SceneError};
 
-/// Where every key of a scene stands. Overrides have spans beyond the end of the text, one byte
-/// each.
+/// Bytes set aside for the spans of one override, beyond the end of the text.
+const OVERRIDE_SPAN: usize = 1 << 20;
+
+/// Where every key of a scene stands. Overrides have spans beyond the end of the text.
 pub(super) struct Document<'a> {
     file: PathBuf,
     text: &'a str,
@@ -49,19 +51,17 @@ impl<'a> Document<'a> {
         let mut root = DeTable::parse(text)
             .map_err(|e| document.fault(e.span(), String::new(), e.message().to_owned()))?;
         for (index, entry) in overrides.iter().enumerate() {
-            let at = document.override_span(index);
-            lay_over(root.get_mut(), entry, at).map_err(|reason| SceneError::Override {
+            let mut spans = OverrideSpans {
+                start: text.len() + 1 + index * OVERRIDE_SPAN,
+                taken: 0,
+            };
+            lay_over(root.get_mut(), entry, &mut spans).map_err(|reason| SceneError::Override {
                 text: entry.clone(),
                 reason,
             })?;
         }
         index_table(root.get_ref(), "", &mut document.entries);
         Ok((document, root))
-    }
-
-    fn override_span(&self, index: usize) -> Range<usize> {
-        let at = self.text.len() + 1 + index;
-        at..at + 1
     }
 
     /// A fault at `span`, of the key that stands there, with what that key allows.
@@ -79,7 +79,7 @@ impl<'a> Document<'a> {
 
     /// A fault of the key `name` that is missing in the table at `span`.
     pub(super) fn missing(&self, span: Range<usize>, name: &str) -> SceneError {
-        let path = join(&self.path_at(&span).unwrap_or_default(), name);
+        let path = self.path_of_missing(&span, name);
         let message = with_allowed("missing".into(), &path);
         self.fault(Some(span), path, message)
     }
@@ -89,7 +89,7 @@ impl<'a> Document<'a> {
             if let Some(text) = span
                 .start
                 .checked_sub(self.text.len() + 1)
-                .and_then(|index| self.overrides.get(index))
+                .and_then(|beyond| self.overrides.get(beyond / OVERRIDE_SPAN))
             {
                 return Place::Override(text.clone());
             }
@@ -114,19 +114,17 @@ impl<'a> Document<'a> {
                 return self.fault(span, String::new(), message.to_owned());
             }
             let name = names.remove(0);
-            let path = span.as_ref().and_then(|s| self.path_ending(s, &name));
-            return self.fault(
-                span,
-                path.unwrap_or_else(|| name.clone()),
-                unknown_key(&name, &names),
-            );
+            let path = span.as_ref().and_then(|s| self.path_at(s));
+            let path = path.unwrap_or_else(|| name.clone());
+            return self.fault(span, path, unknown_key(&name, &names));
         }
         if let Some(name) = message
             .strip_prefix("missing field ")
             .and_then(|rest| quoted(rest).pop())
         {
-            let table = span.as_ref().and_then(|s| self.path_at(s));
-            let path = join(&table.unwrap_or_default(), &name);
+            let path = span
+                .as_ref()
+                .map_or(name.clone(), |s| self.path_of_missing(s, &name));
             let message = with_allowed("missing".into(), &path);
             return self.fault(span.filter(|s| !s.is_empty()), path, message);
         }
@@ -157,12 +155,15 @@ impl<'a> Document<'a> {
         exact.or_else(around).map(|e| e.path.clone())
     }
 
-    /// The key of that name at a span; an override lays several down at once.
-    fn path_ending(&self, span: &Range<usize>, name: &str) -> Option<String> {
+    /// The path of a key that the table at a span lacks. `[a.b]` opens both `a` and `a.b` there:
+    /// the one that knows the key is meant.
+    fn path_of_missing(&self, span: &Range<usize>, name: &str) -> String {
         self.entries
             .iter()
-            .find(|e| e.key == *span && e.path.rsplit('.').next() == Some(name))
-            .map(|e| e.path.clone())
+            .filter(|e| e.value == *span)
+            .map(|e| join(&e.path, name))
+            .find(|path| super::allowed::of(path).is_some())
+            .unwrap_or_else(|| name.to_owned())
     }
 }
 
@@ -228,8 +229,26 @@ fn index_value(value: &Value<'_>, key: Range<usize>, path: String, entries: &mut
     });
 }
 
+/// Spans of one override, a new one for each key and value that it lays down.
+struct OverrideSpans {
+    start: usize,
+    taken: usize,
+}
+
+impl OverrideSpans {
+    fn next(&mut self) -> Range<usize> {
+        let at = self.start + self.taken.min(OVERRIDE_SPAN - 1);
+        self.taken += 1;
+        at..at + 1
+    }
+}
+
 /// Lays `key=value` over the table. `a.b[2].c` and `a.b.2.c` both reach into arrays.
-fn lay_over<'a>(root: &mut DeTable<'a>, entry: &'a str, at: Range<usize>) -> Result<(), String> {
+fn lay_over<'a>(
+    root: &mut DeTable<'a>,
+    entry: &'a str,
+    spans: &mut OverrideSpans,
+) -> Result<(), String> {
     const ALLOWED: &str = "allowed is key=value, as in solver.pbf.iterations=8";
     let (key, value) = entry
         .split_once('=')
@@ -241,12 +260,11 @@ fn lay_over<'a>(root: &mut DeTable<'a>, entry: &'a str, at: Range<usize>) -> Res
     if segments.iter().any(|s| s.is_empty()) {
         return Err(format!("\"{key}\" is no dotted key; {ALLOWED}"));
     }
-    let mut value = parse_value(value.trim())?;
-    respan(&mut value, &at);
+    let value = respan(parse_value(value.trim())?, spans);
     let (first, rest) = segments.split_first().ok_or(ALLOWED)?;
-    let mut slot = enter_table(root, first, &at);
+    let mut slot = enter_table(root, first, spans);
     for segment in rest {
-        slot = enter(slot, segment, &at)?;
+        slot = enter(slot, segment, spans)?;
     }
     *slot = value;
     Ok(())
@@ -270,41 +288,39 @@ fn parse_value(text: &str) -> Result<Value<'_>, String> {
     }
 }
 
-/// Gives every value within `value` the override's span.
-fn respan(value: &mut Value<'_>, at: &Range<usize>) {
-    let inner = std::mem::replace(value.get_mut(), DeValue::Boolean(false));
-    let inner = match inner {
+/// The same value with the override's spans throughout.
+fn respan<'a>(value: Value<'a>, spans: &mut OverrideSpans) -> Value<'a> {
+    let at = spans.next();
+    let inner = match value.into_inner() {
         DeValue::Array(array) => {
             let mut moved = DeArray::new();
             for item in array.iter() {
-                let mut item = item.clone();
-                respan(&mut item, at);
-                moved.push(item);
+                moved.push(respan(item.clone(), spans));
             }
             DeValue::Array(moved)
         }
-        DeValue::Table(table) => {
-            let mut moved = DeTable::new();
-            for (key, item) in table {
-                let mut item = item;
-                respan(&mut item, at);
-                moved.insert(Spanned::new(at.clone(), key.into_inner()), item);
-            }
-            DeValue::Table(moved)
-        }
+        DeValue::Table(table) => DeValue::Table(
+            table
+                .into_iter()
+                .map(|(key, item)| {
+                    let key = Spanned::new(spans.next(), key.into_inner());
+                    (key, respan(item, spans))
+                })
+                .collect(),
+        ),
         other => other,
     };
-    *value = Spanned::new(at.clone(), inner);
+    Spanned::new(at, inner)
 }
 
 /// The value that `segment` names; a table is made where there is none.
 fn enter<'t, 'a>(
     slot: &'t mut Value<'a>,
     segment: &'a str,
-    at: &Range<usize>,
+    spans: &mut OverrideSpans,
 ) -> Result<&'t mut Value<'a>, String> {
     match slot.get_mut() {
-        DeValue::Table(table) => Ok(enter_table(table, segment, at)),
+        DeValue::Table(table) => Ok(enter_table(table, segment, spans)),
         DeValue::Array(array) => {
             let len = array.len();
             segment
@@ -314,7 +330,7 @@ fn enter<'t, 'a>(
                 .ok_or_else(|| format!("\"{segment}\" is no index into an array of {len}"))
         }
         other => Err(format!(
-            "\"{segment}\" cannot be set within a {}",
+            "\"{segment}\" cannot be set within a value of type {}",
             other.type_str()
         )),
     }
@@ -323,10 +339,11 @@ fn enter<'t, 'a>(
 fn enter_table<'t, 'a>(
     table: &'t mut DeTable<'a>,
     segment: &'a str,
-    at: &Range<usize>,
+    spans: &mut OverrideSpans,
 ) -> &'t mut Value<'a> {
-    let key = Spanned::new(at.clone(), Cow::Borrowed(segment));
+    let key = Spanned::new(spans.next(), Cow::Borrowed(segment));
+    let at = spans.next();
     table
         .entry(key)
-        .or_insert_with(|| Spanned::new(at.clone(), DeValue::Table(DeTable::new())))
+        .or_insert_with(|| Spanned::new(at, DeValue::Table(DeTable::new())))
 }

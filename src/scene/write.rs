@@ -17,7 +17,13 @@ pub fn asset_path(file: &Path, file_hash: &str) -> String {
         s.map(|s| s.to_string_lossy().into_owned())
             .unwrap_or_default()
             .chars()
-            .map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' })
+            .map(|c| {
+                if c.is_ascii_alphanumeric() || c == '_' {
+                    c
+                } else {
+                    '-'
+                }
+            })
             .collect()
     };
     let short = file_hash.get(..16).unwrap_or(file_hash);
