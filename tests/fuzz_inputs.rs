@@ -152,6 +152,13 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
         26,
         &["solver.method: missing", "\"pbf\""],
     ),
+    ("xsph = 0.01", "", 33, &["effects.viscosity.xsph: missing"]),
+    (
+        "xsph = 0.01",
+        "xsph = true",
+        33,
+        &["effects.viscosity.xsph: invalid type: boolean `true`"],
+    ),
     // Types.
     (
         "frames = 240",
@@ -464,7 +471,7 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
         "xsph = 0.01",
         "xsph = -1",
         33,
-        &["effects.viscosity.xsph: -1 is out of range", "from 0 to 1"],
+        &["effects.viscosity.xsph: out of range; allowed: a number above 0"],
     ),
 ];
 

@@ -1,1 +1,47 @@
-//! cache.
+//! Particle frames on disk: the file that stands between baking and everything after it.
+//!
+//! ```text
+//! cache/wave-city/pbf/
+//!   manifest.json   what was baked, by what, on what; written once, last in a cache's creation
+//!   scene.toml      the scene as baked; the manifest holds its hash
+//!   assets/         copies of the files that the scene names; the manifest holds their hashes
+//!   frames.jsonl    the ledger: one line a frame, chained by BLAKE3 back to the manifest
+//!   frames/wave-city.0000.ply   the start; 0001 is the first frame after it
+//!   timings.jsonl   seconds, which no two bakes share: in no hash, in no comparison
+//!   lock            held by the one writer
+//! ```
+//!
+//! The same scene, binary and adapter give the same bytes in every file but `timings.jsonl`.
+//!
+//! A frame goes to a temporary file, to the platter, to its name, and only then into the ledger. So
+//! the ledger never names a frame that is not whole, whatever kills the process, and what a crash can
+//! leave (a temporary file, a frame without a line, half a line) is cleared by
+//! [`CacheWriter::resume`].
+//!
+//! The chain finds damage and edits. It is no signature, and a ledger cut at the end of a line reads
+//! as a bake that stopped there.
+
+mod difference;
+mod disk;
+mod error;
+pub mod frame;
+mod ledger;
+mod manifest;
+mod reader;
+mod writer;
+
+pub use difference::{SceneDifference, scene_differences};
+pub use disk::directory_hash;
+pub use error::CacheError;
+pub use frame::file_name;
+pub use ledger::{Clock, Entry};
+pub use manifest::{FileRecord, Manifest};
+pub use reader::{CacheReader, Problem, VerifyReport, survey};
+pub use writer::{Asset, CacheWriter, Summary};
+
+use std::path::Path;
+
+/// Whether `dir` holds a cache whose creation was finished, so that a bake must resume it or leave it.
+pub fn exists(dir: &Path) -> bool {
+    dir.join(manifest::FILE).is_file()
+}

@@ -1,1 +1,4 @@
 //! cli.
+
+pub mod interrupt;
+pub mod verify;

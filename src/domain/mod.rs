@@ -2,9 +2,12 @@
 
 pub mod bounds;
 pub mod bvh;
+pub mod frame_range;
 pub mod mesh;
 pub mod mesh_file;
 pub mod motion;
 pub mod particles;
 pub mod sampling;
 pub mod signed_distance;
+pub mod solver;
+pub mod sph;

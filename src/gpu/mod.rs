@@ -1,4 +1,8 @@
 //! Everything that touches the device and knows nothing of fluids.
 
 pub mod adapter;
+pub mod program;
+pub mod recording;
+pub mod reflect;
 pub mod shader;
+pub mod sort;

@@ -133,15 +133,9 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.pbf.relaxation", "a number above 0, up to 1.5"),
     ("solver.pbf.artificial_pressure", "a number from 0 to 10"),
     ("solver.pbf.max_substeps", "a whole number from 1 to 10000"),
+    // The effects say for themselves what their keys allow.
     (
         "effects",
-        "a table with viscosity, vorticity_confinement, or neither",
-    ),
-    ("effects.viscosity", "{ xsph = number }"),
-    ("effects.viscosity.xsph", "a number from 0 to 1"),
-    ("effects.vorticity_confinement", "{ strength = number }"),
-    (
-        "effects.vorticity_confinement.strength",
-        "a number from 0 to 100",
+        "a table of effects; those not named do not exist",
     ),
 ];

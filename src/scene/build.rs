@@ -6,10 +6,10 @@ use glam::DVec3;
 use toml::Spanned;
 
 use super::{
-    Effects, Iteration, Pbf, PlacedMesh, Placement, Scene, Shot, Solver, Stop, Water,
+    Iteration, Pbf, PlacedMesh, Placement, Scene, Shot, Solver, Stop, Water,
     document::Document,
     error::SceneError,
-    spec::{BoxSpec, EffectsSpec, PbfSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, WaterSpec},
+    spec::{BoxSpec, PbfSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, WaterSpec},
     wave_maker,
 };
 use crate::domain::{
@@ -62,6 +62,9 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
             shot: &shot,
         },
     )?;
+    if let Some((key, allowed)) = spec.effects.fault() {
+        return Err(doc.fault_of(&key, allowed));
+    }
     Ok(Scene {
         shot,
         domain,
@@ -69,7 +72,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         solids,
         wave_makers,
         solver: Solver { pbf },
-        effects: effects(doc, &spec.effects)?,
+        effects: spec.effects,
     })
 }
 
@@ -480,21 +483,6 @@ fn scale(doc: &Document<'_>, spec: &Option<Spanned<ScaleSpec>>) -> Result<DVec3>
             format!("[{}, {}, {}] is out of range", scale.x, scale.y, scale.z),
         ))
     }
-}
-
-fn effects(doc: &Document<'_>, spec: &EffectsSpec) -> Result<Effects> {
-    let viscosity = spec
-        .viscosity
-        .as_ref()
-        .map(|v| number(doc, &v.xsph, |c| (0.0..=1.0).contains(&c)));
-    let vorticity_confinement = spec
-        .vorticity_confinement
-        .as_ref()
-        .map(|v| number(doc, &v.strength, |s| (0.0..=100.0).contains(&s)));
-    Ok(Effects {
-        viscosity: viscosity.transpose()?,
-        vorticity_confinement: vorticity_confinement.transpose()?,
-    })
 }
 
 /// An error and its causes in one line.

@@ -77,6 +77,17 @@ impl<'a> Document<'a> {
         self.fault(Some(span), path, message)
     }
 
+    /// A fault of the value of the key at `path`, which allows what `allowed` says.
+    pub(super) fn fault_of(&self, path: &str, allowed: &str) -> SceneError {
+        let span = self
+            .entries
+            .iter()
+            .find(|e| e.path == path)
+            .map(|e| e.value.clone());
+        let message = format!("out of range; allowed: {allowed}");
+        self.fault(span, path.to_owned(), message)
+    }
+
     /// A fault of the key `name` that is missing in the table at `span`.
     pub(super) fn missing(&self, span: Range<usize>, name: &str) -> SceneError {
         let path = self.path_of_missing(&span, name);
@@ -158,11 +169,11 @@ impl<'a> Document<'a> {
     /// The path of a key that the table at a span lacks. `[a.b]` opens both `a` and `a.b` there:
     /// the one that knows the key is meant.
     fn path_of_missing(&self, span: &Range<usize>, name: &str) -> String {
-        self.entries
-            .iter()
-            .filter(|e| e.value == *span)
+        let tables = || self.entries.iter().filter(|e| e.value == *span);
+        tables()
             .map(|e| join(&e.path, name))
             .find(|path| super::allowed::of(path).is_some())
+            .or_else(|| tables().next_back().map(|e| join(&e.path, name)))
             .unwrap_or_else(|| name.to_owned())
     }
 }

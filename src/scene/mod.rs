@@ -1,5 +1,8 @@
 //! Scene and look files, parsed into validated types, and the plan that follows from them.
 
+pub mod effects;
+pub mod plan;
+
 mod allowed;
 mod build;
 mod difference;
@@ -17,6 +20,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use crate::domain::{bounds::Bounds, mesh::TriangleMesh, motion::Motion};
 
 pub use difference::{physics_difference, physics_hash};
+pub use effects::Effects;
 pub use error::{Fault, Place, SceneError};
 pub use write::asset_path;
 
@@ -213,13 +217,4 @@ pub enum Stop {
         /// Upper bound.
         max_iterations: u32,
     },
-}
-
-/// Effects that a scene names.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Effects {
-    /// XSPH viscosity, c (Macklin and Müller 2013, eq. 17).
-    pub viscosity: Option<f64>,
-    /// Vorticity confinement strength ε (eq. 16).
-    pub vorticity_confinement: Option<f64>,
 }

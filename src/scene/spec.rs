@@ -3,6 +3,8 @@
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::Effects;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneSpec {
@@ -16,7 +18,7 @@ pub(super) struct SceneSpec {
     pub(super) wave_maker: Vec<WaveMakerSpec>,
     pub(super) solver: SolverSpec,
     #[serde(default)]
-    pub(super) effects: EffectsSpec,
+    pub(super) effects: Effects,
 }
 
 #[derive(Deserialize)]
@@ -115,23 +117,4 @@ pub(super) struct PbfSpec {
     pub(super) relaxation: Option<Spanned<f64>>,
     pub(super) artificial_pressure: Option<Spanned<f64>>,
     pub(super) max_substeps: Option<Spanned<i64>>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct EffectsSpec {
-    pub(super) viscosity: Option<ViscositySpec>,
-    pub(super) vorticity_confinement: Option<VorticitySpec>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ViscositySpec {
-    pub(super) xsph: Spanned<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct VorticitySpec {
-    pub(super) strength: Spanned<f64>,
 }

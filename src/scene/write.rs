@@ -87,11 +87,10 @@ impl Scene {
         }
         self.write_solver(out)?;
         writeln!(out, "\n[effects]")?;
-        if let Some(xsph) = self.effects.viscosity {
-            writeln!(out, "viscosity = {{ xsph = {xsph:?} }}")?;
-        }
-        if let Some(strength) = self.effects.vorticity_confinement {
-            writeln!(out, "vorticity_confinement = {{ strength = {strength:?} }}")?;
+        // An effect is a table of numbers, which toml can always write.
+        let effects = toml::Table::try_from(&self.effects).unwrap_or_default();
+        for (name, settings) in effects {
+            writeln!(out, "{name} = {settings}")?;
         }
         Ok(())
     }

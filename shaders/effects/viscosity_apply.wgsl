@@ -1,0 +1,21 @@
+// Adds what viscosity_gather found, once every particle has read the old velocities.
+#import "shared/thread.wgsl"
+#import "shared/phase.wgsl"
+#import "shared/pbf_params.wgsl"
+
+@group(0) @binding(10) var<storage, read> viscosity_change: array<vec4f>;
+@group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= phase.count {
+        return;
+    }
+    let i = phase_particle(thread);
+    velocity[i] += viscosity_change[i];
+}

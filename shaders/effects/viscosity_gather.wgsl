@@ -1,0 +1,43 @@
+// c Σ_j m/ρ (v_j − v_i) W: the mean velocity of the neighbours relative to one's own, by poly6.
+#import "shared/thread.wgsl"
+#import "shared/pbf_params.wgsl"
+#import "shared/phase.wgsl"
+#import "shared/neighbors.wgsl"
+
+override XSPH: f32;
+
+@group(0) @binding(10) var<storage, read> position: array<vec4f>;
+@group(0) @binding(11) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(12) var<storage, read_write> viscosity_change: array<vec4f>;
+
+var<private> own_position: vec3f;
+var<private> own_velocity: vec3f;
+var<private> change: vec3f;
+
+fn visit(i: u32, j: u32) {
+    if j >= fluid_count {
+        return;
+    }
+    let d = own_position - position[j].xyz;
+    let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
+    change += (velocity[j].xyz - own_velocity) * (p * p * p);
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= phase.count {
+        return;
+    }
+    let i = phase_particle(thread);
+    own_velocity = velocity[i].xyz;
+    change = vec3f(0.0);
+    own_position = position[i].xyz;
+    begin_phase();
+    for_each_neighbor(own_position, i);
+    viscosity_change[i] = vec4f(XSPH * params.density_scale * change, 0.0);
+}

@@ -1,0 +1,44 @@
+// ω_i = Σ_j m/ρ (v_j − v_i) × ∇_j W, spiky gradient; its length rides in w.
+#import "shared/thread.wgsl"
+#import "shared/pbf_params.wgsl"
+#import "shared/phase.wgsl"
+#import "shared/neighbors.wgsl"
+
+@group(0) @binding(10) var<storage, read> position: array<vec4f>;
+@group(0) @binding(11) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(12) var<storage, read_write> vorticity: array<vec4f>;
+
+var<private> own_position: vec3f;
+var<private> own_velocity: vec3f;
+var<private> curl: vec3f;
+
+fn visit(i: u32, j: u32) {
+    if j >= fluid_count {
+        return;
+    }
+    let d = own_position - position[j].xyz;
+    let r = length(d);
+    let s = max(1.0 - r * inverse_h, 0.0);
+    // ∇_j W points from j to i.
+    let gradient = d * (params.gradient_scale * s * s / max(r, 1e-15));
+    curl += cross(velocity[j].xyz - own_velocity, gradient);
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= phase.count {
+        return;
+    }
+    let i = phase_particle(thread);
+    own_velocity = velocity[i].xyz;
+    curl = vec3f(0.0);
+    own_position = position[i].xyz;
+    begin_phase();
+    for_each_neighbor(own_position, i);
+    vorticity[i] = vec4f(curl, length(curl));
+}

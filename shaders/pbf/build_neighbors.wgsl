@@ -1,0 +1,84 @@
+// Lists who is within h at the predicted positions, once a substep. A particle with more neighbours
+// than a list holds keeps its true count, and every pass then searches for it instead.
+#import "shared/thread.wgsl"
+#import "shared/pbf_params.wgsl"
+#import "shared/phase.wgsl"
+#import "shared/neighbor_list.wgsl"
+
+@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
+@group(0) @binding(2) var<storage, read> cell_start: array<u32>;
+#ifdef SOLIDS
+@group(0) @binding(3) var<storage, read> boundary_cell_start: array<u32>;
+#endif
+@group(0) @binding(4) var<storage, read_write> neighbor_list: array<vec4u>;
+@group(0) @binding(5) var<storage, read_write> neighbor_count: array<u32>;
+@group(0) @binding(10) var<storage, read_write> counters: array<atomic<u32>>;
+
+var<private> word: u32;
+var<private> four: vec4u;
+var<private> count: u32;
+
+// A word is written when it is full: stores are as dear as loads.
+fn append(j: u32) {
+    four = vec4u(j, four.xyz);
+    count++;
+    if (count & 3u) == 0u && count <= LIST_CAPACITY {
+        neighbor_list[word] = four;
+        word += LIST_STRIDE;
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= phase.count {
+        return;
+    }
+    let i = phase_particle(thread);
+    let xi = predicted[i].xyz;
+    let h2 = params.support_radius * params.support_radius;
+    let fluid_end = params.particle_count;
+    let dims = vec3i(params.grid_dims);
+    let centre = cell_coordinate(xi);
+    let low = max(centre - 1, vec3i(0));
+    let high = min(centre + 1, dims - 1);
+    word = list_base(i);
+    four = vec4u(params.nobody);
+    count = 0u;
+    for (var z = low.z; z <= high.z; z++) {
+        for (var y = low.y; y <= high.y; y++) {
+            let row = (z * dims.y + y) * dims.x;
+            let first = u32(row + low.x);
+            let last = u32(row + high.x) + 1u;
+            let end = cell_start[last];
+            for (var j = cell_start[first]; j < end; j++) {
+                let d = xi - predicted[j].xyz;
+                if dot(d, d) < h2 && j != i {
+                    append(j);
+                }
+            }
+#ifdef SOLIDS
+            let boundary_end = boundary_cell_start[last];
+            for (var b = boundary_cell_start[first]; b < boundary_end; b++) {
+                let d = xi - predicted[2u * fluid_end + b].xyz;
+                if dot(d, d) < h2 {
+                    append(fluid_end + b);
+                }
+            }
+#endif
+        }
+    }
+    if (count & 3u) != 0u && count < LIST_CAPACITY {
+        // The newest stands first; the rest of the word is nobody or repeats of a full word before.
+        let held = count & 3u;
+        neighbor_list[word] = select(vec4u(params.nobody), four, vec4u(0u, 1u, 2u, 3u) < vec4u(held));
+    }
+    neighbor_count[i] = count;
+    if count > LIST_CAPACITY {
+        atomicAdd(&counters[1], 1u);
+    }
+}

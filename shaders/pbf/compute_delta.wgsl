@@ -1,0 +1,71 @@
+// Δx_i = Σ_j (λ_i + λ_j + s_corr) ∇W / ρ0 (Macklin and Müller 2013, eq. 14), bounded: physical masses
+// with the formula verbatim blow up.
+#import "shared/thread.wgsl"
+#import "shared/pbf_params.wgsl"
+#import "shared/phase.wgsl"
+#import "shared/neighbors.wgsl"
+#import "shared/walls.wgsl"
+#import "shared/confine.wgsl"
+#import "shared/hash.wgsl"
+
+@group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
+#ifdef ARTIFICIAL_PRESSURE
+// W at Δq = 0.2 h over W(0): (1 − 0.04)³.
+const REFERENCE_KERNEL = 0.884736;
+#endif
+
+var<private> own_position: vec3f;
+var<private> own_lambda: f32;
+var<private> delta: vec3f;
+// A neighbour on the same spot, or i itself: llvmpipe runs both sides of a branch, so the hash waits until
+// after the loop.
+var<private> coincident: u32;
+#ifdef ARTIFICIAL_PRESSURE
+var<private> artificial_pressure: f32;
+#endif
+
+fn visit(i: u32, j: u32) {
+    let other = predicted[stored_index(j)];
+    let d = own_position - other.xyz;
+    let r2 = dot(d, d);
+    let inverse_r = inverseSqrt(max(r2, 1e-30));
+    let s = max(1.0 - r2 * inverse_r * inverse_h, 0.0);
+    var scale = own_lambda + min(other.w, 0.0);
+#ifdef ARTIFICIAL_PRESSURE
+    let p = max(1.0 - r2 * inverse_h * inverse_h, 0.0);
+    let w = p * p * p / REFERENCE_KERNEL;
+    scale -= artificial_pressure * w * w * w * w;
+#endif
+    delta += d * (inverse_r * scale * weight(other.w) * s * s);
+    coincident = select(coincident, j, r2 * inverse_h * inverse_h < 1e-12);
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= phase.count {
+        return;
+    }
+    let i = phase_particle(thread);
+    begin_phase();
+    let current = predicted[stored_index(i)];
+    own_position = current.xyz;
+    own_lambda = current.w;
+#ifdef ARTIFICIAL_PRESSURE
+    artificial_pressure = params.artificial_pressure;
+#endif
+    delta = vec3f(0.0);
+    coincident = i;
+    for_each_neighbor(current.xyz, i);
+    if coincident != i {
+        delta += pair_direction(i, coincident) * 2.0 * own_lambda;
+    }
+    delta = -params.gradient_scale * delta + own_lambda * wall_term(current.xyz).gradient;
+    delta *= params.relaxation;
+    delta *= min(1.0, params.max_correction / max(length(delta), 1e-30));
+    predicted[phase.write + i] = vec4f(confine(current.xyz + delta), current.w);
+}

@@ -1,0 +1,62 @@
+// λ_i = −max(C_i, 0) / (Σ_k |∇_k C_i|² + ε) (Macklin and Müller 2013, eq. 11). Only compression is
+// corrected: pulling a free surface together makes the water clump.
+#import "shared/thread.wgsl"
+#import "shared/pbf_params.wgsl"
+#import "shared/phase.wgsl"
+#import "shared/neighbors.wgsl"
+#import "shared/walls.wgsl"
+
+// λ goes into w. Others read this particle's w meanwhile, but only its sign, which λ ≤ 0 does not change.
+@group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
+#ifdef DENSITY
+@group(0) @binding(11) var<storage, read_write> density: array<f32>;
+#endif
+
+var<private> own_position: vec3f;
+var<private> kernel_sum: f32;
+var<private> gradient_sum: vec3f;
+var<private> gradient_squares: f32;
+
+fn visit(i: u32, j: u32) {
+    let other = predicted[stored_index(j)];
+    let d = own_position - other.xyz;
+    let r2 = dot(d, d);
+    let p = max(1.0 - r2 * inverse_h * inverse_h, 0.0);
+    let mass = weight(other.w);
+    kernel_sum += mass * p * p * p;
+    let inverse_r = inverseSqrt(max(r2, 1e-30));
+    let s = max(1.0 - r2 * inverse_r * inverse_h, 0.0);
+    let slope = mass * s * s;
+    gradient_sum += d * (slope * inverse_r);
+    // A solid's samples do not move: they have no gradient of their own.
+    gradient_squares += select(slope * slope, 0.0, other.w > 0.0);
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= phase.count {
+        return;
+    }
+    let i = phase_particle(thread);
+    begin_phase();
+    let slot = stored_index(i);
+    let xi = predicted[slot].xyz;
+    own_position = xi;
+    kernel_sum = 1.0;
+    gradient_sum = vec3f(0.0);
+    gradient_squares = 0.0;
+    for_each_neighbor(xi, i);
+    let wall = wall_term(xi);
+    let relative_density = params.density_scale * kernel_sum + wall.density;
+    let own = wall.gradient - params.gradient_scale * gradient_sum;
+    let squares = dot(own, own) + params.gradient_scale * params.gradient_scale * gradient_squares;
+    predicted[slot].w = -max(relative_density - 1.0, 0.0) / (squares + params.regularization);
+#ifdef DENSITY
+    density[i] = relative_density;
+#endif
+}

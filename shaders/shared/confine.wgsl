@@ -1,0 +1,65 @@
+// Keeps a position inside the box, off the walls and out of the solids.
+#ifdef SOLIDS
+struct SolidGrid {
+    // Of the signed-distance grid, relative to the domain's least corner.
+    origin: vec3f,
+    spacing: f32,
+    dims: vec3u,
+    padding: u32,
+}
+@group(0) @binding(7) var<uniform> solid_grid: SolidGrid;
+@group(0) @binding(8) var<storage, read> solid_distance: array<f32>;
+
+fn solid_node(node: vec3u) -> f32 {
+    return solid_distance[(node.z * solid_grid.dims.y + node.y) * solid_grid.dims.x + node.x];
+}
+
+// Pushes x out along the gradient of the trilinear signed distance where it is nearer than the contact
+// distance. Outside the grid no solid is near.
+fn leave_solids(x: vec3f) -> vec3f {
+    let p = (x - solid_grid.origin) / solid_grid.spacing;
+    let last = vec3f(solid_grid.dims - 1u);
+    if any(p < vec3f(0.0)) || any(p >= last) {
+        return x;
+    }
+    let node = vec3u(p);
+    // Two cells' diagonal: no contact can be interpolated from a node so far off.
+    if solid_node(node) > params.contact_distance + 2.0 * solid_grid.spacing {
+        return x;
+    }
+    let t = p - vec3f(node);
+    let a = mix(
+        vec4f(solid_node(node), solid_node(node + vec3u(0, 1, 0)), solid_node(node + vec3u(0, 0, 1)), solid_node(node + vec3u(0, 1, 1))),
+        vec4f(solid_node(node + vec3u(1, 0, 0)), solid_node(node + vec3u(1, 1, 0)), solid_node(node + vec3u(1, 0, 1)), solid_node(node + vec3u(1, 1, 1))),
+        t.x,
+    );
+    let distance = mix(mix(a.x, a.y, t.y), mix(a.z, a.w, t.y), t.z);
+    if distance >= params.contact_distance {
+        return x;
+    }
+    let b = vec4f(
+        solid_node(node + vec3u(1, 0, 0)) - solid_node(node),
+        solid_node(node + vec3u(1, 1, 0)) - solid_node(node + vec3u(0, 1, 0)),
+        solid_node(node + vec3u(1, 0, 1)) - solid_node(node + vec3u(0, 0, 1)),
+        solid_node(node + vec3u(1, 1, 1)) - solid_node(node + vec3u(0, 1, 1)),
+    );
+    let gradient = vec3f(
+        mix(mix(b.x, b.y, t.y), mix(b.z, b.w, t.y), t.z),
+        mix(a.y - a.x, a.w - a.z, t.z),
+        mix(a.z - a.x, a.w - a.y, t.y),
+    );
+    let steepness = length(gradient);
+    if steepness < 1e-6 * solid_grid.spacing {
+        return x;
+    }
+    return x + gradient / steepness * (params.contact_distance - distance);
+}
+#endif
+
+fn confine(x: vec3f) -> vec3f {
+    var y = x;
+#ifdef SOLIDS
+    y = leave_solids(y);
+#endif
+    return clamp(y, params.wall_min + params.contact_distance, params.wall_max - params.contact_distance);
+}

@@ -1,0 +1,122 @@
+//! What goes wrong with a cache.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What goes wrong with a cache. All but [`CacheError::Io`] mean that the cache is damaged or not the
+/// one that was meant.
+#[derive(Debug, thiserror::Error)]
+pub enum CacheError {
+    /// The operating system refused.
+    #[error("{}", path.display())]
+    Io {
+        /// What was touched.
+        path: PathBuf,
+        /// Its words.
+        source: io::Error,
+    },
+    /// No manifest.
+    #[error("{} holds no cache: it has no manifest.json", dir.display())]
+    NotACache {
+        /// The directory.
+        dir: PathBuf,
+    },
+    /// A new bake was sent to a directory with other files in it.
+    #[error(
+        "{} holds files that are no cache of ours ({found}); left untouched, choose another -o",
+        dir.display()
+    )]
+    Occupied {
+        /// The directory.
+        dir: PathBuf,
+        /// One of them.
+        found: String,
+    },
+    /// A new bake was sent to a directory that holds a bake.
+    #[error(
+        "{} already holds a cache; left untouched: --resume goes on, or choose another -o",
+        dir.display()
+    )]
+    Exists {
+        /// The directory.
+        dir: PathBuf,
+    },
+    /// Another process writes.
+    #[error("{} is being written by another bake", dir.display())]
+    Locked {
+        /// The directory.
+        dir: PathBuf,
+    },
+    /// A bake cannot go on because its bytes would not follow from those before.
+    #[error(
+        "{} was baked with {field} = {cached}, and this run has {given}; choose another -o",
+        dir.display()
+    )]
+    OtherScene {
+        /// The directory.
+        dir: PathBuf,
+        /// Manifest field.
+        field: String,
+        /// In the manifest.
+        cached: String,
+        /// In this run.
+        given: String,
+    },
+    /// Written in a format that this program does not read.
+    #[error("{} has cache format {found}, and this program reads {supported}", dir.display())]
+    Format {
+        /// The directory.
+        dir: PathBuf,
+        /// `format_version` as it stands.
+        found: String,
+        /// Ours.
+        supported: u32,
+    },
+    /// A file is not what was written.
+    #[error("{} is damaged: {what}", file.display())]
+    Damaged {
+        /// The file.
+        file: PathBuf,
+        /// What is off.
+        what: String,
+    },
+    /// A frame was asked for that was not baked.
+    #[error("{} has frames 0 to {last}, not {frame}", dir.display())]
+    NoFrame {
+        /// The directory.
+        dir: PathBuf,
+        /// Asked for.
+        frame: u32,
+        /// Last one there.
+        last: u32,
+    },
+    /// What a writer was given cannot stand in a cache: a bug of the caller.
+    #[error("cannot be cached: {0}")]
+    Unfit(String),
+    /// The writer failed before and said so then.
+    #[error("the cache writer stopped at an earlier error")]
+    Stopped,
+}
+
+impl CacheError {
+    pub(super) fn damaged(file: impl Into<PathBuf>, what: impl Into<String>) -> Self {
+        Self::Damaged {
+            file: file.into(),
+            what: what.into(),
+        }
+    }
+}
+
+/// Names the path that an [`io::Error`] keeps to itself.
+pub(super) trait AtPath<T> {
+    fn at(self, path: &Path) -> Result<T, CacheError>;
+}
+
+impl<T> AtPath<T> for io::Result<T> {
+    fn at(self, path: &Path) -> Result<T, CacheError> {
+        self.map_err(|source| CacheError::Io {
+            path: path.to_owned(),
+            source,
+        })
+    }
+}

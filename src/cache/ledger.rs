@@ -1,0 +1,256 @@
+//! `frames.jsonl`: one line a frame, each chained to the one before.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::Path;
+
+use blake3::Hash;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::error::{AtPath, CacheError};
+use super::frame;
+use super::manifest::{self, Manifest};
+
+/// Its file.
+pub(super) const FILE: &str = "frames.jsonl";
+/// Stands between a line's contents and the 64 digits of its chained hash.
+const CHAIN_KEY: &[u8] = b",\"chain\":\"";
+const CHAIN_LEN: usize = CHAIN_KEY.len() + 64 + 2;
+
+/// Where a bake stands after a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Clock {
+    /// 0 is the start.
+    pub frame: u32,
+    /// Simulated, seconds.
+    pub time: f64,
+    /// In this frame.
+    pub substeps: u32,
+    /// Substeps since the start.
+    pub steps: u64,
+}
+
+/// One line of the ledger.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// 0 is the start.
+    pub frame: u32,
+    /// Path from the cache's folder, with `/`.
+    pub file: String,
+    /// Length of the file.
+    pub bytes: u64,
+    /// Of the file, hex.
+    pub blake3: String,
+    /// In the file.
+    pub particles: u64,
+    /// BLAKE3 of `manifest.json`, hex; frame 0 alone has it, so that a changed manifest is told from a
+    /// changed first line.
+    #[serde(default)]
+    pub manifest: Option<String>,
+    /// After this frame.
+    pub clock: Clock,
+    /// What the solver says of the frame. Nothing in it may differ between two bakes of one scene, so
+    /// no seconds.
+    pub report: Value,
+    /// BLAKE3 of the previous line's chained hash and this line's contents, hex; the manifest's hash
+    /// stands before the first.
+    pub chain: String,
+}
+
+/// An [`Entry`] without its chain, as the chain is taken over it.
+#[derive(Serialize)]
+pub(super) struct Contents<'a> {
+    pub(super) frame: u32,
+    pub(super) file: &'a str,
+    pub(super) bytes: u64,
+    pub(super) blake3: &'a str,
+    pub(super) particles: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) manifest: Option<&'a str>,
+    pub(super) clock: Clock,
+    pub(super) report: &'a Value,
+}
+
+impl Contents<'_> {
+    /// The line with its end, and the chained hash that the next one needs.
+    pub(super) fn to_line(&self, previous: &Hash) -> Result<(Vec<u8>, Hash), CacheError> {
+        if !self.clock.time.is_finite() {
+            return Err(CacheError::Unfit(format!(
+                "frame {} at {} s",
+                self.frame, self.clock.time
+            )));
+        }
+        let mut line = serde_json::to_vec(self)
+            .map_err(|error| CacheError::Unfit(format!("step report: {error}")))?;
+        let chain = chained(previous, &line);
+        line.pop();
+        line.extend_from_slice(CHAIN_KEY);
+        line.extend_from_slice(chain.to_hex().as_bytes());
+        line.extend_from_slice(b"\"}\n");
+        Ok((line, chain))
+    }
+}
+
+fn chained(previous: &Hash, contents: &[u8]) -> Hash {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(previous.as_bytes());
+    hasher.update(contents);
+    hasher.finalize()
+}
+
+/// The ledger as found: whole lines, each checked.
+#[derive(Debug)]
+pub(super) struct Ledger {
+    /// Frame i at index i; never empty.
+    pub(super) entries: Vec<Entry>,
+    /// Of the last whole line.
+    pub(super) chain: Hash,
+    /// Length of the whole lines.
+    pub(super) whole_bytes: u64,
+    /// Bytes behind the last line end: what a crash left of a line, or a line being written now.
+    pub(super) torn_bytes: u64,
+}
+
+impl Ledger {
+    /// Reads and checks the ledger of the cache in `dir`.
+    pub(super) fn read(dir: &Path, manifest: &Manifest, seed: &Hash) -> Result<Self, CacheError> {
+        let path = dir.join(FILE);
+        let bytes = match fs::read(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Err(CacheError::damaged(path, "it is missing"));
+            }
+            other => other.at(&path)?,
+        };
+        let mut ledger = Self {
+            entries: Vec::new(),
+            chain: *seed,
+            whole_bytes: 0,
+            torn_bytes: 0,
+        };
+        for piece in bytes.split_inclusive(|&b| b == b'\n') {
+            let Some(line) = piece.strip_suffix(b"\n") else {
+                ledger.torn_bytes = piece.len() as u64;
+                break;
+            };
+            ledger.take(dir, manifest, line)?;
+            ledger.whole_bytes += piece.len() as u64;
+        }
+        if ledger.entries.is_empty() {
+            return Err(CacheError::damaged(path, "it has no whole line"));
+        }
+        Ok(ledger)
+    }
+
+    fn take(&mut self, dir: &Path, manifest: &Manifest, line: &[u8]) -> Result<(), CacheError> {
+        let number = self.entries.len() + 1;
+        let damaged =
+            |what: &str| CacheError::damaged(dir.join(FILE), format!("line {number}: {what}"));
+        let entry: Entry =
+            serde_json::from_slice(line).map_err(|error| damaged(&error.to_string()))?;
+        let (contents, tail) = line.split_at(line.len().saturating_sub(CHAIN_LEN));
+        if !tail.starts_with(CHAIN_KEY) {
+            return Err(damaged("it does not end with its chained hash"));
+        }
+        let contents = [contents, b"}"].concat();
+        let mut previous = self.chain;
+        if number == 1 {
+            // Chained to the manifest that the line itself records: where that holds, the line is
+            // whole, and a manifest with another hash is the file that changed.
+            previous = entry
+                .manifest
+                .as_ref()
+                .and_then(|hex| Hash::from_hex(hex).ok())
+                .ok_or_else(|| damaged("it does not name the manifest's hash"))?;
+        }
+        let chain = chained(&previous, &contents);
+        if chain.to_hex().as_str() != entry.chain {
+            return Err(damaged("its chained hash is off"));
+        }
+        if previous != self.chain {
+            return Err(CacheError::damaged(
+                dir.join(manifest::FILE),
+                "its BLAKE3 is not the one in the ledger",
+            ));
+        }
+        let frame = u32::try_from(number - 1).map_err(|_| damaged("too many frames"))?;
+        let file = frame::file_name(&manifest.shot, frame);
+        if entry.frame != frame || entry.clock.frame != frame || entry.file != file {
+            return Err(damaged(&format!("it is not frame {frame} in {file}")));
+        }
+        self.chain = chain;
+        self.entries.push(entry);
+        Ok(())
+    }
+}
+
+/// Appends a line and waits until it is on the disk. `length` is the ledger's length so far; it is
+/// looked at each time, so that a ledger that was removed or touched in mid-bake is noticed.
+pub(super) fn append(path: &Path, length: u64, line: &[u8]) -> Result<(), CacheError> {
+    let mut file = File::options().append(true).open(path).at(path)?;
+    let found = file.metadata().at(path)?.len();
+    if found != length {
+        return Err(CacheError::damaged(
+            path,
+            format!("{found} bytes, and this bake wrote {length}: something else writes there"),
+        ));
+    }
+    file.write_all(line)
+        .and_then(|()| file.sync_data())
+        .at(path)
+        .inspect_err(|_| {
+            // Half a line is cut on resume as well; the first error is the one to report.
+            let _ = file.set_len(length);
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn line(time: f64, report: &Value) -> Result<Vec<u8>, CacheError> {
+        let contents = Contents {
+            frame: 1,
+            file: "frames/a.0001.ply",
+            bytes: 1,
+            blake3: "",
+            particles: 1,
+            manifest: None,
+            clock: Clock {
+                time,
+                ..Clock::default()
+            },
+            report,
+        };
+        contents.to_line(&blake3::hash(b"")).map(|(line, _)| line)
+    }
+
+    proptest! {
+        /// serde_json reads floats to the last bit with its feature `float_roundtrip` alone; without
+        /// it a resumed bake would start from another clock.
+        #[test]
+        fn the_clock_comes_back_to_the_last_bit(bits in any::<u64>()) {
+            let time = f64::from_bits(bits);
+            match line(time, &Value::Null) {
+                Err(_) => prop_assert!(!time.is_finite()),
+                Ok(line) => {
+                    let entry: Entry = serde_json::from_slice(&line).unwrap();
+                    prop_assert_eq!(entry.clock.time.to_bits(), bits);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_is_one_line_whatever_the_report_says() {
+        let report = serde_json::json!({ "note": "a\nb\",\"chain\":\"x", "list": [1, null] });
+        let line = line(0.5, &report).unwrap();
+        assert_eq!(line.iter().filter(|&&b| b == b'\n').count(), 1);
+        let entry: Entry = serde_json::from_slice(&line).unwrap();
+        assert_eq!(entry.report, report);
+    }
+}

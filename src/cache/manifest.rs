@@ -1,0 +1,248 @@
+//! What was baked, by what, on what.
+
+use std::fs;
+use std::path::{Component, Path};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::disk;
+use super::error::{AtPath, CacheError};
+
+/// Its file.
+pub(super) const FILE: &str = "manifest.json";
+/// The scene as baked.
+pub(super) const SCENE: &str = "scene.toml";
+/// Folder of the scene's own files.
+pub(super) const ASSETS: &str = "assets";
+
+/// `manifest.json`: written once, and hashed into the first line of the ledger.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// [`Manifest::FORMAT_VERSION`] when it was written.
+    pub format_version: u32,
+    /// `swell`.
+    pub program: String,
+    /// Its version.
+    pub program_version: String,
+    /// Shot name, which the frame files carry: letters, digits, `.`, `_`, `-`.
+    pub shot: String,
+    /// Hash of all that decides the physics, hex.
+    pub scene_hash: String,
+    /// `pbf`.
+    pub solver: String,
+    /// Adapter name.
+    pub device: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// `Vulkan`, `Metal`, `Dx12`.
+    pub backend: String,
+    /// Output frames a second.
+    pub frames_per_second: f64,
+    /// d, metres.
+    pub particle_spacing: f64,
+    /// kg/m³.
+    pub rest_density: f64,
+    /// Names of what each particle carries beside position, velocity and id; sorted by
+    /// [`CacheWriter::create`](super::CacheWriter::create).
+    pub attributes: Vec<String>,
+    /// Particles at the start; filled in by `create`.
+    pub start_particles: u64,
+    /// `scene.toml` and the assets; filled in by `create`.
+    pub files: Vec<FileRecord>,
+}
+
+/// A file that stands in the cache beside the frames.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileRecord {
+    /// Path from the cache's folder, with `/`.
+    pub file: String,
+    /// Length.
+    pub bytes: u64,
+    /// BLAKE3, hex.
+    pub blake3: String,
+}
+
+impl FileRecord {
+    pub(super) fn new(file: impl Into<String>, content: &[u8]) -> Self {
+        Self {
+            file: file.into(),
+            bytes: content.len() as u64,
+            blake3: blake3::hash(content).to_hex().to_string(),
+        }
+    }
+
+    /// Reads the file and refuses it where it is not the one recorded.
+    pub(super) fn read(&self, dir: &Path) -> Result<Vec<u8>, CacheError> {
+        let path = dir.join(&self.file);
+        let content = disk::read_exactly(&path, self.bytes)?;
+        if blake3::hash(&content).to_hex().as_str() != self.blake3 {
+            return Err(CacheError::damaged(path, "its BLAKE3 is off"));
+        }
+        Ok(content)
+    }
+}
+
+/// What a resumed bake must have in common with the cache, the most telling first. The scene's hash
+/// comes last: it differs where any of the fields above it that a scene sets does.
+const COMPARED: [&str; 13] = [
+    "format_version",
+    "program",
+    "program_version",
+    "solver",
+    "device",
+    "driver",
+    "backend",
+    "shot",
+    "frames_per_second",
+    "particle_spacing",
+    "rest_density",
+    "attributes",
+    "scene_hash",
+];
+
+impl Manifest {
+    /// The format that this program writes and reads.
+    pub const FORMAT_VERSION: u32 = 1;
+
+    /// Bytes of `manifest.json`.
+    pub(super) fn to_bytes(&self) -> Result<Vec<u8>, CacheError> {
+        let mut text = serde_json::to_vec_pretty(self)
+            .map_err(|error| CacheError::Unfit(format!("manifest: {error}")))?;
+        text.push(b'\n');
+        Ok(text)
+    }
+
+    /// Reads `manifest.json` and its hash.
+    pub(super) fn read(dir: &Path) -> Result<(Self, blake3::Hash), CacheError> {
+        if !super::exists(dir) {
+            return Err(CacheError::NotACache {
+                dir: dir.to_owned(),
+            });
+        }
+        let path = dir.join(FILE);
+        let bytes = fs::read(&path).at(&path)?;
+        let value: Value = serde_json::from_slice(&bytes)
+            .map_err(|error| CacheError::damaged(&path, error.to_string()))?;
+        let found = &value["format_version"];
+        if found != Self::FORMAT_VERSION {
+            return Err(CacheError::Format {
+                dir: dir.to_owned(),
+                found: found.to_string(),
+                supported: Self::FORMAT_VERSION,
+            });
+        }
+        let manifest: Self = serde_json::from_value(value)
+            .map_err(|error| CacheError::damaged(&path, error.to_string()))?;
+        manifest
+            .check()
+            .map_err(|what| CacheError::damaged(&path, what))?;
+        Ok((manifest, blake3::hash(&bytes)))
+    }
+
+    /// The record of `scene.toml`.
+    pub(super) fn scene_record(&self, dir: &Path) -> Result<&FileRecord, CacheError> {
+        self.files
+            .iter()
+            .find(|record| record.file == SCENE)
+            .ok_or_else(|| CacheError::damaged(dir.join(FILE), "it names no scene.toml"))
+    }
+
+    /// What is written must be read back, and no name may lead out of the cache.
+    pub(super) fn check(&self) -> Result<(), String> {
+        if !is_file_stem(&self.shot) {
+            return Err(format!("shot name `{}` is no file name", self.shot));
+        }
+        for (name, value) in [
+            ("frames_per_second", self.frames_per_second),
+            ("particle_spacing", self.particle_spacing),
+            ("rest_density", self.rest_density),
+        ] {
+            if !value.is_finite() {
+                return Err(format!("{name} is {value}"));
+            }
+        }
+        for (i, record) in self.files.iter().enumerate() {
+            let is_asset = record
+                .file
+                .strip_prefix(ASSETS)
+                .and_then(|rest| rest.strip_prefix('/'))
+                .is_some_and(is_relative);
+            if record.file != SCENE && !is_asset {
+                return Err(format!("file name `{}` leads elsewhere", record.file));
+            }
+            if self.files[..i].iter().any(|r| r.file == record.file) {
+                return Err(format!("`{}` is named twice", record.file));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses to go on with a cache that this run would not have written.
+    pub(super) fn expect(&self, dir: &Path, given: &Self) -> Result<(), CacheError> {
+        let fields = |manifest: &Self| {
+            let mut sorted = manifest.clone();
+            sorted.attributes.sort_unstable();
+            serde_json::to_value(sorted)
+                .map_err(|error| CacheError::Unfit(format!("manifest: {error}")))
+        };
+        let (cached, given) = (fields(self)?, fields(given)?);
+        match COMPARED.iter().find(|&&f| cached[f] != given[f]) {
+            None => Ok(()),
+            Some(&field) => Err(CacheError::OtherScene {
+                dir: dir.to_owned(),
+                field: field.to_owned(),
+                cached: cached[field].to_string(),
+                given: given[field].to_string(),
+            }),
+        }
+    }
+}
+
+fn is_file_stem(name: &str) -> bool {
+    !name.is_empty()
+        && !name.starts_with(['.', '-'])
+        && name
+            .bytes()
+            .all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
+}
+
+/// A path of plain names, so that it stays below the folder that it is joined to.
+fn is_relative(path: &str) -> bool {
+    !path.contains('\\')
+        && path.split('/').all(|part| !part.is_empty())
+        && Path::new(path)
+            .components()
+            .all(|c| matches!(c, Component::Normal(_)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_lead_out_of_the_cache_are_refused() {
+        for good in ["city.obj", "meshes/city.obj", "wave 1.csv"] {
+            assert!(is_relative(good), "{good}");
+        }
+        for bad in [
+            "",
+            "/etc/passwd",
+            "../a",
+            "a/../../b",
+            "a//b",
+            "a\\..\\b",
+            "a/",
+        ] {
+            assert!(!is_relative(bad), "{bad}");
+        }
+        for good in ["wave-city", "v1.2_a"] {
+            assert!(is_file_stem(good), "{good}");
+        }
+        for bad in ["", "..", ".a", "a/b", "a b", "-x", "a\nb"] {
+            assert!(!is_file_stem(bad), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! Reading a cache. Nothing is handed out whose checksum is off, and nothing is ever written.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::disk;
+use super::error::{AtPath, CacheError};
+use super::frame;
+use super::ledger::{self, Entry, Ledger};
+use super::manifest::{FileRecord, Manifest};
+use crate::domain::particles::Particles;
+
+/// An open cache: its manifest, its scene and its ledger, all checked; the frames are checked as they
+/// are read. A bake may go on meanwhile: a line that is just being written is not seen.
+#[derive(Debug)]
+pub struct CacheReader {
+    dir: PathBuf,
+    manifest: Manifest,
+    scene_toml: String,
+    ledger: Ledger,
+}
+
+/// What is off in one file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// The file.
+    pub file: PathBuf,
+    /// What is off.
+    pub what: String,
+}
+
+/// What a look at every checksum found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct VerifyReport {
+    /// Baked frames in the ledger; the start is not counted.
+    pub frames: u32,
+    /// Length of the frame files, the start's too, as the ledger has it.
+    pub bytes: u64,
+    /// In the order of the files; empty for a sound cache.
+    pub problems: Vec<Problem>,
+}
+
+impl VerifyReport {
+    /// The report, or its first problem as an error.
+    ///
+    /// # Errors
+    /// [`CacheError::Damaged`].
+    pub fn into_result(self) -> Result<Self, CacheError> {
+        match self.problems.first() {
+            None => Ok(self),
+            Some(problem) => Err(CacheError::damaged(&problem.file, &problem.what)),
+        }
+    }
+}
+
+/// Looks at every checksum of the cache in `dir`, also where the cache is too damaged to be opened.
+///
+/// # Errors
+/// [`CacheError::NotACache`], [`CacheError::Format`], [`CacheError::Io`]; damage stands in the report.
+pub fn survey(dir: &Path) -> Result<VerifyReport, CacheError> {
+    match CacheReader::open(dir) {
+        Ok(reader) => Ok(reader.survey()),
+        Err(CacheError::Damaged { file, what }) => Ok(VerifyReport {
+            problems: vec![Problem { file, what }],
+            ..VerifyReport::default()
+        }),
+        Err(error) => Err(error),
+    }
+}
+
+impl CacheReader {
+    /// Opens the cache in `dir`.
+    ///
+    /// # Errors
+    /// [`CacheError::NotACache`], [`CacheError::Format`], [`CacheError::Damaged`] for the manifest, the
+    /// scene or the ledger, [`CacheError::Io`].
+    pub fn open(dir: &Path) -> Result<Self, CacheError> {
+        let (manifest, seed) = Manifest::read(dir)?;
+        let ledger = Ledger::read(dir, &manifest, &seed)?;
+        let record = manifest.scene_record(dir)?;
+        let scene_toml = String::from_utf8(record.read(dir)?)
+            .map_err(|_| CacheError::damaged(dir.join(&record.file), "it is not UTF-8"))?;
+        Ok(Self {
+            dir: dir.to_owned(),
+            manifest,
+            scene_toml,
+            ledger,
+        })
+    }
+
+    /// The cache's folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// What was baked, by what, on what.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// The scene as baked, every default written out.
+    pub fn scene_toml(&self) -> &str {
+        &self.scene_toml
+    }
+
+    /// Bytes of an asset that was given to [`CacheWriter::create`](super::CacheWriter::create) under
+    /// `name`.
+    ///
+    /// # Errors
+    /// [`CacheError::Damaged`], also where the cache has no such asset; [`CacheError::Io`].
+    pub fn asset(&self, name: &str) -> Result<Vec<u8>, CacheError> {
+        let file = format!("{}/{name}", super::manifest::ASSETS);
+        let record = self.manifest.files.iter().find(|r| r.file == file);
+        record
+            .ok_or_else(|| {
+                CacheError::damaged(self.dir.join(&file), "the manifest has no such file")
+            })?
+            .read(&self.dir)
+    }
+
+    /// The ledger: frame i at index i, the start at 0; never empty.
+    pub fn entries(&self) -> &[Entry] {
+        &self.ledger.entries
+    }
+
+    /// Last frame in the ledger.
+    pub fn last_frame(&self) -> u32 {
+        self.ledger.entries.last().map_or(0, |entry| entry.frame)
+    }
+
+    /// A frame's line.
+    ///
+    /// # Errors
+    /// [`CacheError::NoFrame`].
+    pub fn entry(&self, frame: u32) -> Result<&Entry, CacheError> {
+        let index = usize::try_from(frame).unwrap_or(usize::MAX);
+        self.ledger
+            .entries
+            .get(index)
+            .ok_or_else(|| CacheError::NoFrame {
+                dir: self.dir.clone(),
+                frame,
+                last: self.last_frame(),
+            })
+    }
+
+    /// A frame's particles, once its length and its checksum are found right.
+    ///
+    /// # Errors
+    /// [`CacheError::NoFrame`], [`CacheError::Damaged`] (also for a missing file), [`CacheError::Io`].
+    pub fn read(&self, frame: u32) -> Result<Particles, CacheError> {
+        read_frame(&self.dir, &self.manifest, self.entry(frame)?)
+    }
+
+    /// Looks at every checksum: scene, assets, frames. The manifest and the ledger's chain were
+    /// checked when the cache was opened.
+    /// A file that cannot be read stands in the report as well.
+    pub fn survey(&self) -> VerifyReport {
+        let entries = self.entries();
+        let mut problems: Vec<Problem> = self
+            .manifest
+            .files
+            .iter()
+            .filter_map(|record| self.problem(record))
+            .collect();
+        if self.ledger.torn_bytes > 0 {
+            problems.push(Problem {
+                file: self.dir.join(ledger::FILE),
+                what: format!(
+                    "its last line is torn after frame {}; --resume cuts it (a bake that runs now may \
+                     be writing it)",
+                    self.last_frame()
+                ),
+            });
+        }
+        let frames: Vec<Problem> = entries
+            .par_iter()
+            .filter_map(|entry| self.problem(&record(entry)))
+            .collect();
+        problems.extend(frames);
+        VerifyReport {
+            frames: self.last_frame(),
+            bytes: entries.iter().map(|entry| entry.bytes).sum(),
+            problems,
+        }
+    }
+
+    /// Every checksum: the report of a sound cache, or the first bad file.
+    ///
+    /// # Errors
+    /// [`CacheError::Damaged`].
+    pub fn verify(&self) -> Result<VerifyReport, CacheError> {
+        self.survey().into_result()
+    }
+
+    fn problem(&self, record: &FileRecord) -> Option<Problem> {
+        let path = self.dir.join(&record.file);
+        let found = check_length_on_disk(&path, record.bytes).and_then(|()| {
+            if disk::file_hash(&path)? == record.blake3 {
+                Ok(())
+            } else {
+                Err(CacheError::damaged(&path, "its BLAKE3 is off"))
+            }
+        });
+        let what = match found {
+            Ok(()) => return None,
+            Err(CacheError::Damaged { what, .. }) => what,
+            Err(CacheError::Io { source, .. }) => format!("it cannot be read: {source}"),
+            Err(other) => other.to_string(),
+        };
+        Some(Problem { file: path, what })
+    }
+}
+
+fn record(entry: &Entry) -> FileRecord {
+    FileRecord {
+        file: entry.file.clone(),
+        bytes: entry.bytes,
+        blake3: entry.blake3.clone(),
+    }
+}
+
+/// Whether a file is there with the length that was written.
+pub(super) fn check_length_on_disk(path: &Path, expected: u64) -> Result<(), CacheError> {
+    match path.metadata() {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            Err(CacheError::damaged(path, "it is missing"))
+        }
+        other => disk::check_length(path, expected, other.at(path)?.len()),
+    }
+}
+
+/// Reads and checks the frame of a ledger line.
+pub(super) fn read_frame(
+    dir: &Path,
+    manifest: &Manifest,
+    entry: &Entry,
+) -> Result<Particles, CacheError> {
+    let path = dir.join(&entry.file);
+    let bytes = record(entry).read(dir)?;
+    let particles = frame::decode(&bytes, &path)?;
+    if particles.len() as u64 != entry.particles {
+        return Err(CacheError::damaged(
+            path,
+            format!(
+                "{} particles, and the ledger has {}",
+                particles.len(),
+                entry.particles
+            ),
+        ));
+    }
+    if !particles.attributes.keys().eq(&manifest.attributes) {
+        return Err(CacheError::damaged(
+            path,
+            "its attributes are not the manifest's",
+        ));
+    }
+    Ok(particles)
+}

@@ -1,0 +1,212 @@
+//! Frame ranges as they stand on a command line.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Frames chosen by `7`, `1-240`, `1-240x2`, `1-240:2`, or several of these with commas between.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameRange {
+    /// Sorted, each once, never empty.
+    frames: Vec<u32>,
+    /// As given.
+    text: String,
+}
+
+/// A text that is no frame range.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{part}` is no frame range: {what}; write 7, 1-240, 1-240x2, or several with commas between"
+)]
+pub struct FrameRangeError {
+    /// The part of the list at fault.
+    pub part: String,
+    /// What is off with it.
+    pub what: String,
+}
+
+/// 46 hours at 60 frames a second: whoever asks for more has mistyped.
+const MOST: u64 = 10_000_000;
+
+impl FrameRange {
+    /// From `first` to `last`, both included; `None` where `last` comes before `first` or there are
+    /// more than 10⁷.
+    pub fn inclusive(first: u32, last: u32) -> Option<Self> {
+        format!("{first}-{last}").parse().ok()
+    }
+
+    /// The frames, ascending, each once.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = u32> + DoubleEndedIterator + '_ {
+        self.frames.iter().copied()
+    }
+
+    /// Whether `frame` is one of them.
+    pub fn contains(&self, frame: u32) -> bool {
+        self.frames.binary_search(&frame).is_ok()
+    }
+
+    /// Least frame.
+    pub fn first(&self) -> u32 {
+        self.frames[0]
+    }
+
+    /// Greatest frame.
+    pub fn last(&self) -> u32 {
+        self.frames[self.frames.len() - 1]
+    }
+
+    /// How many; at least one.
+    #[expect(
+        clippy::len_without_is_empty,
+        reason = "a range is never empty, so the question would mislead"
+    )]
+    pub fn len(&self) -> usize {
+        self.frames.len()
+    }
+}
+
+impl fmt::Display for FrameRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// `first`, `last`, `step` of one part of a list.
+type Span = (u32, u32, u32);
+
+impl FromStr for FrameRange {
+    type Err = FrameRangeError;
+
+    fn from_str(text: &str) -> Result<Self, FrameRangeError> {
+        let mut spans = Vec::new();
+        let mut total = 0;
+        for part in text.split(',').map(str::trim) {
+            let error = |what: String| FrameRangeError {
+                part: part.to_owned(),
+                what,
+            };
+            let (first, last, step) = parse_span(part).map_err(error)?;
+            total += u64::from((last - first) / step) + 1;
+            // Counted before anything is allocated.
+            if total > MOST {
+                return Err(error(format!("more than {MOST} frames")));
+            }
+            spans.push((first, last, step as usize));
+        }
+        let mut frames: Vec<u32> = spans
+            .into_iter()
+            .flat_map(|(first, last, step)| (first..=last).step_by(step))
+            .collect();
+        frames.sort_unstable();
+        frames.dedup();
+        Ok(Self {
+            frames,
+            text: text.to_owned(),
+        })
+    }
+}
+
+fn parse_span(part: &str) -> Result<Span, String> {
+    if part.is_empty() {
+        return Err("it is empty".to_owned());
+    }
+    let (range, step) = match part.split_once(['x', ':']) {
+        Some((range, step)) => (range, Some(number(step)?)),
+        None => (part, None),
+    };
+    let (first, last) = match range.split_once('-') {
+        Some((first, last)) => (number(first)?, number(last)?),
+        None if step.is_some() => return Err("a step needs a range before it".to_owned()),
+        None => (number(range)?, number(range)?),
+    };
+    if last < first {
+        return Err(format!("{last} comes before {first}"));
+    }
+    match step {
+        Some(0) => Err("the step is 0".to_owned()),
+        _ => Ok((first, last, step.unwrap_or(1))),
+    }
+}
+
+fn number(digits: &str) -> Result<u32, String> {
+    // `parse` alone would take `+1`.
+    if !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()) {
+        return digits
+            .parse()
+            .map_err(|_| format!("{digits} is more than {}", u32::MAX));
+    }
+    Err(format!("`{digits}` is no frame number"))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn frames(text: &str) -> Vec<u32> {
+        text.parse::<FrameRange>().unwrap().iter().collect()
+    }
+
+    #[test]
+    fn every_form() {
+        assert_eq!(frames("7"), [7]);
+        assert_eq!(frames("0"), [0]);
+        assert_eq!(frames("1-4"), [1, 2, 3, 4]);
+        assert_eq!(frames("4-4"), [4]);
+        assert_eq!(frames("1-6x2"), [1, 3, 5]);
+        assert_eq!(frames("1-6:2"), [1, 3, 5]);
+        assert_eq!(frames("1-7x2"), [1, 3, 5, 7]);
+        assert_eq!(frames("1-3x9"), [1]);
+        assert_eq!(frames("9, 1-5x2,3-4"), [1, 3, 4, 5, 9]);
+        assert_eq!(frames("4294967294-4294967295"), [4_294_967_294, u32::MAX]);
+    }
+
+    #[test]
+    fn faults_are_named() {
+        for (text, words) in [
+            ("", "empty"),
+            ("1,,2", "empty"),
+            ("1-2,", "empty"),
+            ("9-1", "1 comes before 9"),
+            ("1-9x0", "step is 0"),
+            ("1-9:0", "step is 0"),
+            ("3x2", "needs a range"),
+            ("-3", "no frame number"),
+            ("1-", "no frame number"),
+            ("1-2-3", "`2-3` is no frame number"),
+            ("1-9x2x2", "`2x2` is no frame number"),
+            ("+1", "no frame number"),
+            ("1.5", "no frame number"),
+            ("all", "no frame number"),
+            ("4294967296", "more than 4294967295"),
+            ("1-4294967295", "more than 10000000 frames"),
+            ("1-9000000,1-9000000", "more than 10000000 frames"),
+        ] {
+            let error = text.parse::<FrameRange>().unwrap_err().to_string();
+            assert!(error.contains(words), "{text}: {error}");
+            assert!(error.contains("1-240x2"), "tells how: {error}");
+        }
+        assert_eq!(frames("1-10000000").len(), 10_000_000, "control");
+    }
+
+    #[test]
+    fn questions() {
+        let range: FrameRange = "1-9x4,20".parse().unwrap();
+        assert_eq!((range.first(), range.last(), range.len()), (1, 20, 4));
+        assert!(range.contains(5) && !range.contains(6));
+        assert_eq!(range.to_string(), "1-9x4,20");
+        assert_eq!(FrameRange::inclusive(3, 2), None);
+        let three = FrameRange::inclusive(3, 5).unwrap();
+        assert!(three.iter().eq([3, 4, 5]) && three.iter().rev().eq([5, 4, 3]));
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_parses_or_is_refused(text in "[0-9x:,+ -]{0,12}") {
+            if let Ok(range) = text.parse::<FrameRange>() {
+                prop_assert!(range.iter().zip(range.iter().skip(1)).all(|(a, b)| a < b));
+                prop_assert!(range.len() >= 1);
+            }
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! Passes and buffers by name, built on a device.
+
+use std::collections::BTreeMap;
+
+use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
+
+use super::{
+    adapter::{Context, GpuError},
+    reflect::{Access, Binding, reflect},
+    shader,
+};
+
+/// A buffer to be.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BufferSpec {
+    /// Unique; a shader variable of this name binds it.
+    pub name: String,
+    /// Size; rounded up to 16.
+    pub bytes: u64,
+    /// Whether passes bind it as a uniform.
+    pub is_uniform: bool,
+}
+
+/// A pass to be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassSpec {
+    /// Shader file without extension, such as `pbf/predict`.
+    pub name: &'static str,
+    /// Conditions that hold in it.
+    pub defines: Vec<&'static str>,
+    /// Values of its `override` constants.
+    pub constants: Vec<(&'static str, f64)>,
+}
+
+/// A compiled pass.
+#[derive(Debug)]
+pub struct Pass {
+    /// As in [`PassSpec`].
+    pub name: &'static str,
+    /// Compute pipeline.
+    pub pipeline: ComputePipeline,
+    /// Layout of group 0.
+    pub layout: BindGroupLayout,
+    /// Reflected bindings.
+    pub bindings: Vec<Binding>,
+    /// Threads a workgroup.
+    pub workgroup_size: u32,
+}
+
+/// Named passes and buffers on one device.
+#[derive(Debug)]
+pub struct Program {
+    /// The device.
+    pub context: Context,
+    passes: BTreeMap<&'static str, Pass>,
+    buffers: BTreeMap<String, Buffer>,
+}
+
+impl Program {
+    /// Compiles the passes and allocates the buffers, zeroed. `shared` constants go to every pass that
+    /// declares them.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] before anything is allocated, [`GpuError::Shader`], [`GpuError::Lost`].
+    pub fn new(
+        context: &Context,
+        buffers: &[BufferSpec],
+        passes: &[PassSpec],
+        shared: &[(&'static str, f64)],
+    ) -> Result<Self, GpuError> {
+        for spec in buffers {
+            check_size(context, spec)?;
+        }
+        let passes = passes
+            .iter()
+            .map(|spec| Ok((spec.name, compile(context, spec, shared)?)))
+            .collect::<Result<_, GpuError>>()?;
+        let buffers = buffers
+            .iter()
+            .map(|spec| (spec.name.clone(), allocate(context, spec)))
+            .collect();
+        context.check()?;
+        Ok(Self {
+            context: context.clone(),
+            passes,
+            buffers,
+        })
+    }
+
+    /// The pass of that name.
+    ///
+    /// # Panics
+    /// Where the program holds none: a recording that its plan does not cover is a bug.
+    pub fn pass(&self, name: &str) -> &Pass {
+        self.passes
+            .get(name)
+            .unwrap_or_else(|| panic!("pass `{name}` is not in the program"))
+    }
+
+    /// The buffer of that name.
+    ///
+    /// # Panics
+    /// Where the program holds none: a recording that its plan does not cover is a bug.
+    pub fn buffer(&self, name: &str) -> &Buffer {
+        self.buffers
+            .get(name)
+            .unwrap_or_else(|| panic!("buffer `{name}` is not in the program"))
+    }
+
+    /// Names of the passes and of the buffers, sorted.
+    pub fn names(&self) -> (Vec<&str>, Vec<&str>) {
+        (
+            self.passes.keys().copied().collect(),
+            self.buffers.keys().map(String::as_str).collect(),
+        )
+    }
+
+    /// Writes `data` at `offset` bytes of a buffer, before whatever is submitted next.
+    pub fn upload<T: bytemuck::NoUninit>(&self, name: &str, offset: u64, data: &[T]) {
+        if !data.is_empty() {
+            self.context
+                .queue
+                .write_buffer(self.buffer(name), offset, bytemuck::cast_slice(data));
+        }
+    }
+
+    /// Reads the first `counts[k]` values of `T` from buffer `names[k]`, waiting for the device once.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn download<T: bytemuck::Pod>(
+        &self,
+        wanted: &[(&str, usize)],
+    ) -> Result<Vec<Vec<T>>, GpuError> {
+        let context = &self.context;
+        let mut encoder = context.device.create_command_encoder(&Default::default());
+        let staging: Vec<Option<Buffer>> = wanted
+            .iter()
+            .map(|&(name, count)| {
+                let bytes = (count * size_of::<T>()).next_multiple_of(4) as u64;
+                (bytes > 0).then(|| {
+                    let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
+                        label: Some("readback"),
+                        size: bytes,
+                        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+                        mapped_at_creation: false,
+                    });
+                    encoder.copy_buffer_to_buffer(self.buffer(name), 0, &buffer, 0, bytes);
+                    buffer
+                })
+            })
+            .collect();
+        context.queue.submit([encoder.finish()]);
+        for buffer in staging.iter().flatten() {
+            // A failed map shows when its range is asked for.
+            buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        }
+        context.wait()?;
+        let mut out = Vec::with_capacity(wanted.len());
+        for (buffer, &(_, count)) in staging.iter().zip(wanted) {
+            let Some(buffer) = buffer else {
+                out.push(Vec::new());
+                continue;
+            };
+            let view = buffer
+                .get_mapped_range(..)
+                .map_err(|error| GpuError::Lost(error.to_string()))?;
+            out.push(bytemuck::pod_collect_to_vec(
+                &view[..count * size_of::<T>()],
+            ));
+        }
+        Ok(out)
+    }
+}
+
+fn check_size(context: &Context, spec: &BufferSpec) -> Result<(), GpuError> {
+    let limits = &context.limits;
+    let (binding, binding_name) = if spec.is_uniform {
+        (
+            limits.max_uniform_buffer_binding_size,
+            "max_uniform_buffer_binding_size",
+        )
+    } else {
+        (
+            limits.max_storage_buffer_binding_size,
+            "max_storage_buffer_binding_size",
+        )
+    };
+    // Phase slots are bound one at a time, so only the whole buffer counts there.
+    let binding = if spec.is_uniform { u64::MAX } else { binding };
+    let (allowed, limit) = if binding < limits.max_buffer_size {
+        (binding, binding_name)
+    } else {
+        (limits.max_buffer_size, "max_buffer_size")
+    };
+    if spec.bytes > allowed {
+        return Err(GpuError::TooLarge {
+            buffer: spec.name.clone(),
+            needed: spec.bytes,
+            allowed,
+            limit,
+            adapter: context.info.name.clone(),
+        });
+    }
+    Ok(())
+}
+
+fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
+    let role = if spec.is_uniform {
+        BufferUsages::UNIFORM
+    } else {
+        BufferUsages::STORAGE | BufferUsages::INDIRECT
+    };
+    context.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(&spec.name),
+        size: spec.bytes.next_multiple_of(16).max(16),
+        usage: role | BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+fn compile(
+    context: &Context,
+    spec: &PassSpec,
+    shared: &[(&'static str, f64)],
+) -> Result<Pass, GpuError> {
+    let source = shader::compose(spec.name, &spec.defines)?;
+    let reflection = reflect(spec.name, &source)?;
+    let entries: Vec<wgpu::BindGroupLayoutEntry> = reflection
+        .bindings
+        .iter()
+        .map(|binding| wgpu::BindGroupLayoutEntry {
+            binding: binding.index,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: match binding.access {
+                    Access::Uniform => wgpu::BufferBindingType::Uniform,
+                    Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
+                    Access::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
+                },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        })
+        .collect();
+    let declared = |name: &str| reflection.overrides.iter().any(|constant| constant == name);
+    let mut constants = spec.constants.clone();
+    constants.extend(shared.iter().filter(|(name, _)| declared(name)));
+    let device = &context.device;
+    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some(spec.name),
+        entries: &entries,
+    });
+    let descriptor = wgpu::ShaderModuleDescriptor {
+        label: Some(spec.name),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    };
+    let checks = wgpu::ShaderRuntimeChecks {
+        force_loop_bounding: false,
+        ..wgpu::ShaderRuntimeChecks::checked()
+    };
+    // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is fixed
+    // before it starts. All other checks stay on.
+    let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
+    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(spec.name),
+        bind_group_layouts: &[Some(&layout)],
+        immediate_size: 0,
+    });
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(spec.name),
+        layout: Some(&pipeline_layout),
+        module: &module,
+        entry_point: None,
+        compilation_options: wgpu::PipelineCompilationOptions {
+            constants: &constants,
+            zero_initialize_workgroup_memory: false,
+        },
+        cache: None,
+    });
+    if let Some(error) = pollster::block_on(scope.pop()) {
+        return Err(GpuError::Shader {
+            name: spec.name.to_owned(),
+            message: error.to_string(),
+        });
+    }
+    Ok(Pass {
+        name: spec.name,
+        pipeline,
+        layout,
+        bindings: reflection.bindings,
+        workgroup_size: reflection.workgroup_size[0],
+    })
+}

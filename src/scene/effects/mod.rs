@@ -1,0 +1,63 @@
+//! Effects that a scene may name under `[effects]`: one file and one line each.
+//!
+//! An effect's file holds its settings, what they may be, and what it adds to the plan. Its passes run
+//! after the velocity update, in order, and bind buffers by name.
+
+use crate::gpu::program::{BufferSpec, PassSpec};
+
+/// What an effect adds to the plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EffectPlan {
+    /// Key under `[effects]`.
+    pub name: &'static str,
+    /// In the order in which they run.
+    pub passes: Vec<PassSpec>,
+    /// Beyond what the solver has anyway.
+    pub buffers: Vec<BufferSpec>,
+}
+
+macro_rules! effects {
+    ($($name:ident),+ $(,)?) => {
+        $(pub mod $name;)+
+
+        /// The effects that a scene names; what is `None` does not exist.
+        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct Effects {
+            $(
+                #[doc = concat!("`effects.", stringify!($name), "`.")]
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub $name: Option<$name::Settings>,
+            )+
+        }
+
+        impl Effects {
+            /// Keys of all effects.
+            pub const NAMES: &[&str] = &[$(stringify!($name)),+];
+
+            /// What the named effects add for `particles` particles.
+            pub fn plans(&self, particles: usize) -> Vec<EffectPlan> {
+                let mut plans = Vec::new();
+                $(
+                    if let Some(settings) = &self.$name {
+                        let (passes, buffers) = settings.plan(particles);
+                        plans.push(EffectPlan { name: stringify!($name), passes, buffers });
+                    }
+                )+
+                plans
+            }
+
+            /// The first setting that is out of its range: dotted key and what is allowed.
+            pub fn fault(&self) -> Option<(String, &'static str)> {
+                $(
+                    if let Some((key, allowed)) = self.$name.as_ref().and_then($name::Settings::fault) {
+                        return Some((format!("effects.{}.{key}", stringify!($name)), allowed));
+                    }
+                )+
+                None
+            }
+        }
+    };
+}
+
+effects!(viscosity, vorticity_confinement);

@@ -1,0 +1,32 @@
+//! XSPH viscosity (Schechter and Bridson 2012; Macklin and Müller 2013, eq. 17).
+
+use serde::{Deserialize, Serialize};
+
+use crate::gpu::{
+    program::{BufferSpec, PassSpec},
+    sort::storage,
+};
+
+/// `viscosity = { xsph = 0.01 }`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// c: the part of the neighbours' mean relative velocity that a substep takes over, 0 to 1.
+    pub xsph: f64,
+}
+
+impl Settings {
+    pub(super) fn fault(&self) -> Option<(&'static str, &'static str)> {
+        (!(self.xsph > 0.0 && self.xsph <= 1.0)).then_some(("xsph", "a number above 0, at most 1"))
+    }
+
+    pub(super) fn plan(&self, particles: usize) -> (Vec<PassSpec>, Vec<BufferSpec>) {
+        let gather = PassSpec {
+            name: "effects/viscosity_gather",
+            defines: Vec::new(),
+            constants: vec![("XSPH", self.xsph)],
+        };
+        let apply = PassSpec { name: "effects/viscosity_apply", defines: Vec::new(), constants: Vec::new() };
+        (vec![gather, apply], vec![storage("viscosity_change", 16 * particles as u64)])
+    }
+}

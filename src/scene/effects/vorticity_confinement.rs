@@ -1,0 +1,32 @@
+//! Vorticity confinement (Macklin and Müller 2013, eqs. 15 and 16).
+
+use serde::{Deserialize, Serialize};
+
+use crate::gpu::{
+    program::{BufferSpec, PassSpec},
+    sort::storage,
+};
+
+/// `vorticity_confinement = { strength = 0.1 }`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// ε: metres per second squared for each 1/s of vorticity and metre of support radius.
+    pub strength: f64,
+}
+
+impl Settings {
+    pub(super) fn fault(&self) -> Option<(&'static str, &'static str)> {
+        (!(self.strength > 0.0 && self.strength <= 100.0)).then_some(("strength", "a number above 0, at most 100"))
+    }
+
+    pub(super) fn plan(&self, particles: usize) -> (Vec<PassSpec>, Vec<BufferSpec>) {
+        let curl = PassSpec { name: "effects/vorticity_curl", defines: Vec::new(), constants: Vec::new() };
+        let force = PassSpec {
+            name: "effects/vorticity_force",
+            defines: Vec::new(),
+            constants: vec![("STRENGTH", self.strength)],
+        };
+        (vec![curl, force], vec![storage("vorticity", 16 * particles as u64)])
+    }
+}

@@ -1,0 +1,175 @@
+//! The density iteration as commands: Jacobi and red/black, fixed or until an error.
+
+use crate::{
+    gpu::recording::{Bind, Command, Groups},
+    scene::{
+        Iteration, Pbf, Stop,
+        plan::{Chunk, PHASE_BYTES, Plan, list_name},
+    },
+};
+
+use super::params::Phase;
+
+/// Which particles a dispatch handles.
+#[derive(Clone, Copy)]
+enum Who {
+    All,
+    Red,
+    Black,
+}
+
+/// Builds commands and the phase slots that they refer to.
+pub(super) struct Builder<'a> {
+    plan: &'a Plan,
+    phases: Vec<Phase>,
+}
+
+impl<'a> Builder<'a> {
+    pub(super) fn new(plan: &'a Plan) -> Self {
+        Self {
+            plan,
+            phases: Vec::new(),
+        }
+    }
+
+    /// Contents of the `phases` uniform, each in a slot of its own.
+    pub(super) fn phase_slots(&self) -> Vec<u8> {
+        let mut bytes = vec![0; self.phases.len() * PHASE_BYTES as usize];
+        for (slot, phase) in bytes
+            .chunks_exact_mut(PHASE_BYTES as usize)
+            .zip(&self.phases)
+        {
+            slot[..size_of::<Phase>()].copy_from_slice(bytemuck::bytes_of(phase));
+        }
+        bytes
+    }
+
+    fn bind_phase(&mut self, phase: Phase) -> Bind {
+        let slot = self
+            .phases
+            .iter()
+            .position(|known| *known == phase)
+            .unwrap_or_else(|| {
+                self.phases.push(phase);
+                self.phases.len() - 1
+            });
+        let window = (slot as u64 * PHASE_BYTES, size_of::<Phase>() as u64);
+        Bind {
+            variable: "phase",
+            buffer: "phases".into(),
+            window: Some(window),
+        }
+    }
+
+    /// Offsets of the two halves of `predicted`: `moved` says which colours stand in the other half already.
+    fn phase(&self, chunk: Chunk, who: Who, half: usize, red_moved: bool) -> Phase {
+        let n = self.plan.counts.particles;
+        let (here, there) = if half == 0 { (0, n) } else { (n, 0) };
+        let (stride, colour) = match who {
+            Who::All => (1, 0),
+            Who::Red => (2, 0),
+            Who::Black => (2, 1),
+        };
+        Phase {
+            first: chunk.first as u32,
+            count: ((chunk.count - colour).div_ceil(stride)) as u32,
+            stride: stride as u32,
+            colour: colour as u32,
+            read_even: if red_moved { there } else { here } as u32,
+            read_odd: here as u32,
+            write: there as u32,
+            chunk_count: chunk.count as u32,
+        }
+    }
+
+    fn pass(
+        &mut self,
+        pass: &'static str,
+        who: Who,
+        half: usize,
+        red_moved: bool,
+        out: &mut Vec<Command>,
+        indirect: bool,
+    ) {
+        for (index, &chunk) in self.plan.chunks.iter().enumerate() {
+            let phase = self.phase(chunk, who, half, red_moved);
+            let mut binds = vec![self.bind_phase(phase)];
+            if self.plan.has_lists {
+                binds.push(Bind {
+                    variable: "neighbor_list",
+                    buffer: list_name(index),
+                    window: None,
+                });
+            }
+            let groups = match (indirect, who) {
+                (false, _) => Groups::Threads(u64::from(phase.count)),
+                (true, Who::All) => Groups::Indirect("control", 16),
+                (true, _) => Groups::Indirect("control", 32),
+            };
+            out.push(Command::Dispatch {
+                pass,
+                binds,
+                groups,
+            });
+        }
+    }
+
+    /// A pass over all particles that stand in the first half, such as one of an effect.
+    pub(super) fn over_all(&mut self, pass: &'static str, out: &mut Vec<Command>) {
+        self.pass(pass, Who::All, 0, false, out, false);
+    }
+
+    /// Density by a full search over all particles, sorted into the first half.
+    pub(super) fn measure(&mut self, out: &mut Vec<Command>) {
+        let count = self.plan.counts.particles;
+        let phase = self.phase(Chunk { first: 0, count }, Who::All, 0, false);
+        let bind = self.bind_phase(phase);
+        out.push(Command::with("pbf/measure_density", count, vec![bind]));
+    }
+
+    /// All iterations; the last command leaves the result in the half that `finish` binds.
+    pub(super) fn iterations(&mut self, pbf: &Pbf, out: &mut Vec<Command>) {
+        let (count, adaptive) = match pbf.stop {
+            Stop::Iterations(count) => (count, false),
+            Stop::DensityError { max_iterations, .. } => (max_iterations, true),
+        };
+        for k in 0..count {
+            let half = (k % 2) as usize;
+            let is_first = k == 0;
+            // Black λ of the iteration before still hold for red's correction: only the first needs all.
+            let lambda = if is_first || pbf.iteration == Iteration::Jacobi {
+                Who::All
+            } else {
+                Who::Red
+            };
+            self.pass("pbf/compute_lambda", lambda, half, false, out, adaptive);
+            if adaptive {
+                out.push(Command::over("pbf/sum_error", self.plan.counts.particles));
+                out.push(Command::over("pbf/decide", 256));
+            }
+            match pbf.iteration {
+                Iteration::Jacobi => {
+                    self.pass("pbf/compute_delta", Who::All, half, false, out, adaptive)
+                }
+                Iteration::RedBlack => {
+                    self.pass("pbf/compute_delta", Who::Red, half, false, out, adaptive);
+                    self.pass("pbf/compute_lambda", Who::Black, half, true, out, adaptive);
+                    self.pass("pbf/compute_delta", Who::Black, half, true, out, adaptive);
+                }
+            }
+        }
+    }
+
+    /// Velocities and positions from wherever the last of a fixed number of iterations left them.
+    pub(super) fn finish(&mut self, pbf: &Pbf, out: &mut Vec<Command>) {
+        let n = self.plan.counts.particles;
+        let half = match pbf.stop {
+            Stop::Iterations(count) => count % 2,
+            Stop::DensityError { .. } => 0,
+        };
+        let everything = Chunk { first: 0, count: n };
+        let phase = self.phase(everything, Who::All, half as usize, false);
+        let bind = self.bind_phase(phase);
+        out.push(Command::with("pbf/update_velocity", n, vec![bind]));
+    }
+}

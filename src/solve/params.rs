@@ -1,0 +1,102 @@
+//! Rust mirrors of the uniforms; a test holds them against naga's layout of the WGSL structs.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Declares a `repr(C)` mirror together with its field names and offsets.
+macro_rules! mirror {
+    ($(#[$meta:meta])* $name:ident { $($(#[$field_meta:meta])* $field:ident: $ty:ty),+ $(,)? }) => {
+        $(#[$meta])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+        pub struct $name { $($(#[$field_meta])* pub $field: $ty),+ }
+
+        impl $name {
+            /// Field names and byte offsets, in order.
+            pub fn members() -> Vec<(String, u32)> {
+                vec![$((stringify!($field).to_owned(), std::mem::offset_of!($name, $field) as u32)),+]
+            }
+        }
+    };
+}
+
+mirror!(
+    /// `Params` of shared/pbf_params.wgsl; lengths in metres, positions relative to the domain's least corner.
+    Params {
+        /// Gravity times time step, m/s.
+        velocity_step: [f32; 3],
+        /// Fluid particles.
+        particle_count: u32,
+        /// Cells of edge h along each axis.
+        grid_dims: [u32; 3],
+        /// Largest correction of one iteration.
+        max_correction: f32,
+        /// Least faces of the box, wave-makers included.
+        wall_min: [f32; 3],
+        /// Seconds.
+        time_step: f32,
+        /// Greatest faces of the box.
+        wall_max: [f32; 3],
+        /// 1/s; 0 with a time step of 0.
+        inverse_time_step: f32,
+        /// h.
+        support_radius: f32,
+        /// 1/h.
+        inverse_support_radius: f32,
+        /// Index of a particle that is far from everything.
+        nobody: u32,
+        /// As in `domain::sph`.
+        density_scale: f32,
+        /// As in `domain::sph`.
+        gradient_scale: f32,
+        /// As in `domain::sph`.
+        wall_density_scale: f32,
+        /// ε, 1/m².
+        regularization: f32,
+        /// ω.
+        relaxation: f32,
+        /// Least distance from a wall or solid.
+        contact_distance: f32,
+        /// Of a substep.
+        max_displacement: f32,
+        /// k times λ's natural scale, m².
+        artificial_pressure: f32,
+        /// Unused.
+        padding: f32,
+    }
+);
+
+mirror!(
+    /// `Phase` of shared/phase.wgsl.
+    Phase {
+        /// First particle of the chunk; even.
+        first: u32,
+        /// Threads.
+        count: u32,
+        /// 1 for all, 2 for one colour.
+        stride: u32,
+        /// 0 or 1.
+        colour: u32,
+        /// Where even particles stand in `predicted`.
+        read_even: u32,
+        /// Where odd particles stand.
+        read_odd: u32,
+        /// Where corrections are written.
+        write: u32,
+        /// Particles of the chunk.
+        chunk_count: u32,
+    }
+);
+
+mirror!(
+    /// `SolidGrid` of shared/confine.wgsl.
+    SolidGrid {
+        /// Relative to the domain's least corner.
+        origin: [f32; 3],
+        /// Metres.
+        spacing: f32,
+        /// Nodes.
+        dims: [u32; 3],
+        /// Unused.
+        padding: u32,
+    }
+);

@@ -1,0 +1,446 @@
+//! Position-based fluids (Macklin and Müller 2013) with the red/black iteration.
+
+use glam::{DVec3, Vec3};
+
+use crate::{
+    domain::{
+        particles::Particles,
+        solver::{Solver, StepReport},
+        sph::Calibration,
+    },
+    gpu::{
+        adapter::Context,
+        program::Program,
+        recording::{Command, Recording, Timer, spread},
+        sort,
+    },
+    scene::{
+        Scene, Stop,
+        plan::{Counts, DeviceLimits, Plan, SHARED_CONSTANTS},
+    },
+};
+
+use super::{SolveError, boundary::Boundary, iteration::Builder, params::Params};
+
+/// Particles keep this part of their spacing from walls and solids; at rest the lattice stands at 0.5.
+const CONTACT: f64 = 0.25;
+
+/// Largest correction of one iteration, in units of d (METHODS §1: about half).
+const MAX_CORRECTION: f64 = 0.5;
+
+/// Displacement cap of a substep over the CFL displacement: what speeds up within a frame beyond this is
+/// slowed and counted.
+const CAP: f64 = 2.0;
+
+/// ε of λ's denominator over the bulk's Σ|∇C|². As large as that sum it doubles the iterations (measured).
+const REGULARIZATION: f64 = 1e-3;
+
+/// Far from everything, and still finite when squared.
+const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
+
+/// PBF on a device.
+pub struct Pbf {
+    program: Program,
+    plan: Plan,
+    scene: Scene,
+    calibration: Calibration,
+    substep: Recording,
+    measure: Recording,
+    timer: Option<Timer>,
+    state: Particles,
+    frame: u32,
+}
+
+impl Pbf {
+    /// Builds what the plan for `scene` with `particles` particles names, and nothing more.
+    ///
+    /// # Errors
+    /// A buffer over the adapter's limits, with the figures; a shader or the device at fault.
+    pub fn new(
+        context: &Context,
+        scene: &Scene,
+        particles: usize,
+        boundary: &Boundary,
+        is_timed: bool,
+    ) -> Result<Self, SolveError> {
+        let counts = Counts {
+            particles,
+            ..boundary.counts()
+        };
+        let plan = Plan::new(scene, counts, device_limits(context));
+        let buffers: Vec<_> = plan
+            .buffers
+            .iter()
+            .map(|buffer| buffer.spec.clone())
+            .collect();
+        let passes: Vec<_> = plan.passes.iter().map(|pass| pass.spec.clone()).collect();
+        let program = Program::new(context, &buffers, &passes, &SHARED_CONSTANTS)?;
+        let pbf = &scene.solver.pbf;
+        let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
+        let mut builder = Builder::new(&plan);
+        let substep = Recording::new(&program, &substep_commands(&plan, scene, &mut builder));
+        let measure = Recording::new(&program, &measure_commands(&plan, &mut builder));
+        program.upload("phases", 0, &builder.phase_slots());
+        program.upload(
+            "cell_start.lengths",
+            0,
+            &sort::scan_lengths(cell_count(&plan)),
+        );
+        program.upload("element_count", 0, &[particles as u32, 0, 0, 0]);
+        let last = 2 * particles + counts.boundary_samples;
+        program.upload("predicted", 16 * last as u64, &[NOBODY]);
+        boundary.upload(&program, scene, &plan, &calibration);
+        Ok(Self {
+            timer: if is_timed { Timer::new(context) } else { None },
+            program,
+            plan,
+            scene: scene.clone(),
+            calibration,
+            substep,
+            measure,
+            state: Particles::default(),
+            frame: 0,
+        })
+    }
+
+    /// What was built.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Names of the passes that a substep and a frame's measurement run, in order.
+    pub fn recorded_passes(&self) -> Vec<&'static str> {
+        self.substep.passes().chain(self.measure.passes()).collect()
+    }
+
+    /// The named buffer's first `count` values, such as `lambda` or `density`, in sorted order.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn field<T: bytemuck::Pod>(&self, name: &str, count: usize) -> Result<Vec<T>, SolveError> {
+        Ok(self.program.download(&[(name, count)])?.remove(0))
+    }
+
+    fn upload_state(&self) {
+        let origin = self.scene.domain.min;
+        let local = |p: &[f32; 3]| {
+            let x = (Vec3::from_array(*p).as_dvec3() - origin).as_vec3();
+            [x.x, x.y, x.z, 1.0]
+        };
+        let position: Vec<[f32; 4]> = self.state.position.iter().map(local).collect();
+        let velocity: Vec<[f32; 4]> = self
+            .state
+            .velocity
+            .iter()
+            .map(|v| [v[0], v[1], v[2], 0.0])
+            .collect();
+        self.program.upload("position", 0, &position);
+        self.program.upload("velocity", 0, &velocity);
+        self.program.upload("id", 0, &self.state.id);
+    }
+
+    /// Substeps that the CFL number asks of the next frame: from the speeds in the state, what gravity adds
+    /// within the frame, and the fastest wave-maker.
+    fn substeps(&self, start: f64, length: f64) -> Result<u32, SolveError> {
+        let pbf = &self.scene.solver.pbf;
+        let free = max_speed(&self.state) + self.scene.water.gravity.length() * length;
+        let wall = self
+            .scene
+            .wave_makers
+            .iter()
+            .map(|w| w.motion.peak_speed(start, start + length));
+        let speed = wall.fold(free, f64::max);
+        let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
+            .ceil()
+            .max(1.0);
+        if wanted > f64::from(pbf.max_substeps) {
+            return Err(SolveError::Numbers {
+                frame: self.frame + 1,
+                what: format!(
+                    "{speed:.3} m/s asks for {wanted} substeps at cfl {}, and solver.pbf.max_substeps is {}",
+                    pbf.cfl, pbf.max_substeps
+                ),
+            });
+        }
+        Ok(wanted as u32)
+    }
+
+    fn params(&self, time: f64, step: f64) -> Params {
+        let pbf = &self.scene.solver.pbf;
+        let calibration = &self.calibration;
+        let size = self.scene.domain.size();
+        let (mut low, mut high) = (DVec3::ZERO, size);
+        for maker in &self.scene.wave_makers {
+            let inward = maker.motion.displacement(time);
+            if maker.wall.is_max {
+                high[maker.wall.axis] -= inward;
+            } else {
+                low[maker.wall.axis] += inward;
+            }
+        }
+        let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
+        Params {
+            velocity_step: (self.scene.water.gravity * step).as_vec3().to_array(),
+            particle_count: self.plan.counts.particles as u32,
+            grid_dims: self.plan.grid_dims,
+            max_correction: (MAX_CORRECTION * pbf.particle_spacing) as f32,
+            wall_min: low.as_vec3().to_array(),
+            time_step: step as f32,
+            wall_max: high.as_vec3().to_array(),
+            inverse_time_step: if step > 0.0 { (1.0 / step) as f32 } else { 0.0 },
+            support_radius: calibration.support_radius as f32,
+            inverse_support_radius: (1.0 / calibration.support_radius) as f32,
+            nobody: (self.plan.counts.particles + self.plan.counts.boundary_samples) as u32,
+            density_scale: calibration.density_scale as f32,
+            gradient_scale: calibration.gradient_scale as f32,
+            wall_density_scale: calibration.wall_density_scale as f32,
+            regularization: (REGULARIZATION * calibration.bulk_gradient_squares) as f32,
+            relaxation: pbf.relaxation as f32,
+            contact_distance: (CONTACT * pbf.particle_spacing) as f32,
+            max_displacement: (CAP * pbf.cfl * pbf.particle_spacing) as f32,
+            artificial_pressure: (pbf.artificial_pressure * natural_lambda) as f32,
+            padding: 0.0,
+        }
+    }
+
+    fn run_substep(&mut self, time: f64, step: f64) -> Result<(), SolveError> {
+        self.program.upload("params", 0, &[self.params(time, step)]);
+        if let Stop::DensityError { .. } = self.scene.solver.pbf.stop {
+            self.program.upload("control", 0, &self.control());
+        }
+        Ok(self.substep.run(&self.program, self.timer.as_mut())?)
+    }
+
+    /// A fresh `control`: not done, no iterations, and the groups of the largest chunk over all and over a colour.
+    fn control(&self) -> [u32; 12] {
+        let largest = self
+            .plan
+            .chunks
+            .iter()
+            .map(|chunk| chunk.count as u64)
+            .max()
+            .unwrap_or(0);
+        let [x, y, z] = spread(&self.program.context, 64, largest);
+        let [half_x, half_y, half_z] = spread(&self.program.context, 64, largest.div_ceil(2));
+        [0, 0, 0, 0, x, y, z, 0, half_x, half_y, half_z, 0]
+    }
+
+    /// Sorts at the frame's last positions, measures density there, and reads everything back.
+    fn read_state(&mut self, time: f64) -> Result<(Vec<f32>, [u32; 4]), SolveError> {
+        self.program.upload("params", 0, &[self.params(time, 0.0)]);
+        self.measure.run(&self.program, self.timer.as_mut())?;
+        let n = self.plan.counts.particles;
+        let mut vectors = self
+            .program
+            .download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
+        let (velocity, position) = (
+            vectors.pop().unwrap_or_default(),
+            vectors.pop().unwrap_or_default(),
+        );
+        let mut words =
+            self.program
+                .download::<u32>(&[("id", n), ("sorted_id", n), ("counters", 4)])?;
+        let counters = words
+            .pop()
+            .and_then(|c| <[u32; 4]>::try_from(c).ok())
+            .unwrap_or_default();
+        let (sorted_id, id) = (
+            words.pop().unwrap_or_default(),
+            words.pop().unwrap_or_default(),
+        );
+        let density = self.field::<f32>("density", n)?;
+
+        let slot_of = slots_by_id(&self.state.id);
+        let origin = self.scene.domain.min;
+        for k in 0..n {
+            let slot = slot_of(id[k]);
+            let [x, y, z, _] = position[k];
+            let world = origin + DVec3::new(f64::from(x), f64::from(y), f64::from(z));
+            self.state.position[slot] = world.as_vec3().to_array();
+            let [x, y, z, _] = velocity[k];
+            self.state.velocity[slot] = [x, y, z];
+        }
+        let mut by_slot = vec![0.0; n];
+        for (&id, &value) in sorted_id.iter().zip(&density) {
+            by_slot[slot_of(id)] = value;
+        }
+        Ok((by_slot, counters))
+    }
+}
+
+impl Solver for Pbf {
+    type Error = SolveError;
+
+    fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), SolveError> {
+        let planned = self.plan.counts.particles;
+        if particles.len() != planned {
+            return Err(SolveError::Count {
+                planned,
+                given: particles.len(),
+            });
+        }
+        self.state = particles.clone();
+        self.frame = frame;
+        self.upload_state();
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
+        let length = 1.0 / self.scene.shot.frames_per_second;
+        let start = f64::from(self.frame) * length;
+        let substeps = self.substeps(start, length)?;
+        let step = length / f64::from(substeps);
+        self.program.upload("counters", 0, &[0u32; 4]);
+        for k in 1..=substeps {
+            self.run_substep(start + f64::from(k) * step, step)?;
+        }
+        let (density, [capped, searched, adaptive_iterations, _]) =
+            self.read_state(start + length)?;
+        self.frame += 1;
+        check_finite(self.frame, &self.state, &density)?;
+        if self.scene.domain.min != DVec3::ZERO {
+            // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
+            self.upload_state();
+        }
+        let iterations = match self.scene.solver.pbf.stop {
+            Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
+            Stop::DensityError { .. } => u64::from(adaptive_iterations),
+        };
+        let report = report(&self.scene, &self.state, &density);
+        let report = StepReport {
+            substeps,
+            iterations,
+            capped: u64::from(capped),
+            searched: u64::from(searched),
+            ..report
+        };
+        Ok((self.state.clone(), report))
+    }
+
+    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+        let total = self.timer.as_ref().map(|timer| &timer.total);
+        total
+            .into_iter()
+            .flatten()
+            .map(|(&name, &(seconds, runs))| (name, seconds, runs))
+            .collect()
+    }
+}
+
+/// The limits of an open device that a plan depends on.
+pub fn device_limits(context: &Context) -> DeviceLimits {
+    DeviceLimits {
+        binding: context.limits.max_storage_buffer_binding_size,
+        buffer: context.limits.max_buffer_size,
+    }
+}
+
+fn cell_count(plan: &Plan) -> usize {
+    plan.grid_dims.iter().map(|&n| n as usize).product()
+}
+
+fn sort_commands(plan: &Plan) -> Vec<Command> {
+    let n = plan.counts.particles;
+    let mut commands = vec![
+        Command::Clear("cell_start"),
+        Command::over("pbf/assign_cells", n),
+    ];
+    commands.extend(sort::scan("cell_start", cell_count(plan)));
+    commands.extend(sort::SORT_PASSES.map(|pass| Command::over(pass, n)));
+    commands.push(Command::over("pbf/reorder", n));
+    commands
+}
+
+fn substep_commands(plan: &Plan, scene: &Scene, builder: &mut Builder<'_>) -> Vec<Command> {
+    let pbf = &scene.solver.pbf;
+    let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
+    commands.extend(sort_commands(plan));
+    if plan.has_lists {
+        builder.over_all("pbf/build_neighbors", &mut commands);
+    }
+    builder.iterations(pbf, &mut commands);
+    builder.finish(pbf, &mut commands);
+    for effect in plan.effect_passes() {
+        builder.over_all(effect, &mut commands);
+    }
+    commands
+}
+
+fn measure_commands(plan: &Plan, builder: &mut Builder<'_>) -> Vec<Command> {
+    let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
+    commands.extend(sort_commands(plan));
+    builder.measure(&mut commands);
+    commands
+}
+
+/// Where a particle stands in a state, by id.
+fn slots_by_id(ids: &[u32]) -> impl Fn(u32) -> usize + use<> {
+    let top = ids.iter().max().map_or(0, |&id| id as usize + 1);
+    let mut slots = vec![0; top];
+    for (slot, &id) in ids.iter().enumerate() {
+        slots[id as usize] = slot;
+    }
+    move |id| slots[id as usize]
+}
+
+fn max_speed(state: &Particles) -> f64 {
+    state
+        .velocity
+        .iter()
+        .map(|v| Vec3::from_array(*v).as_dvec3().length())
+        .fold(0.0, f64::max)
+}
+
+fn check_finite(frame: u32, state: &Particles, density: &[f32]) -> Result<(), SolveError> {
+    let is_bad = |v: &[f32; 3]| !v.iter().all(|x| x.is_finite());
+    let place = (0..state.len()).find(|&k| {
+        is_bad(&state.position[k]) || is_bad(&state.velocity[k]) || !density[k].is_finite()
+    });
+    match place {
+        None => Ok(()),
+        Some(k) => Err(SolveError::Numbers {
+            frame,
+            what: format!(
+                "particle {} is not finite: position {:?}, velocity {:?}, relative density {}",
+                state.id[k], state.position[k], state.velocity[k], density[k]
+            ),
+        }),
+    }
+}
+
+/// Errors and energies of a state; sums run in the order of the ids.
+fn report(scene: &Scene, state: &Particles, density: &[f32]) -> StepReport {
+    let mass = scene.water.rest_density * scene.solver.pbf.particle_spacing.powi(3);
+    let (mut kinetic, mut potential) = (0.0, 0.0);
+    for (x, v) in state.position.iter().zip(&state.velocity) {
+        kinetic += 0.5 * mass * Vec3::from_array(*v).as_dvec3().length_squared();
+        potential -= mass
+            * scene
+                .water
+                .gravity
+                .dot(Vec3::from_array(*x).as_dvec3() - scene.domain.min);
+    }
+    let mut errors: Vec<f64> = density
+        .iter()
+        .map(|&rho| (f64::from(rho) - 1.0).max(0.0))
+        .collect();
+    let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+    errors.sort_unstable_by(f64::total_cmp);
+    let percentile = |p: f64| {
+        errors
+            .get(((errors.len() as f64 * p).ceil() as usize).saturating_sub(1))
+            .copied()
+    };
+    StepReport {
+        substeps: 0,
+        iterations: 0,
+        density_error_mean: mean,
+        density_error_p99: percentile(0.99).unwrap_or(0.0),
+        density_error_max: percentile(1.0).unwrap_or(0.0),
+        kinetic_energy: kinetic,
+        potential_energy: potential,
+        max_speed: max_speed(state),
+        capped: 0,
+        searched: 0,
+    }
+}

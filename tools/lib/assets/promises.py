@@ -1,0 +1,66 @@
+"""What the scenes count on in each file."""
+
+import itertools
+import math
+
+from . import BrokenMesh
+from .check import box, check_solids
+from .city import ALLEY, BLOCKS_X, BLOCKS_Z, CITY_X, CITY_Z, CROSS_STREET, FOOTPRINTS, HEIGHTS
+from .obj import from_obj
+
+MAX_TRIANGLES = 6_000
+MAX_BYTES = 1_000_000
+
+
+def plan_gap(a, b):
+    """Distance between two boxes seen from above."""
+    apart = [max(a[0][k] - b[1][k], b[0][k] - a[1][k], 0.0) for k in (0, 2)]
+    return math.hypot(*apart)
+
+
+def check_city(text):
+    """Refuses a city that is not what the scenes count on; returns a line about it."""
+    vertices, triangles = from_obj(text)
+    found = check_solids(vertices, triangles)
+    boxes = [extent for extent, _ in found]
+
+    def demand(holds, words):
+        if not holds:
+            raise BrokenMesh(f"city: {words}")
+
+    low, high = box(vertices)
+    demand(45 <= len(found) <= 70, f"{len(found)} buildings")
+    demand(len(triangles) <= MAX_TRIANGLES, f"{len(triangles)} triangles")
+    demand(len(text.encode()) < MAX_BYTES, f"{len(text.encode())} bytes")
+    demand(low[0] >= CITY_X[0] and high[0] <= CITY_X[1], f"x from {low[0]} to {high[0]}")
+    demand(low[2] >= CITY_Z[0] and high[2] <= CITY_Z[1], f"z from {low[2]} to {high[2]}")
+    for extent in boxes:
+        demand(extent[0][1] == 0, f"a building off the ground at {extent[0]}")
+        demand(HEIGHTS[0] <= extent[1][1] <= HEIGHTS[1], f"a height of {extent[1][1]}")
+        for k in (0, 2):
+            width = extent[1][k] - extent[0][k]
+            demand(FOOTPRINTS[0] - 1e-4 <= width <= FOOTPRINTS[1], f"a footprint of {width} at {extent[0]}")
+    for a, b in itertools.combinations(boxes, 2):
+        demand(plan_gap(a, b) >= ALLEY - 2e-4, f"an alley of {plan_gap(a, b)} at {a[0]}")
+    for blocks, axis, least in ((BLOCKS_X, 0, CROSS_STREET), (BLOCKS_Z, 2, 0.7)):
+        for (_, start), (end, _) in itertools.pairwise(blocks):
+            demand(end - start >= least - 1e-9, f"a street of {end - start}")
+            for extent in boxes:
+                free = extent[1][axis] <= start + 1e-4 or extent[0][axis] >= end - 1e-4
+                demand(free, f"a building in the street at {extent[0]}")
+    return (
+        f"{len(found)} buildings, {len(triangles)} triangles, {len(text.encode())} bytes, "
+        f"{sum(inside for _, inside in found):.1f} m³, highest {high[1]:.2f} m"
+    )
+
+
+def check_beach(text):
+    """Refuses a beach without the slope it promises; returns a line about it."""
+    vertices, triangles = from_obj(text)
+    [(extent, inside)] = check_solids(vertices, triangles)
+    expected = (20.2 - 11.2) * (2.05 + 0.2) / 2 * 3.4
+    if abs(inside - expected) > 1e-3:
+        raise BrokenMesh(f"beach: {inside} m³ and not {expected}")
+    if extent != ((11.2, -0.2, -0.2), (20.2, 2.05, 3.2)):
+        raise BrokenMesh(f"beach: reaches {extent}")
+    return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.2f} m³"
