@@ -3,16 +3,29 @@
 pub mod effects;
 pub mod plan;
 
+mod allowed;
+mod build;
+mod difference;
+mod document;
+mod error;
+mod load;
+mod spec;
+mod wave_maker;
+mod write;
+
 use std::path::PathBuf;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 
 use crate::domain::{bounds::Bounds, mesh::TriangleMesh, motion::Motion};
 
+pub use difference::{physics_difference, physics_hash};
 pub use effects::Effects;
+pub use error::{Fault, Place, SceneError};
+pub use write::asset_path;
 
 /// A validated scene: SI units, every default settled, every file read.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// What the shot is called and how long it runs.
     pub shot: Shot,
@@ -41,8 +54,20 @@ pub struct Shot {
     pub frames_per_second: f64,
 }
 
+impl Shot {
+    /// Seconds from one frame to the next.
+    pub fn frame_seconds(&self) -> f64 {
+        1.0 / self.frames_per_second
+    }
+
+    /// Seconds from the start to the last frame.
+    pub fn duration(&self) -> f64 {
+        f64::from(self.frames) / self.frames_per_second
+    }
+}
+
 /// Water at the start.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Water {
     /// kg/m³.
     pub rest_density: f64,
@@ -51,20 +76,57 @@ pub struct Water {
     /// Boxes filled with water at rest, metres.
     pub blocks: Vec<Bounds>,
     /// Closed meshes filled with water at rest, in world space.
-    pub meshes: Vec<TriangleMesh>,
+    pub meshes: Vec<PlacedMesh>,
 }
 
 /// A static solid.
-#[derive(Clone, Debug)]
-pub struct Solid {
+pub type Solid = PlacedMesh;
+
+/// A mesh from a file, put into the world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlacedMesh {
     /// The file it came from.
     pub file: PathBuf,
     /// BLAKE3 of that file's bytes, hex.
     pub file_hash: String,
-    /// Applied already to `mesh`.
+    /// As the scene says it.
+    pub placement: Placement,
+    /// What `placement` comes to; applied already to `mesh`.
     pub world_from_file: DAffine3,
     /// World space, metres.
     pub mesh: TriangleMesh,
+}
+
+/// Scale first, then rotation, then translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Metres.
+    pub translate: DVec3,
+    /// About the world's x axis first, then y, then z, as "XYZ Euler" means in Blender and
+    /// Houdini.
+    pub rotate_degrees: DVec3,
+    /// Metres per unit of the file.
+    pub scale: DVec3,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self {
+            translate: DVec3::ZERO,
+            rotate_degrees: DVec3::ZERO,
+            scale: DVec3::ONE,
+        }
+    }
+}
+
+impl Placement {
+    /// The transform from the file's frame to the world.
+    pub fn world_from_file(&self) -> DAffine3 {
+        let [x, y, z] = self.rotate_degrees.to_array().map(f64::to_radians);
+        let rotation =
+            DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x);
+        DAffine3::from_scale_rotation_translation(self.scale, rotation, self.translate)
+    }
 }
 
 /// One of the six domain walls.
@@ -76,8 +138,29 @@ pub struct Wall {
     pub is_max: bool,
 }
 
+impl Wall {
+    /// All six, with the names that scenes use.
+    pub const NAMED: [(&'static str, Self); 6] = [
+        ("-x", Self::new(0, false)),
+        ("+x", Self::new(0, true)),
+        ("-y", Self::new(1, false)),
+        ("+y", Self::new(1, true)),
+        ("-z", Self::new(2, false)),
+        ("+z", Self::new(2, true)),
+    ];
+
+    const fn new(axis: usize, is_max: bool) -> Self {
+        Self { axis, is_max }
+    }
+
+    /// As scenes name it.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[2 * self.axis + usize::from(self.is_max)].0
+    }
+}
+
 /// A domain wall that moves along its inward normal.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct WaveMaker {
     /// Which wall.
     pub wall: Wall,
@@ -109,7 +192,7 @@ pub struct Pbf {
     pub relaxation: f64,
     /// k of the artificial pressure s_corr, with λ's natural scale as unit; 0 leaves it out.
     pub artificial_pressure: f64,
-    /// Most neighbours kept in a particle's list.
+    /// Most substeps in a frame; a scene that needs more is stopped, never stepped more coarsely.
     pub max_substeps: u32,
 }
 

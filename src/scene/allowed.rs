@@ -1,0 +1,141 @@
+//! What each key of a scene allows, in words: one table for every message.
+
+/// What the value at a dotted path may be; indices do not matter.
+pub(super) fn of(path: &str) -> Option<&'static str> {
+    let mut plain = String::with_capacity(path.len());
+    let mut depth = 0;
+    for c in path.chars() {
+        match c {
+            '[' => depth += 1,
+            ']' => depth -= 1,
+            _ if depth == 0 => plain.push(c),
+            _ => {}
+        }
+    }
+    TABLE
+        .iter()
+        .find(|(key, _)| *key == plain)
+        .map(|(_, allowed)| *allowed)
+}
+
+const TRANSLATE: &str = "three finite numbers, metres";
+const ROTATE: &str = "three finite numbers, degrees about x, then y, then z";
+const SCALE: &str = "a number other than 0, or three of them";
+const BLAKE3: &str = "the BLAKE3 of the file in hex, or nothing";
+
+const TABLE: &[(&str, &str)] = &[
+    ("shot", "a table with name, frames, frames_per_second"),
+    (
+        "shot.name",
+        "1 to 100 letters, digits, \"_\", \"-\" and \".\", the first a letter or digit",
+    ),
+    ("shot.frames", "a whole number from 1 to 1000000"),
+    (
+        "shot.frames_per_second",
+        "a number above 0, up to 100000, per second",
+    ),
+    ("domain", "a table with min and max"),
+    ("domain.min", "three finite numbers, metres, below max"),
+    (
+        "domain.max",
+        "three finite numbers, metres, above min, up to 1e6",
+    ),
+    (
+        "water",
+        "a table with rest_density, gravity, block and mesh",
+    ),
+    ("water.rest_density", "a number above 0, up to 1e6, kg/m³"),
+    ("water.gravity", "three finite numbers up to 1e4, m/s²"),
+    ("water.block", "an array of tables [[water.block]]"),
+    (
+        "water.block.min",
+        "three finite numbers, metres, in the domain and below max",
+    ),
+    (
+        "water.block.max",
+        "three finite numbers, metres, in the domain and above min",
+    ),
+    ("water.mesh", "an array of tables [[water.mesh]]"),
+    (
+        "water.mesh.file",
+        "a closed .obj, .ply or .stl within the domain, relative to the scene file",
+    ),
+    ("water.mesh.blake3", BLAKE3),
+    ("water.mesh.translate", TRANSLATE),
+    ("water.mesh.rotate_degrees", ROTATE),
+    ("water.mesh.scale", SCALE),
+    ("solid", "an array of tables [[solid]]"),
+    (
+        "solid.mesh",
+        "a closed .obj, .ply or .stl that reaches into the domain, relative to the scene file",
+    ),
+    ("solid.blake3", BLAKE3),
+    ("solid.translate", TRANSLATE),
+    ("solid.rotate_degrees", ROTATE),
+    ("solid.scale", SCALE),
+    ("wave_maker", "an array of tables [[wave_maker]]"),
+    (
+        "wave_maker.wall",
+        "\"-x\", \"+x\", \"-y\", \"+y\", \"-z\" or \"+z\", each once",
+    ),
+    (
+        "wave_maker.motion",
+        "a motion that leaves at least two particle spacings between the walls",
+    ),
+    (
+        "wave_maker.motion.kind",
+        "\"constant_velocity\", \"sine\", \"solitary\" or \"table\"",
+    ),
+    ("wave_maker.motion.velocity", "a number above 0, m/s inward"),
+    ("wave_maker.motion.until", "a number above 0, seconds"),
+    ("wave_maker.motion.stroke", "a number above 0, metres"),
+    ("wave_maker.motion.period", "a number above 0, seconds"),
+    (
+        "wave_maker.motion.ramp",
+        "a number from 0, seconds; one period if left out",
+    ),
+    (
+        "wave_maker.motion.height",
+        "a number above 0, at most the depth, metres",
+    ),
+    ("wave_maker.motion.depth", "a number above 0, metres"),
+    (
+        "wave_maker.motion.file",
+        "a CSV of time,displacement (seconds, metres), relative to the scene file",
+    ),
+    (
+        "wave_maker.motion.points",
+        "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0",
+    ),
+    ("solver", "a table with method and pbf"),
+    ("solver.method", "\"pbf\""),
+    ("solver.pbf", "a table with at least particle_spacing"),
+    (
+        "solver.pbf.particle_spacing",
+        "a number above 0, metres, with at most 65536 cells along an axis, 2147483647 cells and \
+         134217728 particles",
+    ),
+    ("solver.pbf.support_ratio", "a number from 1.5 to 4"),
+    ("solver.pbf.iteration", "\"red_black\" or \"jacobi\""),
+    (
+        "solver.pbf.iterations",
+        "a whole number from 1 to 10000; not together with density_error",
+    ),
+    (
+        "solver.pbf.density_error",
+        "a number above 0 and below 1, with max_iterations",
+    ),
+    (
+        "solver.pbf.max_iterations",
+        "a whole number from 1 to 10000, with density_error",
+    ),
+    ("solver.pbf.cfl", "a number above 0, up to 5"),
+    ("solver.pbf.relaxation", "a number above 0, up to 1.5"),
+    ("solver.pbf.artificial_pressure", "a number from 0 to 10"),
+    ("solver.pbf.max_substeps", "a whole number from 1 to 10000"),
+    // The effects say for themselves what their keys allow.
+    (
+        "effects",
+        "a table of effects; those not named do not exist",
+    ),
+];

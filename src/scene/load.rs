@@ -1,0 +1,319 @@
+//! From a file to a [`Scene`].
+
+use std::{fs, path::Path};
+
+use serde::Deserialize as _;
+
+use super::{Scene, build, document::Document, error::SceneError, spec::SceneSpec};
+
+impl Scene {
+    /// Loads a scene file with overrides (`solver.pbf.iterations=8`: dotted keys, TOML values or
+    /// bare words) laid over it. Mesh and table paths are relative to the file.
+    ///
+    /// # Errors
+    /// One [`SceneError`] that names file, line, key, and what is allowed.
+    pub fn load(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let text = fs::read_to_string(path).map_err(|source| SceneError::Read {
+            file: path.to_owned(),
+            source,
+        })?;
+        let base_dir = path.parent().unwrap_or(Path::new(""));
+        Self::parse(&text, path, base_dir, overrides)
+    }
+
+    /// [`Self::load`] on a text; `file` names it in messages, `base_dir` is where relative paths
+    /// start.
+    ///
+    /// # Errors
+    /// Those of [`Self::load`].
+    pub fn parse(
+        text: &str,
+        file: &Path,
+        base_dir: &Path,
+        overrides: &[String],
+    ) -> Result<Self, SceneError> {
+        let (document, root) = Document::parse(text, file, overrides)?;
+        let spec = SceneSpec::deserialize(toml::Deserializer::from(root))
+            .map_err(|error| document.translate(&error))?;
+        build::scene(&document, base_dir, spec)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use glam::DVec3;
+
+    use super::super::{Iteration, Stop, physics_difference, physics_hash};
+    use super::*;
+    use crate::domain::{motion::Motion, sampling, signed_distance::SignedDistance};
+
+    const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
+        f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
+
+    const FULL: &str = r#"
+[shot]
+name = "full"
+frames = 60
+frames_per_second = 30
+[domain]
+min = [0, 0, 0]
+max = [10, 5, 4]
+[water]
+rest_density = 1025.0
+gravity = [0.0, -9.81, 0.0]
+[[water.block]]
+min = [0, 0, 0]
+max = [4, 1, 4]
+[[water.mesh]]
+file = "cube.obj"
+translate = [1.0, 2.0, 1.0]
+[[solid]]
+mesh = "cube.obj"
+translate = [8.0, 0.0, 2.0]
+rotate_degrees = [0.0, 30.0, 0.0]
+scale = [1.0, 2.0, 0.5]
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "solitary", height = 0.2, depth = 1.0 }
+[[wave_maker]]
+wall = "+z"
+motion = { kind = "table", file = "push.csv" }
+[solver]
+method = "pbf"
+[solver.pbf]
+particle_spacing = 0.1
+iteration = "jacobi"
+density_error = 0.01
+max_iterations = 40
+relaxation = 0.5
+[effects]
+vorticity_confinement = { strength = 0.1 }
+"#;
+
+    fn assets() -> tempfile::TempDir {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        fs::write(dir.path().join("cube.obj"), CUBE).expect("written");
+        fs::write(dir.path().join("push.csv"), "time,x\n# rest\n0,0\n1,0.5\n").expect("written");
+        dir
+    }
+
+    fn parse(dir: &Path, text: &str, overrides: &[&str]) -> Result<Scene, String> {
+        let overrides: Vec<_> = overrides.iter().map(|&s| s.to_owned()).collect();
+        Scene::parse(text, Path::new("s.toml"), dir, &overrides).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn everything_that_is_written_is_meant() {
+        let dir = assets();
+        let scene = parse(dir.path(), FULL, &[]).expect("valid");
+        assert_eq!(scene.shot.duration(), 2.0);
+        assert_eq!(scene.domain.max, DVec3::new(10.0, 5.0, 4.0));
+        assert_eq!(scene.water.rest_density, 1025.0);
+        assert_eq!(
+            scene.water.meshes[0].mesh.bounds().expect("a cube").min,
+            DVec3::new(1.0, 2.0, 1.0)
+        );
+        let solid = &scene.solids[0];
+        assert!((solid.mesh.signed_volume() - 1.0).abs() < 1e-12);
+        assert_eq!(
+            solid.file_hash,
+            blake3::hash(CUBE.as_bytes()).to_hex().to_string()
+        );
+        // The corner (1, 0, 0) scaled, then turned by 30° about y, then moved.
+        let corner = solid.world_from_file.transform_point3(DVec3::X);
+        let expected = DVec3::new(8.0 + 30f64.to_radians().cos(), 0.0, 2.0 - 0.5);
+        assert!((corner - expected).length() < 1e-12);
+        assert_eq!(scene.wave_makers[0].wall.name(), "-x");
+        assert_eq!(
+            scene.wave_makers[1].motion,
+            Motion::Table {
+                points: vec![[0.0, 0.0], [1.0, 0.5]]
+            }
+        );
+        let pbf = &scene.solver.pbf;
+        assert_eq!(pbf.iteration, Iteration::Jacobi);
+        assert_eq!(
+            pbf.stop,
+            Stop::DensityError {
+                density_error: 0.01,
+                max_iterations: 40
+            }
+        );
+        assert_eq!(
+            (pbf.support_ratio, pbf.cfl, pbf.relaxation, pbf.max_substeps),
+            (2.0, 1.0, 0.5, 32)
+        );
+        assert_eq!(scene.effects.viscosity, None);
+        assert_eq!(
+            scene.effects.vorticity_confinement.map(|v| v.strength),
+            Some(0.1)
+        );
+    }
+
+    #[test]
+    fn overrides_reach_everywhere_and_take_bare_words() {
+        let dir = assets();
+        let overrides = [
+            "solver.pbf.iteration=red_black",
+            "solver.pbf.particle_spacing = 0.2",
+            "water.block[0].max=[2, 1, 4]",
+            "water.block.0.min=[0.5, 0, 0]",
+            "effects.viscosity.xsph=0.02",
+            "shot.name=other-name",
+        ];
+        let scene = parse(dir.path(), FULL, &overrides).expect("valid");
+        assert_eq!(scene.solver.pbf.iteration, Iteration::RedBlack);
+        assert_eq!(scene.solver.pbf.particle_spacing, 0.2);
+        assert_eq!(scene.water.blocks[0].max.x, 2.0);
+        assert_eq!(scene.water.blocks[0].min.x, 0.5);
+        assert_eq!(scene.effects.viscosity.map(|v| v.xsph), Some(0.02));
+        assert_eq!(scene.shot.name, "other-name");
+
+        for (bad, expected) in [
+            ("frames", "no \"=\""),
+            ("=3", "no dotted key"),
+            ("shot..frames=3", "no dotted key"),
+            ("shot.frames=", "neither a TOML value"),
+            ("shot.frames={", "neither a TOML value"),
+            (
+                "shot.frames.x=3",
+                "cannot be set within a value of type integer",
+            ),
+            ("water.block[7].max=[1,1,1]", "no index into an array of 1"),
+            (
+                "shot.frames=0",
+                "with --set shot.frames=0: shot.frames: 0 is out of range; allowed: a whole number",
+            ),
+            (
+                "solver.pbf.iteratons=3",
+                "solver.pbf.iteratons: unknown key; the nearest is \"iterations\"",
+            ),
+            (
+                "water.block=[{min=[0,0,0],max=[99,1,1]}]",
+                "water.block[0].max: the water does not fit",
+            ),
+        ] {
+            let message = parse(dir.path(), FULL, &[bad]).expect_err(bad);
+            assert!(message.contains(expected), "{message} lacks {expected}");
+            assert!(message.contains(&format!("--set {bad}")), "{message}");
+        }
+    }
+
+    #[test]
+    fn what_is_written_loads_again_equal() {
+        let dir = assets();
+        let mut scene = parse(dir.path(), FULL, &[]).expect("valid");
+        let text = scene.to_toml(&|file, _| {
+            file.file_name()
+                .map(|n| n.to_string_lossy().into_owned())
+                .unwrap_or_default()
+        });
+        let again = parse(dir.path(), &text, &[]).expect("valid");
+        assert_eq!(scene, again);
+        assert!(text.contains("artificial_pressure = 0.0"), "{text}");
+        assert_eq!(scene.mesh_files().len(), 1);
+
+        // Control: one number apart is not equal.
+        scene.solver.pbf.cfl = 0.9;
+        assert_ne!(scene, again);
+        // A mesh that is not the one that was baked is refused.
+        fs::write(
+            dir.path().join("cube.obj"),
+            CUBE.replace("v 1 1 1", "v 1 1 2"),
+        )
+        .expect("written");
+        let message = parse(dir.path(), &text, &[]).expect_err("another mesh");
+        assert!(message.contains("water.mesh[0].blake3"), "{message}");
+    }
+
+    #[test]
+    fn physics_is_compared_by_key() {
+        let dir = assets();
+        let written = |overrides: &[&str], path: &str| {
+            let scene = parse(dir.path(), FULL, overrides).expect("valid");
+            (scene.to_toml(&|_, _| path.to_owned()), physics_hash(&scene))
+        };
+        let (base, base_hash) = written(&[], "assets/a.obj");
+        let same: [&[&str]; 3] = [&[], &["shot.frames=7"], &["shot.name=b"]];
+        for overrides in same {
+            let (other, hash) = written(overrides, "b.obj");
+            assert_eq!(physics_difference(&base, &other).expect("TOML"), None);
+            assert_eq!(hash, base_hash);
+        }
+        for (set, expected) in [
+            (
+                "solver.pbf.particle_spacing=0.125",
+                "solver.pbf.particle_spacing was 0.1, is now 0.125",
+            ),
+            (
+                "effects.viscosity.xsph=0.5",
+                "effects.viscosity.xsph was absent, is now 0.5",
+            ),
+            (
+                "shot.frames_per_second=24",
+                "shot.frames_per_second was 30.0, is now 24.0",
+            ),
+            (
+                "solid[0].scale=1.0",
+                "solid[0].scale[1] was 2.0, is now 1.0",
+            ),
+        ] {
+            let (other, hash) = written(&[set], "a.obj");
+            assert_eq!(
+                physics_difference(&base, &other).expect("TOML").as_deref(),
+                Some(expected)
+            );
+            assert_ne!(hash, base_hash);
+        }
+        fs::write(dir.path().join("cube.obj"), format!("{CUBE}# another\n")).expect("written");
+        let (other, hash) = written(&[], "assets/a.obj");
+        let difference = physics_difference(&base, &other)
+            .expect("TOML")
+            .expect("another file");
+        assert!(
+            difference.starts_with("solid[0].blake3 was"),
+            "{difference}"
+        );
+        assert_ne!(hash, base_hash);
+        assert!(matches!(
+            physics_difference("[", &base),
+            Err(SceneError::NotToml { .. })
+        ));
+    }
+
+    #[test]
+    fn the_scenes_that_ship_fit_together() {
+        let scenes = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes");
+        for (name, in_blocks, has_solid) in [
+            ("quickstart", 41_712, true),
+            ("wave-city", 201_000, true),
+            ("dam-break", 81_920, false),
+            ("wave-tank", 320 * 16 * 48, true),
+        ] {
+            let scene = Scene::load(&scenes.join(name).with_extension("toml"), &[]).expect(name);
+            assert_eq!(scene.shot.name, name);
+            let d = scene.solver.pbf.particle_spacing;
+            let solids = scene.solids.iter().map(|s| &s.mesh);
+            let solid = SignedDistance::from_meshes(solids, &scene.domain, 2.0 * d).expect(name);
+            assert_eq!(solid.is_some(), has_solid);
+            let blocks = &scene.water.blocks;
+            let fill = sampling::fill_water(blocks, [], solid.as_ref(), &scene.domain, d);
+            let fill = fill.expect("no water meshes");
+            assert_eq!(fill.particles.len() + fill.removed, in_blocks, "{name}");
+            // Only the beach stands in water: (4 m × 1 m / 2 + 4 m × 1 m) × 3 m of it, and half a
+            // layer along its slope, 0.4 m³.
+            let displaced = fill.removed as f64 * d.powi(3);
+            let expected = if name == "wave-tank" { 18.0 } else { 0.0 };
+            assert!(
+                (displaced - expected).abs() <= 0.03 * expected,
+                "{name} {displaced}"
+            );
+            for solid in &scene.solids {
+                let samples = sampling::boundary_samples(&solid.mesh, &scene.domain, d);
+                assert!(samples.len() > 1000, "{name}");
+            }
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! A scene as TOML again, every default written out.
+
+use std::{
+    fmt::{self, Write as _},
+    path::{Path, PathBuf},
+};
+
+use glam::DVec3;
+
+use super::{Iteration, PlacedMesh, Scene, Stop};
+use crate::domain::{bounds::Bounds, motion::Motion};
+
+/// Where a cache keeps its own copy of a mesh file: `assets/NAME-HASH.EXT`, so that two files of
+/// one name stay apart.
+pub fn asset_path(file: &Path, file_hash: &str) -> String {
+    let part = |s: Option<&std::ffi::OsStr>| -> String {
+        s.map(|s| s.to_string_lossy().into_owned())
+            .unwrap_or_default()
+            .chars()
+            .map(|c| {
+                if c.is_ascii_alphanumeric() || c == '_' {
+                    c
+                } else {
+                    '-'
+                }
+            })
+            .collect()
+    };
+    let short = file_hash.get(..16).unwrap_or(file_hash);
+    format!(
+        "assets/{}-{short}.{}",
+        part(file.file_stem()),
+        part(file.extension()).to_ascii_lowercase()
+    )
+}
+
+impl Scene {
+    /// The mesh files that the scene was built from, with their BLAKE3, each once.
+    pub fn mesh_files(&self) -> Vec<(PathBuf, String)> {
+        let mut files = Vec::new();
+        for placed in self.solids.iter().chain(&self.water.meshes) {
+            let file = (placed.file.clone(), placed.file_hash.clone());
+            if !files.contains(&file) {
+                files.push(file);
+            }
+        }
+        files
+    }
+
+    /// The scene as TOML with every default written out and motion tables in place; loading it
+    /// again gives an equal scene. `mesh_path` says where a file (given with its hash) will be
+    /// found, relative to where the text is kept: [`asset_path`] for a cache.
+    pub fn to_toml(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> String {
+        let mut out = String::new();
+        // Writing to a String cannot fail.
+        let written = self.write(&mut out, mesh_path);
+        debug_assert!(written.is_ok());
+        out
+    }
+
+    fn write(&self, out: &mut String, mesh_path: &dyn Fn(&Path, &str) -> String) -> fmt::Result {
+        writeln!(out, "[shot]")?;
+        writeln!(out, "name = {}", text(&self.shot.name))?;
+        writeln!(out, "frames = {}", self.shot.frames)?;
+        writeln!(out, "frames_per_second = {:?}", self.shot.frames_per_second)?;
+        writeln!(out, "\n[domain]")?;
+        write_box(out, &self.domain)?;
+        writeln!(out, "\n[water]")?;
+        writeln!(out, "rest_density = {:?}", self.water.rest_density)?;
+        writeln!(out, "gravity = {}", vector(self.water.gravity))?;
+        for block in &self.water.blocks {
+            writeln!(out, "\n[[water.block]]")?;
+            write_box(out, block)?;
+        }
+        for mesh in &self.water.meshes {
+            writeln!(out, "\n[[water.mesh]]")?;
+            write_mesh(out, "file", mesh, mesh_path)?;
+        }
+        for solid in &self.solids {
+            writeln!(out, "\n[[solid]]")?;
+            write_mesh(out, "mesh", solid, mesh_path)?;
+        }
+        for maker in &self.wave_makers {
+            writeln!(out, "\n[[wave_maker]]")?;
+            writeln!(out, "wall = {}", text(maker.wall.name()))?;
+            writeln!(out, "motion = {}", motion(&maker.motion))?;
+        }
+        self.write_solver(out)?;
+        writeln!(out, "\n[effects]")?;
+        // An effect is a table of numbers, which toml can always write.
+        let effects = toml::Table::try_from(&self.effects).unwrap_or_default();
+        for (name, settings) in effects {
+            writeln!(out, "{name} = {settings}")?;
+        }
+        Ok(())
+    }
+
+    fn write_solver(&self, out: &mut String) -> fmt::Result {
+        let pbf = &self.solver.pbf;
+        writeln!(out, "\n[solver]\nmethod = \"pbf\"\n\n[solver.pbf]")?;
+        writeln!(out, "particle_spacing = {:?}", pbf.particle_spacing)?;
+        writeln!(out, "support_ratio = {:?}", pbf.support_ratio)?;
+        let iteration = match pbf.iteration {
+            Iteration::Jacobi => "jacobi",
+            Iteration::RedBlack => "red_black",
+        };
+        writeln!(out, "iteration = {}", text(iteration))?;
+        match pbf.stop {
+            Stop::Iterations(n) => writeln!(out, "iterations = {n}")?,
+            Stop::DensityError {
+                density_error,
+                max_iterations,
+            } => {
+                writeln!(out, "density_error = {density_error:?}")?;
+                writeln!(out, "max_iterations = {max_iterations}")?;
+            }
+        }
+        writeln!(out, "cfl = {:?}", pbf.cfl)?;
+        writeln!(out, "relaxation = {:?}", pbf.relaxation)?;
+        writeln!(out, "artificial_pressure = {:?}", pbf.artificial_pressure)?;
+        writeln!(out, "max_substeps = {}", pbf.max_substeps)
+    }
+}
+
+fn text(s: &str) -> String {
+    toml::Value::from(s).to_string()
+}
+
+/// `{:?}` is the shortest decimal that reads back as the same number, and valid TOML.
+fn vector(v: DVec3) -> String {
+    format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
+}
+
+fn write_box(out: &mut String, bounds: &Bounds) -> fmt::Result {
+    writeln!(out, "min = {}", vector(bounds.min))?;
+    writeln!(out, "max = {}", vector(bounds.max))
+}
+
+fn write_mesh(
+    out: &mut String,
+    key: &str,
+    mesh: &PlacedMesh,
+    mesh_path: &dyn Fn(&Path, &str) -> String,
+) -> fmt::Result {
+    let path = mesh_path(&mesh.file, &mesh.file_hash);
+    writeln!(out, "{key} = {}", text(&path))?;
+    writeln!(out, "blake3 = {}", text(&mesh.file_hash))?;
+    let placement = &mesh.placement;
+    writeln!(out, "translate = {}", vector(placement.translate))?;
+    writeln!(out, "rotate_degrees = {}", vector(placement.rotate_degrees))?;
+    writeln!(out, "scale = {}", vector(placement.scale))
+}
+
+fn motion(motion: &Motion) -> String {
+    match motion {
+        Motion::ConstantVelocity { velocity, until } => {
+            let until = until.map_or(String::new(), |t| format!(", until = {t:?}"));
+            format!("{{ kind = \"constant_velocity\", velocity = {velocity:?}{until} }}")
+        }
+        Motion::Sine {
+            stroke,
+            period,
+            ramp,
+        } => format!(
+            "{{ kind = \"sine\", stroke = {stroke:?}, period = {period:?}, ramp = {ramp:?} }}"
+        ),
+        // Its gravity is the water's.
+        Motion::Solitary { height, depth, .. } => {
+            format!("{{ kind = \"solitary\", height = {height:?}, depth = {depth:?} }}")
+        }
+        Motion::Table { points } => {
+            format!("{{ kind = \"table\", points = {points:?} }}")
+        }
+    }
+}

@@ -1,0 +1,680 @@
+//! Bad input: each fault of a scene has its message, and no bytes make a reader panic.
+
+use std::path::Path;
+
+use proptest::prelude::*;
+use swell::{
+    domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
+    scene::{Scene, SceneError},
+};
+
+const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
+    f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
+
+const SCENE: &str = r#"[shot]
+name = "base"
+frames = 240
+frames_per_second = 60
+
+[domain]
+min = [0.0, 0.0, 0.0]
+max = [25.0, 12.6, 15.0]
+
+[water]
+rest_density = 1000.0
+gravity = [0.0, -9.81, 0.0]
+[[water.block]]
+min = [0.0, 0.0, 0.0]
+max = [13.4, 1.0, 15.0]
+
+[[solid]]
+mesh = "cube.obj"
+translate = [18.0, 0.0, 7.0]
+scale = 2.0
+
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "sine", stroke = 1.5, period = 3.0, ramp = 1.0 }
+
+[solver]
+method = "pbf"
+[solver.pbf]
+particle_spacing = 0.1
+iterations = 4
+
+[effects]
+viscosity = { xsph = 0.01 }
+"#;
+
+/// A folder with one good mesh and some bad ones.
+fn assets() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let files: [(&str, &[u8]); 6] = [
+        ("cube.obj", CUBE.as_bytes()),
+        ("broken.obj", b"v 0 0 0\nv 1 0 x\n"),
+        ("sheet.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+        ("empty.stl", b""),
+        ("push.csv", b"0,0\n1,one\n"),
+        ("back.csv", b"0,0\n1,2\n0.5,3\n"),
+    ];
+    for (name, bytes) in files {
+        std::fs::write(dir.path().join(name), bytes).expect("written");
+    }
+    dir
+}
+
+fn parse(dir: &Path, text: &str) -> Result<Scene, SceneError> {
+    Scene::parse(text, Path::new("scenes/bad.toml"), dir, &[])
+}
+
+/// (what to replace in the good scene, by what, line of the fault, what the message says)
+const FAULTS: &[(&str, &str, usize, &[&str])] = &[
+    // Keys.
+    (
+        "frames = 240",
+        "frame = 240",
+        3,
+        &["shot.frame: unknown key", "nearest is \"frames\""],
+    ),
+    (
+        "iterations = 4",
+        "iteratoins = 4",
+        30,
+        &[
+            "solver.pbf.iteratoins: unknown key",
+            "nearest is \"iterations\"",
+        ],
+    ),
+    (
+        "[effects]",
+        "[efects]",
+        32,
+        &["efects: unknown key", "nearest is \"effects\""],
+    ),
+    (
+        "xsph = 0.01",
+        "xspf = 0.01",
+        33,
+        &["effects.viscosity.xspf: unknown key", "\"xsph\""],
+    ),
+    (
+        "[solver.pbf]",
+        "[solver.flip]",
+        28,
+        &["solver.flip: unknown key", "nearest is \"pbf\""],
+    ),
+    (
+        "stroke = 1.5",
+        "strok = 1.5",
+        24,
+        &["wave_maker[0].motion.strok: unknown key", "\"stroke\""],
+    ),
+    (
+        "stroke = 1.5",
+        "stroke = 1.5, velocity = 1",
+        24,
+        &["motion.velocity: unknown key", "kind \"sine\""],
+    ),
+    (
+        "frames = 240\n",
+        "",
+        1,
+        &["shot.frames: missing", "a whole number from 1"],
+    ),
+    (
+        "particle_spacing = 0.1\n",
+        "",
+        28,
+        &["solver.pbf.particle_spacing: missing"],
+    ),
+    (
+        "period = 3.0, ",
+        "",
+        24,
+        &["wave_maker[0].motion.period: missing"],
+    ),
+    (
+        "[domain]",
+        "[shot.domain]",
+        6,
+        &["shot.domain: unknown key"],
+    ),
+    (
+        "frames = 240",
+        "frames = 240\nframes = 3",
+        4,
+        &["duplicate key"],
+    ),
+    ("frames = 240", "frames = = 3", 3, &["bad.toml:3"]),
+    (
+        "[solver]\nmethod = \"pbf\"\n",
+        "",
+        26,
+        &["solver.method: missing", "\"pbf\""],
+    ),
+    ("xsph = 0.01", "", 33, &["effects.viscosity.xsph: missing"]),
+    (
+        "xsph = 0.01",
+        "xsph = true",
+        33,
+        &["effects.viscosity.xsph: invalid type: boolean `true`"],
+    ),
+    // Types.
+    (
+        "frames = 240",
+        "frames = 1.5",
+        3,
+        &[
+            "shot.frames: invalid type: floating point `1.5`",
+            "a whole number from 1",
+        ],
+    ),
+    (
+        "= 0.1\n",
+        "= \"fine\"\n",
+        29,
+        &[
+            "particle_spacing: invalid type: string \"fine\"",
+            "a number above 0",
+        ],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6]",
+        8,
+        &["domain.max: invalid length 2", "three finite numbers"],
+    ),
+    (
+        "scale = 2.0",
+        "scale = \"big\"",
+        20,
+        &["solid[0].scale: wrong type", "a number other than 0"],
+    ),
+    // Ranges.
+    (
+        "= 0.1\n",
+        "= -0.1\n",
+        29,
+        &[
+            "solver.pbf.particle_spacing: -0.1 is out of range",
+            "a number above 0, metres",
+        ],
+    ),
+    (
+        "= 0.1\n",
+        "= 0\n",
+        29,
+        &["particle_spacing: 0 is out of range"],
+    ),
+    (
+        "= 0.1\n",
+        "= nan\n",
+        29,
+        &["particle_spacing: NaN is out of range"],
+    ),
+    (
+        "= 0.1\n",
+        "= inf\n",
+        29,
+        &["particle_spacing: inf is out of range"],
+    ),
+    (
+        "frames = 240",
+        "frames = 0",
+        3,
+        &["shot.frames: 0 is out of range"],
+    ),
+    (
+        "frames = 240",
+        "frames = -5",
+        3,
+        &["shot.frames: -5 is out of range"],
+    ),
+    (
+        "second = 60",
+        "second = 0",
+        4,
+        &["frames_per_second: 0 is out of range"],
+    ),
+    (
+        "\"base\"",
+        "\"../up\"",
+        2,
+        &["shot.name: \"../up\" is no safe file name", "letters"],
+    ),
+    ("\"base\"", "\"\"", 2, &["shot.name: \"\" is no safe"]),
+    (
+        "iterations = 4",
+        "iterations = 0",
+        30,
+        &["iterations: 0 is out of range"],
+    ),
+    (
+        "iterations = 4",
+        "iterations = 4\ndensity_error = 0.01",
+        30,
+        &["given together with density_error"],
+    ),
+    (
+        "iterations = 4",
+        "density_error = 0.01",
+        30,
+        &["given without max_iterations"],
+    ),
+    (
+        "iterations = 4",
+        "support_ratio = 1",
+        30,
+        &["support_ratio: 1 is out of range", "from 1.5 to 4"],
+    ),
+    (
+        "iterations = 4",
+        "relaxation = 2",
+        30,
+        &["relaxation: 2 is out of range"],
+    ),
+    (
+        "iterations = 4",
+        "iteration = \"gauss\"",
+        30,
+        &["\"gauss\" is no iteration", "red_black"],
+    ),
+    (
+        "\"pbf\"",
+        "\"sph\"",
+        27,
+        &["solver.method: \"sph\" is no method", "\"pbf\""],
+    ),
+    (
+        "gravity = [0.0, -9.81, 0.0]",
+        "gravity = [0.0, nan, 0.0]",
+        12,
+        &["water.gravity", "out of range"],
+    ),
+    (
+        "scale = 2.0",
+        "scale = 0",
+        20,
+        &["solid[0].scale", "out of range"],
+    ),
+    // Boxes.
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, -1.0, 15.0]",
+        8,
+        &["domain.max: the box is inverted: y ends at -1 but starts at 0"],
+    ),
+    (
+        "max = [13.4, 1.0, 15.0]",
+        "max = [13.4, 0.0, 15.0]",
+        15,
+        &["water.block[0].max: the box is inverted"],
+    ),
+    (
+        "max = [13.4, 1.0, 15.0]",
+        "max = [13.4, 1.0, 15.1]",
+        15,
+        &[
+            "water.block[0].max: the water does not fit",
+            "[25, 12.6, 15]",
+        ],
+    ),
+    (
+        "min = [0.0, 0.0, 0.0]\nmax = [13.4",
+        "min = [0.0, -0.5, 0.0]\nmax = [13.4",
+        14,
+        &["water.block[0].min: the water does not fit"],
+    ),
+    (
+        "max = [13.4, 1.0, 15.0]",
+        "max = [13.4, 0.01, 15.0]",
+        15,
+        &["too thin for one layer"],
+    ),
+    // Size.
+    (
+        "= 0.1\n",
+        "= 0.001\n",
+        29,
+        &[
+            "the grid would overflow",
+            "25 × 12.6 × 15 m",
+            "at most 65536 cells",
+        ],
+    ),
+    ("= 0.1\n", "= 1e-9\n", 29, &["the grid would overflow"]),
+    (
+        "= 0.1\n",
+        "= 0.0105\n",
+        29,
+        &["particles 0.0105 m apart", "134217728"],
+    ),
+    (
+        "min = [0.0, 0.0, 0.0]\nmax = [25.0, 12.6, 15.0]",
+        "min = [9e5, 0, 0]\nmax = [9.0001e5, 12.6, 15.0]",
+        29,
+        &["too fine 900010 m from the origin"],
+    ),
+    // Meshes.
+    (
+        "cube.obj",
+        "missing.obj",
+        18,
+        &[
+            "solid[0].mesh: cannot read mesh",
+            "missing.obj",
+            "No such file",
+        ],
+    ),
+    (
+        "cube.obj",
+        "broken.obj",
+        18,
+        &[
+            "solid[0].mesh: mesh",
+            "line 2: a vertex needs three numbers",
+        ],
+    ),
+    ("cube.obj", "empty.stl", 18, &["not an STL: too short"]),
+    ("cube.obj", "cube.fbx", 18, &["unknown extension"]),
+    (
+        "cube.obj",
+        "sheet.obj",
+        18,
+        &["solid[0].mesh", "3 open edges", "close the mesh"],
+    ),
+    (
+        "[18.0, 0.0, 7.0]",
+        "[80.0, 0.0, 7.0]",
+        18,
+        &["solid[0].mesh: the mesh lies outside of the domain"],
+    ),
+    (
+        "scale = 2.0",
+        "blake3 = \"00\"",
+        20,
+        &["solid[0].blake3", "has BLAKE3"],
+    ),
+    ("[[solid]]\nmesh = ", "[[water.mesh]]\nfile = ", 18, &[]),
+    // Wave makers.
+    (
+        "\"-x\"",
+        "\"left\"",
+        23,
+        &["wave_maker[0].wall: \"left\" is no wall", "\"+z\""],
+    ),
+    (
+        "stroke = 1.5",
+        "stroke = 24.9",
+        24,
+        &[
+            "wave_maker[0].motion: the wall -x crosses the whole domain",
+            "of 25 m",
+        ],
+    ),
+    (
+        "stroke = 1.5",
+        "stroke = -1.5",
+        24,
+        &["motion.stroke: -1.5 is out of range"],
+    ),
+    (
+        "ramp = 1.0 }",
+        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"-x\"\nmotion = { kind = \"constant_velocity\", velocity = 1.0 }",
+        26,
+        &["wave_maker[1].wall: a second wave maker on the wall -x"],
+    ),
+    (
+        "ramp = 1.0 }",
+        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 6.0 }",
+        27,
+        &["wave_maker[1].motion: the walls -x and +x collide 3."],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"wobble\"",
+        24,
+        &["motion.kind: \"wobble\" is no kind of motion", "solitary"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"solitary\", height = 2, depth = 1",
+        24,
+        &["motion.height: a wave of 2 m on 1 m"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\", file = \"push.csv\"",
+        24,
+        &["motion.file", "line 2: \"1,one\" is not time,displacement"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\", file = \"back.csv\"",
+        24,
+        &["the time of point 2, 0.5 s"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\", points = [[0, 1], [1, 2]]",
+        24,
+        &["the first displacement is 1"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\"",
+        24,
+        &["motion.points: missing"],
+    ),
+    // Effects.
+    (
+        "xsph = 0.01",
+        "xsph = -1",
+        33,
+        &["effects.viscosity.xsph: out of range; allowed: a number above 0"],
+    ),
+];
+
+#[test]
+fn each_fault_names_file_line_key_and_what_is_allowed() {
+    let dir = assets();
+    parse(dir.path(), SCENE).expect("the good scene is good");
+    let mut wrong = Vec::new();
+    for (old, new, line, expected) in FAULTS {
+        assert!(SCENE.contains(old), "{old}");
+        let result = parse(dir.path(), &SCENE.replacen(old, new, 1));
+        if expected.is_empty() {
+            // A control: the change is allowed.
+            if let Err(error) = result {
+                wrong.push(format!("{new}: {error}"));
+            }
+            continue;
+        }
+        let message = match result {
+            Ok(_) => {
+                wrong.push(format!("{new}: accepted"));
+                continue;
+            }
+            Err(error) => error.to_string(),
+        };
+        let place = format!("scenes/bad.toml:{line}: ");
+        let is_complete = expected.iter().all(|part| message.contains(part));
+        if !message.starts_with(&place) || !is_complete {
+            wrong.push(format!("{message}\n  wanted line {line} and {expected:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_missing_table_and_a_missing_file_are_named() {
+    let dir = assets();
+    let without = SCENE.replace(
+        "[domain]\nmin = [0.0, 0.0, 0.0]\nmax = [25.0, 12.6, 15.0]\n",
+        "",
+    );
+    let message = parse(dir.path(), &without)
+        .expect_err("no domain")
+        .to_string();
+    assert!(
+        message.contains("domain: missing; allowed: a table with min and max"),
+        "{message}"
+    );
+    let error = Scene::load(&dir.path().join("none.toml"), &[]).expect_err("no file");
+    assert!(matches!(error, SceneError::Read { .. }), "{error}");
+}
+
+/// A closed cube in each format, as seeds for mutation.
+fn seeds() -> Vec<(MeshFormat, Vec<u8>)> {
+    let mesh = TriangleMesh::from_bytes(CUBE.as_bytes(), MeshFormat::Obj, Path::new("cube.obj"))
+        .expect("a cube");
+    let mut stl_text = String::from("solid cube\n");
+    let mut stl = vec![0u8; 80];
+    stl.extend((mesh.triangles.len() as u32).to_le_bytes());
+    for t in 0..mesh.triangles.len() {
+        stl_text += "facet normal 0 0 1\nouter loop\n";
+        stl.extend([0u8; 12]);
+        for v in mesh.corners(t) {
+            stl_text += &format!("vertex {} {} {}\n", v.x, v.y, v.z);
+            for x in v.to_array() {
+                stl.extend((x as f32).to_le_bytes());
+            }
+        }
+        stl_text += "endloop\nendfacet\n";
+        stl.extend([0u8; 2]);
+    }
+    stl_text += "endsolid cube\n";
+    let mut vertices = String::new();
+    let mut faces = String::new();
+    let header = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\ncomment seed\nelement vertex 8\nproperty float x\n\
+             property float y\nproperty float z\nelement face {}\n\
+             property list uchar uint vertex_indices\nend_header\n",
+            mesh.triangles.len()
+        )
+    };
+    let mut ply = header("binary_little_endian").into_bytes();
+    for v in &mesh.vertices {
+        vertices += &format!("{} {} {}\n", v.x, v.y, v.z);
+        for x in v.to_array() {
+            ply.extend((x as f32).to_le_bytes());
+        }
+    }
+    for t in &mesh.triangles {
+        faces += &format!("3 {} {} {}\n", t[0], t[1], t[2]);
+        ply.push(3);
+        ply.extend(t.iter().flat_map(|i| i.to_le_bytes()));
+    }
+    let ply_text = header("ascii") + &vertices + &faces;
+    vec![
+        (MeshFormat::Obj, CUBE.as_bytes().to_vec()),
+        (MeshFormat::Stl, stl),
+        (MeshFormat::Stl, stl_text.into_bytes()),
+        (MeshFormat::Ply, ply),
+        (MeshFormat::Ply, ply_text.into_bytes()),
+    ]
+}
+
+#[test]
+fn the_seeds_are_cubes() {
+    for (format, bytes) in seeds() {
+        let mesh = TriangleMesh::from_bytes(&bytes, format, Path::new("seed")).expect("a cube");
+        assert_eq!(
+            (mesh.vertices.len(), mesh.triangles.len()),
+            (8, 12),
+            "{format:?}"
+        );
+        assert_eq!(mesh.check_inside(), Ok(()));
+    }
+}
+
+/// Bytes cut out, overwritten and doubled at random.
+fn mutate(mut bytes: Vec<u8>, edits: &[(u16, u8, u8)]) -> Vec<u8> {
+    for &(at, kind, value) in edits {
+        if bytes.is_empty() {
+            break;
+        }
+        let at = at as usize % bytes.len();
+        match kind % 5 {
+            0 => bytes[at] = value,
+            1 => bytes.truncate(at),
+            2 => bytes.insert(at, value),
+            3 => {
+                let end = (at + value as usize).min(bytes.len());
+                let part = bytes[at..end].to_vec();
+                bytes.extend(part);
+            }
+            _ => {
+                // Text formats break most deeply in their numbers.
+                let digits = [b"-1 ".as_slice(), b"nan", b"1e39", b"99999999999999999999"];
+                let digit = digits[value as usize % digits.len()];
+                bytes.splice(at..at + 1, digit.iter().copied());
+            }
+        }
+    }
+    bytes
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn no_bytes_make_a_mesh_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        for format in [MeshFormat::Obj, MeshFormat::Ply, MeshFormat::Stl] {
+            let _ = TriangleMesh::from_bytes(&bytes, format, Path::new("fuzz"));
+        }
+    }
+
+    #[test]
+    fn no_mutation_makes_a_mesh_reader_panic(
+        seed in 0usize..5,
+        edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
+    ) {
+        let (format, bytes) = seeds().swap_remove(seed);
+        let read = TriangleMesh::from_bytes(&mutate(bytes, &edits), format, Path::new("fuzz"));
+        if let Ok(mesh) = read {
+            prop_assert!(mesh.vertices.iter().all(|v| v.is_finite()));
+            let count = mesh.vertices.len() as u32;
+            prop_assert!(mesh.triangles.iter().flatten().all(|&v| v < count));
+            let _ = mesh.check_inside();
+        }
+    }
+
+    #[test]
+    fn no_tokens_make_the_obj_reader_panic(
+        lines in prop::collection::vec("(v|f|vn|vt|o|g|l|p|usemtl|mtllib|s|\\\\)( -?[0-9]{1,20}(/-?[0-9]{0,19}){0,3}){0,6}", 0..30),
+    ) {
+        let text = lines.join("\n");
+        let _ = TriangleMesh::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("fuzz"));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn no_text_makes_the_scene_parser_panic(text in any::<String>()) {
+        let _ = parse(Path::new("/nowhere"), &text);
+    }
+
+    #[test]
+    fn no_mutation_makes_the_scene_parser_panic(
+        edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
+    ) {
+        let bytes = mutate(SCENE.as_bytes().to_vec(), &edits);
+        // Nothing is allocated for the water here, however much a mutation asks for.
+        let _ = parse(Path::new("/nowhere"), &String::from_utf8_lossy(&bytes));
+    }
+
+    #[test]
+    fn no_override_makes_the_scene_parser_panic(
+        key in "[a-z._\\[\\]0-9]{0,20}",
+        value in any::<String>(),
+        known in "(shot|solver\\.pbf|water\\.block|effects|domain)\\.[a-z0-9_]{0,8}",
+    ) {
+        let overrides = [format!("{key}={value}"), format!("{known}={value}")];
+        let _ = Scene::parse(SCENE, Path::new("s.toml"), Path::new("/nowhere"), &overrides[..1]);
+        let _ = Scene::parse(SCENE, Path::new("s.toml"), Path::new("/nowhere"), &overrides[1..]);
+    }
+}
