@@ -1,2 +1,7 @@
-//! swell.
-fn main() {}
+//! The `swell` command.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    swell::cli::main()
+}

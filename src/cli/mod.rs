@@ -1,4 +1,100 @@
-//! cli.
+//! Arguments in, terminal out: one file a command.
 
+mod bake;
+mod inspect;
 pub mod interrupt;
+mod progress;
 pub mod verify;
+
+use std::{error::Error, process::ExitCode};
+
+use clap::{Parser, Subcommand};
+
+use crate::stage::Blame;
+
+const AFTER: &str = "Exit codes: 0 done; 1 a comparison is out of tolerance; 2 usage, scene or look at fault; \
+    3 no usable device, or device lost; 4 a cache or picture is damaged, of another scene, or cannot be read or \
+    written; 5 the numbers failed, last good frame kept; 130 ended by a signal, resumable.";
+
+/// Offline, film-quality fluid pipeline for ocean-wave shots.
+#[derive(Parser, Debug)]
+#[command(name = "swell", version, after_help = AFTER)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Simulate a scene into a particle cache.
+    Bake(bake::BakeArgs),
+    /// Show a scene's plan, a cache's frames, or this machine's adapters.
+    Inspect(inspect::InspectArgs),
+    /// Check every checksum of a cache.
+    Verify(verify::VerifyArgs),
+}
+
+/// An error with the exit code that it ends the program with.
+#[derive(Debug)]
+struct Failure {
+    code: u8,
+    error: Box<dyn Error>,
+}
+
+impl<E: Error + 'static> From<E> for Failure
+where
+    for<'a> Blame: From<&'a E>,
+{
+    fn from(error: E) -> Self {
+        let code = match Blame::from(&error) {
+            Blame::Input => 2,
+            Blame::Device => 3,
+            Blame::Files => 4,
+            Blame::Numbers => 5,
+        };
+        Self {
+            code,
+            error: Box::new(error),
+        }
+    }
+}
+
+/// Parses the command line, runs the command, prints what went wrong with all its causes.
+pub fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Bake(args) => bake::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Verify(args) => verify::run(&args)
+            .map(|()| ExitCode::SUCCESS)
+            .map_err(Failure::from),
+    };
+    result.unwrap_or_else(|failure| {
+        eprintln!("swell: {}", chain(failure.error.as_ref()));
+        ExitCode::from(failure.code)
+    })
+}
+
+/// An error and its causes on one line.
+fn chain(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        text += &format!(": {error}");
+        cause = error.source();
+    }
+    text
+}
+
+/// Bytes in decimal units with one digit after the point.
+fn size(bytes: u64) -> String {
+    let mut value = bytes as f64;
+    for unit in ["B", "kB", "MB", "GB"] {
+        // 999.95 would print as 1000.0.
+        if value < 999.95 {
+            let digits = usize::from(unit != "B");
+            return format!("{value:.digits$} {unit}");
+        }
+        value /= 1000.0;
+    }
+    format!("{value:.1} TB")
+}

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::size;
 use crate::stage::verify::{CacheError, VerifyReport, verify};
 
 /// Look at every checksum of a cache.
@@ -42,22 +43,9 @@ fn show(out: &mut impl Write, report: &VerifyReport) -> io::Result<()> {
     Ok(())
 }
 
-/// Bytes in decimal units with one digit after the point.
-fn size(bytes: u64) -> String {
-    let mut value = bytes as f64;
-    for unit in ["B", "kB", "MB", "GB"] {
-        // 999.95 would print as 1000.0.
-        if value < 999.95 {
-            let digits = usize::from(unit != "B");
-            return format!("{value:.digits$} {unit}");
-        }
-        value /= 1000.0;
-    }
-    format!("{value:.1} TB")
-}
-
 #[cfg(test)]
 mod tests {
+    use super::size;
     use super::*;
     use crate::stage::verify::Problem;
 

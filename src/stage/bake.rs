@@ -25,7 +25,7 @@ use crate::{
     },
 };
 
-use super::prepare::Start;
+use super::{Blame, prepare::Start};
 
 /// What to bake, and where to.
 #[derive(Clone, Debug)]
@@ -131,11 +131,29 @@ pub enum BakeError {
     },
 }
 
+impl From<&BakeError> for Blame {
+    fn from(error: &BakeError) -> Self {
+        match error {
+            BakeError::Scene(error) => error.into(),
+            BakeError::Solid(error) => error.into(),
+            BakeError::Gpu(error) => error.into(),
+            BakeError::Solve(error) => error.into(),
+            BakeError::Cache(error) => error.into(),
+            BakeError::OtherPhysics { .. } => Self::Files,
+            BakeError::Frames(_) | BakeError::Asset { .. } => Self::Input,
+        }
+    }
+}
+
 /// Runs a bake; `tell` hears of progress, and `stop` ends it after the current frame.
 ///
 /// # Errors
 /// [`BakeError`]; frames that were finished before are in the cache.
-pub fn bake(request: &Request, stop: &AtomicBool, tell: &mut dyn FnMut(Event)) -> Result<Outcome, BakeError> {
+pub fn bake(
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Outcome, BakeError> {
     let scene = &request.scene;
     let start = Start::of(scene)?;
     let context = Context::open(request.adapter.as_deref())?;
@@ -181,8 +199,17 @@ pub fn bake(request: &Request, stop: &AtomicBool, tell: &mut dyn FnMut(Event)) -
         clock.time = f64::from(clock.frame) / scene.shot.frames_per_second;
         clock.substeps = report.substeps;
         clock.steps += u64::from(report.substeps);
-        writer.submit(clock, particles, to_json(&report), json!({ "seconds": seconds }))?;
-        tell(Event::Frame { frame: clock.frame, report, seconds });
+        writer.submit(
+            clock,
+            particles,
+            to_json(&report),
+            json!({ "seconds": seconds }),
+        )?;
+        tell(Event::Frame {
+            frame: clock.frame,
+            report,
+            seconds,
+        });
     }
     // What was computed before a failure is kept.
     let summary = writer.finish()?;
@@ -205,20 +232,31 @@ fn to_json(report: &StepReport) -> Value {
 
 fn describe(context: &Context) -> String {
     let info = &context.info;
-    format!("{} ({} {}, {})", info.name, info.driver, info.driver_info, info.backend)
+    format!(
+        "{} ({} {}, {})",
+        info.name, info.driver, info.driver_info, info.backend
+    )
 }
 
 fn last_frame(request: &Request) -> Result<u32, BakeError> {
-    let Some(frames) = &request.frames else { return Ok(request.scene.shot.frames) };
+    let Some(frames) = &request.frames else {
+        return Ok(request.scene.shot.frames);
+    };
     let whole = FrameRange::inclusive(frames.first(), frames.last());
     if whole.as_ref() != Some(frames) {
-        return Err(BakeError::Frames(format!("{frames} leaves frames out, and each frame of a bake needs the one before")));
+        return Err(BakeError::Frames(format!(
+            "{frames} leaves frames out, and each frame of a bake needs the one before"
+        )));
     }
     Ok(frames.last())
 }
 
 /// A new cache, or one to go on with: the writer, where its clock stands, and the state there.
-fn open_cache(request: &Request, context: &Context, start: &Start) -> Result<(CacheWriter, Clock, Particles), BakeError> {
+fn open_cache(
+    request: &Request,
+    context: &Context,
+    start: &Start,
+) -> Result<(CacheWriter, Clock, Particles), BakeError> {
     let scene = &request.scene;
     let text = scene.to_toml(&scene::asset_path);
     let manifest = Manifest {
@@ -242,7 +280,10 @@ fn open_cache(request: &Request, context: &Context, start: &Start) -> Result<(Ca
     if crate::cache::exists(directory) && request.resume {
         let cached = CacheReader::open(directory)?;
         if let Some(difference) = scene::physics_difference(cached.scene_toml(), &text)? {
-            return Err(BakeError::OtherPhysics { directory: directory.clone(), difference });
+            return Err(BakeError::OtherPhysics {
+                directory: directory.clone(),
+                difference,
+            });
         }
         let (writer, entry, state) = CacheWriter::resume(directory, &manifest)?;
         return Ok((writer, entry.clock, state));
@@ -255,13 +296,19 @@ fn open_cache(request: &Request, context: &Context, start: &Start) -> Result<(Ca
 /// The scene's mesh files as the cache keeps them.
 fn assets(scene: &Scene) -> Result<Vec<Asset>, BakeError> {
     let read = |(file, hash): (PathBuf, String)| {
-        let fault = |what: String| BakeError::Asset { file: file.clone(), what };
+        let fault = |what: String| BakeError::Asset {
+            file: file.clone(),
+            what,
+        };
         let bytes = fs::read(&file).map_err(|error| fault(error.to_string()))?;
         if blake3::hash(&bytes).to_hex().as_str() != hash {
             return Err(fault("changed since the scene was loaded".into()));
         }
         let path = scene::asset_path(&file, &hash);
-        Ok(Asset { name: path.trim_start_matches("assets/").to_owned(), bytes })
+        Ok(Asset {
+            name: path.trim_start_matches("assets/").to_owned(),
+            bytes,
+        })
     };
     scene.mesh_files().into_iter().map(read).collect()
 }

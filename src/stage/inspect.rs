@@ -50,17 +50,33 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
                 kind: format!("{}, {:?}", info.backend, info.device_type),
                 driver: format!("{} {}", info.driver, info.driver_info),
                 limits: vec![
-                    ("max_storage_buffer_binding_size", limits.max_storage_buffer_binding_size),
+                    (
+                        "max_storage_buffer_binding_size",
+                        limits.max_storage_buffer_binding_size,
+                    ),
                     ("max_buffer_size", limits.max_buffer_size),
-                    ("max_compute_workgroups_per_dimension", limits.max_compute_workgroups_per_dimension.into()),
-                    ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage.into()),
-                    ("max_texture_dimension_2d", limits.max_texture_dimension_2d.into()),
+                    (
+                        "max_compute_workgroups_per_dimension",
+                        limits.max_compute_workgroups_per_dimension.into(),
+                    ),
+                    (
+                        "max_storage_buffers_per_shader_stage",
+                        limits.max_storage_buffers_per_shader_stage.into(),
+                    ),
+                    (
+                        "max_texture_dimension_2d",
+                        limits.max_texture_dimension_2d.into(),
+                    ),
                 ],
                 has_timestamps: crate::gpu::adapter::has_timestamps(adapter),
             }
         })
         .collect();
-    if found.is_empty() { Err(GpuError::NoAdapter) } else { Ok(found) }
+    if found.is_empty() {
+        Err(GpuError::NoAdapter)
+    } else {
+        Ok(found)
+    }
 }
 
 /// A scene's plan, and for which limits it was made.
@@ -75,7 +91,11 @@ pub struct ScenePlan {
 }
 
 /// Limits that every Vulkan adapter of the last years has, for machines without any.
-const COMMON_LIMITS: DeviceLimits = DeviceLimits { binding: 128 << 20, buffer: 256 << 20, list_budget: LIST_BUDGET };
+const COMMON_LIMITS: DeviceLimits = DeviceLimits {
+    binding: 128 << 20,
+    buffer: 256 << 20,
+    list_budget: LIST_BUDGET,
+};
 
 /// Plans a scene without allocating or compiling anything.
 ///

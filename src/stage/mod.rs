@@ -3,5 +3,62 @@
 pub mod bake;
 pub mod inspect;
 pub mod prepare;
-pub mod render;
 pub mod verify;
+
+use crate::{
+    cache::CacheError, domain::signed_distance::SignedDistanceError, gpu::adapter::GpuError,
+    scene::SceneError, solve::SolveError,
+};
+
+/// Where the fault of an error lies; what a caller does about it depends on this alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blame {
+    /// Arguments, the scene, the look, or a file that they name.
+    Input,
+    /// No usable device, a scene too large for it, or a device lost.
+    Device,
+    /// A cache or picture that is damaged, of another scene, or cannot be read or written.
+    Files,
+    /// The numbers of a solve.
+    Numbers,
+}
+
+impl From<&GpuError> for Blame {
+    fn from(error: &GpuError) -> Self {
+        match error {
+            GpuError::TooLarge { .. } | GpuError::NoSuchAdapter { .. } => Self::Input,
+            GpuError::NoAdapter
+            | GpuError::Open { .. }
+            | GpuError::Lost(_)
+            | GpuError::Shader { .. } => Self::Device,
+        }
+    }
+}
+
+impl From<&SolveError> for Blame {
+    fn from(error: &SolveError) -> Self {
+        match error {
+            SolveError::Gpu(error) => error.into(),
+            SolveError::Count { .. } => Self::Files,
+            SolveError::Numbers { .. } => Self::Numbers,
+        }
+    }
+}
+
+impl From<&CacheError> for Blame {
+    fn from(_: &CacheError) -> Self {
+        Self::Files
+    }
+}
+
+impl From<&SceneError> for Blame {
+    fn from(_: &SceneError) -> Self {
+        Self::Input
+    }
+}
+
+impl From<&SignedDistanceError> for Blame {
+    fn from(_: &SignedDistanceError) -> Self {
+        Self::Input
+    }
+}

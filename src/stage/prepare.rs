@@ -41,15 +41,30 @@ impl Start {
             Some(bounds) => SignedDistance::from_meshes(meshes(), &bounds, spacing)?,
             None => None,
         };
-        let samples = meshes().flat_map(|mesh| boundary_samples(mesh, &scene.domain, spacing)).collect();
+        let samples = meshes()
+            .flat_map(|mesh| boundary_samples(mesh, &scene.domain, spacing))
+            .collect();
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
-        let fill = fill_water(&scene.water.blocks, water, distance.as_ref(), &scene.domain, spacing)?;
-        Ok(Self { particles: fill.particles, removed: fill.removed, boundary: Boundary { samples, distance } })
+        let fill = fill_water(
+            &scene.water.blocks,
+            water,
+            distance.as_ref(),
+            &scene.domain,
+            spacing,
+        )?;
+        Ok(Self {
+            particles: fill.particles,
+            removed: fill.removed,
+            boundary: Boundary { samples, distance },
+        })
     }
 
     /// What the scene needs on a device with these limits.
     pub fn plan(&self, scene: &Scene, limits: DeviceLimits) -> Plan {
-        let counts = Counts { particles: self.particles.len(), ..self.boundary.counts() };
+        let counts = Counts {
+            particles: self.particles.len(),
+            ..self.boundary.counts()
+        };
         Plan::new(scene, counts, limits)
     }
 }
@@ -62,10 +77,16 @@ fn solid_bounds(scene: &Scene) -> Option<Bounds> {
     for bounds in scene.solids.iter().filter_map(|solid| solid.mesh.bounds()) {
         all = Some(match all {
             None => bounds,
-            Some(other) => Bounds { min: other.min.min(bounds.min), max: other.max.max(bounds.max) },
+            Some(other) => Bounds {
+                min: other.min.min(bounds.min),
+                max: other.max.max(bounds.max),
+            },
         });
     }
     let grown = all?.grown(margin);
-    let clipped = Bounds { min: grown.min.max(reach.min), max: grown.max.min(reach.max) };
+    let clipped = Bounds {
+        min: grown.min.max(reach.min),
+        max: grown.max.min(reach.max),
+    };
     clipped.min.cmplt(clipped.max).all().then_some(clipped)
 }

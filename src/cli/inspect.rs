@@ -1,0 +1,175 @@
+//! `swell inspect SCENE|CACHE|--adapters`
+
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+    process::ExitCode,
+};
+
+use clap::Args;
+
+use crate::{
+    scene::Scene,
+    stage::inspect::{Adapter, Entry, Manifest, ScenePlan, adapters, cache, plan},
+};
+
+use super::{Failure, size};
+
+#[derive(Args, Debug)]
+pub(super) struct InspectArgs {
+    /// A scene file or a cache directory.
+    #[arg(required_unless_present = "adapters")]
+    subject: Option<PathBuf>,
+    /// List this machine's adapters with the limits that matter here.
+    #[arg(long)]
+    adapters: bool,
+    /// Override a scene key.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Plan for the limits of this adapter.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+}
+
+pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
+    let mut text = Vec::new();
+    if args.adapters {
+        for adapter in adapters()? {
+            show_adapter(&mut text, &adapter)?;
+        }
+    }
+    match &args.subject {
+        Some(directory) if directory.is_dir() => {
+            let (manifest, entries) = cache(directory)?;
+            show_cache(&mut text, &manifest, &entries)?;
+        }
+        Some(file) => {
+            let scene = Scene::load(file, &args.set)?;
+            show_plan(&mut text, &scene, &plan(&scene, args.adapter.as_deref())?)?;
+        }
+        None => {}
+    }
+    // A closed pipe (`swell inspect | head`) is no fault.
+    let _ = io::stdout().write_all(&text);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show_adapter(out: &mut impl Write, adapter: &Adapter) -> Result<(), Unprintable> {
+    writeln!(
+        out,
+        "{}: {} ({}), driver {}",
+        adapter.index, adapter.name, adapter.kind, adapter.driver
+    )?;
+    for (name, value) in &adapter.limits {
+        writeln!(out, "   {name} {value}")?;
+    }
+    writeln!(
+        out,
+        "   pass times: {}",
+        if adapter.has_timestamps { "yes" } else { "no" }
+    )?;
+    Ok(())
+}
+
+fn show_plan(out: &mut impl Write, scene: &Scene, planned: &ScenePlan) -> Result<(), Unprintable> {
+    let plan = &planned.plan;
+    let shot = &scene.shot;
+    writeln!(
+        out,
+        "{}: {} frames at {} a second",
+        shot.name, shot.frames, shot.frames_per_second
+    )?;
+    writeln!(
+        out,
+        "{} particles ({} left out where solids are), {} boundary samples, {} × {} × {} cells",
+        plan.counts.particles,
+        planned.removed,
+        plan.counts.boundary_samples,
+        plan.grid_dims[0],
+        plan.grid_dims[1],
+        plan.grid_dims[2]
+    )?;
+    match &planned.adapter {
+        Some(name) => writeln!(out, "planned for {name}")?,
+        None => writeln!(out, "planned for common limits: no adapter here")?,
+    }
+    writeln!(out, "\npass                          for")?;
+    for pass in &plan.passes {
+        writeln!(out, "{:28}  {}", pass.spec.name, pass.owner)?;
+    }
+    writeln!(
+        out,
+        "\nbuffer                        for                      bytes"
+    )?;
+    for buffer in &plan.buffers {
+        writeln!(
+            out,
+            "{:28}  {:22} {:>12}",
+            buffer.spec.name, buffer.owner, buffer.spec.bytes
+        )?;
+    }
+    let (all, lists) = plan.bytes();
+    let each = |bytes: u64| bytes as f64 / plan.counts.particles.max(1) as f64;
+    writeln!(
+        out,
+        "\n{} in all: {:.0} bytes a particle, and {:.0} for neighbour lists",
+        size(all),
+        each(all - lists),
+        each(lists)
+    )?;
+    Ok(())
+}
+
+fn show_cache(
+    out: &mut impl Write,
+    manifest: &Manifest,
+    entries: &[Entry],
+) -> Result<(), Unprintable> {
+    writeln!(
+        out,
+        "{}: {} by {} {}",
+        manifest.shot, manifest.solver, manifest.program, manifest.program_version
+    )?;
+    writeln!(
+        out,
+        "on {} ({}, {})",
+        manifest.device, manifest.driver, manifest.backend
+    )?;
+    writeln!(out, "scene {}", manifest.scene_hash)?;
+    writeln!(
+        out,
+        "{} a second, d = {} m",
+        manifest.frames_per_second, manifest.particle_spacing
+    )?;
+    writeln!(
+        out,
+        "\nframe  particles       bytes  substeps  density error  top speed  capped"
+    )?;
+    for entry in entries {
+        let number = |key: &str| entry.report.get(key).and_then(serde_json::Value::as_f64);
+        let percent =
+            number("density_error_mean").map_or("-".into(), |x| format!("{:.3} %", 100.0 * x));
+        let speed = number("max_speed").map_or("-".into(), |x| format!("{x:.2} m/s"));
+        let capped = number("capped").map_or("-".into(), |x| format!("{x}"));
+        writeln!(
+            out,
+            "{:5}  {:9}  {:>10}  {:8}  {percent:>13}  {speed:>9}  {capped:>6}",
+            entry.clock.frame,
+            entry.particles,
+            size(entry.bytes),
+            entry.clock.substeps
+        )?;
+    }
+    Ok(())
+}
+
+/// Writing to memory does not fail; the type keeps `?` honest.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+struct Unprintable(#[from] io::Error);
+
+impl From<&Unprintable> for crate::stage::Blame {
+    fn from(_: &Unprintable) -> Self {
+        Self::Files
+    }
+}
