@@ -1,5 +1,7 @@
 //! Scene and look files, parsed into validated types, and the plan that follows from them.
 
+pub mod look;
+
 use std::path::PathBuf;
 
 use glam::{DAffine3, DVec3};
