@@ -28,19 +28,37 @@ struct FlowLevel {
     index: u32,
 }
 
-// How many steps, in fractions of a step, this level makes at this depth.
-fn level_steps(params: FlowParams, z: f32, focal: f32, level: u32) -> f32 {
+struct Share {
+    // How many steps, in fractions of a step, this level makes at this depth.
+    steps: f32,
+    // Whether the surface here is taken from this level at all.
+    reached: bool,
+}
+
+// Going down and up one level widens the surface too: averaging two cells by 1/4 cell², interpolating
+// between the coarse ones by 3/4. Both are part of what was asked for.
+const CROSSING: f32 = 1.0;
+
+fn level_share(params: FlowParams, z: f32, focal: f32, level: u32) -> Share {
     let footprint = select(1.0, z / focal, params.world == 1u);
     let cells = params.width / footprint;
     var rest = cells * cells;
     let each = 0.5 * abs(params.fraction);
     var cell = 1.0;
     for (var m = 0u; m < level; m++) {
-        rest -= min(rest, f32(params.steps) * each * cell);
+        let most = f32(params.steps) * each * cell;
+        if rest <= most {
+            return Share(0.0, false);
+        }
+        rest -= CROSSING * cell;
+        rest -= min(rest, most);
         cell *= 4.0;
     }
-    let wanted = rest / (each * cell);
-    return select(min(wanted, f32(params.steps)), wanted, level + 1u == params.levels);
+    let most = f32(params.steps) * each * cell;
+    if rest > most && level + 1u < params.levels {
+        rest = min(rest - CROSSING * cell, most);
+    }
+    return Share(rest / (each * cell), true);
 }
 
 // A depth step that a smooth surface at this level may have between neighbours.

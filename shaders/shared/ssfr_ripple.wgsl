@@ -14,18 +14,21 @@ fn ripple_at(p: vec2f, seconds: f32, wavelength: f32, slope: f32, footprint: f32
     }
     // Slowly varying gusts keep the pattern from repeating.
     let gust = 0.45 + 1.1 * value_noise(p / (5.0 * wavelength));
-    let share = slope * gust / sqrt(9.0);
-    for (var i = 0; i < 9; i++) {
+    let share = slope * gust / sqrt(7.0);
+    let bend = vec2f(
+        value_noise(p * (1.3 / wavelength)) - 0.5,
+        value_noise(p * (3.1 / wavelength) + 17.0) - 0.5,
+    ) * 2.2;
+    for (var i = 0; i < 7; i++) {
         let f = f32(i);
-        let k = 2.0 * PI / (wavelength * pow(0.79, f));
+        let k = 2.0 * PI / (wavelength * pow(0.74, f));
         // Golden-angle spread over a fan of ±80° about +x.
         let turn = (fract(f * 0.618034 + 0.31) - 0.5) * 2.8;
         let direction = vec2f(cos(turn), sin(turn));
-        let bend = 1.7 * (value_noise(p * (0.21 * k) + vec2f(f * 7.3, -f * 3.1)) - 0.5);
-        let phase = k * dot(direction, p) - sqrt(9.81 * k) * seconds + f * 2.4 + bend;
+        let phase = k * dot(direction, p) - sqrt(9.81 * k) * seconds + f * 2.4
+            + select(bend.x, bend.y, i > 2);
         let kept = exp(-0.5 * pow(0.5 * k * footprint, 2.0));
-        let amount = share * 1.41421356;
-        out.slope += direction * (amount * kept * cos(phase));
+        out.slope += direction * (share * 1.41421356 * kept * cos(phase));
         out.lost += share * share * (1.0 - kept * kept);
     }
     return out;

@@ -5,8 +5,18 @@ struct Particle {
     position: vec3f,
     aeration: f32,
     velocity: vec3f,
-    // 1 where the particle belongs to the surface, 0 where it was thrown clear of it.
-    body: f32,
+    // Twice the particle's id, plus 1 where it belongs to the surface, 0 where it was thrown clear of it.
+    tag: u32,
+}
+
+fn is_body(particle: Particle) -> bool {
+    return (particle.tag & 1u) == 1u;
+}
+
+// Row of the i-th pixel of a box `width` wide, exact below 2²² pixels; software adapters divide integers
+// one lane at a time.
+fn row_of(i: u32, width: u32) -> u32 {
+    return u32((f32(i) + 0.5) / f32(width));
 }
 
 // Pixels that the sphere may touch: least and greatest, inclusive; x > z where there are none.

@@ -1,4 +1,5 @@
-// What the flow changed on the coarse level is added to the fine one, between cells of one surface.
+// The surface that the flow left on the coarse level, interpolated on the fine one. Beside an edge, where not all
+// four coarse cells lie on the fine one's surface, only what the flow changed there is taken over.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_flow.wgsl"
 
@@ -19,8 +20,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let at = id.y * level.size.x + id.x;
     let z = fine[at];
     corrected[at] = z;
-    // Nothing to add where the coarser levels made no step.
-    if z >= FAR || level_steps(params, z, camera.focal, level.level + 1u) <= 0.0 {
+    if z >= FAR || !level_share(params, z, camera.focal, level.level + 1u).reached {
         return;
     }
     let size = vec2i((level.size + 1u) / 2u);
@@ -28,7 +28,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let position = (vec2f(id.xy) + 0.5) * 0.5 - 0.5;
     let base = vec2i(floor(position));
     let part = position - floor(position);
-    var sum = 0.0;
+    var change = 0.0;
+    // In 1/z, where a plane is straight.
+    var inverse = 0.0;
     var total = 0.0;
     for (var i = 0; i < 4; i++) {
         let corner = vec2i(i & 1, i >> 1u);
@@ -42,10 +44,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             continue;
         }
         let w = mix(1.0 - part, part, vec2f(corner));
-        sum += w.x * w.y * (coarse_after[index] - before);
+        let after = coarse_after[index];
+        change += w.x * w.y * (after - before);
+        inverse += w.x * w.y / after;
         total += w.x * w.y;
     }
-    if total > 0.0 {
-        corrected[at] = max(z + sum / total, 0.25 * z);
+    if total > 0.999 {
+        corrected[at] = 1.0 / inverse;
+    } else if total > 0.0 {
+        corrected[at] = max(z + change / total, 0.25 * z);
     }
 }

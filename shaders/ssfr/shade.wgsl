@@ -239,22 +239,22 @@ fn transmitted(water: Water, pixel: vec2i, straight: Behind) -> vec3f {
     let ci = clamp(dot(water.normal, water.view), 0.0, 1.0);
     let ct = sqrt(max(1.0 - (1.0 - ci * ci) / (n * n), 0.0));
     let t = normalize(refract(-water.view, water.normal, 1.0 / n));
-    // Splats measure the straight way; the bent one is steeper and shorter.
+    // Splats measure the straight way; through a sheet the bent one is shorter.
     let seen = thickness_at(vec2f(pixel) + 0.5);
-    let path = seen * max(ci, 0.05) / ct;
+    let path = seen * max(ci, 0.3) / ct;
 
     var reach = ground_distance(water.position, t);
     var floor_point = water.position + t * min(reach, 1e4);
     var found = Surface(floor_point, vec3f(0.0, 1.0, 0.0), 2u);
     let eye_t = vec3f(dot(t, camera.right), dot(t, camera.up), dot(t, camera.forward));
-    let hit = march(water.eye, eye_t, min(reach, 1.4 * path + 0.3), 8, 1.0, water.eye.z - 0.1);
+    let hit = march(water.eye, eye_t, min(reach, 1.4 * seen + 0.3), 8, 1.0, water.eye.z - 0.1);
     if hit.distance < reach {
         reach = hit.distance;
         found = solid_surface(hit.at, hit.eye, -t);
     }
     // Water that ends well before the ray meets anything: a sheet or a crest, through which one looks on
     // almost straight.
-    let filled = smoothstep(0.35, 0.75, path / max(reach, 1e-3));
+    let filled = smoothstep(0.35, 0.75, seen / max(reach, 1e-3));
     let way = mix(path, min(reach, 1e3), filled);
     var light = straight.radiance;
     if filled > 0.0 {
@@ -263,8 +263,10 @@ fn transmitted(water: Water, pixel: vec2i, straight: Behind) -> vec3f {
     }
     let extinction = shading.absorption + shading.scattering;
     let clear = exp(-extinction * way);
-    let albedo = shading.scattering / max(extinction, vec3f(1e-6));
-    return light * clear + diffuse_light(water.position) * albedo * (1.0 - clear);
+    // Diffuse reflectance of a deep medium of that single-scattering albedo (Hapke 1981, equation 38).
+    let g = sqrt(shading.absorption / max(extinction, vec3f(1e-6)));
+    let body = select(vec3f(0.0), (1.0 - g) / (1.0 + g), extinction > vec3f(0.0));
+    return light * clear + diffuse_light(water.position) * body * (1.0 - clear);
 }
 
 fn shade_water(pixel: vec2i, z: f32, ray: vec3f, view: vec3f, straight: Behind) -> vec3f {

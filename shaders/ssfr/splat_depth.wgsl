@@ -19,21 +19,27 @@ fn main(
         return;
     }
     let particle = particles[index];
-    if particle.body == 0.0 {
+    if !is_body(particle) {
         return;
     }
     let c = eye_from_world(camera, particle.position + particle.velocity * camera.seconds);
+    let nearest = bitcast<u32>(max(c.z - camera.radius, 0.0));
     let bounds = sphere_bounds(camera, c, camera.radius, 1.0, camera.size);
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
     for (var i = lane; i < count; i += 32u) {
-        let pixel = vec2u(bounds.xy) + vec2u(i % width, i / width);
+        let row = row_of(i, width);
+        let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let at = pixel.y * camera.size.x + pixel.x;
+        // Most spheres are hidden, and are drawn after what hides them: a plain load spares the rest.
+        let known = atomicLoad(&depth[at]);
+        if known <= nearest {
+            continue;
+        }
         let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, camera.radius);
         if hit.chord > 0.0 && hit.depth < solid_depth[at] {
             let bits = bitcast<u32>(hit.depth);
-            // Most spheres are hidden: a plain load spares them the atomic write.
-            if bits < atomicLoad(&depth[at]) {
+            if bits < known {
                 atomicMin(&depth[at], bits);
             }
         }

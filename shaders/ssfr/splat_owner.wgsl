@@ -18,7 +18,7 @@ fn main(
         return;
     }
     let particle = particles[index];
-    if particle.body == 0.0 {
+    if !is_body(particle) {
         return;
     }
     let c = eye_from_world(camera, particle.position + particle.velocity * camera.seconds);
@@ -26,7 +26,8 @@ fn main(
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
     for (var i = lane; i < count; i += 32u) {
-        let pixel = vec2u(bounds.xy) + vec2u(i % width, i / width);
+        let row = row_of(i, width);
+        let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let at = pixel.y * camera.size.x + pixel.x;
         let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, camera.radius);
         // Two shaders may round one formula differently, so equality is asked within a few ulp.

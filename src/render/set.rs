@@ -333,6 +333,7 @@ impl Set {
             pass.set_bind_group(0, &tile.group, &[]);
             pass.draw(0..self.vertices, 0..1);
             drop(pass);
+            timer.split("ssfr/solid", encoder);
             for (texture, buffer) in [(&tile.depth, depth), (&tile.packed, packed)] {
                 let at = u64::from(tile.corner[1]) * u64::from(extent.size[0])
                     + u64::from(tile.corner[0]);

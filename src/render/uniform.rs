@@ -31,7 +31,7 @@ pub(super) struct Particle {
     pub(super) position: [f32; 3],
     pub(super) aeration: f32,
     pub(super) velocity: [f32; 3],
-    pub(super) body: f32,
+    pub(super) tag: u32,
 }
 
 /// `shared/ssfr_light.wgsl`.
@@ -174,7 +174,7 @@ mod tests {
             frame_seconds
         );
         mirrors!(
-            "ssfr/splat_depth", "Particle", Particle, position, aeration, velocity, body
+            "ssfr/splat_depth", "Particle", Particle, position, aeration, velocity, tag
         );
         mirrors!(
             "ssfr/shade", "Shading", Shading, sun_direction, roughness, sun_irradiance, index,

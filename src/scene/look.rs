@@ -144,12 +144,12 @@ fn refuse(path: &str, message: &str) -> Result<(), Refusal> {
 const REACH: f64 = 1e5;
 
 fn validate(spec: &LookSpec) -> Result<(), Refusal> {
-    validate_camera(&spec.camera, &spec.image)?;
     let image = &spec.image;
     in_range("image.width", image.width.into(), 1.0, 32768.0, " pixels")?;
     in_range("image.height", image.height.into(), 1.0, 32768.0, " pixels")?;
     in_range("image.samples", image.samples.into(), 1.0, 1024.0, "")?;
     in_range("image.shutter", image.shutter, 0.0, 1.0, " of a frame")?;
+    validate_camera(&spec.camera, image)?;
     let surface = &spec.surface;
     if let Some(radius) = surface.radius_m {
         in_range("surface.radius_m", radius, 1e-4, 100.0, " m")?;

@@ -7,7 +7,7 @@ use swell::domain::particles::Particles;
 use swell::render::RenderScene;
 
 /// Twelve triangles, counter-clockwise from outside.
-pub fn box_mesh(low: DVec3, high: DVec3) -> TriangleMesh {
+pub(crate) fn box_mesh(low: DVec3, high: DVec3) -> TriangleMesh {
     let vertices = (0..8)
         .map(|i| {
             let pick = |axis: usize| if i >> axis & 1 == 1 { high[axis] } else { low[axis] };
@@ -25,7 +25,7 @@ pub fn box_mesh(low: DVec3, high: DVec3) -> TriangleMesh {
 }
 
 /// A lattice that fills a box from `low`.
-pub fn slab(low: DVec3, size: DVec3, spacing: f64) -> Particles {
+pub(crate) fn slab(low: DVec3, size: DVec3, spacing: f64) -> Particles {
     let mut water = Particles::default();
     let count = (size / spacing).round().as_uvec3();
     for x in 0..count.x {
@@ -55,7 +55,7 @@ impl Random {
 }
 
 /// Box buildings in streets, x 16 to 24.5, z 0.5 to 14.5.
-pub fn city_scene() -> RenderScene {
+pub(crate) fn city_scene() -> RenderScene {
     let mut random = Random(3);
     let mut solids = Vec::new();
     for i in 0..4 {
@@ -82,13 +82,13 @@ pub fn city_scene() -> RenderScene {
 }
 
 /// A metre of water with a crest of 1.4 m at x = 11.5, jittered, and drops flung from the crest.
-pub fn city_water() -> Particles {
+pub(crate) fn city_water() -> Particles {
     let spacing = 0.17;
     let mut random = Random(11);
     let mut water = Particles::default();
-    let mut x = 1.2;
+    let mut x = 1.2f64;
     while x < 14.8 {
-        let mut z = 0.5 * spacing;
+        let mut z: f64 = 0.5 * spacing;
         while z < 15.0 {
             let bent = x - 0.35 * (0.9 * z).sin() - 0.25 * (2.3 * z + 1.0).sin();
             let crest = 1.4 / (0.85 * (bent - 11.5)).cosh().powi(2);
