@@ -1,1 +1,81 @@
-//! render.
+//! Screen-space fluid rendering: particles to a picture.
+//!
+//! A sample of the picture: solids are drawn; particles are splatted as spheres into an eye-space depth
+//! and a thickness; the depth is smoothed by curvature flow or the narrow-range filter; normals are
+//! differences of it; every pixel is shaded from what the water mirrors and what it lets through. Samples
+//! differ in their place in the pixel and in their instant within the shutter; linear radiance is
+//! averaged, depths never are.
+
+mod aeration;
+mod camera;
+mod frame;
+pub mod image;
+mod pass;
+mod plan;
+mod renderer;
+mod set;
+mod sky;
+mod surface;
+mod uniform;
+pub mod view;
+
+use std::path::PathBuf;
+
+use crate::domain::bounds::Bounds;
+use crate::domain::mesh::TriangleMesh;
+use crate::gpu::adapter::GpuError;
+
+pub use image::{Attributes, Image};
+pub use plan::passes;
+pub use renderer::{PassTime, Renderer};
+
+/// What of a scene a picture needs beside the particles.
+#[derive(Clone, Debug)]
+pub struct RenderScene {
+    /// The box that holds the water, metres; its least y is the ground's height.
+    pub domain: Bounds,
+    /// World space, metres.
+    pub solids: Vec<TriangleMesh>,
+    /// d, metres.
+    pub particle_spacing: f64,
+    /// Frames a second, which turns the shutter and velocities into metres.
+    pub frames_per_second: f64,
+}
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The sky panorama.
+    #[error("sky panorama: {0}")]
+    Panorama(String),
+    /// A scene that cannot be drawn.
+    #[error("render scene: {0}")]
+    Scene(String),
+    /// A particle whose position or velocity is not a number.
+    #[error("particle {index} of frame {frame} has a position or velocity that is not finite")]
+    NotFinite {
+        /// Place in the frame.
+        index: usize,
+        /// Frame number.
+        frame: u32,
+    },
+    /// A picture file could not be written.
+    #[error("{}: {source}", file.display())]
+    Write {
+        /// Which.
+        file: PathBuf,
+        /// The system's words.
+        source: std::io::Error,
+    },
+    /// A picture file could not be encoded or decoded.
+    #[error("{}: {message}", file.display())]
+    Format {
+        /// Which.
+        file: PathBuf,
+        /// The library's words.
+        message: String,
+    },
+}

@@ -1,0 +1,58 @@
+// A pinhole camera over a frame that is padded on all sides, so that filters have neighbours at its edge.
+// Eye space: x right, y up, z forward; an eye-space depth is a positive z. World positions are relative
+// to the domain's least corner, which keeps f32 fine when a scene lies far from the origin.
+
+struct Camera {
+    position: vec3f,
+    // From the frame's instant to this sample's, seconds: particles are drawn at x + v seconds.
+    seconds: f32,
+    right: vec3f,
+    // Focal length in pixels.
+    focal: f32,
+    up: vec3f,
+    particle_count: u32,
+    forward: vec3f,
+    // Splat radius, metres.
+    radius: f32,
+    // Principal point in padded pixels, less the sample's jitter.
+    centre: vec2f,
+    // Padded size in pixels.
+    size: vec2u,
+    // Pixels of padding left and above.
+    margin: vec2u,
+    // Size of the picture in pixels.
+    picture: vec2u,
+    // Of this sample in the pixel's mean; the first sample replaces what was there.
+    weight: f32,
+    sample_index: u32,
+    // Seconds since frame 0.
+    clock: f32,
+    // Seconds from this frame to the next.
+    frame_seconds: f32,
+}
+
+// Where nothing was hit. Finite, because fast-math drivers may assume that there is no infinity.
+const FAR: f32 = 1e30;
+
+fn eye_ray(camera: Camera, pixel: vec2f) -> vec3f {
+    let offset = (pixel - camera.centre) / camera.focal;
+    return vec3f(offset.x, -offset.y, 1.0);
+}
+
+fn eye_from_world(camera: Camera, world: vec3f) -> vec3f {
+    let d = world - camera.position;
+    return vec3f(dot(d, camera.right), dot(d, camera.up), dot(d, camera.forward));
+}
+
+fn world_direction(camera: Camera, eye: vec3f) -> vec3f {
+    return camera.right * eye.x + camera.up * eye.y + camera.forward * eye.z;
+}
+
+fn world_from_eye(camera: Camera, eye: vec3f) -> vec3f {
+    return camera.position + world_direction(camera, eye);
+}
+
+// Padded pixel coordinates; z must be positive.
+fn project(camera: Camera, eye: vec3f) -> vec2f {
+    return camera.centre + camera.focal * vec2f(eye.x, -eye.y) / eye.z;
+}

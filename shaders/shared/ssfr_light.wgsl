@@ -1,0 +1,158 @@
+// Sun, sky, shadow, and what the set looks like under them. Needs the bindings `shading`, `sky`,
+// `sky_sampler`, `shadow_map` and `shadow_sampler` of whoever imports it.
+
+struct Shading {
+    // To the sun.
+    sun_direction: vec3f,
+    roughness: f32,
+    // On a face at right angles to it.
+    sun_irradiance: vec3f,
+    index: f32,
+    absorption: vec3f,
+    // Metres that sunlight goes through water for one metre of depth.
+    sun_path: f32,
+    scattering: vec3f,
+    spray_density: f32,
+    ground_colour: vec3f,
+    ground_variation: f32,
+    solid_colour: vec3f,
+    haze: f32,
+    horizon: vec3f,
+    particle_spacing: f32,
+    // Ripples: longest wavelength (0 = none), root mean square slope.
+    ripple: vec2f,
+    // Windows: storey and bay (0 = none).
+    windows: vec2f,
+    // Fraction of the windows that are lit, and their radiance.
+    window_lit: f32,
+    window_radiance: f32,
+    // 1 where the sky belongs in the picture.
+    background: f32,
+    // Radiance of the sun's disc over its irradiance; 0 in a panorama, which has its own.
+    disc: f32,
+    // Irradiance of the sky and the ground over direction: nine spherical harmonics (Ramamoorthi 2001).
+    irradiance: array<vec4f, 9>,
+    shadow_from_world: mat4x4f,
+}
+
+const PI: f32 = 3.14159265;
+
+fn sky_radiance(direction: vec3f) -> vec3f {
+    let d = normalize(direction);
+    let uv = vec2f(atan2(d.z, d.x) / (2.0 * PI) + 0.5, acos(clamp(d.y, -1.0, 1.0)) / PI);
+    return textureSampleLevel(sky, sky_sampler, uv, 0.0).rgb;
+}
+
+fn sky_irradiance(n: vec3f) -> vec3f {
+    let c = &shading.irradiance;
+    return max(
+        (*c)[0].rgb
+            + (*c)[1].rgb * n.y + (*c)[2].rgb * n.z + (*c)[3].rgb * n.x
+            + (*c)[4].rgb * (n.x * n.y) + (*c)[5].rgb * (n.y * n.z)
+            + (*c)[6].rgb * (3.0 * n.z * n.z - 1.0)
+            + (*c)[7].rgb * (n.x * n.z) + (*c)[8].rgb * (n.x * n.x - n.y * n.y),
+        vec3f(0.0),
+    );
+}
+
+// 1 in the sun, 0 in the shadow of a solid. `n` keeps a face out of its own shadow.
+fn sunlit(world: vec3f, n: vec3f) -> f32 {
+    let p = (shading.shadow_from_world * vec4f(world + 0.04 * n, 1.0)).xyz;
+    let uv = vec2f(0.5 * p.x + 0.5, 0.5 - 0.5 * p.y);
+    if any(uv <= vec2f(0.0)) || any(uv >= vec2f(1.0)) {
+        return 1.0;
+    }
+    let texel = 0.7 / vec2f(textureDimensions(shadow_map));
+    var sum = 0.0;
+    for (var i = 0u; i < 4u; i++) {
+        let offset = texel * (vec2f(f32(i & 1u), f32(i >> 1u)) * 2.0 - 1.0);
+        sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + offset, p.z - 0.0004);
+    }
+    return 0.25 * sum;
+}
+
+fn hash2(p: vec2i) -> f32 {
+    var h = bitcast<u32>(p.x) * 0x9E3779B1u ^ bitcast<u32>(p.y) * 0x85EBCA77u;
+    h = (h ^ (h >> 15u)) * 0x2C1B3C6Du;
+    h = (h ^ (h >> 12u)) * 0x297A2D39u;
+    return f32((h ^ (h >> 15u)) >> 8u) / 16777216.0;
+}
+
+fn value_noise(p: vec2f) -> f32 {
+    let i = vec2i(floor(p));
+    let f = fract(p);
+    let s = f * f * (3.0 - 2.0 * f);
+    return mix(
+        mix(hash2(i), hash2(i + vec2i(1, 0)), s.x),
+        mix(hash2(i + vec2i(0, 1)), hash2(i + vec2i(1, 1)), s.x),
+        s.y,
+    );
+}
+
+struct Surface {
+    position: vec3f,
+    normal: vec3f,
+    // As in ssfr_solid; 2 = ground.
+    material: u32,
+}
+
+// A box of width `duty` in each unit cell, filtered over `footprint` cells.
+fn window_edge(x: f32, duty: f32, footprint: f32) -> f32 {
+    let w = max(footprint, 1e-3);
+    let inside = 0.5 * duty - abs(fract(x) - 0.5);
+    return clamp(inside / w + 0.5, 0.0, 1.0);
+}
+
+struct Facade {
+    glass: f32,
+    glow: f32,
+}
+
+fn facade(at: Surface, footprint: f32) -> Facade {
+    if shading.windows.x <= 0.0 || at.material != 0u || abs(at.normal.y) > 0.3 {
+        return Facade(0.0, 0.0);
+    }
+    let along = select(at.position.x, at.position.z, abs(at.normal.x) > abs(at.normal.z));
+    let cell = vec2f(along / shading.windows.y, at.position.y / shading.windows.x);
+    let size = footprint / shading.windows;
+    let mean = 0.55 * 0.6;
+    let sharp = window_edge(cell.x, 0.55, size.y) * window_edge(cell.y, 0.6, size.x);
+    let glass = mix(sharp, mean, clamp(max(size.x, size.y) - 0.5, 0.0, 1.0));
+    let side = i32(sign(at.normal.x) + 3.0 * sign(at.normal.z));
+    let lit = hash2(vec2i(floor(cell)) * 7 + vec2i(side, 17 * side));
+    return Facade(glass, glass * select(0.0, 0.4 + lit, lit < shading.window_lit));
+}
+
+// Radiance that leaves an opaque surface towards the viewer; `view` points to the viewer, `footprint` is
+// the size of a pixel there. `depth` metres of water stand above it.
+fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
+    let through = exp(-(shading.absorption + shading.scattering) * depth * shading.sun_path);
+    let sun = shading.sun_irradiance * max(dot(at.normal, shading.sun_direction), 0.0)
+        * sunlit(at.position, at.normal);
+    // Faces low between other things see less of the sky: a stand-in for its occlusion.
+    let open = select(1.0, mix(0.45, 1.0, smoothstep(0.0, 2.5, at.position.y)), at.material != 2u);
+    let light = (sun + sky_irradiance(at.normal) * open) * through / PI;
+    if at.material == 2u {
+        let p = at.position.xz;
+        let n = 0.5 * value_noise(p * 0.35) + 0.3 * value_noise(p * 1.3) + 0.2 * value_noise(p * 5.1);
+        return light * shading.ground_colour * (1.0 + shading.ground_variation * (2.0 * n - 1.0));
+    }
+    let wall = select(shading.solid_colour, shading.ground_colour * 1.1, at.material == 1u);
+    let stain = 1.0 - 0.25 * shading.ground_variation * value_noise(vec2f(
+        at.position.x * 1.7 + at.position.z * 1.3, at.position.y * 2.3));
+    var colour = light * wall * stain;
+    let pane = facade(at, footprint);
+    if pane.glass > 0.0 {
+        let mirrored = reflect(-view, at.normal);
+        let r = fresnel(clamp(dot(view, at.normal), 0.0, 1.0), 1.5);
+        let glass = light * 0.06 + r * sky_radiance(vec3f(mirrored.x, abs(mirrored.y), mirrored.z));
+        colour = mix(colour, glass, pane.glass);
+        colour += vec3f(1.0, 0.62, 0.28) * (pane.glow * shading.window_radiance);
+    }
+    return colour;
+}
+
+// Air between the viewer and something at a distance takes it towards the horizon's colour.
+fn hazed(colour: vec3f, distance: f32) -> vec3f {
+    return mix(shading.horizon, colour, exp(-distance / shading.haze));
+}

@@ -1,0 +1,35 @@
+// Waves finer than the particles, as normals: a sum of sines that obey ω² = g k, world-anchored.
+
+struct Ripple {
+    // d(height)/d(x, z).
+    slope: vec2f,
+    // Mean square slope of the waves that a pixel cannot resolve.
+    lost: f32,
+}
+
+fn ripple_at(p: vec2f, seconds: f32, wavelength: f32, slope: f32, footprint: f32) -> Ripple {
+    var out = Ripple(vec2f(0.0), 0.0);
+    if wavelength <= 0.0 {
+        return out;
+    }
+    // Slowly varying gusts keep the pattern from repeating.
+    let gust = 0.45 + 1.1 * value_noise(p / (5.0 * wavelength));
+    let share = slope * gust / sqrt(7.0);
+    let bend = vec2f(
+        value_noise(p * (1.3 / wavelength)) - 0.5,
+        value_noise(p * (3.1 / wavelength) + 17.0) - 0.5,
+    ) * 2.2;
+    for (var i = 0; i < 7; i++) {
+        let f = f32(i);
+        let k = 2.0 * PI / (wavelength * pow(0.74, f));
+        // Golden-angle spread over a fan of ±80° about +x.
+        let turn = (fract(f * 0.618034 + 0.31) - 0.5) * 2.8;
+        let direction = vec2f(cos(turn), sin(turn));
+        let phase = k * dot(direction, p) - sqrt(9.81 * k) * seconds + f * 2.4
+            + select(bend.x, bend.y, i > 2);
+        let kept = exp(-0.5 * pow(0.5 * k * footprint, 2.0));
+        out.slope += direction * (share * 1.41421356 * kept * cos(phase));
+        out.lost += share * share * (1.0 - kept * kept);
+    }
+    return out;
+}

@@ -1,0 +1,34 @@
+// A triangle of the set, and how its normal and material are packed into a word.
+
+struct Triangle {
+    a: vec3f,
+    // 0 = solid of the scene, 1 = quay wall of the look.
+    material: u32,
+    b: vec3f,
+    pad0: u32,
+    c: vec3f,
+    pad1: u32,
+}
+
+fn corner(triangle: Triangle, index: u32) -> vec3f {
+    return select(select(triangle.a, triangle.b, index == 1u), triangle.c, index == 2u);
+}
+
+fn sign_not_zero(v: vec2f) -> vec2f {
+    return select(vec2f(-1.0), vec2f(1.0), v >= vec2f(0.0));
+}
+
+// Octahedral, 12 bits an axis; the six axis directions come back exactly.
+fn pack_normal(n: vec3f, material: u32) -> u32 {
+    let p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
+    let folded = select((1.0 - abs(p.yx)) * sign_not_zero(p), p, n.z >= 0.0);
+    let q = vec2u(vec2i(round(folded * 2047.0)) + 2048);
+    return q.x | (q.y << 12u) | (material << 24u);
+}
+
+fn unpack_normal(word: u32) -> vec3f {
+    let q = vec2f(vec2i(vec2u(word & 4095u, (word >> 12u) & 4095u)) - 2048) / 2047.0;
+    let z = 1.0 - abs(q.x) - abs(q.y);
+    let xy = select((1.0 - abs(q.yx)) * sign_not_zero(q), q, z >= 0.0);
+    return normalize(vec3f(xy, z));
+}

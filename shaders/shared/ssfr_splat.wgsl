@@ -1,0 +1,61 @@
+// A particle as a sphere on the screen.
+
+struct Particle {
+    // World position, and how much of it is air (0 to 1).
+    position: vec3f,
+    aeration: f32,
+    velocity: vec3f,
+    // Twice the particle's id, plus 1 where it belongs to the surface, 0 where it was thrown clear of it.
+    tag: u32,
+}
+
+fn is_body(particle: Particle) -> bool {
+    return (particle.tag & 1u) == 1u;
+}
+
+// Row of the i-th pixel of a box `width` wide, exact below 2²² pixels; software adapters divide integers
+// one lane at a time.
+fn row_of(i: u32, width: u32) -> u32 {
+    return u32((f32(i) + 0.5) / f32(width));
+}
+
+// Pixels that the sphere may touch: least and greatest, inclusive; x > z where there are none.
+// The exact perspective bounds of a sphere (Mara and McGuire 2013, 2D polyhedral bounds, in one axis each).
+fn sphere_bounds(camera: Camera, c: vec3f, radius: f32, scale: f32, size: vec2u) -> vec4i {
+    if c.z < 1.5 * radius {
+        return vec4i(0, 0, -1, -1);
+    }
+    let squared = c.z * c.z - radius * radius;
+    let x = c.x * c.z + vec2f(-radius, radius) * sqrt(max(c.x * c.x + squared, 0.0));
+    let y = -c.y * c.z + vec2f(-radius, radius) * sqrt(max(c.y * c.y + squared, 0.0));
+    let low = (camera.centre + camera.focal * vec2f(x.x, y.x) / squared) * scale - 0.5;
+    let high = (camera.centre + camera.focal * vec2f(x.y, y.y) / squared) * scale - 0.5;
+    let edge = vec2f(size) - 1.0;
+    if any(high < vec2f(0.0)) || any(low > edge) {
+        return vec4i(0, 0, -1, -1);
+    }
+    return vec4i(vec2i(ceil(max(low, vec2f(0.0)))), vec2i(floor(min(high, edge))));
+}
+
+struct Hit {
+    // Eye-space depth of the near side.
+    depth: f32,
+    // Length of the chord, metres; negative where the ray misses.
+    chord: f32,
+}
+
+// The ray has z = 1, so its parameter is the depth. The discriminant is taken from the cross product:
+// the textbook b² − ac loses every digit at 20 m for a 10 cm sphere.
+fn hit_sphere(ray: vec3f, c: vec3f, radius: f32) -> Hit {
+    let a = dot(ray, ray);
+    let off = cross(ray, c);
+    let under = a * radius * radius - dot(off, off);
+    if under <= 0.0 {
+        return Hit(FAR, -1.0);
+    }
+    let root = sqrt(under);
+    return Hit((dot(ray, c) - root) / a, 2.0 * root / sqrt(a));
+}
+
+// Fixed point of thickness sums: integer atomics add up to the same bits in any order.
+const THICKNESS_SCALE: f32 = 65536.0;

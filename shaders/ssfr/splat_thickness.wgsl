@@ -1,0 +1,48 @@
+// Water along the line of sight, in front of what is solid, at half resolution: chords of every sphere,
+// scaled so that their sum over a bulk lattice is the length of the way.
+#import "shared/camera.wgsl"
+#import "shared/ssfr_splat.wgsl"
+
+struct ThicknessParams {
+    // d³ / (4/3 π r³): the volume that a particle stands for over that of its sphere.
+    scale: f32,
+    pad0: f32,
+    pad1: f32,
+    pad2: f32,
+}
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<uniform> params: ThicknessParams;
+@group(0) @binding(2) var<storage, read> particles: array<Particle>;
+@group(0) @binding(3) var<storage, read> solid_depth: array<f32>;
+@group(0) @binding(4) var<storage, read_write> thickness: array<atomic<u32>>;
+
+@compute @workgroup_size(32)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = group.x + group.y * groups.x;
+    if index >= camera.particle_count {
+        return;
+    }
+    let particle = particles[index];
+    if !is_body(particle) {
+        return;
+    }
+    let half_size = camera.size / 2u;
+    let c = eye_from_world(camera, particle.position + particle.velocity * camera.seconds);
+    let bounds = sphere_bounds(camera, c, camera.radius, 0.5, half_size);
+    let width = u32(max(bounds.z - bounds.x + 1, 0));
+    let count = width * u32(max(bounds.w - bounds.y + 1, 0));
+    for (var i = lane; i < count; i += 32u) {
+        let row = row_of(i, width);
+        let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
+        let hit = hit_sphere(eye_ray(camera, 2.0 * vec2f(pixel) + 1.0), c, camera.radius);
+        if hit.chord > 0.0 && hit.depth < solid_depth[2u * (pixel.y * camera.size.x + pixel.x)] {
+            let amount = u32(hit.chord * params.scale * THICKNESS_SCALE + 0.5);
+            atomicAdd(&thickness[pixel.y * half_size.x + pixel.x], amount);
+        }
+    }
+}

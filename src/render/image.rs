@@ -1,0 +1,109 @@
+//! Pictures, and the files that hold them.
+
+mod exr_file;
+mod png_file;
+
+use std::io::Write;
+use std::path::Path;
+
+use super::RenderError;
+
+pub use exr_file::{read_exr_attributes, write_exr};
+pub use png_file::{read_png_attributes, write_png, write_png_with_attributes};
+
+/// A picture and the channels beside it; rows from the top.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Image {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Scene-linear Rec. 709, premultiplied by alpha; `width × height`.
+    pub beauty: Vec<[f32; 4]>,
+    /// What the look asked for.
+    pub aovs: Aovs,
+}
+
+/// Channels beside the picture, at pixel centres and the frame's instant; `None` where not asked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Aovs {
+    /// Depth of the first surface along the optical axis, metres; 1e30 in the sky.
+    pub z: Option<Vec<f32>>,
+    /// World normal of the first surface; zero in the sky.
+    pub n: Option<Vec<[f32; 3]>>,
+    /// World position of the first surface, metres; zero in the sky.
+    pub p: Option<Vec<[f32; 3]>>,
+    /// Where the first surface will be in the next frame's picture less where it is, pixels; v points down.
+    pub forward: Option<Vec<[f32; 2]>>,
+    /// Water along the line of sight in front of what is solid, metres.
+    pub thickness: Option<Vec<f32>>,
+}
+
+impl Image {
+    /// A black, transparent picture without AOVs.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            beauty: vec![[0.0; 4]; width as usize * height as usize],
+            aovs: Aovs::default(),
+        }
+    }
+}
+
+/// Where a picture comes from; written into its file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Attributes {
+    /// Frame number.
+    pub frame: u32,
+    /// Name of the shot.
+    pub shot: String,
+    /// Program and version.
+    pub software: String,
+    /// Of the scene's physics.
+    pub scene_hash: String,
+    /// Of the cache frame.
+    pub cache_hash: String,
+    /// Of the look.
+    pub look_hash: String,
+}
+
+impl Attributes {
+    /// Names as they stand in files, with values.
+    fn texts(&self) -> [(&'static str, &str); 5] {
+        [
+            ("shot", &self.shot),
+            ("software", &self.software),
+            ("swell:scene_hash", &self.scene_hash),
+            ("swell:cache_hash", &self.cache_hash),
+            ("swell:look_hash", &self.look_hash),
+        ]
+    }
+
+    fn set(&mut self, name: &str, value: String) {
+        match name {
+            "shot" => self.shot = value,
+            "software" => self.software = value,
+            "swell:scene_hash" => self.scene_hash = value,
+            "swell:cache_hash" => self.cache_hash = value,
+            "swell:look_hash" => self.look_hash = value,
+            _ => {}
+        }
+    }
+}
+
+/// Writes beside the file and renames, so that a picture that exists is whole.
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RenderError> {
+    let fault = |source| RenderError::Write {
+        file: path.to_owned(),
+        source,
+    };
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let part = path.with_file_name(name);
+    let mut file = std::fs::File::create(&part).map_err(fault)?;
+    file.write_all(bytes)
+        .and_then(|()| file.sync_all())
+        .map_err(fault)?;
+    std::fs::rename(&part, path).map_err(fault)
+}

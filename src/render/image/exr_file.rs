@@ -1,0 +1,128 @@
+//! Scene-linear OpenEXR: half beauty, float AOVs, and where they come from.
+
+use std::path::Path;
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples,
+    ImageAttributes, IntegerBounds, Layer, LayerAttributes, LineOrder, Text, Vec2, WritableImage,
+};
+use half::f16;
+
+use super::super::RenderError;
+use super::{Attributes, Image, write_whole};
+
+fn text(value: &str) -> Text {
+    Text::new_or_none(value).unwrap_or_else(|| Text::from("?"))
+}
+
+/// Writes one part: `R G B A` half, and the AOVs float: `Z`, `N.X/.Y/.Z`, `P.X/.Y/.Z`, `forward.u/.v`,
+/// `thickness.Y`. ZIP, lossless; Rec. 709 chromaticities stated.
+///
+/// # Errors
+/// [`RenderError::Write`], [`RenderError::Format`].
+pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<(), RenderError> {
+    let mut channels = Vec::new();
+    for (index, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
+        let samples = image
+            .beauty
+            .iter()
+            // Half ends at 65 504; a brighter glint would become infinite.
+            .map(|pixel| f16::from_f32(pixel[index].min(65504.0)))
+            .collect();
+        channels.push(AnyChannel::new(name, FlatSamples::F16(samples)));
+    }
+    let mut float = |name: &str, samples: Vec<f32>| {
+        channels.push(AnyChannel::new(name, FlatSamples::F32(samples)));
+    };
+    let aovs = &image.aovs;
+    if let Some(z) = &aovs.z {
+        float("Z", z.clone());
+    }
+    for (prefix, values) in [("N", &aovs.n), ("P", &aovs.p)] {
+        for (axis, suffix) in ["X", "Y", "Z"].into_iter().enumerate() {
+            if let Some(values) = values {
+                let samples = values.iter().map(|v| v[axis]).collect();
+                float(&format!("{prefix}.{suffix}"), samples);
+            }
+        }
+    }
+    if let Some(motion) = &aovs.forward {
+        float("forward.u", motion.iter().map(|v| v[0]).collect());
+        float("forward.v", motion.iter().map(|v| v[1]).collect());
+    }
+    if let Some(thickness) = &aovs.thickness {
+        float("thickness.Y", thickness.clone());
+    }
+
+    let size = Vec2(image.width as usize, image.height as usize);
+    let mut layer_attributes = LayerAttributes::default();
+    layer_attributes.software_name = Some(text(&attributes.software));
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    let layer = Layer::new(
+        size,
+        layer_attributes,
+        encoding,
+        AnyChannels::sort(channels.into()),
+    );
+    let mut header = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    header.chromaticities = Some(exr::meta::attribute::Chromaticities {
+        red: Vec2(0.64, 0.33),
+        green: Vec2(0.30, 0.60),
+        blue: Vec2(0.15, 0.06),
+        white: Vec2(0.3127, 0.3290),
+    });
+    for (name, value) in attributes.texts() {
+        if name != "software" {
+            header
+                .other
+                .insert(text(name), AttributeValue::Text(text(value)));
+        }
+    }
+    let frame = i32::try_from(attributes.frame).unwrap_or(i32::MAX);
+    header.other.insert(text("frame"), AttributeValue::I32(frame));
+    let picture = exr::image::Image::empty(header).with_layer(layer);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture
+        .write()
+        .to_buffered(&mut bytes)
+        .map_err(|error| RenderError::Format {
+            file: path.to_owned(),
+            message: error.to_string(),
+        })?;
+    write_whole(path, bytes.get_ref())
+}
+
+/// The attributes of an EXR, or what of them is there; the pixels are not read.
+///
+/// # Errors
+/// [`RenderError::Format`] where it cannot be opened or is no EXR.
+pub fn read_exr_attributes(path: &Path) -> Result<Attributes, RenderError> {
+    let meta = exr::meta::MetaData::read_from_file(path, true).map_err(|error| {
+        RenderError::Format {
+            file: path.to_owned(),
+            message: error.to_string(),
+        }
+    })?;
+    let mut attributes = Attributes::default();
+    for header in &meta.headers {
+        if let Some(software) = &header.own_attributes.software_name {
+            attributes.software = software.to_string();
+        }
+        for (name, value) in &header.shared_attributes.other {
+            match value {
+                AttributeValue::Text(value) => {
+                    attributes.set(&name.to_string(), value.to_string());
+                }
+                AttributeValue::I32(value) if name.to_string() == "frame" => {
+                    attributes.frame = u32::try_from(*value).unwrap_or(0);
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(attributes)
+}

@@ -1,0 +1,107 @@
+//! 8-bit PNG through the view transform.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::super::RenderError;
+use super::super::view;
+use super::{Attributes, Image, write_whole};
+use crate::scene::look::ViewSpec;
+
+/// Writes an 8-bit RGBA PNG, encoded sRGB, alpha not premultiplied.
+///
+/// # Errors
+/// [`RenderError::Write`], [`RenderError::Format`].
+pub fn write_png(path: &Path, image: &Image, view: &ViewSpec) -> Result<(), RenderError> {
+    write(path, image, view, None)
+}
+
+/// As [`write_png`], with the attributes as text chunks.
+///
+/// # Errors
+/// As [`write_png`].
+pub fn write_png_with_attributes(
+    path: &Path,
+    image: &Image,
+    view: &ViewSpec,
+    attributes: &Attributes,
+) -> Result<(), RenderError> {
+    write(path, image, view, Some(attributes))
+}
+
+fn write(
+    path: &Path,
+    image: &Image,
+    view: &ViewSpec,
+    attributes: Option<&Attributes>,
+) -> Result<(), RenderError> {
+    let fault = |error: png::EncodingError| RenderError::Format {
+        file: path.to_owned(),
+        message: error.to_string(),
+    };
+    let opaque = image.beauty.iter().all(|pixel| pixel[3] >= 1.0 - 1e-6);
+    let depth = if opaque { 3 } else { 4 };
+    let pixels: Vec<u8> = image
+        .beauty
+        .par_iter()
+        .flat_map_iter(|&[r, g, b, a]| {
+            let clear = if a > 0.0 { 1.0 / a } else { 0.0 };
+            let [r, g, b] = view::apply(view, [r * clear, g * clear, b * clear]);
+            [r, g, b, f64::from(a).clamp(0.0, 1.0)]
+                .into_iter()
+                .take(depth)
+                .map(|x| (x * 255.0).round() as u8)
+        })
+        .collect();
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, image.width, image.height);
+    encoder.set_color(if opaque {
+        png::ColorType::Rgb
+    } else {
+        png::ColorType::Rgba
+    });
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    if let Some(attributes) = attributes {
+        let frame = attributes.frame.to_string();
+        let texts = attributes.texts().into_iter().chain([("frame", frame.as_str())]);
+        for (name, value) in texts {
+            encoder
+                .add_itxt_chunk(name.to_owned(), value.to_owned())
+                .map_err(fault)?;
+        }
+    }
+    let mut writer = encoder.write_header().map_err(fault)?;
+    writer.write_image_data(&pixels).map_err(fault)?;
+    writer.finish().map_err(fault)?;
+    write_whole(path, &bytes)
+}
+
+/// The attributes of a PNG, or what of them is there.
+///
+/// # Errors
+/// [`RenderError::Write`] where it cannot be opened, [`RenderError::Format`] where it is no PNG.
+pub fn read_png_attributes(path: &Path) -> Result<Attributes, RenderError> {
+    let file = std::fs::File::open(path).map_err(|source| RenderError::Write {
+        file: path.to_owned(),
+        source,
+    })?;
+    let fault = |error: png::DecodingError| RenderError::Format {
+        file: path.to_owned(),
+        message: error.to_string(),
+    };
+    let reader = png::Decoder::new(std::io::BufReader::new(file))
+        .read_info()
+        .map_err(fault)?;
+    let mut attributes = Attributes::default();
+    for chunk in &reader.info().utf8_text {
+        let value = chunk.get_text().map_err(fault)?;
+        if chunk.keyword == "frame" {
+            attributes.frame = value.parse().unwrap_or(0);
+        } else {
+            attributes.set(&chunk.keyword, value);
+        }
+    }
+    Ok(attributes)
+}

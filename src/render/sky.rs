@@ -1,0 +1,339 @@
+//! Sky, sun and the light that they throw on the set.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+use half::f16;
+use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
+use rayon::prelude::*;
+
+use super::RenderError;
+use crate::scene::look::{Look, SkySpec};
+
+/// A latitude-longitude image, and integrals over it.
+pub(super) struct Sky {
+    pub(super) size: [u32; 2],
+    /// Row by row from the zenith; alpha 1.
+    pub(super) texels: Vec<[f16; 4]>,
+    /// Coefficients of the irradiance over direction, in the order of `ssfr_light.wgsl`.
+    pub(super) irradiance: [[f32; 4]; 9],
+    /// On a face at right angles to the sun.
+    pub(super) sun_irradiance: Vec3,
+    /// Mean colour just above the horizon.
+    pub(super) horizon: Vec3,
+    /// Radiance over irradiance of the sun's disc; 0 where the image holds the disc itself.
+    pub(super) disc: f32,
+}
+
+/// Reflectance of white paint that lies in the open under a sun at 45° and a sky of turbidity 3 gives
+/// radiance 1: that fixes the unit of light, and exposures are counted from there.
+const REFERENCE_ELEVATION: f64 = PI / 4.0;
+const REFERENCE_TURBIDITY: f64 = 3.0;
+/// Part of that light that comes from the sky, not the sun (clear-sky measurements lie between 0.15 and 0.2).
+const REFERENCE_DIFFUSE: f64 = 0.18;
+/// Solid angle of the sun, sr.
+const SUN_SOLID_ANGLE: f64 = 6.794e-5;
+
+fn luminance(c: DVec3) -> f64 {
+    c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// Part of the sunlight that the air lets through at 650, 550 and 450 nm: Rayleigh, aerosol and ozone, as
+/// Preetham, Shirley and Smits 1999 give them (appendix A.1).
+fn transmittance(elevation: f64, turbidity: f64) -> DVec3 {
+    let zenith = PI / 2.0 - elevation;
+    let mass = 1.0 / (zenith.cos() + 0.15 * (93.885 - zenith.to_degrees()).powf(-1.253));
+    let beta = 0.04608 * turbidity - 0.04586;
+    let at = |micrometres: f64, ozone: f64| {
+        let rayleigh = 0.008735 * micrometres.powf(-4.08);
+        let aerosol = beta * micrometres.powf(-1.3);
+        (-(rayleigh + aerosol + 0.35 * ozone) * mass).exp()
+    };
+    DVec3::new(at(0.65, 0.062), at(0.55, 0.085), at(0.45, 0.003))
+}
+
+fn state(elevation: f64, turbidity: f64, albedo: [f64; 3]) -> Result<SkyState, RenderError> {
+    SkyState::new(&SkyParams {
+        elevation: (elevation as f32).min(std::f32::consts::FRAC_PI_2),
+        turbidity: turbidity as f32,
+        albedo: albedo.map(|c| c as f32),
+    })
+    .map_err(|error| RenderError::Scene(error.to_string()))
+}
+
+fn radiance(state: &SkyState, direction: DVec3, sun: DVec3) -> DVec3 {
+    let theta = direction.y.clamp(0.0, 1.0).acos() as f32;
+    let gamma = direction.dot(sun).clamp(-1.0, 1.0).acos() as f32;
+    DVec3::new(
+        state.radiance(theta, gamma, Channel::R).max(0.0).into(),
+        state.radiance(theta, gamma, Channel::G).max(0.0).into(),
+        state.radiance(theta, gamma, Channel::B).max(0.0).into(),
+    )
+}
+
+/// Direction of a texel's centre and the solid angle that it covers; as `sky_radiance` in the shader.
+fn texel(size: [u32; 2], x: u32, y: u32) -> (DVec3, f64) {
+    let azimuth = ((f64::from(x) + 0.5) / f64::from(size[0]) - 0.5) * 2.0 * PI;
+    let polar = (f64::from(y) + 0.5) / f64::from(size[1]) * PI;
+    let (sin, cos) = polar.sin_cos();
+    let direction = DVec3::new(sin * azimuth.cos(), cos, sin * azimuth.sin());
+    let area = 2.0 * PI / f64::from(size[0]) * PI / f64::from(size[1]) * sin;
+    (direction, area)
+}
+
+fn image(size: [u32; 2], colour: impl Fn(DVec3) -> DVec3 + Sync) -> Vec<DVec3> {
+    (0..size[1])
+        .into_par_iter()
+        .flat_map_iter(|y| (0..size[0]).map(move |x| (x, y)))
+        .map(|(x, y)| colour(texel(size, x, y).0))
+        .collect()
+}
+
+/// Irradiance on a level face from above.
+fn from_above(size: [u32; 2], texels: &[DVec3]) -> DVec3 {
+    texels
+        .iter()
+        .zip(0u32..)
+        .map(|(&colour, i)| {
+            let (direction, area) = texel(size, i % size[0], i / size[0]);
+            colour * direction.y.max(0.0) * area
+        })
+        .sum()
+}
+
+/// Cosine-convolved spherical harmonics up to order 2 (Ramamoorthi and Hanrahan 2001).
+fn harmonics(size: [u32; 2], texels: &[DVec3]) -> [[f32; 4]; 9] {
+    let mut sums = [DVec3::ZERO; 9];
+    for (&colour, i) in texels.iter().zip(0u32..) {
+        let (d, area) = texel(size, i % size[0], i / size[0]);
+        let basis = basis(d);
+        for (sum, (value, _)) in sums.iter_mut().zip(basis) {
+            *sum += colour * (value * area);
+        }
+    }
+    let lobes = [
+        PI,
+        2.0 * PI / 3.0,
+        2.0 * PI / 3.0,
+        2.0 * PI / 3.0,
+        PI / 4.0,
+        PI / 4.0,
+        PI / 4.0,
+        PI / 4.0,
+        PI / 4.0,
+    ];
+    let norms = basis(DVec3::Y).map(|(_, norm)| norm);
+    std::array::from_fn(|i| {
+        (sums[i] * (lobes[i] * norms[i]))
+            .as_vec3()
+            .extend(0.0)
+            .to_array()
+    })
+}
+
+/// The nine functions, and the constant before each.
+fn basis(d: DVec3) -> [(f64, f64); 9] {
+    const C: [f64; 5] = [0.282_095, 0.488_603, 1.092_548, 0.315_392, 0.546_274];
+    [
+        (C[0], C[0]),
+        (C[1] * d.y, C[1]),
+        (C[1] * d.z, C[1]),
+        (C[1] * d.x, C[1]),
+        (C[2] * d.x * d.y, C[2]),
+        (C[2] * d.y * d.z, C[2]),
+        (C[3] * (3.0 * d.z * d.z - 1.0), C[3]),
+        (C[2] * d.x * d.z, C[2]),
+        (C[4] * (d.x * d.x - d.y * d.y), C[4]),
+    ]
+}
+
+impl Sky {
+    /// Bakes the look's sky; `limit` is the widest texture.
+    pub(super) fn new(look: &Look, limit: u32) -> Result<Self, RenderError> {
+        let spec = look.spec();
+        let sun = look.sun_direction();
+        let elevation = spec.sun.elevation_degrees.to_radians();
+        let reference = state(REFERENCE_ELEVATION, REFERENCE_TURBIDITY, [0.15; 3])?;
+        let reference_sun = DVec3::new(REFERENCE_ELEVATION.cos(), REFERENCE_ELEVATION.sin(), 0.0);
+        let coarse = [128, 64];
+        let diffuse = luminance(from_above(
+            coarse,
+            &image(coarse, |d| radiance(&reference, d, reference_sun)),
+        ));
+        let unit = REFERENCE_DIFFUSE * PI / diffuse;
+        let outside_air = (1.0 - REFERENCE_DIFFUSE) * PI
+            / REFERENCE_ELEVATION.sin()
+            / luminance(transmittance(REFERENCE_ELEVATION, REFERENCE_TURBIDITY));
+
+        let turbidity = match &spec.sky {
+            SkySpec::HosekWilkie { turbidity, .. } => *turbidity,
+            SkySpec::Panorama { .. } => REFERENCE_TURBIDITY,
+        };
+        let sun_irradiance =
+            transmittance(elevation, turbidity) * (outside_air * spec.sun.intensity);
+        let (size, texels, disc) = match &spec.sky {
+            SkySpec::HosekWilkie { turbidity, albedo } => {
+                let size = [512, 256];
+                let state = state(elevation, *turbidity, *albedo)?;
+                let mut texels = image(size, |d| {
+                    radiance(&state, DVec3::new(d.x, d.y.max(0.0), d.z), sun) * unit
+                });
+                // Below the horizon lies the ground, lit by what is above.
+                let light = from_above(size, &texels) + sun_irradiance * sun.y;
+                let ground = light * DVec3::from(spec.ground.colour) / PI;
+                let below = texels.len() / 2;
+                texels[below..].fill(ground);
+                (size, texels, 1.0 / SUN_SOLID_ANGLE)
+            }
+            SkySpec::Panorama {
+                rotate_degrees,
+                intensity,
+                ..
+            } => {
+                let bytes = look.panorama().unwrap_or_default();
+                let (size, texels) = panorama(bytes, limit, *rotate_degrees, *intensity)?;
+                (size, texels, 0.0)
+            }
+        };
+        Ok(Self {
+            size,
+            irradiance: harmonics(size, &texels),
+            horizon: horizon(size, &texels).as_vec3(),
+            sun_irradiance: sun_irradiance.as_vec3(),
+            texels: texels
+                .iter()
+                .map(|c| {
+                    let c = c.clamp(DVec3::ZERO, DVec3::splat(65000.0));
+                    [c.x, c.y, c.z, 1.0].map(f16::from_f64)
+                })
+                .collect(),
+            disc: disc as f32,
+        })
+    }
+}
+
+/// Mean of the rows from the horizon up to about 6°.
+fn horizon(size: [u32; 2], texels: &[DVec3]) -> DVec3 {
+    let middle = (size[1] / 2) as usize;
+    let rows = (size[1] as usize / 30).max(1).min(middle.max(1));
+    let width = size[0] as usize;
+    let part = &texels[middle.saturating_sub(rows) * width..middle.max(1) * width];
+    part.iter().sum::<DVec3>() / part.len().max(1) as f64
+}
+
+fn panorama(
+    bytes: &[u8],
+    limit: u32,
+    rotate_degrees: f64,
+    intensity: f64,
+) -> Result<([u32; 2], Vec<DVec3>), RenderError> {
+    use exr::prelude::{ReadChannels, ReadLayers, read};
+
+    let fault = |message: String| RenderError::Panorama(message);
+    let loaded = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size: exr::math::Vec2<usize>, _: &_| {
+                (size.0, vec![DVec3::ZERO; size.0 * size.1])
+            },
+            |(width, texels): &mut (usize, Vec<DVec3>),
+             at: exr::math::Vec2<usize>,
+             (r, g, b): (f32, f32, f32)| {
+                texels[at.1 * *width + at.0] = DVec3::new(r.into(), g.into(), b.into());
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(std::io::Cursor::new(bytes))
+        .map_err(|error| fault(error.to_string()))?;
+    let layer = loaded.layer_data;
+    let (mut width, mut texels) = layer.channel_data.pixels;
+    let mut height = layer.size.1;
+    if width < 2 || height < 2 {
+        return Err(fault(format!("is {width} × {height} pixels; at least 2 × 2 are needed")));
+    }
+    if texels.iter().any(|c| !c.is_finite()) {
+        return Err(fault("holds a value that is not finite".to_owned()));
+    }
+    while width.max(height) > limit as usize {
+        let (w, h) = (width / 2, height / 2);
+        texels = (0..w * h)
+            .into_par_iter()
+            .map(|i| {
+                let at = 2 * (i / w) * width + 2 * (i % w);
+                (texels[at] + texels[at + 1] + texels[at + width] + texels[at + width + 1]) * 0.25
+            })
+            .collect();
+        (width, height) = (w, h);
+    }
+    let shift = (rotate_degrees / 360.0 * width as f64).round() as i64;
+    let turned = (0..width * height)
+        .map(|i| {
+            let x = (i % width) as i64 - shift;
+            texels[i / width * width + x.rem_euclid(width as i64) as usize] * intensity
+        })
+        .collect();
+    Ok(([width as u32, height as u32], turned))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn look(extra: &str) -> Look {
+        let text = format!(
+            "[camera]\nfocal_length_mm = 35.0\nposition = [0, 1, 0]\ntarget = [1, 1, 0]\n{extra}"
+        );
+        Look::parse(&text, Path::new("look.toml")).unwrap()
+    }
+
+    #[test]
+    fn a_uniform_sky_gives_pi_times_its_radiance_in_every_direction() {
+        let size = [64, 32];
+        let coefficients = harmonics(size, &vec![DVec3::ONE; 64 * 32]);
+        // The quadrature's own error at 32 rows is (π/64)²/6 ≈ 4e-4 of π.
+        assert!((f64::from(coefficients[0][0]) - PI).abs() < 3e-3);
+        assert!(coefficients[1..].iter().all(|c| c[0].abs() < 3e-3));
+    }
+
+    #[test]
+    fn a_low_sun_is_redder_and_dimmer() {
+        let sky = |degrees: f64| {
+            let text = format!("[sun]\nelevation_degrees = {degrees:.1}\n[sky]\nmodel = \"hosek_wilkie\"\n");
+            Sky::new(&look(&text), 8192).unwrap()
+        };
+        let (high, low) = (sky(45.0), sky(4.0));
+        assert!(low.sun_irradiance.x < high.sun_irradiance.x);
+        let ratio = |c: Vec3| c.z / c.x;
+        assert!(ratio(low.sun_irradiance) < 0.3 * ratio(high.sun_irradiance));
+        // The unit of light: white lying in the open under the reference sky has radiance 1.
+        let up = |c: &[[f32; 4]; 9]| {
+            DVec3::from_array([0, 1, 2].map(|i| {
+                f64::from(c[0][i] + c[1][i] - c[6][i] - c[8][i])
+            }))
+        };
+        let total = luminance(up(&high.irradiance))
+            + luminance(high.sun_irradiance.as_dvec3()) * REFERENCE_ELEVATION.sin();
+        assert!((total / PI - 1.0).abs() < 0.05, "{total}");
+    }
+
+    #[test]
+    fn a_panorama_is_read_turned_and_shrunk() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("sky.exr");
+        exr::prelude::write_rgb_file(&file, 16, 8, |x, _| {
+            (if x < 4 { 4.0f32 } else { 0.0 }, 1.0f32, 2.0f32)
+        })
+        .unwrap();
+        let bytes = std::fs::read(&file).unwrap();
+        let (size, texels) = panorama(&bytes, 8, 90.0, 2.0).unwrap();
+        assert_eq!(size, [8, 4]);
+        // Columns 0 and 1 of 8 were bright; a quarter turn puts them at 2 and 3.
+        let reds: Vec<f64> = texels[..8].iter().map(|c| c.x).collect();
+        assert_eq!(reds, [0.0, 0.0, 8.0, 8.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!(panorama(b"not an EXR", 8, 0.0, 1.0).is_err());
+    }
+}

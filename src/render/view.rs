@@ -1,0 +1,128 @@
+//! From scene-linear light to what a screen shows.
+
+use glam::{DMat3, DVec3};
+
+use crate::scene::look::{TransformSpec, ViewSpec};
+
+/// sRGB's encoding of one linear channel, 0 to 1.
+pub fn srgb_encode(linear: f64) -> f64 {
+    let x = linear.clamp(0.0, 1.0);
+    if x <= 0.003_130_8 {
+        12.92 * x
+    } else {
+        1.055 * x.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// Scene-linear Rec. 709 to encoded sRGB, each channel 0 to 1.
+///
+/// Exposure, then the look's tone curve, then contrast about middle grey and saturation, then sRGB's encoding.
+pub fn apply(view: &ViewSpec, colour: [f32; 3]) -> [f64; 3] {
+    let scene = DVec3::from(colour.map(f64::from)).max(DVec3::ZERO) * view.exposure_stops.exp2();
+    let mut display = match view.transform {
+        TransformSpec::Agx => agx(scene),
+        TransformSpec::Srgb => scene.min(DVec3::ONE),
+    };
+    const GREY: f64 = 0.18;
+    if view.contrast != 1.0 {
+        let power = |x: f64| GREY * (x / GREY).powf(view.contrast);
+        display = DVec3::from_array(display.to_array().map(power));
+    }
+    let grey = DVec3::splat(display.dot(DVec3::new(0.2126, 0.7152, 0.0722)));
+    display = grey + (display - grey) * view.saturation;
+    display.to_array().map(srgb_encode)
+}
+
+/// Sobotka's AgX base view as display-linear Rec. 709, by Wrensch's polynomial for its curve (2023): the primaries are drawn together, light is taken to log2 over 16.5
+/// stops about middle grey, bent, and the primaries are spread again.
+fn agx(scene: DVec3) -> DVec3 {
+    let inset = DMat3::from_cols_array(&[
+        0.842_479_062_253_094,
+        0.042_328_242_100_123_8,
+        0.042_375_654_905_705_1,
+        0.078_433_599_999_999_2,
+        0.878_468_636_469_772,
+        0.078_433_6,
+        0.079_223_745_147_764_3,
+        0.079_166_127_460_542_8,
+        0.879_142_973_793_104,
+    ]);
+    let outset = DMat3::from_cols_array(&[
+        1.196_879_005_120_17,
+        -0.052_896_851_757_456_2,
+        -0.052_971_635_514_443_8,
+        -0.098_020_881_140_136_8,
+        1.151_903_129_904_17,
+        -0.098_043_450_117_124_1,
+        -0.099_029_744_079_720_5,
+        -0.098_961_176_844_843_3,
+        1.151_073_672_641_16,
+    ]);
+    const LEAST: f64 = -12.473_93;
+    const MOST: f64 = 4.026_069;
+    let bent = (inset * scene).to_array().map(|x| {
+        let log = (x.max(1e-10).log2().clamp(LEAST, MOST) - LEAST) / (MOST - LEAST);
+        curve(log)
+    });
+    (outset * DVec3::from_array(bent))
+        .to_array()
+        .map(|x| x.max(0.0).powf(2.2).min(1.0))
+        .into()
+}
+
+fn curve(x: f64) -> f64 {
+    let x2 = x * x;
+    let x4 = x2 * x2;
+    15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(view: &ViewSpec, x: f32) -> f64 {
+        let [r, g, b] = apply(view, [x; 3]);
+        // The rows of AgX's matrices add up to 1 within 2e-4.
+        assert!((r - g).abs() < 2e-3 && (b - g).abs() < 2e-3);
+        g
+    }
+
+    #[test]
+    fn known_values_go_through_the_transform() {
+        let agx = ViewSpec::default();
+        // The curve's pivot: middle grey goes to 0.489 of a 2.2 power display, which sRGB encodes as 0.493. The
+        // polynomial is within 0.01 of it.
+        assert!((grey(&agx, 0.18) - 0.493).abs() < 0.01, "{}", grey(&agx, 0.18));
+        assert!(grey(&agx, 0.0) < 1e-6);
+        // Sixteen times white is not yet clipped, where a raw encoding would have been since 1.
+        assert!(grey(&agx, 1.0) < 0.85 && grey(&agx, 10.0) < 1.0);
+        let plain = ViewSpec {
+            transform: TransformSpec::Srgb,
+            ..ViewSpec::default()
+        };
+        // IEC 61966-2-1: linear 0.214041 is encoded 0.5; a power of 1/2.2 would give 0.4962.
+        assert!((grey(&plain, 0.214_041) - 0.5).abs() < 1e-5);
+    }
+
+    #[test]
+    fn brighter_is_never_darker_and_a_stop_is_a_factor_of_two() {
+        let view = ViewSpec::default();
+        let mut last = -1.0;
+        for step in -100..60 {
+            let now = grey(&view, (f64::from(step) / 8.0).exp2() as f32);
+            assert!(now >= last, "{step}");
+            last = now;
+        }
+        let up = ViewSpec {
+            exposure_stops: 1.0,
+            ..ViewSpec::default()
+        };
+        assert_eq!(grey(&up, 0.1), grey(&view, 0.2));
+    }
+
+    #[test]
+    fn strong_colours_run_to_white() {
+        let [r, g, b] = apply(&ViewSpec::default(), [0.5, 4.0, 40.0]);
+        assert!(b > 0.9 && g > 0.5 && r > 0.3, "{r} {g} {b}");
+    }
+}
