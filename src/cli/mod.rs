@@ -4,6 +4,7 @@ mod bake;
 mod inspect;
 pub mod interrupt;
 mod progress;
+mod render;
 pub mod verify;
 
 use std::{error::Error, process::ExitCode};
@@ -28,6 +29,8 @@ struct Cli {
 enum Command {
     /// Simulate a scene into a particle cache.
     Bake(bake::BakeArgs),
+    /// Render a particle cache with a look into an image sequence.
+    Render(render::RenderArgs),
     /// Show a scene's plan, a cache's frames, or this machine's adapters.
     Inspect(inspect::InspectArgs),
     /// Check every checksum of a cache.
@@ -63,6 +66,7 @@ where
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Bake(args) => bake::run(&args),
+        Command::Render(args) => render::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Verify(args) => verify::run(&args)
             .map(|()| ExitCode::SUCCESS)

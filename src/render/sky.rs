@@ -234,9 +234,7 @@ fn panorama(
         .no_deep_data()
         .largest_resolution_level()
         .rgb_channels(
-            |size: exr::math::Vec2<usize>, _: &_| {
-                (size.0, vec![DVec3::ZERO; size.0 * size.1])
-            },
+            |size: exr::math::Vec2<usize>, _: &_| (size.0, vec![DVec3::ZERO; size.0 * size.1]),
             |(width, texels): &mut (usize, Vec<DVec3>),
              at: exr::math::Vec2<usize>,
              (r, g, b): (f32, f32, f32)| {
@@ -251,7 +249,9 @@ fn panorama(
     let (mut width, mut texels) = layer.channel_data.pixels;
     let mut height = layer.size.1;
     if width < 2 || height < 2 {
-        return Err(fault(format!("is {width} × {height} pixels; at least 2 × 2 are needed")));
+        return Err(fault(format!(
+            "is {width} × {height} pixels; at least 2 × 2 are needed"
+        )));
     }
     if texels.iter().any(|c| !c.is_finite()) {
         return Err(fault("holds a value that is not finite".to_owned()));
@@ -302,7 +302,9 @@ mod tests {
     #[test]
     fn a_low_sun_is_redder_and_dimmer() {
         let sky = |degrees: f64| {
-            let text = format!("[sun]\nelevation_degrees = {degrees:.1}\n[sky]\nmodel = \"hosek_wilkie\"\n");
+            let text = format!(
+                "[sun]\nelevation_degrees = {degrees:.1}\n[sky]\nmodel = \"hosek_wilkie\"\n"
+            );
             Sky::new(&look(&text), 8192).unwrap()
         };
         let (high, low) = (sky(45.0), sky(4.0));
@@ -311,9 +313,7 @@ mod tests {
         assert!(ratio(low.sun_irradiance) < 0.3 * ratio(high.sun_irradiance));
         // The unit of light: white lying in the open under the reference sky has radiance 1.
         let up = |c: &[[f32; 4]; 9]| {
-            DVec3::from_array([0, 1, 2].map(|i| {
-                f64::from(c[0][i] + c[1][i] - c[6][i] - c[8][i])
-            }))
+            DVec3::from_array([0, 1, 2].map(|i| f64::from(c[0][i] + c[1][i] - c[6][i] - c[8][i])))
         };
         let total = luminance(up(&high.irradiance))
             + luminance(high.sun_irradiance.as_dvec3()) * REFERENCE_ELEVATION.sin();

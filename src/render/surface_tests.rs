@@ -97,7 +97,8 @@ fn the_smoothed_width_is_the_same_at_any_distance() {
     let plain = explicit(Width::World(SIGMA), 400);
     let pyramid = FlowSettings::for_width(SIGMA, 0.1, FOCAL);
     assert!(pyramid.levels > 3, "the pyramid is what looks use");
-    for (name, settings, tolerance) in [("explicit", plain, TOLERANCE), ("pyramid", pyramid, 0.15)] {
+    for (name, settings, tolerance) in [("explicit", plain, TOLERANCE), ("pyramid", pyramid, 0.15)]
+    {
         for distance in DISTANCES {
             let sigma = widened(&settings, distance);
             println!("{name} at {distance} m: {sigma:.4} m");
@@ -111,7 +112,10 @@ fn the_smoothed_width_is_the_same_at_any_distance() {
 fn without_the_correction_the_width_follows_the_distance() {
     let sigmas = DISTANCES.map(|z| widened(&explicit(Width::Pixels(6.0), 100), z));
     // The same six pixels are four times as wide at four times the distance.
-    assert!((sigmas[2] / sigmas[0] - 4.0).abs() < 4.0 * TOLERANCE, "{sigmas:?}");
+    assert!(
+        (sigmas[2] / sigmas[0] - 4.0).abs() < 4.0 * TOLERANCE,
+        "{sigmas:?}"
+    );
     let spread = (sigmas[2] / sigmas[0] - 1.0).abs();
     assert!(spread > TOLERANCE, "the control passes the test");
 }

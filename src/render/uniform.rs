@@ -169,24 +169,90 @@ mod tests {
     #[test]
     fn mirrors_agree_with_the_shaders() {
         mirrors!(
-            "ssfr/shade", "Camera", Camera, position, seconds, right, focal, up, particle_count,
-            forward, radius, centre, size, margin, picture, weight, sample_index, clock,
+            "ssfr/shade",
+            "Camera",
+            Camera,
+            position,
+            seconds,
+            right,
+            focal,
+            up,
+            particle_count,
+            forward,
+            radius,
+            centre,
+            size,
+            margin,
+            picture,
+            weight,
+            sample_index,
+            clock,
             frame_seconds
         );
         mirrors!(
-            "ssfr/splat_depth", "Particle", Particle, position, aeration, velocity, tag
+            "ssfr/splat_depth",
+            "Particle",
+            Particle,
+            position,
+            aeration,
+            velocity,
+            tag
         );
         mirrors!(
-            "ssfr/shade", "Shading", Shading, sun_direction, roughness, sun_irradiance, index,
-            absorption, sun_path, scattering, spray_density, ground_colour, ground_variation,
-            solid_colour, haze, horizon, particle_spacing, ripple, windows, window_lit,
-            window_radiance, background, disc, irradiance, shadow_from_world
+            "ssfr/shade",
+            "Shading",
+            Shading,
+            sun_direction,
+            roughness,
+            sun_irradiance,
+            index,
+            absorption,
+            sun_path,
+            scattering,
+            spray_density,
+            ground_colour,
+            ground_variation,
+            solid_colour,
+            haze,
+            horizon,
+            particle_spacing,
+            ripple,
+            windows,
+            window_lit,
+            window_radiance,
+            background,
+            disc,
+            irradiance,
+            shadow_from_world
         );
         mirrors!(
-            "ssfr/curvature_flow", "FlowParams", Flow, width, world, fraction, edge, steps, levels
+            "ssfr/curvature_flow",
+            "FlowParams",
+            Flow,
+            width,
+            world,
+            fraction,
+            edge,
+            steps,
+            levels
         );
-        mirrors!("ssfr/curvature_flow", "FlowLevel", FlowLevel, size, level, index);
-        mirrors!("ssfr/narrow_range", "NarrowParams", Narrow, width, range, offset, axis);
+        mirrors!(
+            "ssfr/curvature_flow",
+            "FlowLevel",
+            FlowLevel,
+            size,
+            level,
+            index
+        );
+        mirrors!(
+            "ssfr/narrow_range",
+            "NarrowParams",
+            Narrow,
+            width,
+            range,
+            offset,
+            axis
+        );
         mirrors!("ssfr/fill", "FillParams", Fill, word, count);
         mirrors!("ssfr/solid", "Triangle", Triangle, a, material, b, c);
         mirrors!("ssfr/solid", "Tile", Tile, corner, size);

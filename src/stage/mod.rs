@@ -3,11 +3,15 @@
 pub mod bake;
 pub mod inspect;
 pub mod prepare;
+pub mod render;
 pub mod verify;
 
 use crate::{
-    cache::CacheError, domain::signed_distance::SignedDistanceError, gpu::adapter::GpuError,
-    scene::SceneError, solve::SolveError,
+    cache::CacheError,
+    domain::signed_distance::SignedDistanceError,
+    gpu::adapter::GpuError,
+    scene::{SceneError, look::LookError},
+    solve::SolveError,
 };
 
 /// Where the fault of an error lies; what a caller does about it depends on this alone.
@@ -53,6 +57,12 @@ impl From<&CacheError> for Blame {
 
 impl From<&SceneError> for Blame {
     fn from(_: &SceneError) -> Self {
+        Self::Input
+    }
+}
+
+impl From<&LookError> for Blame {
+    fn from(_: &LookError) -> Self {
         Self::Input
     }
 }

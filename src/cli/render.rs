@@ -1,0 +1,129 @@
+//! `swell render CACHE --look LOOK`
+
+use std::{cell::OnceCell, path::PathBuf, process::ExitCode};
+
+use clap::Args;
+use serde_json::json;
+
+use crate::{
+    domain::frame_range::FrameRange,
+    scene::look::Look,
+    stage::render::{Event, Request, render},
+};
+
+use super::{
+    Failure,
+    interrupt::{self, Interrupt},
+    progress::{Mode, Progress},
+};
+
+#[derive(Args, Debug)]
+pub(super) struct RenderArgs {
+    /// Cache directory.
+    cache: PathBuf,
+    /// Look file (TOML).
+    #[arg(long, value_name = "LOOK")]
+    look: PathBuf,
+    /// Where images go; renders/SHOT-LOOK where left out.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Frames to render, such as 1-240x2; all that are cached where left out.
+    #[arg(long, value_name = "RANGE")]
+    frames: Option<FrameRange>,
+    /// Index or part of the name of the adapter (see `swell inspect --adapters`).
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Render frames again that stand there with the same cache and look.
+    #[arg(long)]
+    overwrite: bool,
+    /// How to tell progress.
+    #[arg(long, value_enum, default_value_t)]
+    progress: Mode,
+}
+
+pub(super) fn run(args: &RenderArgs) -> Result<ExitCode, Failure> {
+    let look = Look::load(&args.look)?;
+    let directory = match &args.output {
+        Some(directory) => directory.clone(),
+        None => {
+            let (manifest, _) = crate::stage::inspect::cache(&args.cache)?;
+            let look = args.look.file_stem().unwrap_or_default().to_string_lossy();
+            PathBuf::from("renders").join(format!("{}-{look}", manifest.shot))
+        }
+    };
+    let request = Request {
+        cache: args.cache.clone(),
+        look,
+        directory,
+        frames: args.frames.clone(),
+        adapter: args.adapter.clone(),
+        overwrite: args.overwrite,
+    };
+    // Without a handler a signal ends the process at once; a picture cut short is made again.
+    let interrupt = Interrupt::install().unwrap_or_default();
+    let progress = OnceCell::new();
+    let outcome = render(&request, interrupt.flag(), &mut |event| {
+        tell(args.progress, &progress, event)
+    });
+    let progress = progress
+        .into_inner()
+        .unwrap_or_else(|| Progress::new(args.progress, 0));
+    progress.finish();
+    let outcome = outcome?;
+    progress.say(
+        &format!(
+            "{} {} frames rendered, {} stood there already, in {}",
+            if outcome.interrupted {
+                "ended by a signal:"
+            } else {
+                "done:"
+            },
+            outcome.rendered,
+            outcome.skipped,
+            request.directory.display()
+        ),
+        json!({
+            "event": "end", "rendered": outcome.rendered, "skipped": outcome.skipped,
+            "interrupted": outcome.interrupted, "directory": request.directory,
+        }),
+    );
+    Ok(if outcome.interrupted {
+        ExitCode::from(interrupt::EXIT_CODE as u8)
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
+    match event {
+        Event::Ready {
+            device,
+            size,
+            frames,
+        } => {
+            let progress = progress.get_or_init(|| Progress::new(mode, frames as u64));
+            let [width, height] = size;
+            progress.say(
+                &format!("on {device}\n{frames} frames of {width} × {height}"),
+                json!({ "event": "ready", "device": device, "width": width, "height": height, "frames": frames }),
+            );
+        }
+        Event::Frame {
+            frame,
+            seconds,
+            skipped,
+        } => {
+            if let Some(progress) = progress.get() {
+                let text = if skipped {
+                    "stands there".into()
+                } else {
+                    format!("{seconds:.2} s")
+                };
+                progress.frame(
+                    &format!("frame {frame:4}  {text}"),
+                    json!({ "event": "frame", "frame": frame, "seconds": seconds, "skipped": skipped }),
+                );
+            }
+        }
+    }
+}

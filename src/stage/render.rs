@@ -1,0 +1,290 @@
+//! `render`: a particle cache and a look to an image sequence. The cache is only read.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
+
+use crate::{
+    cache::{CacheError, CacheReader},
+    domain::frame_range::FrameRange,
+    gpu::adapter::{Context, GpuError},
+    render::{
+        Attributes, Image, RenderError, RenderScene, Renderer,
+        image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
+    },
+    scene::{
+        Scene, SceneError,
+        look::{FormatSpec, Look},
+    },
+};
+
+use super::Blame;
+
+/// What to render, and where to.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Cache directory.
+    pub cache: PathBuf,
+    /// Camera, light, shading, output.
+    pub look: Look,
+    /// Where images go.
+    pub directory: PathBuf,
+    /// Frames wanted; all that are cached where `None`.
+    pub frames: Option<FrameRange>,
+    /// Index or part of the name of an adapter.
+    pub adapter: Option<String>,
+    /// Whether frames that stand there already are made again.
+    pub overwrite: bool,
+}
+
+/// What a render has to tell while it runs.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The device is open.
+    Ready {
+        /// Adapter name.
+        device: String,
+        /// Pixels.
+        size: [u32; 2],
+        /// Frames wanted.
+        frames: usize,
+    },
+    /// A frame is on the disk.
+    Frame {
+        /// Its number.
+        frame: u32,
+        /// Wall clock; 0 for a frame that stood there with the same hashes.
+        seconds: f64,
+        /// Whether it stood there.
+        skipped: bool,
+    },
+}
+
+/// How a render ended.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// Frames rendered now.
+    pub rendered: u32,
+    /// Frames that stood there.
+    pub skipped: u32,
+    /// Whether a signal ended it.
+    pub interrupted: bool,
+}
+
+/// Why a render failed.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderJobError {
+    /// The cache.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// The scene in the cache.
+    #[error("the cache's scene: {0}")]
+    Scene(#[from] SceneError),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The renderer.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The output folder.
+    #[error("{directory}: {source}", directory = .directory.display())]
+    Directory {
+        /// Which.
+        directory: PathBuf,
+        /// The system's words.
+        source: std::io::Error,
+    },
+    /// The output would go into the cache.
+    #[error("{} is in the cache itself: choose another -o", .0.display())]
+    IntoCache(PathBuf),
+}
+
+impl From<&RenderJobError> for Blame {
+    fn from(error: &RenderJobError) -> Self {
+        match error {
+            RenderJobError::Cache(error) => error.into(),
+            RenderJobError::Scene(_) | RenderJobError::Directory { .. } => Self::Files,
+            RenderJobError::Gpu(error) => error.into(),
+            RenderJobError::Render(RenderError::Gpu(error)) => error.into(),
+            RenderJobError::Render(RenderError::Panorama(_) | RenderError::Scene(_))
+            | RenderJobError::IntoCache(_) => Self::Input,
+            RenderJobError::Render(
+                RenderError::NotFinite { .. }
+                | RenderError::Write { .. }
+                | RenderError::Format { .. },
+            ) => Self::Files,
+        }
+    }
+}
+
+/// Renders the frames that are wanted; `tell` hears of progress, and `stop` ends it after the current frame.
+///
+/// # Errors
+/// [`RenderJobError`]; a missing cache frame is one before anything is rendered.
+pub fn render(
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Outcome, RenderJobError> {
+    let cache = CacheReader::open(&request.cache)?;
+    if is_inside(&request.directory, &request.cache) {
+        return Err(RenderJobError::IntoCache(request.directory.clone()));
+    }
+    let frames: Vec<u32> = match &request.frames {
+        Some(frames) => frames.iter().collect(),
+        None => (1..=cache.last_frame()).collect(),
+    };
+    for &frame in &frames {
+        cache.entry(frame)?;
+    }
+    // The cache's own copy: what was baked, wherever the cache has been moved to.
+    let scene = Scene::parse(
+        cache.scene_toml(),
+        &request.cache.join("scene.toml"),
+        &request.cache,
+        &[],
+    )?;
+    let context = Context::open(request.adapter.as_deref())?;
+    fs::create_dir_all(&request.directory).map_err(|source| RenderJobError::Directory {
+        directory: request.directory.clone(),
+        source,
+    })?;
+    let image = &request.look.spec().image;
+    tell(Event::Ready {
+        device: context.info.name.clone(),
+        size: [image.width, image.height],
+        frames: frames.len(),
+    });
+    let mut renderer = None;
+    let mut outcome = Outcome::default();
+    for frame in frames {
+        if stop.load(Ordering::Relaxed) {
+            outcome.interrupted = true;
+            break;
+        }
+        let begin = Instant::now();
+        let attributes = attributes(&cache, &request.look, frame)?;
+        let files = files(request, &attributes, cache.last_frame());
+        if !request.overwrite
+            && files
+                .iter()
+                .all(|(file, format)| is_current(file, *format, &attributes))
+        {
+            outcome.skipped += 1;
+            tell(Event::Frame {
+                frame,
+                seconds: 0.0,
+                skipped: true,
+            });
+            continue;
+        }
+        let renderer = match &mut renderer {
+            Some(renderer) => renderer,
+            None => renderer.insert(Renderer::new(
+                &context,
+                &request.look,
+                &render_scene(&scene),
+            )?),
+        };
+        let picture = renderer.render(frame, &cache.read(frame)?)?;
+        for (file, format) in &files {
+            write(file, *format, &picture, &attributes, &request.look)?;
+        }
+        outcome.rendered += 1;
+        tell(Event::Frame {
+            frame,
+            seconds: begin.elapsed().as_secs_f64(),
+            skipped: false,
+        });
+    }
+    Ok(outcome)
+}
+
+/// Whether a folder is, or would be, within another.
+fn is_inside(directory: &Path, other: &Path) -> bool {
+    let Ok(other) = other.canonicalize() else {
+        return false;
+    };
+    let mut ancestor = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
+    loop {
+        if let Ok(real) = ancestor.canonicalize() {
+            return real.starts_with(&other);
+        }
+        if !ancestor.pop() {
+            return false;
+        }
+    }
+}
+
+fn render_scene(scene: &Scene) -> RenderScene {
+    RenderScene {
+        domain: scene.domain,
+        solids: scene
+            .solids
+            .iter()
+            .map(|solid| solid.mesh.clone())
+            .collect(),
+        particle_spacing: scene.solver.pbf.particle_spacing,
+        frames_per_second: scene.shot.frames_per_second,
+    }
+}
+
+fn attributes(cache: &CacheReader, look: &Look, frame: u32) -> Result<Attributes, CacheError> {
+    let manifest = cache.manifest();
+    Ok(Attributes {
+        frame,
+        shot: manifest.shot.clone(),
+        software: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
+        scene_hash: manifest.scene_hash.clone(),
+        cache_hash: cache.entry(frame)?.blake3.clone(),
+        look_hash: look.hash(),
+    })
+}
+
+/// `SHOT.0001.png`, with as many digits as the last cached frame needs, at least four.
+fn files(
+    request: &Request,
+    attributes: &Attributes,
+    last_frame: u32,
+) -> Vec<(PathBuf, FormatSpec)> {
+    let digits = last_frame.to_string().len().max(4);
+    let formats = &request.look.spec().output.formats;
+    formats
+        .iter()
+        .map(|&format| {
+            let extension = match format {
+                FormatSpec::Png => "png",
+                FormatSpec::Exr => "exr",
+            };
+            let name = format!(
+                "{}.{:0digits$}.{extension}",
+                attributes.shot, attributes.frame
+            );
+            (request.directory.join(name), format)
+        })
+        .collect()
+}
+
+fn is_current(file: &Path, format: FormatSpec, attributes: &Attributes) -> bool {
+    let found = match format {
+        FormatSpec::Png => read_png_attributes(file),
+        FormatSpec::Exr => read_exr_attributes(file),
+    };
+    found.is_ok_and(|found| found == *attributes)
+}
+
+fn write(
+    file: &Path,
+    format: FormatSpec,
+    image: &Image,
+    attributes: &Attributes,
+    look: &Look,
+) -> Result<(), RenderError> {
+    match format {
+        FormatSpec::Png => write_png_with_attributes(file, image, &look.spec().view, attributes),
+        FormatSpec::Exr => write_exr(file, image, attributes),
+    }
+}
