@@ -163,12 +163,6 @@ pub fn bake(
     let last = last_frame(request)?;
     let (mut writer, mut clock, state) = open_cache(request, &context, &start)?;
     let first = clock.frame + 1;
-    if let Some(frames) = &request.frames
-        && frames.first() > first
-    {
-        let what = format!("{frames} begins after frame {first}, which has not been baked");
-        return Err(BakeError::Frames(what));
-    }
     tell(Event::Ready {
         device: describe(&context),
         particles: start.particles.len(),
@@ -251,6 +245,16 @@ fn last_frame(request: &Request) -> Result<u32, BakeError> {
     Ok(frames.last())
 }
 
+/// A bake cannot begin after a frame that is not there.
+fn check_first(request: &Request, next: u32) -> Result<(), BakeError> {
+    match &request.frames {
+        Some(frames) if frames.first() > next => Err(BakeError::Frames(format!(
+            "{frames}: frame {next} has not been baked"
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// A new cache, or one to go on with: the writer, where its clock stands, and the state there.
 fn open_cache(
     request: &Request,
@@ -285,9 +289,11 @@ fn open_cache(
                 difference,
             });
         }
+        check_first(request, cached.last_frame() + 1)?;
         let (writer, entry, state) = CacheWriter::resume(directory, &manifest)?;
         return Ok((writer, entry.clock, state));
     }
+    check_first(request, 1)?;
     let assets = assets(scene)?;
     let writer = CacheWriter::create(directory, manifest, &text, &assets, &start.particles)?;
     Ok((writer, Clock::default(), start.particles.clone()))

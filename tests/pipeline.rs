@@ -1,0 +1,360 @@
+//! The whole program as a user runs it: bake, resume, verify, render; exit codes; what stays untouched.
+#![allow(missing_docs, reason = "tests")]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output, Stdio},
+    time::{Duration, Instant},
+};
+
+use swell::cache::directory_hash;
+use tempfile::TempDir;
+
+const SCENE: &str = r#"
+[shot]
+name = "small"
+frames = 8
+frames_per_second = 60
+
+[domain]
+min = [-1.0, 0.5, 0.25]
+max = [1.0, 2.5, 1.25]
+
+[[water.block]]
+min = [-1.0, 0.5, 0.25]
+max = [-0.2, 1.5, 1.25]
+
+[[solid]]
+mesh = "box.obj"
+
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "sine", stroke = 0.3, period = 0.5, ramp = 0.1 }
+
+[solver]
+method = "pbf"
+
+[solver.pbf]
+particle_spacing = 0.1
+
+[effects]
+viscosity = { xsph = 0.02 }
+"#;
+
+const BOX: &str = "v 0.3 0.5 0.5\nv 0.7 0.5 0.5\nv 0.7 1.0 0.5\nv 0.3 1.0 0.5\n\
+    v 0.3 0.5 0.9\nv 0.7 0.5 0.9\nv 0.7 1.0 0.9\nv 0.3 1.0 0.9\n\
+    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
+
+const LOOK: &str = r#"
+[camera]
+focal_length_mm = 35.0
+film_back_mm = [36.0, 20.25]
+position = [-2.0, 3.0, 2.5]
+target = [0.0, 1.0, 0.75]
+
+[image]
+width = 64
+height = 36
+samples = 1
+
+[sky]
+model = "hosek_wilkie"
+
+[sun]
+azimuth_degrees = 120.0
+elevation_degrees = 35.0
+
+[output]
+formats = ["png", "exr"]
+aovs = ["Z"]
+"#;
+
+struct Job {
+    folder: TempDir,
+}
+
+impl Job {
+    fn new() -> Self {
+        let folder = TempDir::new().unwrap();
+        fs::write(folder.path().join("small.toml"), SCENE).unwrap();
+        fs::write(folder.path().join("box.obj"), BOX).unwrap();
+        fs::write(folder.path().join("look.toml"), LOOK).unwrap();
+        fs::write(
+            folder.path().join("wide.toml"),
+            LOOK.replace("35.0", "24.0"),
+        )
+        .unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn edit(&self, file: &str, from: &str, to: &str) {
+        let text = fs::read_to_string(self.path(file)).unwrap();
+        assert!(text.contains(from), "{from}");
+        fs::write(self.path(file), text.replace(from, to)).unwrap();
+    }
+
+    fn command(&self, words: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_swell"));
+        command
+            .current_dir(self.folder.path())
+            .args(words.split_whitespace());
+        command
+    }
+
+    fn run(&self, words: &str) -> Output {
+        self.command(words).output().unwrap()
+    }
+
+    /// Runs and expects an exit code; gives what was said on standard error.
+    fn expect(&self, code: i32, words: &str) -> String {
+        let output = self.run(words);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "swell {words}: {said}");
+        said
+    }
+
+    fn hash(&self, cache: &str) -> String {
+        directory_hash(&self.path(cache)).unwrap()
+    }
+}
+
+#[test]
+fn bakes_are_the_same_bytes_twice_and_after_any_stop() {
+    let job = Job::new();
+    job.expect(0, "bake small.toml -o whole");
+    job.expect(0, "bake small.toml -o again");
+    assert_eq!(job.hash("whole"), job.hash("again"));
+    job.expect(0, "verify whole");
+    for stops in [&[1][..], &[3, 4], &[7]] {
+        let cache = format!("stop{}", stops[0]);
+        for stop in stops {
+            job.expect(
+                0,
+                &format!("bake small.toml -o {cache} --frames 1-{stop} --resume"),
+            );
+            assert_ne!(job.hash("whole"), job.hash(&cache));
+        }
+        job.expect(0, &format!("bake small.toml -o {cache} --resume"));
+        assert_eq!(job.hash("whole"), job.hash(&cache), "{stops:?}");
+    }
+    // A finished bake has nothing to resume, and does not change.
+    job.expect(0, "bake small.toml -o whole --resume");
+    assert_eq!(job.hash("whole"), job.hash("again"));
+    // Negative control: other physics, other bytes.
+    job.expect(0, "bake small.toml -o other --set solver.pbf.iterations=5");
+    assert_ne!(job.hash("whole"), job.hash("other"));
+}
+
+/// Long enough to be caught in the act.
+const LONG: &str = "--set shot.frames=400";
+
+#[cfg(unix)]
+#[test]
+fn signals_end_resumably() {
+    let job = Job::new();
+    let mut child = job
+        .command(&format!("bake small.toml -o cache {LONG}"))
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let ledger = job.path("cache/frames.jsonl");
+    let begin = Instant::now();
+    while fs::read_to_string(&ledger).map_or(0, |text| text.lines().count()) < 4 {
+        assert!(begin.elapsed() < Duration::from_secs(60), "no frames");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(
+        Command::new("kill")
+            .arg(child.id().to_string())
+            .status()
+            .unwrap()
+            .success()
+    );
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let lines = fs::read_to_string(&ledger).unwrap().lines().count() as u32;
+    assert!((4..400).contains(&lines));
+    job.expect(0, "verify cache");
+    let last = lines + 1;
+    job.expect(
+        0,
+        &format!("bake small.toml -o cache {LONG} --frames 1-{last} --resume"),
+    );
+    job.expect(
+        0,
+        &format!("bake small.toml -o unbroken {LONG} --frames 1-{last}"),
+    );
+    assert_eq!(job.hash("cache"), job.hash("unbroken"));
+}
+
+#[test]
+fn a_cache_of_another_scene_is_left_alone() {
+    let job = Job::new();
+    job.expect(0, "bake small.toml -o cache --frames 1-2");
+    let before = job.hash("cache");
+    assert!(
+        job.expect(4, "bake small.toml -o cache")
+            .contains("--resume")
+    );
+    job.edit(
+        "small.toml",
+        "particle_spacing = 0.1",
+        "particle_spacing = 0.09",
+    );
+    let said = job.expect(4, "bake small.toml -o cache --resume");
+    assert!(
+        said.contains("solver.pbf.particle_spacing") && said.contains("0.09"),
+        "{said}"
+    );
+    job.edit(
+        "small.toml",
+        "particle_spacing = 0.09",
+        "particle_spacing = 0.1",
+    );
+    job.edit("box.obj", "v 0.3 1.0 0.9", "v 0.3 1.1 0.9");
+    let said = job.expect(4, "bake small.toml -o cache --resume");
+    assert!(said.contains("solid"), "{said}");
+    fs::create_dir(job.path("mine")).unwrap();
+    fs::write(job.path("mine/notes.txt"), "keep").unwrap();
+    job.expect(4, "bake small.toml -o mine");
+    assert_eq!(fs::read_dir(job.path("mine")).unwrap().count(), 1);
+    assert_eq!(job.hash("cache"), before);
+    // Not physics: a longer shot goes on.
+    job.edit("box.obj", "v 0.3 1.1 0.9", "v 0.3 1.0 0.9");
+    job.edit("small.toml", "frames = 8", "frames = 3");
+    job.expect(0, "bake small.toml -o cache --resume");
+    assert_ne!(job.hash("cache"), before);
+}
+
+#[test]
+fn faults_end_with_their_code_and_write_nothing() {
+    let job = Job::new();
+    let entries = || fs::read_dir(job.folder.path()).unwrap().count();
+    let before = entries();
+    let said = job.expect(2, "bake small.toml --set solver.pbf.particle_spacing=-1");
+    assert!(said.contains("solver.pbf.particle_spacing"), "{said}");
+    job.expect(2, "bake absent.toml");
+    job.expect(2, "bake small.toml --adapter no-such-adapter");
+    job.expect(2, "bake small.toml --frames 1-8x2");
+    job.expect(2, "bake small.toml --frames 3-8");
+    job.expect(2, "bake small.toml --nonsense");
+    // Too fast for the substeps that the scene allows: the numbers fail, and the start is kept.
+    let said = job.expect(
+        5,
+        "bake small.toml -o fast --set solver.pbf.max_substeps=1 --set water.gravity=[0,-2000,0]",
+    );
+    assert!(
+        said.contains("frame 1") && said.contains("max_substeps"),
+        "{said}"
+    );
+    job.expect(0, "verify fast");
+    fs::remove_dir_all(job.path("fast")).unwrap();
+    job.edit("small.toml", "frames = 8", "frame = 8");
+    let said = job.expect(2, "bake small.toml");
+    assert!(
+        said.contains("small.toml:4") && said.contains("frames"),
+        "{said}"
+    );
+    assert_eq!(entries(), before);
+}
+
+/// No driver at all: the code and the packages to install.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_adapter_names_the_package() {
+    let job = Job::new();
+    let output = job
+        .command("bake small.toml")
+        .env("VK_DRIVER_FILES", "/nonexistent")
+        .env("VK_ICD_FILENAMES", "/nonexistent")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("mesa-vulkan-drivers"), "{said}");
+}
+
+#[test]
+fn a_new_look_leaves_the_cache_as_it_is() {
+    let job = Job::new();
+    job.expect(0, "bake small.toml -o cache --frames 1-4");
+    let before = job.hash("cache");
+    job.expect(0, "render cache --look look.toml -o day");
+    job.expect(0, "render cache --look wide.toml -o wide --frames 2-4x2");
+    assert_eq!(job.hash("cache"), before);
+    let png = |folder: &str, frame: u32| {
+        fs::read(job.path(folder).join(format!("small.{frame:04}.png"))).unwrap()
+    };
+    assert_ne!(png("day", 2), png("wide", 2));
+    assert!(!job.path("wide/small.0003.png").exists());
+    assert!(job.path("day/small.0003.exr").exists());
+
+    // What stands there with the same hashes is left; a picture of another look, or a torn one, is made again.
+    let first = png("day", 1);
+    assert!(
+        job.expect(0, "render cache --look look.toml -o day")
+            .contains("0 frames rendered, 4 stood there")
+    );
+    fs::write(job.path("day/small.0001.png"), &first[..first.len() / 2]).unwrap();
+    let said = job.expect(0, "render cache --look look.toml -o day");
+    assert!(said.contains("1 frames rendered, 3 stood there"), "{said}");
+    assert_eq!(png("day", 1), first);
+    let said = job.expect(0, "render cache --look wide.toml -o day");
+    assert!(said.contains("4 frames rendered"), "{said}");
+    assert_ne!(png("day", 1), first);
+
+    // A cache moved elsewhere renders alike; a missing frame, a damaged one and a strange target are errors.
+    fs::rename(job.path("cache"), job.path("moved")).unwrap();
+    job.expect(0, "render moved --look look.toml -o again --frames 1");
+    assert_eq!(png("again", 1), first);
+    job.expect(4, "render moved --look look.toml -o day --frames 4-5");
+    job.expect(2, "render moved --look look.toml -o moved/pictures");
+    job.expect(4, "render nowhere --look look.toml -o day");
+    let frame = job.path("moved/frames/small.0002.ply");
+    let mut bytes = fs::read(&frame).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&frame, bytes).unwrap();
+    let said = job.expect(4, "render moved --look look.toml -o new --frames 2");
+    assert!(said.contains("small.0002.ply"), "{said}");
+    job.expect(4, "verify moved");
+}
+
+#[test]
+fn inspect_shows_plan_and_frames() {
+    let job = Job::new();
+    let shown = |words: &str| String::from_utf8(job.run(words).stdout).unwrap();
+    let plan = shown("inspect small.toml");
+    assert!(
+        plan.contains("effects/viscosity_gather") && plan.contains("solid_distance"),
+        "{plan}"
+    );
+    assert!(!plan.contains("vorticity"), "{plan}");
+    job.expect(0, "bake small.toml -o cache --frames 1-2");
+    let frames = shown("inspect cache");
+    assert!(
+        frames.lines().filter(|line| line.contains("m/s")).count() >= 2,
+        "{frames}"
+    );
+    assert!(shown("inspect --adapters").contains("max_storage_buffer_binding_size"));
+}
+
+#[test]
+fn shipped_scenes_load_and_plan() {
+    let job = Job::new();
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    for name in ["quickstart", "wave-city", "dam-break", "wave-tank"] {
+        let file = scenes.join(format!("{name}.toml"));
+        let output = job.command("inspect").arg(&file).output().unwrap();
+        assert!(
+            output.status.success(),
+            "{name}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        assert!(String::from_utf8_lossy(&output.stdout).contains("pbf/compute_lambda"));
+    }
+}
