@@ -83,7 +83,9 @@ fn render(look: &Look, scene: &RenderScene, water: &Particles) -> Image {
 #[test]
 fn flat_water_has_flat_normals_and_its_own_thickness() {
     for filter in ["curvature_flow", "narrow_range"] {
-        let look = look(&format!("{TOP_DOWN}[surface]\nfilter = \"{filter}\"\n{ALL_AOVS}"));
+        let look = look(&format!(
+            "{TOP_DOWN}[surface]\nfilter = \"{filter}\"\n{ALL_AOVS}"
+        ));
         let image = render(&look, &tank(SPACING), &tank_water());
         let normals = image.aovs.n.as_ref().unwrap();
         let least = centre(96, 72).map(|i| normals[i][1]).fold(1.0, f32::min);
@@ -95,7 +97,10 @@ fn flat_water_has_flat_normals_and_its_own_thickness() {
         let thickness = image.aovs.thickness.as_ref().unwrap();
         let count = centre(96, 72).count() as f32;
         let mean = centre(96, 72).map(|i| thickness[i]).sum::<f32>() / count;
-        assert!((f64::from(mean) / DEPTH - 1.0).abs() < 0.04, "{filter}: {mean}");
+        assert!(
+            (f64::from(mean) / DEPTH - 1.0).abs() < 0.04,
+            "{filter}: {mean}"
+        );
         // Still water under a still camera does not move.
         let forward = image.aovs.forward.as_ref().unwrap();
         assert!(centre(96, 72).all(|i| forward[i].iter().all(|v| v.abs() < 1e-2)));
@@ -108,14 +113,19 @@ fn rough_water_without_smoothing_is_not_flat() {
     let image = render(&look(&text), &tank(SPACING), &tank_water());
     let normals = image.aovs.n.as_ref().unwrap();
     let least = centre(96, 72).map(|i| normals[i][1]).fold(1.0, f32::min);
-    assert!(least < 10f32.to_radians().cos(), "the control is flat: {least}");
+    assert!(
+        least < 10f32.to_radians().cos(),
+        "the control is flat: {least}"
+    );
 }
 
 #[test]
 fn water_absorbs_as_beer_and_lambert_say() {
     // Three waters: clear, black (which leaves only what the surface mirrors), and the one in question.
     let beauty = |absorption: f64| {
-        let water = format!("[water]\nabsorption_per_metre = [{absorption:.1}, {absorption:.1}, {absorption:.1}]\n");
+        let water = format!(
+            "[water]\nabsorption_per_metre = [{absorption:.1}, {absorption:.1}, {absorption:.1}]\n"
+        );
         render(
             &look(&format!("{TOP_DOWN}{water}{ALL_AOVS}")),
             &tank(SPACING),
@@ -135,7 +145,10 @@ fn water_absorbs_as_beer_and_lambert_say() {
         // Down along the sun's refracted way, up along the viewer's.
         let expected = (-0.5 * y * (sun + bent)).exp();
         // Normals up to 1° off upright lengthen the way by 0.2 % and shift it; f32 adds 1e-6.
-        assert!((found / expected - 1.0).abs() < 0.01, "{found} for {expected}");
+        assert!(
+            (found / expected - 1.0).abs() < 0.01,
+            "{found} for {expected}"
+        );
         // The control: half of the absorption is told apart.
         assert!((found / expected.sqrt() - 1.0).abs() > 0.05);
     }
@@ -210,11 +223,17 @@ fn the_shader_reflects_as_fresnel_says() {
         let p = (n * c - ct) / (n * c + ct);
         let exact = 0.5 * (s * s + p * p);
         // A dozen roundings of values up to 1.
-        assert!((f64::from(found) - exact).abs() < 2e-6, "{c}: {found} {exact}");
+        assert!(
+            (f64::from(found) - exact).abs() < 2e-6,
+            "{c}: {found} {exact}"
+        );
         let r0 = ((n - 1.0) / (n + 1.0)).powi(2);
         schlick_off = schlick_off.max((r0 + (1.0 - r0) * (1.0 - c).powi(5) - exact).abs());
     }
-    assert!(schlick_off > 0.05, "the control, Schlick, is as good: {schlick_off}");
+    assert!(
+        schlick_off > 0.05,
+        "the control, Schlick, is as good: {schlick_off}"
+    );
 }
 
 const OBLIQUE: &str = "[camera]
@@ -249,7 +268,9 @@ fn harbour() -> (RenderScene, Particles) {
     // A few drops in flight, and a current.
     for i in 0..20u16 {
         let t = f32::from(i);
-        water.position.push([1.0 + 0.1 * t, 1.2 + 0.02 * t, 0.1 * t]);
+        water
+            .position
+            .push([1.0 + 0.1 * t, 1.2 + 0.02 * t, 0.1 * t]);
         water.velocity.push([2.0, 1.0, 0.0]);
         water.id.push(water.id.len() as u32);
     }
@@ -279,7 +300,10 @@ fn a_frame_in_tiles_is_the_frame_drawn_whole() {
         .unwrap()
         .render(9, &water)
         .unwrap();
-    assert!(other.beauty != whole.beauty, "the control: another frame's ripples differ");
+    assert!(
+        other.beauty != whole.beauty,
+        "the control: another frame's ripples differ"
+    );
 }
 
 #[test]
@@ -294,7 +318,10 @@ fn the_same_frame_twice_is_the_same_bytes() {
     renderer.render(5, &Particles::default()).unwrap();
     let again = renderer.render(2, &water).unwrap();
     let fresh = render_at(&look, &scene, &water, 2);
-    assert!(bits(&first) == bits(&again), "a renderer remembers its last frame");
+    assert!(
+        bits(&first) == bits(&again),
+        "a renderer remembers its last frame"
+    );
     assert!(bits(&first) == bits(&fresh), "two renderers differ");
     assert!(first.beauty.iter().flatten().all(|x| x.is_finite()));
 }
@@ -312,19 +339,39 @@ fn what_ran_is_what_the_look_calls_for() {
     let names = |look: &Look, scene: &RenderScene| {
         let mut renderer = Renderer::new(&context(), look, scene).unwrap();
         renderer.render(1, &water).unwrap();
-        assert_eq!(renderer.passes(), passes(look, !renderer.passes().is_empty() && renderer.passes().contains(&"ssfr/solid")));
+        assert_eq!(
+            renderer.passes(),
+            passes(
+                look,
+                !renderer.passes().is_empty() && renderer.passes().contains(&"ssfr/solid")
+            )
+        );
         let ran: Vec<_> = renderer.times().iter().map(|time| time.name).collect();
         assert_eq!(ran, renderer.passes());
         ran
     };
     let full = names(&look(&format!("{OBLIQUE}{ALL_AOVS}")), &scene);
-    for pass in ["ssfr/splat_spray", "ssfr/splat_owner", "ssfr/shade_aovs", "ssfr/solid"] {
+    for pass in [
+        "ssfr/splat_spray",
+        "ssfr/splat_owner",
+        "ssfr/shade_aovs",
+        "ssfr/solid",
+    ] {
         assert!(full.contains(&pass), "{pass}");
     }
     scene.solids.clear();
     let plain = names(&look(TOP_DOWN), &scene);
-    for pass in ["ssfr/splat_spray", "ssfr/splat_owner", "ssfr/shade_aovs", "ssfr/solid", "ssfr/shadow"] {
-        assert!(!plain.contains(&pass), "{pass} runs though nothing asks for it");
+    for pass in [
+        "ssfr/splat_spray",
+        "ssfr/splat_owner",
+        "ssfr/shade_aovs",
+        "ssfr/solid",
+        "ssfr/shadow",
+    ] {
+        assert!(
+            !plain.contains(&pass),
+            "{pass} runs though nothing asks for it"
+        );
     }
 }
 
@@ -334,13 +381,21 @@ fn forward_is_the_motion_on_the_screen() {
     for velocity in &mut water.velocity {
         *velocity = [1.2, 0.0, 0.0];
     }
-    let image = render(&look(&format!("{TOP_DOWN}{ALL_AOVS}")), &tank(SPACING), &water);
+    let image = render(
+        &look(&format!("{TOP_DOWN}{ALL_AOVS}")),
+        &tank(SPACING),
+        &water,
+    );
     let forward = image.aovs.forward.as_ref().unwrap();
     let depth = image.aovs.z.as_ref().unwrap();
     for i in centre(96, 72) {
         // 1.2 m/s over 1/24 s at 96 pixels per unit slope; the camera's right is +x.
         let expected = 1.2 / 24.0 * 96.0 / depth[i];
-        assert!((forward[i][0] - expected).abs() < 0.01, "{} {expected}", forward[i][0]);
+        assert!(
+            (forward[i][0] - expected).abs() < 0.01,
+            "{} {expected}",
+            forward[i][0]
+        );
         assert!(forward[i][1].abs() < 0.01);
     }
 }
@@ -353,15 +408,28 @@ fn solids_stand_before_behind_and_in_the_water() {
         box_mesh(DVec3::new(0.6, 0.0, 1.0), DVec3::new(1.4, 1.5, 2.0)),
         box_mesh(DVec3::new(2.6, 0.0, 1.0), DVec3::new(3.4, 0.3, 2.0)),
     ];
-    let image = render(&look(&format!("{TOP_DOWN}{ALL_AOVS}")), &scene, &tank_water());
+    let image = render(
+        &look(&format!("{TOP_DOWN}{ALL_AOVS}")),
+        &scene,
+        &tank_water(),
+    );
     let height = |x: usize| image.aovs.p.as_ref().unwrap()[36 * 96 + x][1];
     // 16 pixels a metre at 6 m: the pillars' middles at x = 1 and x = 3 lie 16 pixels either side of the centre,
     // a little farther for their height.
     assert!((height(28) - 1.5).abs() < 1e-3, "{}", height(28));
-    assert!(height(65) > 0.6, "the sunken pillar is under water: {}", height(65));
+    assert!(
+        height(65) > 0.6,
+        "the sunken pillar is under water: {}",
+        height(65)
+    );
     // It is seen through the water: brighter or darker than the floor beside it.
     let green = |x: usize| image.beauty[36 * 96 + x][1];
-    assert!((green(65) / green(50) - 1.0).abs() > 0.1, "{} {}", green(65), green(50));
+    assert!(
+        (green(65) / green(50) - 1.0).abs() > 0.1,
+        "{} {}",
+        green(65),
+        green(50)
+    );
 }
 
 fn attributes() -> Attributes {
@@ -386,8 +454,15 @@ fn an_exr_holds_every_channel_and_where_it_comes_from() {
     write_exr(&file, &image, &attributes()).unwrap();
     let first = std::fs::read(&file).unwrap();
     write_exr(&file, &image, &attributes()).unwrap();
-    assert!(first == std::fs::read(&file).unwrap(), "the same picture, other bytes");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
+    assert!(
+        first == std::fs::read(&file).unwrap(),
+        "the same picture, other bytes"
+    );
+    assert_eq!(
+        std::fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "nothing is left beside it"
+    );
 
     let read = read_all_data_from_file(&file).unwrap();
     assert_eq!(read.layer_data.len(), 1);
@@ -401,13 +476,27 @@ fn an_exr_holds_every_channel_and_where_it_comes_from() {
                 Levels::Singular(samples) => samples,
                 _ => panic!("one level"),
             };
-            (channel.name.to_string(), matches!(samples, FlatSamples::F16(_)))
+            (
+                channel.name.to_string(),
+                matches!(samples, FlatSamples::F16(_)),
+            )
         })
         .collect();
     let expected = [
-        ("A", true), ("B", true), ("G", true), ("N.X", false), ("N.Y", false), ("N.Z", false),
-        ("P.X", false), ("P.Y", false), ("P.Z", false), ("R", true), ("Z", false),
-        ("forward.u", false), ("forward.v", false), ("thickness.Y", false),
+        ("A", true),
+        ("B", true),
+        ("G", true),
+        ("N.X", false),
+        ("N.Y", false),
+        ("N.Z", false),
+        ("P.X", false),
+        ("P.Y", false),
+        ("P.Z", false),
+        ("R", true),
+        ("Z", false),
+        ("forward.u", false),
+        ("forward.v", false),
+        ("thickness.Y", false),
     ];
     assert_eq!(kinds, expected.map(|(name, half)| (name.to_owned(), half)));
     let z: Vec<f32> = match &layer.channel_data.list[10].sample_data {
@@ -415,7 +504,10 @@ fn an_exr_holds_every_channel_and_where_it_comes_from() {
         _ => panic!("Z is float"),
     };
     assert_eq!(&z, image.aovs.z.as_ref().unwrap());
-    assert_eq!(read.attributes.chromaticities.unwrap().red, Vec2(0.64, 0.33));
+    assert_eq!(
+        read.attributes.chromaticities.unwrap().red,
+        Vec2(0.64, 0.33)
+    );
     assert_eq!(read_exr_attributes(&file).unwrap(), attributes());
 }
 
@@ -447,10 +539,12 @@ fn a_panorama_is_mirrored_and_a_damaged_one_refused() {
         (0.0f32, if y < 8 { 2.0f32 } else { 0.0 }, 0.0f32)
     })
     .unwrap();
-    let text = TOP_DOWN.replace("\"hosek_wilkie\"", "\"panorama\"\nfile = \"sky.exr\"").replace(
-        "[sun]\n",
-        "[water]\nabsorption_per_metre = [1000.0, 1000.0, 1000.0]\n[sun]\nintensity = 0.0\n",
-    );
+    let text = TOP_DOWN
+        .replace("\"hosek_wilkie\"", "\"panorama\"\nfile = \"sky.exr\"")
+        .replace(
+            "[sun]\n",
+            "[water]\nabsorption_per_metre = [1000.0, 1000.0, 1000.0]\n[sun]\nintensity = 0.0\n",
+        );
     let parse = || Look::parse(&text, &folder.path().join("look.toml")).unwrap();
     let image = render(&parse(), &tank(SPACING), &tank_water());
     // Black water under a sky of radiance 2 shows its reflectance at normal incidence, 2.04 %.
@@ -494,7 +588,11 @@ fn a_scene_far_from_the_origin_looks_the_same() {
     let mut far_scene = scene.clone();
     far_scene.domain.min += shift;
     far_scene.domain.max += shift;
-    for vertex in far_scene.solids.iter_mut().flat_map(|mesh| &mut mesh.vertices) {
+    for vertex in far_scene
+        .solids
+        .iter_mut()
+        .flat_map(|mesh| &mut mesh.vertices)
+    {
         *vertex += shift;
     }
     let mut far_water = water.clone();
@@ -528,7 +626,11 @@ fn pictures() {
     println!("{} particles on {}", water.len(), context.info.name);
     for name in std::env::var("SWELL_LOOKS").unwrap().split(',') {
         let look = Look::load(Path::new(name)).unwrap();
-        let stem = Path::new(name).file_stem().unwrap().to_string_lossy().into_owned();
+        let stem = Path::new(name)
+            .file_stem()
+            .unwrap()
+            .to_string_lossy()
+            .into_owned();
         let started = std::time::Instant::now();
         let mut renderer = Renderer::new(&context, &look, &scene).unwrap();
         println!("{stem}: set up {:.2} s", started.elapsed().as_secs_f64());
@@ -539,7 +641,11 @@ fn pictures() {
         renderer.time_one_by_one();
         renderer.render(120, &water).unwrap();
         for time in renderer.times() {
-            println!("  {:24} {:8.1} ms a frame", time.name, 1000.0 * time.seconds);
+            println!(
+                "  {:24} {:8.1} ms a frame",
+                time.name,
+                1000.0 * time.seconds
+            );
         }
         let file = Path::new(&folder).join(format!("{stem}.png"));
         write_png(&file, &image, &look.spec().view).unwrap();

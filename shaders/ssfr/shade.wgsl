@@ -134,12 +134,13 @@ fn behind(pixel: vec2i, ray: vec3f, direction: vec3f, view: vec3f) -> Behind {
         let found = solid_surface(at, ray * solid, view);
         let far = solid * along;
         let colour = radiance_of(found, view, far / camera.focal, 0.0);
-        return Behind(hazed(colour, far), solid, 1.0, found);
+        return Behind(hazed(colour, far, direction), solid, 1.0, found);
     }
     if ground < 0.1 * FAR {
         let found = Surface(camera.position + direction * (ground * along), vec3f(0.0, 1.0, 0.0), 2u);
         let far = ground * along;
-        return Behind(hazed(radiance_of(found, view, far / camera.focal, 0.0), far), ground, 1.0, found);
+        let colour = radiance_of(found, view, far / camera.focal, 0.0);
+        return Behind(hazed(colour, far, direction), ground, 1.0, found);
     }
     var colour = sky_radiance(direction);
     if dot(direction, shading.sun_direction) > 0.99998918 {
@@ -204,11 +205,11 @@ fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32) -> March {
     return March(high, u32(pixel.y) * camera.size.x + u32(pixel.x), q);
 }
 
-// Scattered light in water or foam under this sun and sky, per unit albedo.
-fn diffuse_light(position: vec3f) -> vec3f {
-    let sun = shading.sun_irradiance * max(shading.sun_direction.y, 0.0)
+// Light that enters water or foam through a surface of this normal and is scattered, per unit albedo.
+fn diffuse_light(position: vec3f, n: vec3f) -> vec3f {
+    let sun = shading.sun_irradiance * max(dot(n, shading.sun_direction), 0.0)
         * sunlit(position, vec3f(0.0, 1.0, 0.0));
-    return (sun + sky_irradiance(vec3f(0.0, 1.0, 0.0))) / PI;
+    return (sun + sky_irradiance(n)) / PI;
 }
 
 struct Water {
@@ -266,7 +267,7 @@ fn transmitted(water: Water, pixel: vec2i, straight: Behind) -> vec3f {
     // Diffuse reflectance of a deep medium of that single-scattering albedo (Hapke 1981, equation 38).
     let g = sqrt(shading.absorption / max(extinction, vec3f(1e-6)));
     let body = select(vec3f(0.0), (1.0 - g) / (1.0 + g), extinction > vec3f(0.0));
-    return light * clear + diffuse_light(water.position) * body * (1.0 - clear);
+    return light * clear + diffuse_light(water.position, water.normal) * body * (1.0 - clear);
 }
 
 fn shade_water(pixel: vec2i, z: f32, ray: vec3f, view: vec3f, straight: Behind) -> vec3f {
@@ -348,7 +349,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var alpha = straight.alpha;
     if wet {
         let far = z * length(ray);
-        colour = hazed(shade_water(pixel, z, ray, view, straight), far);
+        colour = hazed(shade_water(pixel, z, ray, view, straight), far, direction);
         alpha = 1.0;
     }
 #ifdef SPRAY
@@ -357,7 +358,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
     if cover > 0.0 {
         let where_to = camera.position + direction * min(z, min(straight.depth, 1e4)) * length(ray);
-        let white = diffuse_light(where_to) * 0.85;
+        let white = diffuse_light(where_to, vec3f(0.0, 1.0, 0.0)) * 0.85;
         colour = mix(colour, white, cover);
         alpha = mix(alpha, 1.0, cover);
     }

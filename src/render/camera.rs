@@ -67,8 +67,9 @@ pub(super) fn pose(camera: &CameraSpec, frame: f64) -> Pose {
             + (3.0 * t2 - 2.0 * t3) * at(i + 1)
             + (t3 - t2) * span * slope(i + 1)
     };
-    let vector =
-        |pick: fn(&Pose) -> DVec3| DVec3::from_array([0, 1, 2].map(|axis| blend(&|p| pick(p)[axis])));
+    let vector = |pick: fn(&Pose) -> DVec3| {
+        DVec3::from_array([0, 1, 2].map(|axis| blend(&|p| pick(p)[axis])))
+    };
     Pose {
         position: vector(|p| p.position),
         target: vector(|p| p.target),
@@ -117,9 +118,8 @@ pub(super) fn samples(count: u32, shutter: f64) -> Vec<Sample> {
     };
     let points: Vec<[f64; 2]> = (1..=count).map(|i| [halton(2, i), halton(3, i)]).collect();
     // Few points of the sequence lean to one side, which would shift the picture.
-    let mean = [0, 1].map(|axis| {
-        points.iter().map(|point| point[axis]).sum::<f64>() / f64::from(count)
-    });
+    let mean =
+        [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / f64::from(count));
     points
         .iter()
         .zip(0u32..)
@@ -197,7 +197,9 @@ mod tests {
     #[test]
     fn keyframes_are_met_and_joined_smoothly() {
         let key = |frame: u32, x: f64| {
-            format!("[[camera.keyframe]]\nframe = {frame}\nposition = [{x:.1}, 2.0, 0.0]\ntarget = [99.0, 0.0, 0.0]\n")
+            format!(
+                "[[camera.keyframe]]\nframe = {frame}\nposition = [{x:.1}, 2.0, 0.0]\ntarget = [99.0, 0.0, 0.0]\n"
+            )
         };
         let text = format!(
             "[camera]\nfocal_length_mm = 36.0\n{}{}{}",
@@ -207,7 +209,10 @@ mod tests {
         );
         let spec = look(&text).spec().camera.clone();
         let x = |frame: f64| pose(&spec, frame).position.x;
-        assert_eq!([x(-5.0), x(1.0), x(11.0), x(31.0), x(90.0)], [0.0, 0.0, 1.0, 5.0, 5.0]);
+        assert_eq!(
+            [x(-5.0), x(1.0), x(11.0), x(31.0), x(90.0)],
+            [0.0, 0.0, 1.0, 5.0, 5.0]
+        );
         // The slope is continuous across the middle key, and zero at the ends.
         let slope = |frame: f64| (x(frame + 1e-5) - x(frame - 1e-5)) / 2e-5;
         assert!((slope(11.0 - 1e-4) - slope(11.0 + 1e-4)).abs() < 1e-3);

@@ -107,7 +107,13 @@ impl Filler {
         Ok(Self { pass })
     }
 
-    pub(super) fn prepare(&self, context: &Context, buffer: &Buffer, word: u32, count: u64) -> Filling {
+    pub(super) fn prepare(
+        &self,
+        context: &Context,
+        buffer: &Buffer,
+        word: u32,
+        count: u64,
+    ) -> Filling {
         let count = u32::try_from(count).unwrap_or(u32::MAX);
         let params = Fill {
             word,
@@ -131,7 +137,8 @@ impl Filler {
         timer: &mut Timer,
         filling: &Filling,
     ) {
-        self.pass.run(encoder, timer, &filling.group, filling.groups);
+        self.pass
+            .run(encoder, timer, &filling.group, filling.groups);
     }
 }
 

@@ -334,7 +334,10 @@ impl Timer {
     /// Call after each pass.
     pub(super) fn split(&mut self, name: &'static str, encoder: &mut CommandEncoder) {
         if let Some(since) = &mut self.one_by_one {
-            let fresh = self.context.device.create_command_encoder(&Default::default());
+            let fresh = self
+                .context
+                .device
+                .create_command_encoder(&Default::default());
             let full = std::mem::replace(encoder, fresh);
             self.context.queue.submit([full.finish()]);
             // A lost device is reported by the wait at the end of the sample.

@@ -134,7 +134,10 @@ impl Renderer {
         let extent = Extent::new(spec.image.width, spec.image.height);
         let spacing = scene.particle_spacing;
         let radius = spec.surface.radius_m.unwrap_or(RADIUS * spacing);
-        let smoothing = spec.surface.smoothing_width_m.unwrap_or(SMOOTHING * spacing);
+        let smoothing = spec
+            .surface
+            .smoothing_width_m
+            .unwrap_or(SMOOTHING * spacing);
         let mut timer = Timer::new(context);
 
         let camera = camera_buffer(context);
@@ -172,7 +175,7 @@ impl Renderer {
         let shading = uniform(
             context,
             "shading",
-            &shading(look, scene, &baked, matrix.to_cols_array_2d()),
+            &shading(look, &baked, matrix.to_cols_array_2d()),
         );
         let volume = spacing.powi(3) / (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3));
         let thickness_params = uniform(context, "thickness", &[volume as f32, 0.0, 0.0, 0.0]);
@@ -198,8 +201,10 @@ impl Renderer {
         use Slot::{Read, Uniform, Write};
         let pass = |name, slots: &[Slot]| ComputePass::new(context, name, name, &[], slots);
         let splat_depth = pass("ssfr/splat_depth", &[Uniform, Read, Read, Write])?;
-        let splat_thickness =
-            pass("ssfr/splat_thickness", &[Uniform, Uniform, Read, Read, Write])?;
+        let splat_thickness = pass(
+            "ssfr/splat_thickness",
+            &[Uniform, Uniform, Read, Read, Write],
+        )?;
         let splat_spray = match spec.water.spray {
             Some(_) => Some(pass(
                 "ssfr/splat_spray",
@@ -272,7 +277,13 @@ impl Renderer {
             .iter()
             .map(|band| {
                 let mut resources = renderer.shade_resources(band, &band.colour);
-                resources.extend(renderer.buffers.spray.as_ref().map(Buffer::as_entire_binding));
+                resources.extend(
+                    renderer
+                        .buffers
+                        .spray
+                        .as_ref()
+                        .map(Buffer::as_entire_binding),
+                );
                 renderer.shade.bind(context, resources)
             })
             .collect();
@@ -284,7 +295,11 @@ impl Renderer {
         &self.buffers.depth[usize::from(self.filter.result_is_in_other())]
     }
 
-    fn shade_resources<'a>(&'a self, band: &'a Band, output: &'a Buffer) -> Vec<BindingResource<'a>> {
+    fn shade_resources<'a>(
+        &'a self,
+        band: &'a Band,
+        output: &'a Buffer,
+    ) -> Vec<BindingResource<'a>> {
         vec![
             self.camera.as_entire_binding(),
             self.shading.as_entire_binding(),
@@ -376,7 +391,12 @@ impl Renderer {
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<u32, RenderError> {
         let origin = self.scene.domain.min;
         let mut packed = Vec::with_capacity(particles.len());
-        for (index, (p, v)) in particles.position.iter().zip(&particles.velocity).enumerate() {
+        for (index, (p, v)) in particles
+            .position
+            .iter()
+            .zip(&particles.velocity)
+            .enumerate()
+        {
             if !p.iter().chain(v).all(|x| x.is_finite()) {
                 return Err(RenderError::NotFinite { index, frame });
             }
@@ -398,7 +418,11 @@ impl Renderer {
             let depth = |p: &uniform::Particle| glam::Vec3::from(p.position).dot(forward);
             depth(a).total_cmp(&depth(b)).then(a.tag.cmp(&b.tag))
         });
-        if self.bound.as_ref().is_none_or(|bound| bound.capacity < packed.len()) {
+        if self
+            .bound
+            .as_ref()
+            .is_none_or(|bound| bound.capacity < packed.len())
+        {
             self.bound = Some(self.bind(packed.len().max(1).next_power_of_two())?);
         }
         if let Some(bound) = &self.bound {
@@ -414,7 +438,10 @@ impl Renderer {
         let buffer = storage(context, "render particles", bytes)?;
         let frame = &self.buffers;
         let group = |pass: &ComputePass, buffers: &[&Buffer]| {
-            let resources = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
+            let resources = buffers
+                .iter()
+                .map(|buffer| buffer.as_entire_binding())
+                .collect();
             pass.bind(context, resources)
         };
         let (camera, params) = (&self.camera, &self.thickness_params);
@@ -437,13 +464,19 @@ impl Renderer {
                 .collect()
         });
         Ok(Bound {
-            splat_depth: group(&self.splat_depth, &[camera, &buffer, solid, &frame.depth[0]]),
+            splat_depth: group(
+                &self.splat_depth,
+                &[camera, &buffer, solid, &frame.depth[0]],
+            ),
             splat_thickness: group(
                 &self.splat_thickness,
                 &[camera, params, &buffer, solid, &frame.thickness],
             ),
             splat_spray: splat_spray.map(|(pass, spray)| {
-                group(pass, &[camera, params, &buffer, solid, self.surface(), spray])
+                group(
+                    pass,
+                    &[camera, params, &buffer, solid, self.surface(), spray],
+                )
             }),
             splat_owner: splat_owner
                 .map(|(pass, owner)| group(pass, &[camera, &buffer, &frame.depth[0], owner])),
@@ -479,9 +512,12 @@ impl Renderer {
             .run(&mut encoder, timer, &bound.splat_depth, groups);
         self.splat_thickness
             .run(&mut encoder, timer, &bound.splat_thickness, groups);
-        if let (true, Some(pass), Some(group), Some(clear)) =
-            (aovs, &self.splat_owner, &bound.splat_owner, &self.clear_owner)
-        {
+        if let (true, Some(pass), Some(group), Some(clear)) = (
+            aovs,
+            &self.splat_owner,
+            &bound.splat_owner,
+            &self.clear_owner,
+        ) {
             // Before the filter, while the depth is still that of the spheres.
             self.filler.run(&mut encoder, timer, clear);
             pass.run(&mut encoder, timer, group, groups);
@@ -512,8 +548,7 @@ impl Renderer {
         let mut values: Vec<[f32; 10]> = Vec::new();
         for band in &self.bands {
             if let Some(buffer) = &band.aovs {
-                let bytes =
-                    AOV_BYTES * u64::from(self.extent.picture[0]) * u64::from(band.rows);
+                let bytes = AOV_BYTES * u64::from(self.extent.picture[0]) * u64::from(band.rows);
                 values.extend(read::<[f32; 10]>(&self.context, buffer, bytes)?);
             }
         }
@@ -534,8 +569,7 @@ impl Renderer {
                     })
                     .collect()
             }),
-            forward: wants(AovSpec::Forward)
-                .then(|| values.iter().map(|v| [v[7], v[8]]).collect()),
+            forward: wants(AovSpec::Forward).then(|| values.iter().map(|v| [v[7], v[8]]).collect()),
             thickness: wants(AovSpec::Thickness).then(|| values.iter().map(|v| v[9]).collect()),
         })
     }
@@ -551,7 +585,9 @@ fn check(scene: &RenderScene) -> Result<(), RenderError> {
         ("frames_per_second", scene.frames_per_second),
     ] {
         if !(value.is_finite() && value > 0.0) {
-            return Err(RenderError::Scene(format!("{name} is {value}; allowed is > 0")));
+            return Err(RenderError::Scene(format!(
+                "{name} is {value}; allowed is > 0"
+            )));
         }
     }
     Ok(())
@@ -590,12 +626,7 @@ fn buffers(context: &Context, look: &Look, extent: &Extent) -> Result<Buffers, R
     })
 }
 
-fn shading(
-    look: &Look,
-    scene: &RenderScene,
-    sky: &Sky,
-    shadow_from_world: [[f32; 4]; 4],
-) -> uniform::Shading {
+fn shading(look: &Look, sky: &Sky, shadow_from_world: [[f32; 4]; 4]) -> uniform::Shading {
     let spec = look.spec();
     let sun = look.sun_direction();
     let colour = |c: [f64; 3]| c.map(|x| x as f32);
@@ -621,8 +652,6 @@ fn shading(
         ground_variation: spec.ground.variation as f32,
         solid_colour: colour(spec.solids.colour),
         haze: spec.ground.haze_m as f32,
-        horizon: sky.horizon.to_array(),
-        particle_spacing: scene.particle_spacing as f32,
         ripple: ripple.map_or([0.0; 2], |r| [r.wavelength_m as f32, r.slope as f32]),
         windows: windows.map_or([0.0; 2], |w| [w.storey_m as f32, w.bay_m as f32]),
         window_lit: windows.map_or(0.0, |w| w.lit as f32),

@@ -34,7 +34,9 @@ pub(super) fn triangles(look: &Look, scene: &RenderScene) -> Result<Vec<Triangle
             let mut points = [DVec3::ZERO; 3];
             for (point, &index) in points.iter_mut().zip(corners) {
                 *point = *mesh.vertices.get(index as usize).ok_or_else(|| {
-                    RenderError::Scene(format!("a triangle names vertex {index}, which is not there"))
+                    RenderError::Scene(format!(
+                        "a triangle names vertex {index}, which is not there"
+                    ))
                 })?;
             }
             // A triangle without area has no normal, and nothing of it would be seen.
@@ -89,7 +91,11 @@ fn box_triangles(low: DVec3, high: DVec3) -> Vec<[DVec3; 3]> {
 /// The sun's view of everything opaque, and of the domain: an orthographic box.
 pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec3) -> Mat4 {
     let forward = -sun.as_vec3();
-    let helper = if forward.y.abs() > 0.99 { Vec3::X } else { Vec3::Y };
+    let helper = if forward.y.abs() > 0.99 {
+        Vec3::X
+    } else {
+        Vec3::Y
+    };
     let right = forward.cross(helper).normalize();
     let up = right.cross(forward);
     let mut low = Vec3::splat(f32::INFINITY);
@@ -103,7 +109,11 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
     for i in 0..8u32 {
         let pick = |axis: u32, length: f32| if i >> axis & 1 == 1 { length } else { 0.0 };
         // Shadows fall on the ground; the domain's ceiling throws none.
-        take(Vec3::new(pick(0, size.x), pick(1, 0.3 * size.y), pick(2, size.z)));
+        take(Vec3::new(
+            pick(0, size.x),
+            pick(1, 0.3 * size.y),
+            pick(2, size.z),
+        ));
     }
     for triangle in triangles.iter().filter(|triangle| triangle.material == 0) {
         for p in [triangle.a, triangle.b, triangle.c] {
@@ -187,7 +197,12 @@ fn pipeline(
     raster: &Raster<'_>,
 ) -> Result<(wgpu::RenderPipeline, wgpu::BindGroupLayout), GpuError> {
     let module = module(context, raster.name, &[])?;
-    let layout = layout(context, raster.name, ShaderStages::VERTEX_FRAGMENT, raster.slots);
+    let layout = layout(
+        context,
+        raster.name,
+        ShaderStages::VERTEX_FRAGMENT,
+        raster.slots,
+    );
     let device = &context.device;
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(raster.name),
@@ -241,7 +256,10 @@ impl Set {
             &Raster {
                 name: "ssfr/solid",
                 slots: &[Slot::Uniform, Slot::Uniform, Slot::Read],
-                targets: &[target(TextureFormat::R32Float), target(TextureFormat::R32Uint)],
+                targets: &[
+                    target(TextureFormat::R32Float),
+                    target(TextureFormat::R32Uint),
+                ],
                 // Near over depth: the nearest is the greatest.
                 compare: wgpu::CompareFunction::Greater,
                 has_fragment: true,
@@ -274,7 +292,11 @@ impl Set {
                 tiles.push(TileTargets {
                     corner: [x, y],
                     size,
-                    group: bind(context, &layout, buffers.map(Buffer::as_entire_binding).to_vec()),
+                    group: bind(
+                        context,
+                        &layout,
+                        buffers.map(Buffer::as_entire_binding).to_vec(),
+                    ),
                     depth: texture(context, "solid depth", size, TextureFormat::R32Float, drawn),
                     packed: texture(context, "solid normal", size, TextureFormat::R32Uint, drawn),
                     order: order.create_view(&Default::default()),
@@ -389,7 +411,11 @@ pub(super) fn shadow_map(
             let (pipeline, layout) = pipeline(context, &raster)?;
             let matrix = uniform(context, "shadow", &matrix.to_cols_array_2d());
             let buffers = [&matrix, buffer];
-            let group = bind(context, &layout, buffers.map(Buffer::as_entire_binding).to_vec());
+            let group = bind(
+                context,
+                &layout,
+                buffers.map(Buffer::as_entire_binding).to_vec(),
+            );
             Some((pipeline, group, 3 * count as u32))
         }
         None => None,

@@ -19,8 +19,6 @@ pub(super) struct Sky {
     pub(super) irradiance: [[f32; 4]; 9],
     /// On a face at right angles to the sun.
     pub(super) sun_irradiance: Vec3,
-    /// Mean colour just above the horizon.
-    pub(super) horizon: Vec3,
     /// Radiance over irradiance of the sun's disc; 0 where the image holds the disc itself.
     pub(super) disc: f32,
 }
@@ -198,7 +196,6 @@ impl Sky {
         Ok(Self {
             size,
             irradiance: harmonics(size, &texels),
-            horizon: horizon(size, &texels).as_vec3(),
             sun_irradiance: sun_irradiance.as_vec3(),
             texels: texels
                 .iter()
@@ -210,15 +207,6 @@ impl Sky {
             disc: disc as f32,
         })
     }
-}
-
-/// Mean of the rows from the horizon up to about 6°.
-fn horizon(size: [u32; 2], texels: &[DVec3]) -> DVec3 {
-    let middle = (size[1] / 2) as usize;
-    let rows = (size[1] as usize / 30).max(1).min(middle.max(1));
-    let width = size[0] as usize;
-    let part = &texels[middle.saturating_sub(rows) * width..middle.max(1) * width];
-    part.iter().sum::<DVec3>() / part.len().max(1) as f64
 }
 
 fn panorama(
@@ -234,9 +222,7 @@ fn panorama(
         .no_deep_data()
         .largest_resolution_level()
         .rgb_channels(
-            |size: exr::math::Vec2<usize>, _: &_| {
-                (size.0, vec![DVec3::ZERO; size.0 * size.1])
-            },
+            |size: exr::math::Vec2<usize>, _: &_| (size.0, vec![DVec3::ZERO; size.0 * size.1]),
             |(width, texels): &mut (usize, Vec<DVec3>),
              at: exr::math::Vec2<usize>,
              (r, g, b): (f32, f32, f32)| {
@@ -251,7 +237,9 @@ fn panorama(
     let (mut width, mut texels) = layer.channel_data.pixels;
     let mut height = layer.size.1;
     if width < 2 || height < 2 {
-        return Err(fault(format!("is {width} × {height} pixels; at least 2 × 2 are needed")));
+        return Err(fault(format!(
+            "is {width} × {height} pixels; at least 2 × 2 are needed"
+        )));
     }
     if texels.iter().any(|c| !c.is_finite()) {
         return Err(fault("holds a value that is not finite".to_owned()));
@@ -302,7 +290,9 @@ mod tests {
     #[test]
     fn a_low_sun_is_redder_and_dimmer() {
         let sky = |degrees: f64| {
-            let text = format!("[sun]\nelevation_degrees = {degrees:.1}\n[sky]\nmodel = \"hosek_wilkie\"\n");
+            let text = format!(
+                "[sun]\nelevation_degrees = {degrees:.1}\n[sky]\nmodel = \"hosek_wilkie\"\n"
+            );
             Sky::new(&look(&text), 8192).unwrap()
         };
         let (high, low) = (sky(45.0), sky(4.0));
@@ -311,9 +301,7 @@ mod tests {
         assert!(ratio(low.sun_irradiance) < 0.3 * ratio(high.sun_irradiance));
         // The unit of light: white lying in the open under the reference sky has radiance 1.
         let up = |c: &[[f32; 4]; 9]| {
-            DVec3::from_array([0, 1, 2].map(|i| {
-                f64::from(c[0][i] + c[1][i] - c[6][i] - c[8][i])
-            }))
+            DVec3::from_array([0, 1, 2].map(|i| f64::from(c[0][i] + c[1][i] - c[6][i] - c[8][i])))
         };
         let total = luminance(up(&high.irradiance))
             + luminance(high.sun_irradiance.as_dvec3()) * REFERENCE_ELEVATION.sin();

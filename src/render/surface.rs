@@ -89,8 +89,14 @@ impl CurvatureFlow {
     ) -> Result<Self, RenderError> {
         use Slot::{Read, Uniform, Write};
         let pass = |name, slots: &[Slot]| ComputePass::new(context, name, name, &[], slots);
-        let restrict = pass("ssfr/flow_restrict", &[Uniform, Uniform, Uniform, Read, Write])?;
-        let flow = pass("ssfr/curvature_flow", &[Uniform, Uniform, Uniform, Read, Write])?;
+        let restrict = pass(
+            "ssfr/flow_restrict",
+            &[Uniform, Uniform, Uniform, Read, Write],
+        )?;
+        let flow = pass(
+            "ssfr/curvature_flow",
+            &[Uniform, Uniform, Uniform, Read, Write],
+        )?;
         let prolong = pass(
             "ssfr/flow_prolong",
             &[Uniform, Uniform, Uniform, Read, Read, Read, Write],
@@ -143,7 +149,10 @@ impl CurvatureFlow {
             let level = level(at, index);
             let mut all = vec![camera, &params, &level];
             all.extend(buffers);
-            let resources = all.iter().map(|buffer| buffer.as_entire_binding()).collect();
+            let resources = all
+                .iter()
+                .map(|buffer| buffer.as_entire_binding())
+                .collect();
             pass.bind(context, resources)
         };
         let top = settings.levels as usize - 1;

@@ -50,8 +50,6 @@ pub(super) struct Shading {
     pub(super) ground_variation: f32,
     pub(super) solid_colour: [f32; 3],
     pub(super) haze: f32,
-    pub(super) horizon: [f32; 3],
-    pub(super) particle_spacing: f32,
     pub(super) ripple: [f32; 2],
     pub(super) windows: [f32; 2],
     pub(super) window_lit: f32,
@@ -169,24 +167,88 @@ mod tests {
     #[test]
     fn mirrors_agree_with_the_shaders() {
         mirrors!(
-            "ssfr/shade", "Camera", Camera, position, seconds, right, focal, up, particle_count,
-            forward, radius, centre, size, margin, picture, weight, sample_index, clock,
+            "ssfr/shade",
+            "Camera",
+            Camera,
+            position,
+            seconds,
+            right,
+            focal,
+            up,
+            particle_count,
+            forward,
+            radius,
+            centre,
+            size,
+            margin,
+            picture,
+            weight,
+            sample_index,
+            clock,
             frame_seconds
         );
         mirrors!(
-            "ssfr/splat_depth", "Particle", Particle, position, aeration, velocity, tag
+            "ssfr/splat_depth",
+            "Particle",
+            Particle,
+            position,
+            aeration,
+            velocity,
+            tag
         );
         mirrors!(
-            "ssfr/shade", "Shading", Shading, sun_direction, roughness, sun_irradiance, index,
-            absorption, sun_path, scattering, spray_density, ground_colour, ground_variation,
-            solid_colour, haze, horizon, particle_spacing, ripple, windows, window_lit,
-            window_radiance, background, disc, irradiance, shadow_from_world
+            "ssfr/shade",
+            "Shading",
+            Shading,
+            sun_direction,
+            roughness,
+            sun_irradiance,
+            index,
+            absorption,
+            sun_path,
+            scattering,
+            spray_density,
+            ground_colour,
+            ground_variation,
+            solid_colour,
+            haze,
+            ripple,
+            windows,
+            window_lit,
+            window_radiance,
+            background,
+            disc,
+            irradiance,
+            shadow_from_world
         );
         mirrors!(
-            "ssfr/curvature_flow", "FlowParams", Flow, width, world, fraction, edge, steps, levels
+            "ssfr/curvature_flow",
+            "FlowParams",
+            Flow,
+            width,
+            world,
+            fraction,
+            edge,
+            steps,
+            levels
         );
-        mirrors!("ssfr/curvature_flow", "FlowLevel", FlowLevel, size, level, index);
-        mirrors!("ssfr/narrow_range", "NarrowParams", Narrow, width, range, offset, axis);
+        mirrors!(
+            "ssfr/curvature_flow",
+            "FlowLevel",
+            FlowLevel,
+            size,
+            level,
+            index
+        );
+        mirrors!(
+            "ssfr/narrow_range",
+            "NarrowParams",
+            Narrow,
+            width,
+            range,
+            offset,
+            axis
+        );
         mirrors!("ssfr/fill", "FillParams", Fill, word, count);
         mirrors!("ssfr/solid", "Triangle", Triangle, a, material, b, c);
         mirrors!("ssfr/solid", "Tile", Tile, corner, size);

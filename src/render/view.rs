@@ -73,7 +73,8 @@ fn agx(scene: DVec3) -> DVec3 {
 fn curve(x: f64) -> f64 {
     let x2 = x * x;
     let x4 = x2 * x2;
-    15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232
+    15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x
+        - 0.00232
 }
 
 #[cfg(test)]
@@ -92,7 +93,11 @@ mod tests {
         let agx = ViewSpec::default();
         // The curve's pivot: middle grey goes to 0.489 of a 2.2 power display, which sRGB encodes as 0.493. The
         // polynomial is within 0.01 of it.
-        assert!((grey(&agx, 0.18) - 0.493).abs() < 0.01, "{}", grey(&agx, 0.18));
+        assert!(
+            (grey(&agx, 0.18) - 0.493).abs() < 0.01,
+            "{}",
+            grey(&agx, 0.18)
+        );
         assert!(grey(&agx, 0.0) < 1e-6);
         // Sixteen times white is not yet clipped, where a raw encoding would have been since 1.
         assert!(grey(&agx, 1.0) < 0.85 && grey(&agx, 10.0) < 1.0);

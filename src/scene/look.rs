@@ -199,7 +199,10 @@ fn validate(spec: &LookSpec) -> Result<(), Refusal> {
         return refuse("output.formats", "is empty; allowed are `png`, `exr`");
     }
     if !spec.output.aovs.is_empty() && !spec.output.formats.contains(&FormatSpec::Exr) {
-        return refuse("output.aovs", "AOVs are written to EXR; add it to `formats`");
+        return refuse(
+            "output.aovs",
+            "AOVs are written to EXR; add it to `formats`",
+        );
     }
     Ok(())
 }
@@ -348,13 +351,7 @@ fn validate_surroundings(spec: &LookSpec) -> Result<(), Refusal> {
     }
     all_in_range("solids.colour", &spec.solids.colour, 0.0, 1.0, "")?;
     if let Some(windows) = &spec.solids.windows {
-        in_range(
-            "solids.windows.storey_m",
-            windows.storey_m,
-            1e-3,
-            1e3,
-            " m",
-        )?;
+        in_range("solids.windows.storey_m", windows.storey_m, 1e-3, 1e3, " m")?;
         in_range("solids.windows.bay_m", windows.bay_m, 1e-3, 1e3, " m")?;
         in_range("solids.windows.lit", windows.lit, 0.0, 1.0, "")?;
     }

@@ -10,11 +10,24 @@ use swell::render::RenderScene;
 pub(crate) fn box_mesh(low: DVec3, high: DVec3) -> TriangleMesh {
     let vertices = (0..8)
         .map(|i| {
-            let pick = |axis: usize| if i >> axis & 1 == 1 { high[axis] } else { low[axis] };
+            let pick = |axis: usize| {
+                if i >> axis & 1 == 1 {
+                    high[axis]
+                } else {
+                    low[axis]
+                }
+            };
             DVec3::new(pick(0), pick(1), pick(2))
         })
         .collect();
-    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let quads = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
     TriangleMesh {
         vertices,
         triangles: quads
@@ -49,7 +62,10 @@ struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) as f64 / (1u64 << 31) as f64
     }
 }
@@ -110,7 +126,11 @@ pub(crate) fn city_water() -> Particles {
     for _ in 0..900 {
         let z = 15.0 * random.next();
         let t = 0.5 * random.next();
-        let v = DVec3::new(4.0 + 2.0 * random.next(), 1.0 + 3.5 * random.next(), random.next() - 0.5);
+        let v = DVec3::new(
+            4.0 + 2.0 * random.next(),
+            1.0 + 3.5 * random.next(),
+            random.next() - 0.5,
+        );
         let start = DVec3::new(11.7 + 0.35 * (0.9 * z).sin(), 2.2, z);
         let p = start + v * t + DVec3::new(0.0, -4.9 * t * t, 0.0);
         push(&mut water, p, v - DVec3::new(0.0, 9.81 * t, 0.0));

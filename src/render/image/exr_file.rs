@@ -83,7 +83,9 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
         }
     }
     let frame = i32::try_from(attributes.frame).unwrap_or(i32::MAX);
-    header.other.insert(text("frame"), AttributeValue::I32(frame));
+    header
+        .other
+        .insert(text("frame"), AttributeValue::I32(frame));
     let picture = exr::image::Image::empty(header).with_layer(layer);
     let mut bytes = std::io::Cursor::new(Vec::new());
     picture
@@ -101,12 +103,11 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
 /// # Errors
 /// [`RenderError::Format`] where it cannot be opened or is no EXR.
 pub fn read_exr_attributes(path: &Path) -> Result<Attributes, RenderError> {
-    let meta = exr::meta::MetaData::read_from_file(path, true).map_err(|error| {
-        RenderError::Format {
+    let meta =
+        exr::meta::MetaData::read_from_file(path, true).map_err(|error| RenderError::Format {
             file: path.to_owned(),
             message: error.to_string(),
-        }
-    })?;
+        })?;
     let mut attributes = Attributes::default();
     for header in &meta.headers {
         if let Some(software) = &header.own_attributes.software_name {

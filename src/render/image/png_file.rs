@@ -65,7 +65,10 @@ fn write(
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     if let Some(attributes) = attributes {
         let frame = attributes.frame.to_string();
-        let texts = attributes.texts().into_iter().chain([("frame", frame.as_str())]);
+        let texts = attributes
+            .texts()
+            .into_iter()
+            .chain([("frame", frame.as_str())]);
         for (name, value) in texts {
             encoder
                 .add_itxt_chunk(name.to_owned(), value.to_owned())

@@ -43,7 +43,10 @@ fn an_unknown_key_names_line_key_and_neighbour() {
     assert_eq!(line, 6);
     assert_eq!(key, "image.widht");
     assert!(message.contains("did you mean `width`"), "{message}");
-    assert!(message.contains("`samples`"), "lists what is allowed: {message}");
+    assert!(
+        message.contains("`samples`"),
+        "lists what is allowed: {message}"
+    );
 }
 
 #[test]
@@ -68,10 +71,12 @@ fn a_missing_key_names_its_table() {
 
 #[test]
 fn an_unknown_variant_names_its_neighbour() {
-    let (line, key, message) =
-        fault(&format!("{PLAIN}[surface]\nfilter = \"curvature_flo\"\n"));
+    let (line, key, message) = fault(&format!("{PLAIN}[surface]\nfilter = \"curvature_flo\"\n"));
     assert_eq!((line, key.as_str()), (11, "surface.filter"));
-    assert!(message.contains("did you mean `curvature_flow`"), "{message}");
+    assert!(
+        message.contains("did you mean `curvature_flow`"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -92,9 +97,10 @@ fn values_out_of_range_are_refused_with_what_is_allowed() {
 
 #[test]
 fn keyframes_must_ascend() {
-    let text = PLAIN
-        .replace("position = [0.0, 3.0, 0.0]\ntarget = [10.0, 1.0, 0.0]\n", "")
-        + "[[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\n\
+    let text = PLAIN.replace(
+        "position = [0.0, 3.0, 0.0]\ntarget = [10.0, 1.0, 0.0]\n",
+        "",
+    ) + "[[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\n\
            [[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\n";
     let (line, key, _) = fault(&text);
     assert_eq!((line, key.as_str()), (13, "camera.keyframe.1.frame"));
@@ -106,11 +112,16 @@ fn the_panorama_counts_in_the_hash_and_its_name_does_not() {
     let text = PLAIN.replace("\"hosek_wilkie\"", "\"panorama\"\nfile = \"x.exr\"");
     let look = |text: &str, name: &str, bytes: &[u8]| {
         std::fs::write(folder.path().join(name), bytes).unwrap();
-        Look::parse(text, &folder.path().join("look.toml")).unwrap().hash()
+        Look::parse(text, &folder.path().join("look.toml"))
+            .unwrap()
+            .hash()
     };
     let first = look(&text, "x.exr", b"one");
     assert_ne!(first, look(&text, "x.exr", b"two"));
-    assert_eq!(first, look(&text.replace("x.exr", "y.exr"), "y.exr", b"one"));
+    assert_eq!(
+        first,
+        look(&text.replace("x.exr", "y.exr"), "y.exr", b"one")
+    );
 }
 
 #[test]
