@@ -255,7 +255,7 @@ fn transmitted(water: Water, pixel: vec2i, straight: Behind) -> vec3f {
     }
     // Water that ends well before the ray meets anything: a sheet or a crest, through which one looks on
     // almost straight.
-    let filled = smoothstep(0.35, 0.75, seen / max(reach, 1e-3));
+    let filled = smoothstep(0.2, 0.5, seen / max(reach, 1e-3));
     let way = mix(path, min(reach, 1e3), filled);
     var light = straight.radiance;
     if filled > 0.0 {

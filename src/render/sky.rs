@@ -267,6 +267,8 @@ fn panorama(
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
     use std::path::Path;
 
     use super::*;

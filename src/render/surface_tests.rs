@@ -1,5 +1,7 @@
 //! The flow against what it must do to a wall with a groove, and where it must fail.
 
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
 use super::*;
 use crate::render::pass::read;
 use crate::render::uniform::Camera;

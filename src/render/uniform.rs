@@ -132,6 +132,8 @@ pub(super) struct Band {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
     use std::mem::size_of;
 
     use super::*;
