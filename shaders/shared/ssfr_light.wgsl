@@ -17,8 +17,6 @@ struct Shading {
     ground_variation: f32,
     solid_colour: vec3f,
     haze: f32,
-    horizon: vec3f,
-    particle_spacing: f32,
     // Ripples: longest wavelength (0 = none), root mean square slope.
     ripple: vec2f,
     // Windows: storey and bay (0 = none).
@@ -152,7 +150,9 @@ fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
     return colour;
 }
 
-// Air between the viewer and something at a distance takes it towards the horizon's colour.
-fn hazed(colour: vec3f, distance: f32) -> vec3f {
-    return mix(shading.horizon, colour, exp(-distance / shading.haze));
+// Air between the viewer and something at a distance takes it towards the sky's colour at the horizon there.
+fn hazed(colour: vec3f, distance: f32, direction: vec3f) -> vec3f {
+    let kept = exp(-distance / shading.haze);
+    let level = normalize(vec3f(direction.x, 0.0, direction.z) + vec3f(1e-4, 0.0, 0.0));
+    return mix(sky_radiance(vec3f(level.x, 0.02, level.z)), colour, kept);
 }

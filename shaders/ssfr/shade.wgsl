@@ -117,36 +117,41 @@ fn solid_surface(at: u32, eye: vec3f, view: vec3f) -> Surface {
 }
 
 struct Behind {
-    radiance: vec3f,
-    // Along the optical axis.
+    // Along the optical axis; FAR in the sky.
     depth: f32,
-    alpha: f32,
+    // Metres to the eye.
+    far: f32,
     surface: Surface,
 }
 
-// What the eye sees at this pixel where there is no water.
-fn behind(pixel: vec2i, ray: vec3f, direction: vec3f, view: vec3f) -> Behind {
+// What stands at this pixel where there is no water.
+fn behind(pixel: vec2i, ray: vec3f, direction: vec3f) -> Behind {
     let at = u32(pixel.y) * camera.size.x + u32(pixel.x);
     let solid = solid_depth[at];
     let along = length(ray);
     let ground = ground_distance(camera.position, direction) / along;
     if solid < min(ground, FAR) {
-        let found = solid_surface(at, ray * solid, view);
-        let far = solid * along;
-        let colour = radiance_of(found, view, far / camera.focal, 0.0);
-        return Behind(hazed(colour, far), solid, 1.0, found);
+        return Behind(solid, solid * along, solid_surface(at, ray * solid, -direction));
     }
     if ground < 0.1 * FAR {
-        let found = Surface(camera.position + direction * (ground * along), vec3f(0.0, 1.0, 0.0), 2u);
         let far = ground * along;
-        return Behind(hazed(radiance_of(found, view, far / camera.focal, 0.0), far), ground, 1.0, found);
+        let up = vec3f(0.0, 1.0, 0.0);
+        return Behind(ground, far, Surface(camera.position + direction * far, up, 2u));
+    }
+    return Behind(FAR, FAR, Surface(vec3f(0.0), vec3f(0.0), 3u));
+}
+
+fn behind_radiance(found: Behind, direction: vec3f) -> vec3f {
+    if found.depth < 0.1 * FAR {
+        let colour = radiance_of(found.surface, -direction, found.far / camera.focal, 0.0);
+        return hazed(colour, found.far, direction);
     }
     var colour = sky_radiance(direction);
+    // Half of the sun's angle across: 0.2666°.
     if dot(direction, shading.sun_direction) > 0.99998918 {
         colour += min(shading.sun_irradiance * shading.disc, vec3f(60000.0));
     }
-    let none = Surface(vec3f(0.0), vec3f(0.0), 3u);
-    return Behind(colour * shading.background, FAR, shading.background, none);
+    return colour * shading.background;
 }
 
 struct March {
@@ -204,11 +209,11 @@ fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32) -> March {
     return March(high, u32(pixel.y) * camera.size.x + u32(pixel.x), q);
 }
 
-// Scattered light in water or foam under this sun and sky, per unit albedo.
-fn diffuse_light(position: vec3f) -> vec3f {
-    let sun = shading.sun_irradiance * max(shading.sun_direction.y, 0.0)
+// Light that enters water or foam through a surface of this normal and is scattered, per unit albedo.
+fn diffuse_light(position: vec3f, n: vec3f) -> vec3f {
+    let sun = shading.sun_irradiance * max(dot(n, shading.sun_direction), 0.0)
         * sunlit(position, vec3f(0.0, 1.0, 0.0));
-    return (sun + sky_irradiance(vec3f(0.0, 1.0, 0.0))) / PI;
+    return (sun + sky_irradiance(n)) / PI;
 }
 
 struct Water {
@@ -254,19 +259,22 @@ fn transmitted(water: Water, pixel: vec2i, straight: Behind) -> vec3f {
     }
     // Water that ends well before the ray meets anything: a sheet or a crest, through which one looks on
     // almost straight.
-    let filled = smoothstep(0.35, 0.75, seen / max(reach, 1e-3));
+    let filled = smoothstep(0.2, 0.5, seen / max(reach, 1e-3));
     let way = mix(path, min(reach, 1e3), filled);
-    var light = straight.radiance;
+    var light = vec3f(0.0);
+    if filled < 1.0 {
+        light += behind_radiance(straight, -water.view) * (1.0 - filled);
+    }
     if filled > 0.0 {
         let depth = max(water.position.y - found.position.y, 0.0);
-        light = mix(light, radiance_of(found, -t, water.eye.z / camera.focal, depth), filled);
+        light += radiance_of(found, -t, water.eye.z / camera.focal, depth) * filled;
     }
     let extinction = shading.absorption + shading.scattering;
     let clear = exp(-extinction * way);
     // Diffuse reflectance of a deep medium of that single-scattering albedo (Hapke 1981, equation 38).
     let g = sqrt(shading.absorption / max(extinction, vec3f(1e-6)));
     let body = select(vec3f(0.0), (1.0 - g) / (1.0 + g), extinction > vec3f(0.0));
-    return light * clear + diffuse_light(water.position) * body * (1.0 - clear);
+    return light * clear + diffuse_light(water.position, water.normal) * body * (1.0 - clear);
 }
 
 fn shade_water(pixel: vec2i, z: f32, ray: vec3f, view: vec3f, straight: Behind) -> vec3f {
@@ -319,7 +327,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let ray = eye_ray(camera, vec2f(pixel) + 0.5);
     let direction = normalize(world_direction(camera, ray));
     let view = -direction;
-    let straight = behind(pixel, ray, direction, view);
+    let straight = behind(pixel, ray, direction);
     let z = surface[at];
     let wet = z < straight.depth && z < 0.1 * FAR;
 #ifdef AOVS
@@ -344,12 +352,16 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let motion = project(next_camera, vec3f(next.xy, max(next.z, 1e-3))) - (vec2f(pixel) + 0.5);
     store(out, straight.depth, straight.surface.normal, straight.surface.position, motion, through);
 #else
-    var colour = straight.radiance;
-    var alpha = straight.alpha;
+    var colour: vec3f;
+    var alpha = 1.0;
     if wet {
         let far = z * length(ray);
-        colour = hazed(shade_water(pixel, z, ray, view, straight), far);
-        alpha = 1.0;
+        colour = hazed(shade_water(pixel, z, ray, view, straight), far, direction);
+    } else {
+        colour = behind_radiance(straight, direction);
+        if straight.depth >= 0.1 * FAR {
+            alpha = shading.background;
+        }
     }
 #ifdef SPRAY
     let tap = half_tap(vec2f(pixel) + 0.5);
@@ -357,7 +369,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
     if cover > 0.0 {
         let where_to = camera.position + direction * min(z, min(straight.depth, 1e4)) * length(ray);
-        let white = diffuse_light(where_to) * 0.85;
+        let white = diffuse_light(where_to, vec3f(0.0, 1.0, 0.0)) * 0.85;
         colour = mix(colour, white, cover);
         alpha = mix(alpha, 1.0, cover);
     }

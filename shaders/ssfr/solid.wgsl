@@ -19,13 +19,20 @@ struct Corner {
     @builtin(position) clip: vec4f,
     // Eye-space plane: normal and distance.
     @location(0) @interpolate(flat) plane: vec4f,
-    @location(1) @interpolate(flat) range: vec2f,
-    @location(2) @interpolate(flat) packed: u32,
+    // Planes through the eye and each side; a ray inside all three meets the triangle.
+    @location(1) @interpolate(flat) side_a: vec3f,
+    @location(2) @interpolate(flat) side_b: vec3f,
+    @location(3) @interpolate(flat) side_c: vec3f,
+    @location(4) @interpolate(flat) range: vec2f,
+    @location(5) @interpolate(flat) packed: u32,
 }
 
+// Two triangles over the box that holds the triangle on the screen, or over the tile where it passes the eye.
+// Which pixels it covers is decided by its sides in the fragment (homogeneous rasterisation, Olano and Greer
+// 1997): the device's own rules snap corners to a grid that starts at the tile, and edges would move with it.
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Corner {
-    let triangle = triangles[index / 3u];
+    let triangle = triangles[index / 6u];
     let a = eye_from_world(camera, triangle.a);
     let b = eye_from_world(camera, triangle.b);
     let c = eye_from_world(camera, triangle.c);
@@ -35,17 +42,30 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
         dot(world_normal, camera.up),
         dot(world_normal, camera.forward),
     );
-    let eye = eye_from_world(camera, corner(triangle, index % 3u));
-    let shift = camera.centre - tile.corner;
     var out: Corner;
-    out.clip = vec4f(
-        2.0 * (camera.focal * eye.x + shift.x * eye.z) / tile.size.x - eye.z,
-        eye.z - 2.0 * (shift.y * eye.z - camera.focal * eye.y) / tile.size.y,
-        NEAR,
-        eye.z,
-    );
-    out.plane = vec4f(normal, dot(normal, a));
     out.range = vec2f(min(a.z, min(b.z, c.z)), max(a.z, max(b.z, c.z)));
+    var low = vec2f(0.0);
+    var high = tile.size;
+    if out.range.x > NEAR {
+        let pa = project(camera, a);
+        let pb = project(camera, b);
+        let pc = project(camera, c);
+        // A pixel wider, for rounding.
+        low = clamp(min(pa, min(pb, pc)) - tile.corner - 1.0, vec2f(0.0), tile.size);
+        high = clamp(max(pa, max(pb, pc)) - tile.corner + 1.0, vec2f(0.0), tile.size);
+    } else if out.range.y <= NEAR {
+        high = vec2f(0.0);
+    }
+    let k = index % 6u;
+    let right = k == 1u || k == 2u || k == 4u;
+    let bottom = k == 2u || k == 4u || k == 5u;
+    let at = vec2f(select(low.x, high.x, right), select(low.y, high.y, bottom));
+    out.clip = vec4f(2.0 * at.x / tile.size.x - 1.0, 1.0 - 2.0 * at.y / tile.size.y, 0.5, 1.0);
+    out.plane = vec4f(normal, dot(normal, a));
+    let orientation = select(-1.0, 1.0, dot(a, cross(b, c)) > 0.0);
+    out.side_a = orientation * cross(a, b);
+    out.side_b = orientation * cross(b, c);
+    out.side_c = orientation * cross(c, a);
     out.packed = pack_normal(world_normal, triangle.material);
     return out;
 }
@@ -59,7 +79,12 @@ struct Texel {
 @fragment
 fn fragment(in: Corner) -> Texel {
     let ray = eye_ray(camera, in.clip.xy + tile.corner);
-    let facing = dot(in.plane.xyz, ray);
-    let depth = clamp(in.plane.w / facing, max(in.range.x, NEAR), in.range.y);
+    let inside = vec3f(dot(in.side_a, ray), dot(in.side_b, ray), dot(in.side_c, ray));
+    let raw = in.plane.w / dot(in.plane.xyz, ray);
+    // Sides that two triangles share belong to both; the nearer one is kept.
+    if any(inside < vec3f(0.0)) || !(raw > 0.0) {
+        discard;
+    }
+    let depth = clamp(raw, max(in.range.x, NEAR), max(in.range.y, NEAR));
     return Texel(depth, in.packed, clamp(NEAR / depth, 0.0, 1.0));
 }

@@ -16,7 +16,7 @@ struct ThicknessParams {
 @group(0) @binding(4) var<storage, read> surface: array<f32>;
 @group(0) @binding(5) var<storage, read_write> spray: array<atomic<u32>>;
 
-const DROPS: u32 = 7u;
+const DROPS: u32 = 5u;
 
 // A number in 0..1 that belongs to a particle and a channel.
 fn random(index: u32, channel: u32) -> f32 {
@@ -46,27 +46,22 @@ fn main(
     if particle.aeration <= 0.0 {
         return;
     }
-    // A thrown particle stands for a cloud of drops, wider than the ball that the solver carries.
+    // The particle stands for a cloud of drops, wider than the ball that the solver carries.
     let thrown = !is_body(particle);
     let id = particle.tag >> 1u;
-    let radius = camera.radius * select(1.2, 1.9, thrown);
+    let radius = 1.4 * camera.radius;
     let half_size = camera.size / 2u;
     let c = eye_from_world(camera, particle.position + particle.velocity * camera.seconds);
     var drops: array<vec4f, DROPS>;
-    var used = 1u;
-    var volume = 1.0 / 1.728;
-    drops[0] = vec4f(c, radius);
-    if thrown {
-        used = DROPS;
-        volume = 0.0;
-        for (var k = 0u; k < DROPS; k++) {
-            let offset = vec3f(random(id, 4u * k), random(id, 4u * k + 1u), random(id, 4u * k + 2u));
-            let size = camera.radius * mix(0.18, 0.6, pow(random(id, 4u * k + 3u), 2.0));
-            drops[k] = vec4f(c + (offset - 0.5) * 1.5 * camera.radius, size);
-            volume += pow(size / camera.radius, 3.0);
-        }
-        volume = 0.35 / volume;
+    var volume = 0.0;
+    for (var k = 0u; k < DROPS; k++) {
+        let offset = vec3f(random(id, 4u * k), random(id, 4u * k + 1u), random(id, 4u * k + 2u));
+        let size = camera.radius * mix(0.14, 0.5, pow(random(id, 4u * k + 3u), 2.0));
+        drops[k] = vec4f(c + (offset - 0.5) * 1.7 * camera.radius, size);
+        volume += pow(size / camera.radius, 3.0);
     }
+    // Thrown water is mostly air: its drops hold a part of what the particle stands for.
+    volume = select(0.5, 0.15, thrown) / volume;
     let bounds = sphere_bounds(camera, c, radius, 0.5, half_size);
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
@@ -79,7 +74,7 @@ fn main(
         }
         let ray = eye_ray(camera, 2.0 * vec2f(pixel) + 1.0);
         var sum = 0.0;
-        for (var k = 0u; k < used; k++) {
+        for (var k = 0u; k < DROPS; k++) {
             sum += soft_chord(ray, drops[k].xyz, drops[k].w);
         }
         let amount = u32(sum * volume * params.scale * particle.aeration * THICKNESS_SCALE + 0.5);

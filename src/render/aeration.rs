@@ -33,8 +33,10 @@ pub(super) fn classify(particles: &mut [Particle], spacing: f32, look: &SpraySpe
             let [x, y, z] = particle.velocity;
             let speed = (x * x + y * y + z * z).sqrt();
             let open = 1.0 - smoothstep(SPRAY_BELOW, SURFACE_BELOW, count);
+            // A film at rest has as few neighbours as a shred in flight: without speed, none of them whitens.
+            let shred = 1.0 - smoothstep(SPRAY_BELOW, 2.0 * SPRAY_BELOW, count);
             particle.aeration = smoothstep(onset, 2.0 * onset, speed) * open
-                + 0.5 * (1.0 - smoothstep(SPRAY_BELOW, 1.8 * SPRAY_BELOW, count));
+                + 0.3 * smoothstep(0.5 * onset, onset, speed) * shred;
         });
 }
 
@@ -137,8 +139,7 @@ mod tests {
         classify(&mut particles, 0.1, &look);
         assert_eq!((particles[1000].tag, particles[1000].aeration), (0, 1.0));
         assert!(particles[..1000].iter().all(|p| p.tag == 1));
-        // The middle of a face is clear; only the block's corners, with few neighbours, whiten a little.
-        assert_eq!(particles[55].aeration, 0.0);
+        assert!(particles[..1000].iter().all(|p| p.aeration == 0.0));
         // The same face at twice the onset is white.
         for particle in &mut particles {
             particle.velocity = [6.0, 0.0, 0.0];

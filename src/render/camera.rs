@@ -183,6 +183,8 @@ pub(super) fn camera(
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
     use std::path::Path;
 
     use super::*;

@@ -61,7 +61,7 @@ pub(super) fn bands(
     let [width, height] = extent.picture;
     let pixel = if aovs { AOV_BYTES } else { 16 };
     let binding = context.limits.max_storage_buffer_binding_size;
-    let bytes = u64::from(binding).min(context.limits.max_buffer_size);
+    let bytes = binding.min(context.limits.max_buffer_size);
     let fitting = u32::try_from(bytes / (pixel * u64::from(width))).unwrap_or(u32::MAX);
     let rows = fitting.min(row_limit).max(1);
     (0..height)

@@ -10,6 +10,7 @@ mod aeration;
 mod camera;
 mod frame;
 pub mod image;
+mod lighting;
 mod pass;
 mod plan;
 mod renderer;

@@ -199,7 +199,7 @@ pub(super) fn uniform<T: bytemuck::Pod>(context: &Context, label: &str, value: &
 /// A storage buffer, refused where the adapter would not bind it.
 pub(super) fn storage(context: &Context, label: &str, bytes: u64) -> Result<Buffer, GpuError> {
     let limits = &context.limits;
-    let binding = u64::from(limits.max_storage_buffer_binding_size);
+    let binding = limits.max_storage_buffer_binding_size;
     for (allowed, limit) in [
         (binding, "max_storage_buffer_binding_size"),
         (limits.max_buffer_size, "max_buffer_size"),

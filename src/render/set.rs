@@ -306,7 +306,7 @@ impl Set {
         Ok(Self {
             pipeline,
             tiles,
-            vertices: 3 * count as u32,
+            vertices: 6 * count as u32,
         })
     }
 

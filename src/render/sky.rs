@@ -19,8 +19,6 @@ pub(super) struct Sky {
     pub(super) irradiance: [[f32; 4]; 9],
     /// On a face at right angles to the sun.
     pub(super) sun_irradiance: Vec3,
-    /// Mean colour just above the horizon.
-    pub(super) horizon: Vec3,
     /// Radiance over irradiance of the sun's disc; 0 where the image holds the disc itself.
     pub(super) disc: f32,
 }
@@ -198,7 +196,6 @@ impl Sky {
         Ok(Self {
             size,
             irradiance: harmonics(size, &texels),
-            horizon: horizon(size, &texels).as_vec3(),
             sun_irradiance: sun_irradiance.as_vec3(),
             texels: texels
                 .iter()
@@ -210,15 +207,6 @@ impl Sky {
             disc: disc as f32,
         })
     }
-}
-
-/// Mean of the rows from the horizon up to about 6°.
-fn horizon(size: [u32; 2], texels: &[DVec3]) -> DVec3 {
-    let middle = (size[1] / 2) as usize;
-    let rows = (size[1] as usize / 30).max(1).min(middle.max(1));
-    let width = size[0] as usize;
-    let part = &texels[middle.saturating_sub(rows) * width..middle.max(1) * width];
-    part.iter().sum::<DVec3>() / part.len().max(1) as f64
 }
 
 fn panorama(
@@ -279,6 +267,8 @@ fn panorama(
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
     use std::path::Path;
 
     use super::*;

@@ -1,5 +1,7 @@
 //! The flow against what it must do to a wall with a groove, and where it must fail.
 
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
 use super::*;
 use crate::render::pass::read;
 use crate::render::uniform::Camera;
@@ -89,21 +91,20 @@ const DISTANCES: [f64; 3] = [4.0, 8.0, 16.0];
 const SIGMA: f64 = 0.16;
 
 /// A ridge of 0.3 × 4/300 m on 4 m is resolved by f32 to 1e-4 of it, but late in the flow a step moves less than
-/// an ulp and some of it is lost; the explicit step's own error on a ridge 4 pixels wide is about 1 %.
-const TOLERANCE: f64 = 0.06;
+/// an ulp and some of it is lost; the explicit step's own error on a ridge 4 pixels wide is about 1 %, as is that of
+/// a bilinear level. Measured: 0.3 % explicit, 1.5 % through the pyramid.
+const TOLERANCE: f64 = 0.03;
 
 #[test]
 fn the_smoothed_width_is_the_same_at_any_distance() {
     let plain = explicit(Width::World(SIGMA), 400);
     let pyramid = FlowSettings::for_width(SIGMA, 0.1, FOCAL);
     assert!(pyramid.levels > 3, "the pyramid is what looks use");
-    for (name, settings, tolerance) in [("explicit", plain, TOLERANCE), ("pyramid", pyramid, 0.15)]
-    {
+    for (name, settings) in [("explicit", plain), ("pyramid", pyramid)] {
         for distance in DISTANCES {
             let sigma = widened(&settings, distance);
-            println!("{name} at {distance} m: {sigma:.4} m");
             let error = (sigma / SIGMA - 1.0).abs();
-            assert!(error < tolerance, "{name} at {distance} m: {sigma:.4} m");
+            assert!(error < TOLERANCE, "{name} at {distance} m: {sigma:.4} m");
         }
     }
 }

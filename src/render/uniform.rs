@@ -50,8 +50,6 @@ pub(super) struct Shading {
     pub(super) ground_variation: f32,
     pub(super) solid_colour: [f32; 3],
     pub(super) haze: f32,
-    pub(super) horizon: [f32; 3],
-    pub(super) particle_spacing: f32,
     pub(super) ripple: [f32; 2],
     pub(super) windows: [f32; 2],
     pub(super) window_lit: f32,
@@ -134,6 +132,8 @@ pub(super) struct Band {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
     use std::mem::size_of;
 
     use super::*;
@@ -214,8 +214,6 @@ mod tests {
             ground_variation,
             solid_colour,
             haze,
-            horizon,
-            particle_spacing,
             ripple,
             windows,
             window_lit,

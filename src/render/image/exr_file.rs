@@ -55,8 +55,10 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
     }
 
     let size = Vec2(image.width as usize, image.height as usize);
-    let mut layer_attributes = LayerAttributes::default();
-    layer_attributes.software_name = Some(text(&attributes.software));
+    let layer_attributes = LayerAttributes {
+        software_name: Some(text(&attributes.software)),
+        ..LayerAttributes::default()
+    };
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: Blocks::ScanLines,
@@ -95,7 +97,35 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
             file: path.to_owned(),
             message: error.to_string(),
         })?;
-    write_whole(path, bytes.get_ref())
+    let mut bytes = bytes.into_inner();
+    sort_attributes(&mut bytes).ok_or_else(|| RenderError::Format {
+        file: path.to_owned(),
+        message: "the header that was just written cannot be read".to_owned(),
+    })?;
+    write_whole(path, &bytes)
+}
+
+/// Puts the header's attributes in the order of their names. The encoder keeps them in a hash map, whose order
+/// changes from run to run; the same picture has to be the same bytes. Offsets in the file stay as they are,
+/// for the header's length does.
+fn sort_attributes(bytes: &mut [u8]) -> Option<()> {
+    // Magic number and version, then name\0 type\0 length value, ended by an empty name.
+    const START: usize = 8;
+    let mut entries: Vec<Vec<u8>> = Vec::new();
+    let mut at = START;
+    while *bytes.get(at)? != 0 {
+        let name = bytes.get(at..)?.iter().position(|&byte| byte == 0)?;
+        let kind_at = at + name + 1;
+        let kind = bytes.get(kind_at..)?.iter().position(|&byte| byte == 0)?;
+        let length_at = kind_at + kind + 1;
+        let length = u32::from_le_bytes(bytes.get(length_at..length_at + 4)?.try_into().ok()?);
+        let end = length_at + 4 + length as usize;
+        entries.push(bytes.get(at..end)?.to_vec());
+        at = end;
+    }
+    entries.sort_unstable();
+    bytes[START..at].copy_from_slice(&entries.concat());
+    Some(())
 }
 
 /// The attributes of an EXR, or what of them is there; the pixels are not read.
@@ -113,12 +143,13 @@ pub fn read_exr_attributes(path: &Path) -> Result<Attributes, RenderError> {
         if let Some(software) = &header.own_attributes.software_name {
             attributes.software = software.to_string();
         }
-        for (name, value) in &header.shared_attributes.other {
+        let shared = header.shared_attributes.other.iter();
+        for (name, value) in shared.chain(&header.own_attributes.other) {
             match value {
                 AttributeValue::Text(value) => {
                     attributes.set(&name.to_string(), value.to_string());
                 }
-                AttributeValue::I32(value) if name.to_string() == "frame" => {
+                AttributeValue::I32(value) if *name == text("frame") => {
                     attributes.frame = u32::try_from(*value).unwrap_or(0);
                 }
                 _ => {}

@@ -109,13 +109,12 @@ pub(super) fn from_toml(file: &Path, text: &str, error: &toml::de::Error) -> Loo
         _ => located,
     };
     let mut message = raw.clone();
-    if is_key || raw.starts_with("unknown variant") {
-        if let Some(found) = words
+    if (is_key || raw.starts_with("unknown variant"))
+        && let Some(found) = words
             .split_first()
             .and_then(|(word, allowed)| nearest(word, allowed))
-        {
-            message.push_str(&format!("; did you mean `{found}`?"));
-        }
+    {
+        message.push_str(&format!("; did you mean `{found}`?"));
     }
     LookError::Fault {
         file: file.to_owned(),

@@ -268,7 +268,7 @@ impl Default for GroundSpec {
         Self {
             colour: [0.30, 0.28, 0.25],
             variation: 0.25,
-            haze_m: 120.0,
+            haze_m: 500.0,
         }
     }
 }

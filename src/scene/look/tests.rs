@@ -1,5 +1,7 @@
 //! Faults of look files carry line, key and a way out; no text makes the parser panic.
 
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
 use std::path::Path;
 
 use proptest::prelude::*;
