@@ -1,114 +1,197 @@
-//! Time and memory of a PBF step by particle count: `tools/bench [--counts 60000,250000] [--adapter NAME]`.
+//! Time per pass and per particle-step, and bytes per particle, of PBF in a collapsing dam.
+//!
+//! `tools/bench [--adapter NAME] [--frames N] [COUNT ...]`; counts are 60 000, 250 000 and 1 000 000 where left
+//! out. A step is all in: sort, neighbour lists, 4 red/black iterations, and the frame's share of measuring
+//! density and reading the state back. h = 2d, no effects, no solids. The first two frames warm up; medians of
+//! the rest.
 #![allow(missing_docs, reason = "a program")]
+
+use std::time::Instant;
+
 use glam::DVec3;
-use std::{path::PathBuf, time::Instant};
 use swell::{
     domain::{bounds::Bounds, particles::Particles, solver::Solver},
     gpu::adapter::Context,
-    scene::*,
-    solve::{boundary::Boundary, pbf::Pbf},
+    scene::{
+        Effects, Iteration, Pbf as Settings, Scene, Shot, Solver as SolverSettings, Stop, Water,
+        plan::{Counts, Plan},
+    },
+    solve::{
+        boundary::Boundary,
+        pbf::{Pbf, device_limits},
+    },
 };
 
-fn scene(side: f64, depth: f64, iteration: Iteration, iterations: u32) -> Scene {
-    Scene {
+const D: f64 = 0.1;
+const WARM_UP: usize = 2;
+
+struct Options {
+    adapter: Option<String>,
+    frames: usize,
+    counts: Vec<usize>,
+}
+
+fn options() -> Result<Options, String> {
+    let mut options = Options {
+        adapter: None,
+        frames: 8,
+        counts: Vec::new(),
+    };
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        let mut value = || words.next().ok_or(format!("{word} wants a value"));
+        match word.as_str() {
+            "--adapter" => options.adapter = Some(value()?),
+            "--frames" => {
+                options.frames = value()?.parse().map_err(|_| "--frames wants a number")?
+            }
+            // Cargo's own.
+            "--bench" => {}
+            _ => options.counts.push(
+                word.parse()
+                    .map_err(|_| format!("`{word}` is no number of particles"))?,
+            ),
+        }
+    }
+    if options.counts.is_empty() {
+        options.counts = vec![60_000, 250_000, 1_000_000];
+    }
+    Ok(options)
+}
+
+/// Half a box full, twice as long as wide: `2 m × m × m` particles beside as much room.
+fn dam(count: usize) -> (Scene, Particles) {
+    let m = (count as f64 / 2.0).cbrt().round() as usize;
+    let edge = m as f64 * D;
+    let scene = Scene {
         shot: Shot {
             name: "bench".into(),
-            frames: 10,
-            frames_per_second: 100.0,
+            frames: 1,
+            frames_per_second: 30.0,
         },
         domain: Bounds {
             min: DVec3::ZERO,
-            max: DVec3::new(side * 1.5, depth * 2.0, side),
+            max: DVec3::new(4.0 * edge, 2.0 * edge, edge),
         },
         water: Water {
             rest_density: 1000.0,
             gravity: DVec3::new(0.0, -9.81, 0.0),
-            blocks: vec![],
-            meshes: vec![],
+            blocks: Vec::new(),
+            meshes: Vec::new(),
         },
-        solids: vec![],
-        wave_makers: vec![],
-        solver: swell::scene::Solver {
-            pbf: swell::scene::Pbf {
-                particle_spacing: 0.1,
+        solids: Vec::new(),
+        wave_makers: Vec::new(),
+        solver: SolverSettings {
+            pbf: Settings {
+                particle_spacing: D,
                 support_ratio: 2.0,
-                iteration,
-                stop: Stop::Iterations(iterations),
-                cfl: 1.0,
+                iteration: Iteration::RedBlack,
+                stop: Stop::Iterations(4),
+                cfl: 0.5,
                 relaxation: 1.0,
                 artificial_pressure: 0.0,
-                max_substeps: 32,
+                max_substeps: 64,
             },
         },
         effects: Effects::default(),
+    };
+    let mut particles = Particles::default();
+    for z in 0..m {
+        for y in 0..m {
+            for x in 0..2 * m {
+                particles
+                    .position
+                    .push([x, y, z].map(|k| ((k as f64 + 0.5) * D) as f32));
+                // Already under way, so that a frame takes the two to four substeps of a shot.
+                particles.velocity.push([2.0, 0.0, 0.0]);
+                particles.id.push(particles.id.len() as u32);
+            }
+        }
     }
+    (scene, particles)
 }
 
-fn main() {
-    let _ = PathBuf::new();
-    let context = Context::open(None).expect("adapter");
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn measure(
+    context: &Context,
+    options: &Options,
+    count: usize,
+) -> Result<(), Box<dyn std::error::Error>> {
+    let (scene, particles) = dam(count);
+    let counts = Counts {
+        particles: particles.len(),
+        ..Counts::default()
+    };
+    let plan = Plan::new(&scene, counts, device_limits(context));
+    let (all, lists) = plan.bytes();
+    let n = particles.len() as f64;
     println!(
-        "{} {} {}",
-        context.info.name, context.info.driver, context.info.driver_info
+        "\n{} particles: {:.0} bytes each, and {:.0} for neighbour lists in {} bindings",
+        particles.len(),
+        (all - lists) as f64 / n,
+        lists as f64 / n,
+        plan.chunks.len()
     );
-    let args: Vec<usize> = std::env::args()
-        .skip(1)
-        .filter_map(|a| a.parse().ok())
-        .collect();
-    for target in if args.is_empty() { vec![60_000] } else { args } {
-        let n = ((target as f64 * 2.0).cbrt()).round() as usize;
-        let m = n / 2;
-        let s = scene(n as f64 * 0.1, m as f64 * 0.1, Iteration::RedBlack, 4);
-        let mut p = Particles::default();
-        for z in 0..n {
-            for y in 0..m {
-                for x in 0..n {
-                    p.position.push([
-                        (x as f32 + 0.5) * 0.1,
-                        (y as f32 + 0.5) * 0.1,
-                        (z as f32 + 0.5) * 0.1,
-                    ]);
-                    p.velocity.push([0.0; 3]);
-                    p.id.push(p.id.len() as u32);
-                }
-            }
-        }
-        let count = p.len();
-        let plan = plan::Plan::new(
-            &s,
-            plan::Counts {
-                particles: count,
-                ..Default::default()
-            },
-            swell::solve::pbf::device_limits(&context),
-        );
-        for timed in [false, true] {
-            let mut solver =
-                Pbf::new(&context, &s, plan.clone(), &Boundary::default(), timed).expect("solver");
-            solver.load(0, &p).expect("load");
-            for frame in 0..8 {
-                let t = Instant::now();
-                let (_, report) = solver.advance().expect("advance");
-                let us = t.elapsed().as_secs_f64() * 1e6 / (count as f64 * report.substeps as f64);
-                println!("{count} frame {frame}: {us:.3} us/particle-step {report:?}");
-            }
-            if timed {
-                let mut rows = solver.timings();
-                rows.sort_by(|a, b| b.1.total_cmp(&a.1));
-                let steps = 8.0;
-                for (name, s, runs) in rows {
-                    println!(
-                        "{name:28} {:8.3} ms x {runs} = {:.3} us/particle-step",
-                        s / runs as f64 * 1e3,
-                        s * 1e6 / (count as f64 * steps)
-                    );
-                }
-            }
-            println!(
-                "{:?} bytes/particle {}",
-                solver.plan().bytes(),
-                solver.plan().bytes().0 as f64 / count as f64
-            );
+    let mut steps_timed = 0;
+    let mut solver = Pbf::new(context, &scene, plan.clone(), &Boundary::default(), false)?;
+    solver.load(0, &particles)?;
+    let mut times = Vec::new();
+    let mut searched = 0;
+    for frame in 0..options.frames + WARM_UP {
+        let begin = Instant::now();
+        let (_, report) = solver.advance()?;
+        if frame >= WARM_UP {
+            times.push(begin.elapsed().as_secs_f64() / f64::from(report.substeps));
+            searched += report.searched;
+            steps_timed += report.substeps;
         }
     }
+    let (least, most) = times
+        .iter()
+        .fold((f64::MAX, 0.0f64), |(a, b), &t| (a.min(t), b.max(t)));
+    println!(
+        "step {:.2} ms ({:.2} to {:.2} over {} frames): {:.3} µs a particle-step; {:.2e} of lists overflowed",
+        1e3 * median(times.clone()),
+        1e3 * least,
+        1e3 * most,
+        times.len(),
+        1e6 * median(times) / n,
+        searched as f64 / (n * f64::from(steps_timed))
+    );
+    let mut solver = Pbf::new(context, &scene, plan, &Boundary::default(), true)?;
+    solver.load(0, &particles)?;
+    let mut steps = 0;
+    for _ in 0..options.frames + WARM_UP {
+        steps += solver.advance()?.1.substeps;
+    }
+    let mut rows = solver.timings();
+    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+    for (pass, seconds, runs) in &rows {
+        let each = 1e3 * seconds / *runs as f64;
+        println!(
+            "   {pass:24} {each:9.3} ms × {runs:5}  {:7.3} µs a particle-step",
+            1e6 * seconds / (n * f64::from(steps))
+        );
+    }
+    if rows.is_empty() {
+        println!("   this adapter has no timestamps: no times per pass");
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let options = options()?;
+    let context = Context::open(options.adapter.as_deref())?;
+    println!(
+        "{} ({} {})",
+        context.info.name, context.info.driver, context.info.driver_info
+    );
+    for &count in &options.counts {
+        measure(&context, &options, count)?;
+    }
+    Ok(())
 }

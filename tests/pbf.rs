@@ -1,5 +1,5 @@
 //! PBF on the GPU: against a naive f64 twin, against analysis, and what must hold in any run.
-#![allow(missing_docs, reason = "tests")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
 mod support;
 

@@ -1,5 +1,5 @@
 //! The whole program as a user runs it: bake, resume, verify, render; exit codes; what stays untouched.
-#![allow(missing_docs, reason = "tests")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
 use std::{
     fs,

@@ -1,5 +1,5 @@
 //! What can be said of shaders and rooms without a GPU.
-#![allow(missing_docs, reason = "tests")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
 use std::{fs, path::Path};
 

@@ -1,5 +1,5 @@
 //! Scan and stable counting sort against the CPU, up to dispatches of two dimensions.
-#![allow(missing_docs, reason = "tests")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
 use swell::gpu::{
     adapter::Context,

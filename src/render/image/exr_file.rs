@@ -133,11 +133,13 @@ fn sort_attributes(bytes: &mut [u8]) -> Option<()> {
 /// # Errors
 /// [`RenderError::Format`] where it cannot be opened or is no EXR.
 pub fn read_exr_attributes(path: &Path) -> Result<Attributes, RenderError> {
-    let meta =
-        exr::meta::MetaData::read_from_file(path, true).map_err(|error| RenderError::Format {
-            file: path.to_owned(),
-            message: error.to_string(),
-        })?;
+    let fault = |error: exr::error::Error| RenderError::Format {
+        file: path.to_owned(),
+        message: error.to_string(),
+    };
+    let whole = exr::prelude::read_all_data_from_file(path).map_err(fault)?;
+    drop(whole);
+    let meta = exr::meta::MetaData::read_from_file(path, true).map_err(fault)?;
     let mut attributes = Attributes::default();
     for header in &meta.headers {
         if let Some(software) = &header.own_attributes.software_name {

@@ -81,10 +81,10 @@ fn write(
     write_whole(path, &bytes)
 }
 
-/// The attributes of a PNG, or what of them is there.
+/// The attributes of a PNG, or what of them is there; all of it is decoded, so that a torn one is known.
 ///
 /// # Errors
-/// [`RenderError::Write`] where it cannot be opened, [`RenderError::Format`] where it is no PNG.
+/// [`RenderError::Write`] where it cannot be opened, [`RenderError::Format`] where it is no whole PNG.
 pub fn read_png_attributes(path: &Path) -> Result<Attributes, RenderError> {
     let file = std::fs::File::open(path).map_err(|source| RenderError::Write {
         file: path.to_owned(),
@@ -94,9 +94,11 @@ pub fn read_png_attributes(path: &Path) -> Result<Attributes, RenderError> {
         file: path.to_owned(),
         message: error.to_string(),
     };
-    let reader = png::Decoder::new(std::io::BufReader::new(file))
+    let mut reader = png::Decoder::new(std::io::BufReader::new(file))
         .read_info()
         .map_err(fault)?;
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap_or(0)];
+    reader.next_frame(&mut pixels).map_err(fault)?;
     let mut attributes = Attributes::default();
     for chunk in &reader.info().utf8_text {
         let value = chunk.get_text().map_err(fault)?;
