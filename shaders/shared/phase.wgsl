@@ -11,8 +11,7 @@ struct Phase {
     read_even: u32,
     read_odd: u32,
     write: u32,
-    // Particles of the chunk.
-    chunk_count: u32,
+    padding: u32,
 }
 @group(0) @binding(6) var<uniform> phase: Phase;
 

@@ -10,7 +10,7 @@ use crate::{
     },
 };
 
-use super::{Iteration, Scene, Stop};
+use super::{Scene, Stop};
 
 /// Constants for every pass that declares them.
 pub const SHARED_CONSTANTS: [(&str, f64); 1] = [("LIST_CAPACITY", LIST_CAPACITY as f64)];
@@ -326,8 +326,3 @@ pub const PARAMS_BYTES: u64 = 144;
 
 /// Stride of phase slots, the largest uniform offset alignment that WebGPU lets an adapter ask for.
 pub const PHASE_BYTES: u64 = 256;
-
-/// Whether the iteration works colour by colour.
-pub fn is_coloured(scene: &Scene) -> bool {
-    scene.solver.pbf.iteration == Iteration::RedBlack
-}

@@ -1,4 +1,18 @@
 //! The density iteration as commands: Jacobi and red/black, fixed or until an error.
+//!
+//! Red/black (Ribas and Pedrini) corrects one colour from everyone's latest positions, then the other, which
+//! sees the corrected first. λ of a colour is computed just before it moves, so an iteration does the work of
+//! one Jacobi iteration in four dispatches of half the size. Measured on a column of 16 × 20 × 16 particles
+//! compressed by 3 % (h = 2d, llvmpipe), mean and max density error in % after 4, 16 and 64 iterations:
+//!
+//! | schedule | 4 | 16 | 64 |
+//! |---|---|---|---|
+//! | Jacobi | 1.51 / 5.7 | 0.93 / 5.4 | 0.40 / 2.8 |
+//! | red/black, λ of all once an iteration (lost) | 1.51 / 5.5 | 0.92 / 5.5 | 0.40 / 3.3 |
+//! | red/black, λ of each colour before it moves (this) | 1.45 / 3.9 | 0.88 / 4.8 | 0.36 / 2.4 |
+//! | red/black, λ of all before each colour, half as dear again (lost) | 1.46 / 3.8 | 0.87 / 4.6 | 0.36 / 1.9 |
+//!
+//! Over-relaxation by 1.3 overshoots in deep columns (max error 36 % at 40 layers after 16 iterations).
 
 use crate::{
     gpu::recording::{Bind, Command, Groups},
@@ -78,7 +92,7 @@ impl<'a> Builder<'a> {
             read_even: if red_moved { there } else { here } as u32,
             read_odd: here as u32,
             write: there as u32,
-            chunk_count: chunk.count as u32,
+            padding: 0,
         }
     }
 

@@ -82,8 +82,8 @@ mirror!(
         read_odd: u32,
         /// Where corrections are written.
         write: u32,
-        /// Particles of the chunk.
-        chunk_count: u32,
+        /// Unused.
+        padding: u32,
     }
 );
 

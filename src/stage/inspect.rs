@@ -13,7 +13,7 @@ use crate::{
     solve::pbf::device_limits,
 };
 
-use super::prepare::Start;
+use super::{Blame, prepare::Start};
 
 pub use crate::cache::{Entry, Manifest};
 
@@ -97,13 +97,37 @@ const COMMON_LIMITS: DeviceLimits = DeviceLimits {
     list_budget: LIST_BUDGET,
 };
 
+/// Why a scene could not be planned.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// The scene's solids.
+    #[error(transparent)]
+    Solid(#[from] SignedDistanceError),
+    /// The adapter asked for.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+impl From<&PlanError> for Blame {
+    fn from(error: &PlanError) -> Self {
+        match error {
+            PlanError::Solid(error) => error.into(),
+            PlanError::Gpu(error) => error.into(),
+        }
+    }
+}
+
 /// Plans a scene without allocating or compiling anything.
 ///
 /// # Errors
-/// A solid without inside, or too large a grid.
-pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, SignedDistanceError> {
+/// A solid without inside, or too large a grid; an adapter that is not there or does not open.
+pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError> {
     let start = Start::of(scene)?;
-    let context = Context::open(adapter).ok();
+    let context = match Context::open(adapter) {
+        Ok(context) => Some(context),
+        Err(GpuError::NoAdapter) => None,
+        Err(error) => return Err(error.into()),
+    };
     let limits = context.as_ref().map_or(COMMON_LIMITS, device_limits);
     Ok(ScenePlan {
         plan: start.plan(scene, limits),
