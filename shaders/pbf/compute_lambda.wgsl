@@ -28,8 +28,12 @@ fn visit(i: u32, j: u32) {
     let s = max(1.0 - r2 * inverse_r * inverse_h, 0.0);
     let slope = mass * s * s;
     gradient_sum += d * (slope * inverse_r);
+#ifdef SOLIDS
     // A solid's samples do not move: they have no gradient of their own.
     gradient_squares += select(slope * slope, 0.0, other.w > 0.0);
+#else
+    gradient_squares += slope * slope;
+#endif
 }
 
 @compute @workgroup_size(64)
