@@ -6,23 +6,16 @@
 //! the rest.
 #![allow(missing_docs, reason = "a program")]
 
-use std::time::Instant;
+use std::{path::Path, time::Instant};
 
-use glam::DVec3;
 use swell::{
-    domain::{bounds::Bounds, particles::Particles, solver::Solver},
+    domain::solver::Solver,
     gpu::adapter::Context,
-    scene::{
-        Effects, Iteration, Pbf as Settings, Scene, Shot, Solver as SolverSettings, Stop, Water,
-        plan::{Counts, Plan},
-    },
-    solve::{
-        boundary::Boundary,
-        pbf::{Pbf, device_limits},
-    },
+    scene::Scene,
+    solve::pbf::{Pbf, device_limits},
+    stage::prepare::Start,
 };
 
-const D: f64 = 0.1;
 const WARM_UP: usize = 2;
 
 struct Options {
@@ -59,56 +52,24 @@ fn options() -> Result<Options, String> {
     Ok(options)
 }
 
-/// Half a box full, twice as long as wide: `2 m × m × m` particles beside as much room.
-fn dam(count: usize) -> (Scene, Particles) {
-    let m = (count as f64 / 2.0).cbrt().round() as usize;
-    let edge = m as f64 * D;
-    let scene = Scene {
-        shot: Shot {
-            name: "bench".into(),
-            frames: 1,
-            frames_per_second: 30.0,
-        },
-        domain: Bounds {
-            min: DVec3::ZERO,
-            max: DVec3::new(4.0 * edge, 2.0 * edge, edge),
-        },
-        water: Water {
-            rest_density: 1000.0,
-            gravity: DVec3::new(0.0, -9.81, 0.0),
-            blocks: Vec::new(),
-            meshes: Vec::new(),
-        },
-        solids: Vec::new(),
-        wave_makers: Vec::new(),
-        solver: SolverSettings {
-            pbf: Settings {
-                particle_spacing: D,
-                support_ratio: 2.0,
-                iteration: Iteration::RedBlack,
-                stop: Stop::Iterations(4),
-                cfl: 0.5,
-                relaxation: 1.0,
-                artificial_pressure: 0.0,
-                max_substeps: 64,
-            },
-        },
-        effects: Effects::default(),
-    };
-    let mut particles = Particles::default();
-    for z in 0..m {
-        for y in 0..m {
-            for x in 0..2 * m {
-                particles
-                    .position
-                    .push([x, y, z].map(|k| ((k as f64 + 0.5) * D) as f32));
-                // Already under way, so that a frame takes the two to four substeps of a shot.
-                particles.velocity.push([2.0, 0.0, 0.0]);
-                particles.id.push(particles.id.len() as u32);
-            }
-        }
-    }
-    (scene, particles)
+/// A dam of about `count` particles, twice as long as wide and high, with as much room before it, already under
+/// way, so that a frame takes the substeps of a shot.
+fn dam(count: usize) -> Result<(Scene, Start), Box<dyn std::error::Error>> {
+    let edge = (count as f64 / 2.0).cbrt().round() * 0.1;
+    let text = format!(
+        "[shot]\nname = \"bench\"\nframes = 1\nframes_per_second = 30\n\
+         [domain]\nmin = [0.0, 0.0, 0.0]\nmax = [{}, {}, {edge}]\n\
+         [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [{}, {edge}, {edge}]\n\
+         [solver]\nmethod = \"pbf\"\n\
+         [solver.pbf]\nparticle_spacing = 0.1\niterations = 4\ncfl = 0.5\nmax_substeps = 64\n",
+        4.0 * edge,
+        2.0 * edge,
+        2.0 * edge
+    );
+    let scene = Scene::parse(&text, Path::new("bench.toml"), Path::new("."), &[])?;
+    let mut start = Start::of(&scene)?;
+    start.particles.velocity.fill([2.0, 0.0, 0.0]);
+    Ok((scene, start))
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -121,12 +82,9 @@ fn measure(
     options: &Options,
     count: usize,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let (scene, particles) = dam(count);
-    let counts = Counts {
-        particles: particles.len(),
-        ..Counts::default()
-    };
-    let plan = Plan::new(&scene, counts, device_limits(context));
+    let (scene, start) = dam(count)?;
+    let particles = &start.particles;
+    let plan = start.plan(&scene, device_limits(context));
     let (all, lists) = plan.bytes();
     let n = particles.len() as f64;
     println!(
@@ -137,8 +95,8 @@ fn measure(
         plan.chunks.len()
     );
     let mut steps_timed = 0;
-    let mut solver = Pbf::new(context, &scene, plan.clone(), &Boundary::default(), false)?;
-    solver.load(0, &particles)?;
+    let mut solver = Pbf::new(context, &scene, plan.clone(), &start.boundary, false)?;
+    solver.load(0, particles)?;
     let mut times = Vec::new();
     let mut searched = 0;
     for frame in 0..options.frames + WARM_UP {
@@ -162,8 +120,8 @@ fn measure(
         1e6 * median(times) / n,
         searched as f64 / (n * f64::from(steps_timed))
     );
-    let mut solver = Pbf::new(context, &scene, plan, &Boundary::default(), true)?;
-    solver.load(0, &particles)?;
+    let mut solver = Pbf::new(context, &scene, plan, &start.boundary, true)?;
+    solver.load(0, particles)?;
     let mut steps = 0;
     for _ in 0..options.frames + WARM_UP {
         steps += solver.advance()?.1.substeps;

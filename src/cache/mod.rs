@@ -21,7 +21,6 @@
 //! The chain finds damage and edits. It is no signature, and a ledger cut at the end of a line reads
 //! as a bake that stopped there.
 
-mod difference;
 mod disk;
 mod error;
 pub mod frame;
@@ -30,7 +29,6 @@ mod manifest;
 mod reader;
 mod writer;
 
-pub use difference::{SceneDifference, scene_differences};
 pub use disk::directory_hash;
 pub use error::CacheError;
 pub use frame::file_name;
