@@ -130,12 +130,12 @@ fn bakes_are_the_same_bytes_twice_and_after_any_stop() {
     job.expect(0, "bake small.toml -o again");
     assert_eq!(job.hash("whole"), job.hash("again"));
     job.expect(0, "verify whole");
-    for stops in [&[1][..], &[3, 4], &[7]] {
+    for stops in [&["1"][..], &["1-3", "1-4"], &["1-7"]] {
         let cache = format!("stop{}", stops[0]);
         for stop in stops {
             job.expect(
                 0,
-                &format!("bake small.toml -o {cache} --frames 1-{stop} --resume"),
+                &format!("bake small.toml -o {cache} --frames {stop} --resume"),
             );
             assert_ne!(job.hash("whole"), job.hash(&cache));
         }
@@ -223,11 +223,17 @@ fn a_cache_of_another_scene_is_left_alone() {
     job.expect(4, "bake small.toml -o mine");
     assert_eq!(fs::read_dir(job.path("mine")).unwrap().count(), 1);
     assert_eq!(job.hash("cache"), before);
-    // Not physics: a longer shot goes on.
+    // Not physics: a longer shot, and when to give up.
     job.edit("box.obj", "v 0.3 1.1 0.9", "v 0.3 1.0 0.9");
     job.edit("small.toml", "frames = 8", "frames = 3");
-    job.expect(0, "bake small.toml -o cache --resume");
+    job.expect(
+        0,
+        "bake small.toml -o cache --resume --set solver.pbf.max_substeps=64",
+    );
     assert_ne!(job.hash("cache"), before);
+    job.expect(0, "bake small.toml -o three");
+    let ledger = |cache: &str| fs::read(job.path(cache).join("frames/small.0003.ply")).unwrap();
+    assert_eq!(ledger("cache"), ledger("three"));
 }
 
 #[test]
@@ -241,6 +247,20 @@ fn faults_end_with_their_code_and_write_nothing() {
     job.expect(2, "bake small.toml --adapter no-such-adapter");
     job.expect(2, "bake small.toml --frames 1-8x2");
     job.expect(2, "bake small.toml --frames 3-8");
+    job.expect(2, "bake small.toml --frames 1,3");
+    assert!(
+        job.expect(2, "bake small.toml --frames 1-9")
+            .contains("shot.frames")
+    );
+    let wide = "--set domain.max=[800,400,400] --set solver.pbf.particle_spacing=0.5";
+    assert!(
+        job.expect(2, &format!("bake small.toml {wide}"))
+            .contains("max_storage_buffer_binding_size")
+    );
+    assert!(
+        job.expect(2, &format!("inspect small.toml {wide}"))
+            .contains("max_storage_buffer_binding_size")
+    );
     job.expect(2, "bake small.toml --nonsense");
     // Too fast for the substeps that the scene allows: the numbers fail, and the start is kept.
     let said = job.expect(

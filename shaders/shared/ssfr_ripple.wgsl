@@ -15,10 +15,11 @@ fn ripple_at(p: vec2f, seconds: f32, wavelength: f32, slope: f32, footprint: f32
     // Slowly varying gusts keep the pattern from repeating.
     let gust = 0.45 + 1.1 * value_noise(p / (5.0 * wavelength));
     let share = slope * gust / sqrt(7.0);
+    // Crests bend by more than a wavelength over a few of them; straight ones cross into a weave.
     let bend = vec2f(
-        value_noise(p * (1.3 / wavelength)) - 0.5,
-        value_noise(p * (3.1 / wavelength) + 17.0) - 0.5,
-    ) * 2.2;
+        value_noise(p * (0.6 / wavelength)) - 0.5,
+        value_noise(p * (1.4 / wavelength) + 17.0) - 0.5,
+    ) * 11.0;
     for (var i = 0; i < 7; i++) {
         let f = f32(i);
         let k = 2.0 * PI / (wavelength * pow(0.74, f));

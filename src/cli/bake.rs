@@ -31,7 +31,7 @@ pub(super) struct BakeArgs {
     /// Override a scene key, such as solver.pbf.iterations=8.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Go on after the last good frame of the cache, if there is one.
+    /// Go on after the last frame of the cache's ledger, if there is one; a damaged frame is refused by name.
     #[arg(long)]
     resume: bool,
     /// Index or part of the name of the adapter (see `swell inspect --adapters`).
@@ -112,9 +112,20 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             let frames = u64::from((last + 1).saturating_sub(first));
             let progress = progress.get_or_init(|| Progress::new(mode, frames));
             let (all, lists) = bytes;
+            if particles == 0 {
+                progress.say(
+                    "warning: the scene holds no water",
+                    json!({ "event": "warning", "what": "no water" }),
+                );
+            }
+            let span = if first > last {
+                "nothing left to bake".into()
+            } else {
+                format!("frames {first} to {last}")
+            };
             let text = format!(
                 "on {device}\n{particles} particles ({removed} left out where solids are), {boundary_samples} boundary \
-                 samples, {} on the device, of it {} neighbour lists\nframes {first} to {last}",
+                 samples, {} on the device, of it {} neighbour lists\n{span}",
                 size(all),
                 size(lists)
             );

@@ -33,6 +33,7 @@ pub(super) struct InspectArgs {
 
 pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     let mut text = Vec::new();
+    let mut misfit = None;
     if args.adapters {
         for adapter in adapters()? {
             show_adapter(&mut text, &adapter)?;
@@ -45,13 +46,15 @@ pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
         }
         Some(file) => {
             let scene = Scene::load(file, &args.set)?;
-            show_plan(&mut text, &scene, &plan(&scene, args.adapter.as_deref())?)?;
+            let planned = plan(&scene, args.adapter.as_deref())?;
+            show_plan(&mut text, &scene, &planned)?;
+            misfit = planned.misfit;
         }
         None => {}
     }
     // A closed pipe (`swell inspect | head`) is no fault.
     let _ = io::stdout().write_all(&text);
-    Ok(ExitCode::SUCCESS)
+    misfit.map_or(Ok(ExitCode::SUCCESS), |misfit| Err(misfit.into()))
 }
 
 fn show_adapter(out: &mut impl Write, adapter: &Adapter) -> Result<(), Unprintable> {

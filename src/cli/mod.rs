@@ -14,7 +14,7 @@ use clap::{Parser, Subcommand};
 use crate::stage::Blame;
 
 const AFTER: &str = "Exit codes: 0 done; 1 a comparison is out of tolerance; 2 usage, scene or look at fault; \
-    3 no usable device, or device lost; 4 a cache or picture is damaged, of another scene, or cannot be read or \
+    3 no usable device, or device lost; 4 a cache or picture is damaged, missing, in use, of another scene, or cannot be read or \
     written; 5 the numbers failed, last good frame kept; 130 ended by a signal, resumable.";
 
 /// Offline, film-quality fluid pipeline for ocean-wave shots.
@@ -83,7 +83,11 @@ fn chain(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {
-        text += &format!(": {error}");
+        let next = error.to_string();
+        // Some errors state their cause themselves.
+        if !text.contains(&next) {
+            text += &format!(": {next}");
+        }
         cause = error.source();
     }
     text

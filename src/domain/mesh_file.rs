@@ -176,11 +176,18 @@ fn weld((vertices, triangles): Raw) -> Result<TriangleMesh, String> {
             });
         }
         mesh.triangles.push(welded);
-        if mesh.area_vector(t).length_squared() == 0.0 {
-            let [a, b, c] = mesh.corners(t);
-            return Err(format!(
-                "triangle {t} (counted from 0) has no area: its corners are {a}, {b}, {c}"
-            ));
+        // Exporters leave slivers without area, which bound nothing and turn no winding number.
+        if mesh.area_vector(mesh.triangles.len() - 1).length_squared() == 0.0 {
+            mesh.triangles.pop();
+        }
+    }
+    if mesh.triangles.is_empty() {
+        return Err("no triangle has an area".into());
+    }
+    if mesh.open_edges().is_empty() && mesh.signed_volume() < 0.0 {
+        // Closed and inside out: the sign of a distance does not mind, normals of samples do.
+        for [_, b, c] in &mut mesh.triangles {
+            std::mem::swap(b, c);
         }
     }
     Ok(mesh)
@@ -527,6 +534,21 @@ mod tests {
         assert!(parse(MeshFormat::Stl, nameless.as_bytes()).is_ok());
     }
 
+    /// A sliver is dropped; a closed mesh that was exported inside out is turned; an open one is left as it is.
+    #[test]
+    fn slivers_go_and_inside_out_is_turned() {
+        let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+        let outward = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+        let inward = "f 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n";
+        let obj =
+            |faces: &str| parse(MeshFormat::Obj, format!("{corners}{faces}").as_bytes()).unwrap();
+        let volume = obj(outward).signed_volume();
+        assert!(volume > 0.1);
+        assert_eq!(obj(inward).signed_volume(), volume);
+        assert_eq!(obj(&format!("{outward}f 1 2 1\n")).triangles.len(), 4);
+        assert_eq!(obj("f 1 2 3\n").triangles, [[0, 1, 2]]);
+    }
+
     #[test]
     fn every_fault_is_named() {
         let obj = |text: &str| parse(MeshFormat::Obj, text.as_bytes());
@@ -557,7 +579,7 @@ mod tests {
             ),
             (
                 obj("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
-                "triangle 0 (counted from 0) has no area",
+                "no triangle has an area",
             ),
             (
                 ply(&SQUARE_PLY.replace("vertex 4", "vertex 4000000000000")),

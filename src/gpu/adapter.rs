@@ -42,7 +42,7 @@ pub enum GpuError {
     },
     /// A buffer is larger than the adapter binds.
     #[error(
-        "buffer `{buffer}` needs {needed} bytes, and {adapter} allows {allowed} ({limit}); use fewer particles or a coarser spacing"
+        "buffer `{buffer}` needs {needed} bytes, and {adapter} allows {allowed} ({limit}); make the scene or the picture smaller or coarser"
     )]
     TooLarge {
         /// Buffer name in the plan.

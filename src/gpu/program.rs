@@ -68,9 +68,7 @@ impl Program {
         passes: &[PassSpec],
         shared: &[(&'static str, f64)],
     ) -> Result<Self, GpuError> {
-        for spec in buffers {
-            check_size(context, spec)?;
-        }
+        check_sizes(context, buffers)?;
         let passes = passes
             .iter()
             .map(|spec| Ok((spec.name, compile(context, spec, shared)?)))
@@ -171,6 +169,16 @@ impl Program {
         }
         Ok(out)
     }
+}
+
+/// Whether the adapter can hold and bind these buffers.
+///
+/// # Errors
+/// [`GpuError::TooLarge`] for the first that it cannot.
+pub fn check_sizes(context: &Context, buffers: &[BufferSpec]) -> Result<(), GpuError> {
+    buffers
+        .iter()
+        .try_for_each(|spec| check_size(context, spec))
 }
 
 fn check_size(context: &Context, spec: &BufferSpec) -> Result<(), GpuError> {

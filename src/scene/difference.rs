@@ -6,16 +6,17 @@ use toml::{Table, Value};
 
 use super::{Scene, error::SceneError};
 
-/// Keys that change which frames there are or where they go, not what happens in them.
-const NOT_PHYSICS: [&str; 2] = ["shot.name", "shot.frames"];
+/// Keys that change which frames there are or where they go, not what happens in them; `max_substeps` only says
+/// when to give up.
+const NOT_PHYSICS: [&str; 3] = ["shot.name", "shot.frames", "solver.pbf.max_substeps"];
 
 /// Changes whenever the canonical form does, so that hashes of two versions never meet.
-const CANONICAL_FORM: &str = "swell scene physics 1";
+const CANONICAL_FORM: &str = "swell scene physics 2";
 
 /// The first key (in alphabetical order) whose value differs between two scenes as
 /// [`Scene::to_toml`] wrote them, with both values; `None` where the physics is the same.
 ///
-/// `shot.name` and `shot.frames` may differ, and so may the path of a mesh whose hash stands
+/// `shot.name`, `shot.frames` and `solver.pbf.max_substeps` may differ, and so may the path of a mesh whose hash stands
 /// beside it in both.
 ///
 /// # Errors

@@ -434,7 +434,8 @@ fn report(scene: &Scene, state: &Particles, density: &[f32]) -> StepReport {
         .iter()
         .map(|&rho| (f64::from(rho) - 1.0).max(0.0))
         .collect();
-    let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+    // From 0: an empty sum is -0.
+    let mean = errors.iter().fold(0.0, |sum, error| sum + error) / errors.len().max(1) as f64;
     errors.sort_unstable_by(f64::total_cmp);
     let percentile = |p: f64| {
         errors

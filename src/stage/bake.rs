@@ -155,12 +155,12 @@ pub fn bake(
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, BakeError> {
     let scene = &request.scene;
+    let last = last_frame(request)?;
     let start = Start::of(scene)?;
     let context = Context::open(request.adapter.as_deref())?;
     let plan = start.plan(scene, device_limits(&context));
     let bytes = plan.bytes();
     let mut solver = Pbf::new(&context, scene, plan, &start.boundary, request.time_passes)?;
-    let last = last_frame(request)?;
     let (mut writer, mut clock, state) = open_cache(request, &context, &start)?;
     let first = clock.frame + 1;
     tell(Event::Ready {
@@ -232,15 +232,18 @@ fn describe(context: &Context) -> String {
     )
 }
 
+/// The last frame wanted. A bake computes every frame up to it, and a scene was validated up to its own last.
 fn last_frame(request: &Request) -> Result<u32, BakeError> {
+    let shot = request.scene.shot.frames;
     let Some(frames) = &request.frames else {
-        return Ok(request.scene.shot.frames);
+        return Ok(shot);
     };
-    let whole = FrameRange::inclusive(frames.first(), frames.last());
-    if whole.as_ref() != Some(frames) {
-        return Err(BakeError::Frames(format!(
-            "{frames} leaves frames out, and each frame of a bake needs the one before"
-        )));
+    let fault = |what: String| Err(BakeError::Frames(format!("{frames}: {what}")));
+    if frames.len() as u64 != u64::from(frames.last() - frames.first()) + 1 {
+        return fault("leaves frames out, and each frame of a bake needs the one before".into());
+    }
+    if frames.last() > shot {
+        return fault(format!("the shot has {shot} frames; raise shot.frames"));
     }
     Ok(frames.last())
 }

@@ -5,7 +5,10 @@ use std::path::Path;
 use crate::{
     cache::{CacheError, CacheReader},
     domain::signed_distance::SignedDistanceError,
-    gpu::adapter::{Context, GpuError, enumerate},
+    gpu::{
+        adapter::{Context, GpuError, enumerate},
+        program::check_sizes,
+    },
     scene::{
         Scene,
         plan::{DeviceLimits, LIST_BUDGET, Plan},
@@ -80,7 +83,7 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
 }
 
 /// A scene's plan, and for which limits it was made.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct ScenePlan {
     /// Passes and buffers.
     pub plan: Plan,
@@ -88,6 +91,8 @@ pub struct ScenePlan {
     pub removed: usize,
     /// The adapter whose limits were used; `None` where the machine has none.
     pub adapter: Option<String>,
+    /// Why that adapter could not bake it.
+    pub misfit: Option<GpuError>,
 }
 
 /// Limits that every Vulkan adapter of the last years has, for machines without any.
@@ -129,8 +134,18 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
         Err(error) => return Err(error.into()),
     };
     let limits = context.as_ref().map_or(COMMON_LIMITS, device_limits);
+    let plan = start.plan(scene, limits);
+    let buffers: Vec<_> = plan
+        .buffers
+        .iter()
+        .map(|buffer| buffer.spec.clone())
+        .collect();
+    let misfit = context
+        .as_ref()
+        .and_then(|context| check_sizes(context, &buffers).err());
     Ok(ScenePlan {
-        plan: start.plan(scene, limits),
+        plan,
+        misfit,
         removed: start.removed,
         adapter: context.map(|context| context.info.name),
     })

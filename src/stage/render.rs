@@ -148,10 +148,6 @@ pub fn render(
         &[],
     )?;
     let context = Context::open(request.adapter.as_deref())?;
-    fs::create_dir_all(&request.directory).map_err(|source| RenderJobError::Directory {
-        directory: request.directory.clone(),
-        source,
-    })?;
     let image = &request.look.spec().image;
     tell(Event::Ready {
         device: context.info.name.clone(),
@@ -189,6 +185,10 @@ pub fn render(
                 &render_scene(&scene),
             )?),
         };
+        fs::create_dir_all(&request.directory).map_err(|source| RenderJobError::Directory {
+            directory: request.directory.clone(),
+            source,
+        })?;
         let picture = renderer.render(frame, &cache.read(frame)?)?;
         for (file, format) in &files {
             write(file, *format, &picture, &attributes, &request.look)?;
