@@ -1,7 +1,12 @@
 //! The `swell` command.
 
-use std::process::ExitCode;
+use std::{env, process::ExitCode};
 
 fn main() -> ExitCode {
+    // Without a desktop session Mesa's device-select layer prints two lines that read like our failure.
+    if env::var_os("XDG_RUNTIME_DIR").is_none() && env::var_os("NODEVICE_SELECT").is_none() {
+        // SAFETY: no other thread runs yet.
+        unsafe { env::set_var("NODEVICE_SELECT", "1") };
+    }
     swell::cli::main()
 }
