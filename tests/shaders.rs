@@ -278,3 +278,49 @@ fn rooms_import_what_they_may() {
     assert_eq!(breaches("scene", "use wgpu::Device;").len(), 1);
     assert!(breaches("solve", "use crate::{domain::mesh, gpu::adapter};\n").is_empty());
 }
+
+/// Lines that name an effect outside its own file, comments and tests aside.
+fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
+    let own = format!("scene/effects/{effect}.rs");
+    files
+        .iter()
+        .filter(|(file, _)| !file.ends_with(&own))
+        .flat_map(|(file, text)| {
+            let code = text.split("#[cfg(test)]").next().unwrap_or("");
+            code.lines()
+                .filter(|line| !line.trim_start().starts_with("//") && line.contains(effect))
+                .map(move |line| format!("{file}: {line}"))
+        })
+        .collect()
+}
+
+#[test]
+fn an_effect_is_one_file_and_one_line() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut paths = Vec::new();
+    sources(&root, &mut paths);
+    let mut files: Vec<(String, String)> = paths
+        .iter()
+        .map(|path| {
+            let name = path
+                .strip_prefix(&root)
+                .unwrap()
+                .to_string_lossy()
+                .replace('\\', "/");
+            (name, fs::read_to_string(path).unwrap())
+        })
+        .collect();
+    assert!(swell::scene::Effects::NAMES.len() >= 2);
+    for effect in swell::scene::Effects::NAMES {
+        let found = mentions(&files, effect);
+        assert_eq!(found.len(), 1, "{effect}: {found:#?}");
+        assert!(found[0].contains("effects!("), "{found:?}");
+        assert!(root.join(format!("scene/effects/{effect}.rs")).exists());
+    }
+    // Negative control: a solver that knew an effect by name would be seen.
+    files.push((
+        "solve/special.rs".into(),
+        "if scene.effects.viscosity.is_some() {}".into(),
+    ));
+    assert_eq!(mentions(&files, "viscosity").len(), 2);
+}
