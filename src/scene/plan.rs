@@ -15,8 +15,8 @@ use super::{Scene, Stop};
 /// Constants for every pass that declares them.
 pub const SHARED_CONSTANTS: [(&str, f64); 1] = [("LIST_CAPACITY", LIST_CAPACITY as f64)];
 
-/// Neighbours that a list holds; a particle with more is searched for. At rest h = 2d has 32, and 48 hold
-/// all but a few in ten thousand of a breaking wave's.
+/// Neighbours that a list holds; a particle with more is searched for, and the report counts it. At rest
+/// h = 2d has 32; in the dam of `tools/bench` no list of 48 overflowed.
 pub const LIST_CAPACITY: u32 = 48;
 
 /// Device memory that neighbour lists may take; a larger scene searches the cells in each pass instead.

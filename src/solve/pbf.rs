@@ -232,24 +232,18 @@ impl Pbf {
         self.program.upload("params", 0, &[self.params(time, 0.0)]);
         self.measure.run(&self.program, self.timer.as_mut())?;
         let n = self.plan.counts.particles;
-        let mut vectors = self
+        let vectors = self
             .program
             .download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
-        let (velocity, position) = (
-            vectors.pop().unwrap_or_default(),
-            vectors.pop().unwrap_or_default(),
-        );
-        let mut words =
+        let words =
             self.program
                 .download::<u32>(&[("id", n), ("sorted_id", n), ("counters", 4)])?;
-        let counters = words
-            .pop()
-            .and_then(|c| <[u32; 4]>::try_from(c).ok())
-            .unwrap_or_default();
-        let (sorted_id, id) = (
-            words.pop().unwrap_or_default(),
-            words.pop().unwrap_or_default(),
-        );
+        let ([position, velocity], [id, sorted_id, counters]) =
+            (vectors.as_slice(), words.as_slice())
+        else {
+            unreachable!("one vector a buffer");
+        };
+        let counters = [counters[0], counters[1], counters[2], counters[3]];
         let density = self.field::<f32>("density", n)?;
 
         let slot_of = slots_by_id(&self.state.id);
