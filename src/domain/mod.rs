@@ -1,6 +1,7 @@
 //! What every stage speaks: particles, meshes, signed distance, sampling, wave-maker motion.
 
 pub mod bounds;
+pub mod bricks;
 pub mod bvh;
 pub mod frame_range;
 pub mod mesh;

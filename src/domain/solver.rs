@@ -27,6 +27,28 @@ pub struct StepReport {
     pub capped: u64,
     /// Times that a particle had more neighbours than its list holds and was searched for.
     pub searched: u64,
+    /// What the pressure projections did; only of solvers that have one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub projection: Option<Projection>,
+}
+
+/// What one output frame's pressure projections did; iterations are those of the report.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Projection {
+    /// Largest ‖b − Ap‖/‖b‖ of a solve, from a freshly computed residual.
+    pub residual: f64,
+    /// Largest |∇·u| in a cell of water before a projection, 1/s.
+    pub divergence_before: f64,
+    /// The same after it.
+    pub divergence_after: f64,
+    /// Solves that ended above their tolerance.
+    pub missed: u32,
+    /// Most bodies of water at once that no air touched.
+    pub pockets: u32,
+    /// Cells of water without an open face, left out of the system, summed over substeps.
+    pub dropped: u64,
+    /// Iterations of the density correction's solves, summed over substeps.
+    pub correction_iterations: u64,
 }
 
 /// A solver that advances a particle state frame by frame.

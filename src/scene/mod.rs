@@ -1,6 +1,7 @@
 //! Scene and look files, parsed into validated types, and the plan that follows from them.
 
 pub mod effects;
+pub mod flip;
 pub mod look;
 pub mod plan;
 

@@ -447,5 +447,6 @@ fn report(scene: &Scene, state: &Particles, density: &[f32]) -> StepReport {
         max_speed: max_speed(state),
         capped: 0,
         searched: 0,
+        projection: None,
     }
 }

@@ -1,0 +1,295 @@
+//! Sparse grids: bricks of 8³ cells where the water is (a VDB leaf), and coarser levels above them.
+//!
+//! Only the topology stands here; values live in flat arrays of [`CELLS`] per slot, so that cell
+//! `local` of slot `s` is element `512 s + local`, `local` = x + 8 y + 64 z. Slot 0 is nobody's: it
+//! stands for whatever is not there, and its values stay zero. Cost and memory follow the slots;
+//! only `table`, four bytes a brick, follows the box.
+
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+
+/// Cells along a brick's edge.
+pub const EDGE: u32 = 8;
+
+/// Cells of a brick.
+pub const CELLS: u32 = EDGE * EDGE * EDGE;
+
+/// Index of a brick itself among its 27 neighbours: (dx+1) + 3 (dy+1) + 9 (dz+1).
+pub const SELF: usize = 13;
+
+/// A brick and who lies about it; `Brick` of shared/bricks.wgsl, word for word.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Brick {
+    /// In bricks of its level, from the domain's least corner.
+    pub coordinate: [u32; 3],
+    /// 0 is the finest; each level doubles the cell size.
+    pub level: u32,
+    /// Slots of the 3³ bricks about it on its level, x fastest; 0 where there is none.
+    pub neighbors: [u32; 27],
+    /// Slot of the brick above; 0 where there is none.
+    pub parent: u32,
+    /// Slots of the 2³ bricks below, x fastest; 0 where there is none.
+    pub children: [u32; 8],
+}
+
+/// Slots of one level: `start..start + count`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Level {
+    /// First slot.
+    pub start: u32,
+    /// Slots.
+    pub count: u32,
+}
+
+/// Bricks about the water of one moment, and their coarser levels.
+///
+/// Slots 1..=`wet` hold water, up to `active` those within reach of it, and then each coarser level
+/// over the wet ones. Within each of these the order is that of the coordinates, x fastest, so the
+/// same wet bricks always come in the same slots.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bricks {
+    /// Cells of the finest level along each axis.
+    pub cells: [u32; 3],
+    /// Bricks of the finest level along each axis.
+    pub table_dims: [u32; 3],
+    /// Slot of each brick of the finest level, x fastest; 0 where there is none.
+    pub table: Vec<u32>,
+    /// Slots that hold water.
+    pub wet: u32,
+    /// Slots of the finest level, wet ones first.
+    pub active: u32,
+    /// `levels[0]` covers the wet bricks alone; the last has one brick.
+    pub levels: Vec<Level>,
+    /// One a slot, slot 0 included.
+    pub records: Vec<Brick>,
+}
+
+/// Bricks along each axis that cover so many cells.
+pub fn table_dims(cells: [u32; 3]) -> [u32; 3] {
+    cells.map(|n| n.div_ceil(EDGE).max(1))
+}
+
+impl Bricks {
+    /// Lays out the bricks with `is_wet` (one flag a brick of the finest level, x fastest) and all
+    /// within `reach` bricks of one, diagonals included. `depth` bounds the number of levels.
+    ///
+    /// # Panics
+    /// Where `is_wet` is not of the length of the table.
+    pub fn new(cells: [u32; 3], is_wet: &[bool], reach: u32, depth: usize) -> Self {
+        let dims = table_dims(cells);
+        assert_eq!(is_wet.len(), volume(dims), "one flag a brick");
+        let near = dilate(is_wet, dims, reach);
+        let wet: Vec<usize> = (0..near.len()).filter(|&k| is_wet[k]).collect();
+        let dry = (0..near.len()).filter(|&k| near[k] && !is_wet[k]);
+        let mut records = vec![Brick::default()];
+        let mut table = vec![0; near.len()];
+        for index in wet.iter().copied().chain(dry) {
+            table[index] = records.len() as u32;
+            records.push(Brick {
+                coordinate: coordinate(index, dims),
+                ..Brick::default()
+            });
+        }
+        let active = records.len() as u32 - 1;
+        connect(&mut records, 1..active as usize + 1, &table, dims);
+        let mut bricks = Self {
+            cells,
+            table_dims: dims,
+            table,
+            wet: wet.len() as u32,
+            active,
+            levels: vec![Level {
+                start: 1,
+                count: wet.len() as u32,
+            }],
+            records,
+        };
+        bricks.add_levels(depth);
+        bricks
+    }
+
+    /// Slots in all, slot 0 included: what the arrays must hold.
+    pub fn slots(&self) -> usize {
+        self.records.len()
+    }
+
+    /// Coarser levels over the wet bricks, until one brick holds all or `depth` levels stand.
+    fn add_levels(&mut self, depth: usize) {
+        let mut dims = self.table_dims;
+        while self.levels.len() < depth && volume(dims) > 1 {
+            let below = self.levels[self.levels.len() - 1];
+            let range = below.start as usize..(below.start + below.count) as usize;
+            dims = dims.map(|n| n.div_ceil(2));
+            let level = self.levels.len() as u32;
+            let mut table = vec![0; volume(dims)];
+            for brick in &self.records[range.clone()] {
+                table[parent_index(brick, dims)] = 1;
+            }
+            let start = self.records.len() as u32;
+            for (index, slot) in table.iter_mut().enumerate().filter(|(_, slot)| **slot != 0) {
+                *slot = self.records.len() as u32;
+                self.records.push(Brick {
+                    coordinate: coordinate(index, dims),
+                    level,
+                    ..Brick::default()
+                });
+            }
+            for slot in range {
+                let parent = table[parent_index(&self.records[slot], dims)];
+                self.records[slot].parent = parent;
+                let [x, y, z] = self.records[slot].coordinate.map(|c| (c & 1) as usize);
+                self.records[parent as usize].children[x + 2 * y + 4 * z] = slot as u32;
+            }
+            let end = self.records.len();
+            connect(&mut self.records, start as usize..end, &table, dims);
+            self.levels.push(Level {
+                start,
+                count: end as u32 - start,
+            });
+        }
+    }
+}
+
+fn volume(dims: [u32; 3]) -> usize {
+    dims.iter().map(|&n| n as usize).product()
+}
+
+fn coordinate(index: usize, dims: [u32; 3]) -> [u32; 3] {
+    let [x, y, _] = dims.map(|n| n as usize);
+    [
+        (index % x) as u32,
+        (index / x % y) as u32,
+        (index / (x * y)) as u32,
+    ]
+}
+
+fn parent_index(brick: &Brick, dims: [u32; 3]) -> usize {
+    let [x, y, z] = brick.coordinate.map(|c| (c / 2) as usize);
+    (z * dims[1] as usize + y) * dims[0] as usize + x
+}
+
+/// Fills in the neighbours of the slots in `range`, whose level has `table`.
+fn connect(records: &mut [Brick], range: std::ops::Range<usize>, table: &[u32], dims: [u32; 3]) {
+    records[range].par_iter_mut().for_each(|brick| {
+        for (k, neighbor) in brick.neighbors.iter_mut().enumerate() {
+            let step = [k % 3, k / 3 % 3, k / 9];
+            // One to the left wraps round and is then too large.
+            let at: [usize; 3] = std::array::from_fn(|axis| {
+                (brick.coordinate[axis] as usize + step[axis]).wrapping_sub(1)
+            });
+            if (0..3).all(|axis| at[axis] < dims[axis] as usize) {
+                *neighbor = table[(at[2] * dims[1] as usize + at[1]) * dims[0] as usize + at[0]];
+            }
+        }
+    });
+}
+
+/// Flags within `reach` of a flag in the maximum norm: one axis after the other.
+fn dilate(flags: &[bool], dims: [u32; 3], reach: u32) -> Vec<bool> {
+    let [nx, ny, _] = dims.map(|n| n as usize);
+    let mut flags = flags.to_vec();
+    for (stride, length) in [(1, nx), (nx, ny), (nx * ny, dims[2] as usize)] {
+        let before = flags.clone();
+        for (index, flag) in flags.iter_mut().enumerate() {
+            let at = index / stride % length;
+            let first = at.saturating_sub(reach as usize);
+            let last = (at + reach as usize).min(length - 1);
+            *flag = (first..=last).any(|other| before[index + other * stride - at * stride]);
+        }
+    }
+    flags
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hash, so that wet bricks lie about without order.
+    fn scattered(count: usize) -> Vec<bool> {
+        (0..count as u64)
+            .map(|k| (k + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 59 == 0)
+            .collect()
+    }
+
+    fn at(bricks: &Bricks, level: u32, coordinate: [u32; 3]) -> u32 {
+        let level0 = |slot: usize| level > 0 || slot <= bricks.active as usize;
+        (1..bricks.slots())
+            .find(|&slot| {
+                let brick = &bricks.records[slot];
+                brick.level == level && brick.coordinate == coordinate && level0(slot)
+            })
+            .unwrap_or(0) as u32
+    }
+
+    #[test]
+    fn every_link_leads_where_its_coordinates_say() {
+        let cells = [70, 33, 41];
+        let is_wet = scattered(9 * 5 * 6);
+        let bricks = Bricks::new(cells, &is_wet, 1, 8);
+        assert_eq!(bricks.table_dims, [9, 5, 6]);
+        assert_eq!(bricks.levels.len(), 5);
+        assert_eq!(bricks.levels[4].count, 1);
+        for (slot, brick) in bricks.records.iter().enumerate().skip(1) {
+            assert_eq!(brick.neighbors[SELF], slot as u32);
+            for (k, &neighbor) in brick.neighbors.iter().enumerate() {
+                let step = [k % 3, k / 3 % 3, k / 9].map(|s| s as i64 - 1);
+                let there: [i64; 3] =
+                    std::array::from_fn(|axis| i64::from(brick.coordinate[axis]) + step[axis]);
+                let expected = if there.iter().any(|&c| c < 0) {
+                    0
+                } else {
+                    at(&bricks, brick.level, there.map(|c| c as u32))
+                };
+                assert_eq!(neighbor, expected, "slot {slot}, neighbour {k}");
+            }
+            let is_dry = slot > bricks.wet as usize && slot <= bricks.active as usize;
+            let is_top = brick.level as usize + 1 == bricks.levels.len();
+            assert_eq!(brick.parent == 0, is_dry || is_top);
+            if brick.parent != 0 {
+                let parent = &bricks.records[brick.parent as usize];
+                assert_eq!(parent.coordinate, brick.coordinate.map(|c| c / 2));
+                assert!(parent.children.contains(&(slot as u32)));
+            }
+        }
+    }
+
+    #[test]
+    fn active_bricks_are_those_within_reach() {
+        let is_wet = scattered(9 * 5 * 6);
+        for reach in 0..3 {
+            let bricks = Bricks::new([72, 40, 48], &is_wet, reach, 8);
+            let position = |k: usize| coordinate(k, bricks.table_dims);
+            let is_near = |k: usize| {
+                (0..is_wet.len()).any(|w| {
+                    let (a, b) = (position(k), position(w));
+                    is_wet[w] && (0..3).all(|axis| a[axis].abs_diff(b[axis]) <= reach)
+                })
+            };
+            for (k, &slot) in bricks.table.iter().enumerate() {
+                assert_eq!(slot != 0, is_near(k));
+                assert_eq!((1..=bricks.wet).contains(&slot), is_wet[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn empty_height_adds_no_slot() {
+        let low = Bricks::new([16, 8, 16], &[true, false, true, true], 1, 8);
+        let mut flags = vec![false; 2 * 4 * 2];
+        (flags[0], flags[8], flags[9]) = (true, true, true);
+        let high = Bricks::new([16, 32, 16], &flags, 1, 2);
+        assert_eq!(high.wet, low.wet);
+        // The layer above the water is within reach.
+        assert_eq!(high.active, 2 * low.active);
+    }
+
+    #[test]
+    fn no_water_has_no_bricks() {
+        let bricks = Bricks::new([20, 20, 20], &[false; 27], 2, 8);
+        assert_eq!((bricks.wet, bricks.active), (0, 0));
+        assert!(bricks.levels.iter().all(|level| level.count == 0));
+        assert_eq!(bricks.slots(), 1);
+    }
+}

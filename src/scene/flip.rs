@@ -1,0 +1,77 @@
+//! PIC/FLIP settings, validated.
+
+/// PIC/FLIP settings (Zhu and Bridson 2005).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flip {
+    /// Δx, metres.
+    pub cell_size: f64,
+    /// Particles that a full cell holds at rest; they start on a lattice of spacing Δx / ∛n.
+    pub particles_per_cell: u32,
+    /// What velocities carry from particles to the grid.
+    pub transfer: Transfer,
+    /// α: the part of the velocity taken from the grid rather than advanced by its change. Acts as a
+    /// viscosity α Δx² / (6 Δt). Unused by APIC, which has its own.
+    pub pic_blend: f64,
+    /// Largest displacement in a substep, in cells.
+    pub cfl: f64,
+    /// Most substeps in a frame; a scene that needs more is stopped, never stepped more coarsely.
+    pub max_substeps: u32,
+    /// Where the pressure is zero.
+    pub surface: Surface,
+    /// Whether particles are moved so that their density stays that of the start (Kugelstadt et
+    /// al. 2019); it keeps the volume.
+    pub density_correction: bool,
+    /// The linear solve.
+    pub pressure: Pressure,
+}
+
+impl Flip {
+    /// Distance between neighbours of the lattice at the start, metres.
+    pub fn particle_spacing(&self) -> f64 {
+        self.cell_size / f64::from(self.particles_per_cell).cbrt()
+    }
+}
+
+/// What velocities carry from particles to the grid and back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transfer {
+    /// The change of the grid's velocity, blended with the velocity itself.
+    Flip,
+    /// The velocity and its affine part (Jiang et al. 2015).
+    Apic,
+}
+
+/// Where the pressure is zero at the free surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Surface {
+    /// At the centre of the first cell of air.
+    Voxel,
+    /// Where the surface crosses the way there (Enright et al. 2003).
+    GhostFluid,
+}
+
+/// The pressure solve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pressure {
+    /// What precedes each conjugate-gradient iteration.
+    pub preconditioner: Preconditioner,
+    /// True residual over the right-hand side, both in the Euclidean norm, at which it stops.
+    pub tolerance: f64,
+    /// Most iterations of a solve; one that ends there is reported as missed.
+    pub max_iterations: u32,
+    /// Relative true residual past which a missed solve ends the bake.
+    pub residual_limit: f64,
+}
+
+/// Preconditioner of the conjugate gradients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preconditioner {
+    /// The identity.
+    None,
+    /// The diagonal.
+    Jacobi,
+    /// Incomplete Poisson (Ament et al. 2010), for a system scaled to a unit diagonal.
+    Ipp,
+    /// One symmetric V-cycle (McAdams et al. 2010).
+    Multigrid,
+}
