@@ -4,6 +4,7 @@ pub mod effects;
 pub mod flip;
 pub mod look;
 pub mod plan;
+pub mod study;
 
 mod allowed;
 mod build;

@@ -1,4 +1,4 @@
-//! From a scene to what a solver starts from: particles, boundary, plan.
+//! From a scene to what a solver starts from (particles, boundary, plan), and the solver.
 
 use crate::{
     domain::{
@@ -6,12 +6,14 @@ use crate::{
         particles::Particles,
         sampling::{boundary_samples, fill_water},
         signed_distance::{SignedDistance, SignedDistanceError},
+        solver::Solver,
     },
+    gpu::adapter::Context,
     scene::{
-        Scene,
+        Method, Scene,
         plan::{Counts, DeviceLimits, Plan},
     },
-    solve::boundary::Boundary,
+    solve::{SolveError, boundary::Boundary, pbf::Pbf},
 };
 
 /// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
@@ -41,9 +43,13 @@ impl Start {
             Some(bounds) => SignedDistance::from_meshes(meshes(), &bounds, spacing)?,
             None => None,
         };
-        let samples = meshes()
-            .flat_map(|mesh| boundary_samples(mesh, &scene.domain, spacing))
-            .collect();
+        // FLIP meets solids by their distance alone.
+        let samples = match scene.solver.method {
+            Method::Pbf => meshes()
+                .flat_map(|mesh| boundary_samples(mesh, &scene.domain, spacing))
+                .collect(),
+            Method::Flip => Vec::new(),
+        };
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
         let fill = fill_water(
             &scene.water.blocks,
@@ -67,6 +73,29 @@ impl Start {
         };
         Plan::new(scene, counts, limits)
     }
+}
+
+/// The scene's solver on a device, with what `plan` names.
+///
+/// # Errors
+/// Those of the solver: a buffer over the adapter's limits, with the figures; the device at fault.
+pub fn build(
+    context: &Context,
+    scene: &Scene,
+    plan: Plan,
+    start: &Start,
+    is_timed: bool,
+) -> Result<Box<dyn Solver<Error = SolveError>>, SolveError> {
+    let boundary = &start.boundary;
+    Ok(match scene.solver.method {
+        Method::Pbf => Box::new(Pbf::new(context, scene, plan, boundary, is_timed)?),
+        Method::Flip => {
+            return Err(SolveError::Numbers {
+                frame: 0,
+                what: "FLIP is not built in yet".into(),
+            });
+        }
+    })
 }
 
 /// Where the solids are, with room about them, as far as water can come.
