@@ -12,7 +12,7 @@ use crate::{
     cache::{CacheError, CacheReader, Manifest},
     domain::{frame_range::FrameRange, solver::StepReport},
     scene::{
-        Method, Scene, SceneError,
+        Method, Scene, SceneError, Solid,
         study::{SolverComparison, Study},
     },
     study::{
@@ -138,7 +138,7 @@ pub fn study(
         course(a, &gauge, &comparison.frames)?,
         course(b, &gauge, &comparison.frames)?,
     ];
-    let impact = Impact::of(&courses, obstacle(&comparison.scene, &gauge, &caches[0])?);
+    let impact = Impact::of(&courses, obstacle(&comparison.scene, &gauge));
     let findings = comparison::findings(&courses, impact);
     write(
         &request.directory.join("results.csv"),
@@ -210,36 +210,31 @@ fn direction(scene: &Scene) -> Direction {
         })
 }
 
-/// One gauge for both: the coarser lattice decides.
+/// One gauge for both: the coarser lattice decides. Where a wave maker stands, the still level is that
+/// of the start; other water has none at the start, and what it would settle to is taken.
 fn gauge(scene: &Scene, caches: &[CacheReader; 2]) -> Result<Gauge, CacheError> {
-    let spacing = |cache: &CacheReader| cache.manifest().particle_spacing;
+    let [spacing, other] = caches.each_ref().map(|c| c.manifest().particle_spacing);
     let start = caches[0].read(0)?;
-    Ok(Gauge::new(
-        scene.domain,
-        direction(scene),
-        spacing(&caches[0]).max(spacing(&caches[1])),
-        &start.position,
-    ))
+    let gauge = Gauge::new(scene.domain, direction(scene), spacing.max(other));
+    let still = if scene.wave_makers.is_empty() {
+        let size = scene.domain.size();
+        start.len() as f64 * spacing.powi(3) / (size.x * size.z)
+    } else {
+        gauge.depth(&start.position, spacing)
+    };
+    Ok(gauge.with_still_level(still))
 }
 
-/// Distance at which the first thing stands that the water does not touch at the start: a solid, or
-/// the far wall.
-fn obstacle(scene: &Scene, gauge: &Gauge, cache: &CacheReader) -> Result<Option<f64>, CacheError> {
-    let start = cache.read(0)?;
-    let front = gauge
-        .measure(&start.position, cache.manifest().particle_spacing)
-        .front;
-    let nearest = |mesh: &crate::domain::mesh::TriangleMesh| {
-        let distances = mesh.vertices.iter().map(|&v| gauge.distance(v));
+/// Distance at which the first thing stands in the wave's way: a solid, or the far wall.
+fn obstacle(scene: &Scene, gauge: &Gauge) -> f64 {
+    let nearest = |solid: &Solid| {
+        let distances = solid.mesh.vertices.iter().map(|&v| gauge.distance(v));
         distances.fold(f64::INFINITY, f64::min)
     };
     let length = scene.domain.size()[direction(scene).axis];
-    let solids = scene.solids.iter().map(|solid| nearest(&solid.mesh));
+    let places = scene.solids.iter().map(nearest).chain([length]);
     // A front is known to a cube.
-    let places = solids
-        .chain([length])
-        .map(|place| place - gauge.resolution());
-    Ok(places.filter(|&place| place > front).reduce(f64::min))
+    places.fold(f64::INFINITY, f64::min) - gauge.resolution()
 }
 
 fn course(cache: &CacheReader, gauge: &Gauge, frames: &FrameRange) -> Result<Course, StudyError> {
@@ -280,8 +275,10 @@ fn parts(
     impact: Impact,
 ) -> Result<Vec<Part>, StudyError> {
     let when = match impact.frame {
-        Some(frame) => format!("The first front meets what stands in its way in frame {frame}."),
-        None => "No front meets anything: crest and splash are taken over all frames.".to_owned(),
+        Some(frame) => {
+            format!("The first wave meets what stands in its way in frame {frame}: the impact.")
+        }
+        None => "No wave meets anything: crest and splash are taken over all frames.".to_owned(),
     };
     let answers = findings
         .iter()

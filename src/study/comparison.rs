@@ -63,12 +63,9 @@ pub struct Finding {
 
 impl Impact {
     /// From the fronts of both solvers and the distance at which the first obstacle stands.
-    pub fn of(courses: &[Course], obstacle: Option<f64>) -> Self {
-        let Some(obstacle) = obstacle else {
-            return Self { frame: None };
-        };
+    pub fn of(courses: &[Course], obstacle: f64) -> Self {
         let first = |course: &Course| {
-            let is_there = |row: &&Row| row.measures.front >= obstacle;
+            let is_there = |row: &&Row| row.measures.front >= Some(obstacle);
             course.rows.iter().find(is_there).map(|row| row.frame)
         };
         Self {
@@ -274,7 +271,7 @@ pub fn to_csv(courses: &[Course]) -> String {
             row.missed,
             m.crest_height,
             optional(m.crest_slope),
-            m.front,
+            optional(m.front),
             m.splash_height,
             m.splash_reach,
             m.airborne,
@@ -294,9 +291,7 @@ pub fn charts(courses: &[Course], impact: Impact) -> Vec<Chart> {
         ("Slope of the crest's front face", "degrees", |row| {
             row.measures.crest_slope
         }),
-        ("Front of the continuous water", "m", |row| {
-            Some(row.measures.front)
-        }),
+        ("Front of the wave", "m", |row| row.measures.front),
         (
             "Height below which 99.9 % of the water is",
             "m above the still level",
@@ -349,7 +344,7 @@ mod tests {
             iterations: 8,
             missed: 0,
             measures: Measures {
-                front: f64::from(frame),
+                front: Some(f64::from(frame)),
                 ..measures
             },
         };
@@ -375,7 +370,7 @@ mod tests {
     }
 
     fn verdicts(courses: &[Course; 2]) -> Vec<Option<String>> {
-        let impact = Impact::of(courses, Some(5.0));
+        let impact = Impact::of(courses, 5.0);
         findings(courses, impact)
             .into_iter()
             .map(|f| f.ahead)
@@ -395,7 +390,7 @@ mod tests {
         assert_eq!(verdicts(&pair(1.0, 1.04)), alike);
 
         let courses = pair(1.0, 1.5);
-        let found = findings(&courses, Impact::of(&courses, None));
+        let found = findings(&courses, Impact::of(&courses, 11.0));
         assert_eq!(
             found[0].text,
             "slope of the crest's front face, median over the frames before the impact: 10.0° with \
@@ -415,10 +410,10 @@ mod tests {
             row.measures.crest_height = if is_before { 1.0 } else { 9.0 };
             row.measures.airborne = if is_before { 9.0 } else { 0.1 };
         }
-        let impact = Impact::of(&courses, Some(5.0));
+        let impact = Impact::of(&courses, 5.0);
         assert_eq!(impact.frame, Some(5));
         assert_eq!(verdicts(&courses)[1..3], [None, None]);
-        assert_eq!(Impact::of(&courses, Some(11.0)).frame, None);
+        assert_eq!(Impact::of(&courses, 11.0).frame, None);
     }
 
     #[test]

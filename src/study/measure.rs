@@ -48,8 +48,10 @@ pub struct Measures {
     /// instead; a bore has a plateau for a crest and may run over a dry bed, which has no crossing.
     /// `None` where fewer than half of the rows have a crest higher than a cube.
     pub crest_slope: Option<f64>,
-    /// How far the continuous water reaches, median over the rows.
-    pub front: f64,
+    /// How far the wave has come: the foremost place of a row that reaches half of its crest's height,
+    /// median over the rows; the thin tongue that runs ahead over a dry bed is not the wave. `None` as
+    /// for the slope.
+    pub front: Option<f64>,
     /// Height that 99.9 % of the particles do not exceed.
     pub splash_height: f64,
     /// Distance that 99.9 % of the particles do not exceed.
@@ -73,9 +75,8 @@ pub struct Gauge {
 
 impl Gauge {
     /// For particles `spacing` metres apart at rest; of several lattices take the coarsest, so that
-    /// all are measured with the same cubes. `start` is the water at rest, which sets the still
-    /// level: the median of its elevations.
-    pub fn new(domain: Bounds, direction: Direction, spacing: f64, start: &[[f32; 3]]) -> Self {
+    /// all are measured with the same cubes. The still level is the domain's floor.
+    pub fn new(domain: Bounds, direction: Direction, spacing: f64) -> Self {
         let mut edge = EDGE_SPACINGS * spacing;
         let size = domain.size();
         let cubes = |edge: f64| (size / edge).ceil().max(glam::DVec3::ONE);
@@ -84,23 +85,28 @@ impl Gauge {
         }
         let across = 2 - direction.axis;
         let dims = [direction.axis, 1, across].map(|axis| cubes(edge)[axis] as usize);
-        let mut gauge = Self {
+        Self {
             domain,
             direction,
             edge,
             dims,
             still: 0.0,
-        };
-        let counts = gauge.counts(start);
-        let body = gauge.body(&counts, gauge.rest_count(spacing));
-        let elevation = gauge.elevation(&counts, &body, gauge.rest_count(spacing));
-        gauge.still = median(elevation.into_iter().flatten().collect()).unwrap_or(0.0);
-        gauge
+        }
     }
 
-    /// Depth of the water at rest, metres.
-    pub fn still_level(&self) -> f64 {
-        self.still
+    /// The same with a still level so many metres above the domain's floor.
+    pub fn with_still_level(self, still: f64) -> Self {
+        Self { still, ..self }
+    }
+
+    /// Depth of water at rest, metres: the median over its columns. Particles are `spacing` metres
+    /// apart.
+    pub fn depth(&self, position: &[[f32; 3]], spacing: f64) -> f64 {
+        let rest = self.rest_count(spacing);
+        let counts = self.counts(position);
+        let body = self.body(&counts, rest);
+        let elevation = self.elevation(&counts, &body, rest);
+        median(elevation.into_iter().flatten().collect()).unwrap_or(0.0)
     }
 
     /// Edge of the cubes, metres: what lengths are good to.
@@ -130,8 +136,10 @@ impl Gauge {
         let rows: Vec<Row> = (0..self.dims[2])
             .filter_map(|t| self.row(&elevation, t))
             .collect();
-        let slopes: Vec<f64> = rows.iter().filter_map(|row| row.slope).collect();
-        let is_wave = 2 * slopes.len() >= self.dims[2];
+        let faces: Vec<Face> = rows.iter().filter_map(|row| row.face).collect();
+        let is_wave = 2 * faces.len() >= self.dims[2];
+        let of_faces =
+            |value: fn(&Face) -> f64| median(faces.iter().map(value).collect()).filter(|_| is_wave);
         let height = |p: &[f32; 3]| f64::from(p[1]) - self.domain.min.y - self.still;
         let heights = position.iter().map(height).collect();
         let reaches = position.iter().map(|&p| self.distance(point(p))).collect();
@@ -139,8 +147,8 @@ impl Gauge {
         let far = |p: &&[f32; 3]| !is_near[self.index(self.cube(**p))];
         Measures {
             crest_height: median(rows.iter().map(|row| row.crest).collect()).unwrap_or(0.0),
-            crest_slope: median(slopes).filter(|_| is_wave),
-            front: median(rows.iter().map(|row| row.front).collect()).unwrap_or(0.0),
+            crest_slope: of_faces(|face| face.slope),
+            front: of_faces(|face| face.front),
             splash_height: percentile(heights, NEARLY_ALL).unwrap_or(0.0),
             splash_reach: percentile(reaches, NEARLY_ALL).unwrap_or(0.0),
             airborne: position.iter().filter(far).count() as f64 / position.len() as f64,
@@ -279,16 +287,19 @@ impl Gauge {
             let (here, ahead) = (above(s)?, above(s + 1).unwrap_or(-self.still));
             Some(s as f64 + ((here - level) / (here - ahead)).clamp(0.0, 1.0))
         };
-        let slope = (crest > self.edge).then(|| {
+        let face = || {
             let [top, half] = FACE.map(|part| foremost(part * crest));
             let run = self.edge * (half? - top?);
             let rise = (FACE[0] - FACE[1]) * crest;
-            Some(rise.atan2(run).to_degrees())
-        });
+            Some(Face {
+                slope: rise.atan2(run).to_degrees(),
+                // The middle of a column stands for it.
+                front: self.edge * (half? + 0.5),
+            })
+        };
         Some(Row {
             crest,
-            slope: slope.flatten(),
-            front: (last + 1) as f64 * self.edge,
+            face: (crest > self.edge).then(face).flatten(),
         })
     }
 
@@ -317,7 +328,13 @@ impl Gauge {
 /// One row of columns along the wave's way.
 struct Row {
     crest: f64,
-    slope: Option<f64>,
+    face: Option<Face>,
+}
+
+/// The front face of a crest.
+#[derive(Clone, Copy)]
+struct Face {
+    slope: f64,
     front: f64,
 }
 
@@ -359,30 +376,30 @@ mod tests {
     }
 
     fn gauge(direction: Direction) -> Gauge {
-        Gauge::new(domain(), direction, D, &water(|_| 1.0))
+        let gauge = Gauge::new(domain(), direction, D);
+        let depth = gauge.depth(&water(|_| 1.0), D);
+        gauge.with_still_level(depth)
     }
 
     #[test]
     fn still_water_is_still() {
         let gauge = gauge(FORWARD);
-        assert!((gauge.still_level() - 1.0).abs() < 1e-12);
+        assert!((gauge.still - 1.0).abs() < 1e-12);
         let measures = gauge.measure(&water(|_| 1.0), D);
         assert!(measures.crest_height.abs() < 1e-12);
-        assert_eq!(measures.crest_slope, None);
+        assert_eq!((measures.crest_slope, measures.front), (None, None));
         assert_eq!(measures.airborne, 0.0);
-        assert!((measures.front - 10.0).abs() < 1e-9);
         assert!((measures.wet_area - 20.0).abs() < 1e-9);
         // The top layer's centres: half a spacing below the surface.
         assert!((measures.splash_height + 0.05).abs() < 1e-6);
-        // A surface between the layers of cubes is found by their fill: 3 of 4 half-layers.
-        let between = Gauge::new(domain(), FORWARD, D, &water(|_| 1.1));
-        assert!((between.still_level() - 1.1).abs() < 1e-12);
+        // A surface between two layers of cubes is found by their fill.
+        assert!((gauge.depth(&water(|_| 1.1), D) - 1.1).abs() < 1e-12);
     }
 
     #[test]
     fn nothing_measures_nothing() {
-        let gauge = Gauge::new(domain(), FORWARD, D, &[]);
-        assert_eq!(gauge.still_level(), 0.0);
+        let gauge = Gauge::new(domain(), FORWARD, D);
+        assert_eq!(gauge.depth(&[], D), 0.0);
         assert_eq!(gauge.measure(&[], D), Measures::default());
     }
 
@@ -419,11 +436,17 @@ mod tests {
     }
 
     #[test]
-    fn a_front_over_a_dry_bed_is_where_the_water_ends() {
+    fn a_front_over_a_dry_bed_is_behind_the_tongue_that_runs_ahead() {
         let gauge = gauge(FORWARD);
-        let measures = gauge.measure(&water(|x| if x < 4.0 { 2.0 } else { 0.0 }), D);
-        assert!((measures.front - 4.0).abs() < 1e-9);
-        assert!((measures.wet_area - 8.0).abs() < 1e-9);
+        let depth = |x: f64| match x {
+            x if x < 4.0 => 2.0,
+            x if x < 6.0 => 0.4,
+            _ => 0.0,
+        };
+        let measures = gauge.measure(&water(depth), D);
+        // Smoothing widens a step to two cubes, of 0.2 m.
+        assert!((measures.front.expect("a wave") - 4.0).abs() < 0.2);
+        assert!((measures.wet_area - 12.0).abs() < 1e-9);
         assert!(measures.crest_slope.expect("a crest") > 66.0);
     }
 
@@ -453,7 +476,7 @@ mod tests {
             min: DVec3::ZERO,
             max: DVec3::splat(1000.0),
         };
-        let gauge = Gauge::new(bounds, FORWARD, 0.1, &[]);
+        let gauge = Gauge::new(bounds, FORWARD, 0.1);
         assert!(gauge.dims.iter().product::<usize>() as f64 <= MAX_CUBES);
     }
 }
