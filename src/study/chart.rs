@@ -88,9 +88,19 @@ impl Chart {
         let middle = (left + right) / 2.0;
         writeln!(
             out,
-            "<text x=\"{middle}\" y=\"16\" text-anchor=\"middle\" font-size=\"13\">{}</text>",
+            "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{left}\" y=\"16\" font-size=\"13\">{}</text>",
             escaped(&self.title)
         )?;
+        // Right to left; letters of this size are about seven units wide.
+        let mut end = right;
+        for (index, series) in self.series.iter().enumerate().rev() {
+            let (colour, name) = (COLOURS[index % COLOURS.len()], escaped(&series.name));
+            writeln!(
+                out,
+                "<text x=\"{end}\" y=\"16\" text-anchor=\"end\" fill=\"{colour}\">{name}</text>"
+            )?;
+            end -= 7.0 * series.name.chars().count() as f64 + 10.0;
+        }
         for value in ticks(x.values) {
             let at = x.at(value);
             writeln!(out, "<path d=\"M{at:.1} {bottom}V{top}\" stroke=\"#ddd\"/>")?;
@@ -126,12 +136,17 @@ impl Chart {
             escaped(&self.y_label)
         )?;
         for (value, text) in &self.marks {
-            let (at, beside, base) = (x.at(*value), x.at(*value) + 4.0, top + 12.0);
-            let text = escaped(text);
+            let (at, base, text) = (x.at(*value), top + 12.0, escaped(text));
+            // On the side that has more room.
+            let (beside, anchor) = if at < middle {
+                (at + 4.0, "start")
+            } else {
+                (at - 4.0, "end")
+            };
             writeln!(
                 out,
                 "<path d=\"M{at:.1} {top}V{bottom}\" stroke=\"#666\" stroke-dasharray=\"4 3\"/>\
-                 <text x=\"{beside:.1}\" y=\"{base}\" fill=\"#666\">{text}</text>"
+                 <text x=\"{beside:.1}\" y=\"{base}\" fill=\"#666\" text-anchor=\"{anchor}\">{text}</text>"
             )?;
         }
         for (index, series) in self.series.iter().enumerate() {
@@ -166,13 +181,6 @@ impl Chart {
             out,
             "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\" \
              stroke-linecap=\"round\"/>"
-        )?;
-        let right = x.paper[1] - 8.0;
-        let base = y.paper[1] + 14.0 + 15.0 * index as f64;
-        let name = escaped(&series.name);
-        writeln!(
-            out,
-            "<text x=\"{right}\" y=\"{base}\" text-anchor=\"end\" fill=\"{colour}\">{name}</text>"
         )
     }
 }

@@ -241,8 +241,8 @@ pub fn summary(findings: &[Finding]) -> String {
     let undecided = claims().filter(|f| f.ahead.is_none()).count();
     let all = claims().count();
     format!(
-        "Of {all} claims that the paper draws from its Figures 2 and 3 and its times, {borne_out} \
-         are borne out here, {undecided} are not decided, and {} are not borne out.",
+        "{all} claims follow from the paper's Figures 2 and 3 and its times. Borne out here: {borne_out}; not borne \
+         out: {}; not decided: {undecided}.",
         all - borne_out - undecided
     )
 }
@@ -397,8 +397,8 @@ mod tests {
              pbf, 15.0° with flip: flip is ahead by 50 %. The paper says pbf: not borne out."
         );
         assert!(found[1].text.ends_with("The paper makes no claim here."));
-        assert!(summary(&found).starts_with("Of 5 claims"));
-        assert!(summary(&found).contains("1 are borne out here, 0 are not decided, and 4"));
+        assert!(summary(&found).starts_with("5 claims"));
+        assert!(summary(&found).ends_with("Borne out here: 1; not borne out: 4; not decided: 0."));
     }
 
     #[test]
