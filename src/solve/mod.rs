@@ -4,6 +4,7 @@ pub mod boundary;
 mod iteration;
 pub mod params;
 pub mod pbf;
+pub mod pressure;
 
 use crate::gpu::adapter::GpuError;
 
