@@ -8,10 +8,10 @@ use crate::{
         signed_distance::{SignedDistance, SignedDistanceError},
     },
     scene::{
-        Scene,
-        plan::{Counts, DeviceLimits, Plan},
+        Method, Scene,
+        plan::{Capacity, Counts, DeviceLimits, Plan},
     },
-    solve::boundary::Boundary,
+    solve::{boundary::Boundary, flip},
 };
 
 /// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
@@ -61,8 +61,13 @@ impl Start {
 
     /// What the scene needs on a device with these limits.
     pub fn plan(&self, scene: &Scene, limits: DeviceLimits) -> Plan {
+        let bricks = match scene.solver.method {
+            Method::Pbf => Capacity::default(),
+            Method::Flip => flip::capacity(scene, &self.particles),
+        };
         let counts = Counts {
             particles: self.particles.len(),
+            bricks,
             ..self.boundary.counts()
         };
         Plan::new(scene, counts, limits)
