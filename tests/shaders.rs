@@ -8,11 +8,11 @@ use swell::{
         reflect::{Access, Layout, reflect},
         shader,
     },
-    solve::params::{Params, Phase, SolidGrid},
+    solve::params::{FlipParams, Params, Phase, SolidGrid},
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 5] = [
+const VARIANTS: [&[&str]; 7] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -24,6 +24,8 @@ const VARIANTS: [&[&str]; 5] = [
         "ARTIFICIAL_PRESSURE",
     ],
     &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
+    &["CORRECTION", "GHOST_FLUID"],
+    &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
 ];
 
 fn compute_passes() -> Vec<String> {
@@ -106,12 +108,18 @@ fn check(
 
 #[test]
 fn mirrors_match_naga() {
-    let mut found = [0; 3];
+    let mut found = [0; 4];
     for pass in compute_passes() {
         let text = shader::compose(&pass, &["SOLIDS", "NEIGHBOR_LIST"]).unwrap();
         let layouts = reflect(&pass, &text).unwrap().layouts;
         let seen = [
             check(&layouts, "Params", size_of::<Params>(), &Params::members()),
+            check(
+                &layouts,
+                "FlipParams",
+                size_of::<FlipParams>(),
+                &FlipParams::members(),
+            ),
             check(&layouts, "Phase", size_of::<Phase>(), &Phase::members()),
             check(
                 &layouts,

@@ -280,7 +280,7 @@ fn open_cache(
         frames_per_second: scene.shot.frames_per_second,
         particle_spacing: scene.particle_spacing(),
         rest_density: scene.water.rest_density,
-        attributes: Vec::new(),
+        attributes: start.particles.attributes.keys().cloned().collect(),
         start_particles: 0,
         files: Vec::new(),
     };

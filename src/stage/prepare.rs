@@ -11,9 +11,14 @@ use crate::{
     gpu::adapter::Context,
     scene::{
         Method, Scene,
-        plan::{Counts, DeviceLimits, Plan},
+        plan::{Capacity, Counts, DeviceLimits, Plan},
     },
-    solve::{SolveError, boundary::Boundary, pbf::Pbf},
+    solve::{
+        SolveError,
+        boundary::Boundary,
+        flip::{self, Flip},
+        pbf::Pbf,
+    },
 };
 
 /// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
@@ -58,8 +63,13 @@ impl Start {
             &scene.domain,
             spacing,
         )?;
+        let mut particles = fill.particles;
+        for name in attributes(scene) {
+            let zeros = vec![0.0; particles.len()];
+            particles.attributes.insert(name.to_owned(), zeros);
+        }
         Ok(Self {
-            particles: fill.particles,
+            particles,
             removed: fill.removed,
             boundary: Boundary { samples, distance },
         })
@@ -67,11 +77,24 @@ impl Start {
 
     /// What the scene needs on a device with these limits.
     pub fn plan(&self, scene: &Scene, limits: DeviceLimits) -> Plan {
+        let bricks = match scene.solver.method {
+            Method::Pbf => Capacity::default(),
+            Method::Flip => flip::capacity(scene, &self.particles),
+        };
         let counts = Counts {
             particles: self.particles.len(),
+            bricks,
             ..self.boundary.counts()
         };
         Plan::new(scene, counts, limits)
+    }
+}
+
+/// What each particle carries beside position, velocity and id.
+fn attributes(scene: &Scene) -> Vec<&'static str> {
+    match scene.solver.method {
+        Method::Pbf => Vec::new(),
+        Method::Flip => flip::attributes(scene.solver.flip()).to_vec(),
     }
 }
 
@@ -89,12 +112,7 @@ pub fn build(
     let boundary = &start.boundary;
     Ok(match scene.solver.method {
         Method::Pbf => Box::new(Pbf::new(context, scene, plan, boundary, is_timed)?),
-        Method::Flip => {
-            return Err(SolveError::Numbers {
-                frame: 0,
-                what: "FLIP is not built in yet".into(),
-            });
-        }
+        Method::Flip => Box::new(Flip::new(context, scene, plan, boundary, is_timed)?),
     })
 }
 
