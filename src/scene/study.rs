@@ -150,3 +150,22 @@ fn range(doc: &Document<'_>, text: &Spanned<String>, last: u32) -> Result<FrameR
     }
     Ok(frames)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_studies_that_ship_fit_their_scenes() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        let mut names = Vec::new();
+        for entry in fs::read_dir(folder).expect("studies") {
+            let file = entry.expect("a study").path();
+            let Study::SolverComparison(comparison) = Study::load(&file).expect("valid");
+            let methods = comparison.scenes.map(|scene| scene.solver.method);
+            assert_eq!(methods, [Method::Pbf, Method::Flip], "{}", file.display());
+            names.push(file);
+        }
+        assert_eq!(names.len(), 2);
+    }
+}
