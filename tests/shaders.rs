@@ -8,11 +8,14 @@ use swell::{
         reflect::{Access, Layout, reflect},
         shader,
     },
-    solve::params::{Params, Phase, SolidGrid},
+    solve::{
+        params::{Params, Phase, SolidGrid},
+        pressure::{PressureBrick, PressureControl, PressurePhase},
+    },
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 5] = [
+const VARIANTS: [&[&str]; 6] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -24,6 +27,7 @@ const VARIANTS: [&[&str]; 5] = [
         "ARTIFICIAL_PRESSURE",
     ],
     &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
+    &["GHOST_FLUID", "DIAGONAL"],
 ];
 
 fn compute_passes() -> Vec<String> {
@@ -106,7 +110,7 @@ fn check(
 
 #[test]
 fn mirrors_match_naga() {
-    let mut found = [0; 3];
+    let mut found = [0; 6];
     for pass in compute_passes() {
         let text = shader::compose(&pass, &["SOLIDS", "NEIGHBOR_LIST"]).unwrap();
         let layouts = reflect(&pass, &text).unwrap().layouts;
@@ -118,6 +122,24 @@ fn mirrors_match_naga() {
                 "SolidGrid",
                 size_of::<SolidGrid>(),
                 &SolidGrid::members(),
+            ),
+            check(
+                &layouts,
+                "PressurePhase",
+                size_of::<PressurePhase>(),
+                &PressurePhase::members(),
+            ),
+            check(
+                &layouts,
+                "PressureControl",
+                size_of::<PressureControl>(),
+                &PressureControl::members(),
+            ),
+            check(
+                &layouts,
+                "PressureBrick",
+                size_of::<PressureBrick>(),
+                &PressureBrick::members(),
             ),
         ];
         for (count, result) in found.iter_mut().zip(seen) {
