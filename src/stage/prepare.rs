@@ -11,7 +11,7 @@ use crate::{
         Method, Scene,
         plan::{Capacity, Counts, DeviceLimits, Plan},
     },
-    solve::{boundary::Boundary, flip},
+    solve::{self, boundary::Boundary, flip},
 };
 
 /// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
@@ -70,7 +70,7 @@ impl Start {
             bricks,
             ..self.boundary.counts()
         };
-        Plan::new(scene, counts, limits)
+        solve::plan(scene, counts, limits)
     }
 }
 
