@@ -1,4 +1,5 @@
-// Adds up the bricks' sums and decides what comes next. What is not to run gets no workgroups.
+// Adds up the bricks' sums and decides what comes next. What is not to run gets no workgroups; this pass itself
+// always runs, since it may not take its size from a buffer that it writes, and does nothing out of its turn.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_control.wgsl"
 
@@ -76,8 +77,11 @@ fn decide(sum: f32) {
 
 @compute @workgroup_size(256)
 fn main(@builtin(local_invocation_index) local: u32) {
+    let wanted = select(ITERATING, VERIFYING, phase.step == VERIFIED);
+    let is_turn = phase.step == BEGIN || pressure_control.state == wanted;
+    let count = select(0u, phase.sum_count, is_turn);
     var sum = 0.0;
-    for (var k = local; k < phase.sum_count; k += 256u) {
+    for (var k = local; k < count; k += 256u) {
         sum += pressure_sums[k];
     }
     terms[local] = sum;
@@ -97,14 +101,14 @@ fn main(@builtin(local_invocation_index) local: u32) {
         }
         if phase.step == BEGIN {
             begin(sum);
-        } else {
+        } else if is_turn {
             decide(sum);
         }
     }
     storageBarrier();
     let state = pressure_control.state;
-    let count = arrayLength(&pressure_sizes);
-    for (var k = local; k < 3u * count; k += 256u) {
-        pressure_groups[k] = select(0u, pressure_sizes[k % count], k / count == state);
+    let sizes = arrayLength(&pressure_sizes);
+    for (var k = local; k < 3u * sizes; k += 256u) {
+        pressure_groups[k] = select(0u, pressure_sizes[k % sizes], k / sizes == state);
     }
 }

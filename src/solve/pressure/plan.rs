@@ -109,6 +109,8 @@ impl Size {
 pub(super) enum When {
     /// In any case.
     Always,
+    /// As one workgroup that itself knows when it is its turn.
+    InTurn,
     /// While the solve goes on.
     Iterating,
     /// Once it believes to be done.
@@ -146,6 +148,7 @@ pub(super) fn run_on(
     let offset = |section: usize| 16 * (section * SIZES + size.index()) as u64;
     let groups = match when {
         When::Always => Groups::Indirect("pressure_sizes", offset(0)),
+        When::InTurn => Groups::Threads(1),
         When::Iterating => Groups::Indirect("pressure_groups", offset(0)),
         When::Verifying => Groups::Indirect("pressure_groups", offset(1)),
         When::Done => Groups::Indirect("pressure_groups", offset(2)),

@@ -67,8 +67,13 @@ impl Stages {
     }
 }
 
-fn reduce(step: Step, when: When) -> Command {
-    run("pressure/reduce", Phase::Reduce(step), when, Size::Single)
+fn reduce(step: Step) -> Command {
+    run(
+        "pressure/reduce",
+        Phase::Reduce(step),
+        When::InTurn,
+        Size::Single,
+    )
 }
 
 fn center(values: &str, is_noted: bool, when: When) -> Command {
@@ -118,7 +123,7 @@ fn begin(shape: Shape) -> Vec<Command> {
             Size::Full(0),
         ));
     }
-    commands.push(reduce(Step::Begin, When::Always));
+    commands.push(reduce(Step::Begin));
     commands
 }
 
@@ -133,16 +138,16 @@ fn iteration(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
         commands.push(center("pressure_correction", false, When::Iterating));
     }
     commands.extend([
-        reduce(Step::Direction, When::Iterating),
+        reduce(Step::Direction),
         finest("pressure/direction"),
         finest("pressure/multiply"),
-        reduce(Step::Length, When::Iterating),
+        reduce(Step::Length),
         finest("pressure/advance"),
     ]);
     if shape.has_pockets {
         commands.push(center("pressure_residual", false, When::Iterating));
     }
-    commands.push(reduce(Step::Check, When::Iterating));
+    commands.push(reduce(Step::Check));
     commands
 }
 
@@ -196,6 +201,6 @@ fn verification(shape: Shape) -> Vec<Command> {
     if shape.has_pockets {
         commands.push(center("pressure_residual", false, When::Verifying));
     }
-    commands.push(reduce(Step::Verified, When::Verifying));
+    commands.push(reduce(Step::Verified));
     commands
 }
