@@ -8,11 +8,14 @@ use swell::{
         reflect::{Access, Layout, reflect},
         shader,
     },
-    solve::params::{FlipParams, Params, Phase, SolidGrid},
+    solve::{
+        params::{FlipParams, Params, Phase, SolidGrid},
+        pressure::{PressureBrick, PressureControl, PressurePhase},
+    },
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 7] = [
+const VARIANTS: [&[&str]; 8] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -26,6 +29,7 @@ const VARIANTS: [&[&str]; 7] = [
     &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
     &["CORRECTION", "GHOST_FLUID"],
     &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
+    &["GHOST_FLUID", "DIAGONAL"],
 ];
 
 fn compute_passes() -> Vec<String> {
@@ -108,7 +112,7 @@ fn check(
 
 #[test]
 fn mirrors_match_naga() {
-    let mut found = [0; 4];
+    let mut found = [0; 7];
     for pass in compute_passes() {
         let text = shader::compose(&pass, &["SOLIDS", "NEIGHBOR_LIST"]).unwrap();
         let layouts = reflect(&pass, &text).unwrap().layouts;
@@ -126,6 +130,24 @@ fn mirrors_match_naga() {
                 "SolidGrid",
                 size_of::<SolidGrid>(),
                 &SolidGrid::members(),
+            ),
+            check(
+                &layouts,
+                "PressurePhase",
+                size_of::<PressurePhase>(),
+                &PressurePhase::members(),
+            ),
+            check(
+                &layouts,
+                "PressureControl",
+                size_of::<PressureControl>(),
+                &PressureControl::members(),
+            ),
+            check(
+                &layouts,
+                "PressureBrick",
+                size_of::<PressureBrick>(),
+                &PressureBrick::members(),
             ),
         ];
         for (count, result) in found.iter_mut().zip(seen) {

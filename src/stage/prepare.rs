@@ -14,6 +14,7 @@ use crate::{
         plan::{Capacity, Counts, DeviceLimits, Plan},
     },
     solve::{
+        self,
         SolveError,
         boundary::Boundary,
         flip::{self, Flip},
@@ -86,7 +87,7 @@ impl Start {
             bricks,
             ..self.boundary.counts()
         };
-        Plan::new(scene, counts, limits)
+        solve::plan(scene, counts, limits)
     }
 }
 
