@@ -42,7 +42,10 @@ impl Recordings {
     pub(super) fn new(program: &Program, plan: &Plan, scene: &Scene) -> Self {
         let layers = layers(scene.solver.flip().cfl);
         let n = plan.counts.particles;
-        let survey = [Command::Clear("survey"), Command::over("flip/survey", n.div_ceil(SURVEY_RUN))];
+        let survey = [
+            Command::Clear("survey"),
+            Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
+        ];
         Self {
             survey: Recording::new(program, &survey),
             to_grid: Recording::new(program, &to_grid(plan)),
@@ -87,7 +90,13 @@ fn over(pass: &'static str, offset: u64) -> Command {
     }
 }
 
-fn window(pass: &'static str, offset: u64, variable: &'static str, buffer: &str, k: usize) -> Command {
+fn window(
+    pass: &'static str,
+    offset: u64,
+    variable: &'static str,
+    buffer: &str,
+    k: usize,
+) -> Command {
     Command::Dispatch {
         pass,
         binds: vec![Bind {
