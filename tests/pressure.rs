@@ -150,6 +150,28 @@ fn iteration_counts_are_those_on_record() {
     }
 }
 
+/// Negative control of the counts: without its coarse levels the same solver takes several times as many.
+#[test]
+fn the_coarse_levels_do_the_work() {
+    let context = context();
+    let case = tank(32, Surface::Voxel, false);
+    let mut rig = rig(&context, case, Preconditioner::Multigrid, 1e-6);
+    rig.solve(&tank_rhs(&rig.case, &rig.system));
+    let excess = vec![0.1f32; rig.case.kind.len()];
+    rig.program.upload("density_excess", 0, &excess);
+    let whole = rig.solver.correct(&rig.program, None).unwrap();
+    // A block without a row has no say.
+    let coarse = rig.case.bricks.levels[1].start as usize;
+    let nothing = vec![0u32; 64 * (rig.case.bricks.slots() - coarse)];
+    rig.program
+        .upload("pressure_block", 4 * 64 * coarse as u64, &nothing);
+    let spoiled = rig.solver.correct(&rig.program, None).unwrap();
+    assert!(
+        !whole.is_missed && spoiled.iterations > 3 * whole.iterations,
+        "{whole:?} {spoiled:?}"
+    );
+}
+
 /// The device's counts are the f64 solver's: rounding costs at most a few iterations in a hundred.
 #[test]
 fn counts_follow_the_f64_solver() {
@@ -310,7 +332,7 @@ fn pockets_converge_and_stay() {
             let mut further = settings(preconditioner, 1e-12);
             further.max_iterations = projected.solved.iterations + 40;
             let solved = Rig::new(&context, case.clone(), &further).solve(&b);
-            assert!(solved.is_missed && solved.residual < 4e-6, "{solved:?}");
+            assert!(solved.is_missed && solved.residual < 1e-6, "{solved:?}");
         }
     }
 }
@@ -405,7 +427,7 @@ fn odd_cells_and_changing_bricks() {
         rig.upload_case();
         let b = white_noise(rig.system.cell.len());
         let solved = rig.solve(&b);
-        assert!(!solved.is_missed && (solved.iterations > 0) == !b.is_empty());
+        assert!(!solved.is_missed && (solved.iterations > 0) != b.is_empty());
     }
     // What other bricks left behind changes nothing: the same bytes.
     assert!(rig.solution() == x);

@@ -1,8 +1,9 @@
 //! Iterations and times of the pressure solve on the tank of n³ cells, by preconditioner and surface.
 //!
-//! `cargo bench --bench pressure -- [--adapter NAME] [--tolerance T] [--repeats R] [--passes] [N ...]`; N are 16,
-//! 32, 64, 96 where left out. A time is one `project`, all in: system, solve, gradient, waiting for the device; the
-//! median of the repeats after one that warms up. `--passes` adds each pass's time by the device's clock.
+//! `cargo bench --bench pressure -- [--adapter NAME] [--tolerance T] [--repeats R] [--passes] [--only P] [N ...]`;
+//! N are 16, 32, 64, 96 where left out, and P one of none, jacobi, ipp, multigrid. A time is one `project`, all in:
+//! system, solve, gradient, waiting for the device; the median of the repeats after one that warms up. `--passes`
+//! adds each pass's time by the device's clock.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a program")]
 
 #[path = "../tests/support/pressure.rs"]
@@ -18,7 +19,7 @@ use swell::{
 
 fn main() {
     let (mut adapter, mut tolerance, mut repeats, mut has_passes) = (None, 1e-6, 5, false);
-    let mut sizes = Vec::new();
+    let (mut sizes, mut only) = (Vec::new(), None);
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         match word.as_str() {
@@ -26,6 +27,7 @@ fn main() {
             "--tolerance" => tolerance = words.next().unwrap().parse().unwrap(),
             "--repeats" => repeats = words.next().unwrap().parse().unwrap(),
             "--passes" => has_passes = true,
+            "--only" => only = words.next(),
             "--bench" => {}
             _ => sizes.push(word.parse().unwrap()),
         }
@@ -44,6 +46,10 @@ fn main() {
                 Preconditioner::Ipp,
                 Preconditioner::Multigrid,
             ] {
+                let name = format!("{preconditioner:?}").to_lowercase();
+                if only.as_ref().is_some_and(|only| *only != name) {
+                    continue;
+                }
                 let settings = support::settings(preconditioner, tolerance);
                 let mut rig = support::Rig::new(&context, tank(n, surface, false), &settings);
                 let b = tank_rhs(&rig.case, &rig.system);

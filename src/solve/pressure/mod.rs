@@ -17,12 +17,13 @@
 //! | `face_open` | `f32` planes | open fraction of the lower faces, 0..1; slot 0 stays 0, so the box is closed |
 //! | `face_velocity` | `f32` planes | m/s; a face with fraction 0 holds the solid's velocity and keeps it |
 //! | `solid_flux` | `f32` cells | Σ ± (1 − f) u_solid over the six faces, outward positive, m/s |
-//! | `liquid_distance` | `f32` cells | metres, negative inside; with [`Surface::GhostFluid`] alone |
+//! | `liquid_distance` | `f32` cells | metres, negative inside; with the ghost-fluid surface alone |
 //! | `density_excess` | `f32` cells | ρ/ρ_target − 1 as it is to be corrected; with the correction alone |
 //!
 //! What the room fills, of [`buffers`]: `face_velocity` in place; `pressure`, Pa, natural cell order, 0 where
 //! there is no water; `face_displacement`, planes in metres, 0 on faces that touch no water or are closed.
-//! Only cells of wet slots are FLUID. Only faces between water and water or water and air change.
+//! Only cells of wet slots are FLUID. Cells of a brick that lie past the box are AIR, and their lower faces closed:
+//! one of those is the box's own wall. Only faces between water and water or water and air change.
 //!
 //! # Use
 //! ```text
@@ -134,8 +135,7 @@ enum Task {
 }
 
 impl PressureSolver {
-    /// Binds the program's buffers; to be built anew when those were replaced by larger ones. `capacity` is in
-    /// slots.
+    /// For a program with buffers of `capacity` slots; to be built anew when those were replaced by larger ones.
     pub fn new(settings: &Pressure, has_correction: bool, capacity: usize) -> Self {
         let expected = match settings.preconditioner {
             Preconditioner::Multigrid => 10,
@@ -345,7 +345,7 @@ fn solved(control: &PressureControl, tolerance: f64) -> Solved {
         iterations: control.iterations,
         residual,
         // The device compares squares in f32.
-        is_missed: !(residual <= tolerance * (1.0 + 1e-6)),
+        is_missed: residual.is_nan() || residual > tolerance * (1.0 + 1e-6),
     }
 }
 

@@ -11,7 +11,7 @@ use crate::{
 use super::plan::{Phase, Size, Step, When, run, run_on};
 
 /// Bricks of a level that one workgroup can take on together with all coarser ones.
-pub(super) const SINGLE: u32 = 8;
+pub(super) const SINGLE: u32 = 4;
 
 /// Symmetric sweeps where there is but one level.
 const SWEEPS: usize = 8;
