@@ -133,6 +133,21 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.pbf.relaxation", "a number above 0, up to 1.5"),
     ("solver.pbf.artificial_pressure", "a number from 0 to 10"),
     ("solver.pbf.max_substeps", "a whole number from 1 to 10000"),
+    (
+        "grids",
+        "a table with surface = true, velocity = true or both, voxel_size, precision",
+    ),
+    (
+        "grids.surface",
+        "true or false; one of surface and velocity true",
+    ),
+    ("grids.velocity", "true or false"),
+    (
+        "grids.voxel_size",
+        "a number from a quarter of the particle spacing to 8 of them, metres, with at most \
+         268435456 leaves of 8³ voxels in the domain",
+    ),
+    ("grids.precision", "\"half\" or \"float\""),
     // The effects say for themselves what their keys allow.
     (
         "effects",

@@ -9,6 +9,7 @@ use super::{
     Iteration, Pbf, PlacedMesh, Placement, Scene, Shot, Solver, Stop, Water,
     document::Document,
     error::SceneError,
+    grids,
     spec::{BoxSpec, PbfSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, WaterSpec},
     wave_maker,
 };
@@ -65,6 +66,12 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     if let Some((key, allowed)) = spec.effects.fault() {
         return Err(doc.fault_of(&key, allowed));
     }
+    let spacing = pbf.particle_spacing;
+    let grids = spec
+        .grids
+        .as_ref()
+        .map(|table| grids::build(doc, table, &domain, spacing, 2.0 * spacing))
+        .transpose()?;
     Ok(Scene {
         shot,
         domain,
@@ -72,6 +79,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         solids,
         wave_makers,
         solver: Solver { pbf },
+        grids,
         effects: spec.effects,
     })
 }

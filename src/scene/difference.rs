@@ -16,7 +16,7 @@ const CANONICAL_FORM: &str = "swell scene physics 2";
 /// The first key (in alphabetical order) whose value differs between two scenes as
 /// [`Scene::to_toml`] wrote them, with both values; `None` where the physics is the same.
 ///
-/// `shot.name`, `shot.frames` and `solver.pbf.max_substeps` may differ, and so may the path of a mesh whose hash stands
+/// `[grids]`, `shot.name`, `shot.frames` and `solver.pbf.max_substeps` may differ, and so may the path of a mesh whose hash stands
 /// beside it in both.
 ///
 /// # Errors
@@ -83,7 +83,8 @@ fn flatten(text: &str) -> Result<BTreeMap<String, String>, SceneError> {
     for (key, value) in &table {
         flatten_value(key.clone(), value, &mut values);
     }
-    values.retain(|key, _| !NOT_PHYSICS.contains(&key.as_str()));
+    // Grids follow from the particles.
+    values.retain(|key, _| !NOT_PHYSICS.contains(&key.as_str()) && !key.starts_with("grids."));
     Ok(values)
 }
 

@@ -2,6 +2,7 @@
 
 pub mod effects;
 pub mod flip;
+pub mod grids;
 pub mod look;
 pub mod plan;
 
@@ -41,6 +42,8 @@ pub struct Scene {
     pub wave_makers: Vec<WaveMaker>,
     /// The chosen solver's settings.
     pub solver: Solver,
+    /// Grids that each frame gets beside its particles, where the scene asks for any.
+    pub grids: Option<grids::Grids>,
     /// Effects that the scene names; what is `None` does not exist.
     pub effects: Effects,
 }

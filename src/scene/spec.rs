@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::Effects;
+use super::{Effects, grids::GridsSpec};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -17,6 +17,7 @@ pub(super) struct SceneSpec {
     #[serde(default)]
     pub(super) wave_maker: Vec<WaveMakerSpec>,
     pub(super) solver: SolverSpec,
+    pub(super) grids: Option<Spanned<GridsSpec>>,
     #[serde(default)]
     pub(super) effects: Effects,
 }

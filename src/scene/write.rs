@@ -86,6 +86,9 @@ impl Scene {
             writeln!(out, "motion = {}", motion(&maker.motion))?;
         }
         self.write_solver(out)?;
+        if let Some(grids) = &self.grids {
+            grids.write(out)?;
+        }
         writeln!(out, "\n[effects]")?;
         // An effect is a table of numbers, which toml can always write.
         let effects = toml::Table::try_from(&self.effects).unwrap_or_default();

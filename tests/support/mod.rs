@@ -55,6 +55,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
                 max_substeps: 32,
             },
         },
+        grids: None,
         effects: Effects::default(),
     }
 }
