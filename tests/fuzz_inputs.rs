@@ -44,6 +44,12 @@ iterations = 4
 
 [effects]
 viscosity = { xsph = 0.01 }
+
+[solver.flip]
+cell_size = 0.2
+transfer = "flip"
+surface = "voxel"
+pressure = { preconditioner = "ipp", tolerance = 1e-4 }
 "#;
 
 /// A folder with one good mesh and some bad ones.
@@ -99,9 +105,39 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
     ),
     (
         "[solver.pbf]",
-        "[solver.flip]",
+        "[solver.pfb]",
         28,
-        &["solver.flip: unknown key", "nearest is \"pbf\""],
+        &["solver.pfb: unknown key", "nearest is \"pbf\""],
+    ),
+    (
+        "[solver.pbf]\nparticle_spacing = 0.1\niterations = 4\n",
+        "",
+        27,
+        &["solver.method: the scene has no table [solver.pbf]"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_sise = 0.2",
+        36,
+        &[
+            "solver.flip.cell_sise: unknown key",
+            "nearest is \"cell_size\"",
+        ],
+    ),
+    (
+        "cell_size = 0.2\n",
+        "",
+        35,
+        &["solver.flip.cell_size: missing", "at least 3"],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerence = 1e-4",
+        39,
+        &[
+            "solver.flip.pressure.tolerence: unknown key",
+            "nearest is \"tolerance\"",
+        ],
     ),
     (
         "stroke = 1.5",
@@ -283,7 +319,128 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
         "\"pbf\"",
         "\"sph\"",
         27,
-        &["solver.method: \"sph\" is no method", "\"pbf\""],
+        &[
+            "solver.method: \"sph\" is no method; the nearest is \"pbf\"",
+            "[solver.flip]",
+        ],
+    ),
+    // FLIP.
+    (
+        "cell_size = 0.2",
+        "cell_size = 0",
+        36,
+        &["solver.flip.cell_size: 0 is out of range"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 4.3",
+        36,
+        &[
+            "solver.flip.cell_size: no interior cell",
+            "5.814 × 2.930 × 3.488 cells of 4.3 m",
+            "at least 3",
+        ],
+    ),
+    ("cell_size = 0.2", "cell_size = 4.2", 36, &[]),
+    (
+        "cell_size = 0.2",
+        "cell_size = 4.2\nparticles_per_cell = 1",
+        15,
+        &["water.block[0].max", "too thin for one layer"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 0.01",
+        36,
+        &["particles 0.005 m apart", "134217728"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 0.001",
+        36,
+        &["the grid would overflow", "cells of 0.001 m"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "transfer = \"pic\"",
+        37,
+        &["\"pic\" is no transfer; the nearest is \"apic\""],
+    ),
+    (
+        "transfer = \"flip\"",
+        "pic_blend = 1.1",
+        37,
+        &["solver.flip.pic_blend: 1.1 is out of range", "from 0 to 1"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "cfl = 5.5",
+        37,
+        &["solver.flip.cfl: 5.5 is out of range", "up to 5"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "particles_per_cell = 0",
+        37,
+        &["particles_per_cell: 0 is out of range"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "density_correction = 1",
+        37,
+        &["density_correction: invalid type: integer `1`"],
+    ),
+    (
+        "surface = \"voxel\"",
+        "surface = \"ghost\"",
+        38,
+        &["\"ghost\" is no surface", "ghost_fluid"],
+    ),
+    (
+        "\"ipp\"",
+        "\"multigird\"",
+        39,
+        &[
+            "solver.flip.pressure.preconditioner: \"multigird\" is no preconditioner; \
+             the nearest is \"multigrid\"",
+            "\"none\"",
+        ],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = 0",
+        39,
+        &[
+            "pressure.tolerance: 0 is out of range",
+            "above 0 and below 1",
+        ],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = -1e-4",
+        39,
+        &["pressure.tolerance: -0.0001 is out of range"],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = 1.0",
+        39,
+        &["pressure.tolerance: 1 is out of range"],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = 0.1, residual_limit = 0.05",
+        39,
+        &[
+            "pressure.residual_limit: 0.05 is out of range",
+            "from the tolerance on",
+        ],
+    ),
+    (
+        "tolerance = 1e-4",
+        "max_iterations = 0",
+        39,
+        &["pressure.max_iterations: 0 is out of range"],
     ),
     (
         "gravity = [0.0, -9.81, 0.0]",
@@ -381,7 +538,13 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
         "cube.obj",
         "sheet.obj",
         18,
-        &["solid[0].mesh", "3 open edges", "close the mesh"],
+        // Edges by their end points, where the scene puts them: scaled by 2 and moved.
+        &[
+            "solid[0].mesh",
+            "3 open edges",
+            "(18.0000, 0.0000, 7.0000)-(20.0000, 0.0000, 7.0000)",
+            "close the mesh",
+        ],
     ),
     (
         "[18.0, 0.0, 7.0]",
@@ -411,6 +574,13 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
             "wave_maker[0].motion: the wall -x crosses the whole domain",
             "of 25 m",
         ],
+    ),
+    // 2 m are left: twenty particle spacings, but fewer than three cells of FLIP.
+    (
+        "stroke = 1.5, period = 3.0, ramp = 1.0 }",
+        "stroke = 23.0, period = 3.0, ramp = 1.0 }",
+        24,
+        &[],
     ),
     (
         "stroke = 1.5",
@@ -671,7 +841,7 @@ proptest! {
     fn no_override_makes_the_scene_parser_panic(
         key in "[a-z._\\[\\]0-9]{0,20}",
         value in any::<String>(),
-        known in "(shot|solver\\.pbf|water\\.block|effects|domain)\\.[a-z0-9_]{0,8}",
+        known in "(shot|solver\\.pbf|solver\\.flip|water\\.block|effects|domain)\\.[a-z0-9_]{0,8}",
     ) {
         let overrides = [format!("{key}={value}"), format!("{known}={value}")];
         let _ = Scene::parse(SCENE, Path::new("s.toml"), Path::new("/nowhere"), &overrides[..1]);

@@ -34,7 +34,7 @@ struct Naive {
 
 impl Naive {
     fn new(scene: &Scene, particles: &Particles) -> Self {
-        let pbf = &scene.solver.pbf;
+        let pbf = scene.solver.pbf();
         Self {
             positions: particles
                 .position
@@ -126,8 +126,8 @@ impl Naive {
 fn compressed() -> (Scene, Particles) {
     let mut scene = scene([1.0, 1.4, 1.0]);
     scene.water.gravity = DVec3::ZERO;
-    scene.solver.pbf.iteration = Iteration::Jacobi;
-    scene.solver.pbf.stop = Stop::Iterations(1);
+    scene.solver.pbf.as_mut().unwrap().iteration = Iteration::Jacobi;
+    scene.solver.pbf.as_mut().unwrap().stop = Stop::Iterations(1);
     let mut particles = lattice([0.0; 3], [10, 10, 10], [D, 0.96 * D, D]);
     jitter(&mut particles, 0.15 * D);
     (scene, particles)
@@ -197,10 +197,10 @@ fn colours_and_stops_converge() {
     let context = context();
     let start = run(&context, &scene, &particles, 1).1.density_error_mean;
     for iteration in [Iteration::Jacobi, Iteration::RedBlack] {
-        scene.solver.pbf.iteration = iteration;
+        scene.solver.pbf.as_mut().unwrap().iteration = iteration;
         let mut last = start;
         for count in [4, 16, 64] {
-            scene.solver.pbf.stop = Stop::Iterations(count);
+            scene.solver.pbf.as_mut().unwrap().stop = Stop::Iterations(count);
             let (_, report) = run(&context, &scene, &particles, 1);
             assert_eq!(
                 report.iterations,
@@ -216,7 +216,7 @@ fn colours_and_stops_converge() {
         // Until an error: fewer iterations for a looser one, and the error is met.
         let mut counts = Vec::new();
         for density_error in [0.01, 0.002] {
-            scene.solver.pbf.stop = Stop::DensityError {
+            scene.solver.pbf.as_mut().unwrap().stop = Stop::DensityError {
                 density_error,
                 max_iterations: 200,
             };
@@ -245,9 +245,9 @@ fn red_black_leaves_less_error_than_jacobi() {
     scene.shot.frames_per_second = 1000.0;
     let particles = lattice([0.0; 3], [16, 20, 16], [D, 0.97 * D, D]);
     for count in [4, 16, 64] {
-        scene.solver.pbf.stop = Stop::Iterations(count);
+        scene.solver.pbf.as_mut().unwrap().stop = Stop::Iterations(count);
         let [jacobi, red_black] = [Iteration::Jacobi, Iteration::RedBlack].map(|iteration| {
-            scene.solver.pbf.iteration = iteration;
+            scene.solver.pbf.as_mut().unwrap().iteration = iteration;
             let (_, report) = run(&context, &scene, &particles, 1);
             println!(
                 "{count:3} {iteration:?}: mean {:.3} %, max {:.2} %",
@@ -263,7 +263,7 @@ fn red_black_leaves_less_error_than_jacobi() {
 #[test]
 fn free_fall_is_a_parabola() {
     let mut scene = scene([2.0, 100.0, 2.0]);
-    scene.solver.pbf.cfl = 50.0;
+    scene.solver.pbf.as_mut().unwrap().cfl = 50.0;
     let mut particles = lattice([0.5, 90.0, 0.5], [1, 1, 1], [D; 3]);
     particles.velocity[0] = [0.5, 2.0, -0.25];
     let frames = 50;
@@ -531,7 +531,7 @@ fn nothing_stays_behind_a_piston() {
 fn too_fast_for_its_substeps_is_an_error() {
     let context = context();
     let mut scene = scene([1.0; 3]);
-    scene.solver.pbf.max_substeps = 4;
+    scene.solver.pbf.as_mut().unwrap().max_substeps = 4;
     let mut particles = lattice([0.3; 3], [2, 2, 2], [D; 3]);
     particles.velocity[3] = [100.0, 0.0, 0.0];
     let mut solver = solver(&context, &scene, &particles, &Boundary::default());
@@ -641,7 +641,7 @@ fn only_what_the_scene_calls_for() {
 #[test]
 fn bytes_per_particle() {
     let mut scene = scene([25.0, 12.6, 15.0]);
-    scene.solver.pbf.particle_spacing = 0.1;
+    scene.solver.pbf.as_mut().unwrap().particle_spacing = 0.1;
     let counts = Counts {
         particles: 201_000,
         ..Counts::default()

@@ -80,7 +80,7 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "wave_maker.motion",
-        "a motion that leaves at least two particle spacings between the walls",
+        "a motion that leaves at least two particle spacings and three cells of FLIP between the walls",
     ),
     (
         "wave_maker.motion.kind",
@@ -107,8 +107,11 @@ const TABLE: &[(&str, &str)] = &[
         "wave_maker.motion.points",
         "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0",
     ),
-    ("solver", "a table with method and pbf"),
-    ("solver.method", "\"pbf\""),
+    ("solver", "a table with method, pbf and flip"),
+    (
+        "solver.method",
+        "\"pbf\" with a table [solver.pbf], or \"flip\" with a table [solver.flip]",
+    ),
     ("solver.pbf", "a table with at least particle_spacing"),
     (
         "solver.pbf.particle_spacing",
@@ -133,6 +136,42 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.pbf.relaxation", "a number above 0, up to 1.5"),
     ("solver.pbf.artificial_pressure", "a number from 0 to 10"),
     ("solver.pbf.max_substeps", "a whole number from 1 to 10000"),
+    ("solver.flip", "a table with at least cell_size"),
+    (
+        "solver.flip.cell_size",
+        "a number above 0, metres, with at least 3 and at most 65536 cells along each axis, 2147483647 \
+         cells and 134217728 particles",
+    ),
+    (
+        "solver.flip.particles_per_cell",
+        "a whole number from 1 to 64",
+    ),
+    ("solver.flip.transfer", "\"flip\" or \"apic\""),
+    ("solver.flip.pic_blend", "a number from 0 to 1"),
+    ("solver.flip.cfl", "a number above 0, up to 5"),
+    ("solver.flip.max_substeps", "a whole number from 1 to 10000"),
+    ("solver.flip.surface", "\"voxel\" or \"ghost_fluid\""),
+    ("solver.flip.density_correction", "true or false"),
+    (
+        "solver.flip.pressure",
+        "a table of preconditioner, tolerance, max_iterations, residual_limit",
+    ),
+    (
+        "solver.flip.pressure.preconditioner",
+        "\"none\", \"jacobi\", \"ipp\" or \"multigrid\"",
+    ),
+    (
+        "solver.flip.pressure.tolerance",
+        "a number above 0 and below 1, of the right-hand side's norm",
+    ),
+    (
+        "solver.flip.pressure.max_iterations",
+        "a whole number from 1 to 10000",
+    ),
+    (
+        "solver.flip.pressure.residual_limit",
+        "a number from the tolerance on, of the right-hand side's norm",
+    ),
     (
         "grids",
         "a table with surface = true, velocity = true or both, voxel_size, precision",

@@ -1,16 +1,18 @@
 //! From what is written to what is meant: ranges, defaults, files, and how the parts fit.
 
+mod solver;
+
 use std::{ops::Range, path::Path};
 
 use glam::DVec3;
 use toml::Spanned;
 
 use super::{
-    Iteration, Pbf, PlacedMesh, Placement, Scene, Shot, Solver, Stop, Water,
+    PlacedMesh, Placement, Scene, Shot, Water,
     document::Document,
     error::SceneError,
     grids,
-    spec::{BoxSpec, PbfSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, WaterSpec},
+    spec::{BoxSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, WaterSpec},
     wave_maker,
 };
 use crate::domain::{
@@ -23,30 +25,27 @@ use crate::domain::{
 /// Most particles of a scene: ids are 32 bits, and 2²⁷ particles of 200 bytes fill 25 GiB.
 pub(super) const MAX_PARTICLES: f64 = 134_217_728.0;
 
-/// Most cells of the neighbour grid, and along one axis.
-const MAX_CELLS: f64 = 2_147_483_647.0;
-const MAX_AXIS_CELLS: f64 = 65_536.0;
-
 /// Largest coordinate of a domain, metres.
 const MAX_COORDINATE: f64 = 1e6;
 
-/// f32 positions at the far end of the domain must still tell apart this fraction of a spacing.
-const POSITION_RESOLUTION: f64 = 1.0 / 16.0;
-
 type Result<T> = std::result::Result<T, SceneError>;
+
+/// The lattice on which a solver's particles start, and where the scene says how fine it is.
+struct Lattice {
+    spacing: f64,
+    span: Range<usize>,
+}
 
 /// Builds the scene.
 pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Result<Scene> {
     let shot = shot(doc, &spec.shot)?;
     let domain = domain(doc, &spec.domain)?;
-    if spec.solver.method.get_ref() != "pbf" {
-        let problem = format!("{:?} is no method", spec.solver.method.get_ref());
-        return Err(doc.fault_at(spec.solver.method.span(), problem));
+    let solver = solver::solver(doc, &spec.solver, &domain)?;
+    let lattices = solver::lattices(&spec.solver, &solver);
+    let water = water(doc, base_dir, &spec.water, &domain, &lattices)?;
+    for lattice in &lattices {
+        check_particle_count(doc, &water, &domain, lattice)?;
     }
-    let spacing_span = spec.solver.pbf.particle_spacing.span();
-    let pbf = pbf(doc, &spec.solver.pbf, &domain)?;
-    let water = water(doc, base_dir, &spec.water, &domain, &pbf)?;
-    check_particle_count(doc, &water, &domain, &pbf, spacing_span)?;
     let solids = spec
         .solid
         .iter()
@@ -59,18 +58,17 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         &wave_maker::Surroundings {
             domain: &domain,
             gravity: water.gravity,
-            spacing: pbf.particle_spacing,
+            least_gap: solver::least_gap(&solver),
             shot: &shot,
         },
     )?;
     if let Some((key, allowed)) = spec.effects.fault() {
         return Err(doc.fault_of(&key, allowed));
     }
-    let spacing = pbf.particle_spacing;
     let grids = spec
         .grids
         .as_ref()
-        .map(|table| grids::build(doc, table, &domain, spacing, 2.0 * spacing))
+        .map(|table| grids::build(doc, table, &domain, &solver))
         .transpose()?;
     Ok(Scene {
         shot,
@@ -78,7 +76,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         water,
         solids,
         wave_makers,
-        solver: Solver { pbf },
+        solver,
         grids,
         effects: spec.effects,
     })
@@ -177,116 +175,17 @@ fn domain(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
     bounds(doc, spec)
 }
 
-fn pbf(doc: &Document<'_>, spec: &PbfSpec, domain: &Bounds) -> Result<Pbf> {
-    let particle_spacing = number(doc, &spec.particle_spacing, |v| v > 0.0)?;
-    let support_ratio = number_or(doc, &spec.support_ratio, 2.0, |v| (1.5..=4.0).contains(&v))?;
-    check_grid(
-        doc,
-        spec.particle_spacing.span(),
-        domain,
-        particle_spacing,
-        support_ratio,
-    )?;
-    Ok(Pbf {
-        particle_spacing,
-        support_ratio,
-        iteration: iteration(doc, &spec.iteration)?,
-        stop: stop(doc, spec)?,
-        cfl: number_or(doc, &spec.cfl, 1.0, |v| v > 0.0 && v <= 5.0)?,
-        relaxation: number_or(doc, &spec.relaxation, 1.0, |v| v > 0.0 && v <= 1.5)?,
-        artificial_pressure: number_or(doc, &spec.artificial_pressure, 0.0, |v| {
-            (0.0..=10.0).contains(&v)
-        })?,
-        max_substeps: spec
-            .max_substeps
-            .as_ref()
-            .map_or(Ok(32), |v| whole(doc, v, 10_000))?,
-    })
-}
-
-fn iteration(doc: &Document<'_>, spec: &Option<Spanned<String>>) -> Result<Iteration> {
-    let Some(spec) = spec else {
-        return Ok(Iteration::RedBlack);
-    };
-    match spec.get_ref().as_str() {
-        "red_black" => Ok(Iteration::RedBlack),
-        "jacobi" => Ok(Iteration::Jacobi),
-        other => Err(doc.fault_at(spec.span(), format!("{other:?} is no iteration"))),
-    }
-}
-
-fn stop(doc: &Document<'_>, spec: &PbfSpec) -> Result<Stop> {
-    match (&spec.iterations, &spec.density_error, &spec.max_iterations) {
-        (None, None, None) => Ok(Stop::Iterations(4)),
-        (Some(iterations), None, None) => Ok(Stop::Iterations(whole(doc, iterations, 10_000)?)),
-        (None, Some(density_error), Some(max_iterations)) => Ok(Stop::DensityError {
-            density_error: number(doc, density_error, |v| v > 0.0 && v < 1.0)?,
-            max_iterations: whole(doc, max_iterations, 10_000)?,
-        }),
-        (Some(iterations), _, _) => {
-            let other = match &spec.density_error {
-                Some(_) => "density_error",
-                None => "max_iterations",
-            };
-            Err(doc.fault_at(iterations.span(), format!("given together with {other}")))
-        }
-        (None, Some(density_error), None) => {
-            Err(doc.fault_at(density_error.span(), "given without max_iterations"))
-        }
-        (None, None, Some(max_iterations)) => {
-            Err(doc.fault_at(max_iterations.span(), "given without density_error"))
-        }
-    }
-}
-
-/// The neighbour grid has cells of the support radius; its indices are 32 bits.
-fn check_grid(
-    doc: &Document<'_>,
-    span: Range<usize>,
-    domain: &Bounds,
-    spacing: f64,
-    support_ratio: f64,
-) -> Result<()> {
-    let cells = (domain.size() / (spacing * support_ratio)).ceil();
-    let all = cells.x * cells.y * cells.z;
-    let axis = cells.max_element();
-    if all > MAX_CELLS || axis > MAX_AXIS_CELLS {
-        let problem = format!(
-            "the grid would overflow: a domain of {} × {} × {} m takes {:.3e} × {:.3e} × {:.3e} \
-             = {all:.3e} cells of {} m",
-            domain.size().x,
-            domain.size().y,
-            domain.size().z,
-            cells.x,
-            cells.y,
-            cells.z,
-            spacing * support_ratio
-        );
-        return Err(doc.fault_at(span, problem));
-    }
-    let farthest = domain.min.abs().max(domain.max.abs()).max_element();
-    let resolution = farthest * f64::from(f32::EPSILON);
-    if resolution > POSITION_RESOLUTION * spacing {
-        let problem = format!(
-            "{spacing} m is too fine {farthest} m from the origin, where positions (32 bit) are \
-             {resolution:.2e} m apart"
-        );
-        return Err(doc.fault_at(span, problem));
-    }
-    Ok(())
-}
-
 fn water(
     doc: &Document<'_>,
     base_dir: &Path,
     spec: &WaterSpec,
     domain: &Bounds,
-    pbf: &Pbf,
+    lattices: &[Lattice],
 ) -> Result<Water> {
     let blocks = spec
         .block
         .iter()
-        .map(|block| water_block(doc, block, domain, pbf))
+        .map(|block| water_block(doc, block, domain, lattices))
         .collect::<Result<_>>()?;
     let meshes = spec
         .mesh
@@ -320,7 +219,12 @@ fn water(
     })
 }
 
-fn water_block(doc: &Document<'_>, spec: &BoxSpec, domain: &Bounds, pbf: &Pbf) -> Result<Bounds> {
+fn water_block(
+    doc: &Document<'_>,
+    spec: &BoxSpec,
+    domain: &Bounds,
+    lattices: &[Lattice],
+) -> Result<Bounds> {
     let block = bounds(doc, spec)?;
     if !fits(&block, domain) {
         let starts_inside = fits(
@@ -342,11 +246,12 @@ fn water_block(doc: &Document<'_>, spec: &BoxSpec, domain: &Bounds, pbf: &Pbf) -
         );
         return Err(doc.fault_at(span, problem));
     }
-    if sampling::block_dims(&block, domain, pbf.particle_spacing).contains(&0) {
+    let is_thin = |l: &&Lattice| sampling::block_dims(&block, domain, l.spacing).contains(&0);
+    if let Some(lattice) = lattices.iter().find(is_thin) {
         let size = block.size();
         let problem = format!(
             "the block, {} × {} × {} m, is too thin for one layer of particles {} m apart",
-            size.x, size.y, size.z, pbf.particle_spacing
+            size.x, size.y, size.z, lattice.spacing
         );
         return Err(doc.fault_at(spec.max.span(), problem));
     }
@@ -375,10 +280,9 @@ fn check_particle_count(
     doc: &Document<'_>,
     water: &Water,
     domain: &Bounds,
-    pbf: &Pbf,
-    span: Range<usize>,
+    lattice: &Lattice,
 ) -> Result<()> {
-    let d = pbf.particle_spacing;
+    let d = lattice.spacing;
     let in_blocks = water
         .blocks
         .iter()
@@ -399,7 +303,7 @@ fn check_particle_count(
     let count = in_blocks + in_meshes;
     if count > MAX_PARTICLES {
         let problem = format!("the water would take about {count:.3e} particles {d} m apart");
-        return Err(doc.fault_at(span, problem));
+        return Err(doc.fault_at(lattice.span.clone(), problem));
     }
     Ok(())
 }

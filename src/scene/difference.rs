@@ -1,23 +1,32 @@
 //! Whether two scenes have the same physics.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, iter};
 
 use toml::{Table, Value};
 
-use super::{Scene, error::SceneError};
+use super::{Method, Scene, error::SceneError};
 
-/// Keys that change which frames there are or where they go, not what happens in them; `max_substeps` only says
-/// when to give up.
-const NOT_PHYSICS: [&str; 3] = ["shot.name", "shot.frames", "solver.pbf.max_substeps"];
+/// Keys that change which frames there are or where they go, not what happens in them; `max_substeps` and
+/// `residual_limit` only say when to give up.
+const NOT_PHYSICS: [&str; 5] = [
+    "shot.name",
+    "shot.frames",
+    "solver.pbf.max_substeps",
+    "solver.flip.max_substeps",
+    "solver.flip.pressure.residual_limit",
+];
+
+/// Comes before every other difference: with it most of the others follow.
+const METHOD: &str = "solver.method";
 
 /// Changes whenever the canonical form does, so that hashes of two versions never meet.
 const CANONICAL_FORM: &str = "swell scene physics 2";
 
-/// The first key (in alphabetical order) whose value differs between two scenes as
+/// The first key (the method, then in alphabetical order) whose value differs between two scenes as
 /// [`Scene::to_toml`] wrote them, with both values; `None` where the physics is the same.
 ///
-/// `[grids]`, `shot.name`, `shot.frames` and `solver.pbf.max_substeps` may differ, and so may the path of a mesh whose hash stands
-/// beside it in both.
+/// `[grids]`, `shot.name`, `shot.frames`, a solver's `max_substeps` and its `residual_limit` may differ, and so may the
+/// settings of a solver that is not chosen and the path of a mesh whose hash stands beside it in both.
 ///
 /// # Errors
 /// [`SceneError::NotToml`].
@@ -32,7 +41,9 @@ pub fn physics_difference(old_toml: &str, new_toml: &str) -> Result<Option<Strin
     }
     let keys: std::collections::BTreeSet<_> = old.keys().chain(new.keys()).collect();
     let show = |value: Option<&String>| value.map_or("absent".to_owned(), Clone::clone);
-    let difference = keys.into_iter().find(|key| old.get(*key) != new.get(*key));
+    let method = METHOD.to_owned();
+    let mut keys = iter::once(&method).chain(keys);
+    let difference = keys.find(|key| old.get(*key) != new.get(*key));
     Ok(difference.map(|key| {
         format!(
             "{key} was {}, is now {}",
@@ -83,8 +94,17 @@ fn flatten(text: &str) -> Result<BTreeMap<String, String>, SceneError> {
     for (key, value) in &table {
         flatten_value(key.clone(), value, &mut values);
     }
+    let solver = table.get("solver").and_then(Value::as_table);
+    let method = solver.and_then(|solver| solver.get("method")?.as_str());
+    let is_idle = |key: &str| {
+        let mut others = Method::NAMED
+            .iter()
+            .filter(|(name, _)| method != Some(name));
+        others.any(|(name, _)| key.starts_with(&format!("solver.{name}.")))
+    };
     // Grids follow from the particles.
-    values.retain(|key, _| !NOT_PHYSICS.contains(&key.as_str()) && !key.starts_with("grids."));
+    let is_output = |key: &str| NOT_PHYSICS.contains(&key) || key.starts_with("grids.");
+    values.retain(|key, _| !is_output(key) && !is_idle(key));
     Ok(values)
 }
 

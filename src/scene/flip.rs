@@ -41,6 +41,16 @@ pub enum Transfer {
     Apic,
 }
 
+impl Transfer {
+    /// With the names that scenes use.
+    pub const NAMED: [(&'static str, Self); 2] = [("flip", Self::Flip), ("apic", Self::Apic)];
+
+    /// As scenes name it.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
+    }
+}
+
 /// Where the pressure is zero at the free surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Surface {
@@ -48,6 +58,17 @@ pub enum Surface {
     Voxel,
     /// Where the surface crosses the way there (Enright et al. 2003).
     GhostFluid,
+}
+
+impl Surface {
+    /// With the names that scenes use.
+    pub const NAMED: [(&'static str, Self); 2] =
+        [("voxel", Self::Voxel), ("ghost_fluid", Self::GhostFluid)];
+
+    /// As scenes name it.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
+    }
 }
 
 /// The pressure solve.
@@ -74,4 +95,19 @@ pub enum Preconditioner {
     Ipp,
     /// One symmetric V-cycle (McAdams et al. 2010).
     Multigrid,
+}
+
+impl Preconditioner {
+    /// With the names that scenes use.
+    pub const NAMED: [(&'static str, Self); 4] = [
+        ("none", Self::None),
+        ("jacobi", Self::Jacobi),
+        ("ipp", Self::Ipp),
+        ("multigrid", Self::Multigrid),
+    ];
+
+    /// As scenes name it.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
+    }
 }

@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{build::number, document::Document, error::SceneError};
+use super::{Method, Solver, build::number, document::Document, error::SceneError};
 use crate::domain::{
     bounds::Bounds,
     sparse_grid::{EDGE, Precision},
@@ -35,15 +35,20 @@ pub(super) struct GridsSpec {
     precision: Option<Spanned<String>>,
 }
 
-/// Builds the table; `spacing` is that of the particles, `cell_size` what `voxel_size` is where it
-/// is left out, both in metres.
+/// Builds the table for the chosen solver.
 pub(super) fn build(
     doc: &Document<'_>,
     spec: &Spanned<GridsSpec>,
     domain: &Bounds,
-    spacing: f64,
-    cell_size: f64,
+    solver: &Solver,
 ) -> Result<Grids, SceneError> {
+    let (spacing, cell_size) = match solver.method {
+        Method::Pbf => {
+            let spacing = solver.pbf().particle_spacing;
+            (spacing, 2.0 * spacing)
+        }
+        Method::Flip => (solver.flip().particle_spacing(), solver.flip().cell_size),
+    };
     let table = spec.get_ref();
     let grids = Grids {
         surface: table.surface.as_ref().is_some_and(|v| *v.get_ref()),

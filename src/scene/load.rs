@@ -45,7 +45,11 @@ mod tests {
 
     use glam::DVec3;
 
-    use super::super::{Iteration, Stop, physics_difference, physics_hash};
+    use super::super::{
+        Iteration, Method, Stop,
+        flip::{Preconditioner, Surface, Transfer},
+        physics_difference, physics_hash,
+    };
     use super::*;
     use crate::domain::{motion::Motion, sampling, signed_distance::SignedDistance};
 
@@ -88,6 +92,10 @@ iteration = "jacobi"
 density_error = 0.01
 max_iterations = 40
 relaxation = 0.5
+[solver.flip]
+cell_size = 0.25
+transfer = "apic"
+pressure = { preconditioner = "ipp", tolerance = 0.05 }
 [effects]
 vorticity_confinement = { strength = 0.1 }
 "#;
@@ -132,7 +140,7 @@ vorticity_confinement = { strength = 0.1 }
                 points: vec![[0.0, 0.0], [1.0, 0.5]]
             }
         );
-        let pbf = &scene.solver.pbf;
+        let pbf = scene.solver.pbf();
         assert_eq!(pbf.iteration, Iteration::Jacobi);
         assert_eq!(
             pbf.stop,
@@ -145,10 +153,42 @@ vorticity_confinement = { strength = 0.1 }
             (pbf.support_ratio, pbf.cfl, pbf.relaxation, pbf.max_substeps),
             (2.0, 1.0, 0.5, 32)
         );
+        let flip = scene.solver.flip();
+        assert_eq!(flip.transfer, Transfer::Apic);
+        assert_eq!(flip.pressure.preconditioner, Preconditioner::Ipp);
+        assert_eq!((flip.cell_size, flip.particle_spacing()), (0.25, 0.125));
+        // What is left out.
+        assert_eq!((flip.particles_per_cell, flip.pic_blend), (8, 0.05));
+        assert_eq!((flip.cfl, flip.max_substeps), (3.0, 32));
+        assert_eq!(flip.surface, Surface::GhostFluid);
+        assert!(flip.density_correction);
+        assert_eq!(flip.pressure.max_iterations, 400);
+        assert_eq!(flip.pressure.residual_limit, 0.05, "never below tolerance");
         assert_eq!(scene.effects.viscosity, None);
         assert_eq!(
             scene.effects.vorticity_confinement.map(|v| v.strength),
             Some(0.1)
+        );
+    }
+
+    #[test]
+    fn either_solver_of_a_scene_can_be_chosen() {
+        let dir = assets();
+        let scene = parse(dir.path(), FULL, &[]).expect("valid");
+        assert_eq!(scene.particle_spacing(), 0.1);
+        let flip = scene.clone().solved_by(Method::Flip).expect("has a table");
+        assert_eq!(flip.particle_spacing(), 0.125);
+        let by_key = parse(dir.path(), FULL, &["solver.method=flip"]).expect("valid");
+        assert_eq!(by_key, flip);
+        assert_ne!(physics_hash(&scene), physics_hash(&flip));
+
+        let mut without = scene;
+        without.solver.flip = None;
+        let message = without.solved_by(Method::Flip).expect_err("no table");
+        let message = message.to_string();
+        assert!(
+            message.contains("[solver.flip]") && message.contains("cell_size"),
+            "{message}"
         );
     }
 
@@ -164,8 +204,8 @@ vorticity_confinement = { strength = 0.1 }
             "shot.name=other-name",
         ];
         let scene = parse(dir.path(), FULL, &overrides).expect("valid");
-        assert_eq!(scene.solver.pbf.iteration, Iteration::RedBlack);
-        assert_eq!(scene.solver.pbf.particle_spacing, 0.2);
+        assert_eq!(scene.solver.pbf().iteration, Iteration::RedBlack);
+        assert_eq!(scene.solver.pbf().particle_spacing, 0.2);
         assert_eq!(scene.water.blocks[0].max.x, 2.0);
         assert_eq!(scene.water.blocks[0].min.x, 0.5);
         assert_eq!(scene.effects.viscosity.map(|v| v.xsph), Some(0.02));
@@ -216,7 +256,7 @@ vorticity_confinement = { strength = 0.1 }
         assert_eq!(scene.mesh_files().len(), 1);
 
         // Control: one number apart is not equal.
-        scene.solver.pbf.cfl = 0.9;
+        scene.solver.flip.as_mut().expect("a table").cfl = 0.9;
         assert_ne!(scene, again);
         // A mesh that is not the one that was baked is refused.
         fs::write(
@@ -236,7 +276,14 @@ vorticity_confinement = { strength = 0.1 }
             (scene.to_toml(&|_, _| path.to_owned()), physics_hash(&scene))
         };
         let (base, base_hash) = written(&[], "assets/a.obj");
-        let same: [&[&str]; 3] = [&[], &["shot.frames=7"], &["shot.name=b"]];
+        // The last two: settings of the solver that is not chosen, and when to give up.
+        let same: [&[&str]; 5] = [
+            &[],
+            &["shot.frames=7"],
+            &["shot.name=b"],
+            &["solver.flip.cell_size=0.3"],
+            &["solver.pbf.max_substeps=9"],
+        ];
         for overrides in same {
             let (other, hash) = written(overrides, "b.obj");
             assert_eq!(physics_difference(&base, &other).expect("TOML"), None);
@@ -246,6 +293,10 @@ vorticity_confinement = { strength = 0.1 }
             (
                 "solver.pbf.particle_spacing=0.125",
                 "solver.pbf.particle_spacing was 0.1, is now 0.125",
+            ),
+            (
+                "solver.method=flip",
+                "solver.method was \"pbf\", is now \"flip\"",
             ),
             (
                 "effects.viscosity.xsph=0.5",
@@ -266,6 +317,21 @@ vorticity_confinement = { strength = 0.1 }
                 Some(expected)
             );
             assert_ne!(hash, base_hash);
+        }
+        let (flip, flip_hash) = written(&["solver.method=flip"], "a.obj");
+        let limit = "solver.flip.pressure.residual_limit=0.5";
+        for (set, expected) in [
+            ("solver.pbf.iteration=red_black", None),
+            (limit, None),
+            (
+                "solver.flip.pressure.tolerance=0.01",
+                Some("solver.flip.pressure.tolerance was 0.05, is now 0.01"),
+            ),
+        ] {
+            let (other, hash) = written(&["solver.method=flip", set, limit], "a.obj");
+            let difference = physics_difference(&flip, &other).expect("TOML");
+            assert_eq!(difference.as_deref(), expected);
+            assert_eq!(hash == flip_hash, expected.is_none());
         }
         fs::write(dir.path().join("cube.obj"), format!("{CUBE}# another\n")).expect("written");
         let (other, hash) = written(&[], "assets/a.obj");
@@ -294,7 +360,10 @@ vorticity_confinement = { strength = 0.1 }
         ] {
             let scene = Scene::load(&scenes.join(name).with_extension("toml"), &[]).expect(name);
             assert_eq!(scene.shot.name, name);
-            let d = scene.solver.pbf.particle_spacing;
+            let d = scene.particle_spacing();
+            // FLIP starts from the same particles.
+            let flip = scene.clone().solved_by(Method::Flip).expect(name);
+            assert_eq!(flip.particle_spacing(), d, "{name}");
             let solids = scene.solids.iter().map(|s| &s.mesh);
             let solid = SignedDistance::from_meshes(solids, &scene.domain, 2.0 * d).expect(name);
             assert_eq!(solid.is_some(), has_solid);

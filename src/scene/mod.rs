@@ -40,12 +40,37 @@ pub struct Scene {
     pub solids: Vec<Solid>,
     /// Domain walls that move; at most one a wall.
     pub wave_makers: Vec<WaveMaker>,
-    /// The chosen solver's settings.
+    /// Which solver, and the solvers' settings.
     pub solver: Solver,
     /// Grids that each frame gets beside its particles, where the scene asks for any.
     pub grids: Option<grids::Grids>,
     /// Effects that the scene names; what is `None` does not exist.
     pub effects: Effects,
+}
+
+impl Scene {
+    /// d of the chosen solver: between neighbours of the lattice at the start, metres.
+    pub fn particle_spacing(&self) -> f64 {
+        match self.solver.method {
+            Method::Pbf => self.solver.pbf().particle_spacing,
+            Method::Flip => self.solver.flip().particle_spacing(),
+        }
+    }
+
+    /// The same scene with `method` chosen.
+    ///
+    /// # Errors
+    /// [`SceneError::NoTable`].
+    pub fn solved_by(mut self, method: Method) -> Result<Self, SceneError> {
+        if !self.solver.has(method) {
+            return Err(SceneError::NoTable {
+                shot: self.shot.name,
+                method: method.name(),
+            });
+        }
+        self.solver.method = method;
+        Ok(self)
+    }
 }
 
 /// Name and clock of a shot.
@@ -173,11 +198,60 @@ pub struct WaveMaker {
     pub motion: Motion,
 }
 
-/// Solver settings.
+/// Solvers' settings. The chosen one's are always there; those of the other may be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solver {
+    /// Which one.
+    pub method: Method,
     /// Position-based fluids.
-    pub pbf: Pbf,
+    pub pbf: Option<Pbf>,
+    /// PIC/FLIP.
+    pub flip: Option<flip::Flip>,
+}
+
+impl Solver {
+    /// Whether the settings of `method` are there.
+    pub fn has(&self, method: Method) -> bool {
+        match method {
+            Method::Pbf => self.pbf.is_some(),
+            Method::Flip => self.flip.is_some(),
+        }
+    }
+
+    /// PBF's settings.
+    ///
+    /// # Panics
+    /// Where there are none: only where PBF is chosen are they sure to be there.
+    pub fn pbf(&self) -> &Pbf {
+        self.pbf.as_ref().expect("a scene with [solver.pbf]")
+    }
+
+    /// FLIP's settings.
+    ///
+    /// # Panics
+    /// Where there are none: only where FLIP is chosen are they sure to be there.
+    pub fn flip(&self) -> &flip::Flip {
+        self.flip.as_ref().expect("a scene with [solver.flip]")
+    }
+}
+
+/// A solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Position-based fluids (Macklin and Müller 2013).
+    Pbf,
+    /// PIC/FLIP (Zhu and Bridson 2005).
+    Flip,
+}
+
+impl Method {
+    /// With the names that scenes use.
+    pub const NAMED: [(&'static str, Self); 2] = [("pbf", Self::Pbf), ("flip", Self::Flip)];
+
+    /// As scenes name it.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
+    }
 }
 
 /// PBF settings (Macklin and Müller 2013).
@@ -208,6 +282,17 @@ pub enum Iteration {
     Jacobi,
     /// One colour, then the other, which sees the corrected first.
     RedBlack,
+}
+
+impl Iteration {
+    /// With the names that scenes use.
+    pub const NAMED: [(&'static str, Self); 2] =
+        [("jacobi", Self::Jacobi), ("red_black", Self::RedBlack)];
+
+    /// As scenes name it.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
+    }
 }
 
 /// When the density iteration stops.

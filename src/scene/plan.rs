@@ -101,7 +101,7 @@ pub fn grid_dims(domain: &Bounds, support_radius: f64) -> [u32; 3] {
 impl Plan {
     /// Lays out PBF for `scene`.
     pub fn new(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Self {
-        let pbf = &scene.solver.pbf;
+        let pbf = scene.solver.pbf();
         let h = Calibration::new(pbf.particle_spacing, pbf.support_ratio).support_radius;
         let mut plan = Self {
             counts,
@@ -244,7 +244,7 @@ impl Plan {
 
     fn add_pbf(&mut self, scene: &Scene) {
         let n = self.counts.particles as u64;
-        let pbf = &scene.solver.pbf;
+        let pbf = scene.solver.pbf();
         self.add_uniform("params", PARAMS_BYTES, "pbf");
         self.add_uniform("phases", PHASE_BYTES * self.phase_slots(), "pbf");
         self.add_buffer(

@@ -102,7 +102,8 @@ pub(super) struct MotionSpec {
 #[serde(deny_unknown_fields)]
 pub(super) struct SolverSpec {
     pub(super) method: Spanned<String>,
-    pub(super) pbf: PbfSpec,
+    pub(super) pbf: Option<PbfSpec>,
+    pub(super) flip: Option<FlipSpec>,
 }
 
 #[derive(Deserialize)]
@@ -118,4 +119,28 @@ pub(super) struct PbfSpec {
     pub(super) relaxation: Option<Spanned<f64>>,
     pub(super) artificial_pressure: Option<Spanned<f64>>,
     pub(super) max_substeps: Option<Spanned<i64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FlipSpec {
+    pub(super) cell_size: Spanned<f64>,
+    pub(super) particles_per_cell: Option<Spanned<i64>>,
+    pub(super) transfer: Option<Spanned<String>>,
+    pub(super) pic_blend: Option<Spanned<f64>>,
+    pub(super) cfl: Option<Spanned<f64>>,
+    pub(super) max_substeps: Option<Spanned<i64>>,
+    pub(super) surface: Option<Spanned<String>>,
+    pub(super) density_correction: Option<bool>,
+    #[serde(default)]
+    pub(super) pressure: PressureSpec,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PressureSpec {
+    pub(super) preconditioner: Option<Spanned<String>>,
+    pub(super) tolerance: Option<Spanned<f64>>,
+    pub(super) max_iterations: Option<Spanned<i64>>,
+    pub(super) residual_limit: Option<Spanned<f64>>,
 }

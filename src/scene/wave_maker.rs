@@ -17,16 +17,14 @@ use crate::domain::{bounds::Bounds, motion::Motion};
 /// Largest motion table read, bytes: ten hours at 60 points a second.
 const MAX_TABLE_BYTES: u64 = 64 << 20;
 
-/// Between two walls, or a wall and the opposite face, in particle spacings.
-const LEAST_GAP: f64 = 2.0;
-
 type Result<T> = std::result::Result<T, SceneError>;
 
 /// What a wave-maker has to fit into.
 pub(super) struct Surroundings<'a> {
     pub(super) domain: &'a Bounds,
     pub(super) gravity: DVec3,
-    pub(super) spacing: f64,
+    /// Between two walls, or a wall and the opposite face, metres.
+    pub(super) least_gap: f64,
     pub(super) shot: &'a Shot,
 }
 
@@ -46,7 +44,7 @@ pub(super) fn build_all(
         }
         let motion = motion(doc, base_dir, &spec.motion, around.gravity)?;
         let size = around.domain.size()[wall.axis];
-        let room = size - LEAST_GAP * around.spacing;
+        let room = size - around.least_gap;
         let reach = motion.peak_displacement(around.shot.duration());
         if reach > room {
             let problem = format!(

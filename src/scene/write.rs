@@ -7,7 +7,7 @@ use std::{
 
 use glam::DVec3;
 
-use super::{Iteration, PlacedMesh, Scene, Stop};
+use super::{Pbf, PlacedMesh, Scene, Stop, flip::Flip};
 use crate::domain::{bounds::Bounds, motion::Motion};
 
 /// Where a cache keeps its own copy of a mesh file: `assets/NAME-HASH.EXT`, so that two files of
@@ -99,29 +99,15 @@ impl Scene {
     }
 
     fn write_solver(&self, out: &mut String) -> fmt::Result {
-        let pbf = &self.solver.pbf;
-        writeln!(out, "\n[solver]\nmethod = \"pbf\"\n\n[solver.pbf]")?;
-        writeln!(out, "particle_spacing = {:?}", pbf.particle_spacing)?;
-        writeln!(out, "support_ratio = {:?}", pbf.support_ratio)?;
-        let iteration = match pbf.iteration {
-            Iteration::Jacobi => "jacobi",
-            Iteration::RedBlack => "red_black",
-        };
-        writeln!(out, "iteration = {}", text(iteration))?;
-        match pbf.stop {
-            Stop::Iterations(n) => writeln!(out, "iterations = {n}")?,
-            Stop::DensityError {
-                density_error,
-                max_iterations,
-            } => {
-                writeln!(out, "density_error = {density_error:?}")?;
-                writeln!(out, "max_iterations = {max_iterations}")?;
-            }
+        writeln!(out, "\n[solver]")?;
+        writeln!(out, "method = {}", text(self.solver.method.name()))?;
+        if let Some(pbf) = &self.solver.pbf {
+            write_pbf(out, pbf)?;
         }
-        writeln!(out, "cfl = {:?}", pbf.cfl)?;
-        writeln!(out, "relaxation = {:?}", pbf.relaxation)?;
-        writeln!(out, "artificial_pressure = {:?}", pbf.artificial_pressure)?;
-        writeln!(out, "max_substeps = {}", pbf.max_substeps)
+        if let Some(flip) = &self.solver.flip {
+            write_flip(out, flip)?;
+        }
+        Ok(())
     }
 }
 
@@ -152,6 +138,46 @@ fn write_mesh(
     writeln!(out, "translate = {}", vector(placement.translate))?;
     writeln!(out, "rotate_degrees = {}", vector(placement.rotate_degrees))?;
     writeln!(out, "scale = {}", vector(placement.scale))
+}
+
+fn write_pbf(out: &mut String, pbf: &Pbf) -> fmt::Result {
+    writeln!(out, "\n[solver.pbf]")?;
+    writeln!(out, "particle_spacing = {:?}", pbf.particle_spacing)?;
+    writeln!(out, "support_ratio = {:?}", pbf.support_ratio)?;
+    writeln!(out, "iteration = {}", text(pbf.iteration.name()))?;
+    match pbf.stop {
+        Stop::Iterations(n) => writeln!(out, "iterations = {n}")?,
+        Stop::DensityError {
+            density_error,
+            max_iterations,
+        } => {
+            writeln!(out, "density_error = {density_error:?}")?;
+            writeln!(out, "max_iterations = {max_iterations}")?;
+        }
+    }
+    writeln!(out, "cfl = {:?}", pbf.cfl)?;
+    writeln!(out, "relaxation = {:?}", pbf.relaxation)?;
+    writeln!(out, "artificial_pressure = {:?}", pbf.artificial_pressure)?;
+    writeln!(out, "max_substeps = {}", pbf.max_substeps)
+}
+
+fn write_flip(out: &mut String, flip: &Flip) -> fmt::Result {
+    writeln!(out, "\n[solver.flip]")?;
+    writeln!(out, "cell_size = {:?}", flip.cell_size)?;
+    writeln!(out, "particles_per_cell = {}", flip.particles_per_cell)?;
+    writeln!(out, "transfer = {}", text(flip.transfer.name()))?;
+    writeln!(out, "pic_blend = {:?}", flip.pic_blend)?;
+    writeln!(out, "cfl = {:?}", flip.cfl)?;
+    writeln!(out, "max_substeps = {}", flip.max_substeps)?;
+    writeln!(out, "surface = {}", text(flip.surface.name()))?;
+    writeln!(out, "density_correction = {}", flip.density_correction)?;
+    let pressure = &flip.pressure;
+    writeln!(out, "\n[solver.flip.pressure]")?;
+    let preconditioner = text(pressure.preconditioner.name());
+    writeln!(out, "preconditioner = {preconditioner}")?;
+    writeln!(out, "tolerance = {:?}", pressure.tolerance)?;
+    writeln!(out, "max_iterations = {}", pressure.max_iterations)?;
+    writeln!(out, "residual_limit = {:?}", pressure.residual_limit)
 }
 
 fn motion(motion: &Motion) -> String {

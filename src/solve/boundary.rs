@@ -46,7 +46,7 @@ impl Boundary {
         let Some(grid) = &self.distance else { return };
         let origin = scene.domain.min;
         let dims = plan.grid_dims.map(|n| n as usize);
-        let spacing = scene.solver.pbf.particle_spacing;
+        let spacing = scene.particle_spacing();
         let cell = |p: DVec3| {
             let c = ((p - origin) / calibration.support_radius)
                 .floor()

@@ -72,7 +72,7 @@ impl Pbf {
             .collect();
         let passes: Vec<_> = plan.passes.iter().map(|pass| pass.spec.clone()).collect();
         let program = Program::new(context, &buffers, &passes, &SHARED_CONSTANTS)?;
-        let pbf = &scene.solver.pbf;
+        let pbf = scene.solver.pbf();
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
         let mut builder = Builder::new(&plan);
         let substep = Recording::new(&program, &substep_commands(&plan, scene, &mut builder));
@@ -144,7 +144,7 @@ impl Pbf {
     /// Substeps that the CFL number asks of the next frame: from the speeds in the state, what gravity adds
     /// within the frame, and the fastest wave-maker.
     fn substeps(&self, start: f64, length: f64) -> Result<u32, SolveError> {
-        let pbf = &self.scene.solver.pbf;
+        let pbf = self.scene.solver.pbf();
         let free = max_speed(&self.state) + self.scene.water.gravity.length() * length;
         let wall = self
             .scene
@@ -168,7 +168,7 @@ impl Pbf {
     }
 
     fn params(&self, time: f64, step: f64) -> Params {
-        let pbf = &self.scene.solver.pbf;
+        let pbf = self.scene.solver.pbf();
         let calibration = &self.calibration;
         let size = self.scene.domain.size();
         let (mut low, mut high) = (DVec3::ZERO, size);
@@ -207,7 +207,7 @@ impl Pbf {
 
     fn run_substep(&mut self, time: f64, step: f64) -> Result<(), SolveError> {
         self.program.upload("params", 0, &[self.params(time, step)]);
-        if let Stop::DensityError { .. } = self.scene.solver.pbf.stop {
+        if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {
             self.program.upload("control", 0, &self.control());
         }
         Ok(self.substep.run(&self.program, self.timer.as_mut())?)
@@ -305,7 +305,7 @@ impl Solver for Pbf {
             // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
             self.upload_state();
         }
-        let iterations = match self.scene.solver.pbf.stop {
+        let iterations = match self.scene.solver.pbf().stop {
             Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
             Stop::DensityError { .. } => u64::from(adaptive_iterations),
         };
@@ -356,7 +356,7 @@ fn sort_commands(plan: &Plan) -> Vec<Command> {
 }
 
 fn substep_commands(plan: &Plan, scene: &Scene, builder: &mut Builder<'_>) -> Vec<Command> {
-    let pbf = &scene.solver.pbf;
+    let pbf = scene.solver.pbf();
     let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
     commands.extend(sort_commands(plan));
     if plan.has_lists {
@@ -414,7 +414,7 @@ fn check_finite(frame: u32, state: &Particles, density: &[f32]) -> Result<(), So
 
 /// Errors and energies of a state; sums run in the order of the ids.
 fn report(scene: &Scene, state: &Particles, density: &[f32]) -> StepReport {
-    let mass = scene.water.rest_density * scene.solver.pbf.particle_spacing.powi(3);
+    let mass = scene.water.rest_density * scene.solver.pbf().particle_spacing.powi(3);
     let (mut kinetic, mut potential) = (0.0, 0.0);
     for (x, v) in state.position.iter().zip(&state.velocity) {
         kinetic += 0.5 * mass * Vec3::from_array(*v).as_dvec3().length_squared();

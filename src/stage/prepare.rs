@@ -35,7 +35,7 @@ impl Start {
     /// # Errors
     /// A mesh without an inside, or too large a distance grid.
     pub fn of(scene: &Scene) -> Result<Self, SignedDistanceError> {
-        let spacing = scene.solver.pbf.particle_spacing;
+        let spacing = scene.particle_spacing();
         let meshes = || scene.solids.iter().map(|solid| &solid.mesh);
         let distance = match solid_bounds(scene) {
             Some(bounds) => SignedDistance::from_meshes(meshes(), &bounds, spacing)?,
@@ -71,7 +71,7 @@ impl Start {
 
 /// Where the solids are, with room about them, as far as water can come.
 fn solid_bounds(scene: &Scene) -> Option<Bounds> {
-    let margin = MARGIN * scene.solver.pbf.particle_spacing;
+    let margin = MARGIN * scene.particle_spacing();
     let reach = scene.domain.grown(margin);
     let mut all: Option<Bounds> = None;
     for bounds in scene.solids.iter().filter_map(|solid| solid.mesh.bounds()) {

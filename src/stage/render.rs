@@ -227,7 +227,7 @@ fn render_scene(scene: &Scene) -> RenderScene {
             .iter()
             .map(|solid| solid.mesh.clone())
             .collect(),
-        particle_spacing: scene.solver.pbf.particle_spacing,
+        particle_spacing: scene.particle_spacing(),
         frames_per_second: scene.shot.frames_per_second,
     }
 }

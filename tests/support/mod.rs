@@ -11,8 +11,8 @@ use swell::{
     domain::{bounds::Bounds, particles::Particles, solver::Solver, solver::StepReport},
     gpu::adapter::Context,
     scene::{
-        Effects, Iteration, Pbf as Settings, Scene, Shot, Solver as SolverSettings, Stop, Water,
-        plan::*,
+        Effects, Iteration, Method, Pbf as Settings, Scene, Shot, Solver as SolverSettings, Stop,
+        Water, plan::*,
     },
     solve::{boundary::Boundary, pbf},
 };
@@ -44,7 +44,9 @@ pub fn scene(size: [f64; 3]) -> Scene {
         solids: Vec::new(),
         wave_makers: Vec::new(),
         solver: SolverSettings {
-            pbf: Settings {
+            method: Method::Pbf,
+            flip: None,
+            pbf: Some(Settings {
                 particle_spacing: D,
                 support_ratio: 2.0,
                 iteration: Iteration::RedBlack,
@@ -53,7 +55,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
                 relaxation: 1.0,
                 artificial_pressure: 0.0,
                 max_substeps: 32,
-            },
+            }),
         },
         grids: None,
         effects: Effects::default(),

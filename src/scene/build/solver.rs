@@ -1,0 +1,277 @@
+//! The solvers' tables. Each one that stands in a scene is checked, whichever is chosen, so that
+//! `--solver` never meets a fault that the scene did not show before.
+
+use toml::Spanned;
+
+use super::{
+    super::{
+        Iteration, Method, Pbf, Solver, Stop,
+        document::Document,
+        flip::{Flip, Preconditioner, Pressure, Surface, Transfer},
+        spec::{FlipSpec, PbfSpec, PressureSpec, SolverSpec},
+    },
+    Lattice, Result, number, number_or, whole,
+};
+use crate::domain::bounds::Bounds;
+
+/// Most cells of a grid, and along one axis.
+const MAX_CELLS: f64 = 2_147_483_647.0;
+const MAX_AXIS_CELLS: f64 = 65_536.0;
+
+/// f32 positions at the far end of the domain must still tell apart this fraction of a spacing.
+const POSITION_RESOLUTION: f64 = 1.0 / 16.0;
+
+/// Room that walls leave each other: spacings with PBF, cells with FLIP, of which one is then
+/// between two that touch a wall.
+const LEAST_SPACINGS: f64 = 2.0;
+const LEAST_CELLS: f64 = 3.0;
+
+/// True residual that ends a bake where the scene sets none.
+const RESIDUAL_LIMIT: f64 = 1e-2;
+
+/// Every table that stands there, and the one that is chosen.
+pub(super) fn solver(doc: &Document<'_>, spec: &SolverSpec, domain: &Bounds) -> Result<Solver> {
+    let method = choice(doc, &spec.method, "method", &Method::NAMED)?;
+    let solver = Solver {
+        method,
+        pbf: match &spec.pbf {
+            Some(spec) => Some(pbf(doc, spec, domain)?),
+            None => None,
+        },
+        flip: match &spec.flip {
+            Some(spec) => Some(flip(doc, spec, domain)?),
+            None => None,
+        },
+    };
+    if solver.has(method) {
+        return Ok(solver);
+    }
+    let problem = format!("the scene has no table [solver.{}]", method.name());
+    Err(doc.fault_at(spec.method.span(), problem))
+}
+
+/// Where each solver's particles start.
+pub(super) fn lattices(spec: &SolverSpec, solver: &Solver) -> Vec<Lattice> {
+    let pbf = spec.pbf.as_ref().zip(solver.pbf.as_ref());
+    let flip = spec.flip.as_ref().zip(solver.flip.as_ref());
+    let pbf = pbf.map(|(spec, pbf)| Lattice {
+        spacing: pbf.particle_spacing,
+        span: spec.particle_spacing.span(),
+    });
+    let flip = flip.map(|(spec, flip)| Lattice {
+        spacing: flip.particle_spacing(),
+        span: spec.cell_size.span(),
+    });
+    pbf.into_iter().chain(flip).collect()
+}
+
+/// Metres that must stay between two walls.
+pub(super) fn least_gap(solver: &Solver) -> f64 {
+    let pbf = solver
+        .pbf
+        .as_ref()
+        .map(|p| LEAST_SPACINGS * p.particle_spacing);
+    let flip = solver.flip.as_ref().map(|f| LEAST_CELLS * f.cell_size);
+    pbf.into_iter().chain(flip).fold(0.0, f64::max)
+}
+
+/// The value that a word stands for.
+fn choice<T: Copy>(
+    doc: &Document<'_>,
+    word: &Spanned<String>,
+    what: &str,
+    named: &[(&str, T)],
+) -> Result<T> {
+    let given = word.get_ref().as_str();
+    if let Some((_, value)) = named.iter().find(|(name, _)| *name == given) {
+        return Ok(*value);
+    }
+    let nearest = named
+        .iter()
+        .map(|(name, _)| *name)
+        .min_by_key(|name| strsim::damerau_levenshtein(name, given))
+        .unwrap_or_default();
+    let problem = format!("{given:?} is no {what}; the nearest is {nearest:?}");
+    Err(doc.fault_at(word.span(), problem))
+}
+
+fn choice_or<T: Copy>(
+    doc: &Document<'_>,
+    word: &Option<Spanned<String>>,
+    what: &str,
+    named: &[(&str, T)],
+    default: T,
+) -> Result<T> {
+    word.as_ref()
+        .map_or(Ok(default), |word| choice(doc, word, what, named))
+}
+
+fn whole_or(
+    doc: &Document<'_>,
+    value: &Option<Spanned<i64>>,
+    default: u32,
+    max: u32,
+) -> Result<u32> {
+    value
+        .as_ref()
+        .map_or(Ok(default), |value| whole(doc, value, max))
+}
+
+fn pbf(doc: &Document<'_>, spec: &PbfSpec, domain: &Bounds) -> Result<Pbf> {
+    let particle_spacing = number(doc, &spec.particle_spacing, |v| v > 0.0)?;
+    let support_ratio = number_or(doc, &spec.support_ratio, 2.0, |v| (1.5..=4.0).contains(&v))?;
+    let lattice = Lattice {
+        spacing: particle_spacing,
+        span: spec.particle_spacing.span(),
+    };
+    check_grid(doc, domain, &lattice, particle_spacing * support_ratio)?;
+    Ok(Pbf {
+        particle_spacing,
+        support_ratio,
+        iteration: choice_or(
+            doc,
+            &spec.iteration,
+            "iteration",
+            &Iteration::NAMED,
+            Iteration::RedBlack,
+        )?,
+        stop: stop(doc, spec)?,
+        cfl: number_or(doc, &spec.cfl, 1.0, |v| v > 0.0 && v <= 5.0)?,
+        relaxation: number_or(doc, &spec.relaxation, 1.0, |v| v > 0.0 && v <= 1.5)?,
+        artificial_pressure: number_or(doc, &spec.artificial_pressure, 0.0, |v| {
+            (0.0..=10.0).contains(&v)
+        })?,
+        max_substeps: whole_or(doc, &spec.max_substeps, 32, 10_000)?,
+    })
+}
+
+fn stop(doc: &Document<'_>, spec: &PbfSpec) -> Result<Stop> {
+    match (&spec.iterations, &spec.density_error, &spec.max_iterations) {
+        (None, None, None) => Ok(Stop::Iterations(4)),
+        (Some(iterations), None, None) => Ok(Stop::Iterations(whole(doc, iterations, 10_000)?)),
+        (None, Some(density_error), Some(max_iterations)) => Ok(Stop::DensityError {
+            density_error: number(doc, density_error, |v| v > 0.0 && v < 1.0)?,
+            max_iterations: whole(doc, max_iterations, 10_000)?,
+        }),
+        (Some(iterations), _, _) => {
+            let other = match &spec.density_error {
+                Some(_) => "density_error",
+                None => "max_iterations",
+            };
+            Err(doc.fault_at(iterations.span(), format!("given together with {other}")))
+        }
+        (None, Some(density_error), None) => {
+            Err(doc.fault_at(density_error.span(), "given without max_iterations"))
+        }
+        (None, None, Some(max_iterations)) => {
+            Err(doc.fault_at(max_iterations.span(), "given without density_error"))
+        }
+    }
+}
+
+fn flip(doc: &Document<'_>, spec: &FlipSpec, domain: &Bounds) -> Result<Flip> {
+    let cell_size = number(doc, &spec.cell_size, |v| v > 0.0)?;
+    check_interior(doc, &spec.cell_size, domain)?;
+    let flip = Flip {
+        cell_size,
+        particles_per_cell: whole_or(doc, &spec.particles_per_cell, 8, 64)?,
+        transfer: choice_or(
+            doc,
+            &spec.transfer,
+            "transfer",
+            &Transfer::NAMED,
+            Transfer::Flip,
+        )?,
+        pic_blend: number_or(doc, &spec.pic_blend, 0.05, |v| (0.0..=1.0).contains(&v))?,
+        cfl: number_or(doc, &spec.cfl, 3.0, |v| v > 0.0 && v <= 5.0)?,
+        max_substeps: whole_or(doc, &spec.max_substeps, 32, 10_000)?,
+        surface: choice_or(
+            doc,
+            &spec.surface,
+            "surface",
+            &Surface::NAMED,
+            Surface::GhostFluid,
+        )?,
+        density_correction: spec.density_correction.unwrap_or(true),
+        pressure: pressure(doc, &spec.pressure)?,
+    };
+    let lattice = Lattice {
+        spacing: flip.particle_spacing(),
+        span: spec.cell_size.span(),
+    };
+    check_grid(doc, domain, &lattice, cell_size)?;
+    Ok(flip)
+}
+
+fn pressure(doc: &Document<'_>, spec: &PressureSpec) -> Result<Pressure> {
+    let tolerance = number_or(doc, &spec.tolerance, 1e-5, |v| v > 0.0 && v < 1.0)?;
+    let default = RESIDUAL_LIMIT.max(tolerance);
+    Ok(Pressure {
+        preconditioner: choice_or(
+            doc,
+            &spec.preconditioner,
+            "preconditioner",
+            &Preconditioner::NAMED,
+            Preconditioner::Multigrid,
+        )?,
+        tolerance,
+        max_iterations: whole_or(doc, &spec.max_iterations, 400, 10_000)?,
+        residual_limit: number_or(doc, &spec.residual_limit, default, |v| v >= tolerance)?,
+    })
+}
+
+/// A cell that touches no wall on either side, along every axis.
+fn check_interior(doc: &Document<'_>, cell_size: &Spanned<f64>, domain: &Bounds) -> Result<()> {
+    let cells = domain.size() / *cell_size.get_ref();
+    // Decimal fractions: 0.6 m are three cells of 0.2 m.
+    if cells.min_element() >= LEAST_CELLS * (1.0 - 1e-9) {
+        return Ok(());
+    }
+    let problem = format!(
+        "no interior cell: a domain of {} × {} × {} m is {:.3} × {:.3} × {:.3} cells of {} m",
+        domain.size().x,
+        domain.size().y,
+        domain.size().z,
+        cells.x,
+        cells.y,
+        cells.z,
+        cell_size.get_ref()
+    );
+    Err(doc.fault_at(cell_size.span(), problem))
+}
+
+/// A grid's indices are 32 bits, and so are positions.
+fn check_grid(
+    doc: &Document<'_>,
+    domain: &Bounds,
+    lattice: &Lattice,
+    cell_size: f64,
+) -> Result<()> {
+    let (spacing, span) = (lattice.spacing, lattice.span.clone());
+    let cells = (domain.size() / cell_size).ceil();
+    let all = cells.x * cells.y * cells.z;
+    let axis = cells.max_element();
+    if all > MAX_CELLS || axis > MAX_AXIS_CELLS {
+        let problem = format!(
+            "the grid would overflow: a domain of {} × {} × {} m takes {:.3e} × {:.3e} × {:.3e} \
+             = {all:.3e} cells of {cell_size} m",
+            domain.size().x,
+            domain.size().y,
+            domain.size().z,
+            cells.x,
+            cells.y,
+            cells.z
+        );
+        return Err(doc.fault_at(span, problem));
+    }
+    let farthest = domain.min.abs().max(domain.max.abs()).max_element();
+    let resolution = farthest * f64::from(f32::EPSILON);
+    if resolution > POSITION_RESOLUTION * spacing {
+        let problem = format!(
+            "{spacing} m is too fine {farthest} m from the origin, where positions (32 bit) are \
+             {resolution:.2e} m apart"
+        );
+        return Err(doc.fault_at(span, problem));
+    }
+    Ok(())
+}
