@@ -23,6 +23,8 @@ mod inactive {
     pub(super) const MINUS_BACKGROUND: u8 = 1;
     /// A mask follows, set where they are the background, clear where they are minus it.
     pub(super) const EITHER: u8 = 3;
+    /// They are written like active ones.
+    pub(super) const WRITTEN: u8 = 6;
 }
 
 /// A grid's leaves by the nodes above them; each map is in the order in which the file has them.
@@ -79,9 +81,9 @@ impl<'a, T: Value> Tree<'a, T> {
                 out.extend_from_slice(&x.to_le_bytes());
             }
             put_masks(out, 5, upper.keys());
-            put_tiles(out, inactive::BACKGROUND, &[]);
+            put_tiles(out, &vec![self.background; 1 << 15], is_half);
             for lower in upper.values() {
-                lower.put_topology(out);
+                lower.put_topology(out, self.background, is_half);
             }
         }
     }
@@ -103,21 +105,14 @@ impl<'a, T: Value> Tree<'a, T> {
     }
 }
 
-impl<T> Lower<'_, T> {
-    fn put_topology(&self, out: &mut Vec<u8>) {
+impl<T: Value> Lower<'_, T> {
+    fn put_topology(&self, out: &mut Vec<u8>, background: T, is_half: bool) {
         put_masks(out, 4, self.leaves.keys());
-        // The places of leaves count as zero there, which is neither.
-        let mut is_background = vec![u64::MAX; 64];
+        let mut tiles = vec![background; 1 << 12];
         for &offset in &self.inside {
-            is_background[offset / 64] &= !(1 << (offset % 64));
+            tiles[offset] = background.negative();
         }
-        if self.inside.is_empty() {
-            put_tiles(out, inactive::BACKGROUND, &[]);
-        } else if self.inside.len() + self.leaves.len() == 4096 {
-            put_tiles(out, inactive::MINUS_BACKGROUND, &[]);
-        } else {
-            put_tiles(out, inactive::EITHER, &is_background);
-        }
+        put_tiles(out, &tiles, is_half);
         for leaf in self.leaves.values() {
             put_words(out, &leaf.active);
         }
@@ -144,11 +139,16 @@ fn put_masks<'a>(out: &mut Vec<u8>, bits: u32, children: impl Iterator<Item = &'
     put_words(out, &vec![0; words]);
 }
 
-/// The values of an inner node: inactive all of them, so that only their kind is written.
-fn put_tiles(out: &mut Vec<u8>, kind: u8, selection: &[u64]) {
-    out.push(kind);
-    put_words(out, selection);
-    out.extend_from_slice(&zipped(&[]));
+/// The values of an inner node, all inactive and all written, which zipping makes next to nothing.
+/// OpenVDB leaves them out where it can, but not even their length stands there in half precision,
+/// and vdb-rs 0.6 expects one.
+fn put_tiles<T: Value>(out: &mut Vec<u8>, tiles: &[T], is_half: bool) {
+    out.push(inactive::WRITTEN);
+    let mut bytes = Vec::new();
+    for &tile in tiles {
+        value::put(&mut bytes, tile, is_half);
+    }
+    out.extend_from_slice(&zipped(&bytes));
 }
 
 /// A leaf's mask once more, and its active values.
