@@ -104,32 +104,17 @@ impl Raster {
         let support = support as f32;
         let mut level = vec![support - radius; voxels.len()];
         voxels.for_each_brick(&mut level, |slot, level| {
-            let corner = voxels.corner(slot).map(|c| c as f32);
-            let mut sums = [[0.0f32; 4]; CELLS as usize];
-            for (place, _) in voxels.near(slot) {
-                let p: [f32; 3] = std::array::from_fn(|axis| place[axis] - corner[axis]);
-                let Some(range) = touched(p, support, [0.5; 3]) else {
-                    continue;
-                };
-                for [x, y, z] in range {
-                    let d = [
-                        x as f32 + 0.5 - p[0],
-                        y as f32 + 0.5 - p[1],
-                        z as f32 + 0.5 - p[2],
-                    ];
-                    let s = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (support * support);
-                    let w = (1.0 - s).max(0.0).powi(3);
-                    let sum = &mut sums[x + 8 * y + 64 * z];
-                    for axis in 0..3 {
-                        sum[axis] += w * d[axis];
-                    }
-                    sum[3] += w;
-                }
-            }
-            for (level, [x, y, z, w]) in level.iter_mut().zip(sums) {
+            // Σ w dx, Σ w dy, Σ w dz, Σ w, each over d = voxel − particle.
+            let mut sums = [[0.0f32; CELLS as usize]; 4];
+            voxels.for_each_near(slot, support.ceil() as usize, |p, _| {
+                add_kernel(&mut sums, p, support);
+            });
+            let [x, y, z, w] = &sums;
+            for (at, level) in level.iter_mut().enumerate() {
                 // Below it the quotient is round-off; a particle there is all but out of reach.
-                if w > 1e-12 {
-                    *level = (x * x + y * y + z * z).sqrt() / w - radius;
+                if w[at] > 1e-12 {
+                    *level =
+                        (x[at] * x[at] + y[at] * y[at] + z[at] * z[at]).sqrt() / w[at] - radius;
                 }
             }
         });
@@ -150,8 +135,7 @@ impl Raster {
         let Some(voxels) = Voxels::new(particles, self.origin, self.voxel_size, reach) else {
             return grid;
         };
-        let faces =
-            [0, 1, 2].map(|axis| extrapolated(&voxels, face_mean(&voxels, particles, axis)));
+        let faces = face_means(&voxels, particles).map(|means| extrapolated(&voxels, means));
         grid.leaves = voxels
             .slots()
             .into_par_iter()
@@ -216,21 +200,27 @@ fn lattice_offset(spacing: f64, support: f64, place: DVec3) -> f64 {
     }
 }
 
-/// The voxels of a brick whose sample points, at `offset` in each, lie within `support` of `p` along
-/// every axis; all in voxels from the brick's corner.
-fn touched(
-    p: [f32; 3],
-    support: f32,
-    offset: [f32; 3],
-) -> Option<impl Iterator<Item = [usize; 3]>> {
-    let low = |axis: usize| (p[axis] - support - offset[axis]).ceil().max(0.0) as usize;
-    let high = |axis: usize| (p[axis] + support - offset[axis]).floor().min(7.0) as i32;
-    let is_near = (0..3).all(|axis| high(axis) >= low(axis) as i32);
-    let [x0, y0, z0] = [0, 1, 2].map(low);
-    let [x1, y1, z1] = [0, 1, 2].map(|axis| high(axis) as usize);
-    is_near.then(|| {
-        (z0..=z1).flat_map(move |z| (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| [x, y, z])))
-    })
+/// Adds a particle at `p` to the sums of the voxels of a brick, in voxels from its corner.
+fn add_kernel(sums: &mut [[f32; CELLS as usize]; 4], p: [f32; 3], support: f32) {
+    let low = p.map(|x| (x - support - 0.5).ceil().max(0.0) as usize);
+    let end = p.map(|x| (x + support + 0.5).floor().clamp(0.0, 8.0) as usize);
+    let inverse = 1.0 / (support * support);
+    for z in low[2]..end[2] {
+        let dz = z as f32 + 0.5 - p[2];
+        for y in low[1]..end[1] {
+            let dy = y as f32 + 0.5 - p[1];
+            for x in low[0]..end[0] {
+                let dx = x as f32 + 0.5 - p[0];
+                let s = (1.0 - (dx * dx + dy * dy + dz * dz) * inverse).max(0.0);
+                let w = s * s * s;
+                let at = x + 8 * y + 64 * z;
+                sums[0][at] += w * dx;
+                sums[1][at] += w * dy;
+                sums[2][at] += w * dz;
+                sums[3][at] += w;
+            }
+        }
+    }
 }
 
 /// Distance to where `level` changes its sign, in voxels, without sign; infinite beyond the band.
@@ -306,34 +296,43 @@ fn upwind_distance(mut a: [f32; 3]) -> f32 {
     (sum + (sum * sum - 3.0 * (squares - 1.0)).max(0.0).sqrt()) / 3.0
 }
 
-/// Mean velocity along `axis` on the faces that particles reach.
-fn face_mean(voxels: &Voxels, particles: &Particles, axis: usize) -> Vec<Option<f32>> {
-    let mut offset = [0.5; 3];
-    offset[axis] = 0.0;
-    let mut means = vec![None; voxels.len()];
-    voxels.for_each_brick(&mut means, |slot, means| {
-        let corner = voxels.corner(slot).map(|c| c as f32);
-        let mut sums = [[0.0f32; 2]; CELLS as usize];
-        for (place, index) in voxels.near(slot) {
-            let p: [f32; 3] = std::array::from_fn(|axis| place[axis] - corner[axis]);
-            let Some(range) = touched(p, 1.0, offset) else {
-                continue;
-            };
-            let velocity = particles.velocity[index as usize][axis];
-            for at in range {
-                let w: f32 = (0..3)
-                    .map(|axis| (1.0 - (at[axis] as f32 + offset[axis] - p[axis]).abs()).max(0.0))
-                    .product();
-                let sum = &mut sums[at[0] + 8 * at[1] + 64 * at[2]];
-                sum[0] += w * velocity;
-                sum[1] += w;
+/// Mean velocity along each axis on the faces that particles reach.
+fn face_means(voxels: &Voxels, particles: &Particles) -> [Vec<Option<f32>>; 3] {
+    [0, 1, 2].map(|axis| {
+        let mut means = vec![None; voxels.len()];
+        voxels.for_each_brick(&mut means, |slot, means| {
+            let mut sums = [[0.0f32; 2]; CELLS as usize];
+            voxels.for_each_near(slot, 1, |p, index| {
+                add_weights(&mut sums, p, axis, particles.velocity[index][axis]);
+            });
+            for (mean, [sum, weight]) in means.iter_mut().zip(sums) {
+                // Below it the quotient is round-off.
+                *mean = (weight > 1e-6).then(|| sum / weight);
             }
+        });
+        means
+    })
+}
+
+/// Adds a particle at `p` to Σ w v and Σ w of the eight faces of `axis` about it, as far as they are
+/// the brick's, in voxels from its corner.
+fn add_weights(sums: &mut [[f32; 2]; CELLS as usize], p: [f32; 3], axis: usize, velocity: f32) {
+    // Faces lie on whole numbers along their axis, halfway between along the others.
+    let from_first: [f32; 3] = std::array::from_fn(|a| if a == axis { p[a] } else { p[a] - 0.5 });
+    let first = from_first.map(|x| x.floor() as i32);
+    for corner in 0..8 {
+        let side = [corner & 1, corner >> 1 & 1, corner >> 2];
+        let at: [i32; 3] = std::array::from_fn(|a| first[a] + side[a]);
+        if at.iter().any(|x| !(0..8).contains(x)) {
+            continue;
         }
-        for (mean, [sum, weight]) in means.iter_mut().zip(sums) {
-            *mean = (weight > 1e-6).then(|| sum / weight);
-        }
-    });
-    means
+        let w: f32 = (0..3)
+            .map(|a| 1.0 - (at[a] as f32 - from_first[a]).abs())
+            .product();
+        let sum = &mut sums[(at[0] + 8 * at[1] + 64 * at[2]) as usize];
+        sum[0] += w * velocity;
+        sum[1] += w;
+    }
 }
 
 /// Carries values outward: layer by layer, the mean of the neighbours that are known.

@@ -9,25 +9,26 @@ use super::{
     sparse_grid::{Leaf, VOXELS},
 };
 
-/// Bricks about the particles of one frame, and the particles of each.
+/// Bricks about the particles of one frame, and the particles of each voxel.
 ///
 /// Positions and indices are relative to `base`, which lies at the least corner of the first brick.
 pub(super) struct Voxels {
     pub(super) bricks: Bricks,
     /// Index of the first voxel of the first brick, in the whole grid.
-    pub(super) base: [i32; 3],
-    /// By wet slot − 1: where its particles begin in `order`, and at the end their number.
-    starts: Vec<usize>,
-    /// Particles by brick, and within it as in the frame.
+    base: [i32; 3],
+    /// By voxel of the wet slots, from the first one's on: where its particles begin in `order`; and
+    /// at the end their number.
+    starts: Vec<u32>,
+    /// Particles by voxel, and within it as in the frame.
     order: Vec<u32>,
     /// In voxels from `base`, in the order of `order`.
     places: Vec<[f32; 3]>,
 }
 
 impl Voxels {
-    /// Sorts `particles` into bricks of voxels whose indices begin at `origin`, with all bricks
-    /// that `reach` voxels about a particle's brick touch. Positions that are no numbers are passed
-    /// over. `None` where nothing is left.
+    /// Sorts `particles` into voxels whose indices begin at `origin`, with all bricks that come
+    /// within `reach` voxels of one with particles. Positions that are no numbers are passed over.
+    /// `None` where nothing is left.
     pub(super) fn new(
         particles: &Particles,
         origin: DVec3,
@@ -57,22 +58,26 @@ impl Voxels {
         }
         let bricks = Bricks::new(cells, &is_wet, margin as u32, 1);
 
-        let mut starts = vec![0; bricks.wet as usize + 1];
+        let voxel_of = |p: DVec3| {
+            let [x, y, z] = (p - base).to_array().map(|c| c as usize % EDGE as usize);
+            (bricks.table[brick_of(p)] as usize - 1) * VOXELS + x + 8 * y + 64 * z
+        };
+        let mut starts = vec![0; bricks.wet as usize * VOXELS + 1];
         for p in sound() {
-            starts[bricks.table[brick_of(p)] as usize] += 1;
+            starts[voxel_of(p) + 1] += 1;
         }
-        for slot in 1..starts.len() {
-            starts[slot] += starts[slot - 1];
+        for voxel in 1..starts.len() {
+            starts[voxel] += starts[voxel - 1];
         }
         let mut next = starts.clone();
-        let mut order = vec![0; starts[bricks.wet as usize]];
-        let mut places = vec![[0.0; 3]; order.len()];
+        let mut order = vec![0; particles.len()];
+        let mut places = vec![[0.0; 3]; particles.len()];
         for (index, p) in particles.position.iter().map(place).enumerate() {
             if is_sound(&p) {
-                let slot = bricks.table[brick_of(p)] as usize - 1;
-                order[next[slot]] = index as u32;
-                places[next[slot]] = (p - base).to_array().map(|x| x as f32);
-                next[slot] += 1;
+                let at = &mut next[voxel_of(p)];
+                order[*at as usize] = index as u32;
+                places[*at as usize] = (p - base).to_array().map(|x| x as f32);
+                *at += 1;
             }
         }
         Some(Self {
@@ -101,18 +106,42 @@ impl Voxels {
             .map(|c| (c * EDGE) as i32)
     }
 
-    /// Places (voxels from `base`) and indices of the particles in the 3³ bricks about `slot`,
-    /// in an order that depends on the frame alone.
-    pub(super) fn near(&self, slot: usize) -> impl Iterator<Item = (&[f32; 3], u32)> {
-        let slots = self.bricks.records[slot].neighbors.iter();
-        slots
-            .filter(|&&s| s != 0 && s <= self.bricks.wet)
-            .flat_map(|&s| {
-                let range = self.starts[s as usize - 1]..self.starts[s as usize];
-                self.places[range.clone()]
-                    .iter()
-                    .zip(self.order[range].iter().copied())
-            })
+    /// Visits the particles of the slot's voxels and of `margin` voxels about them, at most 8, in an
+    /// order that depends on the frame alone: where each lies, in voxels from the slot's corner, and
+    /// its index.
+    pub(super) fn for_each_near(
+        &self,
+        slot: usize,
+        margin: usize,
+        mut visit: impl FnMut([f32; 3], usize),
+    ) {
+        let corner = self.corner(slot).map(|c| c as f32);
+        let neighbors = &self.bricks.records[slot].neighbors;
+        // Along an axis: the brick before, the slot's own, the one behind, and which voxels of each.
+        let parts = [(0, 8 - margin..8), (1, 0..8), (2, 0..margin)];
+        for (bz, zs) in &parts {
+            for (by, ys) in &parts {
+                for (bx, xs) in &parts {
+                    let slot = neighbors[bx + 3 * by + 9 * bz];
+                    if slot == 0 || slot > self.bricks.wet {
+                        continue;
+                    }
+                    for z in zs.clone() {
+                        for y in ys.clone() {
+                            let row = (slot as usize - 1) * VOXELS + 8 * y + 64 * z;
+                            let first = self.starts[row + xs.start] as usize;
+                            let last = self.starts[row + xs.end] as usize;
+                            for k in first..last {
+                                let p = self.places[k];
+                                let from_corner =
+                                    std::array::from_fn(|axis| p[axis] - corner[axis]);
+                                visit(from_corner, self.order[k] as usize);
+                            }
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// Element of the neighbour of a voxel along `axis`, a step of ±1; an element of slot 0 where
