@@ -5,7 +5,7 @@ use std::path::Path;
 use proptest::prelude::*;
 use swell::{
     domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
-    scene::{Scene, SceneError},
+    scene::{Scene, SceneError, study::Study},
 };
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
@@ -341,7 +341,12 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
             "at least 3",
         ],
     ),
-    ("cell_size = 0.2", "cell_size = 4.2", 36, &[]),
+    (
+        "cell_size = 0.2",
+        "cell_size = 4.2\nparticles_per_cell = 64",
+        36,
+        &[],
+    ),
     (
         "cell_size = 0.2",
         "cell_size = 4.2\nparticles_per_cell = 1",
@@ -350,9 +355,9 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
     ),
     (
         "cell_size = 0.2",
-        "cell_size = 0.01",
+        "cell_size = 0.021",
         36,
-        &["particles 0.005 m apart", "134217728"],
+        &["particles 0.0105 m apart", "134217728"],
     ),
     (
         "cell_size = 0.2",
@@ -694,6 +699,101 @@ fn a_missing_table_and_a_missing_file_are_named() {
     assert!(matches!(error, SceneError::Read { .. }), "{error}");
 }
 
+const STUDY: &str = r#"kind = "solver_comparison"
+scene = "scene.toml"
+look = "look.toml"
+solvers = ["pbf", "flip"]
+frames = "1-240x2"
+pictures = "60,120"
+"#;
+
+const LOOK: &str = r#"[camera]
+focal_length_mm = 35.0
+film_back_mm = [36.0, 20.25]
+position = [-2.0, 3.0, 2.5]
+target = [0.0, 1.0, 0.75]
+[image]
+width = 64
+height = 36
+[sky]
+model = "hosek_wilkie"
+[sun]
+azimuth_degrees = 120.0
+elevation_degrees = 35.0
+[output]
+formats = ["png"]
+"#;
+
+#[test]
+fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
+    let dir = assets();
+    let write = |name: &str, text: &str| {
+        std::fs::write(dir.path().join(name), text).expect("written");
+    };
+    write("scene.toml", SCENE);
+    let (pbf_alone, _) = SCENE.split_once("[solver.flip]").expect("a table");
+    write("pbf.toml", pbf_alone);
+    write("bad.toml", &SCENE.replace("frames = 240", "frames = 0"));
+    write("look.toml", LOOK);
+    write("exr.toml", &LOOK.replace("png", "exr"));
+    let parse = |text: &str| Study::parse(text, Path::new("s.toml"), dir.path());
+    parse(STUDY).expect("the good study is good");
+    for (old, new, expected) in [
+        (
+            "solver_comparison",
+            "comparison",
+            "s.toml:1: kind: \"comparison\" is no kind of study; allowed: \"solver_comparison\"",
+        ),
+        (
+            "pictures",
+            "picture",
+            "s.toml:6: picture: unknown key; the nearest is \"pictures\"",
+        ),
+        (
+            "look = \"look.toml\"\n",
+            "",
+            "look: missing; allowed: a look file",
+        ),
+        (
+            "\"flip\"]",
+            "\"pbf\"]",
+            "s.toml:4: solvers: [\"pbf\", \"pbf\"] are not two solvers",
+        ),
+        ("\"flip\"]", "\"sph\"]", "solvers: \"sph\" is no solver"),
+        (
+            "1-240x2",
+            "1-241",
+            "s.toml:5: frames: the shot has frames 1 to 240",
+        ),
+        ("1-240x2", "0-9", "frames: the shot has frames 1 to 240"),
+        (
+            "60,120",
+            "120-60",
+            "s.toml:6: pictures: `120-60` is no frame range",
+        ),
+        (
+            "scene.toml",
+            "pbf.toml",
+            "s.toml:2: scene: it has no table [solver.flip]",
+        ),
+        (
+            "look.toml",
+            "exr.toml",
+            "s.toml:3: look: its output.formats has no \"png\"",
+        ),
+        ("scene.toml", "bad.toml", "bad.toml:3: shot.frames: 0"),
+        ("scene.toml", "none.toml", "cannot read scene"),
+        ("look.toml", "none.toml", "none.toml"),
+    ] {
+        assert!(STUDY.contains(old), "{old}");
+        let message = match parse(&STUDY.replacen(old, new, 1)) {
+            Ok(_) => panic!("{new}: accepted"),
+            Err(error) => error.to_string(),
+        };
+        assert!(message.contains(expected), "{message}\n  wanted {expected}");
+    }
+}
+
 /// A closed cube in each format, as seeds for mutation.
 fn seeds() -> Vec<(MeshFormat, Vec<u8>)> {
     let mesh = TriangleMesh::from_bytes(CUBE.as_bytes(), MeshFormat::Obj, Path::new("cube.obj"))
@@ -835,6 +935,15 @@ proptest! {
         let bytes = mutate(SCENE.as_bytes().to_vec(), &edits);
         // Nothing is allocated for the water here, however much a mutation asks for.
         let _ = parse(Path::new("/nowhere"), &String::from_utf8_lossy(&bytes));
+    }
+
+    #[test]
+    fn no_mutation_makes_the_study_parser_panic(
+        edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
+    ) {
+        let bytes = mutate(STUDY.as_bytes().to_vec(), &edits);
+        let text = String::from_utf8_lossy(&bytes);
+        let _ = Study::parse(&text, Path::new("s.toml"), Path::new("/nowhere"));
     }
 
     #[test]

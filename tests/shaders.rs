@@ -8,11 +8,11 @@ use swell::{
         reflect::{Access, Layout, reflect},
         shader,
     },
-    solve::params::{Params, Phase, SolidGrid},
+    solve::params::{FlipParams, Params, Phase, SolidGrid},
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 5] = [
+const VARIANTS: [&[&str]; 7] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -24,6 +24,8 @@ const VARIANTS: [&[&str]; 5] = [
         "ARTIFICIAL_PRESSURE",
     ],
     &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
+    &["CORRECTION", "GHOST_FLUID"],
+    &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
 ];
 
 fn compute_passes() -> Vec<String> {
@@ -106,12 +108,18 @@ fn check(
 
 #[test]
 fn mirrors_match_naga() {
-    let mut found = [0; 3];
+    let mut found = [0; 4];
     for pass in compute_passes() {
         let text = shader::compose(&pass, &["SOLIDS", "NEIGHBOR_LIST"]).unwrap();
         let layouts = reflect(&pass, &text).unwrap().layouts;
         let seen = [
             check(&layouts, "Params", size_of::<Params>(), &Params::members()),
+            check(
+                &layouts,
+                "FlipParams",
+                size_of::<FlipParams>(),
+                &FlipParams::members(),
+            ),
             check(&layouts, "Phase", size_of::<Phase>(), &Phase::members()),
             check(
                 &layouts,
@@ -160,7 +168,7 @@ fn composition_faults_name_their_place() {
 }
 
 /// Rooms that each room may import; `stage` and `cli` stand above them all.
-const MAY_IMPORT: [(&str, &[&str]); 8] = [
+const MAY_IMPORT: [(&str, &[&str]); 9] = [
     ("domain", &[]),
     ("gpu", &[]),
     // The plan's rows are gpu's own plain descriptions: a copy of them would have to be kept in step.
@@ -168,9 +176,12 @@ const MAY_IMPORT: [(&str, &[&str]); 8] = [
     ("cache", &["domain"]),
     ("solve", &["gpu", "domain", "scene"]),
     ("render", &["gpu", "domain", "scene"]),
+    ("study", &["domain"]),
     (
         "stage",
-        &["domain", "gpu", "scene", "cache", "solve", "render"],
+        &[
+            "domain", "gpu", "scene", "cache", "solve", "render", "study",
+        ],
     ),
     ("cli", &["stage", "scene", "domain"]),
 ];

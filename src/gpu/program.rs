@@ -85,6 +85,22 @@ impl Program {
         })
     }
 
+    /// Allocates those of `buffers` anew, zeroed, whose size is no longer as wanted. Recordings made before
+    /// hold the old ones.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] before anything is allocated, [`GpuError::Lost`].
+    pub fn resize(&mut self, buffers: &[BufferSpec]) -> Result<(), GpuError> {
+        check_sizes(&self.context, buffers)?;
+        for spec in buffers {
+            if self.buffer(&spec.name).size() != allocated(spec) {
+                let buffer = allocate(&self.context, spec);
+                self.buffers.insert(spec.name.clone(), buffer);
+            }
+        }
+        self.context.check()
+    }
+
     /// The pass of that name.
     ///
     /// # Panics
@@ -213,6 +229,10 @@ fn check_size(context: &Context, spec: &BufferSpec) -> Result<(), GpuError> {
     Ok(())
 }
 
+fn allocated(spec: &BufferSpec) -> u64 {
+    spec.bytes.next_multiple_of(16).max(16)
+}
+
 fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
     let role = if spec.is_uniform {
         BufferUsages::UNIFORM
@@ -221,7 +241,7 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
     };
     context.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(&spec.name),
-        size: spec.bytes.next_multiple_of(16).max(16),
+        size: allocated(spec),
         usage: role | BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })

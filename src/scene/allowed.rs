@@ -187,6 +187,25 @@ const TABLE: &[(&str, &str)] = &[
          268435456 leaves of 8³ voxels in the domain",
     ),
     ("grids.precision", "\"half\" or \"float\""),
+    // Of a study file.
+    ("kind", "\"solver_comparison\""),
+    (
+        "scene",
+        "a scene file with a table for each of the solvers, relative to the study file",
+    ),
+    (
+        "look",
+        "a look file that writes PNG, relative to the study file",
+    ),
+    ("solvers", "two of \"pbf\" and \"flip\", each once"),
+    (
+        "frames",
+        "frames to measure, such as \"1-240\" or \"1-240x2\", within the shot; all of it if left out",
+    ),
+    (
+        "pictures",
+        "frames to render, such as \"60-240x60\", within the shot",
+    ),
     // The effects say for themselves what their keys allow.
     (
         "effects",

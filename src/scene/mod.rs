@@ -5,6 +5,7 @@ pub mod flip;
 pub mod grids;
 pub mod look;
 pub mod plan;
+pub mod study;
 
 mod allowed;
 mod build;

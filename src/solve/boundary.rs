@@ -31,6 +31,7 @@ impl Boundary {
             particles: 0,
             boundary_samples: self.samples.len(),
             solid_grid: self.distance.as_ref().map_or([0; 3], |grid| grid.dims),
+            ..Counts::default()
         }
     }
 
@@ -43,7 +44,9 @@ impl Boundary {
         plan: &Plan,
         calibration: &Calibration,
     ) {
-        let Some(grid) = &self.distance else { return };
+        if self.distance.is_none() {
+            return;
+        }
         let origin = scene.domain.min;
         let dims = plan.grid_dims.map(|n| n as usize);
         let spacing = scene.particle_spacing();
@@ -81,6 +84,13 @@ impl Boundary {
             .collect();
         program.upload("predicted", 32 * plan.counts.particles as u64, &packed);
         program.upload("boundary_cell_start", 0, &start);
+        self.upload_distance(program, scene);
+    }
+
+    /// Fills the signed distance that the plan has for solids.
+    pub(super) fn upload_distance(&self, program: &Program, scene: &Scene) {
+        let Some(grid) = &self.distance else { return };
+        let origin = scene.domain.min;
         program.upload("solid_distance", 0, &grid.values);
         let uniform = SolidGrid {
             origin: (grid.origin - origin).as_vec3().to_array(),

@@ -1,9 +1,12 @@
 //! Particle solvers on the GPU.
 
 pub mod boundary;
+pub mod flip;
 mod iteration;
 pub mod params;
 pub mod pbf;
+pub mod pressure;
+mod state;
 
 use crate::gpu::adapter::GpuError;
 

@@ -66,6 +66,57 @@ mirror!(
 );
 
 mirror!(
+    /// `FlipParams` of shared/flip_params.wgsl; lengths in metres, positions relative to the domain's least
+    /// corner.
+    FlipParams {
+        /// Least faces of the box at the substep's end, wave-makers included.
+        wall_min: [f32; 3],
+        /// Particles.
+        particle_count: u32,
+        /// Greatest faces of the box then.
+        wall_max: [f32; 3],
+        /// Cells of slots with water.
+        wet_cells: u32,
+        /// Least faces of the box at the substep's start, in cells.
+        cut_min: [f32; 3],
+        /// Cells of slots with water or within reach.
+        active_cells: u32,
+        /// Greatest faces of the box then, in cells.
+        cut_max: [f32; 3],
+        /// Between planes of face arrays, in elements.
+        stride: u32,
+        /// Of the least faces, each along its axis, m/s.
+        wall_velocity_min: [f32; 3],
+        /// Between planes of partial sums, in elements.
+        partial_stride: u32,
+        /// Of the greatest faces, m/s.
+        wall_velocity_max: [f32; 3],
+        /// Seconds.
+        time_step: f32,
+        /// Gravity times time step, m/s.
+        velocity_step: [f32; 3],
+        /// Δx.
+        cell_size: f32,
+        /// Cells of the domain.
+        cells: [u32; 3],
+        /// 1/Δx.
+        inverse_cell_size: f32,
+        /// Bricks of the table.
+        table_dims: [u32; 3],
+        /// α of a substep.
+        pic_blend: f32,
+        /// One over the particles of a full cell.
+        particle_share: f32,
+        /// Least distance from a wall or solid.
+        contact_distance: f32,
+        /// Of a substep.
+        max_displacement: f32,
+        /// Unused.
+        padding: f32,
+    }
+);
+
+mirror!(
     /// `Phase` of shared/phase.wgsl.
     Phase {
         /// First particle of the chunk; even.

@@ -1,6 +1,6 @@
 //! Position-based fluids (Macklin and Müller 2013) with the red/black iteration.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use crate::{
     domain::{
@@ -20,7 +20,13 @@ use crate::{
     },
 };
 
-use super::{SolveError, boundary::Boundary, iteration::Builder, params::Params};
+use super::{
+    SolveError,
+    boundary::Boundary,
+    iteration::Builder,
+    params::Params,
+    state::{check_finite, max_speed, report, slots_by_id, take_over, upload},
+};
 
 /// Particles keep this part of their spacing from walls and solids; at rest the lattice stands at 0.5.
 const CONTACT: f64 = 0.25;
@@ -121,24 +127,6 @@ impl Pbf {
     /// The device.
     pub fn field<T: bytemuck::Pod>(&self, name: &str, count: usize) -> Result<Vec<T>, SolveError> {
         Ok(self.program.download(&[(name, count)])?.remove(0))
-    }
-
-    fn upload_state(&self) {
-        let origin = self.scene.domain.min;
-        let local = |p: &[f32; 3]| {
-            let x = (Vec3::from_array(*p).as_dvec3() - origin).as_vec3();
-            [x.x, x.y, x.z, 1.0]
-        };
-        let position: Vec<[f32; 4]> = self.state.position.iter().map(local).collect();
-        let velocity: Vec<[f32; 4]> = self
-            .state
-            .velocity
-            .iter()
-            .map(|v| [v[0], v[1], v[2], 0.0])
-            .collect();
-        self.program.upload("position", 0, &position);
-        self.program.upload("velocity", 0, &velocity);
-        self.program.upload("id", 0, &self.state.id);
     }
 
     /// Substeps that the CFL number asks of the next frame: from the speeds in the state, what gravity adds
@@ -247,15 +235,7 @@ impl Pbf {
         let density = self.field::<f32>("density", n)?;
 
         let slot_of = slots_by_id(&self.state.id);
-        let origin = self.scene.domain.min;
-        for k in 0..n {
-            let slot = slot_of(id[k]);
-            let [x, y, z, _] = position[k];
-            let world = origin + DVec3::new(f64::from(x), f64::from(y), f64::from(z));
-            self.state.position[slot] = world.as_vec3().to_array();
-            let [x, y, z, _] = velocity[k];
-            self.state.velocity[slot] = [x, y, z];
-        }
+        take_over(&mut self.state, &self.scene, &slot_of, id, position, velocity);
         let mut by_slot = vec![0.0; n];
         for (&id, &value) in sorted_id.iter().zip(&density) {
             by_slot[slot_of(id)] = value;
@@ -277,7 +257,7 @@ impl Solver for Pbf {
         }
         self.state = particles.clone();
         self.frame = frame;
-        self.upload_state();
+        upload(&self.program, &self.scene, &self.state);
         Ok(())
     }
 
@@ -300,10 +280,10 @@ impl Solver for Pbf {
                 what,
             });
         }
-        check_finite(self.frame, &self.state, &density)?;
+        check_finite(self.frame, &self.state, Some(&density))?;
         if self.scene.domain.min != DVec3::ZERO {
             // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
-            self.upload_state();
+            upload(&self.program, &self.scene, &self.state);
         }
         let iterations = match self.scene.solver.pbf().stop {
             Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
@@ -377,76 +357,3 @@ fn measure_commands(plan: &Plan, builder: &mut Builder<'_>) -> Vec<Command> {
     commands
 }
 
-/// Where a particle stands in a state, by id.
-fn slots_by_id(ids: &[u32]) -> impl Fn(u32) -> usize + use<> {
-    let top = ids.iter().max().map_or(0, |&id| id as usize + 1);
-    let mut slots = vec![0; top];
-    for (slot, &id) in ids.iter().enumerate() {
-        slots[id as usize] = slot;
-    }
-    move |id| slots[id as usize]
-}
-
-fn max_speed(state: &Particles) -> f64 {
-    state
-        .velocity
-        .iter()
-        .map(|v| Vec3::from_array(*v).as_dvec3().length())
-        .fold(0.0, f64::max)
-}
-
-fn check_finite(frame: u32, state: &Particles, density: &[f32]) -> Result<(), SolveError> {
-    let is_bad = |v: &[f32; 3]| !v.iter().all(|x| x.is_finite());
-    let place = (0..state.len()).find(|&k| {
-        is_bad(&state.position[k]) || is_bad(&state.velocity[k]) || !density[k].is_finite()
-    });
-    match place {
-        None => Ok(()),
-        Some(k) => Err(SolveError::Numbers {
-            frame,
-            what: format!(
-                "particle {} is not finite: position {:?}, velocity {:?}, relative density {}",
-                state.id[k], state.position[k], state.velocity[k], density[k]
-            ),
-        }),
-    }
-}
-
-/// Errors and energies of a state; sums run in the order of the ids.
-fn report(scene: &Scene, state: &Particles, density: &[f32]) -> StepReport {
-    let mass = scene.water.rest_density * scene.solver.pbf().particle_spacing.powi(3);
-    let (mut kinetic, mut potential) = (0.0, 0.0);
-    for (x, v) in state.position.iter().zip(&state.velocity) {
-        kinetic += 0.5 * mass * Vec3::from_array(*v).as_dvec3().length_squared();
-        potential -= mass
-            * scene
-                .water
-                .gravity
-                .dot(Vec3::from_array(*x).as_dvec3() - scene.domain.min);
-    }
-    let mut errors: Vec<f64> = density
-        .iter()
-        .map(|&rho| (f64::from(rho) - 1.0).max(0.0))
-        .collect();
-    // From 0: an empty sum is -0.
-    let mean = errors.iter().fold(0.0, |sum, error| sum + error) / errors.len().max(1) as f64;
-    errors.sort_unstable_by(f64::total_cmp);
-    let percentile = |p: f64| {
-        errors
-            .get(((errors.len() as f64 * p).ceil() as usize).saturating_sub(1))
-            .copied()
-    };
-    StepReport {
-        substeps: 0,
-        iterations: 0,
-        density_error_mean: mean,
-        density_error_p99: percentile(0.99).unwrap_or(0.0),
-        density_error_max: percentile(1.0).unwrap_or(0.0),
-        kinetic_energy: kinetic,
-        potential_energy: potential,
-        max_speed: max_speed(state),
-        capped: 0,
-        searched: 0,
-        projection: None,
-    }
-}

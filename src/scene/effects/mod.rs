@@ -1,7 +1,8 @@
 //! Effects that a scene may name under `[effects]`: one file and one line each.
 //!
-//! An effect's file holds its settings, what they may be, and what it adds to the plan. Its passes run
-//! after the velocity update, in order, and bind buffers by name.
+//! An effect's file holds its settings, what they may be, and what it adds to the plan of each solver. Its
+//! passes bind buffers by name and run in order: of PBF after the velocity update, of FLIP on the grid
+//! before the projection.
 
 use crate::gpu::program::{BufferSpec, PassSpec};
 
@@ -14,6 +15,8 @@ pub struct EffectPlan {
     pub passes: Vec<PassSpec>,
     /// Beyond what the solver has anyway.
     pub buffers: Vec<BufferSpec>,
+    /// Part of the velocity that a frame takes from the grid for it; of FLIP alone.
+    pub blend: f64,
 }
 
 macro_rules! effects {
@@ -41,7 +44,19 @@ macro_rules! effects {
                 $(
                     if let Some(settings) = &self.$name {
                         let (passes, buffers) = settings.plan(particles);
-                        plans.push(EffectPlan { name: stringify!($name), passes, buffers });
+                        plans.push(EffectPlan { name: stringify!($name), passes, buffers, blend: 0.0 });
+                    }
+                )+
+                plans
+            }
+
+            /// What the named effects add to FLIP with so many cells in its arrays.
+            pub fn flip_plans(&self, cells: usize) -> Vec<EffectPlan> {
+                let mut plans = Vec::new();
+                $(
+                    if let Some(settings) = &self.$name {
+                        let (passes, buffers, blend) = settings.flip_plan(cells);
+                        plans.push(EffectPlan { name: stringify!($name), passes, buffers, blend });
                     }
                 )+
                 plans

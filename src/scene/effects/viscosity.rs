@@ -11,7 +11,8 @@ use crate::gpu::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// c: the part of the neighbours' mean relative velocity that a substep takes over, 0 to 1.
+    /// c: the part of the neighbours' mean relative velocity that a substep of PBF, or a frame of FLIP, takes
+    /// over, 0 to 1.
     pub xsph: f64,
 }
 
@@ -28,5 +29,11 @@ impl Settings {
         };
         let apply = PassSpec { name: "effects/viscosity_apply", defines: Vec::new(), constants: Vec::new() };
         (vec![gather, apply], vec![storage("viscosity_change", 16 * particles as u64)])
+    }
+
+    /// XSPH's mean of the neighbours' velocities is what the grid holds: c is a further part taken from it,
+    /// without a pass of its own.
+    pub(super) fn flip_plan(&self, _cells: usize) -> (Vec<PassSpec>, Vec<BufferSpec>, f64) {
+        (Vec::new(), Vec::new(), self.xsph)
     }
 }

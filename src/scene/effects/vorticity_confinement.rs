@@ -1,4 +1,4 @@
-//! Vorticity confinement (Macklin and Müller 2013, eqs. 15 and 16).
+//! Vorticity confinement (Macklin and Müller 2013, eqs. 15 and 16; on the grid Fedkiw et al. 2001).
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use crate::gpu::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// ε: metres per second squared for each 1/s of vorticity and metre of support radius.
+    /// ε: metres per second squared for each 1/s of vorticity and metre of support radius (PBF) or cell (FLIP).
     pub strength: f64,
 }
 
@@ -28,5 +28,15 @@ impl Settings {
             constants: vec![("STRENGTH", self.strength)],
         };
         (vec![curl, force], vec![storage("vorticity", 16 * particles as u64)])
+    }
+
+    pub(super) fn flip_plan(&self, cells: usize) -> (Vec<PassSpec>, Vec<BufferSpec>, f64) {
+        let curl = PassSpec { name: "effects/grid_curl", defines: Vec::new(), constants: Vec::new() };
+        let force = PassSpec {
+            name: "effects/grid_confinement",
+            defines: Vec::new(),
+            constants: vec![("STRENGTH", self.strength)],
+        };
+        (vec![curl, force], vec![storage("vorticity", 16 * cells as u64)], 0.0)
     }
 }

@@ -1,16 +1,12 @@
-//! The exact passes and buffers that a scene calls for, in bytes, before a device is touched.
-//!
-//! The solver builds these and nothing more.
+//! What PBF needs on the device.
 
 use crate::{
-    domain::{bounds::Bounds, sph::Calibration},
-    gpu::{
-        program::{BufferSpec, PassSpec},
-        sort,
-    },
+    domain::bounds::Bounds,
+    gpu::{program::PassSpec, sort},
+    scene::{Scene, Stop},
 };
 
-use super::{Scene, Stop};
+use super::{Chunk, DeviceLimits, Plan, PlannedBuffer, PlannedPass};
 
 /// Constants for every pass that declares them.
 pub const SHARED_CONSTANTS: [(&str, f64); 1] = [("LIST_CAPACITY", LIST_CAPACITY as f64)];
@@ -25,72 +21,6 @@ pub const LIST_BUDGET: u64 = 4 << 30;
 /// Particles of a list block: lists are chunked in these.
 const LIST_BLOCK: u64 = 128;
 
-/// What of the device decides the arrangement, bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DeviceLimits {
-    /// Largest storage binding.
-    pub binding: u64,
-    /// Largest buffer.
-    pub buffer: u64,
-    /// What neighbour lists may take in all; 0 goes without them.
-    pub list_budget: u64,
-}
-
-/// How much there is of everything.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Fluid particles.
-    pub particles: usize,
-    /// Samples on solids.
-    pub boundary_samples: usize,
-    /// Nodes of the solids' signed distance along each axis.
-    pub solid_grid: [usize; 3],
-}
-
-/// A buffer, and what it is there for.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PlannedBuffer {
-    /// Name and bytes.
-    pub spec: BufferSpec,
-    /// `pbf`, `sort`, `solids`, `lists`, or an effect's name.
-    pub owner: &'static str,
-}
-
-/// A pass, and what it is there for.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlannedPass {
-    /// Shader and conditions.
-    pub spec: PassSpec,
-    /// As for buffers.
-    pub owner: &'static str,
-}
-
-/// Particles that one binding of the neighbour lists covers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Chunk {
-    /// First sorted index; even.
-    pub first: usize,
-    /// Particles.
-    pub count: usize,
-}
-
-/// What a scene needs on the device.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Plan {
-    /// What it was made for.
-    pub counts: Counts,
-    /// Cells of edge h along each axis.
-    pub grid_dims: [u32; 3],
-    /// One where lists fit into a binding or there are none.
-    pub chunks: Vec<Chunk>,
-    /// Whether neighbours are listed once a substep.
-    pub has_lists: bool,
-    /// Every buffer.
-    pub buffers: Vec<PlannedBuffer>,
-    /// Every pass.
-    pub passes: Vec<PlannedPass>,
-}
-
 /// Cells of edge `support_radius` that cover the domain.
 pub fn grid_dims(domain: &Bounds, support_radius: f64) -> [u32; 3] {
     (domain.size() / support_radius)
@@ -100,48 +30,15 @@ pub fn grid_dims(domain: &Bounds, support_radius: f64) -> [u32; 3] {
 
 impl Plan {
     /// Lays out PBF for `scene`.
-    pub fn new(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Self {
-        let pbf = scene.solver.pbf();
-        let h = Calibration::new(pbf.particle_spacing, pbf.support_ratio).support_radius;
-        let mut plan = Self {
-            counts,
-            grid_dims: grid_dims(&scene.domain, h),
-            chunks: Vec::new(),
-            has_lists: false,
-            buffers: Vec::new(),
-            passes: Vec::new(),
-        };
-        plan.choose_lists(limits);
-        plan.add_sort();
-        plan.add_pbf(scene);
-        plan.add_solids();
-        for effect in scene.effects.plans(counts.particles) {
-            plan.buffers
-                .extend(effect.buffers.into_iter().map(|spec| PlannedBuffer {
-                    spec,
-                    owner: effect.name,
-                }));
-            for mut spec in effect.passes {
-                plan.condition(&mut spec);
-                plan.passes.push(PlannedPass {
-                    spec,
-                    owner: effect.name,
-                });
-            }
-        }
-        plan
-    }
-
-    /// Bytes in all, and those of the neighbour lists.
-    pub fn bytes(&self) -> (u64, u64) {
-        let sum = |lists_only: bool| {
-            self.buffers
-                .iter()
-                .filter(|buffer| !lists_only || buffer.owner == "lists")
-                .map(|buffer| buffer.spec.bytes)
-                .sum()
-        };
-        (sum(false), sum(true))
+    pub(super) fn add_all_of_pbf(&mut self, scene: &Scene, limits: DeviceLimits) {
+        self.choose_lists(limits);
+        self.add_sort();
+        self.add_pbf(scene);
+        self.add_solids();
+        let conditions = self.conditions();
+        self.add_effects(scene.effects.plans(self.counts.particles), |spec| {
+            spec.defines.extend_from_slice(&conditions)
+        });
     }
 
     fn choose_lists(&mut self, limits: DeviceLimits) {
@@ -174,22 +71,6 @@ impl Plan {
         }
     }
 
-    fn add_buffer(&mut self, name: &str, bytes: u64, owner: &'static str) {
-        self.buffers.push(PlannedBuffer {
-            spec: sort::storage(name, bytes),
-            owner,
-        });
-    }
-
-    fn add_uniform(&mut self, name: &str, bytes: u64, owner: &'static str) {
-        let spec = BufferSpec {
-            name: name.to_owned(),
-            bytes,
-            is_uniform: true,
-        };
-        self.buffers.push(PlannedBuffer { spec, owner });
-    }
-
     fn add_pass(
         &mut self,
         name: &'static str,
@@ -201,7 +82,7 @@ impl Plan {
             defines: defines.to_vec(),
             constants: constants.to_vec(),
         };
-        self.condition(&mut spec);
+        spec.defines.extend(self.conditions());
         let owner = if name.starts_with("sort/") {
             "sort"
         } else {
@@ -211,13 +92,15 @@ impl Plan {
     }
 
     /// Conditions that hold for the whole plan; a pass that does not ask ignores them.
-    fn condition(&self, spec: &mut PassSpec) {
+    fn conditions(&self) -> Vec<&'static str> {
+        let mut conditions = Vec::new();
         if self.counts.boundary_samples > 0 || self.counts.solid_grid != [0; 3] {
-            spec.defines.push("SOLIDS");
+            conditions.push("SOLIDS");
         }
         if self.has_lists {
-            spec.defines.push("NEIGHBOR_LIST");
+            conditions.push("NEIGHBOR_LIST");
         }
+        conditions
     }
 
     fn cells(&self) -> usize {
@@ -227,12 +110,7 @@ impl Plan {
     fn add_sort(&mut self) {
         let particles = self.counts.particles as u64;
         self.add_buffer("cell_start", 4 * (self.cells() as u64 + 1), "sort");
-        for spec in sort::scan_buffers("cell_start", self.cells()) {
-            self.buffers.push(PlannedBuffer {
-                spec,
-                owner: "sort",
-            });
-        }
+        self.add_specs(sort::scan_buffers("cell_start", self.cells()), "sort");
         for name in ["cell_of", "slot_in_cell", "placed", "order"] {
             self.add_buffer(name, 4 * particles, "sort");
         }
@@ -298,16 +176,6 @@ impl Plan {
             4 * (self.cells() as u64 + 1),
             "solids",
         );
-    }
-
-    /// Passes of effects, in the order in which they run.
-    pub fn effect_passes(&self) -> Vec<&'static str> {
-        let of_effect = |pass: &&PlannedPass| pass.owner != "pbf" && pass.owner != "sort";
-        self.passes
-            .iter()
-            .filter(of_effect)
-            .map(|pass| pass.spec.name)
-            .collect()
     }
 
     /// Most phases that an iteration can have: per chunk two halves of (all, red, black), and one that ends it.

@@ -1,0 +1,125 @@
+// Particles move with the projected velocity by the midpoint rule (its first stage is what grid_to_particle sampled),
+// and by the density correction's displacement; they are kept out of solids and walls, and lose what velocity they
+// have into them. One that would move farther than the cap is slowed and counted.
+#import "shared/thread.wgsl"
+#import "shared/flip_params.wgsl"
+#import "shared/flip_element.wgsl"
+#import "shared/flip_carried.wgsl"
+#import "shared/confine.wgsl"
+
+@group(0) @binding(1) var<storage, read> brick_slot: array<u32>;
+@group(0) @binding(2) var<storage, read> face_velocity: array<f32>;
+@group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
+@group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
+@group(0) @binding(5) var<storage, read> carried: array<f32>;
+@group(0) @binding(6) var<storage, read_write> position: array<vec4f>;
+@group(0) @binding(9) var<storage, read_write> velocity: array<vec4f>;
+@group(0) @binding(10) var<storage, read_write> id: array<u32>;
+@group(0) @binding(11) var<storage, read_write> counters: array<atomic<u32>>;
+
+fn slot_at(brick: vec3i) -> u32 {
+    let dims = vec3i(params.table_dims);
+    let is_inside = all(brick >= vec3i(0)) && all(brick < dims);
+    let kept = clamp(brick, vec3i(0), dims - 1);
+    return select(0u, brick_slot[(kept.z * dims.y + kept.y) * dims.x + kept.x], is_inside);
+}
+
+// Slots about a cell, straight from the table: a place on the way has no brick of its own yet.
+fn find_slots(cell: vec3i) {
+    own_local = cell & vec3i(7);
+    let brick = cell >> vec3u(3u);
+    let side = brick + select(vec3i(1), vec3i(-1), own_local < vec3i(4));
+    slots_near = vec4u(
+        slot_at(brick),
+        slot_at(vec3i(side.x, brick.yz)),
+        slot_at(vec3i(brick.x, side.y, brick.z)),
+        slot_at(vec3i(side.xy, brick.z)),
+    );
+    slots_far = vec4u(
+        slot_at(vec3i(brick.xy, side.z)),
+        slot_at(vec3i(side.x, brick.y, side.z)),
+        slot_at(vec3i(brick.x, side.yz)),
+        slot_at(side),
+    );
+}
+
+fn component_at(plane: u32, low: vec3i, high: vec3i, t: vec3f) -> f32 {
+    var sum = 0.0;
+    for (var z = 0; z < 2; z++) {
+        for (var y = 0; y < 2; y++) {
+            for (var x = 0; x < 2; x++) {
+                let is_high = vec3i(x, y, z) == vec3i(1);
+                let weight = select(1.0 - t, t, is_high);
+                let face = element_at(select(low, high, is_high));
+                sum += weight.x * weight.y * weight.z * face_velocity[plane + face];
+            }
+        }
+    }
+    return sum;
+}
+
+// The grid's velocity at x; `otherwise` where no brick is.
+fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
+    let p = clamp(x * params.inverse_cell_size, vec3f(0.0), vec3f(params.cells));
+    let cell = vec3i(cell_of_place(p));
+    let f = p - vec3f(cell);
+    find_slots(cell);
+    // Between centres; beyond the outermost ones the velocity is that of the outermost.
+    let is_before = f < vec3f(0.5);
+    let t = select(f - 0.5, f + 0.5, is_before);
+    let low = max(select(vec3i(0), vec3i(-1), is_before), -cell);
+    let high = min(select(vec3i(1), vec3i(0), is_before), vec3i(params.cells) - 1 - cell);
+    let sampled = vec3f(
+        component_at(0u, vec3i(0, low.yz), vec3i(1, high.yz), vec3f(f.x, t.yz)),
+        component_at(params.stride, vec3i(low.x, 0, low.z), vec3i(high.x, 1, high.z), vec3f(t.x, f.y, t.z)),
+        component_at(2u * params.stride, vec3i(low.xy, 0), vec3i(high.xy, 1), vec3f(t.xy, f.z)),
+    );
+    return select(sampled, otherwise, slots_near.x == 0u);
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let i = thread_index(workgroup, workgroups, local, 64u);
+    if i >= params.particle_count {
+        return;
+    }
+    let start = sorted_position[i].xyz;
+    let first = CARRIED * i;
+    let here = vec3f(carried[first], carried[first + 1u], carried[first + 2u]);
+    let between = velocity_at(start + 0.5 * params.time_step * here, here);
+    var way = params.time_step * between;
+#ifdef CORRECTION
+    way += vec3f(carried[first + 3u], carried[first + 4u], carried[first + 5u]);
+#endif
+    let distance = length(way);
+    if distance > params.max_displacement {
+        way *= params.max_displacement / distance;
+        atomicAdd(&counters[0], 1u);
+    }
+    var x = start;
+    var v = velocity[i].xyz;
+#ifdef SOLIDS
+    // In steps of at most half a node spacing, so that nothing thin is stepped over.
+    let steps = u32(ceil(2.0 * length(way) / solid_grid.spacing)) + 1u;
+    for (var k = 0u; k < steps; k++) {
+        let next = x + way / f32(steps);
+        x = leave_solids(next);
+        let push = x - next;
+        let inward = min(dot(v, push), 0.0);
+        v -= push * (inward / max(dot(push, push), 1e-30));
+    }
+#else
+    x += way;
+#endif
+    let low = params.wall_min + params.contact_distance;
+    let high = params.wall_max - params.contact_distance;
+    v = select(v, max(v, params.wall_velocity_min), x < low);
+    v = select(v, min(v, params.wall_velocity_max), x > high);
+    position[i] = vec4f(clamp(x, low, high), 1.0);
+    velocity[i] = vec4f(v, 0.0);
+    id[i] = sorted_id[i];
+}

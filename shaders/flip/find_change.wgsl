@@ -1,0 +1,45 @@
+// After the projection: which faces it gave a velocity (layer 1), and what of that is change.
+#import "shared/thread.wgsl"
+#import "shared/flip_params.wgsl"
+#import "shared/flip_neighborhood.wgsl"
+
+@group(0) @binding(2) var<storage, read> cell_kind: array<u32>;
+@group(0) @binding(3) var<storage, read> face_open: array<f32>;
+@group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
+@group(0) @binding(5) var<storage, read_write> face_change: array<f32>;
+@group(0) @binding(6) var<storage, read_write> face_layer: array<u32>;
+
+const FLUID = 1u;
+const SOLID = 2u;
+
+// Beyond the stored layer of the upper walls: never asked for.
+const NO_NEED = 0x7f7f7fu;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= params.active_cells {
+        return;
+    }
+    let element = thread + CELLS;
+    open_neighborhood(element);
+    let before = vec3u(element_at(vec3i(-1, 0, 0)), element_at(vec3i(0, -1, 0)), element_at(vec3i(0, 0, -1)));
+    let own = cell_kind[element];
+    var tags = face_layer[element];
+    for (var component = 0u; component < 3u; component++) {
+        let face = component * params.stride + element;
+        let other = before[component];
+        let kind = cell_kind[other];
+        let is_closed = face_open[face] == 0.0;
+        // A closed face between solids has no velocity of its own; slot 0 is what lies beyond the domain.
+        let is_buried = own == SOLID && (kind == SOLID || other < CELLS);
+        let is_found = own == FLUID || kind == FLUID || (is_closed && !is_buried);
+        face_change[face] = face_velocity[face] - face_change[face];
+        tags |= u32(is_found) << (8u * component);
+    }
+    face_layer[element] = select(tags, NO_NEED, any(own_cell(element) > params.cells));
+}

@@ -1,0 +1,62 @@
+// Particle-to-grid, second half: a face's velocity from what the cells about it gave. The old velocity is kept; the
+// new one has gravity, and is the wall's or solid's where the face is closed.
+#import "shared/thread.wgsl"
+#import "shared/flip_params.wgsl"
+#import "shared/flip_neighborhood.wgsl"
+#import "shared/flip_axis.wgsl"
+#import "shared/flip_walls.wgsl"
+
+@group(0) @binding(2) var<storage, read> partial_momentum: array<f32>;
+@group(0) @binding(3) var<storage, read> partial_weight: array<f32>;
+@group(0) @binding(4) var<storage, read> face_open: array<f32>;
+@group(0) @binding(5) var<storage, read_write> face_velocity: array<f32>;
+// The old velocity here, its change from flip/find_change on.
+@group(0) @binding(6) var<storage, read_write> face_change: array<f32>;
+// Eight bits a component: bit 7 whether particles gave a velocity, below it the layer, of flip/extrapolate.
+@group(0) @binding(9) var<storage, read_write> face_layer: array<u32>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= params.active_cells {
+        return;
+    }
+    let element = thread + CELLS;
+    open_neighborhood(element);
+    let to_a = turned_back(vec3i(1, 0, 0));
+    let to_b = turned_back(vec3i(0, 1, 0));
+    let to_c = turned_back(vec3i(0, 0, 1));
+    let stride = params.partial_stride;
+    let wet_end = params.wet_cells + CELLS;
+    let last_wet = params.wet_cells / CELLS;
+    let holds_water = (slots_near - 1u < vec4u(last_wet)) | (slots_far - 1u < vec4u(last_wet));
+    var momentum = 0.0;
+    var weight = 0.0;
+    // A loop that no lane enters costs nothing, where a branch would: dry bricks' cells far from water.
+    for (var c = -1; c <= select(-2, 1, any(holds_water)); c++) {
+        for (var b = -1; b <= 1; b++) {
+            for (var a = 0; a <= 1; a++) {
+                let found = element_at(b * to_b + c * to_c - a * to_a);
+                // Partial sums of slot 0 stay zero.
+                let source = select(0u, found, found < wet_end);
+                let plane = u32(9 * a + 3 * (1 - c) + 1 - b);
+                momentum += partial_momentum[plane * stride + source];
+                weight += partial_weight[plane * stride + source];
+            }
+        }
+    }
+    let is_known = weight > 0.0;
+    let velocity = select(0.0, momentum / max(weight, 1e-30), is_known);
+    let component = axis.x;
+    let face = component * params.stride + element;
+    let is_closed = face_open[face] == 0.0;
+    let solid = wall_velocity(vec3f(own_cell(element)))[component];
+    face_velocity[face] = select(velocity + params.velocity_step[component], solid, is_closed);
+    face_change[face] = velocity;
+    let others = select(face_layer[element], 0u, component == 0u);
+    face_layer[element] = others | (u32(is_known) << (8u * component + 7u));
+}

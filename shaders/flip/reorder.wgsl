@@ -1,0 +1,36 @@
+// Re-lays particles in the order of their cells (Hoetzlein 2014).
+#import "shared/thread.wgsl"
+#import "shared/flip_params.wgsl"
+
+@group(0) @binding(1) var<storage, read> order: array<u32>;
+@group(0) @binding(2) var<storage, read> position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(4) var<storage, read> id: array<u32>;
+@group(0) @binding(5) var<storage, read_write> sorted_position: array<vec4f>;
+@group(0) @binding(6) var<storage, read_write> sorted_velocity: array<vec4f>;
+@group(0) @binding(9) var<storage, read_write> sorted_id: array<u32>;
+#ifdef APIC
+@group(0) @binding(10) var<storage, read> affine: array<f32>;
+@group(0) @binding(11) var<storage, read_write> sorted_affine: array<f32>;
+#endif
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let i = thread_index(workgroup, workgroups, local, 64u);
+    if i >= params.particle_count {
+        return;
+    }
+    let source = order[i];
+    sorted_position[i] = position[source];
+    sorted_velocity[i] = velocity[source];
+    sorted_id[i] = id[source];
+#ifdef APIC
+    for (var k = 0u; k < 9u; k++) {
+        sorted_affine[9u * i + k] = affine[9u * source + k];
+    }
+#endif
+}

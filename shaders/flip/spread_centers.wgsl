@@ -1,0 +1,56 @@
+// What the particles of each cell give to the density at the 3 x 3 x 3 cell centres about it, in particles.
+#import "shared/thread.wgsl"
+#import "shared/bricks.wgsl"
+#import "shared/flip_params.wgsl"
+#import "shared/flip_axis.wgsl"
+
+@group(0) @binding(1) var<storage, read> bricks: array<Brick>;
+@group(0) @binding(2) var<storage, read> cell_start: array<u32>;
+@group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> partial_weight: array<f32>;
+
+fn store(plane: u32, element: u32, weight: vec3f) {
+    let first = plane * params.partial_stride + element;
+    for (var k = 0u; k < 3u; k++) {
+        partial_weight[first + k * params.partial_stride] = weight[k];
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= params.wet_cells {
+        return;
+    }
+    let element = thread + CELLS;
+    let slot = element / CELLS;
+    let brick = vec3u(bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
+    let corner = vec3f(8u * brick + local_cell(element % CELLS));
+    let scale = params.inverse_cell_size;
+    let first = cell_start[element];
+    let end = cell_start[element + 1u];
+    var before = mat3x3f();
+    var own = mat3x3f();
+    var after = mat3x3f();
+    for (var i = first; i < end; i++) {
+        let f = sorted_position[i].xyz * scale - corner;
+        let layer = outer(center_weights(f.x), center_weights(f.y));
+        let z = center_weights(f.z);
+        before += layer * z.x;
+        own += layer * z.y;
+        after += layer * z.z;
+    }
+    store(0u, element, before[0]);
+    store(3u, element, before[1]);
+    store(6u, element, before[2]);
+    store(9u, element, own[0]);
+    store(12u, element, own[1]);
+    store(15u, element, own[2]);
+    store(18u, element, after[0]);
+    store(21u, element, after[1]);
+    store(24u, element, after[2]);
+}

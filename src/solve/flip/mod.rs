@@ -1,0 +1,370 @@
+//! PIC/FLIP (Zhu and Bridson 2005) and APIC (Jiang et al. 2015) on sparse bricks of a MAC grid.
+//!
+//! A substep measures the particles' largest speed and the bricks that they touch, sorts them by cell, carries
+//! their velocities to the grid, projects, carries the change back and moves them through the projected field.
+//! No grid outlives its substep: the state is positions, velocities, ids, and with APIC the affine rows.
+
+mod record;
+mod step;
+
+use crate::{
+    domain::{
+        bricks::{Bricks, CELLS, EDGE, table_dims},
+        particles::Particles,
+        solver::{Projection, Solver, StepReport},
+    },
+    gpu::{
+        adapter::Context,
+        program::{BufferSpec, Program},
+        recording::Timer,
+        sort,
+    },
+    scene::{
+        Scene,
+        flip::{Flip as Settings, Transfer},
+        plan::{Capacity, Counts, DeviceLimits, Plan, layers, stored_cells},
+    },
+};
+
+use super::{
+    SolveError,
+    boundary::Boundary,
+    pressure::LEVELS,
+    state::{check_finite, report, slots_by_id, take_over, upload},
+};
+use record::{Recordings, groups, windows};
+use step::Substep;
+
+/// Attributes that APIC declares: C of v(x) = v + C (x − x_p), 1/s, `affine_xy` = ∂v_x/∂y. A state without them
+/// starts from zeros.
+pub const AFFINE: [&str; 9] = [
+    "affine_xx", "affine_xy", "affine_xz", "affine_yx", "affine_yy", "affine_yz", "affine_zx", "affine_zy",
+    "affine_zz",
+];
+
+/// Words of `survey` before the flags.
+const SURVEY_HEAD: usize = 4;
+
+/// Attributes of a frame beyond positions, velocities and ids.
+pub fn attributes(settings: &Settings) -> &'static [&'static str] {
+    match settings.transfer {
+        Transfer::Flip => &[],
+        Transfer::Apic => &AFFINE,
+    }
+}
+
+/// FLIP on a device.
+pub struct Flip {
+    program: Program,
+    plan: Plan,
+    limits: DeviceLimits,
+    scene: Scene,
+    recordings: Recordings,
+    timer: Option<Timer>,
+    state: Particles,
+    frame: u32,
+    /// Of the last substep.
+    bricks: Bricks,
+}
+
+/// What `flip/survey` found.
+struct Survey {
+    /// m/s.
+    speed: f64,
+    not_finite: u32,
+    is_wet: Vec<bool>,
+}
+
+impl Flip {
+    /// Builds what `plan` names, and nothing more. It must have been made for `scene` and `boundary`.
+    ///
+    /// # Errors
+    /// A buffer over the adapter's limits, with the figures; a shader or the device at fault.
+    pub fn new(
+        context: &Context,
+        scene: &Scene,
+        plan: Plan,
+        boundary: &Boundary,
+        is_timed: bool,
+    ) -> Result<Self, SolveError> {
+        let passes: Vec<_> = plan.passes.iter().map(|pass| pass.spec.clone()).collect();
+        let program = Program::new(context, &specs(&plan), &passes, &[])?;
+        boundary.upload_distance(&program, scene);
+        upload_constants(&program, &plan, scene);
+        let bricks = bricks(&plan, &no_water(&plan), 0);
+        // The first survey reads what does not depend on the substep.
+        let frame = Substep {
+            start: 0.0,
+            length: scene.shot.frame_seconds(),
+            displacement: 0.0,
+        };
+        program.upload("params", 0, &[step::params(scene, &plan, &bricks, &frame)]);
+        let most = layers(scene.solver.flip().cfl);
+        Ok(Self {
+            recordings: Recordings::new(&program, &plan, most),
+            timer: if is_timed { Timer::new(context) } else { None },
+            bricks,
+            program,
+            limits: super::pbf::device_limits(context),
+            plan,
+            scene: scene.clone(),
+            state: Particles::default(),
+            frame: 0,
+        })
+    }
+
+    /// What stands now: its bricks grow with the water.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Bricks of the last substep.
+    pub fn bricks(&self) -> &Bricks {
+        &self.bricks
+    }
+
+    /// Names of the transfer passes that a substep runs, in order.
+    pub fn recorded_passes(&self) -> Vec<&'static str> {
+        let recordings = &self.recordings;
+        let before = recordings.survey.passes().chain(recordings.to_grid.passes());
+        before.chain(recordings.to_particles.passes()).collect()
+    }
+
+    /// Names of the passes and buffers that exist on the device, sorted.
+    pub fn built(&self) -> (Vec<&str>, Vec<&str>) {
+        self.program.names()
+    }
+
+    /// The named buffer's first `count` values, such as `face_velocity` or `density`, as the last substep left it.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn field<T: bytemuck::Pod>(&self, name: &str, count: usize) -> Result<Vec<T>, SolveError> {
+        Ok(self.program.download(&[(name, count)])?.remove(0))
+    }
+
+    fn survey(&mut self) -> Result<Survey, SolveError> {
+        self.recordings.survey.run(&self.program, self.timer.as_mut())?;
+        let words = self.field::<u32>("survey", SURVEY_HEAD + no_water(&self.plan).len())?;
+        Ok(Survey {
+            speed: f64::from(f32::from_bits(words[0])).sqrt(),
+            not_finite: words[1],
+            is_wet: words[SURVEY_HEAD..].iter().map(|&flag| flag != 0).collect(),
+        })
+    }
+
+    fn numbers<T>(&self, what: String) -> Result<T, SolveError> {
+        let frame = self.frame + 1;
+        Err(SolveError::Numbers { frame, what })
+    }
+
+    /// The next substep of the `remaining` seconds, and how many these take as things stand.
+    fn choose(&self, survey: &Survey, start: f64, remaining: f64, done: u32) -> Result<(f64, Substep), SolveError> {
+        if survey.not_finite > 0 {
+            return self.numbers(format!("{} particles are not finite", survey.not_finite));
+        }
+        let flip = self.scene.solver.flip();
+        let (wanted, substep) = step::next(&self.scene, start, remaining, survey.speed);
+        if f64::from(done) + wanted > f64::from(flip.max_substeps) {
+            return self.numbers(format!(
+                "{:.3} m/s asks for {} substeps at cfl {}, and solver.flip.max_substeps is {}",
+                survey.speed,
+                f64::from(done) + wanted,
+                flip.cfl,
+                flip.max_substeps
+            ));
+        }
+        Ok((wanted, substep))
+    }
+
+    /// Lays out bricks about the water, and makes room for more where they do not fit.
+    fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
+        let layers = layers(substep.displacement);
+        self.bricks = bricks(&self.plan, is_wet, layers);
+        let needed = capacity_of(&self.bricks);
+        let grown = self.plan.counts.bricks.grown(needed);
+        if grown != self.plan.counts.bricks {
+            let counts = Counts {
+                bricks: grown,
+                ..self.plan.counts
+            };
+            self.plan = Plan::new(&self.scene, counts, self.limits);
+            self.program.resize(&specs(&self.plan))?;
+            upload_constants(&self.program, &self.plan, &self.scene);
+            let most = self::layers(self.scene.solver.flip().cfl);
+            self.recordings = Recordings::new(&self.program, &self.plan, most);
+        }
+        let bricks = &self.bricks;
+        let params = step::params(&self.scene, &self.plan, bricks, substep);
+        let groups = groups(&self.program, params.wet_cells, params.active_cells, layers);
+        self.program.upload("params", 0, &[params]);
+        self.program.upload("bricks", 0, &bricks.records);
+        self.program.upload("brick_slot", 0, &bricks.table);
+        self.program.upload("groups", 0, &groups);
+        Ok(())
+    }
+
+    fn run_substep(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
+        self.lay_out(is_wet, substep)?;
+        self.recordings.to_grid.run(&self.program, self.timer.as_mut())?;
+        self.recordings.to_particles.run(&self.program, self.timer.as_mut())?;
+        Ok(())
+    }
+
+    /// Substeps through one frame; returns how many.
+    fn run_frame(&mut self) -> Result<u32, SolveError> {
+        let length = self.scene.shot.frame_seconds();
+        let start = f64::from(self.frame) * length;
+        let (mut done, mut elapsed) = (0, 0.0);
+        loop {
+            let survey = self.survey()?;
+            let (wanted, substep) = self.choose(&survey, start + elapsed, length - elapsed, done)?;
+            self.run_substep(&survey.is_wet, &substep)?;
+            done += 1;
+            elapsed += substep.length;
+            if wanted <= 1.0 {
+                return Ok(done);
+            }
+        }
+    }
+
+    fn upload_state(&self) {
+        upload(&self.program, &self.scene, &self.state);
+        let names = attributes(self.scene.solver.flip());
+        if !names.is_empty() {
+            let mut rows = vec![0.0f32; names.len() * self.state.len()];
+            for (k, name) in names.iter().enumerate() {
+                let values = self.state.attributes.get(*name).into_iter().flatten();
+                for (row, value) in rows.chunks_exact_mut(names.len()).zip(values) {
+                    row[k] = *value;
+                }
+            }
+            self.program.upload("affine", 0, &rows);
+        }
+    }
+
+    fn read_state(&mut self) -> Result<(), SolveError> {
+        let n = self.state.len();
+        let vectors = self.program.download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
+        let id = self.field::<u32>("id", n)?;
+        let slot_of = slots_by_id(&self.state.id);
+        take_over(&mut self.state, &self.scene, &slot_of, &id, &vectors[0], &vectors[1]);
+        let names = attributes(self.scene.solver.flip());
+        if !names.is_empty() {
+            let rows = self.field::<f32>("affine", names.len() * n)?;
+            for (k, name) in names.iter().enumerate() {
+                let mut values = vec![0.0; n];
+                for (row, id) in rows.chunks_exact(names.len()).zip(&id) {
+                    values[slot_of(*id)] = row[k];
+                }
+                self.state.attributes.insert((*name).to_owned(), values);
+            }
+        }
+        Ok(())
+    }
+
+    /// Relative densities in cells of water, as the last substep found them.
+    fn densities(&self) -> Result<Vec<f32>, SolveError> {
+        let cells = (self.bricks.wet as usize + 1) * CELLS as usize;
+        let mut density = self.field::<f32>("density", cells)?;
+        density.retain(|&value| value != 0.0);
+        Ok(density)
+    }
+}
+
+impl Solver for Flip {
+    type Error = SolveError;
+
+    fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), SolveError> {
+        let planned = self.plan.counts.particles;
+        if particles.len() != planned {
+            return Err(SolveError::Count {
+                planned,
+                given: particles.len(),
+            });
+        }
+        self.state = particles.clone();
+        self.frame = frame;
+        self.upload_state();
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
+        self.program.upload("counters", 0, &[0u32; 4]);
+        let substeps = if self.state.is_empty() { 0 } else { self.run_frame()? };
+        self.read_state()?;
+        check_finite(self.frame + 1, &self.state, None)?;
+        let density = if self.state.is_empty() { Vec::new() } else { self.densities()? };
+        let capped = self.field::<u32>("counters", 1)?[0];
+        self.frame += 1;
+        if self.scene.domain.min != glam::DVec3::ZERO {
+            // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
+            self.upload_state();
+        }
+        let report = StepReport {
+            substeps,
+            capped: u64::from(capped),
+            projection: Some(Projection::default()),
+            ..report(&self.scene, &self.state, &density)
+        };
+        Ok((self.state.clone(), report))
+    }
+
+    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+        let total = self.timer.as_ref().map(|timer| &timer.total);
+        total
+            .into_iter()
+            .flatten()
+            .map(|(&name, &(seconds, runs))| (name, seconds, runs))
+            .collect()
+    }
+}
+
+fn specs(plan: &Plan) -> Vec<BufferSpec> {
+    plan.buffers.iter().map(|buffer| buffer.spec.clone()).collect()
+}
+
+/// No flag set, one a brick of the domain.
+fn no_water(plan: &Plan) -> Vec<bool> {
+    let dims = table_dims(stored_cells(plan.grid_dims));
+    vec![false; dims.iter().map(|&n| n as usize).product()]
+}
+
+fn bricks(plan: &Plan, is_wet: &[bool], layers: usize) -> Bricks {
+    let reach = (layers as u32).div_ceil(EDGE);
+    Bricks::new(stored_cells(plan.grid_dims), is_wet, reach, LEVELS)
+}
+
+fn capacity_of(bricks: &Bricks) -> Capacity {
+    Capacity {
+        wet: bricks.wet as usize + 1,
+        slots: bricks.slots(),
+    }
+}
+
+/// Bricks that a state takes in a scene.
+pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
+    let counts = Counts::default();
+    let limits = DeviceLimits { binding: 0, buffer: 0, list_budget: 0 };
+    let plan = Plan::new(scene, counts, limits);
+    let mut is_wet = no_water(&plan);
+    let dims = table_dims(stored_cells(plan.grid_dims)).map(|n| n as usize);
+    let edge = f64::from(EDGE) * scene.solver.flip().cell_size;
+    for position in &particles.position {
+        let x = glam::Vec3::from_array(*position).as_dvec3() - scene.domain.min;
+        let at: [usize; 3] = std::array::from_fn(|k| ((x[k] / edge).max(0.0) as usize).min(dims[k] - 1));
+        is_wet[(at[2] * dims[1] + at[1]) * dims[0] + at[0]] = true;
+    }
+    // As deep as layers of a first step reach that is not yet fast.
+    capacity_of(&bricks(&plan, &is_wet, layers(1.0)))
+}
+
+/// What does not change from substep to substep.
+fn upload_constants(program: &Program, plan: &Plan, scene: &Scene) {
+    let cells = plan.counts.bricks.wet * CELLS as usize;
+    program.upload("cell_start.lengths", 0, &sort::scan_lengths(cells));
+    program.upload("element_count", 0, &[plan.counts.particles as u32, 0, 0, 0]);
+    program.upload("axes", 0, &windows(0, 3));
+    // The first that is extrapolated is layer 2.
+    program.upload("layers", 0, &windows(2, layers(scene.solver.flip().cfl)));
+}

@@ -1,0 +1,170 @@
+//! Time per output frame and per pass of FLIP in a collapsing dam.
+//!
+//! `tools/bench-flip [--adapter NAME] [--frames N] [--box XxYxZ] [--set "KEY = VALUE"] [--twice]`; the box has
+//! 128×77×64 cells of 0.1 m where left out, and 36×49×64 of them hold 903 168 particles, already under way. Frames
+//! are a sixtieth of a second. The first two warm up; medians of the rest. `--set` adds to `[solver.flip]`, and `--twice` doubles the height of the box
+//! twice, and compares.
+#![allow(missing_docs, reason = "a program")]
+
+use std::{path::Path, time::Instant};
+
+use swell::{
+    domain::solver::Solver,
+    gpu::adapter::Context,
+    scene::Scene,
+    solve::{flip::Flip, pbf::device_limits},
+    stage::prepare::Start,
+};
+
+const WARM_UP: usize = 2;
+
+/// Cells of water at the start.
+const WATER: [f64; 3] = [36.0, 49.0, 64.0];
+
+struct Options {
+    adapter: Option<String>,
+    frames: usize,
+    cells: [f64; 3],
+    settings: String,
+    is_twice: bool,
+}
+
+fn options() -> Result<Options, String> {
+    let mut options = Options {
+        adapter: None,
+        frames: 12,
+        cells: [128.0, 77.0, 64.0],
+        settings: String::new(),
+        is_twice: false,
+    };
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        let mut value = || words.next().ok_or(format!("{word} wants a value"));
+        match word.as_str() {
+            "--adapter" => options.adapter = Some(value()?),
+            "--frames" => {
+                options.frames = value()?.parse().map_err(|_| "--frames wants a number")?
+            }
+            "--box" => options.cells = cells(&value()?)?,
+            "--set" => options.settings += &format!("{}\n", value()?),
+            "--twice" => options.is_twice = true,
+            // Cargo's own.
+            "--bench" => {}
+            _ => return Err(format!("`{word}` is no option")),
+        }
+    }
+    Ok(options)
+}
+
+fn cells(word: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = word.split(['x', '×']).filter_map(|n| n.parse().ok()).collect();
+    numbers.try_into().map_err(|_| format!("--box wants three numbers of cells, not `{word}`"))
+}
+
+fn dam(options: &Options, height: f64) -> Result<(Scene, Start), Box<dyn std::error::Error>> {
+    let metres = |cells: [f64; 3]| format!("{:?}", cells.map(|n| n / 10.0));
+    let [x, y, z] = options.cells;
+    let text = format!(
+        "[shot]\nname = \"bench\"\nframes = 1\nframes_per_second = 60\n\
+         [domain]\nmin = [0.0, 0.0, 0.0]\nmax = {}\n\
+         [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = {}\n\
+         [solver]\nmethod = \"flip\"\n[solver.flip]\ncell_size = 0.1\n{}",
+        metres([x, y * height, z]),
+        metres([WATER[0].min(x), WATER[1].min(y), WATER[2].min(z)]),
+        options.settings
+    );
+    let scene = Scene::parse(&text, Path::new("bench.toml"), Path::new("."), &[])?;
+    let mut start = Start::of(&scene)?;
+    start.particles.velocity.fill([2.0, 0.0, 0.0]);
+    Ok((scene, start))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Prints the median time of a frame, and returns it.
+fn measure(
+    context: &Context,
+    options: &Options,
+    height: f64,
+) -> Result<f64, Box<dyn std::error::Error>> {
+    let (scene, start) = dam(options, height)?;
+    let particles = &start.particles;
+    let plan = start.plan(&scene, device_limits(context));
+    let [x, y, z] = plan.grid_dims;
+    println!("\n{} particles in {x}×{y}×{z} cells", particles.len());
+    let mut solver = Flip::new(context, &scene, plan.clone(), &start.boundary, false)?;
+    solver.load(0, particles)?;
+    let (mut times, mut substeps, mut iterations, mut correction) = (Vec::new(), 0, 0, 0);
+    for frame in 0..options.frames + WARM_UP {
+        let begin = Instant::now();
+        let (_, report) = solver.advance()?;
+        if frame >= WARM_UP {
+            times.push(begin.elapsed().as_secs_f64());
+            substeps += report.substeps;
+            iterations += report.iterations;
+            correction += report.projection.map_or(0, |p| p.correction_iterations);
+        }
+    }
+    let (least, most) = times
+        .iter()
+        .fold((f64::MAX, 0.0f64), |(a, b), &t| (a.min(t), b.max(t)));
+    let frames = times.len() as f64;
+    println!(
+        "{:.3} s a frame ({least:.3} to {most:.3} over {frames} frames), {:.2} substeps, {:.1} iterations and \
+         {:.1} of the correction",
+        median(times.clone()),
+        f64::from(substeps) / frames,
+        iterations as f64 / frames,
+        correction as f64 / frames,
+    );
+    println!(
+        "{:.0} MB on the device, {} bricks with water and {} within reach",
+        1e-6 * solver.plan().bytes().0 as f64,
+        solver.bricks().wet,
+        solver.bricks().active - solver.bricks().wet
+    );
+    Ok(median(times))
+}
+
+fn measure_passes(context: &Context, options: &Options) -> Result<(), Box<dyn std::error::Error>> {
+    let (scene, start) = dam(options, 1.0)?;
+    let plan = start.plan(&scene, device_limits(context));
+    let mut solver = Flip::new(context, &scene, plan, &start.boundary, true)?;
+    solver.load(0, &start.particles)?;
+    let frames = options.frames.min(4) + WARM_UP;
+    for _ in 0..frames {
+        solver.advance()?;
+    }
+    let mut rows = solver.timings();
+    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+    println!("\npasses, by their time a frame:");
+    for (pass, seconds, runs) in &rows {
+        println!(
+            "   {pass:28} {:8.2} ms   {:7.3} ms × {runs}",
+            1e3 * seconds / frames as f64,
+            1e3 * seconds / *runs as f64
+        );
+    }
+    if rows.is_empty() {
+        println!("   this adapter has no timestamps: no times per pass");
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let options = options()?;
+    let context = Context::open(options.adapter.as_deref())?;
+    println!(
+        "{} ({} {})",
+        context.info.name, context.info.driver, context.info.driver_info
+    );
+    let once = measure(&context, &options, 1.0)?;
+    if options.is_twice {
+        let tall = measure(&context, &options, 4.0)?;
+        println!("the box doubled twice in height: {:.3} × the time", tall / once);
+    }
+    measure_passes(&context, &options)
+}
