@@ -1,7 +1,7 @@
 // After the projection: which faces it gave a velocity (layer 1), and what of that is change.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
-#import "shared/flip_neighborhood.wgsl"
+#import "shared/flip_beside.wgsl"
 
 @group(0) @binding(2) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(3) var<storage, read> face_open: array<f32>;
@@ -26,9 +26,11 @@ fn main(
         return;
     }
     let element = thread + CELLS;
-    open_neighborhood(element);
-    let before = vec3u(element_at(vec3i(-1, 0, 0)), element_at(vec3i(0, -1, 0)), element_at(vec3i(0, 0, -1)));
+    open_beside(element);
+    let before = vec3u(element_beside(vec3i(-1, 0, 0)), element_beside(vec3i(0, -1, 0)), element_beside(vec3i(0, 0, -1)));
     let own = cell_kind[element];
+    let brick = vec3u(bricks[own_slot].coordinate[0], bricks[own_slot].coordinate[1], bricks[own_slot].coordinate[2]);
+    let own_cell = 8u * brick + vec3u(own_local);
     var tags = face_layer[element];
     for (var component = 0u; component < 3u; component++) {
         let face = component * params.stride + element;
@@ -41,5 +43,5 @@ fn main(
         face_change[face] = face_velocity[face] - face_change[face];
         tags |= u32(is_found) << (8u * component);
     }
-    face_layer[element] = select(tags, NO_NEED, any(own_cell(element) > params.cells));
+    face_layer[element] = select(tags, NO_NEED, any(own_cell > params.cells));
 }

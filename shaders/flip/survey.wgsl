@@ -9,31 +9,35 @@
 // Bits of the largest speed squared, values that are not finite, two unused words; then a flag a brick.
 @group(0) @binding(3) var<storage, read_write> survey: array<atomic<u32>>;
 
-var<workgroup> fastest: atomic<u32>;
+// Particles of a thread: one atomic for so many, and in sorted order few bricks.
+const RUN = 16u;
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
     @builtin(num_workgroups) workgroups: vec3u,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let i = thread_index(workgroup, workgroups, local, 256u);
-    if local == 0u {
-        atomicStore(&fastest, 0u);
-    }
-    workgroupBarrier();
-    if i < params.particle_count {
+    let first = thread_index(workgroup, workgroups, local, 64u) * RUN;
+    let end = min(first + RUN, params.particle_count);
+    var fastest = 0.0;
+    var not_finite = 0u;
+    var last = 0xffffffffu;
+    for (var i = first; i < end; i++) {
         let x = position[i].xyz;
         let v = velocity[i].xyz;
-        if !is_finite(x) || !is_finite(v) {
-            atomicAdd(&survey[1], 1u);
-        }
+        not_finite += u32(!is_finite(x) || !is_finite(v));
+        fastest = max(fastest, dot(v, v));
         let index = table_index(cell_of_place(x * params.inverse_cell_size));
-        atomicStore(&survey[4u + index], 1u);
-        atomicMax(&fastest, bitcast<u32>(dot(v, v)));
+        if index != last {
+            atomicStore(&survey[4u + index], 1u);
+            last = index;
+        }
     }
-    workgroupBarrier();
-    if local == 0u {
-        atomicMax(&survey[0], atomicLoad(&fastest));
+    if first < end {
+        atomicMax(&survey[0], bitcast<u32>(fastest));
+        if not_finite > 0u {
+            atomicAdd(&survey[1], not_finite);
+        }
     }
 }

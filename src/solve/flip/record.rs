@@ -19,6 +19,9 @@ const ACTIVE: u64 = 16;
 /// Those of the first extrapolated layer, one after the other.
 const LAYERS: u64 = 32;
 
+/// Particles of a thread of `flip/survey`, its `RUN`.
+const SURVEY_RUN: usize = 16;
+
 /// Threads of a workgroup of passes over cells.
 const WORKGROUP: u32 = 64;
 
@@ -35,7 +38,7 @@ pub(super) struct Recordings {
 impl Recordings {
     pub(super) fn new(program: &Program, plan: &Plan, layers: usize) -> Self {
         let n = plan.counts.particles;
-        let survey = [Command::Clear("survey"), Command::over("flip/survey", n)];
+        let survey = [Command::Clear("survey"), Command::over("flip/survey", n.div_ceil(SURVEY_RUN))];
         Self {
             survey: Recording::new(program, &survey),
             to_grid: Recording::new(program, &to_grid(plan)),
