@@ -8,11 +8,11 @@ use swell::{
         reflect::{Access, Layout, reflect},
         shader,
     },
-    solve::params::{FlipParams, Params, Phase, SolidGrid},
+    solve::params::{FlipParams, Params, Phase, SolidGrid, SolidGrids},
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 7] = [
+const VARIANTS: [&[&str]; 8] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -26,6 +26,7 @@ const VARIANTS: [&[&str]; 7] = [
     &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
     &["CORRECTION", "GHOST_FLUID"],
     &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
+    &["SOLIDS", "MOVING_SOLIDS", "CORRECTION", "GHOST_FLUID"],
 ];
 
 fn compute_passes() -> Vec<String> {
@@ -108,10 +109,13 @@ fn check(
 
 #[test]
 fn mirrors_match_naga() {
-    let mut found = [0; 4];
-    for pass in compute_passes() {
-        let text = shader::compose(&pass, &["SOLIDS", "NEIGHBOR_LIST"]).unwrap();
-        let layouts = reflect(&pass, &text).unwrap().layouts;
+    let mut found = [0; 5];
+    let variants = ["NEIGHBOR_LIST", "MOVING_SOLIDS"];
+    let passes = compute_passes();
+    let all = variants.map(|name| passes.iter().map(move |pass| (pass, ["SOLIDS", name])));
+    for (pass, defines) in all.into_iter().flatten().filter(|(pass, defines)| is_meaningful(pass, defines)) {
+        let text = shader::compose(pass, &defines).unwrap();
+        let layouts = reflect(pass, &text).unwrap().layouts;
         let seen = [
             check(&layouts, "Params", size_of::<Params>(), &Params::members()),
             check(
@@ -126,6 +130,12 @@ fn mirrors_match_naga() {
                 "SolidGrid",
                 size_of::<SolidGrid>(),
                 &SolidGrid::members(),
+            ),
+            check(
+                &layouts,
+                "SolidGrids",
+                size_of::<SolidGrids>(),
+                &SolidGrids::members(),
             ),
         ];
         for (count, result) in found.iter_mut().zip(seen) {

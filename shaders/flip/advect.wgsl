@@ -102,6 +102,22 @@ fn main(
     }
     var x = start;
     var v = velocity[i].xyz;
+#ifdef MOVING_SOLIDS
+    // In steps of at most half a node spacing as the fastest solid sees them, so that nothing thin is stepped over.
+    let reach = length(way) + solid_grids.fastest * params.time_step;
+    let steps = u32(ceil(2.0 * reach / solid_grids.grids[0].spacing)) + 1u;
+    for (var k = 0u; k < steps; k++) {
+        x += way / f32(steps);
+        for (var solid = 0u; solid < solid_grids.count; solid++) {
+            look_at_solid(solid, params.time_step * f32(k + 1u) / f32(steps));
+            let next = x;
+            x = leave_solids(next);
+            let push = x - next;
+            let inward = min(dot(v - solid_velocity, push), 0.0);
+            v -= push * (inward / max(dot(push, push), 1e-30));
+        }
+    }
+#else
 #ifdef SOLIDS
     // In steps of at most half a node spacing, so that nothing thin is stepped over.
     let steps = u32(ceil(2.0 * length(way) / solid_grid.spacing)) + 1u;
@@ -114,6 +130,7 @@ fn main(
     }
 #else
     x += way;
+#endif
 #endif
     let low = params.wall_min + params.contact_distance;
     let high = params.wall_max - params.contact_distance;

@@ -32,6 +32,12 @@ pub enum SceneError {
         /// Asked for.
         method: &'static str,
     },
+    /// PBF was asked for a scene in which solids move.
+    #[error("scene {shot}: {}", super::moving_solid::UNKNOWN_TO_PBF)]
+    MovingSolids {
+        /// The scene's shot.
+        shot: String,
+    },
     /// One of two texts to compare is no TOML.
     #[error("cannot compare scenes: {reason}")]
     NotToml {

@@ -4,6 +4,7 @@ pub mod effects;
 pub mod flip;
 pub mod grids;
 pub mod look;
+pub mod moving_solid;
 pub mod plan;
 pub mod study;
 
@@ -39,6 +40,8 @@ pub struct Scene {
     pub water: Water,
     /// Static solids, in world space.
     pub solids: Vec<Solid>,
+    /// Solids that move; static ones stand in `solids`.
+    pub moving_solids: Vec<moving_solid::MovingSolid>,
     /// Domain walls that move; at most one a wall.
     pub wave_makers: Vec<WaveMaker>,
     /// Which solver, and the solvers' settings.
@@ -61,12 +64,17 @@ impl Scene {
     /// The same scene with `method` chosen.
     ///
     /// # Errors
-    /// [`SceneError::NoTable`].
+    /// [`SceneError::NoTable`]; [`SceneError::MovingSolids`].
     pub fn solved_by(mut self, method: Method) -> Result<Self, SceneError> {
         if !self.solver.has(method) {
             return Err(SceneError::NoTable {
                 shot: self.shot.name,
                 method: method.name(),
+            });
+        }
+        if method == Method::Pbf && !self.moving_solids.is_empty() {
+            return Err(SceneError::MovingSolids {
+                shot: self.shot.name,
             });
         }
         self.solver.method = method;

@@ -66,6 +66,8 @@ pub(super) struct SolidSpec {
     pub(super) translate: Option<Spanned<[f64; 3]>>,
     pub(super) rotate_degrees: Option<Spanned<[f64; 3]>>,
     pub(super) scale: Option<Spanned<ScaleSpec>>,
+    pub(super) direction: Option<Spanned<[f64; 3]>>,
+    pub(super) motion: Option<Spanned<MotionSpec>>,
 }
 
 #[derive(Clone, Copy, Deserialize)]

@@ -42,6 +42,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
             meshes: Vec::new(),
         },
         solids: Vec::new(),
+        moving_solids: Vec::new(),
         wave_makers: Vec::new(),
         solver: SolverSettings {
             method: Method::Pbf,

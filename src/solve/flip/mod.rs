@@ -28,7 +28,7 @@ use crate::{
 
 use super::{
     SolveError,
-    boundary::Boundary,
+    boundary::{Boundary, Movers},
     pressure::LEVELS,
     state::{check_finite, report, slots_by_id, take_over, upload},
 };
@@ -59,6 +59,7 @@ pub struct Flip {
     plan: Plan,
     limits: DeviceLimits,
     scene: Scene,
+    movers: Option<Movers>,
     recordings: Recordings,
     timer: Option<Timer>,
     state: Particles,
@@ -108,6 +109,7 @@ impl Flip {
             limits: super::pbf::device_limits(context),
             plan,
             scene: scene.clone(),
+            movers: Movers::of(boundary, scene),
             state: Particles::default(),
             frame: 0,
         })
@@ -201,6 +203,9 @@ impl Flip {
         self.program.upload("bricks", 0, &bricks.records);
         self.program.upload("brick_slot", 0, &bricks.table);
         self.program.upload("groups", 0, &groups);
+        if let Some(movers) = &self.movers {
+            movers.upload(&self.program, &self.scene, substep.start, substep.length);
+        }
         Ok(())
     }
 
