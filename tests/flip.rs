@@ -16,7 +16,7 @@ use swell::{
     scene::{
         Method, Scene,
         flip::{Flip as Settings, Preconditioner, Pressure, Surface, Transfer},
-        plan::{Capacity, Counts, Plan},
+        plan::{Capacity, Counts},
     },
     solve::{
         boundary::Boundary,
@@ -61,7 +61,7 @@ fn flip(scene: &mut Scene) -> &mut Settings {
 
 fn solver_with(context: &Context, scene: &Scene, particles: &Particles, boundary: &Boundary, bricks: Capacity) -> Flip {
     let counts = Counts { particles: particles.len(), bricks, ..boundary.counts() };
-    let plan = Plan::new(scene, counts, device_limits(context));
+    let plan = swell::solve::plan(scene, counts, device_limits(context));
     let mut solver = Flip::new(context, scene, plan, boundary, false).unwrap();
     solver.load(0, particles).unwrap();
     solver
@@ -280,7 +280,7 @@ fn half_space(n: DVec3, d: f64) -> Boundary {
     };
     let values = (0..125_000).map(value).collect();
     let distance = Some(SignedDistance { origin, spacing, dims, values });
-    Boundary { samples: Vec::new(), distance }
+    Boundary { distance, ..Boundary::default() }
 }
 
 #[test]

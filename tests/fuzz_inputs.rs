@@ -5,7 +5,7 @@ use std::path::Path;
 use proptest::prelude::*;
 use swell::{
     domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
-    scene::{Scene, SceneError, study::Study},
+    scene::{Method, Scene, SceneError, study::Study},
 };
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
@@ -324,129 +324,6 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
             "[solver.flip]",
         ],
     ),
-    // FLIP.
-    (
-        "cell_size = 0.2",
-        "cell_size = 0",
-        36,
-        &["solver.flip.cell_size: 0 is out of range"],
-    ),
-    (
-        "cell_size = 0.2",
-        "cell_size = 4.3",
-        36,
-        &[
-            "solver.flip.cell_size: no interior cell",
-            "5.814 × 2.930 × 3.488 cells of 4.3 m",
-            "at least 3",
-        ],
-    ),
-    (
-        "cell_size = 0.2",
-        "cell_size = 4.2\nparticles_per_cell = 64",
-        36,
-        &[],
-    ),
-    (
-        "cell_size = 0.2",
-        "cell_size = 4.2\nparticles_per_cell = 1",
-        15,
-        &["water.block[0].max", "too thin for one layer"],
-    ),
-    (
-        "cell_size = 0.2",
-        "cell_size = 0.021",
-        36,
-        &["particles 0.0105 m apart", "134217728"],
-    ),
-    (
-        "cell_size = 0.2",
-        "cell_size = 0.001",
-        36,
-        &["the grid would overflow", "cells of 0.001 m"],
-    ),
-    (
-        "transfer = \"flip\"",
-        "transfer = \"pic\"",
-        37,
-        &["\"pic\" is no transfer; the nearest is \"apic\""],
-    ),
-    (
-        "transfer = \"flip\"",
-        "pic_blend = 1.1",
-        37,
-        &["solver.flip.pic_blend: 1.1 is out of range", "from 0 to 1"],
-    ),
-    (
-        "transfer = \"flip\"",
-        "cfl = 5.5",
-        37,
-        &["solver.flip.cfl: 5.5 is out of range", "up to 5"],
-    ),
-    (
-        "transfer = \"flip\"",
-        "particles_per_cell = 0",
-        37,
-        &["particles_per_cell: 0 is out of range"],
-    ),
-    (
-        "transfer = \"flip\"",
-        "density_correction = 1",
-        37,
-        &["density_correction: invalid type: integer `1`"],
-    ),
-    (
-        "surface = \"voxel\"",
-        "surface = \"ghost\"",
-        38,
-        &["\"ghost\" is no surface", "ghost_fluid"],
-    ),
-    (
-        "\"ipp\"",
-        "\"multigird\"",
-        39,
-        &[
-            "solver.flip.pressure.preconditioner: \"multigird\" is no preconditioner; \
-             the nearest is \"multigrid\"",
-            "\"none\"",
-        ],
-    ),
-    (
-        "tolerance = 1e-4",
-        "tolerance = 0",
-        39,
-        &[
-            "pressure.tolerance: 0 is out of range",
-            "above 0 and below 1",
-        ],
-    ),
-    (
-        "tolerance = 1e-4",
-        "tolerance = -1e-4",
-        39,
-        &["pressure.tolerance: -0.0001 is out of range"],
-    ),
-    (
-        "tolerance = 1e-4",
-        "tolerance = 1.0",
-        39,
-        &["pressure.tolerance: 1 is out of range"],
-    ),
-    (
-        "tolerance = 1e-4",
-        "tolerance = 0.1, residual_limit = 0.05",
-        39,
-        &[
-            "pressure.residual_limit: 0.05 is out of range",
-            "from the tolerance on",
-        ],
-    ),
-    (
-        "tolerance = 1e-4",
-        "max_iterations = 0",
-        39,
-        &["pressure.max_iterations: 0 is out of range"],
-    ),
     (
         "gravity = [0.0, -9.81, 0.0]",
         "gravity = [0.0, nan, 0.0]",
@@ -580,13 +457,7 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
             "of 25 m",
         ],
     ),
-    // 2 m are left: twenty particle spacings, but fewer than three cells of FLIP.
-    (
-        "stroke = 1.5, period = 3.0, ramp = 1.0 }",
-        "stroke = 23.0, period = 3.0, ramp = 1.0 }",
-        24,
-        &[],
-    ),
+    ("stroke = 1.5", "stroke = 24.5", 24, &[]),
     (
         "stroke = 1.5",
         "stroke = -1.5",
@@ -650,14 +521,157 @@ const FAULTS: &[(&str, &str, usize, &[&str])] = &[
     ),
 ];
 
+/// The same with `solver.method=flip` laid over.
+const FLIP_FAULTS: &[(&str, &str, usize, &[&str])] = &[
+    (
+        "cell_size = 0.2",
+        "cell_size = 0",
+        36,
+        &["solver.flip.cell_size: 0 is out of range"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 4.3",
+        36,
+        &[
+            "solver.flip.cell_size: no interior cell",
+            "5.814 × 2.930 × 3.488 cells of 4.3 m",
+            "at least 3",
+        ],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 4.2\nparticles_per_cell = 64",
+        36,
+        &[],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 4.2\nparticles_per_cell = 1",
+        15,
+        &["water.block[0].max", "too thin for one layer"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 0.021",
+        36,
+        &["particles 0.0105 m apart", "134217728"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 0.001",
+        36,
+        &["the grid would overflow", "cells of 0.001 m"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "transfer = \"pic\"",
+        37,
+        &["\"pic\" is no transfer; the nearest is \"apic\""],
+    ),
+    (
+        "transfer = \"flip\"",
+        "pic_blend = 1.1",
+        37,
+        &["solver.flip.pic_blend: 1.1 is out of range", "from 0 to 1"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "cfl = 5.5",
+        37,
+        &["solver.flip.cfl: 5.5 is out of range", "up to 5"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "particles_per_cell = 0",
+        37,
+        &["particles_per_cell: 0 is out of range"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "density_correction = 1",
+        37,
+        &["density_correction: invalid type: integer `1`"],
+    ),
+    (
+        "surface = \"voxel\"",
+        "surface = \"ghost\"",
+        38,
+        &["\"ghost\" is no surface", "ghost_fluid"],
+    ),
+    (
+        "\"ipp\"",
+        "\"multigird\"",
+        39,
+        &[
+            "solver.flip.pressure.preconditioner: \"multigird\" is no preconditioner; \
+             the nearest is \"multigrid\"",
+            "\"none\"",
+        ],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = 0",
+        39,
+        &[
+            "pressure.tolerance: 0 is out of range",
+            "above 0 and below 1",
+        ],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = -1e-4",
+        39,
+        &["pressure.tolerance: -0.0001 is out of range"],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = 1.0",
+        39,
+        &["pressure.tolerance: 1 is out of range"],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = 0.1, residual_limit = 0.05",
+        39,
+        &[
+            "pressure.residual_limit: 0.05 is out of range",
+            "from the tolerance on",
+        ],
+    ),
+    (
+        "tolerance = 1e-4",
+        "max_iterations = 0",
+        39,
+        &["pressure.max_iterations: 0 is out of range"],
+    ),
+    // 0.5 m are left: five particle spacings, but fewer than three cells.
+    (
+        "stroke = 1.5",
+        "stroke = 24.5",
+        24,
+        &[
+            "wave_maker[0].motion: the wall -x crosses",
+            "three cells (FLIP)",
+        ],
+    ),
+];
+
 #[test]
 fn each_fault_names_file_line_key_and_what_is_allowed() {
     let dir = assets();
-    parse(dir.path(), SCENE).expect("the good scene is good");
+    let flip = [Method::Flip.as_override()];
+    let parse = |text: &str, overrides: &[String]| {
+        Scene::parse(text, Path::new("scenes/bad.toml"), dir.path(), overrides)
+    };
+    parse(SCENE, &[]).expect("the good scene is good");
+    parse(SCENE, &flip).expect("the good scene is good for FLIP");
     let mut wrong = Vec::new();
-    for (old, new, line, expected) in FAULTS {
+    let of_pbf = FAULTS.iter().map(|fault| (fault, &[][..]));
+    let of_flip = FLIP_FAULTS.iter().map(|fault| (fault, &flip[..]));
+    for ((old, new, line, expected), overrides) in of_pbf.chain(of_flip) {
         assert!(SCENE.contains(old), "{old}");
-        let result = parse(dir.path(), &SCENE.replacen(old, new, 1));
+        let result = parse(&SCENE.replacen(old, new, 1), overrides);
         if expected.is_empty() {
             // A control: the change is allowed.
             if let Err(error) = result {
@@ -774,7 +788,7 @@ fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
         (
             "scene.toml",
             "pbf.toml",
-            "s.toml:2: scene: it has no table [solver.flip]",
+            "solver.method: the scene has no table [solver.flip]",
         ),
         (
             "look.toml",

@@ -385,15 +385,6 @@ fn scenes_say_where_solids_go_and_pbf_says_that_it_has_none() {
         swell::scene::physics_hash(&other)
     );
 
-    let refused = scene
-        .clone()
-        .solved_by(Method::Pbf)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        refused.contains("solver pbf has no moving solids yet"),
-        "{refused}"
-    );
     for (set, key, words) in [
         (
             &["solver.method=pbf"][..],

@@ -389,13 +389,19 @@ fn faults_end_with_their_code_and_write_nothing() {
         job.expect(2, &format!("inspect small.toml {wide}"))
             .contains("max_storage_buffer_binding_size")
     );
+    // FLIP: four bytes for each of 98 million bricks.
+    let wide = "--solver flip --set domain.max=[1000,800,500]";
+    for command in ["bake", "inspect"] {
+        let said = job.expect(2, &format!("{command} small.toml {wide}"));
+        assert!(said.contains("max_storage_buffer_binding_size"), "{said}");
+    }
     job.expect(2, "bake small.toml --nonsense");
     for (set, key) in [
         ("cell_size=0.4", "solver.flip.cell_size"),
         ("pressure.tolerance=0", "solver.flip.pressure.tolerance"),
         ("pressure.preconditioner=ippp", "nearest is \"ipp\""),
     ] {
-        let said = job.expect(2, &format!("bake small.toml --set solver.flip.{set}"));
+        let said = job.expect(2, &format!("bake small.toml --solver flip --set solver.flip.{set}"));
         assert!(said.contains(key), "{said}");
     }
     let said = job.expect(2, "bake small.toml --solver sph");

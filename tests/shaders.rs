@@ -8,11 +8,14 @@ use swell::{
         reflect::{Access, Layout, reflect},
         shader,
     },
-    solve::params::{FlipParams, Params, Phase, SolidGrid, SolidGrids},
+    solve::{
+        params::{FlipParams, Params, Phase, SolidGrid, SolidGrids},
+        pressure::{PressureBrick, PressureControl, PressurePhase},
+    },
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 8] = [
+const VARIANTS: [&[&str]; 9] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -27,6 +30,7 @@ const VARIANTS: [&[&str]; 8] = [
     &["CORRECTION", "GHOST_FLUID"],
     &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
     &["SOLIDS", "MOVING_SOLIDS", "CORRECTION", "GHOST_FLUID"],
+    &["GHOST_FLUID", "DIAGONAL"],
 ];
 
 fn compute_passes() -> Vec<String> {
@@ -109,7 +113,7 @@ fn check(
 
 #[test]
 fn mirrors_match_naga() {
-    let mut found = [0; 5];
+    let mut found = [0; 8];
     let variants = ["NEIGHBOR_LIST", "MOVING_SOLIDS"];
     let passes = compute_passes();
     let all = variants.map(|name| passes.iter().map(move |pass| (pass, ["SOLIDS", name])));
@@ -136,6 +140,24 @@ fn mirrors_match_naga() {
                 "SolidGrids",
                 size_of::<SolidGrids>(),
                 &SolidGrids::members(),
+            ),
+            check(
+                &layouts,
+                "PressurePhase",
+                size_of::<PressurePhase>(),
+                &PressurePhase::members(),
+            ),
+            check(
+                &layouts,
+                "PressureControl",
+                size_of::<PressureControl>(),
+                &PressureControl::members(),
+            ),
+            check(
+                &layouts,
+                "PressureBrick",
+                size_of::<PressureBrick>(),
+                &PressureBrick::members(),
             ),
         ];
         for (count, result) in found.iter_mut().zip(seen) {

@@ -29,7 +29,7 @@ pub(super) struct BakeArgs {
     /// Cache directory; cache/SHOT/SOLVER where left out.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Which solver: pbf or flip; the scene's own choice where left out.
+    /// Which solver, pbf or flip: short for --set solver.method=SOLVER.
     #[arg(long, value_name = "SOLVER", value_parser = method)]
     solver: Option<Method>,
     /// Frames to bake, such as 1-30; the whole shot where left out.
@@ -68,11 +68,9 @@ pub(super) fn load(
     set: &[String],
     solver: Option<Method>,
 ) -> Result<Scene, SceneError> {
-    let scene = Scene::load(file, set)?;
-    match solver {
-        Some(method) => scene.solved_by(method),
-        None => Ok(scene),
-    }
+    let chosen = solver.map(Method::as_override);
+    let overrides: Vec<String> = set.iter().cloned().chain(chosen).collect();
+    Scene::load(file, &overrides)
 }
 
 pub(super) fn run(args: &BakeArgs) -> Result<ExitCode, Failure> {

@@ -26,7 +26,7 @@ pub(super) struct InspectArgs {
     /// Override a scene key.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Plan for this solver: pbf or flip; the scene's own choice where left out.
+    /// Plan for this solver, pbf or flip: short for --set solver.method=SOLVER.
     #[arg(long, value_name = "SOLVER", value_parser = bake::method)]
     solver: Option<Method>,
     /// Plan for the limits of this adapter.

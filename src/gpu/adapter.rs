@@ -77,6 +77,11 @@ pub struct Context {
 fn instance() -> Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     descriptor.backends &= Backends::VULKAN | Backends::METAL | Backends::DX12;
+    // It would put a pass of its own before each indirect dispatch, of which a pressure solve has hundreds; their
+    // sizes are our own and within the limits.
+    descriptor
+        .flags
+        .remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     Instance::new(descriptor)
 }
 

@@ -108,18 +108,32 @@ impl Recording {
     /// # Errors
     /// [`GpuError::Lost`].
     pub fn run(&self, program: &Program, timer: Option<&mut Timer>) -> Result<(), GpuError> {
-        match timer {
-            None => {
-                let mut encoder = program
-                    .context
-                    .device
-                    .create_command_encoder(&Default::default());
-                self.encode(program, &mut encoder);
-                program.context.queue.submit([encoder.finish()]);
-                program.context.check()
-            }
-            Some(timer) => timer.run(self, program),
+        Self::run_all(&[self], program, timer)
+    }
+
+    /// Submits one recording after the other at once, like [`Self::run`].
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn run_all(
+        recordings: &[&Self],
+        program: &Program,
+        timer: Option<&mut Timer>,
+    ) -> Result<(), GpuError> {
+        if let Some(timer) = timer {
+            return recordings
+                .iter()
+                .try_for_each(|recording| timer.run(recording, program));
         }
+        let mut encoder = program
+            .context
+            .device
+            .create_command_encoder(&Default::default());
+        for recording in recordings {
+            recording.encode(program, &mut encoder);
+        }
+        program.context.queue.submit([encoder.finish()]);
+        program.context.check()
     }
 
     fn encode(&self, program: &Program, encoder: &mut CommandEncoder) {

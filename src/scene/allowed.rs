@@ -111,7 +111,8 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "wave_maker.motion",
-        "a motion that leaves at least two particle spacings and three cells of FLIP between the walls",
+        "a motion that leaves at least two particle spacings (PBF) or three cells (FLIP) between the \
+         walls",
     ),
     (
         "wave_maker.motion.kind",
@@ -141,7 +142,8 @@ const TABLE: &[(&str, &str)] = &[
     ("solver", "a table with method, pbf and flip"),
     (
         "solver.method",
-        "\"pbf\" with a table [solver.pbf], or \"flip\" with a table [solver.flip]",
+        "\"pbf\" with a table [solver.pbf] of at least particle_spacing, or \"flip\" with a table \
+         [solver.flip] of at least cell_size",
     ),
     ("solver.pbf", "a table with at least particle_spacing"),
     (
@@ -170,7 +172,7 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.flip", "a table with at least cell_size"),
     (
         "solver.flip.cell_size",
-        "a number above 0, metres, with at least 3 and at most 65536 cells along each axis, 2147483647 \
+        "a number above 0, metres, with at least 3 and at most 65536 cells along each axis, 68719476736 \
          cells and 134217728 particles",
     ),
     (

@@ -55,13 +55,12 @@ impl Scene {
 pub(super) fn check_method(doc: &Document<'_>, span: Range<usize>, method: Method) -> Result<()> {
     match method {
         Method::Flip => Ok(()),
-        Method::Pbf => Err(doc.fault_plain(span, UNKNOWN_TO_PBF.to_owned())),
+        Method::Pbf => {
+            let problem = "solver pbf has no moving solids yet; choose solver.method = \"flip\"";
+            Err(doc.fault_plain(span, problem.to_owned()))
+        }
     }
 }
-
-/// What a scene with moving solids is told that PBF shall solve.
-pub(super) const UNKNOWN_TO_PBF: &str =
-    "solver pbf has no moving solids yet; choose solver.method = \"flip\"";
 
 /// Builds one from its mesh and its keys.
 pub(super) fn build(

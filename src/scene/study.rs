@@ -23,12 +23,10 @@ pub enum Study {
 /// Two solvers on one scene, side by side.
 #[derive(Clone, Debug)]
 pub struct SolverComparison {
-    /// Has the settings of both.
-    pub scene: Scene,
+    /// The scene with each solver, left and right.
+    pub scenes: [Scene; 2],
     /// Same for both.
     pub look: Look,
-    /// Left and right.
-    pub solvers: [Method; 2],
     /// Frames that are measured.
     pub frames: FrameRange,
     /// Frames that are rendered.
@@ -96,29 +94,26 @@ fn comparison(
     spec: &StudySpec,
     base_dir: &Path,
 ) -> Result<SolverComparison, StudyFileError> {
-    let solvers = solvers(doc, &spec.solvers)?;
-    let scene = Scene::load(&base_dir.join(spec.scene.get_ref()), &[])?;
-    for method in solvers {
-        if !scene.solver.has(method) {
-            let problem = format!("it has no table [solver.{}]", method.name());
-            return Err(doc.fault_at(spec.scene.span(), problem).into());
-        }
-    }
+    let [left, right] = solvers(doc, &spec.solvers)?;
+    let file = base_dir.join(spec.scene.get_ref());
+    let scenes = [
+        Scene::load(&file, &[left.as_override()])?,
+        Scene::load(&file, &[right.as_override()])?,
+    ];
     let look = Look::load(&base_dir.join(spec.look.get_ref()))?;
     if !look.spec().output.formats.contains(&FormatSpec::Png) {
         let problem = "its output.formats has no \"png\"";
         return Err(doc.fault_at(spec.look.span(), problem).into());
     }
-    let last = scene.shot.frames;
+    let last = scenes[0].shot.frames;
     let frames = match &spec.frames {
         Some(text) => range(doc, text, last)?,
         None => whole_shot(last),
     };
     Ok(SolverComparison {
-        solvers,
         frames,
         pictures: range(doc, &spec.pictures, last)?,
-        scene,
+        scenes,
         look,
     })
 }
@@ -154,4 +149,23 @@ fn range(doc: &Document<'_>, text: &Spanned<String>, last: u32) -> Result<FrameR
         return Err(fault(format!("the shot has frames 1 to {last}")));
     }
     Ok(frames)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_studies_that_ship_fit_their_scenes() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        let mut names = Vec::new();
+        for entry in fs::read_dir(folder).expect("studies") {
+            let file = entry.expect("a study").path();
+            let Study::SolverComparison(comparison) = Study::load(&file).expect("valid");
+            let methods = comparison.scenes.map(|scene| scene.solver.method);
+            assert_eq!(methods, [Method::Pbf, Method::Flip], "{}", file.display());
+            names.push(file);
+        }
+        assert_eq!(names.len(), 2);
+    }
 }

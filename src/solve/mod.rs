@@ -8,7 +8,28 @@ pub mod pbf;
 pub mod pressure;
 mod state;
 
-use crate::gpu::adapter::GpuError;
+use crate::{
+    gpu::adapter::GpuError,
+    scene::{
+        Method, Scene,
+        plan::{Counts, DeviceLimits, Plan},
+    },
+};
+
+/// What `scene`'s solver needs on a device with these limits.
+pub fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
+    let plan = Plan::new(scene, counts, limits);
+    match scene.solver.method {
+        Method::Pbf => plan,
+        Method::Flip => {
+            let flip = scene.solver.flip();
+            let (settings, has_correction) = (&flip.pressure, flip.density_correction);
+            let buffers = pressure::buffers(settings, has_correction, counts.bricks.slots);
+            let passes = pressure::passes(settings, flip.surface, has_correction);
+            plan.with("pressure", buffers, passes)
+        }
+    }
+}
 
 /// What stops a solve.
 #[derive(Debug, thiserror::Error)]

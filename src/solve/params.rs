@@ -21,6 +21,8 @@ macro_rules! mirror {
     };
 }
 
+pub(super) use mirror;
+
 mirror!(
     /// `Params` of shared/pbf_params.wgsl; lengths in metres, positions relative to the domain's least corner.
     Params {

@@ -15,6 +15,7 @@ use crate::{
         plan::{Capacity, Counts, DeviceLimits, Plan},
     },
     solve::{
+        self,
         SolveError,
         boundary::Boundary,
         flip::{self, Flip},
@@ -95,7 +96,7 @@ impl Start {
             bricks,
             ..self.boundary.counts()
         };
-        Plan::new(scene, counts, limits)
+        solve::plan(scene, counts, limits)
     }
 }
 

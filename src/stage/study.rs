@@ -12,7 +12,7 @@ use crate::{
     cache::{CacheError, CacheReader, Manifest},
     domain::{frame_range::FrameRange, solver::StepReport},
     scene::{
-        Method, Scene, SceneError, Solid,
+        Scene, SceneError, Solid,
         study::{SolverComparison, Study},
     },
     study::{
@@ -119,26 +119,22 @@ pub fn study(
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, StudyError> {
     let Study::SolverComparison(comparison) = &request.study;
-    for method in comparison.solvers {
-        let scene = comparison.scene.clone().solved_by(method)?;
-        tell(Event::Solver(method.name()));
+    for scene in &comparison.scenes {
+        tell(Event::Solver(scene.solver.method.name()));
         if bake_and_render(request, comparison, scene, stop, tell)? {
             return Ok(Outcome::default());
         }
     }
-    let caches = comparison.solvers.map(|method| {
-        let directory = cache_directory(&request.directory, method);
-        CacheReader::open(&directory)
-    });
-    let [a, b] = caches;
-    let caches = [a?, b?];
-    let gauge = gauge(&comparison.scene, &caches)?;
+    let [scene, other] = &comparison.scenes;
+    let open = |scene: &Scene| CacheReader::open(&cache_directory(request, scene));
+    let caches = [open(scene)?, open(other)?];
+    let gauge = gauge(scene, &caches)?;
     let [a, b] = &caches;
     let courses = [
         course(a, &gauge, &comparison.frames)?,
         course(b, &gauge, &comparison.frames)?,
     ];
-    let impact = Impact::of(&courses, obstacle(&comparison.scene, &gauge));
+    let impact = Impact::of(&courses, obstacle(scene, &gauge));
     let findings = comparison::findings(&courses, impact);
     write(
         &request.directory.join("results.csv"),
@@ -147,7 +143,7 @@ pub fn study(
     let parts = parts(request, comparison, &caches, &courses, &findings, impact)?;
     let title = format!(
         "{}: {} and {}",
-        comparison.scene.shot.name, courses[0].solver, courses[1].solver
+        scene.shot.name, courses[0].solver, courses[1].solver
     );
     let file = request.directory.join("index.html");
     write(&file, &page::html(&title, &parts))?;
@@ -161,15 +157,14 @@ pub fn study(
 fn bake_and_render(
     request: &Request,
     comparison: &SolverComparison,
-    scene: Scene,
+    scene: &Scene,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<bool, StudyError> {
-    let method = scene.solver.method;
     let last = comparison.frames.last().max(comparison.pictures.last());
-    let cache = cache_directory(&request.directory, method);
+    let cache = cache_directory(request, scene);
     let bake = bake::Request {
-        scene,
+        scene: scene.clone(),
         directory: cache.clone(),
         frames: FrameRange::inclusive(1, last),
         resume: true,
@@ -182,7 +177,7 @@ fn bake_and_render(
     let render = render::Request {
         cache,
         look: comparison.look.clone(),
-        directory: picture_directory(&request.directory, method),
+        directory: picture_directory(request, scene),
         frames: Some(comparison.pictures.clone()),
         adapter: request.adapter.clone(),
         overwrite: false,
@@ -190,12 +185,16 @@ fn bake_and_render(
     Ok(render::render(&render, stop, &mut |event| tell(Event::Render(event)))?.interrupted)
 }
 
-fn cache_directory(directory: &Path, method: Method) -> PathBuf {
-    directory.join("cache").join(method.name())
+fn cache_directory(request: &Request, scene: &Scene) -> PathBuf {
+    request
+        .directory
+        .join("cache")
+        .join(scene.solver.method.name())
 }
 
-fn picture_directory(directory: &Path, method: Method) -> PathBuf {
-    directory.join("pictures").join(method.name())
+fn picture_directory(request: &Request, scene: &Scene) -> PathBuf {
+    let pictures = request.directory.join("pictures");
+    pictures.join(scene.solver.method.name())
 }
 
 /// The wave runs away from the first wave maker; towards greater x where there is none.
@@ -368,9 +367,8 @@ fn pictures(
     comparison: &SolverComparison,
     cache: &CacheReader,
 ) -> Result<Part, StudyError> {
-    let names = comparison.solvers.map(Method::name);
-    let address = |method: Method, frame: u32| {
-        let folder = picture_directory(&request.directory, method);
+    let address = |scene: &Scene, frame: u32| {
+        let folder = picture_directory(request, scene);
         let file = folder.join(render::picture_name(cache, frame));
         let bytes = fs::read(&file).map_err(|source| StudyError::File {
             file: file.clone(),
@@ -379,17 +377,18 @@ fn pictures(
         picture::data_uri(&bytes).map_err(|source| StudyError::Picture { file, source })
     };
     let row = |frame: u32| {
-        let addresses = comparison
-            .solvers
-            .iter()
-            .map(|&method| address(method, frame));
+        let addresses = comparison.scenes.iter().map(|scene| address(scene, frame));
         Ok((
             format!("frame {frame}"),
             addresses.collect::<Result<_, StudyError>>()?,
         ))
     };
     Ok(Part::Pictures {
-        columns: names.map(str::to_owned).to_vec(),
+        columns: comparison
+            .scenes
+            .iter()
+            .map(|scene| scene.solver.method.name().to_owned())
+            .collect(),
         rows: comparison
             .pictures
             .iter()

@@ -9,7 +9,7 @@ use crate::{
     },
 };
 
-use super::{Plan, PlannedPass, pressure};
+use super::{Plan, PlannedPass};
 
 /// Size of the `FlipParams` uniform.
 pub const FLIP_PARAMS_BYTES: u64 = 160;
@@ -46,13 +46,6 @@ impl Plan {
         self.add_bricks(flip);
         self.add_flip_passes(flip);
         let slots = self.counts.bricks.slots;
-        self.add_specs(pressure::buffers(flip, slots), "pressure");
-        for spec in pressure::passes(flip) {
-            self.passes.push(PlannedPass {
-                spec,
-                owner: "pressure",
-            });
-        }
         let cells = CELLS as usize * slots;
         self.add_effects(scene.effects.flip_plans(cells), |_| {});
     }

@@ -4,7 +4,6 @@
 
 mod flip;
 mod pbf;
-mod pressure;
 
 use crate::{
     domain::sph::Calibration,
@@ -115,7 +114,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Lays out the chosen solver for `scene`.
+    /// Lays out the chosen solver for `scene`, but for FLIP's projection, which `solve::plan` adds.
     pub fn new(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Self {
         let cell = match scene.solver.method {
             Method::Pbf => {
@@ -137,6 +136,20 @@ impl Plan {
             Method::Flip => plan.add_all_of_flip(scene),
         }
         plan
+    }
+
+    /// The same with what another part of a solver needs.
+    pub fn with(
+        mut self,
+        owner: &'static str,
+        buffers: Vec<BufferSpec>,
+        passes: Vec<PassSpec>,
+    ) -> Self {
+        self.add_specs(buffers, owner);
+        let passes = passes.into_iter();
+        self.passes
+            .extend(passes.map(|spec| PlannedPass { spec, owner }));
+        self
     }
 
     /// Bytes in all, and those of the neighbour lists.

@@ -29,7 +29,7 @@ use crate::{
 use super::{
     SolveError,
     boundary::{Boundary, Movers},
-    pressure::LEVELS,
+    pressure::{self, LEVELS, PressureSolver},
     state::{check_finite, report, slots_by_id, take_over, upload},
 };
 use record::{Recordings, groups, windows};
@@ -61,6 +61,7 @@ pub struct Flip {
     scene: Scene,
     movers: Option<Movers>,
     recordings: Recordings,
+    pressure: PressureSolver,
     timer: Option<Timer>,
     state: Particles,
     frame: u32,
@@ -74,6 +75,28 @@ struct Survey {
     speed: f64,
     not_finite: u32,
     is_wet: Vec<bool>,
+}
+
+/// What a frame's substeps did.
+#[derive(Default)]
+struct Told {
+    substeps: u32,
+    iterations: u64,
+    projection: Projection,
+}
+
+impl Told {
+    fn add(&mut self, projected: &pressure::Projected) {
+        let solved = &projected.solved;
+        self.iterations += u64::from(solved.iterations);
+        let all = &mut self.projection;
+        all.residual = all.residual.max(solved.residual);
+        all.divergence_before = all.divergence_before.max(projected.divergence_before);
+        all.divergence_after = all.divergence_after.max(projected.divergence_after);
+        all.missed += u32::from(solved.is_missed);
+        all.pockets = all.pockets.max(projected.pockets);
+        all.dropped += u64::from(projected.dropped);
+    }
 }
 
 impl Flip {
@@ -100,9 +123,9 @@ impl Flip {
             displacement: 0.0,
         };
         program.upload("params", 0, &[step::params(scene, &plan, &bricks, &frame)]);
-        let most = layers(scene.solver.flip().cfl);
         Ok(Self {
-            recordings: Recordings::new(&program, &plan, most),
+            recordings: Recordings::new(&program, &plan, scene),
+            pressure: pressure_solver(scene, &plan),
             timer: if is_timed { Timer::new(context) } else { None },
             bricks,
             program,
@@ -190,11 +213,11 @@ impl Flip {
                 bricks: grown,
                 ..self.plan.counts
             };
-            self.plan = Plan::new(&self.scene, counts, self.limits);
+            self.plan = super::plan(&self.scene, counts, self.limits);
             self.program.resize(&specs(&self.plan))?;
             upload_constants(&self.program, &self.plan, &self.scene);
-            let most = self::layers(self.scene.solver.flip().cfl);
-            self.recordings = Recordings::new(&self.program, &self.plan, most);
+            self.recordings = Recordings::new(&self.program, &self.plan, &self.scene);
+            self.pressure = pressure_solver(&self.scene, &self.plan);
         }
         let bricks = &self.bricks;
         let params = step::params(&self.scene, &self.plan, bricks, substep);
@@ -209,26 +232,48 @@ impl Flip {
         Ok(())
     }
 
-    fn run_substep(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
+    fn run_substep(&mut self, is_wet: &[bool], substep: &Substep, told: &mut Told) -> Result<(), SolveError> {
         self.lay_out(is_wet, substep)?;
         self.recordings.to_grid.run(&self.program, self.timer.as_mut())?;
+        let flip = self.scene.solver.flip();
+        let step = pressure::Step {
+            time_step: substep.length,
+            rest_density: self.scene.water.rest_density,
+        };
+        self.pressure.set_topology(&self.program, &self.bricks, flip.cell_size);
+        let projected = self.pressure.project(&self.program, step, self.timer.as_mut())?;
+        told.add(&projected);
+        let limit = flip.pressure.residual_limit;
+        // Not a number is above it too.
+        if !(projected.solved.residual <= limit) {
+            return self.numbers(format!(
+                "the projection of substep {} ended at a relative residual of {:.3e} after {} iterations; \
+                 solver.flip.pressure.residual_limit is {limit}",
+                told.substeps, projected.solved.residual, projected.solved.iterations
+            ));
+        }
+        if flip.density_correction {
+            let corrected = self.pressure.correct(&self.program, self.timer.as_mut())?;
+            told.projection.correction_iterations += u64::from(corrected.iterations);
+        }
         self.recordings.to_particles.run(&self.program, self.timer.as_mut())?;
         Ok(())
     }
 
-    /// Substeps through one frame; returns how many.
-    fn run_frame(&mut self) -> Result<u32, SolveError> {
+    /// Substeps through one frame.
+    fn run_frame(&mut self) -> Result<Told, SolveError> {
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
-        let (mut done, mut elapsed) = (0, 0.0);
+        let mut told = Told::default();
+        let mut elapsed = 0.0;
         loop {
             let survey = self.survey()?;
-            let (wanted, substep) = self.choose(&survey, start + elapsed, length - elapsed, done)?;
-            self.run_substep(&survey.is_wet, &substep)?;
-            done += 1;
+            let (wanted, substep) = self.choose(&survey, start + elapsed, length - elapsed, told.substeps)?;
+            told.substeps += 1;
+            self.run_substep(&survey.is_wet, &substep, &mut told)?;
             elapsed += substep.length;
             if wanted <= 1.0 {
-                return Ok(done);
+                return Ok(told);
             }
         }
     }
@@ -296,7 +341,11 @@ impl Solver for Flip {
 
     fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
         self.program.upload("counters", 0, &[0u32; 4]);
-        let substeps = if self.state.is_empty() { 0 } else { self.run_frame()? };
+        let told = if self.state.is_empty() {
+            Told::default()
+        } else {
+            self.run_frame()?
+        };
         self.read_state()?;
         check_finite(self.frame + 1, &self.state, None)?;
         let density = if self.state.is_empty() { Vec::new() } else { self.densities()? };
@@ -307,9 +356,10 @@ impl Solver for Flip {
             self.upload_state();
         }
         let report = StepReport {
-            substeps,
+            substeps: told.substeps,
+            iterations: told.iterations,
             capped: u64::from(capped),
-            projection: Some(Projection::default()),
+            projection: Some(told.projection),
             ..report(&self.scene, &self.state, &density)
         };
         Ok((self.state.clone(), report))
@@ -327,6 +377,11 @@ impl Solver for Flip {
 
 fn specs(plan: &Plan) -> Vec<BufferSpec> {
     plan.buffers.iter().map(|buffer| buffer.spec.clone()).collect()
+}
+
+fn pressure_solver(scene: &Scene, plan: &Plan) -> PressureSolver {
+    let flip = scene.solver.flip();
+    PressureSolver::new(&flip.pressure, flip.density_correction, plan.counts.bricks.slots)
 }
 
 /// No flag set, one a brick of the domain.

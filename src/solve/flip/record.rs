@@ -7,7 +7,10 @@ use crate::{
         recording::{Bind, Command, Groups, Recording, spread},
         sort,
     },
-    scene::plan::{Plan, WINDOW_BYTES},
+    scene::{
+        Scene,
+        plan::{Plan, WINDOW_BYTES, layers},
+    },
 };
 
 /// Where in `groups` the workgroups over cells of water stand.
@@ -36,7 +39,8 @@ pub(super) struct Recordings {
 }
 
 impl Recordings {
-    pub(super) fn new(program: &Program, plan: &Plan, layers: usize) -> Self {
+    pub(super) fn new(program: &Program, plan: &Plan, scene: &Scene) -> Self {
+        let layers = layers(scene.solver.flip().cfl);
         let n = plan.counts.particles;
         let survey = [Command::Clear("survey"), Command::over("flip/survey", n.div_ceil(SURVEY_RUN))];
         Self {

@@ -27,32 +27,53 @@
 //! # Use
 //! ```text
 //! specs += pressure::buffers(..); passes += pressure::passes(..);      plan
-//! let mut pressure = PressureSolver::new(&program, ..);                once, and again when slots grow
+//! let mut pressure = PressureSolver::new(..);                          once, and again when slots grow
 //! pressure.set_topology(&program, &bricks, cell_size)                  each substep, after `bricks` is uploaded
 //! pressure.project(&program, Step { .. }, timer)                       builds, solves, subtracts; waits once
 //! pressure.correct(&program, timer)                                    same system, density_excess -> face_displacement
 //! ```
 
+mod params;
+mod plan;
+mod pockets;
+mod stages;
+
+use std::collections::BTreeMap;
+
 use crate::{
-    domain::bricks::Bricks,
+    domain::bricks::{Bricks, CELLS, Level},
     gpu::{
-        program::{BufferSpec, PassSpec, Program},
-        recording::Timer,
+        program::Program,
+        recording::{Recording, Timer, spread},
     },
-    scene::flip::{Pressure, Surface},
+    scene::flip::{Preconditioner, Pressure},
 };
 
 use super::SolveError;
 
-/// `cell_kind` of a cell without water.
-pub const AIR: u32 = 0;
-/// `cell_kind` of a cell of water.
-pub const FLUID: u32 = 1;
-/// `cell_kind` of a cell without open volume.
-pub const SOLID: u32 = 2;
+pub use crate::domain::poisson::{AIR, FLUID, SOLID};
+pub use params::{PressureBrick, PressureControl, PressurePhase};
+pub use plan::{buffers, passes};
+
+use plan::{PHASE_STRIDE, PHASES, Phase, SIZES, Size};
+use stages::{SINGLE, Shape, Stages};
 
 /// Levels of bricks that the multigrid uses at most: pass it to [`Bricks::new`] as depth.
 pub const LEVELS: usize = 8;
+
+/// Relative residual of the density correction.
+pub const CORRECTION_TOLERANCE: f64 = 1e-2;
+
+/// Words of `pressure_stats`: the largest |∇·u| before and after and the largest mean over a pocket (bits of
+/// floats), dropped cells, pockets.
+const STATS: usize = 8;
+
+/// States of a solve, as in shared/pressure_control.wgsl.
+const DONE: u32 = 2;
+const WANTS_POCKETS: u32 = 3;
+
+/// Iterations submitted at once at most: a device that is done skips the rest, but not for nothing.
+const MOST_AT_ONCE: u32 = 64;
 
 /// What a substep is.
 #[derive(Clone, Copy, Debug)]
@@ -91,37 +112,101 @@ pub struct Projected {
     pub dropped: u32,
 }
 
-/// Buffers that the room needs beside those of the table above; `capacity` is in slots.
-pub fn buffers(settings: &Pressure, has_correction: bool, capacity: usize) -> Vec<BufferSpec> {
-    let _ = (settings, has_correction, capacity);
-    unimplemented!()
-}
-
-/// Its passes.
-pub fn passes(settings: &Pressure, surface: Surface, has_correction: bool) -> Vec<PassSpec> {
-    let _ = (settings, surface, has_correction);
-    unimplemented!()
-}
-
 /// The projection, bound to a program that holds [`buffers`] and [`passes`].
-pub struct PressureSolver {}
+pub struct PressureSolver {
+    settings: Pressure,
+    has_correction: bool,
+    capacity: usize,
+    stages: BTreeMap<Shape, Stages>,
+    shape: Shape,
+    phase: PressurePhase,
+    sizes: [[u32; 4]; SIZES],
+    pockets: u32,
+    /// Iterations that the last projection and the last correction took: how many the next is submitted with.
+    /// It changes when the device is waited for, and nothing else.
+    expected: [u32; 2],
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Task {
+    Project,
+    Correct,
+}
 
 impl PressureSolver {
-    /// Binds the program's buffers; to be built anew when those were replaced by larger ones.
-    pub fn new(
-        program: &Program,
-        settings: &Pressure,
-        has_correction: bool,
-        capacity: usize,
-    ) -> Self {
-        let _ = (program, settings, has_correction, capacity);
-        unimplemented!()
+    /// Binds the program's buffers; to be built anew when those were replaced by larger ones. `capacity` is in
+    /// slots.
+    pub fn new(settings: &Pressure, has_correction: bool, capacity: usize) -> Self {
+        let expected = match settings.preconditioner {
+            Preconditioner::Multigrid => 10,
+            _ => MOST_AT_ONCE,
+        };
+        Self {
+            settings: settings.clone(),
+            has_correction,
+            capacity,
+            stages: BTreeMap::new(),
+            shape: Shape {
+                levels: 1,
+                dispatched: 1,
+                has_pockets: false,
+            },
+            phase: PressurePhase {
+                stride: CELLS * capacity as u32,
+                max_iterations: settings.max_iterations,
+                ..PressurePhase::default()
+            },
+            sizes: [[0; 4]; SIZES],
+            pockets: 0,
+            expected: [expected, expected / 2],
+        }
     }
 
     /// Takes over the bricks of a substep, whose records the caller has uploaded to `bricks`.
+    ///
+    /// # Panics
+    /// Where they are more than the capacity.
     pub fn set_topology(&mut self, program: &Program, bricks: &Bricks, cell_size: f64) {
-        let _ = (program, bricks, cell_size);
-        unimplemented!()
+        assert!(
+            bricks.slots() <= self.capacity,
+            "{} slots, and the arrays hold {}",
+            bricks.slots(),
+            self.capacity
+        );
+        let used = &bricks.levels[..bricks.levels.len().min(LEVELS)];
+        self.phase.cell_size = cell_size as f32;
+        self.phase.levels = [[0; 4]; LEVELS];
+        for (level, Level { start, count }) in used.iter().enumerate() {
+            self.phase.levels[level] = [*start, *count, 0, 0];
+        }
+        self.phase.levels[0][2] = bricks.active;
+        self.phase.last_level = used.len() as u32 - 1;
+        self.shape = Shape {
+            levels: used.len(),
+            dispatched: (1..used.len())
+                .find(|&level| used[level].count <= SINGLE)
+                .unwrap_or(used.len() - 1)
+                .max(1),
+            has_pockets: false,
+        };
+        self.pockets = 0;
+        self.set_sizes(program, bricks.active, used);
+        program.upload("pressure_bricks", 0, &brick_records(bricks, used.len()));
+    }
+
+    fn set_sizes(&mut self, program: &Program, active: u32, levels: &[Level]) {
+        let groups = |threads: u32| {
+            let [x, y, z] = spread(&program.context, 64, u64::from(threads));
+            [x, y, z, 0]
+        };
+        self.sizes = [[0; 4]; SIZES];
+        for (level, &Level { count, .. }) in levels.iter().enumerate() {
+            self.sizes[Size::Full(level).index()] = groups(64 * count);
+            self.sizes[Size::Half(level).index()] = groups(32 * count);
+        }
+        self.sizes[Size::Single.index()] = [1, 1, 1, 0];
+        self.sizes[Size::Active.index()] = groups(64 * active);
+        program.upload("pressure_sizes", 0, &self.sizes);
     }
 
     /// Builds the system, solves it and makes `face_velocity` free of divergence; waits for the device.
@@ -134,8 +219,21 @@ impl PressureSolver {
         step: Step,
         timer: Option<&mut Timer>,
     ) -> Result<Projected, SolveError> {
-        let _ = (program, step, timer);
-        unimplemented!()
+        let scale = step.rest_density * f64::from(self.phase.cell_size) / step.time_step;
+        self.phase.pressure_scale = scale as f32;
+        self.shape.has_pockets = false;
+        self.pockets = 0;
+        let tolerance = self.settings.tolerance;
+        let (solved, stats) = self.solve(program, Task::Project, tolerance, timer)?;
+        let measured = |k: usize| f64::from(f32::from_bits(stats[k]));
+        Ok(Projected {
+            solved,
+            divergence_before: measured(0),
+            divergence_after: measured(1),
+            incompatible: measured(2),
+            dropped: stats[3],
+            pockets: self.pockets,
+        })
     }
 
     /// Solves the last projection's system for displacements whose divergence is `density_excess`
@@ -143,15 +241,135 @@ impl PressureSolver {
     ///
     /// # Errors
     /// The device.
+    ///
+    /// # Panics
+    /// Where the room was built without the correction.
     pub fn correct(
         &mut self,
         program: &Program,
         timer: Option<&mut Timer>,
     ) -> Result<Solved, SolveError> {
-        let _ = (program, timer);
-        unimplemented!()
+        assert!(self.has_correction, "built without the correction");
+        let (solved, _) = self.solve(program, Task::Correct, CORRECTION_TOLERANCE, timer)?;
+        Ok(solved)
+    }
+
+    /// Runs a task to its end: batches of iterations, each followed by a verification and by what is to be done
+    /// with the solution, which stay empty until it is their turn.
+    fn solve(
+        &mut self,
+        program: &Program,
+        task: Task,
+        tolerance: f64,
+        mut timer: Option<&mut Timer>,
+    ) -> Result<(Solved, [u32; STATS]), SolveError> {
+        if self.phase.levels[0][1] == 0 {
+            return Ok(Default::default());
+        }
+        self.phase.tolerance_square = (tolerance * tolerance) as f32;
+        self.upload_phases(program);
+        let mut batch = self.expected[task as usize] + 1;
+        let mut is_first = true;
+        loop {
+            let stages = self.stages(program);
+            let (start, finish) = match task {
+                Task::Project => (Some(&stages.project), Some(&stages.finish_project)),
+                Task::Correct => (stages.correct.as_ref(), stages.finish_correct.as_ref()),
+            };
+            let mut recordings = Vec::new();
+            if is_first {
+                recordings.extend(start);
+                recordings.push(&stages.begin);
+            }
+            recordings.extend((0..batch.min(MOST_AT_ONCE)).map(|_| &stages.iterate));
+            recordings.push(&stages.verify);
+            recordings.extend(finish);
+            Recording::run_all(&recordings, program, timer.as_deref_mut())?;
+            let (control, stats) = read(program)?;
+            is_first = control.state == WANTS_POCKETS;
+            if is_first {
+                self.find_pockets(program)?;
+            } else if control.state == DONE {
+                self.expected[task as usize] = control.iterations;
+                return Ok((solved(&control, tolerance), stats));
+            } else {
+                batch = (control.iterations / 2).max(4);
+            }
+        }
+    }
+
+    fn stages(&mut self, program: &Program) -> &Stages {
+        let (preconditioner, has_correction) = (self.settings.preconditioner, self.has_correction);
+        self.stages.entry(self.shape).or_insert_with_key(|&shape| {
+            Stages::new(program, preconditioner, has_correction, shape)
+        })
+    }
+
+    fn upload_phases(&self, program: &Program) {
+        let has_halves = self.settings.preconditioner == Preconditioner::Multigrid;
+        let mut bytes = vec![0; PHASES * PHASE_STRIDE as usize];
+        for (index, slot) in bytes.chunks_exact_mut(PHASE_STRIDE as usize).enumerate() {
+            let phase = Phase::fill(index, self.phase, has_halves);
+            slot[..size_of::<PressurePhase>()].copy_from_slice(bytemuck::bytes_of(&phase));
+        }
+        program.upload("pressure_phases", 0, &bytes);
+    }
+
+    /// Lists the cells of each pocket, which the device has counted and found to be there.
+    fn find_pockets(&mut self, program: &Program) -> Result<(), SolveError> {
+        let cells = (CELLS * (self.phase.levels[0][1] + 1)) as usize;
+        let labels = program
+            .download::<u32>(&[("pressure_label", cells)])?
+            .remove(0);
+        let (cells, ranges) = pockets::list(&labels);
+        program.upload("pressure_pocket_cells", 0, &cells);
+        program.upload("pressure_pocket_ranges", 0, &ranges);
+        self.pockets = ranges.len() as u32;
+        let [x, y, z] = spread(&program.context, 1, u64::from(self.pockets));
+        self.sizes[Size::Pockets.index()] = [x, y, z, 0];
+        program.upload("pressure_sizes", 0, &self.sizes);
+        self.shape.has_pockets = true;
+        self.phase.has_pockets = 1;
+        self.upload_phases(program);
+        Ok(())
     }
 }
 
-/// Relative residual of the density correction.
-pub const CORRECTION_TOLERANCE: f64 = 1e-2;
+fn solved(control: &PressureControl, tolerance: f64) -> Solved {
+    let [r, b] = [control.residual_square, control.rhs_square].map(f64::from);
+    let residual = if b == 0.0 { 0.0 } else { (r / b).sqrt() };
+    Solved {
+        iterations: control.iterations,
+        residual,
+        // The device compares squares in f32.
+        is_missed: !(residual <= tolerance * (1.0 + 1e-6)),
+    }
+}
+
+fn read(program: &Program) -> Result<(PressureControl, [u32; STATS]), SolveError> {
+    let words = size_of::<PressureControl>() / 4;
+    let read =
+        program.download::<u32>(&[("pressure_control", words), ("pressure_stats", STATS)])?;
+    let control = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&read[0]));
+    let mut stats = [0; STATS];
+    stats.copy_from_slice(&read[1]);
+    Ok((control, stats))
+}
+
+/// The room's own records: face neighbours, and the way up to the next level, of the first `levels` levels.
+fn brick_records(bricks: &Bricks, levels: usize) -> Vec<PressureBrick> {
+    let record = |brick: &crate::domain::bricks::Brick| {
+        let octant = brick.coordinate.map(|c| c & 1);
+        let has_parent = brick.parent != 0 && (brick.level as usize) + 1 < levels;
+        PressureBrick {
+            faces: [12, 10, 4, 14, 16, 22].map(|k| brick.neighbors[k]),
+            above: if has_parent {
+                CELLS * brick.parent + 2 * octant[0] + 8 * octant[1] + 32 * octant[2]
+            } else {
+                0
+            },
+            padding: 0,
+        }
+    };
+    bricks.records.iter().map(record).collect()
+}

@@ -1,0 +1,36 @@
+// Gives each cell its body's label, 0 where air touches it, and counts the bodies that none touches.
+#import "shared/pressure_phase.wgsl"
+
+@group(0) @binding(1) var<storage, read_write> pressure_label: array<atomic<u32>>;
+@group(0) @binding(2) var<storage, read_write> pressure_stats: array<atomic<u32>>;
+
+const MOST = 1u << 26u;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let i = thread_index(workgroup, workgroups, local, 64u);
+    let range = phase.levels[0];
+    if i / 64u >= range.y {
+        return;
+    }
+    let first = 512u * (range.x + i / 64u) + (i & 63u);
+    for (var e = first; e < first + 512u; e += 64u) {
+        var at = e;
+        for (var step = 0u; step < MOST; step++) {
+            let next = atomicLoad(&pressure_label[at]);
+            if next == at {
+                break;
+            }
+            at = next;
+        }
+        // Others may walk through this cell meanwhile: its root leads them on as well.
+        atomicStore(&pressure_label[e], at);
+        if at == e {
+            atomicAdd(&pressure_stats[4], 1u);
+        }
+    }
+}

@@ -1,0 +1,35 @@
+// Right-hand side −(Σ ± f u + solid flux) of the rows, the solution and residual that the iterations start from,
+// and the largest |∇·u| in a row's cell.
+#import "shared/pressure_divergence.wgsl"
+#import "shared/pressure_sum.wgsl"
+
+@group(0) @binding(6) var<storage, read_write> pressure_rhs: array<f32>;
+@group(0) @binding(7) var<storage, read_write> pressure_residual: array<f32>;
+@group(0) @binding(8) var<storage, read_write> pressure_solution: array<f32>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let i = thread_index(workgroup, workgroups, local, 64u);
+    let range = phase.levels[0];
+    let slot = select(0u, range.x + i / 64u, i / 64u < range.y);
+    let s = site_at(slot, i & 63u, range.z);
+    let b = outflow(s);
+    note_divergence(b, local, 0u);
+    let own = blocked(s.slot, s.block);
+    for (var c = 0u; c < 4u; c++) {
+        pressure_rhs[own + 64u * c] = -b.lo[c];
+        pressure_rhs[own + 64u * c + 256u] = -b.hi[c];
+        pressure_residual[own + 64u * c] = -b.lo[c];
+        pressure_residual[own + 64u * c + 256u] = -b.hi[c];
+    }
+    for (var e = own; e < own + 512u; e += 64u) {
+        pressure_solution[e] = 0.0;
+        pressure_solution[phase.stride + e] = 0.0;
+    }
+    let squares = b.lo * b.lo + b.hi * b.hi;
+    sum_workgroup((squares.x + squares.y) + (squares.z + squares.w), local, thread_index(workgroup, workgroups, 0u, 1u));
+}

@@ -1,0 +1,52 @@
+// Second half of the incomplete Poisson preconditioner (pressure/ipp_lower): Kᵀ times what the first left, and each
+// brick's share of residual · correction.
+#import "shared/pressure_ipp.wgsl"
+#import "shared/pressure_sum.wgsl"
+
+@group(0) @binding(6) var<storage, read> pressure_residual: array<f32>;
+@group(0) @binding(7) var<storage, read> pressure_product: array<f32>;
+@group(0) @binding(8) var<storage, read_write> pressure_correction: array<f32>;
+
+fn halves(first: u32, s: u32, t: u32) -> vec4f {
+    return vec4f(
+        pressure_product[first],
+        pressure_product[first + s],
+        pressure_product[first + t],
+        pressure_product[first + s + t],
+    );
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let i = thread_index(workgroup, workgroups, local, 64u);
+    let range = phase.levels[0];
+    let slot = select(0u, range.x + i / 64u, i / 64u < range.y);
+    let s = site_at(slot, i & 63u, range.x + range.y - 1u);
+    let own = blocked(s.slot, s.block);
+    let upper = blocked_upper(s);
+    let l = links_at(s);
+    let d = Pair(inverse_diagonals(own, 64u, 128u), inverse_diagonals(own + 256u, 64u, 128u));
+    let y = Pair(halves(own, 64u, 128u), halves(own + 256u, 64u, 128u));
+    let within = sides_of(y);
+    let flow = sum_sides(Sides(
+        l.ix * within.xu,
+        l.out.xu * halves(upper.x, 128u, 256u),
+        l.iy * within.yu,
+        l.out.yu * halves(upper.y, 64u, 256u),
+        l.iz * within.zu,
+        l.out.zu * halves(upper.z, 64u, 128u),
+    ));
+    var product = 0.0;
+    for (var c = 0u; c < 4u; c++) {
+        let e = own + 64u * c;
+        let z = vec2f(y.lo[c] + d.lo[c] * flow.lo[c], y.hi[c] + d.hi[c] * flow.hi[c]);
+        pressure_correction[e] = z.x;
+        pressure_correction[e + 256u] = z.y;
+        product += pressure_residual[e] * z.x + pressure_residual[e + 256u] * z.y;
+    }
+    sum_workgroup(product, local, thread_index(workgroup, workgroups, 0u, 1u));
+}

@@ -1,0 +1,14 @@
+// Largest |∇·u| that the projection left.
+#import "shared/pressure_divergence.wgsl"
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let i = thread_index(workgroup, workgroups, local, 64u);
+    let range = phase.levels[0];
+    let slot = select(0u, range.x + i / 64u, i / 64u < range.y);
+    note_divergence(outflow(site_at(slot, i & 63u, range.z)), local, 1u);
+}

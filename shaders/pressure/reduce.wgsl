@@ -1,0 +1,114 @@
+// Adds up the bricks' sums and decides what comes next. What is not to run gets no workgroups; this pass itself
+// always runs, since it may not take its size from a buffer that it writes, and does nothing out of its turn.
+#import "shared/pressure_phase.wgsl"
+#import "shared/pressure_control.wgsl"
+
+@group(0) @binding(1) var<storage, read_write> pressure_control: PressureControl;
+@group(0) @binding(2) var<storage, read> pressure_sums: array<f32>;
+// Pockets that pressure/count_pockets found.
+@group(0) @binding(3) var<storage, read> pressure_stats: array<u32>;
+@group(0) @binding(4) var<storage, read> pressure_sizes: array<u32>;
+// The same sizes three times: of iterations, of the verification, and of what follows; 0 while it is not their turn.
+@group(0) @binding(5) var<storage, read_write> pressure_groups: array<u32>;
+
+const BEGIN = 0u;
+const DIRECTION = 1u;
+const LENGTH = 2u;
+const CHECK = 3u;
+const VERIFIED = 4u;
+
+const MOST_RESTARTS = 16u;
+
+var<workgroup> terms: array<f32, 256>;
+
+fn is_positive(x: f32) -> bool {
+    let bits = bitcast<u32>(x);
+    return bits > 0u && bits < 0x7f800000u;
+}
+
+fn begin(sum: f32) {
+    pressure_control = PressureControl(sum, sum, 0.0, 0.0, 0.0, ITERATING, 0u, 1u, 0u, 0u, 0u, 0u);
+    if phase.has_pockets == 0u && pressure_stats[4] > 0u {
+        pressure_control.state = WANTS_POCKETS;
+    } else if !is_positive(sum) {
+        pressure_control.state = DONE;
+    }
+}
+
+fn decide(sum: f32) {
+    let is_over = pressure_control.iterations >= phase.max_iterations;
+    let target_square = phase.tolerance_square * pressure_control.rhs_square;
+    switch phase.step {
+        case DIRECTION: {
+            pressure_control.beta = select(sum / pressure_control.product, 0.0, pressure_control.is_first == 1u);
+            pressure_control.product = sum;
+            pressure_control.is_first = 0u;
+            // Nothing is left, or rounding has made the preconditioner indefinite.
+            if !is_positive(sum) {
+                pressure_control.state = VERIFYING;
+            }
+        }
+        case LENGTH: {
+            pressure_control.alpha = pressure_control.product / sum;
+            if !is_positive(sum) {
+                pressure_control.state = VERIFYING;
+            }
+        }
+        case CHECK: {
+            pressure_control.residual_square = sum;
+            pressure_control.iterations += 1u;
+            if !(sum > target_square) || pressure_control.iterations >= phase.max_iterations {
+                pressure_control.state = VERIFYING;
+            }
+        }
+        default: {
+            pressure_control.residual_square = sum;
+            pressure_control.restarts += 1u;
+            pressure_control.is_first = 1u;
+            let is_reached = sum <= target_square;
+            if is_reached || is_over || pressure_control.restarts > MOST_RESTARTS {
+                pressure_control.state = DONE;
+            } else {
+                pressure_control.state = ITERATING;
+            }
+        }
+    }
+}
+
+@compute @workgroup_size(256)
+fn main(@builtin(local_invocation_index) local: u32) {
+    let wanted = select(ITERATING, VERIFYING, phase.step == VERIFIED);
+    let is_turn = phase.step == BEGIN || pressure_control.state == wanted;
+    let count = select(0u, phase.sum_count, is_turn);
+    var sum = 0.0;
+    for (var k = local; k < count; k += 256u) {
+        sum += pressure_sums[k];
+    }
+    terms[local] = sum;
+    workgroupBarrier();
+    if local < 16u {
+        sum = 0.0;
+        for (var k = local; k < 256u; k += 16u) {
+            sum += terms[k];
+        }
+        terms[local] = sum;
+    }
+    workgroupBarrier();
+    if local == 0u {
+        sum = 0.0;
+        for (var k = 0u; k < 16u; k++) {
+            sum += terms[k];
+        }
+        if phase.step == BEGIN {
+            begin(sum);
+        } else if is_turn {
+            decide(sum);
+        }
+    }
+    storageBarrier();
+    let state = pressure_control.state;
+    let sizes = arrayLength(&pressure_sizes);
+    for (var k = local; k < 3u * sizes; k += 256u) {
+        pressure_groups[k] = select(0u, pressure_sizes[k % sizes], k / sizes == state);
+    }
+}

@@ -1,0 +1,200 @@
+// The parts of a V-cycle on one level, for one block.
+//
+// Two-colour Gauss-Seidel over 2³ blocks that are solved exactly, which smooths better than over cells and loads
+// less. A coarse cell is a block: residuals are summed into it and its value is given to all eight, and its
+// coefficients (pressure/coarsen) are half of what Galerkin's would be, which makes up for that crude transfer.
+#import "shared/pressure_links.wgsl"
+
+@group(0) @binding(5) var<storage, read_write> pressure_residual: array<f32>;
+@group(0) @binding(6) var<storage, read_write> pressure_correction: array<f32>;
+
+fn last_slot(level: u32) -> u32 {
+    let range = phase.levels[level];
+    return range.x + range.y - 1u;
+}
+
+fn residual_at(s: Site) -> Pair {
+    let own = blocked(s.slot, s.block);
+    return Pair(
+        vec4f(
+            pressure_residual[own],
+            pressure_residual[own + 64u],
+            pressure_residual[own + 128u],
+            pressure_residual[own + 192u],
+        ),
+        vec4f(
+            pressure_residual[own + 256u],
+            pressure_residual[own + 320u],
+            pressure_residual[own + 384u],
+            pressure_residual[own + 448u],
+        ),
+    );
+}
+
+fn corrections(first: u32, s: u32, t: u32) -> vec4f {
+    return vec4f(
+        pressure_correction[first],
+        pressure_correction[first + s],
+        pressure_correction[first + t],
+        pressure_correction[first + s + t],
+    );
+}
+
+fn corrections_about(s: Site) -> Sides {
+    let lower = blocked_lower(s);
+    let upper = blocked_upper(s);
+    return Sides(
+        corrections(lower.x + 64u, 128u, 256u),
+        corrections(upper.x, 128u, 256u),
+        corrections(lower.y + 128u, 64u, 256u),
+        corrections(upper.y, 64u, 256u),
+        corrections(lower.z + 256u, 64u, 128u),
+        corrections(upper.z, 64u, 128u),
+    );
+}
+
+fn store_correction(s: Site, z: Pair) {
+    let own = blocked(s.slot, s.block);
+    pressure_correction[own] = z.lo.x;
+    pressure_correction[own + 64u] = z.lo.y;
+    pressure_correction[own + 128u] = z.lo.z;
+    pressure_correction[own + 192u] = z.lo.w;
+    pressure_correction[own + 256u] = z.hi.x;
+    pressure_correction[own + 320u] = z.hi.y;
+    pressure_correction[own + 384u] = z.hi.z;
+    pressure_correction[own + 448u] = z.hi.w;
+}
+
+// What flows in from values about the block.
+fn inflow(l: Links, v: Sides) -> Pair {
+    return sum_sides(Sides(
+        l.out.xl * v.xl,
+        l.out.xu * v.xu,
+        l.out.yl * v.yl,
+        l.out.yu * v.yu,
+        l.out.zl * v.zl,
+        l.out.zu * v.zu,
+    ));
+}
+
+// 1 / pivot; 0 where there is no row, or where rounding is all that is left of a closed pair's.
+fn inverse(pivot: f32, diagonal: f32) -> f32 {
+    return select(0.0, 1.0 / pivot, pivot > 1e-5 * diagonal);
+}
+
+// The block's exact solution for fixed values about it: cells 0, 3, 5, 6, which do not touch one another, are
+// eliminated, and the other four are left with an L D Lᵀ.
+fn solve_block(l: Links, rhs: Pair) -> Pair {
+    let d = diagonal(l);
+    let red = vec4f(rhs.lo.x, rhs.lo.w, rhs.hi.y, rhs.hi.z);
+    let red_diagonal = vec4f(d.lo.x, d.lo.w, d.hi.y, d.hi.z);
+    let w = select(vec4f(0.0), 1.0 / red_diagonal, red_diagonal > vec4f(0.0));
+    // Columns: what cells 1, 2, 4, 7 share with the four.
+    let c1 = vec4f(l.ix.x, l.iy.y, l.iz.y, 0.0);
+    let c2 = vec4f(l.iy.x, l.ix.y, 0.0, l.iz.z);
+    let c4 = vec4f(l.iz.x, 0.0, l.ix.z, l.iy.z);
+    let c7 = vec4f(0.0, l.iz.w, l.iy.w, l.ix.w);
+    let w1 = w * c1;
+    let w2 = w * c2;
+    let w4 = w * c4;
+    let wr = w * red;
+    let b1 = rhs.lo.y + dot(c1, wr);
+    let p1 = inverse(d.lo.y - dot(w1, c1), d.lo.y);
+    let s12 = -dot(w1, c2);
+    let s14 = -dot(w1, c4);
+    let s17 = -dot(w1, c7);
+    let l12 = p1 * s12;
+    let l14 = p1 * s14;
+    let l17 = p1 * s17;
+    let b2 = rhs.lo.z + dot(c2, wr) - l12 * b1;
+    let p2 = inverse(d.lo.z - dot(w2, c2) - l12 * s12, d.lo.z);
+    let s24 = -dot(w2, c4) - l12 * s14;
+    let s27 = -dot(w2, c7) - l12 * s17;
+    let l24 = p2 * s24;
+    let l27 = p2 * s27;
+    let b4 = rhs.hi.x + dot(c4, wr) - l14 * b1 - l24 * b2;
+    let p4 = inverse(d.hi.x - dot(w4, c4) - l14 * s14 - l24 * s24, d.hi.x);
+    let s47 = -dot(w4, c7) - l14 * s17 - l24 * s27;
+    let l47 = p4 * s47;
+    let b7 = rhs.hi.w + dot(c7, wr) - l17 * b1 - l27 * b2 - l47 * b4;
+    let p7 = inverse(d.hi.w - dot(w * c7, c7) - l17 * s17 - l27 * s27 - l47 * s47, d.hi.w);
+    let z7 = p7 * b7;
+    let z4 = p4 * b4 - l47 * z7;
+    let z2 = p2 * b2 - l24 * z4 - l27 * z7;
+    let z1 = p1 * b1 - l12 * z2 - l14 * z4 - l17 * z7;
+    let z = wr + w * (c1 * z1 + c2 * z2 + c4 * z4 + c7 * z7);
+    return Pair(vec4f(z.x, z1, z2, z.y), vec4f(z4, z.z, z.w, z7));
+}
+
+// The first colour, with all else still 0.
+fn smooth_first_at(s: Site) {
+    store_correction(s, solve_block(links_at(s), residual_at(s)));
+}
+
+// One colour, from the latest values of the other; the block's share of residual · correction.
+fn smooth_at(s: Site) -> f32 {
+    let l = links_at(s);
+    let r = residual_at(s);
+    let flow = inflow(l, corrections_about(s));
+    let z = solve_block(l, Pair(r.lo + flow.lo, r.hi + flow.hi));
+    store_correction(s, z);
+    return dot_pair(r, z);
+}
+
+// Values of the cells above the blocks about this one.
+struct Above {
+    lower: vec3f,
+    upper: vec3f,
+}
+
+fn above_about(s: Site) -> Above {
+    // Along each axis one of the two lies in the own brick.
+    let own = pressure_bricks[s.slot].above;
+    let far_slot = select(s.lower_slot, s.upper_slot, s.lower_slot == vec3u(s.slot));
+    let far = vec3u(
+        pressure_bricks[far_slot.x].above,
+        pressure_bricks[far_slot.y].above,
+        pressure_bricks[far_slot.z].above,
+    );
+    let lower = select(far, vec3u(own), s.lower_slot == vec3u(s.slot));
+    let upper = select(far, vec3u(own), s.upper_slot == vec3u(s.slot));
+    return Above(
+        vec3f(
+            pressure_correction[lower.x + above_offset(s.lower_block.x)],
+            pressure_correction[lower.y + above_offset(s.lower_block.y)],
+            pressure_correction[lower.z + above_offset(s.lower_block.z)],
+        ),
+        vec3f(
+            pressure_correction[upper.x + above_offset(s.upper_block.x)],
+            pressure_correction[upper.y + above_offset(s.upper_block.y)],
+            pressure_correction[upper.z + above_offset(s.upper_block.z)],
+        ),
+    );
+}
+
+// The second colour after the coarser level: the first colour's values plus those above them.
+fn smooth_corrected_at(s: Site) -> f32 {
+    let l = links_at(s);
+    let r = residual_at(s);
+    var about = corrections_about(s);
+    let above = above_about(s);
+    about.xl += above.lower.x;
+    about.xu += above.upper.x;
+    about.yl += above.lower.y;
+    about.yu += above.upper.y;
+    about.zl += above.lower.z;
+    about.zu += above.upper.z;
+    let flow = inflow(l, about);
+    let z = solve_block(l, Pair(r.lo + flow.lo, r.hi + flow.hi));
+    store_correction(s, z);
+    return dot_pair(r, z);
+}
+
+// Residuals of the first colour's block after the second's sweep, summed into the cell above. The block was solved
+// with 0 about it, so what has flowed in since is its residual; the second colour, solved last, has none.
+fn restrict_at(s: Site) {
+    let flow = inflow(links_at(s), corrections_about(s));
+    let above = pressure_bricks[s.slot].above;
+    pressure_residual[above + above_offset(s.block)] = 0.5 * sum_pair(flow);
+    pressure_residual[above + above_offset(s.block ^ 1u)] = 0.0;
+}

@@ -1,0 +1,61 @@
+// What flows out of the cells of a block.
+#import "shared/pressure_site.wgsl"
+
+@group(0) @binding(2) var<storage, read> pressure_block: array<u32>;
+@group(0) @binding(3) var<storage, read> face_open: array<f32>;
+@group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
+@group(0) @binding(5) var<storage, read> solid_flux: array<f32>;
+@group(0) @binding(10) var<storage, read_write> pressure_stats: array<atomic<u32>>;
+
+var<workgroup> largest: array<f32, 64>;
+
+fn through(first: u32, s: u32, t: u32) -> vec4f {
+    return vec4f(
+        face_open[first] * face_velocity[first],
+        face_open[first + s] * face_velocity[first + s],
+        face_open[first + t] * face_velocity[first + t],
+        face_open[first + s + t] * face_velocity[first + s + t],
+    );
+}
+
+// Σ ± f u + solid flux, m/s; 0 where there is no row.
+fn outflow(s: Site) -> Pair {
+    let own = natural(s.slot, s.block);
+    let upper = natural_upper(s);
+    let y = phase.stride;
+    let z = 2u * phase.stride;
+    let ix = through(own + 1u, 8u, 64u);
+    let iy = through(y + own + 8u, 1u, 64u);
+    let iz = through(z + own + 64u, 1u, 8u);
+    let sum = sum_sides(Sides(
+        ix - through(own, 8u, 64u),
+        through(upper.x, 8u, 64u) - ix,
+        iy - through(y + own, 1u, 64u),
+        through(y + upper.y, 1u, 64u) - iy,
+        iz - through(z + own, 1u, 8u),
+        through(z + upper.z, 1u, 8u) - iz,
+    ));
+    let lo = vec4f(solid_flux[own], solid_flux[own + 1u], solid_flux[own + 8u], solid_flux[own + 9u]);
+    let hi = vec4f(solid_flux[own + 64u], solid_flux[own + 65u], solid_flux[own + 72u], solid_flux[own + 73u]);
+    let rows = pressure_block[64u * s.slot + s.block] >> 8u;
+    let is_row_lo = (vec4u(rows) & vec4u(1u, 2u, 4u, 8u)) != vec4u(0u);
+    let is_row_hi = (vec4u(rows) & vec4u(16u, 32u, 64u, 128u)) != vec4u(0u);
+    return Pair(
+        select(vec4f(0.0), sum.lo + lo, is_row_lo),
+        select(vec4f(0.0), sum.hi + hi, is_row_hi),
+    );
+}
+
+// Keeps the largest |∇·u|, 1/s, in `pressure_stats[place]`; the bits of positive floats order as the floats do.
+fn note_divergence(flow: Pair, local: u32, place: u32) {
+    let most = max(abs(flow.lo), abs(flow.hi));
+    largest[local] = max(max(most.x, most.y), max(most.z, most.w));
+    workgroupBarrier();
+    if local == 0u {
+        var worst = 0.0;
+        for (var k = 0u; k < 64u; k++) {
+            worst = max(worst, largest[k]);
+        }
+        atomicMax(&pressure_stats[place], bitcast<u32>(worst / phase.cell_size));
+    }
+}

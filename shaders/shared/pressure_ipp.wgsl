@@ -1,0 +1,13 @@
+// What both halves of the incomplete Poisson preconditioner share.
+#import "shared/pressure_links.wgsl"
+
+@group(0) @binding(5) var<storage, read> pressure_inverse_diagonal: array<f32>;
+
+fn inverse_diagonals(first: u32, s: u32, t: u32) -> vec4f {
+    return vec4f(
+        pressure_inverse_diagonal[first],
+        pressure_inverse_diagonal[first + s],
+        pressure_inverse_diagonal[first + t],
+        pressure_inverse_diagonal[first + s + t],
+    );
+}

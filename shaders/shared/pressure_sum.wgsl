@@ -1,0 +1,25 @@
+// Sums of a workgroup of 64, in a fixed order.
+@group(0) @binding(9) var<storage, read_write> pressure_sums: array<f32>;
+
+var<workgroup> terms: array<f32, 64>;
+
+// Leaves the sum of `term` over the workgroup in `pressure_sums[place]`.
+fn sum_workgroup(term: f32, local: u32, place: u32) {
+    terms[local] = term;
+    workgroupBarrier();
+    if local < 8u {
+        var sum = 0.0;
+        for (var k = local; k < 64u; k += 8u) {
+            sum += terms[k];
+        }
+        terms[local] = sum;
+    }
+    workgroupBarrier();
+    if local == 0u {
+        var sum = 0.0;
+        for (var k = 0u; k < 8u; k++) {
+            sum += terms[k];
+        }
+        pressure_sums[place] = sum;
+    }
+}

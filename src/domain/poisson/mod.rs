@@ -1,0 +1,269 @@
+//! Pressure's linear system on sparse bricks, in double precision: the one that GPU rows are held against.
+//!
+//! For each cell of water Σ f (q − q') over its six faces = b, with f the face's open fraction (Batty et al.
+//! 2007); q' of air is 0 at the air cell's centre, or where the surface crosses the way there (ghost fluid, Enright
+//! et al. 2003). Rows are not scaled: an open face has coefficient 1.
+
+pub mod cases;
+pub mod gradients;
+
+use super::bricks::{Bricks, CELLS, EDGE};
+
+/// Kind of a cell without water.
+pub const AIR: u32 = 0;
+/// Kind of a cell of water.
+pub const FLUID: u32 = 1;
+/// Kind of a cell without open volume; its faces have fraction 0.
+pub const SOLID: u32 = 2;
+
+/// Least part of the way to air at which the surface may lie: a smaller one would make the row ever stiffer
+/// for a pressure that is ever nearer 0.
+pub const LEAST_THETA: f64 = 0.01;
+
+/// No row.
+pub const NONE: u32 = u32::MAX;
+
+/// What a system is built from; arrays are by element, `512 slot + local`, slot 0 included.
+#[derive(Clone, Copy, Debug)]
+pub struct Cells<'a> {
+    /// Where the elements lie.
+    pub bricks: &'a Bricks,
+    /// [`AIR`], [`FLUID`] or [`SOLID`]; only wet bricks hold water.
+    pub kind: &'a [u32],
+    /// Open fractions of the lower faces, 0..1, three planes of the length of `kind`.
+    pub open: &'a [f32],
+    /// Distance to the surface at cell centres, negative inside, in any one unit; voxel surface where `None`.
+    pub distance: Option<&'a [f32]>,
+}
+
+impl Cells<'_> {
+    /// Element of the neighbour in direction `k`: −x, +x, −y, +y, −z, +z; one of slot 0 where there is none.
+    pub fn neighbor(&self, element: u32, k: usize) -> u32 {
+        let (slot, local) = (element / CELLS, element % CELLS);
+        let (axis, is_up) = (k / 2, k % 2 == 1);
+        let step = EDGE.pow(axis as u32);
+        let at = local / step % EDGE;
+        let is_inside = if is_up { at + 1 < EDGE } else { at > 0 };
+        if is_inside {
+            return if is_up {
+                element + step
+            } else {
+                element - step
+            };
+        }
+        let side = 3usize.pow(axis as u32);
+        let brick = if is_up { 13 + side } else { 13 - side };
+        let other = self.bricks.records[slot as usize].neighbors[brick];
+        let across = if is_up {
+            local - at * step
+        } else {
+            local + (EDGE - 1) * step
+        };
+        CELLS * other + across
+    }
+
+    /// Place of the face in direction `k` in a plane array.
+    pub fn face(&self, element: u32, k: usize) -> usize {
+        let owner = if k % 2 == 1 {
+            self.neighbor(element, k)
+        } else {
+            element
+        };
+        k / 2 * self.kind.len() + owner as usize
+    }
+
+    /// θ: the part of the way from `water` to `air` at which the surface lies.
+    fn theta(&self, water: u32, air: u32) -> f64 {
+        let Some(distance) = self.distance else {
+            return 1.0;
+        };
+        let inside = f64::from(-distance[water as usize]).max(0.0);
+        let outside = f64::from(distance[air as usize]).max(0.0);
+        if inside + outside > 0.0 {
+            (inside / (inside + outside)).clamp(LEAST_THETA, 1.0)
+        } else {
+            1.0
+        }
+    }
+}
+
+/// The system; one row a cell of water that has an open face.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct System {
+    /// Element of each row.
+    pub cell: Vec<u32>,
+    /// What air adds to the diagonal: Σ f/θ.
+    pub dirichlet: Vec<f64>,
+    /// The diagonal.
+    pub diagonal: Vec<f64>,
+    /// Rows of the neighbours, −x, +x, −y, +y, −z, +z; [`NONE`] where no water is shared.
+    pub neighbor: Vec<[u32; 6]>,
+    /// What is shared with them, 0..1; the matrix holds its negative.
+    pub coefficient: Vec<[f64; 6]>,
+    /// Elements of water without an open face.
+    pub dropped: Vec<u32>,
+}
+
+impl System {
+    /// Builds the rows, in the order of the elements.
+    pub fn new(cells: Cells<'_>) -> Self {
+        let mut system = Self::default();
+        let wet = CELLS..CELLS * (cells.bricks.wet + 1);
+        let mut row = vec![NONE; cells.kind.len()];
+        for element in wet.filter(|&e| cells.kind[e as usize] == FLUID) {
+            let (mut coefficient, mut dirichlet) = ([0.0; 6], 0.0);
+            for (k, shared) in coefficient.iter_mut().enumerate() {
+                let open = f64::from(cells.open[cells.face(element, k)]);
+                let other = cells.neighbor(element, k);
+                match cells.kind[other as usize] {
+                    FLUID => *shared = open,
+                    AIR => dirichlet += open / cells.theta(element, other),
+                    _ => {}
+                }
+            }
+            let diagonal = dirichlet + coefficient.iter().sum::<f64>();
+            if diagonal > 0.0 {
+                row[element as usize] = system.cell.len() as u32;
+                system.cell.push(element);
+                system.dirichlet.push(dirichlet);
+                system.diagonal.push(diagonal);
+                system.coefficient.push(coefficient);
+            } else {
+                system.dropped.push(element);
+            }
+        }
+        system.neighbor = system
+            .cell
+            .iter()
+            .zip(&system.coefficient)
+            .map(|(&element, coefficient)| {
+                std::array::from_fn(|k| {
+                    if coefficient[k] > 0.0 {
+                        row[cells.neighbor(element, k) as usize]
+                    } else {
+                        NONE
+                    }
+                })
+            })
+            .collect();
+        system
+    }
+
+    /// b = −(Σ ± f u + `solid_flux`) of each row; velocities in planes like `Cells::open`.
+    pub fn rhs(&self, cells: Cells<'_>, velocity: &[f32], solid_flux: &[f32]) -> Vec<f64> {
+        let outflow = |&element: &u32| {
+            let through = (0..6).map(|k| {
+                let face = cells.face(element, k);
+                let sign = if k % 2 == 1 { 1.0 } else { -1.0 };
+                sign * f64::from(cells.open[face]) * f64::from(velocity[face])
+            });
+            through.sum::<f64>() + f64::from(solid_flux[element as usize])
+        };
+        self.cell.iter().map(|element| -outflow(element)).collect()
+    }
+
+    /// The matrix times `x`, by differences, so that a smooth `x` loses no digits.
+    pub fn apply(&self, x: &[f64]) -> Vec<f64> {
+        (0..x.len())
+            .map(|i| {
+                let mut sum = self.dirichlet[i] * x[i];
+                for (&j, &shared) in self.neighbor[i].iter().zip(&self.coefficient[i]) {
+                    if j != NONE {
+                        sum += shared * (x[i] - x[j as usize]);
+                    }
+                }
+                sum
+            })
+            .collect()
+    }
+
+    /// Rows of each body of water that no air touches, in the order of their first rows. There the matrix is
+    /// singular: b must sum to zero, and the pressure is known up to a constant.
+    pub fn pockets(&self) -> Vec<Vec<u32>> {
+        let mut is_seen = vec![false; self.cell.len()];
+        let mut pockets = Vec::new();
+        for first in 0..self.cell.len() {
+            if is_seen[first] {
+                continue;
+            }
+            is_seen[first] = true;
+            let mut body = vec![first as u32];
+            let mut next = 0;
+            while let Some(&row) = body.get(next) {
+                next += 1;
+                for &j in self.neighbor[row as usize].iter().filter(|&&j| j != NONE) {
+                    if !std::mem::replace(&mut is_seen[j as usize], true) {
+                        body.push(j);
+                    }
+                }
+            }
+            if body.iter().all(|&row| self.dirichlet[row as usize] == 0.0) {
+                body.sort_unstable();
+                pockets.push(body);
+            }
+        }
+        pockets
+    }
+}
+
+/// Subtracts the mean of `values` over each pocket.
+pub fn remove_means(values: &mut [f64], pockets: &[Vec<u32>]) {
+    for pocket in pockets {
+        let sum: f64 = pocket.iter().map(|&row| values[row as usize]).sum();
+        let mean = sum / pocket.len() as f64;
+        for &row in pocket {
+            values[row as usize] -= mean;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        cases::{Case, Surface, tank},
+        *,
+    };
+
+    #[test]
+    fn rows_are_symmetric_and_sum_to_what_air_adds() {
+        let case = tank(16, Surface::GhostFluid, true);
+        let system = case.system();
+        assert!(system.cell.len() > 1500);
+        for i in 0..system.cell.len() {
+            let sum: f64 = system.coefficient[i].iter().sum();
+            assert!((system.diagonal[i] - sum - system.dirichlet[i]).abs() < 1e-12);
+            for k in 0..6 {
+                let j = system.neighbor[i][k];
+                if j != NONE {
+                    assert_eq!(system.neighbor[j as usize][k ^ 1], i as u32);
+                    assert_eq!(
+                        system.coefficient[j as usize][k ^ 1],
+                        system.coefficient[i][k]
+                    );
+                }
+            }
+        }
+        assert!(system.pockets().is_empty());
+    }
+
+    #[test]
+    fn a_lone_cell_and_a_closed_pair() {
+        // Water at (1,1,1) in air, water at (5,5,5) and (6,5,5) in rock, water at (5,1,5) alone in rock.
+        let water = [[1, 1, 1], [5, 5, 5], [6, 5, 5], [5, 1, 5]];
+        let kind = |c: [u32; 3]| match (water.contains(&c), c[0] < 4) {
+            (true, _) => FLUID,
+            (_, true) => AIR,
+            _ => SOLID,
+        };
+        let case = Case::new([8; 3], 1.0, kind, |_, _| 1.0, |_| 0.0);
+        let system = System::new(Cells {
+            distance: None,
+            ..case.cells()
+        });
+        let element = |c: [u32; 3]| 512 + c[0] + 8 * c[1] + 64 * c[2];
+        assert_eq!(system.dropped, [element([5, 1, 5])]);
+        assert_eq!(system.cell, [[1, 1, 1], [5, 5, 5], [6, 5, 5]].map(element));
+        assert_eq!(system.diagonal, [6.0, 1.0, 1.0]);
+        assert_eq!(system.pockets(), [vec![1, 2]]);
+    }
+}

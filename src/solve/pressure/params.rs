@@ -1,0 +1,79 @@
+//! Mirrors of the room's WGSL structs.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::super::params::mirror;
+
+mirror!(
+    /// `PressurePhase` of shared/pressure_phase.wgsl.
+    PressurePhase {
+        /// Which of `levels`.
+        level: u32,
+        /// The coarsest one.
+        last_level: u32,
+        /// Of 2³ blocks.
+        colour: u32,
+        /// What `pressure/reduce` decides; whether `pressure/center` notes the mean.
+        step: u32,
+        /// Sums that `pressure/reduce` adds up.
+        sum_count: u32,
+        /// Of a plane.
+        stride: u32,
+        /// Of a solve.
+        max_iterations: u32,
+        /// Whether the pockets are known.
+        has_pockets: u32,
+        /// Of the relative residual.
+        tolerance_square: f32,
+        /// Δx.
+        cell_size: f32,
+        /// ρ Δx / Δt.
+        pressure_scale: f32,
+        /// 0.
+        opaque_zero: u32,
+        /// First slot, bricks, active bricks (of the finest level), 0.
+        levels: [[u32; 4]; super::LEVELS],
+    }
+);
+
+mirror!(
+    /// `PressureControl` of shared/pressure_control.wgsl.
+    PressureControl {
+        /// ‖b‖².
+        rhs_square: f32,
+        /// ‖r‖².
+        residual_square: f32,
+        /// Residual · correction.
+        product: f32,
+        /// Length of the step.
+        alpha: f32,
+        /// Part of the last direction.
+        beta: f32,
+        /// 0 iterating, 1 verifying, 2 done, 3 wants pockets.
+        state: u32,
+        /// So far.
+        iterations: u32,
+        /// Whether the next direction starts afresh.
+        is_first: u32,
+        /// Verifications.
+        restarts: u32,
+        /// Unused.
+        padding_0: u32,
+        /// Unused.
+        padding_1: u32,
+        /// Unused.
+        padding_2: u32,
+    }
+);
+
+mirror!(
+    /// `PressureBrick` of shared/pressure_site.wgsl.
+    PressureBrick {
+        /// Slots at the lower, then the upper faces.
+        faces: [u32; 6],
+        /// Element of the cell above block 0.
+        above: u32,
+        /// Unused.
+        padding: u32,
+    }
+);

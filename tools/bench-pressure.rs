@@ -1,0 +1,80 @@
+//! Iterations and times of the pressure solve on the tank of n³ cells, by preconditioner and surface.
+//!
+//! `cargo bench --bench pressure -- [--adapter NAME] [--tolerance T] [--repeats R] [--passes] [N ...]`; N are 16,
+//! 32, 64, 96 where left out. A time is one `project`, all in: system, solve, gradient, waiting for the device; the
+//! median of the repeats after one that warms up. `--passes` adds each pass's time by the device's clock.
+#![allow(missing_docs, clippy::unwrap_used, reason = "a program")]
+
+#[path = "../tests/support/pressure.rs"]
+mod support;
+
+use std::time::Instant;
+
+use swell::{
+    domain::poisson::cases::{Surface, tank, tank_rhs},
+    gpu::{adapter::Context, recording::Timer},
+    scene::flip::Preconditioner,
+};
+
+fn main() {
+    let (mut adapter, mut tolerance, mut repeats, mut has_passes) = (None, 1e-6, 5, false);
+    let mut sizes = Vec::new();
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        match word.as_str() {
+            "--adapter" => adapter = words.next(),
+            "--tolerance" => tolerance = words.next().unwrap().parse().unwrap(),
+            "--repeats" => repeats = words.next().unwrap().parse().unwrap(),
+            "--passes" => has_passes = true,
+            "--bench" => {}
+            _ => sizes.push(word.parse().unwrap()),
+        }
+    }
+    if sizes.is_empty() {
+        sizes = vec![16, 32, 64, 96];
+    }
+    let context = Context::open(adapter.as_deref()).unwrap();
+    println!("{}, tolerance {tolerance:e}", context.info.name);
+    println!("   n      rows  surface     preconditioner  iterations  residual     ms");
+    for n in sizes {
+        for surface in [Surface::Voxel, Surface::GhostFluid] {
+            for preconditioner in [
+                Preconditioner::None,
+                Preconditioner::Jacobi,
+                Preconditioner::Ipp,
+                Preconditioner::Multigrid,
+            ] {
+                let settings = support::settings(preconditioner, tolerance);
+                let mut rig = support::Rig::new(&context, tank(n, surface, false), &settings);
+                let b = tank_rhs(&rig.case, &rig.system);
+                let mut times = Vec::new();
+                let mut solved = rig.solve(&b);
+                for _ in 0..repeats {
+                    rig.set_rhs(&b);
+                    context.wait().unwrap();
+                    let start = Instant::now();
+                    solved = rig.project(None).solved;
+                    times.push(1e3 * start.elapsed().as_secs_f64());
+                }
+                times.sort_by(f64::total_cmp);
+                println!(
+                    "{n:>4} {:>9}  {:<10}  {:<14}  {:>10}  {:>8.1e}  {:>7.1}",
+                    rig.system.cell.len(),
+                    format!("{surface:?}"),
+                    format!("{preconditioner:?}"),
+                    solved.iterations,
+                    solved.residual,
+                    times[times.len() / 2]
+                );
+                if has_passes {
+                    let mut timer = Timer::new(&context).unwrap();
+                    rig.set_rhs(&b);
+                    rig.project(Some(&mut timer));
+                    for (name, (seconds, runs)) in &timer.total {
+                        println!("      {name:<28} {:>8.3} ms  {runs:>4} runs", 1e3 * seconds);
+                    }
+                }
+            }
+        }
+    }
+}
