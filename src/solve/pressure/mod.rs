@@ -196,6 +196,9 @@ impl PressureSolver {
 
     fn set_sizes(&mut self, program: &Program, active: u32, levels: &[Level]) {
         let groups = |threads: u32| {
+            if threads == 0 {
+                return [0; 4];
+            }
             let [x, y, z] = spread(&program.context, 64, u64::from(threads));
             [x, y, z, 0]
         };
