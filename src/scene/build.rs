@@ -66,7 +66,9 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
                     return Err(doc.fault_plain(motion.span(), problem));
                 }
                 let placed = solid_mesh(doc, base_dir, solid)?;
-                moving_solids.push(moving_solid::build(doc, placed, direction, motion, &around)?);
+                moving_solids.push(moving_solid::build(
+                    doc, placed, direction, motion, &around,
+                )?);
             }
             (Some(direction), None) => {
                 return Err(doc.fault_at(direction.span(), "given without motion"));

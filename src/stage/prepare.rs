@@ -15,8 +15,7 @@ use crate::{
         plan::{Capacity, Counts, DeviceLimits, Plan},
     },
     solve::{
-        self,
-        SolveError,
+        self, SolveError,
         boundary::Boundary,
         flip::{self, Flip},
         pbf::Pbf,
@@ -143,9 +142,12 @@ fn distance(
 fn moving_distances(scene: &Scene) -> Result<Vec<SignedDistance>, SignedDistanceError> {
     let spacing = scene.particle_spacing();
     let solids = scene.moving_solids.iter();
-    let bounded = solids.filter_map(|solid| Some((&solid.placed.mesh, solid.placed.mesh.bounds()?)));
+    let bounded =
+        solids.filter_map(|solid| Some((&solid.placed.mesh, solid.placed.mesh.bounds()?)));
     bounded
-        .map(|(mesh, bounds)| SignedDistance::from_mesh(mesh, &bounds.grown(MARGIN * spacing), spacing))
+        .map(|(mesh, bounds)| {
+            SignedDistance::from_mesh(mesh, &bounds.grown(MARGIN * spacing), spacing)
+        })
         .collect()
 }
 

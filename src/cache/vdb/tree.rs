@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
+use std::iter;
 
 use flate2::{Compression, write::ZlibEncoder};
 use rayon::prelude::*;
@@ -81,7 +82,7 @@ impl<'a, T: Value> Tree<'a, T> {
                 out.extend_from_slice(&x.to_le_bytes());
             }
             put_masks(out, 5, upper.keys());
-            put_tiles(out, &vec![self.background; 1 << 15], is_half);
+            put_tiles(out, iter::repeat_n(self.background, 1 << 15), is_half);
             for lower in upper.values() {
                 lower.put_topology(out, self.background, is_half);
             }
@@ -112,7 +113,7 @@ impl<T: Value> Lower<'_, T> {
         for &offset in &self.inside {
             tiles[offset] = background.negative();
         }
-        put_tiles(out, &tiles, is_half);
+        put_tiles(out, tiles.into_iter(), is_half);
         for leaf in self.leaves.values() {
             put_words(out, &leaf.active);
         }
@@ -142,10 +143,10 @@ fn put_masks<'a>(out: &mut Vec<u8>, bits: u32, children: impl Iterator<Item = &'
 /// The values of an inner node, all inactive and all written, which zipping makes next to nothing.
 /// OpenVDB leaves them out where it can, but not even their length stands there in half precision,
 /// and vdb-rs 0.6 expects one.
-fn put_tiles<T: Value>(out: &mut Vec<u8>, tiles: &[T], is_half: bool) {
+fn put_tiles<T: Value>(out: &mut Vec<u8>, tiles: impl Iterator<Item = T>, is_half: bool) {
     out.push(inactive::WRITTEN);
     let mut bytes = Vec::new();
-    for &tile in tiles {
+    for tile in tiles {
         value::put(&mut bytes, tile, is_half);
     }
     out.extend_from_slice(&zipped(&bytes));
