@@ -57,8 +57,13 @@ fn options() -> Result<Options, String> {
 }
 
 fn cells(word: &str) -> Result<[f64; 3], String> {
-    let numbers: Vec<f64> = word.split(['x', '×']).filter_map(|n| n.parse().ok()).collect();
-    numbers.try_into().map_err(|_| format!("--box wants three numbers of cells, not `{word}`"))
+    let numbers: Vec<f64> = word
+        .split(['x', '×'])
+        .filter_map(|n| n.parse().ok())
+        .collect();
+    numbers
+        .try_into()
+        .map_err(|_| format!("--box wants three numbers of cells, not `{word}`"))
 }
 
 fn dam(options: &Options, height: f64) -> Result<(Scene, Start), Box<dyn std::error::Error>> {
@@ -164,7 +169,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let once = measure(&context, &options, 1.0)?;
     if options.is_twice {
         let tall = measure(&context, &options, 4.0)?;
-        println!("the box doubled twice in height: {:.3} × the time", tall / once);
+        println!(
+            "the box doubled twice in height: {:.3} × the time",
+            tall / once
+        );
     }
     measure_passes(&context, &options)
 }

@@ -5,7 +5,9 @@
 #import "shared/flip_params.wgsl"
 #import "shared/flip_element.wgsl"
 #import "shared/flip_carried.wgsl"
-#import "shared/confine.wgsl"
+#ifdef SOLIDS
+#import "shared/flip_solid.wgsl"
+#endif
 
 @group(0) @binding(1) var<storage, read> brick_slot: array<u32>;
 @group(0) @binding(2) var<storage, read> face_velocity: array<f32>;
@@ -77,6 +79,16 @@ fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
     return select(sampled, otherwise, slots_near.x == 0u);
 }
 
+#ifdef SOLIDS
+// Each halves, or better, how deep one that lies between a wall and a solid 45° off is in either.
+const CORNER_ROUNDS = 4u;
+
+// The velocity of what was pushed back: without its part against the push.
+fn stopped(v: vec3f, push: vec3f) -> vec3f {
+    return v - push * (min(dot(v, push), 0.0) / max(dot(push, push), 1e-30));
+}
+#endif
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -100,40 +112,55 @@ fn main(
         way *= params.max_displacement / distance;
         atomicAdd(&counters[0], 1u);
     }
-    var x = start;
+    let low = params.wall_min + params.contact_distance;
+    let high = params.wall_max - params.contact_distance;
     var v = velocity[i].xyz;
 #ifdef MOVING_SOLIDS
     // In steps of at most half a node spacing as the fastest solid sees them, so that nothing thin is stepped over.
-    let reach = length(way) + solid_grids.fastest * params.time_step;
-    let steps = u32(ceil(2.0 * reach / solid_grids.grids[0].spacing)) + 1u;
-    for (var k = 0u; k < steps; k++) {
+    let most = length(way) + solid_grids.fastest * params.time_step;
+    let spacing = solid_grids.grids[0].spacing;
+    let steps = u32(ceil(2.0 * most / spacing)) + 1u;
+    var is_near = false;
+    for (var solid = 0u; solid < solid_grids.count; solid++) {
+        look_at_solid(solid, 0.0);
+        is_near |= solid_distance_bound(start) < most + params.contact_distance + 2.0 * spacing;
+    }
+    var x = select(start + way, start, is_near);
+    for (var k = 0u; k < select(0u, steps, is_near); k++) {
         x += way / f32(steps);
         for (var solid = 0u; solid < solid_grids.count; solid++) {
             look_at_solid(solid, params.time_step * f32(k + 1u) / f32(steps));
             let next = x;
             x = leave_solids(next);
-            let push = x - next;
-            let inward = min(dot(v - solid_velocity, push), 0.0);
-            v -= push * (inward / max(dot(push, push), 1e-30));
+            v = solid_velocity + stopped(v - solid_velocity, x - next);
+        }
+    }
+    // Where a solid and a wall meet, each would push into the other.
+    for (var k = 0u; k < select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high))); k++) {
+        for (var solid = 0u; solid < solid_grids.count; solid++) {
+            look_at_solid(solid, params.time_step);
+            x = leave_solids(clamp(x, low, high));
         }
     }
 #else
+    var x = start + way;
 #ifdef SOLIDS
-    // In steps of at most half a node spacing, so that nothing thin is stepped over.
+    // In steps of at most half a node spacing, so that nothing thin is stepped over; none where no solid is near.
+    let reach = length(way) + params.contact_distance + 2.0 * solid_grid.spacing;
+    let is_near = solid_distance_bound(start) < reach;
     let steps = u32(ceil(2.0 * length(way) / solid_grid.spacing)) + 1u;
-    for (var k = 0u; k < steps; k++) {
+    x = select(x, start, is_near);
+    for (var k = 0u; k < select(0u, steps, is_near); k++) {
         let next = x + way / f32(steps);
         x = leave_solids(next);
-        let push = x - next;
-        let inward = min(dot(v, push), 0.0);
-        v -= push * (inward / max(dot(push, push), 1e-30));
+        v = stopped(v, x - next);
     }
-#else
-    x += way;
+    // Where a solid and a wall meet, each would push into the other.
+    for (var k = 0u; k < select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high))); k++) {
+        x = leave_solids(clamp(x, low, high));
+    }
 #endif
 #endif
-    let low = params.wall_min + params.contact_distance;
-    let high = params.wall_max - params.contact_distance;
     v = select(v, max(v, params.wall_velocity_min), x < low);
     v = select(v, min(v, params.wall_velocity_max), x > high);
     position[i] = vec4f(clamp(x, low, high), 1.0);

@@ -27,6 +27,13 @@ fn solid_distance_near(x: vec3f) -> f32 {
     return select(solid_node(node), 1e15, is_outside);
 }
 
+// For a first look: the nearest node's distance, or from beyond the grid the way there, since the solids lie within it.
+fn solid_distance_bound(x: vec3f) -> f32 {
+    let last = solid_grid.origin + solid_grid.spacing * vec3f(solid_grid.dims - 1u);
+    let way = distance(x, clamp(x, solid_grid.origin, last));
+    return select(solid_distance_near(x), way, way > 0.0);
+}
+
 // At the lower and at the upper z, each in the order (x, y) = (0,0), (1,0), (0,1), (1,1).
 struct Corners {
     near: vec4f,

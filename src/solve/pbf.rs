@@ -235,7 +235,14 @@ impl Pbf {
         let density = self.field::<f32>("density", n)?;
 
         let slot_of = slots_by_id(&self.state.id);
-        take_over(&mut self.state, &self.scene, &slot_of, id, position, velocity);
+        take_over(
+            &mut self.state,
+            &self.scene,
+            &slot_of,
+            id,
+            position,
+            velocity,
+        );
         let mut by_slot = vec![0.0; n];
         for (&id, &value) in sorted_id.iter().zip(&density) {
             by_slot[slot_of(id)] = value;
@@ -356,4 +363,3 @@ fn measure_commands(plan: &Plan, builder: &mut Builder<'_>) -> Vec<Command> {
     builder.measure(&mut commands);
     commands
 }
-

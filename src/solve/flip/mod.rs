@@ -38,7 +38,14 @@ use step::Substep;
 /// Attributes that APIC declares: C of v(x) = v + C (x − x_p), 1/s, `affine_xy` = ∂v_x/∂y. A state without them
 /// starts from zeros.
 pub const AFFINE: [&str; 9] = [
-    "affine_xx", "affine_xy", "affine_xz", "affine_yx", "affine_yy", "affine_yz", "affine_zx", "affine_zy",
+    "affine_xx",
+    "affine_xy",
+    "affine_xz",
+    "affine_yx",
+    "affine_yy",
+    "affine_yz",
+    "affine_zx",
+    "affine_zy",
     "affine_zz",
 ];
 
@@ -151,7 +158,10 @@ impl Flip {
     /// Names of the transfer passes that a substep runs, in order.
     pub fn recorded_passes(&self) -> Vec<&'static str> {
         let recordings = &self.recordings;
-        let before = recordings.survey.passes().chain(recordings.to_grid.passes());
+        let before = recordings
+            .survey
+            .passes()
+            .chain(recordings.to_grid.passes());
         before.chain(recordings.to_particles.passes()).collect()
     }
 
@@ -169,7 +179,9 @@ impl Flip {
     }
 
     fn survey(&mut self) -> Result<Survey, SolveError> {
-        self.recordings.survey.run(&self.program, self.timer.as_mut())?;
+        self.recordings
+            .survey
+            .run(&self.program, self.timer.as_mut())?;
         let words = self.field::<u32>("survey", SURVEY_HEAD + no_water(&self.plan).len())?;
         Ok(Survey {
             speed: f64::from(f32::from_bits(words[0])).sqrt(),
@@ -184,7 +196,13 @@ impl Flip {
     }
 
     /// The next substep of the `remaining` seconds, and how many these take as things stand.
-    fn choose(&self, survey: &Survey, start: f64, remaining: f64, done: u32) -> Result<(f64, Substep), SolveError> {
+    fn choose(
+        &self,
+        survey: &Survey,
+        start: f64,
+        remaining: f64,
+        done: u32,
+    ) -> Result<(f64, Substep), SolveError> {
         if survey.not_finite > 0 {
             return self.numbers(format!("{} particles are not finite", survey.not_finite));
         }
@@ -232,16 +250,26 @@ impl Flip {
         Ok(())
     }
 
-    fn run_substep(&mut self, is_wet: &[bool], substep: &Substep, told: &mut Told) -> Result<(), SolveError> {
+    fn run_substep(
+        &mut self,
+        is_wet: &[bool],
+        substep: &Substep,
+        told: &mut Told,
+    ) -> Result<(), SolveError> {
         self.lay_out(is_wet, substep)?;
-        self.recordings.to_grid.run(&self.program, self.timer.as_mut())?;
+        self.recordings
+            .to_grid
+            .run(&self.program, self.timer.as_mut())?;
         let flip = self.scene.solver.flip();
         let step = pressure::Step {
             time_step: substep.length,
             rest_density: self.scene.water.rest_density,
         };
-        self.pressure.set_topology(&self.program, &self.bricks, flip.cell_size);
-        let projected = self.pressure.project(&self.program, step, self.timer.as_mut())?;
+        self.pressure
+            .set_topology(&self.program, &self.bricks, flip.cell_size);
+        let projected = self
+            .pressure
+            .project(&self.program, step, self.timer.as_mut())?;
         told.add(&projected);
         let limit = flip.pressure.residual_limit;
         // Not a number is above it too.
@@ -256,7 +284,9 @@ impl Flip {
             let corrected = self.pressure.correct(&self.program, self.timer.as_mut())?;
             told.projection.correction_iterations += u64::from(corrected.iterations);
         }
-        self.recordings.to_particles.run(&self.program, self.timer.as_mut())?;
+        self.recordings
+            .to_particles
+            .run(&self.program, self.timer.as_mut())?;
         Ok(())
     }
 
@@ -268,7 +298,8 @@ impl Flip {
         let mut elapsed = 0.0;
         loop {
             let survey = self.survey()?;
-            let (wanted, substep) = self.choose(&survey, start + elapsed, length - elapsed, told.substeps)?;
+            let (wanted, substep) =
+                self.choose(&survey, start + elapsed, length - elapsed, told.substeps)?;
             told.substeps += 1;
             self.run_substep(&survey.is_wet, &substep, &mut told)?;
             elapsed += substep.length;
@@ -295,10 +326,19 @@ impl Flip {
 
     fn read_state(&mut self) -> Result<(), SolveError> {
         let n = self.state.len();
-        let vectors = self.program.download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
+        let vectors = self
+            .program
+            .download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
         let id = self.field::<u32>("id", n)?;
         let slot_of = slots_by_id(&self.state.id);
-        take_over(&mut self.state, &self.scene, &slot_of, &id, &vectors[0], &vectors[1]);
+        take_over(
+            &mut self.state,
+            &self.scene,
+            &slot_of,
+            &id,
+            &vectors[0],
+            &vectors[1],
+        );
         let names = attributes(self.scene.solver.flip());
         if !names.is_empty() {
             let rows = self.field::<f32>("affine", names.len() * n)?;
@@ -348,7 +388,11 @@ impl Solver for Flip {
         };
         self.read_state()?;
         check_finite(self.frame + 1, &self.state, None)?;
-        let density = if self.state.is_empty() { Vec::new() } else { self.densities()? };
+        let density = if self.state.is_empty() {
+            Vec::new()
+        } else {
+            self.densities()?
+        };
         let capped = self.field::<u32>("counters", 1)?[0];
         self.frame += 1;
         if self.scene.domain.min != glam::DVec3::ZERO {
@@ -376,12 +420,19 @@ impl Solver for Flip {
 }
 
 fn specs(plan: &Plan) -> Vec<BufferSpec> {
-    plan.buffers.iter().map(|buffer| buffer.spec.clone()).collect()
+    plan.buffers
+        .iter()
+        .map(|buffer| buffer.spec.clone())
+        .collect()
 }
 
 fn pressure_solver(scene: &Scene, plan: &Plan) -> PressureSolver {
     let flip = scene.solver.flip();
-    PressureSolver::new(&flip.pressure, flip.density_correction, plan.counts.bricks.slots)
+    PressureSolver::new(
+        &flip.pressure,
+        flip.density_correction,
+        plan.counts.bricks.slots,
+    )
 }
 
 /// No flag set, one a brick of the domain.
@@ -405,14 +456,19 @@ fn capacity_of(bricks: &Bricks) -> Capacity {
 /// Bricks that a state takes in a scene.
 pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
     let counts = Counts::default();
-    let limits = DeviceLimits { binding: 0, buffer: 0, list_budget: 0 };
+    let limits = DeviceLimits {
+        binding: 0,
+        buffer: 0,
+        list_budget: 0,
+    };
     let plan = Plan::new(scene, counts, limits);
     let mut is_wet = no_water(&plan);
     let dims = table_dims(stored_cells(plan.grid_dims)).map(|n| n as usize);
     let edge = f64::from(EDGE) * scene.solver.flip().cell_size;
     for position in &particles.position {
         let x = glam::Vec3::from_array(*position).as_dvec3() - scene.domain.min;
-        let at: [usize; 3] = std::array::from_fn(|k| ((x[k] / edge).max(0.0) as usize).min(dims[k] - 1));
+        let at: [usize; 3] =
+            std::array::from_fn(|k| ((x[k] / edge).max(0.0) as usize).min(dims[k] - 1));
         is_wet[(at[2] * dims[1] + at[1]) * dims[0] + at[0]] = true;
     }
     // As deep as layers of a first step reach that is not yet fast.

@@ -42,7 +42,10 @@ impl Recordings {
     pub(super) fn new(program: &Program, plan: &Plan, scene: &Scene) -> Self {
         let layers = layers(scene.solver.flip().cfl);
         let n = plan.counts.particles;
-        let survey = [Command::Clear("survey"), Command::over("flip/survey", n.div_ceil(SURVEY_RUN))];
+        let survey = [
+            Command::Clear("survey"),
+            Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
+        ];
         Self {
             survey: Recording::new(program, &survey),
             to_grid: Recording::new(program, &to_grid(plan)),
@@ -87,7 +90,13 @@ fn over(pass: &'static str, offset: u64) -> Command {
     }
 }
 
-fn window(pass: &'static str, offset: u64, variable: &'static str, buffer: &str, k: usize) -> Command {
+fn window(
+    pass: &'static str,
+    offset: u64,
+    variable: &'static str,
+    buffer: &str,
+    k: usize,
+) -> Command {
     Command::Dispatch {
         pass,
         binds: vec![Bind {
@@ -132,9 +141,7 @@ fn to_particles(plan: &Plan, layers: usize) -> Vec<Command> {
         let offset = LAYERS + 16 * k as u64;
         commands.push(window("flip/extrapolate", offset, "layer", "layers", k));
     }
-    for axis in 0..3 {
-        commands.push(along("flip/grid_to_particle", WET, axis));
-    }
+    commands.push(over("flip/grid_to_particle", WET));
     commands.push(Command::over("flip/advect", plan.counts.particles));
     commands
 }

@@ -38,10 +38,21 @@ pub(super) fn next(scene: &Scene, start: f64, remaining: f64, speed: f64) -> (f6
     // v t + g t² = cfl Δx.
     let room = flip.cfl * flip.cell_size;
     let longest = 2.0 * room / (speed + (speed * speed + 4.0 * gravity * room).sqrt());
-    let wanted = if longest.is_finite() { (remaining / longest).ceil().max(1.0) } else { 1.0 };
+    let wanted = if longest.is_finite() {
+        (remaining / longest).ceil().max(1.0)
+    } else {
+        1.0
+    };
     let length = remaining / wanted;
     let displacement = (speed + gravity * length) * length / flip.cell_size;
-    (wanted, Substep { start, length, displacement })
+    (
+        wanted,
+        Substep {
+            start,
+            length,
+            displacement,
+        },
+    )
 }
 
 /// Faces of the box at a time, relative to the domain's least corner.
