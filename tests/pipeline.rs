@@ -273,7 +273,7 @@ fn a_study_bakes_renders_measures_and_tells() {
     job.edit("study.toml", "3-6x3", "9");
     let said = job.expect(2, "study study.toml -o new");
     assert!(
-        said.contains("study.toml:8") && !job.path("new").exists(),
+        said.contains("study.toml:7") && !job.path("new").exists(),
         "{said}"
     );
 }

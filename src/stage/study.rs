@@ -285,6 +285,7 @@ fn parts(
         .collect();
     let curves = comparison::charts(courses, impact);
     Ok(vec![
+        Part::Text(comparison::CLAIMS.into()),
         Part::Text(comparison::summary(findings)),
         Part::Text(when),
         Part::Answers(answers),
@@ -295,6 +296,8 @@ fn parts(
         Part::Heading("What was run".into()),
         Part::Table(run_table(caches, courses)),
         Part::Code(request.command.clone()),
+        // Both tables of solvers are in it.
+        Part::Code(caches[0].scene_toml().to_owned()),
         Part::Heading("How it was measured".into()),
         Part::Text(MEASURED.into()),
     ])
