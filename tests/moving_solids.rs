@@ -363,7 +363,7 @@ fn a_box_that_dips_into_a_tank_lifts_its_water_by_what_it_displaces() {
     assert!(nearest(state, end) > -0.1 * DX);
     // Volume: 2.56 L − 0.36 (L − 0.47) = 2.56 · 0.8.
     let expected = (2.56 * 0.8 - 0.36 * 0.47) / (2.56 - 0.36);
-    let (before, after) = (level(&particles, end, [16; 3]), level(&state, end, [16; 3]));
+    let (before, after) = (level(&particles, end, [16; 3]), level(state, end, [16; 3]));
     println!("{before} {after}, expected {expected}");
     // A tenth of a cell: what the surface of jittered particles is off from that of a lattice.
     assert!((before - 0.8).abs() < 0.1 * DX && (after - expected).abs() < 0.1 * DX);

@@ -6,7 +6,7 @@ use half::f16;
 pub(super) trait Value: Copy + PartialEq + Send + Sync {
     /// As OpenVDB names it in a tree's type.
     const NAME: &'static str;
-    /// How transforms act on it: "Vector values are transformed as velocities".
+    /// How transforms act on it: vectors as velocities.
     const VECTOR_TYPE: Option<&'static str>;
 
     /// Minus it.
