@@ -13,33 +13,57 @@
 // The layer that is filled.
 @group(0) @binding(5) var<uniform> layer: vec4u;
 
-var<private> beside: array<u32, 6>;
+// Elements of the cells before and after along each axis.
+var<private> before: vec3u;
+var<private> after: vec3u;
 
 fn find_beside(element: u32) {
     open_beside(element);
-    beside[0] = element_beside(vec3i(-1, 0, 0));
-    beside[1] = element_beside(vec3i(1, 0, 0));
-    beside[2] = element_beside(vec3i(0, -1, 0));
-    beside[3] = element_beside(vec3i(0, 1, 0));
-    beside[4] = element_beside(vec3i(0, 0, -1));
-    beside[5] = element_beside(vec3i(0, 0, 1));
+    before = vec3u(
+        element_beside(vec3i(-1, 0, 0)),
+        element_beside(vec3i(0, -1, 0)),
+        element_beside(vec3i(0, 0, -1)),
+    );
+    after = vec3u(
+        element_beside(vec3i(1, 0, 0)),
+        element_beside(vec3i(0, 1, 0)),
+        element_beside(vec3i(0, 0, 1)),
+    );
 }
+
+// Where each of the six stands in a plane; element 0, which is 0, where its bit is not set.
+fn chosen(plane: u32, sources: u32, elements: vec3u, bits: vec3u) -> vec3u {
+    return select(vec3u(0u), elements + plane, (vec3u(sources) & bits) != vec3u(0u));
+}
+
+const BEFORE = vec3u(1u, 4u, 16u);
+const AFTER = vec3u(2u, 8u, 32u);
 
 // Sum of a field over those of the six faces whose bit is set.
 fn sum_velocity(plane: u32, sources: u32) -> f32 {
-    var sum = 0.0;
-    for (var k = 0u; k < 6u; k++) {
-        sum += face_velocity[select(0u, plane + beside[k], ((sources >> k) & 1u) == 1u)];
-    }
-    return sum;
+    let low = chosen(plane, sources, before, BEFORE);
+    let high = chosen(plane, sources, after, AFTER);
+    return face_velocity[low.x] + face_velocity[high.x] + face_velocity[low.y] + face_velocity[high.y]
+        + face_velocity[low.z] + face_velocity[high.z];
 }
 
 fn sum_change(plane: u32, sources: u32) -> f32 {
-    var sum = 0.0;
-    for (var k = 0u; k < 6u; k++) {
-        sum += face_change[select(0u, plane + beside[k], ((sources >> k) & 1u) == 1u)];
-    }
-    return sum;
+    let low = chosen(plane, sources, before, BEFORE);
+    let high = chosen(plane, sources, after, AFTER);
+    return face_change[low.x] + face_change[high.x] + face_change[low.y] + face_change[high.y]
+        + face_change[low.z] + face_change[high.z];
+}
+
+// A bit for each of the six, by component: of an older layer, and seen by particles.
+var<private> sources: vec3u;
+var<private> seen: vec3u;
+
+fn note(tags: u32, bit: u32) {
+    let other = vec3u(tags) >> vec3u(0u, 8u, 16u);
+    // 0 wraps round.
+    let is_older = (other & vec3u(0x7fu)) - 1u < vec3u(layer.x - 1u);
+    sources |= select(vec3u(0u), vec3u(bit), is_older);
+    seen |= select(vec3u(0u), vec3u(bit), (other & vec3u(0x80u)) != vec3u(0u));
 }
 
 @compute @workgroup_size(64)
@@ -57,18 +81,18 @@ fn main(
     let own_layer = layer.x;
     var tags = face_layer[element];
     let is_open = ((vec3u(tags) >> shifts) & vec3u(0x7fu)) == vec3u(0u);
-    // A bit for each of the six: of an older layer, and seen by particles as well.
-    var sources = vec3u(0u);
-    var seen = vec3u(0u);
+    sources = vec3u(0u);
+    seen = vec3u(0u);
     for (var once = 0; once < select(0, 1, any(is_open)); once++) {
         find_beside(element);
-        for (var k = 0u; k < 6u; k++) {
-            let other = vec3u(face_layer[beside[k]]) >> shifts;
-            // 0 wraps round.
-            let is_source = is_open & ((other & vec3u(0x7fu)) - 1u < vec3u(own_layer - 1u));
-            sources |= select(vec3u(0u), vec3u(1u << k), is_source);
-            seen |= select(vec3u(0u), vec3u(1u << k), is_source & ((other & vec3u(0x80u)) != vec3u(0u)));
-        }
+        note(face_layer[before.x], BEFORE.x);
+        note(face_layer[after.x], AFTER.x);
+        note(face_layer[before.y], BEFORE.y);
+        note(face_layer[after.y], AFTER.y);
+        note(face_layer[before.z], BEFORE.z);
+        note(face_layer[after.z], AFTER.z);
+        sources = select(vec3u(0u), sources, is_open);
+        seen &= sources;
     }
     for (var once = 0; once < select(0, 1, any(sources != vec3u(0u))); once++) {
         for (var component = 0u; component < 3u; component++) {

@@ -4,7 +4,6 @@
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
-#import "shared/flip_axis.wgsl"
 #import "shared/flip_carried.wgsl"
 
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
@@ -49,6 +48,91 @@ fn displacements(faces: vec3u) -> vec3f {
 }
 #endif
 
+// What the faces of one component hold.
+struct Component {
+    speeds: Values,
+#ifndef APIC
+    change: Values,
+#endif
+#ifdef CORRECTION
+    shift: Values,
+#endif
+}
+
+// Steps along b and c to the cells before and after; none where the domain ends.
+struct Steps {
+    a: vec3i,
+    b_before: vec3i,
+    b_after: vec3i,
+    c_before: vec3i,
+    c_after: vec3i,
+}
+
+fn read_component(axis: u32, steps: Steps) -> Component {
+    var read: Component;
+    let plane = vec3u(axis * params.stride);
+    for (var side = 0; side < 2; side++) {
+        let start = side * steps.a;
+        let before = plane + vec3u(
+            element_at(start - steps.b_before - steps.c_before),
+            element_at(start - steps.c_before),
+            element_at(start + steps.b_after - steps.c_before),
+        );
+        let own = plane + vec3u(
+            element_at(start - steps.b_before),
+            element_at(start),
+            element_at(start + steps.b_after),
+        );
+        let after = plane + vec3u(
+            element_at(start - steps.b_before + steps.c_after),
+            element_at(start + steps.c_after),
+            element_at(start + steps.b_after + steps.c_after),
+        );
+        read.speeds.lower = read.speeds.upper;
+        read.speeds.upper = mat3x3f(velocities(before), velocities(own), velocities(after));
+#ifndef APIC
+        read.change.lower = read.change.upper;
+        read.change.upper = mat3x3f(changes(before), changes(own), changes(after));
+#endif
+#ifdef CORRECTION
+        read.shift.lower = read.shift.upper;
+        read.shift.upper = mat3x3f(displacements(before), displacements(own), displacements(after));
+#endif
+    }
+    return read;
+}
+
+fn center_hats(f: f32) -> vec3f {
+    return vec3f(max(0.5 - f, 0.0), 1.0 - abs(f - 0.5), max(f - 0.5, 0.0));
+}
+
+// `f` is the place in the cell, along a, b and c.
+fn give(i: u32, axis: u32, f: vec3f, faces: Component) {
+    let a = vec2f(1.0 - f.x, f.x);
+    let b = center_hats(f.y);
+    let c = center_hats(f.z);
+    let u = value_at(faces.speeds, a, b, c);
+    let k = 4u * i + axis;
+    carried[CARRIED * i + axis] = u;
+#ifdef APIC
+    velocity[k] = u;
+    // Slopes of the hats, 1 over a cell.
+    let of_b = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.y < 0.5);
+    let of_c = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.z < 0.5);
+    let scale = params.inverse_cell_size;
+    let row = 9u * i + 3u * axis;
+    affine[row + axis] = scale * value_at(faces.speeds, vec2f(-1.0, 1.0), b, c);
+    affine[row + (axis + 1u) % 3u] = scale * value_at(faces.speeds, a, of_b, c);
+    affine[row + (axis + 2u) % 3u] = scale * value_at(faces.speeds, a, b, of_c);
+#else
+    let advanced = sorted_velocity[k] + value_at(faces.change, a, b, c);
+    velocity[k] = advanced + params.pic_blend * (u - advanced);
+#endif
+#ifdef CORRECTION
+    carried[CARRIED * i + 3u + axis] = value_at(faces.shift, a, b, c);
+#endif
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -60,78 +144,30 @@ fn main(
         return;
     }
     let element = thread + CELLS;
-    let component = axis.x;
     let first = cell_start[element];
     let end = cell_start[element + 1u];
-    let cell = own_cell(element);
-    let corner = vec3f(cell);
-    let at = turned_cell(cell);
-    let last = turned_cell(params.cells) - 1u;
-    let to_a = turned_back(vec3i(1, 0, 0));
-    let to_b = turned_back(vec3i(0, 1, 0));
-    let to_c = turned_back(vec3i(0, 0, 1));
-    let b_before = select(to_b, vec3i(0), at.y == 0u);
-    let b_after = select(to_b, vec3i(0), at.y >= last.y);
-    let c_before = select(to_c, vec3i(0), at.z == 0u);
-    let c_after = select(to_c, vec3i(0), at.z >= last.z);
-    var speeds: Values;
-#ifndef APIC
-    var change: Values;
-#endif
-#ifdef CORRECTION
-    var shift: Values;
-#endif
+    var of_x: Component;
+    var of_y: Component;
+    var of_z: Component;
+    var corner = vec3f(0.0);
     // Entered only by cells with particles.
     for (var once = 0; once < select(0, 1, end > first); once++) {
         open_neighborhood(element);
-        let plane = vec3u(component * params.stride);
-        for (var side = 0; side < 2; side++) {
-            let start = side * to_a;
-            let before = plane + vec3u(element_at(start - b_before - c_before), element_at(start - c_before), element_at(start + b_after - c_before));
-            let own = plane + vec3u(element_at(start - b_before), element_at(start), element_at(start + b_after));
-            let after = plane + vec3u(element_at(start - b_before + c_after), element_at(start + c_after), element_at(start + b_after + c_after));
-            speeds.lower = speeds.upper;
-            speeds.upper = mat3x3f(velocities(before), velocities(own), velocities(after));
-#ifndef APIC
-            change.lower = change.upper;
-            change.upper = mat3x3f(changes(before), changes(own), changes(after));
-#endif
-#ifdef CORRECTION
-            shift.lower = shift.upper;
-            shift.upper = mat3x3f(displacements(before), displacements(own), displacements(after));
-#endif
-        }
+        let cell = own_cell(element);
+        corner = vec3f(cell);
+        let to_before = select(vec3i(1), vec3i(0), cell == vec3u(0u));
+        let to_after = select(vec3i(1), vec3i(0), cell + 1u >= params.cells);
+        let x = vec3i(1, 0, 0);
+        let y = vec3i(0, 1, 0);
+        let z = vec3i(0, 0, 1);
+        of_x = read_component(0u, Steps(x, y * to_before, y * to_after, z * to_before, z * to_after));
+        of_y = read_component(1u, Steps(y, z * to_before, z * to_after, x * to_before, x * to_after));
+        of_z = read_component(2u, Steps(z, x * to_before, x * to_after, y * to_before, y * to_after));
     }
-    let scale = params.inverse_cell_size;
-    let blend = params.pic_blend;
     for (var i = first; i < end; i++) {
-        let f = turned(sorted_position[i].xyz * scale - corner);
-        let a = vec2f(1.0 - f.x, f.x);
-        let b = vec3f(max(0.5 - f.y, 0.0), 1.0 - abs(f.y - 0.5), max(f.y - 0.5, 0.0));
-        let c = vec3f(max(0.5 - f.z, 0.0), 1.0 - abs(f.z - 0.5), max(f.z - 0.5, 0.0));
-        let u = value_at(speeds, a, b, c);
-        let k = 4u * i + component;
-        carried[CARRIED * i + component] = u;
-#ifdef APIC
-        velocity[k] = u;
-        // Slopes of the hats, 1 over a cell.
-        let of_b = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.y < 0.5);
-        let of_c = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.z < 0.5);
-        let slope = scale * vec3f(
-            value_at(speeds, vec2f(-1.0, 1.0), b, c),
-            value_at(speeds, a, of_b, c),
-            value_at(speeds, a, b, of_c),
-        );
-        let row = 9u * i + 3u * component;
-        affine[row + component] = slope.x;
-        affine[row + (component + 1u) % 3u] = slope.y;
-        affine[row + (component + 2u) % 3u] = slope.z;
-#else
-        let advanced = sorted_velocity[k] + value_at(change, a, b, c);
-        velocity[k] = advanced + blend * (u - advanced);
-#endif
-#ifdef CORRECTION
-        carried[CARRIED * i + 3u + component] = value_at(shift, a, b, c);
-#endif
+        let f = sorted_position[i].xyz * params.inverse_cell_size - corner;
+        give(i, 0u, f, of_x);
+        give(i, 1u, f.yzx, of_y);
+        give(i, 2u, f.zxy, of_z);
     }
 }

@@ -141,9 +141,7 @@ fn to_particles(plan: &Plan, layers: usize) -> Vec<Command> {
         let offset = LAYERS + 16 * k as u64;
         commands.push(window("flip/extrapolate", offset, "layer", "layers", k));
     }
-    for axis in 0..3 {
-        commands.push(along("flip/grid_to_particle", WET, axis));
-    }
+    commands.push(over("flip/grid_to_particle", WET));
     commands.push(Command::over("flip/advect", plan.counts.particles));
     commands
 }
