@@ -12,6 +12,7 @@
 //! - [`solve`]: the particle solvers on the GPU.
 //! - [`cache`]: frames, ledger, manifest on disk.
 //! - [`render`]: screen-space fluid rendering.
+//! - [`study`]: what frames measure, curves, and the page that shows them.
 //! - [`stage`]: wires the rooms into jobs; no terminal.
 //! - [`cli`]: arguments in, terminal out.
 
@@ -23,3 +24,4 @@ pub mod render;
 pub mod scene;
 pub mod solve;
 pub mod stage;
+pub mod study;

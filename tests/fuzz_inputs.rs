@@ -1,56 +1,19 @@
 //! Bad input: each fault of a scene has its message, and no bytes make a reader panic.
 
+mod scene_faults;
+
 use std::path::Path;
 
 use proptest::prelude::*;
 use swell::{
     domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
-    scene::{Scene, SceneError},
+    scene::{Method, Scene, SceneError, study::Study},
 };
+
+use scene_faults::{FAULTS, FLIP_FAULTS, SCENE};
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
-
-const SCENE: &str = r#"[shot]
-name = "base"
-frames = 240
-frames_per_second = 60
-
-[domain]
-min = [0.0, 0.0, 0.0]
-max = [25.0, 12.6, 15.0]
-
-[water]
-rest_density = 1000.0
-gravity = [0.0, -9.81, 0.0]
-[[water.block]]
-min = [0.0, 0.0, 0.0]
-max = [13.4, 1.0, 15.0]
-
-[[solid]]
-mesh = "cube.obj"
-translate = [18.0, 0.0, 7.0]
-scale = 2.0
-
-[[wave_maker]]
-wall = "-x"
-motion = { kind = "sine", stroke = 1.5, period = 3.0, ramp = 1.0 }
-
-[solver]
-method = "pbf"
-[solver.pbf]
-particle_spacing = 0.1
-iterations = 4
-
-[effects]
-viscosity = { xsph = 0.01 }
-
-[solver.flip]
-cell_size = 0.2
-transfer = "flip"
-surface = "voxel"
-pressure = { preconditioner = "ipp", tolerance = 1e-4 }
-"#;
 
 /// A folder with one good mesh and some bad ones.
 fn assets() -> tempfile::TempDir {
@@ -73,586 +36,21 @@ fn parse(dir: &Path, text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, Path::new("scenes/bad.toml"), dir, &[])
 }
 
-/// (what to replace in the good scene, by what, line of the fault, what the message says)
-const FAULTS: &[(&str, &str, usize, &[&str])] = &[
-    // Keys.
-    (
-        "frames = 240",
-        "frame = 240",
-        3,
-        &["shot.frame: unknown key", "nearest is \"frames\""],
-    ),
-    (
-        "iterations = 4",
-        "iteratoins = 4",
-        30,
-        &[
-            "solver.pbf.iteratoins: unknown key",
-            "nearest is \"iterations\"",
-        ],
-    ),
-    (
-        "[effects]",
-        "[efects]",
-        32,
-        &["efects: unknown key", "nearest is \"effects\""],
-    ),
-    (
-        "xsph = 0.01",
-        "xspf = 0.01",
-        33,
-        &["effects.viscosity.xspf: unknown key", "\"xsph\""],
-    ),
-    (
-        "[solver.pbf]",
-        "[solver.pfb]",
-        28,
-        &["solver.pfb: unknown key", "nearest is \"pbf\""],
-    ),
-    (
-        "[solver.pbf]\nparticle_spacing = 0.1\niterations = 4\n",
-        "",
-        27,
-        &["solver.method: the scene has no table [solver.pbf]"],
-    ),
-    (
-        "cell_size = 0.2",
-        "cell_sise = 0.2",
-        36,
-        &[
-            "solver.flip.cell_sise: unknown key",
-            "nearest is \"cell_size\"",
-        ],
-    ),
-    (
-        "cell_size = 0.2\n",
-        "",
-        35,
-        &["solver.flip.cell_size: missing", "at least 3"],
-    ),
-    (
-        "tolerance = 1e-4",
-        "tolerence = 1e-4",
-        39,
-        &[
-            "solver.flip.pressure.tolerence: unknown key",
-            "nearest is \"tolerance\"",
-        ],
-    ),
-    (
-        "stroke = 1.5",
-        "strok = 1.5",
-        24,
-        &["wave_maker[0].motion.strok: unknown key", "\"stroke\""],
-    ),
-    (
-        "stroke = 1.5",
-        "stroke = 1.5, velocity = 1",
-        24,
-        &["motion.velocity: unknown key", "kind \"sine\""],
-    ),
-    (
-        "frames = 240\n",
-        "",
-        1,
-        &["shot.frames: missing", "a whole number from 1"],
-    ),
-    (
-        "particle_spacing = 0.1\n",
-        "",
-        28,
-        &["solver.pbf.particle_spacing: missing"],
-    ),
-    (
-        "period = 3.0, ",
-        "",
-        24,
-        &["wave_maker[0].motion.period: missing"],
-    ),
-    (
-        "[domain]",
-        "[shot.domain]",
-        6,
-        &["shot.domain: unknown key"],
-    ),
-    (
-        "frames = 240",
-        "frames = 240\nframes = 3",
-        4,
-        &["duplicate key"],
-    ),
-    ("frames = 240", "frames = = 3", 3, &["bad.toml:3"]),
-    (
-        "[solver]\nmethod = \"pbf\"\n",
-        "",
-        26,
-        &["solver.method: missing", "\"pbf\""],
-    ),
-    ("xsph = 0.01", "", 33, &["effects.viscosity.xsph: missing"]),
-    (
-        "xsph = 0.01",
-        "xsph = true",
-        33,
-        &["effects.viscosity.xsph: invalid type: boolean `true`"],
-    ),
-    // Types.
-    (
-        "frames = 240",
-        "frames = 1.5",
-        3,
-        &[
-            "shot.frames: invalid type: floating point `1.5`",
-            "a whole number from 1",
-        ],
-    ),
-    (
-        "= 0.1\n",
-        "= \"fine\"\n",
-        29,
-        &[
-            "particle_spacing: invalid type: string \"fine\"",
-            "a number above 0",
-        ],
-    ),
-    (
-        "max = [25.0, 12.6, 15.0]",
-        "max = [25.0, 12.6]",
-        8,
-        &["domain.max: invalid length 2", "three finite numbers"],
-    ),
-    (
-        "scale = 2.0",
-        "scale = \"big\"",
-        20,
-        &["solid[0].scale: wrong type", "a number other than 0"],
-    ),
-    // Ranges.
-    (
-        "= 0.1\n",
-        "= -0.1\n",
-        29,
-        &[
-            "solver.pbf.particle_spacing: -0.1 is out of range",
-            "a number above 0, metres",
-        ],
-    ),
-    (
-        "= 0.1\n",
-        "= 0\n",
-        29,
-        &["particle_spacing: 0 is out of range"],
-    ),
-    (
-        "= 0.1\n",
-        "= nan\n",
-        29,
-        &["particle_spacing: NaN is out of range"],
-    ),
-    (
-        "= 0.1\n",
-        "= inf\n",
-        29,
-        &["particle_spacing: inf is out of range"],
-    ),
-    (
-        "frames = 240",
-        "frames = 0",
-        3,
-        &["shot.frames: 0 is out of range"],
-    ),
-    (
-        "frames = 240",
-        "frames = -5",
-        3,
-        &["shot.frames: -5 is out of range"],
-    ),
-    (
-        "second = 60",
-        "second = 0",
-        4,
-        &["frames_per_second: 0 is out of range"],
-    ),
-    (
-        "\"base\"",
-        "\"../up\"",
-        2,
-        &["shot.name: \"../up\" is no safe file name", "letters"],
-    ),
-    ("\"base\"", "\"\"", 2, &["shot.name: \"\" is no safe"]),
-    (
-        "iterations = 4",
-        "iterations = 0",
-        30,
-        &["iterations: 0 is out of range"],
-    ),
-    (
-        "iterations = 4",
-        "iterations = 4\ndensity_error = 0.01",
-        30,
-        &["given together with density_error"],
-    ),
-    (
-        "iterations = 4",
-        "density_error = 0.01",
-        30,
-        &["given without max_iterations"],
-    ),
-    (
-        "iterations = 4",
-        "support_ratio = 1",
-        30,
-        &["support_ratio: 1 is out of range", "from 1.5 to 4"],
-    ),
-    (
-        "iterations = 4",
-        "relaxation = 2",
-        30,
-        &["relaxation: 2 is out of range"],
-    ),
-    (
-        "iterations = 4",
-        "iteration = \"gauss\"",
-        30,
-        &["\"gauss\" is no iteration", "red_black"],
-    ),
-    (
-        "\"pbf\"",
-        "\"sph\"",
-        27,
-        &[
-            "solver.method: \"sph\" is no method; the nearest is \"pbf\"",
-            "[solver.flip]",
-        ],
-    ),
-    // FLIP.
-    (
-        "cell_size = 0.2",
-        "cell_size = 0",
-        36,
-        &["solver.flip.cell_size: 0 is out of range"],
-    ),
-    (
-        "cell_size = 0.2",
-        "cell_size = 4.3",
-        36,
-        &[
-            "solver.flip.cell_size: no interior cell",
-            "5.814 × 2.930 × 3.488 cells of 4.3 m",
-            "at least 3",
-        ],
-    ),
-    ("cell_size = 0.2", "cell_size = 4.2", 36, &[]),
-    (
-        "cell_size = 0.2",
-        "cell_size = 4.2\nparticles_per_cell = 1",
-        15,
-        &["water.block[0].max", "too thin for one layer"],
-    ),
-    (
-        "cell_size = 0.2",
-        "cell_size = 0.01",
-        36,
-        &["particles 0.005 m apart", "134217728"],
-    ),
-    (
-        "cell_size = 0.2",
-        "cell_size = 0.001",
-        36,
-        &["the grid would overflow", "cells of 0.001 m"],
-    ),
-    (
-        "transfer = \"flip\"",
-        "transfer = \"pic\"",
-        37,
-        &["\"pic\" is no transfer; the nearest is \"apic\""],
-    ),
-    (
-        "transfer = \"flip\"",
-        "pic_blend = 1.1",
-        37,
-        &["solver.flip.pic_blend: 1.1 is out of range", "from 0 to 1"],
-    ),
-    (
-        "transfer = \"flip\"",
-        "cfl = 5.5",
-        37,
-        &["solver.flip.cfl: 5.5 is out of range", "up to 5"],
-    ),
-    (
-        "transfer = \"flip\"",
-        "particles_per_cell = 0",
-        37,
-        &["particles_per_cell: 0 is out of range"],
-    ),
-    (
-        "transfer = \"flip\"",
-        "density_correction = 1",
-        37,
-        &["density_correction: invalid type: integer `1`"],
-    ),
-    (
-        "surface = \"voxel\"",
-        "surface = \"ghost\"",
-        38,
-        &["\"ghost\" is no surface", "ghost_fluid"],
-    ),
-    (
-        "\"ipp\"",
-        "\"multigird\"",
-        39,
-        &[
-            "solver.flip.pressure.preconditioner: \"multigird\" is no preconditioner; \
-             the nearest is \"multigrid\"",
-            "\"none\"",
-        ],
-    ),
-    (
-        "tolerance = 1e-4",
-        "tolerance = 0",
-        39,
-        &[
-            "pressure.tolerance: 0 is out of range",
-            "above 0 and below 1",
-        ],
-    ),
-    (
-        "tolerance = 1e-4",
-        "tolerance = -1e-4",
-        39,
-        &["pressure.tolerance: -0.0001 is out of range"],
-    ),
-    (
-        "tolerance = 1e-4",
-        "tolerance = 1.0",
-        39,
-        &["pressure.tolerance: 1 is out of range"],
-    ),
-    (
-        "tolerance = 1e-4",
-        "tolerance = 0.1, residual_limit = 0.05",
-        39,
-        &[
-            "pressure.residual_limit: 0.05 is out of range",
-            "from the tolerance on",
-        ],
-    ),
-    (
-        "tolerance = 1e-4",
-        "max_iterations = 0",
-        39,
-        &["pressure.max_iterations: 0 is out of range"],
-    ),
-    (
-        "gravity = [0.0, -9.81, 0.0]",
-        "gravity = [0.0, nan, 0.0]",
-        12,
-        &["water.gravity", "out of range"],
-    ),
-    (
-        "scale = 2.0",
-        "scale = 0",
-        20,
-        &["solid[0].scale", "out of range"],
-    ),
-    // Boxes.
-    (
-        "max = [25.0, 12.6, 15.0]",
-        "max = [25.0, -1.0, 15.0]",
-        8,
-        &["domain.max: the box is inverted: y ends at -1 but starts at 0"],
-    ),
-    (
-        "max = [13.4, 1.0, 15.0]",
-        "max = [13.4, 0.0, 15.0]",
-        15,
-        &["water.block[0].max: the box is inverted"],
-    ),
-    (
-        "max = [13.4, 1.0, 15.0]",
-        "max = [13.4, 1.0, 15.1]",
-        15,
-        &[
-            "water.block[0].max: the water does not fit",
-            "[25, 12.6, 15]",
-        ],
-    ),
-    (
-        "min = [0.0, 0.0, 0.0]\nmax = [13.4",
-        "min = [0.0, -0.5, 0.0]\nmax = [13.4",
-        14,
-        &["water.block[0].min: the water does not fit"],
-    ),
-    (
-        "max = [13.4, 1.0, 15.0]",
-        "max = [13.4, 0.01, 15.0]",
-        15,
-        &["too thin for one layer"],
-    ),
-    // Size.
-    (
-        "= 0.1\n",
-        "= 0.001\n",
-        29,
-        &[
-            "the grid would overflow",
-            "25 × 12.6 × 15 m",
-            "at most 65536 cells",
-        ],
-    ),
-    ("= 0.1\n", "= 1e-9\n", 29, &["the grid would overflow"]),
-    (
-        "= 0.1\n",
-        "= 0.0105\n",
-        29,
-        &["particles 0.0105 m apart", "134217728"],
-    ),
-    (
-        "min = [0.0, 0.0, 0.0]\nmax = [25.0, 12.6, 15.0]",
-        "min = [9e5, 0, 0]\nmax = [9.0001e5, 12.6, 15.0]",
-        29,
-        &["too fine 900010 m from the origin"],
-    ),
-    // Meshes.
-    (
-        "cube.obj",
-        "missing.obj",
-        18,
-        &[
-            "solid[0].mesh: cannot read mesh",
-            "missing.obj",
-            "No such file",
-        ],
-    ),
-    (
-        "cube.obj",
-        "broken.obj",
-        18,
-        &[
-            "solid[0].mesh: mesh",
-            "line 2: a vertex needs three numbers",
-        ],
-    ),
-    ("cube.obj", "empty.stl", 18, &["not an STL: too short"]),
-    ("cube.obj", "cube.fbx", 18, &["unknown extension"]),
-    (
-        "cube.obj",
-        "sheet.obj",
-        18,
-        // Edges by their end points, where the scene puts them: scaled by 2 and moved.
-        &[
-            "solid[0].mesh",
-            "3 open edges",
-            "(18.0000, 0.0000, 7.0000)-(20.0000, 0.0000, 7.0000)",
-            "close the mesh",
-        ],
-    ),
-    (
-        "[18.0, 0.0, 7.0]",
-        "[80.0, 0.0, 7.0]",
-        18,
-        &["solid[0].mesh: the mesh lies outside of the domain"],
-    ),
-    (
-        "scale = 2.0",
-        "blake3 = \"00\"",
-        20,
-        &["solid[0].blake3", "has BLAKE3"],
-    ),
-    ("[[solid]]\nmesh = ", "[[water.mesh]]\nfile = ", 18, &[]),
-    // Wave makers.
-    (
-        "\"-x\"",
-        "\"left\"",
-        23,
-        &["wave_maker[0].wall: \"left\" is no wall", "\"+z\""],
-    ),
-    (
-        "stroke = 1.5",
-        "stroke = 24.9",
-        24,
-        &[
-            "wave_maker[0].motion: the wall -x crosses the whole domain",
-            "of 25 m",
-        ],
-    ),
-    // 2 m are left: twenty particle spacings, but fewer than three cells of FLIP.
-    (
-        "stroke = 1.5, period = 3.0, ramp = 1.0 }",
-        "stroke = 23.0, period = 3.0, ramp = 1.0 }",
-        24,
-        &[],
-    ),
-    (
-        "stroke = 1.5",
-        "stroke = -1.5",
-        24,
-        &["motion.stroke: -1.5 is out of range"],
-    ),
-    (
-        "ramp = 1.0 }",
-        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"-x\"\nmotion = { kind = \"constant_velocity\", velocity = 1.0 }",
-        26,
-        &["wave_maker[1].wall: a second wave maker on the wall -x"],
-    ),
-    (
-        "ramp = 1.0 }",
-        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 6.0 }",
-        27,
-        &["wave_maker[1].motion: the walls -x and +x collide 3."],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"wobble\"",
-        24,
-        &["motion.kind: \"wobble\" is no kind of motion", "solitary"],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"solitary\", height = 2, depth = 1",
-        24,
-        &["motion.height: a wave of 2 m on 1 m"],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"table\", file = \"push.csv\"",
-        24,
-        &["motion.file", "line 2: \"1,one\" is not time,displacement"],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"table\", file = \"back.csv\"",
-        24,
-        &["the time of point 2, 0.5 s"],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"table\", points = [[0, 1], [1, 2]]",
-        24,
-        &["the first displacement is 1"],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"table\"",
-        24,
-        &["motion.points: missing"],
-    ),
-    // Effects.
-    (
-        "xsph = 0.01",
-        "xsph = -1",
-        33,
-        &["effects.viscosity.xsph: out of range; allowed: a number above 0"],
-    ),
-];
-
 #[test]
 fn each_fault_names_file_line_key_and_what_is_allowed() {
     let dir = assets();
-    parse(dir.path(), SCENE).expect("the good scene is good");
+    let flip = [Method::Flip.as_override()];
+    let parse = |text: &str, overrides: &[String]| {
+        Scene::parse(text, Path::new("scenes/bad.toml"), dir.path(), overrides)
+    };
+    parse(SCENE, &[]).expect("the good scene is good");
+    parse(SCENE, &flip).expect("the good scene is good for FLIP");
     let mut wrong = Vec::new();
-    for (old, new, line, expected) in FAULTS {
+    let of_pbf = FAULTS.iter().map(|fault| (fault, &[][..]));
+    let of_flip = FLIP_FAULTS.iter().map(|fault| (fault, &flip[..]));
+    for ((old, new, line, expected), overrides) in of_pbf.chain(of_flip) {
         assert!(SCENE.contains(old), "{old}");
-        let result = parse(dir.path(), &SCENE.replacen(old, new, 1));
+        let result = parse(&SCENE.replacen(old, new, 1), overrides);
         if expected.is_empty() {
             // A control: the change is allowed.
             if let Err(error) = result {
@@ -692,6 +90,101 @@ fn a_missing_table_and_a_missing_file_are_named() {
     );
     let error = Scene::load(&dir.path().join("none.toml"), &[]).expect_err("no file");
     assert!(matches!(error, SceneError::Read { .. }), "{error}");
+}
+
+const STUDY: &str = r#"kind = "solver_comparison"
+scene = "scene.toml"
+look = "look.toml"
+solvers = ["pbf", "flip"]
+frames = "1-240x2"
+pictures = "60,120"
+"#;
+
+const LOOK: &str = r#"[camera]
+focal_length_mm = 35.0
+film_back_mm = [36.0, 20.25]
+position = [-2.0, 3.0, 2.5]
+target = [0.0, 1.0, 0.75]
+[image]
+width = 64
+height = 36
+[sky]
+model = "hosek_wilkie"
+[sun]
+azimuth_degrees = 120.0
+elevation_degrees = 35.0
+[output]
+formats = ["png"]
+"#;
+
+#[test]
+fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
+    let dir = assets();
+    let write = |name: &str, text: &str| {
+        std::fs::write(dir.path().join(name), text).expect("written");
+    };
+    write("scene.toml", SCENE);
+    let (pbf_alone, _) = SCENE.split_once("[solver.flip]").expect("a table");
+    write("pbf.toml", pbf_alone);
+    write("bad.toml", &SCENE.replace("frames = 240", "frames = 0"));
+    write("look.toml", LOOK);
+    write("exr.toml", &LOOK.replace("png", "exr"));
+    let parse = |text: &str| Study::parse(text, Path::new("s.toml"), dir.path());
+    parse(STUDY).expect("the good study is good");
+    for (old, new, expected) in [
+        (
+            "solver_comparison",
+            "comparison",
+            "s.toml:1: kind: \"comparison\" is no kind of study; allowed: \"solver_comparison\"",
+        ),
+        (
+            "pictures",
+            "picture",
+            "s.toml:6: picture: unknown key; the nearest is \"pictures\"",
+        ),
+        (
+            "look = \"look.toml\"\n",
+            "",
+            "look: missing; allowed: a look file",
+        ),
+        (
+            "\"flip\"]",
+            "\"pbf\"]",
+            "s.toml:4: solvers: [\"pbf\", \"pbf\"] are not two solvers",
+        ),
+        ("\"flip\"]", "\"sph\"]", "solvers: \"sph\" is no solver"),
+        (
+            "1-240x2",
+            "1-241",
+            "s.toml:5: frames: the shot has frames 1 to 240",
+        ),
+        ("1-240x2", "0-9", "frames: the shot has frames 1 to 240"),
+        (
+            "60,120",
+            "120-60",
+            "s.toml:6: pictures: `120-60` is no frame range",
+        ),
+        (
+            "scene.toml",
+            "pbf.toml",
+            "solver.method: the scene has no table [solver.flip]",
+        ),
+        (
+            "look.toml",
+            "exr.toml",
+            "s.toml:3: look: its output.formats has no \"png\"",
+        ),
+        ("scene.toml", "bad.toml", "bad.toml:3: shot.frames: 0"),
+        ("scene.toml", "none.toml", "cannot read scene"),
+        ("look.toml", "none.toml", "none.toml"),
+    ] {
+        assert!(STUDY.contains(old), "{old}");
+        let message = match parse(&STUDY.replacen(old, new, 1)) {
+            Ok(_) => panic!("{new}: accepted"),
+            Err(error) => error.to_string(),
+        };
+        assert!(message.contains(expected), "{message}\n  wanted {expected}");
+    }
 }
 
 /// A closed cube in each format, as seeds for mutation.
@@ -835,6 +328,15 @@ proptest! {
         let bytes = mutate(SCENE.as_bytes().to_vec(), &edits);
         // Nothing is allocated for the water here, however much a mutation asks for.
         let _ = parse(Path::new("/nowhere"), &String::from_utf8_lossy(&bytes));
+    }
+
+    #[test]
+    fn no_mutation_makes_the_study_parser_panic(
+        edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
+    ) {
+        let bytes = mutate(STUDY.as_bytes().to_vec(), &edits);
+        let text = String::from_utf8_lossy(&bytes);
+        let _ = Study::parse(&text, Path::new("s.toml"), Path::new("/nowhere"));
     }
 
     #[test]

@@ -38,6 +38,9 @@ method = "pbf"
 [solver.pbf]
 particle_spacing = 0.1
 
+[solver.flip]
+cell_size = 0.2
+
 [effects]
 viscosity = { xsph = 0.02 }
 "#;
@@ -70,6 +73,15 @@ formats = ["png", "exr"]
 aovs = ["Z"]
 "#;
 
+const STUDY: &str = r#"
+kind = "solver_comparison"
+scene = "small.toml"
+look = "look.toml"
+solvers = ["pbf", "flip"]
+frames = "1-6"
+pictures = "3-6x3"
+"#;
+
 struct Job {
     folder: TempDir,
 }
@@ -80,6 +92,7 @@ impl Job {
         fs::write(folder.path().join("small.toml"), SCENE).unwrap();
         fs::write(folder.path().join("box.obj"), BOX).unwrap();
         fs::write(folder.path().join("look.toml"), LOOK).unwrap();
+        fs::write(folder.path().join("study.toml"), STUDY).unwrap();
         fs::write(
             folder.path().join("wide.toml"),
             LOOK.replace("35.0", "24.0"),
@@ -123,31 +136,146 @@ impl Job {
     }
 }
 
-#[test]
-fn bakes_are_the_same_bytes_twice_and_after_any_stop() {
+/// `other` is a setting that changes the physics.
+fn same_bytes_twice_and_after_any_stop(solver: &str, other: &str) {
     let job = Job::new();
-    job.expect(0, "bake small.toml -o whole");
-    job.expect(0, "bake small.toml -o again");
+    let bake = format!("bake small.toml --solver {solver} -o");
+    job.expect(0, &format!("{bake} whole"));
+    job.expect(0, &format!("{bake} again"));
     assert_eq!(job.hash("whole"), job.hash("again"));
     job.expect(0, "verify whole");
     for stops in [&["1"][..], &["1-3", "1-4"], &["1-7"]] {
         let cache = format!("stop{}", stops[0]);
         for stop in stops {
-            job.expect(
-                0,
-                &format!("bake small.toml -o {cache} --frames {stop} --resume"),
-            );
+            job.expect(0, &format!("{bake} {cache} --frames {stop} --resume"));
             assert_ne!(job.hash("whole"), job.hash(&cache));
         }
-        job.expect(0, &format!("bake small.toml -o {cache} --resume"));
+        job.expect(0, &format!("{bake} {cache} --resume"));
         assert_eq!(job.hash("whole"), job.hash(&cache), "{stops:?}");
     }
     // A finished bake has nothing to resume, and does not change.
-    job.expect(0, "bake small.toml -o whole --resume");
+    job.expect(0, &format!("{bake} whole --resume"));
     assert_eq!(job.hash("whole"), job.hash("again"));
     // Negative control: other physics, other bytes.
-    job.expect(0, "bake small.toml -o other --set solver.pbf.iterations=5");
+    job.expect(0, &format!("{bake} other --set {other}"));
     assert_ne!(job.hash("whole"), job.hash("other"));
+}
+
+#[test]
+fn bakes_are_the_same_bytes_twice_and_after_any_stop() {
+    same_bytes_twice_and_after_any_stop("pbf", "solver.pbf.iterations=5");
+}
+
+#[test]
+fn flip_bakes_are_the_same_bytes_twice_and_after_any_stop() {
+    same_bytes_twice_and_after_any_stop("flip", "solver.flip.pic_blend=0.06");
+}
+
+#[test]
+fn one_scene_bakes_with_either_solver_and_caches_stay_apart() {
+    let job = Job::new();
+    let said = job.expect(0, "bake small.toml --solver flip --frames 1-2");
+    assert!(
+        said.contains("flip on") && said.contains("residual"),
+        "{said}"
+    );
+    job.expect(0, "bake small.toml --frames 1-2");
+    for solver in ["flip", "pbf"] {
+        job.expect(0, &format!("verify cache/small/{solver}"));
+        job.expect(
+            0,
+            &format!("render cache/small/{solver} --look look.toml -o {solver} --frames 2"),
+        );
+    }
+    let png = |solver: &str| fs::read(job.path(solver).join("small.0002.png")).unwrap();
+    assert_ne!(png("flip"), png("pbf"));
+
+    let before = job.hash("cache/small/pbf");
+    let said = job.expect(
+        4,
+        "bake small.toml --solver flip -o cache/small/pbf --resume",
+    );
+    assert!(
+        said.contains("solver.method was \"pbf\", is now \"flip\""),
+        "{said}"
+    );
+    assert_eq!(job.hash("cache/small/pbf"), before);
+
+    let shown = |words: &str| String::from_utf8(job.run(words).stdout).unwrap();
+    let frames = shown("inspect cache/small/flip");
+    assert!(
+        frames.contains("residual") && frames.contains("missed"),
+        "{frames}"
+    );
+    assert!(!shown("inspect cache/small/pbf").contains("residual"));
+    let plan = shown("inspect small.toml --solver flip");
+    assert!(
+        plan.contains("flip/") && plan.contains("pressure/"),
+        "{plan}"
+    );
+    assert!(
+        !plan.contains("pbf/") && !plan.contains("effects/"),
+        "{plan}"
+    );
+    assert!(!shown("inspect small.toml").contains("flip/"));
+}
+
+#[test]
+fn a_missed_projection_is_told_and_past_its_limit_ends_the_bake() {
+    let job = Job::new();
+    let one = "--solver flip --set solver.flip.pressure.max_iterations=1 \
+               --set solver.flip.pressure.preconditioner=none";
+    let never = "--set solver.flip.pressure.residual_limit=1e9";
+    let said = job.expect(
+        0,
+        &format!("bake small.toml -o told {one} {never} --frames 1-2"),
+    );
+    assert!(said.contains("missed their tolerance"), "{said}");
+    let said = job.expect(5, &format!("bake small.toml -o ended {one} --frames 1-2"));
+    assert!(
+        said.contains("frame 1") && said.contains("residual"),
+        "{said}"
+    );
+    job.expect(0, "verify ended");
+}
+
+/// What a study stands on is gone on with, and its page stands alone.
+#[test]
+fn a_study_bakes_renders_measures_and_tells() {
+    let job = Job::new();
+    let said = job.expect(0, "study study.toml -o out");
+    assert!(said.contains("The paper says pbf"), "{said}");
+    let read = |name: &str| fs::read_to_string(job.path("out").join(name)).unwrap();
+    let csv = read("results.csv");
+    assert_eq!(csv.lines().count(), 1 + 2 * 6);
+    let page = read("index.html");
+    assert_eq!(page.matches("data:image/png;base64,").count(), 4);
+    assert_eq!(page.matches("<svg").count(), 7);
+    assert!(page.contains("swell study study.toml -o out"), "{page}");
+    for outside in ["src=\"/", "href=", "<script", "src=\"http"] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    for solver in ["pbf", "flip"] {
+        job.expect(0, &format!("verify out/cache/{solver}"));
+    }
+    // Again: nothing is baked or rendered twice, and what is written is the same.
+    let said = job.expect(0, "study study.toml -o out");
+    assert!(said.contains("nothing left to bake"), "{said}");
+    assert!(
+        said.contains("stands there") && !said.contains("substeps"),
+        "{said}"
+    );
+    assert_eq!((read("results.csv"), read("index.html")), (csv, page));
+    // A cache of another scene is left alone.
+    job.edit("small.toml", "cell_size = 0.2", "cell_size = 0.25");
+    let said = job.expect(4, "study study.toml -o out");
+    assert!(said.contains("solver.flip.cell_size"), "{said}");
+    job.edit("study.toml", "3-6x3", "9");
+    let said = job.expect(2, "study study.toml -o new");
+    assert!(
+        said.contains("study.toml:7") && !job.path("new").exists(),
+        "{said}"
+    );
 }
 
 /// Long enough to be caught in the act.
@@ -261,7 +389,34 @@ fn faults_end_with_their_code_and_write_nothing() {
         job.expect(2, &format!("inspect small.toml {wide}"))
             .contains("max_storage_buffer_binding_size")
     );
+    // FLIP: four bytes for each of 98 million bricks.
+    let wide = "--solver flip --set domain.max=[1000,800,500]";
+    for command in ["bake", "inspect"] {
+        let said = job.expect(2, &format!("{command} small.toml {wide}"));
+        assert!(said.contains("max_storage_buffer_binding_size"), "{said}");
+    }
     job.expect(2, "bake small.toml --nonsense");
+    for (set, key) in [
+        ("cell_size=0.4", "solver.flip.cell_size"),
+        ("pressure.tolerance=0", "solver.flip.pressure.tolerance"),
+        ("pressure.preconditioner=ippp", "nearest is \"ipp\""),
+    ] {
+        let said = job.expect(2, &format!("bake small.toml --solver flip --set solver.flip.{set}"));
+        assert!(said.contains(key), "{said}");
+    }
+    let said = job.expect(2, "bake small.toml --solver sph");
+    assert!(said.contains("pbf or flip"), "{said}");
+    job.edit("small.toml", "[solver.flip]\ncell_size = 0.2\n", "");
+    let said = job.expect(2, "bake small.toml --solver flip");
+    assert!(
+        said.contains("[solver.flip]") && said.contains("cell_size"),
+        "{said}"
+    );
+    job.edit(
+        "small.toml",
+        "[effects]",
+        "[solver.flip]\ncell_size = 0.2\n[effects]",
+    );
     // Too fast for the substeps that the scene allows: the numbers fail, and the start is kept.
     let said = job.expect(
         5,
@@ -376,5 +531,12 @@ fn shipped_scenes_load_and_plan() {
             String::from_utf8_lossy(&output.stderr)
         );
         assert!(String::from_utf8_lossy(&output.stdout).contains("pbf/compute_lambda"));
+        let mut flip = job.command("inspect --solver flip");
+        let output = flip.arg(&file).output().unwrap();
+        assert!(output.status.success(), "{name}");
+        let plan = String::from_utf8_lossy(&output.stdout);
+        assert!(plan.contains("pressure/"), "{name}: {plan}");
+        let grid = plan.contains("125 × 63 × 75 cells");
+        assert_eq!(grid, name == "wave-city", "{plan}");
     }
 }

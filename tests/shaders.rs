@@ -190,7 +190,7 @@ fn composition_faults_name_their_place() {
 }
 
 /// Rooms that each room may import; `stage` and `cli` stand above them all.
-const MAY_IMPORT: [(&str, &[&str]); 8] = [
+const MAY_IMPORT: [(&str, &[&str]); 9] = [
     ("domain", &[]),
     ("gpu", &[]),
     // The plan's rows are gpu's own plain descriptions: a copy of them would have to be kept in step.
@@ -198,9 +198,12 @@ const MAY_IMPORT: [(&str, &[&str]); 8] = [
     ("cache", &["domain"]),
     ("solve", &["gpu", "domain", "scene"]),
     ("render", &["gpu", "domain", "scene"]),
+    ("study", &["domain"]),
     (
         "stage",
-        &["domain", "gpu", "scene", "cache", "solve", "render"],
+        &[
+            "domain", "gpu", "scene", "cache", "solve", "render", "study",
+        ],
     ),
     ("cli", &["stage", "scene", "domain"]),
 ];

@@ -1,5 +1,6 @@
 //! Reading a cache. Nothing is handed out whose checksum is off, and nothing is ever written.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -151,6 +152,25 @@ impl CacheReader {
     /// [`CacheError::NoFrame`], [`CacheError::Damaged`] (also for a missing file), [`CacheError::Io`].
     pub fn read(&self, frame: u32) -> Result<Particles, CacheError> {
         read_frame(&self.dir, &self.manifest, self.entry(frame)?)
+    }
+
+    /// Seconds that the bake of each frame took, where they are known: `timings.jsonl` is in no
+    /// checksum, and lines that are not whole are passed over.
+    ///
+    /// # Errors
+    /// [`CacheError::Io`].
+    pub fn seconds(&self) -> Result<BTreeMap<u32, f64>, CacheError> {
+        let path = self.dir.join(disk::TIMINGS);
+        let text = match std::fs::read_to_string(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            other => other.at(&path)?,
+        };
+        let seconds = |line: &str| {
+            let value: serde_json::Value = serde_json::from_str(line).ok()?;
+            let frame = u32::try_from(value["frame"].as_u64()?).ok()?;
+            Some((frame, value["timings"]["seconds"].as_f64()?))
+        };
+        Ok(text.lines().filter_map(seconds).collect())
     }
 
     /// Looks at every checksum: scene, assets, frames. The manifest and the ledger's chain were

@@ -1,13 +1,17 @@
 //! `swell bake SCENE`
 
-use std::{cell::OnceCell, path::PathBuf, process::ExitCode};
+use std::{
+    cell::OnceCell,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::{
     domain::{frame_range::FrameRange, solver::StepReport},
-    scene::Scene,
+    scene::{Method, Scene, SceneError},
     stage::bake::{Event, Request, bake},
 };
 
@@ -25,6 +29,9 @@ pub(super) struct BakeArgs {
     /// Cache directory; cache/SHOT/SOLVER where left out.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Which solver, pbf or flip: short for --set solver.method=SOLVER.
+    #[arg(long, value_name = "SOLVER", value_parser = method)]
+    solver: Option<Method>,
     /// Frames to bake, such as 1-30; the whole shot where left out.
     #[arg(long, value_name = "A-B")]
     frames: Option<FrameRange>,
@@ -45,9 +52,31 @@ pub(super) struct BakeArgs {
     progress: Mode,
 }
 
+/// A solver by its name.
+pub(super) fn method(name: &str) -> Result<Method, String> {
+    let mut named = Method::NAMED.into_iter();
+    let found = named.find(|(known, _)| *known == name);
+    let names = Method::NAMED.map(|(known, _)| known).join(" or ");
+    found
+        .map(|(_, method)| method)
+        .ok_or_else(|| format!("no solver of that name; allowed: {names}"))
+}
+
+/// A scene with overrides laid over it, and the solver that was asked for.
+pub(super) fn load(
+    file: &Path,
+    set: &[String],
+    solver: Option<Method>,
+) -> Result<Scene, SceneError> {
+    let chosen = solver.map(Method::as_override);
+    let overrides: Vec<String> = set.iter().cloned().chain(chosen).collect();
+    Scene::load(file, &overrides)
+}
+
 pub(super) fn run(args: &BakeArgs) -> Result<ExitCode, Failure> {
-    let scene = Scene::load(&args.scene, &args.set)?;
-    let default = || PathBuf::from("cache").join(&scene.shot.name).join("pbf");
+    let scene = load(&args.scene, &args.set, args.solver)?;
+    let method = scene.solver.method.name();
+    let default = || PathBuf::from("cache").join(&scene.shot.name).join(method);
     let request = Request {
         directory: args.output.clone().unwrap_or_else(default),
         scene,
@@ -98,13 +127,14 @@ pub(super) fn run(args: &BakeArgs) -> Result<ExitCode, Failure> {
     })
 }
 
-fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
+pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
     match event {
         Event::Ready {
             device,
             particles,
             removed,
             boundary_samples,
+            solver,
             bytes,
             first,
             last,
@@ -123,16 +153,23 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             } else {
                 format!("frames {first} to {last}")
             };
+            let beside = match lists {
+                0 => String::new(),
+                lists => format!(", of it {} neighbour lists", size(lists)),
+            };
+            let samples = match boundary_samples {
+                0 => String::new(),
+                count => format!(", {count} boundary samples"),
+            };
             let text = format!(
-                "on {device}\n{particles} particles ({removed} left out where solids are), {boundary_samples} boundary \
-                 samples, {} on the device, of it {} neighbour lists\n{span}",
-                size(all),
-                size(lists)
+                "{solver} on {device}\n{particles} particles ({removed} left out where solids are){samples}, {} on the \
+                 device{beside}\n{span}",
+                size(all)
             );
             progress.say(
                 &text,
                 json!({
-                    "event": "ready", "device": device, "particles": particles, "removed": removed,
+                    "event": "ready", "solver": solver, "device": device, "particles": particles, "removed": removed,
                     "boundary_samples": boundary_samples, "bytes": all, "list_bytes": lists, "first": first, "last": last,
                 }),
             );
@@ -143,6 +180,9 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             seconds,
         } => {
             if let Some(progress) = progress.get() {
+                for (text, event) in warnings(frame, &report) {
+                    progress.say(&text, event);
+                }
                 progress.frame(
                     &line(frame, &report, seconds),
                     json!({ "event": "frame", "frame": frame, "seconds": seconds, "report": report }),
@@ -153,9 +193,15 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
 }
 
 fn line(frame: u32, report: &StepReport, seconds: f64) -> String {
+    let projection = report.projection.as_ref().map_or(String::new(), |p| {
+        format!(
+            "  residual {:.1e}  divergence {:.2e} to {:.1e} /s",
+            p.residual, p.divergence_before, p.divergence_after
+        )
+    });
     format!(
-        "frame {frame:4}  {seconds:6.2} s  {} substeps, {} iterations  density error {:.2} % (99 %: {:.2}, max {:.2})  \
-         top speed {:.2} m/s  {} capped",
+        "frame {frame:4}  {seconds:6.2} s  {} substeps, {} iterations{projection}  density error {:.2} % (99 %: {:.2}, \
+         max {:.2})  top speed {:.2} m/s  {} capped",
         report.substeps,
         report.iterations,
         100.0 * report.density_error_mean,
@@ -164,4 +210,76 @@ fn line(frame: u32, report: &StepReport, seconds: f64) -> String {
         report.max_speed,
         report.capped
     )
+}
+
+/// What must not be passed over, and the same for farms.
+fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
+    let mut warnings = Vec::new();
+    let Some(projection) = &report.projection else {
+        return warnings;
+    };
+    if projection.missed > 0 {
+        warnings.push((
+            format!(
+                "warning: frame {frame}: {} pressure solves missed their tolerance; residual up to {:.1e}, divergence up \
+                 to {:.1e} /s",
+                projection.missed, projection.residual, projection.divergence_after
+            ),
+            json!({
+                "event": "warning", "what": "missed projections", "frame": frame, "missed": projection.missed,
+                "residual": projection.residual,
+            }),
+        ));
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::solver::Projection;
+
+    fn report(projection: Option<Projection>) -> StepReport {
+        StepReport {
+            substeps: 2,
+            iterations: 14,
+            density_error_mean: 0.01,
+            density_error_p99: 0.02,
+            density_error_max: 0.03,
+            kinetic_energy: 0.0,
+            potential_energy: 0.0,
+            max_speed: 3.0,
+            capped: 0,
+            searched: 0,
+            projection,
+        }
+    }
+
+    #[test]
+    fn a_projection_is_told_and_a_missed_one_is_a_warning() {
+        assert!(!line(1, &report(None), 0.5).contains("residual"));
+        assert!(warnings(1, &report(None)).is_empty());
+        let good = Projection {
+            residual: 8.1e-6,
+            divergence_before: 3.5,
+            divergence_after: 1e-4,
+            ..Projection::default()
+        };
+        let text = line(1, &report(Some(good)), 0.5);
+        assert!(
+            text.contains("14 iterations  residual 8.1e-6  divergence 3.50e0 to 1.0e-4 /s"),
+            "{text}"
+        );
+        assert!(warnings(1, &report(Some(good))).is_empty());
+        let missed = Projection { missed: 2, ..good };
+        let warnings = warnings(7, &report(Some(missed)));
+        assert!(warnings[0].0.contains("frame 7: 2 pressure solves missed"));
+        assert_eq!(warnings[0].1["missed"], 2);
+    }
+
+    #[test]
+    fn solvers_go_by_their_names() {
+        assert_eq!(method("flip"), Ok(Method::Flip));
+        assert!(method("sph").is_err_and(|said| said.contains("pbf or flip")));
+    }
 }

@@ -9,11 +9,11 @@ use std::{
 use clap::Args;
 
 use crate::{
-    scene::Scene,
+    scene::{Method, Scene},
     stage::inspect::{Adapter, Entry, Manifest, ScenePlan, adapters, cache, plan},
 };
 
-use super::{Failure, size};
+use super::{Failure, bake, size};
 
 #[derive(Args, Debug)]
 pub(super) struct InspectArgs {
@@ -26,6 +26,9 @@ pub(super) struct InspectArgs {
     /// Override a scene key.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Plan for this solver, pbf or flip: short for --set solver.method=SOLVER.
+    #[arg(long, value_name = "SOLVER", value_parser = bake::method)]
+    solver: Option<Method>,
     /// Plan for the limits of this adapter.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
@@ -45,7 +48,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
             show_cache(&mut text, &manifest, &entries)?;
         }
         Some(file) => {
-            let scene = Scene::load(file, &args.set)?;
+            let scene = bake::load(file, &args.set, args.solver)?;
             let planned = plan(&scene, args.adapter.as_deref())?;
             show_plan(&mut text, &scene, &planned)?;
             misfit = planned.misfit;
@@ -79,15 +82,21 @@ fn show_plan(out: &mut impl Write, scene: &Scene, planned: &ScenePlan) -> Result
     let shot = &scene.shot;
     writeln!(
         out,
-        "{}: {} frames at {} a second",
-        shot.name, shot.frames, shot.frames_per_second
+        "{}: {} frames at {} a second, by {}",
+        shot.name,
+        shot.frames,
+        shot.frames_per_second,
+        scene.solver.method.name()
     )?;
+    let samples = match plan.counts.boundary_samples {
+        0 => String::new(),
+        count => format!("{count} boundary samples, "),
+    };
     writeln!(
         out,
-        "{} particles ({} left out where solids are), {} boundary samples, {} × {} × {} cells",
+        "{} particles ({} left out where solids are), {samples}{} × {} × {} cells",
         plan.counts.particles,
         planned.removed,
-        plan.counts.boundary_samples,
         plan.grid_dims[0],
         plan.grid_dims[1],
         plan.grid_dims[2]
@@ -113,13 +122,16 @@ fn show_plan(out: &mut impl Write, scene: &Scene, planned: &ScenePlan) -> Result
     }
     let (all, lists) = plan.bytes();
     let each = |bytes: u64| bytes as f64 / plan.counts.particles.max(1) as f64;
-    writeln!(
+    write!(
         out,
-        "\n{} in all: {:.0} bytes a particle, and {:.0} for neighbour lists",
+        "\n{} in all: {:.0} bytes a particle",
         size(all),
-        each(all - lists),
-        each(lists)
+        each(all - lists)
     )?;
+    match lists {
+        0 => writeln!(out)?,
+        lists => writeln!(out, ", and {:.0} for neighbour lists", each(lists))?,
+    }
     Ok(())
 }
 
@@ -144,9 +156,17 @@ fn show_cache(
         "{} a second, d = {} m",
         manifest.frames_per_second, manifest.particle_spacing
     )?;
+    let has_projection = entries
+        .iter()
+        .any(|entry| entry.report.get("projection").is_some());
+    let columns = if has_projection {
+        "  iterations  residual   divergence  missed  pockets"
+    } else {
+        ""
+    };
     writeln!(
         out,
-        "\nframe  particles       bytes  substeps  density error  top speed  capped"
+        "\nframe  particles       bytes  substeps{columns}  density error  top speed  capped"
     )?;
     for entry in entries {
         let number = |key: &str| entry.report.get(key).and_then(serde_json::Value::as_f64);
@@ -154,9 +174,14 @@ fn show_cache(
             number("density_error_mean").map_or("-".into(), |x| format!("{:.3} %", 100.0 * x));
         let speed = number("max_speed").map_or("-".into(), |x| format!("{x:.2} m/s"));
         let capped = number("capped").map_or("-".into(), |x| format!("{x}"));
+        let columns = if has_projection {
+            projection_columns(entry)
+        } else {
+            String::new()
+        };
         writeln!(
             out,
-            "{:5}  {:9}  {:>10}  {:8}  {percent:>13}  {speed:>9}  {capped:>6}",
+            "{:5}  {:9}  {:>10}  {:8}{columns}  {percent:>13}  {speed:>9}  {capped:>6}",
             entry.clock.frame,
             entry.particles,
             size(entry.bytes),
@@ -164,6 +189,22 @@ fn show_cache(
         )?;
     }
     Ok(())
+}
+
+/// Iterations and what stands under `projection`; the start has neither.
+fn projection_columns(entry: &Entry) -> String {
+    let of = |table: Option<&serde_json::Value>, key: &str| table?.get(key)?.as_f64();
+    let projection = entry.report.get("projection");
+    let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v}"));
+    let scientific = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.1e}"));
+    format!(
+        "  {:>10}  {:>8}  {:>8} /s  {:>6}  {:>7}",
+        number(of(Some(&entry.report), "iterations")),
+        scientific(of(projection, "residual")),
+        scientific(of(projection, "divergence_after")),
+        number(of(projection, "missed")),
+        number(of(projection, "pockets"))
+    )
 }
 
 /// Writing to memory does not fail; the type keeps `?` honest.

@@ -5,6 +5,7 @@ mod inspect;
 pub mod interrupt;
 mod progress;
 mod render;
+mod study;
 pub mod verify;
 
 use std::{error::Error, process::ExitCode};
@@ -31,6 +32,8 @@ enum Command {
     Bake(bake::BakeArgs),
     /// Render a particle cache with a look into an image sequence.
     Render(render::RenderArgs),
+    /// Bake, render and measure what a study compares, and write one page about it.
+    Study(study::StudyArgs),
     /// Show a scene's plan, a cache's frames, or this machine's adapters.
     Inspect(inspect::InspectArgs),
     /// Check every checksum of a cache.
@@ -67,6 +70,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Bake(args) => bake::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Study(args) => study::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Verify(args) => verify::run(&args)
             .map(|()| ExitCode::SUCCESS)

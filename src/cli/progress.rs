@@ -20,6 +20,16 @@ pub(super) enum Mode {
     None,
 }
 
+impl Mode {
+    /// The same without a bar, for what is said between jobs.
+    pub(super) fn lines(self) -> Self {
+        match self {
+            Self::Auto => Self::Plain,
+            other => other,
+        }
+    }
+}
+
 /// A job's progress over frames.
 pub(super) struct Progress {
     mode: Mode,

@@ -94,7 +94,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<ExitCode, Failure> {
     })
 }
 
-fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
+pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
     match event {
         Event::Ready {
             device,

@@ -80,7 +80,8 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "wave_maker.motion",
-        "a motion that leaves at least two particle spacings and three cells of FLIP between the walls",
+        "a motion that leaves at least two particle spacings (PBF) or three cells (FLIP) between the \
+         walls",
     ),
     (
         "wave_maker.motion.kind",
@@ -110,7 +111,8 @@ const TABLE: &[(&str, &str)] = &[
     ("solver", "a table with method, pbf and flip"),
     (
         "solver.method",
-        "\"pbf\" with a table [solver.pbf], or \"flip\" with a table [solver.flip]",
+        "\"pbf\" with a table [solver.pbf] of at least particle_spacing, or \"flip\" with a table \
+         [solver.flip] of at least cell_size",
     ),
     ("solver.pbf", "a table with at least particle_spacing"),
     (
@@ -139,7 +141,7 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.flip", "a table with at least cell_size"),
     (
         "solver.flip.cell_size",
-        "a number above 0, metres, with at least 3 and at most 65536 cells along each axis, 2147483647 \
+        "a number above 0, metres, with at least 3 and at most 65536 cells along each axis, 68719476736 \
          cells and 134217728 particles",
     ),
     (
@@ -171,6 +173,25 @@ const TABLE: &[(&str, &str)] = &[
     (
         "solver.flip.pressure.residual_limit",
         "a number from the tolerance on, of the right-hand side's norm",
+    ),
+    // Of a study file.
+    ("kind", "\"solver_comparison\""),
+    (
+        "scene",
+        "a scene file with a table for each of the solvers, relative to the study file",
+    ),
+    (
+        "look",
+        "a look file that writes PNG, relative to the study file",
+    ),
+    ("solvers", "two of \"pbf\" and \"flip\", each once"),
+    (
+        "frames",
+        "frames to measure, such as \"1-240\" or \"1-240x2\", within the shot; all of it if left out",
+    ),
+    (
+        "pictures",
+        "frames to render, such as \"60-240x60\", within the shot",
     ),
     // The effects say for themselves what their keys allow.
     (

@@ -29,22 +29,22 @@ const MAX_COORDINATE: f64 = 1e6;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// The lattice on which a solver's particles start, and where the scene says how fine it is.
+/// The lattice on which the chosen solver's particles start.
 struct Lattice {
     spacing: f64,
+    /// Where the scene says how fine it is.
     span: Range<usize>,
+    /// Metres that must stay between two walls.
+    least_gap: f64,
 }
 
 /// Builds the scene.
 pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Result<Scene> {
     let shot = shot(doc, &spec.shot)?;
     let domain = domain(doc, &spec.domain)?;
-    let solver = solver::solver(doc, &spec.solver, &domain)?;
-    let lattices = solver::lattices(&spec.solver, &solver);
-    let water = water(doc, base_dir, &spec.water, &domain, &lattices)?;
-    for lattice in &lattices {
-        check_particle_count(doc, &water, &domain, lattice)?;
-    }
+    let (solver, lattice) = solver::solver(doc, &spec.solver, &domain)?;
+    let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
+    check_particle_count(doc, &water, &domain, &lattice)?;
     let solids = spec
         .solid
         .iter()
@@ -57,7 +57,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         &wave_maker::Surroundings {
             domain: &domain,
             gravity: water.gravity,
-            least_gap: solver::least_gap(&solver),
+            least_gap: lattice.least_gap,
             shot: &shot,
         },
     )?;
@@ -173,12 +173,12 @@ fn water(
     base_dir: &Path,
     spec: &WaterSpec,
     domain: &Bounds,
-    lattices: &[Lattice],
+    lattice: &Lattice,
 ) -> Result<Water> {
     let blocks = spec
         .block
         .iter()
-        .map(|block| water_block(doc, block, domain, lattices))
+        .map(|block| water_block(doc, block, domain, lattice))
         .collect::<Result<_>>()?;
     let meshes = spec
         .mesh
@@ -216,7 +216,7 @@ fn water_block(
     doc: &Document<'_>,
     spec: &BoxSpec,
     domain: &Bounds,
-    lattices: &[Lattice],
+    lattice: &Lattice,
 ) -> Result<Bounds> {
     let block = bounds(doc, spec)?;
     if !fits(&block, domain) {
@@ -239,8 +239,7 @@ fn water_block(
         );
         return Err(doc.fault_at(span, problem));
     }
-    let is_thin = |l: &&Lattice| sampling::block_dims(&block, domain, l.spacing).contains(&0);
-    if let Some(lattice) = lattices.iter().find(is_thin) {
+    if sampling::block_dims(&block, domain, lattice.spacing).contains(&0) {
         let size = block.size();
         let problem = format!(
             "the block, {} × {} × {} m, is too thin for one layer of particles {} m apart",

@@ -24,28 +24,12 @@ pub enum SceneError {
         /// What is wrong, and what is allowed.
         reason: String,
     },
-    /// A solver was asked for that the scene has no settings of.
-    #[error("scene {shot} has no table [solver.{method}]: add it, with at least {least}", least = least(.method))]
-    NoTable {
-        /// The scene's shot.
-        shot: String,
-        /// Asked for.
-        method: &'static str,
-    },
     /// One of two texts to compare is no TOML.
     #[error("cannot compare scenes: {reason}")]
     NotToml {
         /// The parser's complaint.
         reason: String,
     },
-}
-
-/// The key of a solver's table that has no default.
-fn least(method: &str) -> &'static str {
-    match method {
-        "flip" => "cell_size",
-        _ => "particle_spacing",
-    }
 }
 
 /// One fault of a scene: where, which key, what is wrong and what is allowed.

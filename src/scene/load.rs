@@ -176,20 +176,14 @@ vorticity_confinement = { strength = 0.1 }
         let dir = assets();
         let scene = parse(dir.path(), FULL, &[]).expect("valid");
         assert_eq!(scene.particle_spacing(), 0.1);
-        let flip = scene.clone().solved_by(Method::Flip).expect("has a table");
+        let flip = parse(dir.path(), FULL, &["solver.method=flip"]).expect("valid");
         assert_eq!(flip.particle_spacing(), 0.125);
-        let by_key = parse(dir.path(), FULL, &["solver.method=flip"]).expect("valid");
-        assert_eq!(by_key, flip);
+        assert_eq!(flip.solver.pbf, scene.solver.pbf);
         assert_ne!(physics_hash(&scene), physics_hash(&flip));
-
-        let mut without = scene;
-        without.solver.flip = None;
-        let message = without.solved_by(Method::Flip).expect_err("no table");
-        let message = message.to_string();
-        assert!(
-            message.contains("[solver.flip]") && message.contains("cell_size"),
-            "{message}"
-        );
+        // Where the other solver would not fit is not asked.
+        let coarse = "solver.flip.cell_size=2.0";
+        parse(dir.path(), FULL, &[coarse]).expect("valid with PBF");
+        parse(dir.path(), FULL, &[coarse, "solver.method=flip"]).expect_err("two cells across");
     }
 
     #[test]
@@ -362,7 +356,8 @@ vorticity_confinement = { strength = 0.1 }
             assert_eq!(scene.shot.name, name);
             let d = scene.particle_spacing();
             // FLIP starts from the same particles.
-            let flip = scene.clone().solved_by(Method::Flip).expect(name);
+            let flip = [Method::Flip.as_override()];
+            let flip = Scene::load(&scenes.join(name).with_extension("toml"), &flip).expect(name);
             assert_eq!(flip.particle_spacing(), d, "{name}");
             let solids = scene.solids.iter().map(|s| &s.mesh);
             let solid = SignedDistance::from_meshes(solids, &scene.domain, 2.0 * d).expect(name);

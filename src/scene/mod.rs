@@ -4,6 +4,7 @@ pub mod effects;
 pub mod flip;
 pub mod look;
 pub mod plan;
+pub mod study;
 
 mod allowed;
 mod build;
@@ -52,21 +53,6 @@ impl Scene {
             Method::Pbf => self.solver.pbf().particle_spacing,
             Method::Flip => self.solver.flip().particle_spacing(),
         }
-    }
-
-    /// The same scene with `method` chosen.
-    ///
-    /// # Errors
-    /// [`SceneError::NoTable`].
-    pub fn solved_by(mut self, method: Method) -> Result<Self, SceneError> {
-        if !self.solver.has(method) {
-            return Err(SceneError::NoTable {
-                shot: self.shot.name,
-                method: method.name(),
-            });
-        }
-        self.solver.method = method;
-        Ok(self)
     }
 }
 
@@ -207,14 +193,6 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// Whether the settings of `method` are there.
-    pub fn has(&self, method: Method) -> bool {
-        match method {
-            Method::Pbf => self.pbf.is_some(),
-            Method::Flip => self.flip.is_some(),
-        }
-    }
-
     /// PBF's settings.
     ///
     /// # Panics
@@ -244,6 +222,11 @@ pub enum Method {
 impl Method {
     /// With the names that scenes use.
     pub const NAMED: [(&'static str, Self); 2] = [("pbf", Self::Pbf), ("flip", Self::Flip)];
+
+    /// The override that chooses it.
+    pub fn as_override(self) -> String {
+        format!("solver.method={}", self.name())
+    }
 
     /// As scenes name it.
     pub fn name(self) -> &'static str {

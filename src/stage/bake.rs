@@ -12,20 +12,18 @@ use serde_json::{Value, json};
 use crate::{
     cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, Manifest},
     domain::{
-        frame_range::FrameRange,
-        particles::Particles,
-        signed_distance::SignedDistanceError,
-        solver::{Solver, StepReport},
+        frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
+        solver::StepReport,
     },
     gpu::adapter::{Context, GpuError},
     scene::{self, Scene, SceneError},
-    solve::{
-        SolveError,
-        pbf::{Pbf, device_limits},
-    },
+    solve::{SolveError, pbf::device_limits},
 };
 
-use super::{Blame, prepare::Start};
+use super::{
+    Blame,
+    prepare::{Start, build},
+};
 
 /// What to bake, and where to.
 #[derive(Clone, Debug)]
@@ -57,6 +55,8 @@ pub enum Event {
         removed: usize,
         /// Samples on solids.
         boundary_samples: usize,
+        /// Name of the solver.
+        solver: &'static str,
         /// GPU memory in all and for neighbour lists.
         bytes: (u64, u64),
         /// First frame that will be computed.
@@ -160,7 +160,7 @@ pub fn bake(
     let context = Context::open(request.adapter.as_deref())?;
     let plan = start.plan(scene, device_limits(&context));
     let bytes = plan.bytes();
-    let mut solver = Pbf::new(&context, scene, plan, &start.boundary, request.time_passes)?;
+    let mut solver = build(&context, scene, plan, &start, request.time_passes)?;
     let (mut writer, mut clock, state) = open_cache(request, &context, &start)?;
     let first = clock.frame + 1;
     tell(Event::Ready {
@@ -168,6 +168,7 @@ pub fn bake(
         particles: start.particles.len(),
         removed: start.removed,
         boundary_samples: start.boundary.samples.len(),
+        solver: scene.solver.method.name(),
         bytes,
         first,
         last,
@@ -279,7 +280,7 @@ fn open_cache(
         frames_per_second: scene.shot.frames_per_second,
         particle_spacing: scene.particle_spacing(),
         rest_density: scene.water.rest_density,
-        attributes: Vec::new(),
+        attributes: start.particles.attributes.keys().cloned().collect(),
         start_particles: 0,
         files: Vec::new(),
     };

@@ -4,13 +4,14 @@ pub mod bake;
 pub mod inspect;
 pub mod prepare;
 pub mod render;
+pub mod study;
 pub mod verify;
 
 use crate::{
     cache::CacheError,
     domain::signed_distance::SignedDistanceError,
     gpu::adapter::GpuError,
-    scene::{SceneError, look::LookError},
+    scene::{SceneError, look::LookError, study::StudyFileError},
     solve::SolveError,
 };
 
@@ -63,6 +64,12 @@ impl From<&SceneError> for Blame {
 
 impl From<&LookError> for Blame {
     fn from(_: &LookError) -> Self {
+        Self::Input
+    }
+}
+
+impl From<&StudyFileError> for Blame {
+    fn from(_: &StudyFileError) -> Self {
         Self::Input
     }
 }

@@ -1,4 +1,4 @@
-//! From a scene to what a solver starts from: particles, boundary, plan.
+//! From a scene to what a solver starts from (particles, boundary, plan), and the solver.
 
 use crate::{
     domain::{
@@ -6,12 +6,20 @@ use crate::{
         particles::Particles,
         sampling::{boundary_samples, fill_water},
         signed_distance::{SignedDistance, SignedDistanceError},
+        solver::Solver,
     },
+    gpu::adapter::Context,
     scene::{
         Method, Scene,
         plan::{Capacity, Counts, DeviceLimits, Plan},
     },
-    solve::{self, boundary::Boundary, flip},
+    solve::{
+        self,
+        SolveError,
+        boundary::Boundary,
+        flip::{self, Flip},
+        pbf::Pbf,
+    },
 };
 
 /// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
@@ -41,9 +49,13 @@ impl Start {
             Some(bounds) => SignedDistance::from_meshes(meshes(), &bounds, spacing)?,
             None => None,
         };
-        let samples = meshes()
-            .flat_map(|mesh| boundary_samples(mesh, &scene.domain, spacing))
-            .collect();
+        // FLIP meets solids by their distance alone.
+        let samples = match scene.solver.method {
+            Method::Pbf => meshes()
+                .flat_map(|mesh| boundary_samples(mesh, &scene.domain, spacing))
+                .collect(),
+            Method::Flip => Vec::new(),
+        };
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
         let fill = fill_water(
             &scene.water.blocks,
@@ -52,8 +64,13 @@ impl Start {
             &scene.domain,
             spacing,
         )?;
+        let mut particles = fill.particles;
+        for name in attributes(scene) {
+            let zeros = vec![0.0; particles.len()];
+            particles.attributes.insert(name.to_owned(), zeros);
+        }
         Ok(Self {
-            particles: fill.particles,
+            particles,
             removed: fill.removed,
             boundary: Boundary { samples, distance },
         })
@@ -72,6 +89,32 @@ impl Start {
         };
         solve::plan(scene, counts, limits)
     }
+}
+
+/// What each particle carries beside position, velocity and id.
+fn attributes(scene: &Scene) -> Vec<&'static str> {
+    match scene.solver.method {
+        Method::Pbf => Vec::new(),
+        Method::Flip => flip::attributes(scene.solver.flip()).to_vec(),
+    }
+}
+
+/// The scene's solver on a device, with what `plan` names.
+///
+/// # Errors
+/// Those of the solver: a buffer over the adapter's limits, with the figures; the device at fault.
+pub fn build(
+    context: &Context,
+    scene: &Scene,
+    plan: Plan,
+    start: &Start,
+    is_timed: bool,
+) -> Result<Box<dyn Solver<Error = SolveError>>, SolveError> {
+    let boundary = &start.boundary;
+    Ok(match scene.solver.method {
+        Method::Pbf => Box::new(Pbf::new(context, scene, plan, boundary, is_timed)?),
+        Method::Flip => Box::new(Flip::new(context, scene, plan, boundary, is_timed)?),
+    })
 }
 
 /// Where the solids are, with room about them, as far as water can come.

@@ -245,12 +245,22 @@ fn attributes(cache: &CacheReader, look: &Look, frame: u32) -> Result<Attributes
 }
 
 /// `SHOT.0001.png`, with as many digits as the last cached frame needs, at least four.
+fn name(shot: &str, frame: u32, last_frame: u32, extension: &str) -> String {
+    let digits = last_frame.to_string().len().max(4);
+    format!("{shot}.{frame:0digits$}.{extension}")
+}
+
+/// Name of the PNG of a frame of a cache.
+pub(super) fn picture_name(cache: &CacheReader, frame: u32) -> String {
+    name(&cache.manifest().shot, frame, cache.last_frame(), "png")
+}
+
+/// Where a frame's pictures go, and in which format each.
 fn files(
     request: &Request,
     attributes: &Attributes,
     last_frame: u32,
 ) -> Vec<(PathBuf, FormatSpec)> {
-    let digits = last_frame.to_string().len().max(4);
     let formats = &request.look.spec().output.formats;
     formats
         .iter()
@@ -259,10 +269,7 @@ fn files(
                 FormatSpec::Png => "png",
                 FormatSpec::Exr => "exr",
             };
-            let name = format!(
-                "{}.{:0digits$}.{extension}",
-                attributes.shot, attributes.frame
-            );
+            let name = name(&attributes.shot, attributes.frame, last_frame, extension);
             (request.directory.join(name), format)
         })
         .collect()

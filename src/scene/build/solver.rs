@@ -1,5 +1,5 @@
-//! The solvers' tables. Each one that stands in a scene is checked, whichever is chosen, so that
-//! `--solver` never meets a fault that the scene did not show before.
+//! The solvers' tables. The keys of each one that stands in a scene are checked; whether the scene fits,
+//! only of the one that is chosen.
 
 use toml::Spanned;
 
@@ -14,8 +14,13 @@ use super::{
 };
 use crate::domain::bounds::Bounds;
 
-/// Most cells of a grid, and along one axis.
+/// Most cells of PBF's neighbour grid; their indices are 32 bits.
 const MAX_CELLS: f64 = 2_147_483_647.0;
+
+/// Most cells of FLIP's box, wet or dry: 2²⁷ bricks of 8³, each with four bytes in a table.
+const MAX_FLIP_CELLS: f64 = 68_719_476_736.0;
+
+/// Most cells along one axis.
 const MAX_AXIS_CELLS: f64 = 65_536.0;
 
 /// f32 positions at the far end of the domain must still tell apart this fraction of a spacing.
@@ -29,50 +34,55 @@ const LEAST_CELLS: f64 = 3.0;
 /// True residual that ends a bake where the scene sets none.
 const RESIDUAL_LIMIT: f64 = 1e-2;
 
-/// Every table that stands there, and the one that is chosen.
-pub(super) fn solver(doc: &Document<'_>, spec: &SolverSpec, domain: &Bounds) -> Result<Solver> {
+/// Every table that stands there, the method, and the lattice of the chosen one.
+pub(super) fn solver(
+    doc: &Document<'_>,
+    spec: &SolverSpec,
+    domain: &Bounds,
+) -> Result<(Solver, Lattice)> {
     let method = choice(doc, &spec.method, "method", &Method::NAMED)?;
     let solver = Solver {
         method,
         pbf: match &spec.pbf {
-            Some(spec) => Some(pbf(doc, spec, domain)?),
+            Some(spec) => Some(pbf(doc, spec)?),
             None => None,
         },
         flip: match &spec.flip {
-            Some(spec) => Some(flip(doc, spec, domain)?),
+            Some(spec) => Some(flip(doc, spec)?),
             None => None,
         },
     };
-    if solver.has(method) {
-        return Ok(solver);
-    }
-    let problem = format!("the scene has no table [solver.{}]", method.name());
-    Err(doc.fault_at(spec.method.span(), problem))
+    let lattice = match (method, &spec.pbf, &spec.flip) {
+        (Method::Pbf, Some(spec), _) => fit_pbf(doc, spec, solver.pbf(), domain)?,
+        (Method::Flip, _, Some(spec)) => fit_flip(doc, spec, solver.flip(), domain)?,
+        _ => {
+            let problem = format!("the scene has no table [solver.{}]", method.name());
+            return Err(doc.fault_at(spec.method.span(), problem));
+        }
+    };
+    Ok((solver, lattice))
 }
 
-/// Where each solver's particles start.
-pub(super) fn lattices(spec: &SolverSpec, solver: &Solver) -> Vec<Lattice> {
-    let pbf = spec.pbf.as_ref().zip(solver.pbf.as_ref());
-    let flip = spec.flip.as_ref().zip(solver.flip.as_ref());
-    let pbf = pbf.map(|(spec, pbf)| Lattice {
+fn fit_pbf(doc: &Document<'_>, spec: &PbfSpec, pbf: &Pbf, domain: &Bounds) -> Result<Lattice> {
+    let lattice = Lattice {
         spacing: pbf.particle_spacing,
         span: spec.particle_spacing.span(),
-    });
-    let flip = flip.map(|(spec, flip)| Lattice {
-        spacing: flip.particle_spacing(),
-        span: spec.cell_size.span(),
-    });
-    pbf.into_iter().chain(flip).collect()
+        least_gap: LEAST_SPACINGS * pbf.particle_spacing,
+    };
+    let support_radius = pbf.particle_spacing * pbf.support_ratio;
+    check_grid(doc, domain, &lattice, support_radius, MAX_CELLS)?;
+    Ok(lattice)
 }
 
-/// Metres that must stay between two walls.
-pub(super) fn least_gap(solver: &Solver) -> f64 {
-    let pbf = solver
-        .pbf
-        .as_ref()
-        .map(|p| LEAST_SPACINGS * p.particle_spacing);
-    let flip = solver.flip.as_ref().map(|f| LEAST_CELLS * f.cell_size);
-    pbf.into_iter().chain(flip).fold(0.0, f64::max)
+fn fit_flip(doc: &Document<'_>, spec: &FlipSpec, flip: &Flip, domain: &Bounds) -> Result<Lattice> {
+    let lattice = Lattice {
+        spacing: flip.particle_spacing(),
+        span: spec.cell_size.span(),
+        least_gap: LEAST_CELLS * flip.cell_size,
+    };
+    check_interior(doc, &spec.cell_size, domain)?;
+    check_grid(doc, domain, &lattice, flip.cell_size, MAX_FLIP_CELLS)?;
+    Ok(lattice)
 }
 
 /// The value that a word stands for.
@@ -117,14 +127,9 @@ fn whole_or(
         .map_or(Ok(default), |value| whole(doc, value, max))
 }
 
-fn pbf(doc: &Document<'_>, spec: &PbfSpec, domain: &Bounds) -> Result<Pbf> {
+fn pbf(doc: &Document<'_>, spec: &PbfSpec) -> Result<Pbf> {
     let particle_spacing = number(doc, &spec.particle_spacing, |v| v > 0.0)?;
     let support_ratio = number_or(doc, &spec.support_ratio, 2.0, |v| (1.5..=4.0).contains(&v))?;
-    let lattice = Lattice {
-        spacing: particle_spacing,
-        span: spec.particle_spacing.span(),
-    };
-    check_grid(doc, domain, &lattice, particle_spacing * support_ratio)?;
     Ok(Pbf {
         particle_spacing,
         support_ratio,
@@ -169,10 +174,9 @@ fn stop(doc: &Document<'_>, spec: &PbfSpec) -> Result<Stop> {
     }
 }
 
-fn flip(doc: &Document<'_>, spec: &FlipSpec, domain: &Bounds) -> Result<Flip> {
+fn flip(doc: &Document<'_>, spec: &FlipSpec) -> Result<Flip> {
     let cell_size = number(doc, &spec.cell_size, |v| v > 0.0)?;
-    check_interior(doc, &spec.cell_size, domain)?;
-    let flip = Flip {
+    Ok(Flip {
         cell_size,
         particles_per_cell: whole_or(doc, &spec.particles_per_cell, 8, 64)?,
         transfer: choice_or(
@@ -194,13 +198,7 @@ fn flip(doc: &Document<'_>, spec: &FlipSpec, domain: &Bounds) -> Result<Flip> {
         )?,
         density_correction: spec.density_correction.unwrap_or(true),
         pressure: pressure(doc, &spec.pressure)?,
-    };
-    let lattice = Lattice {
-        spacing: flip.particle_spacing(),
-        span: spec.cell_size.span(),
-    };
-    check_grid(doc, domain, &lattice, cell_size)?;
-    Ok(flip)
+    })
 }
 
 fn pressure(doc: &Document<'_>, spec: &PressureSpec) -> Result<Pressure> {
@@ -240,18 +238,19 @@ fn check_interior(doc: &Document<'_>, cell_size: &Spanned<f64>, domain: &Bounds)
     Err(doc.fault_at(cell_size.span(), problem))
 }
 
-/// A grid's indices are 32 bits, and so are positions.
+/// A grid of at most so many cells, and positions of 32 bits that are fine enough for the lattice.
 fn check_grid(
     doc: &Document<'_>,
     domain: &Bounds,
     lattice: &Lattice,
     cell_size: f64,
+    max_cells: f64,
 ) -> Result<()> {
     let (spacing, span) = (lattice.spacing, lattice.span.clone());
     let cells = (domain.size() / cell_size).ceil();
     let all = cells.x * cells.y * cells.z;
     let axis = cells.max_element();
-    if all > MAX_CELLS || axis > MAX_AXIS_CELLS {
+    if all > max_cells || axis > MAX_AXIS_CELLS {
         let problem = format!(
             "the grid would overflow: a domain of {} × {} × {} m takes {:.3e} × {:.3e} × {:.3e} \
              = {all:.3e} cells of {cell_size} m",

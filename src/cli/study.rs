@@ -1,0 +1,86 @@
+//! `swell study STUDY`
+
+use std::{cell::OnceCell, path::PathBuf, process::ExitCode};
+
+use clap::Args;
+use serde_json::json;
+
+use crate::{
+    scene::study::Study,
+    stage::study::{Event, Request, study},
+};
+
+use super::{
+    Failure, bake,
+    interrupt::{self, Interrupt},
+    progress::{Mode, Progress},
+    render,
+};
+
+#[derive(Args, Debug)]
+pub(super) struct StudyArgs {
+    /// Study file (TOML).
+    study: PathBuf,
+    /// Where caches, pictures, table and page go; studies/NAME where left out. What stands there is gone on with.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Index or part of the name of the adapter (see `swell inspect --adapters`).
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// How to tell progress.
+    #[arg(long, value_enum, default_value_t)]
+    progress: Mode,
+}
+
+pub(super) fn run(args: &StudyArgs) -> Result<ExitCode, Failure> {
+    let default = || PathBuf::from("studies").join(args.study.file_stem().unwrap_or_default());
+    let directory = args.output.clone().unwrap_or_else(default);
+    let request = Request {
+        study: Study::load(&args.study)?,
+        command: format!(
+            "swell study {} -o {}",
+            args.study.display(),
+            directory.display()
+        ),
+        directory,
+        adapter: args.adapter.clone(),
+    };
+    // Without a handler a signal ends the process at once; the next run goes on.
+    let interrupt = Interrupt::install().unwrap_or_default();
+    let say = |text: &str, event| Progress::new(args.progress.lines(), 0).say(text, event);
+    let mut progress = OnceCell::new();
+    let outcome = study(&request, interrupt.flag(), &mut |event| {
+        let is_new = matches!(
+            event,
+            Event::Bake(crate::stage::bake::Event::Ready { .. })
+                | Event::Render(crate::stage::render::Event::Ready { .. })
+        );
+        if is_new && let Some(before) = progress.take() {
+            Progress::finish(&before);
+        }
+        match event {
+            Event::Solver(name) => say(
+                &format!("solver {name}"),
+                json!({ "event": "solver", "solver": name }),
+            ),
+            Event::Bake(event) => bake::tell(args.progress, &progress, event),
+            Event::Render(event) => render::tell(args.progress, &progress, event),
+        }
+    });
+    if let Some(progress) = progress.take() {
+        progress.finish();
+    }
+    let outcome = outcome?;
+    let Some(page) = outcome.page else {
+        say(
+            "ended by a signal; the same command goes on",
+            json!({ "event": "end", "interrupted": true }),
+        );
+        return Ok(ExitCode::from(interrupt::EXIT_CODE as u8));
+    };
+    say(
+        &format!("{}\npage: {}", outcome.findings.join("\n"), page.display()),
+        json!({ "event": "end", "page": page, "findings": outcome.findings, "interrupted": false }),
+    );
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,408 @@
+//! `study`: bakes and renders what a study asks for, measures it, and writes the page.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
+
+use rayon::prelude::*;
+
+use crate::{
+    cache::{CacheError, CacheReader, Manifest},
+    domain::{frame_range::FrameRange, solver::StepReport},
+    scene::{
+        Scene, SceneError, Solid,
+        study::{SolverComparison, Study},
+    },
+    study::{
+        comparison::{self, Course, Finding, Impact, Row},
+        measure::{Direction, Gauge},
+        median,
+        page::{self, Part},
+        picture::{self, PictureError},
+    },
+};
+
+use super::{
+    Blame,
+    bake::{self, BakeError},
+    render::{self, RenderJobError},
+};
+
+/// What to study, and where to.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Validated study.
+    pub study: Study,
+    /// Caches, pictures, table and page go in here.
+    pub directory: PathBuf,
+    /// Index or part of the name of an adapter.
+    pub adapter: Option<String>,
+    /// As typed, for the page.
+    pub command: String,
+}
+
+/// What a study has to tell while it runs.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// A bake begins or goes on.
+    Solver(&'static str),
+    /// A bake tells.
+    Bake(bake::Event),
+    /// A render tells.
+    Render(render::Event),
+}
+
+/// How a study ended.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// Its page; `None` where a signal ended it before.
+    pub page: Option<PathBuf>,
+    /// What was found, in words.
+    pub findings: Vec<String>,
+}
+
+/// Why a study failed.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// A bake.
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    /// A render.
+    #[error(transparent)]
+    Render(#[from] RenderJobError),
+    /// A cache.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A file that cannot be read or written.
+    #[error("{}", file.display())]
+    File {
+        /// Which.
+        file: PathBuf,
+        /// The system's words.
+        source: std::io::Error,
+    },
+    /// A picture that cannot stand in the page.
+    #[error("{}", file.display())]
+    Picture {
+        /// Which.
+        file: PathBuf,
+        /// What is off.
+        source: PictureError,
+    },
+}
+
+impl From<&StudyError> for Blame {
+    fn from(error: &StudyError) -> Self {
+        match error {
+            StudyError::Bake(error) => error.into(),
+            StudyError::Render(error) => error.into(),
+            StudyError::Cache(error) => error.into(),
+            StudyError::Scene(error) => error.into(),
+            StudyError::File { .. } | StudyError::Picture { .. } => Self::Files,
+        }
+    }
+}
+
+/// Runs a study; `tell` hears of progress, and `stop` ends it after the current frame. What stands in
+/// the directory already is gone on with.
+///
+/// # Errors
+/// [`StudyError`].
+pub fn study(
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Outcome, StudyError> {
+    let Study::SolverComparison(comparison) = &request.study;
+    for scene in &comparison.scenes {
+        tell(Event::Solver(scene.solver.method.name()));
+        if bake_and_render(request, comparison, scene, stop, tell)? {
+            return Ok(Outcome::default());
+        }
+    }
+    let [scene, other] = &comparison.scenes;
+    let open = |scene: &Scene| CacheReader::open(&cache_directory(request, scene));
+    let caches = [open(scene)?, open(other)?];
+    let gauge = gauge(scene, &caches)?;
+    let [a, b] = &caches;
+    let courses = [
+        course(a, &gauge, &comparison.frames)?,
+        course(b, &gauge, &comparison.frames)?,
+    ];
+    let impact = Impact::of(&courses, obstacle(scene, &gauge));
+    let findings = comparison::findings(&courses, impact);
+    write(
+        &request.directory.join("results.csv"),
+        &comparison::to_csv(&courses),
+    )?;
+    let parts = parts(request, comparison, &caches, &courses, &findings, impact)?;
+    let title = format!(
+        "{}: {} and {}",
+        scene.shot.name, courses[0].solver, courses[1].solver
+    );
+    let file = request.directory.join("index.html");
+    write(&file, &page::html(&title, &parts))?;
+    Ok(Outcome {
+        page: Some(file),
+        findings: findings.into_iter().map(|found| found.text).collect(),
+    })
+}
+
+/// Whether a signal ended it.
+fn bake_and_render(
+    request: &Request,
+    comparison: &SolverComparison,
+    scene: &Scene,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event),
+) -> Result<bool, StudyError> {
+    let last = comparison.frames.last().max(comparison.pictures.last());
+    let cache = cache_directory(request, scene);
+    let bake = bake::Request {
+        scene: scene.clone(),
+        directory: cache.clone(),
+        frames: FrameRange::inclusive(1, last),
+        resume: true,
+        adapter: request.adapter.clone(),
+        time_passes: false,
+    };
+    if bake::bake(&bake, stop, &mut |event| tell(Event::Bake(event)))?.interrupted {
+        return Ok(true);
+    }
+    let render = render::Request {
+        cache,
+        look: comparison.look.clone(),
+        directory: picture_directory(request, scene),
+        frames: Some(comparison.pictures.clone()),
+        adapter: request.adapter.clone(),
+        overwrite: false,
+    };
+    Ok(render::render(&render, stop, &mut |event| tell(Event::Render(event)))?.interrupted)
+}
+
+fn cache_directory(request: &Request, scene: &Scene) -> PathBuf {
+    request
+        .directory
+        .join("cache")
+        .join(scene.solver.method.name())
+}
+
+fn picture_directory(request: &Request, scene: &Scene) -> PathBuf {
+    let pictures = request.directory.join("pictures");
+    pictures.join(scene.solver.method.name())
+}
+
+/// The wave runs away from the first wave maker; towards greater x where there is none.
+fn direction(scene: &Scene) -> Direction {
+    let along = |axis, is_forward| Direction { axis, is_forward };
+    scene
+        .wave_makers
+        .iter()
+        .find(|maker| maker.wall.axis != 1)
+        .map_or(along(0, true), |maker| {
+            along(maker.wall.axis, !maker.wall.is_max)
+        })
+}
+
+/// One gauge for both: the coarser lattice decides. Where a wave maker stands, the still level is that
+/// of the start; other water has none at the start, and what it would settle to is taken.
+fn gauge(scene: &Scene, caches: &[CacheReader; 2]) -> Result<Gauge, CacheError> {
+    let [spacing, other] = caches.each_ref().map(|c| c.manifest().particle_spacing);
+    let start = caches[0].read(0)?;
+    let gauge = Gauge::new(scene.domain, direction(scene), spacing.max(other));
+    let still = if scene.wave_makers.is_empty() {
+        let size = scene.domain.size();
+        start.len() as f64 * spacing.powi(3) / (size.x * size.z)
+    } else {
+        gauge.depth(&start.position, spacing)
+    };
+    Ok(gauge.with_still_level(still))
+}
+
+/// Distance at which the first thing stands in the wave's way: a solid, or the far wall.
+fn obstacle(scene: &Scene, gauge: &Gauge) -> f64 {
+    let nearest = |solid: &Solid| {
+        let distances = solid.mesh.vertices.iter().map(|&v| gauge.distance(v));
+        distances.fold(f64::INFINITY, f64::min)
+    };
+    let length = scene.domain.size()[direction(scene).axis];
+    let places = scene.solids.iter().map(nearest).chain([length]);
+    // A front is known to a cube.
+    places.fold(f64::INFINITY, f64::min) - gauge.resolution()
+}
+
+fn course(cache: &CacheReader, gauge: &Gauge, frames: &FrameRange) -> Result<Course, StudyError> {
+    let manifest = cache.manifest();
+    let seconds = cache.seconds()?;
+    let frames: Vec<u32> = frames.iter().collect();
+    let row = |&frame: &u32| {
+        let entry = cache.entry(frame)?;
+        let report: Option<StepReport> = serde_json::from_value(entry.report.clone()).ok();
+        let particles = cache.read(frame)?;
+        Ok(Row {
+            frame,
+            time: entry.clock.time,
+            seconds: seconds.get(&frame).copied(),
+            substeps: entry.clock.substeps,
+            iterations: report.as_ref().map_or(0, |report| report.iterations),
+            missed: report
+                .and_then(|report| report.projection)
+                .map_or(0, |p| p.missed),
+            measures: gauge.measure(&particles.position, manifest.particle_spacing),
+        })
+    };
+    Ok(Course {
+        solver: manifest.solver.clone(),
+        rows: frames
+            .par_iter()
+            .map(row)
+            .collect::<Result<_, CacheError>>()?,
+    })
+}
+
+fn parts(
+    request: &Request,
+    comparison: &SolverComparison,
+    caches: &[CacheReader; 2],
+    courses: &[Course; 2],
+    findings: &[Finding],
+    impact: Impact,
+) -> Result<Vec<Part>, StudyError> {
+    let when = match impact.frame {
+        Some(frame) => {
+            format!("The first wave meets what stands in its way in frame {frame}: the impact.")
+        }
+        None => "No wave meets anything: crest and splash are taken over all frames.".to_owned(),
+    };
+    let answers = findings
+        .iter()
+        .map(|found| (found.question.to_owned(), found.text.clone()))
+        .collect();
+    let curves = comparison::charts(courses, impact);
+    Ok(vec![
+        Part::Text(comparison::CLAIMS.into()),
+        Part::Text(comparison::summary(findings)),
+        Part::Text(when),
+        Part::Answers(answers),
+        Part::Heading("The same frames".into()),
+        pictures(request, comparison, &caches[0])?,
+        Part::Heading("Curves".into()),
+        Part::Curves(curves.iter().map(|chart| chart.to_svg()).collect()),
+        Part::Heading("What was run".into()),
+        Part::Table(run_table(caches, courses)),
+        Part::Code(request.command.clone()),
+        // Both tables of solvers are in it.
+        Part::Code(caches[0].scene_toml().to_owned()),
+        Part::Heading("How it was measured".into()),
+        Part::Text(MEASURED.into()),
+    ])
+}
+
+/// For the reader of the page; the definitions stand at `swell::study::measure`.
+const MEASURED: &str = "Both solvers are measured alike, from the particles. Space is cut into cubes two \
+    particle spacings wide; a cube at least half as full as at rest is water, and the largest body of such cubes that \
+    touch by faces is the continuous water. A column's elevation is the top of that body, smoothed once over its \
+    neighbours. Crest: the highest elevation of each row along the wave's way, median over the rows; the slope of its \
+    front face goes from the foremost place at 0.9 of the crest's height to the foremost at half of it (after the crest \
+    front steepness of Kjeldsen and Myrhaug 1979). In the air is what lies more than a cube from the continuous water. \
+    Values that differ by less than 5 % are called alike. Times are wall clock, the whole frame, with writing beside it.";
+
+fn run_table(caches: &[CacheReader; 2], courses: &[Course; 2]) -> Vec<Vec<String>> {
+    type Cell = fn(&Manifest, &Course) -> String;
+    fn each(course: &Course, value: fn(&Row) -> f64) -> Option<f64> {
+        median(course.rows.iter().map(value).collect())
+    }
+    fn show(value: Option<f64>, digits: usize) -> String {
+        value.map_or("none".into(), |value| format!("{value:.digits$}"))
+    }
+    let rows: [(&str, Cell); 10] = [
+        ("particles at the start", |m, _| {
+            m.start_particles.to_string()
+        }),
+        ("particle spacing, m", |m, _| m.particle_spacing.to_string()),
+        ("frames measured", |_, c| c.rows.len().to_string()),
+        ("time per frame, median, s", |_, c| {
+            show(
+                median(c.rows.iter().filter_map(|row| row.seconds).collect()),
+                3,
+            )
+        }),
+        ("substeps a frame, median", |_, c| {
+            show(each(c, |row| row.substeps.into()), 0)
+        }),
+        ("iterations a frame, median", |_, c| {
+            show(each(c, |row| row.iterations as f64), 0)
+        }),
+        ("projections that missed their tolerance", |_, c| {
+            c.rows.iter().map(|row| row.missed).sum::<u32>().to_string()
+        }),
+        ("adapter", |m, _| {
+            format!("{} ({}, {})", m.device, m.driver, m.backend)
+        }),
+        ("program", |m, _| {
+            format!("{} {}", m.program, m.program_version)
+        }),
+        ("scene's physics", |m, _| {
+            m.scene_hash.chars().take(16).collect()
+        }),
+    ];
+    let titles = [String::new()]
+        .into_iter()
+        .chain(courses.iter().map(|c| c.solver.clone()));
+    let mut table = vec![titles.collect()];
+    for (title, cell) in rows {
+        let cells = caches
+            .iter()
+            .zip(courses)
+            .map(|(cache, course)| cell(cache.manifest(), course));
+        table.push([title.to_owned()].into_iter().chain(cells).collect());
+    }
+    table
+}
+
+fn pictures(
+    request: &Request,
+    comparison: &SolverComparison,
+    cache: &CacheReader,
+) -> Result<Part, StudyError> {
+    let address = |scene: &Scene, frame: u32| {
+        let folder = picture_directory(request, scene);
+        let file = folder.join(render::picture_name(cache, frame));
+        let bytes = fs::read(&file).map_err(|source| StudyError::File {
+            file: file.clone(),
+            source,
+        })?;
+        picture::data_uri(&bytes).map_err(|source| StudyError::Picture { file, source })
+    };
+    let row = |frame: u32| {
+        let addresses = comparison.scenes.iter().map(|scene| address(scene, frame));
+        Ok((
+            format!("frame {frame}"),
+            addresses.collect::<Result<_, StudyError>>()?,
+        ))
+    };
+    Ok(Part::Pictures {
+        columns: comparison
+            .scenes
+            .iter()
+            .map(|scene| scene.solver.method.name().to_owned())
+            .collect(),
+        rows: comparison
+            .pictures
+            .iter()
+            .map(row)
+            .collect::<Result<_, StudyError>>()?,
+    })
+}
+
+fn write(file: &Path, text: &str) -> Result<(), StudyError> {
+    fs::write(file, text).map_err(|source| StudyError::File {
+        file: file.to_owned(),
+        source,
+    })
+}

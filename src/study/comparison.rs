@@ -1,0 +1,462 @@
+//! Two solvers on one scene, measured frame by frame, and what follows for the claims that the paper
+//! draws from its Figures 2 (PBF) and 3 (PIC/FLIP).
+
+use std::fmt::Write as _;
+
+use super::{
+    chart::{Chart, Series},
+    measure::Measures,
+    median,
+};
+
+/// Relative difference below which two values are called alike: twice the few per cent by which a
+/// crest or a splash moves when its waterline shifts by half a cube.
+const ALIKE: f64 = 0.05;
+
+/// What the paper says (§3.2), of the same wave and city on a GTX 1650.
+pub const CLAIMS: &str = "The paper sees a better defined crest with PBF (its Figure 2a) than with PIC/FLIP (3a), no \
+    well-defined splash with PIC/FLIP, which swallows the buildings (3b), and a wave that spreads more with PBF (2b); a \
+    frame took it 24.27 ms with PIC/FLIP and 25.22 ms with PBF.";
+
+/// One frame of one solver.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Output frame.
+    pub frame: u32,
+    /// Simulated, seconds.
+    pub time: f64,
+    /// Wall clock of its bake; `None` where the cache has lost it.
+    pub seconds: Option<f64>,
+    /// Substeps.
+    pub substeps: u32,
+    /// Solver iterations.
+    pub iterations: u64,
+    /// Projections that missed their tolerance.
+    pub missed: u32,
+    /// What the water measures.
+    pub measures: Measures,
+}
+
+/// One solver's frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Course {
+    /// `pbf`, `flip`.
+    pub solver: String,
+    /// In the order of the frames; the same frames for every solver.
+    pub rows: Vec<Row>,
+}
+
+/// When the water meets what stands in its way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Impact {
+    /// First measured frame in which either solver's front is there; `None` where none came so far.
+    pub frame: Option<u32>,
+}
+
+/// What was found on one question.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// What is asked.
+    pub question: &'static str,
+    /// The solver that the paper sees ahead; `None` where it makes no claim.
+    pub claimed: Option<&'static str>,
+    /// The solver that is ahead here; `None` where the two are alike or one has no value.
+    pub ahead: Option<String>,
+    /// The finding in words, with its figures.
+    pub text: String,
+}
+
+impl Impact {
+    /// From the fronts of both solvers and the distance at which the first obstacle stands.
+    pub fn of(courses: &[Course], obstacle: f64) -> Self {
+        let first = |course: &Course| {
+            let is_there = |row: &&Row| row.measures.front >= Some(obstacle);
+            course.rows.iter().find(is_there).map(|row| row.frame)
+        };
+        Self {
+            frame: courses.iter().filter_map(first).min(),
+        }
+    }
+
+    fn is_before(self, row: &Row) -> bool {
+        self.frame.is_none_or(|frame| row.frame < frame)
+    }
+
+    fn is_after(self, row: &Row) -> bool {
+        self.frame.is_none_or(|frame| row.frame >= frame)
+    }
+}
+
+/// What a question looks at.
+struct Question {
+    asked: &'static str,
+    claimed: Option<&'static str>,
+    measured: &'static str,
+    unit: &'static str,
+    digits: usize,
+    value: fn(&Course, Impact) -> Option<f64>,
+    /// Whether the lesser value is the better one.
+    less_is_ahead: bool,
+}
+
+const QUESTIONS: [Question; 6] = [
+    Question {
+        asked: "Whose crest is better defined?",
+        claimed: Some("pbf"),
+        measured: "Slope of the crest's front face, median over the frames before the impact",
+        unit: "°",
+        digits: 1,
+        value: |course, impact| {
+            let rows = course.rows.iter().filter(|row| impact.is_before(row));
+            median(rows.filter_map(|row| row.measures.crest_slope).collect())
+        },
+        less_is_ahead: false,
+    },
+    Question {
+        asked: "Whose crest is higher?",
+        claimed: None,
+        measured: "Highest crest above the still level before the impact",
+        unit: " m",
+        digits: 2,
+        value: |course, impact| {
+            let rows = course.rows.iter().filter(|row| impact.is_before(row));
+            rows.map(|row| row.measures.crest_height).reduce(f64::max)
+        },
+        less_is_ahead: false,
+    },
+    Question {
+        asked: "Whose splash stands out more?",
+        claimed: Some("pbf"),
+        measured: "Greatest part of the water in the air from the impact on",
+        unit: " %",
+        digits: 2,
+        value: |course, impact| {
+            let rows = course.rows.iter().filter(|row| impact.is_after(row));
+            let airborne = rows.map(|row| 100.0 * row.measures.airborne);
+            airborne.reduce(f64::max)
+        },
+        less_is_ahead: false,
+    },
+    Question {
+        asked: "Whose splash goes higher?",
+        claimed: Some("pbf"),
+        measured: "Greatest height above the still level that 99.9 % of the water keeps below, from the impact on",
+        unit: " m",
+        digits: 2,
+        value: |course, impact| {
+            let rows = course.rows.iter().filter(|row| impact.is_after(row));
+            rows.map(|row| row.measures.splash_height).reduce(f64::max)
+        },
+        less_is_ahead: false,
+    },
+    Question {
+        asked: "Whose wave spreads farther?",
+        claimed: Some("pbf"),
+        measured: "Ground with water above it, median over the frames from the impact on",
+        unit: " m²",
+        digits: 1,
+        value: |course, impact| {
+            let rows = course.rows.iter().filter(|row| impact.is_after(row));
+            median(rows.map(|row| row.measures.wet_area).collect())
+        },
+        less_is_ahead: false,
+    },
+    Question {
+        asked: "Which is faster?",
+        claimed: Some("flip"),
+        measured: "Time per frame, median",
+        unit: " s",
+        digits: 3,
+        value: |course, _| median(course.rows.iter().filter_map(|row| row.seconds).collect()),
+        less_is_ahead: true,
+    },
+];
+
+/// Answers every question from the measured frames of two solvers.
+pub fn findings(courses: &[Course; 2], impact: Impact) -> Vec<Finding> {
+    QUESTIONS
+        .iter()
+        .map(|question| answer(question, courses, impact))
+        .collect()
+}
+
+fn answer(question: &Question, courses: &[Course; 2], impact: Impact) -> Finding {
+    let values = courses.each_ref().map(|c| (question.value)(c, impact));
+    let names = courses.each_ref().map(|c| c.solver.as_str());
+    let show = |value: Option<f64>| {
+        let digits = question.digits;
+        value.map_or("none".to_owned(), |v| {
+            format!("{v:.digits$}{}", question.unit)
+        })
+    };
+    let ahead = match values {
+        [Some(a), Some(b)] => leader([a, b], question.less_is_ahead),
+        _ => None,
+    };
+    let difference = match (values, ahead) {
+        ([Some(_), Some(_)], None) => "alike within 5 %".to_owned(),
+        ([Some(a), Some(b)], Some(k)) => {
+            let (more, less) = (a.max(b), a.min(b));
+            let factor = if less > 0.0 && more / less < 10.0 {
+                format!(" by {:.0} %", 100.0 * (more / less - 1.0))
+            } else {
+                " by far".to_owned()
+            };
+            format!("{} is ahead{factor}", names[k])
+        }
+        _ => "no comparison".to_owned(),
+    };
+    let text = format!(
+        "{}: {} with {}, {} with {}: {difference}.",
+        question.measured,
+        show(values[0]),
+        names[0],
+        show(values[1]),
+        names[1]
+    );
+    let ahead = ahead.map(|k| names[k].to_owned());
+    let verdict = match (question.claimed, &ahead) {
+        (None, _) => " The paper makes no claim here.".to_owned(),
+        (Some(claimed), Some(ahead)) if claimed == ahead => {
+            format!(" The paper says {claimed}: borne out.")
+        }
+        (Some(claimed), Some(_)) => format!(" The paper says {claimed}: not borne out."),
+        (Some(claimed), None) => format!(" The paper says {claimed}: not decided."),
+    };
+    Finding {
+        question: question.asked,
+        claimed: question.claimed,
+        ahead,
+        text: text + &verdict,
+    }
+}
+
+/// Index of the value that is ahead by more than [`ALIKE`].
+fn leader([a, b]: [f64; 2], less_is_ahead: bool) -> Option<usize> {
+    if (a - b).abs() <= ALIKE * a.abs().max(b.abs()) {
+        return None;
+    }
+    Some(usize::from((a > b) == less_is_ahead))
+}
+
+/// All findings in one sentence.
+pub fn summary(findings: &[Finding]) -> String {
+    let claims = || findings.iter().filter(|f| f.claimed.is_some());
+    let borne_out = claims().filter(|f| f.ahead.as_deref() == f.claimed).count();
+    let undecided = claims().filter(|f| f.ahead.is_none()).count();
+    let all = claims().count();
+    format!(
+        "{all} claims follow from the paper's Figures 2 and 3 and its times. Borne out here: {borne_out}; not borne \
+         out: {}; not decided: {undecided}.",
+        all - borne_out - undecided
+    )
+}
+
+/// Every measured frame as CSV, SI units; empty where there is no value.
+pub fn to_csv(courses: &[Course]) -> String {
+    let mut out = "solver,frame,time_s,bake_s,substeps,iterations,missed,crest_height_m,\
+                   crest_slope_degrees,front_m,splash_height_m,splash_reach_m,airborne,wet_area_m2\n"
+        .to_owned();
+    let optional = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+    for (course, row) in courses
+        .iter()
+        .flat_map(|c| c.rows.iter().map(move |r| (c, r)))
+    {
+        let m = &row.measures;
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            out,
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            course.solver,
+            row.frame,
+            row.time,
+            optional(row.seconds),
+            row.substeps,
+            row.iterations,
+            row.missed,
+            m.crest_height,
+            optional(m.crest_slope),
+            optional(m.front),
+            m.splash_height,
+            m.splash_reach,
+            m.airborne,
+            m.wet_area
+        );
+    }
+    out
+}
+
+/// The curves of a page: each measure against simulated time.
+pub fn charts(courses: &[Course], impact: Impact) -> Vec<Chart> {
+    type Value = fn(&Row) -> Option<f64>;
+    let measured: [(&str, &str, Value); 7] = [
+        ("Crest above the still level", "m", |row| {
+            Some(row.measures.crest_height)
+        }),
+        ("Slope of the crest's front face", "degrees", |row| {
+            row.measures.crest_slope
+        }),
+        ("Front of the wave", "m", |row| row.measures.front),
+        (
+            "Height below which 99.9 % of the water is",
+            "m above the still level",
+            |row| Some(row.measures.splash_height),
+        ),
+        ("Water in the air", "% of the particles", |row| {
+            Some(100.0 * row.measures.airborne)
+        }),
+        ("Ground with water above it", "m²", |row| {
+            Some(row.measures.wet_area)
+        }),
+        ("Time per frame", "s", |row| row.seconds),
+    ];
+    let rows = courses.iter().flat_map(|course| &course.rows);
+    let at_impact = rows
+        .filter(|row| Some(row.frame) == impact.frame)
+        .map(|row| (row.time, "impact".to_owned()));
+    let marks: Vec<_> = at_impact.take(1).collect();
+    let series = |course: &Course, value: Value| Series {
+        name: course.solver.clone(),
+        points: course
+            .rows
+            .iter()
+            .map(|row| (row.time, value(row)))
+            .collect(),
+    };
+    measured
+        .into_iter()
+        .map(|(title, unit, value)| Chart {
+            title: title.into(),
+            x_label: "simulated time, s".into(),
+            y_label: unit.into(),
+            series: courses.iter().map(|course| series(course, value)).collect(),
+            marks: marks.clone(),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten frames, the front a metre a frame; what is given is the same in each.
+    fn course(solver: &str, measures: Measures, seconds: f64) -> Course {
+        let row = |frame: u32| Row {
+            frame,
+            time: 0.1 * f64::from(frame),
+            seconds: Some(seconds),
+            substeps: 2,
+            iterations: 8,
+            missed: 0,
+            measures: Measures {
+                front: Some(f64::from(frame)),
+                ..measures
+            },
+        };
+        Course {
+            solver: solver.into(),
+            rows: (1..=10).map(row).collect(),
+        }
+    }
+
+    fn pair(pbf: f64, flip: f64) -> [Course; 2] {
+        let measures = |k: f64| Measures {
+            crest_height: k,
+            crest_slope: Some(10.0 * k),
+            splash_height: k,
+            airborne: 0.1 * k,
+            wet_area: k,
+            ..Measures::default()
+        };
+        [
+            course("pbf", measures(pbf), 1.0),
+            course("flip", measures(flip), 0.5),
+        ]
+    }
+
+    fn verdicts(courses: &[Course; 2]) -> Vec<Option<String>> {
+        let impact = Impact::of(courses, 5.0);
+        findings(courses, impact)
+            .into_iter()
+            .map(|f| f.ahead)
+            .collect()
+    }
+
+    #[test]
+    fn the_words_follow_the_numbers_both_ways() {
+        let pbf = Some("pbf".to_owned());
+        let flip = Some("flip".to_owned());
+        let mut expected = vec![pbf; 5];
+        expected.push(flip.clone());
+        assert_eq!(verdicts(&pair(2.0, 1.0)), expected);
+        assert_eq!(verdicts(&pair(1.0, 2.0)), vec![flip.clone(); 6]);
+        let mut alike = vec![None; 5];
+        alike.push(flip);
+        assert_eq!(verdicts(&pair(1.0, 1.04)), alike);
+
+        let courses = pair(1.0, 1.5);
+        let found = findings(&courses, Impact::of(&courses, 11.0));
+        assert_eq!(
+            found[0].text,
+            "Slope of the crest's front face, median over the frames before the impact: 10.0° with \
+             pbf, 15.0° with flip: flip is ahead by 50 %. The paper says pbf: not borne out."
+        );
+        assert!(found[1].text.ends_with("The paper makes no claim here."));
+        assert!(summary(&found).starts_with("5 claims"));
+        assert!(summary(&found).ends_with("Borne out here: 1; not borne out: 4; not decided: 0."));
+    }
+
+    #[test]
+    fn before_and_after_the_impact_are_kept_apart() {
+        let mut courses = pair(1.0, 1.0);
+        // What comes after the impact is no crest, and what comes before it no splash.
+        for row in &mut courses[1].rows {
+            let is_before = row.frame < 5;
+            row.measures.crest_height = if is_before { 1.0 } else { 9.0 };
+            row.measures.airborne = if is_before { 9.0 } else { 0.1 };
+        }
+        let impact = Impact::of(&courses, 5.0);
+        assert_eq!(impact.frame, Some(5));
+        assert_eq!(verdicts(&courses)[1..3], [None, None]);
+        assert_eq!(Impact::of(&courses, 11.0).frame, None);
+    }
+
+    #[test]
+    fn no_wave_and_no_frames_are_no_comparison() {
+        let mut courses = pair(1.0, 2.0);
+        for row in &mut courses[0].rows {
+            row.measures.crest_slope = None;
+        }
+        let found = findings(&courses, Impact { frame: None });
+        assert_eq!(found[0].ahead, None);
+        assert!(found[0].text.contains("none with pbf") && found[0].text.contains("not decided"));
+        for course in &mut courses {
+            course.rows.clear();
+        }
+        let found = findings(&courses, Impact { frame: None });
+        assert!(found.iter().all(|f| f.ahead.is_none()));
+    }
+
+    #[test]
+    fn the_table_has_a_line_a_frame_and_as_many_columns_as_titles() {
+        let csv = to_csv(&pair(1.0, 2.0));
+        let lines: Vec<&str> = csv.lines().collect();
+        assert_eq!(lines.len(), 21);
+        let columns = |line: &str| line.split(',').count();
+        assert!(lines.iter().all(|line| columns(line) == columns(lines[0])));
+        assert_eq!(lines[11], "flip,1,0.1,0.5,2,8,0,2,20,1,2,0,0.2,2");
+    }
+
+    #[test]
+    fn every_measure_has_a_curve_for_each_solver() {
+        let courses = pair(1.0, 2.0);
+        let charts = charts(&courses, Impact { frame: Some(3) });
+        assert_eq!(charts.len(), 7);
+        assert!(
+            charts
+                .iter()
+                .all(|c| c.series.len() == 2 && c.marks.len() == 1)
+        );
+        assert!((charts[0].marks[0].0 - 0.3).abs() < 1e-12);
+    }
+}
