@@ -885,3 +885,55 @@ fn free_fall_is_a_parabola() {
         state.position[0]
     );
 }
+
+/// What is left of a shear flow's energy after a tenth of a second.
+fn shear_left(max_cells: f64, pic_blend: f64) -> (f64, u32) {
+    let (mut scene, mut particles) = tank([16, 16, 16], 10);
+    scene.shot.frames_per_second = 50.0;
+    flip(&mut scene).cfl = max_cells;
+    flip(&mut scene).pic_blend = pic_blend;
+    let energy = |state: &Particles| -> f64 {
+        (0..state.len())
+            .map(|k| velocity(state, k).length_squared())
+            .sum()
+    };
+    // One swirl of a few cells beside the other, no flow through a wall.
+    for k in 0..particles.len() {
+        let [x, y, _] = (position(&particles, k) * std::f64::consts::PI / 0.4).to_array();
+        let v = 0.4 * DVec3::new(x.sin() * y.cos(), -x.cos() * y.sin(), 0.0);
+        particles.velocity[k] = v.as_vec3().to_array();
+    }
+    let before = energy(&particles);
+    let (state, report) = run(&context(), &scene, &particles, 5);
+    (energy(&state) / before, report.substeps)
+}
+
+#[test]
+fn substeps_do_not_change_what_blending_takes() {
+    let (one, substeps) = shear_left(2.0, 0.2);
+    let (many, more) = shear_left(0.05, 0.2);
+    assert!(substeps == 1 && more >= 4, "{substeps} {more}");
+    // α as each substep's own would be that of 1 − 0.8^4 a frame.
+    let (untied, _) = shear_left(0.05, 1.0 - 0.8f64.powi(4));
+    println!("{one} of the energy in one substep a frame, {many} in {more}, untied {untied}");
+    assert!((one - many).abs() < 0.3 * (one - untied).abs(), "{one} {many} {untied}");
+}
+
+#[test]
+fn a_missed_projection_is_told_and_past_its_limit_stops() {
+    let context = context();
+    let (mut scene, mut particles) = tank([24, 24, 16], 16);
+    jitter(&mut particles, 0.01);
+    flip(&mut scene).pressure.preconditioner = Preconditioner::Jacobi;
+    flip(&mut scene).pressure.max_iterations = 3;
+    flip(&mut scene).pressure.residual_limit = 1e3;
+    let (_, report) = run(&context, &scene, &particles, 1);
+    let projection = report.projection.unwrap();
+    assert!(projection.missed == 1 && projection.residual > 1e-5, "{projection:?}");
+    flip(&mut scene).pressure.residual_limit = 1e-3;
+    let error = solver(&context, &scene, &particles).advance().unwrap_err().to_string();
+    assert!(error.contains("frame 1") && error.contains("residual_limit is 0.001"), "{error}");
+    // Negative control: with iterations enough it goes on.
+    flip(&mut scene).pressure.max_iterations = 400;
+    assert_eq!(run(&context, &scene, &particles, 1).1.projection.unwrap().missed, 0);
+}
