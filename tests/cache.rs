@@ -36,6 +36,7 @@ fn manifest() -> Manifest {
         // No short decimal: must come back to the last bit.
         particle_spacing: 0.1 + 0.2,
         rest_density: 1000.0,
+        grids: None,
         attributes: vec!["foam".to_owned(), "age".to_owned()],
         start_particles: 0,
         files: Vec::new(),

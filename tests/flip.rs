@@ -348,8 +348,8 @@ fn half_space(n: DVec3, d: f64) -> Boundary {
         values,
     });
     Boundary {
-        samples: Vec::new(),
         distance,
+        ..Boundary::default()
     }
 }
 

@@ -454,6 +454,7 @@ fn boundary_of(mesh: &TriangleMesh, domain: &Bounds) -> Boundary {
     Boundary {
         samples: boundary_samples(mesh, domain, D),
         distance: Some(SignedDistance::from_mesh(mesh, &bounds, D).unwrap()),
+        ..Boundary::default()
     }
 }
 

@@ -9,13 +9,13 @@ use swell::{
         shader,
     },
     solve::{
-        params::{FlipParams, Params, Phase, SolidGrid},
+        params::{FlipParams, Params, Phase, SolidGrid, SolidGrids},
         pressure::{PressureBrick, PressureControl, PressurePhase},
     },
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 8] = [
+const VARIANTS: [&[&str]; 9] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -29,6 +29,7 @@ const VARIANTS: [&[&str]; 8] = [
     &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
     &["CORRECTION", "GHOST_FLUID"],
     &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
+    &["SOLIDS", "MOVING_SOLIDS", "CORRECTION", "GHOST_FLUID"],
     &["GHOST_FLUID", "DIAGONAL"],
 ];
 
@@ -112,10 +113,13 @@ fn check(
 
 #[test]
 fn mirrors_match_naga() {
-    let mut found = [0; 7];
-    for pass in compute_passes() {
-        let text = shader::compose(&pass, &["SOLIDS", "NEIGHBOR_LIST"]).unwrap();
-        let layouts = reflect(&pass, &text).unwrap().layouts;
+    let mut found = [0; 8];
+    let variants = ["NEIGHBOR_LIST", "MOVING_SOLIDS"];
+    let passes = compute_passes();
+    let all = variants.map(|name| passes.iter().map(move |pass| (pass, ["SOLIDS", name])));
+    for (pass, defines) in all.into_iter().flatten().filter(|(pass, defines)| is_meaningful(pass, defines)) {
+        let text = shader::compose(pass, &defines).unwrap();
+        let layouts = reflect(pass, &text).unwrap().layouts;
         let seen = [
             check(&layouts, "Params", size_of::<Params>(), &Params::members()),
             check(
@@ -130,6 +134,12 @@ fn mirrors_match_naga() {
                 "SolidGrid",
                 size_of::<SolidGrid>(),
                 &SolidGrid::members(),
+            ),
+            check(
+                &layouts,
+                "SolidGrids",
+                size_of::<SolidGrids>(),
+                &SolidGrids::members(),
             ),
             check(
                 &layouts,

@@ -114,12 +114,40 @@ fn main(
     }
     let low = params.wall_min + params.contact_distance;
     let high = params.wall_max - params.contact_distance;
-    var x = start + way;
     var v = velocity[i].xyz;
+#ifdef MOVING_SOLIDS
+    // In steps of at most half a node spacing as the fastest solid sees them, so that nothing thin is stepped over.
+    let most = length(way) + solid_grids.fastest * params.time_step;
+    let spacing = solid_grids.grids[0].spacing;
+    let steps = u32(ceil(2.0 * most / spacing)) + 1u;
+    var is_near = false;
+    for (var solid = 0u; solid < solid_grids.count; solid++) {
+        look_at_solid(solid, 0.0);
+        is_near |= solid_distance_bound(start) < most + params.contact_distance + 2.0 * spacing;
+    }
+    var x = select(start + way, start, is_near);
+    for (var k = 0u; k < select(0u, steps, is_near); k++) {
+        x += way / f32(steps);
+        for (var solid = 0u; solid < solid_grids.count; solid++) {
+            look_at_solid(solid, params.time_step * f32(k + 1u) / f32(steps));
+            let next = x;
+            x = leave_solids(next);
+            v = solid_velocity + stopped(v - solid_velocity, x - next);
+        }
+    }
+    // Where a solid and a wall meet, each would push into the other.
+    for (var k = 0u; k < select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high))); k++) {
+        for (var solid = 0u; solid < solid_grids.count; solid++) {
+            look_at_solid(solid, params.time_step);
+            x = leave_solids(clamp(x, low, high));
+        }
+    }
+#else
+    var x = start + way;
 #ifdef SOLIDS
     // In steps of at most half a node spacing, so that nothing thin is stepped over; none where no solid is near.
     let reach = length(way) + params.contact_distance + 2.0 * solid_grid.spacing;
-    let is_near = solid_distance_near(start) < reach;
+    let is_near = solid_distance_bound(start) < reach;
     let steps = u32(ceil(2.0 * length(way) / solid_grid.spacing)) + 1u;
     x = select(x, start, is_near);
     for (var k = 0u; k < select(0u, steps, is_near); k++) {
@@ -131,6 +159,7 @@ fn main(
     for (var k = 0u; k < select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high))); k++) {
         x = leave_solids(clamp(x, low, high));
     }
+#endif
 #endif
     v = select(v, max(v, params.wall_velocity_min), x < low);
     v = select(v, min(v, params.wall_velocity_max), x > high);

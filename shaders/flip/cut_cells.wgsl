@@ -17,6 +17,10 @@
 #ifdef SOLIDS
 @group(0) @binding(6) var<storage, read_write> open_volume: array<f32>;
 #endif
+#ifdef MOVING_SOLIDS
+// What the lower faces have where they are closed, m/s.
+@group(0) @binding(9) var<storage, read_write> closed_velocity: array<f32>;
+#endif
 
 const AIR = 0u;
 const FLUID = 1u;
@@ -42,28 +46,36 @@ fn main(
     var upper = select(vec3f(0.0), across, is_plane_open(cell + 1.0));
     var volume = extent.x * across.x;
 #ifdef SOLIDS
-    let size = params.cell_size;
-    let middle = (cell + 0.5) * size;
-    let is_near = solid_distance_near(middle) < 2.0 * (size + solid_grid.spacing);
+    var corners = Corners(vec4f(1e15), vec4f(1e15));
+    var is_cut = false;
+#ifdef MOVING_SOLIDS
+    let lower_of_walls = lower;
+    let upper_of_walls = upper;
+    // Of what is nearest to each face, along that face's axis.
+    var lower_velocity = vec3f(0.0);
+    var upper_velocity = vec3f(0.0);
+    for (var k = 0u; k < solid_grids.count; k++) {
+        look_at_solid(k, 0.0);
+        for (var once = 0; once < select(0, 1, may_cut(cell)); once++) {
+            let found = corner_distances(cell);
+            let is_nearer_low = lower_sums(found) < lower_sums(corners);
+            let is_nearer_high = upper_sums(found) < upper_sums(corners);
+            lower_velocity = select(lower_velocity, solid_velocity, is_nearer_low);
+            upper_velocity = select(upper_velocity, solid_velocity, is_nearer_high);
+            corners = Corners(min(corners.near, found.near), min(corners.far, found.far));
+            is_cut = true;
+        }
+    }
+#else
     // Entered only where a solid may cut the cell.
-    for (var once = 0; once < select(0, 1, is_near); once++) {
-        let x = vec2f(cell.x, cell.x + 1.0) * size;
-        let y = vec2f(cell.y, cell.y + 1.0) * size;
-        let z = vec2f(cell.z, cell.z + 1.0) * size;
-        // On a face counts as inside.
-        let skin = 1e-4 * size;
-        let near = vec4f(
-            solid_distance_at(vec3f(x.x, y.x, z.x)),
-            solid_distance_at(vec3f(x.y, y.x, z.x)),
-            solid_distance_at(vec3f(x.x, y.y, z.x)),
-            solid_distance_at(vec3f(x.y, y.y, z.x)),
-        ) - skin;
-        let far = vec4f(
-            solid_distance_at(vec3f(x.x, y.x, z.y)),
-            solid_distance_at(vec3f(x.y, y.x, z.y)),
-            solid_distance_at(vec3f(x.x, y.y, z.y)),
-            solid_distance_at(vec3f(x.y, y.y, z.y)),
-        ) - skin;
+    for (var once = 0; once < select(0, 1, may_cut(cell)); once++) {
+        corners = corner_distances(cell);
+        is_cut = true;
+    }
+#endif
+    for (var once = 0; once < select(0, 1, is_cut); once++) {
+        let near = corners.near;
+        let far = corners.far;
         lower *= vec3f(
             open_part(vec4f(near.xz, far.xz)),
             open_part(vec4f(near.xy, far.xy)),
@@ -95,6 +107,16 @@ fn main(
     face_open[element] = lower.x;
     face_open[params.stride + element] = lower.y;
     face_open[2u * params.stride + element] = lower.z;
+#ifdef MOVING_SOLIDS
+    let pushed_high = (1.0 - upper_of_walls) * wall_velocity(cell + 1.0) + (upper_of_walls - upper) * upper_velocity;
+    let pushed_low = (1.0 - lower_of_walls) * wall_velocity(cell) + (lower_of_walls - lower) * lower_velocity;
+    let pushed = pushed_high - pushed_low;
+    let closing = select(wall_velocity(cell), lower_velocity, is_plane_open(cell));
+    closed_velocity[element] = closing.x;
+    closed_velocity[params.stride + element] = closing.y;
+    closed_velocity[2u * params.stride + element] = closing.z;
+#else
     let pushed = (1.0 - upper) * wall_velocity(cell + 1.0) - (1.0 - lower) * wall_velocity(cell);
+#endif
     solid_flux[element] = pushed.x + pushed.y + pushed.z;
 }

@@ -14,6 +14,9 @@
 @group(0) @binding(6) var<storage, read_write> face_change: array<f32>;
 // Eight bits a component: bit 7 whether particles gave a velocity, below it the layer, of flip/extrapolate.
 @group(0) @binding(9) var<storage, read_write> face_layer: array<u32>;
+#ifdef MOVING_SOLIDS
+@group(0) @binding(10) var<storage, read> closed_velocity: array<f32>;
+#endif
 
 @compute @workgroup_size(64)
 fn main(
@@ -54,7 +57,11 @@ fn main(
     let component = axis.x;
     let face = component * params.stride + element;
     let is_closed = face_open[face] == 0.0;
+#ifdef MOVING_SOLIDS
+    let solid = closed_velocity[face];
+#else
     let solid = wall_velocity(vec3f(own_cell(element)))[component];
+#endif
     face_velocity[face] = select(velocity + params.velocity_step[component], solid, is_closed);
     face_change[face] = velocity;
     let others = select(face_layer[element], 0u, component == 0u);

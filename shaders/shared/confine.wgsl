@@ -5,13 +5,23 @@ struct SolidGrid {
     origin: vec3f,
     spacing: f32,
     dims: vec3u,
-    padding: u32,
+    // Where its nodes begin in `solid_distance`.
+    first: u32,
 }
+#ifdef MOVING_SOLIDS
+#import "shared/moving_solids.wgsl"
+#else
 @group(0) @binding(7) var<uniform> solid_grid: SolidGrid;
+#endif
 @group(0) @binding(8) var<storage, read> solid_distance: array<f32>;
 
 fn solid_node(node: vec3u) -> f32 {
-    return solid_distance[(node.z * solid_grid.dims.y + node.y) * solid_grid.dims.x + node.x];
+    let within = (node.z * solid_grid.dims.y + node.y) * solid_grid.dims.x + node.x;
+#ifdef MOVING_SOLIDS
+    return solid_distance[solid_grid.first + within];
+#else
+    return solid_distance[within];
+#endif
 }
 
 // Pushes x out along the gradient of the trilinear signed distance where it is nearer than the contact

@@ -1,4 +1,4 @@
-// Trilinear signed distance of the solids, metres.
+// Trilinear signed distance of the solids, metres, and at the corners of a cell.
 #import "shared/confine.wgsl"
 
 // Where the node before x is farther off than this nothing of a cell can be cut: no interpolation is needed.
@@ -25,4 +25,56 @@ fn solid_distance_near(x: vec3f) -> f32 {
     let is_outside = any(p < vec3f(-1.0)) || any(p > vec3f(solid_grid.dims));
     let node = vec3u(clamp(p + 0.5, vec3f(0.0), vec3f(solid_grid.dims - 1u)));
     return select(solid_node(node), 1e15, is_outside);
+}
+
+// For a first look: the nearest node's distance, or from beyond the grid the way there, since the solids lie within it.
+fn solid_distance_bound(x: vec3f) -> f32 {
+    let last = solid_grid.origin + solid_grid.spacing * vec3f(solid_grid.dims - 1u);
+    let way = distance(x, clamp(x, solid_grid.origin, last));
+    return select(solid_distance_near(x), way, way > 0.0);
+}
+
+// At the lower and at the upper z, each in the order (x, y) = (0,0), (1,0), (0,1), (1,1).
+struct Corners {
+    near: vec4f,
+    far: vec4f,
+}
+
+// Whether a solid comes near enough to a cell to cut it.
+fn may_cut(cell: vec3f) -> bool {
+    let middle = (cell + 0.5) * params.cell_size;
+    return solid_distance_near(middle) < 2.0 * (params.cell_size + solid_grid.spacing);
+}
+
+fn corner_distances(cell: vec3f) -> Corners {
+    let size = params.cell_size;
+    let x = vec2f(cell.x, cell.x + 1.0) * size;
+    let y = vec2f(cell.y, cell.y + 1.0) * size;
+    let z = vec2f(cell.z, cell.z + 1.0) * size;
+    // On a face counts as inside.
+    let skin = 1e-4 * size;
+    let near = vec4f(
+        solid_distance_at(vec3f(x.x, y.x, z.x)),
+        solid_distance_at(vec3f(x.y, y.x, z.x)),
+        solid_distance_at(vec3f(x.x, y.y, z.x)),
+        solid_distance_at(vec3f(x.y, y.y, z.x)),
+    );
+    let far = vec4f(
+        solid_distance_at(vec3f(x.x, y.x, z.y)),
+        solid_distance_at(vec3f(x.y, y.x, z.y)),
+        solid_distance_at(vec3f(x.x, y.y, z.y)),
+        solid_distance_at(vec3f(x.y, y.y, z.y)),
+    );
+    return Corners(near - skin, far - skin);
+}
+
+// Over the corners of each lower face, and of each upper one.
+fn lower_sums(c: Corners) -> vec3f {
+    let both = c.near + c.far;
+    return vec3f(both.x + both.z, both.x + both.y, dot(c.near, vec4f(1.0)));
+}
+
+fn upper_sums(c: Corners) -> vec3f {
+    let both = c.near + c.far;
+    return vec3f(both.y + both.w, both.z + both.w, dot(c.far, vec4f(1.0)));
 }

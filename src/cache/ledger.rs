@@ -10,7 +10,8 @@ use serde_json::Value;
 
 use super::error::{AtPath, CacheError};
 use super::frame;
-use super::manifest::{self, Manifest};
+use super::manifest::{self, FileRecord, Manifest};
+use super::vdb;
 
 /// Its file.
 pub(super) const FILE: &str = "frames.jsonl";
@@ -46,6 +47,9 @@ pub struct Entry {
     pub blake3: String,
     /// In the file.
     pub particles: u64,
+    /// Its grids; absent where the scene asks for none.
+    #[serde(default)]
+    pub grids: Option<FileRecord>,
     /// BLAKE3 of `manifest.json`, hex; frame 0 alone has it, so that a changed manifest is told from a
     /// changed first line.
     #[serde(default)]
@@ -60,6 +64,22 @@ pub struct Entry {
     pub chain: String,
 }
 
+impl Entry {
+    /// The frame's own file.
+    pub(super) fn record(&self) -> FileRecord {
+        FileRecord {
+            file: self.file.clone(),
+            bytes: self.bytes,
+            blake3: self.blake3.clone(),
+        }
+    }
+
+    /// The frame's own file, and that of its grids where it has any.
+    pub fn files(&self) -> impl Iterator<Item = FileRecord> + use<> {
+        std::iter::once(self.record()).chain(self.grids.clone())
+    }
+}
+
 /// An [`Entry`] without its chain, as the chain is taken over it.
 #[derive(Serialize)]
 pub(super) struct Contents<'a> {
@@ -68,6 +88,8 @@ pub(super) struct Contents<'a> {
     pub(super) bytes: u64,
     pub(super) blake3: &'a str,
     pub(super) particles: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) grids: Option<&'a FileRecord>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) manifest: Option<&'a str>,
     pub(super) clock: Clock,
@@ -180,6 +202,13 @@ impl Ledger {
         if entry.frame != frame || entry.clock.frame != frame || entry.file != file {
             return Err(damaged(&format!("it is not frame {frame} in {file}")));
         }
+        let grids = manifest.grids.as_ref();
+        let grids = grids.map(|_| vdb::file_name(&manifest.shot, frame));
+        if entry.grids.as_ref().map(|record| &record.file) != grids.as_ref() {
+            return Err(damaged(
+                "its grids are not those that the manifest announces",
+            ));
+        }
         self.chain = chain;
         self.entries.push(entry);
         Ok(())
@@ -219,6 +248,7 @@ mod tests {
             bytes: 1,
             blake3: "",
             particles: 1,
+            grids: None,
             manifest: None,
             clock: Clock {
                 time,

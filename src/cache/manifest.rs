@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::disk;
 use super::error::{AtPath, CacheError};
+use super::grids::GridRecord;
 
 /// Its file.
 pub(super) const FILE: &str = "manifest.json";
@@ -47,6 +48,9 @@ pub struct Manifest {
     /// Names of what each particle carries beside position, velocity and id; sorted by
     /// [`CacheWriter::create`](super::CacheWriter::create).
     pub attributes: Vec<String>,
+    /// What each frame has beside its particles; absent where the scene asks for no grids.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grids: Option<GridRecord>,
     /// Particles at the start; filled in by `create`.
     pub start_particles: u64,
     /// `scene.toml` and the assets; filled in by `create`.
@@ -87,7 +91,7 @@ impl FileRecord {
 
 /// What a resumed bake must have in common with the cache, the most telling first. The scene's hash
 /// comes last: it differs where any of the fields above it that a scene sets does.
-const COMPARED: [&str; 13] = [
+const COMPARED: [&str; 14] = [
     "format_version",
     "program",
     "program_version",
@@ -100,6 +104,7 @@ const COMPARED: [&str; 13] = [
     "particle_spacing",
     "rest_density",
     "attributes",
+    "grids",
     "scene_hash",
 ];
 
@@ -163,6 +168,9 @@ impl Manifest {
             if !value.is_finite() {
                 return Err(format!("{name} is {value}"));
             }
+        }
+        if let Some(grids) = &self.grids {
+            grids.check()?;
         }
         for (i, record) in self.files.iter().enumerate() {
             let is_asset = record

@@ -7,13 +7,14 @@
 //!   assets/         copies of the files that the scene names; the manifest holds their hashes
 //!   frames.jsonl    the ledger: one line a frame, chained by BLAKE3 back to the manifest
 //!   frames/wave-city.0000.ply   the start; 0001 is the first frame after it
+//!   grids/wave-city.0000.vdb    where the scene asks: level set "surface", staggered "vel"
 //!   timings.jsonl   seconds, which no two bakes share: in no hash, in no comparison
 //!   lock            held by the one writer
 //! ```
 //!
 //! The same scene, binary and adapter give the same bytes in every file but `timings.jsonl`.
 //!
-//! A frame goes to a temporary file, to the platter, to its name, and only then into the ledger. So
+//! A frame, and its grids, go to a temporary file, to the platter, to their name, and only then into the ledger. So
 //! the ledger never names a frame that is not whole, whatever kills the process, and what a crash can
 //! leave (a temporary file, a frame without a line, half a line) is cleared by
 //! [`CacheWriter::resume`].
@@ -24,14 +25,17 @@
 mod disk;
 mod error;
 pub mod frame;
+mod grids;
 mod ledger;
 mod manifest;
 mod reader;
+pub mod vdb;
 mod writer;
 
 pub use disk::directory_hash;
 pub use error::CacheError;
 pub use frame::file_name;
+pub use grids::GridRecord;
 pub use ledger::{Clock, Entry};
 pub use manifest::{FileRecord, Manifest};
 pub use reader::{CacheReader, Problem, VerifyReport, survey};

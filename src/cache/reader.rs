@@ -36,7 +36,7 @@ pub struct Problem {
 pub struct VerifyReport {
     /// Baked frames in the ledger; the start is not counted.
     pub frames: u32,
-    /// Length of the frame files, the start's too, as the ledger has it.
+    /// Length of the frame files and their grids, the start's too, as the ledger has it.
     pub bytes: u64,
     /// In the order of the files; empty for a sound cache.
     pub problems: Vec<Problem>,
@@ -196,12 +196,13 @@ impl CacheReader {
         }
         let frames: Vec<Problem> = entries
             .par_iter()
-            .filter_map(|entry| self.problem(&record(entry)))
+            .flat_map_iter(Entry::files)
+            .filter_map(|record| self.problem(&record))
             .collect();
         problems.extend(frames);
         VerifyReport {
             frames: self.last_frame(),
-            bytes: entries.iter().map(|entry| entry.bytes).sum(),
+            bytes: entries.iter().flat_map(Entry::files).map(|f| f.bytes).sum(),
             problems,
         }
     }
@@ -233,14 +234,6 @@ impl CacheReader {
     }
 }
 
-fn record(entry: &Entry) -> FileRecord {
-    FileRecord {
-        file: entry.file.clone(),
-        bytes: entry.bytes,
-        blake3: entry.blake3.clone(),
-    }
-}
-
 /// Whether a file is there with the length that was written.
 pub(super) fn check_length_on_disk(path: &Path, expected: u64) -> Result<(), CacheError> {
     match path.metadata() {
@@ -258,7 +251,7 @@ pub(super) fn read_frame(
     entry: &Entry,
 ) -> Result<Particles, CacheError> {
     let path = dir.join(&entry.file);
-    let bytes = record(entry).read(dir)?;
+    let bytes = entry.record().read(dir)?;
     let particles = frame::decode(&bytes, &path)?;
     if particles.len() as u64 != entry.particles {
         return Err(CacheError::damaged(

@@ -16,10 +16,13 @@ use super::frame::{self, Stamp};
 use super::ledger::{self, Clock, Contents, Entry, Ledger};
 use super::manifest::{self, FileRecord, Manifest};
 use super::reader::{check_length_on_disk, read_frame};
+use super::vdb;
 use crate::domain::particles::Particles;
 
 /// Folder of the frame files.
 const FRAMES: &str = "frames";
+/// Folder of the grid files.
+const GRIDS: &str = "grids";
 /// Frames that wait for the disk at most; with the one being written, three are in memory.
 const DEPTH: usize = 2;
 
@@ -39,7 +42,7 @@ pub struct Summary {
     pub frames: u32,
     /// Last frame in the ledger.
     pub last_frame: u32,
-    /// Length of the frames that this writer wrote.
+    /// Length of the frames and grids that this writer wrote.
     pub bytes: u64,
     /// Time that the writer's thread was at work.
     pub writing: Duration,
@@ -98,8 +101,10 @@ impl CacheWriter {
             disk::create_directory(parent)?;
             write_bytes(&path, &asset.bytes)?;
         }
-        let frames = dir.join(FRAMES);
-        disk::create_directory(&frames)?;
+        disk::create_directory(&dir.join(FRAMES))?;
+        if manifest.grids.is_some() {
+            disk::create_directory(&dir.join(GRIDS))?;
+        }
         write_bytes(&dir.join(ledger::FILE), b"")?;
 
         let seed = blake3::hash(&manifest_bytes);
@@ -137,13 +142,16 @@ impl CacheWriter {
             torn_bytes,
         } = Ledger::read(dir, &manifest, &seed)?;
         manifest.scene_record(dir)?.read(dir)?;
-        for entry in &entries {
-            check_length_on_disk(&dir.join(&entry.file), entry.bytes)?;
+        for record in entries.iter().flat_map(Entry::files) {
+            check_length_on_disk(&dir.join(&record.file), record.bytes)?;
         }
         let Some(last) = entries.pop() else {
             return Err(CacheError::damaged(dir.join(ledger::FILE), "it is empty"));
         };
         let particles = read_frame(dir, &manifest, &last)?;
+        if let Some(grids) = &last.grids {
+            grids.read(dir)?;
+        }
 
         if torn_bytes > 0 {
             let path = dir.join(ledger::FILE);
@@ -152,7 +160,14 @@ impl CacheWriter {
                 .and_then(|()| file.sync_all())
                 .at(&path)?;
         }
-        clear_leftovers(dir, &manifest.shot, last.frame)?;
+        clear_leftovers(&dir.join(FRAMES), last.frame, |f| {
+            frame::file_name(&manifest.shot, f)
+        })?;
+        if manifest.grids.is_some() {
+            clear_leftovers(&dir.join(GRIDS), last.frame, |f| {
+                vdb::file_name(&manifest.shot, f)
+            })?;
+        }
         let sink = Sink {
             dir: dir.to_owned(),
             manifest: manifest.clone(),
@@ -288,7 +303,7 @@ impl Sink {
         Ok(summary)
     }
 
-    /// Writes a frame, then its line; gives the frame's length.
+    /// Writes a frame and its grids, then its line; gives their length.
     fn write(
         &mut self,
         clock: Clock,
@@ -308,6 +323,21 @@ impl Sink {
         let written = disk::write_whole(&self.dir.join(&file), |out| {
             frame::encode(out, &stamp, particles)
         })?;
+        let grids = match &manifest.grids {
+            None => None,
+            Some(asked) => {
+                let grids = asked.grids(particles, manifest.particle_spacing);
+                let file = vdb::file_name(&manifest.shot, clock.frame);
+                let written = disk::write_whole(&self.dir.join(&file), |out| {
+                    vdb::encode(out, &stamp, &grids, asked.precision)
+                })?;
+                Some(FileRecord {
+                    file,
+                    bytes: written.bytes,
+                    blake3: written.hash.to_hex().to_string(),
+                })
+            }
+        };
         let seed = self.seed.to_hex();
         let contents = Contents {
             frame: clock.frame,
@@ -315,6 +345,7 @@ impl Sink {
             bytes: written.bytes,
             blake3: &written.hash.to_hex(),
             particles: particles.len() as u64,
+            grids: grids.as_ref(),
             manifest: (clock.frame == 0).then_some(seed.as_str()),
             clock,
             report,
@@ -323,7 +354,7 @@ impl Sink {
         ledger::append(&self.dir.join(ledger::FILE), self.ledger_bytes, &line)?;
         self.ledger_bytes += line.len() as u64;
         self.chain = chain;
-        Ok(written.bytes)
+        Ok(written.bytes + grids.map_or(0, |record| record.bytes))
     }
 
     fn note_timings(&self, frame: u32, timings: &Value) -> Result<(), CacheError> {
@@ -414,19 +445,22 @@ fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
         manifest::SCENE,
         manifest::ASSETS,
         FRAMES,
+        GRIDS,
         ledger::FILE,
         manifest::FILE,
     ];
     if let Some(other) = names.iter().find(|name| !ours.contains(&plain(name))) {
         return occupied(other.clone());
     }
-    let frames = dir.join(FRAMES);
-    if frames.is_dir()
-        && let Some(other) = disk::names(&frames)?
-            .into_iter()
-            .find(|name| !plain(name).ends_with(".0000.ply"))
-    {
-        return occupied(format!("{FRAMES}/{other}, but no {}", manifest::FILE));
+    for (folder, ending) in [(FRAMES, ".0000.ply"), (GRIDS, ".0000.vdb")] {
+        let path = dir.join(folder);
+        if path.is_dir()
+            && let Some(other) = disk::names(&path)?
+                .into_iter()
+                .find(|name| !plain(name).ends_with(ending))
+        {
+            return occupied(format!("{folder}/{other}, but no {}", manifest::FILE));
+        }
     }
     Ok(())
 }
@@ -442,7 +476,7 @@ fn plain(name: &str) -> &str {
 fn clear_unfinished(dir: &Path) -> Result<(), CacheError> {
     for name in disk::names(dir)? {
         let path = dir.join(&name);
-        if name == manifest::ASSETS || name == FRAMES {
+        if [manifest::ASSETS, FRAMES, GRIDS].contains(&name.as_str()) {
             fs::remove_dir_all(&path).at(&path)?;
         } else if name != disk::LOCK {
             fs::remove_file(&path).at(&path)?;
@@ -451,21 +485,23 @@ fn clear_unfinished(dir: &Path) -> Result<(), CacheError> {
     Ok(())
 }
 
-/// Removes temporary files, and frames of this shot behind `last`: they were renamed, but a crash came
-/// before their line.
-fn clear_leftovers(dir: &Path, shot: &str, last: u32) -> Result<(), CacheError> {
-    let frames = dir.join(FRAMES);
-    for name in disk::names(&frames)? {
+/// Removes from a folder temporary files, and files behind frame `last` as `file_name` names them: they
+/// were renamed, but a crash came before their line.
+fn clear_leftovers(
+    folder: &Path,
+    last: u32,
+    file_name: impl Fn(u32) -> String,
+) -> Result<(), CacheError> {
+    for name in disk::names(folder)? {
         let is_frame_behind = name
-            .strip_prefix(shot)
-            .and_then(|rest| rest.strip_prefix('.'))
-            .and_then(|rest| rest.strip_suffix(".ply"))
-            .and_then(|digits| digits.parse::<u32>().ok())
-            .is_some_and(|f| f > last && frame::file_name(shot, f).ends_with(&name));
+            .rsplit_once('.')
+            .and_then(|(stem, _)| stem.rsplit_once('.'))
+            .and_then(|(_, digits)| digits.parse::<u32>().ok())
+            .is_some_and(|frame| frame > last && file_name(frame).ends_with(&format!("/{name}")));
         if is_frame_behind || plain(&name).len() < name.len() {
-            let path = frames.join(&name);
+            let path = folder.join(&name);
             fs::remove_file(&path).at(&path)?;
         }
     }
-    disk::sync_directory(&frames)
+    disk::sync_directory(folder)
 }

@@ -12,4 +12,7 @@ pub mod poisson;
 pub mod sampling;
 pub mod signed_distance;
 pub mod solver;
+pub mod sparse_grid;
 pub mod sph;
+pub mod surface;
+mod voxels;

@@ -73,6 +73,37 @@ const TABLE: &[(&str, &str)] = &[
     ("solid.translate", TRANSLATE),
     ("solid.rotate_degrees", ROTATE),
     ("solid.scale", SCALE),
+    (
+        "solid.direction",
+        "three finite numbers, not all 0, with motion; their length does not count",
+    ),
+    (
+        "solid.motion",
+        "a motion, with direction, that brings the solid into the domain and not ten domains away",
+    ),
+    (
+        "solid.motion.kind",
+        "\"constant_velocity\", \"sine\" or \"table\"",
+    ),
+    (
+        "solid.motion.velocity",
+        "a number above 0, m/s along direction",
+    ),
+    ("solid.motion.until", "a number above 0, seconds"),
+    ("solid.motion.stroke", "a number above 0, metres"),
+    ("solid.motion.period", "a number above 0, seconds"),
+    (
+        "solid.motion.ramp",
+        "a number from 0, seconds; one period if left out",
+    ),
+    (
+        "solid.motion.file",
+        "a CSV of time,displacement (seconds, metres), relative to the scene file",
+    ),
+    (
+        "solid.motion.points",
+        "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0",
+    ),
     ("wave_maker", "an array of tables [[wave_maker]]"),
     (
         "wave_maker.wall",
@@ -174,6 +205,21 @@ const TABLE: &[(&str, &str)] = &[
         "solver.flip.pressure.residual_limit",
         "a number from the tolerance on, of the right-hand side's norm",
     ),
+    (
+        "grids",
+        "a table with surface = true, velocity = true or both, voxel_size, precision",
+    ),
+    (
+        "grids.surface",
+        "true or false; one of surface and velocity true",
+    ),
+    ("grids.velocity", "true or false"),
+    (
+        "grids.voxel_size",
+        "a number from a quarter of the particle spacing to 8 of them, metres, with at most \
+         268435456 leaves of 8³ voxels in the domain",
+    ),
+    ("grids.precision", "\"half\" or \"float\""),
     // Of a study file.
     ("kind", "\"solver_comparison\""),
     (

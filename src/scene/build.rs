@@ -11,6 +11,8 @@ use super::{
     PlacedMesh, Placement, Scene, Shot, Water,
     document::Document,
     error::SceneError,
+    grids,
+    moving_solid::{self, MAX_MOVING_SOLIDS},
     spec::{BoxSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, WaterSpec},
     wave_maker,
 };
@@ -45,32 +47,55 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let (solver, lattice) = solver::solver(doc, &spec.solver, &domain)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     check_particle_count(doc, &water, &domain, &lattice)?;
-    let solids = spec
-        .solid
-        .iter()
-        .map(|solid| solid_mesh(doc, base_dir, solid, &domain))
-        .collect::<Result<_>>()?;
-    let wave_makers = wave_maker::build_all(
-        doc,
+    let around = wave_maker::Surroundings {
         base_dir,
-        &spec.wave_maker,
-        &wave_maker::Surroundings {
-            domain: &domain,
-            gravity: water.gravity,
-            least_gap: lattice.least_gap,
-            shot: &shot,
-        },
-    )?;
+        domain: &domain,
+        gravity: water.gravity,
+        least_gap: lattice.least_gap,
+        shot: &shot,
+    };
+    let mut solids = Vec::new();
+    let mut moving_solids = Vec::new();
+    for solid in &spec.solid {
+        match (&solid.direction, &solid.motion) {
+            (None, None) => solids.push(static_solid(doc, solid, &around)?),
+            (Some(direction), Some(motion)) => {
+                moving_solid::check_method(doc, motion.span(), solver.method)?;
+                if moving_solids.len() == MAX_MOVING_SOLIDS {
+                    let problem = format!("at most {MAX_MOVING_SOLIDS} solids can move");
+                    return Err(doc.fault_plain(motion.span(), problem));
+                }
+                let placed = solid_mesh(doc, base_dir, solid)?;
+                moving_solids.push(moving_solid::build(
+                    doc, placed, direction, motion, &around,
+                )?);
+            }
+            (Some(direction), None) => {
+                return Err(doc.fault_at(direction.span(), "given without motion"));
+            }
+            (None, Some(motion)) => {
+                return Err(doc.fault_at(motion.span(), "given without direction"));
+            }
+        }
+    }
+    let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
     if let Some((key, allowed)) = spec.effects.fault() {
         return Err(doc.fault_of(&key, allowed));
     }
+    let grids = spec
+        .grids
+        .as_ref()
+        .map(|table| grids::build(doc, table, &domain, &solver))
+        .transpose()?;
     Ok(Scene {
         shot,
         domain,
         water,
         solids,
+        moving_solids,
         wave_makers,
         solver,
+        grids,
         effects: spec.effects,
     })
 }
@@ -108,7 +133,7 @@ fn whole(doc: &Document<'_>, value: &Spanned<i64>, max: u32) -> Result<u32> {
         .ok_or_else(|| doc.fault_at(value.span(), format!("{v} is out of range")))
 }
 
-fn vector(doc: &Document<'_>, value: &Spanned<[f64; 3]>, limit: f64) -> Result<DVec3> {
+pub(super) fn vector(doc: &Document<'_>, value: &Spanned<[f64; 3]>, limit: f64) -> Result<DVec3> {
     let v = DVec3::from_array(*value.get_ref());
     if v.is_finite() && v.abs().max_element() <= limit {
         Ok(v)
@@ -256,7 +281,7 @@ fn fits(inner: &Bounds, domain: &Bounds) -> bool {
     room.contains(inner.min) && room.contains(inner.max)
 }
 
-fn extent(bounds: Option<Bounds>) -> String {
+pub(super) fn extent(bounds: Option<Bounds>) -> String {
     bounds.map_or_else(
         || "nothing".to_owned(),
         |b| {
@@ -309,12 +334,7 @@ struct MeshSpec<'a> {
     scale: &'a Option<Spanned<ScaleSpec>>,
 }
 
-fn solid_mesh(
-    doc: &Document<'_>,
-    base_dir: &Path,
-    spec: &SolidSpec,
-    domain: &Bounds,
-) -> Result<PlacedMesh> {
+fn solid_mesh(doc: &Document<'_>, base_dir: &Path, spec: &SolidSpec) -> Result<PlacedMesh> {
     let file = MeshSpec {
         path: &spec.mesh,
         blake3: &spec.blake3,
@@ -322,7 +342,16 @@ fn solid_mesh(
         rotate_degrees: &spec.rotate_degrees,
         scale: &spec.scale,
     };
-    let placed = placed_mesh(doc, base_dir, &file)?;
+    placed_mesh(doc, base_dir, &file)
+}
+
+fn static_solid(
+    doc: &Document<'_>,
+    spec: &SolidSpec,
+    around: &wave_maker::Surroundings<'_>,
+) -> Result<PlacedMesh> {
+    let domain = around.domain;
+    let placed = solid_mesh(doc, around.base_dir, spec)?;
     let overlaps = placed
         .mesh
         .bounds()

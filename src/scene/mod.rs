@@ -2,7 +2,9 @@
 
 pub mod effects;
 pub mod flip;
+pub mod grids;
 pub mod look;
+pub mod moving_solid;
 pub mod plan;
 pub mod study;
 
@@ -38,10 +40,14 @@ pub struct Scene {
     pub water: Water,
     /// Static solids, in world space.
     pub solids: Vec<Solid>,
+    /// Solids that move; static ones stand in `solids`.
+    pub moving_solids: Vec<moving_solid::MovingSolid>,
     /// Domain walls that move; at most one a wall.
     pub wave_makers: Vec<WaveMaker>,
     /// Which solver, and the solvers' settings.
     pub solver: Solver,
+    /// Grids that each frame gets beside its particles, where the scene asks for any.
+    pub grids: Option<grids::Grids>,
     /// Effects that the scene names; what is `None` does not exist.
     pub effects: Effects,
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::Effects;
+use super::{Effects, grids::GridsSpec};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -17,6 +17,7 @@ pub(super) struct SceneSpec {
     #[serde(default)]
     pub(super) wave_maker: Vec<WaveMakerSpec>,
     pub(super) solver: SolverSpec,
+    pub(super) grids: Option<Spanned<GridsSpec>>,
     #[serde(default)]
     pub(super) effects: Effects,
 }
@@ -65,6 +66,8 @@ pub(super) struct SolidSpec {
     pub(super) translate: Option<Spanned<[f64; 3]>>,
     pub(super) rotate_degrees: Option<Spanned<[f64; 3]>>,
     pub(super) scale: Option<Spanned<ScaleSpec>>,
+    pub(super) direction: Option<Spanned<[f64; 3]>>,
+    pub(super) motion: Option<Spanned<MotionSpec>>,
 }
 
 #[derive(Clone, Copy, Deserialize)]

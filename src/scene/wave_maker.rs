@@ -19,8 +19,9 @@ const MAX_TABLE_BYTES: u64 = 64 << 20;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// What a wave-maker has to fit into.
+/// What a motion has to fit into.
 pub(super) struct Surroundings<'a> {
+    pub(super) base_dir: &'a Path,
     pub(super) domain: &'a Bounds,
     pub(super) gravity: DVec3,
     /// Between two walls, or a wall and the opposite face, metres.
@@ -31,7 +32,6 @@ pub(super) struct Surroundings<'a> {
 /// Builds and checks all of them.
 pub(super) fn build_all(
     doc: &Document<'_>,
-    base_dir: &Path,
     specs: &[WaveMakerSpec],
     around: &Surroundings<'_>,
 ) -> Result<Vec<WaveMaker>> {
@@ -42,7 +42,7 @@ pub(super) fn build_all(
             let problem = format!("a second wave maker on the wall {}", wall.name());
             return Err(doc.fault_at(spec.wall.span(), problem));
         }
-        let motion = motion(doc, base_dir, &spec.motion, around.gravity)?;
+        let motion = motion(doc, around.base_dir, &spec.motion, around.gravity)?;
         let size = around.domain.size()[wall.axis];
         let room = size - around.least_gap;
         let reach = motion.peak_displacement(around.shot.duration());
@@ -138,7 +138,8 @@ impl Keys<'_, '_> {
     }
 }
 
-fn motion(
+/// Builds a motion's table.
+pub(super) fn motion(
     doc: &Document<'_>,
     base_dir: &Path,
     spec: &Spanned<MotionSpec>,

@@ -38,7 +38,8 @@ impl Scene {
     /// The mesh files that the scene was built from, with their BLAKE3, each once.
     pub fn mesh_files(&self) -> Vec<(PathBuf, String)> {
         let mut files = Vec::new();
-        for placed in self.solids.iter().chain(&self.water.meshes) {
+        let moving = self.moving_solids.iter().map(|solid| &solid.placed);
+        for placed in self.solids.iter().chain(moving).chain(&self.water.meshes) {
             let file = (placed.file.clone(), placed.file_hash.clone());
             if !files.contains(&file) {
                 files.push(file);
@@ -80,12 +81,21 @@ impl Scene {
             writeln!(out, "\n[[solid]]")?;
             write_mesh(out, "mesh", solid, mesh_path)?;
         }
+        for solid in &self.moving_solids {
+            writeln!(out, "\n[[solid]]")?;
+            write_mesh(out, "mesh", &solid.placed, mesh_path)?;
+            writeln!(out, "direction = {}", vector(solid.direction))?;
+            writeln!(out, "motion = {}", motion(&solid.motion))?;
+        }
         for maker in &self.wave_makers {
             writeln!(out, "\n[[wave_maker]]")?;
             writeln!(out, "wall = {}", text(maker.wall.name()))?;
             writeln!(out, "motion = {}", motion(&maker.motion))?;
         }
         self.write_solver(out)?;
+        if let Some(grids) = &self.grids {
+            grids.write(out)?;
+        }
         writeln!(out, "\n[effects]")?;
         // An effect is a table of numbers, which toml can always write.
         let effects = toml::Table::try_from(&self.effects).unwrap_or_default();

@@ -2,7 +2,7 @@
 //!
 //! Samples count in the density and push back (Akinci 2012); the distance stops what would tunnel.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::{
     domain::{sampling::BoundarySample, signed_distance::SignedDistance, sph::Calibration},
@@ -13,15 +13,17 @@ use crate::{
     },
 };
 
-use super::params::SolidGrid;
+use super::params::{SolidGrid, SolidGrids};
 
-/// All static solids of a scene.
+/// All solids of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Boundary {
-    /// Over all surfaces, world space.
+    /// Over all surfaces of static solids, world space.
     pub samples: Vec<BoundarySample>,
-    /// Of their union; `None` where the scene has no solid.
+    /// Of the static solids' union; `None` where the scene has none.
     pub distance: Option<SignedDistance>,
+    /// Of each moving solid, where it stood at the start.
+    pub moving: Vec<SignedDistance>,
 }
 
 impl Boundary {
@@ -31,6 +33,7 @@ impl Boundary {
             particles: 0,
             boundary_samples: self.samples.len(),
             solid_grid: self.distance.as_ref().map_or([0; 3], |grid| grid.dims),
+            moving_nodes: self.moving.iter().map(|grid| grid.values.len()).sum(),
             ..Counts::default()
         }
     }
@@ -89,15 +92,65 @@ impl Boundary {
 
     /// Fills the signed distance that the plan has for solids.
     pub(super) fn upload_distance(&self, program: &Program, scene: &Scene) {
-        let Some(grid) = &self.distance else { return };
-        let origin = scene.domain.min;
-        program.upload("solid_distance", 0, &grid.values);
-        let uniform = SolidGrid {
-            origin: (grid.origin - origin).as_vec3().to_array(),
-            spacing: grid.spacing as f32,
-            dims: grid.dims.map(|n| n as u32),
-            padding: 0,
-        };
-        program.upload("solid_grid", 0, &[uniform]);
+        let mut first = 0;
+        for grid in self.grids() {
+            program.upload("solid_distance", 4 * first as u64, &grid.values);
+            first += grid.values.len();
+        }
+        if let (Some(grid), []) = (&self.distance, &self.moving[..]) {
+            program.upload("solid_grid", 0, &[solid_grid(grid, scene.domain.min, 0)]);
+        }
+    }
+
+    /// In the order in which their nodes stand on the device.
+    fn grids(&self) -> impl Iterator<Item = &SignedDistance> {
+        self.distance.iter().chain(&self.moving)
+    }
+}
+
+/// Where solids stand that move; nothing in a scene without them.
+pub(super) struct Movers {
+    at_start: SolidGrids,
+    /// Before the first that moves.
+    statics: usize,
+}
+
+impl Movers {
+    pub(super) fn of(boundary: &Boundary, scene: &Scene) -> Option<Self> {
+        let mut at_start = SolidGrids::default();
+        let mut first = 0;
+        for (slot, grid) in at_start.grids.iter_mut().zip(boundary.grids()) {
+            *slot = solid_grid(grid, scene.domain.min, first);
+            first += grid.values.len() as u32;
+            at_start.count += 1;
+        }
+        (!boundary.moving.is_empty()).then_some(Self {
+            at_start,
+            statics: boundary.grids().count() - boundary.moving.len(),
+        })
+    }
+
+    /// As they stand at `start`, with the velocities that take them to where they then stand `length` seconds
+    /// later.
+    pub(super) fn upload(&self, program: &Program, scene: &Scene, start: f64, length: f64) {
+        let mut grids = self.at_start;
+        for (solid, k) in scene.moving_solids.iter().zip(self.statics..) {
+            let before = solid.displacement(start);
+            let velocity = (solid.displacement(start + length) - before) / length;
+            let origin = Vec3::from_array(grids.grids[k].origin).as_dvec3() + before;
+            grids.grids[k].origin = origin.as_vec3().to_array();
+            grids.velocities[k] = velocity.as_vec3().extend(0.0).to_array();
+            grids.fastest = grids.fastest.max(velocity.length() as f32);
+        }
+        program.upload("solid_grids", 0, &[grids]);
+    }
+}
+
+fn solid_grid(grid: &SignedDistance, origin: DVec3, first: u32) -> SolidGrid {
+    SolidGrid {
+        origin: (grid.origin - origin).as_vec3().to_array(),
+        spacing: grid.spacing as f32,
+        dims: grid.dims.map(|n| n as u32),
+        first,
     }
 }

@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::scene::moving_solid::MAX_MOVING_SOLIDS;
+
 /// Declares a `repr(C)` mirror together with its field names and offsets.
 macro_rules! mirror {
     ($(#[$meta:meta])* $name:ident { $($(#[$field_meta:meta])* $field:ident: $ty:ty),+ $(,)? }) => {
@@ -149,7 +151,23 @@ mirror!(
         spacing: f32,
         /// Nodes.
         dims: [u32; 3],
+        /// Where its nodes begin in `solid_distance`.
+        first: u32,
+    }
+);
+
+mirror!(
+    /// `SolidGrids` of shared/moving_solids.wgsl.
+    SolidGrids {
+        /// At the substep's start; static solids first, as one.
+        grids: [SolidGrid; MAX_MOVING_SOLIDS + 1],
+        /// m/s.
+        velocities: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
+        /// Of them.
+        count: u32,
+        /// The greatest speed, m/s.
+        fastest: f32,
         /// Unused.
-        padding: u32,
+        padding: [u32; 2],
     }
 );

@@ -10,13 +10,13 @@ use std::{
 use serde_json::{Value, json};
 
 use crate::{
-    cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, Manifest},
+    cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest},
     domain::{
         frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
         solver::StepReport,
     },
     gpu::adapter::{Context, GpuError},
-    scene::{self, Scene, SceneError},
+    scene::{self, Scene, SceneError, grids::Grids},
     solve::{SolveError, pbf::device_limits},
 };
 
@@ -281,6 +281,7 @@ fn open_cache(
         particle_spacing: scene.particle_spacing(),
         rest_density: scene.water.rest_density,
         attributes: start.particles.attributes.keys().cloned().collect(),
+        grids: scene.grids.map(|grids| grid_record(scene, &grids)),
         start_particles: 0,
         files: Vec::new(),
     };
@@ -301,6 +302,17 @@ fn open_cache(
     let assets = assets(scene)?;
     let writer = CacheWriter::create(directory, manifest, &text, &assets, &start.particles)?;
     Ok((writer, Clock::default(), start.particles.clone()))
+}
+
+/// The scene's grids as the cache keeps them.
+fn grid_record(scene: &Scene, grids: &Grids) -> GridRecord {
+    GridRecord {
+        surface: grids.surface,
+        velocity: grids.velocity,
+        voxel_size: grids.voxel_size,
+        origin: scene.domain.min.to_array(),
+        precision: grids.precision,
+    }
 }
 
 /// The scene's mesh files as the cache keeps them.

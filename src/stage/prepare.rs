@@ -3,6 +3,7 @@
 use crate::{
     domain::{
         bounds::Bounds,
+        mesh::TriangleMesh,
         particles::Particles,
         sampling::{boundary_samples, fill_water},
         signed_distance::{SignedDistance, SignedDistanceError},
@@ -14,8 +15,7 @@ use crate::{
         plan::{Capacity, Counts, DeviceLimits, Plan},
     },
     solve::{
-        self,
-        SolveError,
+        self, SolveError,
         boundary::Boundary,
         flip::{self, Flip},
         pbf::Pbf,
@@ -45,9 +45,13 @@ impl Start {
     pub fn of(scene: &Scene) -> Result<Self, SignedDistanceError> {
         let spacing = scene.particle_spacing();
         let meshes = || scene.solids.iter().map(|solid| &solid.mesh);
-        let distance = match solid_bounds(scene) {
-            Some(bounds) => SignedDistance::from_meshes(meshes(), &bounds, spacing)?,
-            None => None,
+        let distance = distance(scene, &meshes().collect::<Vec<_>>())?;
+        let moving = moving_distances(scene)?;
+        // Where solids move, they keep out the water of the start as well.
+        let movers = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
+        let at_start = match scene.moving_solids[..] {
+            [] => None,
+            _ => self::distance(scene, &meshes().chain(movers).collect::<Vec<_>>())?,
         };
         // FLIP meets solids by their distance alone.
         let samples = match scene.solver.method {
@@ -60,7 +64,7 @@ impl Start {
         let fill = fill_water(
             &scene.water.blocks,
             water,
-            distance.as_ref(),
+            at_start.as_ref().or(distance.as_ref()),
             &scene.domain,
             spacing,
         )?;
@@ -72,7 +76,11 @@ impl Start {
         Ok(Self {
             particles,
             removed: fill.removed,
-            boundary: Boundary { samples, distance },
+            boundary: Boundary {
+                samples,
+                distance,
+                moving,
+            },
         })
     }
 
@@ -117,12 +125,38 @@ pub fn build(
     })
 }
 
-/// Where the solids are, with room about them, as far as water can come.
-fn solid_bounds(scene: &Scene) -> Option<Bounds> {
+/// Of the union of meshes, as far as water can come to them.
+fn distance(
+    scene: &Scene,
+    meshes: &[&TriangleMesh],
+) -> Result<Option<SignedDistance>, SignedDistanceError> {
+    match solid_bounds(scene, meshes) {
+        Some(bounds) => {
+            SignedDistance::from_meshes(meshes.iter().copied(), &bounds, scene.particle_spacing())
+        }
+        None => Ok(None),
+    }
+}
+
+/// One a moving solid, all of it: what is outside of the domain now may come in.
+fn moving_distances(scene: &Scene) -> Result<Vec<SignedDistance>, SignedDistanceError> {
+    let spacing = scene.particle_spacing();
+    let solids = scene.moving_solids.iter();
+    let bounded =
+        solids.filter_map(|solid| Some((&solid.placed.mesh, solid.placed.mesh.bounds()?)));
+    bounded
+        .map(|(mesh, bounds)| {
+            SignedDistance::from_mesh(mesh, &bounds.grown(MARGIN * spacing), spacing)
+        })
+        .collect()
+}
+
+/// Where meshes are, with room about them, as far as water can come.
+fn solid_bounds(scene: &Scene, meshes: &[&TriangleMesh]) -> Option<Bounds> {
     let margin = MARGIN * scene.particle_spacing();
     let reach = scene.domain.grown(margin);
     let mut all: Option<Bounds> = None;
-    for bounds in scene.solids.iter().filter_map(|solid| solid.mesh.bounds()) {
+    for bounds in meshes.iter().filter_map(|mesh| mesh.bounds()) {
         all = Some(match all {
             None => bounds,
             Some(other) => Bounds {

@@ -7,6 +7,8 @@ use std::{
     time::Instant,
 };
 
+use glam::DAffine3;
+
 use crate::{
     cache::{CacheError, CacheReader},
     domain::frame_range::FrameRange,
@@ -154,7 +156,7 @@ pub fn render(
         size: [image.width, image.height],
         frames: frames.len(),
     });
-    let mut renderer = None;
+    let mut kept = None;
     let mut outcome = Outcome::default();
     for frame in frames {
         if stop.load(Ordering::Relaxed) {
@@ -177,19 +179,18 @@ pub fn render(
             });
             continue;
         }
-        let renderer = match &mut renderer {
+        let mut renderer = match kept.take() {
             Some(renderer) => renderer,
-            None => renderer.insert(Renderer::new(
-                &context,
-                &request.look,
-                &render_scene(&scene),
-            )?),
+            None => Renderer::new(&context, &request.look, &render_scene(&scene, frame))?,
         };
         fs::create_dir_all(&request.directory).map_err(|source| RenderJobError::Directory {
             directory: request.directory.clone(),
             source,
         })?;
         let picture = renderer.render(frame, &cache.read(frame)?)?;
+        // Solids that move are drawn where they stand at the frame's time, not blurred over its shutter:
+        // a renderer draws its solids once.
+        kept = scene.moving_solids.is_empty().then_some(renderer);
         for (file, format) in &files {
             write(file, *format, &picture, &attributes, &request.look)?;
         }
@@ -219,14 +220,17 @@ fn is_inside(directory: &Path, other: &Path) -> bool {
     }
 }
 
-fn render_scene(scene: &Scene) -> RenderScene {
+/// A scene as it stands at a frame.
+fn render_scene(scene: &Scene, frame: u32) -> RenderScene {
+    let time = f64::from(frame) / scene.shot.frames_per_second;
+    let moving = scene.moving_solids.iter().map(|solid| {
+        let way = DAffine3::from_translation(solid.displacement(time));
+        solid.placed.mesh.transformed(&way)
+    });
+    let solids = scene.solids.iter().map(|solid| solid.mesh.clone());
     RenderScene {
         domain: scene.domain,
-        solids: scene
-            .solids
-            .iter()
-            .map(|solid| solid.mesh.clone())
-            .collect(),
+        solids: solids.chain(moving).collect(),
         particle_spacing: scene.particle_spacing(),
         frames_per_second: scene.shot.frames_per_second,
     }

@@ -42,6 +42,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
             meshes: Vec::new(),
         },
         solids: Vec::new(),
+        moving_solids: Vec::new(),
         wave_makers: Vec::new(),
         solver: SolverSettings {
             method: Method::Pbf,
@@ -57,6 +58,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
                 max_substeps: 32,
             }),
         },
+        grids: None,
         effects: Effects::default(),
     }
 }

@@ -18,6 +18,9 @@ pub const FLIP_PARAMS_BYTES: u64 = 160;
 /// ask for.
 pub const WINDOW_BYTES: u64 = 256;
 
+/// Size of the `SolidGrids` uniform.
+pub const SOLID_GRIDS_BYTES: u64 = 400;
+
 /// Faces about a cell that its particles reach, of one component.
 const FACES: u64 = 18;
 
@@ -101,11 +104,16 @@ impl Plan {
         if flip.surface == Surface::GhostFluid {
             self.add_buffer("liquid_distance", 4 * all, "flip");
         }
-        if self.has_solid_grid() {
+        if self.has_solids() {
             self.add_buffer("open_volume", 4 * all, "solids");
-            self.add_uniform("solid_grid", 32, "solids");
-            let nodes: usize = self.counts.solid_grid.iter().product();
+            let nodes = self.counts.solid_grid.iter().product::<usize>() + self.counts.moving_nodes;
             self.add_buffer("solid_distance", 4 * nodes as u64, "solids");
+            if self.counts.moving_nodes > 0 {
+                self.add_buffer("closed_velocity", 12 * all, "solids");
+                self.add_uniform("solid_grids", SOLID_GRIDS_BYTES, "solids");
+            } else {
+                self.add_uniform("solid_grid", 32, "solids");
+            }
         }
         let layers = layers(flip.cfl) as u64;
         self.add_uniform("params", FLIP_PARAMS_BYTES, "flip");
@@ -114,14 +122,17 @@ impl Plan {
         self.add_buffer("groups", 16 * (2 + layers), "flip");
     }
 
-    fn has_solid_grid(&self) -> bool {
-        self.counts.solid_grid != [0; 3]
+    fn has_solids(&self) -> bool {
+        self.counts.solid_grid != [0; 3] || self.counts.moving_nodes > 0
     }
 
     fn add_flip_passes(&mut self, flip: &Flip) {
         let mut defines = Vec::new();
-        if self.has_solid_grid() {
+        if self.has_solids() {
             defines.push("SOLIDS");
+        }
+        if self.counts.moving_nodes > 0 {
+            defines.push("MOVING_SOLIDS");
         }
         if flip.transfer == Transfer::Apic {
             defines.push("APIC");

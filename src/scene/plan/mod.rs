@@ -15,7 +15,7 @@ use crate::{
 
 use super::{Method, Scene, effects::EffectPlan};
 
-pub use flip::{FLIP_PARAMS_BYTES, WINDOW_BYTES, layers, stored_cells};
+pub use flip::{FLIP_PARAMS_BYTES, SOLID_GRIDS_BYTES, WINDOW_BYTES, layers, stored_cells};
 pub use pbf::{
     LIST_BUDGET, LIST_CAPACITY, PARAMS_BYTES, PHASE_BYTES, SHARED_CONSTANTS, grid_dims, list_name,
 };
@@ -40,6 +40,8 @@ pub struct Counts {
     pub boundary_samples: usize,
     /// Nodes of the solids' signed distance along each axis.
     pub solid_grid: [usize; 3],
+    /// Nodes of the moving solids' signed distances, all together.
+    pub moving_nodes: usize,
     /// Bricks that sparse grids hold; of FLIP alone.
     pub bricks: Capacity,
 }

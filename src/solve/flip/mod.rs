@@ -28,7 +28,7 @@ use crate::{
 
 use super::{
     SolveError,
-    boundary::Boundary,
+    boundary::{Boundary, Movers},
     pressure::{self, LEVELS, PressureSolver},
     state::{check_finite, report, slots_by_id, take_over, upload},
 };
@@ -66,6 +66,7 @@ pub struct Flip {
     plan: Plan,
     limits: DeviceLimits,
     scene: Scene,
+    movers: Option<Movers>,
     recordings: Recordings,
     pressure: PressureSolver,
     timer: Option<Timer>,
@@ -138,6 +139,7 @@ impl Flip {
             limits: super::pbf::device_limits(context),
             plan,
             scene: scene.clone(),
+            movers: Movers::of(boundary, scene),
             state: Particles::default(),
             frame: 0,
         })
@@ -242,6 +244,9 @@ impl Flip {
         self.program.upload("bricks", 0, &bricks.records);
         self.program.upload("brick_slot", 0, &bricks.table);
         self.program.upload("groups", 0, &groups);
+        if let Some(movers) = &self.movers {
+            movers.upload(&self.program, &self.scene, substep.start, substep.length);
+        }
         Ok(())
     }
 

@@ -25,7 +25,7 @@ pub(super) struct Substep {
     pub(super) start: f64,
     /// Seconds.
     pub(super) length: f64,
-    /// Most cells that a particle moves, as its speed, gravity and the wave-makers have it.
+    /// Most cells that a particle moves, as its speed, gravity, walls and solids have it.
     pub(super) displacement: f64,
 }
 
@@ -33,9 +33,7 @@ pub(super) struct Substep {
 /// particle has `speed`, and the first of them.
 pub(super) fn next(scene: &Scene, start: f64, remaining: f64, speed: f64) -> (f64, Substep) {
     let flip = scene.solver.flip();
-    let makers = scene.wave_makers.iter();
-    let wall = makers.map(|maker| maker.motion.peak_speed(start, start + remaining));
-    let speed = wall.fold(speed, f64::max);
+    let speed = speed.max(scene.peak_boundary_speed(start, start + remaining));
     let gravity = scene.water.gravity.length();
     // v t + g t² = cfl Δx.
     let room = flip.cfl * flip.cell_size;

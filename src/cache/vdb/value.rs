@@ -1,0 +1,66 @@
+//! Values that a grid can hold.
+
+use half::f16;
+
+/// A voxel's value.
+pub(super) trait Value: Copy + PartialEq + Send + Sync {
+    /// As OpenVDB names it in a tree's type.
+    const NAME: &'static str;
+    /// How transforms act on it: "Vector values are transformed as velocities".
+    const VECTOR_TYPE: Option<&'static str>;
+
+    /// Minus it.
+    fn negative(self) -> Self;
+
+    /// Its components.
+    fn components(&self) -> &[f32];
+}
+
+impl Value for f32 {
+    const NAME: &'static str = "float";
+    const VECTOR_TYPE: Option<&'static str> = None;
+
+    fn negative(self) -> Self {
+        -self
+    }
+
+    fn components(&self) -> &[f32] {
+        std::slice::from_ref(self)
+    }
+}
+
+impl Value for [f32; 3] {
+    const NAME: &'static str = "vec3s";
+    const VECTOR_TYPE: Option<&'static str> = Some("contravariant relative");
+
+    fn negative(self) -> Self {
+        self.map(|x| -x)
+    }
+
+    fn components(&self) -> &[f32] {
+        self
+    }
+}
+
+/// A value of a buffer: two bytes a component, or four.
+pub(super) fn put<T: Value>(out: &mut Vec<u8>, value: T, is_half: bool) {
+    for &x in value.components() {
+        if is_half {
+            out.extend_from_slice(&f16::from_f32(x).to_le_bytes());
+        } else {
+            out.extend_from_slice(&x.to_le_bytes());
+        }
+    }
+}
+
+/// A value of a tree's own: four bytes a component, rounded where buffers are.
+pub(super) fn put_whole<T: Value>(out: &mut Vec<u8>, value: T, is_half: bool) {
+    for &x in value.components() {
+        let x = if is_half {
+            f16::from_f32(x).to_f32()
+        } else {
+            x
+        };
+        out.extend_from_slice(&x.to_le_bytes());
+    }
+}

@@ -1,0 +1,102 @@
+//! Values on voxels, kept in leaves of 8³ where there are any: what an OpenVDB tree holds.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Voxels along a leaf's edge.
+pub const EDGE: i32 = 8;
+
+/// Voxels of a leaf.
+pub const VOXELS: usize = 512;
+
+/// How the values of a grid are kept on disk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 16 bits: a level set to 1/1000 of a voxel, velocities to 1/2000 of themselves.
+    Half,
+    /// 32 bits.
+    Float,
+}
+
+impl Precision {
+    /// Both, with the names that scenes use.
+    pub const NAMED: [(&'static str, Self); 2] = [("half", Self::Half), ("float", Self::Float)];
+
+    /// As scenes name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Half => "half",
+            Self::Float => "float",
+        }
+    }
+}
+
+/// A sparse grid. Voxel (i, j, k) is the cell whose least corner lies at
+/// `origin + voxel_size · (i, j, k)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SparseGrid<T> {
+    /// World position of the corner where the indices begin, metres.
+    pub origin: DVec3,
+    /// Metres.
+    pub voxel_size: f64,
+    /// Value of every voxel that nothing else speaks of; inactive.
+    pub background: T,
+    /// In the order of their first voxels, x slowest.
+    pub leaves: Vec<Leaf<T>>,
+    /// First voxels of leaves whose voxels all hold minus the background, inactive: the inside of
+    /// a level set. In the same order.
+    pub inside: Vec<[i32; 3]>,
+}
+
+/// 8³ voxels; voxel (x, y, z) of them is element 64 x + 8 y + z.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leaf<T> {
+    /// First voxel, a multiple of 8 along each axis.
+    pub origin: [i32; 3],
+    /// One bit a voxel, the lowest first.
+    pub active: [u64; 8],
+    /// One a voxel; those of inactive voxels are the background or minus it.
+    pub values: Vec<T>,
+}
+
+impl<T> Leaf<T> {
+    /// Active voxels.
+    pub fn active_count(&self) -> u64 {
+        self.active.iter().map(|w| u64::from(w.count_ones())).sum()
+    }
+
+    /// Whether the voxel of `element` is active.
+    pub fn is_active(&self, element: usize) -> bool {
+        self.active[element / 64] >> (element % 64) & 1 == 1
+    }
+
+    /// Index of the voxel of `element`.
+    pub fn voxel(&self, element: usize) -> [i32; 3] {
+        let at = [element / 64, element / 8 % 8, element % 8];
+        std::array::from_fn(|axis| self.origin[axis] + at[axis] as i32)
+    }
+}
+
+impl<T> SparseGrid<T> {
+    /// Active voxels.
+    pub fn active_count(&self) -> u64 {
+        self.leaves.iter().map(Leaf::active_count).sum()
+    }
+
+    /// Least and greatest index of the active voxels; `None` where there are none.
+    pub fn active_bounds(&self) -> Option<([i32; 3], [i32; 3])> {
+        let active = self.leaves.iter().flat_map(|leaf| {
+            (0..VOXELS)
+                .filter(|&element| leaf.is_active(element))
+                .map(|element| leaf.voxel(element))
+        });
+        active.fold(None, |bounds, at| {
+            let (min, max) = bounds.unwrap_or((at, at));
+            Some((
+                std::array::from_fn(|axis| min[axis].min(at[axis])),
+                std::array::from_fn(|axis| max[axis].max(at[axis])),
+            ))
+        })
+    }
+}
