@@ -401,7 +401,10 @@ fn faults_end_with_their_code_and_write_nothing() {
         ("pressure.tolerance=0", "solver.flip.pressure.tolerance"),
         ("pressure.preconditioner=ippp", "nearest is \"ipp\""),
     ] {
-        let said = job.expect(2, &format!("bake small.toml --solver flip --set solver.flip.{set}"));
+        let said = job.expect(
+            2,
+            &format!("bake small.toml --solver flip --set solver.flip.{set}"),
+        );
         assert!(said.contains(key), "{said}");
     }
     let said = job.expect(2, "bake small.toml --solver sph");

@@ -117,7 +117,11 @@ fn mirrors_match_naga() {
     let variants = ["NEIGHBOR_LIST", "MOVING_SOLIDS"];
     let passes = compute_passes();
     let all = variants.map(|name| passes.iter().map(move |pass| (pass, ["SOLIDS", name])));
-    for (pass, defines) in all.into_iter().flatten().filter(|(pass, defines)| is_meaningful(pass, defines)) {
+    for (pass, defines) in all
+        .into_iter()
+        .flatten()
+        .filter(|(pass, defines)| is_meaningful(pass, defines))
+    {
         let text = shader::compose(pass, &defines).unwrap();
         let layouts = reflect(pass, &text).unwrap().layouts;
         let seen = [
