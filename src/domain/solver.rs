@@ -11,7 +11,7 @@ pub struct StepReport {
     pub substeps: u32,
     /// Solver iterations, summed over substeps.
     pub iterations: u64,
-    /// Mean of max(0, ρ/ρ0 − 1) at the frame's end.
+    /// Mean of max(0, ρ/ρ0 − 1) at the frame's end; with FLIP over the cells of water that its last substep found.
     pub density_error_mean: f64,
     /// Its 99th percentile.
     pub density_error_p99: f64,

@@ -272,8 +272,7 @@ impl Flip {
             .project(&self.program, step, self.timer.as_mut())?;
         told.add(&projected);
         let limit = flip.pressure.residual_limit;
-        // Not a number is above it too.
-        if !(projected.solved.residual <= limit) {
+        if projected.solved.residual.is_nan() || projected.solved.residual > limit {
             return self.numbers(format!(
                 "the projection of substep {} ended at a relative residual of {:.3e} after {} iterations; \
                  solver.flip.pressure.residual_limit is {limit}",
