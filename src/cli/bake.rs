@@ -212,6 +212,9 @@ fn line(frame: u32, report: &StepReport, seconds: f64) -> String {
     )
 }
 
+/// Mean divergence of a pocket against the largest anywhere, above which it is not rounding.
+const INCOMPATIBLE: f64 = 1e-3;
+
 /// What must not be passed over, and the same for farms.
 fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
     let mut warnings = Vec::new();
@@ -228,6 +231,19 @@ fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
             json!({
                 "event": "warning", "what": "missed projections", "frame": frame, "missed": projection.missed,
                 "residual": projection.residual,
+            }),
+        ));
+    }
+    if projection.incompatible > INCOMPATIBLE * projection.divergence_before {
+        warnings.push((
+            format!(
+                "warning: frame {frame}: water without air was squeezed by {:.1e} /s, which no pressure undoes: its volume \
+                 is not kept",
+                projection.incompatible
+            ),
+            json!({
+                "event": "warning", "what": "incompatible pocket", "frame": frame,
+                "incompatible": projection.incompatible,
             }),
         ));
     }
@@ -275,6 +291,12 @@ mod tests {
         let warnings = warnings(7, &report(Some(missed)));
         assert!(warnings[0].0.contains("frame 7: 2 pressure solves missed"));
         assert_eq!(warnings[0].1["missed"], 2);
+        let squeezed = Projection {
+            incompatible: 0.5,
+            ..good
+        };
+        let warnings = self::warnings(7, &report(Some(squeezed)));
+        assert!(warnings[0].0.contains("frame 7: water without air was squeezed by 5.0e-1 /s"));
     }
 
     #[test]

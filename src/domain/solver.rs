@@ -45,6 +45,9 @@ pub struct Projection {
     pub missed: u32,
     /// Most bodies of water at once that no air touched.
     pub pockets: u32,
+    /// Largest |mean of ∇·u| over such a body, 1/s: what no pressure undoes, as where a solid crushes it.
+    #[serde(default)]
+    pub incompatible: f64,
     /// Cells of water without an open face, left out of the system, summed over substeps.
     pub dropped: u64,
     /// Iterations of the density correction's solves, summed over substeps.

@@ -102,6 +102,7 @@ impl Told {
         all.divergence_after = all.divergence_after.max(projected.divergence_after);
         all.missed += u32::from(solved.is_missed);
         all.pockets = all.pockets.max(projected.pockets);
+        all.incompatible = all.incompatible.max(projected.incompatible);
         all.dropped += u64::from(projected.dropped);
     }
 }
