@@ -296,7 +296,11 @@ mod tests {
             ..good
         };
         let warnings = self::warnings(7, &report(Some(squeezed)));
-        assert!(warnings[0].0.contains("frame 7: water without air was squeezed by 5.0e-1 /s"));
+        assert!(
+            warnings[0]
+                .0
+                .contains("frame 7: water without air was squeezed by 5.0e-1 /s")
+        );
     }
 
     #[test]
