@@ -24,7 +24,7 @@ use swell::{
     },
 };
 
-/// One Jacobi iteration from rest without gravity, by O(n²) search in f64: METHODS' formulas once more,
+/// One Jacobi iteration from rest without gravity, by O(n²) search in f64: the model's formulas once more,
 /// written from the paper and not from the shaders.
 struct Naive {
     positions: Vec<DVec3>,

@@ -126,7 +126,8 @@ fn right_hand_sides_are_those_of_the_f64_builder() {
     assert!((projected.divergence_after * rig.case.cell_size - worst).abs() < 1e-5);
 }
 
-/// METHODS §2 within 10 %, and at most 15 with multigrid, to 1e-6.
+/// Scaled IPP within 10 % of what another program counted in f64 (see `domain::poisson`), and at most 15 with
+/// multigrid, to 1e-6.
 #[test]
 fn iteration_counts_are_those_on_record() {
     let context = context();

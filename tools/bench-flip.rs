@@ -1,6 +1,6 @@
 //! Time per output frame and per pass of FLIP in a collapsing dam.
 //!
-//! `tools/bench-flip [--adapter NAME] [--frames N] [--box XxYxZ] [--set "KEY = VALUE"] [--twice]`; the box has
+//! `tools/bench flip [--adapter NAME] [--frames N] [--box XxYxZ] [--set "KEY = VALUE"] [--twice]`; the box has
 //! 128×77×64 cells of 0.1 m where left out, and 36×49×64 of them hold 903 168 particles, already under way. Frames
 //! are a sixtieth of a second. The first two warm up; medians of the rest. `--set` adds to `[solver.flip]`, and
 //! `--twice` doubles the height of the box twice, and compares.

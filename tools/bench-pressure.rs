@@ -1,6 +1,6 @@
 //! Iterations and times of the pressure solve on the tank of n³ cells, by preconditioner and surface.
 //!
-//! `cargo bench --bench pressure -- [--adapter NAME] [--tolerance T] [--repeats R] [--passes] [--only P] [N ...]`;
+//! `tools/bench pressure [--adapter NAME] [--tolerance T] [--repeats R] [--passes] [--only P] [N ...]`;
 //! N are 16, 32, 64, 96 where left out, and P one of none, jacobi, ipp, multigrid. A time is one `project`, all in:
 //! system, solve, gradient, waiting for the device; the median of the repeats after one that warms up. `--passes`
 //! adds each pass's time by the device's clock.

@@ -75,7 +75,7 @@ impl Calibration {
 mod tests {
     use super::*;
 
-    /// METHODS §1, h = 2d: face 0.81, edge 0.65, corner 0.52 of bulk; the product of faces meets them.
+    /// Summed over the lattice, h = 2d: face 0.81, edge 0.65, corner 0.52 of bulk; the product of faces meets them.
     #[test]
     fn walls_meet_lattice_deficits() {
         let calibration = Calibration::new(0.1, 2.0);

@@ -31,7 +31,7 @@ use super::{
 /// Particles keep this part of their spacing from walls and solids; at rest the lattice stands at 0.5.
 const CONTACT: f64 = 0.25;
 
-/// Largest correction of one iteration, in units of d (METHODS §1: about half).
+/// Largest correction of one iteration, in units of d ; physical masses with the formula verbatim blow up without.
 const MAX_CORRECTION: f64 = 0.5;
 
 /// Displacement cap of a substep over the CFL displacement: what speeds up within a frame beyond this is

@@ -108,9 +108,9 @@ mod tests {
     use super::*;
     use crate::domain::poisson::cases::{Surface, tank, tank_rhs};
 
-    /// METHODS §2, none / Jacobi / scaled IPP, to 1e-6. 10 %: its tank is known by its description alone. The plain
-    /// counts with a ghost-fluid surface are left out: they follow the least θ of the surface, which it does not
-    /// give.
+    /// Iterations to 1e-6 with none, Jacobi and scaled IPP, as counted by another program, in f64, on a tank known
+    /// here by its description alone: 60 % full, with a sphere. Hence 10 %. The plain counts with a ghost-fluid surface
+    /// are left out: they follow the least θ of the surface, which the description does not give.
     #[test]
     fn counts_are_those_on_record() {
         let record = [(16, [83, 86, 45]), (32, [181, 176, 93])];

@@ -12,7 +12,7 @@ use super::{Chunk, DeviceLimits, Plan, PlannedBuffer, PlannedPass};
 pub const SHARED_CONSTANTS: [(&str, f64); 1] = [("LIST_CAPACITY", LIST_CAPACITY as f64)];
 
 /// Neighbours that a list holds; a particle with more is searched for, and the report counts it. At rest
-/// h = 2d has 32; in the dam of `tools/bench` no list of 48 overflowed.
+/// h = 2d has 32; in the dam of `tools/bench pbf` no list of 48 overflowed.
 pub const LIST_CAPACITY: u32 = 48;
 
 /// Device memory that neighbour lists may take; a larger scene searches the cells in each pass instead.

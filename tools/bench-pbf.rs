@@ -1,6 +1,6 @@
 //! Time per pass and per particle-step, and bytes per particle, of PBF in a collapsing dam.
 //!
-//! `tools/bench [--adapter NAME] [--frames N] [COUNT ...]`; counts are 60 000, 250 000 and 1 000 000 where left
+//! `tools/bench pbf [--adapter NAME] [--frames N] [COUNT ...]`; counts are 60 000, 250 000 and 1 000 000 where left
 //! out. A step is all in: sort, neighbour lists, 4 red/black iterations, and the frame's share of measuring
 //! density and reading the state back. h = 2d, no effects, no solids. The first two frames warm up; medians of
 //! the rest.
