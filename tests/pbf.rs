@@ -260,6 +260,39 @@ fn red_black_leaves_less_error_than_jacobi() {
     }
 }
 
+/// The same column: Chebyshev's semi-iteration reaches in 4 iterations what red/black has not in 8, and in 16
+/// what it has not in 32, at a Jacobi iteration's cost. Spoiled: with a spectral radius of next to nothing
+/// it is Jacobi, under-relaxed, and loses.
+#[test]
+fn chebyshev_leaves_less_error_than_red_black() {
+    let context = context();
+    let mut scene = scene([1.6, 3.0, 1.6]);
+    scene.water.gravity = DVec3::ZERO;
+    scene.shot.frames_per_second = 1000.0;
+    let particles = lattice([0.0; 3], [16, 20, 16], [D, 0.97 * D, D]);
+    let mut error = |iteration: Iteration, spectral_radius: f64, count: u32| {
+        let pbf = scene.solver.pbf.as_mut().unwrap();
+        pbf.stop = Stop::Iterations(count);
+        pbf.iteration = iteration;
+        pbf.spectral_radius = spectral_radius;
+        pbf.relaxation = match iteration {
+            Iteration::Chebyshev => 0.7,
+            Iteration::Jacobi | Iteration::RedBlack => 1.0,
+        };
+        let (_, report) = run(&context, &scene, &particles, 1);
+        println!(
+            "{count:3} {iteration:?}: mean {:.3} %, max {:.2} %",
+            100.0 * report.density_error_mean,
+            100.0 * report.density_error_max
+        );
+        report.density_error_mean
+    };
+    let (chebyshev, red_black) = (Iteration::Chebyshev, Iteration::RedBlack);
+    assert!(error(chebyshev, 0.98, 4) < error(red_black, 0.98, 8));
+    assert!(error(chebyshev, 0.98, 16) < error(red_black, 0.98, 32));
+    assert!(error(chebyshev, 0.001, 16) > error(red_black, 0.98, 16));
+}
+
 #[test]
 fn free_fall_is_a_parabola() {
     let mut scene = scene([2.0, 100.0, 2.0]);

@@ -43,6 +43,10 @@ fn visit(i: u32, j: u32) {
     coincident = select(coincident, j, r2 * inverse_h * inverse_h < 1e-12);
 }
 
+fn bounded(step: vec3f) -> vec3f {
+    return step * min(1.0, params.max_correction / max(length(step), 1e-30));
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -72,6 +76,13 @@ fn main(
     if !is_finite(delta) {
         atomicAdd(&counters[3], 1u);
     }
-    delta *= min(1.0, params.max_correction / max(length(delta), 1e-30));
+    delta = bounded(delta);
+#ifdef CHEBYSHEV
+    // Wang 2015, eq. 9. What is overwritten here is this particle's position of one iteration before.
+    let last = current.xyz - predicted[phase.write + i].xyz;
+    if dot(delta, last) > 0.0 {
+        delta = bounded(phase.acceleration * delta + (phase.acceleration - 1.0) * last);
+    }
+#endif
     predicted[phase.write + i] = vec4f(confine(current.xyz + delta), current.w);
 }

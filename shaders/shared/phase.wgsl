@@ -11,7 +11,8 @@ struct Phase {
     read_even: u32,
     read_odd: u32,
     write: u32,
-    padding: u32,
+    // Of the Chebyshev semi-iteration; 1 is the plain one.
+    acceleration: f32,
 }
 @group(0) @binding(6) var<uniform> phase: Phase;
 

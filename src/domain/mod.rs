@@ -8,6 +8,7 @@ pub mod mesh;
 pub mod mesh_file;
 pub mod motion;
 pub mod particles;
+pub mod pbf;
 pub mod poisson;
 pub mod sampling;
 pub mod signed_distance;

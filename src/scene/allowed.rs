@@ -152,7 +152,10 @@ const TABLE: &[(&str, &str)] = &[
          134217728 particles",
     ),
     ("solver.pbf.support_ratio", "a number from 1.5 to 4"),
-    ("solver.pbf.iteration", "\"red_black\" or \"jacobi\""),
+    (
+        "solver.pbf.iteration",
+        "\"red_black\", \"jacobi\" or \"chebyshev\"",
+    ),
     (
         "solver.pbf.iterations",
         "a whole number from 1 to 10000; not together with density_error",
@@ -166,6 +169,10 @@ const TABLE: &[(&str, &str)] = &[
         "a whole number from 1 to 10000, with density_error",
     ),
     ("solver.pbf.cfl", "a number above 0, up to 5"),
+    (
+        "solver.pbf.spectral_radius",
+        "a number between 0 and 1, with iteration = \"chebyshev\"",
+    ),
     ("solver.pbf.relaxation", "a number above 0, up to 1.5"),
     ("solver.pbf.artificial_pressure", "a number from 0 to 10"),
     ("solver.pbf.max_substeps", "a whole number from 1 to 10000"),

@@ -249,6 +249,8 @@ pub struct Pbf {
     pub support_ratio: f64,
     /// How corrections see each other.
     pub iteration: Iteration,
+    /// ρ of the plain iteration, below 1, as the Chebyshev semi-iteration takes it; nearer to 1 reaches deeper.
+    pub spectral_radius: f64,
     /// When an iteration stops.
     pub stop: Stop,
     /// Largest displacement in a substep, in units of d.
@@ -268,12 +270,17 @@ pub enum Iteration {
     Jacobi,
     /// One colour, then the other, which sees the corrected first.
     RedBlack,
+    /// All at once, and carried on by a Chebyshev semi-iteration (Wang 2015).
+    Chebyshev,
 }
 
 impl Iteration {
     /// With the names that scenes use.
-    pub const NAMED: [(&'static str, Self); 2] =
-        [("jacobi", Self::Jacobi), ("red_black", Self::RedBlack)];
+    pub const NAMED: [(&'static str, Self); 3] = [
+        ("jacobi", Self::Jacobi),
+        ("red_black", Self::RedBlack),
+        ("chebyshev", Self::Chebyshev),
+    ];
 
     /// As scenes name it.
     pub fn name(self) -> &'static str {
@@ -293,4 +300,17 @@ pub enum Stop {
         /// Upper bound.
         max_iterations: u32,
     },
+}
+
+impl Stop {
+    /// Iterations at most.
+    pub fn most_iterations(self) -> u32 {
+        match self {
+            Self::Iterations(count)
+            | Self::DensityError {
+                max_iterations: count,
+                ..
+            } => count,
+        }
+    }
 }

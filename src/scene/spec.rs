@@ -114,6 +114,7 @@ pub(super) struct PbfSpec {
     pub(super) particle_spacing: Spanned<f64>,
     pub(super) support_ratio: Option<Spanned<f64>>,
     pub(super) iteration: Option<Spanned<String>>,
+    pub(super) spectral_radius: Option<Spanned<f64>>,
     pub(super) iterations: Option<Spanned<i64>>,
     pub(super) density_error: Option<Spanned<f64>>,
     pub(super) max_iterations: Option<Spanned<i64>>,

@@ -152,6 +152,9 @@ fn write_pbf(out: &mut String, pbf: &Pbf) -> fmt::Result {
     writeln!(out, "particle_spacing = {:?}", pbf.particle_spacing)?;
     writeln!(out, "support_ratio = {:?}", pbf.support_ratio)?;
     writeln!(out, "iteration = {}", text(pbf.iteration.name()))?;
+    if pbf.iteration == Iteration::Chebyshev {
+        writeln!(out, "spectral_radius = {:?}", pbf.spectral_radius)?;
+    }
     match pbf.stop {
         Stop::Iterations(n) => writeln!(out, "iterations = {n}")?,
         Stop::DensityError {

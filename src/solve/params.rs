@@ -137,8 +137,8 @@ mirror!(
         read_odd: u32,
         /// Where corrections are written.
         write: u32,
-        /// Unused.
-        padding: u32,
+        /// Factor of the Chebyshev semi-iteration; 1 is the plain one.
+        acceleration: f32,
     }
 );
 

@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::{
     domain::{
         particles::Particles,
+        pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
         solver::{Solver, StepReport},
         sph::Calibration,
     },
@@ -27,19 +28,6 @@ use super::{
     params::Params,
     state::{check_finite, max_speed, report, slots_by_id, take_over, upload},
 };
-
-/// Particles keep this part of their spacing from walls and solids; at rest the lattice stands at 0.5.
-const CONTACT: f64 = 0.25;
-
-/// Largest correction of one iteration, in units of d ; physical masses with the formula verbatim blow up without.
-const MAX_CORRECTION: f64 = 0.5;
-
-/// Displacement cap of a substep over the CFL displacement: what speeds up within a frame beyond this is
-/// slowed and counted.
-const CAP: f64 = 2.0;
-
-/// ε of λ's denominator over the bulk's Σ|∇C|². As large as that sum it doubles the iterations (measured).
-const REGULARIZATION: f64 = 1e-3;
 
 /// Far from everything, and still finite when squared.
 const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];

@@ -51,6 +51,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
                 particle_spacing: D,
                 support_ratio: 2.0,
                 iteration: Iteration::RedBlack,
+                spectral_radius: 0.98,
                 stop: Stop::Iterations(4),
                 cfl: 1.0,
                 relaxation: 1.0,

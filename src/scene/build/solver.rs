@@ -127,22 +127,37 @@ fn whole_or(
         .map_or(Ok(default), |value| whole(doc, value, max))
 }
 
+/// Default ω of the Chebyshev semi-iteration: 1 overshoots (table in solve/iteration.rs).
+const CHEBYSHEV_RELAXATION: f64 = 0.7;
+
 fn pbf(doc: &Document<'_>, spec: &PbfSpec) -> Result<Pbf> {
     let particle_spacing = number(doc, &spec.particle_spacing, |v| v > 0.0)?;
     let support_ratio = number_or(doc, &spec.support_ratio, 2.0, |v| (1.5..=4.0).contains(&v))?;
+    let iteration = choice_or(
+        doc,
+        &spec.iteration,
+        "iteration",
+        &Iteration::NAMED,
+        Iteration::RedBlack,
+    )?;
+    let relaxation = match iteration {
+        Iteration::Jacobi | Iteration::RedBlack => 1.0,
+        Iteration::Chebyshev => CHEBYSHEV_RELAXATION,
+    };
+    if let (Some(radius), Iteration::Jacobi | Iteration::RedBlack) =
+        (&spec.spectral_radius, iteration)
+    {
+        let problem = "given without iteration = \"chebyshev\"";
+        return Err(doc.fault_at(radius.span(), problem));
+    }
     Ok(Pbf {
         particle_spacing,
         support_ratio,
-        iteration: choice_or(
-            doc,
-            &spec.iteration,
-            "iteration",
-            &Iteration::NAMED,
-            Iteration::RedBlack,
-        )?,
+        iteration,
+        spectral_radius: number_or(doc, &spec.spectral_radius, 0.98, |v| v > 0.0 && v < 1.0)?,
         stop: stop(doc, spec)?,
         cfl: number_or(doc, &spec.cfl, 1.0, |v| v > 0.0 && v <= 5.0)?,
-        relaxation: number_or(doc, &spec.relaxation, 1.0, |v| v > 0.0 && v <= 1.5)?,
+        relaxation: number_or(doc, &spec.relaxation, relaxation, |v| v > 0.0 && v <= 1.5)?,
         artificial_pressure: number_or(doc, &spec.artificial_pressure, 0.0, |v| {
             (0.0..=10.0).contains(&v)
         })?,

@@ -1,9 +1,9 @@
 //! What PBF needs on the device.
 
 use crate::{
-    domain::bounds::Bounds,
+    domain::{bounds::Bounds, pbf::chebyshev_factors},
     gpu::{program::PassSpec, sort},
-    scene::{Scene, Stop},
+    scene::{Iteration, Pbf, Scene, Stop},
 };
 
 use super::{Chunk, DeviceLimits, Plan, PlannedBuffer, PlannedPass};
@@ -124,7 +124,7 @@ impl Plan {
         let n = self.counts.particles as u64;
         let pbf = scene.solver.pbf();
         self.add_uniform("params", PARAMS_BYTES, "pbf");
-        self.add_uniform("phases", PHASE_BYTES * self.phase_slots(), "pbf");
+        self.add_uniform("phases", PHASE_BYTES * self.phase_slots(pbf), "pbf");
         self.add_buffer(
             "predicted",
             16 * (2 * n + self.counts.boundary_samples as u64 + 1),
@@ -147,11 +147,13 @@ impl Plan {
             lambda.push("DENSITY");
             update.push("ADAPTIVE");
         }
-        let delta: &[&str] = if pbf.artificial_pressure > 0.0 {
-            &["ARTIFICIAL_PRESSURE"]
-        } else {
-            &[]
-        };
+        let mut delta = Vec::new();
+        if pbf.artificial_pressure > 0.0 {
+            delta.push("ARTIFICIAL_PRESSURE");
+        }
+        if pbf.iteration == Iteration::Chebyshev {
+            delta.push("CHEBYSHEV");
+        }
         for name in ["pbf/predict", "pbf/assign_cells", "pbf/reorder"] {
             self.add_pass(name, &[], &[]);
         }
@@ -159,7 +161,7 @@ impl Plan {
             self.add_pass("pbf/build_neighbors", &[], &[]);
         }
         self.add_pass("pbf/compute_lambda", &lambda, &[]);
-        self.add_pass("pbf/compute_delta", delta, &[]);
+        self.add_pass("pbf/compute_delta", &delta, &[]);
         self.add_pass("pbf/update_velocity", &update, &[]);
         self.add_pass("pbf/measure_density", &[], &[]);
     }
@@ -178,9 +180,22 @@ impl Plan {
         );
     }
 
-    /// Most phases that an iteration can have: per chunk two halves of (all, red, black), and one that ends it.
-    pub fn phase_slots(&self) -> u64 {
-        6 * self.chunks.len() as u64 + 1
+    /// Most phases that an iteration can have: per chunk two halves of (all, red, black) and of every factor of
+    /// a semi-iteration, and one that ends it.
+    fn phase_slots(&self, pbf: &Pbf) -> u64 {
+        let factors = match pbf.iteration {
+            Iteration::Jacobi | Iteration::RedBlack => 0,
+            Iteration::Chebyshev => {
+                let mut factors: Vec<f32> = chebyshev_factors(pbf.spectral_radius)
+                    .take(pbf.stop.most_iterations() as usize)
+                    .map(|factor| factor as f32)
+                    .collect();
+                factors.sort_unstable_by(f32::total_cmp);
+                factors.dedup();
+                factors.len() as u64
+            }
+        };
+        (6 + 2 * factors) * self.chunks.len() as u64 + 1
     }
 }
 
