@@ -36,7 +36,7 @@ mod tests {
     /// The polynomial of degree 20 shrinks an error at the edge of the spectrum as 1 / T_20(1/ρ).
     #[test]
     fn factors_give_chebyshev_polynomials() {
-        let rho = 0.98;
+        let rho: f64 = 0.98;
         let (mut before, mut now) = (1.0, 1.0);
         for (k, omega) in chebyshev_factors(rho).take(20).enumerate() {
             let next = if k == 0 {
@@ -46,7 +46,7 @@ mod tests {
             };
             (before, now) = (now, next);
         }
-        let expected = 1.0 / (20.0 * (1.0 / rho as f64).acosh()).cosh();
+        let expected = 1.0 / (20.0 * (1.0 / rho).acosh()).cosh();
         assert!((now - expected).abs() < 1e-12, "{now} {expected}");
     }
 }

@@ -7,7 +7,7 @@ use std::{
 
 use glam::DVec3;
 
-use super::{Pbf, PlacedMesh, Scene, Stop, flip::Flip};
+use super::{Iteration, Pbf, PlacedMesh, Scene, Stop, flip::Flip};
 use crate::domain::{bounds::Bounds, motion::Motion};
 
 /// Where a cache keeps its own copy of a mesh file: `assets/NAME-HASH.EXT`, so that two files of
