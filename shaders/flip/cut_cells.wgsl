@@ -2,14 +2,13 @@
 // Batty et al. 2007, exact for the walls and for planes in meshes.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
-#import "shared/bricks.wgsl"
+#import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_walls.wgsl"
 #ifdef SOLIDS
 #import "shared/flip_solid.wgsl"
 #import "shared/flip_cut.wgsl"
 #endif
 
-@group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read_write> cell_kind: array<u32>;
 @group(0) @binding(4) var<storage, read_write> face_open: array<f32>;
@@ -26,6 +25,27 @@ const AIR = 0u;
 const FLUID = 1u;
 const SOLID = 2u;
 
+fn particles_in(element: u32) -> u32 {
+    let is_wet = element < params.wet_cells + CELLS;
+    return select(0u, cell_start[element + 1u] - cell_start[element], is_wet);
+}
+
+// Particles beside a cell of which a solid or wall leaves less than half, across the faces that it leaves at least half
+// of. Such a cell is water where that is: it may hold no particle of its own, and were it air, a wall would leak
+// pressure all the way down.
+fn water_beside(element: u32, volume: f32, lower: vec3f, upper: vec3f) -> u32 {
+    var count = 0u;
+    for (var once = 0; once < select(0, 1, volume < 0.5 && element < params.wet_cells + CELLS); once++) {
+        open_neighborhood(element);
+        for (var axis = 0; axis < 3; axis++) {
+            let step = vec3i(vec3i(axis) == vec3i(0, 1, 2));
+            count += select(0u, particles_in(element_at(-step)), lower[axis] >= 0.5);
+            count += select(0u, particles_in(element_at(step)), upper[axis] >= 0.5);
+        }
+    }
+    return count;
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -37,9 +57,7 @@ fn main(
         return;
     }
     let element = thread + CELLS;
-    let slot = element / CELLS;
-    let brick = vec3u(bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
-    let cell = vec3f(8u * brick + local_cell(element % CELLS));
+    let cell = vec3f(own_cell(element));
     let extent = open_extent(cell);
     let across = extent.yzx * extent.zxy;
     var lower = select(vec3f(0.0), across, is_plane_open(cell));
@@ -99,11 +117,8 @@ fn main(
     open_volume[element] = volume;
 #endif
     let is_open = volume >= ON_FACE * ON_FACE || any(lower + upper > vec3f(0.0));
-    var count = 0u;
-    if thread < params.wet_cells {
-        count = cell_start[element + 1u] - cell_start[element];
-    }
-    cell_kind[element] = select(SOLID, select(AIR, FLUID, count > 0u), is_open);
+    let fluid = particles_in(element) + water_beside(element, volume, lower, upper);
+    cell_kind[element] = select(SOLID, select(AIR, FLUID, fluid > 0u), is_open);
     face_open[element] = lower.x;
     face_open[params.stride + element] = lower.y;
     face_open[2u * params.stride + element] = lower.z;

@@ -23,6 +23,12 @@
 // Of a cell's excess a substep corrects at most this much either way: displacements stay well below a cell.
 const MOST_EXCESS = 0.5;
 
+// Integral of the hat from minus infinity to t.
+fn hat_below(t: vec3f) -> vec3f {
+    let s = 1.0 - min(abs(t), vec3f(1.0));
+    return select(1.0 - 0.5 * s * s, 0.5 * s * s, t < vec3f(0.0));
+}
+
 // Mean of a hat over the cell of its centre, and over the ones beside it.
 const OWN_SHARE = 0.75;
 const OTHER_SHARE = 0.125;
@@ -67,17 +73,27 @@ fn main(
             }
         }
     }
-#ifndef SOLIDS
+    // What the walls leave of the hats, exactly; meshes take their part of it cell by cell.
     let cell = vec3f(own_cell(element));
-    let along = OWN_SHARE * open_extent(cell) + OTHER_SHARE * (open_extent(cell - 1.0) + open_extent(cell + 1.0));
-    room = along.x * along.y * along.z;
+    let center = cell + 0.5;
+    let along = hat_below(params.cut_max - center) - hat_below(params.cut_min - center);
+    let of_walls = along.x * along.y * along.z;
+    var volume = 0.0;
+#ifdef SOLIDS
+    let cells = OWN_SHARE * open_extent(cell) + OTHER_SHARE * (open_extent(cell - 1.0) + open_extent(cell + 1.0));
+    room *= of_walls / max(cells.x * cells.y * cells.z, 1e-6);
+    volume = open_volume[element];
+#else
+    room = of_walls;
+    let extent = open_extent(cell);
+    volume = extent.x * extent.y * extent.z;
 #endif
     let is_water = cell_kind[element] == 1u;
     let relative = sum * params.particle_share / max(room, 0.02);
     density[element] = select(0.0, relative, is_water);
 #ifdef CORRECTION
     let excess = clamp(relative - 1.0, select(-MOST_EXCESS, 0.0, touches_air), MOST_EXCESS);
-    density_excess[element] = select(0.0, excess, is_water);
+    density_excess[element] = select(0.0, excess * volume, is_water);
 #endif
 #ifdef GHOST_FLUID
     // Across a flat surface the hats' sum is 1/2 at it and falls as s - s²/2 with the distance s in cells.

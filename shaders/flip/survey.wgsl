@@ -28,10 +28,18 @@ fn main(
         let v = velocity[i].xyz;
         not_finite += u32(!is_finite(x) || !is_finite(v));
         fastest = max(fastest, dot(v, v));
-        let index = table_index(cell_of_place(x * params.inverse_cell_size));
+        let cell = cell_of_place(x * params.inverse_cell_size);
+        let index = table_index(cell);
         if index != last {
             atomicStore(&survey[4u + index], 1u);
             last = index;
+        }
+        // The outermost cells may be too thin to hold particles, and are water all the same.
+        let outer = select(cell, cell + 1u, cell + 2u == params.cells);
+        if any((outer & vec3u(7u)) < (cell & vec3u(7u))) {
+            atomicStore(&survey[4u + table_index(vec3u(outer.x, cell.yz))], 1u);
+            atomicStore(&survey[4u + table_index(vec3u(cell.x, outer.y, cell.z))], 1u);
+            atomicStore(&survey[4u + table_index(vec3u(cell.xy, outer.z))], 1u);
         }
     }
     if first < end {

@@ -189,7 +189,6 @@ impl PressureSolver {
                 .max(1),
             has_pockets: false,
         };
-        self.pockets = 0;
         self.set_sizes(program, bricks.active, used);
         program.upload("pressure_bricks", 0, &brick_records(bricks, used.len()));
     }
@@ -224,6 +223,8 @@ impl PressureSolver {
     ) -> Result<Projected, SolveError> {
         let scale = step.rest_density * f64::from(self.phase.cell_size) / step.time_step;
         self.phase.pressure_scale = scale as f32;
+        // Each substep looks for pockets anew.
+        self.phase.has_pockets = 0;
         self.shape.has_pockets = false;
         self.pockets = 0;
         let tolerance = self.settings.tolerance;
