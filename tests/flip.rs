@@ -316,6 +316,61 @@ fn no_water_is_a_frame_too() {
     );
 }
 
+/// A box full to its ceiling, by itself and beside an open tank: its pocket is found in every substep, not only in
+/// the first, and nothing moves; a frame computed from what the one before left has the same bytes.
+#[test]
+fn a_full_box_stays_as_it_is() {
+    let context = context();
+    let mut scene = scene([8.0, 10.0, 12.0]);
+    scene.shot.frames_per_second = 24.0;
+    let particles = lattice([0.0; 3], [16, 20, 24], [0.5 * DX; 3]);
+    let mut solver = solver(&context, &scene, &particles);
+    let mut before = particles;
+    for frame in 0..6 {
+        let (state, report) = solver.advance().unwrap();
+        let projection = report.projection.unwrap();
+        assert_eq!(
+            (projection.pockets, projection.missed),
+            (1, 0),
+            "frame {frame}"
+        );
+        assert!(report.max_speed < 1e-4 && report.capped == 0, "{report:?}");
+        let mut again = rig::solver(&context, &scene, &before);
+        again.load(frame, &before).unwrap();
+        assert!(again.advance().unwrap().0 == state, "frame {frame}");
+        before = state;
+    }
+}
+
+/// Mean density error and mean height after half a second of rest in a tank whose last cells along z are `part` wide.
+fn rest_in_thin_cells(part: f64) -> (f64, f64) {
+    let mut scene = scene([12.0, 12.0, 8.0 + part]);
+    scene.shot.frames_per_second = 24.0;
+    let particles = lattice([0.0; 3], [24, 16, 16], [0.5 * DX; 3]);
+    let (state, report) = run(&context(), &scene, &particles, 12);
+    let height = state.position.iter().map(|x| f64::from(x[1])).sum::<f64>() / state.len() as f64;
+    (report.density_error_mean, height)
+}
+
+/// A domain that is no multiple of the cell size holds still water, however thin its last cells; they hold no
+/// particle at the start, and were they air, they would leak the pressure: 72 % of density error at a tenth of a cell
+/// before. The lattice ends at the last whole cell, so that the water sinks by what it has to fill: `part` of 8 cells,
+/// of a mean height of 0.4 m.
+#[test]
+fn still_water_in_a_domain_of_any_size() {
+    for part in [0.05, 0.1, 0.2, 0.3] {
+        let (error, height) = rest_in_thin_cells(part);
+        println!("{part}: density error {error:.4}, height {height:.4}");
+        assert!(error < 0.01, "{part}: {error}");
+        let settled = 0.4 * 8.0 / (8.0 + part);
+        // A tenth of a cell.
+        assert!(
+            (height - settled).abs() < 0.1 * DX,
+            "{part}: {height} {settled}"
+        );
+    }
+}
+
 #[test]
 fn a_drop_lands_and_stays() {
     let mut scene = scene([16.0, 40.0, 16.0]);
@@ -519,7 +574,7 @@ fn a_missed_projection_is_told_and_past_its_limit_stops() {
     let (_, report) = run(&context, &scene, &particles, 1);
     let projection = report.projection.unwrap();
     assert!(
-        projection.missed == 1 && projection.residual > 1e-5,
+        projection.missed >= 1 && projection.residual > 1e-5,
         "{projection:?}"
     );
     flip(&mut scene).pressure.residual_limit = 1e-3;

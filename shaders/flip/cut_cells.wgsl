@@ -30,18 +30,16 @@ fn particles_in(element: u32) -> u32 {
     return select(0u, cell_start[element + 1u] - cell_start[element], is_wet);
 }
 
-// Particles beside a cell of which a solid or wall leaves less than half, across the faces that it leaves at least half
-// of. Such a cell is water where that is: it may hold no particle of its own, and were it air, a wall would leak
-// pressure all the way down.
-fn water_beside(element: u32, volume: f32, lower: vec3f, upper: vec3f) -> u32 {
+// Particles beside a cell of which the walls leave less than half along an axis: in the cell inward of it. Such a cell
+// is water where that is: it may hold no particle of its own, and were it air, a wall would leak pressure all the way
+// down.
+fn water_beside(element: u32, cell: vec3f, extent: vec3f) -> u32 {
     var count = 0u;
-    for (var once = 0; once < select(0, 1, volume < 0.5 && element < params.wet_cells + CELLS); once++) {
+    let is_thin = extent < vec3f(0.5);
+    for (var once = 0; once < select(0, 1, any(is_thin) && element < params.wet_cells + CELLS); once++) {
         open_neighborhood(element);
-        for (var axis = 0; axis < 3; axis++) {
-            let step = vec3i(vec3i(axis) == vec3i(0, 1, 2));
-            count += select(0u, particles_in(element_at(-step)), lower[axis] >= 0.5);
-            count += select(0u, particles_in(element_at(step)), upper[axis] >= 0.5);
-        }
+        let inward = select(vec3i(1), vec3i(-1), is_plane_open(cell));
+        count = particles_in(element_at(select(vec3i(0), inward, is_thin)));
     }
     return count;
 }
@@ -117,7 +115,7 @@ fn main(
     open_volume[element] = volume;
 #endif
     let is_open = volume >= ON_FACE * ON_FACE || any(lower + upper > vec3f(0.0));
-    let fluid = particles_in(element) + water_beside(element, volume, lower, upper);
+    let fluid = particles_in(element) + water_beside(element, cell, extent);
     cell_kind[element] = select(SOLID, select(AIR, FLUID, fluid > 0u), is_open);
     face_open[element] = lower.x;
     face_open[params.stride + element] = lower.y;

@@ -212,12 +212,27 @@ fn line(frame: u32, report: &StepReport, seconds: f64) -> String {
     )
 }
 
+/// Mean density error above which the water is plainly wrong; splashes stay below 0.1.
+const DENSE: f64 = 0.15;
+
 /// Mean divergence of a pocket against the largest anywhere, above which it is not rounding.
 const INCOMPATIBLE: f64 = 1e-3;
 
 /// What must not be passed over, and the same for farms.
 fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
     let mut warnings = Vec::new();
+    if report.density_error_mean > DENSE {
+        warnings.push((
+            format!(
+                "warning: frame {frame}: the water is {:.0} % too dense on average: its volume is not kept",
+                100.0 * report.density_error_mean
+            ),
+            json!({
+                "event": "warning", "what": "density", "frame": frame,
+                "density_error_mean": report.density_error_mean,
+            }),
+        ));
+    }
     let Some(projection) = &report.projection else {
         return warnings;
     };
@@ -291,6 +306,16 @@ mod tests {
         let warnings = warnings(7, &report(Some(missed)));
         assert!(warnings[0].0.contains("frame 7: 2 pressure solves missed"));
         assert_eq!(warnings[0].1["missed"], 2);
+        let dense = StepReport {
+            density_error_mean: 0.4,
+            ..report(None)
+        };
+        let warnings = self::warnings(3, &dense);
+        assert!(
+            warnings[0]
+                .0
+                .contains("frame 3: the water is 40 % too dense")
+        );
         let squeezed = Projection {
             incompatible: 0.5,
             ..good

@@ -41,7 +41,7 @@ pub struct Projection {
     pub divergence_before: f64,
     /// The same after it.
     pub divergence_after: f64,
-    /// Solves that ended above their tolerance.
+    /// Solves, the density correction's among them, that ended above their tolerance.
     pub missed: u32,
     /// Most bodies of water at once that no air touched.
     pub pockets: u32,

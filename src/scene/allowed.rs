@@ -184,7 +184,7 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "solver.flip.particles_per_cell",
-        "a whole number from 1 to 64",
+        "a whole number from 4 to 64",
     ),
     ("solver.flip.transfer", "\"flip\" or \"apic\""),
     ("solver.flip.pic_blend", "a number from 0 to 1"),

@@ -189,11 +189,22 @@ fn stop(doc: &Document<'_>, spec: &PbfSpec) -> Result<Stop> {
     }
 }
 
+/// Fewer than four in a cell do not tell its density.
+fn particles_per_cell(doc: &Document<'_>, value: &Option<Spanned<i64>>) -> Result<u32> {
+    let count = whole_or(doc, value, 8, 64)?;
+    match value {
+        Some(value) if count < 4 => {
+            Err(doc.fault_at(value.span(), format!("{count} is out of range")))
+        }
+        _ => Ok(count),
+    }
+}
+
 fn flip(doc: &Document<'_>, spec: &FlipSpec) -> Result<Flip> {
     let cell_size = number(doc, &spec.cell_size, |v| v > 0.0)?;
     Ok(Flip {
         cell_size,
-        particles_per_cell: whole_or(doc, &spec.particles_per_cell, 8, 64)?,
+        particles_per_cell: particles_per_cell(doc, &spec.particles_per_cell)?,
         transfer: choice_or(
             doc,
             &spec.transfer,

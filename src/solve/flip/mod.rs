@@ -211,7 +211,9 @@ impl Flip {
         let (wanted, substep) = step::next(&self.scene, start, remaining, survey.speed);
         if f64::from(done) + wanted > f64::from(flip.max_substeps) {
             return self.numbers(format!(
-                "{:.3} m/s asks for {} substeps at cfl {}, and solver.flip.max_substeps is {}",
+                "up to {:.3} m/s (particles {:.3}; gravity, wave makers and moving solids counted in) asks for {} substeps \
+                 at cfl {}, and solver.flip.max_substeps is {}",
+                substep.displacement * flip.cell_size / substep.length,
                 survey.speed,
                 f64::from(done) + wanted,
                 flip.cfl,
@@ -283,6 +285,7 @@ impl Flip {
         if flip.density_correction {
             let corrected = self.pressure.correct(&self.program, self.timer.as_mut())?;
             told.projection.correction_iterations += u64::from(corrected.iterations);
+            told.projection.missed += u32::from(corrected.is_missed);
         }
         self.recordings
             .to_particles
