@@ -30,15 +30,17 @@ fn particles_in(element: u32) -> u32 {
     return select(0u, cell_start[element + 1u] - cell_start[element], is_wet);
 }
 
-// Particles beside a cell of which the walls leave less than half along an axis: in the cell inward of it. Such a cell
+// Particles beside a cell of which walls at rest leave less than half along an axis: in the cell inward of it. Such a cell
 // is water where that is: it may hold no particle of its own, and were it air, a wall would leak pressure all the way
 // down.
 fn water_beside(element: u32, cell: vec3f, extent: vec3f) -> u32 {
     var count = 0u;
-    let is_thin = extent < vec3f(0.5);
+    let is_low = !is_plane_open(cell);
+    let still = select(params.wall_velocity_max, params.wall_velocity_min, is_low) == vec3f(0.0);
+    let is_thin = (extent < vec3f(0.5)) & still;
     for (var once = 0; once < select(0, 1, any(is_thin) && element < params.wet_cells + CELLS); once++) {
         open_neighborhood(element);
-        let inward = select(vec3i(1), vec3i(-1), is_plane_open(cell));
+        let inward = select(vec3i(-1), vec3i(1), is_low);
         count = particles_in(element_at(select(vec3i(0), inward, is_thin)));
     }
     return count;

@@ -519,7 +519,7 @@ pub const FLIP_FAULTS: &[Fault] = &[
     ),
     (
         "cell_size = 0.2",
-        "cell_size = 4.2\nparticles_per_cell = 1",
+        "cell_size = 4.2\nparticles_per_cell = 4",
         15,
         &["water.block[0].max", "too thin for one layer"],
     ),
