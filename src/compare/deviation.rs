@@ -1,0 +1,217 @@
+//! The error of one set of values against another, the reference.
+
+use serde::Serialize;
+
+use crate::domain::statistics::percentile;
+
+/// What can be compared: scalars and 3-vectors, f32 or f64.
+pub trait Value: Copy {
+    /// The Euclidean norm.
+    fn norm(self) -> f64;
+    /// The norm of the difference, in f64; infinite where either value is not finite, so that a NaN is the
+    /// worst error and never none.
+    fn error(self, reference: Self) -> f64;
+}
+
+impl Value for f64 {
+    fn norm(self) -> f64 {
+        self.abs()
+    }
+
+    fn error(self, reference: Self) -> f64 {
+        finite_or_worst((self - reference).abs())
+    }
+}
+
+impl Value for f32 {
+    fn norm(self) -> f64 {
+        f64::from(self).abs()
+    }
+
+    fn error(self, reference: Self) -> f64 {
+        f64::from(self).error(reference.into())
+    }
+}
+
+impl Value for [f64; 3] {
+    fn norm(self) -> f64 {
+        glam::DVec3::from(self).length()
+    }
+
+    fn error(self, reference: Self) -> f64 {
+        finite_or_worst(glam::DVec3::from(self).distance(reference.into()))
+    }
+}
+
+impl Value for [f32; 3] {
+    fn norm(self) -> f64 {
+        self.map(f64::from).norm()
+    }
+
+    fn error(self, reference: Self) -> f64 {
+        self.map(f64::from).error(reference.map(f64::from))
+    }
+}
+
+fn finite_or_worst(error: f64) -> f64 {
+    if error.is_finite() {
+        error
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// The error |a − b| of values a against their reference b, in the unit of the values; of vectors the norm.
+/// All zero where there is no value. JSON has no infinity: there it is null.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Deviation {
+    /// Pairs compared.
+    pub count: usize,
+    /// Largest error.
+    pub max: f64,
+    /// Index of the first pair with the largest error; `None` where every error is zero.
+    pub max_at: Option<usize>,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// The error that half of the pairs do not exceed.
+    pub p50: f64,
+    /// The error that 99 % of the pairs do not exceed.
+    pub p99: f64,
+    /// Root mean square of the reference.
+    pub reference_rms: f64,
+    /// Largest norm in the reference.
+    pub reference_max: f64,
+}
+
+impl Deviation {
+    /// Of pairs of a value and its reference.
+    pub fn of<T: Value>(pairs: impl IntoIterator<Item = (T, T)>) -> Self {
+        let mut reference_squares = 0.0;
+        let mut this = Self::default();
+        let errors: Vec<f64> = pairs
+            .into_iter()
+            .map(|(value, reference)| {
+                let norm = reference.norm();
+                reference_squares += norm * norm;
+                this.reference_max = this.reference_max.max(norm);
+                value.error(reference)
+            })
+            .collect();
+        for (index, &error) in errors.iter().enumerate() {
+            if error > this.max {
+                (this.max, this.max_at) = (error, Some(index));
+            }
+        }
+        this.count = errors.len();
+        let mean = |squares: f64| (squares / errors.len().max(1) as f64).sqrt();
+        this.rms = mean(errors.iter().map(|error| error * error).sum());
+        this.reference_rms = mean(reference_squares);
+        this.p50 = percentile(errors.clone(), 0.5).unwrap_or(0.0);
+        this.p99 = percentile(errors, 0.99).unwrap_or(0.0);
+        this
+    }
+
+    /// Of one array against another.
+    ///
+    /// # Panics
+    /// The lengths differ.
+    pub fn between<T: Value>(values: &[T], reference: &[T]) -> Self {
+        assert_eq!(values.len(), reference.len(), "pairs of values");
+        Self::of(values.iter().copied().zip(reference.iter().copied()))
+    }
+
+    /// RMS error over the reference's RMS: ‖a − b‖/‖b‖. 0 where there is no error, infinite where there is
+    /// one against a reference of zeros.
+    pub fn relative_rms(&self) -> f64 {
+        relative(self.rms, self.reference_rms)
+    }
+
+    /// Largest error over the largest norm in the reference, with the same rule for zeros.
+    pub fn relative_max(&self) -> f64 {
+        relative(self.max, self.reference_max)
+    }
+}
+
+/// Error over scale; 0 for no error, whatever the scale, and infinite where the ratio is no number.
+pub fn relative(error: f64, scale: f64) -> f64 {
+    if error == 0.0 {
+        0.0
+    } else {
+        finite_or_worst(error / scale.abs())
+    }
+}
+
+/// Index of the first pair whose error is above `tolerance`.
+pub fn first_over<T: Value>(
+    pairs: impl IntoIterator<Item = (T, T)>,
+    tolerance: f64,
+) -> Option<usize> {
+    pairs
+        .into_iter()
+        .position(|(value, reference)| value.error(reference) > tolerance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_values_have_no_error_and_none_have_none() {
+        let values = [1.0, -2.0, 3.0];
+        let found = Deviation::between(&values, &values);
+        assert_eq!((found.max, found.max_at, found.rms), (0.0, None, 0.0));
+        assert_eq!((found.count, found.reference_max), (3, 3.0));
+        assert_eq!(found.relative_rms(), 0.0);
+        assert_eq!(Deviation::between::<f64>(&[], &[]), Deviation::default());
+        // No error against a reference of zeros is no error.
+        assert_eq!(Deviation::between(&[0.0], &[0.0]).relative_max(), 0.0);
+    }
+
+    #[test]
+    fn figures_of_a_known_error() {
+        // Errors 0, 1, ..., 99: the 50th of them is 49, the 99th is 98.
+        let reference = [2.0; 100];
+        let values: Vec<f64> = (0..100).map(|k| 2.0 - f64::from(k)).collect();
+        let found = Deviation::between(&values, &reference);
+        assert_eq!((found.max, found.max_at), (99.0, Some(99)));
+        assert_eq!((found.p50, found.p99), (49.0, 98.0));
+        // Σ k² for k < n is (n−1) n (2n−1) / 6.
+        assert!((found.rms - (99.0 * 199.0 / 6.0_f64).sqrt()).abs() < 1e-12);
+        assert_eq!(found.reference_rms, 2.0);
+        assert_eq!(found.relative_max(), 49.5);
+        assert_eq!(found.relative_rms(), found.rms / 2.0);
+        let pairs = || values.iter().copied().zip(reference);
+        assert_eq!(first_over(pairs(), 0.0), Some(1));
+        assert_eq!(first_over(pairs(), 98.5), Some(99));
+        assert_eq!(first_over(pairs(), 99.0), None);
+    }
+
+    #[test]
+    fn vectors_are_compared_by_the_norm() {
+        let found = Deviation::between(&[[3.0f32, 0.0, 4.0]], &[[0.0, 0.0, 0.0]]);
+        assert_eq!((found.max, found.rms), (5.0, 5.0));
+        assert_eq!(found.relative_rms(), f64::INFINITY);
+        // Widened before the difference is taken: 1 and its f32 neighbour.
+        let next = f32::from_bits(1.0f32.to_bits() + 1);
+        let found = Deviation::between(&[[next, 0.0, 0.0]], &[[1.0, 0.0, 0.0]]);
+        assert_eq!(found.max, f64::from(f32::EPSILON));
+    }
+
+    #[test]
+    fn what_is_not_finite_is_the_worst() {
+        for (value, reference) in [
+            (f64::NAN, 0.0),
+            (0.0, f64::NAN),
+            (f64::NAN, f64::NAN),
+            (f64::INFINITY, f64::INFINITY),
+        ] {
+            let pairs = [(1.0, 1.0), (value, reference), (5.0, 1.0)];
+            let found = Deviation::of(pairs);
+            assert_eq!((found.max, found.max_at), (f64::INFINITY, Some(1)));
+            assert_eq!((found.rms, found.p50), (f64::INFINITY, 4.0));
+            assert_eq!(found.relative_rms(), f64::INFINITY);
+            assert_eq!(found.relative_max(), f64::INFINITY);
+            assert_eq!(first_over(pairs, 1e300), Some(1));
+        }
+    }
+}

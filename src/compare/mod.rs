@@ -1,0 +1,13 @@
+//! By how much results differ: pure functions from values to figures. `stage` reads the files and says
+//! what is compared with what.
+//!
+//! In every comparison of two results b is the reference.
+
+pub mod baseline;
+pub mod check;
+pub mod deviation;
+pub mod frames;
+pub mod pictures;
+pub mod rounding;
+
+pub use deviation::{Deviation, Value};
