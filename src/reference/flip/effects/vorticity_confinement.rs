@@ -1,0 +1,33 @@
+//! Vorticity confinement (Fedkiw et al. 2001).
+
+use glam::DVec3;
+
+use super::Water;
+use crate::{
+    reference::{
+        Timings,
+        flip::{grid_confinement, grid_curl},
+    },
+    scene::effects::vorticity_confinement::Settings,
+};
+
+pub(super) fn apply(
+    settings: &Settings,
+    water: Water<'_>,
+    velocity: &mut Vec<DVec3>,
+    timings: &mut Timings,
+) {
+    let Water {
+        model,
+        step,
+        bricks,
+        room,
+    } = water;
+    let vorticity = timings.time("effects/grid_curl", || {
+        grid_curl(model, bricks, room, velocity)
+    });
+    *velocity = timings.time("effects/grid_confinement", || {
+        let strength = settings.strength;
+        grid_confinement(model, step, bricks, room, strength, &vorticity, velocity)
+    });
+}

@@ -1,0 +1,27 @@
+//! PIC/FLIP (Zhu and Bridson 2005) and APIC (Jiang et al. 2015), the same model as on the GPU.
+//!
+//! Positions are relative to the domain's least corner, in metres; grids are laid out on the same bricks as the GPU's,
+//! so that arrays compare element by element, faces as one vector a cell (see [`planes`]). A function under a GPU
+//! pass's name is its twin; where the GPU splits a pass for speed, one twin does both halves. [`Flip`] runs whole
+//! frames.
+
+mod effects;
+mod grid;
+mod model;
+mod pressure;
+mod rotation;
+mod solids;
+mod solver;
+mod sort;
+mod to_grid;
+mod to_particles;
+
+pub use grid::planes;
+pub use model::{Model, Step};
+pub use pressure::{Waters, density_source};
+pub use rotation::{grid_confinement, grid_curl};
+pub use solids::Solid;
+pub use solver::{Flip, Projected, Trace};
+pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
+pub use to_grid::{Centers, Faces, Room, cut_cells, gather_centers, gather_faces};
+pub use to_particles::{Given, Moved, advect, extrapolate, find_change, grid_to_particle};

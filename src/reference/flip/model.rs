@@ -1,0 +1,194 @@
+//! What stays the same over a bake, and what a substep knows.
+
+use glam::{BVec3, DVec3};
+
+use super::solids::Solid;
+use crate::{
+    domain::{
+        boundary::Boundary,
+        bounds::Bounds,
+        bricks::{Bricks, EDGE, table_dims},
+        flip::{CAP, CONTACT},
+        signed_distance::SignedDistance,
+    },
+    scene::{
+        Scene,
+        flip::{Flip, Surface},
+        plan::{grid_dims, layers, stored_cells},
+        step::Substep,
+    },
+};
+
+/// Nearer than this to a cell's face, in cells, counts as on it: the GPU's f32 positions round below it.
+pub(super) const ON_FACE: f64 = 1e-3;
+
+/// The scene, its grid and its solids; positions are relative to the domain's least corner.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// As given.
+    pub scene: Scene,
+    /// Cells that the domain takes along each axis; one more is stored, for its upper faces.
+    pub cells: [u32; 3],
+    /// Distances to solids at the start: to those at rest, if there are any, as one; then to each that moves.
+    pub(super) solids: Vec<SignedDistance>,
+    /// How many of them are at rest.
+    at_rest: usize,
+}
+
+/// One substep.
+#[derive(Clone, Debug)]
+pub struct Step<'a> {
+    /// Δt, seconds.
+    pub length: f64,
+    /// Gravity times Δt, m/s.
+    pub velocity_step: DVec3,
+    /// Faces of the box at the end, metres: where particles are kept.
+    pub walls: Bounds,
+    /// Faces of the box at the start, in cells: what cuts cells.
+    pub cut: Bounds,
+    /// Of the least and of the greatest faces, each along its axis, m/s.
+    pub wall_velocity: [DVec3; 2],
+    /// α of this substep.
+    pub pic_blend: f64,
+    /// Layers of faces that get a velocity.
+    pub layers: usize,
+    /// Solids as they stand at the start.
+    pub solids: Vec<Solid<'a>>,
+}
+
+impl Model {
+    /// Of a scene that FLIP solves, and its solids in world space.
+    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+        let local = |grid: &SignedDistance| SignedDistance {
+            origin: grid.origin - scene.domain.min,
+            ..grid.clone()
+        };
+        let solids = boundary.distance.iter().chain(&boundary.moving);
+        Self {
+            cells: grid_dims(&scene.domain, scene.solver.flip().cell_size),
+            solids: solids.map(local).collect(),
+            at_rest: usize::from(boundary.distance.is_some()),
+            scene: scene.clone(),
+        }
+    }
+
+    /// FLIP's settings.
+    pub fn settings(&self) -> &Flip {
+        self.scene.solver.flip()
+    }
+
+    /// Δx, metres.
+    pub fn cell_size(&self) -> f64 {
+        self.settings().cell_size
+    }
+
+    /// Least distance of a particle from walls and solids, metres.
+    pub(super) fn contact_distance(&self) -> f64 {
+        CONTACT * self.settings().particle_spacing()
+    }
+
+    /// Displacement cap of a substep, metres.
+    pub(super) fn max_displacement(&self) -> f64 {
+        CAP * self.settings().cfl * self.cell_size()
+    }
+
+    /// Whether the surface counts in the pressure.
+    pub(super) fn has_ghost_fluid(&self) -> bool {
+        self.settings().surface == Surface::GhostFluid
+    }
+
+    /// The cell of a place, metres; places at or beyond the domain's faces count to the outermost cells.
+    pub fn cell_of(&self, x: DVec3) -> [u32; 3] {
+        let place = (x / self.cell_size()).floor().to_array();
+        // A cast saturates: what is below 0 becomes 0.
+        std::array::from_fn(|axis| (place[axis] as u32).min(self.cells[axis] - 1))
+    }
+
+    /// One flag a brick, none set.
+    pub(super) fn no_water(&self) -> Vec<bool> {
+        let dims = table_dims(stored_cells(self.cells));
+        vec![false; dims.iter().map(|&n| n as usize).product()]
+    }
+
+    /// Place of a cell's brick among the flags.
+    pub(super) fn brick_index(&self, cell: [u32; 3]) -> usize {
+        let dims = table_dims(stored_cells(self.cells));
+        let [x, y, z] = cell.map(|c| c / EDGE);
+        ((z * dims[1] + y) * dims[0] + x) as usize
+    }
+
+    /// Bricks with water, and those that `layers` of faces beyond it reach; their elements are those of the GPU.
+    pub fn bricks(&self, is_wet: &[bool], layers: usize) -> Bricks {
+        let reach = (layers as u32).div_ceil(EDGE);
+        Bricks::new(stored_cells(self.cells), is_wet, reach, 1)
+    }
+
+    /// What `substep` knows.
+    pub fn step(&self, substep: &Substep) -> Step<'_> {
+        let Substep { start, length, .. } = *substep;
+        let (before, after) = (self.scene.walls(start), self.scene.walls(start + length));
+        Step {
+            length,
+            velocity_step: self.scene.water.gravity * length,
+            walls: after,
+            cut: Bounds {
+                min: before.min / self.cell_size(),
+                max: before.max / self.cell_size(),
+            },
+            wall_velocity: [
+                (after.min - before.min) / length,
+                (after.max - before.max) / length,
+            ],
+            pic_blend: self.scene.substep_pic_blend(length),
+            layers: layers(substep.displacement),
+            solids: self.solids_at(start, length),
+        }
+    }
+
+    fn solids_at(&self, start: f64, length: f64) -> Vec<Solid<'_>> {
+        let moving = self.scene.moving_solids.iter().map(|solid| {
+            let before = solid.displacement(start);
+            (
+                before,
+                (solid.displacement(start + length) - before) / length,
+            )
+        });
+        let ways = std::iter::repeat_n((DVec3::ZERO, DVec3::ZERO), self.at_rest).chain(moving);
+        (self.solids.iter().zip(ways))
+            .map(|(grid, (way, velocity))| Solid {
+                grid,
+                origin: grid.origin + way,
+                velocity,
+            })
+            .collect()
+    }
+}
+
+/// The six walls as half-spaces that cut cells; a cell is named by its least corner, in cells.
+impl Step<'_> {
+    /// Open part of a cell's extent along each axis.
+    pub(super) fn open_extent(&self, cell: DVec3) -> DVec3 {
+        let length = (cell + 1.0).min(self.cut.max) - cell.max(self.cut.min);
+        DVec3::from_array(length.to_array().map(|length| {
+            if length > 1.0 - ON_FACE {
+                1.0
+            } else if length < ON_FACE {
+                0.0
+            } else {
+                length
+            }
+        }))
+    }
+
+    /// Whether the planes of a cell's lower faces lie in the open.
+    pub(super) fn is_plane_open(&self, cell: DVec3) -> BVec3 {
+        cell.cmpgt(self.cut.min + ON_FACE) & cell.cmplt(self.cut.max - ON_FACE)
+    }
+
+    /// Along its own axis, the velocity of what closes the planes of a cell's lower faces, m/s.
+    pub(super) fn closing_velocity(&self, cell: DVec3) -> DVec3 {
+        let [low, high] = self.wall_velocity;
+        let high = DVec3::select(cell.cmpge(self.cut.max - ON_FACE), high, DVec3::ZERO);
+        DVec3::select(cell.cmple(self.cut.min + ON_FACE), low, high)
+    }
+}

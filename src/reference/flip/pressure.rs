@@ -1,0 +1,107 @@
+//! Twins of the pressure passes about the solve; the system and its right-hand side are `domain::poisson`'s.
+
+use glam::DVec3;
+
+use super::{
+    Centers, Model, Room,
+    grid::{along, per_cell, planes},
+};
+use crate::domain::{
+    bricks::Bricks,
+    poisson::{AIR, Cells, FLUID, System},
+};
+
+/// What the linear system is built from, and what its solution is taken to the faces by.
+#[derive(Clone, Debug)]
+pub struct Waters<'a> {
+    bricks: &'a Bricks,
+    room: &'a Room,
+    /// As planes.
+    open: Vec<f64>,
+    distance: Option<&'a [f64]>,
+}
+
+impl<'a> Waters<'a> {
+    /// Of a substep's room; the surface counts where the scene asks for it.
+    pub fn new(model: &Model, bricks: &'a Bricks, room: &'a Room, centers: &'a Centers) -> Self {
+        Self {
+            bricks,
+            room,
+            open: planes(&room.open),
+            distance: model.has_ghost_fluid().then_some(&centers.distance),
+        }
+    }
+
+    /// As the builder takes it.
+    pub fn cells(&self) -> Cells<'_, f64> {
+        Cells {
+            bricks: self.bricks,
+            kind: &self.room.kind,
+            open: &self.open,
+            distance: self.distance,
+        }
+    }
+
+    /// `pressure/build_system`.
+    pub fn system(&self) -> System {
+        System::new(self.cells())
+    }
+
+    /// `pressure/divergence`: −(Σ ± f u + solid flux) of each row, m/s.
+    pub fn divergence(&self, system: &System, velocity: &[DVec3]) -> Vec<f64> {
+        system.rhs(self.cells(), &planes(velocity), &self.room.solid_flux)
+    }
+
+    /// A value a row as one an element; 0 where there is no row.
+    pub fn by_element(&self, system: &System, rows: &[f64]) -> Vec<f64> {
+        let mut values = vec![0.0; self.room.kind.len()];
+        for (&element, &value) in system.cell.iter().zip(rows) {
+            values[element as usize] = value;
+        }
+        values
+    }
+
+    /// q − q' across the lower faces, by the part of the way where water ends; 0 where no water may flow.
+    fn differences(&self, q: &[f64]) -> Vec<DVec3> {
+        let cells = self.cells();
+        let kind = |e: u32| self.room.kind[e as usize];
+        per_cell(self.bricks, |own| {
+            DVec3::from_array([0, 1, 2].map(|axis| {
+                let before = self.bricks.near(own, along(axis, -1));
+                if self.room.open[own as usize][axis] <= 0.0 {
+                    return 0.0;
+                }
+                let part = match (kind(before), kind(own)) {
+                    (FLUID, FLUID) => 1.0,
+                    (AIR, FLUID) => cells.theta(own, before),
+                    (FLUID, AIR) => cells.theta(before, own),
+                    _ => return 0.0,
+                };
+                (q[own as usize] - q[before as usize]) / part
+            }))
+        })
+    }
+
+    /// `pressure/project`: takes the gradient of q, by element, from the velocities.
+    pub fn project(&self, q: &[f64], velocity: &mut [DVec3]) {
+        for (velocity, difference) in velocity.iter_mut().zip(self.differences(q)) {
+            *velocity -= difference;
+        }
+    }
+
+    /// `pressure/displace`: displacements at the lower faces, metres, of the density correction's q, by element.
+    pub fn displace(&self, q: &[f64]) -> Vec<DVec3> {
+        self.differences(q)
+            .into_iter()
+            .map(|difference| -difference)
+            .collect()
+    }
+}
+
+/// `pressure/density_source`: the right-hand side of the density correction, metres.
+pub fn density_source(model: &Model, system: &System, centers: &Centers) -> Vec<f64> {
+    let excess = |&element: &u32| centers.excess[element as usize];
+    (system.cell.iter())
+        .map(|element| model.cell_size() * excess(element))
+        .collect()
+}

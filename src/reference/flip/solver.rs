@@ -1,0 +1,429 @@
+//! Substeps and whole frames of FLIP on the CPU.
+
+use glam::{DMat3, DVec3, Vec3};
+
+use super::{
+    Centers, Cloud, Faces, Model, Room, Sorted, Waters, advect, assign_cells, cut_cells,
+    density_source,
+    effects::{self, Water},
+    extrapolate, find_change, gather_centers, gather_faces, grid_to_particle, reorder, survey,
+};
+use crate::{
+    domain::{
+        boundary::Boundary,
+        bricks::{Bricks, CELLS},
+        gauge::Gauge,
+        particles::Particles,
+        poisson::System,
+        solver::{Projection, Solver, StepReport},
+    },
+    reference::{
+        ReferenceError, Timings,
+        poisson::{self, gradients::Solution},
+    },
+    scene::{
+        Scene,
+        flip::{AFFINE, Transfer},
+        step::Substep,
+    },
+};
+
+/// FLIP in f64. Frames are rounded to f32 as they are written, and the next one starts from what was written.
+pub struct Flip {
+    model: Model,
+    factor_budget: u64,
+    state: Particles,
+    frame: u32,
+    timings: Timings,
+    /// Of the last substep; none before the first.
+    field: Option<Field>,
+}
+
+/// A pressure on cells.
+struct Field {
+    bricks: Bricks,
+    kind: Vec<u32>,
+    /// Pa, by element.
+    pressure: Vec<f64>,
+}
+
+/// What the pressure of a substep did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Projected {
+    /// The rows.
+    pub system: System,
+    /// q of each, m/s; pascal after multiplication by ρ Δx / Δt.
+    pub solution: Solution,
+    /// Of the density correction's displacements, where there is one; metres.
+    pub correction: Option<Solution>,
+    /// Bodies of water that no air touches.
+    pub pockets: u32,
+    /// Largest |mean of ∇·u| over one of them, 1/s.
+    pub incompatible: f64,
+    /// Largest |∇·u| in a row's cell before and after, 1/s.
+    pub divergence: [f64; 2],
+}
+
+/// A substep from its beginning to its end, with all that stood between.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    /// Where the elements lie.
+    pub bricks: Bricks,
+    /// Particles as they were, by cell.
+    pub sorted: Sorted,
+    /// What of the cells is open.
+    pub room: Room,
+    /// Densities.
+    pub centers: Centers,
+    /// Velocities as the last layer of the extrapolation left them.
+    pub faces: Faces,
+    /// The solve.
+    pub projected: Projected,
+    /// Pa, by element; 0 where there is no water.
+    pub pressure: Vec<f64>,
+    /// Displacements of the density correction at the lower faces, metres, where there is one.
+    pub displacement: Option<Vec<DVec3>>,
+    /// Particles as they then are, in the order of `sorted`.
+    pub after: Cloud,
+    /// Particles that were slowed to the displacement cap.
+    pub capped: u64,
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, value| most.max(value.abs()))
+}
+
+impl Flip {
+    /// Of a scene that FLIP solves, and its solids. Pressures are those of conjugate gradients, which come as near to
+    /// the system's solution as a factor does, in a tenth of its time.
+    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+        Self {
+            model: Model::new(scene, boundary),
+            factor_budget: 0,
+            state: Particles::default(),
+            frame: 0,
+            timings: Timings::default(),
+            field: None,
+        }
+    }
+
+    /// Solves by sparse Cholesky factors of up to so many bytes from now on; see [`poisson::BUDGET`].
+    pub fn set_factor_budget(&mut self, bytes: u64) {
+        self.factor_budget = bytes;
+    }
+
+    /// Settings and solids.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The state as the passes take it.
+    pub fn cloud(&self) -> Cloud {
+        let state = &self.state;
+        let origin = self.model.scene.domain.min;
+        let affine = |k: usize| {
+            let at = |name: &str| f64::from(state.attributes.get(name).map_or(0.0, |v| v[k]));
+            let row = |first: usize| {
+                DVec3::new(
+                    at(AFFINE[first]),
+                    at(AFFINE[first + 1]),
+                    at(AFFINE[first + 2]),
+                )
+            };
+            DMat3::from_cols(row(0), row(3), row(6)).transpose()
+        };
+        let is_apic = self.model.settings().transfer == Transfer::Apic;
+        let with_affine = if is_apic { state.len() } else { 0 };
+        Cloud {
+            position: (state.position.iter()).map(|x| widen(x) - origin).collect(),
+            velocity: state.velocity.iter().map(widen).collect(),
+            affine: (0..with_affine).map(affine).collect(),
+            id: state.id.clone(),
+        }
+    }
+
+    /// One substep of `cloud` on bricks about `is_wet`.
+    ///
+    /// # Errors
+    /// A pressure system without a factor.
+    pub fn substep(
+        &mut self,
+        cloud: &Cloud,
+        is_wet: &[bool],
+        substep: &Substep,
+    ) -> Result<Trace, ReferenceError> {
+        let Self {
+            model,
+            timings,
+            factor_budget,
+            ..
+        } = self;
+        let step = model.step(substep);
+        let (bricks, sorted) = timings.time("flip/reorder", || {
+            let bricks = model.bricks(is_wet, step.layers);
+            let cell = assign_cells(model, &bricks, &cloud.position);
+            let sorted = reorder(&bricks, cloud, &cell);
+            (bricks, sorted)
+        });
+        let room = timings.time("flip/cut_cells", || {
+            cut_cells(model, &step, &bricks, &sorted)
+        });
+        let mut faces = timings.time("flip/gather_faces", || {
+            gather_faces(model, &step, &bricks, &sorted, &room)
+        });
+        let centers = timings.time("flip/gather_centers", || {
+            gather_centers(model, &step, &bricks, &sorted, &room)
+        });
+        let water = Water {
+            model,
+            step: &step,
+            bricks: &bricks,
+            room: &room,
+        };
+        effects::apply(&model.scene.effects, water, &mut faces.velocity, timings);
+        let waters = Waters::new(model, &bricks, &room, &centers);
+        let (projected, displacement) = project(
+            model,
+            timings,
+            *factor_budget,
+            &waters,
+            &centers,
+            &mut faces,
+        )?;
+        timings.time("flip/extrapolate", || {
+            find_change(model, &bricks, &room, &mut faces);
+            for layer in 2..=step.layers as u32 {
+                extrapolate(&step, &bricks, layer, &mut faces);
+            }
+        });
+        let given = timings.time("flip/grid_to_particle", || {
+            let displacement = displacement.as_deref();
+            grid_to_particle(model, &step, &bricks, &sorted, &faces, displacement)
+        });
+        let moved = timings.time("flip/advect", || {
+            let position = &sorted.cloud.position;
+            advect(model, &step, &bricks, position, &faces.velocity, &given)
+        });
+        let scale = model.scene.water.rest_density * model.cell_size() / step.length;
+        let pressure = waters.by_element(&projected.system, &projected.solution.x);
+        Ok(Trace {
+            pressure: pressure.into_iter().map(|q| scale * q).collect(),
+            after: Cloud {
+                position: moved.position,
+                velocity: moved.velocity,
+                affine: given.affine,
+                id: sorted.cloud.id.clone(),
+            },
+            capped: moved.capped,
+            bricks,
+            sorted,
+            room,
+            centers,
+            faces,
+            projected,
+            displacement,
+        })
+    }
+
+    /// Substeps through one frame, from `cloud` on; what they did, and the densities that the last one found.
+    fn run_frame(&mut self, cloud: &mut Cloud) -> Result<(StepReport, Vec<f64>), ReferenceError> {
+        let frame = self.frame + 1;
+        let numbers = |what| ReferenceError::Numbers { frame, what };
+        let length = self.model.scene.shot.frame_seconds();
+        let start = f64::from(self.frame) * length;
+        let mut report = self
+            .model
+            .scene
+            .report(&Particles::default(), [].into_iter());
+        let mut all = Projection::default();
+        let mut elapsed = 0.0;
+        loop {
+            let surveyed = survey(&self.model, cloud);
+            if surveyed.not_finite > 0 {
+                let what = format!("{} particles are not finite", surveyed.not_finite);
+                return Err(numbers(what));
+            }
+            let (wanted, substep) = (self.model.scene)
+                .flip_substep(
+                    start + elapsed,
+                    length - elapsed,
+                    surveyed.speed,
+                    report.substeps,
+                )
+                .map_err(numbers)?;
+            let trace = self.substep(cloud, &surveyed.is_wet, &substep)?;
+            check_residual(&self.model, &trace.projected, report.substeps).map_err(numbers)?;
+            report.substeps += 1;
+            report.iterations += u64::from(trace.projected.solution.iterations);
+            report.capped += trace.capped;
+            add(&mut all, &trace.projected);
+            elapsed += substep.length;
+            *cloud = trace.after;
+            if wanted <= 1.0 {
+                report.projection = Some(all);
+                let wet = CELLS as usize * (trace.bricks.wet as usize + 1);
+                let mut density = trace.centers.density;
+                density.truncate(wet);
+                density.retain(|&density| density != 0.0);
+                self.field = Some(Field {
+                    bricks: trace.bricks,
+                    kind: trace.room.kind,
+                    pressure: trace.pressure,
+                });
+                return Ok((report, density));
+            }
+        }
+    }
+
+    /// Rounds into the state, in its order.
+    fn write(&mut self, cloud: &Cloud) {
+        let origin = self.model.scene.domain.min;
+        let mut order: Vec<usize> = (0..cloud.id.len()).collect();
+        order.sort_unstable_by_key(|&k| cloud.id[k]);
+        for (slot, &k) in order.iter().enumerate() {
+            self.state.position[slot] = (origin + cloud.position[k]).as_vec3().to_array();
+            self.state.velocity[slot] = cloud.velocity[k].as_vec3().to_array();
+        }
+        if !cloud.affine.is_empty() {
+            for (place, name) in AFFINE.into_iter().enumerate() {
+                let value = |&k: &usize| cloud.affine[k].row(place / 3)[place % 3] as f32;
+                let values = order.iter().map(value).collect();
+                self.state.attributes.insert(name.to_owned(), values);
+            }
+        }
+    }
+}
+
+/// Refuses, in words, what the scene's limit does.
+fn check_residual(model: &Model, projected: &Projected, substep: u32) -> Result<(), String> {
+    let residual = projected.solution.residual;
+    let limit = model.settings().pressure.residual_limit;
+    if residual <= limit {
+        return Ok(());
+    }
+    Err(format!(
+        "the projection of substep {substep} ended at a relative residual of {residual:.3e}; \
+         solver.flip.pressure.residual_limit is {limit}"
+    ))
+}
+
+fn add(all: &mut Projection, projected: &Projected) {
+    all.residual = all.residual.max(projected.solution.residual);
+    let [before, after] = projected.divergence;
+    all.divergence_before = all.divergence_before.max(before);
+    all.divergence_after = all.divergence_after.max(after);
+    all.pockets = all.pockets.max(projected.pockets);
+    all.incompatible = all.incompatible.max(projected.incompatible);
+    all.dropped += projected.system.dropped.len() as u64;
+    let correction = projected.correction.iter().map(|s| u64::from(s.iterations));
+    all.correction_iterations += correction.sum::<u64>();
+}
+
+/// Makes the velocities free of divergence; what the solves did, and the density correction's displacements.
+fn project(
+    model: &Model,
+    timings: &mut Timings,
+    factor_budget: u64,
+    waters: &Waters<'_>,
+    centers: &Centers,
+    faces: &mut Faces,
+) -> Result<(Projected, Option<Vec<DVec3>>), ReferenceError> {
+    let system = timings.time("pressure/build_system", || waters.system());
+    let solver = timings.time("pressure/prepare", || {
+        poisson::Solver::new(&system, factor_budget)
+    })?;
+    let b = waters.divergence(&system, &faces.velocity);
+    let solution = timings.time("pressure/solve", || solver.solve(&b));
+    waters.project(
+        &waters.by_element(&system, &solution.x),
+        &mut faces.velocity,
+    );
+    let after = waters.divergence(&system, &faces.velocity);
+    let correction = model.settings().density_correction.then(|| {
+        let source = density_source(model, &system, centers);
+        timings.time("pressure/solve", || solver.solve(&source))
+    });
+    let displacement = (correction.as_ref())
+        .map(|correction| waters.displace(&waters.by_element(&system, &correction.x)));
+    let means = solver.pockets().iter().map(|pocket| {
+        let sum: f64 = pocket.iter().map(|&row| b[row as usize]).sum();
+        sum / pocket.len() as f64
+    });
+    let incompatible = largest(&means.collect::<Vec<_>>()) / model.cell_size();
+    let pockets = solver.pockets().len() as u32;
+    let projected = Projected {
+        divergence: [&b, &after].map(|b| largest(b) / model.cell_size()),
+        solution,
+        correction,
+        pockets,
+        incompatible,
+        system,
+    };
+    Ok((projected, displacement))
+}
+
+impl Solver for Flip {
+    type Error = ReferenceError;
+
+    fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
+        self.state = particles.clone();
+        self.frame = frame;
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<(Particles, StepReport), ReferenceError> {
+        let mut cloud = self.cloud();
+        let (done, density) = if self.state.is_empty() {
+            let report = self.model.scene.report(&self.state, [].into_iter());
+            let projection = Some(Projection::default());
+            (
+                StepReport {
+                    projection,
+                    ..report
+                },
+                Vec::new(),
+            )
+        } else {
+            self.run_frame(&mut cloud)?
+        };
+        self.write(&cloud);
+        let frame = self.frame + 1;
+        if let Some(what) = self.state.first_not_finite(None) {
+            return Err(ReferenceError::Numbers { frame, what });
+        }
+        self.frame = frame;
+        let report = StepReport {
+            substeps: done.substeps,
+            iterations: done.iterations,
+            capped: done.capped,
+            projection: done.projection,
+            ..self.model.scene.report(&self.state, density.into_iter())
+        };
+        Ok((self.state.clone(), report))
+    }
+
+    /// The projection's, between cell centres.
+    fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, ReferenceError> {
+        // Without particles there is none.
+        let Some(field) = &self.field else {
+            return Ok(vec![None; points.len()]);
+        };
+        let gauge = Gauge {
+            bricks: &field.bricks,
+            cells: self.model.cells,
+            cell_size: self.model.cell_size(),
+            kind: &field.kind,
+            pressure: &field.pressure,
+        };
+        let local = |at: &DVec3| *at - self.model.scene.domain.min;
+        Ok(points.iter().map(|at| gauge.at(local(at))).collect())
+    }
+
+    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+        self.timings.rows()
+    }
+}
+
+fn widen(v: &[f32; 3]) -> DVec3 {
+    Vec3::from_array(*v).as_dvec3()
+}

@@ -1,0 +1,110 @@
+//! Twins of the passes before the grid: what the particles take, and their order by cell.
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use super::Model;
+use crate::domain::bricks::{Bricks, CELLS};
+
+/// Particles in any order; positions relative to the domain's least corner.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cloud {
+    /// Metres. Shape (particles).
+    pub position: Vec<DVec3>,
+    /// m/s. Shape (particles).
+    pub velocity: Vec<DVec3>,
+    /// C of v(x) = v + C (x − x_p), 1/s, row k of component k. Shape (particles) with APIC, else empty.
+    pub affine: Vec<DMat3>,
+    /// Unique. Shape (particles).
+    pub id: Vec<u32>,
+}
+
+/// What decides a substep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Survey {
+    /// Of the fastest particle, m/s.
+    pub speed: f64,
+    /// Particles that are not finite.
+    pub not_finite: u32,
+    /// One flag a brick of the domain, x fastest.
+    pub is_wet: Vec<bool>,
+}
+
+/// Particles by cell, and within a cell by id.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sorted {
+    /// Themselves.
+    pub cloud: Cloud,
+    /// Element of the cell of each. Shape (particles).
+    pub cell: Vec<u32>,
+    /// First particle of each element up to the last wet one, and one past the last. Shape (512 (wet + 1) + 1).
+    pub start: Vec<u32>,
+}
+
+/// Speeds, and which bricks hold water.
+pub fn survey(model: &Model, cloud: &Cloud) -> Survey {
+    let mut is_wet = model.no_water();
+    let (mut speed, mut not_finite) = (0.0f64, 0);
+    for (&x, &v) in cloud.position.iter().zip(&cloud.velocity) {
+        not_finite += u32::from(!x.is_finite() || !v.is_finite());
+        speed = speed.max(v.length());
+        let cell = model.cell_of(x);
+        is_wet[model.brick_index(cell)] = true;
+        // The outermost cells may be too thin to hold particles, and are water all the same.
+        for axis in 0..3 {
+            if cell[axis] + 2 == model.cells[axis] {
+                let mut outer = cell;
+                outer[axis] += 1;
+                is_wet[model.brick_index(outer)] = true;
+            }
+        }
+    }
+    Survey {
+        speed,
+        not_finite,
+        is_wet,
+    }
+}
+
+/// Element of each particle's cell.
+pub fn assign_cells(model: &Model, bricks: &Bricks, position: &[DVec3]) -> Vec<u32> {
+    (position.par_iter())
+        .map(|&x| bricks.element(model.cell_of(x).map(i64::from)))
+        .collect()
+}
+
+/// The particles in the order of their elements, and of their ids within one.
+pub fn reorder(bricks: &Bricks, cloud: &Cloud, cell: &[u32]) -> Sorted {
+    let mut order: Vec<u32> = (0..cell.len() as u32).collect();
+    order.par_sort_unstable_by_key(|&k| (cell[k as usize], cloud.id[k as usize]));
+    let order: Vec<usize> = order.into_iter().map(|k| k as usize).collect();
+    let mut start = vec![0; (CELLS * (bricks.wet + 1) + 1) as usize];
+    for &element in cell {
+        start[element as usize + 1] += 1;
+    }
+    for k in 1..start.len() {
+        start[k] += start[k - 1];
+    }
+    let affine = |&k: &usize| cloud.affine.get(k).copied();
+    Sorted {
+        cell: order.iter().map(|&k| cell[k]).collect(),
+        cloud: Cloud {
+            position: order.iter().map(|&k| cloud.position[k]).collect(),
+            velocity: order.iter().map(|&k| cloud.velocity[k]).collect(),
+            affine: order.iter().filter_map(affine).collect(),
+            id: order.iter().map(|&k| cloud.id[k]).collect(),
+        },
+        start,
+    }
+}
+
+impl Sorted {
+    /// The particles of an element; none of one that is not wet.
+    pub fn of(&self, element: u32) -> std::ops::Range<usize> {
+        let element = element as usize;
+        match self.start.get(element..element + 2) {
+            Some(range) => range[0] as usize..range[1] as usize,
+            None => 0..0,
+        }
+    }
+}

@@ -1,0 +1,367 @@
+//! Twins of the passes that bring particles and solids to the grid.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{
+    Model, Sorted, Step,
+    grid::{corner, neighborhood, per_cell},
+    model::ON_FACE,
+    solids::{cut, face_sums},
+};
+use crate::domain::{
+    bricks::{Bricks, CELLS},
+    poisson::{AIR, FLUID, SOLID},
+};
+
+/// What each hat has beyond itself, so that a face that no particle of its two cells touches takes the velocity of
+/// the particles nearby.
+const LEAST_WEIGHT: f64 = 2.4e-7;
+
+/// Of a cell's excess a substep corrects at most this much either way.
+const MOST_EXCESS: f64 = 0.5;
+
+/// Mean of a hat over the cell of its centre, and over the ones beside it.
+const OWN_SHARE: f64 = 0.75;
+const OTHER_SHARE: f64 = 0.125;
+
+/// A surface cell of water has its surface at least so far outside of its centre, in cells, and one of air inside.
+const LEAST_DISTANCE: f64 = 0.05;
+
+/// The room that there is for water.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Room {
+    /// [`AIR`], [`FLUID`] or [`SOLID`]. Shape (elements), as of every array here.
+    pub kind: Vec<u32>,
+    /// Open fractions of the lower faces, 0..1.
+    pub open: Vec<DVec3>,
+    /// Σ ± (1 − f) u_solid over the six faces, outward, m/s.
+    pub solid_flux: Vec<f64>,
+    /// Open part of the cell, 0..1.
+    pub volume: Vec<f64>,
+    /// What the lower faces have where they are closed, m/s.
+    pub closed_velocity: Vec<DVec3>,
+}
+
+/// Velocities at the lower faces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Faces {
+    /// With gravity, m/s. Shape (elements), as of every array here.
+    pub velocity: Vec<DVec3>,
+    /// The particles' own, m/s; its change from [`super::find_change`] on.
+    pub change: Vec<DVec3>,
+    /// Eight bits a component: bit 7 whether particles gave a velocity, below it the layer, of
+    /// [`super::extrapolate`].
+    pub layer: Vec<u32>,
+    /// What the particles' hats add up to: it divides the rounding of their places.
+    pub weight: Vec<DVec3>,
+}
+
+/// What cell centres know of the water about them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Centers {
+    /// Over that of a full cell; 0 where there is no water. Shape (elements), as of every array here.
+    pub density: Vec<f64>,
+    /// What the density correction carries out of the cell.
+    pub excess: Vec<f64>,
+    /// Of the surface, metres; negative inside.
+    pub distance: Vec<f64>,
+}
+
+/// Hats of a place at the cells after, at and before its own along each axis: of the cell that sees it one step
+/// down, in itself, one step up. The middle entry of `face` is that of its cell's lower face.
+struct Hats {
+    face: [DVec3; 3],
+    center: [DVec3; 3],
+    /// Place in its cell.
+    place: DVec3,
+}
+
+impl Hats {
+    fn of(place: DVec3) -> Self {
+        let least = DVec3::splat(LEAST_WEIGHT);
+        Self {
+            face: [DVec3::ZERO, 1.0 - place + least, place + least],
+            center: [
+                (0.5 - place).max(DVec3::ZERO) + least,
+                1.0 - (place - 0.5).abs() + least,
+                (place - 0.5).max(DVec3::ZERO) + least,
+            ],
+            place,
+        }
+    }
+
+    /// Weights at the three lower faces of the cell from which this place's cell lies `offset` away.
+    fn at_faces(&self, offset: [i32; 3]) -> DVec3 {
+        let [x, y, z] = offset.map(|step| (1 - step) as usize);
+        let (face, center) = (&self.face, &self.center);
+        DVec3::new(
+            face[x].x * center[y].y * center[z].z,
+            center[x].x * face[y].y * center[z].z,
+            center[x].x * center[y].y * face[z].z,
+        )
+    }
+
+    /// Weight at that cell's centre.
+    fn at_center(&self, offset: [i32; 3]) -> f64 {
+        let [x, y, z] = offset.map(|step| (1 - step) as usize);
+        self.center[x].x * self.center[y].y * self.center[z].z
+    }
+}
+
+fn hats(model: &Model, bricks: &Bricks, sorted: &Sorted) -> Vec<Hats> {
+    (sorted.cloud.position.par_iter().zip(&sorted.cell))
+        .map(|(&x, &element)| Hats::of(x / model.cell_size() - corner(bricks, element)))
+        .collect()
+}
+
+/// What of each cell and of its lower faces is open, and what solids push through the rest (Batty et al. 2007).
+pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks, sorted: &Sorted) -> Room {
+    #[derive(Clone, Default)]
+    struct Cell {
+        kind: u32,
+        open: DVec3,
+        flux: f64,
+        volume: f64,
+        closed_velocity: DVec3,
+    }
+    let of_cell = |element: u32| {
+        let cell = corner(bricks, element);
+        let extent = step.open_extent(cell);
+        let across = DVec3::new(
+            extent.y * extent.z,
+            extent.z * extent.x,
+            extent.x * extent.y,
+        );
+        let planes = [cell, cell + 1.0];
+        let of_walls =
+            planes.map(|plane| DVec3::select(step.is_plane_open(plane), across, DVec3::ZERO));
+        let (mut open, mut volume) = (of_walls, extent.element_product());
+        let mut nearest: Option<[f64; 8]> = None;
+        // Of what is nearest to each face, along that face's axis.
+        let mut velocity = [DVec3::ZERO; 2];
+        for solid in &step.solids {
+            let Some(found) = solid.corners(cell, model.cell_size()) else {
+                continue;
+            };
+            velocity = [0, 1].map(|side| {
+                let sums = nearest.map_or(DVec3::MAX, |nearest| face_sums(&nearest, side));
+                let is_nearer = face_sums(&found, side).cmplt(sums);
+                DVec3::select(is_nearer, solid.velocity, velocity[side])
+            });
+            nearest = Some(nearest.map_or(found, |nearest| {
+                std::array::from_fn(|k| nearest[k].min(found[k]))
+            }));
+        }
+        if let Some(corners) = nearest {
+            let cut = cut(&corners);
+            open = [open[0] * cut.faces[0], open[1] * cut.faces[1]];
+            volume *= cut.volume;
+        }
+        if !step.solids.is_empty() {
+            let on_face = DVec3::splat(ON_FACE);
+            open = open.map(|open| DVec3::select(open.cmplt(on_face), DVec3::ZERO, open));
+        }
+        let [low, high] = [0, 1].map(|side| {
+            (1.0 - of_walls[side]) * step.closing_velocity(planes[side])
+                + (of_walls[side] - open[side]) * velocity[side]
+        });
+        let is_open = volume >= ON_FACE * ON_FACE || (open[0] + open[1]).cmpgt(DVec3::ZERO).any();
+        let is_water = !sorted.of(element).is_empty()
+            || is_water_beside(step, bricks, sorted, element, cell, extent);
+        Cell {
+            kind: match (is_open, is_water) {
+                (false, _) => SOLID,
+                (true, true) => FLUID,
+                (true, false) => AIR,
+            },
+            open: open[0],
+            flux: (high - low).element_sum(),
+            volume,
+            closed_velocity: DVec3::select(
+                step.is_plane_open(cell),
+                velocity[0],
+                step.closing_velocity(cell),
+            ),
+        }
+    };
+    let cells = per_cell(bricks, of_cell);
+    Room {
+        kind: cells.iter().map(|cell| cell.kind).collect(),
+        open: cells.iter().map(|cell| cell.open).collect(),
+        solid_flux: cells.iter().map(|cell| cell.flux).collect(),
+        volume: cells.iter().map(|cell| cell.volume).collect(),
+        closed_velocity: cells.iter().map(|cell| cell.closed_velocity).collect(),
+    }
+}
+
+/// Whether a cell of which walls at rest leave less than half along an axis has water in the cell inward of it: it
+/// may hold no particle of its own, and were it air, a wall would leak pressure all the way down.
+fn is_water_beside(
+    step: &Step<'_>,
+    bricks: &Bricks,
+    sorted: &Sorted,
+    element: u32,
+    cell: DVec3,
+    extent: DVec3,
+) -> bool {
+    if element >= CELLS * (bricks.wet + 1) {
+        return false;
+    }
+    let is_plane_open = step.is_plane_open(cell);
+    let mut inward = [0; 3];
+    for axis in 0..3 {
+        let is_low = !is_plane_open.test(axis);
+        let wall = step.wall_velocity[usize::from(!is_low)][axis];
+        if extent[axis] < 0.5 && wall == 0.0 {
+            inward[axis] = if is_low { 1 } else { -1 };
+        }
+    }
+    inward != [0; 3] && !sorted.of(bricks.near(element, inward)).is_empty()
+}
+
+/// Particle-to-grid (Zhu and Bridson 2005; APIC: Jiang et al. 2015): what `flip/spread_faces` and
+/// `flip/gather_faces` do between them.
+pub fn gather_faces(
+    model: &Model,
+    step: &Step<'_>,
+    bricks: &Bricks,
+    sorted: &Sorted,
+    room: &Room,
+) -> Faces {
+    let hats = hats(model, bricks, sorted);
+    let sums = per_cell(bricks, |element| {
+        let (mut momentum, mut weight) = (DVec3::ZERO, DVec3::ZERO);
+        for offset in neighborhood() {
+            for i in sorted.of(bricks.near(element, offset)) {
+                let part = hats[i].at_faces(offset);
+                weight += part;
+                momentum += part * velocity_at_faces(model, sorted, &hats[i], offset, i);
+            }
+        }
+        (momentum, weight)
+    });
+    let mean = |&(momentum, weight): &(DVec3, DVec3)| {
+        let is_known = weight.cmpgt(DVec3::ZERO);
+        DVec3::select(is_known, momentum / weight, DVec3::ZERO)
+    };
+    let change: Vec<DVec3> = sums.iter().map(mean).collect();
+    let velocity = per_cell(bricks, |element| {
+        let e = element as usize;
+        let is_closed = room.open[e].cmpeq(DVec3::ZERO);
+        let moved = change[e] + step.velocity_step;
+        DVec3::select(is_closed, room.closed_velocity[e], moved)
+    });
+    let is_known = |weight: DVec3| weight.cmpgt(DVec3::ZERO).bitmask();
+    let layer = |&(_, weight): &(DVec3, DVec3)| {
+        let known = is_known(weight);
+        (0..3)
+            .map(|axis| (known >> axis & 1) << (8 * axis + 7))
+            .sum()
+    };
+    Faces {
+        velocity,
+        layer: sums.iter().map(layer).collect(),
+        weight: sums.iter().map(|sums| sums.1).collect(),
+        change,
+    }
+}
+
+/// Particle `i`'s velocity at the lower faces of the cell from which its own lies `offset` away, each along its axis.
+fn velocity_at_faces(
+    model: &Model,
+    sorted: &Sorted,
+    hats: &Hats,
+    offset: [i32; 3],
+    i: usize,
+) -> DVec3 {
+    let v = sorted.cloud.velocity[i];
+    let Some(affine) = sorted.cloud.affine.get(i) else {
+        return v;
+    };
+    let center = DVec3::from_array(offset.map(|step| 0.5 - f64::from(step)));
+    let slope = |axis: usize| {
+        let face = center - 0.5 * DVec3::AXES[axis];
+        model.cell_size() * affine.row(axis).dot(face - hats.place)
+    };
+    v + DVec3::new(slope(0), slope(1), slope(2))
+}
+
+/// Integral of the hat from minus infinity to `t`.
+fn hat_below(t: f64) -> f64 {
+    let s = 1.0 - t.abs().min(1.0);
+    if t < 0.0 {
+        0.5 * s * s
+    } else {
+        1.0 - 0.5 * s * s
+    }
+}
+
+/// Part of the hats about a cell's centre that walls and solids leave.
+fn room_of_hats(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> f64 {
+    let cell = corner(bricks, element);
+    let along_axis = |axis: usize| {
+        let center = cell[axis] + 0.5;
+        hat_below(step.cut.max[axis] - center) - hat_below(step.cut.min[axis] - center)
+    };
+    let of_walls = along_axis(0) * along_axis(1) * along_axis(2);
+    if step.solids.is_empty() {
+        return of_walls;
+    }
+    let share = |step: i32| if step == 0 { OWN_SHARE } else { OTHER_SHARE };
+    let of_cells: f64 = neighborhood()
+        .map(|offset| {
+            let part: f64 = offset.into_iter().map(share).product();
+            part * room.volume[bricks.near(element, offset) as usize]
+        })
+        .sum();
+    let beside = step.open_extent(cell - 1.0) + step.open_extent(cell + 1.0);
+    let whole = OWN_SHARE * step.open_extent(cell) + OTHER_SHARE * beside;
+    of_cells * of_walls / whole.element_product().max(1e-6)
+}
+
+/// Densities at cell centres, the excess that is corrected (Kugelstadt et al. 2019) and the distance of the surface:
+/// what `flip/spread_centers` and `flip/gather_centers` do between them.
+pub fn gather_centers(
+    model: &Model,
+    step: &Step<'_>,
+    bricks: &Bricks,
+    sorted: &Sorted,
+    room: &Room,
+) -> Centers {
+    let hats = hats(model, bricks, sorted);
+    let particle_share = 1.0 / f64::from(model.settings().particles_per_cell);
+    let cells = per_cell(bricks, |element| {
+        let (mut sum, mut touches_air) = (0.0, false);
+        for offset in neighborhood() {
+            let found = bricks.near(element, offset);
+            // Beyond the domain there is no cell and no air.
+            touches_air |= found >= CELLS && room.kind[found as usize] == AIR;
+            sum += (sorted.of(found))
+                .map(|i| hats[i].at_center(offset))
+                .sum::<f64>();
+        }
+        let space = room_of_hats(step, bricks, room, element).max(0.02);
+        let relative = sum * particle_share / space;
+        let e = element as usize;
+        let is_water = room.kind[e] == FLUID;
+        // Across a flat surface the hats' sum is 1/2 at it and falls as s − s²/2 with the distance s in cells.
+        let off = relative.clamp(0.0, 1.0) - 0.5;
+        let way = 1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt();
+        let inside = if off == 0.0 { 0.0 } else { way * off.signum() };
+        if is_water {
+            let least = if touches_air { 0.0 } else { -MOST_EXCESS };
+            let excess = (relative - 1.0).clamp(least, MOST_EXCESS) * room.volume[e];
+            let kept = inside.max(LEAST_DISTANCE);
+            (relative, excess, -kept * model.cell_size())
+        } else {
+            let kept = inside.min(-LEAST_DISTANCE);
+            (0.0, 0.0, -kept * model.cell_size())
+        }
+    });
+    Centers {
+        density: cells.iter().map(|cell| cell.0).collect(),
+        excess: cells.iter().map(|cell| cell.1).collect(),
+        distance: cells.iter().map(|cell| cell.2).collect(),
+    }
+}

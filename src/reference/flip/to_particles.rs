@@ -1,0 +1,330 @@
+//! Twins of the passes that bring the grid's velocity to the particles, and move them.
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use super::{
+    Faces, Model, Room, Sorted, Step,
+    grid::{along, per_cell},
+    solids,
+};
+use crate::domain::{
+    bricks::{Bricks, CELLS},
+    poisson::{FLUID, SOLID},
+};
+
+/// Bits of a component's layer, and whether particles gave it a velocity.
+const LAYER: u32 = 0x7f;
+const KNOWN: u32 = 0x80;
+
+/// Beyond the stored layer of the upper walls: no face is ever asked for.
+const NO_NEED: u32 = 0x7f_7f7f;
+
+/// What the grid gives each particle, in sorted order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Given {
+    /// The particle's new velocity, m/s. Shape (particles).
+    pub velocity: Vec<DVec3>,
+    /// Its new affine part, 1/s. Shape (particles) with APIC, else empty.
+    pub affine: Vec<DMat3>,
+    /// The grid's velocity where it is, m/s. Shape (particles).
+    pub carried: Vec<DVec3>,
+    /// The density correction's displacement there, metres. Shape (particles).
+    pub displacement: Vec<DVec3>,
+}
+
+/// A substep's result, in sorted order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moved {
+    /// Metres. Shape (particles).
+    pub position: Vec<DVec3>,
+    /// m/s. Shape (particles).
+    pub velocity: Vec<DVec3>,
+    /// Particles that were slowed to the displacement cap.
+    pub capped: u64,
+}
+
+fn layer_of(tags: u32, axis: usize) -> u32 {
+    tags >> (8 * axis) & LAYER
+}
+
+fn is_known(tags: u32, axis: usize) -> bool {
+    tags >> (8 * axis) & KNOWN != 0
+}
+
+/// After the projection: which faces it gave a velocity (layer 1), and what of that is change.
+pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Faces) {
+    let tags = per_cell(bricks, |element| {
+        let e = element as usize;
+        let own = room.kind[e];
+        if (bricks.cell(element).iter().zip(&model.cells)).any(|(cell, cells)| cell > cells) {
+            return NO_NEED;
+        }
+        let found = |axis: usize| {
+            let before = bricks.near(element, along(axis, -1));
+            let kind = room.kind[before as usize];
+            let is_closed = room.open[e][axis] == 0.0;
+            // A closed face between solids has no velocity of its own; slot 0 is what lies beyond the domain.
+            let is_buried = own == SOLID && (kind == SOLID || before < CELLS);
+            own == FLUID || kind == FLUID || (is_closed && !is_buried)
+        };
+        let layers = (0..3).map(|axis| u32::from(found(axis)) << (8 * axis));
+        faces.layer[e] | layers.sum::<u32>()
+    });
+    faces.layer = tags;
+    for (change, velocity) in faces.change.iter_mut().zip(&faces.velocity) {
+        *change = velocity - *change;
+    }
+}
+
+/// One layer of faces takes the mean of its neighbours of the layers before. Where particles gave a velocity, it is
+/// the change that is carried on.
+pub fn extrapolate(step: &Step<'_>, bricks: &Bricks, layer: u32, faces: &mut Faces) {
+    let filled = per_cell(bricks, |element| {
+        let e = element as usize;
+        let tags = faces.layer[e];
+        let (mut velocity, mut change, mut new) = (faces.velocity[e], faces.change[e], tags);
+        for axis in (0..3).filter(|&axis| layer_of(tags, axis) == 0) {
+            let is_older =
+                |&other: &usize| (1..layer).contains(&layer_of(faces.layer[other], axis));
+            let sources: Vec<usize> = (0..6)
+                .map(|k| bricks.near(element, along(k / 2, k as i32 % 2 * 2 - 1)) as usize)
+                .filter(is_older)
+                .collect();
+            if sources.is_empty() {
+                continue;
+            }
+            new |= layer << (8 * axis);
+            if is_known(tags, axis) {
+                let seen = sources
+                    .iter()
+                    .filter(|&&other| is_known(faces.layer[other], axis));
+                let changes: Vec<f64> = seen.map(|&other| faces.change[other][axis]).collect();
+                let mean = if changes.is_empty() {
+                    step.velocity_step[axis]
+                } else {
+                    changes.iter().sum::<f64>() / changes.len() as f64
+                };
+                // What gravity changed is in both.
+                velocity[axis] += mean - change[axis];
+                change[axis] = mean;
+            } else {
+                let sum: f64 = sources
+                    .iter()
+                    .map(|&other| faces.velocity[other][axis])
+                    .sum();
+                velocity[axis] = sum / sources.len() as f64;
+            }
+        }
+        (velocity, change, new)
+    });
+    faces.velocity = filled.iter().map(|cell| cell.0).collect();
+    faces.change = filled.iter().map(|cell| cell.1).collect();
+    faces.layer = filled.iter().map(|cell| cell.2).collect();
+}
+
+/// Elements of the 2 × 3 × 3 faces of component `axis` about a cell: a fastest, then b, then c, where (a, b, c) are
+/// the axes turned so that the component's own is first. Beyond the domain the cell's own row or column counts.
+fn stencil(model: &Model, bricks: &Bricks, element: u32, axis: usize) -> [usize; 18] {
+    let cell = bricks.cell(element);
+    std::array::from_fn(|k| {
+        let mut offset = [0; 3];
+        offset[axis] = (k % 2) as i32;
+        for (turn, step) in [(1, k / 2 % 3), (2, k / 6)] {
+            let across = (axis + turn) % 3;
+            offset[across] = match step {
+                0 if cell[across] > 0 => -1,
+                2 if cell[across] + 1 < model.cells[across] => 1,
+                _ => 0,
+            };
+        }
+        bricks.near(element, offset) as usize
+    })
+}
+
+/// Hats of a place in a cell at the centres before it, of its own and after it.
+fn center_hats(f: f64) -> [f64; 3] {
+    [
+        (0.5 - f).max(0.0),
+        1.0 - (f - 0.5).abs(),
+        (f - 0.5).max(0.0),
+    ]
+}
+
+/// Their slopes, 1 over a cell.
+fn center_slopes(f: f64) -> [f64; 3] {
+    if f < 0.5 {
+        [-1.0, 1.0, 0.0]
+    } else {
+        [0.0, -1.0, 1.0]
+    }
+}
+
+/// Σ of products of weights along a, b and c and the values at the faces of a stencil.
+fn weighted(values: &[f64; 18], a: [f64; 2], b: [f64; 3], c: [f64; 3]) -> f64 {
+    let of = |k: usize| a[k % 2] * b[k / 2 % 3] * c[k / 6] * values[k];
+    (0..18).map(of).sum()
+}
+
+/// Velocities from the grid: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its slope (APIC, Jiang et
+/// al. 2015); and the displacements of the density correction, where there is one.
+pub fn grid_to_particle(
+    model: &Model,
+    step: &Step<'_>,
+    bricks: &Bricks,
+    sorted: &Sorted,
+    faces: &Faces,
+    displacement: Option<&[DVec3]>,
+) -> Given {
+    let is_apic = !sorted.cloud.affine.is_empty();
+    let size = model.cell_size();
+    let of_cell = |element: u32| {
+        let stencils = [0, 1, 2].map(|axis| stencil(model, bricks, element, axis));
+        let values = |of: &[DVec3]| -> [[f64; 18]; 3] {
+            [0, 1, 2].map(|axis| stencils[axis].map(|e| of[e][axis]))
+        };
+        let (velocity, change) = (values(&faces.velocity), values(&faces.change));
+        let shift = displacement.map(values);
+        let cell = super::grid::corner(bricks, element);
+        let of_particle = move |i: usize| {
+            let place = sorted.cloud.position[i] / size - cell;
+            let v = sorted.cloud.velocity[i];
+            let mut given = (DVec3::ZERO, DMat3::ZERO, DVec3::ZERO, DVec3::ZERO);
+            let mut rows = [DVec3::ZERO; 3];
+            for axis in 0..3 {
+                let [f, g, h] = [0, 1, 2].map(|turn| place[(axis + turn) % 3]);
+                let (a, b, c) = ([1.0 - f, f], center_hats(g), center_hats(h));
+                let u = weighted(&velocity[axis], a, b, c);
+                let advanced = v[axis] + weighted(&change[axis], a, b, c);
+                given.0[axis] = if is_apic {
+                    u
+                } else {
+                    advanced + step.pic_blend * (u - advanced)
+                };
+                given.2[axis] = u;
+                given.3[axis] = shift.map_or(0.0, |shift| weighted(&shift[axis], a, b, c));
+                if is_apic {
+                    let slopes = [
+                        weighted(&velocity[axis], [-1.0, 1.0], b, c),
+                        weighted(&velocity[axis], a, center_slopes(g), c),
+                        weighted(&velocity[axis], a, b, center_slopes(h)),
+                    ];
+                    for (turn, slope) in slopes.into_iter().enumerate() {
+                        rows[axis][(axis + turn) % 3] = slope / size;
+                    }
+                }
+            }
+            given.1 = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
+            given
+        };
+        sorted.of(element).map(of_particle)
+    };
+    let all: Vec<_> = (CELLS..CELLS * (bricks.wet + 1))
+        .into_par_iter()
+        .with_min_len(CELLS as usize)
+        .filter(|&element| !sorted.of(element).is_empty())
+        .flat_map_iter(of_cell)
+        .collect();
+    Given {
+        velocity: all.iter().map(|given| given.0).collect(),
+        affine: (all.iter().filter(|_| is_apic))
+            .map(|given| given.1)
+            .collect(),
+        carried: all.iter().map(|given| given.2).collect(),
+        displacement: all.iter().map(|given| given.3).collect(),
+    }
+}
+
+/// The grid's velocity at `x`, m/s; `otherwise` where no brick is.
+fn velocity_at(
+    model: &Model,
+    bricks: &Bricks,
+    velocity: &[DVec3],
+    x: DVec3,
+    otherwise: DVec3,
+) -> DVec3 {
+    let cells = DVec3::from_array(model.cells.map(f64::from));
+    let p = (x / model.cell_size()).clamp(DVec3::ZERO, cells);
+    let cell = p.min(cells - 1.0).floor();
+    let f = p - cell;
+    let at = cell.to_array().map(|c| c as i64);
+    if bricks.element(at) < CELLS {
+        return otherwise;
+    }
+    // Two neighbours along each axis and the way from the first to the second: between faces along the component's
+    // own axis, between centres across it, where beyond the outermost ones the velocity is that of the outermost.
+    let across = |axis: usize| {
+        let last = i64::from(model.cells[axis]) - 1;
+        let first = if f[axis] < 0.5 {
+            at[axis] - 1
+        } else {
+            at[axis]
+        };
+        let t = if f[axis] < 0.5 {
+            f[axis] + 0.5
+        } else {
+            f[axis] - 0.5
+        };
+        ([first.max(0), (first + 1).min(last)], t)
+    };
+    let component = |own: usize| {
+        let ways: [_; 3] = std::array::from_fn(|axis| {
+            if axis == own {
+                ([at[axis], at[axis] + 1], f[axis])
+            } else {
+                across(axis)
+            }
+        });
+        let corner = |k: usize| {
+            let high = [k & 1, k >> 1 & 1, k >> 2];
+            let weight = |axis: usize| {
+                let t = ways[axis].1;
+                if high[axis] == 1 { t } else { 1.0 - t }
+            };
+            let there = std::array::from_fn(|axis| ways[axis].0[high[axis]]);
+            weight(0) * weight(1) * weight(2) * velocity[bricks.element(there) as usize][own]
+        };
+        (0..8).map(corner).sum()
+    };
+    DVec3::new(component(0), component(1), component(2))
+}
+
+/// Moves particles by the midpoint rule and by the density correction's displacement, keeps them out of solids and
+/// walls, and takes what velocity they have into them. One that would move farther than the cap is slowed.
+pub fn advect(
+    model: &Model,
+    step: &Step<'_>,
+    bricks: &Bricks,
+    position: &[DVec3],
+    velocity: &[DVec3],
+    given: &Given,
+) -> Moved {
+    let contact = model.contact_distance();
+    let (low, high) = (step.walls.min + contact, step.walls.max - contact);
+    let one = |i: usize| {
+        let (start, here) = (position[i], given.carried[i]);
+        let middle = start + 0.5 * step.length * here;
+        let between = velocity_at(model, bricks, velocity, middle, here);
+        let mut way = step.length * between + given.displacement[i];
+        let distance = way.length();
+        let is_capped = distance > model.max_displacement();
+        if is_capped {
+            way *= model.max_displacement() / distance;
+        }
+        let (x, v) = solids::go(model, step, start, way, given.velocity[i]);
+        let [slowest, fastest] = step.wall_velocity;
+        let v = DVec3::select(x.cmplt(low), v.max(slowest), v);
+        let v = DVec3::select(x.cmpgt(high), v.min(fastest), v);
+        (x.clamp(low, high), v, is_capped)
+    };
+    let all: Vec<_> = (0..position.len())
+        .into_par_iter()
+        .with_min_len(256)
+        .map(one)
+        .collect();
+    Moved {
+        position: all.iter().map(|moved| moved.0).collect(),
+        velocity: all.iter().map(|moved| moved.1).collect(),
+        capped: all.iter().map(|moved| u64::from(moved.2)).sum(),
+    }
+}

@@ -1,0 +1,62 @@
+//! The solvers once more, in f64 on the CPU: what the GPU's results are measured against.
+//!
+//! Plain where the GPU is clever: no lists of fixed capacity, no colours in memory, no f32. Each
+//! function that carries the name of a GPU pass is its twin: the same inputs, the same outputs.
+
+pub mod flip;
+pub mod neighbors;
+pub mod pbf;
+pub mod poisson;
+
+use std::{collections::BTreeMap, time::Instant};
+
+/// What stops the reference.
+#[derive(Debug, thiserror::Error)]
+pub enum ReferenceError {
+    /// The numbers failed; the state before this frame stands.
+    #[error("frame {frame}: {what}")]
+    Numbers {
+        /// Output frame that could not be computed.
+        frame: u32,
+        /// What was seen, with the figure.
+        what: String,
+    },
+    /// A sparse factor could not be made.
+    #[error("the sparse Cholesky factor: {0}")]
+    Factor(String),
+    /// Newton's steps did not come to their end.
+    #[error(
+        "{steps} linear solves leave a compression of {error:.3e}, and {tolerance:.1e} was asked"
+    )]
+    NotConverged {
+        /// Linear solves.
+        steps: usize,
+        /// max(0, C) that is left.
+        error: f64,
+        /// What was asked.
+        tolerance: f64,
+    },
+}
+
+/// Wall clock by pass.
+#[derive(Clone, Debug, Default)]
+pub struct Timings(BTreeMap<&'static str, (f64, u64)>);
+
+impl Timings {
+    /// Does a pass's work.
+    pub fn time<T>(&mut self, pass: &'static str, work: impl FnOnce() -> T) -> T {
+        let begin = Instant::now();
+        let result = work();
+        let (seconds, runs) = self.0.entry(pass).or_default();
+        *seconds += begin.elapsed().as_secs_f64();
+        *runs += 1;
+        result
+    }
+
+    /// Seconds and runs by pass.
+    pub fn rows(&self) -> Vec<(&'static str, f64, u64)> {
+        let rows = self.0.iter();
+        rows.map(|(&pass, &(seconds, runs))| (pass, seconds, runs))
+            .collect()
+    }
+}

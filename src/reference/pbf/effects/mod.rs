@@ -1,0 +1,52 @@
+//! Twins of shaders/effects: a file an effect, a function a pass, under its name.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::passes::Inputs;
+use crate::{
+    reference::Timings,
+    scene::effects::{Effects, with_effects},
+};
+
+macro_rules! twins {
+    ($($name:ident),+ $(,)?) => {
+        $(pub mod $name;)+
+
+        /// Runs the effects that a scene names on the velocities of a substep, m/s.
+        pub(super) fn apply(
+            named: &Effects,
+            inputs: Inputs<'_>,
+            velocity: &mut Vec<DVec3>,
+            timings: &mut Timings,
+        ) {
+            $(
+                if let Some(settings) = &named.$name {
+                    *velocity = $name::apply(settings, inputs, velocity, timings);
+                }
+            )+
+        }
+    };
+}
+
+with_effects!(twins);
+
+/// The sum of `term(i, j)` over the fluid neighbours j of every particle i.
+fn fluid_sums<'a>(
+    inputs: Inputs<'a>,
+    term: impl Fn(usize, usize) -> DVec3 + Sync + Send + 'a,
+) -> impl IndexedParallelIterator<Item = DVec3> + 'a {
+    (0..inputs.particles()).into_par_iter().map(move |i| {
+        let neighbors = inputs.neighbors.fluid(i).iter();
+        neighbors.map(|&j| term(i, j as usize)).sum()
+    })
+}
+
+/// ∇_j W as calibrated, 1/m; it points from j to i.
+fn slope(inputs: Inputs<'_>, i: usize, j: usize) -> DVec3 {
+    let calibration = &inputs.model.calibration;
+    let d = inputs.points[i] - inputs.points[j];
+    let r = d.length();
+    let s = (1.0 - r / calibration.support_radius).max(0.0);
+    d * (calibration.gradient_scale * s * s / r.max(1e-15))
+}

@@ -1,0 +1,38 @@
+//! XSPH viscosity (Schechter and Bridson 2012; Macklin and Müller 2013, eq. 17).
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{Inputs, fluid_sums};
+use crate::{reference::Timings, scene::effects::viscosity::Settings};
+
+/// c Σ_j m/ρ (v_j − v_i) W of each particle, m/s (effects/viscosity_gather).
+pub fn viscosity_gather(inputs: Inputs<'_>, xsph: f64, velocity: &[DVec3]) -> Vec<DVec3> {
+    let calibration = &inputs.model.calibration;
+    let inverse_h = 1.0 / calibration.support_radius;
+    fluid_sums(inputs, |i, j| {
+        let q2 = inputs.points[i].distance_squared(inputs.points[j]) * inverse_h * inverse_h;
+        (velocity[j] - velocity[i]) * (1.0 - q2).max(0.0).powi(3)
+    })
+    .map(|sum| xsph * calibration.density_scale * sum)
+    .collect()
+}
+
+/// Adds the change to each velocity, m/s (effects/viscosity_apply).
+pub fn viscosity_apply(change: &[DVec3], velocity: &[DVec3]) -> Vec<DVec3> {
+    velocity.iter().zip(change).map(|(v, dv)| v + dv).collect()
+}
+
+pub(super) fn apply(
+    settings: &Settings,
+    inputs: Inputs<'_>,
+    velocity: &[DVec3],
+    timings: &mut Timings,
+) -> Vec<DVec3> {
+    let change = timings.time("effects/viscosity_gather", || {
+        viscosity_gather(inputs, settings.xsph, velocity)
+    });
+    timings.time("effects/viscosity_apply", || {
+        viscosity_apply(&change, velocity)
+    })
+}

@@ -1,0 +1,14 @@
+//! Position-based fluids (Macklin and Müller 2013), the same model as on the GPU.
+//!
+//! Positions are relative to the domain's least corner, in metres, in the order of the sort. [`passes`] and
+//! [`effects`] are the GPU passes' twins; [`Pbf`] runs whole frames; [`constraint`] solves exactly what
+//! iterations approach.
+
+pub mod constraint;
+pub mod effects;
+mod model;
+pub mod passes;
+mod solver;
+
+pub use model::{Colour, Model, Substep};
+pub use solver::{Pbf, Sorted, iterate, local};

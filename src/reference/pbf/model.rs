@@ -1,0 +1,170 @@
+//! What stays the same over a bake, and what a substep knows.
+
+use glam::DVec3;
+
+use crate::{
+    domain::{
+        boundary::Boundary,
+        bounds::Bounds,
+        pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
+        signed_distance::SignedDistance,
+        sph::{Calibration, half_space_fraction},
+    },
+    reference::neighbors::Cells,
+    scene::{self, Scene},
+};
+
+/// Which particles a pass handles: the parity of their sorted index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Colour {
+    /// Every particle.
+    All,
+    /// Even ones.
+    Red,
+    /// Odd ones.
+    Black,
+}
+
+impl Colour {
+    /// Whether particle `i` of the sorted order has it.
+    pub fn holds(self, i: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Red => i.is_multiple_of(2),
+            Self::Black => !i.is_multiple_of(2),
+        }
+    }
+}
+
+/// The water's constants and its solids.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Kernels.
+    pub calibration: Calibration,
+    /// Solver settings.
+    pub settings: scene::Pbf,
+    /// m/s².
+    pub gravity: DVec3,
+    /// Cells of edge h over the domain.
+    pub cells: Cells,
+    /// Samples on solids, sorted by cell.
+    pub samples: Vec<DVec3>,
+    /// Their weights in particles' worth of mass.
+    pub sample_weights: Vec<f64>,
+    /// Distance to the solids; `None` without any.
+    pub distance: Option<SignedDistance>,
+}
+
+/// A substep's length and walls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Substep {
+    /// Δt, seconds; 0 measures only.
+    pub time_step: f64,
+    /// The box now, wave-makers included.
+    pub walls: Bounds,
+}
+
+impl Model {
+    /// Of a scene that PBF solves, and its solids in world space.
+    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+        let settings = scene.solver.pbf();
+        let samples = &boundary.samples;
+        let calibration = Calibration::new(settings.particle_spacing, settings.support_ratio);
+        let cells = Cells::new(scene.domain.size(), calibration.support_radius);
+        let origin = scene.domain.min;
+        let local: Vec<DVec3> = samples.iter().map(|s| s.position - origin).collect();
+        let id: Vec<u32> = (0..local.len() as u32).collect();
+        let order = cells.order(&local, &id);
+        let area = settings.particle_spacing * settings.particle_spacing;
+        Self {
+            sample_weights: order
+                .iter()
+                .map(|&k| calibration.sample_weight * samples[k].area / area)
+                .collect(),
+            samples: order.into_iter().map(|k| local[k]).collect(),
+            distance: boundary.distance.as_ref().map(|distance| SignedDistance {
+                origin: distance.origin - origin,
+                ..distance.clone()
+            }),
+            calibration,
+            settings: settings.clone(),
+            gravity: scene.water.gravity,
+            cells,
+        }
+    }
+
+    /// Largest correction of one iteration, metres.
+    pub fn max_correction(&self) -> f64 {
+        MAX_CORRECTION * self.settings.particle_spacing
+    }
+
+    /// Displacement cap of a substep, metres.
+    pub fn max_displacement(&self) -> f64 {
+        CAP * self.settings.cfl * self.settings.particle_spacing
+    }
+
+    /// ε of λ's denominator, 1/m².
+    pub fn regularization(&self) -> f64 {
+        REGULARIZATION * self.calibration.bulk_gradient_squares
+    }
+
+    /// Keeps a position off the walls and out of the solids (shared/confine.wgsl); what is not a number stays so.
+    pub fn confine(&self, x: DVec3, walls: &Bounds) -> DVec3 {
+        let contact = CONTACT * self.settings.particle_spacing;
+        let mut x = x;
+        if let Some(distance) = &self.distance {
+            let d = distance.sample(x);
+            if d < contact {
+                x += distance.gradient(x).normalize_or_zero() * (contact - d);
+            }
+        }
+        DVec3::from_array(std::array::from_fn(|axis| {
+            let (low, high) = (walls.min[axis] + contact, walls.max[axis] - contact);
+            if x[axis] < low {
+                low
+            } else if x[axis] > high {
+                high
+            } else {
+                x[axis]
+            }
+        }))
+    }
+
+    /// The derivative of the relative density that the walls give at `x`, 1/m; the gradient of
+    /// [`wall_term`](Self::wall_term) is spiky's in its place.
+    pub(super) fn wall_derivative(&self, x: DVec3, walls: &Bounds) -> DVec3 {
+        let h = self.calibration.support_radius;
+        let scale = self.calibration.wall_density_scale;
+        let low = ((x - walls.min) / h).clamp(DVec3::ZERO, DVec3::ONE);
+        let high = ((walls.max - x) / h).clamp(DVec3::ZERO, DVec3::ONE);
+        let free = |q: f64| 1.0 - scale * half_space_fraction(q);
+        let slope = |q: f64| scale * 315.0 / 256.0 * (1.0 - q * q).powi(4) / h;
+        let along = |axis: usize| {
+            let (low, high) = (low[axis], high[axis]);
+            let derivative = slope(high) * free(low) - slope(low) * free(high);
+            (free(low) * free(high), derivative)
+        };
+        let [(fx, dx), (fy, dy), (fz, dz)] = [along(0), along(1), along(2)];
+        DVec3::new(dx * fy * fz, dy * fx * fz, dz * fx * fy)
+    }
+
+    /// Relative density that the walls give at `x`, and its gradient, 1/m (shared/walls.wgsl).
+    pub fn wall_term(&self, x: DVec3, walls: &Bounds) -> (f64, DVec3) {
+        let h = self.calibration.support_radius;
+        let low = ((x - walls.min) / h).clamp(DVec3::ZERO, DVec3::ONE);
+        let high = ((walls.max - x) / h).clamp(DVec3::ZERO, DVec3::ONE);
+        if low.min(high).min_element() >= 1.0 {
+            return (0.0, DVec3::ZERO);
+        }
+        let scale = self.calibration.wall_density_scale;
+        let slope = |q: f64| scale * 1.5 * (1.0 - q).powi(4) * (1.0 + 4.0 * q) / h;
+        let along = |axis: usize| {
+            let free = (1.0 - scale * half_space_fraction(low[axis]))
+                * (1.0 - scale * half_space_fraction(high[axis]));
+            (free, slope(high[axis]) - slope(low[axis]))
+        };
+        let [(fx, sx), (fy, sy), (fz, sz)] = [along(0), along(1), along(2)];
+        let gradient = DVec3::new(sx * fy * fz, sy * fx * fz, sz * fx * fy);
+        (1.0 - fx * fy * fz, gradient)
+    }
+}

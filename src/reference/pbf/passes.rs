@@ -1,0 +1,273 @@
+//! Twins of shaders/pbf: one function a pass, under its name.
+//!
+//! A pass that the GPU runs on one colour takes a [`Colour`] here, and leaves the others' values alone.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{Colour, Model, Substep};
+use crate::reference::neighbors::Neighbors;
+
+/// Particles of a task; fewer are not worth the handing out.
+const GRAIN: usize = 256;
+
+/// What the passes of a substep read.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a> {
+    /// Constants and solids.
+    pub model: &'a Model,
+    /// Δt and walls.
+    pub substep: &'a Substep,
+    /// Metres: particles, then samples on solids.
+    pub points: &'a [DVec3],
+    /// Who was near whom when they were listed.
+    pub neighbors: &'a Neighbors,
+}
+
+impl Inputs<'_> {
+    /// How many of the points are particles.
+    pub fn particles(&self) -> usize {
+        self.points.len() - self.model.samples.len()
+    }
+
+    /// Of a sample as lists have it, in particles' worth of mass.
+    pub(super) fn sample_weight(&self, j: u32) -> f64 {
+        self.model.sample_weights[j as usize - self.particles()]
+    }
+}
+
+/// Explicit step of the external forces; what walls and solids take of the way is taken from the
+/// velocity (pbf/predict). Returns the predicted position and the velocity, metres and m/s.
+pub fn predict(
+    model: &Model,
+    substep: &Substep,
+    position: DVec3,
+    velocity: DVec3,
+) -> (DVec3, DVec3) {
+    let step = substep.time_step;
+    let mut v = velocity + model.gravity * step;
+    v *= (model.max_displacement() / (step * v.length()).max(1e-30)).min(1.0);
+    let free = position + step * v;
+    let x = model.confine(free, &substep.walls);
+    let taken = if step > 0.0 {
+        (x - free) / step
+    } else {
+        DVec3::ZERO
+    };
+    (x, v + taken)
+}
+
+/// Relative density ρ/ρ0 of each particle, shape (particles) (pbf/measure_density).
+pub fn measure_density(inputs: Inputs<'_>) -> Vec<f64> {
+    let model = inputs.model;
+    let inverse_h2 = model.calibration.support_radius.powi(-2);
+    let one = |i: usize| {
+        let x = inputs.points[i];
+        let kernel = |&j: &u32| {
+            let q2 = x.distance_squared(inputs.points[j as usize]) * inverse_h2;
+            (1.0 - q2).max(0.0).powi(3)
+        };
+        let (fluid, solid) = inputs.neighbors.of(i);
+        let mut sum = 1.0 + fluid.iter().map(kernel).sum::<f64>();
+        for j in solid {
+            sum += inputs.sample_weight(*j) * kernel(j);
+        }
+        let (wall, _) = model.wall_term(x, &inputs.substep.walls);
+        model.calibration.density_scale * sum + wall
+    };
+    (0..inputs.particles())
+        .into_par_iter()
+        .with_min_len(GRAIN)
+        .map(one)
+        .collect()
+}
+
+/// λ_i = −max(C_i, 0) / (Σ_k |∇_k C_i|² + ε), m², and ρ_i/ρ0 of one colour (pbf/compute_lambda; Macklin and
+/// Müller 2013, eq. 11). Shapes (particles).
+pub fn compute_lambda(inputs: Inputs<'_>, colour: Colour, lambda: &mut [f64], density: &mut [f64]) {
+    let regularization = inputs.model.regularization();
+    let one = |(i, (lambda, density)): (usize, (&mut f64, &mut f64))| {
+        if colour.holds(i) {
+            let row = row(inputs, i);
+            *lambda = -(row.density - 1.0).max(0.0) / (row.squares + regularization);
+            *density = row.density;
+        }
+    };
+    (lambda.par_iter_mut().zip(density))
+        .enumerate()
+        .with_min_len(GRAIN)
+        .for_each(one);
+}
+
+/// One density constraint at the positions as they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// ρ/ρ0.
+    pub density: f64,
+    /// ∇_i C_i, 1/m.
+    pub own: DVec3,
+    /// Σ_k |∇_k C_i|² over the particle and its neighbours, 1/m².
+    pub squares: f64,
+}
+
+/// The constraint of particle `i`.
+#[inline]
+pub fn row(inputs: Inputs<'_>, i: usize) -> Row {
+    let calibration = &inputs.model.calibration;
+    let inverse_h = 1.0 / calibration.support_radius;
+    let x = inputs.points[i];
+    let (mut kernel, mut gradient, mut squares) = (1.0, DVec3::ZERO, 0.0);
+    // Poly6, and spiky's slope beside the difference over r.
+    let pair = |j: u32| {
+        let d = x - inputs.points[j as usize];
+        let r2 = d.length_squared();
+        let r = r2.sqrt();
+        let p = (1.0 - r2 * inverse_h * inverse_h).max(0.0);
+        let s = (1.0 - r * inverse_h).max(0.0);
+        (p * p * p, s * s, d * (s * s / r.max(1e-15)))
+    };
+    let (fluid, solid) = inputs.neighbors.of(i);
+    for &j in fluid {
+        let (w, slope, along) = pair(j);
+        kernel += w;
+        gradient += along;
+        squares += slope * slope;
+    }
+    // A solid's samples do not move: they have no gradient of their own.
+    for &j in solid {
+        let (w, _, along) = pair(j);
+        let weight = inputs.sample_weight(j);
+        kernel += weight * w;
+        gradient += weight * along;
+    }
+    let scale = calibration.gradient_scale;
+    let (wall, wall_gradient) = inputs.model.wall_term(x, &inputs.substep.walls);
+    let own = wall_gradient - scale * gradient;
+    Row {
+        density: calibration.density_scale * kernel + wall,
+        own,
+        squares: own.length_squared() + scale * scale * squares,
+    }
+}
+
+/// How a semi-iteration carries corrections on (Wang 2015, eq. 9).
+#[derive(Clone, Copy, Debug)]
+pub struct Momentum<'a> {
+    /// ω of this iteration.
+    pub factor: f64,
+    /// Positions of one iteration before, metres. Shape (particles).
+    pub before: &'a [DVec3],
+}
+
+/// Δx_i = Σ_j (λ_i + λ_j + s_corr) ∇W / ρ0, metres, relaxed, bounded, and what walls and solids leave of it
+/// (pbf/compute_delta; Macklin and Müller 2013, eq. 14): the new positions of one colour, the others' as they are.
+pub fn compute_delta(
+    inputs: Inputs<'_>,
+    colour: Colour,
+    momentum: Option<Momentum<'_>>,
+    lambda: &[f64],
+) -> Vec<DVec3> {
+    let model = inputs.model;
+    let bounded = |step: DVec3| step * (model.max_correction() / step.length().max(1e-30)).min(1.0);
+    let one = |i: usize| {
+        let x = inputs.points[i];
+        if !colour.holds(i) {
+            return x;
+        }
+        let (_, wall) = model.wall_term(x, &inputs.substep.walls);
+        let pairs = pair_corrections(inputs, i, lambda);
+        let delta = lambda[i] * wall - model.calibration.gradient_scale * pairs;
+        let mut delta = bounded(model.settings.relaxation * delta);
+        if let Some(Momentum { factor, before }) = momentum {
+            let last = x - before[i];
+            if delta.dot(last) > 0.0 {
+                delta = bounded(factor * delta + (factor - 1.0) * last);
+            }
+        }
+        model.confine(x + delta, &inputs.substep.walls)
+    };
+    (0..lambda.len())
+        .into_par_iter()
+        .with_min_len(GRAIN)
+        .map(one)
+        .collect()
+}
+
+/// Σ_j (λ_i + λ_j + s_corr) m_j (1 − q)² over the unit vector from j, m².
+#[inline]
+fn pair_corrections(inputs: Inputs<'_>, i: usize, lambda: &[f64]) -> DVec3 {
+    /// W at Δq = 0.2 h over W(0).
+    const REFERENCE_KERNEL: f64 = 0.884_736;
+    let Model {
+        calibration,
+        settings,
+        ..
+    } = inputs.model;
+    let inverse_h = 1.0 / calibration.support_radius;
+    let artificial = settings.artificial_pressure / calibration.bulk_gradient_squares;
+    let x = inputs.points[i];
+    let mut coincident = None;
+    let mut pair = |j: u32, scale: f64| {
+        let d = x - inputs.points[j as usize];
+        let r2 = d.length_squared();
+        let r = r2.sqrt();
+        let s = (1.0 - r * inverse_h).max(0.0);
+        let mut scale = scale;
+        if artificial > 0.0 {
+            let p = (1.0 - r2 * inverse_h * inverse_h).max(0.0);
+            scale -= artificial * (p.powi(3) / REFERENCE_KERNEL).powi(4);
+        }
+        if r * inverse_h < 1e-6 {
+            coincident = Some(j);
+        }
+        d * (scale * s * s / r.max(1e-15))
+    };
+    let mut sum = DVec3::ZERO;
+    let (fluid, solid) = inputs.neighbors.of(i);
+    for &j in fluid {
+        sum += pair(j, lambda[i] + lambda[j as usize]);
+    }
+    for &j in solid {
+        sum += inputs.sample_weight(j) * pair(j, lambda[i]);
+    }
+    match coincident {
+        Some(j) => sum + pair_direction(i as u32, j) * 2.0 * lambda[i],
+        None => sum,
+    }
+}
+
+/// v += (x* − x*_0) / Δt, with x*_0 the prediction before any correction; what is over the displacement cap
+/// is slowed (pbf/update_velocity). Returns position, velocity, and whether it was.
+pub fn update_velocity(
+    model: &Model,
+    substep: &Substep,
+    predicted: DVec3,
+    start: DVec3,
+    velocity: DVec3,
+) -> (DVec3, DVec3, bool) {
+    let step = substep.time_step;
+    let v = velocity + (predicted - start) / step;
+    let distance = v.length() * step;
+    if distance > model.max_displacement() {
+        let excess = v * (1.0 - model.max_displacement() / distance);
+        return (predicted - excess * step, v - excess, true);
+    }
+    (predicted, v, false)
+}
+
+/// PCG hash (Jarzynski and Olano 2020; shared/hash.wgsl).
+fn pcg(value: u32) -> u32 {
+    let state = value.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
+
+/// A unit vector for a pair that stands on one spot: opposite for (a, b) and (b, a).
+fn pair_direction(a: u32, b: u32) -> DVec3 {
+    let seed = pcg(a.min(b) ^ pcg(a.max(b)));
+    let z = f64::from(seed & 0xffff) / 32767.5 - 1.0;
+    let angle = f64::from(seed >> 16) * (std::f64::consts::TAU / 65536.0);
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    let sign = if a < b { 1.0 } else { -1.0 };
+    sign * DVec3::new(r * angle.cos(), r * angle.sin(), z)
+}

@@ -1,0 +1,339 @@
+//! Whole frames of PBF on the CPU.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{
+    Colour, Model, Substep, effects,
+    passes::{self, Inputs, Momentum},
+};
+use crate::{
+    domain::{
+        boundary::Boundary,
+        particles::Particles,
+        pbf::chebyshev_factors,
+        probe::fitted,
+        solver::{Solver, StepReport},
+    },
+    reference::{
+        ReferenceError, Timings,
+        neighbors::{Crowd, Neighbors},
+    },
+    scene::{Iteration, Scene, Stop},
+};
+
+/// PBF in f64. Frames are rounded to f32 as they are written, and the next one starts from what was written.
+pub struct Pbf {
+    scene: Scene,
+    model: Model,
+    state: Particles,
+    frame: u32,
+    timings: Timings,
+    /// Positions after the last substep, metres, its Σ λ, m², and its length, seconds.
+    position: Vec<DVec3>,
+    pressed: Vec<f64>,
+    step: f64,
+}
+
+/// Particles in the order of the sort, and who is near whom there; positions relative to the domain's least corner.
+#[derive(Clone, Debug)]
+pub struct Sorted {
+    /// Positions, metres: particles, then samples on solids.
+    pub points: Vec<DVec3>,
+    /// Where each stood before the sort. Shape (particles).
+    pub order: Vec<usize>,
+    /// At the positions as they were sorted.
+    pub neighbors: Neighbors,
+    /// Σ λ of the corrections so far, m²: the pressure that they stand for. Shape (particles).
+    pub lambda_sum: Vec<f64>,
+}
+
+impl Sorted {
+    /// Sorts by cell and id (pbf/assign_cells to pbf/reorder), and lists neighbours (pbf/build_neighbors).
+    pub fn new(model: &Model, position: &[DVec3], id: &[u32], timings: &mut Timings) -> Self {
+        let order = timings.time("pbf/reorder", || model.cells.order(position, id));
+        let mut points: Vec<DVec3> = order.iter().map(|&k| position[k]).collect();
+        points.extend(&model.samples);
+        let neighbors = timings.time("pbf/build_neighbors", || {
+            let crowd = Crowd {
+                cells: model.cells,
+                points: &points,
+                particles: order.len(),
+            };
+            Neighbors::search(&crowd, model.calibration.support_radius)
+        });
+        Self {
+            lambda_sum: vec![0.0; order.len()],
+            points,
+            order,
+            neighbors,
+        }
+    }
+
+    /// As passes take it.
+    pub fn inputs<'a>(&'a self, model: &'a Model, substep: &'a Substep) -> Inputs<'a> {
+        Inputs {
+            model,
+            substep,
+            points: &self.points,
+            neighbors: &self.neighbors,
+        }
+    }
+
+    /// Positions of the particles, metres.
+    pub fn particles(&self) -> &[DVec3] {
+        &self.points[..self.order.len()]
+    }
+
+    /// One value a particle, from this order into the one before the sort.
+    pub fn unsorted<T: Copy + Default>(&self, values: &[T]) -> Vec<T> {
+        let mut by_slot = vec![T::default(); values.len()];
+        for (&slot, &value) in self.order.iter().zip(values) {
+            by_slot[slot] = value;
+        }
+        by_slot
+    }
+}
+
+/// What an iteration carries from pass to pass. Shapes (particles).
+struct Corrector<'a> {
+    model: &'a Model,
+    substep: &'a Substep,
+    sorted: &'a mut Sorted,
+    timings: &'a mut Timings,
+    lambda: Vec<f64>,
+    density: Vec<f64>,
+    /// Positions of one iteration before, for a semi-iteration.
+    before: Vec<DVec3>,
+}
+
+impl Corrector<'_> {
+    fn lambda(&mut self, colour: Colour) {
+        let inputs = self.sorted.inputs(self.model, self.substep);
+        self.timings.time("pbf/compute_lambda", || {
+            passes::compute_lambda(inputs, colour, &mut self.lambda, &mut self.density);
+        });
+    }
+
+    /// `factor` is that of a semi-iteration.
+    fn delta(&mut self, colour: Colour, factor: Option<f64>) {
+        let inputs = self.sorted.inputs(self.model, self.substep);
+        let before = &self.before[..];
+        let momentum = factor.map(|factor| Momentum { factor, before });
+        let moved = self.timings.time("pbf/compute_delta", || {
+            passes::compute_delta(inputs, colour, momentum, &self.lambda)
+        });
+        let sums = self.sorted.lambda_sum.iter_mut().zip(&self.lambda);
+        for (_, (sum, lambda)) in sums.enumerate().filter(|(i, _)| colour.holds(*i)) {
+            *sum += lambda;
+        }
+        let now = &mut self.sorted.points[..moved.len()];
+        if factor.is_some() {
+            self.before.copy_from_slice(now);
+        }
+        now.copy_from_slice(&moved);
+    }
+}
+
+/// Corrects sorted positions until the stop that the settings name, at most `most` iterations; returns how many
+/// there were.
+pub fn iterate(
+    model: &Model,
+    substep: &Substep,
+    sorted: &mut Sorted,
+    timings: &mut Timings,
+) -> u32 {
+    let n = sorted.order.len();
+    let settings = &model.settings;
+    let mut factors = chebyshev_factors(settings.spectral_radius);
+    let mut corrector = Corrector {
+        model,
+        substep,
+        lambda: vec![0.0; n],
+        density: vec![0.0; n],
+        before: sorted.particles().to_vec(),
+        sorted,
+        timings,
+    };
+    let most = settings.stop.most_iterations();
+    for k in 0..most {
+        // Black λ of the iteration before still hold for red's correction: only the first needs all.
+        corrector.lambda(match settings.iteration {
+            Iteration::RedBlack if k > 0 => Colour::Red,
+            _ => Colour::All,
+        });
+        if let Stop::DensityError { density_error, .. } = settings.stop {
+            let errors = corrector.density.iter().map(|rho| (rho - 1.0).max(0.0));
+            if errors.sum::<f64>() <= density_error * n as f64 {
+                return k;
+            }
+        }
+        match settings.iteration {
+            Iteration::Jacobi => corrector.delta(Colour::All, None),
+            Iteration::Chebyshev => corrector.delta(Colour::All, factors.next()),
+            Iteration::RedBlack => {
+                corrector.delta(Colour::Red, None);
+                corrector.lambda(Colour::Black);
+                corrector.delta(Colour::Black, None);
+            }
+        }
+    }
+    most
+}
+
+impl Pbf {
+    /// Of a scene that PBF solves, and its solids.
+    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+        Self {
+            model: Model::new(scene, boundary),
+            scene: scene.clone(),
+            state: Particles::default(),
+            frame: 0,
+            timings: Timings::default(),
+            position: Vec::new(),
+            pressed: Vec::new(),
+            step: 0.0,
+        }
+    }
+
+    /// One substep of particles in the order of their ids; returns iterations and capped particles.
+    fn step(
+        &mut self,
+        substep: &Substep,
+        position: &mut Vec<DVec3>,
+        velocity: &mut Vec<DVec3>,
+    ) -> (u32, u64) {
+        let (model, timings) = (&self.model, &mut self.timings);
+        let (predicted, pushed): (Vec<_>, Vec<_>) = timings.time("pbf/predict", || {
+            (position.par_iter().zip(velocity.par_iter()))
+                .map(|(&x, &v)| passes::predict(model, substep, x, v))
+                .unzip()
+        });
+        let mut sorted = Sorted::new(model, &predicted, &self.state.id, timings);
+        let iterations = iterate(model, substep, &mut sorted, timings);
+        let (mut moved, capped) = timings.time("pbf/update_velocity", || {
+            let updated: Vec<_> = (sorted.order.par_iter().zip(sorted.particles()))
+                .map(|(&slot, &x)| {
+                    passes::update_velocity(model, substep, x, predicted[slot], pushed[slot])
+                })
+                .collect();
+            for (point, &(x, ..)) in sorted.points.iter_mut().zip(&updated) {
+                *point = x;
+            }
+            let capped = updated.iter().filter(|(_, _, is_capped)| *is_capped);
+            let capped = capped.count() as u64;
+            (updated.into_iter().map(|(_, v, _)| v).collect(), capped)
+        });
+        let inputs = sorted.inputs(model, substep);
+        effects::apply(&self.scene.effects, inputs, &mut moved, timings);
+        *position = sorted.unsorted(sorted.particles());
+        *velocity = sorted.unsorted(&moved);
+        self.pressed = sorted.unsorted(&sorted.lambda_sum);
+        (iterations, capped)
+    }
+
+    /// Rounds into the state.
+    fn write(&mut self, position: &[DVec3], velocity: &[DVec3]) {
+        let origin = self.scene.domain.min;
+        for (slot, x) in self.state.position.iter_mut().zip(position) {
+            *slot = (origin + *x).as_vec3().to_array();
+        }
+        for (slot, v) in self.state.velocity.iter_mut().zip(velocity) {
+            *slot = v.as_vec3().to_array();
+        }
+    }
+
+    /// Relative densities of the state in its order.
+    fn density(&mut self, time: f64) -> Vec<f64> {
+        let substep = Substep {
+            time_step: 0.0,
+            walls: self.scene.walls(time),
+        };
+        let (model, timings) = (&self.model, &mut self.timings);
+        let position = local(&self.scene, &self.state);
+        let sorted = Sorted::new(model, &position, &self.state.id, timings);
+        let density = timings.time("pbf/measure_density", || {
+            passes::measure_density(sorted.inputs(model, &substep))
+        });
+        sorted.unsorted(&density)
+    }
+}
+
+impl Solver for Pbf {
+    type Error = ReferenceError;
+
+    fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
+        self.state = particles.clone();
+        self.frame = frame;
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<(Particles, StepReport), ReferenceError> {
+        let frame = self.frame + 1;
+        let numbers = |what| ReferenceError::Numbers { frame, what };
+        let length = self.scene.shot.frame_seconds();
+        let start = f64::from(self.frame) * length;
+        let substeps = self
+            .scene
+            .pbf_substeps(self.frame, self.state.max_speed())
+            .map_err(numbers)?;
+        let step = length / f64::from(substeps);
+        let mut position = local(&self.scene, &self.state);
+        let mut velocity: Vec<DVec3> = self.state.velocity.iter().map(widen).collect();
+        let (mut iterations, mut capped) = (0, 0);
+        for k in 1..=substeps {
+            let substep = Substep {
+                time_step: step,
+                walls: self.scene.walls(start + f64::from(k) * step),
+            };
+            let (some, slowed) = self.step(&substep, &mut position, &mut velocity);
+            iterations += u64::from(some);
+            capped += slowed;
+        }
+        self.write(&position, &velocity);
+        let density = self.density(start + length);
+        if let Some(what) = self.state.first_not_finite(Some(&density)) {
+            return Err(numbers(what));
+        }
+        self.frame = frame;
+        (self.position, self.step) = (position, step);
+        let report = StepReport {
+            substeps,
+            iterations,
+            capped,
+            ..self.scene.report(&self.state, density.into_iter())
+        };
+        Ok((self.state.clone(), report))
+    }
+
+    /// As [`pressure_scale`](crate::domain::sph::Calibration::pressure_scale) has it from Σ λ.
+    fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, ReferenceError> {
+        let calibration = &self.model.calibration;
+        let scale = calibration.pressure_scale(
+            self.scene.water.rest_density,
+            self.model.settings.relaxation,
+            self.step,
+        );
+        let pressure = |at: &DVec3| {
+            let pressed = self.pressed.iter().map(|sum| scale * sum);
+            let particles = self.position.iter().copied().zip(pressed);
+            let at = *at - self.scene.domain.min;
+            fitted(particles, at, calibration.support_radius)
+        };
+        Ok(points.iter().map(pressure).collect())
+    }
+
+    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+        self.timings.rows()
+    }
+}
+
+/// Positions of a state relative to the domain's least corner, metres.
+pub fn local(scene: &Scene, state: &Particles) -> Vec<DVec3> {
+    let position = state.position.iter();
+    position.map(|x| widen(x) - scene.domain.min).collect()
+}
+
+fn widen(v: &[f32; 3]) -> DVec3 {
+    Vec3::from_array(*v).as_dvec3()
+}
