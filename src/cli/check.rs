@@ -1,0 +1,221 @@
+//! `swell check CACHE|SCENE`
+
+use std::{cell::OnceCell, fmt::Write as _, path::PathBuf, process::ExitCode};
+
+use clap::Args;
+use serde_json::json;
+
+use crate::{
+    domain::frame_range::FrameRange,
+    scene::Method,
+    stage::check::{Event, Outcome, Request, Row, Source, Table, check, is_cache},
+};
+
+use super::{
+    Failure, bake,
+    interrupt::{self, Interrupt},
+    progress::{Mode, Progress},
+};
+
+#[derive(Args, Debug)]
+pub(super) struct CheckArgs {
+    /// A cache's folder, or a scene file (TOML), of which the start is taken.
+    #[arg(value_name = "CACHE|SCENE")]
+    source: PathBuf,
+    /// Frames of the cache from which the step is taken, such as 1,30,72; its last where left out.
+    #[arg(long, value_name = "FRAMES")]
+    frames: Option<FrameRange>,
+    /// Of a scene: which solver, pbf or flip.
+    #[arg(long, value_name = "SOLVER", value_parser = bake::method)]
+    solver: Option<Method>,
+    /// Of a scene: override a key, such as solver.pbf.iteration=jacobi.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// The result as one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Index or part of the name of the adapter (see `swell inspect --adapters`).
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// How to tell progress.
+    #[arg(long, value_enum, default_value_t)]
+    progress: Mode,
+}
+
+/// What an option is for, where it is for the other kind of source.
+#[derive(Debug, thiserror::Error)]
+#[error("{option} is for {what}; {} is {is}", .source_file.display())]
+struct Misplaced {
+    option: &'static str,
+    what: &'static str,
+    is: &'static str,
+    source_file: PathBuf,
+}
+
+pub(super) fn run(args: &CheckArgs) -> Result<ExitCode, Failure> {
+    let request = Request {
+        source: source(args)?,
+        adapter: args.adapter.clone(),
+    };
+    let interrupt = Interrupt::install_or_warn();
+    let progress = OnceCell::new();
+    let outcome = check(&request, interrupt.flag(), &mut |event| {
+        tell(args.progress, &progress, &event);
+    });
+    if let Some(progress) = progress.get() {
+        progress.finish();
+    }
+    let outcome = outcome?;
+    if args.json {
+        println!("{}", to_json(&outcome));
+    } else {
+        print!("{}", show(&outcome.table));
+        println!("{}", verdict(&outcome));
+    }
+    Ok(if outcome.interrupted {
+        ExitCode::from(interrupt::EXIT_CODE as u8)
+    } else {
+        ExitCode::from(u8::from(outcome.first_over.is_some()))
+    })
+}
+
+fn source(args: &CheckArgs) -> Result<Source, Failure> {
+    let misplaced = |option, what, is| Failure {
+        code: 2,
+        error: Box::new(Misplaced {
+            option,
+            what,
+            is,
+            source_file: args.source.clone(),
+        }),
+    };
+    if !is_cache(&args.source) {
+        if args.frames.is_some() {
+            return Err(misplaced(
+                "--frames",
+                "caches",
+                "a scene: its start is frame 0",
+            ));
+        }
+        let scene = bake::load(&args.source, &args.set, args.solver)?;
+        return Ok(Source::Scene(Box::new(scene)));
+    }
+    if args.solver.is_some() || !args.set.is_empty() {
+        let is = "a cache: it says what it was baked with";
+        return Err(misplaced("--solver or --set", "scenes", is));
+    }
+    Ok(Source::Cache(args.source.clone(), args.frames.clone()))
+}
+
+fn tell(mode: Mode, progress: &OnceCell<Progress>, event: &Event<'_>) {
+    match event {
+        Event::Ready {
+            device,
+            solver,
+            particles,
+            frames,
+        } => {
+            progress
+                .get_or_init(|| Progress::new(mode, *frames as u64))
+                .say(
+                    &format!("{solver} on {device} against f64, {particles} particles at the start"),
+                    json!({
+                        "event": "ready", "solver": solver, "device": device, "particles": particles, "frames": frames,
+                    }),
+                );
+        }
+        Event::Frame {
+            frame,
+            table,
+            seconds,
+        } => {
+            let Some(progress) = progress.get() else {
+                return;
+            };
+            let over = table.rows.iter().filter(|row| !row.is_within()).count();
+            progress.frame(
+                &format!(
+                    "frame {frame:4}  {seconds:6.2} s  {} rows, {over} out of tolerance",
+                    table.rows.len()
+                ),
+                json!({
+                    "event": "frame", "frame": frame, "seconds": seconds, "rows": table.rows.len(), "over": over,
+                }),
+            );
+        }
+    }
+}
+
+fn to_json(outcome: &Outcome) -> serde_json::Value {
+    let first = outcome
+        .first_over
+        .map(|(frame, pass, field)| json!({ "frame": frame, "pass": pass, "field": field }));
+    json!({
+        "frames": outcome.frames,
+        "interrupted": outcome.interrupted,
+        "within": outcome.first_over.is_none(),
+        "first_over": first,
+        "rows": outcome.table.rows,
+        "unchecked": outcome.table.unchecked,
+    })
+}
+
+/// Two figures of a number, short.
+fn short(value: f64) -> String {
+    match value {
+        0.0 => "0".into(),
+        value if (0.01..100.0).contains(&value) => format!("{value:.2}"),
+        value => format!("{value:.1e}"),
+    }
+}
+
+fn line(row: &Row) -> String {
+    let worst = &row.worst;
+    format!(
+        "{:28} {:30} {:>4} {:>9} {:>6} {:>9} {:>9} {:>9} {:>8}{}",
+        row.field.pass,
+        row.field.name,
+        row.field.unit,
+        row.values,
+        row.ties,
+        short(row.deviation.max),
+        short(worst.error),
+        short(worst.tolerance),
+        short(worst.ratio),
+        if row.is_within() { "" } else { "  OUT" }
+    )
+}
+
+fn show(table: &Table) -> String {
+    let mut text = format!(
+        "{:28} {:30} {:>4} {:>9} {:>6} {:>9} {:>9} {:>9} {:>8}\n",
+        "pass", "field", "unit", "values", "ties", "max", "worst", "allowed", "part"
+    );
+    for row in &table.rows {
+        let _ = writeln!(text, "{}", line(row));
+    }
+    for (pass, why) in &table.unchecked {
+        let _ = writeln!(text, "{pass:28} not checked: {why}");
+    }
+    text
+}
+
+fn verdict(outcome: &Outcome) -> String {
+    match outcome.first_over {
+        None if outcome.interrupted => {
+            format!("ended by a signal after {} frames", outcome.frames.len())
+        }
+        None if outcome.table.rows.is_empty() => "nothing to check: no water".into(),
+        None => "all within tolerance".into(),
+        Some((frame, pass, field)) => {
+            let rows = &outcome.table.rows;
+            let row = rows
+                .iter()
+                .find(|row| row.field.pass == pass && row.field.name == field);
+            let why = row.map_or("", |row| row.field.derivation);
+            format!(
+                "out of tolerance: {pass} first, its {field}, in the step after frame {frame}; allowed there: {why}"
+            )
+        }
+    }
+}

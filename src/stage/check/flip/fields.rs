@@ -1,0 +1,67 @@
+//! What a check of FLIP compares, and where each tolerance comes from; u = 2⁻²⁴, N cells along the domain's longest
+//! side: a particle's place in its cell errs by 3 u N.
+
+use crate::compare::check::fields;
+
+fields! {
+    SPEED = "flip/survey", "largest speed squared", "m²/s²", "5 u";
+    WET = "flip/survey", "bricks with water", "", "equal";
+    CELL = "flip/assign_cells", "cell", "", "equal; within 4 u x/Δx of a cell's face either is right";
+    COUNTS = "flip/assign_cells", "particles in cells", "", "whole numbers: equal";
+    SLOTS = "flip/assign_cells", "slots in cells", "", "whole numbers: each slot once";
+    POSITION = "flip/reorder", "position", "m", "a copy: equal";
+    VELOCITY = "flip/reorder", "velocity", "m/s", "a copy: equal";
+    ID = "flip/reorder", "id", "", "a copy: equal";
+    AFFINE = "flip/reorder", "affine rows", "1/s", "a copy: equal";
+    KIND = "flip/cut_cells", "kind of cell", "", "equal; a tie where it turns as the solids' distances move by their rounding";
+    OPEN = "flip/cut_cells", "open fraction", "",
+        "8 u N, and 3 times what it changes by as the solids' distances move by theirs, u (7 |x − x0| + |x0| + 48 spacings)";
+    FLUX = "flip/cut_cells", "flux of solids", "m/s",
+        "the open fractions' tolerance times the walls' speed, 6 faces; and so for solids";
+    VOLUME = "flip/cut_cells", "open volume", "", "as the open fraction";
+    OLD = "flip/gather_faces", "velocity at faces", "m/s",
+        "12 u N (particles about) / (their weight), at most 1, of the range of their velocities, + u (particles + 20) |v|";
+    NEW = "flip/gather_faces", "velocity with gravity", "m/s", "the same + 2 u g Δt";
+    KNOWN = "flip/gather_faces", "whether particles are near", "", "equal";
+    DENSITY = "flip/gather_centers", "relative density", "",
+        "share (9 u N (particles about) + u (particles + 40) Σ) / room + 16 u N of it";
+    EXCESS = "flip/gather_centers", "density excess", "", "the density's";
+    DISTANCE = "flip/gather_centers", "distance of the surface", "m",
+        "what the twin answers when the density moves by its tolerance, + 24 u";
+    DIRICHLET = "pressure/build_system", "what air adds to the diagonal", "", "16 u of each quotient, 6 sums: 24 u";
+    COEFFICIENT = "pressure/build_system", "coefficients", "", "copies: equal";
+    ROWS = "pressure/build_system", "rows", "", "equal";
+    RHS = "pressure/divergence", "right-hand side", "m/s", "7 products and sums: 10 u Σ|f u|";
+    BEFORE = "pressure/divergence", "largest divergence", "1/s", "10 u of the largest Σ|f u| over Δx";
+    PRODUCT = "pressure/multiply", "system times direction", "m/s", "by differences: 12 u Σ c |x − x'|";
+    PROJECTED = "pressure/project", "velocity at faces", "m/s", "24 u |Δq|/θ of each of its two words, which may cancel, + 2 u |v|";
+    PRESSURE = "pressure/project", "pressure", "Pa", "4 u p";
+    AFTER = "pressure/measure_divergence", "largest divergence", "1/s", "10 u of the largest Σ|f u| over Δx";
+    SOURCE = "pressure/density_source", "right-hand side", "m", "2 u";
+    DISPLACEMENT = "pressure/displace", "displacement at faces", "m", "24 u |Δq|/θ of each of its two words";
+    CHANGE = "flip/find_change", "change at faces", "m/s", "one difference: u";
+    LAYER = "flip/find_change", "layers", "", "equal";
+    SPREAD_VELOCITY = "flip/extrapolate", "velocity at faces", "m/s", "a mean of six and two sums: 12 u of the largest";
+    SPREAD_CHANGE = "flip/extrapolate", "change at faces", "m/s", "likewise";
+    SPREAD_LAYER = "flip/extrapolate", "layers", "", "equal";
+    GIVEN = "flip/grid_to_particle", "velocity", "m/s",
+        "9 u N of the range of the faces' values and changes about the cell, + 32 u of the largest";
+    CARRIED = "flip/grid_to_particle", "velocity of the grid", "m/s", "likewise";
+    SHIFT = "flip/grid_to_particle", "displacement", "m", "likewise";
+    GIVEN_AFFINE = "flip/grid_to_particle", "affine rows", "1/s", "likewise, twice over Δx";
+    MOVED = "flip/advect", "position", "m",
+        "what the twin answers when its start moves along each axis by u (8 |x| + 30 Δt |v|), with solids 7 u of the distance \
+         to the grid's origin more, + u |x|";
+    ADVECTED = "flip/advect", "velocity", "m/s", "what the twin answers likewise, + 8 u |v|";
+    CAPPED = "flip/advect", "particles slowed", "", "equal, but for what the moved starts change";
+    MOVED_ID = "flip/advect", "id", "", "a copy: equal";
+    RESIDUAL = "whole projection", "‖b − A x‖ / ‖b‖", "", "solver.flip.pressure.tolerance, and what f32 measures it by: 12 u ‖Σ c |x − x'|‖ / ‖b‖";
+    SOLUTION = "whole projection", "‖p − p64‖ / ‖p64‖", "",
+        "1.5 times the residual's tolerance ‖b‖ / (λ ‖p64‖), λ the least eigenvalue by eight inverse iterations on the direct factor";
+    ENERGY = "whole projection", "‖u − u64‖", "m/s",
+        "each face weighted by √(f θ), which is the norm of the pressure's error by the system: 1.5 times the residual's \
+         tolerance ‖b‖ / √λ";
+    DIVERGENCE = "whole projection", "‖∇·u‖ after / before", "",
+        "the residual's tolerance and 30 u (‖Σ|f u|‖ + ‖Σ c |x − x'|‖) / ‖b‖ by the velocities' rounding";
+    CORRECTION = "whole correction", "‖b − A x‖ / ‖b‖", "", "its tolerance, 1e-2";
+}

@@ -1,0 +1,427 @@
+//! The projection: its passes, and the device's own system solved directly.
+
+use glam::DVec3;
+
+use super::{Checker, Layout, fields::*, pair, pair_of};
+use crate::{
+    compare::{deviation::relative, rounding::U},
+    domain::{
+        bricks::{Bricks, CELLS},
+        poisson::{NONE, System, remove_means},
+    },
+    gpu::recording::Moment,
+    reference::{
+        flip::{Centers, Room, Waters, density_source},
+        poisson::{BUDGET, Solver, gradients::norm},
+    },
+    scene::flip::Surface,
+    solve::{
+        SolveError,
+        pressure::{CORRECTION_TOLERANCE, PressureControl},
+        trace::Traced,
+    },
+};
+
+/// `state` of a solve that has ended, as in shared/pressure_control.wgsl.
+const DONE: u32 = 2;
+
+/// Runs of pressure/multiply that are compared: each is as good as any.
+const PRODUCTS: usize = 3;
+
+/// Inverse iterations for the least eigenvalue.
+const EIGEN_STEPS: usize = 8;
+
+/// The device's own system.
+pub(super) struct Built {
+    system: System,
+    centers: Centers,
+}
+
+/// Where an element stands in the pressure's own arrays: by block of 2³ cells.
+fn blocked(element: u32) -> usize {
+    let (slot, local) = (element / CELLS, element % CELLS);
+    let [x, y, z] = [local % 8, local / 8 % 8, local / 64];
+    let cell = x % 2 + 2 * (y % 2) + 4 * (z % 2);
+    let block = x / 2 + 4 * (y / 2) + 16 * (z / 2);
+    (CELLS * slot + 64 * cell + block) as usize
+}
+
+/// Σ |f u| and the solids' flux of each row.
+fn flow(bricks: &Bricks, room: &Room, system: &System, velocity: &[DVec3]) -> Vec<f64> {
+    let of_row = |&element: &u32| {
+        let through = |e: u32, axis: usize| {
+            let e = e as usize;
+            (room.open[e][axis] * velocity[e][axis]).abs()
+        };
+        let sum: f64 = (0..3)
+            .map(|axis| {
+                let mut up = [0; 3];
+                up[axis] = 1;
+                through(element, axis) + through(bricks.near(element, up), axis)
+            })
+            .sum();
+        sum + room.solid_flux[element as usize].abs()
+    };
+    system.cell.iter().map(of_row).collect()
+}
+
+/// Σ c |x − x'| and what air takes, of each row.
+fn differences(system: &System, x: &[f64]) -> Vec<f64> {
+    (0..x.len())
+        .map(|i| {
+            let shared = system.neighbor[i].iter().zip(&system.coefficient[i]);
+            let inner: f64 = shared
+                .filter(|(j, _)| **j != NONE)
+                .map(|(&j, c)| c * (x[i] - x[j as usize]).abs())
+                .sum();
+            inner + system.dirichlet[i] * x[i].abs()
+        })
+        .collect()
+}
+
+fn sum([large, small]: &[Vec<f64>; 2]) -> Vec<f64> {
+    large.iter().zip(small).map(|(a, b)| a + b).collect()
+}
+
+fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl Checker<'_> {
+    pub(super) fn pressure(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        match (traced.moment, traced.pass) {
+            (Moment::After, "pressure/build_system") => self.build_system(traced),
+            (Moment::After, "pressure/divergence") => self.divergence(traced),
+            (Moment::After, "pressure/multiply") => self.multiply(traced),
+            (Moment::After, "pressure/density_source") => self.density_source(traced),
+            (Moment::Before, "pressure/project" | "pressure/displace") => {
+                let words = size_of::<PressureControl>() / 4;
+                self.is_done = traced.read::<u32>("pressure_control", words)?[5] == DONE;
+                self.old = self.planes(traced, "face_velocity")?;
+                Ok(())
+            }
+            (Moment::After, "pressure/project") if self.is_done => self.project(traced),
+            (Moment::After, "pressure/measure_divergence") if self.is_done => self.after(traced),
+            (Moment::After, "pressure/displace") if self.is_done => self.displace(traced),
+            _ => Ok(()),
+        }
+    }
+
+    fn waters<'b>(&'b self, built: &'b Built) -> Waters<'b> {
+        let Layout { bricks, .. } = self.layout();
+        Waters::new(&self.model, bricks, self.room(), &built.centers)
+    }
+
+    fn built(&self) -> &Built {
+        self.system.as_ref().expect("after pressure/build_system")
+    }
+
+    /// An array of the pressure's own, by row.
+    fn by_row(&self, traced: Traced<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
+        let values = self.cells::<f32>(traced, name)?;
+        let rows = self.built().system.cell.iter();
+        Ok(rows.map(|&e| f64::from(values[blocked(e)])).collect())
+    }
+
+    /// The two words of the solution, by row.
+    fn words(&self, traced: Traced<'_>) -> Result<[Vec<f64>; 2], SolveError> {
+        let Layout { cells, stride, .. } = *self.layout();
+        let values = traced.read::<f32>("pressure_solution", stride + cells)?;
+        let word = |first: usize| {
+            let rows = self.built().system.cell.iter();
+            rows.map(|&e| f64::from(values[first + blocked(e)]))
+                .collect()
+        };
+        Ok([word(0), word(stride)])
+    }
+
+    /// What differences of the solution across faces err by: those of both words, which may cancel.
+    fn difference_errors(&self, words: &[Vec<f64>; 2]) -> Vec<f64> {
+        let built = self.built();
+        let waters = self.waters(built);
+        let [large, small] = words
+            .each_ref()
+            .map(|word| waters.displace(&waters.by_element(&built.system, word)));
+        let of = |(a, b): (&DVec3, &DVec3)| 24.0 * U * (a.length() + b.length());
+        large.iter().zip(&small).map(of).collect()
+    }
+
+    fn build_system(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let settings = self.model.settings();
+        let centers = Centers {
+            density: Vec::new(),
+            excess: match settings.density_correction {
+                true => self.scalars(traced, "density_excess")?,
+                false => Vec::new(),
+            },
+            distance: match settings.surface {
+                Surface::GhostFluid => self.scalars(traced, "liquid_distance")?,
+                Surface::Voxel => Vec::new(),
+            },
+        };
+        let Layout {
+            bricks,
+            cells,
+            stride,
+            ..
+        } = self.layout();
+        let system = Waters::new(&self.model, bricks, self.room(), &centers).system();
+        let dirichlet = traced.read::<f32>("pressure_dirichlet", *cells)?;
+        let coefficient = traced.read::<f32>("pressure_coefficient", 2 * stride + cells)?;
+        let block = traced.read::<u32>("pressure_block", cells / 8)?;
+        let wet = CELLS..CELLS * (bricks.wet + 1);
+        let mut row_of = vec![NONE; *cells];
+        for (row, &element) in system.cell.iter().enumerate() {
+            row_of[element as usize] = row as u32;
+        }
+        let (mut airs, mut shared) = (Vec::new(), Vec::new());
+        let (mut rows, mut expected) = (Vec::new(), Vec::new());
+        for element in wet {
+            let e = element as usize;
+            let place = blocked(element);
+            let of_block = place / 512 * 64 + place % 64;
+            rows.push(block[of_block] >> (8 + place % 512 / 64) & 1);
+            expected.push(u32::from(row_of[e] != NONE));
+            if row_of[e] == NONE {
+                continue;
+            }
+            let row = row_of[e] as usize;
+            let exact = system.dirichlet[row];
+            airs.push(pair_of(
+                e,
+                f64::from(dirichlet[place]),
+                exact,
+                24.0 * U * exact,
+            ));
+            let lower = |values: &dyn Fn(usize) -> f64| DVec3::new(values(0), values(1), values(2));
+            let found = lower(&|axis| f64::from(coefficient[axis * stride + place]));
+            let twin = lower(&|axis| system.coefficient[row][2 * axis]);
+            shared.push(pair(e, found, twin, 0.0));
+        }
+        self.table.add(&DIRICHLET, &airs, 0);
+        self.table.add(&COEFFICIENT, &shared, 0);
+        self.table.add_exact(&ROWS, &rows, &expected);
+        self.system = Some(Built { system, centers });
+        Ok(())
+    }
+
+    /// The largest of two divergences that the device noted, in place `k`, against `rows`.
+    fn noted(
+        &self,
+        traced: Traced<'_>,
+        k: usize,
+        rows: &[f64],
+        flow: &[f64],
+    ) -> Result<crate::compare::check::Pair<f64>, SolveError> {
+        let bits = traced.read::<u32>("pressure_stats", k + 1)?[k];
+        let size = self.model.cell_size();
+        let largest = |of: &[f64]| of.iter().fold(0.0, |most: f64, v| most.max(v.abs())) / size;
+        let tolerance = 10.0 * U * largest(flow) + 4.0 * U * largest(rows);
+        Ok(pair_of(
+            k,
+            f64::from(f32::from_bits(bits)),
+            largest(rows),
+            tolerance,
+        ))
+    }
+
+    fn divergence(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let velocity = self.planes(traced, "face_velocity")?;
+        let built = self.built();
+        let twin = self.waters(built).divergence(&built.system, &velocity);
+        let flow = flow(&self.layout().bricks, self.room(), &built.system, &velocity);
+        let rhs = self.by_row(traced, "pressure_rhs")?;
+        let pairs: Vec<_> = (0..rhs.len())
+            .map(|row| {
+                let element = built.system.cell[row] as usize;
+                pair_of(element, rhs[row], twin[row], 10.0 * U * flow[row])
+            })
+            .collect();
+        let noted = self.noted(traced, 0, &twin, &flow)?;
+        self.table.add(&RHS, &pairs, 0);
+        self.table.add(&BEFORE, &[noted], 0);
+        Ok(())
+    }
+
+    fn multiply(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        if self.products == PRODUCTS {
+            return Ok(());
+        }
+        let direction = self.by_row(traced, "pressure_direction")?;
+        if direction.iter().all(|&value| value == 0.0) {
+            return Ok(());
+        }
+        let product = self.by_row(traced, "pressure_product")?;
+        let system = &self.built().system;
+        let (twin, errors) = (system.apply(&direction), differences(system, &direction));
+        let pairs: Vec<_> = (0..twin.len())
+            .map(|row| {
+                let tolerance = 12.0 * U * errors[row];
+                pair_of(
+                    system.cell[row] as usize,
+                    product[row],
+                    twin[row],
+                    tolerance,
+                )
+            })
+            .collect();
+        self.table.add(&PRODUCT, &pairs, 0);
+        self.products += 1;
+        Ok(())
+    }
+
+    fn project(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let words = self.words(traced)?;
+        let errors = self.difference_errors(&words);
+        let x = sum(&words);
+        let built = self.built();
+        let waters = self.waters(built);
+        let mut twin = self.old.clone();
+        waters.project(&waters.by_element(&built.system, &x), &mut twin);
+        let velocity = self.planes(traced, "face_velocity")?;
+        let pairs: Vec<_> = (self.active())
+            .map(|e| {
+                let tolerance = errors[e] + 2.0 * U * twin[e].length();
+                pair(e, velocity[e], twin[e], tolerance)
+            })
+            .collect();
+        let pressure = self.scalars(traced, "pressure")?;
+        let scale =
+            self.scene.water.rest_density * self.model.cell_size() / self.layout().substep.length;
+        let pascals: Vec<_> = (built.system.cell.iter().zip(&x))
+            .map(|(&e, x)| {
+                let exact = scale * x;
+                pair_of(
+                    e as usize,
+                    pressure[e as usize],
+                    exact,
+                    4.0 * U * exact.abs(),
+                )
+            })
+            .collect();
+        self.table.add(&PROJECTED, &pairs, 0);
+        self.table.add(&PRESSURE, &pascals, 0);
+        self.whole(traced, x, &velocity)
+    }
+
+    /// The device's own system solved directly, against what its iterations came to.
+    fn whole(
+        &mut self,
+        traced: Traced<'_>,
+        mut x: Vec<f64>,
+        velocity: &[DVec3],
+    ) -> Result<(), SolveError> {
+        let mut b = self.by_row(traced, "pressure_rhs")?;
+        let built = self.built();
+        let system = &built.system;
+        let solver = match Solver::new(system, BUDGET) {
+            Ok(solver) => solver,
+            Err(_) => {
+                let why = "the direct factor of its system could not be made";
+                self.table.unchecked.push(("whole projection", why));
+                return Ok(());
+            }
+        };
+        remove_means(&mut b, solver.pockets());
+        remove_means(&mut x, solver.pockets());
+        let exact = solver.solve(&b).x;
+        let size = norm(&b);
+        let spread = norm(&differences(system, &x));
+        let residual = relative(norm(&minus(&b, &system.apply(&x))), size);
+        let asked = self.model.settings().pressure.tolerance;
+        let allowed = asked * (1.0 + 1e-6) + relative(12.0 * U * spread, size);
+        let off = minus(&x, &exact);
+        let least = least_eigenvalue(&solver, b.len());
+        let energy = dot(&off, &system.apply(&off)).max(0.0).sqrt();
+        let mut after = self.waters(built).divergence(system, velocity);
+        remove_means(&mut after, solver.pockets());
+        let flow = norm(&flow(&self.layout().bricks, self.room(), system, velocity));
+        let rounding = relative(30.0 * U * (flow + spread), size);
+        let far = 1.5 * allowed * size;
+        let apart = relative(norm(&off), norm(&exact));
+        let may_part = relative(far / least, norm(&exact));
+        let left = relative(norm(&after), size);
+        self.table
+            .add(&RESIDUAL, &[pair_of(0, residual, 0.0, allowed)], 0);
+        self.table
+            .add(&SOLUTION, &[pair_of(0, apart, 0.0, may_part)], 0);
+        let of_energy = pair_of(0, energy, 0.0, far / least.sqrt());
+        self.table.add(&ENERGY, &[of_energy], 0);
+        let of_divergence = pair_of(0, left, 0.0, allowed + rounding);
+        self.table.add(&DIVERGENCE, &[of_divergence], 0);
+        Ok(())
+    }
+
+    fn after(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let velocity = self.planes(traced, "face_velocity")?;
+        let built = self.built();
+        let twin = self.waters(built).divergence(&built.system, &velocity);
+        let flow = flow(&self.layout().bricks, self.room(), &built.system, &velocity);
+        let noted = self.noted(traced, 1, &twin, &flow)?;
+        self.table.add(&AFTER, &[noted], 0);
+        self.is_done = false;
+        Ok(())
+    }
+
+    fn density_source(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let rhs = self.by_row(traced, "pressure_rhs")?;
+        let built = self.built();
+        let twin = density_source(&self.model, &built.system, &built.centers);
+        let pairs: Vec<_> = (0..rhs.len())
+            .map(|row| {
+                let element = built.system.cell[row] as usize;
+                pair_of(element, rhs[row], twin[row], 2.0 * U * twin[row].abs())
+            })
+            .collect();
+        self.table.add(&SOURCE, &pairs, 0);
+        Ok(())
+    }
+
+    fn displace(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let words = self.words(traced)?;
+        let errors = self.difference_errors(&words);
+        let x = sum(&words);
+        let mut b = self.by_row(traced, "pressure_rhs")?;
+        let built = self.built();
+        let system = &built.system;
+        let waters = self.waters(built);
+        let twin = waters.displace(&waters.by_element(system, &x));
+        let found = self.planes(traced, "face_displacement")?;
+        let pairs: Vec<_> = (self.active())
+            .map(|e| pair(e, found[e], twin[e], errors[e]))
+            .collect();
+        remove_means(&mut b, &system.pockets());
+        let size = norm(&b);
+        let residual = relative(norm(&minus(&b, &system.apply(&x))), size);
+        let spread = norm(&differences(system, &x));
+        let allowed = CORRECTION_TOLERANCE * (1.0 + 1e-6) + relative(12.0 * U * spread, size);
+        self.table.add(&DISPLACEMENT, &pairs, 0);
+        self.table
+            .add(&CORRECTION, &[pair_of(0, residual, 0.0, allowed)], 0);
+        self.is_done = false;
+        Ok(())
+    }
+}
+
+/// By inverse iterations from a vector of hashed signs; what a few of them reach is at most a few percent above it.
+fn least_eigenvalue(solver: &Solver<'_>, rows: usize) -> f64 {
+    let sign = |k: usize| {
+        let hash = (k as u32 + 1).wrapping_mul(0x9e37_79b9) >> 31;
+        1.0 + f64::from(hash)
+    };
+    let mut y: Vec<f64> = (0..rows).map(sign).collect();
+    let mut eigenvalue = f64::INFINITY;
+    for _ in 0..EIGEN_STEPS {
+        let size = norm(&y);
+        for value in &mut y {
+            *value /= size;
+        }
+        y = solver.solve(&y).x;
+        eigenvalue = 1.0 / norm(&y);
+    }
+    eigenvalue
+}

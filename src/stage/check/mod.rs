@@ -1,0 +1,201 @@
+//! `check`: a step on the GPU against the f64 reference, from the same inputs, pass by pass and as a whole.
+
+pub mod flip;
+pub mod pbf;
+mod sort;
+
+use std::{
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
+
+use crate::{
+    cache::{self, CacheError, CacheReader},
+    domain::{frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError},
+    gpu::adapter::{Context, GpuError},
+    scene::{Method, Scene, SceneError},
+    solve::{SolveError, pbf::device_limits},
+};
+
+use super::{Blame, prepare::Start};
+
+pub use crate::compare::check::{Row, Table};
+
+/// Where the inputs of the step come from.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// A scene's start: frame 0.
+    Scene(Box<Scene>),
+    /// Frames of a cache; of its last one where none are asked for.
+    Cache(PathBuf, Option<FrameRange>),
+}
+
+/// What to check.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Inputs.
+    pub source: Source,
+    /// Index or part of the name of an adapter.
+    pub adapter: Option<String>,
+}
+
+/// What a check has to tell while it runs.
+#[derive(Clone, Debug)]
+pub enum Event<'a> {
+    /// The device is open.
+    Ready {
+        /// Adapter and driver.
+        device: String,
+        /// Name of the solver.
+        solver: &'static str,
+        /// Particles at the start.
+        particles: usize,
+        /// Frames that will be checked.
+        frames: usize,
+    },
+    /// The step after a frame was checked.
+    Frame {
+        /// The frame that it started from.
+        frame: u32,
+        /// What was found.
+        table: &'a Table,
+        /// Wall clock for it.
+        seconds: f64,
+    },
+}
+
+/// What a check found.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// All frames in one: of each row the value that is furthest out.
+    pub table: Table,
+    /// The first frame with a row out of tolerance, and that row's pass and field.
+    pub first_over: Option<(u32, &'static str, &'static str)>,
+    /// Frames checked.
+    pub frames: Vec<u32>,
+    /// Whether a signal ended it.
+    pub interrupted: bool,
+}
+
+/// Why a check could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckError {
+    /// The cache.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// Its scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The scene's solids.
+    #[error(transparent)]
+    Solid(#[from] SignedDistanceError),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The solver.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+}
+
+impl From<&CheckError> for Blame {
+    fn from(error: &CheckError) -> Self {
+        match error {
+            CheckError::Cache(error) => error.into(),
+            CheckError::Scene(error) => error.into(),
+            CheckError::Solid(error) => error.into(),
+            CheckError::Gpu(error) => error.into(),
+            CheckError::Solve(error) => error.into(),
+        }
+    }
+}
+
+/// Whether there is a cache in `directory`, and not a scene file.
+pub fn is_cache(directory: &std::path::Path) -> bool {
+    directory.is_dir() || cache::exists(directory)
+}
+
+/// Checks the step after each frame; `stop` ends it after the current one.
+///
+/// # Errors
+/// [`CheckError`]; a row out of tolerance is none, but in the outcome.
+pub fn check(
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event<'_>),
+) -> Result<Outcome, CheckError> {
+    let (scene, cache, frames) = open(&request.source)?;
+    let start = Start::of(&scene)?;
+    let context = Context::open(request.adapter.as_deref())?;
+    let info = &context.info;
+    tell(Event::Ready {
+        device: format!("{} ({} {})", info.name, info.driver, info.driver_info),
+        solver: scene.solver.method.name(),
+        particles: start.particles.len(),
+        frames: frames.len(),
+    });
+    let mut outcome = Outcome::default();
+    for frame in frames {
+        outcome.interrupted = stop.load(Ordering::Relaxed);
+        if outcome.interrupted {
+            break;
+        }
+        let begin = Instant::now();
+        let particles = match &cache {
+            Some(cache) => cache.read(frame)?,
+            None => start.particles.clone(),
+        };
+        let table = check_frame(&context, &scene, &start, frame, &particles)?;
+        tell(Event::Frame {
+            frame,
+            table: &table,
+            seconds: begin.elapsed().as_secs_f64(),
+        });
+        if let (None, Some(row)) = (outcome.first_over, table.first_over()) {
+            outcome.first_over = Some((frame, row.field.pass, row.field.name));
+        }
+        outcome.frames.push(frame);
+        outcome.table.absorb(table);
+    }
+    Ok(outcome)
+}
+
+fn open(source: &Source) -> Result<(Scene, Option<CacheReader>, Vec<u32>), CheckError> {
+    match source {
+        Source::Scene(scene) => Ok(((**scene).clone(), None, vec![0])),
+        Source::Cache(directory, frames) => {
+            let cache = CacheReader::open(directory)?;
+            let frames: Vec<u32> = match frames {
+                Some(frames) => frames.iter().collect(),
+                None => vec![cache.last_frame()],
+            };
+            for &frame in &frames {
+                cache.entry(frame)?;
+            }
+            // The cache's own copy: what was baked, wherever the cache has been moved to.
+            let file = directory.join("scene.toml");
+            let scene = Scene::parse(cache.scene_toml(), &file, directory, &[])?;
+            Ok((scene, Some(cache), frames))
+        }
+    }
+}
+
+/// Checks the first substep after `particles`, the state at the end of `frame`; with PBF the measurement at a
+/// frame's end too.
+///
+/// # Errors
+/// The device, or the numbers of the solver.
+pub fn check_frame(
+    context: &Context,
+    scene: &Scene,
+    start: &Start,
+    frame: u32,
+    particles: &Particles,
+) -> Result<Table, SolveError> {
+    let plan = start.plan(scene, device_limits(context));
+    let boundaries = [&start.boundary; 2];
+    match scene.solver.method {
+        Method::Pbf => pbf::check(context, scene, plan, boundaries, frame, particles),
+        Method::Flip => flip::check(context, scene, plan, &start.boundary, frame, particles),
+    }
+}

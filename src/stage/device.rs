@@ -1,0 +1,175 @@
+//! What a bake runs on: an adapter, or the CPU with the f64 reference.
+
+use std::{
+    env::consts::{ARCH, OS},
+    fmt,
+};
+
+use glam::DVec3;
+
+use crate::{
+    domain::{
+        particles::Particles,
+        solver::{Solver, StepReport},
+    },
+    gpu::adapter::{Context, GpuError},
+    reference::{self, ReferenceError},
+    scene::{Method, Scene},
+    solve::{
+        SolveError,
+        flip::Flip,
+        pbf::{Pbf, device_limits},
+    },
+};
+
+use super::{Blame, prepare::Start};
+
+/// What to run on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Device {
+    /// The adapter of this index or with this in its name; the best one where `None`.
+    Gpu(Option<String>),
+    /// The f64 reference; no driver is touched.
+    Cpu,
+}
+
+/// A device that stands ready.
+pub enum Opened {
+    /// An adapter's.
+    Gpu(Box<Context>),
+    /// This machine's processors.
+    Cpu,
+}
+
+/// A device as the manifest has it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// Adapter, or that it is the reference.
+    pub name: String,
+    /// Driver and its version; of the reference what its libraries were built for.
+    pub driver: String,
+    /// `Vulkan`, `Metal`, `Dx12`; `CPU` of the reference.
+    pub backend: String,
+}
+
+impl fmt::Display for Identity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({}, {})", self.name, self.driver, self.backend)
+    }
+}
+
+/// What stops a solver, whichever it is.
+#[derive(Debug, thiserror::Error)]
+pub enum SolverError {
+    /// On the GPU.
+    #[error(transparent)]
+    Gpu(#[from] SolveError),
+    /// In f64 on the CPU.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+}
+
+impl From<&SolverError> for Blame {
+    fn from(error: &SolverError) -> Self {
+        match error {
+            SolverError::Gpu(error) => error.into(),
+            SolverError::Reference(error) => error.into(),
+        }
+    }
+}
+
+impl Device {
+    /// Opens it.
+    ///
+    /// # Errors
+    /// Those of an adapter.
+    pub fn open(&self) -> Result<Opened, GpuError> {
+        Ok(match self {
+            Self::Gpu(adapter) => Opened::Gpu(Box::new(Context::open(adapter.as_deref())?)),
+            Self::Cpu => Opened::Cpu,
+        })
+    }
+}
+
+/// A solver of a scene, and the GPU memory that it takes: bytes in all and for neighbour lists.
+pub struct Built {
+    /// Not loaded yet.
+    pub solver: Box<dyn Solver<Error = SolverError>>,
+    /// `None` on the CPU.
+    pub bytes: Option<(u64, u64)>,
+}
+
+impl Opened {
+    /// For the manifest.
+    pub fn identity(&self) -> Identity {
+        match self {
+            Self::Gpu(context) => Identity {
+                name: context.info.name.clone(),
+                driver: format!("{} {}", context.info.driver, context.info.driver_info),
+                backend: context.info.backend.to_string(),
+            },
+            Self::Cpu => Identity {
+                name: "CPU f64 reference".into(),
+                driver: format!("{ARCH} {OS}"),
+                backend: "CPU".into(),
+            },
+        }
+    }
+
+    /// The scene's solver on it, with what the scene's plan names and no more.
+    ///
+    /// # Errors
+    /// A buffer over the adapter's limits, with the figures; the device at fault.
+    pub fn build(
+        &self,
+        scene: &Scene,
+        start: &Start,
+        is_timed: bool,
+    ) -> Result<Built, SolverError> {
+        let boundary = &start.boundary;
+        let method = scene.solver.method;
+        let Self::Gpu(context) = self else {
+            let solver: Box<dyn Solver<Error = SolverError>> = match method {
+                Method::Pbf => Box::new(Told(reference::pbf::Pbf::new(scene, boundary))),
+                Method::Flip => Box::new(Told(reference::flip::Flip::new(scene, boundary))),
+            };
+            return Ok(Built {
+                solver,
+                bytes: None,
+            });
+        };
+        let plan = start.plan(scene, device_limits(context));
+        let bytes = Some(plan.bytes());
+        let solver: Box<dyn Solver<Error = SolverError>> = match method {
+            Method::Pbf => Box::new(Told(Pbf::new(context, scene, plan, boundary, is_timed)?)),
+            Method::Flip => Box::new(Told(Flip::new(context, scene, plan, boundary, is_timed)?)),
+        };
+        Ok(Built { solver, bytes })
+    }
+}
+
+/// A solver that tells its errors as [`SolverError`]s.
+struct Told<S>(S);
+
+impl<S: Solver> Solver for Told<S>
+where
+    SolverError: From<S::Error>,
+{
+    type Error = SolverError;
+
+    fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), SolverError> {
+        Ok(self.0.load(frame, particles)?)
+    }
+
+    fn advance(&mut self) -> Result<(Particles, StepReport), SolverError> {
+        Ok(self.0.advance()?)
+    }
+
+    fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolverError> {
+        Ok(self.0.pressures(points)?)
+    }
+
+    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+        self.0.timings()
+    }
+}
