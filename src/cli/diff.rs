@@ -1,0 +1,472 @@
+//! `swell diff A B`
+
+use std::{
+    fmt::Write as _,
+    io::{self, Write as _},
+    path::PathBuf,
+    process::ExitCode,
+};
+
+use clap::Args;
+use serde_json::json;
+
+use crate::{
+    domain::frame_range::FrameRange,
+    scene::tolerance,
+    stage::diff::{
+        AggregatePeak, BaselineDiff, Basis, CacheDiff, Fault, Images, Outcome, PairDiff,
+        PicturesDiff, Request, Written, aggregate_peaks, diff, ranges, write_baseline,
+    },
+};
+
+use super::Failure;
+
+/// Exit code where something is out of tolerance.
+const OUT_OF_TOLERANCE: u8 = 1;
+
+/// Lines of one kind that are printed before the rest is counted.
+const MOST_LINES: usize = 10;
+
+#[derive(Args, Debug)]
+pub(super) struct DiffArgs {
+    /// A cache, a folder of PNG or EXR pictures, or one picture.
+    a: PathBuf,
+    /// The reference: the same kind of thing, or a baseline (.json) where A is a cache.
+    #[arg(required_unless_present = "write_baseline")]
+    b: Option<PathBuf>,
+    /// Frames to compare, such as 1-240x2; all where left out.
+    #[arg(long, value_name = "RANGE")]
+    frames: Option<FrameRange>,
+    /// Limits (TOML); equal in every bit where left out.
+    #[arg(long, value_name = "FILE")]
+    tolerance: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Write difference images of two renders: a PNG for two pictures, a folder for two folders.
+    #[arg(short, long, value_name = "PATH")]
+    output: Option<PathBuf>,
+    /// What differences are multiplied by in difference images.
+    #[arg(long, default_value = "10", requires = "output", value_parser = gain)]
+    gain: f64,
+    /// Write cache A as a baseline, or add its adapter to the one that stands there.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["b", "tolerance", "output"])]
+    write_baseline: Option<PathBuf>,
+}
+
+fn gain(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(gain) if gain > 0.0 && f64::is_finite(gain) => Ok(gain),
+        _ => Err("allowed: a finite number above 0".to_owned()),
+    }
+}
+
+pub(super) fn run(args: &DiffArgs) -> Result<ExitCode, Failure> {
+    let b = match (&args.b, &args.write_baseline) {
+        (Some(b), _) => b,
+        (None, Some(file)) => {
+            let written = write_baseline(&args.a, file, args.frames.as_ref())?;
+            let text = show_written(file, &written);
+            print(&text, args.json.then(|| json!(written)));
+            return Ok(ExitCode::SUCCESS);
+        }
+        (None, None) => unreachable!("clap asks for one of them"),
+    };
+    let request = Request {
+        a: args.a.clone(),
+        b: b.clone(),
+        frames: args.frames.clone(),
+        tolerance: args.tolerance.as_deref().map(tolerance::load).transpose()?,
+        images: args.output.clone().map(|path| Images {
+            path,
+            gain: args.gain,
+        }),
+    };
+    let outcome = diff(&request)?;
+    let mut text = format!(
+        "A {}\nB {} (the reference)\n",
+        request.a.display(),
+        request.b.display()
+    );
+    // Writing to a String cannot fail.
+    let _ = match &outcome {
+        Outcome::Caches(diff) => show_caches(&mut text, diff),
+        Outcome::Baseline(diff) => show_baseline(&mut text, diff),
+        Outcome::Pictures(diff) => show_pictures(&mut text, diff, args.gain),
+    };
+    let is_within = outcome.is_within();
+    let verdict = match (is_within, &request.tolerance, &outcome) {
+        (false, ..) => "OUT OF TOLERANCE",
+        (true, None, Outcome::Caches(_) | Outcome::Pictures(_)) => "the same, bit for bit",
+        _ => "within tolerance",
+    };
+    let _ = writeln!(text, "\n{verdict}");
+    let object = json!({ "a": request.a, "b": request.b, "is_within": is_within, "diff": outcome });
+    print(&text, args.json.then_some(object));
+    Ok(if is_within {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(OUT_OF_TOLERANCE)
+    })
+}
+
+/// A closed pipe (`swell diff A B | head`) must not hide the result, which is the exit code.
+fn print(text: &str, object: Option<serde_json::Value>) {
+    let mut out = io::stdout().lock();
+    let _ = match object {
+        Some(object) => writeln!(out, "{object}"),
+        None => out.write_all(text.as_bytes()),
+    };
+}
+
+fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
+    let [a, b] = &diff.bakes;
+    writeln!(out, "A is {a}\nB is {b}")?;
+    show_physics(out, diff.physics.as_deref())?;
+    show_lone(out, "frames", "A", &ranges(&diff.only_a))?;
+    show_lone(out, "frames", "B", &ranges(&diff.only_b))?;
+    let numbers: Vec<u32> = diff.frames.iter().map(|frame| frame.frame).collect();
+    writeln!(out, "compared frames {}", ranges(&numbers))?;
+    let lone = |frame: &&crate::stage::diff::FrameDiff| frame.only_a.count + frame.only_b.count > 0;
+    for frame in diff.frames.iter().filter(lone).take(1) {
+        writeln!(
+            out,
+            "particles in frame {}: {} in both, {} in A alone{}, {} in B alone{}",
+            frame.frame,
+            frame.matched,
+            frame.only_a.count,
+            first_id(frame.only_a.first),
+            frame.only_b.count,
+            first_id(frame.only_b.first)
+        )?;
+    }
+    show_fields(out, diff)?;
+    let pairs: Vec<_> = diff
+        .frames
+        .iter()
+        .map(|f| (f.frame, f.aggregates))
+        .collect();
+    show_aggregates(out, &aggregate_peaks(&pairs), |_| None)?;
+    show_first_difference(out, diff)?;
+    let faults = diff.frames.iter().flat_map(|frame| {
+        let of_frame = |fault| (frame.frame, fault);
+        frame.faults.iter().map(of_frame)
+    });
+    show_faults(out, faults)
+}
+
+fn first_id(id: Option<u32>) -> String {
+    id.map_or(String::new(), |id| format!(" (first id {id})"))
+}
+
+fn show_physics(out: &mut String, difference: Option<&str>) -> std::fmt::Result {
+    match difference {
+        Some(difference) => writeln!(out, "other physics, B then A: {difference}"),
+        None => writeln!(out, "the same physics"),
+    }
+}
+
+fn show_lone(out: &mut String, what: &str, side: &str, names: &str) -> std::fmt::Result {
+    if names.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "{what} in {side} alone: {names}")
+}
+
+/// Of each field the worst of all frames, each measure with its frame.
+fn show_fields(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
+    let Some(first) = diff.frames.first() else {
+        return Ok(());
+    };
+    writeln!(
+        out,
+        "\nfield      unit        largest  frame  particle         RMS  frame        99 %  frame  RMS / RMS of B"
+    )?;
+    for (index, field) in first.fields.iter().enumerate() {
+        let peak = |measure: fn(&crate::stage::diff::FieldDiff) -> f64| {
+            let values = diff.frames.iter().map(|f| (f.frame, &f.fields[index]));
+            values
+                .map(|(frame, field)| (measure(field), frame, field))
+                .reduce(|most, next| if next.0 > most.0 { next } else { most })
+        };
+        let measures = (
+            peak(|f| f.deviation.max),
+            peak(|f| f.deviation.rms),
+            peak(|f| f.deviation.p99),
+            peak(|f| f.deviation.relative_rms()),
+        );
+        let (Some(max), Some(rms), Some(p99), Some(relative)) = measures else {
+            continue;
+        };
+        let particle = max
+            .2
+            .worst
+            .as_ref()
+            .map_or("-".to_owned(), |w| w.particle.to_string());
+        let unit = match field.field.as_str() {
+            "position" => "m",
+            "velocity" => "m/s",
+            _ => "",
+        };
+        writeln!(
+            out,
+            "{:9}  {unit:4}  {:>13}  {:5}  {particle:>8}  {:>10}  {:5}  {:>10}  {:5}  {:>14}",
+            field.field,
+            number(max.0),
+            max.1,
+            number(rms.0),
+            rms.1,
+            number(p99.0),
+            p99.1,
+            number(relative.0)
+        )?;
+    }
+    Ok(())
+}
+
+/// Of each aggregate the frame in which it is farthest apart.
+fn show_aggregates(
+    out: &mut String,
+    peaks: &[AggregatePeak],
+    limit: impl Fn(&AggregatePeak) -> Option<f64>,
+) -> std::fmt::Result {
+    writeln!(
+        out,
+        "\naggregate         unit  largest difference  relative  frame           A           B     allowed"
+    )?;
+    let optional = |value: Option<f64>| value.map_or("-".to_owned(), number);
+    for peak in peaks {
+        writeln!(
+            out,
+            "{:16}  {:4}  {:>18}  {:>8}  {:5}  {:>10}  {:>10}  {:>10}",
+            peak.name,
+            peak.unit,
+            number(peak.difference),
+            number(peak.relative),
+            peak.frame,
+            optional(peak.a),
+            optional(peak.b),
+            optional(limit(peak))
+        )?;
+    }
+    Ok(())
+}
+
+fn show_first_difference(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
+    let first = diff.frames.iter().find_map(|frame| {
+        let field = frame
+            .fields
+            .iter()
+            .find(|field| field.first_different.is_some())?;
+        Some((frame.frame, &field.field, field.first_different.as_ref()?))
+    });
+    match first {
+        Some((frame, field, parting)) => writeln!(
+            out,
+            "\nfirst other bit: frame {frame}, {field} of particle {}: A {:?}, B {:?}",
+            parting.particle, parting.a, parting.b
+        ),
+        None => writeln!(out, "\nno other bit in what both have"),
+    }
+}
+
+fn show_faults<'a>(
+    out: &mut String,
+    faults: impl Iterator<Item = (u32, &'a Fault)>,
+) -> std::fmt::Result {
+    let faults: Vec<_> = faults.collect();
+    for (frame, fault) in faults.iter().take(MOST_LINES) {
+        writeln!(out, "out: frame {frame}, {}", describe(fault))?;
+    }
+    show_rest(out, faults.len())
+}
+
+fn show_rest(out: &mut String, count: usize) -> std::fmt::Result {
+    match count.saturating_sub(MOST_LINES) {
+        0 => Ok(()),
+        more => writeln!(out, "out: {more} more; --json has them all"),
+    }
+}
+
+fn describe(fault: &Fault) -> String {
+    let what = &fault.what;
+    let place = fault.parting.as_ref().map_or(String::new(), |parting| {
+        format!(
+            "; particle {}: A {:?}, B {:?}",
+            parting.particle, parting.a, parting.b
+        )
+    });
+    let value = number(fault.value);
+    match fault.measure {
+        "bits" => format!("{what}: {value} particles are not the same{place}"),
+        "hash" => "the particles' hash is another one".to_owned(),
+        "on one side alone" => format!("{what}: {value} on one side alone"),
+        measure => format!(
+            "{what}: {measure} {value}, allowed {}{place}",
+            number(fault.limit)
+        ),
+    }
+}
+
+fn show_baseline(out: &mut String, diff: &BaselineDiff) -> std::fmt::Result {
+    writeln!(out, "A is {}", diff.bake)?;
+    show_physics(out, diff.physics.as_deref())?;
+    match diff.basis {
+        Basis::Hashes => writeln!(out, "by hashes: the baseline knows this adapter")?,
+        Basis::Aggregates => writeln!(
+            out,
+            "by aggregates: the baseline has no hashes of this adapter, but of {}",
+            diff.known_adapters.join("; ")
+        )?,
+    }
+    writeln!(out, "aggregates of B are from {}", diff.aggregates_from)?;
+    show_lone(out, "frames", "B", &ranges(&diff.only_baseline))?;
+    let numbers: Vec<u32> = diff.frames.iter().map(|frame| frame.frame).collect();
+    writeln!(out, "compared frames {}", ranges(&numbers))?;
+    let pairs: Vec<_> = diff
+        .frames
+        .iter()
+        .map(|f| (f.frame, f.aggregates))
+        .collect();
+    show_aggregates(out, &aggregate_peaks(&pairs), |peak| {
+        let limit = diff.limits.get(peak.name)?;
+        Some(limit.allowed(peak.b.unwrap_or(0.0)))
+    })?;
+    show_faults(out, diff.faults.iter().map(|f| (f.frame, &f.fault)))?;
+    if !diff.faults.is_empty() && diff.faults.iter().all(|f| f.fault.measure == "hash") {
+        writeln!(
+            out,
+            "the aggregates are within their limits: other bits, much the same water"
+        )?;
+    }
+    Ok(())
+}
+
+fn show_written(file: &std::path::Path, written: &Written) -> String {
+    let mut text = format!(
+        "{}: {} frames of {}{}\n",
+        file.display(),
+        written.frames,
+        written.adapter,
+        if written.is_unchanged {
+            ", unchanged"
+        } else {
+            ""
+        }
+    );
+    let adapters = [
+        ("hashes taken before and kept", &written.kept),
+        (
+            "hashes of another scene or other frames dropped",
+            &written.dropped,
+        ),
+    ];
+    for (what, names) in adapters {
+        if !names.is_empty() {
+            text += &format!("{what}: {}\n", names.join("; "));
+        }
+    }
+    text
+}
+
+fn show_pictures(out: &mut String, diff: &PicturesDiff, gain: f64) -> std::fmt::Result {
+    show_lone(out, "pictures", "A", &diff.only_a.join(", "))?;
+    show_lone(out, "pictures", "B", &diff.only_b.join(", "))?;
+    let longest = diff.pairs.iter().map(|pair| pair.name.len()).max();
+    let width = longest.unwrap_or(0).max("picture".len());
+    writeln!(
+        out,
+        "\n{:width$}        mean        99 %     largest           at  perceptual (100: no difference)",
+        "picture"
+    )?;
+    for pair in &diff.pairs {
+        show_pair(out, pair, width)?;
+    }
+    let images = diff.pairs.iter().filter_map(|pair| pair.image.as_ref());
+    for image in images.take(1) {
+        let more = if diff.pairs.len() > 1 {
+            " and beside it"
+        } else {
+            ""
+        };
+        let image = image.display();
+        writeln!(out, "difference image, |A − B| × {gain}: {image}{more}")?;
+    }
+    let faults = diff.pairs.iter().flat_map(|pair| {
+        let of_pair = |fault| (&pair.name, fault);
+        pair.faults.iter().map(of_pair)
+    });
+    let faults: Vec<_> = faults.collect();
+    for (name, fault) in faults.iter().take(MOST_LINES) {
+        let (value, limit) = (number(fault.value), number(fault.limit));
+        match fault.measure {
+            "bits" => writeln!(out, "out: {name} is not the same")?,
+            measure => writeln!(out, "out: {name}: {measure} {value}, allowed {limit}")?,
+        }
+    }
+    show_rest(out, faults.len())
+}
+
+fn show_pair(out: &mut String, pair: &PairDiff, width: usize) -> std::fmt::Result {
+    let Some(diff) = &pair.diff else {
+        let [a, b] = pair
+            .sizes
+            .map(|[width, height]| format!("{width} × {height}"));
+        return writeln!(
+            out,
+            "{:width$}  A is {a}, B is {b}: not compared",
+            pair.name
+        );
+    };
+    let at = diff
+        .max_at
+        .map_or("-".to_owned(), |[x, y]| format!("{x}, {y}"));
+    let score = diff
+        .perceptual
+        .map_or("-".to_owned(), |score| format!("{score:.3}"));
+    writeln!(
+        out,
+        "{:width$}  {:>10}  {:>10}  {:>10}  {at:>11}  {score}",
+        pair.name,
+        number(diff.mean),
+        number(diff.p99),
+        number(diff.max)
+    )
+}
+
+/// Four digits, plain where that is short.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 {
+        "0".to_owned()
+    } else if !(1e-3..1e5).contains(&size) {
+        format!("{value:.3e}")
+    } else if value.fract() == 0.0 {
+        format!("{value}")
+    } else {
+        let digits = (3 - size.log10().floor() as i32).max(0) as usize;
+        format!("{value:.digits$}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        for (value, text) in [
+            (0.0, "0"),
+            (3.0, "3"),
+            (1234.56, "1235"),
+            (0.012345, "0.01235"),
+            (1.5e-7, "1.500e-7"),
+            (2.5e6, "2.500e6"),
+            (-0.5, "-0.5000"),
+            (f64::INFINITY, "inf"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+}

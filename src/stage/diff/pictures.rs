@@ -1,0 +1,241 @@
+//! Two renders: pictures by their names.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{DiffError, Images, Request};
+use crate::{
+    compare::pictures::{self, Encoding, Picture, PictureDiff, PictureFault, difference_image},
+    domain::{frame_range::FrameRange, tolerance::PictureLimits},
+    render::{
+        RenderError,
+        image::{read_exr, read_png, write_rgb_png},
+    },
+};
+
+/// What differs between two renders.
+#[derive(Clone, Debug, Serialize)]
+pub struct PicturesDiff {
+    /// Names that a alone has.
+    pub only_a: Vec<String>,
+    /// Names that b alone has.
+    pub only_b: Vec<String>,
+    /// By name.
+    pub pairs: Vec<PairDiff>,
+}
+
+/// Two pictures of one name.
+#[derive(Clone, Debug, Serialize)]
+pub struct PairDiff {
+    /// File name.
+    pub name: String,
+    /// Width and height of a and of b, pixels.
+    pub sizes: [[usize; 2]; 2],
+    /// `None` where the sizes differ.
+    pub diff: Option<PictureDiff>,
+    /// What is out of tolerance.
+    pub faults: Vec<PictureFault>,
+    /// Where its difference image went.
+    pub image: Option<PathBuf>,
+}
+
+impl PicturesDiff {
+    pub(super) fn is_within(&self) -> bool {
+        let is_within = |pair: &PairDiff| pair.diff.is_some() && pair.faults.is_empty();
+        self.only_a.is_empty() && self.only_b.is_empty() && self.pairs.iter().all(is_within)
+    }
+}
+
+fn encoding(path: &Path) -> Option<Encoding> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    match extension.as_str() {
+        "png" => Some(Encoding::Srgb),
+        "exr" => Some(Encoding::Linear),
+        _ => None,
+    }
+}
+
+/// By its name.
+pub(super) fn is_picture(path: &Path) -> bool {
+    encoding(path).is_some()
+}
+
+/// Frame number of `NAME.0001.png`.
+fn frame_of(path: &Path) -> Option<u32> {
+    let stem = path.file_stem()?.to_str()?;
+    stem.rsplit('.').next()?.parse().ok()
+}
+
+/// Pictures of a folder by name.
+pub(super) fn in_folder(
+    folder: &Path,
+    frames: Option<&FrameRange>,
+) -> Result<BTreeMap<String, PathBuf>, DiffError> {
+    let fault = |source| DiffError::File {
+        file: folder.to_owned(),
+        source,
+    };
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).map_err(fault)? {
+        let path = entry.map_err(fault)?.path();
+        let is_wanted = |frames: &FrameRange| frame_of(&path).is_some_and(|f| frames.contains(f));
+        if is_picture(&path) && path.is_file() && frames.is_none_or(is_wanted) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            found.insert(name.into_owned(), path);
+        }
+    }
+    Ok(found)
+}
+
+pub(super) fn compare_folders(request: &Request) -> Result<PicturesDiff, DiffError> {
+    let frames = request.frames.as_ref();
+    let (a, b) = (
+        in_folder(&request.a, frames)?,
+        in_folder(&request.b, frames)?,
+    );
+    if let Some(frames) = frames {
+        let missing = |found: &BTreeMap<String, PathBuf>| {
+            let numbers: Vec<u32> = found.values().filter_map(|path| frame_of(path)).collect();
+            frames.iter().find(|frame| !numbers.contains(frame))
+        };
+        for (folder, found) in [(&request.a, &a), (&request.b, &b)] {
+            if let Some(frame) = missing(found) {
+                let folder = folder.display();
+                let message =
+                    format!("--frames {frames}: {folder} has no picture of frame {frame}");
+                return Err(DiffError::Usage(message));
+            }
+        }
+    }
+    if let Some(images) = &request.images {
+        for folder in [&request.a, &request.b] {
+            refuse_same(&images.path, folder)?;
+        }
+        fs::create_dir_all(&images.path).map_err(|source| DiffError::File {
+            file: images.path.clone(),
+            source,
+        })?;
+    }
+    let lone = |x: &BTreeMap<String, PathBuf>, y: &BTreeMap<String, PathBuf>| {
+        let names = x.keys().filter(|name| !y.contains_key(*name));
+        names.cloned().collect()
+    };
+    let both: Vec<_> = a
+        .iter()
+        .filter_map(|(name, file)| Some((name, file, b.get(name)?)))
+        .collect();
+    let pair = |&(name, a, b): &(&String, &PathBuf, &PathBuf)| {
+        let images = request.images.as_ref().map(|images| Images {
+            // An EXR and a PNG of one frame stand side by side.
+            path: images.path.join(format!("{name}.difference.png")),
+            gain: images.gain,
+        });
+        compare_pair(name, [a, b], limits(request), images.as_ref())
+    };
+    Ok(PicturesDiff {
+        only_a: lone(&a, &b),
+        only_b: lone(&b, &a),
+        pairs: both.par_iter().map(pair).collect::<Result<_, _>>()?,
+    })
+}
+
+pub(super) fn compare_files(request: &Request) -> Result<PicturesDiff, DiffError> {
+    if let Some(frames) = &request.frames {
+        let message = format!("--frames {frames}: two pictures have no frames to choose from");
+        return Err(DiffError::Usage(message));
+    }
+    if encoding(&request.a) != encoding(&request.b) {
+        let message =
+            "a PNG has gone through the look's view transform, an EXR has not: they do not compare";
+        return Err(DiffError::Usage(message.to_owned()));
+    }
+    if let Some(images) = &request.images {
+        if encoding(&images.path) != Some(Encoding::Srgb) {
+            let message = format!("--output {}: it has to end in .png", images.path.display());
+            return Err(DiffError::Usage(message));
+        }
+        for file in [&request.a, &request.b] {
+            refuse_same(&images.path, file)?;
+        }
+    }
+    let name = request.a.file_name().unwrap_or_default().to_string_lossy();
+    let files = [request.a.as_path(), &request.b];
+    let pair = compare_pair(&name, files, limits(request), request.images.as_ref())?;
+    Ok(PicturesDiff {
+        only_a: Vec::new(),
+        only_b: Vec::new(),
+        pairs: vec![pair],
+    })
+}
+
+fn limits(request: &Request) -> Option<&PictureLimits> {
+    request.tolerance.as_ref().map(|t| &t.pictures)
+}
+
+fn refuse_same(output: &Path, input: &Path) -> Result<(), DiffError> {
+    match (output.canonicalize(), input.canonicalize()) {
+        (Ok(output), Ok(input)) if output == input => Err(DiffError::Usage(format!(
+            "--output {} is what is compared: choose another",
+            input.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+fn compare_pair(
+    name: &str,
+    files: [&Path; 2],
+    limits: Option<&PictureLimits>,
+    images: Option<&Images>,
+) -> Result<PairDiff, DiffError> {
+    let [a, b] = [load(files[0])?, load(files[1])?];
+    let diff = pictures::compare(&a, &b);
+    let image = match (&diff, images) {
+        (Some(_), Some(images)) => {
+            let pixels = difference_image(&a, &b, images.gain);
+            let comment = format!("|a - b| of {name} times {}", images.gain);
+            write_rgb_png(&images.path, [a.width, a.height], &pixels, &comment)?;
+            Some(images.path.clone())
+        }
+        _ => None,
+    };
+    Ok(PairDiff {
+        name: name.to_owned(),
+        sizes: [[a.width, a.height], [b.width, b.height]],
+        faults: diff.map_or(Vec::new(), |diff| diff.faults(limits)),
+        diff,
+        image,
+    })
+}
+
+fn load(path: &Path) -> Result<Picture, RenderError> {
+    let (encoding, (width, height, pixels)) = match encoding(path) {
+        Some(Encoding::Linear) => (Encoding::Linear, read_exr(path)?),
+        _ => (Encoding::Srgb, read_png(path)?),
+    };
+    Ok(Picture {
+        width,
+        height,
+        pixels,
+        encoding,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frame_numbers_stand_before_the_extension() {
+        assert_eq!(frame_of(Path::new("a/wave-city.v2.0068.png")), Some(68));
+        assert_eq!(frame_of(Path::new("0007.exr")), Some(7));
+        assert_eq!(frame_of(Path::new("still.png")), None);
+        assert!(is_picture(Path::new("A.PNG")) && !is_picture(Path::new("a.jpg")));
+    }
+}

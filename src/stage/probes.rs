@@ -1,0 +1,73 @@
+//! What a scene's probes see of a frame.
+
+use crate::{
+    cache::{Entry, ProbeRecord, ProbeValues},
+    domain::{
+        particles::Particles,
+        probe::{elevation, energies, volume},
+    },
+    scene::{Scene, probe::ProbeKind},
+    study::chart::{Chart, Series},
+};
+
+/// The scene's probes as the cache keeps them.
+pub(super) fn records(scene: &Scene) -> Vec<ProbeRecord> {
+    let probes = scene.probes.iter();
+    probes
+        .map(|probe| ProbeRecord {
+            name: probe.name.clone(),
+            kind: probe.kind.name().to_owned(),
+            at: probe.kind.at(),
+            columns: probe.kind.columns().iter().map(|&c| c.to_owned()).collect(),
+        })
+        .collect()
+}
+
+/// Values of a frame, one list a probe. `pressures` are those at the scene's
+/// [`pressure_points`](Scene::pressure_points), Pa.
+pub(super) fn look(scene: &Scene, particles: &Particles, pressures: &[Option<f64>]) -> ProbeValues {
+    let spacing = scene.particle_spacing();
+    let mut pressures = pressures.iter().copied();
+    let probes = scene.probes.iter();
+    probes
+        .map(|probe| match probe.kind {
+            ProbeKind::Elevation { at } => vec![elevation(particles, spacing, &scene.domain, at)],
+            ProbeKind::Pressure { .. } => vec![pressures.next().flatten()],
+            ProbeKind::Energy => {
+                let mass = scene.water.rest_density * spacing.powi(3);
+                let gravity = scene.water.gravity;
+                let (kinetic, potential) = energies(particles, mass, gravity, scene.domain.min);
+                vec![Some(kinetic), Some(potential), Some(kinetic + potential)]
+            }
+            ProbeKind::Volume => vec![Some(volume(particles, spacing, &scene.domain))],
+        })
+        .collect()
+}
+
+/// What the probe of `index` saw over time as a chart, one line a column.
+pub(super) fn chart(shot: &str, record: &ProbeRecord, index: usize, entries: &[Entry]) -> Chart {
+    let columns = || record.columns.iter().map(|column| column.rsplit_once('_'));
+    let value = |entry: &Entry, column: usize| *entry.probes.as_ref()?.get(index)?.get(column)?;
+    let series = columns().enumerate().map(|(column, parts)| Series {
+        name: parts.map_or_else(String::new, |(quantity, _)| quantity.to_owned()),
+        points: entries
+            .iter()
+            .map(|entry| (entry.clock.time, value(entry, column)))
+            .collect(),
+    });
+    let unit = columns().flatten().map(|(_, unit)| unit).next();
+    let place = match &record.at[..] {
+        [] => String::new(),
+        at => format!(" at {at:?} m"),
+    };
+    Chart {
+        title: format!("{shot}: {}{place}", record.name),
+        x_label: "time, s".to_owned(),
+        y_label: match unit {
+            Some("m3") => "m³".to_owned(),
+            unit => unit.unwrap_or_default().to_owned(),
+        },
+        series: series.collect(),
+        marks: Vec::new(),
+    }
+}
