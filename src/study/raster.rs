@@ -1,0 +1,89 @@
+//! A drawn curve as PNG, with a font of its own, so that every machine draws the same.
+
+use std::sync::Arc;
+
+use resvg::{tiny_skia, usvg};
+
+/// Pixels a unit of the drawing.
+const SCALE: f32 = 2.0;
+
+/// Why a drawing could not be made a picture.
+#[derive(Debug, thiserror::Error)]
+pub enum RasterError {
+    /// It is no SVG.
+    #[error("the drawing: {0}")]
+    Svg(#[from] usvg::Error),
+    /// It is too large, or its bytes could not be written.
+    #[error("the drawing's picture: {0}")]
+    Png(String),
+}
+
+/// The bytes of a PNG of `svg`, two pixels a unit, text in Ubuntu Light, and in Hack what that lacks.
+///
+/// # Errors
+/// [`RasterError`].
+pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
+    let mut fonts = usvg::fontdb::Database::new();
+    fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
+    let family = fonts
+        .faces()
+        .next()
+        .and_then(|face| face.families.first())
+        .map(|(name, _)| name.clone());
+    fonts.load_font_data(epaint_default_fonts::HACK_REGULAR.to_vec());
+    if let Some(family) = family {
+        fonts.set_sans_serif_family(family);
+    }
+    let options = usvg::Options {
+        fontdb: Arc::new(fonts),
+        ..usvg::Options::default()
+    };
+    let tree = usvg::Tree::from_str(svg, &options)?;
+    let size = tree
+        .size()
+        .to_int_size()
+        .scale_by(SCALE)
+        .ok_or_else(|| RasterError::Png("its size".into()))?;
+    let mut picture = tiny_skia::Pixmap::new(size.width(), size.height())
+        .ok_or_else(|| RasterError::Png(format!("{} × {}", size.width(), size.height())))?;
+    let scale = tiny_skia::Transform::from_scale(SCALE, SCALE);
+    resvg::render(&tree, scale, &mut picture.as_mut());
+    picture
+        .encode_png()
+        .map_err(|error| RasterError::Png(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Dark pixels of a white drawing with `inside`.
+    fn dark(inside: &str) -> usize {
+        let svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 200 40\" font-family=\"sans-serif\" \
+             font-size=\"20\"><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>{inside}</svg>"
+        );
+        let bytes = png(&svg).expect("a picture");
+        let picture = tiny_skia::Pixmap::decode_png(&bytes).expect("a PNG");
+        assert_eq!((picture.width(), picture.height()), (400, 80));
+        picture.pixels().iter().filter(|p| p.red() < 128).count()
+    }
+
+    #[test]
+    fn text_is_drawn() {
+        // A letter of 40 pixels has strokes of about 3: some hundred dark pixels each.
+        let text = dark("<text x=\"10\" y=\"28\">‖p − p64‖</text>");
+        assert!(text > 300, "{text}");
+        let more = dark("<text x=\"10\" y=\"28\">‖p − p64‖ mm</text>");
+        assert!(more > text + 50, "{more} {text}");
+        // Negative control: no text, no dark pixels.
+        assert_eq!(dark("<text x=\"10\" y=\"28\"></text>"), 0);
+    }
+
+    #[test]
+    fn the_same_drawing_gives_the_same_bytes() {
+        let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><text y=\"8\">a</text></svg>";
+        assert_eq!(png(svg).expect("a picture"), png(svg).expect("a picture"));
+        assert!(matches!(png("<svg"), Err(RasterError::Svg(_))));
+    }
+}
