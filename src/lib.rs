@@ -10,16 +10,20 @@
 //! - [`scene`]: scene and look files, validated, and the plan of passes and buffers.
 //! - [`gpu`]: adapter, shader composition, passes recorded as data, scan and sort.
 //! - [`solve`]: the particle solvers on the GPU.
+//! - [`mod@reference`]: the same solvers on the CPU, in f64: what the GPU is held against.
 //! - [`cache`]: frames, ledger, manifest on disk.
 //! - [`render`]: screen-space fluid rendering.
+//! - [`compare`]: by how much two sets of values, two caches or two pictures differ.
 //! - [`study`]: what frames measure, curves, and the page that shows them.
 //! - [`stage`]: wires the rooms into jobs; no terminal.
 //! - [`cli`]: arguments in, terminal out.
 
 pub mod cache;
 pub mod cli;
+pub mod compare;
 pub mod domain;
 pub mod gpu;
+pub mod reference;
 pub mod render;
 pub mod scene;
 pub mod solve;

@@ -130,9 +130,8 @@ fn main(
         x += way / f32(steps);
         for (var solid = 0u; solid < solid_grids.count; solid++) {
             look_at_solid(solid, params.time_step * f32(k + 1u) / f32(steps));
-            let next = x;
-            x = leave_solids(next);
-            v = solid_velocity + stopped(v - solid_velocity, x - next);
+            x = leave_solids(x);
+            v = solid_velocity + stopped(v - solid_velocity, solid_push);
         }
     }
     // Where a solid and a wall meet, each would push into the other.
@@ -151,9 +150,8 @@ fn main(
     let steps = u32(ceil(2.0 * length(way) / solid_grid.spacing)) + 1u;
     x = select(x, start, is_near);
     for (var k = 0u; k < select(0u, steps, is_near); k++) {
-        let next = x + way / f32(steps);
-        x = leave_solids(next);
-        v = stopped(v, x - next);
+        x = leave_solids(x + way / f32(steps));
+        v = stopped(v, solid_push);
     }
     // Where a solid and a wall meet, each would push into the other.
     for (var k = 0u; k < select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high))); k++) {

@@ -12,6 +12,10 @@
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
 // 3: values that are not finite, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: array<atomic<u32>>;
+#ifdef PRESSURE
+// Σ λ over the substep's corrections: the pressure that they stand for.
+@group(0) @binding(12) var<storage, read_write> lambda_sum: array<f32>;
+#endif
 #ifdef ARTIFICIAL_PRESSURE
 // W at Δq = 0.2 h over W(0): (1 − 0.04)³.
 const REFERENCE_KERNEL = 0.884736;
@@ -73,6 +77,9 @@ fn main(
     }
     delta = -params.gradient_scale * delta + own_lambda * wall_term(current.xyz).gradient;
     delta *= params.relaxation;
+#ifdef PRESSURE
+    lambda_sum[i] += own_lambda;
+#endif
     if !is_finite(delta) {
         atomicAdd(&counters[3], 1u);
     }

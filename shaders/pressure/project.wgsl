@@ -22,6 +22,8 @@ fn main(
             face_velocity[face.element] -= select(0.0, face.difference, face.is_open);
         }
         let own = natural(s.slot, s.block) + (c & 1u) + 8u * ((c >> 1u) & 1u) + 64u * (c >> 2u);
-        pressure[own] = phase.pressure_scale * pressure_solution[q_element(s.slot, s.block, c)];
+        let q = q_element(s.slot, s.block, c);
+        // Both words: the large one alone is good to 12 bits.
+        pressure[own] = phase.pressure_scale * (pressure_solution[q] + pressure_solution[phase.stride + q]);
     }
 }

@@ -24,9 +24,14 @@ fn solid_node(node: vec3u) -> f32 {
 #endif
 }
 
+// What leave_solids last pushed by. A difference of positions has their rounding: far from the origin that turns a
+// small push by as much as it is long.
+var<private> solid_push: vec3f;
+
 // Pushes x out along the gradient of the trilinear signed distance where it is nearer than the contact
 // distance. Outside the grid no solid is near.
 fn leave_solids(x: vec3f) -> vec3f {
+    solid_push = vec3f(0.0);
     let p = (x - solid_grid.origin) / solid_grid.spacing;
     let last = vec3f(solid_grid.dims - 1u);
     if any(p < vec3f(0.0)) || any(p >= last) {
@@ -62,7 +67,8 @@ fn leave_solids(x: vec3f) -> vec3f {
     if steepness < 1e-6 * solid_grid.spacing {
         return x;
     }
-    return x + gradient / steepness * (params.contact_distance - distance);
+    solid_push = gradient / steepness * (params.contact_distance - distance);
+    return x + solid_push;
 }
 #endif
 

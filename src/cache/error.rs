@@ -62,6 +62,20 @@ pub enum CacheError {
         /// In this run.
         given: String,
     },
+    /// Frames that stand there were not looked at by the probes that this run has.
+    #[error(
+        "{} was baked with {cached}, and this run has {given}: what a probe sees while a frame is computed cannot be \
+         made up afterwards; go on with the same probes, or choose another -o",
+        dir.display()
+    )]
+    OtherProbes {
+        /// The directory.
+        dir: PathBuf,
+        /// In the manifest.
+        cached: String,
+        /// In this run.
+        given: String,
+    },
     /// Written in a format that this program does not read.
     #[error("{} has cache format {found}, and this program reads {supported}", dir.display())]
     Format {

@@ -11,6 +11,7 @@ use serde_json::Value;
 use super::error::{AtPath, CacheError};
 use super::frame;
 use super::manifest::{self, FileRecord, Manifest};
+use super::probes::{self, ProbeValues};
 use super::vdb;
 
 /// Its file.
@@ -50,6 +51,9 @@ pub struct Entry {
     /// Its grids; absent where the scene asks for none.
     #[serde(default)]
     pub grids: Option<FileRecord>,
+    /// What the probes saw; absent where the scene has none.
+    #[serde(default)]
+    pub probes: Option<ProbeValues>,
     /// BLAKE3 of `manifest.json`, hex; frame 0 alone has it, so that a changed manifest is told from a
     /// changed first line.
     #[serde(default)]
@@ -90,6 +94,8 @@ pub(super) struct Contents<'a> {
     pub(super) particles: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) grids: Option<&'a FileRecord>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) probes: Option<&'a ProbeValues>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) manifest: Option<&'a str>,
     pub(super) clock: Clock,
@@ -209,6 +215,9 @@ impl Ledger {
                 "its grids are not those that the manifest announces",
             ));
         }
+        if let Some(misfit) = probes::misfit(&manifest.probes, entry.probes.as_ref()) {
+            return Err(damaged(&misfit));
+        }
         self.chain = chain;
         self.entries.push(entry);
         Ok(())
@@ -249,6 +258,7 @@ mod tests {
             blake3: "",
             particles: 1,
             grids: None,
+            probes: None,
             manifest: None,
             clock: Clock {
                 time,

@@ -9,6 +9,7 @@ use serde_json::Value;
 use super::disk;
 use super::error::{AtPath, CacheError};
 use super::grids::GridRecord;
+use super::probes::ProbeRecord;
 
 /// Its file.
 pub(super) const FILE: &str = "manifest.json";
@@ -31,13 +32,13 @@ pub struct Manifest {
     pub shot: String,
     /// Hash of all that decides the physics, hex.
     pub scene_hash: String,
-    /// `pbf`.
+    /// `pbf` or `flip`.
     pub solver: String,
-    /// Adapter name.
+    /// Adapter name, or that it was the f64 reference.
     pub device: String,
-    /// Driver and its version.
+    /// Driver and its version; of the reference what it was built for.
     pub driver: String,
-    /// `Vulkan`, `Metal`, `Dx12`.
+    /// `Vulkan`, `Metal`, `Dx12`; `CPU` of the reference.
     pub backend: String,
     /// Output frames a second.
     pub frames_per_second: f64,
@@ -51,6 +52,9 @@ pub struct Manifest {
     /// What each frame has beside its particles; absent where the scene asks for no grids.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grids: Option<GridRecord>,
+    /// What is measured at each frame; absent where the scene has no probe.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub probes: Vec<ProbeRecord>,
     /// Particles at the start; filled in by `create`.
     pub start_particles: u64,
     /// `scene.toml` and the assets; filled in by `create`.
@@ -172,6 +176,7 @@ impl Manifest {
         if let Some(grids) = &self.grids {
             grids.check()?;
         }
+        ProbeRecord::check_all(&self.probes)?;
         for (i, record) in self.files.iter().enumerate() {
             let is_asset = record
                 .file
@@ -196,20 +201,25 @@ impl Manifest {
             serde_json::to_value(sorted)
                 .map_err(|error| CacheError::Unfit(format!("manifest: {error}")))
         };
-        let (cached, given) = (fields(self)?, fields(given)?);
-        match COMPARED.iter().find(|&&f| cached[f] != given[f]) {
+        let (cached, given_fields) = (fields(self)?, fields(given)?);
+        match COMPARED.iter().find(|&&f| cached[f] != given_fields[f]) {
+            None if self.probes != given.probes => Err(CacheError::OtherProbes {
+                dir: dir.to_owned(),
+                cached: ProbeRecord::list(&self.probes),
+                given: ProbeRecord::list(&given.probes),
+            }),
             None => Ok(()),
             Some(&field) => Err(CacheError::OtherScene {
                 dir: dir.to_owned(),
                 field: field.to_owned(),
                 cached: cached[field].to_string(),
-                given: given[field].to_string(),
+                given: given_fields[field].to_string(),
             }),
         }
     }
 }
 
-fn is_file_stem(name: &str) -> bool {
+pub(super) fn is_file_stem(name: &str) -> bool {
     !name.is_empty()
         && !name.starts_with(['.', '-'])
         && name

@@ -8,6 +8,7 @@
 //!   frames.jsonl    the ledger: one line a frame, chained by BLAKE3 back to the manifest
 //!   frames/wave-city.0000.ply   the start; 0001 is the first frame after it
 //!   grids/wave-city.0000.vdb    where the scene asks: level set "surface", staggered "vel"
+//!   probes/elevation-1.csv      where the scene has probes: a row a frame, from the ledger
 //!   timings.jsonl   seconds, which no two bakes share: in no hash, in no comparison
 //!   lock            held by the one writer
 //! ```
@@ -28,6 +29,7 @@ pub mod frame;
 mod grids;
 mod ledger;
 mod manifest;
+mod probes;
 mod reader;
 pub mod vdb;
 mod writer;
@@ -38,6 +40,7 @@ pub use frame::file_name;
 pub use grids::GridRecord;
 pub use ledger::{Clock, Entry};
 pub use manifest::{FileRecord, Manifest};
+pub use probes::{ProbeRecord, ProbeValues};
 pub use reader::{CacheReader, Problem, VerifyReport, survey};
 pub use writer::{Asset, CacheWriter, Summary};
 

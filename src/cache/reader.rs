@@ -10,6 +10,7 @@ use super::error::{AtPath, CacheError};
 use super::frame;
 use super::ledger::{self, Entry, Ledger};
 use super::manifest::{FileRecord, Manifest};
+use super::probes;
 use crate::domain::particles::Particles;
 
 /// An open cache: its manifest, its scene and its ledger, all checked; the frames are checked as they
@@ -173,7 +174,8 @@ impl CacheReader {
         Ok(text.lines().filter_map(seconds).collect())
     }
 
-    /// Looks at every checksum: scene, assets, frames. The manifest and the ledger's chain were
+    /// Looks at every checksum: scene, assets, frames; and at the probes' files, which have to be what the ledger says.
+    /// The manifest and the ledger's chain were
     /// checked when the cache was opened.
     /// A file that cannot be read stands in the report as well.
     pub fn survey(&self) -> VerifyReport {
@@ -200,6 +202,12 @@ impl CacheReader {
             .filter_map(|record| self.problem(&record))
             .collect();
         problems.extend(frames);
+        let records = self.manifest.probes.iter().enumerate();
+        problems.extend(records.filter_map(|(index, record)| {
+            let what = probes::problem(&self.dir, index, record, entries)?;
+            let file = record.path(&self.dir);
+            Some(Problem { file, what })
+        }));
         VerifyReport {
             frames: self.last_frame(),
             bytes: entries.iter().flat_map(Entry::files).map(|f| f.bytes).sum(),

@@ -15,6 +15,7 @@ use super::error::{AtPath, CacheError};
 use super::frame::{self, Stamp};
 use super::ledger::{self, Clock, Contents, Entry, Ledger};
 use super::manifest::{self, FileRecord, Manifest};
+use super::probes::{self, ProbeValues};
 use super::reader::{check_length_on_disk, read_frame};
 use super::vdb;
 use crate::domain::particles::Particles;
@@ -67,13 +68,15 @@ pub struct CacheWriter {
 struct Job {
     clock: Clock,
     particles: Particles,
+    probes: ProbeValues,
     report: Value,
     timings: Value,
 }
 
 impl CacheWriter {
     /// Starts a cache in `dir`, which must be absent, empty, or a creation of ours that was cut
-    /// short. `start` becomes frame 0. `manifest.files` and `manifest.start_particles` are filled in.
+    /// short. `start` becomes frame 0, of which the probes say
+    /// `probes`: one list a probe of the manifest. `manifest.files` and `manifest.start_particles` are filled in.
     ///
     /// # Errors
     /// [`CacheError::Exists`] and [`CacheError::Occupied`], with the directory untouched;
@@ -84,8 +87,10 @@ impl CacheWriter {
         scene_toml: &str,
         assets: &[Asset],
         start: &Particles,
+        probes: &ProbeValues,
     ) -> Result<Self, CacheError> {
         let manifest = completed(manifest, scene_toml, assets, start)?;
+        check_probes(&manifest, probes)?;
         refuse_occupied(dir)?;
         disk::create_directory(dir)?;
         let lock = disk::lock(dir)?;
@@ -105,6 +110,10 @@ impl CacheWriter {
         if manifest.grids.is_some() {
             disk::create_directory(&dir.join(GRIDS))?;
         }
+        if !manifest.probes.is_empty() {
+            disk::create_directory(&dir.join(probes::FOLDER))?;
+            probes::write_all(dir, &manifest.probes, &[])?;
+        }
         write_bytes(&dir.join(ledger::FILE), b"")?;
 
         let seed = blake3::hash(&manifest_bytes);
@@ -115,7 +124,7 @@ impl CacheWriter {
             chain: seed,
             ledger_bytes: 0,
         };
-        sink.write(Clock::default(), start, &Value::Null)?;
+        sink.write(Clock::default(), start, probes, &Value::Null)?;
         // Last, because it is what makes the directory a cache.
         write_bytes(&dir.join(manifest::FILE), &manifest_bytes)?;
         Self::spawn(sink, manifest, 0, lock)
@@ -168,6 +177,13 @@ impl CacheWriter {
                 vdb::file_name(&manifest.shot, f)
             })?;
         }
+        if !manifest.probes.is_empty() {
+            let folder = dir.join(probes::FOLDER);
+            disk::create_directory(&folder)?;
+            clear_leftovers(&folder, last.frame, |_| String::new())?;
+            entries.push(last.clone());
+            probes::write_all(dir, &manifest.probes, &entries)?;
+        }
         let sink = Sink {
             dir: dir.to_owned(),
             manifest: manifest.clone(),
@@ -207,7 +223,7 @@ impl CacheWriter {
     }
 
     /// Hands over the frame that follows the last one. Waits only where the disk is more than two
-    /// frames behind. `report` goes into the ledger and must be the same in every bake of the scene;
+    /// frames behind. `probes` has one list a probe of the manifest. `report` goes into the ledger and must be the same in every bake of the scene;
     /// `timings` goes beside it, or nowhere where it is null.
     ///
     /// # Errors
@@ -217,6 +233,7 @@ impl CacheWriter {
         &mut self,
         clock: Clock,
         particles: Particles,
+        probes: ProbeValues,
         report: Value,
         timings: Value,
     ) -> Result<(), CacheError> {
@@ -233,6 +250,7 @@ impl CacheWriter {
         let sent = sender.send(Job {
             clock,
             particles,
+            probes,
             report,
             timings,
         });
@@ -294,7 +312,7 @@ impl Sink {
         };
         while let Ok(job) = jobs.recv() {
             let begin = Instant::now();
-            summary.bytes += self.write(job.clock, &job.particles, &job.report)?;
+            summary.bytes += self.write(job.clock, &job.particles, &job.probes, &job.report)?;
             self.note_timings(job.clock.frame, &job.timings)?;
             summary.frames += 1;
             summary.last_frame = job.clock.frame;
@@ -303,15 +321,17 @@ impl Sink {
         Ok(summary)
     }
 
-    /// Writes a frame and its grids, then its line; gives their length.
+    /// Writes a frame and its grids, then its line, then its rows; gives the length of the first two.
     fn write(
         &mut self,
         clock: Clock,
         particles: &Particles,
+        probes: &ProbeValues,
         report: &Value,
     ) -> Result<u64, CacheError> {
         let manifest = &self.manifest;
         check(manifest, particles)?;
+        check_probes(manifest, probes)?;
         let file = frame::file_name(&manifest.shot, clock.frame);
         let stamp = Stamp {
             program: &manifest.program,
@@ -346,6 +366,7 @@ impl Sink {
             blake3: &written.hash.to_hex(),
             particles: particles.len() as u64,
             grids: grids.as_ref(),
+            probes: (!probes.is_empty()).then_some(probes),
             manifest: (clock.frame == 0).then_some(seed.as_str()),
             clock,
             report,
@@ -354,6 +375,7 @@ impl Sink {
         ledger::append(&self.dir.join(ledger::FILE), self.ledger_bytes, &line)?;
         self.ledger_bytes += line.len() as u64;
         self.chain = chain;
+        probes::append(&self.dir, &self.manifest.probes, clock, probes)?;
         Ok(written.bytes + grids.map_or(0, |record| record.bytes))
     }
 
@@ -382,6 +404,11 @@ fn check(manifest: &Manifest, particles: &Particles) -> Result<(), CacheError> {
         )));
     }
     Ok(())
+}
+
+fn check_probes(manifest: &Manifest, values: &ProbeValues) -> Result<(), CacheError> {
+    let values = (!values.is_empty()).then_some(values);
+    probes::misfit(&manifest.probes, values).map_or(Ok(()), |what| Err(CacheError::Unfit(what)))
 }
 
 fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), CacheError> {
@@ -446,13 +473,18 @@ fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
         manifest::ASSETS,
         FRAMES,
         GRIDS,
+        probes::FOLDER,
         ledger::FILE,
         manifest::FILE,
     ];
     if let Some(other) = names.iter().find(|name| !ours.contains(&plain(name))) {
         return occupied(other.clone());
     }
-    for (folder, ending) in [(FRAMES, ".0000.ply"), (GRIDS, ".0000.vdb")] {
+    for (folder, ending) in [
+        (FRAMES, ".0000.ply"),
+        (GRIDS, ".0000.vdb"),
+        (probes::FOLDER, probes::ENDING),
+    ] {
         let path = dir.join(folder);
         if path.is_dir()
             && let Some(other) = disk::names(&path)?
@@ -476,7 +508,7 @@ fn plain(name: &str) -> &str {
 fn clear_unfinished(dir: &Path) -> Result<(), CacheError> {
     for name in disk::names(dir)? {
         let path = dir.join(&name);
-        if [manifest::ASSETS, FRAMES, GRIDS].contains(&name.as_str()) {
+        if [manifest::ASSETS, FRAMES, GRIDS, probes::FOLDER].contains(&name.as_str()) {
             fs::remove_dir_all(&path).at(&path)?;
         } else if name != disk::LOCK {
             fs::remove_file(&path).at(&path)?;

@@ -6,13 +6,16 @@ use std::{
     process::ExitCode,
 };
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use crate::{
     domain::{frame_range::FrameRange, solver::StepReport},
     scene::{Method, Scene, SceneError},
-    stage::bake::{Event, Request, bake},
+    stage::{
+        bake::{Event, Request, bake},
+        device::Device,
+    },
 };
 
 use super::{
@@ -41,7 +44,10 @@ pub(super) struct BakeArgs {
     /// Go on after the last frame of the cache's ledger, if there is one; a damaged frame is refused by name.
     #[arg(long)]
     resume: bool,
-    /// Index or part of the name of the adapter (see `swell inspect --adapters`).
+    /// What to solve on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
+    #[arg(long, value_enum, default_value_t, value_name = "DEVICE")]
+    device: DeviceKind,
+    /// Index or part of the name of the adapter (see `swell inspect --adapters`); of --device gpu alone.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Time each pass on the device and print a table; passes then run one by one.
@@ -50,6 +56,26 @@ pub(super) struct BakeArgs {
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
     progress: Mode,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, Default)]
+enum DeviceKind {
+    #[default]
+    Gpu,
+    Cpu,
+}
+
+impl BakeArgs {
+    fn device(&self) -> Result<Device, Failure> {
+        match (self.device, &self.adapter) {
+            (DeviceKind::Gpu, adapter) => Ok(Device::Gpu(adapter.clone())),
+            (DeviceKind::Cpu, None) => Ok(Device::Cpu),
+            (DeviceKind::Cpu, Some(name)) => Err(Failure {
+                code: 2,
+                error: format!("--adapter {name} names a GPU, and --device is cpu").into(),
+            }),
+        }
+    }
 }
 
 /// A solver by its name.
@@ -74,6 +100,7 @@ pub(super) fn load(
 }
 
 pub(super) fn run(args: &BakeArgs) -> Result<ExitCode, Failure> {
+    let device = args.device()?;
     let scene = load(&args.scene, &args.set, args.solver)?;
     let method = scene.solver.method.name();
     let default = || PathBuf::from("cache").join(&scene.shot.name).join(method);
@@ -82,11 +109,10 @@ pub(super) fn run(args: &BakeArgs) -> Result<ExitCode, Failure> {
         scene,
         frames: args.frames.clone(),
         resume: args.resume,
-        adapter: args.adapter.clone(),
+        device,
         time_passes: args.time_passes,
     };
-    // Without a handler a signal ends the process at once, which a bake survives as well.
-    let interrupt = Interrupt::install().unwrap_or_default();
+    let interrupt = Interrupt::install_or_warn();
     let progress = OnceCell::new();
     let outcome = bake(&request, interrupt.flag(), &mut |event| {
         tell(args.progress, &progress, event)
@@ -141,7 +167,6 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
         } => {
             let frames = u64::from((last + 1).saturating_sub(first));
             let progress = progress.get_or_init(|| Progress::new(mode, frames));
-            let (all, lists) = bytes;
             if particles == 0 {
                 progress.say(
                     "warning: the scene holds no water",
@@ -153,24 +178,27 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             } else {
                 format!("frames {first} to {last}")
             };
-            let beside = match lists {
-                0 => String::new(),
-                lists => format!(", of it {} neighbour lists", size(lists)),
-            };
+            let memory = bytes.map_or(String::new(), |bytes| match bytes {
+                (all, 0) => format!(", {} on the device", size(all)),
+                (all, lists) => format!(
+                    ", {} on the device, of it {} neighbour lists",
+                    size(all),
+                    size(lists)
+                ),
+            });
+            let device = device.to_string();
             let samples = match boundary_samples {
                 0 => String::new(),
                 count => format!(", {count} boundary samples"),
             };
             let text = format!(
-                "{solver} on {device}\n{particles} particles ({removed} left out where solids are){samples}, {} on the \
-                 device{beside}\n{span}",
-                size(all)
+                "{solver} on {device}\n{particles} particles ({removed} left out where solids are){samples}{memory}\n{span}"
             );
             progress.say(
                 &text,
                 json!({
                     "event": "ready", "solver": solver, "device": device, "particles": particles, "removed": removed,
-                    "boundary_samples": boundary_samples, "bytes": all, "list_bytes": lists, "first": first, "last": last,
+                    "boundary_samples": boundary_samples, "bytes": bytes.map(|(all, _)| all), "list_bytes": bytes.map(|(_, lists)| lists), "first": first, "last": last,
                 }),
             );
         }

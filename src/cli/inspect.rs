@@ -10,7 +10,7 @@ use clap::Args;
 
 use crate::{
     scene::{Method, Scene},
-    stage::inspect::{Adapter, Entry, Manifest, ScenePlan, adapters, cache, plan},
+    stage::inspect::{Adapter, Entry, Manifest, ScenePlan, adapters, cache, plan, plot},
 };
 
 use super::{Failure, bake, size};
@@ -23,6 +23,9 @@ pub(super) struct InspectArgs {
     /// List this machine's adapters with the limits that matter here.
     #[arg(long)]
     adapters: bool,
+    /// Draw what the cache's probes saw over time, an SVG a probe, into this folder.
+    #[arg(long, value_name = "DIR", requires = "subject")]
+    plot: Option<PathBuf>,
     /// Override a scene key.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -37,6 +40,10 @@ pub(super) struct InspectArgs {
 pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     let mut text = Vec::new();
     let mut misfit = None;
+    let plotted = match (&args.plot, &args.subject) {
+        (Some(folder), Some(directory)) => plot(directory, folder)?,
+        _ => Vec::new(),
+    };
     if args.adapters {
         for adapter in adapters()? {
             show_adapter(&mut text, &adapter)?;
@@ -46,6 +53,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
         Some(directory) if directory.is_dir() => {
             let (manifest, entries) = cache(directory)?;
             show_cache(&mut text, &manifest, &entries)?;
+            show_probes(&mut text, &manifest, &entries)?;
         }
         Some(file) => {
             let scene = bake::load(file, &args.set, args.solver)?;
@@ -54,6 +62,9 @@ pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
             misfit = planned.misfit;
         }
         None => {}
+    }
+    for file in plotted {
+        writeln!(text, "{}", file.display()).map_err(Unprintable::from)?;
     }
     // A closed pipe (`swell inspect | head`) is no fault.
     let _ = io::stdout().write_all(&text);
@@ -187,6 +198,38 @@ fn show_cache(
             size(entry.bytes),
             entry.clock.substeps
         )?;
+    }
+    Ok(())
+}
+
+/// A line a column of each probe: its least, greatest and last value.
+fn show_probes(
+    out: &mut impl Write,
+    manifest: &Manifest,
+    entries: &[Entry],
+) -> Result<(), Unprintable> {
+    if manifest.probes.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        out,
+        "\n{:24}  {:14}  {:>12}  {:>12}  {:>12}",
+        "probe", "column", "least", "greatest", "last"
+    )?;
+    for (index, probe) in manifest.probes.iter().enumerate() {
+        for (k, column) in probe.columns.iter().enumerate() {
+            let value = |entry: &Entry| *entry.probes.as_ref()?.get(index)?.get(k)?;
+            let least = entries.iter().filter_map(value).min_by(f64::total_cmp);
+            let greatest = entries.iter().filter_map(value).max_by(f64::total_cmp);
+            let last = entries.last().and_then(value);
+            let [least, greatest, last] = [least, greatest, last]
+                .map(|value| value.map_or("-".to_owned(), |v| format!("{v:.6}")));
+            writeln!(
+                out,
+                "{:24}  {column:14}  {least:>12}  {greatest:>12}  {last:>12}",
+                probe.name
+            )?;
+        }
     }
     Ok(())
 }

@@ -13,22 +13,33 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Takes over SIGINT, SIGTERM and SIGHUP (on Windows Ctrl-C and Ctrl-Break) for the rest of the
-    /// process; once a process.
+    /// Takes over SIGINT, SIGTERM and SIGHUP (on Windows Ctrl-C) for the rest of the process; those that the process was
+    /// started to ignore, as under `nohup`, stay ignored.
     ///
     /// # Errors
-    /// Where handlers are there already, or the system refuses.
-    pub fn install() -> Result<Self, ctrlc::Error> {
+    /// Where the system refuses.
+    pub fn install() -> std::io::Result<Self> {
         let interrupt = Self::default();
         let shared = interrupt.clone();
-        ctrlc::try_set_handler(move || {
+        on_signal(move || {
             if shared.raise() {
                 // The process ends with its temporary files in place; resuming clears them.
                 std::process::exit(EXIT_CODE);
             }
-            eprintln!("ends after the current frame; once more to end at once");
+            eprintln!("ends after the current frame, resumably; once more to end at once");
         })?;
         Ok(interrupt)
+    }
+
+    /// The same, and where it cannot be, a warning: a signal then ends the process at once, which finished
+    /// frames survive.
+    pub fn install_or_warn() -> Self {
+        Self::install().unwrap_or_else(|error| {
+            eprintln!(
+                "warning: a signal will end this at once, without finishing its frame: {error}"
+            );
+            Self::default()
+        })
     }
 
     /// Whether to end after the current frame.
@@ -45,6 +56,36 @@ impl Interrupt {
     fn raise(&self) -> bool {
         self.flag.swap(true, Ordering::Relaxed)
     }
+}
+
+/// Has `handle` called, on a thread of its own, for each signal from here on.
+#[cfg(unix)]
+fn on_signal(handle: impl Fn() + Send + 'static) -> std::io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter();
+    let heard: Vec<i32> = wanted.filter(|&signal| !is_ignored(signal)).collect();
+    let mut signals = signal_hook::iterator::Signals::new(heard)?;
+    std::thread::Builder::new()
+        .name("signals".into())
+        .spawn(move || signals.forever().for_each(|_| handle()))?;
+    Ok(())
+}
+
+/// Whether whoever started the process had it ignore a signal.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let mut now = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
+    // SAFETY: a null action changes nothing; `now` has room for what is told, and all zeros are valid where nothing is.
+    let now = unsafe {
+        libc::sigaction(signal, std::ptr::null(), now.as_mut_ptr());
+        now.assume_init()
+    };
+    now.sa_sigaction == libc::SIG_IGN
+}
+
+#[cfg(not(unix))]
+fn on_signal(handle: impl Fn() + Send + 'static) -> std::io::Result<()> {
+    ctrlc::set_handler(handle).map_err(std::io::Error::other)
 }
 
 #[cfg(test)]
@@ -67,13 +108,40 @@ mod tests {
     #[ignore = "runs as the child of the test below"]
     fn child() {
         let interrupt = Interrupt::install().unwrap();
-        assert!(Interrupt::install().is_err(), "once a process");
         println!("\nready");
         while !interrupt.is_raised() {
             std::thread::sleep(std::time::Duration::from_millis(2));
         }
         println!("\nraised");
         std::thread::sleep(std::time::Duration::from_secs(60));
+    }
+
+    /// As under `nohup`: what is ignored stays so, and the others are heard.
+    #[cfg(unix)]
+    #[test]
+    fn an_ignored_signal_stays_ignored() {
+        use std::io::{BufRead, BufReader};
+        use std::process::{Command, Stdio};
+
+        let this = std::env::current_exe().unwrap();
+        let mut child = Command::new("sh")
+            .args(["-c", "trap '' HUP; exec \"$@\"", "sh"])
+            .arg(this)
+            .args(["--ignored", "--exact", "--nocapture"])
+            .arg("cli::interrupt::tests::child")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let pid = child.id().to_string();
+        let send = |signal| Command::new("kill").args(["-s", signal, &pid]).status();
+        assert!(lines.any(|line| line.unwrap() == "ready"));
+        assert!(send("HUP").unwrap().success() && send("HUP").unwrap().success());
+        assert!(send("TERM").unwrap().success());
+        assert!(lines.any(|line| line.unwrap() == "raised"));
+        assert!(send("TERM").unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(EXIT_CODE));
     }
 
     #[cfg(unix)]

@@ -1,6 +1,8 @@
 //! Arguments in, terminal out: one file a command.
 
 mod bake;
+mod check;
+mod diff;
 mod inspect;
 pub mod interrupt;
 mod progress;
@@ -34,8 +36,12 @@ enum Command {
     Render(render::RenderArgs),
     /// Bake, render and measure what a study compares, and write one page about it.
     Study(study::StudyArgs),
+    /// Hold a step on the GPU against the f64 reference, pass by pass.
+    Check(check::CheckArgs),
     /// Show a scene's plan, a cache's frames, or this machine's adapters.
     Inspect(inspect::InspectArgs),
+    /// Compare two caches, a cache and a baseline, or two renders: where they part, and by how much.
+    Diff(diff::DiffArgs),
     /// Check every checksum of a cache.
     Verify(verify::VerifyArgs),
 }
@@ -71,7 +77,9 @@ pub fn main() -> ExitCode {
         Command::Bake(args) => bake::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Study(args) => study::run(&args),
+        Command::Check(args) => check::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Diff(args) => diff::run(&args),
         Command::Verify(args) => verify::run(&args)
             .map(|()| ExitCode::SUCCESS)
             .map_err(Failure::from),

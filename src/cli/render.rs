@@ -59,8 +59,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<ExitCode, Failure> {
         adapter: args.adapter.clone(),
         overwrite: args.overwrite,
     };
-    // Without a handler a signal ends the process at once; a picture cut short is made again.
-    let interrupt = Interrupt::install().unwrap_or_default();
+    let interrupt = Interrupt::install_or_warn();
     let progress = OnceCell::new();
     let outcome = render(&request, interrupt.flag(), &mut |event| {
         tell(args.progress, &progress, event)

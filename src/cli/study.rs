@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::{
     scene::study::Study,
-    stage::study::{Event, Request, study},
+    stage::study::{Event, PointEvent, PointStatus, Request, study},
 };
 
 use super::{
@@ -45,8 +45,7 @@ pub(super) fn run(args: &StudyArgs) -> Result<ExitCode, Failure> {
         directory,
         adapter: args.adapter.clone(),
     };
-    // Without a handler a signal ends the process at once; the next run goes on.
-    let interrupt = Interrupt::install().unwrap_or_default();
+    let interrupt = Interrupt::install_or_warn();
     let say = |text: &str, event| Progress::new(args.progress.lines(), 0).say(text, event);
     let mut progress = OnceCell::new();
     let outcome = study(&request, interrupt.flag(), &mut |event| {
@@ -65,6 +64,14 @@ pub(super) fn run(args: &StudyArgs) -> Result<ExitCode, Failure> {
             ),
             Event::Bake(event) => bake::tell(args.progress, &progress, event),
             Event::Render(event) => render::tell(args.progress, &progress, event),
+            Event::Point(event) => {
+                let bar = progress.get_or_init(|| Progress::new(args.progress, event.count as u64));
+                let (text, json) = point(&event);
+                if let PointStatus::Failed(_) = event.status {
+                    bar.say(&text, json.clone());
+                }
+                bar.frame(&text, json);
+            }
         }
     });
     if let Some(progress) = progress.take() {
@@ -83,4 +90,41 @@ pub(super) fn run(args: &StudyArgs) -> Result<ExitCode, Failure> {
         json!({ "event": "end", "page": page, "findings": outcome.findings, "interrupted": false }),
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// A point's line, and the same for farms.
+fn point(event: &PointEvent) -> (String, serde_json::Value) {
+    let (status, told) = match &event.status {
+        PointStatus::Stands => ("stands there", String::new()),
+        PointStatus::Done(ms, errors) => {
+            let errors = errors
+                .iter()
+                .map(|(name, value)| format!("  {name} {value:.3e}"));
+            (
+                "done",
+                format!("  {ms:.2} ms{}", errors.collect::<String>()),
+            )
+        }
+        PointStatus::Failed(message) => ("failed", format!(": {message}")),
+    };
+    let text = format!(
+        "point {} of {}  {}  {status}{told}",
+        event.number, event.count, event.name
+    );
+    let mut json = json!({
+        "event": "point", "number": event.number, "count": event.count, "name": event.name, "status": status,
+    });
+    match &event.status {
+        PointStatus::Stands => {}
+        PointStatus::Done(ms, errors) => {
+            let errors: serde_json::Map<_, _> = errors
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), json!(value)))
+                .collect();
+            json["ms"] = json!(ms);
+            json["errors"] = errors.into();
+        }
+        PointStatus::Failed(message) => json["message"] = json!(message),
+    }
+    (text, json)
 }

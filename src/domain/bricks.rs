@@ -115,6 +115,41 @@ impl Bricks {
         self.records.len()
     }
 
+    /// Coordinates of an element's cell on its level.
+    pub fn cell(&self, element: u32) -> [u32; 3] {
+        let brick = &self.records[(element / CELLS) as usize];
+        let within = place(element);
+        std::array::from_fn(|axis| EDGE * brick.coordinate[axis] + within[axis])
+    }
+
+    /// Element of a cell of the finest level; in slot 0 where no brick is.
+    pub fn element(&self, cell: [i64; 3]) -> u32 {
+        let edge = i64::from(EDGE);
+        let brick = cell.map(|c| c.div_euclid(edge));
+        let dims = self.table_dims.map(i64::from);
+        let is_inside = (0..3).all(|axis| (0..dims[axis]).contains(&brick[axis]));
+        let slot = if is_inside {
+            self.table[((brick[2] * dims[1] + brick[1]) * dims[0] + brick[0]) as usize]
+        } else {
+            0
+        };
+        let [x, y, z] = cell.map(|c| c.rem_euclid(edge) as u32);
+        CELLS * slot + x + EDGE * (y + EDGE * z)
+    }
+
+    /// Element of the cell `offset` away, at most eight cells along each axis; in slot 0 where there is none.
+    pub fn near(&self, element: u32, offset: [i32; 3]) -> u32 {
+        let at = place(element);
+        let (mut neighbor, mut local) = (0, 0);
+        for axis in (0..3).rev() {
+            let moved = (at[axis] + EDGE).wrapping_add_signed(offset[axis]);
+            neighbor = 3 * neighbor + moved / EDGE;
+            local = EDGE * local + moved % EDGE;
+        }
+        let brick = &self.records[(element / CELLS) as usize];
+        CELLS * brick.neighbors[neighbor as usize] + local
+    }
+
     /// Coarser levels over the wet bricks, until one brick holds all or `depth` levels stand.
     fn add_levels(&mut self, depth: usize) {
         let mut dims = self.table_dims;
@@ -150,6 +185,12 @@ impl Bricks {
             });
         }
     }
+}
+
+/// Where in its brick an element's cell lies.
+fn place(element: u32) -> [u32; 3] {
+    let local = element % CELLS;
+    [local % EDGE, local / EDGE % EDGE, local / (EDGE * EDGE)]
 }
 
 fn volume(dims: [u32; 3]) -> usize {
@@ -272,6 +313,22 @@ mod tests {
                 assert_eq!((1..=bricks.wet).contains(&slot), is_wet[k]);
             }
         }
+    }
+
+    #[test]
+    fn neighbours_are_where_their_cells_say() {
+        let bricks = Bricks::new([72, 40, 48], &scattered(9 * 5 * 6), 1, 8);
+        let mut found = 0;
+        for element in (CELLS..CELLS * (bricks.active + 1)).step_by(37) {
+            let cell = bricks.cell(element).map(i64::from);
+            assert_eq!(bricks.element(cell), element);
+            for offset in [[-1, 0, 0], [1, -1, 1], [8, 0, -8], [0, 1, 0]] {
+                let there: [i64; 3] = std::array::from_fn(|k| cell[k] + i64::from(offset[k]));
+                assert_eq!(bricks.near(element, offset), bricks.element(there));
+                found += u32::from(bricks.element(there) >= CELLS);
+            }
+        }
+        assert!(found > 100);
     }
 
     #[test]

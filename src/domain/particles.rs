@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::Vec3;
+
 /// Particles in the order of their ids.
 ///
 /// The state between two frames is this and nothing else, so every frame is a checkpoint.
@@ -26,5 +28,30 @@ impl Particles {
     /// Whether there is no particle.
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
+    }
+
+    /// Largest speed, m/s; 0 without particles.
+    pub fn max_speed(&self) -> f64 {
+        self.velocity
+            .iter()
+            .map(|v| Vec3::from_array(*v).as_dvec3().length())
+            .fold(0.0, f64::max)
+    }
+
+    /// The first particle that is not finite, in words; `density` is one relative density a particle, where there is
+    /// any.
+    pub fn first_not_finite(&self, density: Option<&[f64]>) -> Option<String> {
+        let is_bad = |v: &[f32; 3]| !v.iter().all(|x| x.is_finite());
+        let density = |k: usize| density.map_or(1.0, |density| density[k]);
+        let k = (0..self.len()).find(|&k| {
+            is_bad(&self.position[k]) || is_bad(&self.velocity[k]) || !density(k).is_finite()
+        })?;
+        Some(format!(
+            "particle {} is not finite: position {:?}, velocity {:?}, relative density {}",
+            self.id[k],
+            self.position[k],
+            self.velocity[k],
+            density(k)
+        ))
     }
 }

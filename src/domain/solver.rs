@@ -1,5 +1,6 @@
 //! What every solver is to the stages.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::particles::Particles;
@@ -72,6 +73,13 @@ pub trait Solver {
     /// # Errors
     /// The device fails, or the numbers do.
     fn advance(&mut self) -> Result<(Particles, StepReport), Self::Error>;
+
+    /// Pressure at world points, metres, as the last substep of [`Solver::advance`] had it, Pa against the air's; `None`
+    /// where there was no water. Told only of scenes with a probe of pressure: others keep nothing for it.
+    ///
+    /// # Errors
+    /// The device.
+    fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, Self::Error>;
 
     /// Seconds and runs by pass since the solver was built, where it measures them.
     fn timings(&self) -> Vec<(&'static str, f64, u64)>;

@@ -18,6 +18,8 @@ pub struct Calibration {
     pub wall_density_scale: f64,
     /// Fluid particles' worth of one boundary sample that stands for d² of a solid's surface.
     pub sample_weight: f64,
+    /// Part of a linear field's gradient that Σ_j (a_i + a_j) ∇W gives on the bulk lattice; 0.95 at h = 2d.
+    pub linear_gradient: f64,
     /// Σ_k |∇_k C|² of a bulk particle, 1/m².
     pub bulk_gradient_squares: f64,
 }
@@ -36,7 +38,7 @@ impl Calibration {
     pub fn new(spacing: f64, support_ratio: f64) -> Self {
         let h = spacing * support_ratio;
         let reach = support_ratio.ceil() as i32;
-        let (mut kernel, mut below, mut squares) = (0.0, 0.0, 0.0);
+        let (mut kernel, mut below, mut squares, mut linear) = (0.0, 0.0, 0.0, 0.0);
         for z in -reach..=reach {
             for y in -reach..=reach {
                 for x in -reach..=reach {
@@ -51,6 +53,7 @@ impl Calibration {
                     }
                     if q > 0.0 {
                         squares += (1.0 - q).powi(4);
+                        linear += f64::from(x * x) * (1.0 - q).powi(2) / (q * support_ratio);
                     }
                 }
             }
@@ -66,8 +69,17 @@ impl Calibration {
             gradient_scale,
             wall_density_scale: deficit / half_space_fraction(face),
             sample_weight: deficit * spacing * spacing / (volume * plane),
+            linear_gradient: gradient_scale * spacing * linear,
             bulk_gradient_squares: gradient_scale * gradient_scale * squares,
         }
+    }
+
+    /// p / Σ λ of a substep of Δt seconds whose corrections were relaxed by ω: −ρ0 κ ω / Δt². Σ_j (λ_i + λ_j) ∇C moves
+    /// a particle as the pressure force −Σ_j m (p_i/ρ0² + p_j/ρ0²) ∇W does in Δt², but that on the lattice the sum gives
+    /// κ of a pressure's gradient ([`Self::linear_gradient`]). What a correction's bound cuts off counts as if it were
+    /// not cut. λ in m², ρ0 in kg/m³; the result in Pa/m².
+    pub fn pressure_scale(&self, rest_density: f64, relaxation: f64, time_step: f64) -> f64 {
+        -rest_density * relaxation * self.linear_gradient / (time_step * time_step)
     }
 }
 

@@ -171,6 +171,20 @@ fn rest_radius(spacing: f64, support: f64) -> f64 {
     sum / f64::from(SAMPLES.pow(3))
 }
 
+/// The same without voxels, over a spacing of 1: the mean along the surface of |x − x̄| half a spacing above the
+/// outermost particles.
+pub(super) fn calm_radius(support: f64) -> f64 {
+    const SAMPLES: i32 = 16;
+    let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(SAMPLES);
+    let sum: f64 = (0..SAMPLES.pow(2))
+        .map(|k| {
+            let (x, z) = (middle(k % SAMPLES), middle(k / SAMPLES));
+            lattice_offset(1.0, support, DVec3::new(x, 0.0, z))
+        })
+        .sum();
+    sum / f64::from(SAMPLES.pow(2))
+}
+
 /// |x − x̄| at `place` over half a lattice that fills y < 0; x and z in spacings.
 fn lattice_offset(spacing: f64, support: f64, place: DVec3) -> f64 {
     let layers = (support / spacing).ceil() as i32 + 1;

@@ -71,7 +71,20 @@ pub struct Context {
     pub limits: Limits,
     /// Whether passes can be timed on the device.
     pub has_timestamps: bool,
+    /// A fault put into one pass, so that a comparison can be seen to fail; `None` in every command.
+    pub spoil: Option<Spoil>,
     fault: Arc<Mutex<Option<String>>>,
+}
+
+/// A text of one pass, imports pasted, that is replaced before it compiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Spoil {
+    /// Pass name.
+    pub pass: &'static str,
+    /// Has to occur.
+    pub from: &'static str,
+    /// Stands there instead.
+    pub to: &'static str,
 }
 
 fn instance() -> Instance {
@@ -175,6 +188,7 @@ impl Context {
             info,
             limits,
             has_timestamps,
+            spoil: None,
             fault,
         })
     }

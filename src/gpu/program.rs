@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
-    adapter::{Context, GpuError},
+    adapter::{Context, GpuError, Spoil},
     reflect::{Access, Binding, reflect},
     shader,
 };
@@ -247,12 +247,25 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
     })
 }
 
+fn spoiled(source: &str, spoil: &Spoil) -> Result<String, GpuError> {
+    if !source.contains(spoil.from) {
+        return Err(GpuError::Shader {
+            name: spoil.pass.to_owned(),
+            message: format!("`{}`, which is to be replaced, is not in it", spoil.from),
+        });
+    }
+    Ok(source.replace(spoil.from, spoil.to))
+}
+
 fn compile(
     context: &Context,
     spec: &PassSpec,
     shared: &[(&'static str, f64)],
 ) -> Result<Pass, GpuError> {
-    let source = shader::compose(spec.name, &spec.defines)?;
+    let mut source = shader::compose(spec.name, &spec.defines)?;
+    if let Some(spoil) = context.spoil.filter(|spoil| spoil.pass == spec.name) {
+        source = spoiled(&source, &spoil)?;
+    }
     let reflection = reflect(spec.name, &source)?;
     let entries: Vec<wgpu::BindGroupLayoutEntry> = reflection
         .bindings

@@ -68,6 +68,7 @@ impl Command {
 enum Step {
     Dispatch {
         pass: &'static str,
+        binds: Vec<Bind>,
         group: BindGroup,
         size: Size,
     },
@@ -77,6 +78,15 @@ enum Step {
 enum Size {
     Direct([u32; 3]),
     Indirect(&'static str, u64),
+}
+
+/// Where a traced recording stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// A dispatch is about to run: its inputs stand in the buffers.
+    Before,
+    /// It has run: its outputs do.
+    After,
 }
 
 /// Commands with their bind groups, to be run many times.
@@ -130,25 +140,52 @@ impl Recording {
             .device
             .create_command_encoder(&Default::default());
         for recording in recordings {
-            recording.encode(program, &mut encoder);
+            encode(&recording.steps, program, &mut encoder);
         }
         program.context.queue.submit([encoder.finish()]);
         program.context.check()
     }
 
-    fn encode(&self, program: &Program, encoder: &mut CommandEncoder) {
-        let mut steps = self.steps.iter().peekable();
-        while let Some(step) = steps.peek() {
-            if let Step::Clear(buffer) = step {
-                encoder.clear_buffer(program.buffer(buffer), 0, None);
-                steps.next();
-                continue;
+    /// Runs dispatch by dispatch; `observe` is called before and after each, and may read any buffer.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`], and what `observe` returns.
+    pub fn trace<E: From<GpuError>>(
+        &self,
+        program: &Program,
+        mut observe: impl FnMut(Moment, &'static str, &[Bind]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for step in &self.steps {
+            if let Step::Dispatch { pass, binds, .. } = step {
+                observe(Moment::Before, pass, binds)?;
             }
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            while let Some(step @ Step::Dispatch { .. }) = steps.peek() {
-                dispatch(program, &mut pass, step);
-                steps.next();
+            let mut encoder = program
+                .context
+                .device
+                .create_command_encoder(&Default::default());
+            encode(std::slice::from_ref(step), program, &mut encoder);
+            program.context.queue.submit([encoder.finish()]);
+            program.context.check()?;
+            if let Step::Dispatch { pass, binds, .. } = step {
+                observe(Moment::After, pass, binds)?;
             }
+        }
+        Ok(())
+    }
+}
+
+fn encode(steps: &[Step], program: &Program, encoder: &mut CommandEncoder) {
+    let mut steps = steps.iter().peekable();
+    while let Some(step) = steps.peek() {
+        if let Step::Clear(buffer) = step {
+            encoder.clear_buffer(program.buffer(buffer), 0, None);
+            steps.next();
+            continue;
+        }
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        while let Some(step @ Step::Dispatch { .. }) = steps.peek() {
+            dispatch(program, &mut pass, step);
+            steps.next();
         }
     }
 }
@@ -171,6 +208,7 @@ fn record(program: &Program, command: &Command) -> Option<Step> {
             };
             Some(Step::Dispatch {
                 pass: name,
+                binds: binds.clone(),
                 group: bind(program, pass, binds),
                 size,
             })
@@ -216,7 +254,10 @@ fn bind(program: &Program, pass: &Pass, binds: &[Bind]) -> BindGroup {
 }
 
 fn dispatch(program: &Program, compute: &mut ComputePass<'_>, step: &Step) {
-    let Step::Dispatch { pass, group, size } = step else {
+    let Step::Dispatch {
+        pass, group, size, ..
+    } = step
+    else {
         return;
     };
     compute.set_pipeline(&program.pass(pass).pipeline);

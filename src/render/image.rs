@@ -1,6 +1,7 @@
 //! Pictures, and the files that hold them.
 
 mod exr_file;
+mod pixels;
 mod png_file;
 
 use std::io::Write;
@@ -9,6 +10,7 @@ use std::path::Path;
 use super::RenderError;
 
 pub use exr_file::{read_exr_attributes, write_exr};
+pub use pixels::{Pixels, read_exr, read_png, write_rgb_png};
 pub use png_file::{read_png_attributes, write_png, write_png_with_attributes};
 
 /// A picture and the channels beside it; rows from the top.

@@ -23,6 +23,10 @@ const ROTATE: &str = "three finite numbers, degrees about x, then y, then z";
 const SCALE: &str = "a number other than 0, or three of them";
 const BLAKE3: &str = "the BLAKE3 of the file in hex, or nothing";
 
+const SET: &str = "an array of overrides of the scene, such as [\"solver.pbf.iterations=8\"]";
+const KEY: &str = "a key of the scene, such as \"solver.pbf.iterations\", here or for all methods";
+const VALUES: &str = "two or more values of the key, from coarse to fine, here or for all methods";
+
 const TABLE: &[(&str, &str)] = &[
     ("shot", "a table with name, frames, frames_per_second"),
     (
@@ -227,11 +231,56 @@ const TABLE: &[(&str, &str)] = &[
          268435456 leaves of 8³ voxels in the domain",
     ),
     ("grids.precision", "\"half\" or \"float\""),
-    // Of a study file.
-    ("kind", "\"solver_comparison\""),
+    ("probe", "an array of tables [[probe]]"),
     (
-        "scene",
-        "a scene file with a table for each of the solvers, relative to the study file",
+        "probe.kind",
+        "\"elevation\" or \"pressure\" with at, \"energy\" or \"volume\"; with the solver pbf a pressure asks for \
+         iteration = \"red_black\" or \"jacobi\" and artificial_pressure = 0",
+    ),
+    (
+        "probe.name",
+        "1 to 100 letters, digits, \"_\", \"-\" and \".\", the first a letter or digit, each name once; the kind with a \
+         number if left out",
+    ),
+    (
+        "probe.at",
+        "[x, z] of an elevation or [x, y, z] of a pressure, metres, in the domain",
+    ),
+    // Of a study file.
+    ("kind", "\"solver_comparison\" or \"sweep\""),
+    ("scene", "a scene file, relative to the study file"),
+    ("about", "an array of paragraphs for the page"),
+    ("set", SET),
+    ("key", KEY),
+    ("values", VALUES),
+    (
+        "steps",
+        "a whole number of output frames from 1 to 1000000; or seconds",
+    ),
+    (
+        "seconds",
+        "seconds of the shot, a whole number of frames at every frame rate; or steps",
+    ),
+    ("repeats", "a whole number from 1 to 100"),
+    (
+        "errors",
+        "of \"density_error_mean\", \"density_error_p99\", \"density_error_max\", or of \"crest_error\", \
+         \"front_error\", \"energy_error\", \"profile_error\", or of \"pressure_error\", \"velocity_error\", \
+         \"divergence\", or \"distance_to_converged\"",
+    ),
+    ("convergence_point", "true or false"),
+    ("method", "an array of tables [[method]], each with a name"),
+    ("method.name", "what the line of the curves is called"),
+    ("method.set", SET),
+    ("method.key", KEY),
+    ("method.values", VALUES),
+    (
+        "method.device",
+        "\"gpu\", or \"cpu\" for the f64 reference, which runs whole frames and no single projections",
+    ),
+    (
+        "method.against",
+        "another method of the same key and values, with errors that are else against the finest run",
     ),
     (
         "look",
@@ -246,6 +295,12 @@ const TABLE: &[(&str, &str)] = &[
         "pictures",
         "frames to render, such as \"60-240x60\", within the shot",
     ),
+    // Of a tolerance file.
+    ("position", "a table of max, rms, p99"),
+    ("velocity", "a table of max, rms, p99"),
+    ("attributes", "a table of max, rms, p99 for each attribute"),
+    ("aggregates", "a table of { absolute, relative } by name"),
+    ("pictures", "a table of mean, p99, max, perceptual"),
     // The effects say for themselves what their keys allow.
     (
         "effects",

@@ -13,6 +13,7 @@ use super::{
     error::SceneError,
     grids,
     moving_solid::{self, MAX_MOVING_SOLIDS},
+    probe,
     spec::{BoxSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, WaterSpec},
     wave_maker,
 };
@@ -87,6 +88,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         .as_ref()
         .map(|table| grids::build(doc, table, &domain, &solver))
         .transpose()?;
+    let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
     Ok(Scene {
         shot,
         domain,
@@ -96,6 +98,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         wave_makers,
         solver,
         grids,
+        probes,
         effects: spec.effects,
     })
 }
@@ -156,14 +159,18 @@ fn vector_or(
         .map_or(Ok(default), |value| vector(doc, value, limit))
 }
 
-fn shot(doc: &Document<'_>, spec: &ShotSpec) -> Result<Shot> {
-    let name = spec.name.get_ref();
-    let is_safe = (1..=100).contains(&name.len())
+/// Whether a name can be a part of a file's.
+pub(super) fn is_file_stem(name: &str) -> bool {
+    (1..=100).contains(&name.len())
         && name.starts_with(|c: char| c.is_ascii_alphanumeric())
         && name
             .chars()
-            .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.'));
-    if !is_safe {
+            .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.'))
+}
+
+fn shot(doc: &Document<'_>, spec: &ShotSpec) -> Result<Shot> {
+    let name = spec.name.get_ref();
+    if !is_file_stem(name) {
         return Err(doc.fault_at(spec.name.span(), format!("{name:?} is no safe file name")));
     }
     Ok(Shot {

@@ -25,7 +25,7 @@ const CANONICAL_FORM: &str = "swell scene physics 2";
 /// The first key (the method, then in alphabetical order) whose value differs between two scenes as
 /// [`Scene::to_toml`] wrote them, with both values; `None` where the physics is the same.
 ///
-/// `[grids]`, `shot.name`, `shot.frames`, a solver's `max_substeps` and its `residual_limit` may differ, and so may the
+/// `[grids]`, `[[probe]]`, `shot.name`, `shot.frames`, a solver's `max_substeps` and its `residual_limit` may differ, and so may the
 /// settings of a solver that is not chosen and the path of a mesh whose hash stands beside it in both.
 ///
 /// # Errors
@@ -102,8 +102,10 @@ fn flatten(text: &str) -> Result<BTreeMap<String, String>, SceneError> {
             .filter(|(name, _)| method != Some(name));
         others.any(|(name, _)| key.starts_with(&format!("solver.{name}.")))
     };
-    // Grids follow from the particles.
-    let is_output = |key: &str| NOT_PHYSICS.contains(&key) || key.starts_with("grids.");
+    // Grids follow from the particles, and probes only look at them.
+    let is_output = |key: &str| {
+        NOT_PHYSICS.contains(&key) || key.starts_with("grids.") || key.starts_with("probe[")
+    };
     values.retain(|key, _| !is_output(key) && !is_idle(key));
     Ok(values)
 }

@@ -77,6 +77,11 @@ impl<'a> Document<'a> {
         self.fault(Some(span), path, message)
     }
 
+    /// The text at a span, as the file has it.
+    pub(super) fn text_at(&self, span: Range<usize>) -> &'a str {
+        self.text.get(span).unwrap_or_default()
+    }
+
     /// A fault of the value of the key at `path`, which allows what `allowed` says.
     pub(super) fn fault_of(&self, path: &str, allowed: &str) -> SceneError {
         let span = self

@@ -5,8 +5,8 @@ use std::{fmt, io, path::PathBuf};
 /// Why a scene could not be loaded or compared.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// The scene file cannot be read.
-    #[error("cannot read scene {file}")]
+    /// The file cannot be read.
+    #[error("cannot read {file}")]
     Read {
         /// Which file.
         file: PathBuf,

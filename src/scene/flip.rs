@@ -1,5 +1,19 @@
 //! PIC/FLIP settings, validated.
 
+/// Attributes that APIC declares: C of v(x) = v + C (x − x_p), 1/s, `affine_xy` = ∂v_x/∂y. A state without them
+/// starts from zeros.
+pub const AFFINE: [&str; 9] = [
+    "affine_xx",
+    "affine_xy",
+    "affine_xz",
+    "affine_yx",
+    "affine_yy",
+    "affine_yz",
+    "affine_zx",
+    "affine_zy",
+    "affine_zz",
+];
+
 /// PIC/FLIP settings (Zhu and Bridson 2005).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flip {
@@ -29,6 +43,14 @@ impl Flip {
     /// Distance between neighbours of the lattice at the start, metres.
     pub fn particle_spacing(&self) -> f64 {
         self.cell_size / f64::from(self.particles_per_cell).cbrt()
+    }
+
+    /// Attributes of a frame beyond positions, velocities and ids.
+    pub fn attributes(&self) -> &'static [&'static str] {
+        match self.transfer {
+            Transfer::Flip => &[],
+            Transfer::Apic => &AFFINE,
+        }
     }
 }
 

@@ -6,7 +6,10 @@ pub mod grids;
 pub mod look;
 pub mod moving_solid;
 pub mod plan;
+pub mod probe;
+pub mod step;
 pub mod study;
+pub mod tolerance;
 
 mod allowed;
 mod build;
@@ -48,16 +51,37 @@ pub struct Scene {
     pub solver: Solver,
     /// Grids that each frame gets beside its particles, where the scene asks for any.
     pub grids: Option<grids::Grids>,
+    /// What is measured at each frame; most scenes have none.
+    pub probes: Vec<probe::Probe>,
     /// Effects that the scene names; what is `None` does not exist.
     pub effects: Effects,
 }
 
 impl Scene {
+    /// World points of the probes of pressure, in order, metres.
+    pub fn pressure_points(&self) -> Vec<DVec3> {
+        let probes = self.probes.iter();
+        probes
+            .filter_map(|probe| match probe.kind {
+                probe::ProbeKind::Pressure { at } => Some(at),
+                _ => None,
+            })
+            .collect()
+    }
+
     /// d of the chosen solver: between neighbours of the lattice at the start, metres.
     pub fn particle_spacing(&self) -> f64 {
         match self.solver.method {
             Method::Pbf => self.solver.pbf().particle_spacing,
             Method::Flip => self.solver.flip().particle_spacing(),
+        }
+    }
+
+    /// What each particle carries beside position, velocity and id.
+    pub fn declared_attributes(&self) -> &'static [&'static str] {
+        match self.solver.method {
+            Method::Pbf => &[],
+            Method::Flip => self.solver.flip().attributes(),
         }
     }
 }

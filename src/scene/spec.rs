@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Effects, grids::GridsSpec};
+use super::{Effects, grids::GridsSpec, probe::ProbeSpec};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -18,6 +18,8 @@ pub(super) struct SceneSpec {
     pub(super) wave_maker: Vec<WaveMakerSpec>,
     pub(super) solver: SolverSpec,
     pub(super) grids: Option<Spanned<GridsSpec>>,
+    #[serde(default)]
+    pub(super) probe: Vec<Spanned<ProbeSpec>>,
     #[serde(default)]
     pub(super) effects: Effects,
 }

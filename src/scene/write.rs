@@ -7,7 +7,7 @@ use std::{
 
 use glam::DVec3;
 
-use super::{Iteration, Pbf, PlacedMesh, Scene, Stop, flip::Flip};
+use super::{Iteration, Pbf, PlacedMesh, Scene, Stop, flip::Flip, probe};
 use crate::domain::{bounds::Bounds, motion::Motion};
 
 /// Where a cache keeps its own copy of a mesh file: `assets/NAME-HASH.EXT`, so that two files of
@@ -95,6 +95,9 @@ impl Scene {
         self.write_solver(out)?;
         if let Some(grids) = &self.grids {
             grids.write(out)?;
+        }
+        for probe in &self.probes {
+            probe::write(out, probe)?;
         }
         writeln!(out, "\n[effects]")?;
         // An effect is a table of numbers, which toml can always write.

@@ -1,11 +1,11 @@
-//! Solids as the solver meets them: samples with a weight in the density, and a signed distance.
+//! Solids on their way to the device.
 //!
 //! Samples count in the density and push back (Akinci 2012); the distance stops what would tunnel.
 
 use glam::{DVec3, Vec3};
 
 use crate::{
-    domain::{sampling::BoundarySample, signed_distance::SignedDistance, sph::Calibration},
+    domain::{boundary::Boundary, signed_distance::SignedDistance, sph::Calibration},
     gpu::program::Program,
     scene::{
         Scene,
@@ -14,17 +14,6 @@ use crate::{
 };
 
 use super::params::{SolidGrid, SolidGrids};
-
-/// All solids of a scene.
-#[derive(Clone, Debug, Default)]
-pub struct Boundary {
-    /// Over all surfaces of static solids, world space.
-    pub samples: Vec<BoundarySample>,
-    /// Of the static solids' union; `None` where the scene has none.
-    pub distance: Option<SignedDistance>,
-    /// Of each moving solid, where it stood at the start.
-    pub moving: Vec<SignedDistance>,
-}
 
 impl Boundary {
     /// Samples and grid nodes; no particles.

@@ -7,6 +7,7 @@ pub mod params;
 pub mod pbf;
 pub mod pressure;
 mod state;
+pub mod trace;
 
 use crate::{
     gpu::adapter::GpuError,

@@ -4,8 +4,10 @@ use glam::DVec3;
 
 use crate::{
     domain::{
+        boundary::Boundary,
         particles::Particles,
         pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
+        probe::fitted,
         solver::{Solver, StepReport},
         sph::Calibration,
     },
@@ -23,10 +25,10 @@ use crate::{
 
 use super::{
     SolveError,
-    boundary::Boundary,
     iteration::Builder,
     params::Params,
-    state::{check_finite, max_speed, report, slots_by_id, take_over, upload},
+    state::{check_finite, slots_by_id, take_over, upload},
+    trace::{Traced, trace},
 };
 
 /// Far from everything, and still finite when squared.
@@ -43,6 +45,9 @@ pub struct Pbf {
     timer: Option<Timer>,
     state: Particles,
     frame: u32,
+    /// Positions relative to the domain's least corner, metres, and pressures, Pa, of the last substep's particles; empty
+    /// where the scene asks for none.
+    pressed: Vec<(DVec3, f64)>,
 }
 
 impl Pbf {
@@ -91,6 +96,7 @@ impl Pbf {
             measure,
             state: Particles::default(),
             frame: 0,
+            pressed: Vec::new(),
         })
     }
 
@@ -117,54 +123,19 @@ impl Pbf {
         Ok(self.program.download(&[(name, count)])?.remove(0))
     }
 
-    /// Substeps that the CFL number asks of the next frame: from the speeds in the state, what gravity adds
-    /// within the frame, and the fastest wave-maker.
-    fn substeps(&self, start: f64, length: f64) -> Result<u32, SolveError> {
-        let pbf = self.scene.solver.pbf();
-        let free = max_speed(&self.state) + self.scene.water.gravity.length() * length;
-        let wall = self
-            .scene
-            .wave_makers
-            .iter()
-            .map(|w| w.motion.peak_speed(start, start + length));
-        let speed = wall.fold(free, f64::max);
-        let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
-            .ceil()
-            .max(1.0);
-        if wanted > f64::from(pbf.max_substeps) {
-            return Err(SolveError::Numbers {
-                frame: self.frame + 1,
-                what: format!(
-                    "{speed:.3} m/s asks for {wanted} substeps at cfl {}, and solver.pbf.max_substeps is {}",
-                    pbf.cfl, pbf.max_substeps
-                ),
-            });
-        }
-        Ok(wanted as u32)
-    }
-
     fn params(&self, time: f64, step: f64) -> Params {
         let pbf = self.scene.solver.pbf();
         let calibration = &self.calibration;
-        let size = self.scene.domain.size();
-        let (mut low, mut high) = (DVec3::ZERO, size);
-        for maker in &self.scene.wave_makers {
-            let inward = maker.motion.displacement(time);
-            if maker.wall.is_max {
-                high[maker.wall.axis] -= inward;
-            } else {
-                low[maker.wall.axis] += inward;
-            }
-        }
+        let walls = self.scene.walls(time);
         let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
         Params {
             velocity_step: (self.scene.water.gravity * step).as_vec3().to_array(),
             particle_count: self.plan.counts.particles as u32,
             grid_dims: self.plan.grid_dims,
             max_correction: (MAX_CORRECTION * pbf.particle_spacing) as f32,
-            wall_min: low.as_vec3().to_array(),
+            wall_min: walls.min.as_vec3().to_array(),
             time_step: step as f32,
-            wall_max: high.as_vec3().to_array(),
+            wall_max: walls.max.as_vec3().to_array(),
             inverse_time_step: if step > 0.0 { (1.0 / step) as f32 } else { 0.0 },
             support_radius: calibration.support_radius as f32,
             inverse_support_radius: (1.0 / calibration.support_radius) as f32,
@@ -181,12 +152,50 @@ impl Pbf {
         }
     }
 
-    fn run_substep(&mut self, time: f64, step: f64) -> Result<(), SolveError> {
+    fn prepare_substep(&self, time: f64, step: f64) {
         self.program.upload("params", 0, &[self.params(time, step)]);
         if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {
             self.program.upload("control", 0, &self.control());
         }
+    }
+
+    fn run_substep(&mut self, time: f64, step: f64) -> Result<(), SolveError> {
+        self.prepare_substep(time, step);
         Ok(self.substep.run(&self.program, self.timer.as_mut())?)
+    }
+
+    /// Runs the first substep after the loaded state, and the measurement of a frame's end, one dispatch at a time.
+    /// The solver then has to be loaded anew.
+    ///
+    /// # Errors
+    /// The device, more substeps than are allowed, and what `observe` returns.
+    pub fn trace(
+        &self,
+        observe: &mut dyn FnMut(Traced<'_>) -> Result<(), SolveError>,
+    ) -> Result<(), SolveError> {
+        let (time, step) = self.substep_of(self.substeps()?, 1);
+        self.program.upload("counters", 0, &[0u32; 4]);
+        self.prepare_substep(time, step);
+        trace(&[&self.substep], &self.program, observe)?;
+        self.program.upload("params", 0, &[self.params(time, 0.0)]);
+        trace(&[&self.measure], &self.program, observe)
+    }
+
+    /// Substeps of the next frame.
+    fn substeps(&self) -> Result<u32, SolveError> {
+        self.scene
+            .pbf_substeps(self.frame, self.state.max_speed())
+            .map_err(|what| SolveError::Numbers {
+                frame: self.frame + 1,
+                what,
+            })
+    }
+
+    /// When the k-th of so many ends, and how long it is, seconds.
+    fn substep_of(&self, substeps: u32, k: u32) -> (f64, f64) {
+        let length = self.scene.shot.frame_seconds();
+        let step = length / f64::from(substeps);
+        (f64::from(self.frame) * length + f64::from(k) * step, step)
     }
 
     /// A fresh `control`: not done, no iterations, and the groups of the largest chunk over all and over a colour.
@@ -203,8 +212,25 @@ impl Pbf {
         [0, 0, 0, 0, x, y, z, 0, half_x, half_y, half_z, 0]
     }
 
+    /// As [`Calibration::pressure_scale`] has it from Σ λ; in sorted order, before the state is uploaded again.
+    fn particle_pressures(&self, step: f64) -> Result<Vec<(DVec3, f64)>, SolveError> {
+        let n = self.plan.counts.particles;
+        let position = self.field::<[f32; 4]>("position", n)?;
+        let lambda = self.field::<f32>("lambda_sum", n)?;
+        let relaxation = self.scene.solver.pbf().relaxation;
+        let density = self.scene.water.rest_density;
+        let scale = self.calibration.pressure_scale(density, relaxation, step);
+        let particles = position.iter().zip(&lambda);
+        Ok(particles
+            .map(|([x, y, z, _], lambda)| {
+                let x = DVec3::new(f64::from(*x), f64::from(*y), f64::from(*z));
+                (x, scale * f64::from(*lambda))
+            })
+            .collect())
+    }
+
     /// Sorts at the frame's last positions, measures density there, and reads everything back.
-    fn read_state(&mut self, time: f64) -> Result<(Vec<f32>, [u32; 4]), SolveError> {
+    fn read_state(&mut self, time: f64) -> Result<(Vec<f64>, [u32; 4]), SolveError> {
         self.program.upload("params", 0, &[self.params(time, 0.0)]);
         self.measure.run(&self.program, self.timer.as_mut())?;
         let n = self.plan.counts.particles;
@@ -233,7 +259,7 @@ impl Pbf {
         );
         let mut by_slot = vec![0.0; n];
         for (&id, &value) in sorted_id.iter().zip(&density) {
-            by_slot[slot_of(id)] = value;
+            by_slot[slot_of(id)] = f64::from(value);
         }
         Ok((by_slot, counters))
     }
@@ -257,16 +283,19 @@ impl Solver for Pbf {
     }
 
     fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
-        let length = 1.0 / self.scene.shot.frames_per_second;
+        let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
-        let substeps = self.substeps(start, length)?;
-        let step = length / f64::from(substeps);
+        let substeps = self.substeps()?;
         self.program.upload("counters", 0, &[0u32; 4]);
         for k in 1..=substeps {
-            self.run_substep(start + f64::from(k) * step, step)?;
+            let (time, step) = self.substep_of(substeps, k);
+            self.run_substep(time, step)?;
         }
         let (density, [capped, searched, adaptive_iterations, not_finite]) =
             self.read_state(start + length)?;
+        if !self.scene.pressure_points().is_empty() {
+            self.pressed = self.particle_pressures(length / f64::from(substeps))?;
+        }
         self.frame += 1;
         if not_finite > 0 {
             let what = format!("{not_finite} values that are not finite in {substeps} substeps");
@@ -284,15 +313,24 @@ impl Solver for Pbf {
             Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
             Stop::DensityError { .. } => u64::from(adaptive_iterations),
         };
-        let report = report(&self.scene, &self.state, &density);
         let report = StepReport {
             substeps,
             iterations,
             capped: u64::from(capped),
             searched: u64::from(searched),
-            ..report
+            ..self.scene.report(&self.state, density.into_iter())
         };
         Ok((self.state.clone(), report))
+    }
+
+    /// Of the particles about a point, by the plane that fits them best.
+    fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
+        let local = |at: &DVec3| *at - self.scene.domain.min;
+        let support = self.calibration.support_radius;
+        let points = points.iter().map(local);
+        Ok(points
+            .map(|at| fitted(self.pressed.iter().copied(), at, support))
+            .collect())
     }
 
     fn timings(&self) -> Vec<(&'static str, f64, u64)> {
@@ -333,6 +371,9 @@ fn sort_commands(plan: &Plan) -> Vec<Command> {
 fn substep_commands(plan: &Plan, scene: &Scene, builder: &mut Builder<'_>) -> Vec<Command> {
     let pbf = scene.solver.pbf();
     let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
+    if !scene.pressure_points().is_empty() {
+        commands.push(Command::Clear("lambda_sum"));
+    }
     commands.extend(sort_commands(plan));
     if plan.has_lists {
         builder.over_all("pbf/build_neighbors", &mut commands);

@@ -2,11 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::{
-    domain::{particles::Particles, solver::StepReport},
-    gpu::program::Program,
-    scene::Scene,
-};
+use crate::{domain::particles::Particles, gpu::program::Program, scene::Scene};
 
 use super::SolveError;
 
@@ -58,75 +54,14 @@ pub(super) fn slots_by_id(ids: &[u32]) -> impl Fn(u32) -> usize + use<> {
     move |id| slots[id as usize]
 }
 
-pub(super) fn max_speed(state: &Particles) -> f64 {
-    state
-        .velocity
-        .iter()
-        .map(|v| Vec3::from_array(*v).as_dvec3().length())
-        .fold(0.0, f64::max)
-}
-
-/// `density` is one value a particle, in the state's order, where the solver has it.
+/// `density` is one relative density a particle, in the state's order, where the solver has it.
 pub(super) fn check_finite(
     frame: u32,
     state: &Particles,
-    density: Option<&[f32]>,
+    density: Option<&[f64]>,
 ) -> Result<(), SolveError> {
-    let is_bad = |v: &[f32; 3]| !v.iter().all(|x| x.is_finite());
-    let density = |k: usize| density.map_or(1.0, |density| density[k]);
-    let place = (0..state.len()).find(|&k| {
-        is_bad(&state.position[k]) || is_bad(&state.velocity[k]) || !density(k).is_finite()
-    });
-    match place {
+    match state.first_not_finite(density) {
         None => Ok(()),
-        Some(k) => Err(SolveError::Numbers {
-            frame,
-            what: format!(
-                "particle {} is not finite: position {:?}, velocity {:?}, relative density {}",
-                state.id[k],
-                state.position[k],
-                state.velocity[k],
-                density(k)
-            ),
-        }),
-    }
-}
-
-/// Energies of a state, and the errors of relative densities; sums run in order.
-pub(super) fn report(scene: &Scene, state: &Particles, density: &[f32]) -> StepReport {
-    let mass = scene.water.rest_density * scene.particle_spacing().powi(3);
-    let (mut kinetic, mut potential) = (0.0, 0.0);
-    for (x, v) in state.position.iter().zip(&state.velocity) {
-        kinetic += 0.5 * mass * Vec3::from_array(*v).as_dvec3().length_squared();
-        potential -= mass
-            * scene
-                .water
-                .gravity
-                .dot(Vec3::from_array(*x).as_dvec3() - scene.domain.min);
-    }
-    let mut errors: Vec<f64> = density
-        .iter()
-        .map(|&rho| (f64::from(rho) - 1.0).max(0.0))
-        .collect();
-    // From 0: an empty sum is -0.
-    let mean = errors.iter().fold(0.0, |sum, error| sum + error) / errors.len().max(1) as f64;
-    errors.sort_unstable_by(f64::total_cmp);
-    let percentile = |p: f64| {
-        errors
-            .get(((errors.len() as f64 * p).ceil() as usize).saturating_sub(1))
-            .copied()
-    };
-    StepReport {
-        substeps: 0,
-        iterations: 0,
-        density_error_mean: mean,
-        density_error_p99: percentile(0.99).unwrap_or(0.0),
-        density_error_max: percentile(1.0).unwrap_or(0.0),
-        kinetic_energy: kinetic,
-        potential_energy: potential,
-        max_speed: max_speed(state),
-        capped: 0,
-        searched: 0,
-        projection: None,
+        Some(what) => Err(SolveError::Numbers { frame, what }),
     }
 }

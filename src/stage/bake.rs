@@ -15,14 +15,15 @@ use crate::{
         frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
         solver::StepReport,
     },
-    gpu::adapter::{Context, GpuError},
+    gpu::adapter::GpuError,
     scene::{self, Scene, SceneError, grids::Grids},
-    solve::{SolveError, pbf::device_limits},
 };
 
 use super::{
     Blame,
-    prepare::{Start, build},
+    device::{Built, Device, Identity, SolverError},
+    prepare::Start,
+    probes,
 };
 
 /// What to bake, and where to.
@@ -36,9 +37,9 @@ pub struct Request {
     pub frames: Option<FrameRange>,
     /// Whether to go on with a bake that stands there.
     pub resume: bool,
-    /// Index or part of the name of an adapter.
-    pub adapter: Option<String>,
-    /// Whether passes are timed on the device, which runs them one by one.
+    /// What to solve on.
+    pub device: Device,
+    /// Whether passes are timed on the device, which runs them one by one; on the CPU they do so anyway.
     pub time_passes: bool,
 }
 
@@ -47,8 +48,8 @@ pub struct Request {
 pub enum Event {
     /// The device is open and the scene filled.
     Ready {
-        /// Adapter and driver.
-        device: String,
+        /// Adapter and driver, or the f64 reference.
+        device: Identity,
         /// Particles at the start.
         particles: usize,
         /// Left out because a solid is there.
@@ -57,8 +58,8 @@ pub enum Event {
         boundary_samples: usize,
         /// Name of the solver.
         solver: &'static str,
-        /// GPU memory in all and for neighbour lists.
-        bytes: (u64, u64),
+        /// GPU memory in all and for neighbour lists; `None` on the CPU.
+        bytes: Option<(u64, u64)>,
         /// First frame that will be computed.
         first: u32,
         /// Last one.
@@ -106,7 +107,7 @@ pub enum BakeError {
     Gpu(#[from] GpuError),
     /// The solver.
     #[error(transparent)]
-    Solve(#[from] SolveError),
+    Solve(#[from] SolverError),
     /// The cache.
     #[error(transparent)]
     Cache(#[from] CacheError),
@@ -157,14 +158,13 @@ pub fn bake(
     let scene = &request.scene;
     let last = last_frame(request)?;
     let start = Start::of(scene)?;
-    let context = Context::open(request.adapter.as_deref())?;
-    let plan = start.plan(scene, device_limits(&context));
-    let bytes = plan.bytes();
-    let mut solver = build(&context, scene, plan, &start, request.time_passes)?;
-    let (mut writer, mut clock, state) = open_cache(request, &context, &start)?;
+    let opened = request.device.open()?;
+    let Built { mut solver, bytes } = opened.build(scene, &start, request.time_passes)?;
+    let device = opened.identity();
+    let (mut writer, mut clock, state) = open_cache(request, &device, &start)?;
     let first = clock.frame + 1;
     tell(Event::Ready {
-        device: describe(&context),
+        device,
         particles: start.particles.len(),
         removed: start.removed,
         boundary_samples: start.boundary.samples.len(),
@@ -174,6 +174,7 @@ pub fn bake(
         last,
     });
     solver.load(clock.frame, &state)?;
+    let gauges = scene.pressure_points();
     let mut failed = None;
     let mut interrupted = false;
     while clock.frame < last {
@@ -182,13 +183,21 @@ pub fn bake(
             break;
         }
         let begin = Instant::now();
-        let (particles, report) = match solver.advance() {
+        let advanced = solver.advance().and_then(|(particles, report)| {
+            let pressures = match gauges[..] {
+                [] => Vec::new(),
+                _ => solver.pressures(&gauges)?,
+            };
+            Ok((particles, report, pressures))
+        });
+        let (particles, report, pressures) = match advanced {
             Ok(result) => result,
             Err(error) => {
                 failed = Some(error);
                 break;
             }
         };
+        let seen = probes::look(scene, &particles, &pressures);
         let seconds = begin.elapsed().as_secs_f64();
         clock.frame += 1;
         clock.time = f64::from(clock.frame) / scene.shot.frames_per_second;
@@ -197,6 +206,7 @@ pub fn bake(
         writer.submit(
             clock,
             particles,
+            seen,
             to_json(&report),
             json!({ "seconds": seconds }),
         )?;
@@ -217,20 +227,16 @@ pub fn bake(
         bytes: summary.bytes,
         waited: summary.waiting.as_secs_f64(),
         interrupted,
-        passes: solver.timings(),
+        passes: if request.time_passes {
+            solver.timings()
+        } else {
+            Vec::new()
+        },
     })
 }
 
 fn to_json(report: &StepReport) -> Value {
     serde_json::to_value(report).unwrap_or(Value::Null)
-}
-
-fn describe(context: &Context) -> String {
-    let info = &context.info;
-    format!(
-        "{} ({} {}, {})",
-        info.name, info.driver, info.driver_info, info.backend
-    )
 }
 
 /// The last frame wanted. A bake computes every frame up to it, and a scene was validated up to its own last.
@@ -262,7 +268,7 @@ fn check_first(request: &Request, next: u32) -> Result<(), BakeError> {
 /// A new cache, or one to go on with: the writer, where its clock stands, and the state there.
 fn open_cache(
     request: &Request,
-    context: &Context,
+    device: &Identity,
     start: &Start,
 ) -> Result<(CacheWriter, Clock, Particles), BakeError> {
     let scene = &request.scene;
@@ -274,14 +280,15 @@ fn open_cache(
         shot: scene.shot.name.clone(),
         scene_hash: scene::physics_hash(scene),
         solver: scene.solver.method.name().into(),
-        device: context.info.name.clone(),
-        driver: format!("{} {}", context.info.driver, context.info.driver_info),
-        backend: context.info.backend.to_string(),
+        device: device.name.clone(),
+        driver: device.driver.clone(),
+        backend: device.backend.clone(),
         frames_per_second: scene.shot.frames_per_second,
         particle_spacing: scene.particle_spacing(),
         rest_density: scene.water.rest_density,
         attributes: start.particles.attributes.keys().cloned().collect(),
         grids: scene.grids.map(|grids| grid_record(scene, &grids)),
+        probes: probes::records(scene),
         start_particles: 0,
         files: Vec::new(),
     };
@@ -300,7 +307,9 @@ fn open_cache(
     }
     check_first(request, 1)?;
     let assets = assets(scene)?;
-    let writer = CacheWriter::create(directory, manifest, &text, &assets, &start.particles)?;
+    // No step has been made, so no pressure is known.
+    let seen = probes::look(scene, &start.particles, &[]);
+    let writer = CacheWriter::create(directory, manifest, &text, &assets, &start.particles, &seen)?;
     Ok((writer, Clock::default(), start.particles.clone()))
 }
 

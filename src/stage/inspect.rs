@@ -1,6 +1,9 @@
 //! `inspect`: adapters, a scene's plan, a cache's frames.
 
-use std::path::Path;
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
 
 use crate::{
     cache::{CacheError, CacheReader},
@@ -16,7 +19,7 @@ use crate::{
     solve::pbf::device_limits,
 };
 
-use super::{Blame, prepare::Start};
+use super::{Blame, prepare::Start, probes};
 
 pub use crate::cache::{Entry, Manifest};
 
@@ -158,4 +161,57 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
 pub fn cache(directory: &Path) -> Result<(Manifest, Vec<Entry>), CacheError> {
     let reader = CacheReader::open(directory)?;
     Ok((reader.manifest().clone(), reader.entries().to_vec()))
+}
+
+/// Why a cache's probes could not be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum PlotError {
+    /// The cache.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// It was baked without any.
+    #[error("{} has no probes to plot: its scene has no [[probe]]", .0.display())]
+    NoProbes(PathBuf),
+    /// A picture.
+    #[error("cannot write {}", file.display())]
+    Write {
+        /// The file or folder.
+        file: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+impl From<&PlotError> for Blame {
+    fn from(error: &PlotError) -> Self {
+        match error {
+            PlotError::NoProbes(_) => Self::Input,
+            PlotError::Cache(_) | PlotError::Write { .. } => Self::Files,
+        }
+    }
+}
+
+/// Draws what a cache's probes saw over time, an SVG a probe, into `folder`; gives the files.
+///
+/// # Errors
+/// [`PlotError`].
+pub fn plot(directory: &Path, folder: &Path) -> Result<Vec<PathBuf>, PlotError> {
+    let reader = CacheReader::open(directory)?;
+    let manifest = reader.manifest();
+    if manifest.probes.is_empty() {
+        return Err(PlotError::NoProbes(directory.to_owned()));
+    }
+    let fault = |file: &Path| {
+        let file = file.to_owned();
+        move |source| PlotError::Write { file, source }
+    };
+    fs::create_dir_all(folder).map_err(fault(folder))?;
+    let mut files = Vec::new();
+    for (index, record) in manifest.probes.iter().enumerate() {
+        let chart = probes::chart(&manifest.shot, record, index, reader.entries());
+        let file = folder.join(format!("{}.svg", record.name));
+        fs::write(&file, chart.to_svg()).map_err(fault(&file))?;
+        files.push(file);
+    }
+    Ok(files)
 }

@@ -1,8 +1,12 @@
 //! Jobs: each wires rooms together from a typed request to a typed result. No terminal, no printing.
 
 pub mod bake;
+pub mod check;
+pub mod device;
+pub mod diff;
 pub mod inspect;
 pub mod prepare;
+mod probes;
 pub mod render;
 pub mod study;
 pub mod verify;
@@ -11,6 +15,7 @@ use crate::{
     cache::CacheError,
     domain::signed_distance::SignedDistanceError,
     gpu::adapter::GpuError,
+    reference::ReferenceError,
     scene::{SceneError, look::LookError, study::StudyFileError},
     solve::SolveError,
 };
@@ -46,6 +51,16 @@ impl From<&SolveError> for Blame {
             SolveError::Gpu(error) => error.into(),
             SolveError::Count { .. } => Self::Files,
             SolveError::Numbers { .. } => Self::Numbers,
+        }
+    }
+}
+
+impl From<&ReferenceError> for Blame {
+    fn from(error: &ReferenceError) -> Self {
+        match error {
+            ReferenceError::Numbers { .. }
+            | ReferenceError::Factor(_)
+            | ReferenceError::NotConverged { .. } => Self::Numbers,
         }
     }
 }

@@ -1,25 +1,19 @@
-//! From a scene to what a solver starts from (particles, boundary, plan), and the solver.
+//! From a scene to what a solver starts from: particles, boundary, plan.
 
 use crate::{
     domain::{
+        boundary::Boundary,
         bounds::Bounds,
         mesh::TriangleMesh,
         particles::Particles,
         sampling::{boundary_samples, fill_water},
         signed_distance::{SignedDistance, SignedDistanceError},
-        solver::Solver,
     },
-    gpu::adapter::Context,
     scene::{
         Method, Scene,
         plan::{Capacity, Counts, DeviceLimits, Plan},
     },
-    solve::{
-        self, SolveError,
-        boundary::Boundary,
-        flip::{self, Flip},
-        pbf::Pbf,
-    },
+    solve::{self, flip},
 };
 
 /// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
@@ -69,9 +63,9 @@ impl Start {
             spacing,
         )?;
         let mut particles = fill.particles;
-        for name in attributes(scene) {
+        for name in scene.declared_attributes() {
             let zeros = vec![0.0; particles.len()];
-            particles.attributes.insert(name.to_owned(), zeros);
+            particles.attributes.insert((*name).to_owned(), zeros);
         }
         Ok(Self {
             particles,
@@ -97,32 +91,6 @@ impl Start {
         };
         solve::plan(scene, counts, limits)
     }
-}
-
-/// What each particle carries beside position, velocity and id.
-fn attributes(scene: &Scene) -> Vec<&'static str> {
-    match scene.solver.method {
-        Method::Pbf => Vec::new(),
-        Method::Flip => flip::attributes(scene.solver.flip()).to_vec(),
-    }
-}
-
-/// The scene's solver on a device, with what `plan` names.
-///
-/// # Errors
-/// Those of the solver: a buffer over the adapter's limits, with the figures; the device at fault.
-pub fn build(
-    context: &Context,
-    scene: &Scene,
-    plan: Plan,
-    start: &Start,
-    is_timed: bool,
-) -> Result<Box<dyn Solver<Error = SolveError>>, SolveError> {
-    let boundary = &start.boundary;
-    Ok(match scene.solver.method {
-        Method::Pbf => Box::new(Pbf::new(context, scene, plan, boundary, is_timed)?),
-        Method::Flip => Box::new(Flip::new(context, scene, plan, boundary, is_timed)?),
-    })
 }
 
 /// Of the union of meshes, as far as water can come to them.

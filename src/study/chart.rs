@@ -29,7 +29,9 @@ pub struct Chart {
 }
 
 /// Okabe and Ito (2008): told apart by everyone.
-const COLOURS: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"];
+pub(super) const COLOURS: [&str; 7] = [
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000",
+];
 
 const SIZE: [f64; 2] = [560.0, 280.0];
 /// Room for labels: left, top, right, bottom.
@@ -226,7 +228,7 @@ fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
 }
 
 /// As few digits as tell it.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

@@ -60,6 +60,8 @@ pub struct Measures {
     pub airborne: f64,
     /// Ground with any water above it, m².
     pub wet_area: f64,
+    /// Of the continuous water, m³: its cubes, the top ones of each column by their fill.
+    pub volume: f64,
 }
 
 /// Measures the frames of one scene.
@@ -109,6 +111,27 @@ impl Gauge {
         median(elevation.into_iter().flatten().collect()).unwrap_or(0.0)
     }
 
+    /// Elevation above the domain's floor along the wave's way, metres: the mean over each row across it, dry ground
+    /// at 0. Particles are `spacing` metres apart.
+    pub fn profile(&self, position: &[[f32; 3]], spacing: f64) -> Vec<f64> {
+        let rest = self.rest_count(spacing);
+        let counts = self.counts(position);
+        let body = self.body(&counts, rest);
+        let elevation = self.elevation(&counts, &body, rest);
+        let [nx, _, nz] = self.dims;
+        (0..nx)
+            .map(|s| {
+                let across = (0..nz).map(|t| elevation[t * nx + s].unwrap_or(0.0));
+                across.sum::<f64>() / nz as f64
+            })
+            .collect()
+    }
+
+    /// The domain's least corner, metres.
+    pub fn corner(&self) -> glam::DVec3 {
+        self.domain.min
+    }
+
     /// Edge of the cubes, metres: what lengths are good to.
     pub fn resolution(&self) -> f64 {
         self.edge
@@ -153,6 +176,7 @@ impl Gauge {
             splash_reach: percentile(reaches, NEARLY_ALL).unwrap_or(0.0),
             airborne: position.iter().filter(far).count() as f64 / position.len() as f64,
             wet_area: self.wet_columns(&counts) as f64 * self.edge * self.edge,
+            volume: self.volume(&counts, &body, rest),
         }
     }
 
@@ -233,15 +257,30 @@ impl Gauge {
 
     /// Depth of the continuous water in each column (way fastest), metres; `None` where it is dry.
     fn elevation(&self, counts: &[u32], body: &[bool], rest: f64) -> Vec<Option<f64>> {
+        let column = |(top, fill): (usize, f64)| (top as f64 + fill) * self.edge;
+        let tops = self.tops(counts, body, rest);
+        tops.into_iter().map(|top| top.map(column)).collect()
+    }
+
+    /// Top cube of the continuous water in each column (way fastest), and the fill of it and of the one
+    /// above it, in cubes.
+    fn tops(&self, counts: &[u32], body: &[bool], rest: f64) -> Vec<Option<(usize, f64)>> {
         let [nx, ny, nz] = self.dims;
         let fill = |index: usize| (f64::from(counts[index]) / rest).min(1.0);
         let column = |s: usize, t: usize| {
             let top = (0..ny).rev().find(|&y| body[self.index([s, y, t])])?;
             let above = (top + 1 < ny).then(|| fill(self.index([s, top + 1, t])));
-            let cubes = top as f64 + fill(self.index([s, top, t])) + above.unwrap_or(0.0);
-            Some(cubes * self.edge)
+            Some((top, fill(self.index([s, top, t])) + above.unwrap_or(0.0)))
         };
         (0..nx * nz).map(|k| column(k % nx, k / nx)).collect()
+    }
+
+    fn volume(&self, counts: &[u32], body: &[bool], rest: f64) -> f64 {
+        let tops = self.tops(counts, body, rest).into_iter().flatten();
+        let (columns, fills) = tops.fold((0, 0.0), |(n, sum), (_, fill)| (n + 1, sum + fill));
+        // The cubes below the tops are full.
+        let full = body.iter().filter(|&&is_water| is_water).count() - columns;
+        (full as f64 + fills) * self.edge.powi(3)
     }
 
     /// The binomial filter over wet columns; dry ones have no part in it.
@@ -390,8 +429,14 @@ mod tests {
         assert_eq!((measures.crest_slope, measures.front), (None, None));
         assert_eq!(measures.airborne, 0.0);
         assert!((measures.wet_area - 20.0).abs() < 1e-9);
+        assert!((measures.volume - 20.0).abs() < 1e-9);
+        let higher = gauge.measure(&water(|_| 1.1), D);
+        assert!((higher.volume - 22.0).abs() < 1e-9);
         // The top layer's centres: half a spacing below the surface.
         assert!((measures.splash_height + 0.05).abs() < 1e-6);
+        let profile = gauge.profile(&water(|x| if x < 4.0 { 2.0 } else { 0.4 }), D);
+        assert_eq!(profile.len(), 50);
+        assert!((profile[5] - 2.0).abs() < 1e-9 && (profile[45] - 0.4).abs() < 1e-9);
         // A surface between two layers of cubes is found by their fill.
         assert!((gauge.depth(&water(|_| 1.1), D) - 1.1).abs() < 1e-12);
     }

@@ -2,38 +2,17 @@
 //!
 //! Pure functions from particles to numbers, and from numbers to text; `stage::study` reads the
 //! caches, draws the pictures and writes the files. A kind of study is one file: [`comparison`] sets
-//! two solvers side by side. [`measure`], [`chart`] and [`page`] serve every kind.
+//! two solvers side by side; a sweep draws [`work_precision`], finds the [`knee`] and, for the paper's Table 1, the
+//! [`convergence_point`]. [`measure`], [`chart`] and [`page`] serve every kind.
 
 pub mod chart;
 pub mod comparison;
+pub mod convergence_point;
+pub mod knee;
 pub mod measure;
 pub mod page;
 pub mod picture;
+pub mod raster;
+pub mod work_precision;
 
-/// The value in the middle; the upper one of two. `None` where there is none.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
-/// The value that a part `p` (0 to 1) of all does not exceed.
-pub fn percentile(mut values: Vec<f64>, p: f64) -> Option<f64> {
-    let index = (values.len() as f64 * p).ceil() as usize;
-    let index = index.saturating_sub(1);
-    (index < values.len()).then(|| *values.select_nth_unstable_by(index, f64::total_cmp).1)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn middles_and_tails() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(Vec::new()), None);
-        let thousand: Vec<f64> = (1..=1000).map(f64::from).collect();
-        assert_eq!(percentile(thousand.clone(), 0.999), Some(999.0));
-        assert_eq!(percentile(thousand, 1.0), Some(1000.0));
-        assert_eq!(percentile(Vec::new(), 0.5), None);
-    }
-}
+pub use crate::domain::statistics::{median, percentile};

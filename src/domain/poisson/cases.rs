@@ -77,10 +77,7 @@ impl Case {
 
     /// Coordinates of an element's cell.
     pub fn cell(&self, element: u32) -> [u32; 3] {
-        let brick = &self.bricks.records[(element / CELLS) as usize];
-        let local = element % CELLS;
-        let within = [local % EDGE, local / EDGE % EDGE, local / (EDGE * EDGE)];
-        std::array::from_fn(|axis| EDGE * brick.coordinate[axis] + within[axis])
+        self.bricks.cell(element)
     }
 
     /// Centre of an element's cell, metres.

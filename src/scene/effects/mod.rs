@@ -1,8 +1,8 @@
-//! Effects that a scene may name under `[effects]`: one file and one line each.
+//! Effects that a scene may name under `[effects]`: one word in a list, one file here, and one a reference solver.
 //!
-//! An effect's file holds its settings, what they may be, and what it adds to the plan of each solver. Its
+//! An effect's file here holds its settings, what they may be, and what it adds to the plan of each solver. Its
 //! passes bind buffers by name and run in order: of PBF after the velocity update, of FLIP on the grid
-//! before the projection.
+//! before the projection. Their f64 twins stand in a file of the same name in `reference`.
 
 use crate::gpu::program::{BufferSpec, PassSpec};
 
@@ -18,6 +18,14 @@ pub struct EffectPlan {
     /// Part of the velocity that a frame takes from the grid for it; of FLIP alone.
     pub blend: f64,
 }
+
+/// Gives the list of effects, in the order in which they act, to a macro.
+macro_rules! with_effects {
+    ($callback:ident) => {
+        $callback!(viscosity, vorticity_confinement);
+    };
+}
+pub(crate) use with_effects;
 
 macro_rules! effects {
     ($($name:ident),+ $(,)?) => {
@@ -75,4 +83,4 @@ macro_rules! effects {
     };
 }
 
-effects!(viscosity, vorticity_confinement);
+with_effects!(effects);

@@ -74,7 +74,7 @@ impl Capacity {
 pub struct PlannedBuffer {
     /// Name and bytes.
     pub spec: BufferSpec,
-    /// `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, or an effect's name.
+    /// `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, `probes`, or an effect's name.
     pub owner: &'static str,
 }
 

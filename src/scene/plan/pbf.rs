@@ -154,6 +154,10 @@ impl Plan {
         if pbf.iteration == Iteration::Chebyshev {
             delta.push("CHEBYSHEV");
         }
+        if !scene.pressure_points().is_empty() {
+            self.add_buffer("lambda_sum", 4 * n, "probes");
+            delta.push("PRESSURE");
+        }
         for name in ["pbf/predict", "pbf/assign_cells", "pbf/reorder"] {
             self.add_pass(name, &[], &[]);
         }

@@ -7,58 +7,40 @@
 mod record;
 mod step;
 
+use glam::DVec3;
+
 use crate::{
     domain::{
+        boundary::Boundary,
         bricks::{Bricks, CELLS, EDGE, table_dims},
+        gauge::Gauge,
         particles::Particles,
         solver::{Projection, Solver, StepReport},
     },
     gpu::{
         adapter::Context,
         program::{BufferSpec, Program},
-        recording::Timer,
+        recording::{Recording, Timer},
         sort,
     },
     scene::{
         Scene,
-        flip::{Flip as Settings, Transfer},
         plan::{Capacity, Counts, DeviceLimits, Plan, layers, stored_cells},
+        step::Substep,
     },
 };
 
 use super::{
     SolveError,
-    boundary::{Boundary, Movers},
+    boundary::Movers,
     pressure::{self, LEVELS, PressureSolver},
-    state::{check_finite, report, slots_by_id, take_over, upload},
+    state::{check_finite, slots_by_id, take_over, upload},
+    trace::{Run, Traced, trace},
 };
 use record::{Recordings, groups, windows};
-use step::Substep;
-
-/// Attributes that APIC declares: C of v(x) = v + C (x − x_p), 1/s, `affine_xy` = ∂v_x/∂y. A state without them
-/// starts from zeros.
-pub const AFFINE: [&str; 9] = [
-    "affine_xx",
-    "affine_xy",
-    "affine_xz",
-    "affine_yx",
-    "affine_yy",
-    "affine_yz",
-    "affine_zx",
-    "affine_zy",
-    "affine_zz",
-];
 
 /// Words of `survey` before the flags.
 const SURVEY_HEAD: usize = 4;
-
-/// Attributes of a frame beyond positions, velocities and ids.
-pub fn attributes(settings: &Settings) -> &'static [&'static str] {
-    match settings.transfer {
-        Transfer::Flip => &[],
-        Transfer::Apic => &AFFINE,
-    }
-}
 
 /// FLIP on a device.
 pub struct Flip {
@@ -179,10 +161,8 @@ impl Flip {
         Ok(self.program.download(&[(name, count)])?.remove(0))
     }
 
-    fn survey(&mut self) -> Result<Survey, SolveError> {
-        self.recordings
-            .survey
-            .run(&self.program, self.timer.as_mut())?;
+    fn survey(&mut self, run: &mut Run<'_>) -> Result<Survey, SolveError> {
+        run(&self.program, &[&self.recordings.survey])?;
         let words = self.field::<u32>("survey", SURVEY_HEAD + no_water(&self.plan).len())?;
         Ok(Survey {
             speed: f64::from(f32::from_bits(words[0])).sqrt(),
@@ -191,9 +171,9 @@ impl Flip {
         })
     }
 
-    fn numbers<T>(&self, what: String) -> Result<T, SolveError> {
+    fn numbers(&self, what: String) -> SolveError {
         let frame = self.frame + 1;
-        Err(SolveError::Numbers { frame, what })
+        SolveError::Numbers { frame, what }
     }
 
     /// The next substep of the `remaining` seconds, and how many these take as things stand.
@@ -205,22 +185,11 @@ impl Flip {
         done: u32,
     ) -> Result<(f64, Substep), SolveError> {
         if survey.not_finite > 0 {
-            return self.numbers(format!("{} particles are not finite", survey.not_finite));
+            return Err(self.numbers(format!("{} particles are not finite", survey.not_finite)));
         }
-        let flip = self.scene.solver.flip();
-        let (wanted, substep) = step::next(&self.scene, start, remaining, survey.speed);
-        if f64::from(done) + wanted > f64::from(flip.max_substeps) {
-            return self.numbers(format!(
-                "up to {:.3} m/s (particles {:.3}; gravity, wave makers and moving solids counted in) asks for {} substeps \
-                 at cfl {}, and solver.flip.max_substeps is {}",
-                substep.displacement * flip.cell_size / substep.length,
-                survey.speed,
-                f64::from(done) + wanted,
-                flip.cfl,
-                flip.max_substeps
-            ));
-        }
-        Ok((wanted, substep))
+        self.scene
+            .flip_substep(start, remaining, survey.speed, done)
+            .map_err(|what| self.numbers(what))
     }
 
     /// Lays out bricks about the water, and makes room for more where they do not fit.
@@ -253,58 +222,125 @@ impl Flip {
         Ok(())
     }
 
+    /// Carries the loaded state to the grid, as the next frame's first substep does: what [`Self::project`] starts from.
+    ///
+    /// # Errors
+    /// The device, or a state that is not finite or too fast.
+    pub fn carry_to_grid(&mut self) -> Result<Substep, SolveError> {
+        self.timed(|flip, run| {
+            let (survey, substep) = flip.first_substep(run)?;
+            flip.carry(&survey.is_wet, &substep, run)?;
+            Ok(substep)
+        })
+    }
+
+    /// Projects the face velocities that stand on the grid; waits for the device.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn project(&mut self, substep: &Substep) -> Result<pressure::Projected, SolveError> {
+        self.timed(|flip, run| flip.project_by(substep, run))
+    }
+
+    /// `work` with what runs recordings at once, or timed where the solver times passes.
+    fn timed<T>(
+        &mut self,
+        work: impl FnOnce(&mut Self, &mut Run<'_>) -> Result<T, SolveError>,
+    ) -> Result<T, SolveError> {
+        let mut timer = self.timer.take();
+        let result = work(self, &mut |program, recordings| {
+            Ok(Recording::run_all(recordings, program, timer.as_mut())?)
+        });
+        self.timer = timer;
+        result
+    }
+
+    /// Of the frame after the loaded state.
+    fn first_substep(&mut self, run: &mut Run<'_>) -> Result<(Survey, Substep), SolveError> {
+        let length = self.scene.shot.frame_seconds();
+        let survey = self.survey(run)?;
+        let (_, substep) = self.choose(&survey, f64::from(self.frame) * length, length, 0)?;
+        Ok((survey, substep))
+    }
+
+    fn carry(
+        &mut self,
+        is_wet: &[bool],
+        substep: &Substep,
+        run: &mut Run<'_>,
+    ) -> Result<(), SolveError> {
+        self.lay_out(is_wet, substep)?;
+        run(&self.program, &[&self.recordings.to_grid])
+    }
+
+    fn project_by(
+        &mut self,
+        substep: &Substep,
+        run: &mut Run<'_>,
+    ) -> Result<pressure::Projected, SolveError> {
+        let step = pressure::Step {
+            time_step: substep.length,
+            rest_density: self.scene.water.rest_density,
+        };
+        let cell_size = self.scene.solver.flip().cell_size;
+        self.pressure
+            .set_topology(&self.program, &self.bricks, cell_size);
+        self.pressure.project_by(&self.program, step, run)
+    }
+
     fn run_substep(
         &mut self,
         is_wet: &[bool],
         substep: &Substep,
         told: &mut Told,
+        run: &mut Run<'_>,
     ) -> Result<(), SolveError> {
-        self.lay_out(is_wet, substep)?;
-        self.recordings
-            .to_grid
-            .run(&self.program, self.timer.as_mut())?;
-        let flip = self.scene.solver.flip();
-        let step = pressure::Step {
-            time_step: substep.length,
-            rest_density: self.scene.water.rest_density,
-        };
-        self.pressure
-            .set_topology(&self.program, &self.bricks, flip.cell_size);
-        let projected = self
-            .pressure
-            .project(&self.program, step, self.timer.as_mut())?;
+        self.carry(is_wet, substep, run)?;
+        let projected = self.project_by(substep, run)?;
         told.add(&projected);
+        let flip = self.scene.solver.flip();
         let limit = flip.pressure.residual_limit;
         if projected.solved.residual.is_nan() || projected.solved.residual > limit {
-            return self.numbers(format!(
+            return Err(self.numbers(format!(
                 "the projection of substep {} ended at a relative residual of {:.3e} after {} iterations; \
                  solver.flip.pressure.residual_limit is {limit}",
                 told.substeps, projected.solved.residual, projected.solved.iterations
-            ));
+            )));
         }
         if flip.density_correction {
-            let corrected = self.pressure.correct(&self.program, self.timer.as_mut())?;
+            let corrected = self.pressure.correct_by(&self.program, run)?;
             told.projection.correction_iterations += u64::from(corrected.iterations);
             told.projection.missed += u32::from(corrected.is_missed);
         }
-        self.recordings
-            .to_particles
-            .run(&self.program, self.timer.as_mut())?;
-        Ok(())
+        run(&self.program, &[&self.recordings.to_particles])
+    }
+
+    /// Runs the first substep after the loaded state one dispatch at a time. The solver then has to be loaded anew.
+    ///
+    /// # Errors
+    /// The device, the numbers, and what `observe` returns.
+    pub fn trace(
+        &mut self,
+        observe: &mut dyn FnMut(Traced<'_>) -> Result<(), SolveError>,
+    ) -> Result<(), SolveError> {
+        let run: &mut Run<'_> = &mut |program, recordings| trace(recordings, program, observe);
+        self.program.upload("counters", 0, &[0u32; 4]);
+        let (survey, substep) = self.first_substep(run)?;
+        self.run_substep(&survey.is_wet, &substep, &mut Told::default(), run)
     }
 
     /// Substeps through one frame.
-    fn run_frame(&mut self) -> Result<Told, SolveError> {
+    fn run_substeps(&mut self, run: &mut Run<'_>) -> Result<Told, SolveError> {
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
         let mut told = Told::default();
         let mut elapsed = 0.0;
         loop {
-            let survey = self.survey()?;
+            let survey = self.survey(run)?;
             let (wanted, substep) =
                 self.choose(&survey, start + elapsed, length - elapsed, told.substeps)?;
             told.substeps += 1;
-            self.run_substep(&survey.is_wet, &substep, &mut told)?;
+            self.run_substep(&survey.is_wet, &substep, &mut told, run)?;
             elapsed += substep.length;
             if wanted <= 1.0 {
                 return Ok(told);
@@ -314,7 +350,7 @@ impl Flip {
 
     fn upload_state(&self) {
         upload(&self.program, &self.scene, &self.state);
-        let names = attributes(self.scene.solver.flip());
+        let names = self.scene.solver.flip().attributes();
         if !names.is_empty() {
             let mut rows = vec![0.0f32; names.len() * self.state.len()];
             for (k, name) in names.iter().enumerate() {
@@ -342,7 +378,7 @@ impl Flip {
             &vectors[0],
             &vectors[1],
         );
-        let names = attributes(self.scene.solver.flip());
+        let names = self.scene.solver.flip().attributes();
         if !names.is_empty() {
             let rows = self.field::<f32>("affine", names.len() * n)?;
             for (k, name) in names.iter().enumerate() {
@@ -354,6 +390,11 @@ impl Flip {
             }
         }
         Ok(())
+    }
+
+    /// Of a cell array up to the last slot that the last substep used on the finest level.
+    fn elements(&self) -> usize {
+        (self.bricks.active as usize + 1) * CELLS as usize
     }
 
     /// Relative densities in cells of water, as the last substep found them.
@@ -387,7 +428,7 @@ impl Solver for Flip {
         let told = if self.state.is_empty() {
             Told::default()
         } else {
-            self.run_frame()?
+            self.timed(Self::run_substeps)?
         };
         self.read_state()?;
         check_finite(self.frame + 1, &self.state, None)?;
@@ -398,7 +439,7 @@ impl Solver for Flip {
         };
         let capped = self.field::<u32>("counters", 1)?[0];
         self.frame += 1;
-        if self.scene.domain.min != glam::DVec3::ZERO {
+        if self.scene.domain.min != DVec3::ZERO {
             // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
             self.upload_state();
         }
@@ -407,9 +448,27 @@ impl Solver for Flip {
             iterations: told.iterations,
             capped: u64::from(capped),
             projection: Some(told.projection),
-            ..report(&self.scene, &self.state, &density)
+            ..self
+                .scene
+                .report(&self.state, density.into_iter().map(f64::from))
         };
         Ok((self.state.clone(), report))
+    }
+
+    /// The projection's, between cell centres.
+    fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
+        let kind: Vec<u32> = self.field("cell_kind", self.elements())?;
+        let pressure: Vec<f32> = self.field("pressure", self.elements())?;
+        let pressure: Vec<f64> = pressure.into_iter().map(f64::from).collect();
+        let gauge = Gauge {
+            bricks: &self.bricks,
+            cells: self.plan.grid_dims,
+            cell_size: self.scene.solver.flip().cell_size,
+            kind: &kind,
+            pressure: &pressure,
+        };
+        let local = |at: &DVec3| *at - self.scene.domain.min;
+        Ok(points.iter().map(|at| gauge.at(local(at))).collect())
     }
 
     fn timings(&self) -> Vec<(&'static str, f64, u64)> {

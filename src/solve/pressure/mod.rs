@@ -50,7 +50,7 @@ use crate::{
     scene::flip::{Preconditioner, Pressure},
 };
 
-use super::SolveError;
+use super::{SolveError, trace::Run};
 
 pub use crate::domain::poisson::{AIR, FLUID, SOLID};
 pub use params::{PressureBrick, PressureControl, PressurePhase};
@@ -219,7 +219,23 @@ impl PressureSolver {
         &mut self,
         program: &Program,
         step: Step,
-        timer: Option<&mut Timer>,
+        mut timer: Option<&mut Timer>,
+    ) -> Result<Projected, SolveError> {
+        self.project_by(program, step, &mut |program, recordings| {
+            Ok(Recording::run_all(
+                recordings,
+                program,
+                timer.as_deref_mut(),
+            )?)
+        })
+    }
+
+    /// The same, by whatever runs recordings.
+    pub(super) fn project_by(
+        &mut self,
+        program: &Program,
+        step: Step,
+        run: &mut Run<'_>,
     ) -> Result<Projected, SolveError> {
         let scale = step.rest_density * f64::from(self.phase.cell_size) / step.time_step;
         self.phase.pressure_scale = scale as f32;
@@ -228,7 +244,7 @@ impl PressureSolver {
         self.shape.has_pockets = false;
         self.pockets = 0;
         let tolerance = self.settings.tolerance;
-        let (solved, stats) = self.solve(program, Task::Project, tolerance, timer)?;
+        let (solved, stats) = self.solve(program, Task::Project, tolerance, run)?;
         let measured = |k: usize| f64::from(f32::from_bits(stats[k]));
         Ok(Projected {
             solved,
@@ -251,10 +267,25 @@ impl PressureSolver {
     pub fn correct(
         &mut self,
         program: &Program,
-        timer: Option<&mut Timer>,
+        mut timer: Option<&mut Timer>,
+    ) -> Result<Solved, SolveError> {
+        self.correct_by(program, &mut |program, recordings| {
+            Ok(Recording::run_all(
+                recordings,
+                program,
+                timer.as_deref_mut(),
+            )?)
+        })
+    }
+
+    /// The same, by whatever runs recordings.
+    pub(super) fn correct_by(
+        &mut self,
+        program: &Program,
+        run: &mut Run<'_>,
     ) -> Result<Solved, SolveError> {
         assert!(self.has_correction, "built without the correction");
-        let (solved, _) = self.solve(program, Task::Correct, CORRECTION_TOLERANCE, timer)?;
+        let (solved, _) = self.solve(program, Task::Correct, CORRECTION_TOLERANCE, run)?;
         Ok(solved)
     }
 
@@ -265,7 +296,7 @@ impl PressureSolver {
         program: &Program,
         task: Task,
         tolerance: f64,
-        mut timer: Option<&mut Timer>,
+        run: &mut Run<'_>,
     ) -> Result<(Solved, [u32; STATS]), SolveError> {
         if self.phase.levels[0][1] == 0 {
             return Ok(Default::default());
@@ -288,7 +319,7 @@ impl PressureSolver {
             recordings.extend((0..batch.min(MOST_AT_ONCE)).map(|_| &stages.iterate));
             recordings.push(&stages.verify);
             recordings.extend(finish);
-            Recording::run_all(&recordings, program, timer.as_deref_mut())?;
+            run(program, &recordings)?;
             let (control, stats) = read(program)?;
             is_first = control.state == WANTS_POCKETS;
             if is_first {

@@ -1,24 +1,20 @@
-//! Study files: what is to be compared, on which scene, seen with which look.
+//! `kind = "solver_comparison"`: two solvers on one scene, seen with one look.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use serde::Deserialize;
-use toml::Spanned;
+use toml::{Spanned, de::DeTable};
 
 use super::{
-    Method, Scene,
-    document::Document,
-    error::SceneError,
-    look::{FormatSpec, Look, LookError},
+    super::{
+        Method, Scene,
+        document::Document,
+        error::SceneError,
+        look::{FormatSpec, Look},
+    },
+    StudyFileError,
 };
 use crate::domain::frame_range::FrameRange;
-
-/// A validated study: every file that it names read.
-#[derive(Clone, Debug)]
-pub enum Study {
-    /// `kind = "solver_comparison"`.
-    SolverComparison(Box<SolverComparison>),
-}
 
 /// Two solvers on one scene, side by side.
 #[derive(Clone, Debug)]
@@ -33,21 +29,11 @@ pub struct SolverComparison {
     pub pictures: FrameRange,
 }
 
-/// Why a study could not be loaded.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyFileError {
-    /// The study file itself, or its scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Its look.
-    #[error(transparent)]
-    Look(#[from] LookError),
-}
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct StudySpec {
-    kind: Spanned<String>,
+struct ComparisonSpec {
+    #[serde(rename = "kind")]
+    _kind: String,
     scene: Spanned<String>,
     look: Spanned<String>,
     solvers: Spanned<Vec<String>>,
@@ -55,45 +41,14 @@ struct StudySpec {
     pictures: Spanned<String>,
 }
 
-/// Kinds of study.
-const KINDS: [&str; 1] = ["solver_comparison"];
-
-impl Study {
-    /// Loads a study file, its scene and its look, whose paths are relative to it.
-    ///
-    /// # Errors
-    /// [`StudyFileError`], with file, line and key.
-    pub fn load(path: &Path) -> Result<Self, StudyFileError> {
-        let text = fs::read_to_string(path).map_err(|source| SceneError::Read {
-            file: path.to_owned(),
-            source,
-        })?;
-        Self::parse(&text, path, path.parent().unwrap_or(Path::new("")))
-    }
-
-    /// [`Self::load`] on a text; `file` names it in messages, `base_dir` is where relative paths
-    /// start.
-    ///
-    /// # Errors
-    /// Those of [`Self::load`].
-    pub fn parse(text: &str, file: &Path, base_dir: &Path) -> Result<Self, StudyFileError> {
-        let (doc, root) = Document::parse(text, file, &[])?;
-        let spec = StudySpec::deserialize(toml::Deserializer::from(root))
-            .map_err(|error| doc.translate(&error))?;
-        if !KINDS.contains(&spec.kind.get_ref().as_str()) {
-            let problem = format!("{:?} is no kind of study", spec.kind.get_ref());
-            return Err(doc.fault_at(spec.kind.span(), problem).into());
-        }
-        let comparison = comparison(&doc, &spec, base_dir)?;
-        Ok(Self::SolverComparison(Box::new(comparison)))
-    }
-}
-
-fn comparison(
+/// The rest of a document of this kind; files are relative to `base_dir`.
+pub(super) fn parse(
     doc: &Document<'_>,
-    spec: &StudySpec,
+    root: Spanned<DeTable<'_>>,
     base_dir: &Path,
 ) -> Result<SolverComparison, StudyFileError> {
+    let spec = ComparisonSpec::deserialize(toml::Deserializer::from(root))
+        .map_err(|error| doc.translate(&error))?;
     let [left, right] = solvers(doc, &spec.solvers)?;
     let file = base_dir.join(spec.scene.get_ref());
     let scenes = [
@@ -149,23 +104,4 @@ fn range(doc: &Document<'_>, text: &Spanned<String>, last: u32) -> Result<FrameR
         return Err(fault(format!("the shot has frames 1 to {last}")));
     }
     Ok(frames)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_studies_that_ship_fit_their_scenes() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
-        let mut names = Vec::new();
-        for entry in fs::read_dir(folder).expect("studies") {
-            let file = entry.expect("a study").path();
-            let Study::SolverComparison(comparison) = Study::load(&file).expect("valid");
-            let methods = comparison.scenes.map(|scene| scene.solver.method);
-            assert_eq!(methods, [Method::Pbf, Method::Flip], "{}", file.display());
-            names.push(file);
-        }
-        assert_eq!(names.len(), 2);
-    }
 }

@@ -1,124 +1,34 @@
-//! `study`: bakes and renders what a study asks for, measures it, and writes the page.
+//! Two solvers on one scene: bakes and renders both, measures them, and writes the page.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    sync::atomic::AtomicBool,
-};
+use std::{fs, path::PathBuf, sync::atomic::AtomicBool};
 
 use rayon::prelude::*;
 
 use crate::{
     cache::{CacheError, CacheReader, Manifest},
     domain::{frame_range::FrameRange, solver::StepReport},
-    scene::{
-        Scene, SceneError, Solid,
-        study::{SolverComparison, Study},
-    },
+    scene::{Scene, Solid, study::comparison::SolverComparison},
     study::{
         comparison::{self, Course, Finding, Impact, Row},
-        measure::{Direction, Gauge},
+        measure::Gauge,
         median,
         page::{self, Part},
-        picture::{self, PictureError},
+        picture,
     },
 };
 
 use super::{
-    Blame,
-    bake::{self, BakeError},
-    render::{self, RenderJobError},
+    super::{bake, device::Device, render},
+    Event, Outcome, Request, StudyError, direction, gauge, write,
 };
 
-/// What to study, and where to.
-#[derive(Clone, Debug)]
-pub struct Request {
-    /// Validated study.
-    pub study: Study,
-    /// Caches, pictures, table and page go in here.
-    pub directory: PathBuf,
-    /// Index or part of the name of an adapter.
-    pub adapter: Option<String>,
-    /// As typed, for the page.
-    pub command: String,
-}
-
-/// What a study has to tell while it runs.
-#[derive(Clone, Debug)]
-pub enum Event {
-    /// A bake begins or goes on.
-    Solver(&'static str),
-    /// A bake tells.
-    Bake(bake::Event),
-    /// A render tells.
-    Render(render::Event),
-}
-
-/// How a study ended.
-#[derive(Clone, Debug, Default)]
-pub struct Outcome {
-    /// Its page; `None` where a signal ended it before.
-    pub page: Option<PathBuf>,
-    /// What was found, in words.
-    pub findings: Vec<String>,
-}
-
-/// Why a study failed.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// A bake.
-    #[error(transparent)]
-    Bake(#[from] BakeError),
-    /// A render.
-    #[error(transparent)]
-    Render(#[from] RenderJobError),
-    /// A cache.
-    #[error(transparent)]
-    Cache(#[from] CacheError),
-    /// The scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// A file that cannot be read or written.
-    #[error("{}", file.display())]
-    File {
-        /// Which.
-        file: PathBuf,
-        /// The system's words.
-        source: std::io::Error,
-    },
-    /// A picture that cannot stand in the page.
-    #[error("{}", file.display())]
-    Picture {
-        /// Which.
-        file: PathBuf,
-        /// What is off.
-        source: PictureError,
-    },
-}
-
-impl From<&StudyError> for Blame {
-    fn from(error: &StudyError) -> Self {
-        match error {
-            StudyError::Bake(error) => error.into(),
-            StudyError::Render(error) => error.into(),
-            StudyError::Cache(error) => error.into(),
-            StudyError::Scene(error) => error.into(),
-            StudyError::File { .. } | StudyError::Picture { .. } => Self::Files,
-        }
-    }
-}
-
-/// Runs a study; `tell` hears of progress, and `stop` ends it after the current frame. What stands in
-/// the directory already is gone on with.
-///
-/// # Errors
-/// [`StudyError`].
-pub fn study(
+/// Runs it; what stands in the directory already is gone on with.
+pub(super) fn run(
     request: &Request,
+    comparison: &SolverComparison,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, StudyError> {
-    let Study::SolverComparison(comparison) = &request.study;
     for scene in &comparison.scenes {
         tell(Event::Solver(scene.solver.method.name()));
         if bake_and_render(request, comparison, scene, stop, tell)? {
@@ -128,8 +38,8 @@ pub fn study(
     let [scene, other] = &comparison.scenes;
     let open = |scene: &Scene| CacheReader::open(&cache_directory(request, scene));
     let caches = [open(scene)?, open(other)?];
-    let gauge = gauge(scene, &caches)?;
     let [a, b] = &caches;
+    let gauge = gauge(scene, &[a, b])?;
     let courses = [
         course(a, &gauge, &comparison.frames)?,
         course(b, &gauge, &comparison.frames)?,
@@ -138,7 +48,7 @@ pub fn study(
     let findings = comparison::findings(&courses, impact);
     write(
         &request.directory.join("results.csv"),
-        &comparison::to_csv(&courses),
+        comparison::to_csv(&courses),
     )?;
     let parts = parts(request, comparison, &caches, &courses, &findings, impact)?;
     let title = format!(
@@ -146,7 +56,7 @@ pub fn study(
         scene.shot.name, courses[0].solver, courses[1].solver
     );
     let file = request.directory.join("index.html");
-    write(&file, &page::html(&title, &parts))?;
+    write(&file, page::html(&title, &parts))?;
     Ok(Outcome {
         page: Some(file),
         findings: findings.into_iter().map(|found| found.text).collect(),
@@ -168,7 +78,7 @@ fn bake_and_render(
         directory: cache.clone(),
         frames: FrameRange::inclusive(1, last),
         resume: true,
-        adapter: request.adapter.clone(),
+        device: Device::Gpu(request.adapter.clone()),
         time_passes: false,
     };
     if bake::bake(&bake, stop, &mut |event| tell(Event::Bake(event)))?.interrupted {
@@ -195,33 +105,6 @@ fn cache_directory(request: &Request, scene: &Scene) -> PathBuf {
 fn picture_directory(request: &Request, scene: &Scene) -> PathBuf {
     let pictures = request.directory.join("pictures");
     pictures.join(scene.solver.method.name())
-}
-
-/// The wave runs away from the first wave maker; towards greater x where there is none.
-fn direction(scene: &Scene) -> Direction {
-    let along = |axis, is_forward| Direction { axis, is_forward };
-    scene
-        .wave_makers
-        .iter()
-        .find(|maker| maker.wall.axis != 1)
-        .map_or(along(0, true), |maker| {
-            along(maker.wall.axis, !maker.wall.is_max)
-        })
-}
-
-/// One gauge for both: the coarser lattice decides. Where a wave maker stands, the still level is that
-/// of the start; other water has none at the start, and what it would settle to is taken.
-fn gauge(scene: &Scene, caches: &[CacheReader; 2]) -> Result<Gauge, CacheError> {
-    let [spacing, other] = caches.each_ref().map(|c| c.manifest().particle_spacing);
-    let start = caches[0].read(0)?;
-    let gauge = Gauge::new(scene.domain, direction(scene), spacing.max(other));
-    let still = if scene.wave_makers.is_empty() {
-        let size = scene.domain.size();
-        start.len() as f64 * spacing.powi(3) / (size.x * size.z)
-    } else {
-        gauge.depth(&start.position, spacing)
-    };
-    Ok(gauge.with_still_level(still))
 }
 
 /// Distance at which the first thing stands in the wave's way: a solid, or the far wall.
@@ -397,12 +280,5 @@ fn pictures(
             .iter()
             .map(row)
             .collect::<Result<_, StudyError>>()?,
-    })
-}
-
-fn write(file: &Path, text: &str) -> Result<(), StudyError> {
-    fs::write(file, text).map_err(|source| StudyError::File {
-        file: file.to_owned(),
-        source,
     })
 }

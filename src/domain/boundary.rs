@@ -1,0 +1,14 @@
+//! Solids as a solver meets them: samples with a weight in the density, and a signed distance.
+
+use super::{sampling::BoundarySample, signed_distance::SignedDistance};
+
+/// All solids of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct Boundary {
+    /// Over all surfaces of static solids, world space.
+    pub samples: Vec<BoundarySample>,
+    /// Of the static solids' union; `None` where the scene has none.
+    pub distance: Option<SignedDistance>,
+    /// Of each moving solid, where it stood at the start.
+    pub moving: Vec<SignedDistance>,
+}

@@ -1,0 +1,56 @@
+//! How far two results may be apart.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// Limits of a comparison; what is not named is shown and not judged.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tolerance {
+    /// By field: `position` (metres), `velocity` (m/s), and attributes by name.
+    pub fields: BTreeMap<String, FieldLimits>,
+    /// By the names of [`Aggregates::NAMES`](super::aggregates::Aggregates::NAMES).
+    pub aggregates: BTreeMap<String, Limit>,
+    /// Of pictures.
+    pub pictures: PictureLimits,
+}
+
+/// Largest allowed errors of one field in any frame, in its unit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FieldLimits {
+    /// Of the worst particle.
+    pub max: Option<f64>,
+    /// Root mean square.
+    pub rms: Option<f64>,
+    /// That 99 % of the particles do not exceed.
+    pub p99: Option<f64>,
+}
+
+/// |a − b| ≤ absolute + relative · |b|.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Limit {
+    /// In the value's unit.
+    pub absolute: f64,
+    /// Of the reference b.
+    pub relative: f64,
+}
+
+impl Limit {
+    /// The largest error that is allowed against `reference`.
+    pub fn allowed(&self, reference: f64) -> f64 {
+        self.absolute + self.relative * reference.abs()
+    }
+}
+
+/// Limits of one picture against another.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PictureLimits {
+    /// Mean over the pixels.
+    pub mean: Option<f64>,
+    /// That 99 % of the pixels do not exceed.
+    pub p99: Option<f64>,
+    /// Of the worst pixel.
+    pub max: Option<f64>,
+    /// Least SSIMULACRA 2 score; 100 is no visible difference.
+    pub perceptual: Option<f64>,
+}

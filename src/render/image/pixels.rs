@@ -1,0 +1,108 @@
+//! Pixels of picture files, of ours and of others, and a picture of plain bytes.
+
+use std::path::Path;
+
+use exr::prelude::read_first_rgba_layer_from_file;
+use png::{BitDepth, ColorType, Transformations};
+
+use super::super::RenderError;
+
+/// Width, height, and red, green, blue, alpha of each pixel, rows from the top.
+pub type Pixels = (usize, usize, Vec<[f32; 4]>);
+
+fn fault(path: &Path, message: impl ToString) -> RenderError {
+    RenderError::Format {
+        file: path.to_owned(),
+        message: message.to_string(),
+    }
+}
+
+/// The pixels of a PNG of any kind, 0 to 1 as they stand in the file; grey in all three channels, alpha 1
+/// where there is none.
+///
+/// # Errors
+/// [`RenderError::Write`] where it cannot be opened, [`RenderError::Format`] where it is no whole PNG.
+pub fn read_png(path: &Path) -> Result<Pixels, RenderError> {
+    let file = std::fs::File::open(path).map_err(|source| RenderError::Write {
+        file: path.to_owned(),
+        source,
+    })?;
+    let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
+    decoder.set_transformations(Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(|error| fault(path, error))?;
+    let size = reader
+        .output_buffer_size()
+        .ok_or_else(|| fault(path, "too large"))?;
+    let mut bytes = vec![0; size];
+    let info = reader
+        .next_frame(&mut bytes)
+        .map_err(|error| fault(path, error))?;
+    let channels = match info.color_type {
+        ColorType::Grayscale => 1,
+        ColorType::GrayscaleAlpha => 2,
+        ColorType::Rgb => 3,
+        ColorType::Rgba => 4,
+        ColorType::Indexed => return Err(fault(path, "its palette cannot be expanded")),
+    };
+    let bytes = &bytes[..info.buffer_size()];
+    let values: Vec<f32> = match info.bit_depth {
+        BitDepth::Sixteen => {
+            let pairs = bytes.chunks_exact(2);
+            pairs
+                .map(|pair| f32::from(u16::from_be_bytes([pair[0], pair[1]])) / 65535.0)
+                .collect()
+        }
+        _ => bytes.iter().map(|&byte| f32::from(byte) / 255.0).collect(),
+    };
+    let pixel = |values: &[f32]| match *values {
+        [grey] => [grey, grey, grey, 1.0],
+        [grey, alpha] => [grey, grey, grey, alpha],
+        [r, g, b] => [r, g, b, 1.0],
+        _ => [values[0], values[1], values[2], values[3]],
+    };
+    let pixels = values.chunks_exact(channels).map(pixel).collect();
+    Ok((info.width as usize, info.height as usize, pixels))
+}
+
+/// The beauty of an EXR, `R G B` and `A` (1 where there is none) of its first layer that has them.
+///
+/// # Errors
+/// [`RenderError::Format`] where it cannot be opened, is no whole EXR, or has no such layer.
+pub fn read_exr(path: &Path) -> Result<Pixels, RenderError> {
+    let image = read_first_rgba_layer_from_file(
+        path,
+        |size, _| (size.0, vec![[0.0; 4]; size.area()]),
+        |(width, pixels): &mut (usize, Vec<[f32; 4]>), at, (r, g, b, a): (f32, f32, f32, f32)| {
+            pixels[at.1 * *width + at.0] = [r, g, b, a];
+        },
+    )
+    .map_err(|error| fault(path, error))?;
+    let size = image.layer_data.size;
+    Ok((size.0, size.1, image.layer_data.channel_data.pixels.1))
+}
+
+/// Writes an 8-bit RGB PNG without a colour space, with one line of text.
+///
+/// # Errors
+/// [`RenderError::Write`], [`RenderError::Format`].
+pub fn write_rgb_png(
+    path: &Path,
+    size: [usize; 2],
+    pixels: &[[u8; 3]],
+    comment: &str,
+) -> Result<(), RenderError> {
+    let [width, height] = size.map(|side| side as u32);
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(BitDepth::Eight);
+    encoder
+        .add_itxt_chunk("Comment".to_owned(), comment.to_owned())
+        .map_err(|error| fault(path, error))?;
+    let mut writer = encoder.write_header().map_err(|error| fault(path, error))?;
+    writer
+        .write_image_data(pixels.as_flattened())
+        .map_err(|error| fault(path, error))?;
+    writer.finish().map_err(|error| fault(path, error))?;
+    super::write_whole(path, &bytes)
+}

@@ -1,0 +1,105 @@
+//! Study files: what is to be compared, on which scene.
+//!
+//! One file a kind: [`comparison`] sets two solvers side by side, [`sweep`] runs a scene over and over, with one
+//! setting changed at a time.
+
+pub mod comparison;
+pub mod sweep;
+
+use std::{fs, path::Path};
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{document::Document, error::SceneError, look::LookError};
+
+use comparison::SolverComparison;
+use sweep::Sweep;
+
+/// A validated study: every file that it names read.
+#[derive(Clone, Debug)]
+pub enum Study {
+    /// `kind = "solver_comparison"`.
+    SolverComparison(Box<SolverComparison>),
+    /// `kind = "sweep"`.
+    Sweep(Box<Sweep>),
+}
+
+/// Why a study could not be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyFileError {
+    /// The study file itself, or its scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Its look.
+    #[error(transparent)]
+    Look(#[from] LookError),
+}
+
+/// What every kind says; the rest is read by the kind.
+#[derive(Deserialize)]
+struct KindSpec {
+    kind: Spanned<String>,
+}
+
+impl Study {
+    /// Loads a study file and what it names; paths are relative to it.
+    ///
+    /// # Errors
+    /// [`StudyFileError`], with file, line and key.
+    pub fn load(path: &Path) -> Result<Self, StudyFileError> {
+        let text = fs::read_to_string(path).map_err(|source| SceneError::Read {
+            file: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text, path, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// [`Self::load`] on a text; `file` names it in messages, `base_dir` is where relative paths
+    /// start.
+    ///
+    /// # Errors
+    /// Those of [`Self::load`].
+    pub fn parse(text: &str, file: &Path, base_dir: &Path) -> Result<Self, StudyFileError> {
+        let (doc, root) = Document::parse(text, file, &[])?;
+        let told = KindSpec::deserialize(toml::Deserializer::from(root.clone()))
+            .map_err(|error| doc.translate(&error))?;
+        match told.kind.get_ref().as_str() {
+            "solver_comparison" => {
+                let comparison = comparison::parse(&doc, root, base_dir)?;
+                Ok(Self::SolverComparison(Box::new(comparison)))
+            }
+            "sweep" => Ok(Self::Sweep(Box::new(sweep::parse(&doc, root, base_dir)?))),
+            other => {
+                let problem = format!("{other:?} is no kind of study");
+                Err(doc.fault_at(told.kind.span(), problem).into())
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::Method, *};
+
+    #[test]
+    fn the_studies_that_ship_fit_their_scenes() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        let (mut comparisons, mut sweeps) = (0, 0);
+        for entry in fs::read_dir(folder).expect("studies") {
+            let file = entry.expect("a study").path();
+            match Study::load(&file).unwrap_or_else(|error| panic!("{error}")) {
+                Study::SolverComparison(comparison) => {
+                    let methods = comparison.scenes.map(|scene| scene.solver.method);
+                    assert_eq!(methods, [Method::Pbf, Method::Flip], "{}", file.display());
+                    comparisons += 1;
+                }
+                Study::Sweep(sweep) => {
+                    assert!(sweep.lines.iter().all(|line| line.points.len() >= 2));
+                    sweeps += 1;
+                }
+            }
+        }
+        assert_eq!((comparisons, sweeps), (2, 8));
+    }
+}

@@ -1,0 +1,562 @@
+//! `kind = "sweep"`: one scene over and over, with one setting changed at a time, by one or more methods.
+//!
+//! ```toml
+//! kind = "sweep"
+//! scene = "../dam-break.toml"
+//! set = ["solver.pbf.particle_spacing=0.1"]   # laid over the scene in every run, as --set does
+//! key = "solver.pbf.iterations"               # what changes from run to run
+//! values = [2, 4, 8, 16]                      # from coarse to fine
+//! seconds = 2.0                               # of the shot; or steps = 120, output frames
+//! repeats = 3                                 # times are medians over so many
+//! errors = ["density_error_mean"]
+//!
+//! [[method]]                                  # a line of the curves each
+//! name = "red/black"
+//! set = ["solver.pbf.iteration=red_black"]    # key and values may stand here as well, for this line alone
+//! device = "gpu"                              # or "cpu", the f64 reference
+//! against = "jacobi"                          # value by value against that method, not against the own finest run
+//! ```
+
+use std::{collections::BTreeSet, ops::Range, path::Path};
+
+use serde::Deserialize;
+use toml::{Spanned, Value, de::DeTable};
+
+use super::{
+    super::{Fault, Method, Place, Scene, document::Document, error::SceneError, physics_hash},
+    StudyFileError,
+};
+use crate::domain::sampling::fill_water;
+
+/// The key that changes the length of a frame.
+pub const FRAME_RATE: &str = "shot.frames_per_second";
+
+/// Times, equally spaced, at which a run is compared with the finest.
+pub const SAMPLES: u32 = 10;
+
+/// Most particles whose distance to where their constraints hold is measured. With 8 000 a factor takes about 1 s, and
+/// Newton's method some 20 of them; both grow faster than the particles do.
+const MOST_CONVERGED: usize = 9000;
+
+/// Most runs of a study.
+const MOST_POINTS: usize = 1000;
+
+/// A validated sweep: every point's scene is loaded.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    /// In the reader's words, for the page; paragraphs.
+    pub about: Vec<String>,
+    /// Curves.
+    pub lines: Vec<Line>,
+    /// Times that each point runs.
+    pub repeats: u32,
+    /// What is measured; not empty, all of one [`Measure`].
+    pub errors: Vec<ErrorMeasure>,
+    /// What a projection is measured on, after its frames; only of that measure.
+    pub state: Option<Point>,
+    /// Whether the convergence point of the paper's Table 1 is looked for.
+    pub has_convergence_point: bool,
+}
+
+/// One method: a curve.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// For the legend.
+    pub name: String,
+    /// What its runs are on.
+    pub device: LineDevice,
+    /// The line whose run of the same value each of these is held against; its own finest run where `None`. Only of
+    /// [`Measure::Finest`].
+    pub against: Option<usize>,
+    /// The key that is swept.
+    pub key: String,
+    /// From coarse to fine.
+    pub points: Vec<Point>,
+}
+
+/// What a method runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineDevice {
+    /// The study's adapter, in f32.
+    Gpu,
+    /// The f64 reference.
+    Cpu,
+}
+
+impl LineDevice {
+    /// As studies name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gpu => "gpu",
+            Self::Cpu => "cpu",
+        }
+    }
+}
+
+/// One setting of one method.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// The value as the file has it.
+    pub label: String,
+    /// With every override laid over it.
+    pub scene: Scene,
+    /// Output frames to run.
+    pub frames: u32,
+}
+
+/// How errors are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// From each frame's report, averaged over the frames.
+    Report,
+    /// At the same times against the finest run of the same line, the last of its values, or another line's run.
+    Finest,
+    /// From the end of the last frame on: how far the particles are from where their constraints hold.
+    Converged,
+    /// One projection of one fixed state, against the exact solution of the same system in f64.
+    Projection,
+}
+
+/// An error, as the curves show it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorMeasure {
+    /// Mean of max(0, ρ/ρ0 − 1).
+    DensityMean,
+    /// Its 99th percentile.
+    DensityP99,
+    /// Its maximum.
+    DensityMax,
+    /// Height of the crest against the finest run.
+    Crest,
+    /// Place of the front against the finest run.
+    Front,
+    /// Energy per mass against the finest run.
+    Energy,
+    /// Elevation along the wave's way against the finest run.
+    Profile,
+    /// ‖p − p64‖ / ‖p64‖.
+    Pressure,
+    /// ‖u − u64‖ / ‖u64‖ over the faces that the projection changes.
+    Velocity,
+    /// Largest |∇·u| Δt after the projection.
+    Divergence,
+    /// RMS over the particles of the way to where Newton's method meets their constraints, in spacings.
+    DistanceToConverged,
+}
+
+impl ErrorMeasure {
+    /// With the names that studies use.
+    pub const NAMED: [(&'static str, Self); 11] = [
+        ("density_error_mean", Self::DensityMean),
+        ("density_error_p99", Self::DensityP99),
+        ("density_error_max", Self::DensityMax),
+        ("crest_error", Self::Crest),
+        ("front_error", Self::Front),
+        ("energy_error", Self::Energy),
+        ("profile_error", Self::Profile),
+        ("pressure_error", Self::Pressure),
+        ("velocity_error", Self::Velocity),
+        ("divergence", Self::Divergence),
+        ("distance_to_converged", Self::DistanceToConverged),
+    ];
+
+    /// As studies name it.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
+    }
+
+    /// What it takes to measure it.
+    pub fn measure(self) -> Measure {
+        match self {
+            Self::DensityMean | Self::DensityP99 | Self::DensityMax => Measure::Report,
+            Self::Crest | Self::Front | Self::Energy | Self::Profile => Measure::Finest,
+            Self::Pressure | Self::Velocity | Self::Divergence => Measure::Projection,
+            Self::DistanceToConverged => Measure::Converged,
+        }
+    }
+
+    /// In words with its unit, for an axis.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::DensityMean => "density error, mean",
+            Self::DensityP99 => "density error, 99th percentile",
+            Self::DensityMax => "density error, maximum",
+            Self::Crest => "height of the crest against the finest run, m",
+            Self::Front => "place of the front against the finest run, m",
+            Self::Energy => "energy against the finest run, relative",
+            Self::Profile => "elevation against the finest run, RMS, m",
+            Self::Pressure => "pressure, ‖p − p64‖ / ‖p64‖",
+            Self::Velocity => "velocity, ‖u − u64‖ / ‖u64‖",
+            Self::Divergence => "largest |∇·u| Δt",
+            Self::DistanceToConverged => "distance from converged, RMS, spacings",
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SweepSpec {
+    #[serde(rename = "kind")]
+    _kind: String,
+    about: Option<Vec<String>>,
+    scene: Spanned<String>,
+    #[serde(default)]
+    set: Vec<Spanned<String>>,
+    key: Option<Spanned<String>>,
+    values: Option<Spanned<Vec<Spanned<Value>>>>,
+    steps: Option<Spanned<i64>>,
+    seconds: Option<Spanned<f64>>,
+    repeats: Option<Spanned<i64>>,
+    errors: Spanned<Vec<Spanned<String>>>,
+    #[serde(default)]
+    convergence_point: bool,
+    method: Spanned<Vec<Spanned<MethodSpec>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MethodSpec {
+    name: Spanned<String>,
+    #[serde(default)]
+    set: Vec<Spanned<String>>,
+    key: Option<Spanned<String>>,
+    values: Option<Spanned<Vec<Spanned<Value>>>>,
+    device: Option<Spanned<String>>,
+    against: Option<Spanned<String>>,
+}
+
+/// The rest of a document of this kind; files are relative to `base_dir`.
+pub(super) fn parse(
+    doc: &Document<'_>,
+    root: Spanned<DeTable<'_>>,
+    base_dir: &Path,
+) -> Result<Sweep, StudyFileError> {
+    let spec = SweepSpec::deserialize(toml::Deserializer::from(root))
+        .map_err(|error| doc.translate(&error))?;
+    let errors = errors(doc, &spec.errors)?;
+    let repeats = whole(doc, &spec.repeats, 100)?.unwrap_or(1);
+    let state = match errors[0].measure() {
+        Measure::Projection => Some(state(doc, &spec, base_dir)?),
+        Measure::Report | Measure::Finest | Measure::Converged => None,
+    };
+    let mut lines: Vec<Line> = Vec::new();
+    for method in spec.method.get_ref() {
+        let line = line(doc, &spec, method, base_dir)?;
+        if lines.iter().any(|other| other.name == line.name) {
+            let problem = format!("{:?} is the name of another method", line.name);
+            return Err(doc.fault_at(method.get_ref().name.span(), problem).into());
+        }
+        check_fit(doc, &spec, &line, errors[0], state.as_ref())?;
+        if errors[0].measure() == Measure::Converged {
+            check_converged(doc, &spec, &line)?;
+        }
+        lines.push(line);
+    }
+    for (place, method) in spec.method.get_ref().iter().enumerate() {
+        if let Some(name) = &method.get_ref().against {
+            lines[place].against = Some(against(doc, name, &lines, place, errors[0])?);
+        }
+    }
+    let points: usize = lines.iter().map(|line| line.points.len()).sum();
+    if points == 0 || points > MOST_POINTS {
+        let problem = format!("{points} runs in all, and a study has 1 to {MOST_POINTS}");
+        return Err(doc.fault_at(spec.method.span(), problem).into());
+    }
+    Ok(Sweep {
+        about: spec.about.unwrap_or_default(),
+        lines,
+        repeats,
+        errors,
+        state,
+        has_convergence_point: spec.convergence_point,
+    })
+}
+
+fn errors(
+    doc: &Document<'_>,
+    spec: &Spanned<Vec<Spanned<String>>>,
+) -> Result<Vec<ErrorMeasure>, SceneError> {
+    let mut errors: Vec<ErrorMeasure> = Vec::new();
+    for word in spec.get_ref() {
+        let fault =
+            |problem: &str| doc.fault_at(word.span(), format!("{:?} {problem}", word.get_ref()));
+        let named = ErrorMeasure::NAMED
+            .iter()
+            .find(|(name, _)| name == word.get_ref());
+        let (_, error) = named.ok_or_else(|| fault("is no error that is measured"))?;
+        if errors
+            .iter()
+            .any(|other| other.measure() != error.measure())
+        {
+            return Err(fault("is not measured in the same run as those before it"));
+        }
+        if errors.contains(error) {
+            return Err(fault("stands there twice"));
+        }
+        errors.push(*error);
+    }
+    if errors.is_empty() {
+        return Err(doc.fault_at(spec.span(), "empty"));
+    }
+    Ok(errors)
+}
+
+fn whole(
+    doc: &Document<'_>,
+    spec: &Option<Spanned<i64>>,
+    most: u32,
+) -> Result<Option<u32>, SceneError> {
+    let Some(spec) = spec else {
+        return Ok(None);
+    };
+    let value = u32::try_from(*spec.get_ref()).ok();
+    match value.filter(|value| (1..=most).contains(value)) {
+        Some(value) => Ok(Some(value)),
+        None => Err(doc.fault_at(spec.span(), format!("{} is out of range", spec.get_ref()))),
+    }
+}
+
+/// What projections start from: the scene with what is set for all.
+fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point, SceneError> {
+    let fixed: Vec<_> = spec.set.iter().collect();
+    let scene = load(doc, &base_dir.join(spec.scene.get_ref()), &fixed, None)?;
+    if scene.solver.method != Method::Flip {
+        let problem = "these are measured with solver.method flip, which set does not choose";
+        return Err(doc.fault_at(spec.errors.span(), problem));
+    }
+    Ok(Point {
+        label: String::new(),
+        frames: frames(doc, spec, &scene)?,
+        scene,
+    })
+}
+
+/// Whether a line's runs can be measured.
+fn check_fit(
+    doc: &Document<'_>,
+    spec: &SweepSpec,
+    line: &Line,
+    error: ErrorMeasure,
+    state: Option<&Point>,
+) -> Result<(), SceneError> {
+    let fault = |problem: String| Err(doc.fault_at(spec.errors.span(), problem));
+    for Point {
+        scene,
+        frames,
+        label,
+    } in &line.points
+    {
+        if error.measure() == Measure::Finest && frames % SAMPLES != 0 {
+            return fault(format!(
+                "{} is taken at {SAMPLES} times, and {:?} with {label} has {frames} frames, no multiple of that",
+                error.name(),
+                line.name
+            ));
+        }
+        let is_same = |state: &Point| {
+            let water =
+                |scene: &Scene| (scene.solver.method, scene.particle_spacing(), scene.domain);
+            water(scene) == water(&state.scene)
+                && scene.solver.flip().cell_size == state.scene.solver.flip().cell_size
+        };
+        if !state.is_none_or(is_same) {
+            return fault(format!(
+                "{} is measured on one state, and {:?} with {label} has another solver, domain or resolution",
+                error.name(),
+                line.name
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the distance to where the constraints hold can be measured, and in minutes.
+fn check_converged(doc: &Document<'_>, spec: &SweepSpec, line: &Line) -> Result<(), SceneError> {
+    let fault = |problem: String| Err(doc.fault_at(spec.errors.span(), problem));
+    for Point { scene, label, .. } in &line.points {
+        let name = &line.name;
+        if scene.solver.method != Method::Pbf {
+            return fault(format!(
+                "distance_to_converged is measured with solver.method pbf, and {name:?} with {label} has another"
+            ));
+        }
+        let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
+        let (blocks, spacing) = (&scene.water.blocks, scene.particle_spacing());
+        let filled = match fill_water(blocks, water, None, &scene.domain, spacing) {
+            Ok(fill) => fill.particles.len(),
+            Err(error) => return fault(error.to_string()),
+        };
+        if filled > MOST_CONVERGED {
+            return fault(format!(
+                "distance_to_converged takes some 20 sparse factors of the constraints a run, a second each with 8000 \
+                 particles and soon gigabytes with more; {name:?} with {label} has {filled} particles, and up to \
+                 {MOST_CONVERGED} are measured"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The line that the line at `place` is held against.
+fn against(
+    doc: &Document<'_>,
+    name: &Spanned<String>,
+    lines: &[Line],
+    place: usize,
+    error: ErrorMeasure,
+) -> Result<usize, SceneError> {
+    let fault =
+        |problem: &str| doc.fault_at(name.span(), format!("{:?} {problem}", name.get_ref()));
+    if error.measure() != Measure::Finest {
+        return Err(fault("is needed by none of these errors"));
+    }
+    let found = lines.iter().position(|line| &line.name == name.get_ref());
+    let found = found.filter(|&found| found != place);
+    let found = found.ok_or_else(|| fault("is the name of no other method"))?;
+    let setting = |line: &Line| {
+        let points = line.points.iter();
+        let values: Vec<_> = points.map(|p| (p.label.clone(), p.frames)).collect();
+        (line.key.clone(), values)
+    };
+    if setting(&lines[found]) != setting(&lines[place]) {
+        return Err(fault("has another key, other values or other frames"));
+    }
+    Ok(found)
+}
+
+/// What a method says that it runs on.
+fn device(
+    doc: &Document<'_>,
+    spec: &SweepSpec,
+    method: &MethodSpec,
+) -> Result<LineDevice, SceneError> {
+    let Some(word) = &method.device else {
+        return Ok(LineDevice::Gpu);
+    };
+    let fault = |problem: &str| Err(doc.fault_at(word.span(), problem));
+    let named = |wanted: &str| spec.errors.get_ref().iter().any(|e| e.get_ref() == wanted);
+    let is_projection = ErrorMeasure::NAMED
+        .iter()
+        .any(|(name, error)| error.measure() == Measure::Projection && named(name));
+    match word.get_ref().as_str() {
+        "gpu" => Ok(LineDevice::Gpu),
+        "cpu" if is_projection => {
+            fault("the reference's projection is what these errors are measured against")
+        }
+        "cpu" => Ok(LineDevice::Cpu),
+        other => fault(&format!("{other:?} is no device")),
+    }
+}
+
+fn line(
+    doc: &Document<'_>,
+    spec: &SweepSpec,
+    method: &Spanned<MethodSpec>,
+    base_dir: &Path,
+) -> Result<Line, SceneError> {
+    let at = method.span();
+    let method = method.get_ref();
+    let key = method.key.as_ref().or(spec.key.as_ref());
+    let key = key.ok_or_else(|| doc.missing(at.clone(), "key"))?;
+    let values = method.values.as_ref().or(spec.values.as_ref());
+    let values = values.ok_or_else(|| doc.missing(at, "values"))?;
+    let file = base_dir.join(spec.scene.get_ref());
+    let fixed: Vec<_> = spec.set.iter().chain(&method.set).collect();
+    // The rate that the scene itself has, to which what is taken a frame is tied.
+    let own_rate = load(doc, &file, &fixed, None)?.shot.frames_per_second;
+    let mut seen = BTreeSet::new();
+    let mut points = Vec::new();
+    for value in values.get_ref() {
+        let swept = (
+            format!("{}={}", key.get_ref(), value.get_ref()),
+            value.span(),
+        );
+        let mut scene = load(doc, &file, &fixed, Some(swept))?;
+        if key.get_ref() == FRAME_RATE {
+            tie_pic_blend(&mut scene, own_rate);
+        }
+        let is_new = seen.insert(physics_hash(&scene));
+        if !is_new {
+            let problem = format!(
+                "the scene is the same as with a value before it: {} changes nothing with solver.method {:?}, or the value \
+                 stands there twice",
+                key.get_ref(),
+                scene.solver.method.name()
+            );
+            return Err(doc.fault_at(value.span(), problem));
+        }
+        points.push(Point {
+            label: doc.text_at(value.span()).trim_matches('"').to_owned(),
+            frames: frames(doc, spec, &scene)?,
+            scene,
+        });
+    }
+    if points.len() < 2 {
+        return Err(doc.fault_at(values.span(), "a sweep has two values or more"));
+    }
+    Ok(Line {
+        name: method.name.get_ref().clone(),
+        device: device(doc, spec, method)?,
+        against: None,
+        key: key.get_ref().clone(),
+        points,
+    })
+}
+
+/// The scene with overrides; what is wrong with one of them is said at its place in the study file.
+fn load(
+    doc: &Document<'_>,
+    file: &Path,
+    fixed: &[&Spanned<String>],
+    swept: Option<(String, Range<usize>)>,
+) -> Result<Scene, SceneError> {
+    let fixed = fixed.iter().map(|set| (set.get_ref().clone(), set.span()));
+    let (overrides, spans): (Vec<_>, Vec<_>) = fixed.chain(swept).unzip();
+    Scene::load(file, &overrides).map_err(|error| {
+        let (text, message) = match &error {
+            SceneError::Fault(fault) => match fault.as_ref() {
+                Fault {
+                    place: Place::Override(text),
+                    key,
+                    message,
+                    ..
+                } => (text, format!("{key}: {message}")),
+                _ => return error,
+            },
+            SceneError::Override { text, reason } => (text, reason.clone()),
+            _ => return error,
+        };
+        let place = overrides.iter().position(|known| known == text);
+        place.map_or(error, |place| {
+            doc.fault_plain(spans[place].clone(), message)
+        })
+    })
+}
+
+/// FLIP's `pic_blend` is a part of the velocity a frame: over as many seconds each rate is to take the same part,
+/// α = 1 − (1 − α_ref)^(Δt / Δt_ref), or halving Δt would double the dissipation.
+fn tie_pic_blend(scene: &mut Scene, own_rate: f64) {
+    let exponent = own_rate / scene.shot.frames_per_second;
+    if let Some(flip) = &mut scene.solver.flip {
+        flip.pic_blend = 1.0 - (1.0 - flip.pic_blend).powf(exponent);
+    }
+}
+
+/// Output frames of a run of this scene.
+fn frames(doc: &Document<'_>, spec: &SweepSpec, scene: &Scene) -> Result<u32, SceneError> {
+    let rate = scene.shot.frames_per_second;
+    let Some(seconds) = &spec.seconds else {
+        let steps = whole(doc, &spec.steps, 1_000_000)?;
+        return steps.ok_or_else(|| doc.missing(spec.scene.span(), "steps"));
+    };
+    if let Some(steps) = &spec.steps {
+        return Err(doc.fault_at(steps.span(), "seconds stands there as well"));
+    }
+    let frames = seconds.get_ref() * rate;
+    let is_whole = (frames - frames.round()).abs() <= 1e-6 * frames;
+    if !is_whole || !(1.0..=1e6).contains(&frames.round()) {
+        let problem = format!("at {rate} frames a second these are {frames} frames");
+        return Err(doc.fault_at(seconds.span(), problem));
+    }
+    Ok(frames.round() as u32)
+}

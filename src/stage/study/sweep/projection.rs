@@ -1,0 +1,210 @@
+//! A point that is one projection of a fixed state, against the exact solution of the same system.
+
+use std::{collections::BTreeMap, time::Instant};
+
+use crate::{
+    domain::{
+        bricks::CELLS,
+        particles::Particles,
+        poisson::{Cells, System},
+        solver::Solver,
+    },
+    gpu::adapter::Context,
+    reference::{
+        ReferenceError,
+        poisson::{self, gradients::norm},
+    },
+    scene::{flip::Surface, study::sweep::Point},
+    solve::{SolveError, flip::Flip, pbf::device_limits},
+};
+
+use super::{
+    super::{super::prepare::Start, StudyError},
+    frames::products,
+    ledger::{ProjectionErrors, Run},
+};
+
+/// Projections of one state.
+pub(super) struct Projections {
+    made_by: Point,
+    /// Made when it is first needed.
+    state: Option<Particles>,
+    /// By a hash of the system and its right-hand side.
+    exact: BTreeMap<[u8; 32], Exact>,
+}
+
+#[derive(Clone)]
+struct Exact {
+    q: Vec<f64>,
+    residual: f64,
+    /// Whether by a factor, not by conjugate gradients.
+    has_factor: bool,
+}
+
+/// What stands on the grid before a projection.
+struct Grid {
+    kind: Vec<u32>,
+    open: Vec<f32>,
+    distance: Option<Vec<f32>>,
+    flux: Vec<f32>,
+    velocity: Vec<f32>,
+}
+
+impl Projections {
+    /// Of the state at the end of this point's frames.
+    pub(super) fn new(made_by: Point) -> Self {
+        Self {
+            made_by,
+            state: None,
+            exact: BTreeMap::new(),
+        }
+    }
+
+    fn state(&mut self, context: &Context) -> Result<&Particles, StudyError> {
+        let state = match self.state.take() {
+            Some(state) => state,
+            None => {
+                let start = Start::of(&self.made_by.scene)?;
+                let mut solver = flip(context, &self.made_by, &start)?;
+                solver.load(0, &start.particles)?;
+                let mut state = start.particles;
+                for _ in 0..self.made_by.frames {
+                    state = solver.advance()?.0;
+                }
+                state
+            }
+        };
+        Ok(self.state.insert(state))
+    }
+
+    /// Projects `repeats` times, after one that is not counted. A time is one projection, all in: system, solve,
+    /// gradient, waiting for the device.
+    pub(super) fn run(
+        &mut self,
+        context: &Context,
+        point: &Point,
+        repeats: u32,
+    ) -> Result<Run, StudyError> {
+        let state = self.state(context)?.clone();
+        let start = Start::of(&point.scene)?;
+        let mut solver = flip(context, point, &start)?;
+        solver.load(self.made_by.frames, &state)?;
+        let substep = solver.carry_to_grid()?;
+        let grid = Grid::read(&solver, point)?;
+        solver.project(&substep)?;
+        let mut run = Run {
+            particles: state.len(),
+            frames: 1,
+            substeps: 1,
+            ..Run::default()
+        };
+        for _ in 0..repeats {
+            solver.carry_to_grid()?;
+            context.wait().map_err(SolveError::from)?;
+            let begin = Instant::now();
+            let projected = solver.project(&substep)?;
+            run.seconds.push(begin.elapsed().as_secs_f64());
+            if !projected.solved.residual.is_finite() {
+                let what = format!("a residual of {}", projected.solved.residual);
+                let frame = self.made_by.frames + 1;
+                return Err(SolveError::Numbers { frame, what }.into());
+            }
+            run.iterations = u64::from(projected.solved.iterations);
+            run.missed = u32::from(projected.solved.is_missed);
+            run.projection = Some(ProjectionErrors {
+                divergence: projected.divergence_after * substep.length,
+                residual: projected.solved.residual,
+                ..self.errors(&solver, point, &grid, substep.length)?
+            });
+        }
+        let settings = &point.scene.solver.flip().pressure;
+        run.work = run.iterations as f64 * products(settings.preconditioner);
+        Ok(run)
+    }
+
+    /// What the device's solution is off by.
+    fn errors(
+        &mut self,
+        solver: &Flip,
+        point: &Point,
+        grid: &Grid,
+        step: f64,
+    ) -> Result<ProjectionErrors, StudyError> {
+        let cells = grid.cells(solver);
+        let system = System::new(cells);
+        let exact = self.exact(&system, &system.rhs(cells, &grid.velocity, &grid.flux))?;
+        let (stride, scene) = (grid.kind.len(), &point.scene);
+        let scale = scene.water.rest_density * scene.solver.flip().cell_size / step;
+        let pressure = solver.field::<f32>("pressure", stride)?;
+        let pressures = system.cell.iter().zip(&exact.q);
+        let (off, all): (Vec<f64>, Vec<f64>) = pressures
+            .map(|(&element, q)| (f64::from(pressure[element as usize]) - scale * q, scale * q))
+            .unzip();
+        let velocity = solver.field::<f32>("face_velocity", 3 * stride)?;
+        let faces = system.gradient(cells, &exact.q);
+        let (moved, after): (Vec<f64>, Vec<f64>) = faces
+            .into_iter()
+            .map(|(face, difference)| {
+                let exact = f64::from(grid.velocity[face]) - difference;
+                (f64::from(velocity[face]) - exact, exact)
+            })
+            .unzip();
+        Ok(ProjectionErrors {
+            pressure: norm(&off) / norm(&all),
+            velocity: norm(&moved) / norm(&after),
+            divergence: 0.0,
+            residual: 0.0,
+            rows: system.cell.len(),
+            exact_residual: exact.residual,
+            has_factor: exact.has_factor,
+        })
+    }
+
+    /// The solution of a system, solved once: methods that share it share its solution.
+    fn exact(&mut self, system: &System, b: &[f64]) -> Result<Exact, ReferenceError> {
+        let mut hasher = blake3::Hasher::new();
+        for values in [&system.diagonal, &system.dirichlet, b] {
+            hasher.update(bytemuck::cast_slice(values));
+        }
+        let key = *hasher.finalize().as_bytes();
+        if let Some(exact) = self.exact.get(&key) {
+            return Ok(exact.clone());
+        }
+        let solution = poisson::solve(system, b)?;
+        let exact = Exact {
+            q: solution.x,
+            residual: solution.residual,
+            has_factor: solution.iterations == 0,
+        };
+        Ok(self.exact.entry(key).or_insert(exact).clone())
+    }
+}
+
+fn flip(context: &Context, point: &Point, start: &Start) -> Result<Flip, SolveError> {
+    let plan = start.plan(&point.scene, device_limits(context));
+    Flip::new(context, &point.scene, plan, &start.boundary, false)
+}
+
+impl Grid {
+    fn read(solver: &Flip, point: &Point) -> Result<Self, SolveError> {
+        let stride = solver.plan().counts.bricks.slots * CELLS as usize;
+        let has_distance = point.scene.solver.flip().surface == Surface::GhostFluid;
+        let distance = has_distance.then(|| solver.field("liquid_distance", stride));
+        Ok(Self {
+            kind: solver.field("cell_kind", stride)?,
+            open: solver.field("face_open", 3 * stride)?,
+            distance: distance.transpose()?,
+            flux: solver.field("solid_flux", stride)?,
+            velocity: solver.field("face_velocity", 3 * stride)?,
+        })
+    }
+
+    fn cells<'a>(&'a self, solver: &'a Flip) -> Cells<'a> {
+        Cells {
+            bricks: solver.bricks(),
+            kind: &self.kind,
+            open: &self.open,
+            distance: self.distance.as_deref(),
+        }
+    }
+}
