@@ -13,7 +13,8 @@ use std::time::Instant;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use swell::cache::{
-    self, Asset, CacheError, CacheReader, CacheWriter, Clock, Manifest, Summary, directory_hash,
+    self, Asset, CacheError, CacheReader, CacheWriter, Clock, Manifest, ProbeRecord, ProbeValues,
+    Summary, directory_hash,
 };
 use swell::domain::particles::Particles;
 use tempfile::TempDir;
@@ -37,10 +38,31 @@ fn manifest() -> Manifest {
         particle_spacing: 0.1 + 0.2,
         rest_density: 1000.0,
         grids: None,
+        probes: probes(),
         attributes: vec!["foam".to_owned(), "age".to_owned()],
         start_particles: 0,
         files: Vec::new(),
     }
+}
+
+fn probes() -> Vec<ProbeRecord> {
+    let probe = |name: &str, kind: &str, at: &[f64], columns: &[&str]| ProbeRecord {
+        name: name.to_owned(),
+        kind: kind.to_owned(),
+        at: at.to_vec(),
+        columns: columns.iter().map(|&column| column.to_owned()).collect(),
+    };
+    vec![
+        probe("gauge", "elevation", &[0.5, 1.5], &["elevation_m"]),
+        probe("energy-1", "energy", &[], &["kinetic_J", "potential_J"]),
+    ]
+}
+
+/// What they see at a time; the first is dry at each third frame.
+fn seen(clock: Clock) -> ProbeValues {
+    let wet = !clock.frame.is_multiple_of(3);
+    let at = |scale: f64| Some(scale * (1.0 + clock.time).ln());
+    vec![vec![at(0.1).filter(|_| wet)], vec![at(1e20), at(-1e-7)]]
 }
 
 fn assets() -> Vec<Asset> {
@@ -90,7 +112,8 @@ fn start() -> Particles {
 }
 
 fn create(dir: &Path) -> CacheWriter {
-    CacheWriter::create(dir, manifest(), SCENE, &assets(), &start()).unwrap()
+    let seen = seen(Clock::default());
+    CacheWriter::create(dir, manifest(), SCENE, &assets(), &start(), &seen).unwrap()
 }
 
 /// Frames `clock.frame + 1 ..= last`, from a state.
@@ -104,7 +127,7 @@ fn go_on(
         let report;
         (clock, particles, report) = step(&particles, clock, frame);
         let seconds = json!({ "seconds": Instant::now().elapsed().as_secs_f64() });
-        writer.submit(clock, particles.clone(), report, seconds)?;
+        writer.submit(clock, particles.clone(), seen(clock), report, seconds)?;
     }
     writer.finish()
 }
@@ -231,20 +254,25 @@ fn an_empty_state_is_a_cache_too() {
     let dir = tempfile::tempdir().unwrap();
     let mut manifest = manifest();
     manifest.attributes.clear();
+    manifest.probes.clear();
     let nothing = Particles::default();
-    let mut writer = CacheWriter::create(dir.path(), manifest, SCENE, &[], &nothing).unwrap();
+    let mut writer =
+        CacheWriter::create(dir.path(), manifest, SCENE, &[], &nothing, &Vec::new()).unwrap();
     let clock = Clock {
         frame: 1,
         ..Clock::default()
     };
     writer
-        .submit(clock, nothing.clone(), Value::Null, Value::Null)
+        .submit(clock, nothing.clone(), Vec::new(), Value::Null, Value::Null)
         .unwrap();
     writer.finish().unwrap();
     let reader = CacheReader::open(dir.path()).unwrap();
     assert_eq!(reader.read(1).unwrap(), nothing);
     assert!(reader.verify().is_ok());
     assert!(!dir.path().join("timings.jsonl").exists());
+    assert!(!dir.path().join("probes").exists());
+    let ledger = fs::read_to_string(dir.path().join(LEDGER)).unwrap();
+    assert!(!ledger.contains("probes"));
 }
 
 #[test]
@@ -299,7 +327,14 @@ fn resumed_from_any_torn_ledger_it_is_the_unbroken_bake() {
         }
         let is_torn = ledger[length - 1] != b'\n';
         let problems = CacheReader::open(d).unwrap().survey().problems;
-        assert_eq!(!problems.is_empty(), is_torn, "{length}");
+        let is_off = |file: &str| problems.iter().any(|problem| problem.file == d.join(file));
+        assert_eq!(is_off(LEDGER), is_torn, "{length}");
+        // Rows of frames that are not in the ledger any more.
+        assert_eq!(
+            is_off("probes/gauge.csv"),
+            length < ledger.len(),
+            "{length}"
+        );
         assert_eq!(resume(d, 4).unwrap().last_frame, 4);
         assert_eq!(directory_hash(d).unwrap(), whole, "{length}");
     }
@@ -473,7 +508,16 @@ fn a_second_writer_is_refused() {
 
 #[test]
 fn other_peoples_directories_stay_untouched() {
-    let attempt = |d: &Path| CacheWriter::create(d, manifest(), SCENE, &assets(), &start());
+    let attempt = |d: &Path| {
+        CacheWriter::create(
+            d,
+            manifest(),
+            SCENE,
+            &assets(),
+            &start(),
+            &seen(Clock::default()),
+        )
+    };
     let dir = tempfile::tempdir().unwrap();
     let d = dir.path();
     fs::write(d.join("scene.toml"), "mine").unwrap();
@@ -564,6 +608,105 @@ fn resume_names_the_field_that_differs() {
 }
 
 #[test]
+fn probes_have_a_file_each_that_the_ledger_vouches_for() {
+    let text = fs::read_to_string(baked().join("probes/gauge.csv")).unwrap();
+    let mut expected = "frame,time_s,elevation_m\n".to_owned();
+    let (mut clock, mut particles) = (Clock::default(), start());
+    for frame in 0..=4 {
+        if frame > 0 {
+            (clock, particles, _) = step(&particles, clock, frame);
+        }
+        let value = seen(clock)[0][0].map_or(String::new(), |v| format!("{v:?}"));
+        expected += &format!("{frame},{:?},{value}\n", clock.time);
+    }
+    assert_eq!(text, expected);
+    assert!(text.contains("\n3,0.05,\n"), "dry is empty: {text}");
+    let energy = fs::read_to_string(baked().join("probes/energy-1.csv")).unwrap();
+    assert!(energy.starts_with("frame,time_s,kinetic_J,potential_J\n0,0.0,0.0,-0.0\n1,"));
+
+    // A row changed, cut, added; the file gone: each is named, and mended by going on.
+    let spoil: [fn(&Path); 4] = [
+        |path| {
+            let text = fs::read_to_string(path).unwrap();
+            fs::write(path, text.replacen("\n2,", "\n2,1", 1)).unwrap();
+        },
+        |path| {
+            let text = fs::read(path).unwrap();
+            fs::write(path, &text[..text.len() - 5]).unwrap();
+        },
+        |path| {
+            let text = fs::read_to_string(path).unwrap();
+            fs::write(path, text + "5,0.1,1.0\n").unwrap();
+        },
+        |path| fs::remove_file(path).unwrap(),
+    ];
+    for (k, spoil) in spoil.into_iter().enumerate() {
+        let dir = copied();
+        let path = dir.path().join("probes/gauge.csv");
+        spoil(&path);
+        let problems = CacheReader::open(dir.path()).unwrap().survey().problems;
+        assert_eq!(problems.len(), 1, "{k}: {problems:?}");
+        assert_eq!(problems[0].file, path);
+        let what = ["line 4 ", "line 6 ", "line 7 ", "it is missing"][k];
+        assert!(problems[0].what.starts_with(what), "{k}: {problems:?}");
+        fs::write(dir.path().join("probes/other.csv.tmp"), "half").unwrap();
+        resume(dir.path(), 4).unwrap();
+        assert_eq!(
+            directory_hash(dir.path()).unwrap(),
+            directory_hash(baked()).unwrap()
+        );
+    }
+}
+
+/// What a frame showed to a probe is gone with the frame's computation.
+#[test]
+fn a_bake_goes_on_with_its_own_probes_alone() {
+    let dir = copied();
+    let before = directory_hash(dir.path()).unwrap();
+    let changes: [fn(&mut Manifest); 3] = [
+        |m| m.probes.truncate(1),
+        |m| m.probes[0].at[1] = 1.25,
+        |m| m.probes.clear(),
+    ];
+    for change in changes {
+        let mut given = manifest();
+        change(&mut given);
+        let error = CacheWriter::resume(dir.path(), &given).unwrap_err();
+        let message = error.to_string();
+        assert!(matches!(error, CacheError::OtherProbes { .. }), "{message}");
+        assert!(
+            message.contains(
+                "was baked with gauge (elevation at [0.5, 1.5]), energy-1, and this run has"
+            ),
+            "{message}"
+        );
+    }
+    assert_eq!(directory_hash(dir.path()).unwrap(), before);
+}
+
+/// No number that is none gets into the ledger, and each frame has a value for each column.
+#[test]
+fn probes_that_measure_nothing_sensible_stop_the_bake() {
+    let spoil: [fn(&mut ProbeValues); 3] = [
+        |values| values[1][0] = Some(f64::NAN),
+        |values| values[1].truncate(1),
+        |values| values.clear(),
+    ];
+    for spoil in spoil {
+        let dir = tempfile::tempdir().unwrap();
+        let mut writer = create(dir.path());
+        let (clock, particles, report) = step(&start(), Clock::default(), 1);
+        let mut values = seen(clock);
+        spoil(&mut values);
+        writer
+            .submit(clock, particles, values, report, Value::Null)
+            .unwrap();
+        assert!(matches!(writer.finish(), Err(CacheError::Unfit(_))));
+        assert_eq!(ledger_holds(dir.path()), 0);
+    }
+}
+
+#[test]
 fn another_format_is_named_not_guessed_at() {
     let dir = copied();
     let path = dir.path().join("manifest.json");
@@ -585,7 +728,8 @@ fn what_cannot_be_cached_is_refused_before_anything_is_written() {
     let dir = tempfile::tempdir().unwrap();
     let d = dir.path().join("new");
     let refuse = |manifest: Manifest, assets: &[Asset], start: &Particles| {
-        let result = CacheWriter::create(&d, manifest, SCENE, assets, start);
+        let result =
+            CacheWriter::create(&d, manifest, SCENE, assets, start, &seen(Clock::default()));
         assert!(matches!(result, Err(CacheError::Unfit(_))), "{result:?}");
         assert!(!d.exists());
     };
@@ -605,7 +749,19 @@ fn what_cannot_be_cached_is_refused_before_anything_is_written() {
     refuse(manifest(), &leading_up, &start());
     leading_up[0].name = leading_up[1].name.clone();
     refuse(manifest(), &leading_up, &start());
-    CacheWriter::create(&d, manifest(), SCENE, &assets(), &start()).unwrap();
+    refuse(
+        with(|m| m.probes[1].name = "../up".to_owned()),
+        &[],
+        &start(),
+    );
+    // One file on some file systems.
+    refuse(
+        with(|m| m.probes[1].name = "GAUGE".to_owned()),
+        &[],
+        &start(),
+    );
+    refuse(with(|m| m.probes.truncate(1)), &[], &start());
+    create(&d);
 }
 
 #[test]
@@ -617,7 +773,7 @@ fn frames_come_in_turn() {
             frame,
             ..Clock::default()
         };
-        let refused = writer.submit(clock, start(), Value::Null, Value::Null);
+        let refused = writer.submit(clock, start(), seen(clock), Value::Null, Value::Null);
         assert!(matches!(refused, Err(CacheError::Unfit(_))));
     }
     assert_eq!(
@@ -632,7 +788,9 @@ fn submit_until_error(writer: &mut CacheWriter) -> CacheError {
     for frame in 1..50 {
         let report;
         (clock, particles, report) = step(&particles, clock, frame);
-        if let Err(error) = writer.submit(clock, particles.clone(), report, Value::Null) {
+        if let Err(error) =
+            writer.submit(clock, particles.clone(), seen(clock), report, Value::Null)
+        {
             return error;
         }
     }
@@ -650,7 +808,7 @@ fn unfit_frames_speak_up_on_finish() {
         ..Clock::default()
     };
     writer
-        .submit(clock, spoiled, Value::Null, Value::Null)
+        .submit(clock, spoiled, seen(clock), Value::Null, Value::Null)
         .unwrap();
     assert!(matches!(writer.finish(), Err(CacheError::Unfit(_))));
     assert_eq!(ledger_holds(dir.path()), 0);
@@ -674,7 +832,7 @@ fn a_directory_removed_in_mid_bake_is_an_error() {
     };
     assert!(
         writer
-            .submit(again, start(), Value::Null, Value::Null)
+            .submit(again, start(), seen(again), Value::Null, Value::Null)
             .is_err()
     );
     assert!(matches!(writer.finish(), Err(CacheError::Stopped)));

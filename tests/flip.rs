@@ -9,39 +9,14 @@ use glam::DVec3;
 use rig::*;
 use support::{context, jitter, lattice};
 use swell::{
-    domain::{motion::Motion, particles::Particles, solver::Solver},
+    domain::{boundary::Boundary, motion::Motion, particles::Particles, solver::Solver},
     scene::{
         Scene, Wall, WaveMaker, effects,
         flip::{Preconditioner, Transfer},
         plan::Capacity,
     },
-    solve::{
-        boundary::Boundary,
-        flip::{Flip, capacity},
-    },
+    solve::flip::{Flip, capacity},
 };
-
-#[test]
-fn still_water_stays_still() {
-    let (scene, particles) = tank([16, 20, 12], 11);
-    let mut solver = solver(&context(), &scene, &particles);
-    for frame in 0..20 {
-        let (_, report) = solver.advance().unwrap();
-        let pressure = Field::new(&solver, "pressure", 1);
-        let mut worst = 0.0f64;
-        for y in 0..11 {
-            let depth = 1.1 - (y as f64 + 0.5) * DX;
-            worst = worst.max((pressure.at(0, [7, y, 5]) / (9810.0 * depth) - 1.0).abs());
-        }
-        // The solve's tolerance leaves 1e-5 of what gravity adds in 10 ms, 0.1 m/s, each frame; and the lattice's
-        // surface lies on a face to rounding.
-        assert!(report.max_speed < 2e-5, "frame {frame}: {report:?}");
-        assert!(worst < 1e-3, "frame {frame}: pressure off by {worst}");
-        // Negative control: a surface a twentieth of a cell off is 5 % of the top cell's pressure.
-        let spoiled = pressure.at(0, [7, 10, 5]) / (9810.0 * (0.05 + 0.005)) - 1.0;
-        assert!(spoiled.abs() > 1e-2);
-    }
-}
 
 /// How far the water's volume is from that of its particles: mean over cells with water or walls all about them of
 /// the density, hats over what a full cell holds.
@@ -358,6 +333,7 @@ fn rest_in_thin_cells(part: f64) -> (f64, f64) {
 /// of a mean height of 0.4 m.
 #[test]
 fn still_water_in_a_domain_of_any_size() {
+    // A wider gap is a gap: the lattice's edge is a column that collapses into it.
     for part in [0.05, 0.1, 0.2, 0.3] {
         let (error, height) = rest_in_thin_cells(part);
         println!("{part}: density error {error:.4}, height {height:.4}");
@@ -407,58 +383,6 @@ fn fast_water_takes_substeps_or_is_refused() {
     solver.load(0, &particles).unwrap();
     let error = solver.advance().unwrap_err().to_string();
     assert!(error.contains("1 particles are not finite"), "{error}");
-}
-
-/// A block that turns and falls in free space: what is left of its momenta after 0.4 s, over what they should be.
-fn free_block(transfer: Transfer, pic_blend: f64) -> (DVec3, f64) {
-    let mut scene = scene([24.0, 32.0, 24.0]);
-    scene.shot.frames_per_second = 50.0;
-    flip(&mut scene).transfer = transfer;
-    flip(&mut scene).pic_blend = pic_blend;
-    let mut particles = block([8, 18, 8], [8, 8, 8]);
-    let middle = DVec3::new(1.2, 2.2, 1.2);
-    let spin = DVec3::new(0.0, 0.0, 1.0);
-    for k in 0..particles.len() {
-        let v = spin.cross(position(&particles, k) - middle) + DVec3::new(0.5, 0.0, 0.0);
-        particles.velocity[k] = v.as_vec3().to_array();
-        for (name, value) in [("affine_xy", -1.0), ("affine_yx", 1.0)] {
-            particles
-                .attributes
-                .entry(name.to_owned())
-                .or_default()
-                .push(value);
-        }
-    }
-    let momenta = |state: &Particles| {
-        let n = state.len() as f64;
-        let center = (0..state.len()).map(|k| position(state, k)).sum::<DVec3>() / n;
-        let linear = (0..state.len()).map(|k| velocity(state, k)).sum::<DVec3>() / n;
-        let angular = (0..state.len())
-            .map(|k| (position(state, k) - center).cross(velocity(state, k)).z)
-            .sum::<f64>();
-        (linear, angular)
-    };
-    let (_, angular) = momenta(&particles);
-    let (state, _) = run(&context(), &scene, &particles, 20);
-    let (linear_after, angular_after) = momenta(&state);
-    let expected = DVec3::new(0.5, -9.81 * 0.4, 0.0);
-    (linear_after - expected, angular_after / angular)
-}
-
-#[test]
-fn momentum_is_kept_in_free_flight() {
-    for transfer in [Transfer::Flip, Transfer::Apic] {
-        let (linear, angular) = free_block(transfer, 0.05);
-        println!("{transfer:?}: {linear} m/s off, {angular} of the spin");
-        // The pressure of water that turns is not zero, and pushes on faces that hold unequal mass: a hundredth of
-        // the 3.9 m/s is allowed.
-        assert!(linear.length() < 0.04, "{linear}");
-        assert!((0.9..1.05).contains(&angular), "{angular}");
-    }
-    // Negative control: PIC alone grinds the spin down.
-    let (_, angular) = free_block(Transfer::Flip, 1.0);
-    println!("PIC: {angular} of the spin");
-    assert!(angular < 0.9, "{angular}");
 }
 
 #[test]
@@ -573,8 +497,9 @@ fn a_missed_projection_is_told_and_past_its_limit_stops() {
     flip(&mut scene).pressure.residual_limit = 1e3;
     let (_, report) = run(&context, &scene, &particles, 1);
     let projection = report.projection.unwrap();
+    // The projection and the density correction.
     assert!(
-        projection.missed >= 1 && projection.residual > 1e-5,
+        projection.missed == 2 && projection.residual > 1e-5,
         "{projection:?}"
     );
     flip(&mut scene).pressure.residual_limit = 1e-3;

@@ -10,8 +10,9 @@ use rig::*;
 use support::{context, jitter, lattice, noise};
 use swell::{
     domain::{particles::Particles, solver::Solver},
+    scene::flip::AFFINE,
     scene::{Scene, flip::Transfer},
-    solve::flip::{AFFINE, capacity},
+    solve::flip::capacity,
 };
 
 /// Water somewhere in a box, with velocities at random.

@@ -7,7 +7,7 @@ use std::path::Path;
 use proptest::prelude::*;
 use swell::{
     domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
-    scene::{Method, Scene, SceneError, study::Study},
+    scene::{Method, Scene, SceneError, study::Study, tolerance},
 };
 
 use scene_faults::{FAULTS, FLIP_FAULTS, SCENE};
@@ -175,7 +175,7 @@ fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
             "s.toml:3: look: its output.formats has no \"png\"",
         ),
         ("scene.toml", "bad.toml", "bad.toml:3: shot.frames: 0"),
-        ("scene.toml", "none.toml", "cannot read scene"),
+        ("scene.toml", "none.toml", "cannot read"),
         ("look.toml", "none.toml", "none.toml"),
     ] {
         assert!(STUDY.contains(old), "{old}");
@@ -337,6 +337,16 @@ proptest! {
         let bytes = mutate(STUDY.as_bytes().to_vec(), &edits);
         let text = String::from_utf8_lossy(&bytes);
         let _ = Study::parse(&text, Path::new("s.toml"), Path::new("/nowhere"));
+    }
+
+    #[test]
+    fn no_mutation_makes_the_tolerance_parser_panic(
+        edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
+    ) {
+        let text = "[position]\nmax = 1e-3\n[attributes.c]\nrms = 1\n[aggregates]\nvolume = { relative = 0.1 }\n\
+            [pictures]\nperceptual = 90\n";
+        let bytes = mutate(text.as_bytes().to_vec(), &edits);
+        let _ = tolerance::parse(&String::from_utf8_lossy(&bytes), Path::new("t.toml"));
     }
 
     #[test]

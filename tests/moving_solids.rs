@@ -6,21 +6,20 @@ mod support;
 use std::{collections::BTreeMap, path::Path};
 
 use glam::{DVec3, Vec3};
-use support::{context, lattice};
+use support::{box_mesh, context, lattice, mover};
 use swell::{
     domain::{
-        bounds::Bounds, mesh::TriangleMesh, motion::Motion, particles::Particles,
+        boundary::Boundary, bounds::Bounds, motion::Motion, particles::Particles,
         signed_distance::SignedDistance, solver::Solver, surface::Raster,
     },
     gpu::adapter::Context,
     scene::{
-        Method, PlacedMesh, Placement, Scene,
+        Method, Scene,
         flip::{Flip as Settings, Preconditioner, Pressure, Surface, Transfer},
         moving_solid::MovingSolid,
         plan::{Counts, SOLID_GRIDS_BYTES},
     },
     solve::{
-        boundary::Boundary,
         flip::{Flip, capacity},
         params::SolidGrids,
         pbf::device_limits,
@@ -50,46 +49,6 @@ fn scene(cells: [f64; 3]) -> Scene {
         },
     });
     scene
-}
-
-fn box_mesh(bounds: Bounds) -> TriangleMesh {
-    let corner = |i: usize| {
-        let pick = |axis: usize| {
-            if i >> axis & 1 == 0 {
-                bounds.min[axis]
-            } else {
-                bounds.max[axis]
-            }
-        };
-        DVec3::new(pick(0), pick(1), pick(2))
-    };
-    let quads = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
-    TriangleMesh {
-        vertices: (0..8).map(corner).collect(),
-        triangles: quads.into_iter().flat_map(halves).collect(),
-    }
-}
-
-fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
-    MovingSolid {
-        placed: PlacedMesh {
-            file: "box.obj".into(),
-            file_hash: String::new(),
-            placement: Placement::default(),
-            world_from_file: Default::default(),
-            mesh: box_mesh(bounds),
-        },
-        direction,
-        motion,
-    }
 }
 
 fn boundary(scene: &Scene) -> Boundary {

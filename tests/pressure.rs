@@ -11,11 +11,11 @@ use swell::{
         poisson::{
             AIR, FLUID, NONE, SOLID, System,
             cases::{Case, Surface, manufactured, tank, tank_rhs, white_noise},
-            gradients::{Precondition, norm, solve},
             remove_means,
         },
     },
     gpu::adapter::Context,
+    reference::poisson::gradients::{Precondition, norm, solve},
     scene::flip::Preconditioner,
 };
 

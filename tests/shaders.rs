@@ -15,7 +15,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 9] = [
+const VARIANTS: [&[&str]; 10] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -27,6 +27,7 @@ const VARIANTS: [&[&str]; 9] = [
         "ARTIFICIAL_PRESSURE",
     ],
     &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
+    &["NEIGHBOR_LIST", "SOLIDS", "PRESSURE"],
     &["CORRECTION", "GHOST_FLUID"],
     &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
     &["SOLIDS", "MOVING_SOLIDS", "CORRECTION", "GHOST_FLUID"],
@@ -204,26 +205,37 @@ fn composition_faults_name_their_place() {
 }
 
 /// Rooms that each room may import; `stage` and `cli` stand above them all.
-const MAY_IMPORT: [(&str, &[&str]); 9] = [
+const MAY_IMPORT: [(&str, &[&str]); 11] = [
     ("domain", &[]),
     ("gpu", &[]),
     // The plan's rows are gpu's own plain descriptions: a copy of them would have to be kept in step.
     ("scene", &["domain", "gpu"]),
     ("cache", &["domain"]),
     ("solve", &["gpu", "domain", "scene"]),
+    ("reference", &["domain", "scene"]),
     ("render", &["gpu", "domain", "scene"]),
-    ("study", &["domain"]),
+    ("compare", &["domain"]),
+    ("study", &["domain", "compare"]),
     (
         "stage",
         &[
-            "domain", "gpu", "scene", "cache", "solve", "render", "study",
+            "domain",
+            "gpu",
+            "scene",
+            "cache",
+            "solve",
+            "reference",
+            "render",
+            "compare",
+            "study",
         ],
     ),
     ("cli", &["stage", "scene", "domain"]),
 ];
 
 /// Crates that only some rooms name.
-const CRATES: [(&str, &[&str]); 2] = [
+const CRATES: [(&str, &[&str]); 3] = [
+    ("faer", &["reference"]),
     ("wgpu", &["gpu", "solve", "render"]),
     ("clap", &["cli", "main"]),
 ];
@@ -326,12 +338,22 @@ fn rooms_import_what_they_may() {
     assert!(breaches("solve", "use crate::{domain::mesh, gpu::adapter};\n").is_empty());
 }
 
-/// Lines that name an effect outside its own file, comments and tests aside.
+/// Files of an effect's own: its settings and plan, its f64 twins, and what holds the two
+/// against each other.
+const EFFECT_FILES: [&str; 5] = [
+    "scene/effects",
+    "reference/pbf/effects",
+    "stage/check/pbf/effects",
+    "reference/flip/effects",
+    "stage/check/flip/effects",
+];
+
+/// Lines that name an effect outside its own files, comments and tests aside.
 fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
-    let own = format!("scene/effects/{effect}.rs");
+    let own = EFFECT_FILES.map(|folder| format!("{folder}/{effect}.rs"));
     files
         .iter()
-        .filter(|(file, _)| !file.ends_with(&own))
+        .filter(|(file, _)| !own.contains(file))
         .flat_map(|(file, text)| {
             let code = text.split("#[cfg(test)]").next().unwrap_or("");
             code.lines()
@@ -342,7 +364,7 @@ fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
 }
 
 #[test]
-fn an_effect_is_one_file_and_one_line() {
+fn an_effect_is_its_files_and_one_line() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut paths = Vec::new();
     sources(&root, &mut paths);
@@ -361,8 +383,10 @@ fn an_effect_is_one_file_and_one_line() {
     for effect in swell::scene::Effects::NAMES {
         let found = mentions(&files, effect);
         assert_eq!(found.len(), 1, "{effect}: {found:#?}");
-        assert!(found[0].contains("effects!("), "{found:?}");
-        assert!(root.join(format!("scene/effects/{effect}.rs")).exists());
+        assert!(found[0].contains("$callback!("), "{found:?}");
+        for folder in &EFFECT_FILES[..3] {
+            assert!(root.join(format!("{folder}/{effect}.rs")).exists());
+        }
     }
     // Negative control: a solver that knew an effect by name would be seen.
     files.push((

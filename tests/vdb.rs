@@ -273,6 +273,7 @@ fn manifest(grids: Option<GridRecord>) -> Manifest {
         rest_density: 1000.0,
         attributes: Vec::new(),
         grids,
+        probes: Vec::new(),
         start_particles: 0,
         files: Vec::new(),
     }
@@ -298,14 +299,15 @@ fn go_on(mut writer: CacheWriter, first: u32, last: u32) {
         };
         let particles = ball(clock.time);
         writer
-            .submit(clock, particles, Value::Null, Value::Null)
+            .submit(clock, particles, Vec::new(), Value::Null, Value::Null)
             .unwrap();
     }
     writer.finish().unwrap();
 }
 
 fn bake(dir: &Path, grids: Option<GridRecord>, last: u32) {
-    let writer = CacheWriter::create(dir, manifest(grids), "", &[], &ball(0.0)).unwrap();
+    let writer =
+        CacheWriter::create(dir, manifest(grids), "", &[], &ball(0.0), &Vec::new()).unwrap();
     go_on(writer, 1, last);
 }
 

@@ -1,6 +1,7 @@
 //! Time per output frame and per pass of FLIP in a collapsing dam.
 //!
-//! `tools/bench flip [--adapter NAME] [--frames N] [--box XxYxZ] [--set "KEY = VALUE"] [--twice]`; the box has
+//! `tools/bench flip [--adapter NAME | --device cpu] [--frames N] [--box XxYxZ] [--set "KEY = VALUE"] [--twice]`; the
+//! CPU has the f64 reference, of which the passes' times are wall clock. The box has
 //! 128×77×64 cells of 0.1 m where left out, and 36×49×64 of them hold 903 168 particles, already under way. Frames
 //! are a sixtieth of a second. The first two warm up; medians of the rest. `--set` adds to `[solver.flip]`, and
 //! `--twice` doubles the height of the box twice, and compares.
@@ -11,6 +12,7 @@ use std::{path::Path, time::Instant};
 use swell::{
     domain::solver::Solver,
     gpu::adapter::Context,
+    reference::flip::Flip as Reference,
     scene::Scene,
     solve::{flip::Flip, pbf::device_limits},
     stage::prepare::Start,
@@ -23,6 +25,7 @@ const WATER: [f64; 3] = [36.0, 49.0, 64.0];
 
 struct Options {
     adapter: Option<String>,
+    is_cpu: bool,
     frames: usize,
     cells: [f64; 3],
     settings: String,
@@ -32,6 +35,7 @@ struct Options {
 fn options() -> Result<Options, String> {
     let mut options = Options {
         adapter: None,
+        is_cpu: false,
         frames: 12,
         cells: [128.0, 77.0, 64.0],
         settings: String::new(),
@@ -42,6 +46,10 @@ fn options() -> Result<Options, String> {
         let mut value = || words.next().ok_or(format!("{word} wants a value"));
         match word.as_str() {
             "--adapter" => options.adapter = Some(value()?),
+            "--device" => match value()?.as_str() {
+                "cpu" => options.is_cpu = true,
+                other => return Err(format!("--device wants cpu, not `{other}`")),
+            },
             "--frames" => {
                 options.frames = value()?.parse().map_err(|_| "--frames wants a number")?
             }
@@ -166,7 +174,34 @@ fn measure_passes(context: &Context, options: &Options) -> Result<(), Box<dyn st
     for _ in 0..frames {
         solver.advance()?;
     }
-    let mut rows = solver.timings();
+    print_passes(solver.timings(), frames);
+    Ok(())
+}
+
+/// Of the f64 reference: µs a particle and substep, and where they go.
+fn measure_reference(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
+    let (scene, start) = dam(options, 1.0)?;
+    let mut solver = Reference::new(&scene, &start.boundary);
+    solver.load(0, &start.particles)?;
+    let (mut substeps, mut iterations) = (0, 0);
+    let begin = Instant::now();
+    for _ in 0..options.frames {
+        let (_, report) = solver.advance()?;
+        substeps += report.substeps;
+        iterations += report.iterations;
+    }
+    let seconds = begin.elapsed().as_secs_f64();
+    let n = start.particles.len();
+    println!(
+        "{n} particles, f64: {:.3} µs a particle and substep over {substeps} substeps, {:.1} iterations each",
+        1e6 * seconds / (n as f64 * f64::from(substeps)),
+        iterations as f64 / f64::from(substeps)
+    );
+    print_passes(solver.timings(), options.frames);
+    Ok(())
+}
+
+fn print_passes(mut rows: Vec<(&'static str, f64, u64)>, frames: usize) {
     rows.sort_by(|a, b| b.1.total_cmp(&a.1));
     println!("\npasses, by their time a frame:");
     for (pass, seconds, runs) in &rows {
@@ -179,11 +214,13 @@ fn measure_passes(context: &Context, options: &Options) -> Result<(), Box<dyn st
     if rows.is_empty() {
         println!("   this adapter has no timestamps: no times per pass");
     }
-    Ok(())
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = options()?;
+    if options.is_cpu {
+        return measure_reference(&options);
+    }
     let context = Context::open(options.adapter.as_deref())?;
     println!(
         "{} ({} {})",

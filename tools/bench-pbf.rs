@@ -1,6 +1,6 @@
 //! Time per pass and per particle-step, and bytes per particle, of PBF in a collapsing dam.
 //!
-//! `tools/bench pbf [--adapter NAME] [--frames N] [COUNT ...]`; counts are 60 000, 250 000 and 1 000 000 where left
+//! `tools/bench pbf [--device cpu] [--adapter NAME] [--frames N] [COUNT ...]`; `cpu` is the f64 reference; counts are 60 000, 250 000 and 1 000 000 where left
 //! out. A step is all in: sort, neighbour lists, 4 red/black iterations, and the frame's share of measuring
 //! density and reading the state back. h = 2d, no effects, no solids. The first two frames warm up; medians of
 //! the rest.
@@ -9,24 +9,24 @@
 use std::{path::Path, time::Instant};
 
 use swell::{
-    domain::solver::Solver,
-    gpu::adapter::Context,
     scene::Scene,
-    solve::pbf::{Pbf, device_limits},
-    stage::prepare::Start,
+    stage::{
+        device::{Device, Opened},
+        prepare::Start,
+    },
 };
 
 const WARM_UP: usize = 2;
 
 struct Options {
-    adapter: Option<String>,
+    device: Device,
     frames: usize,
     counts: Vec<usize>,
 }
 
 fn options() -> Result<Options, String> {
     let mut options = Options {
-        adapter: None,
+        device: Device::Gpu(None),
         frames: 8,
         counts: Vec::new(),
     };
@@ -34,7 +34,12 @@ fn options() -> Result<Options, String> {
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} wants a value"));
         match word.as_str() {
-            "--adapter" => options.adapter = Some(value()?),
+            "--adapter" => options.device = Device::Gpu(Some(value()?)),
+            "--device" => match value()?.as_str() {
+                "gpu" => {}
+                "cpu" => options.device = Device::Cpu,
+                other => return Err(format!("--device {other}: gpu or cpu")),
+            },
             "--frames" => {
                 options.frames = value()?.parse().map_err(|_| "--frames wants a number")?
             }
@@ -78,24 +83,24 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 fn measure(
-    context: &Context,
+    opened: &Opened,
     options: &Options,
     count: usize,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let (scene, start) = dam(count)?;
     let particles = &start.particles;
-    let plan = start.plan(&scene, device_limits(context));
-    let (all, lists) = plan.bytes();
     let n = particles.len() as f64;
-    println!(
-        "\n{} particles: {:.0} bytes each, and {:.0} for neighbour lists in {} bindings",
-        particles.len(),
-        (all - lists) as f64 / n,
-        lists as f64 / n,
-        plan.chunks.len()
-    );
+    let mut built = opened.build(&scene, &start, false)?;
+    let solver = &mut built.solver;
+    println!("\n{} particles", particles.len());
+    if let Some((all, lists)) = built.bytes {
+        println!(
+            "{:.0} bytes each, and {:.0} for neighbour lists",
+            (all - lists) as f64 / n,
+            lists as f64 / n
+        );
+    }
     let mut steps_timed = 0;
-    let mut solver = Pbf::new(context, &scene, plan.clone(), &start.boundary, false)?;
     solver.load(0, particles)?;
     let mut times = Vec::new();
     let mut searched = 0;
@@ -112,15 +117,18 @@ fn measure(
         .iter()
         .fold((f64::MAX, 0.0f64), |(a, b), &t| (a.min(t), b.max(t)));
     println!(
-        "step {:.2} ms ({:.2} to {:.2} over {} frames): {:.3} µs a particle-step; {:.2e} of lists overflowed",
+        "step {:.2} ms ({:.2} to {:.2} over {} frames): {:.3} µs a particle-step",
         1e3 * median(times.clone()),
         1e3 * least,
         1e3 * most,
         times.len(),
-        1e6 * median(times) / n,
-        searched as f64 / (n * f64::from(steps_timed))
+        1e6 * median(times) / n
     );
-    let mut solver = Pbf::new(context, &scene, plan, &start.boundary, true)?;
+    if built.bytes.is_some() {
+        let overflowed = searched as f64 / (n * f64::from(steps_timed));
+        println!("{overflowed:.2e} of lists overflowed");
+    }
+    let mut solver = opened.build(&scene, &start, true)?.solver;
     solver.load(0, particles)?;
     let mut steps = 0;
     for _ in 0..options.frames + WARM_UP {
@@ -143,13 +151,10 @@ fn measure(
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = options()?;
-    let context = Context::open(options.adapter.as_deref())?;
-    println!(
-        "{} ({} {})",
-        context.info.name, context.info.driver, context.info.driver_info
-    );
+    let opened = options.device.open()?;
+    println!("{}", opened.identity());
     for &count in &options.counts {
-        measure(&context, &options, count)?;
+        measure(&opened, &options, count)?;
     }
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! Iterations and times of the pressure solve on the tank of n³ cells, by preconditioner and surface.
 //!
 //! `tools/bench pressure [--adapter NAME] [--tolerance T] [--repeats R] [--passes] [--only P] [N ...]`;
-//! N are 16, 32, 64, 96 where left out, and P one of none, jacobi, ipp, multigrid. A time is one `project`, all in:
+//! N are 16, 32, 64, 96 where left out, and P one of none, jacobi, ipp, multigrid, or reference: that is the f64
+//! solve on the CPU, by a factor where `reference::poisson::BUDGET` holds it and by conjugate gradients, alone. A time is one `project`, all in:
 //! system, solve, gradient, waiting for the device; the median of the repeats after one that warms up. `--passes`
 //! adds each pass's time by the device's clock.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a program")]
@@ -14,6 +15,7 @@ use std::time::Instant;
 use swell::{
     domain::poisson::cases::{Surface, tank, tank_rhs},
     gpu::{adapter::Context, recording::Timer},
+    reference::poisson::{BUDGET, Solver},
     scene::flip::Preconditioner,
 };
 
@@ -81,6 +83,35 @@ fn main() {
                     }
                 }
             }
+            if only.as_ref().is_none_or(|only| only == "reference") {
+                for budget in [BUDGET, 0] {
+                    print_reference(n, surface, budget);
+                }
+            }
         }
     }
+}
+
+/// One line for the f64 solve with so many bytes for a factor, and what a further right-hand side takes.
+fn print_reference(n: u32, surface: Surface, budget: u64) {
+    let case = tank(n, surface, false);
+    let system = case.system();
+    let b = tank_rhs(&case, &system);
+    let start = Instant::now();
+    let solver = Solver::new(&system, budget).unwrap();
+    let prepared = start.elapsed();
+    let solution = solver.solve(&b);
+    let method = match solver.factor_bytes() {
+        Some(bytes) => format!("f64, {} MiB", bytes >> 20),
+        None => "f64, MIC(0)".to_owned(),
+    };
+    println!(
+        "{n:>4} {:>9}  {:<10}  {method:<14}  {:>10}  {:>8.1e}  {:>7.1}  of which {:.1} prepare",
+        system.cell.len(),
+        format!("{surface:?}"),
+        solution.iterations,
+        solution.residual,
+        1e3 * start.elapsed().as_secs_f64(),
+        1e3 * prepared.as_secs_f64()
+    );
 }

@@ -111,6 +111,34 @@ pub const FAULTS: &[Fault] = &[
             "nearest is \"tolerance\"",
         ],
     ),
+    // Probes.
+    (
+        "[effects]",
+        "[[probe]]\nkind = \"elevaton\"\n\n[effects]",
+        33,
+        &[
+            "probe[0].kind: \"elevaton\" is no probe",
+            "\"elevation\" or \"pressure\" with at",
+        ],
+    ),
+    (
+        "[effects]",
+        "[[probe]]\nkind = \"elevation\"\n\n[effects]",
+        32,
+        &["probe[0].at: missing", "[x, z] of an elevation"],
+    ),
+    (
+        "[effects]",
+        "[[probe]]\nkind = \"pressure\"\nat = [26.0, 1.0, 1.0]\n\n[effects]",
+        34,
+        &["probe[0].at: [26.0, 1.0, 1.0] is outside of the domain"],
+    ),
+    (
+        "[effects]",
+        "[[probe]]\nkind = \"energy\"\nname = \"a/b\"\n\n[effects]",
+        34,
+        &["probe[0].name: \"a/b\" is no safe file name"],
+    ),
     (
         "stroke = 1.5",
         "strok = 1.5",

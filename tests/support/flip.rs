@@ -9,6 +9,7 @@
 use glam::{DVec3, Vec3};
 use swell::{
     domain::{
+        boundary::Boundary,
         bricks::{Bricks, CELLS},
         particles::Particles,
         signed_distance::SignedDistance,
@@ -21,7 +22,6 @@ use swell::{
         plan::{Capacity, Counts},
     },
     solve::{
-        boundary::Boundary,
         flip::{Flip, capacity},
         pbf::device_limits,
     },

@@ -8,13 +8,16 @@
 
 use glam::DVec3;
 use swell::{
-    domain::{bounds::Bounds, particles::Particles, solver::Solver, solver::StepReport},
+    domain::{
+        boundary::Boundary, bounds::Bounds, mesh::TriangleMesh, motion::Motion,
+        particles::Particles, solver::Solver, solver::StepReport,
+    },
     gpu::adapter::Context,
     scene::{
-        Effects, Iteration, Method, Pbf as Settings, Scene, Shot, Solver as SolverSettings, Stop,
-        Water, plan::*,
+        Effects, Iteration, Method, Pbf as Settings, PlacedMesh, Placement, Scene, Shot,
+        Solver as SolverSettings, Stop, Water, moving_solid::MovingSolid, plan::*,
     },
-    solve::{boundary::Boundary, pbf},
+    solve::pbf,
 };
 
 pub const D: f64 = 0.1;
@@ -60,6 +63,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
             }),
         },
         grids: None,
+        probes: Vec::new(),
         effects: Effects::default(),
     }
 }
@@ -142,4 +146,46 @@ pub fn max_distance(a: &Particles, b: &Particles) -> f64 {
         .zip(&b.position)
         .map(|(a, b)| glam::Vec3::from_array(*a).distance(glam::Vec3::from_array(*b)) as f64)
         .fold(0.0, f64::max)
+}
+
+/// A box's surface.
+pub fn box_mesh(bounds: Bounds) -> TriangleMesh {
+    let corner = |i: usize| {
+        let pick = |axis: usize| {
+            if i >> axis & 1 == 0 {
+                bounds.min[axis]
+            } else {
+                bounds.max[axis]
+            }
+        };
+        DVec3::new(pick(0), pick(1), pick(2))
+    };
+    let quads = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    TriangleMesh {
+        vertices: (0..8).map(corner).collect(),
+        triangles: quads.into_iter().flat_map(halves).collect(),
+    }
+}
+
+/// A box that moves.
+pub fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
+    MovingSolid {
+        placed: PlacedMesh {
+            file: "box.obj".into(),
+            file_hash: String::new(),
+            placement: Placement::default(),
+            world_from_file: Default::default(),
+            mesh: box_mesh(bounds),
+        },
+        direction,
+        motion,
+    }
 }

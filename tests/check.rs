@@ -1,0 +1,278 @@
+//! `check` passes on what the device computes, and each of its rows fails where that pass is spoiled.
+#![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
+
+mod check_controls;
+mod support;
+
+use swell::{
+    domain::{particles::Particles, sampling::BoundarySample, signed_distance::SignedDistance},
+    gpu::adapter::{Context, Spoil},
+    scene::{
+        Effects, Iteration, Method, Scene, Stop,
+        effects::{viscosity, vorticity_confinement},
+        flip::{Preconditioner, Pressure, Surface, Transfer},
+    },
+    stage::{
+        check::{Table, check_frame, pbf},
+        prepare::Start,
+    },
+};
+
+use check_controls::{Control, control, flip::FLIP, pbf::PBF};
+use glam::DVec3;
+use support::{D, context, jitter, lattice, noise};
+
+/// A floor at 0.23 m as a solid: it cuts cells.
+fn floor() -> (Vec<BoundarySample>, SignedDistance) {
+    let samples = (0..144).map(|k| BoundarySample {
+        position: DVec3::new(
+            0.1 * f64::from(k % 12) + 0.05,
+            0.23,
+            0.1 * f64::from(k / 12) + 0.05,
+        ),
+        normal: DVec3::Y,
+        area: 0.01,
+    });
+    let dims = [16, 10, 16];
+    let value = |k: usize| (0.1 * (k / 16 % 10) as f64 - 0.1 - 0.23) as f32;
+    let distance = SignedDistance {
+        origin: DVec3::new(-0.15, -0.1, -0.15),
+        spacing: 0.1,
+        dims,
+        values: (0..dims.iter().product()).map(value).collect(),
+    };
+    (samples.collect(), distance)
+}
+
+/// So small that corrections take particles past the displacement cap.
+const CFL: f64 = 0.1;
+
+/// Moving water of 8 × 6 × 7 particles over a floor, pressed together, in a box of more than one block of cells.
+fn case(method: Method) -> (Scene, Start) {
+    let mut scene = support::scene([1.6, 6.4, 1.6]);
+    scene.solver.method = method;
+    scene.solver.flip = Some(swell::scene::flip::Flip {
+        cell_size: 2.0 * D,
+        particles_per_cell: 8,
+        transfer: Transfer::Flip,
+        pic_blend: 0.05,
+        cfl: CFL,
+        max_substeps: 32,
+        surface: Surface::GhostFluid,
+        density_correction: true,
+        pressure: Pressure {
+            preconditioner: Preconditioner::Multigrid,
+            tolerance: 1e-5,
+            max_iterations: 40,
+            residual_limit: 1e9,
+        },
+    });
+    scene.effects = Effects {
+        viscosity: Some(viscosity::Settings { xsph: 0.1 }),
+        vorticity_confinement: Some(vorticity_confinement::Settings { strength: 1.0 }),
+    };
+    scene.solver.pbf.as_mut().unwrap().cfl = CFL;
+    let mut particles = lattice([-0.01, 0.2, -0.01], [8, 6, 7], [0.9 * D; 3]);
+    jitter(&mut particles, 0.02 * D);
+    for (k, v) in particles.velocity.iter_mut().enumerate() {
+        *v = std::array::from_fn(|axis| noise(3 * k as u64 + axis as u64 + 7) as f32);
+    }
+    let (samples, distance) = floor();
+    let start = Start {
+        particles,
+        removed: 0,
+        boundary: swell::domain::boundary::Boundary {
+            samples: if method == Method::Pbf {
+                samples
+            } else {
+                Vec::new()
+            },
+            distance: Some(distance),
+            moving: Vec::new(),
+        },
+    };
+    (scene, start)
+}
+
+fn run(context: &Context, scene: &Scene, start: &Start) -> Table {
+    check_frame(context, scene, start, 0, &start.particles).unwrap()
+}
+
+fn over(table: &Table) -> Vec<(&'static str, &'static str)> {
+    let rows = table.rows.iter().filter(|row| !row.is_within());
+    rows.map(|row| (row.field.pass, row.field.name)).collect()
+}
+
+fn lines(table: &Table) -> String {
+    let line = |row: &swell::compare::check::Row| {
+        format!(
+            "{} {}: {} values, {} ties, {} over, {:?}\n",
+            row.field.pass, row.field.name, row.values, row.ties, row.over, row.worst
+        )
+    };
+    table.rows.iter().map(line).collect()
+}
+
+/// Rows that other passes' faults may turn too: they follow from everything.
+const FOLLOW: [&str; 3] = ["whole solve", "whole projection", "whole correction"];
+
+/// Passes of `elsewhere` have their controls in another test.
+fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], elsewhere: &[&str]) {
+    let clean = run(context, scene, start);
+    assert!(over(&clean).is_empty(), "{}", lines(&clean));
+    let mut faults = String::new();
+    for Control {
+        spoil,
+        pass,
+        fields,
+        follow,
+    } in controls
+    {
+        let mut spoiled = context.clone();
+        spoiled.spoil = Some(*spoil);
+        let table = match check_frame(&spoiled, scene, start, 0, &start.particles) {
+            Ok(table) => table,
+            Err(error) => {
+                faults += &format!("{spoil:?}: {error}\n");
+                continue;
+            }
+        };
+        let found = over(&table);
+        let is_seen = fields.iter().all(|field| found.contains(&(*pass, *field)));
+        // Each pass is given the inputs that the device had: no fault spreads.
+        let is_alone = found
+            .iter()
+            .all(|(other, _)| other == pass || FOLLOW.contains(other) || follow.contains(other));
+        if !is_seen || !is_alone {
+            faults += &format!("{spoil:?}: {found:?}\n");
+        }
+    }
+    let covered = |row: &swell::compare::check::Row| {
+        let field = row.field;
+        let is_of =
+            |control: &Control| control.pass == field.pass && control.fields.contains(&field.name);
+        controls.iter().any(is_of) || elsewhere.contains(&field.pass)
+    };
+    for row in clean.rows.iter().filter(|row| !covered(row)) {
+        faults += &format!("no control: {} {}\n", row.field.pass, row.field.name);
+    }
+    assert!(faults.is_empty(), "{faults}");
+}
+
+#[test]
+fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
+    let (scene, start) = case(Method::Pbf);
+    let context = context();
+    hold(&context, &scene, &start, PBF, &["upload of solids"]);
+    let clean = run(&context, &scene, &start);
+    assert!(clean.unchecked.is_empty(), "{:?}", clean.unchecked);
+
+    // A solid that is not where the reference has it.
+    let mut moved = start.boundary.clone();
+    moved.samples[3].position.x += 1e-6;
+    moved.samples[4].area *= 1.00001;
+    let plan = start.plan(&scene, swell::solve::pbf::device_limits(&context));
+    let boundaries = [&start.boundary, &moved];
+    let table = pbf::check(&context, &scene, plan, boundaries, 0, &start.particles).unwrap();
+    let found = over(&table);
+    assert!(
+        found.contains(&("upload of solids", "sample positions")),
+        "{found:?}"
+    );
+    assert!(
+        found.contains(&("upload of solids", "sample weights")),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn pbf_until_a_density_error() {
+    let (mut scene, start) = case(Method::Pbf);
+    let settings = scene.solver.pbf.as_mut().unwrap();
+    settings.iteration = Iteration::Chebyshev;
+    settings.relaxation = 0.7;
+    settings.artificial_pressure = 0.1;
+    settings.stop = Stop::DensityError {
+        density_error: 0.04,
+        max_iterations: 8,
+    };
+    let controls = [
+        control(
+            "pbf/sum_error",
+            "max(density[i] - 1.0, 0.0)",
+            "abs(density[i] - 1.0)",
+            "pbf/sum_error",
+            &["sums of density error"],
+        ),
+        control(
+            "pbf/decide",
+            "control[1] += 1u",
+            "control[1] += 2u",
+            "pbf/decide",
+            &["done, iterations"],
+        ),
+        control(
+            "pbf/compute_lambda",
+            "density[i] = relative_density",
+            "density[i] = relative_density * 1.0001",
+            "pbf/compute_lambda",
+            &["relative density"],
+        ),
+        control(
+            "pbf/compute_delta",
+            "(phase.acceleration - 1.0) * last",
+            "phase.acceleration * last",
+            "pbf/compute_delta",
+            &["corrected position"],
+        ),
+        control(
+            "pbf/compute_delta",
+            "scale -= artificial_pressure",
+            "scale += artificial_pressure",
+            "pbf/compute_delta",
+            &["corrected position"],
+        ),
+    ];
+    let elsewhere: Vec<&str> = PBF.iter().map(|control| control.pass).collect();
+    hold(
+        &context(),
+        &scene,
+        &start,
+        &controls,
+        &[&elsewhere[..], &["upload of solids"]].concat(),
+    );
+}
+
+#[test]
+fn flip_is_within_tolerance_and_each_row_fails_where_it_should() {
+    let (scene, start) = case(Method::Flip);
+    let context = context();
+    let sort = [
+        "sort/scan_blocks",
+        "sort/add_block_sums",
+        "sort/place",
+        "sort/stabilize",
+    ];
+    hold(&context, &scene, &start, FLIP, &sort);
+    let clean = run(&context, &scene, &start);
+    let unknown = clean
+        .unchecked
+        .iter()
+        .find(|(_, why)| *why == "no f64 twin");
+    assert!(unknown.is_none(), "{unknown:?}");
+}
+
+/// A fault that no longer fits its shader is an error, and not a control that passes.
+#[test]
+fn a_fault_has_to_occur() {
+    let (scene, start) = case(Method::Pbf);
+    let mut context = context();
+    context.spoil = Some(Spoil {
+        pass: "pbf/predict",
+        from: "no such text",
+        to: "",
+    });
+    let particles: &Particles = &start.particles;
+    let error = check_frame(&context, &scene, &start, 0, particles).unwrap_err();
+    assert!(error.to_string().contains("no such text"), "{error}");
+}

@@ -1,0 +1,142 @@
+//! The whole program in a folder of its own.
+#![allow(
+    dead_code,
+    missing_docs,
+    unreachable_pub,
+    reason = "each test binary uses its part"
+)]
+
+use std::{
+    fs,
+    path::PathBuf,
+    process::{Command, Output},
+};
+
+use swell::cache::directory_hash;
+use tempfile::TempDir;
+
+const SCENE: &str = r#"
+[shot]
+name = "small"
+frames = 8
+frames_per_second = 60
+
+[domain]
+min = [-1.0, 0.5, 0.25]
+max = [1.0, 2.5, 1.25]
+
+[[water.block]]
+min = [-1.0, 0.5, 0.25]
+max = [-0.2, 1.5, 1.25]
+
+[[solid]]
+mesh = "box.obj"
+
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "sine", stroke = 0.3, period = 0.5, ramp = 0.1 }
+
+[solver]
+method = "pbf"
+
+[solver.pbf]
+particle_spacing = 0.1
+
+[solver.flip]
+cell_size = 0.2
+
+[effects]
+viscosity = { xsph = 0.02 }
+"#;
+
+const BOX: &str = "v 0.3 0.5 0.5\nv 0.7 0.5 0.5\nv 0.7 1.0 0.5\nv 0.3 1.0 0.5\n\
+    v 0.3 0.5 0.9\nv 0.7 0.5 0.9\nv 0.7 1.0 0.9\nv 0.3 1.0 0.9\n\
+    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
+
+const LOOK: &str = r#"
+[camera]
+focal_length_mm = 35.0
+film_back_mm = [36.0, 20.25]
+position = [-2.0, 3.0, 2.5]
+target = [0.0, 1.0, 0.75]
+
+[image]
+width = 64
+height = 36
+samples = 1
+
+[sky]
+model = "hosek_wilkie"
+
+[sun]
+azimuth_degrees = 120.0
+elevation_degrees = 35.0
+
+[output]
+formats = ["png", "exr"]
+aovs = ["Z"]
+"#;
+
+const STUDY: &str = r#"
+kind = "solver_comparison"
+scene = "small.toml"
+look = "look.toml"
+solvers = ["pbf", "flip"]
+frames = "1-6"
+pictures = "3-6x3"
+"#;
+
+/// A folder with a scene, its mesh, two looks and a study, in which the program runs.
+pub struct Job {
+    pub folder: TempDir,
+}
+
+impl Job {
+    pub fn new() -> Self {
+        let folder = TempDir::new().unwrap();
+        fs::write(folder.path().join("small.toml"), SCENE).unwrap();
+        fs::write(folder.path().join("box.obj"), BOX).unwrap();
+        fs::write(folder.path().join("look.toml"), LOOK).unwrap();
+        fs::write(folder.path().join("study.toml"), STUDY).unwrap();
+        fs::write(
+            folder.path().join("wide.toml"),
+            LOOK.replace("35.0", "24.0"),
+        )
+        .unwrap();
+        Self { folder }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn edit(&self, file: &str, from: &str, to: &str) {
+        let text = fs::read_to_string(self.path(file)).unwrap();
+        assert!(text.contains(from), "{from}");
+        fs::write(self.path(file), text.replace(from, to)).unwrap();
+    }
+
+    pub fn command(&self, words: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_swell"));
+        command
+            .current_dir(self.folder.path())
+            .args(words.split_whitespace());
+        command
+    }
+
+    pub fn run(&self, words: &str) -> Output {
+        self.command(words).output().unwrap()
+    }
+
+    /// Runs and expects an exit code; gives what was said on standard error.
+    pub fn expect(&self, code: i32, words: &str) -> String {
+        let output = self.run(words);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "swell {words}: {said}");
+        said
+    }
+
+    pub fn hash(&self, cache: &str) -> String {
+        directory_hash(&self.path(cache)).unwrap()
+    }
+}
