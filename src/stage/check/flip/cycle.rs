@@ -142,24 +142,25 @@ impl Block {
             if a[k][k] < LEAST_PIVOT * self.matrix[k][k] {
                 return None;
             }
-            for i in k + 1..8 {
-                let factor = a[i][k] / a[k][k];
-                for j in k..8 {
-                    a[i][j] -= factor * a[k][j];
+            let (pivots, known) = (a[k], rhs[k]);
+            for (row, rhs) in a.iter_mut().zip(&mut rhs).skip(k + 1) {
+                let factor = row[k] / pivots[k];
+                for (value, pivot) in row.iter_mut().zip(&pivots).skip(k) {
+                    *value -= factor * pivot;
                 }
-                for n in 0..N {
-                    rhs[i][n] -= factor * rhs[k][n];
+                for (value, known) in rhs.iter_mut().zip(&known) {
+                    *value -= factor * known;
                 }
             }
         }
         for k in (0..8).rev() {
-            for n in 0..N {
+            rhs[k] = std::array::from_fn(|n| {
                 let known: f64 = (k + 1..8).map(|j| a[k][j] * rhs[j][n]).sum();
-                rhs[k][n] = match is_row(k) {
+                match is_row(k) {
                     true => (rhs[k][n] - known) / a[k][k],
                     false => 0.0,
-                };
-            }
+                }
+            });
         }
         Some(rhs)
     }
