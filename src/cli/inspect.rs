@@ -167,6 +167,9 @@ fn show_cache(
         "{} a second, d = {} m",
         manifest.frames_per_second, manifest.particle_spacing
     )?;
+    if manifest.origin != [0.0; 3] {
+        writeln!(out, "solved about the origin {:?} m", manifest.origin)?;
+    }
     let has_projection = entries
         .iter()
         .any(|entry| entry.report.get("projection").is_some());
