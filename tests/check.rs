@@ -10,7 +10,7 @@ use swell::{
     scene::{
         Effects, Iteration, Method, Scene, Stop,
         effects::{viscosity, vorticity_confinement},
-        flip::{Preconditioner, Pressure, Surface, Transfer},
+        flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
     },
     stage::{
         check::{Table, check_frame, pbf},
@@ -62,6 +62,7 @@ fn case(method: Method) -> (Scene, Start) {
         density_correction: true,
         pressure: Pressure {
             preconditioner: Preconditioner::Multigrid,
+            precision: Precision::F32Refined,
             tolerance: 1e-5,
             max_iterations: 40,
             residual_limit: 1e9,

@@ -198,11 +198,15 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.flip.density_correction", "true or false"),
     (
         "solver.flip.pressure",
-        "a table of preconditioner, tolerance, max_iterations, residual_limit",
+        "a table of preconditioner, precision, tolerance, max_iterations, residual_limit",
     ),
     (
         "solver.flip.pressure.preconditioner",
         "\"none\", \"jacobi\", \"ipp\" or \"multigrid\"",
+    ),
+    (
+        "solver.flip.pressure.precision",
+        "\"f32\", \"f32_refined\", or \"f64\" where the adapter has it",
     ),
     (
         "solver.flip.pressure.tolerance",

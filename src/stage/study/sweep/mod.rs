@@ -33,7 +33,7 @@ use ledger::{Ledger, Record, Run, Verdict};
 use projection::Projections;
 
 /// Changes whenever what a line holds does.
-const FORM: &str = "swell sweep 1";
+const FORM: &str = "swell sweep 2";
 
 /// What the points of a sweep share.
 struct Bench<'a> {
