@@ -317,7 +317,10 @@ fn each_precision_stalls_where_it_has_to() {
         plain_truth < stall && plain_truth > 1e-2 * stall,
         "{plain_truth:e} {stall:e}"
     );
-    assert!((plain.residual / plain_truth - 1.0).abs() < 0.1, "{plain:?} {plain_truth:e}");
+    assert!(
+        (plain.residual / plain_truth - 1.0).abs() < 0.1,
+        "{plain:?} {plain_truth:e}"
+    );
     let (refined, refined_truth, _, _) = solve_in(Precision::F32Refined, 1e-9);
     // Two words hold x to ε², but the residual is a sum of f32 fluxes, rounded at ε of ‖b‖ a few times over.
     assert!(
@@ -351,7 +354,10 @@ fn f64_takes_pockets_and_corrections() {
         remove_means(&mut b, &known);
         rig.set_rhs(&b);
         let projected = rig.project(None);
-        assert!(!projected.solved.is_missed, "{preconditioner:?} {projected:?}");
+        assert!(
+            !projected.solved.is_missed,
+            "{preconditioner:?} {projected:?}"
+        );
         assert_eq!(projected.pockets, 1);
         rig.program
             .upload("density_excess", 0, &vec![0.01f32; rig.case.kind.len()]);
@@ -379,14 +385,21 @@ fn a_precision_takes_its_own_bytes_and_features() {
     assert_eq!((double.0, double.1), (2 * cells, 2 * cells));
     assert_eq!(refined.2 - plain.2, cells);
     // Six vectors and the rows' share of air, the sums, and five scalars.
-    assert_eq!(double.2 - plain.2, 7 * cells + 4 * (slots as u64 + 1024) + 20);
+    assert_eq!(
+        double.2 - plain.2,
+        7 * cells + 4 * (slots as u64 + 1024) + 20
+    );
 
     let context = context();
     assert!(!context.has_f64);
     let error = swell::gpu::program::Program::new(
         &context,
         &[],
-        &passes(&in_precision(Precision::F64, 1e-5), SceneSurface::GhostFluid, true),
+        &passes(
+            &in_precision(Precision::F64, 1e-5),
+            SceneSurface::GhostFluid,
+            true,
+        ),
         &[],
     );
     assert!(matches!(error, Err(GpuError::NoF64 { .. })), "{error:?}");

@@ -184,14 +184,8 @@ fn mirrors_match_naga() {
     // The one struct whose members are wider where the projection is in f64.
     let wide = shader::compose("pressure/advance", &["F64"]).unwrap();
     let layouts = reflect("pressure/advance", &wide).unwrap().layouts;
-    let (size, members) = (
-        size_of::<PressureControl64>(),
-        PressureControl64::members(),
-    );
-    assert_eq!(
-        check(&layouts, "PressureControl", size, &members),
-        Ok(true)
-    );
+    let (size, members) = (size_of::<PressureControl64>(), PressureControl64::members());
+    assert_eq!(check(&layouts, "PressureControl", size, &members), Ok(true));
     let (size, members) = (size_of::<PressureControl>(), PressureControl::members());
     check(&layouts, "PressureControl", size, &members).unwrap_err();
 

@@ -117,8 +117,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/project",
-        "-= select",
-        "+= select",
+        "- change)",
+        "+ change)",
         "pressure/project",
         &["velocity at faces"],
     ),
@@ -131,8 +131,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/density_source",
-        "excess * phase.cell_size",
-        "excess * phase.cell_size * 1.001",
+        "real(excess)",
+        "real(excess) * 1.001",
         "pressure/density_source",
         &["right-hand side"],
     ),
@@ -276,8 +276,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/reduce",
-        "let target_square = phase",
-        "let target_square = 1e6 * phase",
+        "let target_square = real",
+        "let target_square = 1e6 * real",
         "whole projection",
         &[
             "‖b − A x‖ / ‖b‖",
@@ -288,8 +288,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/reduce",
-        "let target_square = phase",
-        "let target_square = 1e6 * phase",
+        "let target_square = real",
+        "let target_square = 1e6 * real",
         "whole correction",
         &["‖b − A x‖ / ‖b‖"],
     ),

@@ -16,6 +16,10 @@
 //! device = "gpu"                              # or "cpu", the f64 reference
 //! against = "jacobi"                          # value by value against that method, not against the own finest run
 //! ```
+//!
+//! `key = "device"` with the values `"cpu"` and `"gpu"` sweeps what it runs on. `coarser = ["solver.flip.cell_size=0.4"]`, for
+//! all or for one method, is laid over the last value's run: what that is off by is the discretisation error, beside which
+//! the knee is told.
 
 use std::{collections::BTreeSet, ops::Range, path::Path};
 
@@ -24,12 +28,15 @@ use toml::{Spanned, Value, de::DeTable};
 
 use super::{
     super::{Fault, Method, Place, Scene, document::Document, error::SceneError, physics_hash},
-    StudyFileError,
+    StudyFileError, unreadable,
 };
 use crate::domain::sampling::fill_water;
 
 /// The key that changes the length of a frame.
 pub const FRAME_RATE: &str = "shot.frames_per_second";
+
+/// The key that changes what a run is on, and nothing in the scene.
+const DEVICE: &str = "device";
 
 /// Times, equally spaced, at which a run is compared with the finest.
 pub const SAMPLES: u32 = 10;
@@ -63,8 +70,6 @@ pub struct Sweep {
 pub struct Line {
     /// For the legend.
     pub name: String,
-    /// What its runs are on.
-    pub device: LineDevice,
     /// The line whose run of the same value each of these is held against; its own finest run where `None`. Only of
     /// [`Measure::Finest`].
     pub against: Option<usize>,
@@ -72,10 +77,12 @@ pub struct Line {
     pub key: String,
     /// From coarse to fine.
     pub points: Vec<Point>,
+    /// The last of them, coarser: what its error is told beside. Of [`Measure::Finest`] and [`Measure::Projection`].
+    pub coarser: Option<Point>,
 }
 
-/// What a method runs on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a run is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LineDevice {
     /// The study's adapter, in f32.
     Gpu,
@@ -102,6 +109,8 @@ pub struct Point {
     pub scene: Scene,
     /// Output frames to run.
     pub frames: u32,
+    /// What it runs on.
+    pub device: LineDevice,
 }
 
 /// How errors are measured.
@@ -204,6 +213,7 @@ struct SweepSpec {
     set: Vec<Spanned<String>>,
     key: Option<Spanned<String>>,
     values: Option<Spanned<Vec<Spanned<Value>>>>,
+    coarser: Option<Spanned<Vec<Spanned<String>>>>,
     steps: Option<Spanned<i64>>,
     seconds: Option<Spanned<f64>>,
     repeats: Option<Spanned<i64>>,
@@ -221,6 +231,7 @@ struct MethodSpec {
     set: Vec<Spanned<String>>,
     key: Option<Spanned<String>>,
     values: Option<Spanned<Vec<Spanned<Value>>>>,
+    coarser: Option<Spanned<Vec<Spanned<String>>>>,
     device: Option<Spanned<String>>,
     against: Option<Spanned<String>>,
 }
@@ -255,6 +266,10 @@ pub(super) fn parse(
     for (place, method) in spec.method.get_ref().iter().enumerate() {
         if let Some(name) = &method.get_ref().against {
             lines[place].against = Some(against(doc, name, &lines, place, errors[0])?);
+            if lines[place].coarser.is_some() {
+                let problem = "with coarser, and these are not held against the own finest run";
+                return Err(doc.fault_at(name.span(), problem).into());
+            }
         }
     }
     let points: usize = lines.iter().map(|line| line.points.len()).sum();
@@ -319,7 +334,7 @@ fn whole(
 /// What projections start from: the scene with what is set for all.
 fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point, SceneError> {
     let fixed: Vec<_> = spec.set.iter().collect();
-    let scene = load(doc, &base_dir.join(spec.scene.get_ref()), &fixed, None)?;
+    let scene = load(doc, spec, base_dir, &fixed, None)?;
     if scene.solver.method != Method::Flip {
         let problem = "these are measured with solver.method flip, which set does not choose";
         return Err(doc.fault_at(spec.errors.span(), problem));
@@ -328,6 +343,7 @@ fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point,
         label: String::new(),
         frames: frames(doc, spec, &scene)?,
         scene,
+        device: LineDevice::Gpu,
     })
 }
 
@@ -340,11 +356,16 @@ fn check_fit(
     state: Option<&Point>,
 ) -> Result<(), SceneError> {
     let fault = |problem: String| Err(doc.fault_at(spec.errors.span(), problem));
+    let of_frames = |_: &&Point| error.measure() == Measure::Finest;
     for Point {
         scene,
         frames,
         label,
-    } in &line.points
+        ..
+    } in line
+        .points
+        .iter()
+        .chain(line.coarser.iter().filter(of_frames))
     {
         if error.measure() == Measure::Finest && frames % SAMPLES != 0 {
             return fault(format!(
@@ -424,21 +445,19 @@ fn against(
     Ok(found)
 }
 
-/// What a method says that it runs on.
+/// What a word of the study, at `at`, says that is run on.
 fn device(
     doc: &Document<'_>,
     spec: &SweepSpec,
-    method: &MethodSpec,
+    word: &str,
+    at: Range<usize>,
 ) -> Result<LineDevice, SceneError> {
-    let Some(word) = &method.device else {
-        return Ok(LineDevice::Gpu);
-    };
-    let fault = |problem: &str| Err(doc.fault_at(word.span(), problem));
+    let fault = |problem: &str| Err(doc.fault_at(at.clone(), problem));
     let named = |wanted: &str| spec.errors.get_ref().iter().any(|e| e.get_ref() == wanted);
     let is_projection = ErrorMeasure::NAMED
         .iter()
         .any(|(name, error)| error.measure() == Measure::Projection && named(name));
-    match word.get_ref().as_str() {
+    match word {
         "gpu" => Ok(LineDevice::Gpu),
         "cpu" if is_projection => {
             fault("the reference's projection is what these errors are measured against")
@@ -460,22 +479,43 @@ fn line(
     let key = key.ok_or_else(|| doc.missing(at.clone(), "key"))?;
     let values = method.values.as_ref().or(spec.values.as_ref());
     let values = values.ok_or_else(|| doc.missing(at, "values"))?;
-    let file = base_dir.join(spec.scene.get_ref());
     let fixed: Vec<_> = spec.set.iter().chain(&method.set).collect();
     // The rate that the scene itself has, to which what is taken a frame is tied.
-    let own_rate = load(doc, &file, &fixed, None)?.shot.frames_per_second;
-    let mut seen = BTreeSet::new();
-    let mut points = Vec::new();
-    for value in values.get_ref() {
-        let swept = (
-            format!("{}={}", key.get_ref(), value.get_ref()),
-            value.span(),
-        );
-        let mut scene = load(doc, &file, &fixed, Some(swept))?;
+    let own_rate = load(doc, spec, base_dir, &fixed, None)?
+        .shot
+        .frames_per_second;
+    let loaded = |fixed: &[&Spanned<String>], swept| {
+        let mut scene = load(doc, spec, base_dir, fixed, swept)?;
         if key.get_ref() == FRAME_RATE {
             tie_pic_blend(&mut scene, own_rate);
         }
-        let is_new = seen.insert(physics_hash(&scene));
+        Ok::<_, SceneError>(scene)
+    };
+    let is_device = key.get_ref() == DEVICE;
+    let own_device = match &method.device {
+        None => LineDevice::Gpu,
+        Some(word) if is_device => {
+            return Err(doc.fault_at(word.span(), "the key is the device itself"));
+        }
+        Some(word) => device(doc, spec, word.get_ref(), word.span())?,
+    };
+    let on = |value: &Spanned<Value>| match is_device {
+        true => {
+            let word = value.get_ref().as_str().unwrap_or_default();
+            device(doc, spec, word, value.span())
+        }
+        false => Ok(own_device),
+    };
+    let swept = |value: &Spanned<Value>| {
+        let text = || format!("{}={}", key.get_ref(), value.get_ref());
+        (!is_device).then(|| (text(), value.span()))
+    };
+    let mut seen = BTreeSet::new();
+    let mut points = Vec::new();
+    for value in values.get_ref() {
+        let scene = loaded(&fixed, swept(value))?;
+        let device = on(value)?;
+        let is_new = seen.insert((physics_hash(&scene), device));
         if !is_new {
             let problem = format!(
                 "the scene is the same as with a value before it: {} changes nothing with solver.method {:?}, or the value \
@@ -489,31 +529,87 @@ fn line(
             label: doc.text_at(value.span()).trim_matches('"').to_owned(),
             frames: frames(doc, spec, &scene)?,
             scene,
+            device,
         });
     }
-    if points.len() < 2 {
-        return Err(doc.fault_at(values.span(), "a sweep has two values or more"));
-    }
+    let last = match values.get_ref().last() {
+        Some(last) if points.len() >= 2 => last,
+        _ => return Err(doc.fault_at(values.span(), "a sweep has two values or more")),
+    };
+    let coarser = match method.coarser.as_ref().or(spec.coarser.as_ref()) {
+        None => None,
+        Some(set) => {
+            let fixed: Vec<_> = fixed.iter().copied().chain(set.get_ref()).collect();
+            let scene = loaded(&fixed, swept(last))?;
+            check_coarser(doc, spec, set, &scene, &points[points.len() - 1].scene)?;
+            let texts: Vec<_> = set
+                .get_ref()
+                .iter()
+                .map(|text| text.get_ref().as_str())
+                .collect();
+            Some(Point {
+                label: texts.join(" and "),
+                frames: frames(doc, spec, &scene)?,
+                scene,
+                device: on(last)?,
+            })
+        }
+    };
     Ok(Line {
         name: method.name.get_ref().clone(),
-        device: device(doc, spec, method)?,
         against: None,
         key: key.get_ref().clone(),
         points,
+        coarser,
     })
+}
+
+/// Whether `coarser` can tell what `finest` is off by.
+fn check_coarser(
+    doc: &Document<'_>,
+    spec: &SweepSpec,
+    set: &Spanned<Vec<Spanned<String>>>,
+    coarser: &Scene,
+    finest: &Scene,
+) -> Result<(), SceneError> {
+    let fault = |problem: &str| Err(doc.fault_at(set.span(), problem));
+    match errors(doc, &spec.errors)?[0].measure() {
+        Measure::Finest if physics_hash(coarser) != physics_hash(finest) => Ok(()),
+        Measure::Finest => fault("the scene is that of the last value: this changes nothing"),
+        Measure::Projection => {
+            let size = |scene: &Scene| scene.solver.flip().cell_size;
+            let is_same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b;
+            let is_twice = is_same(size(coarser), 2.0 * size(finest))
+                && is_same(coarser.particle_spacing(), finest.particle_spacing())
+                && coarser.domain == finest.domain;
+            match is_twice {
+                true => Ok(()),
+                false => fault(
+                    "a projection is held against one of the same particles on cells twice as large, with eight times as many \
+                     in each",
+                ),
+            }
+        }
+        Measure::Report | Measure::Converged => fault(
+            "these errors say what the iterations leave, which no grid or step is coarser for",
+        ),
+    }
 }
 
 /// The scene with overrides; what is wrong with one of them is said at its place in the study file.
 fn load(
     doc: &Document<'_>,
-    file: &Path,
+    spec: &SweepSpec,
+    base_dir: &Path,
     fixed: &[&Spanned<String>],
     swept: Option<(String, Range<usize>)>,
 ) -> Result<Scene, SceneError> {
+    let file = base_dir.join(spec.scene.get_ref());
     let fixed = fixed.iter().map(|set| (set.get_ref().clone(), set.span()));
     let (overrides, spans): (Vec<_>, Vec<_>) = fixed.chain(swept).unzip();
-    Scene::load(file, &overrides).map_err(|error| {
+    Scene::load(&file, &overrides).map_err(|error| {
         let (text, message) = match &error {
+            SceneError::Read { source, .. } => return unreadable(doc, &spec.scene, &file, source),
             SceneError::Fault(fault) => match fault.as_ref() {
                 Fault {
                     place: Place::Override(text),

@@ -299,7 +299,11 @@ impl PressureSolver {
         let words = precision.terms() * stride * precision.words();
         let words = program.download::<u32>(&[("pressure_solution", words)])?;
         let values = widen(&words[0], precision);
-        let at = |place: usize| (0..precision.terms()).map(|k| values[k * stride + place]).sum();
+        let at = |place: usize| {
+            (0..precision.terms())
+                .map(|k| values[k * stride + place])
+                .sum()
+        };
         Ok(elements.iter().map(|&e| at(blocked(e))).collect())
     }
 

@@ -128,12 +128,7 @@ impl Checker<'_> {
     }
 
     /// The first `count` values of an array of the pressure's own, in the precision that it is kept in.
-    fn reals(
-        &self,
-        traced: Traced<'_>,
-        name: &str,
-        count: usize,
-    ) -> Result<Vec<f64>, SolveError> {
+    fn reals(&self, traced: Traced<'_>, name: &str, count: usize) -> Result<Vec<f64>, SolveError> {
         let words = traced.read::<u32>(name, self.precision().words() * count)?;
         Ok(widen(&words, self.precision()))
     }

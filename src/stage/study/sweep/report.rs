@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fs};
 use crate::{
     scene::{
         Method, asset_path,
-        study::sweep::{ErrorMeasure, FRAME_RATE, Measure, SAMPLES, Sweep},
+        study::sweep::{self, ErrorMeasure, FRAME_RATE, Measure, SAMPLES, Sweep},
     },
     study::{
         convergence_point::{Reading, TABLE_1, convergence_point},
@@ -18,17 +18,18 @@ use crate::{
 
 use super::{
     super::{Outcome, Request, StudyError, write},
-    errors,
+    Devices, errors,
     ledger::{Record, Run, Verdict},
 };
 
 /// What the report is made from.
 struct Results<'a> {
     sweep: &'a Sweep,
-    /// Each line's, with its driver.
-    devices: &'a [String],
-    /// As [`Sweep::lines`].
-    records: &'a [Vec<Record>],
+    devices: &'a Devices,
+    /// As [`Sweep::lines`], without what is coarser.
+    records: Vec<&'a [Record]>,
+    /// Of each line, where it has one.
+    coarser: Vec<Option<&'a Record>>,
     units: Units,
 }
 
@@ -46,13 +47,19 @@ struct Units {
 pub(super) fn write_all(
     request: &Request,
     sweep: &Sweep,
-    devices: &[String],
+    devices: &Devices,
     records: &[Vec<Record>],
 ) -> Result<Outcome, StudyError> {
+    let parts = || sweep.lines.iter().zip(records);
     let results = Results {
         sweep,
         devices,
-        records,
+        records: parts()
+            .map(|(line, all)| &all[..line.points.len()])
+            .collect(),
+        coarser: parts()
+            .map(|(line, all)| all.get(line.points.len()))
+            .collect(),
         units: units(sweep),
     };
     let directory = &request.directory;
@@ -124,7 +131,7 @@ impl Record {
 impl Results<'_> {
     /// An error of point `index` of a line; `None` where it failed, cannot be told, or is its own reference.
     fn error(&self, line: usize, index: usize, error: ErrorMeasure) -> Option<f64> {
-        let records = &self.records[line];
+        let records = self.records[line];
         let (run, reference) = match self.sweep.lines[line].against {
             Some(other) => (&records[index], &self.records[other][index]),
             None => (&records[index], records.last()?),
@@ -132,6 +139,13 @@ impl Results<'_> {
         let is_itself = error.measure() == Measure::Finest && std::ptr::eq(run, reference);
         let run = run.run().filter(|_| !is_itself)?;
         errors::of(error, run, reference.run())
+    }
+
+    /// The error that a line's grid or step itself has, where the study measured one.
+    fn discretisation(&self, line: usize, error: ErrorMeasure) -> Option<f64> {
+        let run = self.coarser[line]?.run()?;
+        let finest = self.records[line].last()?.run();
+        errors::of(error, run, finest).filter(|error| *error > 0.0)
     }
 
     /// Milliseconds: least, median and greatest.
@@ -163,7 +177,7 @@ impl Results<'_> {
                 error: self.error(line, index, error)?,
             })
         };
-        let of = |(k, line): (usize, &crate::scene::study::sweep::Line)| Line {
+        let of = |(k, line): (usize, &sweep::Line)| Line {
             name: line.name.clone(),
             points: (0..line.points.len()).filter_map(|i| point(k, i)).collect(),
         };
@@ -178,7 +192,13 @@ impl Results<'_> {
             )),
             Verdict::Done(_) => None,
         };
-        self.records.iter().flatten().filter_map(failed).collect()
+        self.all().filter_map(failed).collect()
+    }
+
+    /// Every record, what is coarser among them.
+    fn all(&self) -> impl Iterator<Item = &Record> {
+        let lines = self.records.iter().zip(&self.coarser);
+        lines.flat_map(|(records, coarser)| records.iter().chain(*coarser))
     }
 
     /// With the names of their files.
@@ -200,7 +220,8 @@ impl Results<'_> {
                 (Cost::Work, "work", self.work_label()),
             ] {
                 let chart = LogChart {
-                    title: error.title().to_owned(),
+                    title: self.title(),
+                    subtitle: self.subtitle(),
                     x_label,
                     y_label: error.title().to_owned(),
                     cost,
@@ -211,6 +232,27 @@ impl Results<'_> {
             }
         }
         charts
+    }
+
+    /// The shot and what is swept.
+    fn title(&self) -> String {
+        let points = self.sweep.lines.iter().flat_map(|line| &line.points);
+        let shots = unique(points.map(|point| point.scene.shot.name.as_str()));
+        let keys = unique(self.sweep.lines.iter().map(|line| line.key.as_str()));
+        format!("{} by {}", shots.join(", "), keys.join(", "))
+    }
+
+    /// What it ran on, and what the bars are.
+    fn subtitle(&self) -> String {
+        let points = self.sweep.lines.iter().flat_map(|line| &line.points);
+        let names: Vec<_> = points
+            .map(|point| self.devices.of(point).identity().name)
+            .collect();
+        let on = unique(names.iter().map(String::as_str)).join(" and ");
+        match self.sweep.repeats {
+            1 => format!("on {on}"),
+            repeats => format!("on {on}; bars from the least to the greatest of {repeats}"),
+        }
     }
 
     fn work_label(&self) -> String {
@@ -230,7 +272,7 @@ impl Results<'_> {
             for (index, line) in lines.iter().enumerate() {
                 findings.push((
                     format!("{}, {}", error.name(), line.name),
-                    knee::words(line),
+                    knee::words(line, self.discretisation(index, error)),
                 ));
                 // Lines that are measured against references of their own are no rivals.
                 if lines.len() > 1 && error.measure() != Measure::Finest {
@@ -246,9 +288,7 @@ impl Results<'_> {
 
     fn csv(&self) -> String {
         let mut rows = vec![self.titles()];
-        for (line, records) in self.records.iter().enumerate() {
-            rows.extend((0..records.len()).map(|index| self.row(line, index)));
-        }
+        rows.extend(self.rows());
         let quoted = |cell: &String| match cell.contains([',', '"', '\n']) {
             true => format!("\"{}\"", cell.replace('"', "\"\"")),
             false => cell.clone(),
@@ -287,11 +327,29 @@ impl Results<'_> {
         titles
     }
 
-    fn row(&self, line: usize, index: usize) -> Vec<String> {
-        let record = &self.records[line][index];
+    /// Line by line, what is coarser last.
+    fn rows(&self) -> Vec<Vec<String>> {
+        let mut rows = Vec::new();
+        for (k, line) in self.sweep.lines.iter().enumerate() {
+            for (index, (point, record)) in line.points.iter().zip(self.records[k]).enumerate() {
+                rows.push(self.row(point, record, |error| self.error(k, index, error)));
+            }
+            if let (Some(point), Some(record)) = (&line.coarser, self.coarser[k]) {
+                rows.push(self.row(point, record, |error| self.discretisation(k, error)));
+            }
+        }
+        rows
+    }
+
+    fn row(
+        &self,
+        point: &sweep::Point,
+        record: &Record,
+        error_of: impl Fn(ErrorMeasure) -> Option<f64>,
+    ) -> Vec<String> {
         let mut row = vec![
             record.method.clone(),
-            self.sweep.lines[line].device.name().to_owned(),
+            point.device.name().to_owned(),
             record.key.clone(),
             record.setting.clone(),
         ];
@@ -313,10 +371,10 @@ impl Results<'_> {
             run.iterations.to_string(),
             run.missed.to_string(),
         ]);
-        let errors = self.sweep.errors.iter().map(|&error| {
-            let value = self.error(line, index, error);
-            value.map_or(String::new(), |value| format!("{value:.4e}"))
-        });
+        let errors =
+            self.sweep.errors.iter().map(|&error| {
+                error_of(error).map_or(String::new(), |value| format!("{value:.4e}"))
+            });
         row.extend(errors);
         if self.sweep.has_convergence_point {
             row.extend(Reading::ALL.map(|reading| found(run, reading).unwrap_or_default()));
@@ -353,12 +411,8 @@ impl Results<'_> {
         parts.push(Part::Heading("Curves".into()));
         parts.push(Part::Curves(curves));
         parts.push(Part::Heading("Table".into()));
-        let rows = self.records.iter().enumerate();
-        let rows =
-            rows.flat_map(|(line, records)| (0..records.len()).map(move |index| (line, index)));
-        let rows = rows.map(|(line, index)| self.row(line, index));
         parts.push(Part::Table(
-            [self.titles()].into_iter().chain(rows).collect(),
+            [self.titles()].into_iter().chain(self.rows()).collect(),
         ));
         parts.push(Part::Heading("What was run".into()));
         parts.push(Part::Code(request.command.clone()));
@@ -387,9 +441,15 @@ impl Results<'_> {
 
     /// Which methods ran on what.
     fn where_run(&self) -> String {
-        let mut methods: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-        for (line, device) in self.sweep.lines.iter().zip(self.devices) {
-            methods.entry(device).or_default().push(&line.name);
+        let mut methods: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+        for line in &self.sweep.lines {
+            for point in &line.points {
+                let device = self.devices.of(point).identity().to_string();
+                let names = methods.entry(device).or_default();
+                if names.last() != Some(&line.name.as_str()) {
+                    names.push(&line.name);
+                }
+            }
         }
         let told = methods
             .iter()
@@ -427,7 +487,7 @@ impl Results<'_> {
                 1e-6. It is what further iterations would still have to move; its time is not in the run's."
                 .to_owned(),
             Measure::Projection => {
-                let rows = self.records.iter().flatten().filter_map(|r| r.run()?.projection);
+                let rows = self.all().filter_map(|r| r.run()?.projection);
                 let rows: Vec<_> = rows.collect();
                 let most = rows.iter().map(|p| p.rows).max().unwrap_or(0);
                 let worst = rows.iter().fold(0.0, |worst: f64, p| worst.max(p.exact_residual));
@@ -441,10 +501,20 @@ impl Results<'_> {
                      device has it (up to {most} rows) and solved in f64 by {by}, to a relative residual of {worst:.1e}: p64 \
                      is that solution, u64 the velocities that it leaves on the faces which a projection changes. An error is \
                      solver error alone: the system is the same, so that what the grid or the surface's treatment gets wrong \
-                     is not in it. A solve that missed its tolerance is counted under missed."
+                     is not in it. The pressure is taken as the solve has it; velocities are f32 whatever the solve's precision, and their \
+                     rounding, some 3e-8, is the least error that they can show. A solve that missed its tolerance is counted \
+                     under missed."
                 )
             }
         });
+        if let Some(coarser) = self
+            .sweep
+            .lines
+            .iter()
+            .find_map(|line| line.coarser.as_ref())
+        {
+            texts.push(self.coarser_words(&coarser.label));
+        }
         texts.extend(self.sweep.lines.iter().filter_map(|line| {
             let other = &self.sweep.lines[line.against?];
             Some(format!(
@@ -459,14 +529,26 @@ impl Results<'_> {
         texts
     }
 
+    fn coarser_words(&self, set: &str) -> String {
+        let how = match self.sweep.state {
+            Some(_) => {
+                "the exact projection of the same particles on cells twice as large against that on this grid, where the two have \
+                 faces and centres in common, after the mean over the smaller ones. With an error of first order, as ∇p has at \
+                 the free surface, that is the error of this grid; with one of second order, three times it"
+            }
+            None => "one more run against the same finest one",
+        };
+        format!("The discretisation error, in the rows with the key coarser ({set}): {how}.")
+    }
+
     /// Ours and the paper's, a row for each number of iterations.
     fn convergence_table(&self) -> Vec<Vec<String>> {
         let mut titles = vec!["method".into(), "setting".into(), "ms".into()];
         titles.extend(Reading::ALL.map(|reading| format!("point: {}", reading.text())));
         titles.extend(["the paper's ms".into(), "the paper's point".into()]);
         let mut table = vec![titles];
-        for (line, records) in self.sweep.lines.iter().zip(self.records) {
-            for (point, record) in line.points.iter().zip(records) {
+        for (line, records) in self.sweep.lines.iter().zip(&self.records) {
+            for (point, record) in line.points.iter().zip(*records) {
                 let Some(run) = record.run() else { continue };
                 let mut row = vec![
                     record.method.clone(),
@@ -483,6 +565,17 @@ impl Results<'_> {
         }
         table
     }
+}
+
+/// Each once, in the order in which they come.
+fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut known = Vec::new();
+    for name in names {
+        if !known.contains(&name) {
+            known.push(name);
+        }
+    }
+    known
 }
 
 fn found(run: &Run, reading: Reading) -> Option<String> {
@@ -505,9 +598,10 @@ fn paper(scene: &crate::scene::Scene) -> Option<(f64, u32)> {
     }
 }
 
-const KNEE: &str = "The knee of a line is the setting with the least product of error and time: up to it x times the time buys \
-    more than x times the accuracy, beyond it less. Settings that another of the same line beats in both are left out of the \
-    account.";
+const KNEE: &str = "Where the study measured the discretisation error, the knee of a line is the cheapest setting whose error is \
+    below a tenth of that: what a further one gains is lost in what the grid or the step has wrong. Where it did not, the \
+    least product of error and time stands in for it: up to there x times the time buys more than x times the accuracy, \
+    beyond it less. Settings that another of the same line beats in both are left out of the account.";
 
 const EQUAL_TIME: &str = "At equal time: another line's error at a point's time is read off between its own settings, by \
     straight lines in the logarithmic chart; the ratio is that error over the point's own. Only times between two settings of \
