@@ -221,7 +221,7 @@ impl Results<'_> {
             ] {
                 let chart = LogChart {
                     title: self.title(),
-                    subtitle: self.subtitle(),
+                    subtitle: self.subtitle(cost),
                     x_label,
                     y_label: error.title().to_owned(),
                     cost,
@@ -243,15 +243,17 @@ impl Results<'_> {
     }
 
     /// What it ran on, and what the bars are.
-    fn subtitle(&self) -> String {
+    fn subtitle(&self, cost: Cost) -> String {
         let points = self.sweep.lines.iter().flat_map(|line| &line.points);
         let names: Vec<_> = points
             .map(|point| self.devices.of(point).identity().name)
             .collect();
         let on = unique(names.iter().map(String::as_str)).join(" and ");
-        match self.sweep.repeats {
-            1 => format!("on {on}"),
-            repeats => format!("on {on}; bars from the least to the greatest of {repeats}"),
+        match (cost, self.sweep.repeats) {
+            (Cost::Work, _) | (_, 1) => format!("on {on}"),
+            (Cost::Time, repeats) => {
+                format!("on {on}; bars from the least to the greatest of {repeats}")
+            }
         }
     }
 
