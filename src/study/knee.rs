@@ -60,7 +60,7 @@ pub fn words(line: &Line, discretisation: Option<f64>) -> String {
         None => (
             least,
             format!(
-                "the discretisation error is not known here; the least error × time is at {}",
+                "the discretisation error is not known here; by error × time the knee is {}",
                 least.label
             ),
         ),
@@ -75,7 +75,7 @@ pub fn words(line: &Line, discretisation: Option<f64>) -> String {
             None => (
                 least,
                 format!(
-                    "no setting comes below a tenth of the discretisation error ({error:.2e}); the least error × time is at {}",
+                    "no setting comes below a tenth of the discretisation error ({error:.2e}); by error × time the knee is {}",
                     least.label
                 ),
             ),
@@ -195,7 +195,7 @@ mod tests {
         assert_eq!(knee(&bent).map(|p| p.label.as_str()), Some("s2"));
         let said = words(&bent, None);
         assert!(
-            said.contains("is not known here; the least error × time is at s2"),
+            said.contains("is not known here; by error × time the knee is s2"),
             "{said}"
         );
         assert!(
