@@ -18,6 +18,7 @@ use swell::{
     reference::poisson::gradients::{Precondition, norm, solve},
     scene::flip::{Precision, Preconditioner, Pressure, Surface as SceneSurface},
     solve::pressure::{blocked, buffers, passes},
+    stage::Blame,
 };
 
 const SURFACES: [Surface; 2] = [Surface::Voxel, Surface::GhostFluid];
@@ -402,7 +403,10 @@ fn a_precision_takes_its_own_bytes_and_features() {
         ),
         &[],
     );
-    assert!(matches!(error, Err(GpuError::NoF64 { .. })), "{error:?}");
+    let error = error.unwrap_err();
+    assert!(matches!(error, GpuError::NoF64 { .. }), "{error:?}");
+    // What the commands end with 2 for.
+    assert_eq!(Blame::from(&error), Blame::Input);
 }
 
 /// Water in rock: `rooms` boxes (least, greatest cell) filled to the brim in a box of n³, and a tank below.
