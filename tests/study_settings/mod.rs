@@ -39,7 +39,7 @@ name = "multigrid"
     for (from, to, expected) in [
         (
             "cell_size=0.2",
-            "cell_size=0.3",
+            "cell_size=0.15",
             "s.toml:7: coarser: a projection is held against",
         ),
         (
