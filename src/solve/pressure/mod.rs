@@ -56,7 +56,8 @@ pub use crate::domain::poisson::{AIR, FLUID, SOLID};
 pub use params::{PressureBrick, PressureControl, PressureControl64, PressurePhase};
 pub use plan::{buffers, passes};
 
-use plan::{PHASE_STRIDE, PHASES, Phase, SIZES, Size, control_bytes};
+pub use plan::control_words;
+use plan::{PHASE_STRIDE, PHASES, Phase, SIZES, Size};
 use stages::{SINGLE, Shape, Stages};
 
 /// Levels of bricks that the multigrid uses at most: pass it to [`Bricks::new`] as depth.
@@ -388,8 +389,9 @@ impl PressureSolver {
     }
 }
 
-/// What the device decided, in f64 whatever it computes in.
-fn widen_control(bytes: &[u8], precision: Precision) -> PressureControl64 {
+/// What stands in `pressure_control`, in f64 whatever the device computes in, from its words of 32 bits.
+pub fn widen_control(words: &[u32], precision: Precision) -> PressureControl64 {
+    let bytes: &[u8] = bytemuck::cast_slice(words);
     match precision {
         Precision::F32 | Precision::F32Refined => {
             let narrow: PressureControl = bytemuck::pod_read_unaligned(bytes);
@@ -448,10 +450,10 @@ fn read(
     program: &Program,
     precision: Precision,
 ) -> Result<(PressureControl64, [u32; STATS]), SolveError> {
-    let words = control_bytes(precision) / 4;
+    let words = control_words(precision);
     let read =
         program.download::<u32>(&[("pressure_control", words), ("pressure_stats", STATS)])?;
-    let control = widen_control(bytemuck::cast_slice(&read[0]), precision);
+    let control = widen_control(&read[0], precision);
     let mut stats = [0; STATS];
     stats.copy_from_slice(&read[1]);
     Ok((control, stats))

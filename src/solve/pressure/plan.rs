@@ -167,11 +167,11 @@ fn has_diagonal(settings: &Pressure) -> bool {
     )
 }
 
-/// Size of `pressure_control`.
-pub(super) fn control_bytes(precision: Precision) -> usize {
+/// Words of 32 bits of `pressure_control`.
+pub fn control_words(precision: Precision) -> usize {
     match precision {
-        Precision::F32 | Precision::F32Refined => size_of::<PressureControl>(),
-        Precision::F64 => size_of::<PressureControl64>(),
+        Precision::F32 | Precision::F32Refined => size_of::<PressureControl>() / 4,
+        Precision::F64 => size_of::<PressureControl64>() / 4,
     }
 }
 
@@ -202,7 +202,7 @@ pub fn buffers(settings: &Pressure, has_correction: bool, capacity: usize) -> Ve
         ),
         // A sum a workgroup, and room for those that a dispatch in two dimensions adds.
         storage("pressure_sums", 4 * real * (capacity as u64 + 1024)),
-        storage("pressure_control", control_bytes(precision) as u64),
+        storage("pressure_control", 4 * control_words(precision) as u64),
         storage("pressure_stats", 4 * super::STATS as u64),
         storage("pressure_sizes", 16 * SIZES as u64),
         storage("pressure_groups", 3 * 16 * SIZES as u64),

@@ -17,7 +17,7 @@ use crate::{
         flip::{Centers, Room, Waters, density_source},
         poisson::{BUDGET, Solver, gradients::norm},
     },
-    scene::flip::{Precision, Surface},
+    scene::flip::{Precision, Preconditioner, Surface},
     solve::{
         SolveError,
         pressure::{CORRECTION_TOLERANCE, blocked, widen},
@@ -28,15 +28,15 @@ use crate::{
 /// `state` of a solve that has ended, as in shared/pressure_control.wgsl.
 const DONE: u32 = 2;
 
-/// Runs of pressure/multiply that are compared: each is as good as any.
-const PRODUCTS: usize = 3;
+/// Runs of an iteration's pass that are compared: each is as good as any.
+pub(super) const PRODUCTS: usize = 3;
 
 /// Inverse iterations for the least eigenvalue.
 const EIGEN_STEPS: usize = 8;
 
 /// The device's own system.
 pub(super) struct Built {
-    system: System,
+    pub(super) system: System,
     centers: Centers,
 }
 
@@ -60,7 +60,7 @@ fn flow(bricks: &Bricks, room: &Room, system: &System, velocity: &[DVec3]) -> Ve
 }
 
 /// Σ c |x − x'| and what air takes, of each row.
-fn differences(system: &System, x: &[f64]) -> Vec<f64> {
+pub(super) fn differences(system: &System, x: &[f64]) -> Vec<f64> {
     (0..x.len())
         .map(|i| {
             let shared = system.neighbor[i].iter().zip(&system.coefficient[i]);
@@ -89,6 +89,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 impl Checker<'_> {
     pub(super) fn pressure(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        self.iterate(traced)?;
         match (traced.moment, traced.pass) {
             (Moment::After, "pressure/build_system") => self.build_system(traced),
             (Moment::After, "pressure/divergence") => self.divergence(traced),
@@ -111,16 +112,16 @@ impl Checker<'_> {
         Waters::new(&self.model, bricks, self.room(), &built.centers)
     }
 
-    fn built(&self) -> &Built {
+    pub(super) fn built(&self) -> &Built {
         self.system.as_ref().expect("after pressure/build_system")
     }
 
-    fn precision(&self) -> Precision {
+    pub(super) fn precision(&self) -> Precision {
         self.model.settings().pressure.precision
     }
 
     /// Unit roundoff of what the projection computes in.
-    fn unit(&self) -> f64 {
+    pub(super) fn unit(&self) -> f64 {
         match self.precision() {
             Precision::F32 | Precision::F32Refined => U,
             Precision::F64 => U64,
@@ -128,20 +129,25 @@ impl Checker<'_> {
     }
 
     /// The first `count` values of an array of the pressure's own, in the precision that it is kept in.
-    fn reals(&self, traced: Traced<'_>, name: &str, count: usize) -> Result<Vec<f64>, SolveError> {
+    pub(super) fn reals(
+        &self,
+        traced: Traced<'_>,
+        name: &str,
+        count: usize,
+    ) -> Result<Vec<f64>, SolveError> {
         let words = traced.read::<u32>(name, self.precision().words() * count)?;
         Ok(widen(&words, self.precision()))
     }
 
     /// An array of the pressure's own, by row.
-    fn by_row(&self, traced: Traced<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
+    pub(super) fn by_row(&self, traced: Traced<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
         let values = self.reals(traced, name, self.layout().cells)?;
         let rows = self.built().system.cell.iter();
         Ok(rows.map(|&e| values[blocked(e)]).collect())
     }
 
     /// The terms that the solution is the sum of, by row.
-    fn terms(&self, traced: Traced<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
+    pub(super) fn terms(&self, traced: Traced<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
         let Layout { cells, stride, .. } = *self.layout();
         let last = stride * (self.precision().terms() - 1);
         let values = self.reals(traced, "pressure_solution", last + cells)?;
@@ -194,7 +200,13 @@ impl Checker<'_> {
         for (row, &element) in system.cell.iter().enumerate() {
             row_of[element as usize] = row as u32;
         }
-        let (mut airs, mut shared) = (Vec::new(), Vec::new());
+        let inverse = match settings.pressure.preconditioner {
+            Preconditioner::Jacobi | Preconditioner::Ipp => {
+                self.reals(traced, "pressure_inverse_diagonal", *cells)?
+            }
+            Preconditioner::None | Preconditioner::Multigrid => Vec::new(),
+        };
+        let (mut airs, mut shared, mut inverses) = (Vec::new(), Vec::new(), Vec::new());
         let (mut rows, mut expected) = (Vec::new(), Vec::new());
         for element in wet {
             let e = element as usize;
@@ -213,6 +225,10 @@ impl Checker<'_> {
                 exact,
                 24.0 * self.unit() * exact,
             ));
+            if let Some(&found) = inverse.get(place) {
+                let exact = 1.0 / system.diagonal[row];
+                inverses.push(pair_of(e, found, exact, 36.0 * self.unit() * exact));
+            }
             let lower = |values: &dyn Fn(usize) -> f64| DVec3::new(values(0), values(1), values(2));
             let found = lower(&|axis| f64::from(coefficient[axis * stride + place]));
             let twin = lower(&|axis| system.coefficient[row][2 * axis]);
@@ -221,6 +237,9 @@ impl Checker<'_> {
         self.table.add(&DIRICHLET, &airs, 0);
         self.table.add(&COEFFICIENT, &shared, 0);
         self.table.add_exact(&ROWS, &rows, &expected);
+        if !inverse.is_empty() {
+            self.table.add(&INVERSE, &inverses, 0);
+        }
         self.system = Some(Built { system, centers });
         Ok(())
     }
