@@ -6,11 +6,11 @@ mod support;
 
 use swell::{
     domain::{particles::Particles, sampling::BoundarySample, signed_distance::SignedDistance},
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::{Context, Needs, Spoil},
     scene::{
         Effects, Iteration, Method, Scene, Stop,
         effects::{viscosity, vorticity_confinement},
-        flip::{Preconditioner, Pressure, Surface, Transfer},
+        flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
         plan::DeviceLimits,
     },
     solve::{SolveError, pbf::device_limits},
@@ -69,6 +69,7 @@ fn case(method: Method) -> (Scene, Start) {
         density_correction: true,
         pressure: Pressure {
             preconditioner: Preconditioner::Multigrid,
+            precision: Precision::F32Refined,
             tolerance: 1e-5,
             max_iterations: 40,
             residual_limit: 1e9,
@@ -337,6 +338,52 @@ fn pbf_lists_in_chunks_and_none() {
         all += &faults(&context, &checked, controls).1;
     }
     assert!(all.is_empty(), "{all}");
+}
+
+/// The other precisions of the projection; in f64 with the tolerances of its own roundoff: a product that is off by 1e-9
+/// fails there, which f32 could not tell.
+#[test]
+fn flip_is_within_tolerance_in_each_precision_of_its_projection() {
+    let context = Context::open_for(None, Needs { f64: true })
+        .expect("this test needs an adapter with f64, as lavapipe is");
+    let (mut scene, start) = case(Method::Flip);
+    let off = |factor| {
+        control(
+            "pressure/multiply",
+            "pressure_product[own + 64u * c] = product.lo[c]",
+            factor,
+            "pressure/multiply",
+            &["system times direction"],
+        )
+        .and(&["pressure/reduce"])
+    };
+    let elsewhere: Vec<&str> = FLIP.iter().map(|control| control.pass).collect();
+    let sort = ["sort/scan_blocks", "sort/add_block_sums", "sort/place"];
+    let elsewhere = [&elsewhere[..], &sort, &["sort/stabilize"]].concat();
+    let slight = "pressure_product[own + 64u * c] = product.lo[c] * 1.000000001";
+    let controls = [
+        off(slight),
+        control(
+            "pressure/build_system",
+            "row.dirichlet += air",
+            "row.dirichlet += air * 1.000000001",
+            "pressure/build_system",
+            &["what air adds to the diagonal"],
+        )
+        .and(&["pressure/multiply", "pressure/verify"]),
+    ];
+    let precision = |scene: &mut Scene, precision| {
+        scene.solver.flip.as_mut().unwrap().pressure.precision = precision;
+    };
+    precision(&mut scene, Precision::F64);
+    hold(&context, &scene, &start, &controls, &elsewhere);
+    precision(&mut scene, Precision::F32);
+    let gross = "pressure_product[own + 64u * c] = product.lo[c] * 1.0001";
+    hold(&context, &scene, &start, &[off(gross)], &elsewhere);
+    // In f32 the slight fault is none: 1.000000001 rounds to 1.
+    let mut spoiled = context.clone();
+    spoiled.spoil = Some(off(slight).spoil);
+    assert!(over(&run(&spoiled, &scene, &start)).is_empty());
 }
 
 /// A fault that no longer fits its shader is an error, and not a control that passes.

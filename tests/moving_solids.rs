@@ -15,7 +15,7 @@ use swell::{
     gpu::adapter::Context,
     scene::{
         Method, Scene,
-        flip::{Flip as Settings, Preconditioner, Pressure, Surface, Transfer},
+        flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
         moving_solid::MovingSolid,
         plan::{Counts, SOLID_GRIDS_BYTES},
     },
@@ -43,6 +43,7 @@ fn scene(cells: [f64; 3]) -> Scene {
         density_correction: true,
         pressure: Pressure {
             preconditioner: Preconditioner::Multigrid,
+            precision: Precision::F32Refined,
             tolerance: 1e-5,
             max_iterations: 400,
             residual_limit: 1e-2,

@@ -1,10 +1,11 @@
 //! Pressure room: rows against the f64 builder, iteration counts, honest residuals, pockets.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
+mod pressure_precision;
 #[path = "support/pressure.rs"]
 mod rig;
 
-use rig::{Rig, blocked, settings};
+use rig::{Rig, settings};
 use swell::{
     domain::{
         bricks::CELLS,
@@ -17,6 +18,7 @@ use swell::{
     gpu::adapter::Context,
     reference::poisson::gradients::{Precondition, norm, solve},
     scene::flip::Preconditioner,
+    solve::pressure::blocked,
 };
 
 const SURFACES: [Surface; 2] = [Surface::Voxel, Surface::GhostFluid];

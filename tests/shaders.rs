@@ -10,12 +10,12 @@ use swell::{
     },
     solve::{
         params::{FlipParams, Params, Phase, SolidGrid, SolidGrids},
-        pressure::{PressureBrick, PressureControl, PressurePhase},
+        pressure::{PressureBrick, PressureControl, PressureControl64, PressurePhase},
     },
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 10] = [
+const VARIANTS: [&[&str]; 14] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -32,6 +32,10 @@ const VARIANTS: [&[&str]; 10] = [
     &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
     &["SOLIDS", "MOVING_SOLIDS", "CORRECTION", "GHOST_FLUID"],
     &["GHOST_FLUID", "DIAGONAL"],
+    &["GHOST_FLUID", "DIAGONAL", "TWO_WORDS"],
+    &["TWO_WORDS"],
+    &["GHOST_FLUID", "DIAGONAL", "F64"],
+    &["F64"],
 ];
 
 fn compute_passes() -> Vec<String> {
@@ -58,6 +62,9 @@ fn every_pass_validates_in_every_variant() {
             let text = shader::compose(pass, defines).unwrap();
             let reflection =
                 reflect(pass, &text).unwrap_or_else(|error| panic!("{pass} {defines:?}: {error}"));
+            // Nothing but the projection may ask an adapter for f64, and that only where it is told to.
+            let is_wide = pass.starts_with("pressure/") && defines.contains(&"F64");
+            assert!(is_wide || !reflection.has_f64, "{pass} {defines:?}");
             let [x, y, z] = reflection.workgroup_size;
             assert!(
                 [64, 256].contains(&x) && (y, z) == (1, 1),
@@ -173,6 +180,14 @@ fn mirrors_match_naga() {
         found.iter().all(|&count| count > 0),
         "a mirror without its struct: {found:?}"
     );
+
+    // The one struct whose members are wider where the projection is in f64.
+    let wide = shader::compose("pressure/advance", &["F64"]).unwrap();
+    let layouts = reflect("pressure/advance", &wide).unwrap().layouts;
+    let (size, members) = (size_of::<PressureControl64>(), PressureControl64::members());
+    assert_eq!(check(&layouts, "PressureControl", size, &members), Ok(true));
+    let (size, members) = (size_of::<PressureControl>(), PressureControl::members());
+    check(&layouts, "PressureControl", size, &members).unwrap_err();
 
     // Negative controls: a member out of place and a wrong size are seen.
     let text = shader::compose("pbf/predict", &[]).unwrap();

@@ -1,6 +1,8 @@
 //! Sweeps from the study file to the page.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
+mod study_settings;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -611,6 +613,20 @@ fn the_command_tells_each_point() {
         said.contains("density_error_mean, jacobi: ") && said.contains("page: out"),
         "{said}"
     );
+    // A failure is told once.
+    let failing = ITERATIONS.replace(
+        "name = \"red_black\"",
+        "name = \"red_black\"\nset = [\"solver.pbf.cfl=1e-4\", \"solver.pbf.max_substeps=1\"]",
+    );
+    fs::write(job.folder.path().join("s.toml"), failing).unwrap();
+    let said = run("plain").stderr;
+    let said = String::from_utf8_lossy(&said);
+    assert_eq!(said.matches("point 3 of 4").count(), 1, "{said}");
+    assert!(
+        said.contains("red_black, solver.pbf.iterations = 1  failed: frame 1"),
+        "{said}"
+    );
+    fs::write(job.folder.path().join("s.toml"), ITERATIONS).unwrap();
     let output = run("json");
     let lines = String::from_utf8(output.stdout).unwrap();
     let events: Vec<serde_json::Value> = lines

@@ -9,6 +9,7 @@
 use std::{path::Path, time::Instant};
 
 use swell::{
+    gpu::adapter::Needs,
     scene::Scene,
     stage::{
         device::{Device, Opened},
@@ -151,7 +152,7 @@ fn measure(
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = options()?;
-    let opened = options.device.open()?;
+    let opened = options.device.open(Needs::default())?;
     println!("{}", opened.identity());
     for &count in &options.counts {
         measure(&opened, &options, count)?;

@@ -2,7 +2,7 @@
 #import "shared/pressure_site.wgsl"
 
 @group(0) @binding(2) var<storage, read_write> pressure_coefficient: array<f32>;
-@group(0) @binding(3) var<storage, read_write> pressure_dirichlet: array<f32>;
+@group(0) @binding(3) var<storage, read_write> pressure_dirichlet: array<real>;
 @group(0) @binding(4) var<storage, read_write> pressure_block: array<u32>;
 @group(0) @binding(5) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(6) var<storage, read> face_open: array<f32>;
@@ -11,7 +11,7 @@
 #endif
 @group(0) @binding(8) var<storage, read_write> pressure_stats: array<atomic<u32>>;
 #ifdef DIAGONAL
-@group(0) @binding(9) var<storage, read_write> pressure_inverse_diagonal: array<f32>;
+@group(0) @binding(9) var<storage, read_write> pressure_inverse_diagonal: array<real>;
 #endif
 
 const AIR = 0u;
@@ -20,8 +20,8 @@ const FLUID = 1u;
 const LEAST_THETA = 0.01;
 
 struct Row {
-    dirichlet: f32,
-    diagonal: f32,
+    dirichlet: real,
+    diagonal: real,
     // Lower faces.
     coefficient: vec3f,
     // Whether the six coefficients are 1.
@@ -45,10 +45,10 @@ fn neighbors_of(s: Site, c: u32) -> array<u32, 6> {
 }
 
 // 1 / θ, for a surface between a cell of water and one of air.
-fn inverse_theta(water: u32, air: u32) -> f32 {
+fn inverse_theta(water: u32, air: u32) -> real {
 #ifdef GHOST_FLUID
-    let inside = max(-liquid_distance[water], 0.0);
-    let outside = max(liquid_distance[air], 0.0);
+    let inside = max(-real(liquid_distance[water]), 0.0);
+    let outside = max(real(liquid_distance[air]), 0.0);
     let theta = select(1.0, inside / (inside + outside), inside + outside > 0.0);
     return 1.0 / clamp(theta, LEAST_THETA, 1.0);
 #else
@@ -66,9 +66,9 @@ fn row_of(s: Site, c: u32) -> Row {
         let other = cell_kind[neighbor[k]];
         let open = select(0.0, face_open[axis * phase.stride + select(neighbor[k], own, k < 3u)], is_fluid);
         let coefficient = select(0.0, open, other == FLUID);
-        let air = select(0.0, open, other == AIR) * inverse_theta(own, neighbor[k]);
+        let air = real(select(0.0, open, other == AIR)) * inverse_theta(own, neighbor[k]);
         row.dirichlet += air;
-        row.diagonal += coefficient + air;
+        row.diagonal += real(coefficient) + air;
         row.is_full = row.is_full && coefficient == 1.0;
         if k < 3u {
             row.coefficient[k] = coefficient;

@@ -1,13 +1,14 @@
 // Removes the mean over each pocket, where the system is singular; one workgroup a pocket, sums in a fixed order.
 #import "shared/pressure_phase.wgsl"
+#import "shared/pressure_real.wgsl"
 
 @group(0) @binding(1) var<storage, read> pressure_pocket_cells: array<u32>;
 // First and past the last of each pocket's cells.
 @group(0) @binding(2) var<storage, read> pressure_pocket_ranges: array<vec2u>;
-@group(0) @binding(3) var<storage, read_write> values: array<f32>;
+@group(0) @binding(3) var<storage, read_write> values: array<real>;
 @group(0) @binding(4) var<storage, read_write> pressure_stats: array<atomic<u32>>;
 
-var<workgroup> terms: array<f32, 256>;
+var<workgroup> terms: array<real, 256>;
 
 @compute @workgroup_size(256)
 fn main(
@@ -16,7 +17,7 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let range = pressure_pocket_ranges[thread_index(workgroup, workgroups, 0u, 1u)];
-    var sum = 0.0;
+    var sum = real(0.0);
     for (var k = range.x + local; k < range.y; k += 256u) {
         sum += values[pressure_pocket_cells[k]];
     }
@@ -28,11 +29,11 @@ fn main(
         }
         workgroupBarrier();
     }
-    let mean = terms[0] / max(f32(range.y - range.x), 1.0);
+    let mean = terms[0] / max(real(range.y - range.x), 1.0);
     for (var k = range.x + local; k < range.y; k += 256u) {
         values[pressure_pocket_cells[k]] -= mean;
     }
     if local == 0u && phase.step == 1u {
-        atomicMax(&pressure_stats[2], bitcast<u32>(abs(mean) / phase.cell_size));
+        atomicMax(&pressure_stats[2], bitcast<u32>(f32(abs(mean)) / phase.cell_size));
     }
 }

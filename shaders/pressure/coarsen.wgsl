@@ -4,14 +4,14 @@
 #import "shared/bricks.wgsl"
 
 @group(0) @binding(2) var<storage, read_write> pressure_coefficient: array<f32>;
-@group(0) @binding(3) var<storage, read_write> pressure_dirichlet: array<f32>;
+@group(0) @binding(3) var<storage, read_write> pressure_dirichlet: array<real>;
 @group(0) @binding(4) var<storage, read_write> pressure_block: array<u32>;
-@group(0) @binding(5) var<storage, read_write> pressure_residual: array<f32>;
+@group(0) @binding(5) var<storage, read_write> pressure_residual: array<real>;
 @group(0) @binding(6) var<storage, read> bricks: array<Brick>;
 
 // A surface very close to one fine cell must not pin the seven others (measured: 1 costs two iterations, above 4
 // nothing is won).
-const MOST_AIR = 4.0;
+const MOST_AIR = real(4.0);
 
 @compute @workgroup_size(64)
 fn main(
@@ -49,7 +49,7 @@ fn main(
                 + (pressure_coefficient[first + t] + pressure_coefficient[first + s + t]);
             pressure_coefficient[axis * phase.stride + coarse] = 0.25 * sum;
         }
-        var air = 0.0;
+        var air = real(0.0);
         for (var d = 0u; d < 8u; d++) {
             air += min(pressure_dirichlet[fine + 64u * d], MOST_AIR);
         }

@@ -3,8 +3,8 @@
 #import "shared/pressure_control.wgsl"
 
 @group(0) @binding(1) var<storage, read> pressure_control: PressureControl;
-@group(0) @binding(2) var<storage, read> pressure_correction: array<f32>;
-@group(0) @binding(3) var<storage, read_write> pressure_direction: array<f32>;
+@group(0) @binding(2) var<storage, read> pressure_correction: array<real>;
+@group(0) @binding(3) var<storage, read_write> pressure_direction: array<real>;
 
 @compute @workgroup_size(64)
 fn main(

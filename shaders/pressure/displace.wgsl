@@ -18,7 +18,7 @@ fn main(
     for (var c = 0u; c < 8u; c++) {
         for (var axis = 0u; axis < 3u; axis++) {
             let face = face_at(s, c, axis);
-            face_displacement[face.element] = select(0.0, -face.difference, face.is_open);
+            face_displacement[face.element] = f32(select(0.0, -face.difference, face.is_open));
         }
     }
 }

@@ -3,9 +3,9 @@
 #import "shared/pressure_divergence.wgsl"
 #import "shared/pressure_sum.wgsl"
 
-@group(0) @binding(6) var<storage, read_write> pressure_rhs: array<f32>;
-@group(0) @binding(7) var<storage, read_write> pressure_residual: array<f32>;
-@group(0) @binding(8) var<storage, read_write> pressure_solution: array<f32>;
+@group(0) @binding(6) var<storage, read_write> pressure_rhs: array<real>;
+@group(0) @binding(7) var<storage, read_write> pressure_residual: array<real>;
+@group(0) @binding(8) var<storage, read_write> pressure_solution: array<real>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -28,7 +28,9 @@ fn main(
     }
     for (var e = own; e < own + 512u; e += 64u) {
         pressure_solution[e] = 0.0;
+#ifdef TWO_WORDS
         pressure_solution[phase.stride + e] = 0.0;
+#endif
     }
     let squares = b.lo * b.lo + b.hi * b.hi;
     sum_workgroup((squares.x + squares.y) + (squares.z + squares.w), local, thread_index(workgroup, workgroups, 0u, 1u));

@@ -2,15 +2,15 @@
 // scaled to a unit diagonal; as published it is worse than the diagonal where that varies): D⁻¹ K residual.
 #import "shared/pressure_ipp.wgsl"
 
-@group(0) @binding(6) var<storage, read> pressure_residual: array<f32>;
-@group(0) @binding(7) var<storage, read_write> pressure_product: array<f32>;
+@group(0) @binding(6) var<storage, read> pressure_residual: array<real>;
+@group(0) @binding(7) var<storage, read_write> pressure_product: array<real>;
 
-fn scaled(first: u32, s: u32, t: u32) -> vec4f {
+fn scaled(first: u32, s: u32, t: u32) -> vec4r {
     return inverse_diagonals(first, s, t) * residuals(first, s, t);
 }
 
-fn residuals(first: u32, s: u32, t: u32) -> vec4f {
-    return vec4f(
+fn residuals(first: u32, s: u32, t: u32) -> vec4r {
+    return vec4r(
         pressure_residual[first],
         pressure_residual[first + s],
         pressure_residual[first + t],

@@ -3,12 +3,12 @@
 #import "shared/pressure_ipp.wgsl"
 #import "shared/pressure_sum.wgsl"
 
-@group(0) @binding(6) var<storage, read> pressure_residual: array<f32>;
-@group(0) @binding(7) var<storage, read> pressure_product: array<f32>;
-@group(0) @binding(8) var<storage, read_write> pressure_correction: array<f32>;
+@group(0) @binding(6) var<storage, read> pressure_residual: array<real>;
+@group(0) @binding(7) var<storage, read> pressure_product: array<real>;
+@group(0) @binding(8) var<storage, read_write> pressure_correction: array<real>;
 
-fn halves(first: u32, s: u32, t: u32) -> vec4f {
-    return vec4f(
+fn halves(first: u32, s: u32, t: u32) -> vec4r {
+    return vec4r(
         pressure_product[first],
         pressure_product[first + s],
         pressure_product[first + t],
@@ -40,10 +40,10 @@ fn main(
         l.iz * within.zu,
         l.out.zu * halves(upper.z, 64u, 128u),
     ));
-    var product = 0.0;
+    var product = real(0.0);
     for (var c = 0u; c < 4u; c++) {
         let e = own + 64u * c;
-        let z = vec2f(y.lo[c] + d.lo[c] * flow.lo[c], y.hi[c] + d.hi[c] * flow.hi[c]);
+        let z = vec2<real>(y.lo[c] + d.lo[c] * flow.lo[c], y.hi[c] + d.hi[c] * flow.hi[c]);
         pressure_correction[e] = z.x;
         pressure_correction[e + 256u] = z.y;
         product += pressure_residual[e] * z.x + pressure_residual[e + 256u] * z.y;

@@ -4,7 +4,7 @@
 
 @group(0) @binding(5) var<storage, read_write> pressure_label: array<u32>;
 
-fn join(labels: ptr<function, array<u32, 8>>, a: u32, b: u32, coefficient: f32) {
+fn join(labels: ptr<function, array<u32, 8>>, a: u32, b: u32, coefficient: real) {
     let least = min((*labels)[a], (*labels)[b]);
     if coefficient > 0.0 {
         (*labels)[a] = least;

@@ -33,7 +33,7 @@ fn unite(a: u32, b: u32) {
 }
 
 // Four pairs across one side of a block; pairs of the same labels as the last are the same union.
-fn across(mine: vec4u, theirs: vec4u, coefficient: vec4f) {
+fn across(mine: vec4u, theirs: vec4u, coefficient: vec4r) {
     var last = vec2u(0u);
     for (var k = 0u; k < 4u; k++) {
         let a = atomicLoad(&pressure_label[mine[k]]);

@@ -2,11 +2,11 @@
 #import "shared/pressure_links.wgsl"
 #import "shared/pressure_sum.wgsl"
 
-@group(0) @binding(5) var<storage, read> pressure_direction: array<f32>;
-@group(0) @binding(6) var<storage, read_write> pressure_product: array<f32>;
+@group(0) @binding(5) var<storage, read> pressure_direction: array<real>;
+@group(0) @binding(6) var<storage, read_write> pressure_product: array<real>;
 
-fn values(first: u32, s: u32, t: u32) -> vec4f {
-    return vec4f(
+fn values(first: u32, s: u32, t: u32) -> vec4r {
+    return vec4r(
         pressure_direction[first],
         pressure_direction[first + s],
         pressure_direction[first + t],

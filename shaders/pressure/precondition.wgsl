@@ -2,10 +2,10 @@
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_sum.wgsl"
 
-@group(0) @binding(1) var<storage, read> pressure_residual: array<f32>;
-@group(0) @binding(2) var<storage, read_write> pressure_correction: array<f32>;
+@group(0) @binding(1) var<storage, read> pressure_residual: array<real>;
+@group(0) @binding(2) var<storage, read_write> pressure_correction: array<real>;
 #ifdef DIAGONAL
-@group(0) @binding(3) var<storage, read> pressure_inverse_diagonal: array<f32>;
+@group(0) @binding(3) var<storage, read> pressure_inverse_diagonal: array<real>;
 #endif
 
 @compute @workgroup_size(64)
@@ -16,7 +16,7 @@ fn main(
 ) {
     let i = thread_index(workgroup, workgroups, local, 64u);
     let range = phase.levels[0];
-    var product = 0.0;
+    var product = real(0.0);
     if i / 64u < range.y {
         let first = 512u * (range.x + i / 64u) + (i & 63u);
         for (var e = first; e < first + 512u; e += 64u) {

@@ -19,11 +19,16 @@ fn main(
     for (var c = 0u; c < 8u; c++) {
         for (var axis = 0u; axis < 3u; axis++) {
             let face = face_at(s, c, axis);
-            face_velocity[face.element] -= select(0.0, face.difference, face.is_open);
+            let change = select(0.0, face.difference, face.is_open);
+            face_velocity[face.element] = f32(real(face_velocity[face.element]) - change);
         }
         let own = natural(s.slot, s.block) + (c & 1u) + 8u * ((c >> 1u) & 1u) + 64u * (c >> 2u);
         let q = q_element(s.slot, s.block, c);
-        // Both words: the large one alone is good to 12 bits.
-        pressure[own] = phase.pressure_scale * (pressure_solution[q] + pressure_solution[phase.stride + q]);
+        var value = pressure_solution[q];
+#ifdef TWO_WORDS
+        // The large word alone is good to 12 bits.
+        value += pressure_solution[phase.stride + q];
+#endif
+        pressure[own] = phase.pressure_scale * f32(value);
     }
 }

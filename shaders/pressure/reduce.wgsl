@@ -4,7 +4,7 @@
 #import "shared/pressure_control.wgsl"
 
 @group(0) @binding(1) var<storage, read_write> pressure_control: PressureControl;
-@group(0) @binding(2) var<storage, read> pressure_sums: array<f32>;
+@group(0) @binding(2) var<storage, read> pressure_sums: array<real>;
 // Pockets that pressure/count_pockets found.
 @group(0) @binding(3) var<storage, read> pressure_stats: array<u32>;
 @group(0) @binding(4) var<storage, read> pressure_sizes: array<u32>;
@@ -19,15 +19,21 @@ const VERIFIED = 4u;
 
 const MOST_RESTARTS = 16u;
 
-var<workgroup> terms: array<f32, 256>;
+var<workgroup> terms: array<real, 256>;
 
-fn is_positive(x: f32) -> bool {
+// By its bits: a comparison may be compiled as if there were no NaN.
+fn is_positive(x: real) -> bool {
+#ifdef F64
+    // The root of every positive f64 that a sum comes to has its place in f32; a negative one's is no number.
+    let bits = bitcast<u32>(f32(sqrt(x)));
+#else
     let bits = bitcast<u32>(x);
+#endif
     return bits > 0u && bits < 0x7f800000u;
 }
 
-fn begin(sum: f32) {
-    pressure_control = PressureControl(sum, sum, 0.0, 0.0, 0.0, ITERATING, 0u, 1u, 0u, 0u, 0u, 0u);
+fn begin(sum: real) {
+    pressure_control = PressureControl(ITERATING, 0u, 1u, 0u, sum, sum, 0.0, 0.0, 0.0);
     if phase.has_pockets == 0u && pressure_stats[4] > 0u {
         pressure_control.state = WANTS_POCKETS;
     } else if !is_positive(sum) {
@@ -35,9 +41,9 @@ fn begin(sum: f32) {
     }
 }
 
-fn decide(sum: f32) {
+fn decide(sum: real) {
     let is_over = pressure_control.iterations >= phase.max_iterations;
-    let target_square = phase.tolerance_square * pressure_control.rhs_square;
+    let target_square = real(phase.tolerance_square) * pressure_control.rhs_square;
     switch phase.step {
         case DIRECTION: {
             pressure_control.beta = select(sum / pressure_control.product, 0.0, pressure_control.is_first == 1u);
@@ -80,7 +86,7 @@ fn main(@builtin(local_invocation_index) local: u32) {
     let wanted = select(ITERATING, VERIFYING, phase.step == VERIFIED);
     let is_turn = phase.step == BEGIN || pressure_control.state == wanted;
     let count = select(0u, phase.sum_count, is_turn);
-    var sum = 0.0;
+    var sum = real(0.0);
     for (var k = local; k < count; k += 256u) {
         sum += pressure_sums[k];
     }

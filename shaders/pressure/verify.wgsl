@@ -2,12 +2,12 @@
 #import "shared/pressure_links.wgsl"
 #import "shared/pressure_sum.wgsl"
 
-@group(0) @binding(5) var<storage, read> pressure_solution: array<f32>;
-@group(0) @binding(6) var<storage, read> pressure_rhs: array<f32>;
-@group(0) @binding(7) var<storage, read_write> pressure_residual: array<f32>;
+@group(0) @binding(5) var<storage, read> pressure_solution: array<real>;
+@group(0) @binding(6) var<storage, read> pressure_rhs: array<real>;
+@group(0) @binding(7) var<storage, read_write> pressure_residual: array<real>;
 
-fn values(first: u32, s: u32, t: u32) -> vec4f {
-    return vec4f(
+fn values(first: u32, s: u32, t: u32) -> vec4r {
+    return vec4r(
         pressure_solution[first],
         pressure_solution[first + s],
         pressure_solution[first + t],
@@ -15,7 +15,7 @@ fn values(first: u32, s: u32, t: u32) -> vec4f {
     );
 }
 
-// The system times one of the solution's two words; its differences are exact, or nearly so.
+// The system times a word of the solution; where it has two, the differences of each are exact, or nearly so.
 fn product(s: Site, l: Links, word: u32) -> Pair {
     let own = word + blocked(s.slot, s.block);
     let lower = word + blocked_lower(s);
@@ -43,12 +43,18 @@ fn main(
     let s = site_at(slot, i & 63u, range.x + range.y - 1u);
     let l = links_at(s);
     let main_part = product(s, l, 0u);
+#ifdef TWO_WORDS
     let small_part = product(s, l, phase.stride);
+#endif
     let own = blocked(s.slot, s.block);
     var r: Pair;
     for (var c = 0u; c < 4u; c++) {
-        r.lo[c] = (pressure_rhs[own + 64u * c] - main_part.lo[c]) - small_part.lo[c];
-        r.hi[c] = (pressure_rhs[own + 64u * c + 256u] - main_part.hi[c]) - small_part.hi[c];
+        r.lo[c] = pressure_rhs[own + 64u * c] - main_part.lo[c];
+        r.hi[c] = pressure_rhs[own + 64u * c + 256u] - main_part.hi[c];
+#ifdef TWO_WORDS
+        r.lo[c] -= small_part.lo[c];
+        r.hi[c] -= small_part.hi[c];
+#endif
         pressure_residual[own + 64u * c] = r.lo[c];
         pressure_residual[own + 64u * c + 256u] = r.hi[c];
     }

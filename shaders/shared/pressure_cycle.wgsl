@@ -5,8 +5,8 @@
 // coefficients (pressure/coarsen) are half of what Galerkin's would be, which makes up for that crude transfer.
 #import "shared/pressure_links.wgsl"
 
-@group(0) @binding(5) var<storage, read_write> pressure_residual: array<f32>;
-@group(0) @binding(6) var<storage, read_write> pressure_correction: array<f32>;
+@group(0) @binding(5) var<storage, read_write> pressure_residual: array<real>;
+@group(0) @binding(6) var<storage, read_write> pressure_correction: array<real>;
 
 fn last_slot(level: u32) -> u32 {
     let range = phase.levels[level];
@@ -16,13 +16,13 @@ fn last_slot(level: u32) -> u32 {
 fn residual_at(s: Site) -> Pair {
     let own = blocked(s.slot, s.block);
     return Pair(
-        vec4f(
+        vec4r(
             pressure_residual[own],
             pressure_residual[own + 64u],
             pressure_residual[own + 128u],
             pressure_residual[own + 192u],
         ),
-        vec4f(
+        vec4r(
             pressure_residual[own + 256u],
             pressure_residual[own + 320u],
             pressure_residual[own + 384u],
@@ -31,8 +31,8 @@ fn residual_at(s: Site) -> Pair {
     );
 }
 
-fn corrections(first: u32, s: u32, t: u32) -> vec4f {
-    return vec4f(
+fn corrections(first: u32, s: u32, t: u32) -> vec4r {
+    return vec4r(
         pressure_correction[first],
         pressure_correction[first + s],
         pressure_correction[first + t],
@@ -78,7 +78,7 @@ fn inflow(l: Links, v: Sides) -> Pair {
 }
 
 // 1 / pivot; 0 where there is no row, or where rounding is all that is left of a closed pair's.
-fn inverse(pivot: f32, diagonal: f32) -> f32 {
+fn inverse(pivot: real, diagonal: real) -> real {
     return select(0.0, 1.0 / pivot, pivot > 1e-5 * diagonal);
 }
 
@@ -86,14 +86,14 @@ fn inverse(pivot: f32, diagonal: f32) -> f32 {
 // eliminated, and the other four are left with an L D Lᵀ.
 fn solve_block(l: Links, rhs: Pair) -> Pair {
     let d = diagonal(l);
-    let red = vec4f(rhs.lo.x, rhs.lo.w, rhs.hi.y, rhs.hi.z);
-    let red_diagonal = vec4f(d.lo.x, d.lo.w, d.hi.y, d.hi.z);
-    let w = select(vec4f(0.0), 1.0 / red_diagonal, red_diagonal > vec4f(0.0));
+    let red = vec4r(rhs.lo.x, rhs.lo.w, rhs.hi.y, rhs.hi.z);
+    let red_diagonal = vec4r(d.lo.x, d.lo.w, d.hi.y, d.hi.z);
+    let w = select(vec4r(0.0), 1.0 / red_diagonal, red_diagonal > vec4r(0.0));
     // Columns: what cells 1, 2, 4, 7 share with the four.
-    let c1 = vec4f(l.ix.x, l.iy.y, l.iz.y, 0.0);
-    let c2 = vec4f(l.iy.x, l.ix.y, 0.0, l.iz.z);
-    let c4 = vec4f(l.iz.x, 0.0, l.ix.z, l.iy.z);
-    let c7 = vec4f(0.0, l.iz.w, l.iy.w, l.ix.w);
+    let c1 = vec4r(l.ix.x, l.iy.y, l.iz.y, 0.0);
+    let c2 = vec4r(l.iy.x, l.ix.y, 0.0, l.iz.z);
+    let c4 = vec4r(l.iz.x, 0.0, l.ix.z, l.iy.z);
+    let c7 = vec4r(0.0, l.iz.w, l.iy.w, l.ix.w);
     let w1 = w * c1;
     let w2 = w * c2;
     let w4 = w * c4;
@@ -123,7 +123,7 @@ fn solve_block(l: Links, rhs: Pair) -> Pair {
     let z2 = p2 * b2 - l24 * z4 - l27 * z7;
     let z1 = p1 * b1 - l12 * z2 - l14 * z4 - l17 * z7;
     let z = wr + w * (c1 * z1 + c2 * z2 + c4 * z4 + c7 * z7);
-    return Pair(vec4f(z.x, z1, z2, z.y), vec4f(z4, z.z, z.w, z7));
+    return Pair(vec4r(z.x, z1, z2, z.y), vec4r(z4, z.z, z.w, z7));
 }
 
 // The first colour, with all else still 0.
@@ -132,7 +132,7 @@ fn smooth_first_at(s: Site) {
 }
 
 // One colour, from the latest values of the other; the block's share of residual · correction.
-fn smooth_at(s: Site) -> f32 {
+fn smooth_at(s: Site) -> real {
     let l = links_at(s);
     let r = residual_at(s);
     let flow = inflow(l, corrections_about(s));
@@ -143,8 +143,8 @@ fn smooth_at(s: Site) -> f32 {
 
 // Values of the cells above the blocks about this one.
 struct Above {
-    lower: vec3f,
-    upper: vec3f,
+    lower: vec3r,
+    upper: vec3r,
 }
 
 fn above_about(s: Site) -> Above {
@@ -159,12 +159,12 @@ fn above_about(s: Site) -> Above {
     let lower = select(far, vec3u(own), s.lower_slot == vec3u(s.slot));
     let upper = select(far, vec3u(own), s.upper_slot == vec3u(s.slot));
     return Above(
-        vec3f(
+        vec3r(
             pressure_correction[lower.x + above_offset(s.lower_block.x)],
             pressure_correction[lower.y + above_offset(s.lower_block.y)],
             pressure_correction[lower.z + above_offset(s.lower_block.z)],
         ),
-        vec3f(
+        vec3r(
             pressure_correction[upper.x + above_offset(s.upper_block.x)],
             pressure_correction[upper.y + above_offset(s.upper_block.y)],
             pressure_correction[upper.z + above_offset(s.upper_block.z)],
@@ -173,7 +173,7 @@ fn above_about(s: Site) -> Above {
 }
 
 // The second colour after the coarser level: the first colour's values plus those above them.
-fn smooth_corrected_at(s: Site) -> f32 {
+fn smooth_corrected_at(s: Site) -> real {
     let l = links_at(s);
     let r = residual_at(s);
     var about = corrections_about(s);

@@ -9,13 +9,15 @@
 
 var<workgroup> largest: array<f32, 64>;
 
-fn through(first: u32, s: u32, t: u32) -> vec4f {
-    return vec4f(
-        face_open[first] * face_velocity[first],
-        face_open[first + s] * face_velocity[first + s],
-        face_open[first + t] * face_velocity[first + t],
-        face_open[first + s + t] * face_velocity[first + s + t],
+fn through(first: u32, s: u32, t: u32) -> vec4r {
+    let open = vec4f(face_open[first], face_open[first + s], face_open[first + t], face_open[first + s + t]);
+    let velocity = vec4f(
+        face_velocity[first],
+        face_velocity[first + s],
+        face_velocity[first + t],
+        face_velocity[first + s + t],
     );
+    return vec4r(open) * vec4r(velocity);
 }
 
 // Σ ± f u + solid flux, m/s; 0 where there is no row.
@@ -35,21 +37,21 @@ fn outflow(s: Site) -> Pair {
         iz - through(z + own, 1u, 8u),
         through(z + upper.z, 1u, 8u) - iz,
     ));
-    let lo = vec4f(solid_flux[own], solid_flux[own + 1u], solid_flux[own + 8u], solid_flux[own + 9u]);
-    let hi = vec4f(solid_flux[own + 64u], solid_flux[own + 65u], solid_flux[own + 72u], solid_flux[own + 73u]);
+    let lo = vec4r(vec4f(solid_flux[own], solid_flux[own + 1u], solid_flux[own + 8u], solid_flux[own + 9u]));
+    let hi = vec4r(vec4f(solid_flux[own + 64u], solid_flux[own + 65u], solid_flux[own + 72u], solid_flux[own + 73u]));
     let rows = pressure_block[64u * s.slot + s.block] >> 8u;
     let is_row_lo = (vec4u(rows) & vec4u(1u, 2u, 4u, 8u)) != vec4u(0u);
     let is_row_hi = (vec4u(rows) & vec4u(16u, 32u, 64u, 128u)) != vec4u(0u);
     return Pair(
-        select(vec4f(0.0), sum.lo + lo, is_row_lo),
-        select(vec4f(0.0), sum.hi + hi, is_row_hi),
+        select(vec4r(0.0), sum.lo + lo, is_row_lo),
+        select(vec4r(0.0), sum.hi + hi, is_row_hi),
     );
 }
 
 // Keeps the largest |∇·u|, 1/s, in `pressure_stats[place]`; the bits of positive floats order as the floats do.
 fn note_divergence(flow: Pair, local: u32, place: u32) {
     let most = max(abs(flow.lo), abs(flow.hi));
-    largest[local] = max(max(most.x, most.y), max(most.z, most.w));
+    largest[local] = f32(max(max(most.x, most.y), max(most.z, most.w)));
     workgroupBarrier();
     if local == 0u {
         var worst = 0.0;

@@ -1,7 +1,7 @@
 // Differences of q across the lower faces of a block's cells.
 #import "shared/pressure_site.wgsl"
 
-@group(0) @binding(2) var<storage, read> pressure_solution: array<f32>;
+@group(0) @binding(2) var<storage, read> pressure_solution: array<real>;
 @group(0) @binding(3) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(4) var<storage, read> face_open: array<f32>;
 #ifdef GHOST_FLUID
@@ -29,7 +29,7 @@ struct Face {
     // Whether water may flow through it.
     is_open: bool,
     // q of its cell − q of the cell before it, by the part of the way where water ends.
-    difference: f32,
+    difference: real,
 }
 
 // Lower face along `axis` of cell `c`.
@@ -46,11 +46,13 @@ fn face_at(s: Site, c: u32, axis: u32) -> Face {
     let is_open = (kind == FLUID && kind_before <= FLUID) || (kind_before == FLUID && kind == AIR);
     let q = q_element(s.slot, s.block, c);
     let q_before = q_element(slot, block, d);
+    var difference = pressure_solution[q] - pressure_solution[q_before];
+#ifdef TWO_WORDS
     // The small words only where the large ones leave them room.
-    var difference = (pressure_solution[q] - pressure_solution[q_before])
-        + (pressure_solution[phase.stride + q] - pressure_solution[phase.stride + q_before]);
+    difference += pressure_solution[phase.stride + q] - pressure_solution[phase.stride + q_before];
+#endif
 #ifdef GHOST_FLUID
-    let phi = vec2f(liquid_distance[own], liquid_distance[before]);
+    let phi = vec2<real>(vec2f(liquid_distance[own], liquid_distance[before]));
     let ordered = select(phi.yx, phi, kind == FLUID);
     let inside = max(-ordered.x, 0.0);
     let outside = max(ordered.y, 0.0);

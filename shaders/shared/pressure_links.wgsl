@@ -4,7 +4,7 @@
 // Coefficients of the lower faces, three planes; what air adds to the diagonal; and of each block its kind, with
 // a bit a row from bit 8.
 @group(0) @binding(2) var<storage, read> pressure_coefficient: array<f32>;
-@group(0) @binding(3) var<storage, read> pressure_dirichlet: array<f32>;
+@group(0) @binding(3) var<storage, read> pressure_dirichlet: array<real>;
 @group(0) @binding(4) var<storage, read> pressure_block: array<u32>;
 
 // No row; every coefficient 1 and no air; anything else.
@@ -14,26 +14,26 @@ const MIXED = 2u;
 
 struct Links {
     // Within the block: across x (cells 0-1, 2-3, 4-5, 6-7), y (0-2, 1-3, 4-6, 5-7), z (0-4, 1-5, 2-6, 3-7).
-    ix: vec4f,
-    iy: vec4f,
-    iz: vec4f,
+    ix: vec4r,
+    iy: vec4r,
+    iz: vec4r,
     out: Sides,
     dirichlet: Pair,
 }
 
-fn coefficients(first: u32, s: u32, t: u32) -> vec4f {
-    return vec4f(
+fn coefficients(first: u32, s: u32, t: u32) -> vec4r {
+    return vec4r(vec4f(
         pressure_coefficient[first],
         pressure_coefficient[first + s],
         pressure_coefficient[first + t],
         pressure_coefficient[first + s + t],
-    );
+    ));
 }
 
 fn links_at(s: Site) -> Links {
     let kind = pressure_block[64u * s.slot + s.block] & 3u;
-    let one = vec4f(select(0.0, 1.0, kind == FULL));
-    let none = Pair(vec4f(0.0), vec4f(0.0));
+    let one = vec4r(real(select(0.0, 1.0, kind == FULL)));
+    let none = Pair(vec4r(0.0), vec4r(0.0));
     var l = Links(one, one, one, Sides(one, one, one, one, one, one), none);
     // A loop where a branch would do: software devices run both sides of a branch and leave a loop that no lane
     // is in, and most blocks are FULL.
@@ -88,11 +88,11 @@ fn diagonal(l: Links) -> Pair {
     return Pair(sum.lo + l.dirichlet.lo, sum.hi + l.dirichlet.hi);
 }
 
-fn sum_pair(p: Pair) -> f32 {
+fn sum_pair(p: Pair) -> real {
     let s = p.lo + p.hi;
     return (s.x + s.y) + (s.z + s.w);
 }
 
-fn dot_pair(a: Pair, b: Pair) -> f32 {
+fn dot_pair(a: Pair, b: Pair) -> real {
     return sum_pair(Pair(a.lo * b.lo, a.hi * b.hi));
 }

@@ -4,6 +4,7 @@
 // room's own arrays cell c = x + 2 y + 4 z of block b = X + 4 Y + 16 Z of a brick is element 64 c + b, so that
 // neighbouring threads read neighbouring words.
 #import "shared/pressure_phase.wgsl"
+#import "shared/pressure_real.wgsl"
 
 struct PressureBrick {
     // Slots of the bricks at the lower faces x, y, z, then at the upper ones; 0 where there is none.
@@ -96,28 +97,28 @@ fn above_offset(block: u32) -> u32 {
 
 // The 8 cells of a block: c = 0..3 and 4..7.
 struct Pair {
-    lo: vec4f,
-    hi: vec4f,
+    lo: vec4r,
+    hi: vec4r,
 }
 
 // Values by side: of the cells with x = 0 (c = 0, 2, 4, 6) and x = 1, those with y = 0 (0, 1, 4, 5) and y = 1,
 // those with z = 0 and z = 1.
 struct Sides {
-    xl: vec4f,
-    xu: vec4f,
-    yl: vec4f,
-    yu: vec4f,
-    zl: vec4f,
-    zu: vec4f,
+    xl: vec4r,
+    xu: vec4r,
+    yl: vec4r,
+    yu: vec4r,
+    zl: vec4r,
+    zu: vec4r,
 }
 
 // A block's own cells by side.
 fn sides_of(p: Pair) -> Sides {
     return Sides(
-        vec4f(p.lo.xz, p.hi.xz),
-        vec4f(p.lo.yw, p.hi.yw),
-        vec4f(p.lo.xy, p.hi.xy),
-        vec4f(p.lo.zw, p.hi.zw),
+        vec4r(p.lo.xz, p.hi.xz),
+        vec4r(p.lo.yw, p.hi.yw),
+        vec4r(p.lo.xy, p.hi.xy),
+        vec4r(p.lo.zw, p.hi.zw),
         p.lo,
         p.hi,
     );
@@ -126,7 +127,7 @@ fn sides_of(p: Pair) -> Sides {
 // Sums by cell what stands by side.
 fn sum_sides(s: Sides) -> Pair {
     return Pair(
-        vec4f(s.xl.x, s.xu.x, s.xl.y, s.xu.y) + vec4f(s.yl.xy, s.yu.xy) + s.zl,
-        vec4f(s.xl.z, s.xu.z, s.xl.w, s.xu.w) + vec4f(s.yl.zw, s.yu.zw) + s.zu,
+        vec4r(s.xl.x, s.xu.x, s.xl.y, s.xu.y) + vec4r(s.yl.xy, s.yu.xy) + s.zl,
+        vec4r(s.xl.z, s.xu.z, s.xl.w, s.xu.w) + vec4r(s.yl.zw, s.yu.zw) + s.zu,
     );
 }

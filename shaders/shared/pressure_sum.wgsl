@@ -1,14 +1,16 @@
 // Sums of a workgroup of 64, in a fixed order.
-@group(0) @binding(9) var<storage, read_write> pressure_sums: array<f32>;
+#import "shared/pressure_real.wgsl"
 
-var<workgroup> terms: array<f32, 64>;
+@group(0) @binding(9) var<storage, read_write> pressure_sums: array<real>;
+
+var<workgroup> terms: array<real, 64>;
 
 // Leaves the sum of `term` over the workgroup in `pressure_sums[place]`.
-fn sum_workgroup(term: f32, local: u32, place: u32) {
+fn sum_workgroup(term: real, local: u32, place: u32) {
     terms[local] = term;
     workgroupBarrier();
     if local < 8u {
-        var sum = 0.0;
+        var sum = real(0.0);
         for (var k = local; k < 64u; k += 8u) {
             sum += terms[k];
         }
@@ -16,7 +18,7 @@ fn sum_workgroup(term: f32, local: u32, place: u32) {
     }
     workgroupBarrier();
     if local == 0u {
-        var sum = 0.0;
+        var sum = real(0.0);
         for (var k = 0u; k < 8u; k++) {
             sum += terms[k];
         }

@@ -85,6 +85,11 @@ fn show_adapter(out: &mut impl Write, adapter: &Adapter) -> Result<(), Unprintab
         "   pass times: {}",
         if adapter.has_timestamps { "yes" } else { "no" }
     )?;
+    writeln!(
+        out,
+        "   f64 in shaders: {}",
+        if adapter.has_f64 { "yes" } else { "no" }
+    )?;
     Ok(())
 }
 

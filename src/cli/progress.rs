@@ -74,6 +74,14 @@ impl Progress {
         }
     }
 
+    /// The same with a line that stays.
+    pub(super) fn frame_to_keep(&self, text: &str, event: Value) {
+        self.say(text, event);
+        if let Some(bar) = &self.bar {
+            bar.inc(1);
+        }
+    }
+
     pub(super) fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -67,10 +67,10 @@ pub(super) fn run(args: &StudyArgs) -> Result<ExitCode, Failure> {
             Event::Point(event) => {
                 let bar = progress.get_or_init(|| Progress::new(args.progress, event.count as u64));
                 let (text, json) = point(&event);
-                if let PointStatus::Failed(_) = event.status {
-                    bar.say(&text, json.clone());
+                match event.status {
+                    PointStatus::Failed(_) => bar.frame_to_keep(&text, json),
+                    PointStatus::Stands | PointStatus::Done(..) => bar.frame(&text, json),
                 }
-                bar.frame(&text, json);
             }
         }
     });

@@ -12,6 +12,9 @@
 /// Unit roundoff of f32.
 pub const U: f64 = 1.0 / (1 << 24) as f64;
 
+/// Unit roundoff of f64.
+pub const U64: f64 = 1.0 / (1u64 << 53) as f64;
+
 /// Of a root, in u.
 pub const ROOT: f64 = 9.0;
 

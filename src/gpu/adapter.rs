@@ -40,6 +40,15 @@ pub enum GpuError {
         /// Where and what.
         message: String,
     },
+    /// 64-bit floats are asked for, and there are none.
+    #[error(
+        "{adapter} has no 64-bit floats in shaders (SHADER_F64), which precision = \"f64\" asks for; \"f32_refined\" \
+         needs none"
+    )]
+    NoF64 {
+        /// Adapter name.
+        adapter: String,
+    },
     /// A buffer is larger than the adapter binds.
     #[error(
         "buffer `{buffer}` needs {needed} bytes, and {adapter} allows {allowed} ({limit}); make the scene or the picture smaller or coarser"
@@ -71,6 +80,8 @@ pub struct Context {
     pub limits: Limits,
     /// Whether passes can be timed on the device.
     pub has_timestamps: bool,
+    /// Whether passes may compute in f64: only where that was asked for.
+    pub has_f64: bool,
     /// A fault put into one pass, so that a comparison can be seen to fail; `None` in every command.
     pub spoil: Option<Spoil>,
     fault: Arc<Mutex<Option<String>>>,
@@ -101,6 +112,27 @@ fn instance() -> Instance {
 /// Every adapter of this machine, in the driver's order, which `--adapter` indexes.
 pub fn enumerate() -> Vec<Adapter> {
     pollster::block_on(instance().enumerate_adapters(Backends::all()))
+}
+
+/// What a device is opened for, beyond what every pass needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Passes that compute in f64.
+    pub f64: bool,
+}
+
+/// Those that are used where they are offered, and those that are needed; `None` where one of the latter is missing.
+fn features(offered: Features, needs: Needs) -> Option<Features> {
+    let used = offered & (Features::TIMESTAMP_QUERY | Features::FLOAT32_FILTERABLE);
+    match needs.f64 {
+        true => (offered.contains(Features::SHADER_F64)).then_some(used | Features::SHADER_F64),
+        false => Some(used),
+    }
+}
+
+/// Whether shaders may compute in f64 on an adapter.
+pub fn has_f64(adapter: &Adapter) -> bool {
+    adapter.features().contains(Features::SHADER_F64)
 }
 
 /// Whether passes can be timed on an adapter.
@@ -154,11 +186,20 @@ impl Context {
     /// # Errors
     /// [`GpuError::NoAdapter`], [`GpuError::NoSuchAdapter`], [`GpuError::Open`].
     pub fn open(request: Option<&str>) -> Result<Self, GpuError> {
+        Self::open_for(request, Needs::default())
+    }
+
+    /// The same for passes with these needs; no feature is enabled that they do not ask for.
+    ///
+    /// # Errors
+    /// Those of [`Self::open`], and [`GpuError::NoF64`].
+    pub fn open_for(request: Option<&str>, needs: Needs) -> Result<Self, GpuError> {
         let adapter = choose(enumerate(), request)?;
         let info = adapter.get_info();
         let limits = adapter.limits();
-        let wanted = Features::TIMESTAMP_QUERY | Features::FLOAT32_FILTERABLE;
-        let features = adapter.features() & wanted;
+        let features = features(adapter.features(), needs).ok_or_else(|| GpuError::NoF64 {
+            adapter: info.name.clone(),
+        })?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("swell"),
             required_features: features,
@@ -188,6 +229,7 @@ impl Context {
             info,
             limits,
             has_timestamps,
+            has_f64: features.contains(Features::SHADER_F64),
             spoil: None,
             fault,
         })
@@ -221,5 +263,20 @@ impl Context {
 fn record(fault: &Mutex<Option<String>>, message: String) {
     if let Ok(mut fault) = fault.lock() {
         fault.get_or_insert(message);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn f64_is_enabled_where_asked_for_and_refused_where_missing() {
+        let (plain, double) = (Needs::default(), Needs { f64: true });
+        let offered = Features::TIMESTAMP_QUERY | Features::SHADER_F64;
+        assert_eq!(features(offered, plain), Some(Features::TIMESTAMP_QUERY));
+        assert_eq!(features(offered, double), Some(offered));
+        assert_eq!(features(Features::TIMESTAMP_QUERY, double), None);
+        assert_eq!(features(Features::empty(), plain), Some(Features::empty()));
     }
 }

@@ -61,7 +61,8 @@ impl Program {
     /// declares them.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] before anything is allocated, [`GpuError::Shader`], [`GpuError::Lost`].
+    /// [`GpuError::TooLarge`] and [`GpuError::NoF64`] before anything is allocated, [`GpuError::Shader`],
+    /// [`GpuError::Lost`].
     pub fn new(
         context: &Context,
         buffers: &[BufferSpec],
@@ -267,6 +268,11 @@ fn compile(
         source = spoiled(&source, &spoil)?;
     }
     let reflection = reflect(spec.name, &source)?;
+    if reflection.has_f64 && !context.has_f64 {
+        return Err(GpuError::NoF64 {
+            adapter: context.info.name.clone(),
+        });
+    }
     let entries: Vec<wgpu::BindGroupLayoutEntry> = reflection
         .bindings
         .iter()

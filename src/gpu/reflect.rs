@@ -50,6 +50,8 @@ pub struct Reflection {
     pub layouts: Vec<Layout>,
     /// Names of its `override` constants.
     pub overrides: Vec<String>,
+    /// Whether it computes in f64.
+    pub has_f64: bool,
 }
 
 /// Reads the single compute entry point of `wgsl`.
@@ -66,7 +68,7 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
         naga::front::wgsl::parse_str(wgsl).map_err(|error| fault(error.emit_to_string(wgsl)))?;
     let mut validator = naga::valid::Validator::new(
         naga::valid::ValidationFlags::all(),
-        naga::valid::Capabilities::default(),
+        naga::valid::Capabilities::default() | naga::valid::Capabilities::FLOAT64,
     );
     validator
         .validate(&module)
@@ -127,7 +129,12 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
         .iter()
         .filter_map(|(_, constant)| constant.name.clone())
         .collect();
+    let has_f64 = module.types.iter().any(|(_, ty)| {
+        let scalar = ty.inner.scalar();
+        scalar.is_some_and(|scalar| scalar.kind == naga::ScalarKind::Float && scalar.width == 8)
+    });
     Ok(Reflection {
+        has_f64,
         bindings,
         workgroup_size: entry.workgroup_size,
         layouts,

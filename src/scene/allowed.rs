@@ -24,7 +24,10 @@ const SCALE: &str = "a number other than 0, or three of them";
 const BLAKE3: &str = "the BLAKE3 of the file in hex, or nothing";
 
 const SET: &str = "an array of overrides of the scene, such as [\"solver.pbf.iterations=8\"]";
-const KEY: &str = "a key of the scene, such as \"solver.pbf.iterations\", here or for all methods";
+const KEY: &str =
+    "a key of the scene, such as \"solver.pbf.iterations\", or \"device\", here or for all methods";
+const COARSER: &str = "an array of overrides of the scene that make the last value's run coarser, with errors against a \
+     finest run or of a projection";
 const VALUES: &str = "two or more values of the key, from coarse to fine, here or for all methods";
 
 const TABLE: &[(&str, &str)] = &[
@@ -198,11 +201,15 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.flip.density_correction", "true or false"),
     (
         "solver.flip.pressure",
-        "a table of preconditioner, tolerance, max_iterations, residual_limit",
+        "a table of preconditioner, precision, tolerance, max_iterations, residual_limit",
     ),
     (
         "solver.flip.pressure.preconditioner",
         "\"none\", \"jacobi\", \"ipp\" or \"multigrid\"",
+    ),
+    (
+        "solver.flip.pressure.precision",
+        "\"f32\", \"f32_refined\", or \"f64\" where the adapter has it",
     ),
     (
         "solver.flip.pressure.tolerance",
@@ -253,6 +260,7 @@ const TABLE: &[(&str, &str)] = &[
     ("set", SET),
     ("key", KEY),
     ("values", VALUES),
+    ("coarser", COARSER),
     (
         "steps",
         "a whole number of output frames from 1 to 1000000; or seconds",
@@ -274,6 +282,7 @@ const TABLE: &[(&str, &str)] = &[
     ("method.set", SET),
     ("method.key", KEY),
     ("method.values", VALUES),
+    ("method.coarser", COARSER),
     (
         "method.device",
         "\"gpu\", or \"cpu\" for the f64 reference, which runs whole frames and no single projections",

@@ -98,12 +98,55 @@ impl Surface {
 pub struct Pressure {
     /// What precedes each conjugate-gradient iteration.
     pub preconditioner: Preconditioner,
+    /// What it is solved in on the GPU; the CPU's reference is f64 whatever stands here.
+    pub precision: Precision,
     /// True residual over the right-hand side, both in the Euclidean norm, at which it stops.
     pub tolerance: f64,
     /// Most iterations of a solve; one that ends there is reported as missed.
     pub max_iterations: u32,
     /// Relative true residual past which a missed solve ends the bake.
     pub residual_limit: f64,
+}
+
+/// What the projection's system is solved in. Face velocities and pressures are f32 before and after it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// One f32 word: the true residual stalls near ε ‖A‖ ‖x‖ / ‖b‖.
+    F32,
+    /// Iterative refinement: f32 iterations for a solution of two words, from residuals that are computed afresh.
+    F32Refined,
+    /// f64, where the adapter has it.
+    F64,
+}
+
+impl Precision {
+    /// With the names that scenes use.
+    pub const NAMED: [(&'static str, Self); 3] = [
+        ("f32", Self::F32),
+        ("f32_refined", Self::F32Refined),
+        ("f64", Self::F64),
+    ];
+
+    /// As scenes name it.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
+    }
+
+    /// Words of 32 bits of a value of the iterations.
+    pub fn words(self) -> usize {
+        match self {
+            Self::F32 | Self::F32Refined => 1,
+            Self::F64 => 2,
+        }
+    }
+
+    /// Values that the solution at a cell is the sum of.
+    pub fn terms(self) -> usize {
+        match self {
+            Self::F32 | Self::F64 => 1,
+            Self::F32Refined => 2,
+        }
+    }
 }
 
 /// Preconditioner of the conjugate gradients.

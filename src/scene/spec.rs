@@ -145,6 +145,7 @@ pub(super) struct FlipSpec {
 #[serde(deny_unknown_fields)]
 pub(super) struct PressureSpec {
     pub(super) preconditioner: Option<Spanned<String>>,
+    pub(super) precision: Option<Spanned<String>>,
     pub(super) tolerance: Option<Spanned<f64>>,
     pub(super) max_iterations: Option<Spanned<i64>>,
     pub(super) residual_limit: Option<Spanned<f64>>,

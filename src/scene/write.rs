@@ -188,6 +188,7 @@ fn write_flip(out: &mut String, flip: &Flip) -> fmt::Result {
     writeln!(out, "\n[solver.flip.pressure]")?;
     let preconditioner = text(pressure.preconditioner.name());
     writeln!(out, "preconditioner = {preconditioner}")?;
+    writeln!(out, "precision = {}", text(pressure.precision.name()))?;
     writeln!(out, "tolerance = {:?}", pressure.tolerance)?;
     writeln!(out, "max_iterations = {}", pressure.max_iterations)?;
     writeln!(out, "residual_limit = {:?}", pressure.residual_limit)

@@ -21,7 +21,7 @@ use crate::{
 
 use super::{
     Blame,
-    device::{Built, Device, Identity, SolverError},
+    device::{Built, Device, Identity, SolverError, needs},
     prepare::Start,
     probes,
 };
@@ -158,7 +158,7 @@ pub fn bake(
     let scene = &request.scene;
     let last = last_frame(request)?;
     let start = Start::of(scene)?;
-    let opened = request.device.open()?;
+    let opened = request.device.open(needs(scene))?;
     let Built { mut solver, bytes } = opened.build(scene, &start, request.time_passes)?;
     let device = opened.identity();
     let (mut writer, mut clock, state) = open_cache(request, &device, &start)?;

@@ -12,9 +12,9 @@ use crate::{
         particles::Particles,
         solver::{Solver, StepReport},
     },
-    gpu::adapter::{Context, GpuError},
+    gpu::adapter::{Context, GpuError, Needs},
     reference::{self, ReferenceError},
-    scene::{Method, Scene},
+    scene::{Method, Scene, flip::Precision},
     solve::{
         SolveError,
         flip::Flip,
@@ -79,15 +79,26 @@ impl From<&SolverError> for Blame {
 }
 
 impl Device {
-    /// Opens it.
+    /// Opens it; an adapter for passes with these needs.
     ///
     /// # Errors
     /// Those of an adapter.
-    pub fn open(&self) -> Result<Opened, GpuError> {
+    pub fn open(&self, needs: Needs) -> Result<Opened, GpuError> {
         Ok(match self {
-            Self::Gpu(adapter) => Opened::Gpu(Box::new(Context::open(adapter.as_deref())?)),
+            Self::Gpu(adapter) => {
+                Opened::Gpu(Box::new(Context::open_for(adapter.as_deref(), needs)?))
+            }
             Self::Cpu => Opened::Cpu,
         })
+    }
+}
+
+/// What a scene's passes ask of an adapter.
+pub fn needs(scene: &Scene) -> Needs {
+    let flip = scene.solver.flip.as_ref();
+    let flip = flip.filter(|_| scene.solver.method == Method::Flip);
+    Needs {
+        f64: flip.is_some_and(|flip| flip.pressure.precision == Precision::F64),
     }
 }
 

@@ -19,7 +19,7 @@ use crate::{
     solve::pbf::device_limits,
 };
 
-use super::{Blame, prepare::Start, probes};
+use super::{Blame, device::needs, prepare::Start, probes};
 
 pub use crate::cache::{Entry, Manifest};
 
@@ -38,6 +38,8 @@ pub struct Adapter {
     pub limits: Vec<(&'static str, u64)>,
     /// Whether passes can be timed on it.
     pub has_timestamps: bool,
+    /// Whether passes may compute in f64 on it.
+    pub has_f64: bool,
 }
 
 /// All adapters.
@@ -75,6 +77,7 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
                     ),
                 ],
                 has_timestamps: crate::gpu::adapter::has_timestamps(adapter),
+                has_f64: crate::gpu::adapter::has_f64(adapter),
             }
         })
         .collect();
@@ -131,9 +134,14 @@ impl From<&PlanError> for Blame {
 /// A solid without inside, or too large a grid; an adapter that is not there or does not open.
 pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError> {
     let start = Start::of(scene)?;
-    let context = match Context::open(adapter) {
+    let mut lacks = None;
+    let context = match Context::open_for(adapter, needs(scene)) {
         Ok(context) => Some(context),
         Err(GpuError::NoAdapter) => None,
+        Err(error @ GpuError::NoF64 { .. }) => {
+            lacks = Some(error);
+            Some(Context::open(adapter)?)
+        }
         Err(error) => return Err(error.into()),
     };
     let limits = context.as_ref().map_or(COMMON_LIMITS, device_limits);
@@ -145,7 +153,8 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
         .collect();
     let misfit = context
         .as_ref()
-        .and_then(|context| check_sizes(context, &buffers).err());
+        .and_then(|context| check_sizes(context, &buffers).err())
+        .or(lacks);
     Ok(ScenePlan {
         plan,
         misfit,

@@ -36,7 +36,9 @@ pub enum Blame {
 impl From<&GpuError> for Blame {
     fn from(error: &GpuError) -> Self {
         match error {
-            GpuError::TooLarge { .. } | GpuError::NoSuchAdapter { .. } => Self::Input,
+            GpuError::TooLarge { .. } | GpuError::NoF64 { .. } | GpuError::NoSuchAdapter { .. } => {
+                Self::Input
+            }
             GpuError::NoAdapter
             | GpuError::Open { .. }
             | GpuError::Lost(_)

@@ -1,5 +1,8 @@
 //! Where more time stops paying, and who is better for the same time.
 
+/// Part of the discretisation error below which a solver's error is of no account.
+const OF_NO_ACCOUNT: f64 = 0.1;
+
 use super::work_precision::{Line, Point};
 
 /// The points of a line that no other beats in both time and error, from the cheapest on.
@@ -19,8 +22,14 @@ fn best(line: &Line) -> Vec<&Point> {
     points
 }
 
-/// The knee: the setting with the least error × time. Up to it x times the time buys more than x times the accuracy,
-/// beyond it less. `None` for a line without points.
+/// The cheapest setting whose error is below a tenth of the discretisation error; `None` where none is.
+pub fn first_of_no_account(line: &Line, discretisation: f64) -> Option<&Point> {
+    let mut points = best(line).into_iter();
+    points.find(|point| point.error <= OF_NO_ACCOUNT * discretisation)
+}
+
+/// The setting with the least error × time, which stands in for the knee where the discretisation error is not known. Up to
+/// it x times the time buys more than x times the accuracy, beyond it less. `None` for a line without points.
 pub fn knee(line: &Line) -> Option<&Point> {
     best(line)
         .into_iter()
@@ -38,22 +47,47 @@ fn bargain(from: &Point, to: &Point) -> String {
     )
 }
 
-/// What the knee of a line is, in words.
-pub fn words(line: &Line) -> String {
+/// What the knee of a line is, in words, beside the discretisation error where that is known.
+pub fn words(line: &Line, discretisation: Option<f64>) -> String {
     let best = best(line);
-    let (Some(knee), Some(first), Some(last)) = (knee(line), best.first(), best.last()) else {
+    let (Some(least), Some(first), Some(last)) = (knee(line), best.first(), best.last()) else {
         return "nothing was measured".into();
     };
     if best.len() < 2 {
         return "one setting alone has no knee".into();
     }
-    let mut said = vec![format!("the knee is {}", knee.label)];
+    let (knee, told) = match discretisation {
+        None => (
+            least,
+            format!(
+                "the discretisation error is not known here; by error × time the knee is {}",
+                least.label
+            ),
+        ),
+        Some(error) => match first_of_no_account(line, error) {
+            Some(knee) => (
+                knee,
+                format!(
+                    "the knee is {}, the cheapest whose error ({:.2e}) is below a tenth of the discretisation error ({error:.2e})",
+                    knee.label, knee.error
+                ),
+            ),
+            None => (
+                least,
+                format!(
+                    "no setting comes below a tenth of the discretisation error ({error:.2e}); by error × time the knee is {}",
+                    least.label
+                ),
+            ),
+        },
+    };
+    let mut said = vec![told];
     if knee.label != first.label {
         said.push(bargain(first, knee));
     }
     if knee.label != last.label {
         said.push(bargain(knee, last));
-    } else {
+    } else if discretisation.is_none_or(|error| knee.error > OF_NO_ACCOUNT * error) {
         said.push("it is the best that was run, so that more may still pay".into());
     }
     said.join("; ")
@@ -159,7 +193,11 @@ mod tests {
             ],
         );
         assert_eq!(knee(&bent).map(|p| p.label.as_str()), Some("s2"));
-        let said = words(&bent);
+        let said = words(&bent, None);
+        assert!(
+            said.contains("is not known here; by error × time the knee is s2"),
+            "{said}"
+        );
         assert!(
             said.contains("from s0 to s2 4.00 times the time buys 16.00 times the accuracy"),
             "{said}"
@@ -171,8 +209,38 @@ mod tests {
         // A setting that is slower and worse is no part of it; no points have no knee.
         let worse = line("a", &[(1.0, 1.6), (2.0, 0.4), (3.0, 0.5), (4.0, 0.1)]);
         assert_eq!(best(&worse).len(), 3);
-        assert!(words(&worse).contains("more may still pay"));
+        assert!(words(&worse, None).contains("more may still pay"));
         assert_eq!(knee(&line("a", &[(1.0, 0.0)])), None);
+    }
+
+    #[test]
+    fn a_tenth_of_the_discretisation_error_is_enough() {
+        let steady = line(
+            "a",
+            &[
+                (1.0, 1.6),
+                (2.0, 0.4),
+                (4.0, 0.1),
+                (8.0, 0.02),
+                (16.0, 0.002),
+            ],
+        );
+        let label = |error| first_of_no_account(&steady, error).map(|p| p.label.as_str());
+        assert_eq!(
+            (label(4.0), label(3.9), label(1.0)),
+            (Some("s1"), Some("s2"), Some("s2"))
+        );
+        assert_eq!((label(0.02), label(0.019)), (Some("s4"), None));
+        let said = words(&steady, Some(3.9));
+        assert!(
+            said.starts_with("the knee is s2, the cheapest whose error (1.00e-1)"),
+            "{said}"
+        );
+        assert!(said.contains("from s2 to s4 4.00 times the time"), "{said}");
+        assert!(words(&steady, Some(0.02)).starts_with("the knee is s4"));
+        assert!(!words(&steady, Some(0.02)).contains("more may still pay"));
+        let said = words(&steady, Some(0.01));
+        assert!(said.starts_with("no setting comes below a tenth"), "{said}");
     }
 
     #[test]

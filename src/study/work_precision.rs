@@ -41,8 +41,10 @@ pub enum Cost {
 /// A chart of an error against a cost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogChart {
-    /// Above it.
+    /// Above it: what is studied.
     pub title: String,
+    /// Below that: on what.
+    pub subtitle: String,
     /// Below the x axis, with its unit.
     pub x_label: String,
     /// Beside the y axis, with its unit.
@@ -57,13 +59,16 @@ pub struct LogChart {
 
 const SIZE: [f64; 2] = [680.0, 440.0];
 /// Room for labels: left, top, right, bottom.
-const MARGIN: [f64; 4] = [70.0, 54.0, 24.0, 50.0];
+const MARGIN: [f64; 4] = [70.0, 70.0, 24.0, 50.0];
 /// Height of a further row of the legend.
 const ROW: f64 = 16.0;
 /// Height of a note's line.
 const NOTE: f64 = 14.0;
-/// Letters of a note that fit; the page has the whole.
+/// Letters of a note that fit in a line, and lines that notes take at most.
 const NOTE_LETTERS: usize = 105;
+const NOTE_LINES: usize = 8;
+/// Half the height of a bar's ends.
+const CAP: f64 = 4.5;
 /// Width of a letter of a label, about, and height of one.
 const LETTER: [f64; 2] = [5.8, 10.0];
 
@@ -171,6 +176,26 @@ impl Room {
     }
 }
 
+/// Lines of at most `letters` letters, broken between words; a word that is longer is broken too.
+fn wrapped(text: &str, letters: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let pieces: Vec<char> = word.chars().collect();
+        for piece in pieces.chunks(letters) {
+            let last = lines.len() - 1;
+            let used = lines[last].chars().count();
+            let gap = usize::from(used > 0);
+            if used + gap + piece.len() > letters {
+                lines.push(piece.iter().collect());
+            } else {
+                lines[last].push_str(&" "[..gap]);
+                lines[last].extend(piece);
+            }
+        }
+    }
+    lines
+}
+
 impl LogChart {
     fn x(&self, point: &Point) -> f64 {
         match self.cost {
@@ -210,7 +235,7 @@ impl LogChart {
         });
         let x = Axis::about(costs, [left, SIZE[0] - right]);
         let y = Axis::about(points().map(|p| p.error), [SIZE[1] - bottom, top]);
-        let height = SIZE[1] + NOTE * self.notes.len() as f64;
+        let height = SIZE[1] + NOTE * self.note_lines().len() as f64;
         let mut out = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {height}\" role=\"img\" \
              font-family=\"sans-serif\" font-size=\"11\">\n<title>{}</title>\n\
@@ -229,19 +254,30 @@ impl LogChart {
             self.write_line(out, COLOURS[index % COLOURS.len()], line, x, y)?;
         }
         self.write_labels(out, x, y)?;
-        for (index, note) in self.notes.iter().enumerate() {
+        for (index, text) in self.note_lines().iter().enumerate() {
             let base = SIZE[1] + NOTE * index as f64;
-            let mut text: String = note.chars().take(NOTE_LETTERS).collect();
-            if text.len() < note.len() {
-                text.push('…');
-            }
             writeln!(
                 out,
                 "<text x=\"12\" y=\"{base}\" fill=\"#666\">{}</text>",
-                escaped(&text)
+                escaped(text)
             )?;
         }
         Ok(())
+    }
+
+    /// The notes, wrapped; those that do not fit are counted.
+    fn note_lines(&self) -> Vec<String> {
+        let mut lines: Vec<String> = Vec::new();
+        for (index, note) in self.notes.iter().enumerate() {
+            let more = wrapped(note, NOTE_LETTERS);
+            if lines.len() + more.len() > NOTE_LINES {
+                let left = self.notes.len() - index;
+                lines.push(format!("and {left} more, in the table (results.csv)"));
+                break;
+            }
+            lines.extend(more);
+        }
+        lines
     }
 
     fn write_line(
@@ -270,10 +306,14 @@ impl LogChart {
         for (px, py, point) in places {
             if self.cost == Cost::Time {
                 let [least, most] = [point.time[0], point.time[2]].map(|t| x.at(t));
-                writeln!(
-                    out,
-                    "<path d=\"M{least:.1} {py:.1}H{most:.1}\" stroke=\"{colour}\" stroke-width=\"3\" stroke-opacity=\"0.35\"/>"
-                )?;
+                if point.time[0] < point.time[2] {
+                    let [low, high] = [py - CAP, py + CAP];
+                    writeln!(
+                        out,
+                        "<path d=\"M{least:.1} {low:.1}V{high:.1}M{least:.1} {py:.1}H{most:.1}M{most:.1} {low:.1}V{high:.1}\" \
+                         fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.2\"/>"
+                    )?;
+                }
             }
             writeln!(
                 out,
@@ -319,12 +359,13 @@ fn write_frame(out: &mut String, chart: &LogChart, x: &Axis, y: &Axis) -> std::f
     let ([left, right], [bottom, top]) = (x.paper, y.paper);
     writeln!(
         out,
-        "<text x=\"12\" y=\"18\" font-size=\"13\">{}</text>",
-        escaped(&chart.title)
+        "<text x=\"12\" y=\"18\" font-size=\"13\">{}</text>\n<text x=\"12\" y=\"34\" fill=\"#666\">{}</text>",
+        escaped(&chart.title),
+        escaped(&chart.subtitle)
     )?;
     for (index, (line, (at, row))) in chart.lines.iter().zip(chart.legend()).enumerate() {
         let colour = COLOURS[index % COLOURS.len()];
-        let base = 40.0 + ROW * row as f64;
+        let base = 54.0 + ROW * row as f64;
         writeln!(
             out,
             "<circle cx=\"{at:.1}\" cy=\"{}\" r=\"4\" fill=\"{colour}\"/>\
@@ -397,6 +438,7 @@ mod tests {
         };
         LogChart {
             title: "a <b>".into(),
+            subtitle: "on c".into(),
             x_label: "ms".into(),
             y_label: "error".into(),
             cost: Cost::Time,
@@ -460,6 +502,42 @@ mod tests {
                 .iter()
                 .all(|(at, _)| at + 24.0 + LETTER[0] * 31.0 <= SIZE[0])
         );
+    }
+
+    #[test]
+    fn notes_are_whole_or_counted() {
+        assert_eq!(wrapped("ab cd efghijk", 5), ["ab cd", "efghi", "jk"]);
+        let long = "failed: ".to_owned() + &"word ".repeat(60);
+        let mut noted = chart([1.0; 3]);
+        noted.notes = vec![long.clone(), "short".into()];
+        let lines = noted.note_lines();
+        assert!(
+            lines
+                .iter()
+                .all(|line| line.chars().count() <= NOTE_LETTERS)
+        );
+        let words: usize = lines.iter().map(|line| line.matches("word").count()).sum();
+        assert_eq!(
+            (words, lines.last().map(String::as_str)),
+            (60, Some("short"))
+        );
+        noted.notes = vec![long; 4];
+        let lines = noted.note_lines();
+        assert_eq!(lines.len(), 7);
+        assert_eq!(lines[6], "and 2 more, in the table (results.csv)");
+    }
+
+    /// A bar of a point's own times, and none where they are one time.
+    #[test]
+    fn repeats_have_bars() {
+        let bars = |chart: &LogChart| chart.to_svg().matches("stroke-width=\"1.2\"").count();
+        let mut chart = chart([1e-1, 1e-2, 1e-3]);
+        assert_eq!(bars(&chart), 3);
+        for point in &mut chart.lines[0].points {
+            point.time = [point.time[1]; 3];
+        }
+        assert_eq!(bars(&chart), 0);
+        assert!(chart.to_svg().contains(">on c<"));
     }
 
     #[test]

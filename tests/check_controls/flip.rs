@@ -136,8 +136,8 @@ pub const FLIP: &[Control] = &[
     .and(&["pressure/reduce"]),
     control(
         "pressure/project",
-        "-= select",
-        "+= select",
+        "- change)",
+        "+ change)",
         "pressure/project",
         &["velocity at faces"],
     ),
@@ -150,8 +150,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/density_source",
-        "excess * phase.cell_size",
-        "excess * phase.cell_size * 1.001",
+        "real(excess)",
+        "real(excess) * 1.001",
         "pressure/density_source",
         &["right-hand side"],
     ),
@@ -289,8 +289,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/reduce",
-        "let target_square = phase",
-        "let target_square = 1e6 * phase",
+        "let target_square = real",
+        "let target_square = 1e6 * real",
         "whole projection",
         &[
             "‖b − A x‖ / ‖b‖",
@@ -302,8 +302,8 @@ pub const FLIP: &[Control] = &[
     .and(&["pressure/reduce"]),
     control(
         "pressure/reduce",
-        "let target_square = phase",
-        "let target_square = 1e6 * phase",
+        "let target_square = real",
+        "let target_square = 1e6 * real",
         "whole correction",
         &["‖b − A x‖ / ‖b‖"],
     )
@@ -437,8 +437,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "pressure/verify",
-        "(pressure_rhs[own + 64u * c] - main_part",
-        "(1.001 * pressure_rhs[own + 64u * c] - main_part",
+        "= pressure_rhs[own + 64u * c] - main_part",
+        "= 1.001 * pressure_rhs[own + 64u * c] - main_part",
         "pressure/verify",
         &["residual"],
     ),

@@ -18,7 +18,7 @@ use swell::{
     gpu::adapter::Context,
     scene::{
         Method, Scene,
-        flip::{Flip as Settings, Preconditioner, Pressure, Surface, Transfer},
+        flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
         plan::{Capacity, Counts},
     },
     solve::{
@@ -44,6 +44,7 @@ pub fn settings() -> Settings {
         density_correction: true,
         pressure: Pressure {
             preconditioner: Preconditioner::Multigrid,
+            precision: Precision::F32Refined,
             tolerance: 1e-5,
             max_iterations: 400,
             residual_limit: 1e-2,

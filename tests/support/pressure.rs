@@ -15,8 +15,8 @@ use swell::{
         },
     },
     gpu::{adapter::Context, program::Program, recording::Timer, sort::storage},
-    scene::flip::{Preconditioner, Pressure, Surface},
-    solve::pressure::{self, PressureSolver, Projected, Solved, Step},
+    scene::flip::{Precision, Preconditioner, Pressure, Surface},
+    solve::pressure::{self, PressureSolver, Projected, Solved, Step, blocked},
 };
 
 pub struct Rig {
@@ -25,24 +25,17 @@ pub struct Rig {
     pub system: System,
     pub case: Case,
     capacity: usize,
+    precision: Precision,
 }
 
 pub fn settings(preconditioner: Preconditioner, tolerance: f64) -> Pressure {
     Pressure {
         preconditioner,
+        precision: Precision::F32Refined,
         tolerance,
         max_iterations: 3000,
         residual_limit: 1.0,
     }
-}
-
-/// Where an element stands in the room's own arrays.
-pub fn blocked(element: u32) -> usize {
-    let (slot, local) = (element / CELLS, element % CELLS);
-    let [x, y, z] = [local % 8, local / 8 % 8, local / 64];
-    let cell = x % 2 + 2 * (y % 2) + 4 * (z % 2);
-    let block = x / 2 + 4 * (y / 2) + 16 * (z / 2);
-    (CELLS * slot + 64 * cell + block) as usize
 }
 
 impl Rig {
@@ -71,6 +64,7 @@ impl Rig {
             program,
             case,
             capacity,
+            precision: settings.precision,
         };
         rig.upload_case();
         rig
@@ -125,25 +119,23 @@ impl Rig {
         self.project(None).solved
     }
 
-    /// An array of the room, by row.
-    pub fn by_row(&self, name: &str) -> Vec<f64> {
+    /// `planes` arrays of the room's own precision, added up, by row.
+    fn sum(&self, name: &str, planes: usize) -> Vec<f64> {
         let cells = self.capacity * CELLS as usize;
-        let values = self.program.download::<f32>(&[(name, cells)]).unwrap();
-        self.system
-            .cell
-            .iter()
-            .map(|&element| f64::from(values[0][blocked(element)]))
-            .collect()
+        let words = planes * cells * self.precision.words();
+        let values = self.program.download::<u32>(&[(name, words)]).unwrap();
+        let values = pressure::widen(&values[0], self.precision);
+        let at = |e: usize| (0..planes).map(|k| values[k * cells + e]).sum();
+        self.system.cell.iter().map(|&e| at(blocked(e))).collect()
     }
 
-    /// Both words of the solution, by row.
+    /// An array of the room, by row.
+    pub fn by_row(&self, name: &str) -> Vec<f64> {
+        self.sum(name, 1)
+    }
+
+    /// All terms of the solution, by row.
     pub fn solution(&self) -> Vec<f64> {
-        let cells = self.capacity * CELLS as usize;
-        let values = self
-            .program
-            .download::<f32>(&[("pressure_solution", 2 * cells)])
-            .unwrap();
-        let at = |e: usize| f64::from(values[0][e]) + f64::from(values[0][cells + e]);
-        self.system.cell.iter().map(|&e| at(blocked(e))).collect()
+        self.sum("pressure_solution", self.precision.terms())
     }
 }

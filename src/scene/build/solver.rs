@@ -7,7 +7,7 @@ use super::{
     super::{
         Iteration, Method, Pbf, Solver, Stop,
         document::Document,
-        flip::{Flip, Preconditioner, Pressure, Surface, Transfer},
+        flip::{Flip, Precision, Preconditioner, Pressure, Surface, Transfer},
         spec::{FlipSpec, PbfSpec, PressureSpec, SolverSpec},
     },
     Lattice, Result, number, number_or, whole,
@@ -237,6 +237,13 @@ fn pressure(doc: &Document<'_>, spec: &PressureSpec) -> Result<Pressure> {
             "preconditioner",
             &Preconditioner::NAMED,
             Preconditioner::Multigrid,
+        )?,
+        precision: choice_or(
+            doc,
+            &spec.precision,
+            "precision",
+            &Precision::NAMED,
+            Precision::F32Refined,
         )?,
         tolerance,
         max_iterations: whole_or(doc, &spec.max_iterations, 400, 10_000)?,

@@ -52,8 +52,8 @@ pub(super) fn parse(
     let [left, right] = solvers(doc, &spec.solvers)?;
     let file = base_dir.join(spec.scene.get_ref());
     let scenes = [
-        Scene::load(&file, &[left.as_override()])?,
-        Scene::load(&file, &[right.as_override()])?,
+        load(doc, &spec, &file, left)?,
+        load(doc, &spec, &file, right)?,
     ];
     let look = Look::load(&base_dir.join(spec.look.get_ref()))?;
     if !look.spec().output.formats.contains(&FormatSpec::Png) {
@@ -70,6 +70,18 @@ pub(super) fn parse(
         pictures: range(doc, &spec.pictures, last)?,
         scenes,
         look,
+    })
+}
+
+fn load(
+    doc: &Document<'_>,
+    spec: &ComparisonSpec,
+    file: &Path,
+    solver: Method,
+) -> Result<Scene, SceneError> {
+    Scene::load(file, &[solver.as_override()]).map_err(|error| match error {
+        SceneError::Read { source, .. } => super::unreadable(doc, &spec.scene, file, &source),
+        other => other,
     })
 }
 

@@ -78,6 +78,17 @@ impl Study {
     }
 }
 
+/// That the scene which a study names cannot be read, at its place in the study.
+fn unreadable(
+    doc: &Document<'_>,
+    named: &Spanned<String>,
+    file: &Path,
+    source: &std::io::Error,
+) -> SceneError {
+    let problem = format!("cannot read {}: {source}", file.display());
+    doc.fault_at(named.span(), problem)
+}
+
 #[cfg(test)]
 mod tests {
     use super::{super::Method, *};
@@ -100,6 +111,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!((comparisons, sweeps), (2, 8));
+        assert_eq!((comparisons, sweeps), (2, 9));
     }
 }

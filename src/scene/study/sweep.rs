@@ -16,6 +16,12 @@
 //! device = "gpu"                              # or "cpu", the f64 reference
 //! against = "jacobi"                          # value by value against that method, not against the own finest run
 //! ```
+//!
+//! `key = "device"` with the values `"cpu"` and `"gpu"` sweeps what it runs on. `coarser = ["solver.flip.cell_size=0.4"]`, for
+//! all or for one method, is laid over the last value's run: what that is off by is the discretisation error, beside which
+//! the knee is told.
+
+mod fit;
 
 use std::{collections::BTreeSet, ops::Range, path::Path};
 
@@ -24,19 +30,18 @@ use toml::{Spanned, Value, de::DeTable};
 
 use super::{
     super::{Fault, Method, Place, Scene, document::Document, error::SceneError, physics_hash},
-    StudyFileError,
+    StudyFileError, unreadable,
 };
-use crate::domain::sampling::fill_water;
+use fit::{check_coarser, check_converged, check_fit};
 
 /// The key that changes the length of a frame.
 pub const FRAME_RATE: &str = "shot.frames_per_second";
 
+/// The key that changes what a run is on, and nothing in the scene.
+const DEVICE: &str = "device";
+
 /// Times, equally spaced, at which a run is compared with the finest.
 pub const SAMPLES: u32 = 10;
-
-/// Most particles whose distance to where their constraints hold is measured. With 8 000 a factor takes about 1 s, and
-/// Newton's method some 20 of them; both grow faster than the particles do.
-const MOST_CONVERGED: usize = 9000;
 
 /// Most runs of a study.
 const MOST_POINTS: usize = 1000;
@@ -63,8 +68,6 @@ pub struct Sweep {
 pub struct Line {
     /// For the legend.
     pub name: String,
-    /// What its runs are on.
-    pub device: LineDevice,
     /// The line whose run of the same value each of these is held against; its own finest run where `None`. Only of
     /// [`Measure::Finest`].
     pub against: Option<usize>,
@@ -72,10 +75,12 @@ pub struct Line {
     pub key: String,
     /// From coarse to fine.
     pub points: Vec<Point>,
+    /// The last of them, coarser: what its error is told beside. Of [`Measure::Finest`] and [`Measure::Projection`].
+    pub coarser: Option<Point>,
 }
 
-/// What a method runs on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a run is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LineDevice {
     /// The study's adapter, in f32.
     Gpu,
@@ -102,6 +107,8 @@ pub struct Point {
     pub scene: Scene,
     /// Output frames to run.
     pub frames: u32,
+    /// What it runs on.
+    pub device: LineDevice,
 }
 
 /// How errors are measured.
@@ -204,6 +211,7 @@ struct SweepSpec {
     set: Vec<Spanned<String>>,
     key: Option<Spanned<String>>,
     values: Option<Spanned<Vec<Spanned<Value>>>>,
+    coarser: Option<Spanned<Vec<Spanned<String>>>>,
     steps: Option<Spanned<i64>>,
     seconds: Option<Spanned<f64>>,
     repeats: Option<Spanned<i64>>,
@@ -221,6 +229,7 @@ struct MethodSpec {
     set: Vec<Spanned<String>>,
     key: Option<Spanned<String>>,
     values: Option<Spanned<Vec<Spanned<Value>>>>,
+    coarser: Option<Spanned<Vec<Spanned<String>>>>,
     device: Option<Spanned<String>>,
     against: Option<Spanned<String>>,
 }
@@ -255,6 +264,10 @@ pub(super) fn parse(
     for (place, method) in spec.method.get_ref().iter().enumerate() {
         if let Some(name) = &method.get_ref().against {
             lines[place].against = Some(against(doc, name, &lines, place, errors[0])?);
+            if lines[place].coarser.is_some() {
+                let problem = "with coarser, and these are not held against the own finest run";
+                return Err(doc.fault_at(name.span(), problem).into());
+            }
         }
     }
     let points: usize = lines.iter().map(|line| line.points.len()).sum();
@@ -319,7 +332,7 @@ fn whole(
 /// What projections start from: the scene with what is set for all.
 fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point, SceneError> {
     let fixed: Vec<_> = spec.set.iter().collect();
-    let scene = load(doc, &base_dir.join(spec.scene.get_ref()), &fixed, None)?;
+    let scene = load(doc, spec, base_dir, &fixed, None)?;
     if scene.solver.method != Method::Flip {
         let problem = "these are measured with solver.method flip, which set does not choose";
         return Err(doc.fault_at(spec.errors.span(), problem));
@@ -328,73 +341,8 @@ fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point,
         label: String::new(),
         frames: frames(doc, spec, &scene)?,
         scene,
+        device: LineDevice::Gpu,
     })
-}
-
-/// Whether a line's runs can be measured.
-fn check_fit(
-    doc: &Document<'_>,
-    spec: &SweepSpec,
-    line: &Line,
-    error: ErrorMeasure,
-    state: Option<&Point>,
-) -> Result<(), SceneError> {
-    let fault = |problem: String| Err(doc.fault_at(spec.errors.span(), problem));
-    for Point {
-        scene,
-        frames,
-        label,
-    } in &line.points
-    {
-        if error.measure() == Measure::Finest && frames % SAMPLES != 0 {
-            return fault(format!(
-                "{} is taken at {SAMPLES} times, and {:?} with {label} has {frames} frames, no multiple of that",
-                error.name(),
-                line.name
-            ));
-        }
-        let is_same = |state: &Point| {
-            let water =
-                |scene: &Scene| (scene.solver.method, scene.particle_spacing(), scene.domain);
-            water(scene) == water(&state.scene)
-                && scene.solver.flip().cell_size == state.scene.solver.flip().cell_size
-        };
-        if !state.is_none_or(is_same) {
-            return fault(format!(
-                "{} is measured on one state, and {:?} with {label} has another solver, domain or resolution",
-                error.name(),
-                line.name
-            ));
-        }
-    }
-    Ok(())
-}
-
-/// Whether the distance to where the constraints hold can be measured, and in minutes.
-fn check_converged(doc: &Document<'_>, spec: &SweepSpec, line: &Line) -> Result<(), SceneError> {
-    let fault = |problem: String| Err(doc.fault_at(spec.errors.span(), problem));
-    for Point { scene, label, .. } in &line.points {
-        let name = &line.name;
-        if scene.solver.method != Method::Pbf {
-            return fault(format!(
-                "distance_to_converged is measured with solver.method pbf, and {name:?} with {label} has another"
-            ));
-        }
-        let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
-        let (blocks, spacing) = (&scene.water.blocks, scene.particle_spacing());
-        let filled = match fill_water(blocks, water, None, &scene.domain, spacing) {
-            Ok(fill) => fill.particles.len(),
-            Err(error) => return fault(error.to_string()),
-        };
-        if filled > MOST_CONVERGED {
-            return fault(format!(
-                "distance_to_converged takes some 20 sparse factors of the constraints a run, a second each with 8000 \
-                 particles and soon gigabytes with more; {name:?} with {label} has {filled} particles, and up to \
-                 {MOST_CONVERGED} are measured"
-            ));
-        }
-    }
-    Ok(())
 }
 
 /// The line that the line at `place` is held against.
@@ -424,21 +372,19 @@ fn against(
     Ok(found)
 }
 
-/// What a method says that it runs on.
+/// What a word of the study, at `at`, says that is run on.
 fn device(
     doc: &Document<'_>,
     spec: &SweepSpec,
-    method: &MethodSpec,
+    word: &str,
+    at: Range<usize>,
 ) -> Result<LineDevice, SceneError> {
-    let Some(word) = &method.device else {
-        return Ok(LineDevice::Gpu);
-    };
-    let fault = |problem: &str| Err(doc.fault_at(word.span(), problem));
+    let fault = |problem: &str| Err(doc.fault_at(at.clone(), problem));
     let named = |wanted: &str| spec.errors.get_ref().iter().any(|e| e.get_ref() == wanted);
     let is_projection = ErrorMeasure::NAMED
         .iter()
         .any(|(name, error)| error.measure() == Measure::Projection && named(name));
-    match word.get_ref().as_str() {
+    match word {
         "gpu" => Ok(LineDevice::Gpu),
         "cpu" if is_projection => {
             fault("the reference's projection is what these errors are measured against")
@@ -460,22 +406,43 @@ fn line(
     let key = key.ok_or_else(|| doc.missing(at.clone(), "key"))?;
     let values = method.values.as_ref().or(spec.values.as_ref());
     let values = values.ok_or_else(|| doc.missing(at, "values"))?;
-    let file = base_dir.join(spec.scene.get_ref());
     let fixed: Vec<_> = spec.set.iter().chain(&method.set).collect();
     // The rate that the scene itself has, to which what is taken a frame is tied.
-    let own_rate = load(doc, &file, &fixed, None)?.shot.frames_per_second;
-    let mut seen = BTreeSet::new();
-    let mut points = Vec::new();
-    for value in values.get_ref() {
-        let swept = (
-            format!("{}={}", key.get_ref(), value.get_ref()),
-            value.span(),
-        );
-        let mut scene = load(doc, &file, &fixed, Some(swept))?;
+    let own_rate = load(doc, spec, base_dir, &fixed, None)?
+        .shot
+        .frames_per_second;
+    let loaded = |fixed: &[&Spanned<String>], swept| {
+        let mut scene = load(doc, spec, base_dir, fixed, swept)?;
         if key.get_ref() == FRAME_RATE {
             tie_pic_blend(&mut scene, own_rate);
         }
-        let is_new = seen.insert(physics_hash(&scene));
+        Ok::<_, SceneError>(scene)
+    };
+    let is_device = key.get_ref() == DEVICE;
+    let own_device = match &method.device {
+        None => LineDevice::Gpu,
+        Some(word) if is_device => {
+            return Err(doc.fault_at(word.span(), "the key is the device itself"));
+        }
+        Some(word) => device(doc, spec, word.get_ref(), word.span())?,
+    };
+    let on = |value: &Spanned<Value>| match is_device {
+        true => {
+            let word = value.get_ref().as_str().unwrap_or_default();
+            device(doc, spec, word, value.span())
+        }
+        false => Ok(own_device),
+    };
+    let swept = |value: &Spanned<Value>| {
+        let text = || format!("{}={}", key.get_ref(), value.get_ref());
+        (!is_device).then(|| (text(), value.span()))
+    };
+    let mut seen = BTreeSet::new();
+    let mut points = Vec::new();
+    for value in values.get_ref() {
+        let scene = loaded(&fixed, swept(value))?;
+        let device = on(value)?;
+        let is_new = seen.insert((physics_hash(&scene), device));
         if !is_new {
             let problem = format!(
                 "the scene is the same as with a value before it: {} changes nothing with solver.method {:?}, or the value \
@@ -489,31 +456,55 @@ fn line(
             label: doc.text_at(value.span()).trim_matches('"').to_owned(),
             frames: frames(doc, spec, &scene)?,
             scene,
+            device,
         });
     }
-    if points.len() < 2 {
-        return Err(doc.fault_at(values.span(), "a sweep has two values or more"));
-    }
+    let last = match values.get_ref().last() {
+        Some(last) if points.len() >= 2 => last,
+        _ => return Err(doc.fault_at(values.span(), "a sweep has two values or more")),
+    };
+    let coarser = match method.coarser.as_ref().or(spec.coarser.as_ref()) {
+        None => None,
+        Some(set) => {
+            let fixed: Vec<_> = fixed.iter().copied().chain(set.get_ref()).collect();
+            let scene = loaded(&fixed, swept(last))?;
+            check_coarser(doc, spec, set, &scene, &points[points.len() - 1].scene)?;
+            let texts: Vec<_> = set
+                .get_ref()
+                .iter()
+                .map(|text| text.get_ref().as_str())
+                .collect();
+            Some(Point {
+                label: texts.join(" and "),
+                frames: frames(doc, spec, &scene)?,
+                scene,
+                device: on(last)?,
+            })
+        }
+    };
     Ok(Line {
         name: method.name.get_ref().clone(),
-        device: device(doc, spec, method)?,
         against: None,
         key: key.get_ref().clone(),
         points,
+        coarser,
     })
 }
 
 /// The scene with overrides; what is wrong with one of them is said at its place in the study file.
 fn load(
     doc: &Document<'_>,
-    file: &Path,
+    spec: &SweepSpec,
+    base_dir: &Path,
     fixed: &[&Spanned<String>],
     swept: Option<(String, Range<usize>)>,
 ) -> Result<Scene, SceneError> {
+    let file = base_dir.join(spec.scene.get_ref());
     let fixed = fixed.iter().map(|set| (set.get_ref().clone(), set.span()));
     let (overrides, spans): (Vec<_>, Vec<_>) = fixed.chain(swept).unzip();
-    Scene::load(file, &overrides).map_err(|error| {
+    Scene::load(&file, &overrides).map_err(|error| {
         let (text, message) = match &error {
+            SceneError::Read { source, .. } => return unreadable(doc, &spec.scene, &file, source),
             SceneError::Fault(fault) => match fault.as_ref() {
                 Fault {
                     place: Place::Override(text),

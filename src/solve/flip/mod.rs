@@ -242,6 +242,14 @@ impl Flip {
         self.timed(|flip, run| flip.project_by(substep, run))
     }
 
+    /// The last projection's q = p Δt / (ρ Δx) at elements of cell arrays, as the solve has it, m/s.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn solution(&self, elements: &[u32]) -> Result<Vec<f64>, SolveError> {
+        self.pressure.solution(&self.program, elements)
+    }
+
     /// `work` with what runs recordings at once, or timed where the solver times passes.
     fn timed<T>(
         &mut self,

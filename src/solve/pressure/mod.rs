@@ -47,15 +47,16 @@ use crate::{
         program::Program,
         recording::{Recording, Timer, spread},
     },
-    scene::flip::{Preconditioner, Pressure},
+    scene::flip::{Precision, Preconditioner, Pressure},
 };
 
 use super::{SolveError, trace::Run};
 
 pub use crate::domain::poisson::{AIR, FLUID, SOLID};
-pub use params::{PressureBrick, PressureControl, PressurePhase};
+pub use params::{PressureBrick, PressureControl, PressureControl64, PressurePhase};
 pub use plan::{buffers, passes};
 
+pub use plan::control_words;
 use plan::{PHASE_STRIDE, PHASES, Phase, SIZES, Size};
 use stages::{SINGLE, Shape, Stages};
 
@@ -289,6 +290,24 @@ impl PressureSolver {
         Ok(solved)
     }
 
+    /// q of the last solve in the precision that it was solved in, m/s, of `elements` of the caller's cell arrays.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn solution(&self, program: &Program, elements: &[u32]) -> Result<Vec<f64>, SolveError> {
+        let precision = self.settings.precision;
+        let stride = CELLS as usize * self.capacity;
+        let words = precision.terms() * stride * precision.words();
+        let words = program.download::<u32>(&[("pressure_solution", words)])?;
+        let values = widen(&words[0], precision);
+        let at = |place: usize| {
+            (0..precision.terms())
+                .map(|k| values[k * stride + place])
+                .sum()
+        };
+        Ok(elements.iter().map(|&e| at(blocked(e))).collect())
+    }
+
     /// Runs a task to its end: batches of iterations, each followed by a verification and by what is to be done
     /// with the solution, which stay empty until it is their turn.
     fn solve(
@@ -320,7 +339,7 @@ impl PressureSolver {
             recordings.push(&stages.verify);
             recordings.extend(finish);
             run(program, &recordings)?;
-            let (control, stats) = read(program)?;
+            let (control, stats) = read(program, self.settings.precision)?;
             is_first = control.state == WANTS_POCKETS;
             if is_first {
                 self.find_pockets(program)?;
@@ -370,22 +389,71 @@ impl PressureSolver {
     }
 }
 
-fn solved(control: &PressureControl, tolerance: f64) -> Solved {
-    let [r, b] = [control.residual_square, control.rhs_square].map(f64::from);
+/// What stands in `pressure_control`, in f64 whatever the device computes in, from its words of 32 bits.
+pub fn widen_control(words: &[u32], precision: Precision) -> PressureControl64 {
+    let bytes: &[u8] = bytemuck::cast_slice(words);
+    match precision {
+        Precision::F32 | Precision::F32Refined => {
+            let narrow: PressureControl = bytemuck::pod_read_unaligned(bytes);
+            PressureControl64 {
+                state: narrow.state,
+                iterations: narrow.iterations,
+                is_first: narrow.is_first,
+                restarts: narrow.restarts,
+                rhs_square: narrow.rhs_square.into(),
+                residual_square: narrow.residual_square.into(),
+                product: narrow.product.into(),
+                alpha: narrow.alpha.into(),
+                beta: narrow.beta.into(),
+            }
+        }
+        Precision::F64 => bytemuck::pod_read_unaligned(bytes),
+    }
+}
+
+/// Values that an array of the room's own holds in `precision`, from its words of 32 bits. `pressure_solution` has
+/// [`Precision::terms`] planes of them, whose sum it is.
+pub fn widen(words: &[u32], precision: Precision) -> Vec<f64> {
+    match precision {
+        Precision::F32 | Precision::F32Refined => {
+            let wide = |&bits: &u32| f64::from(f32::from_bits(bits));
+            words.iter().map(wide).collect()
+        }
+        Precision::F64 => {
+            let wide = |pair: &[u32]| f64::from_bits(u64::from(pair[1]) << 32 | u64::from(pair[0]));
+            words.chunks_exact(2).map(wide).collect()
+        }
+    }
+}
+
+/// Where an element stands in the room's own arrays: by block of 2³ cells.
+pub fn blocked(element: u32) -> usize {
+    let (slot, local) = (element / CELLS, element % CELLS);
+    let [x, y, z] = [local % 8, local / 8 % 8, local / 64];
+    let cell = x % 2 + 2 * (y % 2) + 4 * (z % 2);
+    let block = x / 2 + 4 * (y / 2) + 16 * (z / 2);
+    (CELLS * slot + 64 * cell + block) as usize
+}
+
+fn solved(control: &PressureControl64, tolerance: f64) -> Solved {
+    let [r, b] = [control.residual_square, control.rhs_square];
     let residual = if b == 0.0 { 0.0 } else { (r / b).sqrt() };
     Solved {
         iterations: control.iterations,
         residual,
-        // The device compares squares in f32.
+        // The device compares squares, with the tolerance's in f32.
         is_missed: residual.is_nan() || residual > tolerance * (1.0 + 1e-6),
     }
 }
 
-fn read(program: &Program) -> Result<(PressureControl, [u32; STATS]), SolveError> {
-    let words = size_of::<PressureControl>() / 4;
+fn read(
+    program: &Program,
+    precision: Precision,
+) -> Result<(PressureControl64, [u32; STATS]), SolveError> {
+    let words = control_words(precision);
     let read =
         program.download::<u32>(&[("pressure_control", words), ("pressure_stats", STATS)])?;
-    let control = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&read[0]));
+    let control = widen_control(&read[0], precision);
     let mut stats = [0; STATS];
     stats.copy_from_slice(&read[1]);
     Ok((control, stats))

@@ -36,34 +36,44 @@ mirror!(
     }
 );
 
-mirror!(
+macro_rules! control {
+    ($(#[$meta:meta])* $name:ident, $real:ty) => {
+        mirror!(
+            $(#[$meta])*
+            $name {
+                /// 0 iterating, 1 verifying, 2 done, 3 wants pockets.
+                state: u32,
+                /// So far.
+                iterations: u32,
+                /// Whether the next direction starts afresh.
+                is_first: u32,
+                /// Verifications.
+                restarts: u32,
+                /// ‖b‖².
+                rhs_square: $real,
+                /// ‖r‖².
+                residual_square: $real,
+                /// Residual · correction.
+                product: $real,
+                /// Length of the step.
+                alpha: $real,
+                /// Part of the last direction.
+                beta: $real,
+            }
+        );
+    };
+}
+
+control!(
     /// `PressureControl` of shared/pressure_control.wgsl.
-    PressureControl {
-        /// ‖b‖².
-        rhs_square: f32,
-        /// ‖r‖².
-        residual_square: f32,
-        /// Residual · correction.
-        product: f32,
-        /// Length of the step.
-        alpha: f32,
-        /// Part of the last direction.
-        beta: f32,
-        /// 0 iterating, 1 verifying, 2 done, 3 wants pockets.
-        state: u32,
-        /// So far.
-        iterations: u32,
-        /// Whether the next direction starts afresh.
-        is_first: u32,
-        /// Verifications.
-        restarts: u32,
-        /// Unused.
-        padding_0: u32,
-        /// Unused.
-        padding_1: u32,
-        /// Unused.
-        padding_2: u32,
-    }
+    PressureControl,
+    f32
+);
+
+control!(
+    /// The same where the solve is in f64.
+    PressureControl64,
+    f64
 );
 
 mirror!(

@@ -7,12 +7,12 @@ use crate::{
         recording::{Bind, Command, Groups},
         sort::storage,
     },
-    scene::flip::{Preconditioner, Pressure, Surface},
+    scene::flip::{Precision, Preconditioner, Pressure, Surface},
 };
 
 use super::{
     LEVELS,
-    params::{PressureBrick, PressureControl, PressurePhase},
+    params::{PressureBrick, PressureControl, PressureControl64, PressurePhase},
 };
 
 /// Bytes between two phases in `pressure_phases`.
@@ -167,20 +167,32 @@ fn has_diagonal(settings: &Pressure) -> bool {
     )
 }
 
+/// Words of 32 bits of `pressure_control`.
+pub fn control_words(precision: Precision) -> usize {
+    match precision {
+        Precision::F32 | Precision::F32Refined => size_of::<PressureControl>() / 4,
+        Precision::F64 => size_of::<PressureControl64>() / 4,
+    }
+}
+
 /// Buffers that the room adds to its inputs (module docs); `capacity` is in slots.
 pub fn buffers(settings: &Pressure, has_correction: bool, capacity: usize) -> Vec<BufferSpec> {
     let cells = 4 * capacity as u64 * u64::from(CELLS);
+    let precision = settings.precision;
+    // Of what the iterations compute with.
+    let real = precision.words() as u64;
+    let reals = real * cells;
     let mut specs = vec![
         storage("pressure", cells),
         storage("pressure_coefficient", 3 * cells),
-        storage("pressure_dirichlet", cells),
+        storage("pressure_dirichlet", reals),
         storage("pressure_block", cells / 8),
-        storage("pressure_rhs", cells),
-        storage("pressure_residual", cells),
-        storage("pressure_correction", cells),
-        storage("pressure_direction", cells),
-        storage("pressure_product", cells),
-        storage("pressure_solution", 2 * cells),
+        storage("pressure_rhs", reals),
+        storage("pressure_residual", reals),
+        storage("pressure_correction", reals),
+        storage("pressure_direction", reals),
+        storage("pressure_product", reals),
+        storage("pressure_solution", precision.terms() as u64 * reals),
         storage("pressure_label", cells),
         storage("pressure_pocket_cells", cells),
         storage("pressure_pocket_ranges", cells),
@@ -189,8 +201,8 @@ pub fn buffers(settings: &Pressure, has_correction: bool, capacity: usize) -> Ve
             (capacity * size_of::<PressureBrick>()) as u64,
         ),
         // A sum a workgroup, and room for those that a dispatch in two dimensions adds.
-        storage("pressure_sums", 4 * (capacity as u64 + 1024)),
-        storage("pressure_control", size_of::<PressureControl>() as u64),
+        storage("pressure_sums", 4 * real * (capacity as u64 + 1024)),
+        storage("pressure_control", 4 * control_words(precision) as u64),
         storage("pressure_stats", 4 * super::STATS as u64),
         storage("pressure_sizes", 16 * SIZES as u64),
         storage("pressure_groups", 3 * 16 * SIZES as u64),
@@ -201,7 +213,7 @@ pub fn buffers(settings: &Pressure, has_correction: bool, capacity: usize) -> Ve
         },
     ];
     if has_diagonal(settings) {
-        specs.push(storage("pressure_inverse_diagonal", cells));
+        specs.push(storage("pressure_inverse_diagonal", reals));
     }
     if has_correction {
         specs.push(storage("face_displacement", 3 * cells));
@@ -247,6 +259,11 @@ pub fn passes(settings: &Pressure, surface: Surface, has_correction: bool) -> Ve
     }
     if has_diagonal(settings) {
         defines.push("DIAGONAL");
+    }
+    match settings.precision {
+        Precision::F32 => {}
+        Precision::F32Refined => defines.push("TWO_WORDS"),
+        Precision::F64 => defines.push("F64"),
     }
     names
         .into_iter()

@@ -21,7 +21,7 @@ use crate::{
     solve::{SolveError, pbf::device_limits},
 };
 
-use super::{Blame, prepare::Start};
+use super::{Blame, device::needs, prepare::Start};
 
 pub use crate::compare::check::{Row, Table};
 
@@ -128,7 +128,7 @@ pub fn check(
 ) -> Result<Outcome, CheckError> {
     let (scene, cache, frames) = open(&request.source)?;
     let start = Start::of(&scene)?;
-    let context = Context::open(request.adapter.as_deref())?;
+    let context = Context::open_for(request.adapter.as_deref(), needs(&scene))?;
     let info = &context.info;
     tell(Event::Ready {
         device: format!("{} ({} {})", info.name, info.driver, info.driver_info),

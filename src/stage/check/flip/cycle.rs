@@ -25,9 +25,11 @@ struct Levels {
     bricks: Vec<PressureBrick>,
     /// Of the lower faces.
     coefficient: [Vec<f32>; 3],
-    dirichlet: Vec<f32>,
-    residual: Vec<f32>,
-    correction: Vec<f32>,
+    dirichlet: Vec<f64>,
+    residual: Vec<f64>,
+    correction: Vec<f64>,
+    /// Unit roundoff of what they are computed in.
+    unit: f64,
 }
 
 /// What a block sees about it.
@@ -97,8 +99,8 @@ impl Levels {
         };
         for c in 0..8 {
             let own = place(slot, block, c);
-            found.matrix[c][c] += f64::from(self.dirichlet[own]);
-            found.rhs[c] = f64::from(self.residual[own]);
+            found.matrix[c][c] += self.dirichlet[own];
+            found.rhs[c] = self.residual[own];
             found.size[c] = found.rhs[c].abs();
             for k in 0..6 {
                 let (axis, is_up) = (k / 2, k % 2 == 1);
@@ -115,13 +117,13 @@ impl Levels {
                 if is_inner {
                     found.matrix[c][other_c] -= shared;
                 } else if about != About::Nothing {
-                    let mut value = f64::from(self.correction[other]);
+                    let mut value = self.correction[other];
                     let mut size = value.abs();
                     if about == About::WithAbove {
                         let brick = self.bricks[there as usize].above;
                         let more = self.correction[(brick + above_offset(other_block)) as usize];
-                        value += f64::from(more);
-                        size += f64::from(more.abs());
+                        value += more;
+                        size += more.abs();
                     }
                     found.inflow[c] += shared * value;
                     found.size[c] += shared * size;
@@ -165,15 +167,15 @@ impl Block {
         Some(rhs)
     }
 
-    /// The solution and what f32 may err by: elimination solves a matrix and a right-hand side that are 40 u off
+    /// The solution and what may be off by `unit`, the roundoff: elimination solves a matrix and a right-hand side that are 40 u off
     /// (Higham 2002, theorem 9.3; its factors have no greater entries than an M-matrix itself), and the inverse has no
     /// negative entry.
-    fn solution(&self) -> Option<[[f64; 2]; 8]> {
+    fn solution(&self, unit: f64) -> Option<[[f64; 2]; 8]> {
         let exact = self.solve(self.rhs.map(|b| [b]))?;
         let off = std::array::from_fn(|c| {
             let terms = self.matrix[c].iter().zip(&exact);
             let row: f64 = terms.map(|(a, [z])| (a * z).abs()).sum();
-            [40.0 * U * (row + self.size[c])]
+            [40.0 * unit * (row + self.size[c])]
         });
         let off = self.solve(off)?;
         Some(std::array::from_fn(|c| [exact[c][0], off[c][0]]))
@@ -213,9 +215,10 @@ impl Checker<'_> {
             phase,
             bricks: traced.read("pressure_bricks", slots)?,
             coefficient: [0, 1, 2].map(|axis| planes[axis * stride..][..cells].to_vec()),
-            dirichlet: traced.read("pressure_dirichlet", cells)?,
-            residual: traced.read("pressure_residual", cells)?,
-            correction: traced.read("pressure_correction", cells)?,
+            dirichlet: self.reals(traced, "pressure_dirichlet", cells)?,
+            residual: self.reals(traced, "pressure_residual", cells)?,
+            correction: self.reals(traced, "pressure_correction", cells)?,
+            unit: self.unit(),
         })
     }
 
@@ -238,11 +241,11 @@ impl Checker<'_> {
         };
         let blocks = Self::coloured(levels);
         let one = |&(slot, block): &(u32, u32)| {
-            let solution = levels.block(slot, block, about).solution()?;
+            let solution = levels.block(slot, block, about).solution(levels.unit)?;
             Some([0, 1, 2, 3, 4, 5, 6, 7].map(|c| {
                 let at = place(slot, block, c);
                 let [exact, off] = solution[c];
-                pair_of(at, f64::from(levels.correction[at]), exact, off)
+                pair_of(at, levels.correction[at], exact, off)
             }))
         };
         let found: Vec<_> = blocks.par_iter().map(one).collect();
@@ -259,18 +262,14 @@ impl Checker<'_> {
             let sum: f64 = found.inflow.iter().sum();
             // Residuals apart, that is what its size is made of.
             let size: f64 = (0..8)
-                .map(|c| found.size[c] - f64::from(levels.residual[place(slot, block, c)]).abs())
+                .map(|c| found.size[c] - levels.residual[place(slot, block, c)].abs())
                 .sum();
-            for (block, exact, tolerance) in
-                [(block, 0.5 * sum, 4.0 * U * size), (block ^ 1, 0.0, 0.0)]
-            {
+            for (block, exact, tolerance) in [
+                (block, 0.5 * sum, 4.0 * levels.unit * size),
+                (block ^ 1, 0.0, 0.0),
+            ] {
                 let at = (above + above_offset(block)) as usize;
-                pairs.push(pair_of(
-                    at,
-                    f64::from(levels.residual[at]),
-                    exact,
-                    tolerance,
-                ));
+                pairs.push(pair_of(at, levels.residual[at], exact, tolerance));
             }
         }
         self.table.add(&RESTRICTED, &pairs, 0);
@@ -295,10 +294,10 @@ impl Checker<'_> {
                     let value = f64::from(levels.coefficient[axis][at]);
                     shared.push(pair_of(at, value, exact, 3.0 * U * exact));
                 }
-                let air = (0..8).map(|c| f64::from(levels.dirichlet[place(slot, block, c)]));
+                let air = (0..8).map(|c| levels.dirichlet[place(slot, block, c)]);
                 let exact = 0.5 * air.map(|air| air.min(MOST_AIR)).sum::<f64>();
-                let value = f64::from(levels.dirichlet[at]);
-                airs.push(pair_of(at, value, exact, 8.0 * U * exact));
+                let value = levels.dirichlet[at];
+                airs.push(pair_of(at, value, exact, 8.0 * levels.unit * exact));
                 let kind = kinds[(64 * slot + block) as usize] & 3;
                 let coarse = at / 512 * 64 + at % 64;
                 full[coarse] = [full[coarse][0] && kind == 1, full[coarse][1] && kind == 0];

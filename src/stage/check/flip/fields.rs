@@ -1,5 +1,7 @@
 //! What a check of FLIP compares, and where each tolerance comes from; u = 2⁻²⁴, N cells along the domain's longest
 //! side: a particle's place in its cell errs by 3 u N.
+//! What the projection computes in f64, where the scene asks for that, has u = 2⁻⁵³: the system, its right-hand side,
+//! products, differences of the solution, the residual. Velocities, displacements and pascals stay f32.
 
 use crate::compare::check::fields;
 
@@ -62,7 +64,7 @@ fields! {
     PRESSURE = "pressure/project", "pressure", "Pa", "4 u p";
     AFTER = "pressure/measure_divergence", "largest divergence", "1/s", "10 u of the largest Σ|f u| over Δx";
     SOURCE = "pressure/density_source", "right-hand side", "m", "2 u";
-    DISPLACEMENT = "pressure/displace", "displacement at faces", "m", "24 u |Δq|/θ of each of its two words";
+    DISPLACEMENT = "pressure/displace", "displacement at faces", "m", "24 u |Δq|/θ of each of its terms + u (f32) of it";
     CHANGE = "flip/find_change", "change at faces", "m/s", "one difference: u";
     LAYER = "flip/find_change", "layers", "", "equal";
     SPREAD_VELOCITY = "flip/extrapolate", "velocity at faces", "m/s", "a mean of six and two sums: 12 u of the largest";

@@ -6,13 +6,10 @@ use super::{
     Checker,
     fields::*,
     pair_of,
-    pressure::{PRODUCTS, blocked, differences},
+    pressure::{PRODUCTS, differences},
 };
 use crate::{
-    compare::{
-        check::{Field, Pair},
-        rounding::U,
-    },
+    compare::check::{Field, Pair},
     domain::{
         bricks::CELLS,
         poisson::{NONE, System, remove_means},
@@ -21,7 +18,7 @@ use crate::{
     scene::flip::Preconditioner,
     solve::{
         SolveError,
-        pressure::{PressureControl, PressurePhase},
+        pressure::{PressureControl64, PressurePhase, blocked, control_words, widen_control},
         trace::Traced,
     },
 };
@@ -50,14 +47,15 @@ const MULTIGRID: [&str; 5] = [
 /// What a pass had before it ran.
 #[derive(Default)]
 pub(super) struct Iteration {
-    control: PressureControl,
+    control: PressureControl64,
     /// The pass before.
     last: &'static str,
     now: &'static str,
     /// How often each pass was met on each level.
     runs: BTreeMap<(&'static str, u32), usize>,
     direction: Vec<f64>,
-    words: [Vec<f64>; 2],
+    /// Of the solution.
+    terms: Vec<Vec<f64>>,
     values: Vec<f64>,
     /// What the bricks' sums of the latest pass that made any come to, and the sum of the terms' magnitudes.
     sum: Option<[f64; 2]>,
@@ -99,16 +97,21 @@ impl Checker<'_> {
         }
     }
 
+    fn control(&self, traced: Traced<'_>) -> Result<PressureControl64, SolveError> {
+        let words = traced.read::<u32>("pressure_control", control_words(self.precision()))?;
+        Ok(widen_control(&words, self.precision()))
+    }
+
     fn before(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
         let iteration = &mut self.iteration;
         (iteration.last, iteration.now) = (iteration.now, traced.pass);
-        self.iteration.control = traced.read("pressure_control", 1)?[0];
+        self.iteration.control = self.control(traced)?;
         match traced.pass {
             "pressure/direction" => {
                 self.iteration.direction = self.by_row(traced, "pressure_direction")?;
             }
             "pressure/advance" => {
-                self.iteration.words = self.words(traced)?;
+                self.iteration.terms = self.terms(traced)?;
                 self.iteration.values = self.by_row(traced, "pressure_residual")?;
             }
             "pressure/center" => {
@@ -196,13 +199,14 @@ impl Checker<'_> {
     }
 
     fn precondition(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let unit = self.unit();
         let r = self.by_row(traced, "pressure_residual")?;
         let z = self.by_row(traced, "pressure_correction")?;
         let rows: Vec<_> = match self.model.settings().pressure.preconditioner {
             Preconditioner::Jacobi => {
                 let d = self.by_row(traced, "pressure_inverse_diagonal")?;
                 (0..r.len())
-                    .map(|i| [z[i], d[i] * r[i], U * (d[i] * r[i]).abs()])
+                    .map(|i| [z[i], d[i] * r[i], unit * (d[i] * r[i]).abs()])
                     .collect()
             }
             _ => (0..r.len()).map(|i| [z[i], r[i], 0.0]).collect(),
@@ -213,6 +217,7 @@ impl Checker<'_> {
     }
 
     fn ipp_lower(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let unit = self.unit();
         let r = self.by_row(traced, "pressure_residual")?;
         let d = self.by_row(traced, "pressure_inverse_diagonal")?;
         let half = self.by_row(traced, "pressure_product")?;
@@ -220,7 +225,7 @@ impl Checker<'_> {
         let of = |i: usize| {
             let [sum, size] = shared(system, i, 0, |j| d[j] * r[j]);
             let exact = d[i] * (r[i] + sum);
-            [half[i], exact, 9.0 * U * d[i] * (r[i].abs() + size)]
+            [half[i], exact, 9.0 * unit * d[i] * (r[i].abs() + size)]
         };
         let rows: Vec<_> = (0..r.len()).map(of).collect();
         self.add_rows(&IPP_LOWER, &rows);
@@ -228,6 +233,7 @@ impl Checker<'_> {
     }
 
     fn ipp_upper(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let unit = self.unit();
         let r = self.by_row(traced, "pressure_residual")?;
         let d = self.by_row(traced, "pressure_inverse_diagonal")?;
         let half = self.by_row(traced, "pressure_product")?;
@@ -236,7 +242,7 @@ impl Checker<'_> {
         let of = |i: usize| {
             let [sum, size] = shared(system, i, 1, |j| half[j]);
             let exact = half[i] + d[i] * sum;
-            [z[i], exact, 9.0 * U * (half[i].abs() + d[i] * size)]
+            [z[i], exact, 9.0 * unit * (half[i].abs() + d[i] * size)]
         };
         let rows: Vec<_> = (0..r.len()).map(of).collect();
         self.add_rows(&IPP_UPPER, &rows);
@@ -245,13 +251,14 @@ impl Checker<'_> {
     }
 
     fn direction(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let unit = self.unit();
         let z = self.by_row(traced, "pressure_correction")?;
         let p = self.by_row(traced, "pressure_direction")?;
-        let beta = f64::from(self.iteration.control.beta);
+        let beta = self.iteration.control.beta;
         let rows: Vec<_> = (z.iter().zip(&self.iteration.direction).zip(p))
             .map(|((z, before), p)| {
                 let kept = beta * before;
-                [p, z + kept, 2.0 * U * (z.abs() + kept.abs())]
+                [p, z + kept, 2.0 * unit * (z.abs() + kept.abs())]
             })
             .collect();
         self.add_rows(&DIRECTED, &rows);
@@ -262,26 +269,33 @@ impl Checker<'_> {
         let p = self.by_row(traced, "pressure_direction")?;
         let q = self.by_row(traced, "pressure_product")?;
         let r = self.by_row(traced, "pressure_residual")?;
-        let [large, small] = self.words(traced)?;
-        let alpha = f64::from(self.iteration.control.alpha);
-        let Iteration { words, values, .. } = &self.iteration;
+        let (terms, unit) = (self.terms(traced)?, self.unit());
+        let alpha = self.iteration.control.alpha;
+        let Iteration {
+            terms: before,
+            values,
+            ..
+        } = &self.iteration;
         let of_x = |i: usize| {
             let way = alpha * p[i];
-            let exact = words[0][i] + words[1][i] + way;
-            // What the first word loses, and of the step what is beyond its factors' leading 12 bits.
-            let kept = U * large[i].abs() + way.abs() / 512.0;
-            [
-                large[i] + small[i],
-                exact,
-                U * (small[i].abs() + 4.0 * kept),
-            ]
+            let at = |terms: &[Vec<f64>]| terms.iter().map(|term| term[i]).sum::<f64>();
+            let tolerance = match &terms[..] {
+                [one] => unit * (2.0 * way.abs() + one[i].abs()),
+                // What the first word loses, and of the step what is beyond its factors' leading 12 bits.
+                [large, small, ..] => {
+                    let kept = unit * large[i].abs() + way.abs() / 512.0;
+                    unit * (small[i].abs() + 4.0 * kept)
+                }
+                [] => 0.0,
+            };
+            [at(&terms), at(before) + way, tolerance]
         };
         let of_r = |i: usize| {
             let way = alpha * q[i];
             [
                 r[i],
                 values[i] - way,
-                2.0 * U * (values[i].abs() + way.abs()),
+                2.0 * unit * (values[i].abs() + way.abs()),
             ]
         };
         let solution: Vec<_> = (0..p.len()).map(of_x).collect();
@@ -293,17 +307,19 @@ impl Checker<'_> {
     }
 
     fn verify(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
-        let words = self.words(traced)?;
+        let (terms, unit) = (self.terms(traced)?, self.unit());
         let b = self.by_row(traced, "pressure_rhs")?;
         let r = self.by_row(traced, "pressure_residual")?;
         let system = &self.built().system;
-        let images = words.each_ref().map(|word| system.apply(word));
-        let errors = words.each_ref().map(|word| differences(system, word));
+        let images: Vec<_> = terms.iter().map(|term| system.apply(term)).collect();
+        let errors: Vec<_> = terms.iter().map(|term| differences(system, term)).collect();
         let of = |i: usize| {
-            let exact = b[i] - images[0][i] - images[1][i];
-            let size = b[i].abs() + images[0][i].abs() + images[1][i].abs();
-            let tolerance = U * (12.0 * (errors[0][i] + errors[1][i]) + 2.0 * size);
-            [r[i], exact, tolerance]
+            let exact = images.iter().fold(b[i], |left, image| left - image[i]);
+            let size = images
+                .iter()
+                .fold(b[i].abs(), |size, image| size + image[i].abs());
+            let error: f64 = errors.iter().map(|error| error[i]).sum();
+            [r[i], exact, unit * (12.0 * error + 2.0 * size)]
         };
         let rows: Vec<_> = (0..b.len()).map(of).collect();
         self.add_rows(&VERIFIED_RESIDUAL, &rows);
@@ -312,6 +328,7 @@ impl Checker<'_> {
     }
 
     fn center(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let unit = self.unit();
         let found = self.by_row(traced, traced.buffer("values"))?;
         let before = &self.iteration.values;
         let pockets = self.built().system.pockets();
@@ -324,7 +341,7 @@ impl Checker<'_> {
             for &i in pocket {
                 let i = i as usize;
                 let of_mean = (n / 256.0 + 14.0) * size / n;
-                tolerance[i] = U * (of_mean + before[i].abs());
+                tolerance[i] = unit * (of_mean + before[i].abs());
             }
         }
         let rows: Vec<_> = (0..found.len())
@@ -368,16 +385,22 @@ impl Checker<'_> {
         let Some([sum, size]) = self.iteration.sum.take().filter(|_| is_turn) else {
             return Ok(());
         };
-        let after: PressureControl = traced.read("pressure_control", 1)?[0];
+        let after = self.control(traced)?;
         let found = traced.read::<u32>("pressure_stats", 5)?[4];
         // Of a brick's 8 cells a thread, its 64 threads, and the bricks.
-        let terms = f64::from(phase.sum_count) / 256.0 + 60.0;
-        let expected = Expected::new(&phase, before, after, [sum, U * terms * size], found);
+        let (terms, unit) = (f64::from(phase.sum_count) / 256.0 + 60.0, self.unit());
+        let expected = Expected::new(
+            &phase,
+            [before, after],
+            [sum, unit * terms * size],
+            found,
+            unit,
+        );
         let pairs: Vec<_> = (expected.scalars.iter().enumerate())
-            .map(|(k, &(value, exact, tolerance))| pair_of(k, value.into(), exact, tolerance))
+            .map(|(k, &(value, exact, tolerance))| pair_of(k, value, exact, tolerance))
             .collect();
         self.table.add(&SCALARS, &pairs, 0);
-        let decided = |c: &PressureControl| [c.state, c.iterations, c.is_first, c.restarts];
+        let decided = |c: &PressureControl64| [c.state, c.iterations, c.is_first, c.restarts];
         if expected.is_tie {
             self.table.add::<f64>(&DECIDED, &[], 1);
         } else {
@@ -390,9 +413,9 @@ impl Checker<'_> {
 /// What `pressure/reduce` should come to.
 struct Expected {
     /// State and counts.
-    control: PressureControl,
+    control: PressureControl64,
     /// The device's, what it should be, and by how much it may be off.
-    scalars: Vec<(f32, f64, f64)>,
+    scalars: Vec<(f64, f64, f64)>,
     /// Rounding decides the state.
     is_tie: bool,
 }
@@ -401,10 +424,10 @@ impl Expected {
     /// `sum` is what the bricks' sums come to, give or take `slack`; `found` how many pockets were counted.
     fn new(
         phase: &PressurePhase,
-        before: PressureControl,
-        after: PressureControl,
+        [before, after]: [PressureControl64; 2],
         [sum, slack]: [f64; 2],
         found: u32,
+        unit: f64,
     ) -> Self {
         let mut control = before;
         let mut is_tie = false;
@@ -412,24 +435,24 @@ impl Expected {
             BEGIN => (after.rhs_square, sum, slack),
             DIRECTION => (after.product, sum, slack),
             LENGTH => {
-                let alpha = f64::from(before.product) / sum;
-                let error = (slack / sum).abs() + 4.0 * U;
+                let alpha = before.product / sum;
+                let error = (slack / sum).abs() + 4.0 * unit;
                 (after.alpha, alpha, alpha.abs() * error / (1.0 - error))
             }
             _ => (after.residual_square, sum, slack),
         }];
-        let target = f64::from(phase.tolerance_square) * f64::from(before.rhs_square);
+        let target = f64::from(phase.tolerance_square) * before.rhs_square;
         let is_reached = sum <= target;
         match phase.step {
             BEGIN => {
-                control = PressureControl {
+                control = PressureControl64 {
                     state: match (phase.has_pockets == 0 && found > 0, sum > 0.0) {
                         (true, _) => WANTS_POCKETS,
                         (_, true) => ITERATING,
                         _ => DONE,
                     },
                     is_first: 1,
-                    ..PressureControl::default()
+                    ..PressureControl64::default()
                 };
                 scalars.push((after.residual_square, sum, slack));
             }
@@ -438,7 +461,7 @@ impl Expected {
                 is_tie = sum <= slack;
                 let beta = match before.is_first {
                     1 => [0.0; 2],
-                    _ => [sum, slack + 4.0 * U * sum.abs()].map(|v| v / f64::from(before.product)),
+                    _ => [sum, slack + 4.0 * unit * sum.abs()].map(|v| v / before.product),
                 };
                 scalars.push((after.beta, beta[0], beta[1].abs()));
             }
@@ -448,14 +471,14 @@ impl Expected {
                 if is_reached || control.iterations >= phase.max_iterations {
                     control.state = VERIFYING;
                 }
-                is_tie = (sum - target).abs() <= slack + 2.0 * U * target;
+                is_tie = (sum - target).abs() <= slack + 2.0 * unit * target;
             }
             _ => {
                 (control.restarts, control.is_first) = (before.restarts + 1, 1);
                 let is_over = before.iterations >= phase.max_iterations;
                 let is_last = is_reached || is_over || control.restarts > MOST_RESTARTS;
                 control.state = if is_last { DONE } else { ITERATING };
-                is_tie = (sum - target).abs() <= slack + 2.0 * U * target;
+                is_tie = (sum - target).abs() <= slack + 2.0 * unit * target;
             }
         }
         Self {

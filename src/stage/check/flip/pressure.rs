@@ -4,7 +4,10 @@ use glam::DVec3;
 
 use super::{Checker, Layout, fields::*, pair, pair_of};
 use crate::{
-    compare::{deviation::relative, rounding::U},
+    compare::{
+        deviation::relative,
+        rounding::{U, U64},
+    },
     domain::{
         bricks::{Bricks, CELLS},
         poisson::{NONE, System, remove_means},
@@ -14,10 +17,10 @@ use crate::{
         flip::{Centers, Room, Waters, density_source},
         poisson::{BUDGET, Solver, gradients::norm},
     },
-    scene::flip::{Preconditioner, Surface},
+    scene::flip::{Precision, Preconditioner, Surface},
     solve::{
         SolveError,
-        pressure::{CORRECTION_TOLERANCE, PressureControl},
+        pressure::{CORRECTION_TOLERANCE, blocked, widen},
         trace::Traced,
     },
 };
@@ -35,15 +38,6 @@ const EIGEN_STEPS: usize = 8;
 pub(super) struct Built {
     pub(super) system: System,
     centers: Centers,
-}
-
-/// Where an element stands in the pressure's own arrays: by block of 2³ cells.
-pub(super) fn blocked(element: u32) -> usize {
-    let (slot, local) = (element / CELLS, element % CELLS);
-    let [x, y, z] = [local % 8, local / 8 % 8, local / 64];
-    let cell = x % 2 + 2 * (y % 2) + 4 * (z % 2);
-    let block = x / 2 + 4 * (y / 2) + 16 * (z / 2);
-    (CELLS * slot + 64 * cell + block) as usize
 }
 
 /// Σ |f u| and the solids' flux of each row.
@@ -79,8 +73,10 @@ pub(super) fn differences(system: &System, x: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn sum([large, small]: &[Vec<f64>; 2]) -> Vec<f64> {
-    large.iter().zip(small).map(|(a, b)| a + b).collect()
+/// Of the solution's terms.
+fn sum(terms: &[Vec<f64>]) -> Vec<f64> {
+    let all = |row: usize| terms.iter().map(|term| term[row]).sum();
+    (0..terms[0].len()).map(all).collect()
 }
 
 fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
@@ -100,8 +96,7 @@ impl Checker<'_> {
             (Moment::After, "pressure/multiply") => self.multiply(traced),
             (Moment::After, "pressure/density_source") => self.density_source(traced),
             (Moment::Before, "pressure/project" | "pressure/displace") => {
-                let words = size_of::<PressureControl>() / 4;
-                self.is_done = traced.read::<u32>("pressure_control", words)?[5] == DONE;
+                self.is_done = traced.read::<u32>("pressure_control", 1)?[0] == DONE;
                 self.old = self.planes(traced, "face_velocity")?;
                 Ok(())
             }
@@ -121,34 +116,60 @@ impl Checker<'_> {
         self.system.as_ref().expect("after pressure/build_system")
     }
 
+    pub(super) fn precision(&self) -> Precision {
+        self.model.settings().pressure.precision
+    }
+
+    /// Unit roundoff of what the projection computes in.
+    pub(super) fn unit(&self) -> f64 {
+        match self.precision() {
+            Precision::F32 | Precision::F32Refined => U,
+            Precision::F64 => U64,
+        }
+    }
+
+    /// The first `count` values of an array of the pressure's own, in the precision that it is kept in.
+    pub(super) fn reals(
+        &self,
+        traced: Traced<'_>,
+        name: &str,
+        count: usize,
+    ) -> Result<Vec<f64>, SolveError> {
+        let words = traced.read::<u32>(name, self.precision().words() * count)?;
+        Ok(widen(&words, self.precision()))
+    }
+
     /// An array of the pressure's own, by row.
     pub(super) fn by_row(&self, traced: Traced<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
-        let values = self.cells::<f32>(traced, name)?;
+        let values = self.reals(traced, name, self.layout().cells)?;
         let rows = self.built().system.cell.iter();
-        Ok(rows.map(|&e| f64::from(values[blocked(e)])).collect())
+        Ok(rows.map(|&e| values[blocked(e)]).collect())
     }
 
-    /// The two words of the solution, by row.
-    pub(super) fn words(&self, traced: Traced<'_>) -> Result<[Vec<f64>; 2], SolveError> {
+    /// The terms that the solution is the sum of, by row.
+    pub(super) fn terms(&self, traced: Traced<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
         let Layout { cells, stride, .. } = *self.layout();
-        let values = traced.read::<f32>("pressure_solution", stride + cells)?;
-        let word = |first: usize| {
+        let last = stride * (self.precision().terms() - 1);
+        let values = self.reals(traced, "pressure_solution", last + cells)?;
+        let term = |k: usize| {
             let rows = self.built().system.cell.iter();
-            rows.map(|&e| f64::from(values[first + blocked(e)]))
-                .collect()
+            rows.map(|&e| values[k * stride + blocked(e)]).collect()
         };
-        Ok([word(0), word(stride)])
+        Ok((0..self.precision().terms()).map(term).collect())
     }
 
-    /// What differences of the solution across faces err by: those of both words, which may cancel.
-    fn difference_errors(&self, words: &[Vec<f64>; 2]) -> Vec<f64> {
+    /// What differences of the solution across faces err by: those of its terms, which may cancel.
+    fn difference_errors(&self, terms: &[Vec<f64>]) -> Vec<f64> {
         let built = self.built();
         let waters = self.waters(built);
-        let [large, small] = words
-            .each_ref()
-            .map(|word| waters.displace(&waters.by_element(&built.system, word)));
-        let of = |(a, b): (&DVec3, &DVec3)| 24.0 * U * (a.length() + b.length());
-        large.iter().zip(&small).map(of).collect()
+        let mut errors = vec![0.0; self.layout().cells];
+        for term in terms {
+            let differences = waters.displace(&waters.by_element(&built.system, term));
+            for (error, difference) in errors.iter_mut().zip(&differences) {
+                *error += 24.0 * self.unit() * difference.length();
+            }
+        }
+        errors
     }
 
     fn build_system(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
@@ -171,7 +192,7 @@ impl Checker<'_> {
             ..
         } = self.layout();
         let system = Waters::new(&self.model, bricks, self.room(), &centers).system();
-        let dirichlet = traced.read::<f32>("pressure_dirichlet", *cells)?;
+        let dirichlet = self.reals(traced, "pressure_dirichlet", *cells)?;
         let coefficient = traced.read::<f32>("pressure_coefficient", 2 * stride + cells)?;
         let block = traced.read::<u32>("pressure_block", cells / 8)?;
         let wet = CELLS..CELLS * (bricks.wet + 1);
@@ -181,7 +202,7 @@ impl Checker<'_> {
         }
         let inverse = match settings.pressure.preconditioner {
             Preconditioner::Jacobi | Preconditioner::Ipp => {
-                traced.read::<f32>("pressure_inverse_diagonal", *cells)?
+                self.reals(traced, "pressure_inverse_diagonal", *cells)?
             }
             Preconditioner::None | Preconditioner::Multigrid => Vec::new(),
         };
@@ -200,13 +221,13 @@ impl Checker<'_> {
             let exact = system.dirichlet[row];
             airs.push(pair_of(
                 e,
-                f64::from(dirichlet[place]),
+                dirichlet[place],
                 exact,
-                24.0 * U * exact,
+                24.0 * self.unit() * exact,
             ));
             if let Some(&found) = inverse.get(place) {
                 let exact = 1.0 / system.diagonal[row];
-                inverses.push(pair_of(e, f64::from(found), exact, 36.0 * U * exact));
+                inverses.push(pair_of(e, found, exact, 36.0 * self.unit() * exact));
             }
             let lower = |values: &dyn Fn(usize) -> f64| DVec3::new(values(0), values(1), values(2));
             let found = lower(&|axis| f64::from(coefficient[axis * stride + place]));
@@ -252,7 +273,7 @@ impl Checker<'_> {
         let pairs: Vec<_> = (0..rhs.len())
             .map(|row| {
                 let element = built.system.cell[row] as usize;
-                pair_of(element, rhs[row], twin[row], 10.0 * U * flow[row])
+                pair_of(element, rhs[row], twin[row], 10.0 * self.unit() * flow[row])
             })
             .collect();
         let noted = self.noted(traced, 0, &twin, &flow)?;
@@ -274,7 +295,7 @@ impl Checker<'_> {
         let (twin, errors) = (system.apply(&direction), differences(system, &direction));
         let pairs: Vec<_> = (0..twin.len())
             .map(|row| {
-                let tolerance = 12.0 * U * errors[row];
+                let tolerance = 12.0 * self.unit() * errors[row];
                 pair_of(
                     system.cell[row] as usize,
                     product[row],
@@ -289,9 +310,9 @@ impl Checker<'_> {
     }
 
     fn project(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
-        let words = self.words(traced)?;
-        let errors = self.difference_errors(&words);
-        let x = sum(&words);
+        let terms = self.terms(traced)?;
+        let errors = self.difference_errors(&terms);
+        let x = sum(&terms);
         let built = self.built();
         let waters = self.waters(built);
         let mut twin = self.old.clone();
@@ -347,7 +368,7 @@ impl Checker<'_> {
         let spread = norm(&differences(system, &x));
         let residual = relative(norm(&minus(&b, &system.apply(&x))), size);
         let asked = self.model.settings().pressure.tolerance;
-        let allowed = asked * (1.0 + 1e-6) + relative(12.0 * U * spread, size);
+        let allowed = asked * (1.0 + 1e-6) + relative(12.0 * self.unit() * spread, size);
         let off = minus(&x, &exact);
         let least = least_eigenvalue(&solver, b.len());
         let energy = dot(&off, &system.apply(&off)).max(0.0).sqrt();
@@ -396,9 +417,9 @@ impl Checker<'_> {
     }
 
     fn displace(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
-        let words = self.words(traced)?;
-        let errors = self.difference_errors(&words);
-        let x = sum(&words);
+        let terms = self.terms(traced)?;
+        let errors = self.difference_errors(&terms);
+        let x = sum(&terms);
         let mut b = self.by_row(traced, "pressure_rhs")?;
         let built = self.built();
         let system = &built.system;
@@ -406,13 +427,14 @@ impl Checker<'_> {
         let twin = waters.displace(&waters.by_element(system, &x));
         let found = self.planes(traced, "face_displacement")?;
         let pairs: Vec<_> = (self.active())
-            .map(|e| pair(e, found[e], twin[e], errors[e]))
+            .map(|e| pair(e, found[e], twin[e], errors[e] + U * twin[e].length()))
             .collect();
         remove_means(&mut b, &system.pockets());
         let size = norm(&b);
         let residual = relative(norm(&minus(&b, &system.apply(&x))), size);
         let spread = norm(&differences(system, &x));
-        let allowed = CORRECTION_TOLERANCE * (1.0 + 1e-6) + relative(12.0 * U * spread, size);
+        let allowed =
+            CORRECTION_TOLERANCE * (1.0 + 1e-6) + relative(12.0 * self.unit() * spread, size);
         self.table.add(&DISPLACEMENT, &pairs, 0);
         self.table
             .add(&CORRECTION, &[pair_of(0, residual, 0.0, allowed)], 0);

@@ -73,7 +73,7 @@ pub(super) struct Sample {
 }
 
 /// One projection against the exact solution of its system.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct ProjectionErrors {
     /// ‖p − p64‖ / ‖p64‖.
     pub(super) pressure: f64,

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::{
     domain::particles::Particles,
-    gpu::adapter::Context,
+    gpu::adapter::{Context, GpuError, Needs},
     reference::ReferenceError,
     scene::{
         Method, Scene, physics_hash,
@@ -24,7 +24,7 @@ use crate::{
 
 use super::{
     super::{
-        device::{Opened, SolverError},
+        device::{Opened, SolverError, needs},
         prepare::Start,
     },
     Event, Outcome, PointEvent, PointStatus, Request, StudyError, direction, still_level,
@@ -33,7 +33,7 @@ use ledger::{Ledger, Record, Run, Verdict};
 use projection::Projections;
 
 /// Changes whenever what a line holds does.
-const FORM: &str = "swell sweep 1";
+const FORM: &str = "swell sweep 2";
 
 /// What the points of a sweep share.
 struct Bench<'a> {
@@ -57,12 +57,14 @@ pub(super) fn run(
         sweep,
     };
     let mut ledger = Ledger::open(&request.directory)?;
-    let count = sweep.lines.iter().map(|line| line.points.len()).sum();
+    let points = |line: &Line| line.points.len() + usize::from(line.coarser.is_some());
+    let count = sweep.lines.iter().map(points).sum();
     let mut number = 0;
     let mut results: Vec<Vec<Record>> = Vec::new();
-    for (line, opened) in sweep.lines.iter().zip(&devices) {
+    for line in &sweep.lines {
         let mut records = Vec::new();
-        for point in &line.points {
+        for point in line.points.iter().chain(&line.coarser) {
+            let opened = devices.of(point);
             let Some((record, status)) = bench.record(&mut ledger, line, opened, point, stop)?
             else {
                 return Ok(Outcome::default());
@@ -71,34 +73,67 @@ pub(super) fn run(
             tell(Event::Point(PointEvent {
                 number,
                 count,
-                name: format!("{}, {} = {}", line.name, line.key, point.label),
+                name: match is_coarser(line, point) {
+                    true => format!("{}, coarser: {}", line.name, point.label),
+                    false => format!("{}, {} = {}", line.name, line.key, point.label),
+                },
                 status,
             }));
             records.push(record);
         }
         results.push(records);
     }
-    let names: Vec<String> = devices.iter().map(|d| d.identity().to_string()).collect();
-    report::write_all(request, sweep, &names, &results)
+    report::write_all(request, sweep, &devices, &results)
 }
 
-/// Each line's device; the adapter is opened once, and only where a line is on it.
-fn open(request: &Request, sweep: &Sweep) -> Result<Vec<Opened>, StudyError> {
-    let mut context: Option<Context> = None;
-    let mut devices = Vec::new();
-    for line in &sweep.lines {
-        devices.push(match line.device {
-            LineDevice::Cpu => Opened::Cpu,
-            LineDevice::Gpu => {
-                let known = match context.take() {
-                    Some(context) => context,
-                    None => Context::open(request.adapter.as_deref())?,
-                };
-                Opened::Gpu(Box::new(context.insert(known).clone()))
-            }
-        });
+/// What a sweep's points run on.
+struct Devices {
+    cpu: Opened,
+    /// `None` where no point is on it.
+    gpu: Option<Opened>,
+}
+
+impl Devices {
+    fn of(&self, point: &Point) -> &Opened {
+        match (point.device, &self.gpu) {
+            (LineDevice::Gpu, Some(gpu)) => gpu,
+            _ => &self.cpu,
+        }
     }
-    Ok(devices)
+}
+
+/// The adapter is opened once, and only where a point is on it. Where it has no f64 the points that ask for it fail, and
+/// the others do not.
+fn open(request: &Request, sweep: &Sweep) -> Result<Devices, StudyError> {
+    let points = || sweep.lines.iter().flat_map(|line| &line.points);
+    let mut on_gpu = points()
+        .filter(|point| point.device == LineDevice::Gpu)
+        .peekable();
+    let gpu = match on_gpu.peek() {
+        None => None,
+        Some(_) => {
+            let wanted = Needs {
+                f64: on_gpu.any(|point| needs(&point.scene).f64),
+            };
+            let adapter = request.adapter.as_deref();
+            let context = match Context::open_for(adapter, wanted) {
+                Err(GpuError::NoF64 { .. }) => Context::open(adapter)?,
+                other => other?,
+            };
+            Some(Opened::Gpu(Box::new(context)))
+        }
+    };
+    Ok(Devices {
+        cpu: Opened::Cpu,
+        gpu,
+    })
+}
+
+/// Whether a point is what the finest one's error is told beside.
+fn is_coarser(line: &Line, point: &Point) -> bool {
+    line.coarser
+        .as_ref()
+        .is_some_and(|coarser| std::ptr::eq(coarser, point))
 }
 
 impl Bench<'_> {
@@ -111,11 +146,12 @@ impl Bench<'_> {
         point: &Point,
         stop: &AtomicBool,
     ) -> Result<Option<(Record, PointStatus)>, StudyError> {
-        let hash = self.hash(opened, point);
+        let finest = line.points.last().filter(|_| is_coarser(line, point));
+        let hash = self.hash(opened, point, finest);
         if let Some(record) = ledger.find(&hash) {
             return Ok(Some((record.clone(), PointStatus::Stands)));
         }
-        let (verdict, status) = match self.run(opened, point, stop) {
+        let (verdict, status) = match self.run(opened, point, finest, stop) {
             Ok(None) => return Ok(None),
             Ok(Some(run)) => {
                 let known =
@@ -125,7 +161,9 @@ impl Bench<'_> {
                 (Verdict::Done(Box::new(run)), status)
             }
             Err(StudyError::Solve(
-                error @ (SolverError::Gpu(SolveError::Numbers { .. })
+                error @ (SolverError::Gpu(
+                    SolveError::Numbers { .. } | SolveError::Gpu(GpuError::NoF64 { .. }),
+                )
                 | SolverError::Reference(
                     ReferenceError::Numbers { .. } | ReferenceError::NotConverged { .. },
                 )),
@@ -138,10 +176,14 @@ impl Bench<'_> {
             }
             Err(error) => return Err(error),
         };
+        let key = match finest {
+            None => line.key.clone(),
+            Some(_) => "coarser".to_owned(),
+        };
         let record = Record {
             hash,
             method: line.name.clone(),
-            key: line.key.clone(),
+            key,
             setting: point.label.clone(),
             verdict,
         };
@@ -153,6 +195,7 @@ impl Bench<'_> {
         &mut self,
         opened: &Opened,
         point: &Point,
+        finest: Option<&Point>,
         stop: &AtomicBool,
     ) -> Result<Option<Run>, StudyError> {
         if stop.load(Ordering::Relaxed) {
@@ -164,13 +207,16 @@ impl Bench<'_> {
             return frames::run(opened, point, repeats, measure, self.gauge.as_ref(), stop);
         };
         match opened {
-            Opened::Gpu(context) => Ok(Some(projections.run(context, point, repeats)?)),
+            Opened::Gpu(context) => Ok(Some(match finest {
+                None => projections.run(context, point, repeats)?,
+                Some(finest) => projections.coarser(context, finest, point)?,
+            })),
             Opened::Cpu => unreachable!("refused where the study is loaded"),
         }
     }
 
     /// Of all that a line depends on: physics, when to give up, frames, repeats, how it is measured, device, program.
-    fn hash(&self, opened: &Opened, point: &Point) -> String {
+    fn hash(&self, opened: &Opened, point: &Point, finest: Option<&Point>) -> String {
         let state = self.sweep.state.as_ref();
         let limits = match point.scene.solver.method {
             Method::Pbf => point.scene.solver.pbf().max_substeps.to_string(),
@@ -187,6 +233,7 @@ impl Bench<'_> {
             self.sweep.repeats.to_string(),
             format!("{:?}", self.sweep.errors[0].measure()),
             state.map_or(String::new(), |state| physics_hash(&state.scene)),
+            finest.map_or(String::new(), |finest| physics_hash(&finest.scene)),
             format!("{:?}", self.gauge),
             opened.identity().to_string(),
             env!("CARGO_PKG_VERSION").to_owned(),

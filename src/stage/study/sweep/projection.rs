@@ -41,6 +41,20 @@ struct Exact {
     has_factor: bool,
 }
 
+/// In place of an axis, for what stands at a cell's centre.
+const CENTER: usize = 3;
+
+/// An exact projection on one grid.
+struct Resolved {
+    /// By x, y, z in cells and axis or [`CENTER`]: m/s at the faces that a projection changes, q Δx at centres.
+    values: BTreeMap<[u32; 4], f64>,
+    /// Δt, seconds.
+    step: f64,
+    rows: usize,
+    residual: f64,
+    has_factor: bool,
+}
+
 /// What stands on the grid before a projection.
 struct Grid {
     kind: Vec<u32>,
@@ -114,7 +128,7 @@ impl Projections {
             run.projection = Some(ProjectionErrors {
                 divergence: projected.divergence_after * substep.length,
                 residual: projected.solved.residual,
-                ..self.errors(&solver, point, &grid, substep.length)?
+                ..self.errors(&solver, &grid)?
             });
         }
         let settings = &point.scene.solver.flip().pressure;
@@ -122,24 +136,112 @@ impl Projections {
         Ok(run)
     }
 
-    /// What the device's solution is off by.
-    fn errors(
+    /// How far the exact projection of the state on `coarse` cells is from that on `fine` ones, half as large: velocities
+    /// at faces against the mean of the four faces that make up each, q Δx at centres against the mean of eight.
+    pub(super) fn coarser(
         &mut self,
-        solver: &Flip,
-        point: &Point,
-        grid: &Grid,
-        step: f64,
-    ) -> Result<ProjectionErrors, StudyError> {
+        context: &Context,
+        fine: &Point,
+        coarse: &Point,
+    ) -> Result<Run, StudyError> {
+        let begin = Instant::now();
+        let [fine, coarse] = [
+            self.resolved(context, fine)?,
+            self.resolved(context, coarse)?,
+        ];
+        if (fine.step - coarse.step).abs() > 1e-9 * fine.step {
+            let frame = self.made_by.frames + 1;
+            let what = format!(
+                "the coarser cells take a substep of {} s, the others of {} s",
+                coarse.step, fine.step
+            );
+            return Err(SolveError::Numbers { frame, what }.into());
+        }
+        let mean = |of: &BTreeMap<[u32; 4], f64>, place: &[u32; 4]| {
+            let axis = place[3] as usize;
+            let below = (0..8u32).filter(|k| axis == CENTER || (k >> axis) & 1 == 0);
+            let values = below.map(|k| {
+                let at = |i: usize| 2 * place[i] + ((k >> i) & 1);
+                of.get(&[at(0), at(1), at(2), place[3]]).copied()
+            });
+            let values: Option<Vec<f64>> = values.collect();
+            values.map(|values| values.iter().sum::<f64>() / values.len() as f64)
+        };
+        let relative = |is_center: bool| {
+            let places = coarse.values.iter();
+            let places = places.filter(|(place, _)| (place[3] as usize == CENTER) == is_center);
+            let pairs =
+                places.filter_map(|(place, value)| Some((*value, mean(&fine.values, place)?)));
+            let (off, all): (Vec<f64>, Vec<f64>) = pairs.map(|(c, f)| (c - f, f)).unzip();
+            norm(&off) / norm(&all)
+        };
+        Ok(Run {
+            particles: self.state(context)?.len(),
+            frames: 1,
+            substeps: 1,
+            seconds: vec![begin.elapsed().as_secs_f64()],
+            projection: Some(ProjectionErrors {
+                pressure: relative(true),
+                velocity: relative(false),
+                rows: fine.rows,
+                exact_residual: fine.residual.max(coarse.residual),
+                has_factor: fine.has_factor && coarse.has_factor,
+                ..ProjectionErrors::default()
+            }),
+            ..Run::default()
+        })
+    }
+
+    /// The exact projection of the state as a point's grid has it.
+    fn resolved(&mut self, context: &Context, point: &Point) -> Result<Resolved, StudyError> {
+        let state = self.state(context)?.clone();
+        let start = Start::of(&point.scene)?;
+        let mut solver = flip(context, point, &start)?;
+        solver.load(self.made_by.frames, &state)?;
+        let substep = solver.carry_to_grid()?;
+        let grid = Grid::read(&solver, point)?;
+        let cells = grid.cells(&solver);
+        let system = System::new(cells);
+        let exact = self.exact(&system, &system.rhs(cells, &grid.velocity, &grid.flux))?;
+        let records = &solver.bricks().records;
+        let place = |element: usize, axis: usize| {
+            let local = (element % CELLS as usize) as u32;
+            let corner = records[element / CELLS as usize].coordinate;
+            let [x, y, z] = [local % 8, local / 8 % 8, local / 64];
+            [
+                8 * corner[0] + x,
+                8 * corner[1] + y,
+                8 * corner[2] + z,
+                axis as u32,
+            ]
+        };
+        let stride = grid.kind.len();
+        let size = point.scene.solver.flip().cell_size;
+        let faces = system.gradient(cells, &exact.q).into_iter();
+        let faces = faces.map(|(face, difference)| {
+            let velocity = f64::from(grid.velocity[face]) - difference;
+            (place(face % stride, face / stride), velocity)
+        });
+        let centers = system.cell.iter().zip(&exact.q);
+        let centers = centers.map(|(&element, q)| (place(element as usize, CENTER), q * size));
+        Ok(Resolved {
+            values: faces.chain(centers).collect(),
+            step: substep.length,
+            rows: system.cell.len(),
+            residual: exact.residual,
+            has_factor: exact.has_factor,
+        })
+    }
+
+    /// What the device's solution is off by.
+    fn errors(&mut self, solver: &Flip, grid: &Grid) -> Result<ProjectionErrors, StudyError> {
         let cells = grid.cells(solver);
         let system = System::new(cells);
         let exact = self.exact(&system, &system.rhs(cells, &grid.velocity, &grid.flux))?;
-        let (stride, scene) = (grid.kind.len(), &point.scene);
-        let scale = scene.water.rest_density * scene.solver.flip().cell_size / step;
-        let pressure = solver.field::<f32>("pressure", stride)?;
-        let pressures = system.cell.iter().zip(&exact.q);
-        let (off, all): (Vec<f64>, Vec<f64>) = pressures
-            .map(|(&element, q)| (f64::from(pressure[element as usize]) - scale * q, scale * q))
-            .unzip();
+        let stride = grid.kind.len();
+        // p is q times the same factor on both sides.
+        let found = solver.solution(&system.cell)?;
+        let off: Vec<f64> = found.iter().zip(&exact.q).map(|(q, q64)| q - q64).collect();
         let velocity = solver.field::<f32>("face_velocity", 3 * stride)?;
         let faces = system.gradient(cells, &exact.q);
         let (moved, after): (Vec<f64>, Vec<f64>) = faces
@@ -150,7 +252,7 @@ impl Projections {
             })
             .unzip();
         Ok(ProjectionErrors {
-            pressure: norm(&off) / norm(&all),
+            pressure: norm(&off) / norm(&exact.q),
             velocity: norm(&moved) / norm(&after),
             divergence: 0.0,
             residual: 0.0,

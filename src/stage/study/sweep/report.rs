@@ -1,11 +1,13 @@
 //! A sweep's table, curves and page.
 
+mod measured;
+
 use std::{collections::BTreeMap, fs};
 
 use crate::{
     scene::{
         Method, asset_path,
-        study::sweep::{ErrorMeasure, FRAME_RATE, Measure, SAMPLES, Sweep},
+        study::sweep::{self, ErrorMeasure, Measure, Sweep},
     },
     study::{
         convergence_point::{Reading, TABLE_1, convergence_point},
@@ -18,17 +20,18 @@ use crate::{
 
 use super::{
     super::{Outcome, Request, StudyError, write},
-    errors,
+    Devices, errors,
     ledger::{Record, Run, Verdict},
 };
 
 /// What the report is made from.
 struct Results<'a> {
     sweep: &'a Sweep,
-    /// Each line's, with its driver.
-    devices: &'a [String],
-    /// As [`Sweep::lines`].
-    records: &'a [Vec<Record>],
+    devices: &'a Devices,
+    /// As [`Sweep::lines`], without what is coarser.
+    records: Vec<&'a [Record]>,
+    /// Of each line, where it has one.
+    coarser: Vec<Option<&'a Record>>,
     units: Units,
 }
 
@@ -46,13 +49,19 @@ struct Units {
 pub(super) fn write_all(
     request: &Request,
     sweep: &Sweep,
-    devices: &[String],
+    devices: &Devices,
     records: &[Vec<Record>],
 ) -> Result<Outcome, StudyError> {
+    let parts = || sweep.lines.iter().zip(records);
     let results = Results {
         sweep,
         devices,
-        records,
+        records: parts()
+            .map(|(line, all)| &all[..line.points.len()])
+            .collect(),
+        coarser: parts()
+            .map(|(line, all)| all.get(line.points.len()))
+            .collect(),
         units: units(sweep),
     };
     let directory = &request.directory;
@@ -124,7 +133,7 @@ impl Record {
 impl Results<'_> {
     /// An error of point `index` of a line; `None` where it failed, cannot be told, or is its own reference.
     fn error(&self, line: usize, index: usize, error: ErrorMeasure) -> Option<f64> {
-        let records = &self.records[line];
+        let records = self.records[line];
         let (run, reference) = match self.sweep.lines[line].against {
             Some(other) => (&records[index], &self.records[other][index]),
             None => (&records[index], records.last()?),
@@ -132,6 +141,13 @@ impl Results<'_> {
         let is_itself = error.measure() == Measure::Finest && std::ptr::eq(run, reference);
         let run = run.run().filter(|_| !is_itself)?;
         errors::of(error, run, reference.run())
+    }
+
+    /// The error that a line's grid or step itself has, where the study measured one.
+    fn discretisation(&self, line: usize, error: ErrorMeasure) -> Option<f64> {
+        let run = self.coarser[line]?.run()?;
+        let finest = self.records[line].last()?.run();
+        errors::of(error, run, finest).filter(|error| *error > 0.0)
     }
 
     /// Milliseconds: least, median and greatest.
@@ -163,7 +179,7 @@ impl Results<'_> {
                 error: self.error(line, index, error)?,
             })
         };
-        let of = |(k, line): (usize, &crate::scene::study::sweep::Line)| Line {
+        let of = |(k, line): (usize, &sweep::Line)| Line {
             name: line.name.clone(),
             points: (0..line.points.len()).filter_map(|i| point(k, i)).collect(),
         };
@@ -178,7 +194,13 @@ impl Results<'_> {
             )),
             Verdict::Done(_) => None,
         };
-        self.records.iter().flatten().filter_map(failed).collect()
+        self.all().filter_map(failed).collect()
+    }
+
+    /// Every record, what is coarser among them.
+    fn all(&self) -> impl Iterator<Item = &Record> {
+        let lines = self.records.iter().zip(&self.coarser);
+        lines.flat_map(|(records, coarser)| records.iter().chain(*coarser))
     }
 
     /// With the names of their files.
@@ -200,7 +222,8 @@ impl Results<'_> {
                 (Cost::Work, "work", self.work_label()),
             ] {
                 let chart = LogChart {
-                    title: error.title().to_owned(),
+                    title: self.title(),
+                    subtitle: self.subtitle(cost),
                     x_label,
                     y_label: error.title().to_owned(),
                     cost,
@@ -211,6 +234,29 @@ impl Results<'_> {
             }
         }
         charts
+    }
+
+    /// The shot and what is swept.
+    fn title(&self) -> String {
+        let points = self.sweep.lines.iter().flat_map(|line| &line.points);
+        let shots = unique(points.map(|point| point.scene.shot.name.as_str()));
+        let keys = unique(self.sweep.lines.iter().map(|line| line.key.as_str()));
+        format!("{} by {}", shots.join(", "), keys.join(", "))
+    }
+
+    /// What it ran on, and what the bars are.
+    fn subtitle(&self, cost: Cost) -> String {
+        let points = self.sweep.lines.iter().flat_map(|line| &line.points);
+        let names: Vec<_> = points
+            .map(|point| self.devices.of(point).identity().name)
+            .collect();
+        let on = unique(names.iter().map(String::as_str)).join(" and ");
+        match (cost, self.sweep.repeats) {
+            (Cost::Work, _) | (_, 1) => format!("on {on}"),
+            (Cost::Time, repeats) => {
+                format!("on {on}; bars from the least to the greatest of {repeats}")
+            }
+        }
     }
 
     fn work_label(&self) -> String {
@@ -230,7 +276,7 @@ impl Results<'_> {
             for (index, line) in lines.iter().enumerate() {
                 findings.push((
                     format!("{}, {}", error.name(), line.name),
-                    knee::words(line),
+                    knee::words(line, self.discretisation(index, error)),
                 ));
                 // Lines that are measured against references of their own are no rivals.
                 if lines.len() > 1 && error.measure() != Measure::Finest {
@@ -246,9 +292,7 @@ impl Results<'_> {
 
     fn csv(&self) -> String {
         let mut rows = vec![self.titles()];
-        for (line, records) in self.records.iter().enumerate() {
-            rows.extend((0..records.len()).map(|index| self.row(line, index)));
-        }
+        rows.extend(self.rows());
         let quoted = |cell: &String| match cell.contains([',', '"', '\n']) {
             true => format!("\"{}\"", cell.replace('"', "\"\"")),
             false => cell.clone(),
@@ -287,11 +331,29 @@ impl Results<'_> {
         titles
     }
 
-    fn row(&self, line: usize, index: usize) -> Vec<String> {
-        let record = &self.records[line][index];
+    /// Line by line, what is coarser last.
+    fn rows(&self) -> Vec<Vec<String>> {
+        let mut rows = Vec::new();
+        for (k, line) in self.sweep.lines.iter().enumerate() {
+            for (index, (point, record)) in line.points.iter().zip(self.records[k]).enumerate() {
+                rows.push(self.row(point, record, |error| self.error(k, index, error)));
+            }
+            if let (Some(point), Some(record)) = (&line.coarser, self.coarser[k]) {
+                rows.push(self.row(point, record, |error| self.discretisation(k, error)));
+            }
+        }
+        rows
+    }
+
+    fn row(
+        &self,
+        point: &sweep::Point,
+        record: &Record,
+        error_of: impl Fn(ErrorMeasure) -> Option<f64>,
+    ) -> Vec<String> {
         let mut row = vec![
             record.method.clone(),
-            self.sweep.lines[line].device.name().to_owned(),
+            point.device.name().to_owned(),
             record.key.clone(),
             record.setting.clone(),
         ];
@@ -313,10 +375,10 @@ impl Results<'_> {
             run.iterations.to_string(),
             run.missed.to_string(),
         ]);
-        let errors = self.sweep.errors.iter().map(|&error| {
-            let value = self.error(line, index, error);
-            value.map_or(String::new(), |value| format!("{value:.4e}"))
-        });
+        let errors =
+            self.sweep.errors.iter().map(|&error| {
+                error_of(error).map_or(String::new(), |value| format!("{value:.4e}"))
+            });
         row.extend(errors);
         if self.sweep.has_convergence_point {
             row.extend(Reading::ALL.map(|reading| found(run, reading).unwrap_or_default()));
@@ -353,12 +415,8 @@ impl Results<'_> {
         parts.push(Part::Heading("Curves".into()));
         parts.push(Part::Curves(curves));
         parts.push(Part::Heading("Table".into()));
-        let rows = self.records.iter().enumerate();
-        let rows =
-            rows.flat_map(|(line, records)| (0..records.len()).map(move |index| (line, index)));
-        let rows = rows.map(|(line, index)| self.row(line, index));
         parts.push(Part::Table(
-            [self.titles()].into_iter().chain(rows).collect(),
+            [self.titles()].into_iter().chain(self.rows()).collect(),
         ));
         parts.push(Part::Heading("What was run".into()));
         parts.push(Part::Code(request.command.clone()));
@@ -387,9 +445,15 @@ impl Results<'_> {
 
     /// Which methods ran on what.
     fn where_run(&self) -> String {
-        let mut methods: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-        for (line, device) in self.sweep.lines.iter().zip(self.devices) {
-            methods.entry(device).or_default().push(&line.name);
+        let mut methods: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+        for line in &self.sweep.lines {
+            for point in &line.points {
+                let device = self.devices.of(point).identity().to_string();
+                let names = methods.entry(device).or_default();
+                if names.last() != Some(&line.name.as_str()) {
+                    names.push(&line.name);
+                }
+            }
         }
         let told = methods
             .iter()
@@ -409,64 +473,14 @@ impl Results<'_> {
         )
     }
 
-    fn measured(&self) -> Vec<String> {
-        let mut texts = vec![KNEE.to_owned(), EQUAL_TIME.to_owned(), WORK.to_owned()];
-        texts.push(match self.sweep.errors[0].measure() {
-            Measure::Report => "A density error is max(0, ρ/ρ0 − 1) at a frame's end, over the particles (with FLIP over the \
-                cells of water); its mean, 99th percentile or maximum is averaged over all frames."
-                .to_owned(),
-            Measure::Finest => format!(
-                "Errors are differences from the same method's finest run, the last of its values, at {SAMPLES} equally \
-                 spaced times, averaged. The crest, the front and the elevation along the wave's way are measured from the \
-                 particles with the same cubes for all runs; energy is ½ v² + g h a mass. Such a reference knows nothing of \
-                 an error that all runs share, and the run next to it looks better than it is. After the impact particles \
-                 are chaotic: only such sums are compared."
-            ),
-            Measure::Converged => "The distance from converged is that of the last frame's end: the RMS over the particles, \
-                in spacings, of the way to where Newton's method in f64 takes them until none is compressed by more than \
-                1e-6. It is what further iterations would still have to move; its time is not in the run's."
-                .to_owned(),
-            Measure::Projection => {
-                let rows = self.records.iter().flatten().filter_map(|r| r.run()?.projection);
-                let rows: Vec<_> = rows.collect();
-                let most = rows.iter().map(|p| p.rows).max().unwrap_or(0);
-                let worst = rows.iter().fold(0.0, |worst: f64, p| worst.max(p.exact_residual));
-                let by = if rows.iter().all(|p| p.has_factor) {
-                    "a sparse Cholesky factor"
-                } else {
-                    "a sparse Cholesky factor where memory holds it, else conjugate gradients"
-                };
-                format!(
-                    "One state of the scene is carried to the grid and projected once. The system is read back as the \
-                     device has it (up to {most} rows) and solved in f64 by {by}, to a relative residual of {worst:.1e}: p64 \
-                     is that solution, u64 the velocities that it leaves on the faces which a projection changes. An error is \
-                     solver error alone: the system is the same, so that what the grid or the surface's treatment gets wrong \
-                     is not in it. A solve that missed its tolerance is counted under missed."
-                )
-            }
-        });
-        texts.extend(self.sweep.lines.iter().filter_map(|line| {
-            let other = &self.sweep.lines[line.against?];
-            Some(format!(
-                "{} is held, value by value, against {}, not against its own finest run.",
-                line.name, other.name
-            ))
-        }));
-        let is_swept = self.sweep.lines.iter().any(|line| line.key == FRAME_RATE);
-        if is_swept {
-            texts.push(PIC_BLEND.to_owned());
-        }
-        texts
-    }
-
     /// Ours and the paper's, a row for each number of iterations.
     fn convergence_table(&self) -> Vec<Vec<String>> {
         let mut titles = vec!["method".into(), "setting".into(), "ms".into()];
         titles.extend(Reading::ALL.map(|reading| format!("point: {}", reading.text())));
         titles.extend(["the paper's ms".into(), "the paper's point".into()]);
         let mut table = vec![titles];
-        for (line, records) in self.sweep.lines.iter().zip(self.records) {
-            for (point, record) in line.points.iter().zip(records) {
+        for (line, records) in self.sweep.lines.iter().zip(&self.records) {
+            for (point, record) in line.points.iter().zip(*records) {
                 let Some(run) = record.run() else { continue };
                 let mut row = vec![
                     record.method.clone(),
@@ -483,6 +497,17 @@ impl Results<'_> {
         }
         table
     }
+}
+
+/// Each once, in the order in which they come.
+fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut known = Vec::new();
+    for name in names {
+        if !known.contains(&name) {
+            known.push(name);
+        }
+    }
+    known
 }
 
 fn found(run: &Run, reading: Reading) -> Option<String> {
@@ -505,18 +530,6 @@ fn paper(scene: &crate::scene::Scene) -> Option<(f64, u32)> {
     }
 }
 
-const KNEE: &str = "The knee of a line is the setting with the least product of error and time: up to it x times the time buys \
-    more than x times the accuracy, beyond it less. Settings that another of the same line beats in both are left out of the \
-    account.";
-
-const EQUAL_TIME: &str = "At equal time: another line's error at a point's time is read off between its own settings, by \
-    straight lines in the logarithmic chart; the ratio is that error over the point's own. Only times between two settings of \
-    the other line are compared.";
-
-const WORK: &str = "The cost that no machine changes: with PBF neighbour visits, particles × mean neighbours (at the run's end) \
-    × passes over them, which are two an iteration and one search a substep; with FLIP products with the matrix of the finest \
-    grid, of which an iteration of conjugate gradients takes one, IPP one more, as the incomplete Cholesky of the f64 reference, a V-cycle 2.3 more.";
-
 const CONVERGENCE: &str = "The paper calls a run converged from the step on at which \"the relative error of the current \
     iteration and the 50 before is less than 0.5 %\", for good. It does not say what the error is, nor whether the 50 are what \
     the current step is compared with. The first column reads it so: the mean density, 1 + the mean of max(0, ρ/ρ0 − 1), \
@@ -524,7 +537,3 @@ const CONVERGENCE: &str = "The paper calls a run converged from the step on at w
     itself had to stay below 0.5 %, and if it had to differ from each of the 50 by less than 0.5 % of itself. The paper's scene is \
     not known beyond its 500 000 particles and 16 ms, so that its points can be compared in their order and trend alone; its \
     times are of a GTX 1650.";
-
-const PIC_BLEND: &str = "FLIP takes a part pic_blend of the grid's velocity a frame. Where the frame rate is swept that part is \
-    tied to it, α = 1 − (1 − α_ref)^(Δt / Δt_ref) with the scene's own rate as reference, so that the same part is taken a \
-    second; at a fixed α halving Δt would double the dissipation.";
