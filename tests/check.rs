@@ -64,7 +64,6 @@ fn case(method: Method) -> (Scene, Start) {
             preconditioner: Preconditioner::Multigrid,
             tolerance: 1e-5,
             max_iterations: 40,
-            residual_limit: 1e9,
         },
     });
     scene.effects = Effects {

@@ -80,7 +80,7 @@ fn main(
 #ifdef PRESSURE
     lambda_sum[i] += own_lambda;
 #endif
-    if !is_finite(delta) {
+    if !is_finite(current.xyz + delta) {
         atomicAdd(&counters[3], 1u);
     }
     delta = bounded(delta);

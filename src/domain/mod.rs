@@ -3,6 +3,7 @@
 pub mod aggregates;
 pub mod boundary;
 pub mod bounds;
+pub mod budget;
 pub mod bricks;
 pub mod bvh;
 pub mod flip;

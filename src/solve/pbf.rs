@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::{
     domain::{
         boundary::Boundary,
+        budget::Breach,
         particles::Particles,
         pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
         probe::fitted,
@@ -183,12 +184,8 @@ impl Pbf {
 
     /// Substeps of the next frame.
     fn substeps(&self) -> Result<u32, SolveError> {
-        self.scene
-            .pbf_substeps(self.frame, self.state.max_speed())
-            .map_err(|what| SolveError::Numbers {
-                frame: self.frame + 1,
-                what,
-            })
+        let substeps = (self.scene).pbf_substeps(self.frame, self.state.max_speed())?;
+        Ok(substeps)
     }
 
     /// When the k-th of so many ends, and how long it is, seconds.
@@ -298,11 +295,7 @@ impl Solver for Pbf {
         }
         self.frame += 1;
         if not_finite > 0 {
-            let what = format!("{not_finite} values that are not finite in {substeps} substeps");
-            return Err(SolveError::Numbers {
-                frame: self.frame,
-                what,
-            });
+            return Err(Breach::not_finite(self.frame, not_finite.into(), None).into());
         }
         check_finite(self.frame, &self.state, Some(&density))?;
         if self.scene.domain.min != DVec3::ZERO {

@@ -2,9 +2,11 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::{domain::particles::Particles, gpu::program::Program, scene::Scene};
-
-use super::SolveError;
+use crate::{
+    domain::{budget::Breach, particles::Particles},
+    gpu::program::Program,
+    scene::Scene,
+};
 
 /// Positions go up relative to the domain's least corner.
 pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
@@ -59,9 +61,9 @@ pub(super) fn check_finite(
     frame: u32,
     state: &Particles,
     density: Option<&[f64]>,
-) -> Result<(), SolveError> {
+) -> Result<(), Breach> {
     match state.first_not_finite(density) {
         None => Ok(()),
-        Some(what) => Err(SolveError::Numbers { frame, what }),
+        Some((count, first)) => Err(Breach::not_finite(frame, count, Some(first))),
     }
 }

@@ -50,7 +50,7 @@ impl From<&SolveError> for Blame {
         match error {
             SolveError::Gpu(error) => error.into(),
             SolveError::Count { .. } => Self::Files,
-            SolveError::Numbers { .. } => Self::Numbers,
+            SolveError::Numbers(_) => Self::Numbers,
         }
     }
 }
@@ -58,7 +58,7 @@ impl From<&SolveError> for Blame {
 impl From<&ReferenceError> for Blame {
     fn from(error: &ReferenceError) -> Self {
         match error {
-            ReferenceError::Numbers { .. }
+            ReferenceError::Numbers(_)
             | ReferenceError::Factor(_)
             | ReferenceError::NotConverged { .. } => Self::Numbers,
         }

@@ -10,6 +10,7 @@ use super::{
 use crate::{
     domain::{
         boundary::Boundary,
+        budget::Breach,
         particles::Particles,
         pbf::chebyshev_factors,
         probe::fitted,
@@ -270,13 +271,11 @@ impl Solver for Pbf {
 
     fn advance(&mut self) -> Result<(Particles, StepReport), ReferenceError> {
         let frame = self.frame + 1;
-        let numbers = |what| ReferenceError::Numbers { frame, what };
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
         let substeps = self
             .scene
-            .pbf_substeps(self.frame, self.state.max_speed())
-            .map_err(numbers)?;
+            .pbf_substeps(self.frame, self.state.max_speed())?;
         let step = length / f64::from(substeps);
         let mut position = local(&self.scene, &self.state);
         let mut velocity: Vec<DVec3> = self.state.velocity.iter().map(widen).collect();
@@ -292,8 +291,8 @@ impl Solver for Pbf {
         }
         self.write(&position, &velocity);
         let density = self.density(start + length);
-        if let Some(what) = self.state.first_not_finite(Some(&density)) {
-            return Err(numbers(what));
+        if let Some((count, first)) = self.state.first_not_finite(Some(&density)) {
+            return Err(Breach::not_finite(frame, count, Some(first)).into());
         }
         self.frame = frame;
         (self.position, self.step) = (position, step);

@@ -266,11 +266,7 @@ impl Checker<'_> {
         let start = f64::from(self.frame) * length;
         let (_, substep) = self
             .scene
-            .flip_substep(start, length, fastest.sqrt(), 0)
-            .map_err(|what| SolveError::Numbers {
-                frame: self.frame + 1,
-                what,
-            })?;
+            .flip_substep(self.frame + 1, start, length, fastest.sqrt(), 0)?;
         let flags: Vec<bool> = words[4..].iter().map(|&flag| flag != 0).collect();
         let bricks = self.model.bricks(&flags, self.model.step(&substep).layers);
         self.layout = Some(Layout {

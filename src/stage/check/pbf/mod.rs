@@ -71,12 +71,7 @@ pub fn check(
     }
     let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
     solver.load(frame, particles)?;
-    let substeps = scene
-        .pbf_substeps(frame, particles.max_speed())
-        .map_err(|what| SolveError::Numbers {
-            frame: frame + 1,
-            what,
-        })?;
+    let substeps = scene.pbf_substeps(frame, particles.max_speed())?;
     let length = scene.shot.frame_seconds();
     let time_step = length / f64::from(substeps);
     let substep = Substep {
