@@ -36,16 +36,44 @@ impl Watched {
     /// Each with its name in reports, and what a message calls it.
     const NAMED: [(Self, &'static str, &'static str); 11] = [
         (Self::NotFinite, "not_finite", "values that are not finite"),
-        (Self::Particles, "particles", "particles lost, doubled or outside"),
+        (
+            Self::Particles,
+            "particles",
+            "particles lost, doubled or outside",
+        ),
         (Self::Substeps, "max_substeps", "substeps asked for"),
         (Self::Speed, "speed", "the largest speed, m/s,"),
-        (Self::DensityErrorMean, "density_error_mean", "the mean density error"),
-        (Self::DensityErrorP99, "density_error_p99", "the density error's 99th percentile"),
-        (Self::Capped, "capped", "the part of particles slowed to the displacement cap"),
-        (Self::Residual, "residual", "the relative residual of the projection"),
-        (Self::Divergence, "divergence", "the largest |∇·u| Δt after the projection"),
+        (
+            Self::DensityErrorMean,
+            "density_error_mean",
+            "the mean density error",
+        ),
+        (
+            Self::DensityErrorP99,
+            "density_error_p99",
+            "the density error's 99th percentile",
+        ),
+        (
+            Self::Capped,
+            "capped",
+            "the part of particles slowed to the displacement cap",
+        ),
+        (
+            Self::Residual,
+            "residual",
+            "the relative residual of the projection",
+        ),
+        (
+            Self::Divergence,
+            "divergence",
+            "the largest |∇·u| Δt after the projection",
+        ),
         (Self::Volume, "volume", "the volume's drift from the start"),
-        (Self::Energy, "energy", "the energy's rise beyond the work done, of the total,"),
+        (
+            Self::Energy,
+            "energy",
+            "the energy's rise beyond the work done, of the total,",
+        ),
     ];
 
     fn row(self) -> (Self, &'static str, &'static str) {

@@ -3,8 +3,8 @@
 pub mod aggregates;
 pub mod boundary;
 pub mod bounds;
-pub mod budget;
 pub mod bricks;
+pub mod budget;
 pub mod bvh;
 pub mod flip;
 pub mod frame_range;

@@ -114,7 +114,12 @@ pub(super) fn build(
         density_error_mean: plain(&spec.density_error_mean, Some(DENSITY_ERROR_MEAN))?,
         density_error_p99: plain(&spec.density_error_p99, Some(DENSITY_ERROR_P99))?,
         capped: plain(&spec.capped, Some(CAPPED))?,
-        residual: limit(doc, &spec.residual, Some(RESIDUAL.max(tolerance)), tolerance)?,
+        residual: limit(
+            doc,
+            &spec.residual,
+            Some(RESIDUAL.max(tolerance)),
+            tolerance,
+        )?,
         divergence: plain(&spec.divergence, Some(DIVERGENCE))?,
         volume: plain(&spec.volume, None)?,
         energy: plain(&spec.energy, Some(ENERGY))?,
@@ -183,8 +188,16 @@ impl Budget {
     ) -> Result<(), Breach> {
         let check = |watched, measured, limit| Breach::check(frame, watched, measured, limit);
         check(Watched::Speed, report.max_speed, self.speed)?;
-        check(Watched::DensityErrorMean, report.density_error_mean, self.density_error_mean)?;
-        check(Watched::DensityErrorP99, report.density_error_p99, self.density_error_p99)?;
+        check(
+            Watched::DensityErrorMean,
+            report.density_error_mean,
+            self.density_error_mean,
+        )?;
+        check(
+            Watched::DensityErrorP99,
+            report.density_error_p99,
+            self.density_error_p99,
+        )?;
         let runs = particles.max(1) as f64 * f64::from(report.substeps.max(1));
         check(Watched::Capped, report.capped as f64 / runs, self.capped)?;
         if let (Some(volume), Some(start)) = (report.volume, start_volume)
@@ -192,9 +205,12 @@ impl Budget {
         {
             check(Watched::Volume, (volume / start - 1.0).abs(), self.volume)?;
         }
+        if particles == 0 {
+            return Ok(());
+        }
         let rise = scene.total_energy(particles, report) - energy - report.boundary_work;
-        let total = energy + report.boundary_work.abs() + scene.least_energy(particles);
-        check(Watched::Energy, rise / total, self.energy.filter(|_| particles > 0))
+        let scale = scene.energy_scale(particles, energy, report.boundary_work);
+        check(Watched::Energy, rise / scale, self.energy)
     }
 }
 
@@ -208,10 +224,17 @@ impl Scene {
         report.kinetic_energy + report.potential_energy - mass * lowest
     }
 
-    /// What is added to the total energy, so that water at rest on the floor may stir.
-    fn least_energy(&self, particles: usize) -> f64 {
+    /// The most that a frame may end with where it began with `energy`, `work` was done in it, and `limit` is the
+    /// budget, joule.
+    pub fn allowed_energy(&self, particles: usize, energy: f64, work: f64, limit: f64) -> f64 {
+        energy + work + limit * self.energy_scale(particles, energy, work)
+    }
+
+    /// The total that a rise is a part of. Something is added to it, so that water at rest on the floor may stir.
+    fn energy_scale(&self, particles: usize, energy: f64, work: f64) -> f64 {
         let speed = LEAST_ENERGY_SPEED * self.particle_spacing() * self.shot.frames_per_second;
-        0.5 * self.particle_mass() * particles as f64 * speed * speed
+        let least = 0.5 * self.particle_mass() * particles as f64 * speed * speed;
+        energy + work.abs() + least
     }
 
     /// kg.

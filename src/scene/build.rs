@@ -8,8 +8,7 @@ use glam::DVec3;
 use toml::Spanned;
 
 use super::{
-    PlacedMesh, Placement, Scene, Shot, Water,
-    budget,
+    PlacedMesh, Placement, Scene, Shot, Water, budget,
     document::Document,
     error::SceneError,
     grids,

@@ -104,7 +104,9 @@ fn flatten(text: &str) -> Result<BTreeMap<String, String>, SceneError> {
     // Grids follow from the particles; probes and budgets only look at them.
     let is_output = |key: &str| {
         NOT_PHYSICS.contains(&key)
-            || ["grids.", "probe[", "budget."].iter().any(|table| key.starts_with(table))
+            || ["grids.", "probe[", "budget."]
+                .iter()
+                .any(|table| key.starts_with(table))
     };
     values.retain(|key, _| !is_output(key) && !is_idle(key));
     Ok(values)

@@ -56,7 +56,7 @@ pub struct Scene {
     /// What is measured at each frame; most scenes have none.
     pub probes: Vec<probe::Probe>,
     /// What the bake is held to.
-    pub budget: budget::Budget,
+    pub budget: Budget,
     /// Effects that the scene names; what is `None` does not exist.
     pub effects: Effects,
 }

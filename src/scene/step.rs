@@ -37,6 +37,20 @@ impl Scene {
         Bounds { min, max }
     }
 
+    /// What takes each face of the box in `step` seconds to where it stands at `time`, along its axis, m/s; 0 where `step`
+    /// is.
+    pub fn wall_velocity(&self, time: f64, step: f64) -> Bounds {
+        let (before, after) = (self.walls(time - step), self.walls(time));
+        let speed = |after: DVec3, before: DVec3| match step {
+            0.0 => DVec3::ZERO,
+            step => (after - before) / step,
+        };
+        Bounds {
+            min: speed(after.min, before.min),
+            max: speed(after.max, before.max),
+        }
+    }
+
     /// Whether a wall or a solid moves, and so does work on the water.
     pub fn has_movers(&self) -> bool {
         !self.wave_makers.is_empty() || !self.moving_solids.is_empty()

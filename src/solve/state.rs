@@ -3,7 +3,10 @@
 use glam::{DVec3, Vec3};
 
 use crate::{
-    domain::{budget::Breach, particles::Particles},
+    domain::{
+        budget::{Breach, Watched},
+        particles::Particles,
+    },
     gpu::program::Program,
     scene::Scene,
 };
@@ -54,6 +57,23 @@ pub(super) fn slots_by_id(ids: &[u32]) -> impl Fn(u32) -> usize + use<> {
         slots[id as usize] = slot;
     }
     move |id| slots[id as usize]
+}
+
+/// Whether the ids that came back are those that went up, in any order, before they are used as places.
+pub(super) fn check_ids(frame: u32, sent: &[u32], found: &[u32]) -> Result<(), Breach> {
+    let top = sent.iter().max().map_or(0, |&id| id as usize + 1);
+    let mut is_missing = vec![false; top];
+    for &id in sent {
+        is_missing[id as usize] = true;
+    }
+    let is_wrong = |&&id: &&u32| match is_missing.get_mut(id as usize) {
+        Some(missing) => !std::mem::replace(missing, false),
+        None => true,
+    };
+    match found.iter().filter(is_wrong).count() {
+        0 => Ok(()),
+        wrong => Err(Breach::new(frame, Watched::Particles, wrong as f64, 0.0)),
+    }
 }
 
 /// `density` is one relative density a particle, in the state's order, where the solver has it.

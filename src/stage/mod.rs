@@ -8,8 +8,10 @@ pub mod inspect;
 pub mod prepare;
 mod probes;
 pub mod render;
+pub mod replay;
 pub mod study;
 pub mod verify;
+mod watch;
 
 use crate::{
     cache::CacheError,

@@ -243,14 +243,13 @@ impl Flip {
                 let breach = Breach::not_finite(frame, surveyed.not_finite as u64, None);
                 return Err(breach.in_substep(report.substeps.max(1)).into());
             }
-            let (wanted, substep) = (self.model.scene)
-                .flip_substep(
-                    frame,
-                    start + elapsed,
-                    length - elapsed,
-                    surveyed.speed,
-                    report.substeps,
-                )?;
+            let (wanted, substep) = (self.model.scene).flip_substep(
+                frame,
+                start + elapsed,
+                length - elapsed,
+                surveyed.speed,
+                report.substeps,
+            )?;
             let trace = self.substep(cloud, &surveyed.is_wet, &substep)?;
             report.substeps += 1;
             let [_, divergence] = trace.projected.divergence;

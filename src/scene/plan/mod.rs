@@ -200,8 +200,9 @@ impl Plan {
 
     /// Passes of effects, in the order in which they run.
     pub fn effect_passes(&self) -> Vec<&'static str> {
-        let of_effect =
-            |pass: &&PlannedPass| !["pbf", "flip", "pressure", "sort", "budget"].contains(&pass.owner);
+        let of_effect = |pass: &&PlannedPass| {
+            !["pbf", "flip", "pressure", "sort", "budget"].contains(&pass.owner)
+        };
         self.passes
             .iter()
             .filter(of_effect)

@@ -35,8 +35,8 @@ use super::{
     SolveError,
     boundary::Movers,
     pressure::{self, LEVELS, PressureSolver},
-    state::{check_finite, slots_by_id, take_over, upload},
-    trace::{Run, Traced, trace},
+    state::{check_finite, check_ids, slots_by_id, take_over, upload},
+    trace::{Run, TraceFrame, Traced, trace},
 };
 use record::{Recordings, groups, windows};
 
@@ -408,6 +408,7 @@ impl Flip {
             .program
             .download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
         let id = self.field::<u32>("id", n)?;
+        check_ids(self.frame + 1, &self.state.id, &id)?;
         let slot_of = slots_by_id(&self.state.id);
         take_over(
             &mut self.state,
@@ -463,7 +464,7 @@ impl Solver for Flip {
     }
 
     fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
-        self.program.upload("counters", 0, &[0u32; 4]);
+        self.program.upload("counters", 0, &[0u32; COUNTERS]);
         let told = if self.state.is_empty() {
             Told::default()
         } else {
@@ -521,6 +522,27 @@ impl Solver for Flip {
             .flatten()
             .map(|(&name, &(seconds, runs))| (name, seconds, runs))
             .collect()
+    }
+}
+
+impl TraceFrame for Flip {
+    fn trace_frame(
+        &mut self,
+        from: u32,
+        observe: &mut dyn FnMut(u32, Traced<'_>) -> Result<(), SolveError>,
+    ) -> Result<(), SolveError> {
+        let mut substep = 0;
+        let run: &mut Run<'_> = &mut |program, recordings| {
+            // Each substep begins with one.
+            let first = recordings.first().and_then(|first| first.passes().next());
+            substep += u32::from(first == Some("flip/survey"));
+            if substep < from {
+                return Ok(Recording::run_all(recordings, program, None)?);
+            }
+            trace(recordings, program, &mut |traced| observe(substep, traced))
+        };
+        self.program.upload("counters", 0, &[0u32; COUNTERS]);
+        self.run_substeps(run).map(|_| ())
     }
 }
 

@@ -264,9 +264,9 @@ impl Checker<'_> {
         // What the device found is what its substep follows.
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
-        let (_, substep) = self
-            .scene
-            .flip_substep(self.frame + 1, start, length, fastest.sqrt(), 0)?;
+        let (_, substep) =
+            self.scene
+                .flip_substep(self.frame + 1, start, length, fastest.sqrt(), 0)?;
         let flags: Vec<bool> = words[4..].iter().map(|&flag| flag != 0).collect();
         let bricks = self.model.bricks(&flags, self.model.step(&substep).layers);
         self.layout = Some(Layout {

@@ -74,10 +74,7 @@ pub fn check(
     let substeps = scene.pbf_substeps(frame, particles.max_speed())?;
     let length = scene.shot.frame_seconds();
     let time_step = length / f64::from(substeps);
-    let substep = Substep {
-        time_step,
-        walls: scene.walls(f64::from(frame) * length + time_step),
-    };
+    let substep = Substep::new(scene, f64::from(frame) * length + time_step, time_step);
     let mut checker = Checker::new(scene, plan, boundary, substep);
     checker.take_samples(&solver)?;
     solver.trace(&mut |traced| checker.observe(traced))?;
