@@ -7,7 +7,7 @@ use std::{fs, path::Path};
 
 use glam::DVec3;
 use swell::{
-    domain::{boundary::Boundary, particles::Particles, solver::Solver, solver::StepReport},
+    domain::{boundary::Boundary, budget::Breach, particles::Particles, solver::Solver, solver::StepReport},
     reference::{
         ReferenceError, Timings,
         pbf::{
@@ -190,7 +190,7 @@ fn not_a_number_is_an_error() {
     solver.load(0, &start.particles).unwrap();
     let fault = solver.advance().unwrap_err();
     assert!(
-        matches!(fault, ReferenceError::Numbers { frame: 1, .. }),
+        matches!(fault, ReferenceError::Numbers(Breach { frame: 1, .. })),
         "{fault}"
     );
 }

@@ -35,7 +35,10 @@ particle_spacing = 0.1
 [solver.flip]
 cell_size = 0.1
 density_correction = false
-pressure = { max_iterations = 1000, residual_limit = 1.0 }
+pressure = { max_iterations = 1000 }
+[budget]
+residual = 1.0
+divergence = false
 "#;
 
 const ITERATIONS: &str = r#"

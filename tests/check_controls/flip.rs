@@ -4,6 +4,13 @@ use super::{Control, control};
 
 pub const FLIP: &[Control] = &[
     control(
+        "flip/boundary_work",
+        "for (var k = 0u;",
+        "for (var k = 1u;",
+        "flip/boundary_work",
+        &["shares of the work"],
+    ),
+    control(
         "flip/survey",
         "dot(v, v)",
         "dot(v, v) * 1.001",

@@ -632,12 +632,9 @@ pub const FLIP_FAULTS: &[Fault] = &[
     ),
     (
         "tolerance = 1e-4",
-        "tolerance = 0.1, residual_limit = 0.05",
+        "tolerance = 1e-4, residual_limit = 0.05",
         39,
-        &[
-            "pressure.residual_limit: 0.05 is out of range",
-            "from the tolerance on",
-        ],
+        &["pressure.residual_limit: unknown key"],
     ),
     (
         "tolerance = 1e-4",

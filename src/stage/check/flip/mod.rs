@@ -17,6 +17,7 @@ use crate::{
         boundary::Boundary,
         bricks::{Bricks, CELLS},
         particles::Particles,
+        poisson::FLUID,
         solver::Solver,
     },
     gpu::{adapter::Context, recording::Moment},
@@ -29,7 +30,11 @@ use super::sort::{SortCheck, check_slots};
 use fields::*;
 
 /// Passes without a row of their own, and where they are checked.
-const EXCEPTIONS: [(&str, &str); 19] = [
+const EXCEPTIONS: [(&str, &str); 20] = [
+    (
+        "flip/find_not_finite",
+        "it counts what is not finite, which is nothing here",
+    ),
     (
         "flip/spread_faces",
         "its twin is that of flip/gather_faces: both halves in one",
@@ -179,9 +184,33 @@ impl Checker<'_> {
             (Moment::After, "flip/extrapolate") => self.extrapolate(traced),
             (Moment::After, "flip/grid_to_particle") => self.grid_to_particle(traced),
             (Moment::After, "flip/advect") => self.advect(traced),
+            (Moment::After, "flip/boundary_work") => self.boundary_work(traced),
             (_, pass) if pass.starts_with("pressure/") => self.pressure(traced),
             _ => effects::compare(self, traced),
         }
+    }
+
+    /// From the pressure and the flux that the device has.
+    fn boundary_work(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let pressure = self.scalars(traced, "pressure")?;
+        let flux = self.scalars(traced, "solid_flux")?;
+        let kind = self.cells::<u32>(traced, "cell_kind")?;
+        let wet = (CELLS * self.layout().bricks.wet) as usize;
+        let sums = traced.read::<f32>("boundary_work", wet / 64)?;
+        let term = |e: usize| match kind[e] {
+            FLUID => -pressure[e] * flux[e],
+            _ => 0.0,
+        };
+        let pairs: Vec<_> = (sums.iter().enumerate())
+            .map(|(group, &sum)| {
+                let first = CELLS as usize + 64 * group;
+                let terms = (first..first + 64).map(term);
+                let sizes: f64 = terms.clone().map(f64::abs).sum();
+                pair_of(group, f64::from(sum), terms.sum(), 66.0 * U * sizes)
+            })
+            .collect();
+        self.table.add(&WORK, &pairs, 0);
+        Ok(())
     }
 
     fn finish(mut self) -> Table {
