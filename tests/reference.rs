@@ -7,7 +7,10 @@ use std::{fs, path::Path};
 
 use glam::DVec3;
 use swell::{
-    domain::{boundary::Boundary, budget::Breach, particles::Particles, solver::Solver, solver::StepReport},
+    domain::{
+        boundary::Boundary, budget::Breach, particles::Particles, solver::Solver,
+        solver::StepReport,
+    },
     reference::{
         ReferenceError, Timings,
         pbf::{
