@@ -148,10 +148,12 @@ fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
             assert!(place.substep >= 1 && place.pass.contains('/'), "{place:?}");
             let is_of_flip = matches!(watched, Watched::Residual | Watched::Divergence);
             assert_eq!(breach.substep.is_some(), is_of_flip, "{breach}");
-            if watched == Watched::Residual {
+            let on_cpu = bake(&Opened::Cpu, &scene, "1-4");
+            if is_of_flip {
+                // Its solves come to the rounding of f64.
+                assert!(on_cpu.error.is_none(), "{:?}", on_cpu.error);
                 continue;
             }
-            let on_cpu = bake(&Opened::Cpu, &scene, "1-4");
             let Failure { breach, place } = on_cpu.failure();
             assert_eq!((breach.watched, place), (watched, &None), "{breach}");
         }
@@ -585,11 +587,11 @@ fn a_broken_budget_is_exit_5_a_folder_and_a_line_that_can_be_had_again() {
             &format!("bake small.toml -o {name} {flags} --frames 1-2"),
         );
         let sound = job.hash(name);
-        let said = job.expect(5, &format!("{bake} --resume --set budget.speed=0.5"));
+        let said = job.expect(5, &format!("{bake} --resume --set budget.speed=0.2"));
         let line = said.lines().last().unwrap();
         let head = "swell: frame 3: the largest speed, m/s, is ";
         assert!(
-            line.starts_with(head) && line.contains("and budget.speed is 0.5000; "),
+            line.starts_with(head) && line.contains("and budget.speed is 0.2000; "),
             "{line}"
         );
         assert_eq!(line.contains("first in flip/"), name == "gpu", "{line}");

@@ -2,14 +2,16 @@
 
 use super::{Control, control};
 
+/// Of a scene whose walls move.
+pub const FLIP_WALLS: &[Control] = &[control(
+    "flip/boundary_work",
+    "for (var k = 0u;",
+    "for (var k = 1u;",
+    "flip/boundary_work",
+    &["shares of the work"],
+)];
+
 pub const FLIP: &[Control] = &[
-    control(
-        "flip/boundary_work",
-        "for (var k = 0u;",
-        "for (var k = 1u;",
-        "flip/boundary_work",
-        &["shares of the work"],
-    ),
     control(
         "flip/survey",
         "dot(v, v)",

@@ -11,7 +11,8 @@ const UNSORTED: [&str; 5] = [
     "pbf/assign_cells",
 ];
 
-pub const PBF: &[Control] = &[
+/// Of a scene whose walls move.
+pub const PBF_WALLS: &[Control] = &[
     control(
         "pbf/predict",
         "= work_of_push(wall_push);",
@@ -33,6 +34,9 @@ pub const PBF: &[Control] = &[
         "pbf/boundary_work",
         &["shares of the work"],
     ),
+];
+
+pub const PBF: &[Control] = &[
     control(
         "pbf/predict",
         "params.time_step * v;",
