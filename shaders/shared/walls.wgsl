@@ -27,6 +27,10 @@ fn wall_rate(x: vec3f) -> f32 {
     let h = params.support_radius;
     let low = clamp((x - params.wall_min) / h, vec3f(0.0), vec3f(1.0));
     let high = clamp((params.wall_max - x) / h, vec3f(0.0), vec3f(1.0));
+    let least = min(low, high);
+    if min(least.x, min(least.y, least.z)) >= 1.0 {
+        return 0.0;
+    }
     let free = vec3f(
         (1.0 - wall_fraction(low.x)) * (1.0 - wall_fraction(high.x)),
         (1.0 - wall_fraction(low.y)) * (1.0 - wall_fraction(high.y)),

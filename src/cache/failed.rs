@@ -56,7 +56,7 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
     file(REPORT, format!("{:#}\n", failed.report).as_bytes())
 }
 
-/// Reads what [`write`] wrote to `dir`, the folder itself.
+/// Reads what [`write()`] wrote to `dir`, the folder itself.
 ///
 /// # Errors
 /// [`CacheError::Damaged`], [`CacheError::Io`].
