@@ -6,7 +6,7 @@ use super::{Control, control};
 pub const FLIP_WALLS: &[Control] = &[control(
     "flip/boundary_work",
     "for (var k = 0u;",
-    "for (var k = 1u;",
+    "for (var k = 16u;",
     "flip/boundary_work",
     &["shares of the work"],
 )];
