@@ -382,7 +382,7 @@ fn fast_water_takes_substeps_or_is_refused() {
     particles.velocity[77] = [f32::NAN, 0.0, 0.0];
     solver.load(0, &particles).unwrap();
     let error = solver.advance().unwrap_err().to_string();
-    assert!(error.contains("1 particles are not finite"), "{error}");
+    assert!(error.contains("1 values that are not finite"), "{error}");
 }
 
 #[test]
