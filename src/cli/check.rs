@@ -1,6 +1,8 @@
 //! `swell check CACHE|SCENE`
 
-use std::{cell::OnceCell, fmt::Write as _, path::PathBuf, process::ExitCode};
+use std::{
+    cell::OnceCell, collections::BTreeMap, fmt::Write as _, path::PathBuf, process::ExitCode,
+};
 
 use clap::Args;
 use serde_json::json;
@@ -9,7 +11,7 @@ use crate::{
     domain::frame_range::FrameRange,
     scene::Method,
     stage::{
-        check::{Event, Outcome, Request, Row, Source, Table, check, is_cache},
+        check::{Event, Outcome, Request, Row, Source, Table, check},
         replay::{Replayed, is_failed, replay_failed},
     },
 };
@@ -17,6 +19,7 @@ use crate::{
 use super::{
     Failure, bake,
     interrupt::{self, Interrupt},
+    is_cache,
     progress::{Mode, Progress},
 };
 
@@ -226,8 +229,12 @@ fn show(table: &Table) -> String {
     for row in &table.rows {
         let _ = writeln!(text, "{}", line(row));
     }
+    let mut passes: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for (pass, why) in &table.unchecked {
-        let _ = writeln!(text, "{pass:28} not checked: {why}");
+        passes.entry(why).or_default().push(pass);
+    }
+    for (why, passes) in passes {
+        let _ = writeln!(text, "without a row: {} ({why})", passes.join(", "));
     }
     text
 }
@@ -237,7 +244,6 @@ fn verdict(outcome: &Outcome) -> String {
         None if outcome.interrupted => {
             format!("ended by a signal after {} frames", outcome.frames.len())
         }
-        None if outcome.table.rows.is_empty() => "nothing to check: no water".into(),
         None => "all within tolerance".into(),
         Some((frame, pass, field)) => {
             let rows = &outcome.table.rows;

@@ -138,9 +138,9 @@ pub enum BakeError {
     #[error("{breach}; keeping its inputs failed")]
     NotKept {
         /// What was broken.
-        breach: Breach,
+        breach: Box<Breach>,
         /// Why they could not be kept.
-        source: ReplayError,
+        source: Box<ReplayError>,
     },
     /// A mesh file changed or went between loading and caching.
     #[error("{file}: {what}", file = .file.display())]
@@ -290,8 +290,8 @@ fn end(request: &Request, opened: &Opened, start: &Start, error: SolverError) ->
             failed: directory.join(failed::FAILED),
         },
         Err(source) => BakeError::NotKept {
-            breach: breach.clone(),
-            source,
+            breach: Box::new(breach.clone()),
+            source: Box::new(source),
         },
     }
 }
@@ -347,6 +347,7 @@ fn open_cache(
         frames_per_second: scene.shot.frames_per_second,
         particle_spacing: scene.particle_spacing(),
         rest_density: scene.water.rest_density,
+        origin: scene.origin.to_array(),
         attributes: start.particles.attributes.keys().cloned().collect(),
         grids: scene.grids.map(|grids| grid_record(scene, &grids)),
         probes: probes::records(scene),

@@ -347,6 +347,7 @@ pub(super) fn keep(
         program: env!("CARGO_PKG_NAME"),
         program_version: env!("CARGO_PKG_VERSION"),
         shot: &scene.shot.name,
+        origin: scene.origin,
         frame: last,
         time: f64::from(last) / scene.shot.frames_per_second,
     };

@@ -103,6 +103,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         frames_per_second: 60.0,
         particle_spacing: 0.1,
         rest_density: 1000.0,
+        origin: [0.0; 3],
         grids: None,
         probes: Vec::new(),
         attributes: Vec::new(),
