@@ -46,7 +46,6 @@ fn scene(cells: [f64; 3]) -> Scene {
             precision: Precision::F32Refined,
             tolerance: 1e-5,
             max_iterations: 400,
-            residual_limit: 1e-2,
         },
     });
     scene

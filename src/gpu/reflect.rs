@@ -26,6 +26,8 @@ pub struct Binding {
     pub index: u32,
     /// Uniform or storage.
     pub access: Access,
+    /// Whether it is an array of floats or of vectors of them.
+    pub is_float: bool,
 }
 
 /// A `struct` of the shader as WGSL lays it out.
@@ -52,6 +54,14 @@ pub struct Reflection {
     pub overrides: Vec<String>,
     /// Whether it computes in f64.
     pub has_f64: bool,
+}
+
+fn is_float(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
+    let scalar = match module.types[ty].inner {
+        TypeInner::Array { base, .. } => module.types[base].inner.scalar(),
+        _ => None,
+    };
+    scalar.is_some_and(|scalar| scalar.kind == naga::ScalarKind::Float)
 }
 
 /// Reads the single compute entry point of `wgsl`.
@@ -106,6 +116,7 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
             name,
             index: place.binding,
             access,
+            is_float: is_float(&module, variable.ty),
         });
     }
     bindings.sort_by_key(|binding| binding.index);

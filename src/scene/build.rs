@@ -8,7 +8,7 @@ use glam::DVec3;
 use toml::Spanned;
 
 use super::{
-    PlacedMesh, Placement, Scene, Shot, Water,
+    PlacedMesh, Placement, Scene, Shot, Water, budget,
     document::Document,
     error::SceneError,
     grids,
@@ -44,10 +44,9 @@ struct Lattice {
 /// Builds the scene.
 pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Result<Scene> {
     let shot = shot(doc, &spec.shot)?;
-    // All is held against the domain in the world's coordinates, but for what f32 resolves.
     let domain = bounds(doc, &spec.domain)?;
     let origin = origin::of(&domain);
-    let (solver, lattice) = solver::solver(doc, &spec.solver, &domain.moved(-origin))?;
+    let (solver, lattice) = solver::solver(doc, &spec.solver, &domain)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     check_particle_count(doc, &water, &domain, &lattice)?;
     let around = wave_maker::Surroundings {
@@ -91,6 +90,15 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         .map(|table| grids::build(doc, table, &domain, &solver))
         .transpose()?;
     let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
+    let motions = (wave_makers.iter().map(|maker| &maker.motion))
+        .chain(moving_solids.iter().map(|solid| &solid.motion));
+    let duration = shot.duration();
+    let scales = budget::Scales {
+        fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
+        push: (motions.map(|motion| motion.peak_speed(0.0, duration))).fold(0.0, f64::max),
+        spacing: lattice.spacing,
+    };
+    let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
     let scene = Scene {
         shot,
         origin,
@@ -102,6 +110,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         solver,
         grids,
         probes,
+        budget,
         effects: spec.effects,
     };
     Ok(scene.into_local())

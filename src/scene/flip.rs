@@ -104,8 +104,6 @@ pub struct Pressure {
     pub tolerance: f64,
     /// Most iterations of a solve; one that ends there is reported as missed.
     pub max_iterations: u32,
-    /// Relative true residual past which a missed solve ends the bake.
-    pub residual_limit: f64,
 }
 
 /// What the projection's system is solved in. Face velocities and pressures are f32 before and after it.

@@ -6,7 +6,7 @@ use super::{PlacedMesh, Scene, probe::ProbeKind};
 use crate::domain::bounds::Bounds;
 
 /// A domain that lies within this many of its own edge lengths of the world's origin keeps the world's coordinates.
-const NEAR: f64 = 4.0;
+const NEAR: f64 = 2.0;
 
 /// Where a scene with this domain has its own zero in the world, metres, along each axis.
 ///
@@ -74,10 +74,11 @@ mod tests {
             // Near: as they are.
             (0.0, 25.0, 0.0),
             (-2.0, 2.0, 0.0),
-            (6.0, 8.0, 0.0),
+            (2.0, 4.0, 0.0),
             // Far: 8 within 12.6, 2 within 2, a quarter within 0.3.
             (10_000.0, 10_012.6, 9_992.0),
             (-10_002.0, -10_000.0, -10_004.0),
+            (6.0, 8.0, 4.0),
             (1.3, 1.6, 1.0),
         ] {
             let found = of(&Bounds {

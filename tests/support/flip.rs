@@ -47,7 +47,6 @@ pub fn settings() -> Settings {
             precision: Precision::F32Refined,
             tolerance: 1e-5,
             max_iterations: 400,
-            residual_limit: 1e-2,
         },
     }
 }

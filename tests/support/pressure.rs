@@ -34,7 +34,6 @@ pub fn settings(preconditioner: Preconditioner, tolerance: f64) -> Pressure {
         precision: Precision::F32Refined,
         tolerance,
         max_iterations: 3000,
-        residual_limit: 1.0,
     }
 }
 

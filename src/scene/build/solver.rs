@@ -23,16 +23,10 @@ const MAX_FLIP_CELLS: f64 = 68_719_476_736.0;
 /// Most cells along one axis.
 const MAX_AXIS_CELLS: f64 = 65_536.0;
 
-/// f32 positions at the far end of the domain must still tell apart this fraction of a spacing.
-const POSITION_RESOLUTION: f64 = 1.0 / 16.0;
-
 /// Room that walls leave each other: spacings with PBF, cells with FLIP, of which one is then
 /// between two that touch a wall.
 const LEAST_SPACINGS: f64 = 2.0;
 const LEAST_CELLS: f64 = 3.0;
-
-/// True residual that ends a bake where the scene sets none.
-const RESIDUAL_LIMIT: f64 = 1e-2;
 
 /// Every table that stands there, the method, and the lattice of the chosen one.
 pub(super) fn solver(
@@ -228,8 +222,6 @@ fn flip(doc: &Document<'_>, spec: &FlipSpec) -> Result<Flip> {
 }
 
 fn pressure(doc: &Document<'_>, spec: &PressureSpec) -> Result<Pressure> {
-    let tolerance = number_or(doc, &spec.tolerance, 1e-5, |v| v > 0.0 && v < 1.0)?;
-    let default = RESIDUAL_LIMIT.max(tolerance);
     Ok(Pressure {
         preconditioner: choice_or(
             doc,
@@ -245,9 +237,8 @@ fn pressure(doc: &Document<'_>, spec: &PressureSpec) -> Result<Pressure> {
             &Precision::NAMED,
             Precision::F32Refined,
         )?,
-        tolerance,
+        tolerance: number_or(doc, &spec.tolerance, 1e-5, |v| v > 0.0 && v < 1.0)?,
         max_iterations: whole_or(doc, &spec.max_iterations, 400, 10_000)?,
-        residual_limit: number_or(doc, &spec.residual_limit, default, |v| v >= tolerance)?,
     })
 }
 
@@ -293,15 +284,6 @@ fn check_grid(
             cells.x,
             cells.y,
             cells.z
-        );
-        return Err(doc.fault_at(span, problem));
-    }
-    let farthest = domain.min.abs().max(domain.max.abs()).max_element();
-    let resolution = farthest * f64::from(f32::EPSILON);
-    if resolution > POSITION_RESOLUTION * spacing {
-        let problem = format!(
-            "{spacing} m is too fine {farthest} m from the origin, where positions (32 bit) are \
-             {resolution:.2e} m apart"
         );
         return Err(doc.fault_at(span, problem));
     }

@@ -124,6 +124,9 @@ pub enum StudyError {
     /// A curve that cannot be drawn.
     #[error(transparent)]
     Raster(#[from] RasterError),
+    /// A point of a sweep that its measure does not fit.
+    #[error("{0}")]
+    Point(String),
     /// A line of a sweep's results that cannot be read.
     #[error("{}:{line}: {what}; remove the line, and its point is run again", file.display())]
     Ledger {
@@ -166,6 +169,7 @@ impl From<&StudyError> for Blame {
             StudyError::Solid(error) => error.into(),
             StudyError::Gpu(error) => error.into(),
             StudyError::Solve(error) => error.into(),
+            StudyError::Point(_) => Self::Input,
             StudyError::File { .. }
             | StudyError::Picture { .. }
             | StudyError::Ledger { .. }

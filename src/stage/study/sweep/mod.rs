@@ -160,14 +160,7 @@ impl Bench<'_> {
                 let status = PointStatus::Done(1e3 * run.per_frame()[1], told);
                 (Verdict::Done(Box::new(run)), status)
             }
-            Err(StudyError::Solve(
-                error @ (SolverError::Gpu(
-                    SolveError::Numbers { .. } | SolveError::Gpu(GpuError::NoF64 { .. }),
-                )
-                | SolverError::Reference(
-                    ReferenceError::Numbers { .. } | ReferenceError::NotConverged { .. },
-                )),
-            )) => {
+            Err(error) if is_of_the_point(&error) => {
                 let message = error.to_string();
                 (
                     Verdict::Failed(message.clone()),
@@ -218,13 +211,12 @@ impl Bench<'_> {
     /// Of all that a line depends on: physics, when to give up, frames, repeats, how it is measured, device, program.
     fn hash(&self, opened: &Opened, point: &Point, finest: Option<&Point>) -> String {
         let state = self.sweep.state.as_ref();
-        let limits = match point.scene.solver.method {
-            Method::Pbf => point.scene.solver.pbf().max_substeps.to_string(),
-            Method::Flip => {
-                let flip = point.scene.solver.flip();
-                format!("{} {}", flip.max_substeps, flip.pressure.residual_limit)
-            }
+        let solver = &point.scene.solver;
+        let most = match solver.method {
+            Method::Pbf => solver.pbf().max_substeps,
+            Method::Flip => solver.flip().max_substeps,
         };
+        let limits = format!("{most} {:?}", point.scene.budget);
         let text = [
             FORM.to_owned(),
             physics_hash(&point.scene),
@@ -270,4 +262,18 @@ fn specific_energy(scene: &Scene, particles: &Particles) -> f64 {
     };
     let all = particles.position.iter().zip(&particles.velocity);
     all.map(of).sum::<f64>() / particles.len().max(1) as f64
+}
+
+/// Whether an error says something of the point, and the study goes on without it.
+fn is_of_the_point(error: &StudyError) -> bool {
+    matches!(
+        error,
+        StudyError::Point(_)
+            | StudyError::Solve(
+                SolverError::Gpu(SolveError::Numbers(_) | SolveError::Gpu(GpuError::NoF64 { .. }),)
+                    | SolverError::Reference(
+                        ReferenceError::Numbers(_) | ReferenceError::NotConverged { .. },
+                    )
+            )
+    )
 }

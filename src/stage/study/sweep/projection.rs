@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, time::Instant};
 use crate::{
     domain::{
         bricks::CELLS,
+        budget::Breach,
         particles::Particles,
         poisson::{Cells, System},
         solver::Solver,
@@ -119,9 +120,9 @@ impl Projections {
             let projected = solver.project(&substep)?;
             run.seconds.push(begin.elapsed().as_secs_f64());
             if !projected.solved.residual.is_finite() {
-                let what = format!("a residual of {}", projected.solved.residual);
-                let frame = self.made_by.frames + 1;
-                return Err(SolveError::Numbers { frame, what }.into());
+                let detail = format!("a residual of {}", projected.solved.residual);
+                let breach = Breach::not_finite(self.made_by.frames + 1, 1, Some(detail));
+                return Err(SolveError::Numbers(breach).into());
             }
             run.iterations = u64::from(projected.solved.iterations);
             run.missed = u32::from(projected.solved.is_missed);
@@ -150,12 +151,11 @@ impl Projections {
             self.resolved(context, coarse)?,
         ];
         if (fine.step - coarse.step).abs() > 1e-9 * fine.step {
-            let frame = self.made_by.frames + 1;
             let what = format!(
                 "the coarser cells take a substep of {} s, the others of {} s",
                 coarse.step, fine.step
             );
-            return Err(SolveError::Numbers { frame, what }.into());
+            return Err(StudyError::Point(what));
         }
         let mean = |of: &BTreeMap<[u32; 4], f64>, place: &[u32; 4]| {
             let axis = place[3] as usize;
