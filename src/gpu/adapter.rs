@@ -67,7 +67,7 @@ pub struct Context {
     pub queue: Queue,
     /// Name, driver, backend.
     pub info: AdapterInfo,
-    /// What the device was opened with: the adapter's own limits.
+    /// What the device was opened with: the adapter's own limits, unless they were lowered.
     pub limits: Limits,
     /// Whether passes can be timed on the device.
     pub has_timestamps: bool,
@@ -154,9 +154,22 @@ impl Context {
     /// # Errors
     /// [`GpuError::NoAdapter`], [`GpuError::NoSuchAdapter`], [`GpuError::Open`].
     pub fn open(request: Option<&str>) -> Result<Self, GpuError> {
+        Self::open_lowered(request, |_| {})
+    }
+
+    /// The same on a device with less than the adapter has: `lower` takes its limits down. What then passes them is an
+    /// error of the device, as it would be on an adapter that has no more.
+    ///
+    /// # Errors
+    /// Those of [`Context::open`]; [`GpuError::Open`] for a limit above the adapter's own.
+    pub fn open_lowered(
+        request: Option<&str>,
+        lower: impl FnOnce(&mut Limits),
+    ) -> Result<Self, GpuError> {
         let adapter = choose(enumerate(), request)?;
         let info = adapter.get_info();
-        let limits = adapter.limits();
+        let mut limits = adapter.limits();
+        lower(&mut limits);
         let wanted = Features::TIMESTAMP_QUERY | Features::FLOAT32_FILTERABLE;
         let features = adapter.features() & wanted;
         let descriptor = wgpu::DeviceDescriptor {

@@ -25,10 +25,12 @@ use crate::{
 use super::{Blame, prepare::Start};
 
 /// What to run on.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub enum Device {
     /// The adapter of this index or with this in its name; the best one where `None`.
     Gpu(Option<String>),
+    /// A device that the caller opened.
+    Open(Box<Context>),
     /// The f64 reference; no driver is touched.
     Cpu,
 }
@@ -86,6 +88,7 @@ impl Device {
     pub fn open(&self) -> Result<Opened, GpuError> {
         Ok(match self {
             Self::Gpu(adapter) => Opened::Gpu(Box::new(Context::open(adapter.as_deref())?)),
+            Self::Open(context) => Opened::Gpu(context.clone()),
             Self::Cpu => Opened::Cpu,
         })
     }

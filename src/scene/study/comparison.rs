@@ -52,10 +52,10 @@ pub(super) fn parse(
     let [left, right] = solvers(doc, &spec.solvers)?;
     let file = base_dir.join(spec.scene.get_ref());
     let scenes = [
-        Scene::load(&file, &[left.as_override()])?,
-        Scene::load(&file, &[right.as_override()])?,
+        Scene::load_within(&file, &[left.as_override()], doc.reach())?,
+        Scene::load_within(&file, &[right.as_override()], doc.reach())?,
     ];
-    let look = Look::load(&base_dir.join(spec.look.get_ref()))?;
+    let look = Look::load_within(&base_dir.join(spec.look.get_ref()), doc.reach())?;
     if !look.spec().output.formats.contains(&FormatSpec::Png) {
         let problem = "its output.formats has no \"png\"";
         return Err(doc.fault_at(spec.look.span(), problem).into());

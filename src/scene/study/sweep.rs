@@ -512,7 +512,7 @@ fn load(
 ) -> Result<Scene, SceneError> {
     let fixed = fixed.iter().map(|set| (set.get_ref().clone(), set.span()));
     let (overrides, spans): (Vec<_>, Vec<_>) = fixed.chain(swept).unzip();
-    Scene::load(file, &overrides).map_err(|error| {
+    Scene::load_within(file, &overrides, doc.reach()).map_err(|error| {
         let (text, message) = match &error {
             SceneError::Fault(fault) => match fault.as_ref() {
                 Fault {
