@@ -17,8 +17,8 @@ use swell::{
     gpu::adapter::{Context, Spoil},
     scene::Scene,
     stage::{
-        bake::{BakeError, Event, Request, bake_on},
-        device::{Device, Opened},
+        bake::{self, BakeError, Event, Request},
+        device::{Device, needs},
         prepare::Start,
         replay::{Failure, replay},
     },
@@ -35,11 +35,11 @@ fn load(name: &str, set: &[&str]) -> Scene {
     Scene::load(&case(name), &set).unwrap()
 }
 
-fn opened(context: &Context) -> Opened {
-    Opened::Gpu(Box::new(context.clone()))
+fn opened(context: &Context) -> Device {
+    Device::Open(Box::new(context.clone()))
 }
 
-fn spoiled(context: &Context, spoil: Spoil) -> Opened {
+fn spoiled(context: &Context, spoil: Spoil) -> Device {
     let mut context = context.clone();
     context.spoil = Some(spoil);
     opened(&context)
@@ -59,18 +59,18 @@ impl Baked {
         self.folder.path().join("cache")
     }
 
-    fn go_on(&mut self, opened: &Opened, scene: &Scene, frames: &str) {
+    fn go_on(&mut self, device: &Device, scene: &Scene, frames: &str) {
         let request = Request {
             scene: scene.clone(),
             directory: self.cache(),
             frames: Some(frames.parse().unwrap()),
             resume: true,
-            device: Device::Gpu(None),
+            device: device.clone(),
             time_passes: false,
+            from: None,
         };
-        let start = Start::of(scene).unwrap();
         let never = AtomicBool::new(false);
-        let ended = bake_on(opened, &start, &request, &never, &mut |event| match event {
+        let ended = bake::bake(&request, &never, &mut |event| match event {
             Event::Ready {
                 removed, particles, ..
             } => (self.removed, self.particles) = (removed, particles),
@@ -87,7 +87,7 @@ impl Baked {
     }
 }
 
-fn bake(opened: &Opened, scene: &Scene, frames: &str) -> Baked {
+fn bake(opened: &Device, scene: &Scene, frames: &str) -> Baked {
     let mut baked = Baked {
         folder: TempDir::new().unwrap(),
         reports: Vec::new(),
@@ -99,7 +99,7 @@ fn bake(opened: &Opened, scene: &Scene, frames: &str) -> Baked {
     baked
 }
 
-fn whole(opened: &Opened, scene: &Scene) -> Baked {
+fn whole(opened: &Device, scene: &Scene) -> Baked {
     bake(opened, scene, &format!("1-{}", scene.shot.frames))
 }
 
@@ -121,7 +121,7 @@ fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
     ];
     for method in SOLVERS {
         let scene = load("34-not-a-number", &[method]);
-        let (fine, on_cpu) = (whole(&gpu, &scene), whole(&Opened::Cpu, &scene));
+        let (fine, on_cpu) = (whole(&gpu, &scene), whole(&Device::Cpu, &scene));
         assert!(fine.error.is_none(), "{:?}", fine.error);
         assert!(on_cpu.error.is_none(), "{:?}", on_cpu.error);
         assert_eq!((fine.reports.len(), on_cpu.reports.len()), (4, 4));
@@ -148,7 +148,7 @@ fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
             assert!(place.substep >= 1 && place.pass.contains('/'), "{place:?}");
             let is_of_flip = matches!(watched, Watched::Residual | Watched::Divergence);
             assert_eq!(breach.substep.is_some(), is_of_flip, "{breach}");
-            let on_cpu = bake(&Opened::Cpu, &scene, "1-4");
+            let on_cpu = bake(&Device::Cpu, &scene, "1-4");
             if is_of_flip {
                 // Its solves come to the rounding of f64.
                 assert!(on_cpu.error.is_none(), "{:?}", on_cpu.error);
@@ -252,11 +252,11 @@ fn the_work_of_walls_is_that_of_the_reference() {
     let gpu = opened(&Context::open(None).unwrap());
     for method in SOLVERS {
         let scene = load("24-leaving", &[method]);
-        let work = |opened: &Opened| -> f64 {
+        let work = |opened: &Device| -> f64 {
             let reports = bake(opened, &scene, "1-4").reports;
             reports.iter().map(|report| report.boundary_work).sum()
         };
-        let (single, double) = (work(&gpu), work(&Opened::Cpu));
+        let (single, double) = (work(&gpu), work(&Device::Cpu));
         println!("{method}: {single} J, {double} J in f64");
         // Four frames of a splash part by more than rounding.
         assert!(
@@ -301,7 +301,14 @@ fn is_caught(context: &Context, scene: &Scene, sound: &Path, spoil: Spoil) {
     // The line that a replay gives.
     let kept = failed::read(&broken.cache().join("failed")).unwrap();
     let start = Start::of(scene).unwrap();
-    let again = replay(&opened, scene, &start, kept.last_frame, &kept.start).unwrap();
+    let again = replay(
+        &opened.open(needs(scene)).unwrap(),
+        scene,
+        &start,
+        kept.last_frame,
+        &kept.start,
+    )
+    .unwrap();
     assert_eq!(again.as_ref(), Some(broken.failure()));
     assert!(said.starts_with(&again.unwrap().to_string()), "{said}");
     // Nothing else of the cache is other than it was.
@@ -451,7 +458,7 @@ fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_flip() {
 #[test]
 fn a_lid_on_sealed_water_is_reported_as_incompatible() {
     let gpu = opened(&Context::open(None).unwrap());
-    for device in [&gpu, &Opened::Cpu] {
+    for device in [&gpu, &Device::Cpu] {
         let scene = load("14-sealed", &["budget.volume=false"]);
         let pressed = whole(device, &scene);
         assert!(pressed.error.is_none(), "{:?}", pressed.error);

@@ -1,5 +1,7 @@
 //! Bad input: each fault of a scene has its message, and no bytes make a reader panic.
 
+#[path = "support/mutate.rs"]
+mod mutate;
 mod scene_faults;
 
 use std::path::Path;
@@ -10,6 +12,7 @@ use swell::{
     scene::{Method, Scene, SceneError, study::Study, tolerance},
 };
 
+use mutate::mutate;
 use scene_faults::{FAULTS, FLIP_FAULTS, SCENE};
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
@@ -250,33 +253,6 @@ fn the_seeds_are_cubes() {
         );
         assert_eq!(mesh.check_inside(), Ok(()));
     }
-}
-
-/// Bytes cut out, overwritten and doubled at random.
-fn mutate(mut bytes: Vec<u8>, edits: &[(u16, u8, u8)]) -> Vec<u8> {
-    for &(at, kind, value) in edits {
-        if bytes.is_empty() {
-            break;
-        }
-        let at = at as usize % bytes.len();
-        match kind % 5 {
-            0 => bytes[at] = value,
-            1 => bytes.truncate(at),
-            2 => bytes.insert(at, value),
-            3 => {
-                let end = (at + value as usize).min(bytes.len());
-                let part = bytes[at..end].to_vec();
-                bytes.extend(part);
-            }
-            _ => {
-                // Text formats break most deeply in their numbers.
-                let digits = [b"-1 ".as_slice(), b"nan", b"1e39", b"99999999999999999999"];
-                let digit = digits[value as usize % digits.len()];
-                bytes.splice(at..at + 1, digit.iter().copied());
-            }
-        }
-    }
-    bytes
 }
 
 proptest! {

@@ -276,6 +276,7 @@ fn manifest(grids: Option<GridRecord>) -> Manifest {
         attributes: Vec::new(),
         grids,
         probes: Vec::new(),
+        parent: None,
         start_particles: 0,
         files: Vec::new(),
     }
@@ -308,8 +309,16 @@ fn go_on(mut writer: CacheWriter, first: u32, last: u32) {
 }
 
 fn bake(dir: &Path, grids: Option<GridRecord>, last: u32) {
-    let writer =
-        CacheWriter::create(dir, manifest(grids), "", &[], &ball(0.0), &Vec::new()).unwrap();
+    let writer = CacheWriter::create(
+        dir,
+        manifest(grids),
+        "",
+        &[],
+        Clock::default(),
+        &ball(0.0),
+        &Vec::new(),
+    )
+    .unwrap();
     go_on(writer, 1, last);
 }
 

@@ -76,6 +76,16 @@ pub enum CacheError {
         /// In this run.
         given: String,
     },
+    /// Frames that stand there follow from another frame than the one that this run is to begin from.
+    #[error("{} began from {cached}, and this run from {given}; choose another -o", dir.display())]
+    OtherParent {
+        /// The directory.
+        dir: PathBuf,
+        /// In the manifest.
+        cached: String,
+        /// In this run.
+        given: String,
+    },
     /// Written in a format that this program does not read.
     #[error("{} has cache format {found}, and this program reads {supported}", dir.display())]
     Format {
@@ -95,12 +105,14 @@ pub enum CacheError {
         what: String,
     },
     /// A frame was asked for that was not baked.
-    #[error("{} has frames 0 to {last}, not {frame}", dir.display())]
+    #[error("{} has frames {first} to {last}, not {frame}", dir.display())]
     NoFrame {
         /// The directory.
         dir: PathBuf,
         /// Asked for.
         frame: u32,
+        /// First one there.
+        first: u32,
         /// Last one there.
         last: u32,
     },

@@ -54,7 +54,7 @@ pub struct Entry {
     /// What the probes saw; absent where the scene has none.
     #[serde(default)]
     pub probes: Option<ProbeValues>,
-    /// BLAKE3 of `manifest.json`, hex; frame 0 alone has it, so that a changed manifest is told from a
+    /// BLAKE3 of `manifest.json`, hex; the first frame alone has it, so that a changed manifest is told from a
     /// changed first line.
     #[serde(default)]
     pub manifest: Option<String>,
@@ -132,7 +132,7 @@ fn chained(previous: &Hash, contents: &[u8]) -> Hash {
 /// The ledger as found: whole lines, each checked.
 #[derive(Debug)]
 pub(super) struct Ledger {
-    /// Frame i at index i; never empty.
+    /// In order, the start first; never empty.
     pub(super) entries: Vec<Entry>,
     /// Of the last whole line.
     pub(super) chain: Hash,
@@ -203,7 +203,10 @@ impl Ledger {
                 "its BLAKE3 is not the one in the ledger",
             ));
         }
-        let frame = u32::try_from(number - 1).map_err(|_| damaged("too many frames"))?;
+        let frame = u32::try_from(number - 1)
+            .ok()
+            .and_then(|index| index.checked_add(manifest.first_frame()))
+            .ok_or_else(|| damaged("too many frames"))?;
         let file = frame::file_name(&manifest.shot, frame);
         if entry.frame != frame || entry.clock.frame != frame || entry.file != file {
             return Err(damaged(&format!("it is not frame {frame} in {file}")));

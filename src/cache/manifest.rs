@@ -1,5 +1,6 @@
 //! What was baked, by what, on what.
 
+use std::fmt;
 use std::fs;
 use std::path::{Component, Path};
 
@@ -58,10 +59,41 @@ pub struct Manifest {
     /// What is measured at each frame; absent where the scene has no probe.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub probes: Vec<ProbeRecord>,
+    /// The frame of another cache that this bake began from; absent where it began from its scene's start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<Parent>,
     /// Particles at the start; filled in by `create`.
     pub start_particles: u64,
     /// `scene.toml` and the assets; filled in by `create`.
     pub files: Vec<FileRecord>,
+}
+
+/// A frame of another cache. The bake that began there goes on with its number and its clock, so the frame is the
+/// first of both.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parent {
+    /// Shot of that cache.
+    pub shot: String,
+    /// Its solver.
+    pub solver: String,
+    /// Hash of its physics, hex.
+    pub scene_hash: String,
+    /// Number of the frame, in both caches.
+    pub frame: u32,
+    /// BLAKE3 of the frame's file there, hex.
+    pub blake3: String,
+}
+
+impl fmt::Display for Parent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let hash: String = self.blake3.chars().take(16).collect();
+        write!(
+            f,
+            "frame {} of {} {} ({hash})",
+            self.frame, self.shot, self.solver
+        )
+    }
 }
 
 fn is_zero(origin: &[f64; 3]) -> bool {
@@ -122,6 +154,11 @@ const COMPARED: [&str; 14] = [
 impl Manifest {
     /// The format that this program writes and reads.
     pub const FORMAT_VERSION: u32 = 1;
+
+    /// Number of the first frame: 0 is a scene's own start.
+    pub fn first_frame(&self) -> u32 {
+        self.parent.as_ref().map_or(0, |parent| parent.frame)
+    }
 
     /// Bytes of `manifest.json`.
     pub(super) fn to_bytes(&self) -> Result<Vec<u8>, CacheError> {
@@ -209,6 +246,18 @@ impl Manifest {
                 .map_err(|error| CacheError::Unfit(format!("manifest: {error}")))
         };
         let (cached, given_fields) = (fields(self)?, fields(given)?);
+        // Without a parent this run asks for none: what stands there is all that it needs.
+        if given.parent.is_some() && given.parent != self.parent {
+            let name = |parent: &Option<Parent>| match parent {
+                None => "the start of its scene".to_owned(),
+                Some(parent) => parent.to_string(),
+            };
+            return Err(CacheError::OtherParent {
+                dir: dir.to_owned(),
+                cached: name(&self.parent),
+                given: name(&given.parent),
+            });
+        }
         match COMPARED.iter().find(|&&f| cached[f] != given_fields[f]) {
             None if self.probes != given.probes => Err(CacheError::OtherProbes {
                 dir: dir.to_owned(),

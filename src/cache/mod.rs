@@ -6,7 +6,8 @@
 //!   scene.toml      the scene as baked; the manifest holds its hash
 //!   assets/         copies of the files that the scene names; the manifest holds their hashes
 //!   frames.jsonl    the ledger: one line a frame, chained by BLAKE3 back to the manifest
-//!   frames/wave-city.0000.ply   the start; 0001 is the first frame after it
+//!   frames/wave-city.0000.ply   the start; 0001 is the first frame after it. A bake that began from a frame of another
+//!                   cache starts with that number
 //!   grids/wave-city.0000.vdb    where the scene asks: level set "surface", staggered "vel"
 //!   probes/elevation-1.csv      where the scene has probes: a row a frame, from the ledger
 //!   timings.jsonl   seconds, which no two bakes share: in no hash, in no comparison
@@ -41,7 +42,7 @@ pub use error::CacheError;
 pub use frame::file_name;
 pub use grids::GridRecord;
 pub use ledger::{Clock, Entry};
-pub use manifest::{FileRecord, Manifest};
+pub use manifest::{FileRecord, Manifest, Parent};
 pub use probes::{ProbeRecord, ProbeValues};
 pub use reader::{CacheReader, Problem, VerifyReport, survey};
 pub use writer::{Asset, CacheWriter, Summary};

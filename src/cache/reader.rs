@@ -121,14 +121,20 @@ impl CacheReader {
             .read(&self.dir)
     }
 
-    /// The ledger: frame i at index i, the start at 0; never empty.
+    /// The ledger: one entry a frame without gaps, the start first; never empty.
     pub fn entries(&self) -> &[Entry] {
         &self.ledger.entries
     }
 
+    /// The start: 0, or the frame of another cache that the bake began from.
+    pub fn first_frame(&self) -> u32 {
+        self.manifest.first_frame()
+    }
+
     /// Last frame in the ledger.
     pub fn last_frame(&self) -> u32 {
-        self.ledger.entries.last().map_or(0, |entry| entry.frame)
+        let last = self.ledger.entries.last();
+        last.map_or(self.first_frame(), |entry| entry.frame)
     }
 
     /// A frame's line.
@@ -136,13 +142,13 @@ impl CacheReader {
     /// # Errors
     /// [`CacheError::NoFrame`].
     pub fn entry(&self, frame: u32) -> Result<&Entry, CacheError> {
-        let index = usize::try_from(frame).unwrap_or(usize::MAX);
-        self.ledger
-            .entries
-            .get(index)
+        let index = frame.checked_sub(self.first_frame());
+        index
+            .and_then(|index| self.ledger.entries.get(usize::try_from(index).ok()?))
             .ok_or_else(|| CacheError::NoFrame {
                 dir: self.dir.clone(),
                 frame,
+                first: self.first_frame(),
                 last: self.last_frame(),
             })
     }
@@ -209,7 +215,7 @@ impl CacheReader {
             Some(Problem { file, what })
         }));
         VerifyReport {
-            frames: self.last_frame(),
+            frames: self.last_frame() - self.first_frame(),
             bytes: entries.iter().flat_map(Entry::files).map(|f| f.bytes).sum(),
             problems,
         }

@@ -75,8 +75,8 @@ struct Job {
 
 impl CacheWriter {
     /// Starts a cache in `dir`, which must be absent, empty, or a creation of ours that was cut
-    /// short. `start` becomes frame 0, of which the probes say
-    /// `probes`: one list a probe of the manifest. `manifest.files` and `manifest.start_particles` are filled in.
+    /// short. `start` becomes the first frame: 0, or that of the manifest's parent, with `clock` as it stood there. Of it the
+    /// probes say `probes`: one list a probe of the manifest. `manifest.files` and `manifest.start_particles` are filled in.
     ///
     /// # Errors
     /// [`CacheError::Exists`] and [`CacheError::Occupied`], with the directory untouched;
@@ -86,11 +86,17 @@ impl CacheWriter {
         manifest: Manifest,
         scene_toml: &str,
         assets: &[Asset],
+        clock: Clock,
         start: &Particles,
         probes: &ProbeValues,
     ) -> Result<Self, CacheError> {
         let manifest = completed(manifest, scene_toml, assets, start)?;
         check_probes(&manifest, probes)?;
+        if clock.frame != manifest.first_frame() {
+            let first = manifest.first_frame();
+            let what = format!("a start at frame {} where {first} is first", clock.frame);
+            return Err(CacheError::Unfit(what));
+        }
         refuse_occupied(dir)?;
         disk::create_directory(dir)?;
         let lock = disk::lock(dir)?;
@@ -124,10 +130,10 @@ impl CacheWriter {
             chain: seed,
             ledger_bytes: 0,
         };
-        sink.write(Clock::default(), start, probes, &Value::Null)?;
+        sink.write(clock, start, probes, &Value::Null)?;
         // Last, because it is what makes the directory a cache.
         write_bytes(&dir.join(manifest::FILE), &manifest_bytes)?;
-        Self::spawn(sink, manifest, 0, lock)
+        Self::spawn(sink, manifest, clock.frame, lock)
     }
 
     /// Goes on with the cache in `dir` after its last frame, which is handed back with its line. What
@@ -370,7 +376,7 @@ impl Sink {
             particles: particles.len() as u64,
             grids: grids.as_ref(),
             probes: (!probes.is_empty()).then_some(probes),
-            manifest: (clock.frame == 0).then_some(seed.as_str()),
+            manifest: (clock.frame == manifest.first_frame()).then_some(seed.as_str()),
             clock,
             report,
         };
@@ -444,7 +450,7 @@ fn completed(
 }
 
 /// Refuses a directory with anything in it but a creation of ours that was cut short: our lock, no
-/// manifest, and no frame but the start.
+/// manifest, and one frame at most.
 fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
     if super::exists(dir) {
         return Err(CacheError::Exists {
@@ -483,17 +489,23 @@ fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
     if let Some(other) = names.iter().find(|name| !ours.contains(&plain(name))) {
         return occupied(other.clone());
     }
-    for (folder, ending) in [
-        (FRAMES, ".0000.ply"),
-        (GRIDS, ".0000.vdb"),
-        (probes::FOLDER, probes::ENDING),
+    for (folder, ending, is_one) in [
+        (FRAMES, ".ply", true),
+        (GRIDS, ".vdb", true),
+        (probes::FOLDER, probes::ENDING, false),
     ] {
         let path = dir.join(folder);
-        if path.is_dir()
-            && let Some(other) = disk::names(&path)?
-                .into_iter()
-                .find(|name| !plain(name).ends_with(ending))
-        {
+        let names = if path.is_dir() {
+            disk::names(&path)?
+        } else {
+            Vec::new()
+        };
+        let first = names.first().map(|name| plain(name).to_owned());
+        let is_ours = |name: &String| {
+            let name = plain(name);
+            name.ends_with(ending) && (!is_one || first.as_deref() == Some(name))
+        };
+        if let Some(other) = names.iter().find(|name| !is_ours(name)) {
             return occupied(format!("{folder}/{other}, but no {}", manifest::FILE));
         }
     }

@@ -11,9 +11,10 @@ use serde_json::{Value, json};
 
 use crate::{
     domain::{frame_range::FrameRange, solver::StepReport},
-    scene::{Method, Scene, SceneError},
+    scene::{Method, Reach, Scene, SceneError},
     stage::{
         bake::{Event, Request, bake},
+        branch::BranchPoint,
         device::Device,
     },
 };
@@ -35,7 +36,12 @@ pub(super) struct BakeArgs {
     /// Which solver, pbf or flip: short for --set solver.method=SOLVER.
     #[arg(long, value_name = "SOLVER", value_parser = method)]
     solver: Option<Method>,
-    /// Frames to bake, such as 1-30; the whole shot where left out.
+    /// Begin from a frame of another cache, such as cache/wave-city/pbf:120, of the same solver, spacing and frame
+    /// rate; numbers and time go on from there.
+    #[arg(long, value_name = "CACHE:FRAME")]
+    from: Option<BranchPoint>,
+    /// Frames to bake, such as 1-30; the whole shot where left out. With --resume past the end of the shot, which is then
+    /// longer.
     #[arg(long, value_name = "A-B")]
     frames: Option<FrameRange>,
     /// Override a scene key, such as solver.pbf.iterations=8.
@@ -44,6 +50,9 @@ pub(super) struct BakeArgs {
     /// Go on after the last frame of the cache's ledger, if there is one; a damaged frame is refused by name.
     #[arg(long)]
     resume: bool,
+    /// Take meshes and tables that lie outside of the scene's folder.
+    #[arg(long)]
+    allow_outside: bool,
     /// What to solve on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
     #[arg(long, value_enum, default_value_t, value_name = "DEVICE")]
     device: DeviceKind,
@@ -88,20 +97,44 @@ pub(super) fn method(name: &str) -> Result<Method, String> {
         .ok_or_else(|| format!("no solver of that name; allowed: {names}"))
 }
 
+/// How far paths in scenes and looks lead.
+pub(super) fn reach(allow_outside: bool) -> Reach {
+    if allow_outside {
+        Reach::Anywhere
+    } else {
+        Reach::Folder
+    }
+}
+
 /// A scene with overrides laid over it, and the solver that was asked for.
 pub(super) fn load(
     file: &Path,
     set: &[String],
     solver: Option<Method>,
+    allow_outside: bool,
 ) -> Result<Scene, SceneError> {
     let chosen = solver.map(Method::as_override);
     let overrides: Vec<String> = set.iter().cloned().chain(chosen).collect();
-    Scene::load(file, &overrides)
+    Scene::load_within(file, &overrides, reach(allow_outside))
+}
+
+/// The scene; where a bake is to go on past the end of its shot, the scene with a longer one, so that walls and solids
+/// are known to stay where they may as far as that.
+fn load_lengthened(args: &BakeArgs) -> Result<Scene, SceneError> {
+    let scene = load(&args.scene, &args.set, args.solver, args.allow_outside)?;
+    match &args.frames {
+        Some(frames) if args.resume && frames.last() > scene.shot.frames => {
+            let longer = format!("shot.frames={}", frames.last());
+            let set: Vec<String> = args.set.iter().cloned().chain([longer]).collect();
+            load(&args.scene, &set, args.solver, args.allow_outside)
+        }
+        _ => Ok(scene),
+    }
 }
 
 pub(super) fn run(args: &BakeArgs) -> Result<ExitCode, Failure> {
     let device = args.device()?;
-    let scene = load(&args.scene, &args.set, args.solver)?;
+    let scene = load_lengthened(args)?;
     let method = scene.solver.method.name();
     let default = || PathBuf::from("cache").join(&scene.shot.name).join(method);
     let request = Request {
@@ -109,6 +142,7 @@ pub(super) fn run(args: &BakeArgs) -> Result<ExitCode, Failure> {
         scene,
         frames: args.frames.clone(),
         resume: args.resume,
+        from: args.from.clone(),
         device,
         time_passes: args.time_passes,
     };
@@ -164,6 +198,8 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             bytes,
             first,
             last,
+            parent,
+            notes,
         } => {
             let frames = u64::from((last + 1).saturating_sub(first));
             let progress = progress.get_or_init(|| Progress::new(mode, frames));
@@ -194,6 +230,17 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             let text = format!(
                 "{solver} on {device}\n{particles} particles ({removed} left out where solids are){samples}{memory}\n{span}"
             );
+            if let Some(parent) = &parent {
+                let notes =
+                    json!({ "event": "branch", "parent": parent.to_string(), "notes": notes });
+                progress.say(&format!("begins from {parent}"), notes);
+            }
+            for note in &notes {
+                progress.say(
+                    &format!("note: {note}"),
+                    json!({ "event": "note", "what": note }),
+                );
+            }
             progress.say(
                 &text,
                 json!({

@@ -38,6 +38,9 @@ pub(super) struct CheckArgs {
     /// Of a scene: override a key, such as solver.pbf.iteration=jacobi.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Of a scene: take meshes and tables that lie outside of its folder.
+    #[arg(long)]
+    allow_outside: bool,
     /// The result as one JSON object on standard output.
     #[arg(long)]
     json: bool,
@@ -132,7 +135,7 @@ fn source(args: &CheckArgs) -> Result<Source, Failure> {
                 "a scene: its start is frame 0",
             ));
         }
-        let scene = bake::load(&args.source, &args.set, args.solver)?;
+        let scene = bake::load(&args.source, &args.set, args.solver, args.allow_outside)?;
         return Ok(Source::Scene(Box::new(scene)));
     }
     if args.solver.is_some() || !args.set.is_empty() {

@@ -32,6 +32,9 @@ pub(super) struct InspectArgs {
     /// Plan for this solver, pbf or flip: short for --set solver.method=SOLVER.
     #[arg(long, value_name = "SOLVER", value_parser = bake::method)]
     solver: Option<Method>,
+    /// Take meshes and tables that lie outside of the scene's folder.
+    #[arg(long)]
+    allow_outside: bool,
     /// Plan for the limits of this adapter.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
@@ -56,7 +59,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
             show_probes(&mut text, &manifest, &entries)?;
         }
         Some(file) => {
-            let scene = bake::load(file, &args.set, args.solver)?;
+            let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
             let planned = plan(&scene, args.adapter.as_deref())?;
             show_plan(&mut text, &scene, &planned)?;
             misfit = planned.misfit;
@@ -167,6 +170,9 @@ fn show_cache(
         manifest.device, manifest.driver, manifest.backend
     )?;
     writeln!(out, "scene {}", manifest.scene_hash)?;
+    if let Some(parent) = &manifest.parent {
+        writeln!(out, "begins from {parent}")?;
+    }
     writeln!(
         out,
         "{} a second, d = {} m",

@@ -12,7 +12,7 @@ use crate::{
 };
 
 use super::{
-    Failure,
+    Failure, bake,
     interrupt::{self, Interrupt},
     progress::{Mode, Progress},
 };
@@ -33,6 +33,9 @@ pub(super) struct RenderArgs {
     /// Index or part of the name of the adapter (see `swell inspect --adapters`).
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
+    /// Take a panorama that lies outside of the look's folder.
+    #[arg(long)]
+    allow_outside: bool,
     /// Render frames again that stand there with the same cache and look.
     #[arg(long)]
     overwrite: bool,
@@ -42,7 +45,7 @@ pub(super) struct RenderArgs {
 }
 
 pub(super) fn run(args: &RenderArgs) -> Result<ExitCode, Failure> {
-    let look = Look::load(&args.look)?;
+    let look = Look::load_within(&args.look, bake::reach(args.allow_outside))?;
     let directory = match &args.output {
         Some(directory) => directory.clone(),
         None => {

@@ -27,6 +27,9 @@ pub(super) struct StudyArgs {
     /// Index or part of the name of the adapter (see `swell inspect --adapters`).
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
+    /// Take meshes, tables and panoramas that lie outside of the folders of the scene and the look.
+    #[arg(long)]
+    allow_outside: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
     progress: Mode,
@@ -36,7 +39,7 @@ pub(super) fn run(args: &StudyArgs) -> Result<ExitCode, Failure> {
     let default = || PathBuf::from("studies").join(args.study.file_stem().unwrap_or_default());
     let directory = args.output.clone().unwrap_or_else(default);
     let request = Request {
-        study: Study::load(&args.study)?,
+        study: Study::load_within(&args.study, bake::reach(args.allow_outside))?,
         command: format!(
             "swell study {} -o {}",
             args.study.display(),

@@ -76,7 +76,7 @@ pub struct Context {
     pub queue: Queue,
     /// Name, driver, backend.
     pub info: AdapterInfo,
-    /// What the device was opened with: the adapter's own limits.
+    /// What the device was opened with: the adapter's own limits, unless they were lowered.
     pub limits: Limits,
     /// Whether passes can be timed on the device.
     pub has_timestamps: bool,
@@ -194,9 +194,23 @@ impl Context {
     /// # Errors
     /// Those of [`Self::open`], and [`GpuError::NoF64`].
     pub fn open_for(request: Option<&str>, needs: Needs) -> Result<Self, GpuError> {
+        Self::open_lowered(request, needs, |_| {})
+    }
+
+    /// The same on a device with less than the adapter has: `lower` takes its limits down. What then passes them is an
+    /// error of the device, as it would be on an adapter that has no more.
+    ///
+    /// # Errors
+    /// Those of [`Self::open_for`]; [`GpuError::Open`] for a limit above the adapter's own.
+    pub fn open_lowered(
+        request: Option<&str>,
+        needs: Needs,
+        lower: impl FnOnce(&mut Limits),
+    ) -> Result<Self, GpuError> {
         let adapter = choose(enumerate(), request)?;
         let info = adapter.get_info();
-        let limits = adapter.limits();
+        let mut limits = adapter.limits();
+        lower(&mut limits);
         let features = features(adapter.features(), needs).ok_or_else(|| GpuError::NoF64 {
             adapter: info.name.clone(),
         })?;

@@ -18,6 +18,35 @@ pub(super) fn of(path: &str) -> Option<&'static str> {
         .map(|(_, allowed)| *allowed)
 }
 
+/// Every key of a scene, tables included, without indices: all but those of studies and tolerances.
+#[cfg(test)]
+pub(super) fn scene_keys() -> impl Iterator<Item = &'static str> {
+    const OTHERS: [&str; 20] = [
+        "kind",
+        "scene",
+        "about",
+        "set",
+        "key",
+        "values",
+        "steps",
+        "seconds",
+        "repeats",
+        "errors",
+        "convergence_point",
+        "method",
+        "look",
+        "solvers",
+        "frames",
+        "pictures",
+        "position",
+        "velocity",
+        "attributes",
+        "aggregates",
+    ];
+    let keys = TABLE.iter().map(|(key, _)| *key);
+    keys.filter(|key| !OTHERS.contains(&key.split('.').next().unwrap_or(key)))
+}
+
 const TRANSLATE: &str = "three finite numbers, metres";
 const ROTATE: &str = "three finite numbers, degrees about x, then y, then z";
 const SCALE: &str = "a number other than 0, or three of them";

@@ -385,7 +385,7 @@ fn static_solid(
 
 fn placed_mesh(doc: &Document<'_>, base_dir: &Path, spec: &MeshSpec<'_>) -> Result<PlacedMesh> {
     let fail = |problem: String| doc.fault_at(spec.path.span(), problem);
-    let file = base_dir.join(spec.path.get_ref());
+    let file = doc.find(base_dir, spec.path)?;
     let bytes = MeshFormat::of(&file)
         .and_then(|format| Ok((format, mesh_file::read_bytes(&file)?)))
         .and_then(|(format, bytes)| Ok((TriangleMesh::from_bytes(&bytes, format, &file)?, bytes)));

@@ -11,7 +11,10 @@ use toml::{
     de::{DeArray, DeTable, DeValue},
 };
 
-use super::error::{Fault, Place, SceneError};
+use super::{
+    error::{Fault, Place, SceneError},
+    reach::Reach,
+};
 
 /// Bytes set aside for the spans of one override, beyond the end of the text.
 const OVERRIDE_SPAN: usize = 1 << 20;
@@ -22,6 +25,7 @@ pub(super) struct Document<'a> {
     text: &'a str,
     overrides: &'a [String],
     entries: Vec<Entry>,
+    reach: Reach,
 }
 
 struct Entry {
@@ -47,6 +51,7 @@ impl<'a> Document<'a> {
             text,
             overrides,
             entries: Vec::new(),
+            reach: Reach::Folder,
         };
         let mut root = DeTable::parse(text)
             .map_err(|e| document.fault(e.span(), String::new(), e.message().to_owned()))?;
@@ -62,6 +67,26 @@ impl<'a> Document<'a> {
         }
         index_table(root.get_ref(), "", &mut document.entries);
         Ok((document, root))
+    }
+
+    /// The same with paths that lead so far.
+    pub(super) fn within(self, reach: Reach) -> Self {
+        Self { reach, ..self }
+    }
+
+    /// How far its paths lead.
+    pub(super) fn reach(&self) -> Reach {
+        self.reach
+    }
+
+    /// The file that a value names, from `base_dir`.
+    pub(super) fn find(
+        &self,
+        base_dir: &Path,
+        name: &Spanned<String>,
+    ) -> Result<PathBuf, SceneError> {
+        let found = self.reach.find(base_dir, Path::new(name.get_ref()));
+        found.map_err(|problem| self.fault_at(name.span(), problem))
     }
 
     /// A fault at `span`, of the key that stands there, with what that key allows.

@@ -4,25 +4,37 @@ use std::{fs, path::Path};
 
 use serde::Deserialize as _;
 
-use super::{Scene, build, document::Document, error::SceneError, spec::SceneSpec};
+use super::{Reach, Scene, build, document::Document, error::SceneError, spec::SceneSpec};
 
 impl Scene {
     /// Loads a scene file with overrides (`solver.pbf.iterations=8`: dotted keys, TOML values or
-    /// bare words) laid over it. Mesh and table paths are relative to the file.
+    /// bare words) laid over it. Mesh and table paths are relative to the file, and stay below its folder.
     ///
     /// # Errors
     /// One [`SceneError`] that names file, line, key, and what is allowed.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        Self::load_within(path, overrides, Reach::Folder)
+    }
+
+    /// [`Self::load`] with files from as far as `reach` says.
+    ///
+    /// # Errors
+    /// Those of [`Self::load`].
+    pub fn load_within(
+        path: &Path,
+        overrides: &[String],
+        reach: Reach,
+    ) -> Result<Self, SceneError> {
         let text = fs::read_to_string(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
             source,
         })?;
         let base_dir = path.parent().unwrap_or(Path::new(""));
-        Self::parse(&text, path, base_dir, overrides)
+        Self::parse_within(&text, path, base_dir, overrides, reach)
     }
 
     /// [`Self::load`] on a text; `file` names it in messages, `base_dir` is where relative paths
-    /// start.
+    /// start, and what they may not leave.
     ///
     /// # Errors
     /// Those of [`Self::load`].
@@ -32,7 +44,18 @@ impl Scene {
         base_dir: &Path,
         overrides: &[String],
     ) -> Result<Self, SceneError> {
+        Self::parse_within(text, file, base_dir, overrides, Reach::Folder)
+    }
+
+    fn parse_within(
+        text: &str,
+        file: &Path,
+        base_dir: &Path,
+        overrides: &[String],
+        reach: Reach,
+    ) -> Result<Self, SceneError> {
         let (document, root) = Document::parse(text, file, overrides)?;
+        let document = document.within(reach);
         let spec = SceneSpec::deserialize(toml::Deserializer::from(root))
             .map_err(|error| document.translate(&error))?;
         build::scene(&document, base_dir, spec)
@@ -41,7 +64,7 @@ impl Scene {
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
+    use std::{collections::BTreeSet, path::PathBuf};
 
     use glam::DVec3;
 
@@ -265,6 +288,69 @@ vorticity_confinement = { strength = 0.1 }
         .expect("written");
         let message = parse(dir.path(), &text, &[]).expect_err("another mesh");
         assert!(message.contains("water.mesh[0].blake3"), "{message}");
+    }
+
+    /// A key that is not written out is in no hash and in no comparison: a bake would go on with another scene.
+    #[test]
+    fn every_key_of_a_scene_is_written_out() {
+        let dir = assets();
+        let more = r#"
+[[solid]]
+mesh = "cube.obj"
+translate = [6.0, 0.0, 2.0]
+direction = [1.0, 0.0, 0.0]
+motion = { kind = "KIND" }
+[[wave_maker]]
+wall = "+x"
+motion = { kind = "KIND" }
+[grids]
+surface = true
+velocity = true
+[[probe]]
+kind = "elevation"
+at = [5.0, 2.0]
+"#;
+        let of_solid = FULL.replace("[solver]\n", &format!("{more}[solver]\n"));
+        let kinds = [
+            "\"sine\", stroke = 0.1, period = 2.0, ramp = 1.0",
+            "\"constant_velocity\", velocity = 0.1, until = 1.0",
+            "\"table\", points = [[0, 0], [1, 0.1]]",
+        ];
+        let variants: [&[&str]; 3] = [
+            &[],
+            &["solver.pbf.iteration=red_black"],
+            &[
+                "solver.pbf={particle_spacing=0.1,iteration=\"chebyshev\",spectral_radius=0.9}",
+                "solver.pbf.iterations=4",
+            ],
+        ];
+        let mut written = BTreeSet::new();
+        for (kind, overrides) in kinds.iter().zip(variants) {
+            let text = of_solid.replace("\"KIND\"", kind);
+            let flip = ["solver.method=flip"];
+            let all: Vec<&str> = flip.iter().chain(overrides).copied().collect();
+            let scene = parse(dir.path(), &text, &all).expect("valid");
+            let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
+            let table: toml::Table = toml::from_str(&toml).expect("TOML");
+            collect_keys("", &table, &mut written);
+        }
+        // A motion's file is written as the points that were read from it.
+        let missing: Vec<_> = super::super::allowed::scene_keys()
+            .filter(|key| !key.ends_with("motion.file") && !written.contains(*key))
+            .collect();
+        assert_eq!(missing, [] as [&str; 0]);
+    }
+
+    /// Dotted keys of a table and of those below it, without indices.
+    fn collect_keys(path: &str, table: &toml::Table, keys: &mut BTreeSet<String>) {
+        for (name, value) in table {
+            let path = format!("{path}{name}");
+            let array = value.as_array().into_iter().flatten();
+            for below in array.chain([value]).filter_map(toml::Value::as_table) {
+                collect_keys(&format!("{path}."), below, keys);
+            }
+            keys.insert(path);
+        }
     }
 
     #[test]

@@ -9,6 +9,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::Reach;
+
 pub use fault::LookError;
 pub use spec::{
     AovSpec, BasinSpec, CameraSpec, FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LookSpec,
@@ -30,25 +32,40 @@ impl Look {
     /// # Errors
     /// [`LookError::Read`] for the file or its panorama, [`LookError::Fault`] with line and key.
     pub fn load(path: &Path) -> Result<Self, LookError> {
+        Self::load_within(path, Reach::Folder)
+    }
+
+    /// [`Look::load`] with a panorama from as far as `reach` says.
+    ///
+    /// # Errors
+    /// As [`Look::load`].
+    pub fn load_within(path: &Path, reach: Reach) -> Result<Self, LookError> {
         let text = std::fs::read_to_string(path).map_err(|source| LookError::Read {
             file: path.to_owned(),
             source,
         })?;
-        Self::parse(&text, path)
+        Self::parse_within(&text, path, reach)
     }
 
     /// Parses and validates the text of a look; `file` names it in errors, and its folder is where a
-    /// relative panorama is looked for.
+    /// relative panorama is looked for, which it must not leave.
     ///
     /// # Errors
     /// As [`Look::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, LookError> {
+        Self::parse_within(text, file, Reach::Folder)
+    }
+
+    fn parse_within(text: &str, file: &Path, reach: Reach) -> Result<Self, LookError> {
         let spec: LookSpec =
             toml::from_str(text).map_err(|error| fault::from_toml(file, text, &error))?;
         validate(&spec).map_err(|(path, message)| fault::at_path(file, text, &path, &message))?;
         let panorama = match &spec.sky {
             SkySpec::Panorama { file: name, .. } => {
-                let path = file.parent().unwrap_or(Path::new(".")).join(name);
+                let folder = file.parent().unwrap_or(Path::new("."));
+                let path = reach
+                    .find(folder, name)
+                    .map_err(|message| fault::at_path(file, text, "sky.file", &message))?;
                 let bytes = std::fs::read(&path).map_err(|source| LookError::Read {
                     file: path.clone(),
                     source,

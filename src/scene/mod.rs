@@ -19,6 +19,7 @@ mod document;
 mod error;
 mod load;
 mod origin;
+mod reach;
 mod spec;
 mod wave_maker;
 mod write;
@@ -33,6 +34,7 @@ pub use budget::Budget;
 pub use difference::{physics_difference, physics_hash};
 pub use effects::Effects;
 pub use error::{Fault, Place, SceneError};
+pub use reach::Reach;
 pub use write::asset_path;
 
 /// A validated scene: SI units, every default settled, every file read.

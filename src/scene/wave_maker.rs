@@ -202,7 +202,7 @@ fn table(doc: &Document<'_>, base_dir: &Path, spec: &Spanned<MotionSpec>) -> Res
     let (points, span) = match (&m.points, &m.file) {
         (Some(points), None) => (points.get_ref().clone(), points.span()),
         (None, Some(file)) => {
-            let path = base_dir.join(file.get_ref());
+            let path = doc.find(base_dir, file)?;
             let points = read_table(&path).map_err(|problem| {
                 doc.fault_at(file.span(), format!("{}: {problem}", path.display()))
             })?;

@@ -10,7 +10,9 @@ use std::{
 use serde_json::{Value, json};
 
 use crate::{
-    cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, failed},
+    cache::{
+        Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, Parent, failed,
+    },
     domain::{
         budget::Breach, frame_range::FrameRange, particles::Particles,
         signed_distance::SignedDistanceError, solver::StepReport,
@@ -21,6 +23,7 @@ use crate::{
 
 use super::{
     Blame,
+    branch::{Branch, BranchError, BranchPoint},
     device::{Built, Device, Identity, Opened, SolverError, needs},
     prepare::Start,
     probes,
@@ -39,6 +42,8 @@ pub struct Request {
     pub frames: Option<FrameRange>,
     /// Whether to go on with a bake that stands there.
     pub resume: bool,
+    /// Frame of another cache to begin from; the scene's own start where `None`.
+    pub from: Option<BranchPoint>,
     /// What to solve on.
     pub device: Device,
     /// Whether passes are timed on the device, which runs them one by one; on the CPU they do so anyway.
@@ -66,6 +71,10 @@ pub enum Event {
         first: u32,
         /// Last one.
         last: u32,
+        /// Where a new bake begins from a frame of another cache, that frame.
+        parent: Option<Parent>,
+        /// What a user has to know of such a beginning, a sentence each.
+        notes: Vec<String>,
     },
     /// A frame was computed.
     Frame {
@@ -121,6 +130,9 @@ pub enum BakeError {
         /// Key and both values.
         difference: String,
     },
+    /// The frame to begin from.
+    #[error(transparent)]
+    Branch(#[from] BranchError),
     /// Frames that a bake cannot compute.
     #[error("--frames {0}")]
     Frames(String),
@@ -159,7 +171,9 @@ impl From<&BakeError> for Blame {
             BakeError::Solid(error) => error.into(),
             BakeError::Gpu(error) => error.into(),
             BakeError::Solve(error) => error.into(),
-            BakeError::Cache(error) => error.into(),
+            BakeError::Cache(error) | BakeError::Branch(BranchError::Cache(error)) => error.into(),
+            BakeError::Branch(BranchError::Scene { .. }) => Self::Files,
+            BakeError::Branch(_) => Self::Input,
             BakeError::OtherPhysics { .. } => Self::Files,
             BakeError::Budget { .. } | BakeError::NotKept { .. } => Self::Numbers,
             BakeError::Frames(_) | BakeError::Asset { .. } => Self::Input,
@@ -176,33 +190,18 @@ pub fn bake(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, BakeError> {
-    last_frame(request)?;
-    let start = Start::of(&request.scene)?;
-    bake_on(
-        &request.device.open(needs(&request.scene))?,
-        &start,
-        request,
-        stop,
-        tell,
-    )
-}
-
-/// The same on a device that stands open; `start` is the scene's.
-///
-/// # Errors
-/// Those of [`bake`].
-pub fn bake_on(
-    opened: &Opened,
-    start: &Start,
-    request: &Request,
-    stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, BakeError> {
     let scene = &request.scene;
     let last = last_frame(request)?;
-    let Built { mut solver, bytes } = opened.build(scene, start, request.time_passes)?;
+    let Beginning {
+        start,
+        clock,
+        parent,
+        notes,
+    } = beginning(request, last)?;
+    let opened = request.device.open(needs(scene))?;
+    let Built { mut solver, bytes } = opened.build(scene, &start, request.time_passes)?;
     let device = opened.identity();
-    let (mut writer, mut clock, state) = open_cache(request, &device, start)?;
+    let (mut writer, mut clock, state) = open_cache(request, &device, &start, clock, &parent)?;
     let first = clock.frame + 1;
     tell(Event::Ready {
         device,
@@ -213,6 +212,8 @@ pub fn bake_on(
         bytes,
         first,
         last,
+        parent,
+        notes,
     });
     solver.load(clock.frame, &state)?;
     let mut watch = Watch::new(scene, &start.particles, clock.frame, &state);
@@ -268,7 +269,7 @@ pub fn bake_on(
     let passes = solver.timings();
     if let Some(error) = broken {
         drop(solver);
-        return Err(end(request, opened, start, error));
+        return Err(end(request, &opened, &start, error));
     }
     Ok(Outcome {
         last_frame: summary.last_frame,
@@ -322,6 +323,53 @@ fn last_frame(request: &Request) -> Result<u32, BakeError> {
     Ok(frames.last())
 }
 
+/// What a new bake begins with, and the plan is made for.
+struct Beginning {
+    start: Start,
+    clock: Clock,
+    parent: Option<Parent>,
+    notes: Vec<String>,
+}
+
+/// The scene's own start, the frame that the request names, or what a cache that is gone on with began from.
+fn beginning(request: &Request, last: u32) -> Result<Beginning, BakeError> {
+    let (scene, directory) = (&request.scene, &request.directory);
+    let stands = request.resume && crate::cache::exists(directory);
+    let open = |from| Branch::open(from, scene);
+    let branch = match request.from.as_ref().map(open).transpose()? {
+        Some(branch) if !stands => return branched(scene, last, branch),
+        other => other,
+    };
+    let start = if stands {
+        Start::of_cache::<BakeError>(scene, &CacheReader::open(directory)?)?
+    } else {
+        Start::of(scene)?
+    };
+    Ok(Beginning {
+        start,
+        clock: Clock::default(),
+        parent: branch.map(|branch| branch.parent),
+        notes: Vec::new(),
+    })
+}
+
+fn branched(scene: &Scene, last: u32, mut branch: Branch) -> Result<Beginning, BakeError> {
+    let frame = branch.clock.frame;
+    if last <= frame {
+        return Err(BakeError::Frames(format!(
+            "1-{last}: nothing is left to bake after frame {frame}; raise shot.frames"
+        )));
+    }
+    let start = Start::with(scene, branch.particles.clone())?;
+    branch.note_covered(scene, &start.boundary);
+    Ok(Beginning {
+        start,
+        clock: branch.clock,
+        parent: Some(branch.parent),
+        notes: branch.notes,
+    })
+}
+
 /// A bake cannot begin after a frame that is not there.
 fn check_first(request: &Request, next: u32) -> Result<(), BakeError> {
     match &request.frames {
@@ -337,6 +385,8 @@ fn open_cache(
     request: &Request,
     device: &Identity,
     start: &Start,
+    clock: Clock,
+    parent: &Option<Parent>,
 ) -> Result<(CacheWriter, Clock, Particles), BakeError> {
     let scene = &request.scene;
     let text = scene.to_toml(&scene::asset_path);
@@ -357,6 +407,7 @@ fn open_cache(
         attributes: start.particles.attributes.keys().cloned().collect(),
         grids: scene.grids.map(|grids| grid_record(scene, &grids)),
         probes: probes::records(scene),
+        parent: parent.clone(),
         start_particles: 0,
         files: Vec::new(),
     };
@@ -373,12 +424,13 @@ fn open_cache(
         let (writer, entry, state) = CacheWriter::resume(directory, &manifest)?;
         return Ok((writer, entry.clock, state));
     }
-    check_first(request, 1)?;
+    check_first(request, clock.frame + 1)?;
     let assets = assets(scene)?;
     // No step has been made, so no pressure is known.
     let seen = probes::look(scene, &start.particles, &[]);
-    let writer = CacheWriter::create(directory, manifest, &text, &assets, &start.particles, &seen)?;
-    Ok((writer, Clock::default(), start.particles.clone()))
+    let particles = &start.particles;
+    let writer = CacheWriter::create(directory, manifest, &text, &assets, clock, particles, &seen)?;
+    Ok((writer, clock, particles.clone()))
 }
 
 /// The scene's grids as the cache keeps them.

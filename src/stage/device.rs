@@ -26,10 +26,12 @@ use crate::{
 use super::{Blame, prepare::Start};
 
 /// What to run on.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub enum Device {
     /// The adapter of this index or with this in its name; the best one where `None`.
     Gpu(Option<String>),
+    /// A device that the caller opened.
+    Open(Box<Context>),
     /// The f64 reference; no driver is touched.
     Cpu,
 }
@@ -105,6 +107,7 @@ impl Device {
             Self::Gpu(adapter) => {
                 Opened::Gpu(Box::new(Context::open_for(adapter.as_deref(), needs)?))
             }
+            Self::Open(context) => Opened::Gpu(context.clone()),
             Self::Cpu => Opened::Cpu,
         })
     }

@@ -278,14 +278,22 @@ fn caches(a: &CacheReader, b: &CacheReader, request: &Request) -> Result<CacheDi
     if let Some(tolerance) = &request.tolerance {
         check_tolerance(tolerance, [a, b])?;
     }
-    let all = |cache: &CacheReader| -> Vec<u32> { (0..=cache.last_frame()).collect() };
+    let all =
+        |cache: &CacheReader| -> Vec<u32> { (cache.first_frame()..=cache.last_frame()).collect() };
     let [in_a, in_b] = [a, b].map(all);
     let (chosen, only_a, only_b) = match &request.frames {
         Some(frames) => (frames.iter().collect(), Vec::new(), Vec::new()),
         None => {
-            let beyond = |x: &[u32], y: &[u32]| x.get(y.len()..).unwrap_or_default().to_vec();
-            let common = in_a.iter().zip(&in_b).map(|(&frame, _)| frame).collect();
-            (common, beyond(&in_a, &in_b), beyond(&in_b, &in_a))
+            let pick = |x: &[u32], y: &[u32], is_in: bool| -> Vec<u32> {
+                let frames = x.iter().copied();
+                frames.filter(|frame| y.contains(frame) == is_in).collect()
+            };
+            let only = |x: &[u32], y: &[u32]| pick(x, y, false);
+            (
+                pick(&in_a, &in_b, true),
+                only(&in_a, &in_b),
+                only(&in_b, &in_a),
+            )
         }
     };
     let gauge = gauge(&scene_of(b)?, &[b, a])?;

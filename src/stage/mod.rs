@@ -1,6 +1,7 @@
 //! Jobs: each wires rooms together from a typed request to a typed result. No terminal, no printing.
 
 pub mod bake;
+pub mod branch;
 pub mod check;
 pub mod device;
 pub mod diff;

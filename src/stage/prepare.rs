@@ -1,6 +1,7 @@
 //! From a scene to what a solver starts from: particles, boundary, plan.
 
 use crate::{
+    cache::{CacheError, CacheReader},
     domain::{
         boundary::Boundary,
         bounds::Bounds,
@@ -38,27 +39,18 @@ impl Start {
     /// A mesh without an inside, or too large a distance grid.
     pub fn of(scene: &Scene) -> Result<Self, SignedDistanceError> {
         let spacing = scene.particle_spacing();
-        let meshes = || scene.solids.iter().map(|solid| &solid.mesh);
-        let distance = distance(scene, &meshes().collect::<Vec<_>>())?;
-        let moving = moving_distances(scene)?;
+        let boundary = boundary(scene)?;
         // Where solids move, they keep out the water of the start as well.
         let movers = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
         let at_start = match scene.moving_solids[..] {
             [] => None,
-            _ => self::distance(scene, &meshes().chain(movers).collect::<Vec<_>>())?,
-        };
-        // FLIP meets solids by their distance alone.
-        let samples = match scene.solver.method {
-            Method::Pbf => meshes()
-                .flat_map(|mesh| boundary_samples(mesh, &scene.domain, spacing))
-                .collect(),
-            Method::Flip => Vec::new(),
+            _ => distance(scene, &meshes(scene).chain(movers).collect::<Vec<_>>())?,
         };
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
         let fill = fill_water(
             &scene.water.blocks,
             water,
-            at_start.as_ref().or(distance.as_ref()),
+            at_start.as_ref().or(boundary.distance.as_ref()),
             &scene.domain,
             spacing,
         )?;
@@ -70,11 +62,33 @@ impl Start {
         Ok(Self {
             particles,
             removed: fill.removed,
-            boundary: Boundary {
-                samples,
-                distance,
-                moving,
-            },
+            boundary,
+        })
+    }
+
+    /// Samples solids about `particles`, the state of a frame, which has the scene's attributes.
+    ///
+    /// # Errors
+    /// A mesh without an inside, or too large a distance grid.
+    pub fn with(scene: &Scene, particles: Particles) -> Result<Self, SignedDistanceError> {
+        Ok(Self {
+            particles,
+            removed: 0,
+            boundary: boundary(scene)?,
+        })
+    }
+
+    /// The start of a bake of `scene` that stands in `cache`: the scene's own, or the frame that it began from.
+    ///
+    /// # Errors
+    /// Those of [`Start::of`]; of that frame.
+    pub fn of_cache<E>(scene: &Scene, cache: &CacheReader) -> Result<Self, E>
+    where
+        E: From<SignedDistanceError> + From<CacheError>,
+    {
+        Ok(match cache.manifest().parent {
+            None => Self::of(scene)?,
+            Some(_) => Self::with(scene, cache.read(cache.first_frame())?)?,
         })
     }
 
@@ -91,6 +105,24 @@ impl Start {
         };
         solve::plan(scene, counts, limits)
     }
+}
+
+fn meshes(scene: &Scene) -> impl Iterator<Item = &TriangleMesh> {
+    scene.solids.iter().map(|solid| &solid.mesh)
+}
+
+/// Solids as the solver meets them.
+fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
+    let sampled = |mesh| boundary_samples(mesh, &scene.domain, scene.particle_spacing());
+    Ok(Boundary {
+        // FLIP meets solids by their distance alone.
+        samples: match scene.solver.method {
+            Method::Pbf => meshes(scene).flat_map(sampled).collect(),
+            Method::Flip => Vec::new(),
+        },
+        distance: distance(scene, &meshes(scene).collect::<Vec<_>>())?,
+        moving: moving_distances(scene)?,
+    })
 }
 
 /// Of the union of meshes, as far as water can come to them.

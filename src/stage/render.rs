@@ -137,7 +137,7 @@ pub fn render(
     }
     let frames: Vec<u32> = match &request.frames {
         Some(frames) => frames.iter().collect(),
-        None => (1..=cache.last_frame()).collect(),
+        None => (cache.first_frame() + 1..=cache.last_frame()).collect(),
     };
     for &frame in &frames {
         cache.entry(frame)?;

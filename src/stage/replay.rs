@@ -435,7 +435,7 @@ pub fn replay_failed(directory: &Path, adapter: Option<String>) -> Result<Replay
     // Mesh files stand in the cache, whose folder this one is in.
     let cache: PathBuf = directory.join("..");
     let scene = Scene::parse(&scene_toml, &directory.join("scene.toml"), &cache, &[])?;
-    let start = Start::of(&scene)?;
+    let start = Start::of_cache::<ReplayError>(&scene, &CacheReader::open(&cache)?)?;
     let device = match report["device"].as_str() {
         Some("cpu") => Device::Cpu,
         _ => Device::Gpu(adapter),

@@ -82,6 +82,8 @@ pub fn report(frame: u32) -> Value {
         max_speed: 1.0,
         capped: 0,
         searched: 0,
+        boundary_work: 0.0,
+        volume: None,
         projection: None,
     })
     .unwrap()
@@ -107,6 +109,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         grids: None,
         probes: Vec::new(),
         attributes: Vec::new(),
+        parent: None,
         start_particles: 0,
         files: Vec::new(),
     };
@@ -116,7 +119,16 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         particles
     };
     let toml = scene.to_toml(&|_, hash| hash.to_owned());
-    let mut writer = CacheWriter::create(path, manifest, &toml, &[], &of(0), &Vec::new()).unwrap();
+    let mut writer = CacheWriter::create(
+        path,
+        manifest,
+        &toml,
+        &[],
+        Clock::default(),
+        &of(0),
+        &Vec::new(),
+    )
+    .unwrap();
     for frame in 1..=made.last {
         let clock = Clock {
             frame,

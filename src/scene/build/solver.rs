@@ -270,7 +270,7 @@ fn check_grid(
     cell_size: f64,
     max_cells: f64,
 ) -> Result<()> {
-    let (spacing, span) = (lattice.spacing, lattice.span.clone());
+    let span = lattice.span.clone();
     let cells = (domain.size() / cell_size).ceil();
     let all = cells.x * cells.y * cells.z;
     let axis = cells.max_element();

@@ -55,7 +55,7 @@ pub(super) fn parse(
         load(doc, &spec, &file, left)?,
         load(doc, &spec, &file, right)?,
     ];
-    let look = Look::load(&base_dir.join(spec.look.get_ref()))?;
+    let look = Look::load_within(&base_dir.join(spec.look.get_ref()), doc.reach())?;
     if !look.spec().output.formats.contains(&FormatSpec::Png) {
         let problem = "its output.formats has no \"png\"";
         return Err(doc.fault_at(spec.look.span(), problem).into());
@@ -79,7 +79,7 @@ fn load(
     file: &Path,
     solver: Method,
 ) -> Result<Scene, SceneError> {
-    Scene::load(file, &[solver.as_override()]).map_err(|error| match error {
+    Scene::load_within(file, &[solver.as_override()], doc.reach()).map_err(|error| match error {
         SceneError::Read { source, .. } => super::unreadable(doc, &spec.scene, file, &source),
         other => other,
     })

@@ -11,7 +11,7 @@ use std::{fs, path::Path};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{document::Document, error::SceneError, look::LookError};
+use super::{Reach, document::Document, error::SceneError, look::LookError};
 
 use comparison::SolverComparison;
 use sweep::Sweep;
@@ -43,16 +43,26 @@ struct KindSpec {
 }
 
 impl Study {
-    /// Loads a study file and what it names; paths are relative to it.
+    /// Loads a study file and what it names; paths are relative to it. Scene and look may lie anywhere; the files that
+    /// these name in turn stay below their folders.
     ///
     /// # Errors
     /// [`StudyFileError`], with file, line and key.
     pub fn load(path: &Path) -> Result<Self, StudyFileError> {
+        Self::load_within(path, Reach::Folder)
+    }
+
+    /// [`Self::load`] where the scenes and looks may name files from as far as `reach` says.
+    ///
+    /// # Errors
+    /// Those of [`Self::load`].
+    pub fn load_within(path: &Path, reach: Reach) -> Result<Self, StudyFileError> {
         let text = fs::read_to_string(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
             source,
         })?;
-        Self::parse(&text, path, path.parent().unwrap_or(Path::new("")))
+        let base_dir = path.parent().unwrap_or(Path::new(""));
+        Self::parse_within(&text, path, base_dir, reach)
     }
 
     /// [`Self::load`] on a text; `file` names it in messages, `base_dir` is where relative paths
@@ -61,7 +71,17 @@ impl Study {
     /// # Errors
     /// Those of [`Self::load`].
     pub fn parse(text: &str, file: &Path, base_dir: &Path) -> Result<Self, StudyFileError> {
+        Self::parse_within(text, file, base_dir, Reach::Folder)
+    }
+
+    fn parse_within(
+        text: &str,
+        file: &Path,
+        base_dir: &Path,
+        reach: Reach,
+    ) -> Result<Self, StudyFileError> {
         let (doc, root) = Document::parse(text, file, &[])?;
+        let doc = doc.within(reach);
         let told = KindSpec::deserialize(toml::Deserializer::from(root.clone()))
             .map_err(|error| doc.translate(&error))?;
         match told.kind.get_ref().as_str() {

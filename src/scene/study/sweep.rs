@@ -502,7 +502,7 @@ fn load(
     let file = base_dir.join(spec.scene.get_ref());
     let fixed = fixed.iter().map(|set| (set.get_ref().clone(), set.span()));
     let (overrides, spans): (Vec<_>, Vec<_>) = fixed.chain(swept).unzip();
-    Scene::load(&file, &overrides).map_err(|error| {
+    Scene::load_within(&file, &overrides, doc.reach()).map_err(|error| {
         let (text, message) = match &error {
             SceneError::Read { source, .. } => return unreadable(doc, &spec.scene, &file, source),
             SceneError::Fault(fault) => match fault.as_ref() {

@@ -127,7 +127,10 @@ pub fn check(
     tell: &mut dyn FnMut(Event<'_>),
 ) -> Result<Outcome, CheckError> {
     let (scene, cache, frames) = open(&request.source)?;
-    let start = Start::of(&scene)?;
+    let start = match &cache {
+        None => Start::of(&scene)?,
+        Some(cache) => Start::of_cache::<CheckError>(&scene, cache)?,
+    };
     let context = Context::open_for(request.adapter.as_deref(), needs(&scene))?;
     let info = &context.info;
     tell(Event::Ready {

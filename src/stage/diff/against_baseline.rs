@@ -106,7 +106,7 @@ pub(super) fn compare(
     }
     let (there, only_baseline): (Vec<u32>, Vec<u32>) = wanted
         .into_iter()
-        .partition(|&frame| frame <= cache.last_frame());
+        .partition(|&frame| cache.entry(frame).is_ok());
     let measured = measure(cache, &there)?;
     let adapter = adapter_of(cache.manifest());
     let (basis, faults) = baseline.compare(&adapter, &measured);
@@ -149,7 +149,7 @@ pub fn write_baseline(
     };
     let frames: Vec<u32> = match frames {
         Some(frames) => frames.iter().collect(),
-        None => (0..=cache.last_frame()).collect(),
+        None => (cache.first_frame()..=cache.last_frame()).collect(),
     };
     let measured = measure(&cache, &frames)?;
     let adapter = adapter_of(cache.manifest());

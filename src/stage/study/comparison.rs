@@ -78,6 +78,7 @@ fn bake_and_render(
         directory: cache.clone(),
         frames: FrameRange::inclusive(1, last),
         resume: true,
+        from: None,
         device: Device::Gpu(request.adapter.clone()),
         time_passes: false,
     };

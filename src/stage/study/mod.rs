@@ -210,8 +210,11 @@ fn direction(scene: &Scene) -> Direction {
 pub(super) fn gauge(scene: &Scene, caches: &[&CacheReader]) -> Result<Gauge, CacheError> {
     let spacings = caches.iter().map(|c| c.manifest().particle_spacing);
     let coarsest = spacings.fold(0.0, f64::max);
-    let spacing = caches[0].manifest().particle_spacing;
-    let start = caches[0].read(0)?;
+    // A bake that began from a frame of another knows no rest: the earliest start comes nearest.
+    let first = caches.iter().min_by_key(|cache| cache.first_frame());
+    let first = first.unwrap_or(&caches[0]);
+    let spacing = first.manifest().particle_spacing;
+    let start = first.read(first.first_frame())?;
     let gauge = Gauge::new(scene.domain, direction(scene), coarsest);
     let still = still_level(scene, &gauge, &start.position, spacing);
     Ok(gauge.with_still_level(still))

@@ -1,0 +1,55 @@
+//! A folder with a manifest and a ledger, for two targets.
+#![allow(dead_code, reason = "each target uses its part")]
+
+use std::{fs, path::Path, sync::OnceLock};
+
+use swell::cache::{CacheReader, survey};
+
+/// As a bake writes it, in fewer lines.
+pub const MANIFEST: &str = r#"{"format_version":1,"program":"swell","program_version":"0.1.0","shot":"a","scene_hash":"5c",
+"solver":"pbf","device":"d","driver":"d","backend":"Vulkan","frames_per_second":60.0,"particle_spacing":0.1,
+"rest_density":1000.0,"attributes":[],"start_particles":1,"probes":[{"name":"e","kind":"energy","at":[],
+"columns":["kinetic_J"]}],"files":[{"file":"scene.toml","bytes":0,
+"blake3":"af1349b9f5f9a1a6a0404dea36dcc9499bcb25c9adc112b7cc9a93cae41f3262"}]}"#;
+
+/// Contents of frame 0's line.
+pub fn first_line(manifest: &[u8]) -> Vec<u8> {
+    format!(
+        "{{\"frame\":0,\"file\":\"frames/a.0000.ply\",\"bytes\":1,\"blake3\":\"\",\"particles\":1,\"probes\":[[1.0]],\
+         \"manifest\":\"{}\",\"clock\":{{\"frame\":0,\"time\":0.0,\"substeps\":0,\"steps\":0}},\"report\":null}}",
+        blake3::hash(manifest).to_hex()
+    )
+    .into_bytes()
+}
+
+/// Opens and surveys a cache of these two; lines are chained as ours are.
+pub fn read(manifest: &[u8], lines: &[Vec<u8>]) {
+    static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        // In memory where the machine has such a place.
+        let memory = Path::new("/dev/shm");
+        let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
+        folder.expect("a temporary folder")
+    });
+    let path = folder.path();
+    let mut chain = blake3::hash(manifest);
+    let mut ledger = Vec::new();
+    for line in lines {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(chain.as_bytes());
+        hasher.update(line);
+        chain = hasher.finalize();
+        ledger.extend_from_slice(line.strip_suffix(b"}").unwrap_or(line));
+        ledger.extend_from_slice(format!(",\"chain\":\"{}\"}}\n", chain.to_hex()).as_bytes());
+    }
+    fs::write(path.join("scene.toml"), b"").expect("written");
+    fs::write(path.join("manifest.json"), manifest).expect("written");
+    fs::write(path.join("frames.jsonl"), ledger).expect("written");
+    let _ = survey(path);
+    if let Ok(reader) = CacheReader::open(path) {
+        assert!(!reader.entries().is_empty() && reader.first_frame() <= reader.last_frame());
+        for entry in reader.entries() {
+            let _ = reader.read(entry.frame);
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! A look file.
+#![no_main]
+
+use std::path::Path;
+
+use libfuzzer_sys::fuzz_target;
+use swell::scene::look::Look;
+
+fuzz_target!(|text: &str| {
+    let _ = Look::parse(text, Path::new("/nowhere/look.toml"));
+});

@@ -1,0 +1,16 @@
+//! A mesh file: any bytes are a mesh of finite vertices that its triangles name, or a refusal.
+#![no_main]
+
+use std::path::Path;
+
+use libfuzzer_sys::fuzz_target;
+use swell::domain::{mesh::TriangleMesh, mesh_file::MeshFormat};
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Ok(mesh) = TriangleMesh::from_bytes(bytes, MeshFormat::Ply, Path::new("mesh")) {
+        assert!(mesh.vertices.iter().all(|v| v.is_finite()));
+        let count = mesh.vertices.len() as u32;
+        assert!(mesh.triangles.iter().flatten().all(|&v| v < count));
+        let _ = mesh.check_inside();
+    }
+});

@@ -1,0 +1,11 @@
+//! A study file.
+#![no_main]
+
+use std::path::Path;
+
+use libfuzzer_sys::fuzz_target;
+use swell::scene::study::Study;
+
+fuzz_target!(|text: &str| {
+    let _ = Study::parse(text, Path::new("study.toml"), Path::new("/nowhere"));
+});

@@ -1,0 +1,11 @@
+//! A tolerance file of `swell diff`.
+#![no_main]
+
+use std::path::Path;
+
+use libfuzzer_sys::fuzz_target;
+use swell::scene::tolerance;
+
+fuzz_target!(|text: &str| {
+    let _ = tolerance::parse(text, Path::new("tolerance.toml"));
+});

@@ -1,0 +1,126 @@
+//! Where the files that a scene or a look names may lie.
+
+use std::path::{Component, Path, PathBuf};
+
+/// How far the paths in a scene or a look lead. A file that came from elsewhere must not read what it likes of the
+/// machine, and a cache that keeps copies of it must not carry that away.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reach {
+    /// Files below the folder of the file that names them; links are followed before that is decided.
+    #[default]
+    Folder,
+    /// Any file that the user can read: `--allow-outside`.
+    Anywhere,
+}
+
+impl Reach {
+    /// Where `name` leads from `folder`.
+    ///
+    /// # Errors
+    /// In words where that is further than it may.
+    pub(super) fn find(self, folder: &Path, name: &Path) -> Result<PathBuf, String> {
+        let path = folder.join(name);
+        let is_below = match (path.canonicalize(), real(folder).canonicalize()) {
+            (Ok(path), Ok(folder)) => path.starts_with(folder),
+            // What is not there is not read; that it leads out is still the better message.
+            _ => stays_below(name),
+        };
+        if self == Self::Anywhere || is_below {
+            return Ok(path);
+        }
+        Err(format!(
+            "{} leads out of the folder {}; copy it there, or --allow-outside takes it where it is",
+            path.display(),
+            real(folder).display()
+        ))
+    }
+}
+
+fn real(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    }
+}
+
+/// Whether a path stays below where it starts, by its names alone.
+fn stays_below(name: &Path) -> bool {
+    let mut depth = 0i32;
+    name.components().all(|part| {
+        depth += match part {
+            Component::Normal(_) => 1,
+            Component::CurDir => 0,
+            Component::ParentDir => -1,
+            Component::RootDir | Component::Prefix(_) => return false,
+        };
+        depth >= 0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn no_path_leads_out_of_the_folder() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let folder = dir.path().join("scenes");
+        fs::create_dir_all(folder.join("assets")).expect("made");
+        for file in ["secret.obj", "scenes/in.obj", "scenes/assets/city.obj"] {
+            fs::write(dir.path().join(file), "v 0 0 0").expect("written");
+        }
+        let outside = dir.path().join("secret.obj").display().to_string();
+        let inside = folder.join("in.obj").display().to_string();
+        let find = |name: &str| Reach::Folder.find(&folder, Path::new(name));
+        for good in [
+            "in.obj",
+            "./in.obj",
+            "assets/city.obj",
+            "assets/../in.obj",
+            &inside,
+            "none.obj",
+            "a/../none.obj",
+        ] {
+            assert_eq!(find(good), Ok(folder.join(good)), "{good}");
+        }
+        for bad in [
+            "../secret.obj",
+            "assets/../../secret.obj",
+            &outside,
+            "../none.obj",
+            "/none.obj",
+            "a/../../none.obj",
+        ] {
+            let said = find(bad).expect_err(bad);
+            assert!(
+                said.contains("leads out of the folder") && said.contains("--allow-outside"),
+                "{said}"
+            );
+            assert_eq!(
+                Reach::Anywhere.find(&folder, Path::new(bad)),
+                Ok(folder.join(bad))
+            );
+        }
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::symlink;
+            symlink("../secret.obj", folder.join("link.obj")).expect("linked");
+            symlink("in.obj", folder.join("inner.obj")).expect("linked");
+            symlink(dir.path(), folder.join("up")).expect("linked");
+            assert!(find("inner.obj").is_ok());
+            assert!(find("link.obj").is_err() && find("up/secret.obj").is_err());
+            // The folder itself may be reached by a link.
+            let linked = dir.path().join("linked");
+            symlink("scenes", &linked).expect("linked");
+            assert!(Reach::Folder.find(&linked, Path::new("in.obj")).is_ok());
+            assert!(
+                Reach::Folder
+                    .find(&linked, Path::new("../secret.obj"))
+                    .is_err()
+            );
+        }
+    }
+}

@@ -1,0 +1,317 @@
+//! A bake that begins from a frame of another cache.
+
+use std::{fmt, path::PathBuf, str::FromStr};
+
+use glam::{DVec3, Vec3};
+
+use crate::{
+    cache::{CacheError, CacheReader, Clock, Parent},
+    domain::{boundary::Boundary, bounds::Bounds, particles::Particles},
+    scene::{self, Scene, SceneError},
+};
+
+/// A frame of a cache, written `CACHE:120`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BranchPoint {
+    /// Cache directory.
+    pub directory: PathBuf,
+    /// Its frame to begin from.
+    pub frame: u32,
+}
+
+impl FromStr for BranchPoint {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        // The last colon: a path may hold others.
+        let parts = text.rsplit_once(':').filter(|(path, _)| !path.is_empty());
+        let frame = parts.and_then(|(path, frame)| Some((path, frame.parse().ok()?)));
+        let (path, frame) =
+            frame.ok_or("not a cache and a frame, such as cache/wave-city/pbf:120")?;
+        Ok(Self {
+            directory: path.into(),
+            frame,
+        })
+    }
+}
+
+impl fmt::Display for BranchPoint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.directory.display(), self.frame)
+    }
+}
+
+/// What a scene begins with where it begins from a frame.
+#[derive(Clone, Debug)]
+pub struct Branch {
+    /// For the manifest.
+    pub parent: Parent,
+    /// As it stood after the frame: number and time go on, so that walls and solids move on as they would have.
+    pub clock: Clock,
+    /// The frame's particles with the scene's attributes.
+    pub particles: Particles,
+    /// What a user has to know of it, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Why a scene cannot begin from a frame.
+#[derive(Debug, thiserror::Error)]
+pub enum BranchError {
+    /// The cache or its frame.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// The cache's own scene.
+    #[error("{file}: the cache's scene", file = .file.display())]
+    Scene {
+        /// The cache.
+        file: PathBuf,
+        /// What is off.
+        source: SceneError,
+    },
+    /// What the particles of a frame stand for is decided by this key.
+    #[error(
+        "--from {from}: it was baked with {key} = {cached}, and the scene has {given}; a bake that begins from a frame \
+         keeps it"
+    )]
+    Unfit {
+        /// The frame.
+        from: BranchPoint,
+        /// Key of the scene.
+        key: &'static str,
+        /// In the cache.
+        cached: String,
+        /// In the scene.
+        given: String,
+    },
+    /// Water where the scene has none of its room.
+    #[error(
+        "--from {from}: {count} of {all} particles lie beyond the walls of the scene as they stand at {time} s; the first is \
+         particle {id} at {position:?}"
+    )]
+    Beyond {
+        /// The frame.
+        from: BranchPoint,
+        /// How many.
+        count: usize,
+        /// Particles of the frame.
+        all: usize,
+        /// Of the frame, seconds.
+        time: f64,
+        /// Of the first one.
+        id: u32,
+        /// Its place in the world, metres.
+        position: [f64; 3],
+    },
+}
+
+impl Branch {
+    /// Reads the frame and looks whether the scene can go on from it.
+    ///
+    /// Solver, frame rate and particle spacing have to be the same: they decide what a particle and a frame number
+    /// stand for. Attributes that the scene has and the frame has not are zero, as at a scene's own start.
+    ///
+    /// # Errors
+    /// [`BranchError`].
+    pub fn open(from: &BranchPoint, scene: &Scene) -> Result<Self, BranchError> {
+        let cache = CacheReader::open(&from.directory)?;
+        let entry = cache.entry(from.frame)?;
+        check_keys(from, &cache, scene)?;
+        let origin = cache.manifest().origin.into();
+        let mut particles = cache.read(from.frame)?.about(origin, scene.origin);
+        let clock = entry.clock;
+        check_walls(from, clock, scene, &particles)?;
+        let manifest = cache.manifest();
+        let parent = Parent {
+            shot: manifest.shot.clone(),
+            solver: manifest.solver.clone(),
+            scene_hash: manifest.scene_hash.clone(),
+            frame: from.frame,
+            blake3: entry.blake3.clone(),
+        };
+        let mut notes = Vec::new();
+        if origin != scene.origin {
+            notes.push(
+                "positions are rounded about another origin: the domain is another".to_owned(),
+            );
+        }
+        let text = scene.to_toml(&scene::asset_path);
+        let physics = scene::physics_difference(cache.scene_toml(), &text);
+        notes.extend(physics.map_err(|source| BranchError::Scene {
+            file: from.directory.clone(),
+            source,
+        })?);
+        notes.extend(take_attributes(&mut particles, scene.declared_attributes()));
+        Ok(Self {
+            parent,
+            clock,
+            particles,
+            notes,
+        })
+    }
+
+    /// A note where solids of the scene cover particles.
+    pub fn note_covered(&mut self, scene: &Scene, boundary: &Boundary) {
+        let time = self.clock.time;
+        let still = boundary.distance.iter().map(|field| (field, DVec3::ZERO));
+        let solids = boundary.moving.iter().zip(&scene.moving_solids);
+        let moving = solids.map(|(field, solid)| (field, solid.displacement(time)));
+        let fields: Vec<_> = still.chain(moving).collect();
+        let is_covered = |x: &&[f32; 3]| {
+            let x = Vec3::from_array(**x).as_dvec3();
+            fields
+                .iter()
+                .any(|(field, way)| field.sample(x - *way) < 0.0)
+        };
+        match self.particles.position.iter().filter(is_covered).count() {
+            0 => {}
+            count => self.notes.push(format!(
+                "{count} particles lie within solids of the scene, which will push them out"
+            )),
+        }
+    }
+}
+
+fn check_keys(from: &BranchPoint, cache: &CacheReader, scene: &Scene) -> Result<(), BranchError> {
+    let manifest = cache.manifest();
+    let quoted = |name: &str| format!("{name:?}");
+    let number = |value: f64| format!("{value:?}");
+    let spacing = match scene.solver.method {
+        scene::Method::Pbf => "solver.pbf.particle_spacing",
+        scene::Method::Flip => {
+            "the particle spacing of solver.flip (cell_size, particles_per_cell)"
+        }
+    };
+    let rows = [
+        (
+            "solver.method",
+            quoted(&manifest.solver),
+            quoted(scene.solver.method.name()),
+        ),
+        (
+            "shot.frames_per_second",
+            number(manifest.frames_per_second),
+            number(scene.shot.frames_per_second),
+        ),
+        (
+            spacing,
+            number(manifest.particle_spacing),
+            number(scene.particle_spacing()),
+        ),
+    ];
+    match rows.into_iter().find(|(_, cached, given)| cached != given) {
+        None => Ok(()),
+        Some((key, cached, given)) => Err(BranchError::Unfit {
+            from: from.clone(),
+            key,
+            cached,
+            given,
+        }),
+    }
+}
+
+/// Refuses a frame of which more than a skin half a spacing deep lies outside: that much a solver lets walls push.
+fn check_walls(
+    from: &BranchPoint,
+    clock: Clock,
+    scene: &Scene,
+    particles: &Particles,
+) -> Result<(), BranchError> {
+    let walls = scene.walls(clock.time);
+    let corner = scene.domain.min;
+    let room = Bounds {
+        min: corner + walls.min,
+        max: corner + walls.max,
+    }
+    .grown(0.5 * scene.particle_spacing());
+    let is_beyond = |&k: &usize| {
+        let x = Vec3::from_array(particles.position[k]).as_dvec3();
+        !room.contains(x)
+    };
+    let mut beyond = (0..particles.len()).filter(is_beyond);
+    match beyond.next() {
+        None => Ok(()),
+        Some(first) => Err(BranchError::Beyond {
+            from: from.clone(),
+            count: 1 + beyond.count(),
+            all: particles.len(),
+            time: clock.time,
+            id: particles.id[first],
+            position: (scene.origin + Vec3::from_array(particles.position[first]).as_dvec3())
+                .to_array(),
+        }),
+    }
+}
+
+/// Leaves the attributes that are declared; tells which were not there and which go.
+fn take_attributes(particles: &mut Particles, declared: &[&str]) -> Vec<String> {
+    let count = particles.len();
+    let mut found = std::mem::take(&mut particles.attributes);
+    let mut zeroed = Vec::new();
+    for name in declared {
+        let values = found.remove(*name).unwrap_or_else(|| {
+            zeroed.push(*name);
+            vec![0.0; count]
+        });
+        particles.attributes.insert((*name).to_owned(), values);
+    }
+    let dropped: Vec<&str> = found.keys().map(String::as_str).collect();
+    let mut notes = Vec::new();
+    if !zeroed.is_empty() {
+        notes.push(format!(
+            "the frame has no {}: zero, as at a scene's own start",
+            zeroed.join(", ")
+        ));
+    }
+    if !dropped.is_empty() {
+        notes.push(format!(
+            "the scene has no use for {}: left out",
+            dropped.join(", ")
+        ));
+    }
+    notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cache_and_a_frame_are_parted_at_the_last_colon() {
+        let parse = |text: &str| text.parse::<BranchPoint>();
+        let point = parse("C:/shots/a:b:120").unwrap();
+        assert_eq!(point.directory, PathBuf::from("C:/shots/a:b"));
+        assert_eq!(point.frame, 120);
+        assert_eq!(point.to_string(), "C:/shots/a:b:120");
+        for bad in [
+            "",
+            "cache",
+            ":3",
+            "cache:",
+            "cache:-1",
+            "cache:last",
+            "cache:4294967296",
+        ] {
+            assert!(parse(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn attributes_are_kept_made_zero_or_left_out_and_that_is_told() {
+        let mut particles = Particles {
+            position: vec![[0.0; 3]; 2],
+            velocity: vec![[0.0; 3]; 2],
+            id: vec![0, 1],
+            attributes: [("a", 1.0), ("b", 2.0)]
+                .map(|(name, value)| (name.to_owned(), vec![value; 2]))
+                .into(),
+        };
+        let mut same = particles.clone();
+        assert!(take_attributes(&mut same, &["a", "b"]).is_empty());
+        assert_eq!(same, particles);
+        let notes = take_attributes(&mut particles, &["b", "c"]);
+        assert_eq!(particles.attributes["b"], [2.0; 2]);
+        assert_eq!(particles.attributes["c"], [0.0; 2]);
+        assert!(!particles.attributes.contains_key("a"));
+        assert!(notes[0].contains("no c: zero") && notes[1].contains("for a: left out"));
+    }
+}
