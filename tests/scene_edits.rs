@@ -178,10 +178,15 @@ fn expected(key: &str, solver: &str) -> Option<String> {
         "shot.frames",
         "solver.pbf.max_substeps",
         "solver.flip.max_substeps",
-        "solver.flip.pressure.residual_limit",
     ];
     // The file's hash beside its path is physics, the path is not.
-    if is_idle || is_free.contains(&key) || key.ends_with("].mesh") || key.ends_with("].file") {
+    let is_budget = key.starts_with("budget.");
+    if is_idle
+        || is_budget
+        || is_free.contains(&key)
+        || key.ends_with("].mesh")
+        || key.ends_with("].file")
+    {
         return None;
     }
     Some(if key == "shot.name" {
