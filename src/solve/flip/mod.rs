@@ -5,6 +5,7 @@
 //! No grid outlives its substep: the state is positions, velocities, ids, and with APIC the affine rows.
 
 mod record;
+mod room;
 mod step;
 
 use glam::DVec3;
@@ -12,7 +13,7 @@ use glam::DVec3;
 use crate::{
     domain::{
         boundary::Boundary,
-        bricks::{Bricks, CELLS, EDGE, table_dims},
+        bricks::{Bricks, CELLS},
         budget::Breach,
         gauge::Gauge,
         particles::Particles,
@@ -26,7 +27,7 @@ use crate::{
     },
     scene::{
         Scene,
-        plan::{Capacity, Counts, DeviceLimits, Plan, layers, stored_cells},
+        plan::{Plan, layers},
         step::Substep,
     },
 };
@@ -39,6 +40,9 @@ use super::{
     trace::{Run, TraceFrame, Traced, trace},
 };
 use record::{Recordings, groups, windows};
+use room::{bricks, capacity_of, no_water};
+
+pub use room::capacity;
 
 /// Words of `survey` before the flags.
 const SURVEY_HEAD: usize = 4;
@@ -568,46 +572,6 @@ fn pressure_solver(scene: &Scene, plan: &Plan) -> PressureSolver {
         flip.density_correction,
         plan.counts.bricks.slots,
     )
-}
-
-/// No flag set, one a brick of the domain.
-fn no_water(plan: &Plan) -> Vec<bool> {
-    let dims = table_dims(stored_cells(plan.grid_dims));
-    vec![false; dims.iter().map(|&n| n as usize).product()]
-}
-
-fn bricks(plan: &Plan, is_wet: &[bool], layers: usize) -> Bricks {
-    let reach = (layers as u32).div_ceil(EDGE);
-    Bricks::new(stored_cells(plan.grid_dims), is_wet, reach, LEVELS)
-}
-
-fn capacity_of(bricks: &Bricks) -> Capacity {
-    Capacity {
-        wet: bricks.wet as usize + 1,
-        slots: bricks.slots(),
-    }
-}
-
-/// Bricks that a state takes in a scene.
-pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
-    let counts = Counts::default();
-    let limits = DeviceLimits {
-        binding: 0,
-        buffer: 0,
-        list_budget: 0,
-    };
-    let plan = Plan::new(scene, counts, limits);
-    let mut is_wet = no_water(&plan);
-    let dims = table_dims(stored_cells(plan.grid_dims)).map(|n| n as usize);
-    let edge = f64::from(EDGE) * scene.solver.flip().cell_size;
-    for position in &particles.position {
-        let x = glam::Vec3::from_array(*position).as_dvec3() - scene.domain.min;
-        let at: [usize; 3] =
-            std::array::from_fn(|k| ((x[k] / edge).max(0.0) as usize).min(dims[k] - 1));
-        is_wet[(at[2] * dims[1] + at[1]) * dims[0] + at[0]] = true;
-    }
-    // As deep as layers of a first step reach that is not yet fast.
-    capacity_of(&bricks(&plan, &is_wet, layers(1.0)))
 }
 
 /// What does not change from substep to substep.
