@@ -69,7 +69,9 @@ motion = { kind = "sine", stroke = 0.05, period = 4.0, ramp = 1.0 }
 "#;
 
 /// Strings that some key takes.
-const WORDS: [&str; 24] = [
+const WORDS: [&str; 26] = [
+    "f32",
+    "f64",
     "pbf",
     "flip",
     "apic",
@@ -130,7 +132,8 @@ fn at<'a>(root: &'a mut Value, path: &[Step]) -> &'a mut Value {
 /// Other values that a key might take.
 fn others(value: &Value) -> Vec<Value> {
     match value {
-        Value::Boolean(is) => vec![Value::Boolean(!is)],
+        // Some limits are `false` or a number.
+        Value::Boolean(is) => vec![Value::Boolean(!is), Value::Float(0.5)],
         Value::Integer(n) => [n + 1, n - 1, 2 * n].map(Value::Integer).into(),
         Value::Float(x) => [
             x * 1.03125,

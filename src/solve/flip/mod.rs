@@ -27,7 +27,7 @@ use crate::{
     },
     scene::{
         Scene,
-        plan::{Plan, layers},
+        plan::{Counts, DeviceLimits, Plan, layers},
         step::Substep,
     },
 };
@@ -35,7 +35,7 @@ use crate::{
 use super::{
     SolveError,
     boundary::Movers,
-    pressure::{self, LEVELS, PressureSolver},
+    pressure::{self, PressureSolver},
     state::{check_finite, check_ids, slots_by_id, take_over, upload},
     trace::{Run, TraceFrame, Traced, trace},
 };
