@@ -17,7 +17,7 @@ use crate::{
 };
 
 use super::{
-    super::{Outcome, Request, StudyError, write},
+    super::{Outcome, Request, StudyError, csv, write},
     errors,
     ledger::{Record, Run, Verdict},
 };
@@ -80,6 +80,7 @@ pub(super) fn write_all(
     Ok(Outcome {
         page: Some(file),
         findings: told.collect(),
+        missed: Vec::new(),
     })
 }
 
@@ -249,14 +250,7 @@ impl Results<'_> {
         for (line, records) in self.records.iter().enumerate() {
             rows.extend((0..records.len()).map(|index| self.row(line, index)));
         }
-        let quoted = |cell: &String| match cell.contains([',', '"', '\n']) {
-            true => format!("\"{}\"", cell.replace('"', "\"\"")),
-            false => cell.clone(),
-        };
-        let joined = rows
-            .iter()
-            .map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n");
-        joined.collect()
+        csv(&rows)
     }
 
     fn titles(&self) -> Vec<String> {
