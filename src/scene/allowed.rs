@@ -30,7 +30,8 @@ const VALUES: &str = "two or more values of the key, from coarse to fine, here o
 const SOLVERS: &str = "an array of \"pbf\" and \"flip\"; both if left out";
 const DEVICES: &str = "an array of \"gpu\" and \"cpu\"; both if left out";
 const MARK: &str = "an array of tables [[mark]] of of and at_most or at_least";
-const MEASURED: &str = "a name of swell::scene::study::stability::Quantity, such as \"least_spacing\"";
+const MEASURED: &str =
+    "a name of swell::scene::study::stability::Quantity, such as \"least_spacing\"";
 
 const TABLE: &[(&str, &str)] = &[
     ("shot", "a table with name, frames, frames_per_second"),
@@ -73,10 +74,7 @@ const TABLE: &[(&str, &str)] = &[
     ("water.mesh.translate", TRANSLATE),
     ("water.mesh.rotate_degrees", ROTATE),
     ("water.mesh.scale", SCALE),
-    (
-        "water.particles",
-        "an array of tables [[water.particles]]",
-    ),
+    ("water.particles", "an array of tables [[water.particles]]"),
     (
         "water.particles.at",
         "an array of [x, y, z], metres, in the domain",
@@ -317,8 +315,14 @@ const TABLE: &[(&str, &str)] = &[
         "case.number",
         "a whole number; name and number together each once",
     ),
-    ("case.name", "words, other than those of a case of the same number"),
-    ("case.scene", "a scene file, relative to the study file; or test"),
+    (
+        "case.name",
+        "words, other than those of a case of the same number",
+    ),
+    (
+        "case.scene",
+        "a scene file, relative to the study file; or test",
+    ),
     (
         "case.test",
         "the command that runs a test that holds the case, in place of scene",

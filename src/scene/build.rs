@@ -250,7 +250,13 @@ fn water(
 }
 
 fn swarm(doc: &Document<'_>, spec: &SwarmSpec, domain: &Bounds) -> Result<Swarm> {
-    let at: Vec<_> = spec.at.get_ref().iter().copied().map(DVec3::from_array).collect();
+    let at: Vec<_> = spec
+        .at
+        .get_ref()
+        .iter()
+        .copied()
+        .map(DVec3::from_array)
+        .collect();
     // NaN is in no box.
     if let Some(p) = at.iter().find(|p| !domain.contains(**p)) {
         let problem = format!(

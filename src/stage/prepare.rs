@@ -67,9 +67,7 @@ impl Start {
             for at in &swarm.at {
                 particles.id.push(particles.id.len() as u32);
                 particles.position.push(at.as_vec3().to_array());
-                particles
-                    .velocity
-                    .push(swarm.velocity.as_vec3().to_array());
+                particles.velocity.push(swarm.velocity.as_vec3().to_array());
             }
         }
         for name in scene.declared_attributes() {

@@ -35,7 +35,10 @@ pub fn least_spacing(position: &[[f32; 3]], spacing: f64) -> f64 {
 
 /// Particles outside of a box.
 pub fn outside(position: &[[f32; 3]], bounds: &Bounds) -> usize {
-    position.iter().filter(|p| !bounds.contains(point(p))).count()
+    position
+        .iter()
+        .filter(|p| !bounds.contains(point(p)))
+        .count()
 }
 
 /// For each particle of `ours` the one of `theirs` that starts where it does, `of` mapping their places to ours; `None`
@@ -130,8 +133,18 @@ mod tests {
 
     #[test]
     fn particles_are_matched_by_where_they_start() {
-        let ours = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [5.0, 0.0, 0.0]];
-        let theirs = [[12.0f32, 0.0, 0.0], [10.0, 0.02, 0.0], [12.0, 0.0, 0.0], [99.0, 0.0, 0.0]];
+        let ours = [
+            [0.0f32, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [5.0, 0.0, 0.0],
+        ];
+        let theirs = [
+            [12.0f32, 0.0, 0.0],
+            [10.0, 0.02, 0.0],
+            [12.0, 0.0, 0.0],
+            [99.0, 0.0, 0.0],
+        ];
         let map = |p: DVec3| (p - DVec3::new(10.0, 0.0, 0.0)) / 2.0;
         let found = matched(&ours, &theirs, map, 1.0);
         assert_eq!(found, [Some(1), Some(0), Some(2), None]);

@@ -12,9 +12,7 @@ use std::{fs, ops::Range, path::Path};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{
-    Fault, Place, Scene, document::Document, error::SceneError, look::LookError,
-};
+use super::{Fault, Place, Scene, document::Document, error::SceneError, look::LookError};
 
 use comparison::SolverComparison;
 use stability::Stability;

@@ -41,12 +41,11 @@ impl<R: Line> Ledger<R> {
         let whole = text.rfind('\n').map_or(0, |end| end + 1);
         let mut records = BTreeMap::new();
         for (index, line) in text[..whole].lines().enumerate() {
-            let record: R =
-                serde_json::from_str(line).map_err(|error| StudyError::Ledger {
-                    file: path.clone(),
-                    line: index + 1,
-                    what: error.to_string(),
-                })?;
+            let record: R = serde_json::from_str(line).map_err(|error| StudyError::Ledger {
+                file: path.clone(),
+                line: index + 1,
+                what: error.to_string(),
+            })?;
             records.insert(record.hash().to_owned(), record);
         }
         let file = OpenOptions::new()

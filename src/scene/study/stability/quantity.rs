@@ -31,9 +31,9 @@ pub enum Quantity {
     Sinking,
     /// Farthest from the parabola of symplectic Euler's substeps, over the way that the particle has come.
     BallisticError,
-    /// Highest that a particle has risen above its lowest place so far, in particle spacings.
+    /// Highest that a particle has risen above its lowest place so far, over what it had fallen until there.
     Rebound,
-    /// |V/V0 − 1| of what the level set about the particles encloses.
+    /// |V/V0 − 1| of what the level set about the particles encloses, V0 that of the particles.
     VolumeDrift,
     /// Energy over that of the start, less 1; heights count from the domain's floor.
     EnergyGain,
@@ -169,15 +169,17 @@ impl Quantity {
             Self::Climb => plain("climb", "highest particle above the start's, d"),
             Self::Sinking => plain("sinking", "mean height lost, of the start's"),
             Self::BallisticError => plain("ballistic_error", "off the parabola, of the way"),
-            Self::Rebound => plain("rebound", "rise above the lowest place so far, d"),
-            Self::VolumeDrift => plain("volume_drift", "volume, off the start's"),
+            Self::Rebound => plain("rebound", "rise from the lowest place, of the fall to it"),
+            Self::VolumeDrift => plain("volume_drift", "volume, off the particles'"),
             Self::EnergyGain => plain("energy_gain", "energy above the start's, of it"),
-            Self::EnergyRise => plain("energy_rise", "energy above the least so far, of the start's"),
+            Self::EnergyRise => plain(
+                "energy_rise",
+                "energy above the least so far, of the start's",
+            ),
             Self::PressureError => plain("pressure_error", "pressure, off ρ g depth"),
-            Self::MeanPressureError => last(plain(
-                "mean_pressure_error",
-                "mean pressure, off ρ g depth",
-            )),
+            Self::MeanPressureError => {
+                last(plain("mean_pressure_error", "mean pressure, off ρ g depth"))
+            }
             Self::Compression => plain("compression", "mean of max(0, ρ/ρ0 − 1)"),
             Self::LargestCompression => plain("largest_compression", "largest ρ/ρ0 − 1"),
             Self::Residual => plain("residual", "residual of the projection"),
@@ -198,12 +200,23 @@ impl Quantity {
                 takes_region: true,
                 ..of_pair("difference", "off the other run, d or Δx")
             },
-            Self::DisplacementError => of_pair("displacement_error", "displacement, off the other run's"),
-            Self::IterationsRatio => last(of_pair("iterations_ratio", "iterations over the other run's")),
-            Self::GaugeDifference => of_pair("gauge_difference", "elevation, off the other run's, d or Δx"),
+            Self::DisplacementError => {
+                of_pair("displacement_error", "displacement, off the other run's")
+            }
+            Self::IterationsRatio => last(of_pair(
+                "iterations_ratio",
+                "iterations over the other run's",
+            )),
+            Self::GaugeDifference => of_pair(
+                "gauge_difference",
+                "elevation, off the other run's, d or Δx",
+            ),
             Self::GaugeConvergence => last(About {
                 others: 2,
-                ..plain("gauge_convergence", "difference of the finer pair over the coarser's")
+                ..plain(
+                    "gauge_convergence",
+                    "difference of the finer pair over the coarser's",
+                )
             }),
         }
     }

@@ -109,7 +109,10 @@ pub(in super::super) fn parse(
         let case = case(doc, spec, base_dir)?;
         let is_same = |other: &Case| (other.number, &other.name) == (case.number, &case.name);
         if cases.iter().any(is_same) {
-            let problem = format!("{:?} is the name of another case {}", case.name, case.number);
+            let problem = format!(
+                "{:?} is the name of another case {}",
+                case.name, case.number
+            );
             return Err(doc.fault_at(spec.get_ref().name.span(), problem).into());
         }
         cases.push(case);
@@ -223,7 +226,9 @@ fn other(
     let rate = beside.shot.frames_per_second / scale.sqrt();
     if (scene.shot.frames_per_second / rate - 1.0).abs() > 1e-9 {
         let place = spec.scale.as_ref().map(Spanned::span);
-        let place = place.or(spec.set.first().map(Spanned::span)).unwrap_or(0..0);
+        let place = place
+            .or(spec.set.first().map(Spanned::span))
+            .unwrap_or(0..0);
         let problem = format!(
             "its shot.frames_per_second is {}, and at this scale it has to be {rate}",
             scene.shot.frames_per_second
@@ -346,7 +351,9 @@ impl Template {
         }
         overrides.push(method.as_override());
         let scene = Scene::load(&self.file, &overrides)?;
-        let frames = (self.seconds * scene.shot.frames_per_second).ceil().max(1.0);
+        let frames = (self.seconds * scene.shot.frames_per_second)
+            .ceil()
+            .max(1.0);
         Ok(Trial {
             device: CaseDevice::Gpu,
             scene,
@@ -366,7 +373,10 @@ fn filled(set: &str, value: f64) -> std::result::Result<String, String> {
         let close = inner.find('}').ok_or("a brace is not closed")?;
         let term = &inner[1..close];
         out.push_str(before);
-        let factor = |text: &str| text.parse::<f64>().map_err(|_| format!("{{{term}}} is none of {{}}, {{2*}}, {{2/}}"));
+        let factor = |text: &str| {
+            text.parse::<f64>()
+                .map_err(|_| format!("{{{term}}} is none of {{}}, {{2*}}, {{2/}}"))
+        };
         match (term, term.strip_suffix('*'), term.strip_suffix('/')) {
             ("", ..) => out.push_str(&format!("{value:?}")),
             (_, Some(times), _) => out.push_str(&format!("{:?}", factor(times)? * value)),
@@ -385,7 +395,9 @@ fn methods(doc: &Document<'_>, words: &Option<Vec<Spanned<String>>>) -> Result<V
         return Ok(vec![Method::Pbf, Method::Flip]);
     };
     let of = |word: &Spanned<String>| {
-        let named = Method::NAMED.iter().find(|(name, _)| name == word.get_ref());
+        let named = Method::NAMED
+            .iter()
+            .find(|(name, _)| name == word.get_ref());
         let fault = || doc.fault_at(word.span(), format!("{:?} is no solver", word.get_ref()));
         named.map(|(_, method)| *method).ok_or_else(fault)
     };
@@ -425,7 +437,10 @@ mod tests {
     #[test]
     fn values_go_into_braces() {
         let fill = |text: &str| filled(text, 0.5);
-        assert_eq!(fill("a=[{}, {3*}, {2/}]").as_deref(), Ok("a=[0.5, 1.5, 4.0]"));
+        assert_eq!(
+            fill("a=[{}, {3*}, {2/}]").as_deref(),
+            Ok("a=[0.5, 1.5, 4.0]")
+        );
         assert_eq!(fill("a={ b = 1 }").as_deref(), Ok("a={ b = 1 }"));
         assert!(fill("a={x*}").is_err());
         assert!(fill("a={").is_err());

@@ -44,7 +44,10 @@ impl Bench<'_> {
             next = following(limit, &found);
         }
         let words = found.words(&limit.unit);
-        self.told(format!("{title}: {words}"), PointStatus::Done(0.0, Vec::new()));
+        self.told(
+            format!("{title}: {words}"),
+            PointStatus::Done(0.0, Vec::new()),
+        );
         Ok(Some(found))
     }
 
@@ -108,7 +111,10 @@ impl Found {
                 report::number(*fails)
             ),
             (Some(passes), None) => {
-                format!("passes at {} {unit}, as far as was tried", report::number(passes))
+                format!(
+                    "passes at {} {unit}, as far as was tried",
+                    report::number(passes)
+                )
             }
             (None, _) => "fails at the first value".to_owned(),
         }

@@ -183,13 +183,17 @@ impl Bench<'_> {
 
 fn status(record: &Record, trial: &Trial, stood: bool) -> PointStatus {
     let run = &record.run;
-    let missed: Vec<_> = (trial.marks.iter().zip(run.verdicts(trial)).zip(&run.measured))
-        .filter(|((_, verdict), _)| *verdict == Verdict::Misses)
-        .map(|((mark, _), measured)| {
-            let value = measured.value.map_or("none".into(), report::number);
-            format!("{} is {value}", mark.of.name())
-        })
-        .collect();
+    let missed: Vec<_> = (trial
+        .marks
+        .iter()
+        .zip(run.verdicts(trial))
+        .zip(&run.measured))
+    .filter(|((_, verdict), _)| *verdict == Verdict::Misses)
+    .map(|((mark, _), measured)| {
+        let value = measured.value.map_or("none".into(), report::number);
+        format!("{} is {value}", mark.of.name())
+    })
+    .collect();
     match &run.ended {
         Some(message) => PointStatus::Failed(message.clone()),
         None if !missed.is_empty() => PointStatus::Failed(missed.join(", ")),
@@ -231,7 +235,10 @@ fn hash(devices: &Devices, trial: &Trial) -> String {
     for mark in &trial.marks {
         // The worst of the frames depends on the side that the mark is on, not on where it is.
         let side = matches!(mark.bound, crate::scene::study::stability::Bound::AtMost(_));
-        text.push(format!("{:?} {side} {} {:?}", mark.of, mark.after, mark.region));
+        text.push(format!(
+            "{:?} {side} {} {:?}",
+            mark.of, mark.after, mark.region
+        ));
     }
     blake3::hash(text.join("\n").as_bytes())
         .to_hex()

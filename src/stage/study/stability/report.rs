@@ -38,7 +38,10 @@ impl Row<'_> {
             Verdict::Passes => 3,
         };
         // Of two devices the worse: a failure that one of them has is a failure still.
-        verdicts.map(of).min_by_key(order).unwrap_or(Verdict::Misses)
+        verdicts
+            .map(of)
+            .min_by_key(order)
+            .unwrap_or(Verdict::Misses)
     }
 
     fn value(&self, device: CaseDevice) -> String {
@@ -98,7 +101,10 @@ pub(super) fn write_all(request: &Request, results: &Results<'_>) -> Result<Outc
     let title = format!("{}: stability", name.to_string_lossy());
     let file = directory.join("index.html");
     let findings = results.findings();
-    write(&file, page::html(&title, &results.parts(request, &findings)))?;
+    write(
+        &file,
+        page::html(&title, &results.parts(request, &findings)),
+    )?;
     let told = findings
         .into_iter()
         .map(|(what, words)| format!("{what}: {words}"));
@@ -205,8 +211,18 @@ impl Results<'_> {
     /// A line a mark and device.
     fn table(&self) -> Vec<Vec<String>> {
         let titles = [
-            "number", "case", "solver", "device", "quantity", "value", "mark", "verdict",
-            "particles", "frames", "seconds", "ended",
+            "number",
+            "case",
+            "solver",
+            "device",
+            "quantity",
+            "value",
+            "mark",
+            "verdict",
+            "particles",
+            "frames",
+            "seconds",
+            "ended",
         ];
         let mut table = vec![titles.map(str::to_owned).to_vec()];
         for row in self.rows() {
@@ -269,7 +285,13 @@ impl Results<'_> {
     }
 
     fn parts(&self, request: &Request, findings: &[(String, String)]) -> Vec<Part> {
-        let mut parts: Vec<Part> = self.stability.about.iter().cloned().map(Part::Text).collect();
+        let mut parts: Vec<Part> = self
+            .stability
+            .about
+            .iter()
+            .cloned()
+            .map(Part::Text)
+            .collect();
         parts.push(Part::Answers(findings.to_vec()));
         parts.push(Part::Heading("Cases".into()));
         parts.push(self.verdicts());
@@ -350,7 +372,9 @@ impl Results<'_> {
                 }
             }
         }
-        let titles = ["", "case", "solver", "measured", "GPU", "CPU, f64", "mark", "verdict"];
+        let titles = [
+            "", "case", "solver", "measured", "GPU", "CPU, f64", "mark", "verdict",
+        ];
         Part::Verdicts {
             titles: titles.map(str::to_owned).to_vec(),
             rows: out,
@@ -402,9 +426,7 @@ impl Results<'_> {
 
     fn where_run(&self) -> String {
         let gpu = self.devices.gpu.as_ref();
-        let gpu = gpu.map_or(String::new(), |gpu| {
-            format!("GPU: {}. ", gpu.identity())
-        });
+        let gpu = gpu.map_or(String::new(), |gpu| format!("GPU: {}. ", gpu.identity()));
         format!(
             "{gpu}CPU: {}. By {} {}. Limits are those of the GPU's solvers.",
             self.devices.cpu.identity(),
@@ -414,7 +436,15 @@ impl Results<'_> {
     }
 
     fn runs(&self) -> Vec<Vec<String>> {
-        let titles = ["case", "solver", "device", "particles", "frames", "frames a second", "s"];
+        let titles = [
+            "case",
+            "solver",
+            "device",
+            "particles",
+            "frames",
+            "frames a second",
+            "s",
+        ];
         let mut table = vec![titles.map(str::to_owned).to_vec()];
         for (case, records) in self.stability.cases.iter().zip(&self.cases) {
             let Held::Runs(trials) = &case.held else {
@@ -470,7 +500,11 @@ fn chart<'a>(of: Quantity, rows: impl Iterator<Item = &'a Row<'a>>) -> Option<St
         }
         marks.push(row.mark.bound.value());
     }
-    let values = || series.iter().flat_map(|s| s.points.iter().filter_map(|p| p.1));
+    let values = || {
+        series
+            .iter()
+            .flat_map(|s| s.points.iter().filter_map(|p| p.1))
+    };
     let first = values().next()?;
     let longest = series.iter().map(|s| s.points.len()).max()?;
     if longest < 3 || values().all(|value| value == first) {

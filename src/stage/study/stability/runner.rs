@@ -112,9 +112,8 @@ impl<'a> Runner<'a> {
         let boundary = &self.start.boundary;
         let still = boundary.distance.iter().map(|solid| -solid.sample(at));
         let movers = boundary.moving.iter().zip(&self.scene.moving_solids);
-        let moving = movers.map(|(distance, solid)| {
-            -distance.sample(at - solid.displacement(self.time()))
-        });
+        let moving =
+            movers.map(|(distance, solid)| -distance.sample(at - solid.displacement(self.time())));
         still.chain(moving).fold(f64::NEG_INFINITY, f64::max)
     }
 }

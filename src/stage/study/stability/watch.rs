@@ -63,8 +63,6 @@ enum Memory {
     Flight(Flight),
     /// Lowest place so far, a particle.
     Lowest(Vec<f64>),
-    /// Of the start.
-    Volume(f64),
     /// Of the start, and the least so far.
     Energy(f64, f64),
     /// Sums a probe, and how many there are.
@@ -82,10 +80,6 @@ impl<'a> Watch<'a> {
             }
             Quantity::Rebound => {
                 Memory::Lowest(start.position.iter().map(|p| f64::from(p[1])).collect())
-            }
-            Quantity::VolumeDrift => {
-                let spacing = run.scene.particle_spacing();
-                Memory::Volume(volume(start, spacing, &run.scene.domain))
             }
             Quantity::EnergyGain | Quantity::EnergyRise => {
                 let mass = run.scene.water.rest_density * run.scene.particle_spacing().powi(3);
@@ -152,10 +146,10 @@ impl<'a> Watch<'a> {
                 let floor = scene.domain.min.y;
                 1.0 - (mean_height(&now.position) - floor) / (mean_height(&start.position) - floor)
             }
-            Quantity::VolumeDrift => match self.memory {
-                Memory::Volume(first) => (volume(now, spacing, &scene.domain) / first - 1.0).abs(),
-                _ => f64::NAN,
-            },
+            Quantity::VolumeDrift => {
+                let own = start.len() as f64 * spacing.powi(3);
+                (volume(now, spacing, &scene.domain) / own - 1.0).abs()
+            }
             Quantity::Compression => report.density_error_mean,
             Quantity::LargestCompression => report.density_error_max,
             Quantity::Residual
@@ -211,11 +205,15 @@ impl<'a> Watch<'a> {
             }
             Memory::Lowest(lowest) => {
                 let mut most = 0.0f64;
-                for (low, p) in lowest.iter_mut().zip(&now.position) {
+                let start = run.start.particles.position.iter();
+                for ((low, p), from) in lowest.iter_mut().zip(&now.position).zip(start) {
                     *low = low.min(f64::from(p[1]));
-                    most = most.max(f64::from(p[1]) - *low);
+                    let fallen = f64::from(from[1]) - *low;
+                    if fallen > 0.0 {
+                        most = most.max((f64::from(p[1]) - *low) / fallen);
+                    }
                 }
-                most / run.scene.particle_spacing()
+                most
             }
             Memory::Energy(first, least) => {
                 let energy = report.kinetic_energy + report.potential_energy;
@@ -247,7 +245,7 @@ impl<'a> Watch<'a> {
                 }
                 _ => f64::NAN,
             },
-            Memory::Nothing | Memory::Volume(_) => f64::NAN,
+            Memory::Nothing => f64::NAN,
         }
     }
 
@@ -303,7 +301,10 @@ fn of_projection(of: Quantity, projection: &Projection) -> f64 {
 }
 
 fn top(position: &[[f32; 3]]) -> f64 {
-    position.iter().map(|p| f64::from(p[1])).fold(f64::MIN, f64::max)
+    position
+        .iter()
+        .map(|p| f64::from(p[1]))
+        .fold(f64::MIN, f64::max)
 }
 
 fn mean_height(position: &[[f32; 3]]) -> f64 {
@@ -312,7 +313,13 @@ fn mean_height(position: &[[f32; 3]]) -> f64 {
 
 /// Largest; what is no number is larger than any.
 fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    let larger = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
+    let larger = |a: f64, b: f64| {
+        if a.is_nan() || b.is_nan() {
+            f64::NAN
+        } else {
+            a.max(b)
+        }
+    };
     values.into_iter().fold(0.0, larger)
 }
 

@@ -27,7 +27,9 @@ use super::{
         device::{Opened, SolverError},
         prepare::Start,
     },
-    Event, Outcome, PointEvent, PointStatus, Request, StudyError, direction, ledger::Ledger, still_level,
+    Event, Outcome, PointEvent, PointStatus, Request, StudyError, direction,
+    ledger::Ledger,
+    still_level,
 };
 use ledger::{Record, Run, Verdict};
 use projection::Projections;
