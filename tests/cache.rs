@@ -37,6 +37,7 @@ fn manifest() -> Manifest {
         // No short decimal: must come back to the last bit.
         particle_spacing: 0.1 + 0.2,
         rest_density: 1000.0,
+        origin: [0.0; 3],
         grids: None,
         probes: probes(),
         attributes: vec!["foam".to_owned(), "age".to_owned()],

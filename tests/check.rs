@@ -11,14 +11,21 @@ use swell::{
         Effects, Iteration, Method, Scene, Stop,
         effects::{viscosity, vorticity_confinement},
         flip::{Preconditioner, Pressure, Surface, Transfer},
+        plan::DeviceLimits,
     },
+    solve::{SolveError, pbf::device_limits},
     stage::{
         check::{Table, check_frame, pbf},
         prepare::Start,
     },
 };
 
-use check_controls::{Control, control, flip::FLIP, pbf::PBF};
+use check_controls::{
+    Control, control,
+    flip::FLIP,
+    pbf::{CHUNKED, PBF, SEARCHED},
+    variants::{VARIANTS, Variant},
+};
 use glam::DVec3;
 use support::{D, context, jitter, lattice, noise};
 
@@ -116,11 +123,20 @@ fn lines(table: &Table) -> String {
 /// Rows that other passes' faults may turn too: they follow from everything.
 const FOLLOW: [&str; 3] = ["whole solve", "whole projection", "whole correction"];
 
-/// Passes of `elsewhere` have their controls in another test.
-fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], elsewhere: &[&str]) {
-    let clean = run(context, scene, start);
-    assert!(over(&clean).is_empty(), "{}", lines(&clean));
+/// What is checked, on a context whose shaders may be spoiled.
+type Checked<'a> = dyn Fn(&Context) -> Result<Table, SolveError> + 'a;
+
+/// The clean table, and which of the controls do not show where they should, or elsewhere too.
+fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (Table, String) {
+    let clean = checked(context).unwrap();
     let mut faults = String::new();
+    if !over(&clean).is_empty() {
+        faults += &lines(&clean);
+    }
+    let unknown = |(_, why): &&(&str, &str)| *why == "no f64 twin";
+    if let Some(pass) = clean.unchecked.iter().find(unknown) {
+        faults += &format!("{pass:?}\n");
+    }
     for Control {
         spoil,
         pass,
@@ -130,7 +146,7 @@ fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], e
     {
         let mut spoiled = context.clone();
         spoiled.spoil = Some(*spoil);
-        let table = match check_frame(&spoiled, scene, start, 0, &start.particles) {
+        let table = match checked(&spoiled) {
             Ok(table) => table,
             Err(error) => {
                 faults += &format!("{spoil:?}: {error}\n");
@@ -147,6 +163,13 @@ fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], e
             faults += &format!("{spoil:?}: {found:?}\n");
         }
     }
+    (clean, faults)
+}
+
+/// Passes of `elsewhere` have their controls in another test.
+fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], elsewhere: &[&str]) {
+    let checked = |context: &Context| check_frame(context, scene, start, 0, &start.particles);
+    let (clean, mut faults) = faults(context, &checked, controls);
     let covered = |row: &swell::compare::check::Row| {
         let field = row.field;
         let is_of =
@@ -171,7 +194,7 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
     let mut moved = start.boundary.clone();
     moved.samples[3].position.x += 1e-6;
     moved.samples[4].area *= 1.00001;
-    let plan = start.plan(&scene, swell::solve::pbf::device_limits(&context));
+    let plan = start.plan(&scene, device_limits(&context));
     let boundaries = [&start.boundary, &moved];
     let table = pbf::check(&context, &scene, plan, boundaries, 0, &start.particles).unwrap();
     let found = over(&table);
@@ -254,12 +277,66 @@ fn flip_is_within_tolerance_and_each_row_fails_where_it_should() {
         "sort/stabilize",
     ];
     hold(&context, &scene, &start, FLIP, &sort);
-    let clean = run(&context, &scene, &start);
-    let unknown = clean
-        .unchecked
-        .iter()
-        .find(|(_, why)| *why == "no f64 twin");
-    assert!(unknown.is_none(), "{unknown:?}");
+}
+
+/// What a scene may ask of FLIP beyond the common case, each with faults in what it alone runs.
+#[test]
+fn flip_variants_are_within_tolerance_and_fail_where_they_should() {
+    let context = context();
+    let mut all = String::new();
+    for Variant {
+        name,
+        change,
+        controls,
+    } in VARIANTS
+    {
+        let (mut scene, mut start) = case(Method::Flip);
+        scene.effects = Effects::default();
+        change(&mut scene, &mut start);
+        let checked = |context: &Context| check_frame(context, &scene, &start, 0, &start.particles);
+        let (_, faults) = faults(&context, &checked, controls);
+        if !faults.is_empty() {
+            all += &format!("{name}:\n{faults}");
+        }
+    }
+    assert!(all.is_empty(), "{all}");
+}
+
+/// Lists in several bindings, and none where they do not fit.
+#[test]
+fn pbf_lists_in_chunks_and_none() {
+    let context = context();
+    let (mut scene, start) = case(Method::Pbf);
+    scene.effects = Effects::default();
+    let limits = device_limits(&context);
+    let chunked = DeviceLimits {
+        binding: 30_000,
+        ..limits
+    };
+    let none = DeviceLimits {
+        list_budget: 0,
+        ..limits
+    };
+    let mut all = String::new();
+    for (limits, chunks, has_lists, controls) in
+        [(chunked, 3, true, CHUNKED), (none, 1, false, SEARCHED)]
+    {
+        let plan = start.plan(&scene, limits);
+        assert_eq!((plan.chunks.len(), plan.has_lists), (chunks, has_lists));
+        let checked = |context: &Context| {
+            let boundaries = [&start.boundary; 2];
+            pbf::check(
+                context,
+                &scene,
+                plan.clone(),
+                boundaries,
+                0,
+                &start.particles,
+            )
+        };
+        all += &faults(&context, &checked, controls).1;
+    }
+    assert!(all.is_empty(), "{all}");
 }
 
 /// A fault that no longer fits its shader is an error, and not a control that passes.

@@ -333,6 +333,41 @@ fn no_adapter_names_the_package() {
     assert!(said.contains("mesa-vulkan-drivers"), "{said}");
 }
 
+/// The table of exit codes in the README: what is not there is a cache's fault, a scene's where it is named like one.
+#[test]
+fn what_is_missing_ends_as_the_table_says() {
+    let job = Job::new();
+    let commands = [
+        (4, "check missing"),
+        (4, "inspect missing"),
+        (4, "inspect missing --plot plots"),
+        (4, "verify missing"),
+        (4, "diff missing missing"),
+        (4, "render missing --look look.toml"),
+        (4, "render missing --look look.toml -o pictures"),
+        (2, "check missing.toml"),
+        (2, "inspect missing.toml"),
+        (2, "bake missing.toml"),
+        (2, "render missing --look missing.toml"),
+    ];
+    for (code, command) in commands {
+        let said = job.expect(code, command);
+        assert!(said.contains("missing"), "{command}: {said}");
+    }
+}
+
+/// A check that had nothing to compare is not one that passed.
+#[test]
+fn a_check_without_water_is_refused() {
+    let job = Job::new();
+    let dry = "--set water.block=[]";
+    for solver in ["pbf", "flip"] {
+        let said = job.expect(2, &format!("check small.toml --solver {solver} {dry}"));
+        assert!(said.contains("nothing was compared"), "{said}");
+        job.expect(0, &format!("check small.toml --solver {solver}"));
+    }
+}
+
 #[test]
 fn a_new_look_leaves_the_cache_as_it_is() {
     let job = Job::new();

@@ -1,18 +1,16 @@
 //! Probes: what a scene says of them, what they cost, and the files that they leave in a cache.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
+#[path = "support/job.rs"]
+mod job;
 mod support;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::{Command, Output},
-};
+use std::{fs, path::Path};
 
 use glam::{DVec2, DVec3};
+use job::Job;
 use support::{D, context, lattice};
 use swell::{
-    cache::directory_hash,
     domain::{boundary::Boundary, solver::Solver},
     scene::{
         Method, Scene, SceneError, physics_difference, physics_hash,
@@ -25,7 +23,6 @@ use swell::{
     },
     stage::prepare::Start,
 };
-use tempfile::TempDir;
 
 const SCENE: &str = r#"
 [shot]
@@ -338,67 +335,32 @@ fn the_reference_sees_the_same_pressure() {
     }
 }
 
-struct Job {
-    folder: TempDir,
-}
-
-impl Job {
-    fn new() -> Self {
-        let folder = TempDir::new().unwrap();
-        fs::write(folder.path().join("tank.toml"), format!("{SCENE}{PROBES}")).unwrap();
-        fs::write(folder.path().join("plain.toml"), SCENE).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn run(&self, words: &str) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_swell"));
-        let folder = self.folder.path();
-        command
-            .current_dir(folder)
-            .args(words.split_whitespace())
-            .output()
-            .unwrap()
-    }
-
-    /// Runs and expects an exit code; gives what was said.
-    fn expect(&self, code: i32, words: &str) -> String {
-        let output = self.run(words);
-        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        let said = text(&output.stdout) + &text(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "swell {words}: {said}");
-        said
-    }
-
-    /// Rows of a probe's file, without the header.
-    fn rows(&self, file: &str) -> Vec<Vec<Option<f64>>> {
-        let text = fs::read_to_string(self.path(file)).unwrap();
-        let number = |field: &str| (!field.is_empty()).then(|| field.parse().unwrap());
-        text.lines()
-            .skip(1)
-            .map(|line| line.split(',').map(number).collect())
-            .collect()
-    }
+/// Rows of a probe's file, without the header.
+fn rows(job: &Job, file: &str) -> Vec<Vec<Option<f64>>> {
+    let text = fs::read_to_string(job.path(file)).unwrap();
+    let number = |field: &str| (!field.is_empty()).then(|| field.parse().unwrap());
+    text.lines()
+        .skip(1)
+        .map(|line| line.split(',').map(number).collect())
+        .collect()
 }
 
 fn a_bake_leaves_a_file_a_probe(solver: &str) {
-    let job = Job::new();
+    let scene = format!("{SCENE}{PROBES}");
+    let job = Job::of(&[("tank.toml", &scene), ("plain.toml", SCENE)]);
     let bake = format!("bake tank.toml --solver {solver} -o");
     job.expect(0, &format!("{bake} whole"));
     let said = job.expect(0, "verify whole");
     assert!(said.contains('6'), "{said}");
-    let near = job.rows("whole/probes/elevation-1.csv");
+    let near = rows(&job, "whole/probes/elevation-1.csv");
     assert_eq!(near.len(), 7);
     // Before it falls, the water stands to y = 1.5 there; the far end is dry.
     assert!((near[0][2].unwrap() - 1.5).abs() < 0.01, "{near:?}");
     assert!((near[6][1].unwrap() - 0.1).abs() < 1e-12);
-    assert_eq!(job.rows("whole/probes/far.csv")[0][2], None);
+    assert_eq!(rows(&job, "whole/probes/far.csv")[0][2], None);
     // At most the 0.7 m of water above weigh on it, and less while they fall; PBF's water, not compressed at the start,
     // only comes to press, and scatters. The start has no pressure yet.
-    let pressure = job.rows("whole/probes/pressure-1.csv");
+    let pressure = rows(&job, "whole/probes/pressure-1.csv");
     assert_eq!(pressure[0][2], None);
     let pressures: Vec<f64> = pressure[1..].iter().map(|row| row[2].unwrap()).collect();
     assert!(
@@ -406,14 +368,14 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
         "{pressures:?}"
     );
     // 0.8 m³ of water; 0.5 m above the floor on average.
-    let volume = job.rows("whole/probes/volume-1.csv");
+    let volume = rows(&job, "whole/probes/volume-1.csv");
     assert!(
         volume
             .iter()
             .all(|row| (row[2].unwrap() / 0.8 - 1.0).abs() < 0.06),
         "{volume:?}"
     );
-    let energy = job.rows("whole/probes/energy-1.csv");
+    let energy = rows(&job, "whole/probes/energy-1.csv");
     assert_eq!(energy[0][2], Some(0.0));
     assert!((energy[0][3].unwrap() / (800.0 * 9.81 * 0.5) - 1.0).abs() < 1e-6);
     let ledger = fs::read_to_string(job.path("whole/frames.jsonl")).unwrap();
@@ -432,8 +394,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
         "{said}"
     );
     job.expect(0, &format!("{bake} stopped --resume"));
-    let hash = |cache: &str| directory_hash(&job.path(cache)).unwrap();
-    assert_eq!(hash("stopped"), hash("whole"));
+    assert_eq!(job.hash("stopped"), job.hash("whole"));
 
     // With other probes it is another bake.
     let said = job.expect(
@@ -449,7 +410,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
         &format!("bake plain.toml --solver {solver} -o whole --resume"),
     );
     assert!(said.contains("this run has no probes"), "{said}");
-    assert_eq!(hash("stopped"), hash("whole"));
+    assert_eq!(job.hash("stopped"), job.hash("whole"));
 
     let shown = job.expect(0, "inspect whole --plot plots");
     assert!(
@@ -462,7 +423,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
         "{svg}"
     );
     assert_eq!(fs::read_dir(job.path("plots")).unwrap().count(), 6);
-    assert_eq!(hash("stopped"), hash("whole"));
+    assert_eq!(job.hash("stopped"), job.hash("whole"));
 
     // Negative control: who asks for nothing gets nothing, and the same water.
     job.expect(0, &format!("bake plain.toml --solver {solver} -o plain"));

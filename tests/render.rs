@@ -52,6 +52,7 @@ const ALL_AOVS: &str =
 /// A tank of 8 × 4 × 6 m; the slab reaches past what the camera sees on all sides.
 fn tank(spacing: f64) -> RenderScene {
     RenderScene {
+        origin: DVec3::ZERO,
         domain: Bounds {
             min: DVec3::new(-2.0, 0.0, -1.5),
             max: DVec3::new(6.0, 4.0, 4.5),

@@ -65,6 +65,7 @@ fn grids() -> Grids {
 
 fn encoded(precision: Precision) -> Vec<u8> {
     let stamp = Stamp {
+        origin: DVec3::ZERO,
         program: "swell",
         program_version: "0.1.0",
         shot: "ball",
@@ -271,6 +272,7 @@ fn manifest(grids: Option<GridRecord>) -> Manifest {
         frames_per_second: 24.0,
         particle_spacing: RASTER.particle_spacing,
         rest_density: 1000.0,
+        origin: [0.0; 3],
         attributes: Vec::new(),
         grids,
         probes: Vec::new(),

@@ -135,7 +135,8 @@ fn main(
         }
     }
     // Where a solid and a wall meet, each would push into the other.
-    for (var k = 0u; k < select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high))); k++) {
+    let rounds = select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high)));
+    for (var k = 0u; k < rounds; k++) {
         for (var solid = 0u; solid < solid_grids.count; solid++) {
             look_at_solid(solid, params.time_step);
             x = leave_solids(clamp(x, low, high));
@@ -153,8 +154,10 @@ fn main(
         x = leave_solids(x + way / f32(steps));
         v = stopped(v, solid_push);
     }
-    // Where a solid and a wall meet, each would push into the other.
-    for (var k = 0u; k < select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high))); k++) {
+    // Where a solid and a wall meet, each would push into the other. How often is decided once: x lies exactly on
+    // the wall after a push along it, and next to it after any other.
+    let rounds = select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high)));
+    for (var k = 0u; k < rounds; k++) {
         x = leave_solids(clamp(x, low, high));
     }
 #endif

@@ -16,7 +16,7 @@ pub struct GridRecord {
     pub velocity: bool,
     /// Metres.
     pub voxel_size: f64,
-    /// World position of the corner of voxel (0, 0, 0), metres: the domain's least corner.
+    /// Corner of voxel (0, 0, 0), metres, about the manifest's origin: the domain's least corner.
     pub origin: [f64; 3],
     /// How values are kept.
     pub precision: Precision,

@@ -46,6 +46,9 @@ pub struct Manifest {
     pub particle_spacing: f64,
     /// kg/m³.
     pub rest_density: f64,
+    /// World position of what the solver has as [0, 0, 0], metres; absent where it is the world's own.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub origin: [f64; 3],
     /// Names of what each particle carries beside position, velocity and id; sorted by
     /// [`CacheWriter::create`](super::CacheWriter::create).
     pub attributes: Vec<String>,
@@ -59,6 +62,10 @@ pub struct Manifest {
     pub start_particles: u64,
     /// `scene.toml` and the assets; filled in by `create`.
     pub files: Vec<FileRecord>,
+}
+
+fn is_zero(origin: &[f64; 3]) -> bool {
+    *origin == [0.0; 3]
 }
 
 /// A file that stands in the cache beside the frames.

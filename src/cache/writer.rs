@@ -339,6 +339,7 @@ impl Sink {
             shot: &manifest.shot,
             frame: clock.frame,
             time: clock.time,
+            origin: manifest.origin.into(),
         };
         let written = disk::write_whole(&self.dir.join(&file), |out| {
             frame::encode(out, &stamp, particles)
@@ -346,7 +347,9 @@ impl Sink {
         let grids = match &manifest.grids {
             None => None,
             Some(asked) => {
-                let grids = asked.grids(particles, manifest.particle_spacing);
+                let grids = asked
+                    .grids(particles, manifest.particle_spacing)
+                    .moved(manifest.origin.into());
                 let file = vdb::file_name(&manifest.shot, clock.frame);
                 let written = disk::write_whole(&self.dir.join(&file), |out| {
                     vdb::encode(out, &stamp, &grids, asked.precision)

@@ -1,6 +1,8 @@
 //! `swell check CACHE|SCENE`
 
-use std::{cell::OnceCell, fmt::Write as _, path::PathBuf, process::ExitCode};
+use std::{
+    cell::OnceCell, collections::BTreeMap, fmt::Write as _, path::PathBuf, process::ExitCode,
+};
 
 use clap::Args;
 use serde_json::json;
@@ -8,12 +10,13 @@ use serde_json::json;
 use crate::{
     domain::frame_range::FrameRange,
     scene::Method,
-    stage::check::{Event, Outcome, Request, Row, Source, Table, check, is_cache},
+    stage::check::{Event, Outcome, Request, Row, Source, Table, check},
 };
 
 use super::{
     Failure, bake,
     interrupt::{self, Interrupt},
+    is_cache,
     progress::{Mode, Progress},
 };
 
@@ -194,8 +197,12 @@ fn show(table: &Table) -> String {
     for row in &table.rows {
         let _ = writeln!(text, "{}", line(row));
     }
+    let mut passes: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for (pass, why) in &table.unchecked {
-        let _ = writeln!(text, "{pass:28} not checked: {why}");
+        passes.entry(why).or_default().push(pass);
+    }
+    for (why, passes) in passes {
+        let _ = writeln!(text, "without a row: {} ({why})", passes.join(", "));
     }
     text
 }
@@ -205,7 +212,6 @@ fn verdict(outcome: &Outcome) -> String {
         None if outcome.interrupted => {
             format!("ended by a signal after {} frames", outcome.frames.len())
         }
-        None if outcome.table.rows.is_empty() => "nothing to check: no water".into(),
         None => "all within tolerance".into(),
         Some((frame, pass, field)) => {
             let rows = &outcome.table.rows;

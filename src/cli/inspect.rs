@@ -13,7 +13,7 @@ use crate::{
     stage::inspect::{Adapter, Entry, Manifest, ScenePlan, adapters, cache, plan, plot},
 };
 
-use super::{Failure, bake, size};
+use super::{Failure, bake, is_cache, size};
 
 #[derive(Args, Debug)]
 pub(super) struct InspectArgs {
@@ -50,7 +50,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
         }
     }
     match &args.subject {
-        Some(directory) if directory.is_dir() => {
+        Some(directory) if is_cache(directory) => {
             let (manifest, entries) = cache(directory)?;
             show_cache(&mut text, &manifest, &entries)?;
             show_probes(&mut text, &manifest, &entries)?;
@@ -167,6 +167,9 @@ fn show_cache(
         "{} a second, d = {} m",
         manifest.frames_per_second, manifest.particle_spacing
     )?;
+    if manifest.origin != [0.0; 3] {
+        writeln!(out, "solved about the origin {:?} m", manifest.origin)?;
+    }
     let has_projection = entries
         .iter()
         .any(|entry| entry.report.get("projection").is_some());

@@ -10,7 +10,7 @@ mod render;
 mod study;
 pub mod verify;
 
-use std::{error::Error, process::ExitCode};
+use std::{error::Error, path::Path, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 
@@ -91,6 +91,11 @@ pub fn main() -> ExitCode {
         eprintln!("swell: {}", chain(failure.error.as_ref()));
         ExitCode::from(failure.code)
     })
+}
+
+/// Whether a path that may be a cache or a scene is a cache: a folder, or missing and not named like a scene.
+fn is_cache(path: &Path) -> bool {
+    path.is_dir() || (!path.exists() && path.extension().is_none_or(|end| end != "toml"))
 }
 
 /// An error and its causes on one line.

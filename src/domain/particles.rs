@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Particles in the order of their ids.
 ///
 /// The state between two frames is this and nothing else, so every frame is a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles {
-    /// World positions, metres.
+    /// Positions, metres, about the scene's origin: the world's, but for scenes far off.
     pub position: Vec<[f32; 3]>,
     /// Velocities, metres per second.
     pub velocity: Vec<[f32; 3]>,
@@ -28,6 +28,19 @@ impl Particles {
     /// Whether there is no particle.
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
+    }
+
+    /// The particles with their positions about another origin; both in the world, metres. What 32 bits do not hold is
+    /// rounded.
+    #[must_use]
+    pub fn about(mut self, from: DVec3, to: DVec3) -> Self {
+        if from != to {
+            for p in &mut self.position {
+                let local = Vec3::from_array(*p).as_dvec3() + (from - to);
+                *p = local.as_vec3().to_array();
+            }
+        }
+        self
     }
 
     /// Largest speed, m/s; 0 without particles.

@@ -22,6 +22,8 @@ pub mod view;
 
 use std::path::PathBuf;
 
+use glam::DVec3;
+
 use crate::domain::bounds::Bounds;
 use crate::domain::mesh::TriangleMesh;
 use crate::gpu::adapter::GpuError;
@@ -33,6 +35,8 @@ pub use renderer::{PassTime, Renderer};
 /// What of a scene a picture needs beside the particles.
 #[derive(Clone, Debug)]
 pub struct RenderScene {
+    /// Where the coordinates of domain, solids and particles have their zero in the world of the look, metres.
+    pub origin: DVec3,
     /// The box that holds the water, metres; its least y is the ground's height.
     pub domain: Bounds,
     /// World space, metres.

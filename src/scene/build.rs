@@ -13,7 +13,7 @@ use super::{
     error::SceneError,
     grids,
     moving_solid::{self, MAX_MOVING_SOLIDS},
-    probe,
+    origin, probe,
     spec::{BoxSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, SwarmSpec, WaterSpec},
     wave_maker,
 };
@@ -44,8 +44,10 @@ struct Lattice {
 /// Builds the scene.
 pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Result<Scene> {
     let shot = shot(doc, &spec.shot)?;
-    let domain = domain(doc, &spec.domain)?;
-    let (solver, lattice) = solver::solver(doc, &spec.solver, &domain)?;
+    // All is held against the domain in the world's coordinates, but for what f32 resolves.
+    let domain = bounds(doc, &spec.domain)?;
+    let origin = origin::of(&domain);
+    let (solver, lattice) = solver::solver(doc, &spec.solver, &domain.moved(-origin))?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     check_particle_count(doc, &water, &domain, &lattice)?;
     let around = wave_maker::Surroundings {
@@ -89,8 +91,9 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         .map(|table| grids::build(doc, table, &domain, &solver))
         .transpose()?;
     let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
-    Ok(Scene {
+    let scene = Scene {
         shot,
+        origin,
         domain,
         water,
         solids,
@@ -100,7 +103,8 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         grids,
         probes,
         effects: spec.effects,
-    })
+    };
+    Ok(scene.into_local())
 }
 
 /// The value, if `is_allowed`; NaN never is.
@@ -194,10 +198,6 @@ fn bounds(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
         }
     }
     Ok(Bounds { min, max })
-}
-
-fn domain(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
-    bounds(doc, spec)
 }
 
 fn water(
@@ -424,15 +424,13 @@ fn placed_mesh(doc: &Document<'_>, base_dir: &Path, spec: &MeshSpec<'_>) -> Resu
         rotate_degrees: vector_or(doc, spec.rotate_degrees, DVec3::ZERO, 1e6)?,
         scale: scale(doc, spec.scale)?,
     };
-    let world_from_file = placement.world_from_file();
-    let mesh = in_file.transformed(&world_from_file);
+    let mesh = in_file.transformed(&placement.world_from_file());
     mesh.check_inside()
         .map_err(|error| fail(format!("{}: {error}", file.display())))?;
     Ok(PlacedMesh {
         file,
         file_hash,
         placement,
-        world_from_file,
         mesh,
     })
 }

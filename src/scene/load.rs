@@ -133,7 +133,7 @@ vorticity_confinement = { strength = 0.1 }
             blake3::hash(CUBE.as_bytes()).to_hex().to_string()
         );
         // The corner (1, 0, 0) scaled, then turned by 30° about y, then moved.
-        let corner = solid.world_from_file.transform_point3(DVec3::X);
+        let corner = solid.placement.world_from_file().transform_point3(DVec3::X);
         let expected = DVec3::new(8.0 + 30f64.to_radians().cos(), 0.0, 2.0 - 0.5);
         assert!((corner - expected).length() < 1e-12);
         assert_eq!(scene.wave_makers[0].wall.name(), "-x");

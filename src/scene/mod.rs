@@ -17,6 +17,7 @@ mod difference;
 mod document;
 mod error;
 mod load;
+mod origin;
 mod spec;
 mod wave_maker;
 mod write;
@@ -37,11 +38,14 @@ pub use write::asset_path;
 pub struct Scene {
     /// What the shot is called and how long it runs.
     pub shot: Shot,
+    /// Where the coordinates of all that follows have their zero in the world, metres: `[0, 0, 0]` but for scenes far
+    /// off, which 32 bits could not resolve otherwise. World position = origin + position.
+    pub origin: DVec3,
     /// The box whose six walls are solid, metres.
     pub domain: Bounds,
     /// The water at the start.
     pub water: Water,
-    /// Static solids, in world space.
+    /// Static solids.
     pub solids: Vec<Solid>,
     /// Solids that move; static ones stand in `solids`.
     pub moving_solids: Vec<moving_solid::MovingSolid>,
@@ -58,7 +62,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// World points of the probes of pressure, in order, metres.
+    /// Points of the probes of pressure, in order, metres.
     pub fn pressure_points(&self) -> Vec<DVec3> {
         let probes = self.probes.iter();
         probes
@@ -118,7 +122,7 @@ pub struct Water {
     pub gravity: DVec3,
     /// Boxes filled with water at rest, metres.
     pub blocks: Vec<Bounds>,
-    /// Closed meshes filled with water at rest, in world space.
+    /// Closed meshes filled with water at rest.
     pub meshes: Vec<PlacedMesh>,
     /// Particles at places of their own.
     pub particles: Vec<Swarm>,
@@ -145,9 +149,7 @@ pub struct PlacedMesh {
     pub file_hash: String,
     /// As the scene says it.
     pub placement: Placement,
-    /// What `placement` comes to; applied already to `mesh`.
-    pub world_from_file: DAffine3,
-    /// World space, metres.
+    /// Metres, about the scene's origin.
     pub mesh: TriangleMesh,
 }
 

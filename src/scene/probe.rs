@@ -28,12 +28,12 @@ pub struct Probe {
 pub enum ProbeKind {
     /// Height of the water's surface.
     Elevation {
-        /// World x and z, metres.
+        /// x and z, metres.
         at: DVec2,
     },
     /// Pressure of the water at a point.
     Pressure {
-        /// World position, metres.
+        /// Position, metres.
         at: DVec3,
     },
     /// Kinetic, potential and total energy of all water.
@@ -66,11 +66,11 @@ impl ProbeKind {
         }
     }
 
-    /// Coordinates of its point, metres: x and z, or x, y and z, or none.
-    pub fn at(self) -> Vec<f64> {
+    /// World coordinates of its point, metres: x and z, or x, y and z, or none. `origin` is the scene's.
+    pub fn at(self, origin: DVec3) -> Vec<f64> {
         match self {
-            Self::Elevation { at } => at.to_array().to_vec(),
-            Self::Pressure { at } => at.to_array().to_vec(),
+            Self::Elevation { at } => (at + DVec2::new(origin.x, origin.z)).to_array().to_vec(),
+            Self::Pressure { at } => (at + origin).to_array().to_vec(),
             Self::Energy | Self::Volume => Vec::new(),
         }
     }
@@ -158,7 +158,7 @@ fn kind(
             );
             Err(doc.fault_at(at.span(), problem))
         }
-        Some(at) if kind.at().is_empty() => {
+        Some(at) if kind.at(DVec3::ZERO).is_empty() => {
             let problem = format!("a probe of {} has no place", kind.name());
             Err(doc.fault_at(at.span(), problem))
         }
@@ -227,11 +227,11 @@ fn check_volume(
 }
 
 /// As [`super::Scene::to_toml`] writes it.
-pub(super) fn write(out: &mut String, probe: &Probe) -> fmt::Result {
+pub(super) fn write(out: &mut String, probe: &Probe, origin: DVec3) -> fmt::Result {
     writeln!(out, "\n[[probe]]")?;
     writeln!(out, "name = {:?}", probe.name)?;
     writeln!(out, "kind = {:?}", probe.kind.name())?;
-    let at = probe.kind.at();
+    let at = probe.kind.at(origin);
     if at.is_empty() {
         return Ok(());
     }

@@ -65,13 +65,13 @@ impl Scene {
         writeln!(out, "frames = {}", self.shot.frames)?;
         writeln!(out, "frames_per_second = {:?}", self.shot.frames_per_second)?;
         writeln!(out, "\n[domain]")?;
-        write_box(out, &self.domain)?;
+        write_box(out, &self.domain.moved(self.origin))?;
         writeln!(out, "\n[water]")?;
         writeln!(out, "rest_density = {:?}", self.water.rest_density)?;
         writeln!(out, "gravity = {}", vector(self.water.gravity))?;
         for block in &self.water.blocks {
             writeln!(out, "\n[[water.block]]")?;
-            write_box(out, block)?;
+            write_box(out, &block.moved(self.origin))?;
         }
         for mesh in &self.water.meshes {
             writeln!(out, "\n[[water.mesh]]")?;
@@ -103,7 +103,7 @@ impl Scene {
             grids.write(out)?;
         }
         for probe in &self.probes {
-            probe::write(out, probe)?;
+            probe::write(out, probe, self.origin)?;
         }
         writeln!(out, "\n[effects]")?;
         // An effect is a table of numbers, which toml can always write.

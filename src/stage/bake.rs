@@ -286,6 +286,7 @@ fn open_cache(
         frames_per_second: scene.shot.frames_per_second,
         particle_spacing: scene.particle_spacing(),
         rest_density: scene.water.rest_density,
+        origin: scene.origin.to_array(),
         attributes: start.particles.attributes.keys().cloned().collect(),
         grids: scene.grids.map(|grids| grid_record(scene, &grids)),
         probes: probes::records(scene),

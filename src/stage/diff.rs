@@ -291,7 +291,8 @@ fn caches(a: &CacheReader, b: &CacheReader, request: &Request) -> Result<CacheDi
     let gauge = gauge(&scene_of(b)?, &[b, a])?;
     let (gravity_a, gravity_b) = (scene_of(a)?.water.gravity, scene_of(b)?.water.gravity);
     let frame = |&frame: &u32| {
-        let (of_a, of_b) = (a.read(frame)?, b.read(frame)?);
+        let [from, to] = [a, b].map(|cache| cache.manifest().origin.into());
+        let (of_a, of_b) = (a.read(frame)?.about(from, to), b.read(frame)?);
         let aggregates = [
             aggregates(a, &gauge, gravity_a, frame, &of_a)?,
             aggregates(b, &gauge, gravity_b, frame, &of_b)?,

@@ -17,7 +17,7 @@ pub(super) fn records(scene: &Scene) -> Vec<ProbeRecord> {
         .map(|probe| ProbeRecord {
             name: probe.name.clone(),
             kind: probe.kind.name().to_owned(),
-            at: probe.kind.at(),
+            at: probe.kind.at(scene.origin),
             columns: probe.kind.columns().iter().map(|&c| c.to_owned()).collect(),
         })
         .collect()
@@ -31,7 +31,10 @@ pub(super) fn look(scene: &Scene, particles: &Particles, pressures: &[Option<f64
     let probes = scene.probes.iter();
     probes
         .map(|probe| match probe.kind {
-            ProbeKind::Elevation { at } => vec![elevation(particles, spacing, &scene.domain, at)],
+            ProbeKind::Elevation { at } => {
+                let height = elevation(particles, spacing, &scene.domain, at);
+                vec![height.map(|y| scene.origin.y + y)]
+            }
             ProbeKind::Pressure { .. } => vec![pressures.next().flatten()],
             ProbeKind::Energy => {
                 let mass = scene.water.rest_density * spacing.powi(3);

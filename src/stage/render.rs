@@ -229,6 +229,7 @@ fn render_scene(scene: &Scene, frame: u32) -> RenderScene {
     });
     let solids = scene.solids.iter().map(|solid| solid.mesh.clone());
     RenderScene {
+        origin: scene.origin,
         domain: scene.domain,
         solids: solids.chain(moving).collect(),
         particle_spacing: scene.particle_spacing(),

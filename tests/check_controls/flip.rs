@@ -2,6 +2,24 @@
 
 use super::{Control, control};
 
+/// What is handed another system than the twin's.
+pub const SYSTEM: &[&str] = &[
+    "pressure/multiply",
+    "pressure/divergence",
+    "pressure/measure_divergence",
+    "pressure/density_source",
+    "pressure/project",
+    "pressure/verify",
+    "pressure/count_pockets",
+    "pressure/center",
+    "pressure/reduce",
+    "pressure/coarsen",
+    "pressure/smooth_first",
+    "pressure/smooth",
+    "pressure/smooth_corrected",
+    "pressure/restrict",
+];
+
 pub const FLIP: &[Control] = &[
     control(
         "flip/survey",
@@ -114,7 +132,8 @@ pub const FLIP: &[Control] = &[
         "pressure_product[own + 64u * c] = product.lo[c] * 1.001",
         "pressure/multiply",
         &["system times direction"],
-    ),
+    )
+    .and(&["pressure/reduce"]),
     control(
         "pressure/project",
         "-= select",
@@ -237,7 +256,7 @@ pub const FLIP: &[Control] = &[
         "pressure/build_system",
         &["what air adds to the diagonal"],
     )
-    .and(&["pressure/multiply"]),
+    .and(SYSTEM),
     control(
         "pressure/build_system",
         "row.coefficient[k] = coefficient",
@@ -245,7 +264,7 @@ pub const FLIP: &[Control] = &[
         "pressure/build_system",
         &["coefficients"],
     )
-    .and(&["pressure/multiply"]),
+    .and(SYSTEM),
     control(
         "pressure/build_system",
         "(rows << 8u)",
@@ -253,13 +272,7 @@ pub const FLIP: &[Control] = &[
         "pressure/build_system",
         &["rows"],
     )
-    .and(&[
-        "pressure/multiply",
-        "pressure/divergence",
-        "pressure/measure_divergence",
-        "pressure/density_source",
-        "pressure/project",
-    ]),
+    .and(SYSTEM),
     control(
         "pressure/divergence",
         "worst / phase.cell_size",
@@ -285,14 +298,16 @@ pub const FLIP: &[Control] = &[
             "‖u − u64‖",
             "‖∇·u‖ after / before",
         ],
-    ),
+    )
+    .and(&["pressure/reduce"]),
     control(
         "pressure/reduce",
         "let target_square = phase",
         "let target_square = 1e6 * phase",
         "whole correction",
         &["‖b − A x‖ / ‖b‖"],
-    ),
+    )
+    .and(&["pressure/reduce"]),
     control(
         "flip/find_change",
         "u32(is_found)",
@@ -349,4 +364,112 @@ pub const FLIP: &[Control] = &[
         "flip/advect",
         &["id"],
     ),
+    control(
+        "pressure/coarsen",
+        "0.25 * sum",
+        "0.2501 * sum",
+        "pressure/coarsen",
+        &["coefficients"],
+    ),
+    control(
+        "pressure/coarsen",
+        "0.5 * air",
+        "0.501 * air",
+        "pressure/coarsen",
+        &["what air adds to the diagonal"],
+    ),
+    control(
+        "pressure/coarsen",
+        "select(2u, 1u, is_full), 0u, is_empty",
+        "select(2u, 2u, is_full), 2u, is_empty",
+        "pressure/coarsen",
+        &["kind of block"],
+    ),
+    control(
+        "pressure/smooth_first",
+        "wr + w * (",
+        "wr - w * (",
+        "pressure/smooth_first",
+        &["correction"],
+    )
+    .and(&["pressure/reduce"]),
+    control(
+        "pressure/smooth",
+        "r.lo + flow.lo",
+        "r.lo - flow.lo",
+        "pressure/smooth",
+        &["correction"],
+    ),
+    control(
+        "pressure/smooth_corrected",
+        "about.zu += above.upper.z",
+        "about.zu -= above.upper.z",
+        "pressure/smooth_corrected",
+        &["correction"],
+    ),
+    control(
+        "pressure/restrict",
+        "0.5 * sum_pair(flow)",
+        "0.5001 * sum_pair(flow)",
+        "pressure/restrict",
+        &["residual of the coarser level"],
+    ),
+    control(
+        "pressure/direction",
+        "z + beta *",
+        "z - beta *",
+        "pressure/direction",
+        &["direction"],
+    ),
+    control(
+        "pressure/advance",
+        "+ alpha_small * p",
+        "- alpha_small * p",
+        "pressure/advance",
+        &["solution, both words"],
+    ),
+    control(
+        "pressure/advance",
+        "- alpha * pressure_product[e]",
+        "- 1.001 * alpha * pressure_product[e]",
+        "pressure/advance",
+        &["residual"],
+    ),
+    control(
+        "pressure/verify",
+        "(pressure_rhs[own + 64u * c] - main_part",
+        "(1.001 * pressure_rhs[own + 64u * c] - main_part",
+        "pressure/verify",
+        &["residual"],
+    ),
+    control(
+        "pressure/reduce",
+        "pressure_control.alpha = pressure_control.product",
+        "pressure_control.alpha = 1.001 * pressure_control.product",
+        "pressure/reduce",
+        &["sums and what follows"],
+    ),
+    // A sum that is not of what the pass wrote.
+    control(
+        "pressure/multiply",
+        "sum_workgroup(dot_pair",
+        "sum_workgroup(1.001 * dot_pair",
+        "pressure/reduce",
+        &["sums and what follows"],
+    ),
+    control(
+        "pressure/reduce",
+        "pressure_control.iterations += 1u",
+        "pressure_control.iterations += 2u",
+        "pressure/reduce",
+        &["state, iterations, restarts"],
+    ),
+    control(
+        "pressure/label_cells",
+        "&& air == 0.0",
+        "&& air >= 0.0",
+        "pressure/count_pockets",
+        &["labels of water that no air touches", "pockets"],
+    )
+    .and(&["pressure/center", "pressure/reduce", "pressure/verify"]),
 ];

@@ -3,6 +3,7 @@
 
 pub mod flip;
 pub mod pbf;
+pub mod variants;
 
 use swell::gpu::adapter::Spoil;
 

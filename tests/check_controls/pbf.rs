@@ -225,3 +225,47 @@ pub const PBF: &[Control] = &[
     )
     .and(&["pbf/build_neighbors"]),
 ];
+
+/// Faults that show only where a chunk is not the first.
+pub const CHUNKED: &[Control] = &[
+    control(
+        "pbf/build_neighbors",
+        "i - phase.first",
+        "i - phase.first / 2u",
+        "pbf/build_neighbors",
+        &["wrong members of a list"],
+    )
+    .and(&["pbf/compute_lambda", "pbf/compute_delta"]),
+    control(
+        "pbf/compute_lambda",
+        "i - phase.first",
+        "i - phase.first / 2u",
+        "pbf/compute_lambda",
+        &["lambda"],
+    ),
+    control(
+        "pbf/compute_delta",
+        "i - phase.first",
+        "i - phase.first / 2u",
+        "pbf/compute_delta",
+        &["corrected position"],
+    ),
+];
+
+/// Faults of the search that takes the place of lists.
+pub const SEARCHED: &[Control] = &[
+    control(
+        "pbf/compute_lambda",
+        "if j != i {",
+        "if j != i + 1u {",
+        "pbf/compute_lambda",
+        &["lambda"],
+    ),
+    control(
+        "pbf/compute_delta",
+        "let low = max(centre - 1, vec3i(0));",
+        "let low = max(centre, vec3i(0));",
+        "pbf/compute_delta",
+        &["corrected position"],
+    ),
+];

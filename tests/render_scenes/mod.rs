@@ -87,6 +87,7 @@ pub(crate) fn city_scene() -> RenderScene {
         }
     }
     RenderScene {
+        origin: DVec3::ZERO,
         domain: Bounds {
             min: DVec3::ZERO,
             max: DVec3::new(25.0, 12.6, 15.0),

@@ -53,7 +53,7 @@ const BOX: &str = "v 0.3 0.5 0.5\nv 0.7 0.5 0.5\nv 0.7 1.0 0.5\nv 0.3 1.0 0.5\n\
     v 0.3 0.5 0.9\nv 0.7 0.5 0.9\nv 0.7 1.0 0.9\nv 0.3 1.0 0.9\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
 
-const LOOK: &str = r#"
+pub const LOOK: &str = r#"
 [camera]
 focal_length_mm = 35.0
 film_back_mm = [36.0, 20.25]
@@ -93,17 +93,28 @@ pub struct Job {
 
 impl Job {
     pub fn new() -> Self {
-        let folder = TempDir::new().unwrap();
-        fs::write(folder.path().join("small.toml"), SCENE).unwrap();
-        fs::write(folder.path().join("box.obj"), BOX).unwrap();
-        fs::write(folder.path().join("look.toml"), LOOK).unwrap();
-        fs::write(folder.path().join("study.toml"), STUDY).unwrap();
-        fs::write(
-            folder.path().join("wide.toml"),
-            LOOK.replace("35.0", "24.0"),
-        )
-        .unwrap();
-        Self { folder }
+        Self::of(&[
+            ("small.toml", SCENE),
+            ("box.obj", BOX),
+            ("look.toml", LOOK),
+            ("study.toml", STUDY),
+            ("wide.toml", &LOOK.replace("35.0", "24.0")),
+        ])
+    }
+
+    /// A folder with these files, each a name and a text.
+    pub fn of(files: &[(&str, &str)]) -> Self {
+        let job = Self {
+            folder: TempDir::new().unwrap(),
+        };
+        for (name, text) in files {
+            job.write(name, text);
+        }
+        job
+    }
+
+    pub fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).unwrap();
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
@@ -128,15 +139,28 @@ impl Job {
         self.command(words).output().unwrap()
     }
 
-    /// Runs and expects an exit code; gives what was said on standard error.
+    /// Runs and expects an exit code; gives what was said, standard output first.
     pub fn expect(&self, code: i32, words: &str) -> String {
         let output = self.run(words);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let said = [output.stdout, output.stderr].concat();
+        let said = String::from_utf8_lossy(&said).into_owned();
         assert_eq!(output.status.code(), Some(code), "swell {words}: {said}");
         said
     }
 
+    /// The same with `--json`.
+    pub fn json(&self, code: i32, words: &str) -> serde_json::Value {
+        serde_json::from_str(&self.expect(code, &format!("{words} --json"))).unwrap()
+    }
+
     pub fn hash(&self, cache: &str) -> String {
         directory_hash(&self.path(cache)).unwrap()
+    }
+}
+
+/// That all of `words` stand in what was said.
+pub fn assert_has(said: &str, words: &[&str]) {
+    for word in words {
+        assert!(said.contains(word), "no {word:?} in: {said}");
     }
 }

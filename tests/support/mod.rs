@@ -34,6 +34,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
             frames: 10,
             frames_per_second: 100.0,
         },
+        origin: DVec3::ZERO,
         domain: Bounds {
             min: DVec3::ZERO,
             max: DVec3::from_array(size),
@@ -183,7 +184,6 @@ pub fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
             file: "box.obj".into(),
             file_hash: String::new(),
             placement: Placement::default(),
-            world_from_file: Default::default(),
             mesh: box_mesh(bounds),
         },
         direction,

@@ -11,6 +11,8 @@ mod value;
 
 use std::io::{self, Write};
 
+use glam::DVec3;
+
 use super::frame::{Stamp, Written};
 use crate::domain::sparse_grid::{Precision, SparseGrid};
 use value::Value;
@@ -36,6 +38,20 @@ pub struct Grids {
     pub surface: Option<SparseGrid<f32>>,
     /// Staggered `vel`, m/s.
     pub velocity: Option<SparseGrid<[f32; 3]>>,
+}
+
+impl Grids {
+    /// The grids moved by `way`, metres.
+    #[must_use]
+    pub fn moved(mut self, way: DVec3) -> Self {
+        if let Some(grid) = &mut self.surface {
+            grid.origin += way;
+        }
+        if let Some(grid) = &mut self.velocity {
+            grid.origin += way;
+        }
+        self
+    }
 }
 
 /// Writes one file.

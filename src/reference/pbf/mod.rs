@@ -11,4 +11,4 @@ pub mod passes;
 mod solver;
 
 pub use model::{Colour, Model, Substep};
-pub use solver::{Pbf, Sorted, iterate, local};
+pub use solver::{Pbf, Sorted, Visit, iterate, iterate_among, local};

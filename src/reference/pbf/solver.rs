@@ -105,10 +105,21 @@ struct Corrector<'a> {
     density: Vec<f64>,
     /// Positions of one iteration before, for a semi-iteration.
     before: Vec<DVec3>,
+    visit: &'a mut Visit<'a>,
 }
 
+/// Whom a pass visits from these points; `None` for whom the one before did.
+pub type Visit<'a> = dyn FnMut(&[DVec3]) -> Option<Neighbors> + 'a;
+
 impl Corrector<'_> {
+    fn look_about(&mut self) {
+        if let Some(neighbors) = (self.visit)(&self.sorted.points) {
+            self.sorted.neighbors = neighbors;
+        }
+    }
+
     fn lambda(&mut self, colour: Colour) {
+        self.look_about();
         let inputs = self.sorted.inputs(self.model, self.substep);
         self.timings.time("pbf/compute_lambda", || {
             passes::compute_lambda(inputs, colour, &mut self.lambda, &mut self.density);
@@ -117,6 +128,7 @@ impl Corrector<'_> {
 
     /// `factor` is that of a semi-iteration.
     fn delta(&mut self, colour: Colour, factor: Option<f64>) {
+        self.look_about();
         let inputs = self.sorted.inputs(self.model, self.substep);
         let before = &self.before[..];
         let momentum = factor.map(|factor| Momentum { factor, before });
@@ -143,6 +155,17 @@ pub fn iterate(
     sorted: &mut Sorted,
     timings: &mut Timings,
 ) -> u32 {
+    iterate_among(model, substep, sorted, timings, &mut |_| None)
+}
+
+/// The same, where whom a pass visits may change from pass to pass.
+pub fn iterate_among<'a>(
+    model: &'a Model,
+    substep: &'a Substep,
+    sorted: &'a mut Sorted,
+    timings: &'a mut Timings,
+    visit: &'a mut Visit<'a>,
+) -> u32 {
     let n = sorted.order.len();
     let settings = &model.settings;
     let mut factors = chebyshev_factors(settings.spectral_radius);
@@ -154,6 +177,7 @@ pub fn iterate(
         before: sorted.particles().to_vec(),
         sorted,
         timings,
+        visit,
     };
     let most = settings.stop.most_iterations();
     for k in 0..most {

@@ -20,7 +20,7 @@ impl Renderer {
                 values.extend(read::<[f32; 10]>(&self.context, buffer, bytes)?);
             }
         }
-        let origin = self.scene.domain.min;
+        let origin = self.scene.origin + self.scene.domain.min;
         let seen = |v: &[f32; 10]| v[0] < 0.1 * FAR;
         let wants = |aov| self.look.wants(aov);
         Ok(Aovs {

@@ -94,7 +94,7 @@ impl Renderer {
     pub fn render(&mut self, frame: u32, particles: &Particles) -> Result<Image, RenderError> {
         let count = self.load(frame, particles)?;
         let setting = Setting {
-            origin: self.scene.domain.min,
+            origin: self.scene.origin + self.scene.domain.min,
             size: self.extent.size,
             margin: self.extent.margin,
             particle_count: count,

@@ -10,8 +10,11 @@ use std::{
     time::Instant,
 };
 
+use glam::{DVec3, Vec4};
+
 use crate::{
-    cache::{self, CacheError, CacheReader},
+    cache::{CacheError, CacheReader},
+    compare::check::Pair,
     domain::{frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError},
     gpu::adapter::{Context, GpuError},
     scene::{Method, Scene, SceneError},
@@ -96,6 +99,9 @@ pub enum CheckError {
     /// The solver.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// A comparison of nothing is none that held.
+    #[error("nothing was compared: there is no water in it")]
+    NoWater,
 }
 
 impl From<&CheckError> for Blame {
@@ -106,13 +112,9 @@ impl From<&CheckError> for Blame {
             CheckError::Solid(error) => error.into(),
             CheckError::Gpu(error) => error.into(),
             CheckError::Solve(error) => error.into(),
+            CheckError::NoWater => Self::Input,
         }
     }
-}
-
-/// Whether there is a cache in `directory`, and not a scene file.
-pub fn is_cache(directory: &std::path::Path) -> bool {
-    directory.is_dir() || cache::exists(directory)
 }
 
 /// Checks the step after each frame; `stop` ends it after the current one.
@@ -157,6 +159,9 @@ pub fn check(
         outcome.frames.push(frame);
         outcome.table.absorb(table);
     }
+    if outcome.table.rows.is_empty() && !outcome.interrupted {
+        return Err(CheckError::NoWater);
+    }
     Ok(outcome)
 }
 
@@ -197,5 +202,27 @@ pub fn check_frame(
     match scene.solver.method {
         Method::Pbf => pbf::check(context, scene, plan, boundaries, frame, particles),
         Method::Flip => flip::check(context, scene, plan, &start.boundary, frame, particles),
+    }
+}
+
+fn wide(value: &[f32; 4]) -> DVec3 {
+    Vec4::from_array(*value).as_dvec4().truncate()
+}
+
+fn pair(index: usize, value: DVec3, reference: DVec3, tolerance: f64) -> Pair<[f64; 3]> {
+    Pair {
+        index,
+        value: value.to_array(),
+        reference: reference.to_array(),
+        tolerance,
+    }
+}
+
+fn pair_of(index: usize, value: f64, reference: f64, tolerance: f64) -> Pair<f64> {
+    Pair {
+        index,
+        value,
+        reference,
+        tolerance,
     }
 }

@@ -19,6 +19,7 @@ fields! {
     FLUX = "flip/cut_cells", "flux of solids", "m/s",
         "the open fractions' tolerance times the walls' speed, 6 faces; and so for solids";
     VOLUME = "flip/cut_cells", "open volume", "", "as the open fraction";
+    CLOSED = "flip/cut_cells", "velocity of closed faces", "m/s", "a solid's: 2 u; a tie where another turns out to be nearest";
     OLD = "flip/gather_faces", "velocity at faces", "m/s",
         "12 u N (particles about) / (their weight), at most 1, of the range of their velocities, + u (particles + 20) |v|";
     NEW = "flip/gather_faces", "velocity with gravity", "m/s", "the same + 2 u g Δt";
@@ -31,6 +32,29 @@ fields! {
     DIRICHLET = "pressure/build_system", "what air adds to the diagonal", "", "16 u of each quotient, 6 sums: 24 u";
     COEFFICIENT = "pressure/build_system", "coefficients", "", "copies: equal";
     ROWS = "pressure/build_system", "rows", "", "equal";
+    INVERSE = "pressure/build_system", "inverse diagonal", "", "what air adds 24 u, 6 sums, a quotient: 36 u";
+    COARSE_COEFFICIENT = "pressure/coarsen", "coefficients", "", "a sum of four: 3 u";
+    COARSE_AIR = "pressure/coarsen", "what air adds to the diagonal", "", "a sum of eight: 8 u";
+    COARSE_KIND = "pressure/coarsen", "kind of block", "", "equal";
+    LABELS = "pressure/count_pockets", "labels of water that no air touches", "", "the least place of each: equal";
+    POCKETS = "pressure/count_pockets", "pockets", "", "equal";
+    CENTERED = "pressure/center", "values less their mean", "", "the mean u (cells / 256 + 14) of the mean magnitude, + u";
+    SCALARS = "pressure/reduce", "sums and what follows", "", "u (bricks / 256 + 60) of the sum of magnitudes, quotients 4 u";
+    DECIDED = "pressure/reduce", "state, iterations, restarts", "", "equal; a tie where the sum is that near to its target";
+    PRECONDITIONED = "pressure/precondition", "correction", "", "a product: u; without the diagonal a copy";
+    IPP_LOWER = "pressure/ipp_lower", "first half", "", "3 products, 4 sums: 9 u of the sum of magnitudes";
+    IPP_UPPER = "pressure/ipp_upper", "correction", "", "likewise";
+    SMOOTHED_FIRST = "pressure/smooth_first", "correction", "",
+        "each block solved with 40 u (|A| |z| + |b|) on its right-hand side (Higham 2002, theorem 9.3); a tie where a pivot is \
+         below 2e-5 of its diagonal";
+    SMOOTHED = "pressure/smooth", "correction", "", "likewise";
+    SMOOTHED_CORRECTED = "pressure/smooth_corrected", "correction", "", "likewise";
+    RESTRICTED = "pressure/restrict", "residual of the coarser level", "", "products and 6 sums: 8 u of half the sum of magnitudes";
+    DIRECTED = "pressure/direction", "direction", "", "2 u (|z| + |β p|)";
+    ADVANCED_SOLUTION = "pressure/advance", "solution, both words", "",
+        "u of the lesser word, and 4 u of what the greater one rounds off and of α p beyond its factors' leading 12 bits, 2⁻⁹";
+    ADVANCED_RESIDUAL = "pressure/advance", "residual", "", "2 u (|r| + |α A p|)";
+    VERIFIED_RESIDUAL = "pressure/verify", "residual", "", "12 u Σ c |x − x'| of both words, + 2 u of each difference";
     RHS = "pressure/divergence", "right-hand side", "m/s", "7 products and sums: 10 u Σ|f u|";
     BEFORE = "pressure/divergence", "largest divergence", "1/s", "10 u of the largest Σ|f u| over Δx";
     PRODUCT = "pressure/multiply", "system times direction", "m/s", "by differences: 12 u Σ c |x − x'|";
@@ -52,7 +76,7 @@ fields! {
     MOVED = "flip/advect", "position", "m",
         "what the twin answers when its start moves along each axis by u (8 |x| + 30 Δt |v|), with solids 7 u of the distance \
          to the grid's origin more, + u |x|";
-    ADVECTED = "flip/advect", "velocity", "m/s", "what the twin answers likewise, + 8 u |v|";
+    ADVECTED = "flip/advect", "velocity", "m/s", "what the twin answers likewise, + 8 u |v|, with solids of what came in and of theirs too";
     CAPPED = "flip/advect", "particles slowed", "", "equal, but for what the moved starts change";
     MOVED_ID = "flip/advect", "id", "", "a copy: equal";
     RESIDUAL = "whole projection", "‖b − A x‖ / ‖b‖", "", "solver.flip.pressure.tolerance, and what f32 measures it by: 12 u ‖Σ c |x − x'|‖ / ‖b‖";

@@ -98,9 +98,10 @@ impl Checker<'_> {
             true => self.scalars(traced, "open_volume")?,
             false => twin.volume.clone(),
         };
-        let closed = match self.boundary.moving.is_empty() {
-            true => twin.closed_velocity.clone(),
-            false => self.planes(traced, "closed_velocity")?,
+        let has_moving = !self.boundary.moving.is_empty();
+        let closed = match has_moving {
+            false => twin.closed_velocity.clone(),
+            true => self.planes(traced, "closed_velocity")?,
         };
         let base = 8.0 * self.place();
         let wall = step.wall_velocity.map(|v| v.abs().max_element());
@@ -108,6 +109,7 @@ impl Checker<'_> {
         let speed = solid.fold(wall[0].max(wall[1]), f64::max);
         let (mut kinds, mut ties) = (Vec::new(), 0);
         let (mut opens, mut fluxes, mut volumes) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut closings, mut turned) = (Vec::new(), 0);
         for e in self.active() {
             let is_tie = others.iter().any(|other| other.kind[e] != twin.kind[e]);
             if is_tie {
@@ -124,6 +126,14 @@ impl Checker<'_> {
             let through = moved(&|other| (other.solid_flux[e] - twin.solid_flux[e]).abs());
             let tolerance = 6.0 * base * speed + through;
             fluxes.push(pair_of(e, flux[e], twin.solid_flux[e], tolerance));
+            if has_moving {
+                let exact = twin.closed_velocity[e];
+                if others.iter().any(|other| other.closed_velocity[e] != exact) {
+                    turned += 1;
+                } else {
+                    closings.push(pair(e, closed[e], exact, 2.0 * U * exact.length()));
+                }
+            }
             if has_solids {
                 let tolerance = moved(&|other| (other.volume[e] - twin.volume[e]).abs());
                 volumes.push(pair_of(e, volume[e], twin.volume[e], tolerance));
@@ -141,6 +151,9 @@ impl Checker<'_> {
         self.table.add(&FLUX, &fluxes, 0);
         if has_solids {
             self.table.add(&VOLUME, &volumes, 0);
+        }
+        if has_moving {
+            self.table.add(&CLOSED, &closings, turned);
         }
         self.room = Some(room);
         Ok(())

@@ -113,6 +113,10 @@ impl Checker<'_> {
         let twin = go(start);
         let fastest = faces.iter().map(|v| v.length()).fold(0.0, f64::max);
         let among_solids = self.distance_error();
+        // What is left of a velocity that a solid stops has the rounding of the two that were subtracted.
+        let among = f64::from(u8::from(!step.solids.is_empty()));
+        let solids = step.solids.iter().map(|s| s.velocity.length());
+        let solids = solids.fold(0.0, f64::max);
         let reach =
             |x: &DVec3| U * (8.0 * x.length() + 30.0 * step.length * fastest) + among_solids;
         let mut answers: Vec<Moved> = Vec::new();
@@ -134,7 +138,9 @@ impl Checker<'_> {
         for i in 0..self.n {
             let (x, v) = (twin.position[i], twin.velocity[i]);
             let of_x = answer(&|moved| moved.position[i].distance(x)) + U * x.length();
-            let of_v = answer(&|moved| moved.velocity[i].distance(v)) + 8.0 * U * v.length();
+            let speeds_in = given.velocity[i].length() + solids;
+            let of_v = answer(&|moved| moved.velocity[i].distance(v))
+                + 8.0 * U * (v.length() + among * speeds_in);
             places.push(pair(i, position[i], x, of_x));
             speeds.push(pair(i, velocity[i], v, of_v));
         }

@@ -14,7 +14,7 @@ use crate::{
         flip::{Centers, Room, Waters, density_source},
         poisson::{BUDGET, Solver, gradients::norm},
     },
-    scene::flip::Surface,
+    scene::flip::{Preconditioner, Surface},
     solve::{
         SolveError,
         pressure::{CORRECTION_TOLERANCE, PressureControl},
@@ -25,20 +25,20 @@ use crate::{
 /// `state` of a solve that has ended, as in shared/pressure_control.wgsl.
 const DONE: u32 = 2;
 
-/// Runs of pressure/multiply that are compared: each is as good as any.
-const PRODUCTS: usize = 3;
+/// Runs of an iteration's pass that are compared: each is as good as any.
+pub(super) const PRODUCTS: usize = 3;
 
 /// Inverse iterations for the least eigenvalue.
 const EIGEN_STEPS: usize = 8;
 
 /// The device's own system.
 pub(super) struct Built {
-    system: System,
+    pub(super) system: System,
     centers: Centers,
 }
 
 /// Where an element stands in the pressure's own arrays: by block of 2³ cells.
-fn blocked(element: u32) -> usize {
+pub(super) fn blocked(element: u32) -> usize {
     let (slot, local) = (element / CELLS, element % CELLS);
     let [x, y, z] = [local % 8, local / 8 % 8, local / 64];
     let cell = x % 2 + 2 * (y % 2) + 4 * (z % 2);
@@ -66,7 +66,7 @@ fn flow(bricks: &Bricks, room: &Room, system: &System, velocity: &[DVec3]) -> Ve
 }
 
 /// Σ c |x − x'| and what air takes, of each row.
-fn differences(system: &System, x: &[f64]) -> Vec<f64> {
+pub(super) fn differences(system: &System, x: &[f64]) -> Vec<f64> {
     (0..x.len())
         .map(|i| {
             let shared = system.neighbor[i].iter().zip(&system.coefficient[i]);
@@ -93,6 +93,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 impl Checker<'_> {
     pub(super) fn pressure(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        self.iterate(traced)?;
         match (traced.moment, traced.pass) {
             (Moment::After, "pressure/build_system") => self.build_system(traced),
             (Moment::After, "pressure/divergence") => self.divergence(traced),
@@ -116,19 +117,19 @@ impl Checker<'_> {
         Waters::new(&self.model, bricks, self.room(), &built.centers)
     }
 
-    fn built(&self) -> &Built {
+    pub(super) fn built(&self) -> &Built {
         self.system.as_ref().expect("after pressure/build_system")
     }
 
     /// An array of the pressure's own, by row.
-    fn by_row(&self, traced: Traced<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
+    pub(super) fn by_row(&self, traced: Traced<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
         let values = self.cells::<f32>(traced, name)?;
         let rows = self.built().system.cell.iter();
         Ok(rows.map(|&e| f64::from(values[blocked(e)])).collect())
     }
 
     /// The two words of the solution, by row.
-    fn words(&self, traced: Traced<'_>) -> Result<[Vec<f64>; 2], SolveError> {
+    pub(super) fn words(&self, traced: Traced<'_>) -> Result<[Vec<f64>; 2], SolveError> {
         let Layout { cells, stride, .. } = *self.layout();
         let values = traced.read::<f32>("pressure_solution", stride + cells)?;
         let word = |first: usize| {
@@ -178,7 +179,13 @@ impl Checker<'_> {
         for (row, &element) in system.cell.iter().enumerate() {
             row_of[element as usize] = row as u32;
         }
-        let (mut airs, mut shared) = (Vec::new(), Vec::new());
+        let inverse = match settings.pressure.preconditioner {
+            Preconditioner::Jacobi | Preconditioner::Ipp => {
+                traced.read::<f32>("pressure_inverse_diagonal", *cells)?
+            }
+            Preconditioner::None | Preconditioner::Multigrid => Vec::new(),
+        };
+        let (mut airs, mut shared, mut inverses) = (Vec::new(), Vec::new(), Vec::new());
         let (mut rows, mut expected) = (Vec::new(), Vec::new());
         for element in wet {
             let e = element as usize;
@@ -197,6 +204,10 @@ impl Checker<'_> {
                 exact,
                 24.0 * U * exact,
             ));
+            if let Some(&found) = inverse.get(place) {
+                let exact = 1.0 / system.diagonal[row];
+                inverses.push(pair_of(e, f64::from(found), exact, 36.0 * U * exact));
+            }
             let lower = |values: &dyn Fn(usize) -> f64| DVec3::new(values(0), values(1), values(2));
             let found = lower(&|axis| f64::from(coefficient[axis * stride + place]));
             let twin = lower(&|axis| system.coefficient[row][2 * axis]);
@@ -205,6 +216,9 @@ impl Checker<'_> {
         self.table.add(&DIRICHLET, &airs, 0);
         self.table.add(&COEFFICIENT, &shared, 0);
         self.table.add_exact(&ROWS, &rows, &expected);
+        if !inverse.is_empty() {
+            self.table.add(&INVERSE, &inverses, 0);
+        }
         self.system = Some(Built { system, centers });
         Ok(())
     }

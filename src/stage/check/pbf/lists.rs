@@ -23,6 +23,8 @@ pub(super) struct Lists {
     /// More neighbours than a list holds: searched for in each pass.
     is_searched: Vec<bool>,
     all: Option<Arc<Neighbors>>,
+    /// Where the device's cells begin.
+    start: Vec<u32>,
 }
 
 impl Lists {
@@ -32,6 +34,7 @@ impl Lists {
             members: vec![Vec::new(); n],
             is_searched: vec![!plan.has_lists; n],
             all: None,
+            start: Vec::new(),
         }
     }
 }
@@ -76,25 +79,6 @@ impl Checker<'_> {
         })
     }
 
-    /// Whom the iteration from `points` on visits: lists hold who is near at the start, and who is searched for sees
-    /// all of the cells about it, whoever comes near later.
-    pub(super) fn visited_from(&self, points: &[DVec3]) -> Neighbors {
-        let near = self.search(points);
-        let is_searched = &self.lists.is_searched;
-        if !is_searched.contains(&true) {
-            return near;
-        }
-        // A search looks no further than the 27 cells about.
-        let all = self.search_within(points, 4.0 * self.model.calibration.support_radius);
-        Neighbors::listed(self.n(), |i, members| {
-            let (fluid, solid) = if is_searched[i] { &all } else { &near }.of(i);
-            [fluid, solid].map(|group| {
-                members.extend(group);
-                members.len() as u32
-            })
-        })
-    }
-
     /// Whom a pass visits from `points`: the list, or the cells about where there is none.
     pub(super) fn visited(
         &mut self,
@@ -104,21 +88,35 @@ impl Checker<'_> {
         if let Some(all) = &self.lists.all {
             return Ok(Arc::clone(all));
         }
-        let n = self.n();
-        let cells = &self.model.cells;
-        let lists = &self.lists;
-        if !lists.is_searched.contains(&true) {
-            let all = Neighbors::listed(n, |i, members| split(&lists.members[i], n, members));
+        if !self.is_searching() {
+            let (n, lists) = (self.n(), &self.lists.members);
+            let all = Neighbors::listed(n, |i, members| split(&lists[i], n, members));
             let all = Arc::new(all);
             self.lists.all = Some(Arc::clone(&all));
             return Ok(all);
         }
-        let count: usize = cells.dims.iter().product();
-        let start = traced.read::<u32>("cell_start", count + 1)?;
+        if self.lists.start.is_empty() {
+            let count: usize = self.model.cells.dims.iter().product();
+            self.lists.start = traced.read("cell_start", count + 1)?;
+        }
+        Ok(Arc::new(self.searched(points)))
+    }
+
+    /// Whether there are particles without a list.
+    pub(super) fn is_searching(&self) -> bool {
+        self.lists.is_searched.contains(&true)
+    }
+
+    /// Whom a pass visits from `points` where some have no list: who was sorted into the cells about where a particle
+    /// is now. Two that come near each other from cells farther apart do not see each other.
+    pub(super) fn searched(&self, points: &[DVec3]) -> Neighbors {
+        let n = self.n();
+        let (cells, lists) = (&self.model.cells, &self.lists);
+        let start = &lists.start;
         let solid_start = cells.starts(&self.model.samples);
         let [nx, ny, nz] = cells.dims;
         let h2 = self.model.calibration.support_radius.powi(2);
-        let found = Neighbors::listed(n, |i, members| {
+        Neighbors::listed(n, |i, members| {
             if !lists.is_searched[i] {
                 return split(&lists.members[i], n, members);
             }
@@ -138,8 +136,7 @@ impl Checker<'_> {
             }
             near.sort_unstable();
             split(&near, n, members)
-        });
-        Ok(Arc::new(found))
+        })
     }
 
     pub(super) fn build_neighbors(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {

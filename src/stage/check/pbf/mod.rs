@@ -8,14 +8,11 @@ mod whole;
 
 use std::collections::BTreeMap;
 
-use glam::{DVec3, Vec4};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    compare::{
-        check::{Pair, Table},
-        rounding::U,
-    },
+    compare::{check::Table, rounding::U},
     domain::{boundary::Boundary, particles::Particles, solver::Solver},
     gpu::{adapter::Context, recording::Moment},
     reference::{
@@ -29,7 +26,11 @@ use crate::{
     solve::{SolveError, params::Phase, pbf::Pbf, trace::Traced},
 };
 
-use super::sort::{SortCheck, check_slots};
+use super::{
+    pair, pair_of,
+    sort::{SortCheck, check_slots},
+    wide,
+};
 use bounds::Bounds;
 use fields::*;
 use lists::Lists;
@@ -360,7 +361,7 @@ impl<'a> Checker<'a> {
         let (points, before) = self.stored(&phase);
         let neighbors = self.visited(traced, &points)?;
         if !self.whole.has_start() {
-            let near = self.visited_from(&points);
+            let near = self.search(&points);
             self.whole.start(&points, n, near);
         }
         let after = traced.read::<[f32; 4]>("predicted", 2 * n)?;
@@ -564,26 +565,4 @@ impl<'a> Checker<'a> {
 fn handled(phase: &Phase) -> Vec<usize> {
     let particle = |thread| phase.first + thread * phase.stride + phase.colour;
     (0..phase.count).map(|k| particle(k) as usize).collect()
-}
-
-fn wide(value: &[f32; 4]) -> DVec3 {
-    Vec4::from_array(*value).as_dvec4().truncate()
-}
-
-fn pair(index: usize, value: DVec3, reference: DVec3, tolerance: f64) -> Pair<[f64; 3]> {
-    Pair {
-        index,
-        value: value.to_array(),
-        reference: reference.to_array(),
-        tolerance,
-    }
-}
-
-fn pair_of(index: usize, value: f64, reference: f64, tolerance: f64) -> Pair<f64> {
-    Pair {
-        index,
-        value,
-        reference,
-        tolerance,
-    }
 }

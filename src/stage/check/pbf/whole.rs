@@ -8,7 +8,7 @@ use crate::{
     reference::{
         Timings,
         neighbors::Neighbors,
-        pbf::{Colour, Model, Sorted, iterate, passes},
+        pbf::{Colour, Model, Sorted, iterate_among, passes},
     },
 };
 
@@ -64,7 +64,8 @@ impl Checker<'_> {
                 *x += shift * signs(k);
             }
             let timings = &mut Timings::default();
-            let iterations = iterate(&model, &self.substep, &mut moved, timings);
+            let mut visit = |points: &[DVec3]| self.is_searching().then(|| self.searched(points));
+            let iterations = iterate_among(&model, &self.substep, &mut moved, timings, &mut visit);
             (moved.points, iterations)
         };
         let diagonal = self.scene.domain.size().length();

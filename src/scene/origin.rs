@@ -1,0 +1,99 @@
+//! Scenes far from the world's origin, where 32 bits no longer tell particles apart.
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use super::{PlacedMesh, Scene, probe::ProbeKind};
+use crate::domain::bounds::Bounds;
+
+/// A domain that lies within this many of its own edge lengths of the world's origin keeps the world's coordinates.
+const NEAR: f64 = 4.0;
+
+/// Where a scene with this domain has its own zero in the world, metres, along each axis.
+///
+/// Zero unless the domain is far off. Otherwise the domain begins one to two powers of two past it, q being the largest
+/// power of two within the edge: local coordinates lie in [q, 4 q], so an f32 there is finer than 2⁻²² of the edge and a
+/// multiple of 2⁻²³ q, and the sum with the origin is exact in f64 up to 2²⁹ edges off.
+pub(super) fn of(domain: &Bounds) -> DVec3 {
+    let [min, max] = [domain.min, domain.max].map(|p| p.to_array());
+    DVec3::from_array(std::array::from_fn(|axis| {
+        let edge = max[axis] - min[axis];
+        if min[axis].abs().max(max[axis].abs()) <= NEAR * edge {
+            return 0.0;
+        }
+        let quantum = edge.log2().floor().exp2();
+        ((min[axis] / quantum).floor() - 1.0) * quantum
+    }))
+}
+
+impl Bounds {
+    /// This box moved by `way`, metres.
+    pub(super) fn moved(&self, way: DVec3) -> Self {
+        Self {
+            min: self.min + way,
+            max: self.max + way,
+        }
+    }
+}
+
+impl Scene {
+    /// From world coordinates to those about `self.origin`.
+    pub(super) fn into_local(mut self) -> Self {
+        let way = -self.origin;
+        if way == DVec3::ZERO {
+            return self;
+        }
+        self.domain = self.domain.moved(way);
+        for block in &mut self.water.blocks {
+            *block = block.moved(way);
+        }
+        let placed = self.water.meshes.iter_mut().chain(&mut self.solids);
+        let moving = self.moving_solids.iter_mut().map(|solid| &mut solid.placed);
+        placed.chain(moving).for_each(|mesh| carry(mesh, way));
+        for probe in &mut self.probes {
+            match &mut probe.kind {
+                ProbeKind::Elevation { at } => *at += DVec2::new(way.x, way.z),
+                ProbeKind::Pressure { at } => *at += way,
+                ProbeKind::Energy | ProbeKind::Volume => {}
+            }
+        }
+        self
+    }
+}
+
+fn carry(placed: &mut PlacedMesh, way: DVec3) {
+    placed.mesh = placed.mesh.transformed(&DAffine3::from_translation(way));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn far_domains_begin_near_their_own_zero() {
+        for (min, max, origin) in [
+            // Near: as they are.
+            (0.0, 25.0, 0.0),
+            (-2.0, 2.0, 0.0),
+            (6.0, 8.0, 0.0),
+            // Far: 8 within 12.6, 2 within 2, a quarter within 0.3.
+            (10_000.0, 10_012.6, 9_992.0),
+            (-10_002.0, -10_000.0, -10_004.0),
+            (1.3, 1.6, 1.0),
+        ] {
+            let found = of(&Bounds {
+                min: DVec3::splat(min),
+                max: DVec3::splat(max),
+            });
+            assert_eq!(found, DVec3::splat(origin), "{min} to {max}");
+            if origin != 0.0 {
+                let edge: f64 = max - min;
+                let quantum = edge.log2().floor().exp2();
+                let local = [min - origin, max - origin];
+                assert!(
+                    local[0] >= quantum && local[1] <= 4.0 * quantum,
+                    "{local:?}"
+                );
+            }
+        }
+    }
+}
