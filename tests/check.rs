@@ -5,10 +5,13 @@ mod check_controls;
 mod support;
 
 use swell::{
-    domain::{particles::Particles, sampling::BoundarySample, signed_distance::SignedDistance},
+    domain::{
+        motion::Motion, particles::Particles, sampling::BoundarySample,
+        signed_distance::SignedDistance,
+    },
     gpu::adapter::{Context, Spoil},
     scene::{
-        Effects, Iteration, Method, Scene, Stop,
+        Effects, Iteration, Method, Scene, Stop, Wall, WaveMaker,
         effects::{viscosity, vorticity_confinement},
         flip::{Preconditioner, Pressure, Surface, Transfer},
         plan::DeviceLimits,
@@ -22,8 +25,8 @@ use swell::{
 
 use check_controls::{
     Control, control,
-    flip::FLIP,
-    pbf::{CHUNKED, PBF, SEARCHED},
+    flip::{FLIP, FLIP_WALLS},
+    pbf::{CHUNKED, PBF, PBF_WALLS, SEARCHED},
     variants::{VARIANTS, Variant},
 };
 use glam::DVec3;
@@ -71,7 +74,6 @@ fn case(method: Method) -> (Scene, Start) {
             preconditioner: Preconditioner::Multigrid,
             tolerance: 1e-5,
             max_iterations: 40,
-            residual_limit: 1e9,
         },
     });
     scene.effects = Effects {
@@ -337,6 +339,41 @@ fn pbf_lists_in_chunks_and_none() {
         all += &faults(&context, &checked, controls).1;
     }
     assert!(all.is_empty(), "{all}");
+}
+
+/// The same water between walls that close in: what they do on it.
+#[test]
+fn work_of_moving_walls_is_within_tolerance_and_fails_where_it_should() {
+    let context = context();
+    for (method, still, walls) in [
+        (Method::Pbf, PBF, PBF_WALLS),
+        (Method::Flip, FLIP, FLIP_WALLS),
+    ] {
+        let (mut scene, start) = case(method);
+        for (index, velocity) in [(0, 2.0), (5, 0.7)] {
+            scene.wave_makers.push(WaveMaker {
+                wall: Wall::NAMED[index].1,
+                motion: Motion::ConstantVelocity {
+                    velocity,
+                    until: None,
+                },
+            });
+        }
+        let elsewhere: Vec<&str> = still.iter().map(|control| control.pass).collect();
+        let others = [
+            "upload of solids",
+            "sort/scan_blocks",
+            "sort/add_block_sums",
+        ];
+        let others = [&elsewhere[..], &others, &["sort/place", "sort/stabilize"]].concat();
+        hold(&context, &scene, &start, walls, &others);
+        let clean = run(&context, &scene, &start);
+        let work = clean
+            .rows
+            .iter()
+            .find(|row| row.field.name == "shares of the work");
+        assert!(work.is_some_and(|row| row.values > 0), "{}", lines(&clean));
+    }
 }
 
 /// A fault that no longer fits its shader is an error, and not a control that passes.

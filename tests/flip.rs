@@ -382,7 +382,7 @@ fn fast_water_takes_substeps_or_is_refused() {
     particles.velocity[77] = [f32::NAN, 0.0, 0.0];
     solver.load(0, &particles).unwrap();
     let error = solver.advance().unwrap_err().to_string();
-    assert!(error.contains("1 particles are not finite"), "{error}");
+    assert!(error.contains("1 values that are not finite"), "{error}");
 }
 
 #[test]
@@ -494,7 +494,7 @@ fn a_missed_projection_is_told_and_past_its_limit_stops() {
     jitter(&mut particles, 0.01);
     flip(&mut scene).pressure.preconditioner = Preconditioner::Jacobi;
     flip(&mut scene).pressure.max_iterations = 3;
-    flip(&mut scene).pressure.residual_limit = 1e3;
+    scene.budget.residual = Some(1e3);
     let (_, report) = run(&context, &scene, &particles, 1);
     let projection = report.projection.unwrap();
     // The projection and the density correction.
@@ -502,13 +502,13 @@ fn a_missed_projection_is_told_and_past_its_limit_stops() {
         projection.missed == 2 && projection.residual > 1e-5,
         "{projection:?}"
     );
-    flip(&mut scene).pressure.residual_limit = 1e-3;
+    scene.budget.residual = Some(1e-3);
     let error = solver(&context, &scene, &particles)
         .advance()
         .unwrap_err()
         .to_string();
     assert!(
-        error.contains("frame 1") && error.contains("residual_limit is 0.001"),
+        error.contains("frame 1") && error.contains("budget.residual is 0.0010"),
         "{error}"
     );
     // Negative control: with iterations enough it goes on.

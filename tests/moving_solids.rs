@@ -45,7 +45,6 @@ fn scene(cells: [f64; 3]) -> Scene {
             preconditioner: Preconditioner::Multigrid,
             tolerance: 1e-5,
             max_iterations: 400,
-            residual_limit: 1e-2,
         },
     });
     scene

@@ -9,6 +9,7 @@ use swell::{
     domain::{
         boundary::Boundary,
         bounds::Bounds,
+        budget::Breach,
         mesh::TriangleMesh,
         motion::Motion,
         particles::Particles,
@@ -543,7 +544,7 @@ fn too_fast_for_its_substeps_is_an_error() {
     let mut solver = solver(&context, &scene, &particles, &Boundary::default());
     let error = solver.advance().unwrap_err();
     assert!(
-        matches!(error, SolveError::Numbers { frame: 1, .. }),
+        matches!(error, SolveError::Numbers(Breach { frame: 1, .. })),
         "{error}"
     );
     assert!(error.to_string().contains("max_substeps"), "{error}");

@@ -102,7 +102,7 @@ fn a_missed_projection_is_told_and_past_its_limit_ends_the_bake() {
     let job = Job::new();
     let one = "--solver flip --set solver.flip.pressure.max_iterations=1 \
                --set solver.flip.pressure.preconditioner=none";
-    let never = "--set solver.flip.pressure.residual_limit=1e9";
+    let never = "--set budget.residual=false";
     let said = job.expect(
         0,
         &format!("bake small.toml -o told {one} {never} --frames 1-2"),

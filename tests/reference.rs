@@ -7,7 +7,10 @@ use std::{fs, path::Path};
 
 use glam::DVec3;
 use swell::{
-    domain::{boundary::Boundary, particles::Particles, solver::Solver, solver::StepReport},
+    domain::{
+        boundary::Boundary, budget::Breach, particles::Particles, solver::Solver,
+        solver::StepReport,
+    },
     reference::{
         ReferenceError, Timings,
         pbf::{
@@ -190,7 +193,7 @@ fn not_a_number_is_an_error() {
     solver.load(0, &start.particles).unwrap();
     let fault = solver.advance().unwrap_err();
     assert!(
-        matches!(fault, ReferenceError::Numbers { frame: 1, .. }),
+        matches!(fault, ReferenceError::Numbers(Breach { frame: 1, .. })),
         "{fault}"
     );
 }
@@ -243,10 +246,7 @@ fn squeezed(count: usize) -> (Scene, Particles) {
 
 fn sorted(scene: &Scene, particles: &Particles) -> (Model, Substep, Sorted) {
     let model = Model::new(scene, &Boundary::default());
-    let substep = Substep {
-        time_step: 0.0,
-        walls: scene.walls(0.0),
-    };
+    let substep = Substep::new(scene, 0.0, 0.0);
     let position = local(scene, particles);
     let sorted = Sorted::new(&model, &position, &particles.id, &mut Timings::default());
     (model, substep, sorted)

@@ -35,7 +35,10 @@ particle_spacing = 0.1
 [solver.flip]
 cell_size = 0.1
 density_correction = false
-pressure = { max_iterations = 1000, residual_limit = 1.0 }
+pressure = { max_iterations = 1000 }
+[budget]
+residual = 1.0
+divergence = false
 "#;
 
 const ITERATIONS: &str = r#"
@@ -225,7 +228,7 @@ fn a_signal_ends_it_and_a_failure_is_listed() {
         [true, false, false, true, false, false]
     );
     assert_eq!(job.column("setting").len(), 6);
-    assert!(job.column("failed")[0].contains("asks for"));
+    assert!(job.column("failed")[0].contains("asked for"));
     assert_eq!(job.column("failed")[1], "");
     let page = job.read("index.html");
     assert!(page.contains("<h2>Failed</h2>"));

@@ -5,6 +5,7 @@
 #import "shared/flip_params.wgsl"
 #import "shared/flip_element.wgsl"
 #import "shared/flip_carried.wgsl"
+#import "shared/finite.wgsl"
 #ifdef SOLIDS
 #import "shared/flip_solid.wgsl"
 #endif
@@ -17,6 +18,7 @@
 @group(0) @binding(6) var<storage, read_write> position: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> velocity: array<vec4f>;
 @group(0) @binding(10) var<storage, read_write> id: array<u32>;
+// 0: particles slowed; 3: values that are not finite, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: array<atomic<u32>>;
 
 fn slot_at(brick: vec3i) -> u32 {
@@ -107,6 +109,9 @@ fn main(
 #ifdef CORRECTION
     way += vec3f(carried[first + 3u], carried[first + 4u], carried[first + 5u]);
 #endif
+    if !is_finite(start + way) {
+        atomicAdd(&counters[3], 1u);
+    }
     let distance = length(way);
     if distance > params.max_displacement {
         way *= params.max_displacement / distance;

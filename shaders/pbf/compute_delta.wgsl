@@ -8,6 +8,9 @@
 #import "shared/confine.wgsl"
 #import "shared/hash.wgsl"
 #import "shared/finite.wgsl"
+#ifdef WALL_WORK
+#import "shared/wall_work.wgsl"
+#endif
 
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
 // 3: values that are not finite, which clamping would hide.
@@ -80,16 +83,27 @@ fn main(
 #ifdef PRESSURE
     lambda_sum[i] += own_lambda;
 #endif
-    if !is_finite(delta) {
+    if !is_finite(current.xyz + delta) {
         atomicAdd(&counters[3], 1u);
     }
+#ifdef WALL_WORK
+    let kept = min(1.0, params.max_correction / max(length(delta), 1e-30));
+    var work = kept * params.relaxation * own_lambda * wall_rate(current.xyz);
+#endif
     delta = bounded(delta);
 #ifdef CHEBYSHEV
     // Wang 2015, eq. 9. What is overwritten here is this particle's position of one iteration before.
     let last = current.xyz - predicted[phase.write + i].xyz;
     if dot(delta, last) > 0.0 {
         delta = bounded(phase.acceleration * delta + (phase.acceleration - 1.0) * last);
+#ifdef WALL_WORK
+        // As if the walls' part of the last step had been that of this one.
+        work *= 2.0 * phase.acceleration - 1.0;
+#endif
     }
 #endif
     predicted[phase.write + i] = vec4f(confine(current.xyz + delta), current.w);
+#ifdef WALL_WORK
+    wall_work[i] += work + work_of_push(wall_push);
+#endif
 }

@@ -5,6 +5,9 @@
 #import "shared/pbf_params.wgsl"
 #import "shared/confine.wgsl"
 #import "shared/finite.wgsl"
+#ifdef WALL_WORK
+#import "shared/wall_work.wgsl"
+#endif
 
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
 @group(0) @binding(10) var<storage, read> position: array<vec4f>;
@@ -29,6 +32,9 @@ fn main(
     v *= min(1.0, params.max_displacement / max(params.time_step * length(v), 1e-30));
     let free = position[thread].xyz + params.time_step * v;
     let x = confine(free);
+#ifdef WALL_WORK
+    wall_work[params.particle_count + thread] = work_of_push(wall_push);
+#endif
     predicted[params.particle_count + thread] = vec4f(x, 0.0);
     velocity[thread] = vec4f(v + (x - free) * params.inverse_time_step, 0.0);
 }

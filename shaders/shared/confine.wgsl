@@ -72,10 +72,19 @@ fn leave_solids(x: vec3f) -> vec3f {
 }
 #endif
 
+#ifdef WALL_WORK
+// What the walls last added to a position.
+var<private> wall_push: vec3f;
+
+#endif
 fn confine(x: vec3f) -> vec3f {
     var y = x;
 #ifdef SOLIDS
     y = leave_solids(y);
 #endif
-    return clamp(y, params.wall_min + params.contact_distance, params.wall_max - params.contact_distance);
+    let kept = clamp(y, params.wall_min + params.contact_distance, params.wall_max - params.contact_distance);
+#ifdef WALL_WORK
+    wall_push = kept - y;
+#endif
+    return kept;
 }

@@ -27,6 +27,11 @@ struct Params {
     // k of s_corr times lambda's natural scale, m²
     artificial_pressure: f32,
     padding: f32,
+    // Of the least faces and of the greatest, m/s.
+    wall_velocity_min: vec3f,
+    padding_min: f32,
+    wall_velocity_max: vec3f,
+    padding_max: f32,
 }
 @group(0) @binding(0) var<uniform> params: Params;
 

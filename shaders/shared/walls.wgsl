@@ -21,6 +21,28 @@ fn wall_slope(q: f32) -> f32 {
     return params.wall_density_scale * 1.5 * s2 * s2 * (1.0 + 4.0 * q) / params.support_radius;
 }
 
+#ifdef WALL_WORK
+// The gradient of what each wall adds to the density times the wall's velocity, 1/s.
+fn wall_rate(x: vec3f) -> f32 {
+    let h = params.support_radius;
+    let low = clamp((x - params.wall_min) / h, vec3f(0.0), vec3f(1.0));
+    let high = clamp((params.wall_max - x) / h, vec3f(0.0), vec3f(1.0));
+    let least = min(low, high);
+    if min(least.x, min(least.y, least.z)) >= 1.0 {
+        return 0.0;
+    }
+    let free = vec3f(
+        (1.0 - wall_fraction(low.x)) * (1.0 - wall_fraction(high.x)),
+        (1.0 - wall_fraction(low.y)) * (1.0 - wall_fraction(high.y)),
+        (1.0 - wall_fraction(low.z)) * (1.0 - wall_fraction(high.z)),
+    );
+    let of_low = vec3f(wall_slope(low.x), wall_slope(low.y), wall_slope(low.z));
+    let of_high = vec3f(wall_slope(high.x), wall_slope(high.y), wall_slope(high.z));
+    let others = vec3f(free.y * free.z, free.x * free.z, free.x * free.y);
+    return dot(others, of_high * params.wall_velocity_max - of_low * params.wall_velocity_min);
+}
+
+#endif
 fn wall_term(x: vec3f) -> WallTerm {
     let h = params.support_radius;
     let low = clamp((x - params.wall_min) / h, vec3f(0.0), vec3f(1.0));

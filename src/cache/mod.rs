@@ -10,10 +10,11 @@
 //!   grids/wave-city.0000.vdb    where the scene asks: level set "surface", staggered "vel"
 //!   probes/elevation-1.csv      where the scene has probes: a row a frame, from the ledger
 //!   timings.jsonl   seconds, which no two bakes share: in no hash, in no comparison
+//!   failed/         of the frame that a bake broke off at: its scene, the state that it began with, what was seen
 //!   lock            held by the one writer
 //! ```
 //!
-//! The same scene, binary and adapter give the same bytes in every file but `timings.jsonl`.
+//! The same scene, binary and adapter give the same bytes in every file but `timings.jsonl`; `failed/` is in no checksum, and goes when a bake gets past its frame.
 //!
 //! A frame, and its grids, go to a temporary file, to the platter, to their name, and only then into the ledger. So
 //! the ledger never names a frame that is not whole, whatever kills the process, and what a crash can
@@ -25,6 +26,7 @@
 
 mod disk;
 mod error;
+pub mod failed;
 pub mod frame;
 mod grids;
 mod ledger;

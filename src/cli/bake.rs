@@ -310,6 +310,8 @@ mod tests {
             max_speed: 3.0,
             capped: 0,
             searched: 0,
+            boundary_work: 0.0,
+            volume: None,
             projection,
         }
     }

@@ -10,7 +10,10 @@ use serde_json::json;
 use crate::{
     domain::frame_range::FrameRange,
     scene::Method,
-    stage::check::{Event, Outcome, Request, Row, Source, Table, check},
+    stage::{
+        check::{Event, Outcome, Request, Row, Source, Table, check},
+        replay::{Replayed, is_failed, replay_failed},
+    },
 };
 
 use super::{
@@ -22,7 +25,8 @@ use super::{
 
 #[derive(Args, Debug)]
 pub(super) struct CheckArgs {
-    /// A cache's folder, or a scene file (TOML), of which the start is taken.
+    /// A cache's folder, or a scene file (TOML), of which the start is taken; or the `failed` folder of a cache, whose
+    /// frame is then computed again.
     #[arg(value_name = "CACHE|SCENE")]
     source: PathBuf,
     /// Frames of the cache from which the step is taken, such as 1,30,72; its last where left out.
@@ -55,7 +59,35 @@ struct Misplaced {
     source_file: PathBuf,
 }
 
+/// What a failed bake left, computed again: the line that the bake ended with, or that it now goes well.
+fn run_failed(args: &CheckArgs) -> Result<ExitCode, Failure> {
+    if args.frames.is_some() || args.solver.is_some() || !args.set.is_empty() {
+        let error = Misplaced {
+            option: "--frames, --solver or --set",
+            what: "caches or scenes",
+            is: "a frame that failed: it says itself how it was baked",
+            source_file: args.source.clone(),
+        };
+        return Err(Failure {
+            code: 2,
+            error: Box::new(error),
+        });
+    }
+    let Replayed { frame, failure } = replay_failed(&args.source, args.adapter.clone())?;
+    let Some(failure) = failure else {
+        println!("frame {frame} keeps its budgets now");
+        return Ok(ExitCode::SUCCESS);
+    };
+    Err(Failure {
+        code: 5,
+        error: failure.to_string().into(),
+    })
+}
+
 pub(super) fn run(args: &CheckArgs) -> Result<ExitCode, Failure> {
+    if is_failed(&args.source) {
+        return run_failed(args);
+    }
     let request = Request {
         source: source(args)?,
         adapter: args.adapter.clone(),

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// An axis-aligned box, metres.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bounds {
     /// Least corner.
     pub min: DVec3,

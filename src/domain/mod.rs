@@ -4,6 +4,7 @@ pub mod aggregates;
 pub mod boundary;
 pub mod bounds;
 pub mod bricks;
+pub mod budget;
 pub mod bvh;
 pub mod flip;
 pub mod frame_range;

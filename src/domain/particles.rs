@@ -51,20 +51,22 @@ impl Particles {
             .fold(0.0, f64::max)
     }
 
-    /// The first particle that is not finite, in words; `density` is one relative density a particle, where there is
-    /// any.
-    pub fn first_not_finite(&self, density: Option<&[f64]>) -> Option<String> {
+    /// How many particles are not finite, and the first of them in words; `density` is one relative density a particle,
+    /// where there is any.
+    pub fn first_not_finite(&self, density: Option<&[f64]>) -> Option<(u64, String)> {
         let is_bad = |v: &[f32; 3]| !v.iter().all(|x| x.is_finite());
         let density = |k: usize| density.map_or(1.0, |density| density[k]);
-        let k = (0..self.len()).find(|&k| {
+        let mut bad = (0..self.len()).filter(|&k| {
             is_bad(&self.position[k]) || is_bad(&self.velocity[k]) || !density(k).is_finite()
-        })?;
-        Some(format!(
-            "particle {} is not finite: position {:?}, velocity {:?}, relative density {}",
+        });
+        let k = bad.next()?;
+        let first = format!(
+            "particle {} first: position {:?}, velocity {:?}, relative density {}",
             self.id[k],
             self.position[k],
             self.velocity[k],
             density(k)
-        ))
+        );
+        Some((1 + bad.count() as u64, first))
     }
 }

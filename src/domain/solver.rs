@@ -28,6 +28,12 @@ pub struct StepReport {
     pub capped: u64,
     /// Times that a particle had more neighbours than its list holds and was searched for.
     pub searched: u64,
+    /// Done on the water by walls and solids that move, joule.
+    #[serde(default)]
+    pub boundary_work: f64,
+    /// Of the water at the frame's end, m³, as a probe has it; only where a budget watches it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume: Option<f64>,
     /// What the pressure projections did; only of solvers that have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub projection: Option<Projection>,

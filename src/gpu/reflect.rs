@@ -26,6 +26,8 @@ pub struct Binding {
     pub index: u32,
     /// Uniform or storage.
     pub access: Access,
+    /// Whether it is an array of floats or of vectors of them.
+    pub is_float: bool,
 }
 
 /// A `struct` of the shader as WGSL lays it out.
@@ -50,6 +52,14 @@ pub struct Reflection {
     pub layouts: Vec<Layout>,
     /// Names of its `override` constants.
     pub overrides: Vec<String>,
+}
+
+fn is_float(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
+    let scalar = match module.types[ty].inner {
+        TypeInner::Array { base, .. } => module.types[base].inner.scalar(),
+        _ => None,
+    };
+    scalar.is_some_and(|scalar| scalar.kind == naga::ScalarKind::Float)
 }
 
 /// Reads the single compute entry point of `wgsl`.
@@ -104,6 +114,7 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
             name,
             index: place.binding,
             access,
+            is_float: is_float(&module, variable.ty),
         });
     }
     bindings.sort_by_key(|binding| binding.index);

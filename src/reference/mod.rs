@@ -10,17 +10,14 @@ pub mod poisson;
 
 use std::{collections::BTreeMap, time::Instant};
 
+use crate::domain::budget::Breach;
+
 /// What stops the reference.
 #[derive(Debug, thiserror::Error)]
 pub enum ReferenceError {
     /// The numbers failed; the state before this frame stands.
-    #[error("frame {frame}: {what}")]
-    Numbers {
-        /// Output frame that could not be computed.
-        frame: u32,
-        /// What was seen, with the figure.
-        what: String,
-    },
+    #[error(transparent)]
+    Numbers(#[from] Breach),
     /// A sparse factor could not be made.
     #[error("the sparse Cholesky factor: {0}")]
     Factor(String),

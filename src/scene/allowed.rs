@@ -213,7 +213,7 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.flip.density_correction", "true or false"),
     (
         "solver.flip.pressure",
-        "a table of preconditioner, tolerance, max_iterations, residual_limit",
+        "a table of preconditioner, tolerance, max_iterations",
     ),
     (
         "solver.flip.pressure.preconditioner",
@@ -226,10 +226,6 @@ const TABLE: &[(&str, &str)] = &[
     (
         "solver.flip.pressure.max_iterations",
         "a whole number from 1 to 10000",
-    ),
-    (
-        "solver.flip.pressure.residual_limit",
-        "a number from the tolerance on, of the right-hand side's norm",
     ),
     (
         "grids",
@@ -246,6 +242,36 @@ const TABLE: &[(&str, &str)] = &[
          268435456 leaves of 8³ voxels in the domain",
     ),
     ("grids.precision", "\"half\" or \"float\""),
+    ("budget", "a table of limits, each a number or false"),
+    ("budget.speed", "a number above 0, m/s, or false"),
+    (
+        "budget.density_error_mean",
+        "a number above 0, of the rest density, or false",
+    ),
+    (
+        "budget.density_error_p99",
+        "a number above 0, of the rest density, or false",
+    ),
+    (
+        "budget.capped",
+        "a number above 0, of all particles in all substeps, or false",
+    ),
+    (
+        "budget.residual",
+        "a number from solver.flip.pressure.tolerance on, of the right-hand side's norm, or false",
+    ),
+    (
+        "budget.divergence",
+        "a number above 0, of a cell's volume in a substep, or false",
+    ),
+    (
+        "budget.volume",
+        "a number above 0, of the volume at the start, or false",
+    ),
+    (
+        "budget.energy",
+        "a number above 0, of the total energy in a frame, or false",
+    ),
     ("probe", "an array of tables [[probe]]"),
     (
         "probe.kind",

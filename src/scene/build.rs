@@ -8,7 +8,7 @@ use glam::DVec3;
 use toml::Spanned;
 
 use super::{
-    PlacedMesh, Placement, Scene, Shot, Swarm, Water,
+    PlacedMesh, Placement, Scene, Shot, Swarm, Water, budget,
     document::Document,
     error::SceneError,
     grids,
@@ -91,6 +91,15 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         .map(|table| grids::build(doc, table, &domain, &solver))
         .transpose()?;
     let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
+    let motions = (wave_makers.iter().map(|maker| &maker.motion))
+        .chain(moving_solids.iter().map(|solid| &solid.motion));
+    let duration = shot.duration();
+    let scales = budget::Scales {
+        fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
+        push: (motions.map(|motion| motion.peak_speed(0.0, duration))).fold(0.0, f64::max),
+        spacing: lattice.spacing,
+    };
+    let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
     let scene = Scene {
         shot,
         origin,
@@ -102,6 +111,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         solver,
         grids,
         probes,
+        budget,
         effects: spec.effects,
     };
     Ok(scene.into_local())

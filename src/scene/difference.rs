@@ -6,14 +6,13 @@ use toml::{Table, Value};
 
 use super::{Method, Scene, error::SceneError};
 
-/// Keys that change which frames there are or where they go, not what happens in them; `max_substeps` and
-/// `residual_limit` only say when to give up.
-const NOT_PHYSICS: [&str; 5] = [
+/// Keys that change which frames there are or where they go, not what happens in them; `max_substeps`,
+/// as `[budget]`, only says when to give up.
+const NOT_PHYSICS: [&str; 4] = [
     "shot.name",
     "shot.frames",
     "solver.pbf.max_substeps",
     "solver.flip.max_substeps",
-    "solver.flip.pressure.residual_limit",
 ];
 
 /// Comes before every other difference: with it most of the others follow.
@@ -25,7 +24,7 @@ const CANONICAL_FORM: &str = "swell scene physics 2";
 /// The first key (the method, then in alphabetical order) whose value differs between two scenes as
 /// [`Scene::to_toml`] wrote them, with both values; `None` where the physics is the same.
 ///
-/// `[grids]`, `[[probe]]`, `shot.name`, `shot.frames`, a solver's `max_substeps` and its `residual_limit` may differ, and so may the
+/// `[grids]`, `[[probe]]`, `[budget]`, `shot.name`, `shot.frames` and a solver's `max_substeps` may differ, and so may the
 /// settings of a solver that is not chosen and the path of a mesh whose hash stands beside it in both.
 ///
 /// # Errors
@@ -102,9 +101,12 @@ fn flatten(text: &str) -> Result<BTreeMap<String, String>, SceneError> {
             .filter(|(name, _)| method != Some(name));
         others.any(|(name, _)| key.starts_with(&format!("solver.{name}.")))
     };
-    // Grids follow from the particles, and probes only look at them.
+    // Grids follow from the particles; probes and budgets only look at them.
     let is_output = |key: &str| {
-        NOT_PHYSICS.contains(&key) || key.starts_with("grids.") || key.starts_with("probe[")
+        NOT_PHYSICS.contains(&key)
+            || ["grids.", "probe[", "budget."]
+                .iter()
+                .any(|table| key.starts_with(table))
     };
     values.retain(|key, _| !is_output(key) && !is_idle(key));
     Ok(values)

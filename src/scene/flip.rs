@@ -102,8 +102,6 @@ pub struct Pressure {
     pub tolerance: f64,
     /// Most iterations of a solve; one that ends there is reported as missed.
     pub max_iterations: u32,
-    /// Relative true residual past which a missed solve ends the bake.
-    pub residual_limit: f64,
 }
 
 /// Preconditioner of the conjugate gradients.

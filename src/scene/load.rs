@@ -166,7 +166,12 @@ vorticity_confinement = { strength = 0.1 }
         assert_eq!(flip.surface, Surface::GhostFluid);
         assert!(flip.density_correction);
         assert_eq!(flip.pressure.max_iterations, 400);
-        assert_eq!(flip.pressure.residual_limit, 0.05, "never below tolerance");
+        assert_eq!(scene.budget.residual, Some(0.05), "never below tolerance");
+        assert_eq!(scene.budget.volume, None, "not measured unless asked for");
+        assert_eq!(scene.budget.energy, Some(0.25));
+        let set = ["budget.energy=false", "budget.volume=0.02"];
+        let other = parse(dir.path(), FULL, &set).expect("valid").budget;
+        assert_eq!((other.energy, other.volume), (None, Some(0.02)));
         assert_eq!(scene.effects.viscosity, None);
         assert_eq!(
             scene.effects.vorticity_confinement.map(|v| v.strength),
@@ -316,8 +321,10 @@ vorticity_confinement = { strength = 0.1 }
             assert_ne!(hash, base_hash);
         }
         let (flip, flip_hash) = written(&["solver.method=flip"], "a.obj");
-        let limit = "solver.flip.pressure.residual_limit=0.5";
+        let limit = "budget.residual=0.5";
         for (set, expected) in [
+            ("budget.speed=false", None),
+            ("budget.volume=0.1", None),
             ("solver.pbf.iteration=red_black", None),
             (limit, None),
             (

@@ -1,5 +1,6 @@
 //! Scene and look files, parsed into validated types, and the plan that follows from them.
 
+pub mod budget;
 pub mod effects;
 pub mod flip;
 pub mod grids;
@@ -28,6 +29,7 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use crate::domain::{bounds::Bounds, mesh::TriangleMesh, motion::Motion};
 
+pub use budget::Budget;
 pub use difference::{physics_difference, physics_hash};
 pub use effects::Effects;
 pub use error::{Fault, Place, SceneError};
@@ -57,6 +59,8 @@ pub struct Scene {
     pub grids: Option<grids::Grids>,
     /// What is measured at each frame; most scenes have none.
     pub probes: Vec<probe::Probe>,
+    /// What the bake is held to.
+    pub budget: Budget,
     /// Effects that the scene names; what is `None` does not exist.
     pub effects: Effects,
 }

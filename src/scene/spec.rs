@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Effects, grids::GridsSpec, probe::ProbeSpec};
+use super::{Effects, budget::BudgetSpec, grids::GridsSpec, probe::ProbeSpec};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -20,6 +20,8 @@ pub(super) struct SceneSpec {
     pub(super) grids: Option<Spanned<GridsSpec>>,
     #[serde(default)]
     pub(super) probe: Vec<Spanned<ProbeSpec>>,
+    #[serde(default)]
+    pub(super) budget: BudgetSpec,
     #[serde(default)]
     pub(super) effects: Effects,
 }
@@ -156,5 +158,4 @@ pub(super) struct PressureSpec {
     pub(super) preconditioner: Option<Spanned<String>>,
     pub(super) tolerance: Option<Spanned<f64>>,
     pub(super) max_iterations: Option<Spanned<i64>>,
-    pub(super) residual_limit: Option<Spanned<f64>>,
 }

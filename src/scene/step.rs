@@ -3,7 +3,13 @@
 use glam::DVec3;
 
 use super::Scene;
-use crate::domain::{bounds::Bounds, particles::Particles, probe::energies, solver::StepReport};
+use crate::domain::{
+    bounds::Bounds,
+    budget::{Breach, Watched},
+    particles::Particles,
+    probe::energies,
+    solver::StepReport,
+};
 
 /// A piece of a frame, as FLIP takes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,12 +37,31 @@ impl Scene {
         Bounds { min, max }
     }
 
+    /// What takes each face of the box in `step` seconds to where it stands at `time`, along its axis, m/s; 0 where `step`
+    /// is.
+    pub fn wall_velocity(&self, time: f64, step: f64) -> Bounds {
+        let (before, after) = (self.walls(time - step), self.walls(time));
+        let speed = |after: DVec3, before: DVec3| match step {
+            0.0 => DVec3::ZERO,
+            step => (after - before) / step,
+        };
+        Bounds {
+            min: speed(after.min, before.min),
+            max: speed(after.max, before.max),
+        }
+    }
+
+    /// Whether a wall or a solid moves, and so does work on the water.
+    pub fn has_movers(&self) -> bool {
+        !self.wave_makers.is_empty() || !self.moving_solids.is_empty()
+    }
+
     /// Equal substeps that PBF's CFL number asks of the frame after `frame`: from the fastest particle, `speed` in
     /// m/s, what gravity adds within the frame, and the fastest wave maker.
     ///
     /// # Errors
-    /// In words where they are more than `max_substeps`.
-    pub fn pbf_substeps(&self, frame: u32, speed: f64) -> Result<u32, String> {
+    /// Where they are more than `max_substeps`.
+    pub fn pbf_substeps(&self, frame: u32, speed: f64) -> Result<u32, Breach> {
         let pbf = self.solver.pbf();
         let length = self.shot.frame_seconds();
         let start = f64::from(frame) * length;
@@ -49,26 +74,29 @@ impl Scene {
             .ceil()
             .max(1.0);
         if wanted > f64::from(pbf.max_substeps) {
-            return Err(format!(
-                "{speed:.3} m/s asks for {wanted} substeps at cfl {}, and solver.pbf.max_substeps is {}",
-                pbf.cfl, pbf.max_substeps
-            ));
+            let most = f64::from(pbf.max_substeps);
+            let detail = format!("{speed:.3} m/s at solver.pbf.cfl {}", pbf.cfl);
+            return Err(Breach {
+                detail: Some(detail),
+                ..Breach::new(frame + 1, Watched::Substeps, wanted, most)
+            });
         }
         Ok(wanted as u32)
     }
 
     /// How many equal substeps FLIP's CFL number asks of the `remaining` seconds from `start` on, where the fastest
-    /// particle has `speed`, m/s, and the first of them; `done` substeps of the frame are over.
+    /// particle has `speed`, m/s, and the first of them; `done` substeps of `frame` are over.
     ///
     /// # Errors
-    /// In words where the frame's are more than `max_substeps`.
+    /// Where the frame's are more than `max_substeps`.
     pub fn flip_substep(
         &self,
+        frame: u32,
         start: f64,
         remaining: f64,
         speed: f64,
         done: u32,
-    ) -> Result<(f64, Substep), String> {
+    ) -> Result<(f64, Substep), Breach> {
         let flip = self.solver.flip();
         let fastest = speed.max(self.peak_boundary_speed(start, start + remaining));
         let gravity = self.water.gravity.length();
@@ -83,13 +111,16 @@ impl Scene {
         let length = remaining / wanted;
         let reached = fastest + gravity * length;
         if f64::from(done) + wanted > f64::from(flip.max_substeps) {
-            return Err(format!(
-                "up to {reached:.3} m/s (particles {speed:.3}; gravity, wave makers and moving solids counted in) asks \
-                 for {} substeps at cfl {}, and solver.flip.max_substeps is {}",
-                f64::from(done) + wanted,
-                flip.cfl,
-                flip.max_substeps
-            ));
+            let detail = format!(
+                "up to {reached:.3} m/s, particles {speed:.3}, with gravity, wave makers and moving solids, at \
+                 solver.flip.cfl {}",
+                flip.cfl
+            );
+            let (asked, most) = (f64::from(done) + wanted, f64::from(flip.max_substeps));
+            return Err(Breach {
+                detail: Some(detail),
+                ..Breach::new(frame, Watched::Substeps, asked, most).in_substep(done + 1)
+            });
         }
         let displacement = reached * length / flip.cell_size;
         let substep = Substep {
@@ -112,7 +143,7 @@ impl Scene {
 
     /// Energies of a state, and the errors of relative densities; sums run in order. What the steps did is left at 0.
     pub fn report(&self, state: &Particles, density: impl Iterator<Item = f64>) -> StepReport {
-        let mass = self.water.rest_density * self.particle_spacing().powi(3);
+        let mass = self.particle_mass();
         let (kinetic, potential) = energies(state, mass, self.water.gravity, self.domain.min);
         let mut errors: Vec<f64> = density.map(|rho| (rho - 1.0).max(0.0)).collect();
         // From 0: an empty sum is -0.
@@ -134,6 +165,8 @@ impl Scene {
             max_speed: state.max_speed(),
             capped: 0,
             searched: 0,
+            boundary_work: 0.0,
+            volume: None,
             projection: None,
         }
     }

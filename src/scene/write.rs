@@ -105,6 +105,7 @@ impl Scene {
         for probe in &self.probes {
             probe::write(out, probe, self.origin)?;
         }
+        self.budget.write(out)?;
         writeln!(out, "\n[effects]")?;
         // An effect is a table of numbers, which toml can always write.
         let effects = toml::Table::try_from(&self.effects).unwrap_or_default();
@@ -195,8 +196,7 @@ fn write_flip(out: &mut String, flip: &Flip) -> fmt::Result {
     let preconditioner = text(pressure.preconditioner.name());
     writeln!(out, "preconditioner = {preconditioner}")?;
     writeln!(out, "tolerance = {:?}", pressure.tolerance)?;
-    writeln!(out, "max_iterations = {}", pressure.max_iterations)?;
-    writeln!(out, "residual_limit = {:?}", pressure.residual_limit)
+    writeln!(out, "max_iterations = {}", pressure.max_iterations)
 }
 
 fn motion(motion: &Motion) -> String {

@@ -10,6 +10,7 @@ mod state;
 pub mod trace;
 
 use crate::{
+    domain::budget::Breach,
     gpu::adapter::GpuError,
     scene::{
         Method, Scene,
@@ -47,11 +48,6 @@ pub enum SolveError {
         given: usize,
     },
     /// The numbers failed; the state before this frame stands.
-    #[error("frame {frame}: {what}")]
-    Numbers {
-        /// Output frame that could not be computed.
-        frame: u32,
-        /// What was seen, with the figure.
-        what: String,
-    },
+    #[error(transparent)]
+    Numbers(#[from] Breach),
 }

@@ -66,6 +66,14 @@ mirror!(
         artificial_pressure: f32,
         /// Unused.
         padding: f32,
+        /// Of the least faces, each along its axis, m/s.
+        wall_velocity_min: [f32; 3],
+        /// Unused.
+        padding_min: f32,
+        /// Of the greatest faces.
+        wall_velocity_max: [f32; 3],
+        /// Unused.
+        padding_max: f32,
     }
 );
 

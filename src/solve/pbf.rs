@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::{
     domain::{
         boundary::Boundary,
+        budget::Breach,
         particles::Particles,
         pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
         probe::fitted,
@@ -27,8 +28,8 @@ use super::{
     SolveError,
     iteration::Builder,
     params::Params,
-    state::{check_finite, slots_by_id, take_over, upload},
-    trace::{Traced, trace},
+    state::{check_finite, check_ids, slots_by_id, take_over, upload},
+    trace::{TraceFrame, Traced, trace},
 };
 
 /// Far from everything, and still finite when squared.
@@ -127,6 +128,7 @@ impl Pbf {
         let pbf = self.scene.solver.pbf();
         let calibration = &self.calibration;
         let walls = self.scene.walls(time);
+        let wall_velocity = self.scene.wall_velocity(time, step);
         let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
         Params {
             velocity_step: (self.scene.water.gravity * step).as_vec3().to_array(),
@@ -149,7 +151,32 @@ impl Pbf {
             max_displacement: (CAP * pbf.cfl * pbf.particle_spacing) as f32,
             artificial_pressure: (pbf.artificial_pressure * natural_lambda) as f32,
             padding: 0.0,
+            wall_velocity_min: wall_velocity.min.as_vec3().to_array(),
+            padding_min: 0.0,
+            wall_velocity_max: wall_velocity.max.as_vec3().to_array(),
+            padding_max: 0.0,
         }
+    }
+
+    /// Zeroes what adds up over a frame.
+    fn begin_frame(&self) {
+        self.program.upload("counters", 0, &[0u32; 4]);
+        if self.scene.has_movers() {
+            let groups = self.plan.counts.particles.div_ceil(64);
+            self.program
+                .upload("boundary_work", 0, &vec![0.0f32; groups]);
+        }
+    }
+
+    /// Done on the water by moving walls in the frame that ran last, joule; substeps were `step` seconds long.
+    fn boundary_work(&self, step: f64) -> Result<f64, SolveError> {
+        if !self.scene.has_movers() {
+            return Ok(0.0);
+        }
+        let groups = self.plan.counts.particles.div_ceil(64);
+        let sums = self.field::<f32>("boundary_work", groups)?;
+        let sum: f64 = sums.into_iter().map(f64::from).sum();
+        Ok(self.scene.particle_mass() / step * sum)
     }
 
     fn prepare_substep(&self, time: f64, step: f64) {
@@ -174,7 +201,7 @@ impl Pbf {
         observe: &mut dyn FnMut(Traced<'_>) -> Result<(), SolveError>,
     ) -> Result<(), SolveError> {
         let (time, step) = self.substep_of(self.substeps()?, 1);
-        self.program.upload("counters", 0, &[0u32; 4]);
+        self.begin_frame();
         self.prepare_substep(time, step);
         trace(&[&self.substep], &self.program, observe)?;
         self.program.upload("params", 0, &[self.params(time, 0.0)]);
@@ -183,12 +210,8 @@ impl Pbf {
 
     /// Substeps of the next frame.
     fn substeps(&self) -> Result<u32, SolveError> {
-        self.scene
-            .pbf_substeps(self.frame, self.state.max_speed())
-            .map_err(|what| SolveError::Numbers {
-                frame: self.frame + 1,
-                what,
-            })
+        let substeps = (self.scene).pbf_substeps(self.frame, self.state.max_speed())?;
+        Ok(substeps)
     }
 
     /// When the k-th of so many ends, and how long it is, seconds.
@@ -248,6 +271,8 @@ impl Pbf {
         let counters = [counters[0], counters[1], counters[2], counters[3]];
         let density = self.field::<f32>("density", n)?;
 
+        check_ids(self.frame + 1, &self.state.id, id)?;
+        check_ids(self.frame + 1, &self.state.id, sorted_id)?;
         let slot_of = slots_by_id(&self.state.id);
         take_over(
             &mut self.state,
@@ -286,7 +311,7 @@ impl Solver for Pbf {
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
         let substeps = self.substeps()?;
-        self.program.upload("counters", 0, &[0u32; 4]);
+        self.begin_frame();
         for k in 1..=substeps {
             let (time, step) = self.substep_of(substeps, k);
             self.run_substep(time, step)?;
@@ -298,11 +323,7 @@ impl Solver for Pbf {
         }
         self.frame += 1;
         if not_finite > 0 {
-            let what = format!("{not_finite} values that are not finite in {substeps} substeps");
-            return Err(SolveError::Numbers {
-                frame: self.frame,
-                what,
-            });
+            return Err(Breach::not_finite(self.frame, not_finite.into(), None).into());
         }
         check_finite(self.frame, &self.state, Some(&density))?;
         if self.scene.domain.min != DVec3::ZERO {
@@ -318,6 +339,7 @@ impl Solver for Pbf {
             iterations,
             capped: u64::from(capped),
             searched: u64::from(searched),
+            boundary_work: self.boundary_work(length / f64::from(substeps))?,
             ..self.scene.report(&self.state, density.into_iter())
         };
         Ok((self.state.clone(), report))
@@ -340,6 +362,31 @@ impl Solver for Pbf {
             .flatten()
             .map(|(&name, &(seconds, runs))| (name, seconds, runs))
             .collect()
+    }
+}
+
+impl TraceFrame for Pbf {
+    fn trace_frame(
+        &mut self,
+        from: u32,
+        observe: &mut dyn FnMut(u32, Traced<'_>) -> Result<(), SolveError>,
+    ) -> Result<(), SolveError> {
+        let substeps = self.substeps()?;
+        self.begin_frame();
+        for k in 1..=substeps {
+            let (time, step) = self.substep_of(substeps, k);
+            if k < from {
+                self.run_substep(time, step)?;
+                continue;
+            }
+            self.prepare_substep(time, step);
+            let told = &mut |traced: Traced<'_>| observe(k, traced);
+            trace(&[&self.substep], &self.program, told)?;
+        }
+        let end = f64::from(self.frame + 1) * self.scene.shot.frame_seconds();
+        self.program.upload("params", 0, &[self.params(end, 0.0)]);
+        let told = &mut |traced: Traced<'_>| observe(substeps, traced);
+        trace(&[&self.measure], &self.program, told)
     }
 }
 
@@ -374,12 +421,18 @@ fn substep_commands(plan: &Plan, scene: &Scene, builder: &mut Builder<'_>) -> Ve
     if !scene.pressure_points().is_empty() {
         commands.push(Command::Clear("lambda_sum"));
     }
+    if scene.has_movers() {
+        commands.insert(0, Command::Clear("wall_work"));
+    }
     commands.extend(sort_commands(plan));
     if plan.has_lists {
         builder.over_all("pbf/build_neighbors", &mut commands);
     }
     builder.iterations(pbf, &mut commands);
     builder.finish(pbf, &mut commands);
+    if scene.has_movers() {
+        commands.push(Command::over("pbf/boundary_work", plan.counts.particles));
+    }
     for effect in plan.effect_passes() {
         builder.over_all(effect, &mut commands);
     }

@@ -2,9 +2,14 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::{domain::particles::Particles, gpu::program::Program, scene::Scene};
-
-use super::SolveError;
+use crate::{
+    domain::{
+        budget::{Breach, Watched},
+        particles::Particles,
+    },
+    gpu::program::Program,
+    scene::Scene,
+};
 
 /// Positions go up relative to the domain's least corner.
 pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
@@ -54,14 +59,31 @@ pub(super) fn slots_by_id(ids: &[u32]) -> impl Fn(u32) -> usize + use<> {
     move |id| slots[id as usize]
 }
 
+/// Whether the ids that came back are those that went up, in any order, before they are used as places.
+pub(super) fn check_ids(frame: u32, sent: &[u32], found: &[u32]) -> Result<(), Breach> {
+    let top = sent.iter().max().map_or(0, |&id| id as usize + 1);
+    let mut is_missing = vec![false; top];
+    for &id in sent {
+        is_missing[id as usize] = true;
+    }
+    let is_wrong = |&&id: &&u32| match is_missing.get_mut(id as usize) {
+        Some(missing) => !std::mem::replace(missing, false),
+        None => true,
+    };
+    match found.iter().filter(is_wrong).count() {
+        0 => Ok(()),
+        wrong => Err(Breach::new(frame, Watched::Particles, wrong as f64, 0.0)),
+    }
+}
+
 /// `density` is one relative density a particle, in the state's order, where the solver has it.
 pub(super) fn check_finite(
     frame: u32,
     state: &Particles,
     density: Option<&[f64]>,
-) -> Result<(), SolveError> {
+) -> Result<(), Breach> {
     match state.first_not_finite(density) {
         None => Ok(()),
-        Some(what) => Err(SolveError::Numbers { frame, what }),
+        Some((count, first)) => Err(Breach::not_finite(frame, count, Some(first))),
     }
 }

@@ -1,8 +1,12 @@
 //! A substep run dispatch by dispatch, for whoever holds each pass against its f64 twin.
 
-use crate::gpu::{
-    program::Program,
-    recording::{Bind, Moment, Recording},
+use crate::{
+    domain::solver::Solver,
+    gpu::{
+        program::Program,
+        recording::{Bind, Moment, Recording},
+        reflect::Access,
+    },
 };
 
 use super::SolveError;
@@ -46,6 +50,56 @@ impl Traced<'_> {
         let bytes: Vec<u8> = self.read(self.buffer(variable), offset + size_of::<T>())?;
         Ok(bytemuck::pod_read_unaligned(&bytes[offset..]))
     }
+}
+
+impl Traced<'_> {
+    /// Names of the buffers that the dispatch writes, of floats or of all.
+    fn written(&self, floats_only: bool) -> impl Iterator<Item = &str> {
+        let bindings = self.program.pass(self.pass).bindings.iter();
+        bindings
+            .filter(move |binding| {
+                binding.access == Access::ReadWrite && (binding.is_float || !floats_only)
+            })
+            .map(|binding| self.buffer(&binding.name))
+    }
+
+    /// Whether the dispatch writes a buffer.
+    pub fn writes(&self, buffer: &str) -> bool {
+        self.written(false).any(|written| written == buffer)
+    }
+
+    /// How many values of `T` a buffer holds.
+    pub fn length<T>(&self, buffer: &str) -> usize {
+        self.program.buffer(buffer).size() as usize / size_of::<T>()
+    }
+
+    /// The first buffer of floats that the dispatch writes and in which something is not finite as it stands now.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn first_not_finite(&self) -> Result<Option<String>, SolveError> {
+        for buffer in self.written(true) {
+            let values: Vec<f32> = self.read(buffer, self.length::<f32>(buffer))?;
+            if !values.iter().all(|value| value.is_finite()) {
+                return Ok(Some(buffer.to_owned()));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// A solver whose frames can be run dispatch by dispatch.
+pub trait TraceFrame: Solver {
+    /// Runs the frame after the loaded state, from substep `from` on, counted from 1, one dispatch at a time; `observe`
+    /// is told the substep. The solver then has to be loaded anew.
+    ///
+    /// # Errors
+    /// The device, the numbers, and what `observe` returns.
+    fn trace_frame(
+        &mut self,
+        from: u32,
+        observe: &mut dyn FnMut(u32, Traced<'_>) -> Result<(), SolveError>,
+    ) -> Result<(), SolveError>;
 }
 
 /// What runs recordings one after the other: at once, timed, or traced.

@@ -10,10 +10,10 @@ use std::{
 use serde_json::{Value, json};
 
 use crate::{
-    cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest},
+    cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, failed},
     domain::{
-        frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
-        solver::StepReport,
+        budget::Breach, frame_range::FrameRange, particles::Particles,
+        signed_distance::SignedDistanceError, solver::StepReport,
     },
     gpu::adapter::GpuError,
     scene::{self, Scene, SceneError, grids::Grids},
@@ -21,9 +21,11 @@ use crate::{
 
 use super::{
     Blame,
-    device::{Built, Device, Identity, SolverError},
+    device::{Built, Device, Identity, Opened, SolverError},
     prepare::Start,
     probes,
+    replay::{self, Failure, ReplayError},
+    watch::Watch,
 };
 
 /// What to bake, and where to.
@@ -122,6 +124,24 @@ pub enum BakeError {
     /// Frames that a bake cannot compute.
     #[error("--frames {0}")]
     Frames(String),
+    /// A budget was broken; what the frame began with is kept.
+    #[error(
+        "{failure}; the last good frame is kept, and `swell check {}` computes this one again", .failed.display()
+    )]
+    Budget {
+        /// What, and where in the frame.
+        failure: Box<Failure>,
+        /// Folder of its inputs.
+        failed: PathBuf,
+    },
+    /// What the failed frame began with could not be kept, or the frame not be computed again.
+    #[error("{breach}; keeping its inputs failed")]
+    NotKept {
+        /// What was broken.
+        breach: Box<Breach>,
+        /// Why they could not be kept.
+        source: Box<ReplayError>,
+    },
     /// A mesh file changed or went between loading and caching.
     #[error("{file}: {what}", file = .file.display())]
     Asset {
@@ -141,6 +161,7 @@ impl From<&BakeError> for Blame {
             BakeError::Solve(error) => error.into(),
             BakeError::Cache(error) => error.into(),
             BakeError::OtherPhysics { .. } => Self::Files,
+            BakeError::Budget { .. } | BakeError::NotKept { .. } => Self::Numbers,
             BakeError::Frames(_) | BakeError::Asset { .. } => Self::Input,
         }
     }
@@ -155,13 +176,27 @@ pub fn bake(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, BakeError> {
+    last_frame(request)?;
+    let start = Start::of(&request.scene)?;
+    bake_on(&request.device.open()?, &start, request, stop, tell)
+}
+
+/// The same on a device that stands open; `start` is the scene's.
+///
+/// # Errors
+/// Those of [`bake`].
+pub fn bake_on(
+    opened: &Opened,
+    start: &Start,
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Outcome, BakeError> {
     let scene = &request.scene;
     let last = last_frame(request)?;
-    let start = Start::of(scene)?;
-    let opened = request.device.open()?;
-    let Built { mut solver, bytes } = opened.build(scene, &start, request.time_passes)?;
+    let Built { mut solver, bytes } = opened.build(scene, start, request.time_passes)?;
     let device = opened.identity();
-    let (mut writer, mut clock, state) = open_cache(request, &device, &start)?;
+    let (mut writer, mut clock, state) = open_cache(request, &device, start)?;
     let first = clock.frame + 1;
     tell(Event::Ready {
         device,
@@ -174,8 +209,9 @@ pub fn bake(
         last,
     });
     solver.load(clock.frame, &state)?;
+    let mut watch = Watch::new(scene, &start.particles, clock.frame, &state);
     let gauges = scene.pressure_points();
-    let mut failed = None;
+    let mut broken = None;
     let mut interrupted = false;
     while clock.frame < last {
         interrupted = stop.load(Ordering::Relaxed);
@@ -183,7 +219,8 @@ pub fn bake(
             break;
         }
         let begin = Instant::now();
-        let advanced = solver.advance().and_then(|(particles, report)| {
+        let advanced = solver.advance().and_then(|(particles, mut report)| {
+            watch.look(&particles, &mut report)?;
             let pressures = match gauges[..] {
                 [] => Vec::new(),
                 _ => solver.pressures(&gauges)?,
@@ -193,7 +230,7 @@ pub fn bake(
         let (particles, report, pressures) = match advanced {
             Ok(result) => result,
             Err(error) => {
-                failed = Some(error);
+                broken = Some(error);
                 break;
             }
         };
@@ -210,6 +247,10 @@ pub fn bake(
             to_json(&report),
             json!({ "seconds": seconds }),
         )?;
+        if clock.frame == first {
+            // Of an earlier bake, which broke off here.
+            failed::remove(&request.directory)?;
+        }
         tell(Event::Frame {
             frame: clock.frame,
             report,
@@ -218,8 +259,10 @@ pub fn bake(
     }
     // What was computed before a failure is kept.
     let summary = writer.finish()?;
-    if let Some(error) = failed {
-        return Err(error.into());
+    let passes = solver.timings();
+    if let Some(error) = broken {
+        drop(solver);
+        return Err(end(request, opened, start, error));
     }
     Ok(Outcome {
         last_frame: summary.last_frame,
@@ -228,11 +271,29 @@ pub fn bake(
         waited: summary.waiting.as_secs_f64(),
         interrupted,
         passes: if request.time_passes {
-            solver.timings()
+            passes
         } else {
             Vec::new()
         },
     })
+}
+
+/// What is said of a frame that could not be computed; of one that broke a budget, once its inputs are kept.
+fn end(request: &Request, opened: &Opened, start: &Start, error: SolverError) -> BakeError {
+    let Some(breach) = error.breach() else {
+        return error.into();
+    };
+    let directory = &request.directory;
+    match replay::keep(directory, opened, &request.scene, start, breach) {
+        Ok(failure) => BakeError::Budget {
+            failure: Box::new(failure),
+            failed: directory.join(failed::FAILED),
+        },
+        Err(source) => BakeError::NotKept {
+            breach: Box::new(breach.clone()),
+            source: Box::new(source),
+        },
+    }
 }
 
 fn to_json(report: &StepReport) -> Value {

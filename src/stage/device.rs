@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use crate::{
     domain::{
+        budget::Breach,
         particles::Particles,
         solver::{Solver, StepReport},
     },
@@ -67,6 +68,21 @@ pub enum SolverError {
     /// In f64 on the CPU.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
+    /// A budget, at a frame's end.
+    #[error(transparent)]
+    Budget(#[from] Breach),
+}
+
+impl SolverError {
+    /// The budget that was broken, where that is what it is.
+    pub fn breach(&self) -> Option<&Breach> {
+        match self {
+            Self::Gpu(SolveError::Numbers(breach))
+            | Self::Reference(ReferenceError::Numbers(breach))
+            | Self::Budget(breach) => Some(breach),
+            _ => None,
+        }
+    }
 }
 
 impl From<&SolverError> for Blame {
@@ -74,6 +90,7 @@ impl From<&SolverError> for Blame {
         match error {
             SolverError::Gpu(error) => error.into(),
             SolverError::Reference(error) => error.into(),
+            SolverError::Budget(_) => Self::Numbers,
         }
     }
 }

@@ -8,8 +8,10 @@ pub mod inspect;
 pub mod prepare;
 mod probes;
 pub mod render;
+pub mod replay;
 pub mod study;
 pub mod verify;
+mod watch;
 
 use crate::{
     cache::CacheError,
@@ -50,7 +52,7 @@ impl From<&SolveError> for Blame {
         match error {
             SolveError::Gpu(error) => error.into(),
             SolveError::Count { .. } => Self::Files,
-            SolveError::Numbers { .. } => Self::Numbers,
+            SolveError::Numbers(_) => Self::Numbers,
         }
     }
 }
@@ -58,7 +60,7 @@ impl From<&SolveError> for Blame {
 impl From<&ReferenceError> for Blame {
     fn from(error: &ReferenceError) -> Self {
         match error {
-            ReferenceError::Numbers { .. }
+            ReferenceError::Numbers(_)
             | ReferenceError::Factor(_)
             | ReferenceError::NotConverged { .. } => Self::Numbers,
         }

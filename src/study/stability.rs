@@ -33,6 +33,44 @@ pub fn least_spacing(position: &[[f32; 3]], spacing: f64) -> f64 {
     least / spacing
 }
 
+/// Volume of the water that fills its cells, over what its particles hold: of cells of two spacings that hold water and
+/// have water or the box's walls all about them, how many there are over the density in them, hats over what a full cell
+/// holds, mirrored at the walls. `None` where there are none. Positions are about the box's own origin.
+pub fn filled_volume(position: &[[f32; 3]], spacing: f64, domain: &Bounds) -> Option<f64> {
+    let edge = 2.0 * spacing;
+    let dims = (domain.size() / edge).round().as_i64vec3().to_array();
+    let mut cells: HashMap<[i64; 3], (bool, f64)> = HashMap::new();
+    for p in position.iter().map(point) {
+        let place = (p - domain.min) / edge;
+        let own = place.floor().as_i64vec3().to_array();
+        let held = [0, 1, 2].map(|axis| own[axis].clamp(0, dims[axis] - 1));
+        cells.entry(held).or_default().0 = true;
+        let low = (place - 0.5).floor();
+        let part = place - 0.5 - low;
+        for corner in 0..8u32 {
+            let mut weight = 0.125;
+            let cell = [0, 1, 2].map(|axis| {
+                let is_high = corner >> axis & 1 == 1;
+                weight *= if is_high { part[axis] } else { 1.0 - part[axis] };
+                (low[axis] as i64 + i64::from(is_high)).clamp(0, dims[axis] - 1)
+            });
+            cells.entry(cell).or_default().1 += weight;
+        }
+    }
+    let holds_water = |c: [i64; 3]| {
+        let is_out = (0..3).any(|axis| !(0..dims[axis]).contains(&c[axis]));
+        is_out || cells.get(&c).is_some_and(|(has_water, _)| *has_water)
+    };
+    let is_filled = |[x, y, z]: [i64; 3]| {
+        (0..27).all(|k| holds_water([x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]))
+    };
+    // In order of cells: sums of f64 depend on it.
+    let mut filled: Vec<_> = cells.iter().filter(|(cell, _)| is_filled(**cell)).collect();
+    filled.sort_by_key(|(cell, _)| **cell);
+    let sum: f64 = filled.iter().map(|(_, (_, density))| density).sum();
+    (!filled.is_empty()).then(|| filled.len() as f64 / sum)
+}
+
 /// Particles outside of a box.
 pub fn outside(position: &[[f32; 3]], bounds: &Bounds) -> usize {
     position
@@ -129,6 +167,27 @@ mod tests {
         assert_eq!(least_spacing(&points, 1.0), 0.25);
         points.push([0.0, 0.0, 0.0]);
         assert_eq!(least_spacing(&points, 1.0), 0.0);
+    }
+
+    #[test]
+    fn a_lattice_fills_its_volume_and_a_compressed_one_less() {
+        let domain = Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::new(8.0, 12.0, 8.0),
+        };
+        let lattice = |height: f32| -> Vec<[f32; 3]> {
+            let layer = |y: u16| (0..64u16).map(move |k| (k % 8, y, k / 8));
+            let at = |(x, y, z): (u16, u16, u16)| {
+                let [x, y, z] = [x, y, z].map(|n| f32::from(n) + 0.5);
+                [x, height * y, z]
+            };
+            (0..8).flat_map(layer).map(at).collect()
+        };
+        assert_eq!(filled_volume(&lattice(1.0), 1.0, &domain), Some(1.0));
+        // Its whole cells below the topmost, and what the mirror at the floor makes of the first.
+        let pressed = filled_volume(&lattice(0.9), 1.0, &domain).unwrap();
+        assert!((pressed - 0.9).abs() < 0.03, "{pressed}");
+        assert_eq!(filled_volume(&[[0.5; 3]], 1.0, &domain), None);
     }
 
     #[test]

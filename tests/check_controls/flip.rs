@@ -2,6 +2,15 @@
 
 use super::{Control, control};
 
+/// Of a scene whose walls move.
+pub const FLIP_WALLS: &[Control] = &[control(
+    "flip/boundary_work",
+    "for (var k = 0u;",
+    "for (var k = 16u;",
+    "flip/boundary_work",
+    &["shares of the work"],
+)];
+
 /// What is handed another system than the twin's.
 pub const SYSTEM: &[&str] = &[
     "pressure/multiply",

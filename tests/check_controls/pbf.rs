@@ -11,6 +11,31 @@ const UNSORTED: [&str; 5] = [
     "pbf/assign_cells",
 ];
 
+/// Of a scene whose walls move.
+pub const PBF_WALLS: &[Control] = &[
+    control(
+        "pbf/predict",
+        "= work_of_push(wall_push);",
+        "= 1.001 * work_of_push(wall_push);",
+        "pbf/predict",
+        &["work of walls"],
+    ),
+    control(
+        "pbf/compute_delta",
+        "of_high * params.wall_velocity_max - of_low",
+        "of_high * params.wall_velocity_max + of_low",
+        "pbf/compute_delta",
+        &["work of walls"],
+    ),
+    control(
+        "pbf/boundary_work",
+        "for (var k = 0u;",
+        "for (var k = 1u;",
+        "pbf/boundary_work",
+        &["shares of the work"],
+    ),
+];
+
 pub const PBF: &[Control] = &[
     control(
         "pbf/predict",

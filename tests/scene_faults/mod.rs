@@ -70,6 +70,39 @@ pub const FAULTS: &[Fault] = &[
         &["efects: unknown key", "nearest is \"effects\""],
     ),
     (
+        "[effects]",
+        "[budget]\nspede = 3.0\n[effects]",
+        33,
+        &["budget.spede: unknown key", "nearest is \"speed\""],
+    ),
+    (
+        "[effects]",
+        "[budget]\nspeed = -3.0\n[effects]",
+        33,
+        &["budget.speed: -3 is out of range", "above 0, m/s, or false"],
+    ),
+    (
+        "[effects]",
+        "[budget]\nenergy = true\n[effects]",
+        33,
+        &["budget.energy: true is no limit", "or false"],
+    ),
+    (
+        "[effects]",
+        "[budget]\nvolume = \"much\"\n[effects]",
+        33,
+        &["budget.volume: wrong type", "or false"],
+    ),
+    (
+        "[effects]",
+        "[budget]\nresidual = 1e-5\n[effects]",
+        33,
+        &[
+            "budget.residual: 0.00001 is out of range",
+            "from solver.flip.pressure.tolerance on",
+        ],
+    ),
+    (
         "xsph = 0.01",
         "xspf = 0.01",
         33,
@@ -632,12 +665,9 @@ pub const FLIP_FAULTS: &[Fault] = &[
     ),
     (
         "tolerance = 1e-4",
-        "tolerance = 0.1, residual_limit = 0.05",
+        "tolerance = 1e-4, residual_limit = 0.05",
         39,
-        &[
-            "pressure.residual_limit: 0.05 is out of range",
-            "from the tolerance on",
-        ],
+        &["pressure.residual_limit: unknown key"],
     ),
     (
         "tolerance = 1e-4",

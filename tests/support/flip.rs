@@ -46,7 +46,6 @@ pub fn settings() -> Settings {
             preconditioner: Preconditioner::Multigrid,
             tolerance: 1e-5,
             max_iterations: 400,
-            residual_limit: 1e-2,
         },
     }
 }

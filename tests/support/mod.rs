@@ -14,7 +14,7 @@ use swell::{
     },
     gpu::adapter::Context,
     scene::{
-        Effects, Iteration, Method, Pbf as Settings, PlacedMesh, Placement, Scene, Shot,
+        Budget, Effects, Iteration, Method, Pbf as Settings, PlacedMesh, Placement, Scene, Shot,
         Solver as SolverSettings, Stop, Water, moving_solid::MovingSolid, plan::*,
     },
     solve::pbf,
@@ -66,6 +66,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
         },
         grids: None,
         probes: Vec::new(),
+        budget: Budget::default(),
         effects: Effects::default(),
     }
 }

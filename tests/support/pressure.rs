@@ -32,7 +32,6 @@ pub fn settings(preconditioner: Preconditioner, tolerance: f64) -> Pressure {
         preconditioner,
         tolerance,
         max_iterations: 3000,
-        residual_limit: 1.0,
     }
 }
 

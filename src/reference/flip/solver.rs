@@ -12,6 +12,7 @@ use crate::{
     domain::{
         boundary::Boundary,
         bricks::{Bricks, CELLS},
+        budget::Breach,
         gauge::Gauge,
         particles::Particles,
         poisson::System,
@@ -228,7 +229,6 @@ impl Flip {
     /// Substeps through one frame, from `cloud` on; what they did, and the densities that the last one found.
     fn run_frame(&mut self, cloud: &mut Cloud) -> Result<(StepReport, Vec<f64>), ReferenceError> {
         let frame = self.frame + 1;
-        let numbers = |what| ReferenceError::Numbers { frame, what };
         let length = self.model.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
         let mut report = self
@@ -240,20 +240,27 @@ impl Flip {
         loop {
             let surveyed = survey(&self.model, cloud);
             if surveyed.not_finite > 0 {
-                let what = format!("{} particles are not finite", surveyed.not_finite);
-                return Err(numbers(what));
+                let breach = Breach::not_finite(frame, surveyed.not_finite as u64, None);
+                return Err(breach.in_substep(report.substeps.max(1)).into());
             }
-            let (wanted, substep) = (self.model.scene)
-                .flip_substep(
-                    start + elapsed,
-                    length - elapsed,
-                    surveyed.speed,
-                    report.substeps,
-                )
-                .map_err(numbers)?;
+            let (wanted, substep) = (self.model.scene).flip_substep(
+                frame,
+                start + elapsed,
+                length - elapsed,
+                surveyed.speed,
+                report.substeps,
+            )?;
             let trace = self.substep(cloud, &surveyed.is_wet, &substep)?;
-            check_residual(&self.model, &trace.projected, report.substeps).map_err(numbers)?;
             report.substeps += 1;
+            let [_, divergence] = trace.projected.divergence;
+            self.model.scene.budget.check_projection(
+                frame,
+                report.substeps,
+                trace.projected.solution.residual,
+                divergence,
+                substep.length,
+            )?;
+            report.boundary_work += self.model.boundary_work(&trace, substep.length);
             report.iterations += u64::from(trace.projected.solution.iterations);
             report.capped += trace.capped;
             add(&mut all, &trace.projected);
@@ -294,17 +301,13 @@ impl Flip {
     }
 }
 
-/// Refuses, in words, what the scene's limit does.
-fn check_residual(model: &Model, projected: &Projected, substep: u32) -> Result<(), String> {
-    let residual = projected.solution.residual;
-    let limit = model.settings().pressure.residual_limit;
-    if residual <= limit {
-        return Ok(());
+impl Model {
+    /// Done on the water by what moves in a substep of `length` seconds, joule (flip/boundary_work).
+    fn boundary_work(&self, trace: &Trace, length: f64) -> f64 {
+        let cells = trace.pressure.iter().zip(&trace.room.solid_flux);
+        let sum: f64 = cells.map(|(pressure, flux)| -pressure * flux).sum();
+        self.cell_size().powi(2) * length * sum
     }
-    Err(format!(
-        "the projection of substep {substep} ended at a relative residual of {residual:.3e}; \
-         solver.flip.pressure.residual_limit is {limit}"
-    ))
 }
 
 fn add(all: &mut Projection, projected: &Projected) {
@@ -388,14 +391,15 @@ impl Solver for Flip {
         };
         self.write(&cloud);
         let frame = self.frame + 1;
-        if let Some(what) = self.state.first_not_finite(None) {
-            return Err(ReferenceError::Numbers { frame, what });
+        if let Some((count, first)) = self.state.first_not_finite(None) {
+            return Err(Breach::not_finite(frame, count, Some(first)).into());
         }
         self.frame = frame;
         let report = StepReport {
             substeps: done.substeps,
             iterations: done.iterations,
             capped: done.capped,
+            boundary_work: done.boundary_work,
             projection: done.projection,
             ..self.model.scene.report(&self.state, density.into_iter())
         };

@@ -166,10 +166,8 @@ pub fn distance_to_converged(
     tolerance: f64,
 ) -> Result<f64, ReferenceError> {
     let model = Model::new(scene, boundary);
-    let substep = Substep {
-        time_step: 0.0,
-        walls: scene.walls(f64::from(frame) * scene.shot.frame_seconds()),
-    };
+    let time = f64::from(frame) * scene.shot.frame_seconds();
+    let substep = Substep::new(scene, time, 0.0);
     let position = local(scene, state);
     let solved = converged(&model, &substep, &position, tolerance)?;
     let pairs = position.iter().zip(&solved.position);

@@ -62,6 +62,25 @@ pub struct Substep {
     pub time_step: f64,
     /// The box now, wave-makers included.
     pub walls: Bounds,
+    /// Of its faces, each along its axis, m/s.
+    pub wall_velocity: Bounds,
+}
+
+impl Substep {
+    /// That ends at `time` and is `time_step` long, seconds.
+    pub fn new(scene: &Scene, time: f64, time_step: f64) -> Self {
+        Self {
+            time_step,
+            walls: scene.walls(time),
+            wall_velocity: scene.wall_velocity(time, time_step),
+        }
+    }
+
+    /// What walls do on a particle by adding `push` to its way, over m / Δt² (shared/wall_work.wgsl).
+    pub fn work_of_push(&self, push: DVec3) -> f64 {
+        push.max(DVec3::ZERO).dot(self.wall_velocity.min)
+            + push.min(DVec3::ZERO).dot(self.wall_velocity.max)
+    }
 }
 
 impl Model {
@@ -110,6 +129,11 @@ impl Model {
 
     /// Keeps a position off the walls and out of the solids (shared/confine.wgsl); what is not a number stays so.
     pub fn confine(&self, x: DVec3, walls: &Bounds) -> DVec3 {
+        self.confine_by(x, walls).0
+    }
+
+    /// The same, and what the walls added to the position.
+    pub fn confine_by(&self, x: DVec3, walls: &Bounds) -> (DVec3, DVec3) {
         let contact = CONTACT * self.settings.particle_spacing;
         let mut x = x;
         if let Some(distance) = &self.distance {
@@ -118,7 +142,7 @@ impl Model {
                 x += distance.gradient(x).normalize_or_zero() * (contact - d);
             }
         }
-        DVec3::from_array(std::array::from_fn(|axis| {
+        let kept = DVec3::from_array(std::array::from_fn(|axis| {
             let (low, high) = (walls.min[axis] + contact, walls.max[axis] - contact);
             if x[axis] < low {
                 low
@@ -127,7 +151,8 @@ impl Model {
             } else {
                 x[axis]
             }
-        }))
+        }));
+        (kept, kept - x)
     }
 
     /// The derivative of the relative density that the walls give at `x`, 1/m; the gradient of
@@ -146,6 +171,29 @@ impl Model {
         };
         let [(fx, dx), (fy, dy), (fz, dz)] = [along(0), along(1), along(2)];
         DVec3::new(dx * fy * fz, dy * fx * fz, dz * fx * fy)
+    }
+
+    /// The gradient of what each wall adds to the density times the wall's velocity, 1/s (shared/walls.wgsl).
+    pub(super) fn wall_rate(&self, x: DVec3, substep: &Substep) -> f64 {
+        let velocity = &substep.wall_velocity;
+        if *velocity == Bounds::default() {
+            return 0.0;
+        }
+        let (h, walls) = (self.calibration.support_radius, &substep.walls);
+        let low = ((x - walls.min) / h).clamp(DVec3::ZERO, DVec3::ONE);
+        let high = ((walls.max - x) / h).clamp(DVec3::ZERO, DVec3::ONE);
+        let scale = self.calibration.wall_density_scale;
+        let slope = |q: f64| scale * 1.5 * (1.0 - q).powi(4) * (1.0 + 4.0 * q) / h;
+        let free = |axis: usize| {
+            (1.0 - scale * half_space_fraction(low[axis]))
+                * (1.0 - scale * half_space_fraction(high[axis]))
+        };
+        let others = DVec3::new(free(1) * free(2), free(0) * free(2), free(0) * free(1));
+        let along = (0..3).map(|axis| {
+            let pushed = slope(high[axis]) * velocity.max[axis];
+            others[axis] * (pushed - slope(low[axis]) * velocity.min[axis])
+        });
+        along.sum()
     }
 
     /// Relative density that the walls give at `x`, and its gradient, 1/m (shared/walls.wgsl).

@@ -44,17 +44,28 @@ pub fn predict(
     position: DVec3,
     velocity: DVec3,
 ) -> (DVec3, DVec3) {
+    let (x, v, _) = predict_and_work(model, substep, position, velocity);
+    (x, v)
+}
+
+/// The same, and what moving walls did on the particle by it, over m / Δt².
+pub fn predict_and_work(
+    model: &Model,
+    substep: &Substep,
+    position: DVec3,
+    velocity: DVec3,
+) -> (DVec3, DVec3, f64) {
     let step = substep.time_step;
     let mut v = velocity + model.gravity * step;
     v *= (model.max_displacement() / (step * v.length()).max(1e-30)).min(1.0);
     let free = position + step * v;
-    let x = model.confine(free, &substep.walls);
+    let (x, push) = model.confine_by(free, &substep.walls);
     let taken = if step > 0.0 {
         (x - free) / step
     } else {
         DVec3::ZERO
     };
-    (x, v + taken)
+    (x, v + taken, substep.work_of_push(push))
 }
 
 /// Relative density ρ/ρ0 of each particle, shape (particles) (pbf/measure_density).
@@ -167,24 +178,42 @@ pub fn compute_delta(
     momentum: Option<Momentum<'_>>,
     lambda: &[f64],
 ) -> Vec<DVec3> {
+    let moved = compute_delta_and_work(inputs, colour, momentum, lambda);
+    moved.into_iter().map(|(x, _)| x).collect()
+}
+
+/// The same, and what moving walls did on each particle by it, over m / Δt².
+pub fn compute_delta_and_work(
+    inputs: Inputs<'_>,
+    colour: Colour,
+    momentum: Option<Momentum<'_>>,
+    lambda: &[f64],
+) -> Vec<(DVec3, f64)> {
     let model = inputs.model;
-    let bounded = |step: DVec3| step * (model.max_correction() / step.length().max(1e-30)).min(1.0);
+    let part = |step: DVec3| (model.max_correction() / step.length().max(1e-30)).min(1.0);
+    let bounded = |step: DVec3| step * part(step);
     let one = |i: usize| {
         let x = inputs.points[i];
         if !colour.holds(i) {
-            return x;
+            return (x, 0.0);
         }
         let (_, wall) = model.wall_term(x, &inputs.substep.walls);
         let pairs = pair_corrections(inputs, i, lambda);
         let delta = lambda[i] * wall - model.calibration.gradient_scale * pairs;
-        let mut delta = bounded(model.settings.relaxation * delta);
+        let delta = model.settings.relaxation * delta;
+        let rate = lambda[i] * model.wall_rate(x, inputs.substep);
+        let mut work = part(delta) * model.settings.relaxation * rate;
+        let mut delta = bounded(delta);
         if let Some(Momentum { factor, before }) = momentum {
             let last = x - before[i];
             if delta.dot(last) > 0.0 {
                 delta = bounded(factor * delta + (factor - 1.0) * last);
+                // As if the walls' part of the last step had been that of this one.
+                work *= 2.0 * factor - 1.0;
             }
         }
-        model.confine(x + delta, &inputs.substep.walls)
+        let (x, push) = model.confine_by(x + delta, &inputs.substep.walls);
+        (x, work + inputs.substep.work_of_push(push))
     };
     (0..lambda.len())
         .into_par_iter()

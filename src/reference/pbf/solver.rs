@@ -10,6 +10,7 @@ use super::{
 use crate::{
     domain::{
         boundary::Boundary,
+        budget::Breach,
         particles::Particles,
         pbf::chebyshev_factors,
         probe::fitted,
@@ -46,6 +47,8 @@ pub struct Sorted {
     pub neighbors: Neighbors,
     /// Σ λ of the corrections so far, m²: the pressure that they stand for. Shape (particles).
     pub lambda_sum: Vec<f64>,
+    /// What moving walls did by the corrections so far, over m / Δt².
+    pub wall_work: f64,
 }
 
 impl Sorted {
@@ -64,6 +67,7 @@ impl Sorted {
         });
         Self {
             lambda_sum: vec![0.0; order.len()],
+            wall_work: 0.0,
             points,
             order,
             neighbors,
@@ -133,7 +137,7 @@ impl Corrector<'_> {
         let before = &self.before[..];
         let momentum = factor.map(|factor| Momentum { factor, before });
         let moved = self.timings.time("pbf/compute_delta", || {
-            passes::compute_delta(inputs, colour, momentum, &self.lambda)
+            passes::compute_delta_and_work(inputs, colour, momentum, &self.lambda)
         });
         let sums = self.sorted.lambda_sum.iter_mut().zip(&self.lambda);
         for (_, (sum, lambda)) in sums.enumerate().filter(|(i, _)| colour.holds(*i)) {
@@ -143,7 +147,12 @@ impl Corrector<'_> {
         if factor.is_some() {
             self.before.copy_from_slice(now);
         }
-        now.copy_from_slice(&moved);
+        let mut work = 0.0;
+        for (now, (x, of_walls)) in now.iter_mut().zip(moved) {
+            *now = x;
+            work += of_walls;
+        }
+        self.sorted.wall_work += work;
     }
 }
 
@@ -220,21 +229,27 @@ impl Pbf {
         }
     }
 
-    /// One substep of particles in the order of their ids; returns iterations and capped particles.
+    /// One substep of particles in the order of their ids; returns iterations, capped particles and what moving walls
+    /// did on them, joule.
     fn step(
         &mut self,
         substep: &Substep,
         position: &mut Vec<DVec3>,
         velocity: &mut Vec<DVec3>,
-    ) -> (u32, u64) {
+    ) -> (u32, u64, f64) {
         let (model, timings) = (&self.model, &mut self.timings);
-        let (predicted, pushed): (Vec<_>, Vec<_>) = timings.time("pbf/predict", || {
+        let by_prediction: Vec<_> = timings.time("pbf/predict", || {
             (position.par_iter().zip(velocity.par_iter()))
-                .map(|(&x, &v)| passes::predict(model, substep, x, v))
-                .unzip()
+                .map(|(&x, &v)| passes::predict_and_work(model, substep, x, v))
+                .collect()
         });
+        let predicted: Vec<DVec3> = by_prediction.iter().map(|p| p.0).collect();
+        let pushed: Vec<DVec3> = by_prediction.iter().map(|p| p.1).collect();
+        // One after the other: the sum is the same on any number of threads.
+        let mut work: f64 = by_prediction.iter().map(|p| p.2).sum();
         let mut sorted = Sorted::new(model, &predicted, &self.state.id, timings);
         let iterations = iterate(model, substep, &mut sorted, timings);
+        work += sorted.wall_work;
         let (mut moved, capped) = timings.time("pbf/update_velocity", || {
             let updated: Vec<_> = (sorted.order.par_iter().zip(sorted.particles()))
                 .map(|(&slot, &x)| {
@@ -253,7 +268,8 @@ impl Pbf {
         *position = sorted.unsorted(sorted.particles());
         *velocity = sorted.unsorted(&moved);
         self.pressed = sorted.unsorted(&sorted.lambda_sum);
-        (iterations, capped)
+        let work = self.scene.particle_mass() / substep.time_step * work;
+        (iterations, capped, work)
     }
 
     /// Rounds into the state.
@@ -269,10 +285,7 @@ impl Pbf {
 
     /// Relative densities of the state in its order.
     fn density(&mut self, time: f64) -> Vec<f64> {
-        let substep = Substep {
-            time_step: 0.0,
-            walls: self.scene.walls(time),
-        };
+        let substep = Substep::new(&self.scene, time, 0.0);
         let (model, timings) = (&self.model, &mut self.timings);
         let position = local(&self.scene, &self.state);
         let sorted = Sorted::new(model, &position, &self.state.id, timings);
@@ -294,30 +307,26 @@ impl Solver for Pbf {
 
     fn advance(&mut self) -> Result<(Particles, StepReport), ReferenceError> {
         let frame = self.frame + 1;
-        let numbers = |what| ReferenceError::Numbers { frame, what };
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
         let substeps = self
             .scene
-            .pbf_substeps(self.frame, self.state.max_speed())
-            .map_err(numbers)?;
+            .pbf_substeps(self.frame, self.state.max_speed())?;
         let step = length / f64::from(substeps);
         let mut position = local(&self.scene, &self.state);
         let mut velocity: Vec<DVec3> = self.state.velocity.iter().map(widen).collect();
-        let (mut iterations, mut capped) = (0, 0);
+        let (mut iterations, mut capped, mut boundary_work) = (0, 0, 0.0);
         for k in 1..=substeps {
-            let substep = Substep {
-                time_step: step,
-                walls: self.scene.walls(start + f64::from(k) * step),
-            };
-            let (some, slowed) = self.step(&substep, &mut position, &mut velocity);
+            let substep = Substep::new(&self.scene, start + f64::from(k) * step, step);
+            let (some, slowed, work) = self.step(&substep, &mut position, &mut velocity);
             iterations += u64::from(some);
             capped += slowed;
+            boundary_work += work;
         }
         self.write(&position, &velocity);
         let density = self.density(start + length);
-        if let Some(what) = self.state.first_not_finite(Some(&density)) {
-            return Err(numbers(what));
+        if let Some((count, first)) = self.state.first_not_finite(Some(&density)) {
+            return Err(Breach::not_finite(frame, count, Some(first)).into());
         }
         self.frame = frame;
         (self.position, self.step) = (position, step);
@@ -325,6 +334,7 @@ impl Solver for Pbf {
             substeps,
             iterations,
             capped,
+            boundary_work,
             ..self.scene.report(&self.state, density.into_iter())
         };
         Ok((self.state.clone(), report))

@@ -31,9 +31,6 @@ const POSITION_RESOLUTION: f64 = 1.0 / 16.0;
 const LEAST_SPACINGS: f64 = 2.0;
 const LEAST_CELLS: f64 = 3.0;
 
-/// True residual that ends a bake where the scene sets none.
-const RESIDUAL_LIMIT: f64 = 1e-2;
-
 /// Every table that stands there, the method, and the lattice of the chosen one.
 pub(super) fn solver(
     doc: &Document<'_>,
@@ -228,8 +225,6 @@ fn flip(doc: &Document<'_>, spec: &FlipSpec) -> Result<Flip> {
 }
 
 fn pressure(doc: &Document<'_>, spec: &PressureSpec) -> Result<Pressure> {
-    let tolerance = number_or(doc, &spec.tolerance, 1e-5, |v| v > 0.0 && v < 1.0)?;
-    let default = RESIDUAL_LIMIT.max(tolerance);
     Ok(Pressure {
         preconditioner: choice_or(
             doc,
@@ -238,9 +233,8 @@ fn pressure(doc: &Document<'_>, spec: &PressureSpec) -> Result<Pressure> {
             &Preconditioner::NAMED,
             Preconditioner::Multigrid,
         )?,
-        tolerance,
+        tolerance: number_or(doc, &spec.tolerance, 1e-5, |v| v > 0.0 && v < 1.0)?,
         max_iterations: whole_or(doc, &spec.max_iterations, 400, 10_000)?,
-        residual_limit: number_or(doc, &spec.residual_limit, default, |v| v >= tolerance)?,
     })
 }
 

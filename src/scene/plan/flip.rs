@@ -2,7 +2,10 @@
 
 use crate::{
     domain::bricks::{Brick, CELLS, table_dims},
-    gpu::{program::PassSpec, sort},
+    gpu::{
+        program::{BufferSpec, PassSpec},
+        sort,
+    },
     scene::{
         Scene,
         flip::{Flip, Surface, Transfer},
@@ -45,6 +48,7 @@ impl Plan {
         self.add_particles(flip);
         self.add_bricks(flip);
         self.add_flip_passes(flip);
+        self.add_watch(scene);
         let slots = self.counts.bricks.slots;
         let cells = CELLS as usize * slots;
         self.add_effects(scene.effects.flip_plans(cells), |_| {});
@@ -120,6 +124,46 @@ impl Plan {
         self.add_uniform("axes", 3 * WINDOW_BYTES, "flip");
         self.add_uniform("layers", layers * WINDOW_BYTES, "flip");
         self.add_buffer("groups", 16 * (2 + layers), "flip");
+    }
+
+    /// What budgets take: the passes that look for values that are not finite and, where something moves, for its work.
+    fn add_watch(&mut self, scene: &Scene) {
+        let mut names = vec!["flip/find_not_finite"];
+        if scene.has_movers() {
+            let cells = self.counts.bricks.wet as u64 * u64::from(CELLS);
+            self.add_buffer("boundary_work", 4 * cells / 64, "budget");
+            names.push("flip/boundary_work");
+        }
+        for name in names {
+            let spec = PassSpec {
+                name,
+                defines: Vec::new(),
+                constants: Vec::new(),
+            };
+            let owner = "budget";
+            self.passes.push(PlannedPass { spec, owner });
+        }
+    }
+
+    /// Arrays of floats in which what is not finite may be hidden from all that follows; of those that the plan has.
+    pub fn watched(&self) -> impl Iterator<Item = &BufferSpec> {
+        const NAMES: [&str; 13] = [
+            "face_open",
+            "solid_flux",
+            "open_volume",
+            "closed_velocity",
+            "face_velocity",
+            "face_change",
+            "density",
+            "density_excess",
+            "liquid_distance",
+            "pressure",
+            "face_displacement",
+            "carried",
+            "affine",
+        ];
+        let specs = self.buffers.iter().map(|buffer| &buffer.spec);
+        specs.filter(|spec| NAMES.contains(&spec.name.as_str()))
     }
 
     fn has_solids(&self) -> bool {

@@ -74,7 +74,7 @@ impl Capacity {
 pub struct PlannedBuffer {
     /// Name and bytes.
     pub spec: BufferSpec,
-    /// `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, `probes`, or an effect's name.
+    /// `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, `probes`, `budget`, or an effect's name.
     pub owner: &'static str,
 }
 
@@ -200,8 +200,9 @@ impl Plan {
 
     /// Passes of effects, in the order in which they run.
     pub fn effect_passes(&self) -> Vec<&'static str> {
-        let of_effect =
-            |pass: &&PlannedPass| !["pbf", "flip", "pressure", "sort"].contains(&pass.owner);
+        let of_effect = |pass: &&PlannedPass| {
+            !["pbf", "flip", "pressure", "sort", "budget"].contains(&pass.owner)
+        };
         self.passes
             .iter()
             .filter(of_effect)

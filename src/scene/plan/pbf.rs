@@ -83,10 +83,10 @@ impl Plan {
             constants: constants.to_vec(),
         };
         spec.defines.extend(self.conditions());
-        let owner = if name.starts_with("sort/") {
-            "sort"
-        } else {
-            "pbf"
+        let owner = match name {
+            "pbf/boundary_work" => "budget",
+            name if name.starts_with("sort/") => "sort",
+            _ => "pbf",
         };
         self.passes.push(PlannedPass { spec, owner });
     }
@@ -158,7 +158,16 @@ impl Plan {
             self.add_buffer("lambda_sum", 4 * n, "probes");
             delta.push("PRESSURE");
         }
-        for name in ["pbf/predict", "pbf/assign_cells", "pbf/reorder"] {
+        let mut predict = Vec::new();
+        if scene.has_movers() {
+            self.add_buffer("wall_work", 8 * n, "budget");
+            self.add_buffer("boundary_work", 4 * n.div_ceil(64), "budget");
+            self.add_pass("pbf/boundary_work", &[], &[]);
+            predict.push("WALL_WORK");
+            delta.push("WALL_WORK");
+        }
+        self.add_pass("pbf/predict", &predict, &[]);
+        for name in ["pbf/assign_cells", "pbf/reorder"] {
             self.add_pass(name, &[], &[]);
         }
         if self.has_lists {
@@ -209,7 +218,7 @@ pub fn list_name(chunk: usize) -> String {
 }
 
 /// Size of the `Params` uniform.
-pub const PARAMS_BYTES: u64 = 144;
+pub const PARAMS_BYTES: u64 = 176;
 
 /// Stride of phase slots, the largest uniform offset alignment that WebGPU lets an adapter ask for.
 pub const PHASE_BYTES: u64 = 256;

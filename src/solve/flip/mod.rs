@@ -13,6 +13,7 @@ use crate::{
     domain::{
         boundary::Boundary,
         bricks::{Bricks, CELLS, EDGE, table_dims},
+        budget::Breach,
         gauge::Gauge,
         particles::Particles,
         solver::{Projection, Solver, StepReport},
@@ -34,13 +35,17 @@ use super::{
     SolveError,
     boundary::Movers,
     pressure::{self, LEVELS, PressureSolver},
-    state::{check_finite, slots_by_id, take_over, upload},
-    trace::{Run, Traced, trace},
+    state::{check_finite, check_ids, slots_by_id, take_over, upload},
+    trace::{Run, TraceFrame, Traced, trace},
 };
 use record::{Recordings, groups, windows};
 
 /// Words of `survey` before the flags.
 const SURVEY_HEAD: usize = 4;
+
+/// Words of `counters`, and the one that counts what is not finite.
+const COUNTERS: usize = 4;
+const NOT_FINITE: usize = 3;
 
 /// FLIP on a device.
 pub struct Flip {
@@ -72,6 +77,8 @@ struct Told {
     substeps: u32,
     iterations: u64,
     projection: Projection,
+    /// Joule.
+    work: f64,
 }
 
 impl Told {
@@ -145,7 +152,11 @@ impl Flip {
             .survey
             .passes()
             .chain(recordings.to_grid.passes());
-        before.chain(recordings.to_particles.passes()).collect()
+        let after = recordings
+            .to_particles
+            .passes()
+            .chain(recordings.watch.passes());
+        before.chain(after).collect()
     }
 
     /// Names of the passes and buffers that exist on the device, sorted.
@@ -171,11 +182,6 @@ impl Flip {
         })
     }
 
-    fn numbers(&self, what: String) -> SolveError {
-        let frame = self.frame + 1;
-        SolveError::Numbers { frame, what }
-    }
-
     /// The next substep of the `remaining` seconds, and how many these take as things stand.
     fn choose(
         &self,
@@ -185,11 +191,13 @@ impl Flip {
         done: u32,
     ) -> Result<(f64, Substep), SolveError> {
         if survey.not_finite > 0 {
-            return Err(self.numbers(format!("{} particles are not finite", survey.not_finite)));
+            let breach = Breach::not_finite(self.frame + 1, survey.not_finite.into(), None);
+            // What the substep before left, or the loaded state.
+            return Err(breach.in_substep(done.max(1)).into());
         }
-        self.scene
-            .flip_substep(start, remaining, survey.speed, done)
-            .map_err(|what| self.numbers(what))
+        let frame = self.frame + 1;
+        let chosen = (self.scene).flip_substep(frame, start, remaining, survey.speed, done)?;
+        Ok(chosen)
     }
 
     /// Lays out bricks about the water, and makes room for more where they do not fit.
@@ -298,21 +306,48 @@ impl Flip {
         self.carry(is_wet, substep, run)?;
         let projected = self.project_by(substep, run)?;
         told.add(&projected);
-        let flip = self.scene.solver.flip();
-        let limit = flip.pressure.residual_limit;
-        if projected.solved.residual.is_nan() || projected.solved.residual > limit {
-            return Err(self.numbers(format!(
-                "the projection of substep {} ended at a relative residual of {:.3e} after {} iterations; \
-                 solver.flip.pressure.residual_limit is {limit}",
-                told.substeps, projected.solved.residual, projected.solved.iterations
-            )));
-        }
-        if flip.density_correction {
+        self.scene.budget.check_projection(
+            self.frame + 1,
+            told.substeps,
+            projected.solved.residual,
+            projected.divergence_after,
+            substep.length,
+        )?;
+        if self.scene.solver.flip().density_correction {
             let corrected = self.pressure.correct_by(&self.program, run)?;
             told.projection.correction_iterations += u64::from(corrected.iterations);
             told.projection.missed += u32::from(corrected.is_missed);
         }
-        run(&self.program, &[&self.recordings.to_particles])
+        run(
+            &self.program,
+            &[&self.recordings.to_particles, &self.recordings.watch],
+        )?;
+        let work = self.watched(told.substeps)?;
+        let face = self.scene.solver.flip().cell_size.powi(2);
+        told.work += face * substep.length * work;
+        Ok(())
+    }
+
+    /// Whether all that the substep left is finite; then the work over Δx² Δt that was done in it, W/m².
+    fn watched(&self, substep: u32) -> Result<f64, SolveError> {
+        let groups = match self.scene.has_movers() {
+            true => self.bricks.wet as usize * (CELLS / 64) as usize,
+            false => 0,
+        };
+        let mut wanted = vec![("counters", COUNTERS)];
+        if groups > 0 {
+            wanted.push(("boundary_work", groups));
+        }
+        let words = self.program.download::<u32>(&wanted)?;
+        match words[0][NOT_FINITE] {
+            0 => {}
+            count => {
+                let breach = Breach::not_finite(self.frame + 1, count.into(), None);
+                return Err(breach.in_substep(substep).into());
+            }
+        }
+        let sums = words.get(1).into_iter().flatten();
+        Ok(sums.map(|&bits| f64::from(f32::from_bits(bits))).sum())
     }
 
     /// Runs the first substep after the loaded state one dispatch at a time. The solver then has to be loaded anew.
@@ -326,7 +361,11 @@ impl Flip {
         let run: &mut Run<'_> = &mut |program, recordings| trace(recordings, program, observe);
         self.program.upload("counters", 0, &[0u32; 4]);
         let (survey, substep) = self.first_substep(run)?;
-        self.run_substep(&survey.is_wet, &substep, &mut Told::default(), run)
+        let mut told = Told {
+            substeps: 1,
+            ..Told::default()
+        };
+        self.run_substep(&survey.is_wet, &substep, &mut told, run)
     }
 
     /// Substeps through one frame.
@@ -369,6 +408,7 @@ impl Flip {
             .program
             .download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
         let id = self.field::<u32>("id", n)?;
+        check_ids(self.frame + 1, &self.state.id, &id)?;
         let slot_of = slots_by_id(&self.state.id);
         take_over(
             &mut self.state,
@@ -424,14 +464,17 @@ impl Solver for Flip {
     }
 
     fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
-        self.program.upload("counters", 0, &[0u32; 4]);
+        self.program.upload("counters", 0, &[0u32; COUNTERS]);
         let told = if self.state.is_empty() {
             Told::default()
         } else {
             self.timed(Self::run_substeps)?
         };
         self.read_state()?;
-        check_finite(self.frame + 1, &self.state, None)?;
+        check_finite(self.frame + 1, &self.state, None).map_err(|breach| match told.substeps {
+            0 => breach,
+            last => breach.in_substep(last),
+        })?;
         let density = if self.state.is_empty() {
             Vec::new()
         } else {
@@ -447,6 +490,7 @@ impl Solver for Flip {
             substeps: told.substeps,
             iterations: told.iterations,
             capped: u64::from(capped),
+            boundary_work: told.work,
             projection: Some(told.projection),
             ..self
                 .scene
@@ -478,6 +522,27 @@ impl Solver for Flip {
             .flatten()
             .map(|(&name, &(seconds, runs))| (name, seconds, runs))
             .collect()
+    }
+}
+
+impl TraceFrame for Flip {
+    fn trace_frame(
+        &mut self,
+        from: u32,
+        observe: &mut dyn FnMut(u32, Traced<'_>) -> Result<(), SolveError>,
+    ) -> Result<(), SolveError> {
+        let mut substep = 0;
+        let run: &mut Run<'_> = &mut |program, recordings| {
+            // Each substep begins with one.
+            let first = recordings.first().and_then(|first| first.passes().next());
+            substep += u32::from(first == Some("flip/survey"));
+            if substep < from {
+                return Ok(Recording::run_all(recordings, program, None)?);
+            }
+            trace(recordings, program, &mut |traced| observe(substep, traced))
+        };
+        self.program.upload("counters", 0, &[0u32; COUNTERS]);
+        self.run_substeps(run).map(|_| ())
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::{
     domain::bricks::CELLS,
     gpu::{
-        program::Program,
+        program::{BufferSpec, Program},
         recording::{Bind, Command, Groups, Recording, spread},
         sort,
     },
@@ -25,6 +25,9 @@ const LAYERS: u64 = 32;
 /// Particles of a thread of `flip/survey`, its `RUN`.
 const SURVEY_RUN: usize = 16;
 
+/// Values of a thread of `flip/find_not_finite`, four times its `RUN`.
+const WATCH_RUN: u64 = 16;
+
 /// Threads of a workgroup of passes over cells.
 const WORKGROUP: u32 = 64;
 
@@ -36,6 +39,8 @@ pub(super) struct Recordings {
     pub(super) to_grid: Recording,
     /// From what it wrote.
     pub(super) to_particles: Recording,
+    /// What the host is told of the substep.
+    pub(super) watch: Recording,
 }
 
 impl Recordings {
@@ -50,6 +55,7 @@ impl Recordings {
             survey: Recording::new(program, &survey),
             to_grid: Recording::new(program, &to_grid(plan)),
             to_particles: Recording::new(program, &to_particles(plan, layers)),
+            watch: Recording::new(program, &watch(plan, scene)),
         }
     }
 }
@@ -131,6 +137,23 @@ fn to_grid(plan: &Plan) -> Vec<Command> {
     commands.push(over("flip/gather_centers", ACTIVE));
     for effect in plan.effect_passes() {
         commands.push(over(effect, ACTIVE));
+    }
+    commands
+}
+
+fn watch(plan: &Plan, scene: &Scene) -> Vec<Command> {
+    let look = |spec: &BufferSpec| Command::Dispatch {
+        pass: "flip/find_not_finite",
+        binds: vec![Bind {
+            variable: "values",
+            buffer: spec.name.clone(),
+            window: None,
+        }],
+        groups: Groups::Threads(spec.bytes.div_ceil(4 * WATCH_RUN)),
+    };
+    let mut commands: Vec<Command> = plan.watched().map(look).collect();
+    if scene.has_movers() {
+        commands.push(over("flip/boundary_work", WET));
     }
     commands
 }

@@ -20,8 +20,7 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
     let before = scene.walls(step.start);
     let after = scene.walls(step.start + step.length);
     let cut = |wall: DVec3| (wall / flip.cell_size).as_vec3().to_array();
-    // What takes a wall exactly to where it then stands.
-    let speed = |after: DVec3, before: DVec3| ((after - before) / step.length).as_vec3().to_array();
+    let speed = scene.wall_velocity(step.start + step.length, step.length);
     FlipParams {
         wall_min: after.min.as_vec3().to_array(),
         particle_count: plan.counts.particles as u32,
@@ -31,9 +30,9 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
         active_cells: bricks.active * CELLS,
         cut_max: cut(before.max),
         stride: plan.counts.bricks.slots as u32 * CELLS,
-        wall_velocity_min: speed(after.min, before.min),
+        wall_velocity_min: speed.min.as_vec3().to_array(),
         partial_stride: plan.counts.bricks.wet as u32 * CELLS,
-        wall_velocity_max: speed(after.max, before.max),
+        wall_velocity_max: speed.max.as_vec3().to_array(),
         time_step: step.length as f32,
         velocity_step: (scene.water.gravity * step.length).as_vec3().to_array(),
         cell_size: flip.cell_size as f32,

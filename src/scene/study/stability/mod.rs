@@ -17,6 +17,7 @@
 //! of = "least_spacing"
 //! at_least = 0.5                              # or at_most
 //! after = 0.5                                 # seconds that do not count; 0 where left out
+//! since = 1.0                                 # against the state then, not that of the start
 //! known_failure = "why it is missed"          # shown as such; a known failure that passes is told as well
 //!
 //! [[case.against]]                            # another run beside it, frame by frame
@@ -139,6 +140,9 @@ pub struct Mark {
     pub bound: Bound,
     /// Seconds of the shot that do not count.
     pub after: f64,
+    /// Seconds of the shot from which what is held against the start is held against the state then; sooner does not
+    /// count.
+    pub since: Option<f64>,
     /// Only what starts in this box.
     pub region: Option<Bounds>,
     /// Why it is missed.

@@ -35,6 +35,9 @@ pub enum Quantity {
     Rebound,
     /// |V/V0 − 1| of what the level set about the particles encloses, V0 that of the particles.
     VolumeDrift,
+    /// |V/V0 − 1| of the water that fills its cells of two spacings: those that water or walls surround, over what their
+    /// particles hold. Unlike the level set it does not see how rough the surface is.
+    FilledVolume,
     /// Energy over that of the start, less 1; heights count from the domain's floor.
     EnergyGain,
     /// Energy above the least so far, over that of the start.
@@ -92,13 +95,15 @@ pub struct About {
     pub others: usize,
     /// Whether it needs a box.
     pub takes_region: bool,
+    /// Whether it can be held against a later state than the start.
+    pub takes_since: bool,
     /// How frames come to one.
     pub over: Over,
 }
 
 impl Quantity {
     /// All, in order.
-    pub const ALL: [Self; 33] = [
+    pub const ALL: [Self; 34] = [
         Self::Escaped,
         Self::Lost,
         Self::NotFinite,
@@ -110,6 +115,7 @@ impl Quantity {
         Self::BallisticError,
         Self::Rebound,
         Self::VolumeDrift,
+        Self::FilledVolume,
         Self::EnergyGain,
         Self::EnergyRise,
         Self::PressureError,
@@ -149,10 +155,15 @@ impl Quantity {
             title,
             others: 0,
             takes_region: false,
+            takes_since: false,
             over: Over::Worst,
         };
         let of_pair = |name, title| About {
             others: 1,
+            ..plain(name, title)
+        };
+        let drifting = |name, title| About {
+            takes_since: true,
             ..plain(name, title)
         };
         let last = |about: About| About {
@@ -167,10 +178,11 @@ impl Quantity {
             Self::SpeedOverCap => plain("speed_over_cap", "largest speed over the cap"),
             Self::LeastSpacing => plain("least_spacing", "least distance of two particles, d"),
             Self::Climb => plain("climb", "highest particle above the start's, d"),
-            Self::Sinking => plain("sinking", "mean height lost, of the start's"),
+            Self::Sinking => drifting("sinking", "mean height lost, of the start's"),
             Self::BallisticError => plain("ballistic_error", "off the parabola, of the way"),
             Self::Rebound => plain("rebound", "rise from the lowest place, of the fall to it"),
-            Self::VolumeDrift => plain("volume_drift", "volume, off the particles'"),
+            Self::VolumeDrift => drifting("volume_drift", "volume in the level set, off V0"),
+            Self::FilledVolume => drifting("filled_volume", "volume of filled cells, off V0"),
             Self::EnergyGain => plain("energy_gain", "energy above the start's, of it"),
             Self::EnergyRise => plain(
                 "energy_rise",

@@ -65,6 +65,7 @@ struct MarkSpec {
     at_most: Option<f64>,
     at_least: Option<f64>,
     after: Option<f64>,
+    since: Option<Spanned<f64>>,
     region: Option<Spanned<[[f64; 3]; 2]>>,
     solvers: Option<Vec<Spanned<String>>>,
     devices: Option<Vec<Spanned<String>>>,
@@ -258,6 +259,7 @@ fn marks(
         of,
         bound: Bound::AtMost(0.0),
         after: 0.0,
+        since: None,
         region: None,
         known_failure: None,
     });
@@ -291,6 +293,14 @@ fn mark(doc: &Document<'_>, spec: &Spanned<MarkSpec>, others: usize) -> Result<M
     if spec.region.is_some() != of.about().takes_region && of != Quantity::Difference {
         return Err(fault(format!("{word:?} and region do not go together")));
     }
+    if let Some(since) = &spec.since {
+        if !of.about().takes_since {
+            return Err(doc.fault_at(since.span(), format!("{word:?} does not take since")));
+        }
+        if !(*since.get_ref() >= 0.0) {
+            return Err(doc.fault_at(since.span(), "out of range"));
+        }
+    }
     let bound = match (spec.at_most, spec.at_least) {
         (Some(most), None) => Bound::AtMost(most),
         (None, Some(least)) => Bound::AtLeast(least),
@@ -301,6 +311,7 @@ fn mark(doc: &Document<'_>, spec: &Spanned<MarkSpec>, others: usize) -> Result<M
         of,
         bound,
         after: spec.after.unwrap_or(0.0),
+        since: spec.since.as_ref().map(|since| *since.get_ref()),
         region: spec.region.as_ref().map(|corners| {
             let [min, max] = corners.get_ref().map(DVec3::from_array);
             Bounds { min, max }

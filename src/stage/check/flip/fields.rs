@@ -63,6 +63,7 @@ fields! {
     AFTER = "pressure/measure_divergence", "largest divergence", "1/s", "10 u of the largest Σ|f u| over Δx";
     SOURCE = "pressure/density_source", "right-hand side", "m", "2 u";
     DISPLACEMENT = "pressure/displace", "displacement at faces", "m", "24 u |Δq|/θ of each of its two words";
+    WORK = "flip/boundary_work", "shares of the work", "W/m²", "64 products and sums: 66 u Σ|p f|";
     CHANGE = "flip/find_change", "change at faces", "m/s", "one difference: u";
     LAYER = "flip/find_change", "layers", "", "equal";
     SPREAD_VELOCITY = "flip/extrapolate", "velocity at faces", "m/s", "a mean of six and two sums: 12 u of the largest";

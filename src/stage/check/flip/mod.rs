@@ -16,6 +16,7 @@ use crate::{
         boundary::Boundary,
         bricks::{Bricks, CELLS},
         particles::Particles,
+        poisson::FLUID,
         solver::Solver,
     },
     gpu::{adapter::Context, recording::Moment},
@@ -32,7 +33,11 @@ use super::{
 use fields::*;
 
 /// Passes without a row of their own, and where they are checked.
-const EXCEPTIONS: [(&str, &str); 5] = [
+const EXCEPTIONS: [(&str, &str); 6] = [
+    (
+        "flip/find_not_finite",
+        "it counts what is not finite, which is nothing here",
+    ),
     ("flip/spread_faces", BOTH_HALVES),
     ("flip/spread_centers", BOTH_HALVES),
     ("pressure/label_cells", LABELLED),
@@ -144,9 +149,33 @@ impl Checker<'_> {
             (Moment::After, "flip/extrapolate") => self.extrapolate(traced),
             (Moment::After, "flip/grid_to_particle") => self.grid_to_particle(traced),
             (Moment::After, "flip/advect") => self.advect(traced),
+            (Moment::After, "flip/boundary_work") => self.boundary_work(traced),
             (_, pass) if pass.starts_with("pressure/") => self.pressure(traced),
             _ => effects::compare(self, traced),
         }
+    }
+
+    /// From the pressure and the flux that the device has.
+    fn boundary_work(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let pressure = self.scalars(traced, "pressure")?;
+        let flux = self.scalars(traced, "solid_flux")?;
+        let kind = self.cells::<u32>(traced, "cell_kind")?;
+        let wet = (CELLS * self.layout().bricks.wet) as usize;
+        let sums = traced.read::<f32>("boundary_work", wet / 64)?;
+        let term = |e: usize| match kind[e] {
+            FLUID => -pressure[e] * flux[e],
+            _ => 0.0,
+        };
+        let pairs: Vec<_> = (sums.iter().enumerate())
+            .map(|(group, &sum)| {
+                let first = CELLS as usize + 64 * group;
+                let terms = (first..first + 64).map(term);
+                let sizes: f64 = terms.clone().map(f64::abs).sum();
+                pair_of(group, f64::from(sum), terms.sum(), 66.0 * U * sizes)
+            })
+            .collect();
+        self.table.add(&WORK, &pairs, 0);
+        Ok(())
     }
 
     fn finish(mut self) -> Table {
@@ -229,13 +258,9 @@ impl Checker<'_> {
         // What the device found is what its substep follows.
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
-        let (_, substep) = self
-            .scene
-            .flip_substep(start, length, fastest.sqrt(), 0)
-            .map_err(|what| SolveError::Numbers {
-                frame: self.frame + 1,
-                what,
-            })?;
+        let (_, substep) =
+            self.scene
+                .flip_substep(self.frame + 1, start, length, fastest.sqrt(), 0)?;
         let flags: Vec<bool> = words[4..].iter().map(|&flag| flag != 0).collect();
         let bricks = self.model.bricks(&flags, self.model.step(&substep).layers);
         self.layout = Some(Layout {

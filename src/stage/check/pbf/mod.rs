@@ -5,6 +5,7 @@ mod effects;
 mod fields;
 mod lists;
 mod whole;
+mod work;
 
 use std::collections::BTreeMap;
 
@@ -72,18 +73,10 @@ pub fn check(
     }
     let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
     solver.load(frame, particles)?;
-    let substeps = scene
-        .pbf_substeps(frame, particles.max_speed())
-        .map_err(|what| SolveError::Numbers {
-            frame: frame + 1,
-            what,
-        })?;
+    let substeps = scene.pbf_substeps(frame, particles.max_speed())?;
     let length = scene.shot.frame_seconds();
     let time_step = length / f64::from(substeps);
-    let substep = Substep {
-        time_step,
-        walls: scene.walls(f64::from(frame) * length + time_step),
-    };
+    let substep = Substep::new(scene, f64::from(frame) * length + time_step, time_step);
     let mut checker = Checker::new(scene, plan, boundary, substep);
     checker.take_samples(&solver)?;
     solver.trace(&mut |traced| checker.observe(traced))?;
@@ -103,6 +96,8 @@ struct Checker<'a> {
     vectors: BTreeMap<&'static str, Vec<[f32; 4]>>,
     words: BTreeMap<&'static str, Vec<u32>>,
     floats: Vec<f32>,
+    /// What a pass adds to.
+    work: Vec<f32>,
 }
 
 impl<'a> Checker<'a> {
@@ -120,6 +115,7 @@ impl<'a> Checker<'a> {
             vectors: BTreeMap::new(),
             words: BTreeMap::new(),
             floats: Vec::new(),
+            work: Vec::new(),
         }
     }
 
@@ -174,9 +170,13 @@ impl<'a> Checker<'a> {
 
     fn read_inputs(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
         let n = self.n();
+        if self.scene.has_movers() {
+            self.read_work(traced)?;
+        }
         // A frame's measurement begins with a prediction of no length.
         if traced.pass == "pbf/predict" && self.ran.contains(&"pbf/update_velocity") {
             self.substep.time_step = 0.0;
+            self.substep.wall_velocity = Default::default();
         }
         let pass = match traced.pass.split_once('/') {
             Some((room @ "effects", _)) => room,
@@ -232,6 +232,7 @@ impl<'a> Checker<'a> {
             "pbf/decide" => self.decide(traced),
             "pbf/update_velocity" => self.update_velocity(traced),
             "pbf/measure_density" => self.measure_density(traced),
+            "pbf/boundary_work" => self.boundary_work(traced),
             _ => effects::compare(self, traced),
         }
     }
@@ -302,6 +303,10 @@ impl<'a> Checker<'a> {
         let (positions, velocities): (Vec<_>, Vec<_>) = all.into_iter().unzip();
         self.table.add(&PREDICT_POSITION, &positions, 0);
         self.table.add(&PREDICT_VELOCITY, &velocities, 0);
+        if self.scene.has_movers() {
+            let tolerance: Vec<f64> = positions.iter().map(|pair| pair.tolerance).collect();
+            self.predict_work(traced, &tolerance)?;
+        }
         Ok(())
     }
 
@@ -450,6 +455,9 @@ impl<'a> Checker<'a> {
         let moved: Vec<_> = moved.into_iter().flatten().collect();
         self.table.add(&DELTA, &moved, count - moved.len());
         self.table.add(&CARRIED, &carried, 0);
+        if self.scene.has_movers() {
+            self.delta_work(traced, &neighbors)?;
+        }
         Ok(())
     }
 

@@ -36,6 +36,7 @@ impl Whole {
             order: (0..particles).collect(),
             neighbors,
             lambda_sum: vec![0.0; particles],
+            wall_work: 0.0,
         });
     }
 

@@ -28,7 +28,7 @@ pub use record::{Measured, Record, Run, Verdict};
 pub use run::{Devices, refusal, run_trial};
 
 /// Changes whenever what a line holds does.
-const FORM: &str = "swell stability 1";
+const FORM: &str = "swell stability 2";
 
 /// What a study has come to.
 struct Results<'a> {
@@ -207,10 +207,7 @@ fn hash(devices: &Devices, trial: &Trial) -> String {
     let of_scene = |scene: &Scene, device: CaseDevice| {
         let limits = match scene.solver.method {
             Method::Pbf => scene.solver.pbf().max_substeps.to_string(),
-            Method::Flip => {
-                let flip = scene.solver.flip();
-                format!("{} {}", flip.max_substeps, flip.pressure.residual_limit)
-            }
+            Method::Flip => scene.solver.flip().max_substeps.to_string(),
         };
         let identity = match device {
             CaseDevice::Cpu => devices.cpu.identity().to_string(),
@@ -236,8 +233,8 @@ fn hash(devices: &Devices, trial: &Trial) -> String {
         // The worst of the frames depends on the side that the mark is on, not on where it is.
         let side = matches!(mark.bound, crate::scene::study::stability::Bound::AtMost(_));
         text.push(format!(
-            "{:?} {side} {} {:?}",
-            mark.of, mark.after, mark.region
+            "{:?} {side} {} {:?} {:?}",
+            mark.of, mark.after, mark.since, mark.region
         ));
     }
     blake3::hash(text.join("\n").as_bytes())

@@ -4,11 +4,12 @@ use glam::DVec3;
 
 use crate::{
     domain::{
+        bounds::Bounds,
         probe::{energies, volume},
         solver::{Projection, StepReport},
     },
-    scene::study::stability::{Mark, Other, Over, Quantity},
-    study::stability::{Flight, least_spacing, matched, outside, point},
+    scene::{Scene, study::stability::{Mark, Other, Over, Quantity}},
+    study::stability::{Flight, filled_volume, least_spacing, matched, outside, point},
 };
 
 use super::runner::Runner;
@@ -19,6 +20,13 @@ pub(super) struct Beside<'a> {
     pub(super) other: &'a Other,
     /// For each particle of the run its own; `None` where it has none there.
     pub(super) partner: Vec<Option<usize>>,
+    /// Of the run that is measured.
+    origin: DVec3,
+}
+
+/// A place of the other run, about its own origin, where the run would have it, about its own.
+fn to_ours(p: DVec3, origin: DVec3, runner: &Runner<'_>, other: &Other) -> DVec3 {
+    (p + runner.scene.origin - other.shift) / other.scale - origin
 }
 
 impl<'a> Beside<'a> {
@@ -26,10 +34,11 @@ impl<'a> Beside<'a> {
         let partner = matched(
             &ours.state.position,
             &runner.state.position,
-            |p| (p - other.shift) / other.scale,
+            |p| to_ours(p, ours.scene.origin, &runner, other),
             ours.scene.particle_spacing(),
         );
         Self {
+            origin: ours.scene.origin,
             runner,
             other,
             partner,
@@ -38,7 +47,7 @@ impl<'a> Beside<'a> {
 
     /// Where a particle of the run would be if it went as here; its place at the start as well.
     fn places(&self, k: usize) -> Option<(DVec3, DVec3)> {
-        let of = |p: &[f32; 3]| (point(p) - self.other.shift) / self.other.scale;
+        let of = |p: &[f32; 3]| to_ours(point(p), self.origin, &self.runner, self.other);
         let partner = self.partner[k]?;
         let start = &self.runner.start.particles;
         Some((
@@ -67,6 +76,8 @@ enum Memory {
     Energy(f64, f64),
     /// Sums a probe, and how many there are.
     Means(Vec<f64>, f64),
+    /// At `since`, or of the start; `None` before.
+    Reference(Option<f64>),
     /// Two sums.
     Sums([f64; 2]),
 }
@@ -90,6 +101,13 @@ impl<'a> Watch<'a> {
             Quantity::MeanPressureError => {
                 Memory::Means(vec![0.0; run.scene.pressure_points().len()], 0.0)
             }
+            Quantity::Sinking => {
+                let start = mean_height(&start.position) - run.scene.domain.min.y;
+                Memory::Reference(mark.since.is_none().then_some(start))
+            }
+            Quantity::VolumeDrift | Quantity::FilledVolume => {
+                Memory::Reference(mark.since.is_none().then_some(1.0))
+            }
             Quantity::IterationsRatio | Quantity::GaugeConvergence => Memory::Sums([0.0; 2]),
             _ => Memory::Nothing,
         };
@@ -103,7 +121,8 @@ impl<'a> Watch<'a> {
 
     /// After each frame.
     pub(super) fn look(&mut self, run: &Runner<'_>, beside: &[Beside<'_>], report: &StepReport) {
-        let counts = run.time() >= self.mark.after * (1.0 - 1e-9);
+        let from = self.mark.after.max(self.mark.since.unwrap_or(0.0));
+        let counts = run.time() >= from * (1.0 - 1e-9);
         // What sums up the way from the start has to see all of it; means begin where the mark does.
         if !counts && !matches!(self.memory, Memory::Flight(_) | Memory::Lowest(_)) {
             return;
@@ -142,14 +161,6 @@ impl<'a> Watch<'a> {
             }
             Quantity::LeastSpacing => least_spacing(&now.position, spacing),
             Quantity::Climb => (top(&now.position) - top(&start.position)) / spacing,
-            Quantity::Sinking => {
-                let floor = scene.domain.min.y;
-                1.0 - (mean_height(&now.position) - floor) / (mean_height(&start.position) - floor)
-            }
-            Quantity::VolumeDrift => {
-                let own = start.len() as f64 * spacing.powi(3);
-                (volume(now, spacing, &scene.domain) / own - 1.0).abs()
-            }
             Quantity::Compression => report.density_error_mean,
             Quantity::LargestCompression => report.density_error_max,
             Quantity::Residual
@@ -169,7 +180,7 @@ impl<'a> Watch<'a> {
                 depths.fold(f64::NEG_INFINITY, f64::max).max(-1e3) / run.resolution()
             }
             Quantity::InRegion => match &self.mark.region {
-                Some(region) => (now.len() - outside(&now.position, region)) as f64,
+                Some(region) => (now.len() - outside(&now.position, &about(region, scene))) as f64,
                 None => f64::NAN,
             },
             Quantity::PressureError => {
@@ -184,7 +195,10 @@ impl<'a> Watch<'a> {
                 }
                 [] => f64::NAN,
             },
-            Quantity::BallisticError
+            Quantity::Sinking
+            | Quantity::VolumeDrift
+            | Quantity::FilledVolume
+            | Quantity::BallisticError
             | Quantity::Rebound
             | Quantity::EnergyGain
             | Quantity::EnergyRise
@@ -214,6 +228,22 @@ impl<'a> Watch<'a> {
                     }
                 }
                 most
+            }
+            Memory::Reference(reference) => {
+                let scene = run.scene;
+                let spacing = scene.particle_spacing();
+                let number = match self.mark.of {
+                    Quantity::Sinking => mean_height(&now.position) - scene.domain.min.y,
+                    Quantity::FilledVolume => {
+                        filled_volume(&now.position, spacing, &scene.domain).unwrap_or(f64::NAN)
+                    }
+                    _ => volume(now, spacing, &scene.domain) / (now.len() as f64 * spacing.powi(3)),
+                };
+                let ratio = number / *reference.get_or_insert(number);
+                match self.mark.of {
+                    Quantity::Sinking => 1.0 - ratio,
+                    _ => (ratio - 1.0).abs(),
+                }
             }
             Memory::Energy(first, least) => {
                 let energy = report.kinetic_energy + report.potential_energy;
@@ -256,7 +286,8 @@ impl<'a> Watch<'a> {
         let (start, now) = (&run.start.particles, &run.state);
         let is_meant = |k: &usize| {
             let region = self.mark.region.as_ref();
-            region.is_none_or(|region| region.contains(point(&start.position[*k])))
+            let at = point(&start.position[*k]) + run.scene.origin;
+            region.is_none_or(|region| region.contains(at))
         };
         let gap = |k: usize| match other.places(k) {
             Some((place, _)) => place.distance(point(&now.position[k])),
@@ -279,6 +310,14 @@ fn displacement_error(run: &Runner<'_>, beside: &[Beside<'_>]) -> f64 {
         ways += place.distance_squared(start);
     }
     (gaps / ways).sqrt()
+}
+
+/// A box of the world about the scene's origin.
+fn about(region: &Bounds, scene: &Scene) -> Bounds {
+    Bounds {
+        min: region.min - scene.origin,
+        max: region.max - scene.origin,
+    }
 }
 
 /// Ids that one of two ascending lists has and the other has not.

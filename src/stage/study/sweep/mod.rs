@@ -127,9 +127,9 @@ impl Bench<'_> {
                 (Verdict::Done(Box::new(run)), status)
             }
             Err(StudyError::Solve(
-                error @ (SolverError::Gpu(SolveError::Numbers { .. })
+                error @ (SolverError::Gpu(SolveError::Numbers(_))
                 | SolverError::Reference(
-                    ReferenceError::Numbers { .. } | ReferenceError::NotConverged { .. },
+                    ReferenceError::Numbers(_) | ReferenceError::NotConverged { .. },
                 )),
             )) => {
                 let message = error.to_string();
@@ -174,13 +174,12 @@ impl Bench<'_> {
     /// Of all that a line depends on: physics, when to give up, frames, repeats, how it is measured, device, program.
     fn hash(&self, opened: &Opened, point: &Point) -> String {
         let state = self.sweep.state.as_ref();
-        let limits = match point.scene.solver.method {
-            Method::Pbf => point.scene.solver.pbf().max_substeps.to_string(),
-            Method::Flip => {
-                let flip = point.scene.solver.flip();
-                format!("{} {}", flip.max_substeps, flip.pressure.residual_limit)
-            }
+        let solver = &point.scene.solver;
+        let most = match solver.method {
+            Method::Pbf => solver.pbf().max_substeps,
+            Method::Flip => solver.flip().max_substeps,
         };
+        let limits = format!("{most} {:?}", point.scene.budget);
         let text = [
             FORM.to_owned(),
             physics_hash(&point.scene),

@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, time::Instant};
 use crate::{
     domain::{
         bricks::CELLS,
+        budget::Breach,
         particles::Particles,
         poisson::{Cells, System},
         solver::Solver,
@@ -105,9 +106,9 @@ impl Projections {
             let projected = solver.project(&substep)?;
             run.seconds.push(begin.elapsed().as_secs_f64());
             if !projected.solved.residual.is_finite() {
-                let what = format!("a residual of {}", projected.solved.residual);
-                let frame = self.made_by.frames + 1;
-                return Err(SolveError::Numbers { frame, what }.into());
+                let detail = format!("a residual of {}", projected.solved.residual);
+                let breach = Breach::not_finite(self.made_by.frames + 1, 1, Some(detail));
+                return Err(SolveError::Numbers(breach).into());
             }
             run.iterations = u64::from(projected.solved.iterations);
             run.missed = u32::from(projected.solved.is_missed);

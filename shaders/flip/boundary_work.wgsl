@@ -1,0 +1,33 @@
+// Work that walls and solids which move do on the water in a substep, over Δx² Δt: −p times what they push out through
+// the closed parts of a cell's faces, each workgroup's share of it. It is what the projection's energy gains by them.
+#import "shared/thread.wgsl"
+#import "shared/flip_params.wgsl"
+#import "shared/bricks.wgsl"
+
+@group(0) @binding(1) var<storage, read> cell_kind: array<u32>;
+@group(0) @binding(2) var<storage, read> solid_flux: array<f32>;
+@group(0) @binding(3) var<storage, read> pressure: array<f32>;
+@group(0) @binding(4) var<storage, read_write> boundary_work: array<f32>;
+
+var<workgroup> terms: array<f32, 64>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    let is_inside = thread < params.wet_cells;
+    let element = select(0u, thread + CELLS, is_inside);
+    let is_water = cell_kind[element] == 1u;
+    terms[local] = select(0.0, -pressure[element] * solid_flux[element], is_water && is_inside);
+    workgroupBarrier();
+    if local == 0u && is_inside {
+        var sum = 0.0;
+        for (var k = 0u; k < 64u; k++) {
+            sum += terms[k];
+        }
+        boundary_work[thread / 64u] = sum;
+    }
+}

@@ -1,0 +1,27 @@
+// Counts what is not finite in one of a substep's arrays: what clamps, maxima and comparisons behind it would hide.
+#import "shared/thread.wgsl"
+
+@group(0) @binding(0) var<storage, read> values: array<vec4u>;
+// 3: values that are not finite.
+@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
+
+// Values of a thread, in fours.
+const RUN = 4u;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let first = thread_index(workgroup, workgroups, local, 64u) * RUN;
+    let exponent = vec4u(0x7f800000u);
+    var bad = vec4u(0u);
+    for (var k = first; k < min(first + RUN, arrayLength(&values)); k++) {
+        bad += select(vec4u(0u), vec4u(1u), (values[k] & exponent) == exponent);
+    }
+    let count = bad.x + bad.y + bad.z + bad.w;
+    if count > 0u {
+        atomicAdd(&counters[3], count);
+    }
+}

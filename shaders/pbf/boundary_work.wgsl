@@ -1,0 +1,29 @@
+// Each workgroup's share of what moving walls did on the particles in a substep, added to that of the substeps before.
+#import "shared/thread.wgsl"
+#import "shared/pbf_params.wgsl"
+
+@group(0) @binding(1) var<storage, read> wall_work: array<f32>;
+@group(0) @binding(2) var<storage, read_write> boundary_work: array<f32>;
+
+var<workgroup> terms: array<f32, 64>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    let is_inside = thread < params.particle_count;
+    let i = select(0u, thread, is_inside);
+    // By corrections, and before the sort by the prediction.
+    terms[local] = select(0.0, wall_work[i] + wall_work[params.particle_count + i], is_inside);
+    workgroupBarrier();
+    if local == 0u && is_inside {
+        var sum = 0.0;
+        for (var k = 0u; k < 64u; k++) {
+            sum += terms[k];
+        }
+        boundary_work[thread / 64u] += sum;
+    }
+}

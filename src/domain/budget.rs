@@ -1,0 +1,218 @@
+//! Limits that a bake is held to, and what is told where one is passed.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// What is watched while a bake runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Watched {
+    /// Whether every number is one.
+    NotFinite,
+    /// Whether every particle that a frame began with is there at its end, once, within the domain.
+    Particles,
+    /// Substeps that a frame asks for.
+    Substeps,
+    /// Largest speed of a particle at a frame's end, m/s.
+    Speed,
+    /// Mean of max(0, ρ/ρ0 − 1) at a frame's end.
+    DensityErrorMean,
+    /// Its 99th percentile.
+    DensityErrorP99,
+    /// Times that a particle was slowed to the displacement cap, over particles and substeps.
+    Capped,
+    /// Relative true residual of a projection.
+    Residual,
+    /// Largest |∇·u| Δt in a cell of water after a projection.
+    Divergence,
+    /// |V/V0 − 1| at a frame's end, V0 the volume of the start.
+    Volume,
+    /// Rise of the total energy within a frame beyond the work done on the water, over the total.
+    Energy,
+}
+
+impl Watched {
+    /// Each with its name in reports, and what a message calls it.
+    const NAMED: [(Self, &'static str, &'static str); 11] = [
+        (Self::NotFinite, "not_finite", "values that are not finite"),
+        (
+            Self::Particles,
+            "particles",
+            "particles lost, doubled or outside",
+        ),
+        (Self::Substeps, "max_substeps", "substeps asked for"),
+        (Self::Speed, "speed", "the largest speed, m/s,"),
+        (
+            Self::DensityErrorMean,
+            "density_error_mean",
+            "the mean density error",
+        ),
+        (
+            Self::DensityErrorP99,
+            "density_error_p99",
+            "the density error's 99th percentile",
+        ),
+        (
+            Self::Capped,
+            "capped",
+            "the part of particles slowed to the displacement cap",
+        ),
+        (
+            Self::Residual,
+            "residual",
+            "the relative residual of the projection",
+        ),
+        (
+            Self::Divergence,
+            "divergence",
+            "the largest |∇·u| Δt after the projection",
+        ),
+        (Self::Volume, "volume", "the volume's drift from the start"),
+        (
+            Self::Energy,
+            "energy",
+            "the energy's rise beyond the work done, of the total,",
+        ),
+    ];
+
+    fn row(self) -> (Self, &'static str, &'static str) {
+        // In the order of the variants; a test holds them against each other.
+        Self::NAMED[self as usize]
+    }
+
+    /// As reports and `[budget]` name it.
+    pub fn name(self) -> &'static str {
+        self.row().1
+    }
+}
+
+/// A limit that was passed; the state before its frame stands.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub struct Breach {
+    /// Output frame that could not be computed.
+    pub frame: u32,
+    /// Substep of it, from 1, where it was seen within the frame.
+    pub substep: Option<u32>,
+    /// What is watched.
+    pub watched: Watched,
+    /// What was seen.
+    pub measured: f64,
+    /// What is allowed.
+    pub limit: f64,
+    /// More of it, where there is more to say.
+    pub detail: Option<String>,
+}
+
+impl Breach {
+    /// Of something that `[budget]` limits.
+    pub fn new(frame: u32, watched: Watched, measured: f64, limit: f64) -> Self {
+        Self {
+            frame,
+            substep: None,
+            watched,
+            measured,
+            limit,
+            detail: None,
+        }
+    }
+
+    /// So many values that are not finite.
+    pub fn not_finite(frame: u32, count: u64, detail: Option<String>) -> Self {
+        Self {
+            detail,
+            ..Self::new(frame, Watched::NotFinite, count as f64, 0.0)
+        }
+    }
+
+    /// The same, seen in a substep.
+    pub fn in_substep(self, substep: u32) -> Self {
+        Self {
+            substep: Some(substep),
+            ..self
+        }
+    }
+
+    /// A value that may not be over `limit` and has to be a number; `None` is no limit.
+    ///
+    /// # Errors
+    /// The breach, where it is over or not finite.
+    pub fn check(
+        frame: u32,
+        watched: Watched,
+        measured: f64,
+        limit: Option<f64>,
+    ) -> Result<(), Self> {
+        if !measured.is_finite() {
+            let detail = format!("{} is {measured}", watched.row().2.trim_end_matches(','));
+            return Err(Self::not_finite(frame, 1, Some(detail)));
+        }
+        match limit {
+            Some(limit) if measured > limit => Err(Self::new(frame, watched, measured, limit)),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Four digits: with them two that differ are told apart from a limit.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            value if value == value.trunc() && value.abs() < 1e9 => write!(f, "{value}"),
+            value if (0.001..10_000.0).contains(&value.abs()) => write!(f, "{value:.4}"),
+            value => write!(f, "{value:.3e}"),
+        }
+    }
+}
+
+impl fmt::Display for Breach {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "frame {}", self.frame)?;
+        if let Some(substep) = self.substep {
+            write!(f, ", substep {substep}")?;
+        }
+        let (watched, name, words) = self.watched.row();
+        let (measured, limit) = (Short(self.measured), Short(self.limit));
+        match watched {
+            Watched::NotFinite | Watched::Particles => write!(f, ": {measured} {words}")?,
+            Watched::Substeps => write!(f, ": {measured} {words}, and {name} is {limit}")?,
+            _ => write!(f, ": {words} is {measured}, and budget.{name} is {limit}")?,
+        }
+        match &self.detail {
+            Some(detail) => write!(f, " ({detail})"),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_stand_in_the_order_of_the_variants() {
+        for (k, (watched, ..)) in Watched::NAMED.into_iter().enumerate() {
+            assert_eq!(watched as usize, k);
+        }
+    }
+
+    #[test]
+    fn a_breach_is_told_with_frame_substep_measure_and_limit() {
+        let check = |measured, limit| Breach::check(7, Watched::Residual, measured, limit);
+        assert_eq!(check(0.01, Some(0.01)), Ok(()));
+        assert_eq!(check(1e9, None), Ok(()));
+        let breach = check(0.034, Some(0.01)).unwrap_err().in_substep(2);
+        assert_eq!(
+            breach.to_string(),
+            "frame 7, substep 2: the relative residual of the projection is 0.0340, and budget.residual is 0.0100"
+        );
+        // What is no number is over every limit, and over none as well.
+        for limit in [Some(0.01), None] {
+            let breach = check(f64::NAN, limit).unwrap_err();
+            assert_eq!(breach.watched, Watched::NotFinite);
+            assert!(breach.to_string().contains("is NaN"), "{breach}");
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! What moving walls do on the particles, over m / Δt².
+
+use rayon::prelude::*;
+
+use crate::{
+    compare::{check::Pair, rounding::U},
+    reference::{
+        neighbors::Neighbors,
+        pbf::{Colour, passes},
+    },
+    scene::Iteration,
+    solve::{SolveError, params::Phase, trace::Traced},
+};
+
+use super::{Checker, bounds::Bounds, fields::*, handled, pair_of, wide};
+
+impl Checker<'_> {
+    /// Largest speed of a wall, m/s.
+    fn wall_speed(&self) -> f64 {
+        let velocity = &self.substep.wall_velocity;
+        velocity.min.abs().max(velocity.max.abs()).max_element()
+    }
+
+    /// What a pass adds to; kept until it has run.
+    pub(super) fn read_work(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        self.work = match traced.pass {
+            "pbf/compute_delta" => traced.read("wall_work", self.n())?,
+            "pbf/boundary_work" => traced.read("boundary_work", self.n().div_ceil(64))?,
+            _ => Vec::new(),
+        };
+        Ok(())
+    }
+
+    /// By the prediction: `tolerance` of each particle's position, metres.
+    pub(super) fn predict_work(
+        &mut self,
+        traced: Traced<'_>,
+        tolerance: &[f64],
+    ) -> Result<(), SolveError> {
+        let n = self.n();
+        let work = traced.read::<f32>("wall_work", 2 * n)?;
+        let (position, velocity) = (&self.vectors["position"], &self.vectors["velocity"]);
+        let speed = self.wall_speed();
+        let pairs: Vec<Pair<f64>> = (0..n)
+            .map(|i| {
+                let (x, v) = (wide(&position[i]), wide(&velocity[i]));
+                let (_, _, twin) = passes::predict_and_work(&self.model, &self.substep, x, v);
+                let error = 3.0 * speed * (tolerance[i] + U * x.length()) + 4.0 * U * twin.abs();
+                pair_of(i, f64::from(work[n + i]), twin, error)
+            })
+            .collect();
+        self.table.add(&PREDICT_WORK, &pairs, 0);
+        Ok(())
+    }
+
+    /// By a correction. With Chebyshev what is compared are the particles of which nothing is carried on.
+    pub(super) fn delta_work(
+        &mut self,
+        traced: Traced<'_>,
+        neighbors: &Neighbors,
+    ) -> Result<(), SolveError> {
+        let phase = traced.uniform::<Phase>("phase")?;
+        let (points, lambda) = self.stored(&phase);
+        let is_plain = self.scene.solver.pbf().iteration != Iteration::Chebyshev;
+        let inputs = self.inputs(&points, neighbors);
+        let twin = passes::compute_delta_and_work(inputs, Colour::All, None, &lambda);
+        let after = traced.read::<f32>("wall_work", self.n())?;
+        let bounds = Bounds(inputs);
+        let h = self.model.calibration.support_radius;
+        let speed = self.wall_speed();
+        let one = |i: usize| {
+            let is_coincident = (neighbors.all(i))
+                .any(|j| points[i].distance_squared(points[j as usize]) < 2e-12 * h * h);
+            if is_coincident || !(is_plain || phase.acceleration == 1.0) {
+                return None;
+            }
+            let (before, after) = (f64::from(self.work[i]), f64::from(after[i]));
+            let (to, added) = twin[i];
+            let step = (to - points[i]).length();
+            let error = bounds.delta(i, &lambda) + 16.0 * U * step;
+            let confined = bounds.confine(to, error + U * points[i].length());
+            let tolerance = 3.0 * speed * (error + confined.error + U * points[i].length())
+                + 2.0 * U * (before.abs() + after.abs())
+                + 16.0 * U * added.abs();
+            Some(pair_of(i, after, before + added, tolerance))
+        };
+        let all: Vec<_> = handled(&phase).into_par_iter().map(one).collect();
+        let count = all.len();
+        let pairs: Vec<_> = all.into_iter().flatten().collect();
+        self.table.add(&DELTA_WORK, &pairs, count - pairs.len());
+        Ok(())
+    }
+
+    pub(super) fn boundary_work(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        let n = self.n();
+        let work = traced.read::<f32>("wall_work", 2 * n)?;
+        let sums = traced.read::<f32>("boundary_work", n.div_ceil(64))?;
+        let pairs: Vec<_> = (sums.iter().zip(&self.work).enumerate())
+            .map(|(group, (&after, &before))| {
+                let terms = 64 * group..(64 * group + 64).min(n);
+                let term = |i: usize| f64::from(work[i]) + f64::from(work[n + i]);
+                let sum: f64 = terms.clone().map(term).sum();
+                let sizes: f64 = terms
+                    .map(|i| f64::from(work[i].abs() + work[n + i].abs()))
+                    .sum();
+                let before = f64::from(before);
+                let tolerance = U * (66.0 * sizes + before.abs() + f64::from(after).abs());
+                pair_of(group, f64::from(after), before + sum, tolerance)
+            })
+            .collect();
+        self.table.add(&WORK, &pairs, 0);
+        Ok(())
+    }
+}

@@ -1,0 +1,448 @@
+//! A frame that broke a budget, computed again from the state before it: which pass first went wrong.
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
+
+use glam::{DVec3, Vec3};
+use serde_json::json;
+
+use crate::{
+    cache::{
+        CacheError, CacheReader,
+        failed::{self, Failed},
+        frame::Stamp,
+    },
+    domain::{
+        budget::{Breach, Watched},
+        particles::Particles,
+        signed_distance::SignedDistanceError,
+        solver::StepReport,
+    },
+    gpu::{adapter::GpuError, recording::Moment},
+    scene::{self, Method, Scene, SceneError},
+    solve::{
+        SolveError,
+        flip::Flip,
+        params::FlipParams,
+        pbf::{Pbf, device_limits},
+        pressure::PressureControl,
+        trace::{TraceFrame, Traced},
+    },
+};
+
+use super::{
+    Blame,
+    device::{Built, Device, Opened, SolverError},
+    prepare::Start,
+    watch::{Watch, volume_of},
+};
+
+/// Where in a frame something first went wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Substep of the frame, from 1.
+    pub substep: u32,
+    /// Pass.
+    pub pass: &'static str,
+    /// Buffer that it wrote.
+    pub buffer: String,
+}
+
+/// A frame that breaks a budget each time that it is computed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// What was broken.
+    pub breach: Breach,
+    /// Where first; `None` on the CPU, where passes are not traced, and where the state that the frame began with is
+    /// at fault.
+    pub place: Option<Place>,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}; ", self.breach)?;
+        match &self.place {
+            Some(Place {
+                substep,
+                pass,
+                buffer,
+            }) => write!(
+                f,
+                "first in {pass} of substep {substep}, in what it wrote to {buffer}"
+            ),
+            None => write!(f, "in no pass that can be named"),
+        }
+    }
+}
+
+/// Computes the frame after `last`, of which `state` is the end, and finds out what goes wrong in it. `None` where
+/// nothing does.
+///
+/// # Errors
+/// The device; a state that is not the scene's.
+pub fn replay(
+    opened: &Opened,
+    scene: &Scene,
+    start: &Start,
+    last: u32,
+    state: &Particles,
+) -> Result<Option<Failure>, SolverError> {
+    let mut watch = Watch::new(scene, &start.particles, last, state);
+    let (energy, start_volume) = (watch.energy(), watch.start_volume());
+    let Built { mut solver, .. } = opened.build(scene, start, false)?;
+    solver.load(last, state)?;
+    let mut made = None;
+    let breach = match solver.advance() {
+        Ok((particles, mut report)) => match watch.look(&particles, &mut report) {
+            Ok(()) => return Ok(None),
+            Err(breach) => {
+                made = Some(report);
+                breach
+            }
+        },
+        Err(error) => match error.breach() {
+            Some(breach) => breach.clone(),
+            None => return Err(error),
+        },
+    };
+    // Two solvers at once may be more than the device holds.
+    drop(solver);
+    let Opened::Gpu(context) = opened else {
+        return Ok(Some(Failure {
+            breach,
+            place: None,
+        }));
+    };
+    let mut finder = Finder {
+        scene,
+        state,
+        breach: &breach,
+        made,
+        energy,
+        start_volume,
+        is_projected: false,
+        place: None,
+    };
+    let plan = start.plan(scene, device_limits(context));
+    let boundary = &start.boundary;
+    match scene.solver.method {
+        Method::Pbf => finder.trace(last, Pbf::new(context, scene, plan, boundary, false)?)?,
+        Method::Flip => finder.trace(last, Flip::new(context, scene, plan, boundary, false)?)?,
+    }
+    let place = finder.place;
+    Ok(Some(Failure { breach, place }))
+}
+
+/// Looks at what each dispatch wrote: for what is not finite, and for the watched quantity over its limit.
+struct Finder<'a> {
+    scene: &'a Scene,
+    state: &'a Particles,
+    breach: &'a Breach,
+    /// What the frame reported, where it came to its end.
+    made: Option<StepReport>,
+    energy: f64,
+    start_volume: Option<f64>,
+    /// Whether the substep's projection is over: what is solved then is the density correction.
+    is_projected: bool,
+    place: Option<Place>,
+}
+
+/// State of a solve that is over, of shared/pressure_control.wgsl.
+const DONE: u32 = 2;
+
+impl Finder<'_> {
+    fn trace(
+        &mut self,
+        last: u32,
+        mut solver: impl TraceFrame<Error = SolveError>,
+    ) -> Result<(), SolveError> {
+        solver.load(last, self.state)?;
+        // PBF counts over a frame, so that the substep may not be known.
+        let from = self.breach.substep.unwrap_or(1);
+        let traced = solver.trace_frame(from, &mut |substep, traced| self.observe(substep, traced));
+        match traced {
+            // Found, or the solver came upon it itself.
+            Ok(()) | Err(SolveError::Numbers(_)) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn observe(&mut self, substep: u32, traced: Traced<'_>) -> Result<(), SolveError> {
+        if traced.moment == Moment::Before {
+            return Ok(());
+        }
+        match traced.pass {
+            "flip/survey" => self.is_projected = false,
+            "pressure/project" => self.is_projected = true,
+            _ => {}
+        }
+        let found = match traced.first_not_finite()? {
+            Some(buffer) => Some(buffer),
+            None => self.first_over(&traced)?.map(str::to_owned),
+        };
+        let Some(buffer) = found else {
+            return Ok(());
+        };
+        self.place = Some(Place {
+            substep,
+            pass: traced.pass,
+            buffer,
+        });
+        // Ends the trace.
+        Err(self.breach.clone().into())
+    }
+
+    /// The buffer, of those that the dispatch wrote, whose content is over the watched limit.
+    fn first_over(&self, traced: &Traced<'_>) -> Result<Option<&'static str>, SolveError> {
+        let limit = self.breach.limit;
+        let n = self.state.len();
+        match self.breach.watched {
+            Watched::NotFinite => Ok(None),
+            Watched::Speed => self.too_fast(traced, limit),
+            Watched::Substeps => self.too_fast(traced, self.most_speed()),
+            Watched::Particles => {
+                let of_ids = ["id", "sorted_id"].into_iter();
+                for buffer in of_ids.filter(|buffer| traced.writes(buffer)) {
+                    let mut id: Vec<u32> = traced.read(buffer, n)?;
+                    id.sort_unstable();
+                    if id != self.state.id {
+                        return Ok(Some(buffer));
+                    }
+                }
+                Ok(None)
+            }
+            Watched::DensityErrorMean | Watched::DensityErrorP99 if traced.writes("density") => {
+                let count = match self.scene.solver.method {
+                    Method::Pbf => n,
+                    Method::Flip => traced.length::<f32>("density"),
+                };
+                let mut density: Vec<f32> = traced.read("density", count)?;
+                if self.scene.solver.method == Method::Flip {
+                    density.retain(|&density| density != 0.0);
+                }
+                let density = density.into_iter().map(f64::from);
+                let report = self.scene.report(&Particles::default(), density);
+                let measured = match self.breach.watched {
+                    Watched::DensityErrorMean => report.density_error_mean,
+                    _ => report.density_error_p99,
+                };
+                Ok((measured > limit).then_some("density"))
+            }
+            Watched::Residual if traced.pass == "pressure/reduce" && !self.is_projected => {
+                let control: Vec<PressureControl> = traced.read("pressure_control", 1)?;
+                let [r, b] = [control[0].residual_square, control[0].rhs_square].map(f64::from);
+                let is_over = control[0].state == DONE && r > limit * limit * b;
+                Ok(is_over.then_some("pressure_control"))
+            }
+            Watched::Divergence if traced.pass == "pressure/measure_divergence" => {
+                let stats: Vec<f32> = traced.read("pressure_stats", 2)?;
+                let params: Vec<FlipParams> = traced.read("params", 1)?;
+                let change = f64::from(stats[1]) * f64::from(params[0].time_step);
+                Ok((change > limit).then_some("pressure_stats"))
+            }
+            Watched::Volume if traced.writes("position") => {
+                let moved = Particles {
+                    position: self.positions(traced)?,
+                    ..Particles::default()
+                };
+                let drift = |start: f64| (volume_of(self.scene, &moved) / start - 1.0).abs();
+                let is_over = self.start_volume.is_some_and(|start| drift(start) > limit);
+                Ok(is_over.then_some("position"))
+            }
+            Watched::Energy if traced.writes("velocity") || traced.writes("position") => {
+                let energy = self.energy_of(traced)?;
+                let work = self
+                    .made
+                    .as_ref()
+                    .map_or(0.0, |report| report.boundary_work);
+                let allowed = self.scene.allowed_energy(n, self.energy, work, limit);
+                Ok((energy > allowed).then_some("velocity"))
+            }
+            Watched::Capped if traced.writes("counters") => {
+                let counters: Vec<u32> = traced.read("counters", 1)?;
+                let substeps = self.made.as_ref().map_or(1, |report| report.substeps);
+                let most = limit * n as f64 * f64::from(substeps);
+                Ok((f64::from(counters[0]) > most).then_some("counters"))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// Past which the scene's `max_substeps` do not do, m/s.
+    fn most_speed(&self) -> f64 {
+        let solver = &self.scene.solver;
+        let way = match solver.method {
+            Method::Pbf => solver.pbf().cfl * solver.pbf().particle_spacing,
+            Method::Flip => solver.flip().cfl * solver.flip().cell_size,
+        };
+        way * self.breach.limit * self.scene.shot.frames_per_second
+    }
+
+    fn too_fast(
+        &self,
+        traced: &Traced<'_>,
+        limit: f64,
+    ) -> Result<Option<&'static str>, SolveError> {
+        for buffer in ["velocity", "sorted_velocity"] {
+            if traced.writes(buffer) {
+                let velocity: Vec<[f32; 4]> = traced.read(buffer, self.state.len())?;
+                let speed = |v: &[f32; 4]| vector(v).length();
+                if velocity.iter().any(|v| speed(v) > limit) {
+                    return Ok(Some(buffer));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// World positions as they stand, metres.
+    fn positions(&self, traced: &Traced<'_>) -> Result<Vec<[f32; 3]>, SolveError> {
+        let local: Vec<[f32; 4]> = traced.read("position", self.state.len())?;
+        let world = |x: &[f32; 4]| (self.scene.domain.min + vector(x)).as_vec3().to_array();
+        Ok(local.iter().map(world).collect())
+    }
+
+    /// Kinetic and potential energy of positions and velocities as they stand, joule: their order does not count.
+    fn energy_of(&self, traced: &Traced<'_>) -> Result<f64, SolveError> {
+        let velocity: Vec<[f32; 4]> = traced.read("velocity", self.state.len())?;
+        let state = Particles {
+            position: self.positions(traced)?,
+            velocity: velocity.iter().map(|v| [v[0], v[1], v[2]]).collect(),
+            ..Particles::default()
+        };
+        let report = self.scene.report(&state, [].into_iter());
+        Ok(self.scene.total_energy(state.len(), &report))
+    }
+}
+
+fn vector(v: &[f32; 4]) -> DVec3 {
+    Vec3::new(v[0], v[1], v[2]).as_dvec3()
+}
+
+/// Writes `failed/` into the cache that a failed bake left, and says where in the frame it went wrong.
+///
+/// # Errors
+/// The cache, or the device.
+pub(super) fn keep(
+    directory: &Path,
+    opened: &Opened,
+    scene: &Scene,
+    start: &Start,
+    breach: &Breach,
+) -> Result<Failure, ReplayError> {
+    let cached = CacheReader::open(directory)?;
+    let last = cached.last_frame();
+    let state = cached.read(last)?;
+    // A device that fails now has its say in the frame's own breach all the same.
+    let failure = match replay(opened, scene, start, last, &state) {
+        Ok(Some(failure)) => failure,
+        Ok(None) | Err(_) => Failure {
+            breach: breach.clone(),
+            place: None,
+        },
+    };
+    let stamp = Stamp {
+        program: env!("CARGO_PKG_NAME"),
+        program_version: env!("CARGO_PKG_VERSION"),
+        shot: &scene.shot.name,
+        origin: scene.origin,
+        frame: last,
+        time: f64::from(last) / scene.shot.frames_per_second,
+    };
+    let Breach {
+        frame,
+        substep,
+        watched,
+        measured,
+        limit,
+        ..
+    } = &failure.breach;
+    let place = failure.place.as_ref();
+    let report = json!({
+        "last_frame": last, "frame": frame, "substep": substep, "budget": watched.name(), "measured": measured,
+        "limit": limit, "message": failure.to_string(), "device": match opened { Opened::Gpu(_) => "gpu", Opened::Cpu => "cpu" },
+        "pass": place.map(|p| json!({ "name": p.pass, "substep": p.substep, "buffer": p.buffer })),
+    });
+    let failed = Failed {
+        scene_toml: scene.to_toml(&scene::asset_path),
+        start: state,
+        last_frame: last,
+        report,
+    };
+    failed::write(directory, &failed, &stamp)?;
+    Ok(failure)
+}
+
+/// Why a frame could not be computed again.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The folder.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// Its scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The scene's solids.
+    #[error(transparent)]
+    Solid(#[from] SignedDistanceError),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The solver.
+    #[error(transparent)]
+    Solve(#[from] SolverError),
+}
+
+impl From<&ReplayError> for Blame {
+    fn from(error: &ReplayError) -> Self {
+        match error {
+            ReplayError::Cache(error) => error.into(),
+            ReplayError::Scene(error) => error.into(),
+            ReplayError::Solid(error) => error.into(),
+            ReplayError::Gpu(error) => error.into(),
+            ReplayError::Solve(error) => error.into(),
+        }
+    }
+}
+
+/// Whether `directory` is what a failed bake left in its cache.
+pub fn is_failed(directory: &Path) -> bool {
+    failed::is_failed(directory)
+}
+
+/// A frame computed again from what a failed bake left.
+#[derive(Debug)]
+pub struct Replayed {
+    /// The frame.
+    pub frame: u32,
+    /// What went wrong again; `None` where it went well.
+    pub failure: Option<Failure>,
+}
+
+/// Computes the frame of `directory`, a cache's `failed/`, again, on the kind of device that it failed on.
+///
+/// # Errors
+/// [`ReplayError`]; a breach is none, but in the result.
+pub fn replay_failed(directory: &Path, adapter: Option<String>) -> Result<Replayed, ReplayError> {
+    let Failed {
+        scene_toml,
+        start: state,
+        last_frame,
+        report,
+    } = failed::read(directory)?;
+    // Mesh files stand in the cache, whose folder this one is in.
+    let cache: PathBuf = directory.join("..");
+    let scene = Scene::parse(&scene_toml, &directory.join("scene.toml"), &cache, &[])?;
+    let start = Start::of(&scene)?;
+    let device = match report["device"].as_str() {
+        Some("cpu") => Device::Cpu,
+        _ => Device::Gpu(adapter),
+    };
+    let failure = replay(&device.open()?, &scene, &start, last_frame, &state)?;
+    Ok(Replayed {
+        frame: last_frame + 1,
+        failure,
+    })
+}

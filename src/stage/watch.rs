@@ -1,0 +1,104 @@
+//! What a bake is held to at each frame's end, the same for every solver.
+
+use glam::Vec3;
+
+use crate::{
+    domain::{
+        budget::{Breach, Watched},
+        particles::Particles,
+        probe::volume,
+        solver::StepReport,
+    },
+    scene::Scene,
+};
+
+/// Roundings of a coordinate by which a particle may lie beyond a face of the domain.
+const ROUNDINGS: f64 = 4.0;
+
+/// What frames are held against.
+pub(super) struct Watch<'a> {
+    scene: &'a Scene,
+    /// Of the frame that comes next.
+    frame: u32,
+    /// Of the state before it, joule.
+    energy: f64,
+    /// m³, where it is watched.
+    start_volume: Option<f64>,
+    /// Of all frames.
+    id: Vec<u32>,
+}
+
+impl<'a> Watch<'a> {
+    /// Before the frame after `last`, of which `state` is the end; `start` is that of the bake.
+    pub(super) fn new(scene: &'a Scene, start: &Particles, last: u32, state: &Particles) -> Self {
+        let report = scene.report(state, [].into_iter());
+        Self {
+            scene,
+            frame: last + 1,
+            energy: scene.total_energy(state.len(), &report),
+            start_volume: scene.budget.volume.map(|_| volume_of(scene, start)),
+            id: state.id.clone(),
+        }
+    }
+
+    /// Joule, of the state before the frame that comes next.
+    pub(super) fn energy(&self) -> f64 {
+        self.energy
+    }
+
+    /// m³, where a budget watches it.
+    pub(super) fn start_volume(&self) -> Option<f64> {
+        self.start_volume
+    }
+
+    /// Looks at the frame that came next, and notes in its report what was measured for this.
+    ///
+    /// # Errors
+    /// The first budget that it breaks.
+    pub(super) fn look(
+        &mut self,
+        particles: &Particles,
+        report: &mut StepReport,
+    ) -> Result<(), Breach> {
+        let (scene, n) = (self.scene, particles.len());
+        if let Some((count, first)) = particles.first_not_finite(None) {
+            return Err(Breach::not_finite(self.frame, count, Some(first)));
+        }
+        self.count(particles)?;
+        report.volume = scene.budget.volume.map(|_| volume_of(scene, particles));
+        let budget = &scene.budget;
+        budget.check_frame(scene, self.frame, n, report, self.energy, self.start_volume)?;
+        self.energy = scene.total_energy(n, report);
+        self.frame += 1;
+        Ok(())
+    }
+
+    /// Neither solver takes particles out, and both clamp them to the domain: the ledger of particles closes at
+    /// every frame, and no budget loosens that.
+    fn count(&self, particles: &Particles) -> Result<(), Breach> {
+        let domain = &self.scene.domain;
+        let farthest = domain.min.abs().max(domain.max.abs()).max_element();
+        let room = domain.grown(ROUNDINGS * f64::from(f32::EPSILON) * farthest);
+        let is_outside = |x: &&[f32; 3]| !room.contains(Vec3::from_array(**x).as_dvec3());
+        let outside = particles.position.iter().filter(is_outside).count();
+        let pairs = particles.id.iter().zip(&self.id);
+        let lost = self.id.len().abs_diff(particles.len()) + pairs.filter(|(a, b)| a != b).count();
+        if outside + lost == 0 {
+            return Ok(());
+        }
+        let detail = format!(
+            "{lost} of {} by their ids, {outside} outside",
+            self.id.len()
+        );
+        let breach = Breach::new(self.frame, Watched::Particles, (outside + lost) as f64, 0.0);
+        Err(Breach {
+            detail: Some(detail),
+            ..breach
+        })
+    }
+}
+
+/// As a probe has it.
+pub(super) fn volume_of(scene: &Scene, particles: &Particles) -> f64 {
+    volume(particles, scene.particle_spacing(), &scene.domain)
+}
