@@ -51,7 +51,11 @@ pub fn filled_volume(position: &[[f32; 3]], spacing: f64, domain: &Bounds) -> Op
             let mut weight = 0.125;
             let cell = [0, 1, 2].map(|axis| {
                 let is_high = corner >> axis & 1 == 1;
-                weight *= if is_high { part[axis] } else { 1.0 - part[axis] };
+                weight *= if is_high {
+                    part[axis]
+                } else {
+                    1.0 - part[axis]
+                };
                 (low[axis] as i64 + i64::from(is_high)).clamp(0, dims[axis] - 1)
             });
             cells.entry(cell).or_default().1 += weight;

@@ -375,30 +375,36 @@ impl Template {
     }
 }
 
-/// An override with the value in its braces: `{}` is the value, `{2*}` twice it, `{2/}` two over it.
+/// An override with the value in its braces: `{}` is the value, `{2*}` twice it, `{2/}` two over it. Other braces are
+/// tables of the override's own.
 fn filled(set: &str, value: f64) -> std::result::Result<String, String> {
     let mut out = String::new();
     let mut rest = set;
-    while let Some(open) = rest.find('{') {
-        let (before, inner) = rest.split_at(open);
-        let close = inner.find('}').ok_or("a brace is not closed")?;
-        let term = &inner[1..close];
-        out.push_str(before);
+    while let Some(close) = rest.find('}') {
+        let (before, after) = rest.split_at(close);
+        let open = before.rfind('{').unwrap_or(before.len());
+        let (before, term) = before.split_at(open);
         let factor = |text: &str| {
             text.parse::<f64>()
-                .map_err(|_| format!("{{{term}}} is none of {{}}, {{2*}}, {{2/}}"))
+                .map_err(|_| format!("{{{text}}} is none of {{}}, {{2*}}, {{2/}}"))
         };
-        match (term, term.strip_suffix('*'), term.strip_suffix('/')) {
-            ("", ..) => out.push_str(&format!("{value:?}")),
-            (_, Some(times), _) => out.push_str(&format!("{:?}", factor(times)? * value)),
-            (_, _, Some(over)) => out.push_str(&format!("{:?}", factor(over)? / value)),
-            // A table of the override's own.
-            _ => out.push_str(&inner[..=close]),
+        out.push_str(before);
+        match term.strip_prefix('{') {
+            Some("") => out.push_str(&format!("{value:?}")),
+            Some(inner) => match (inner.strip_suffix('*'), inner.strip_suffix('/')) {
+                (Some(times), _) => out.push_str(&format!("{:?}", factor(times)? * value)),
+                (_, Some(over)) => out.push_str(&format!("{:?}", factor(over)? / value)),
+                _ => out.push_str(&format!("{term}}}")),
+            },
+            None => out.push('}'),
         }
-        rest = &inner[close + 1..];
+        rest = &after[1..];
     }
     out.push_str(rest);
-    Ok(out)
+    match out.matches('{').count() == out.matches('}').count() {
+        true => Ok(out),
+        false => Err("a brace is not closed".to_owned()),
+    }
 }
 
 fn methods(doc: &Document<'_>, words: &Option<Vec<Spanned<String>>>) -> Result<Vec<Method>> {
@@ -453,6 +459,10 @@ mod tests {
             Ok("a=[0.5, 1.5, 4.0]")
         );
         assert_eq!(fill("a={ b = 1 }").as_deref(), Ok("a={ b = 1 }"));
+        assert_eq!(
+            fill("a=[{ b = { c = 1 }, d = {2*} }]").as_deref(),
+            Ok("a=[{ b = { c = 1 }, d = 1.0 }]")
+        );
         assert!(fill("a={x*}").is_err());
         assert!(fill("a={").is_err());
     }

@@ -8,7 +8,10 @@ use crate::{
         probe::{energies, volume},
         solver::{Projection, StepReport},
     },
-    scene::{Scene, study::stability::{Mark, Other, Over, Quantity}},
+    scene::{
+        Scene,
+        study::stability::{Mark, Other, Over, Quantity},
+    },
     study::stability::{Flight, filled_volume, least_spacing, matched, outside, point},
 };
 
@@ -380,4 +383,24 @@ fn gaps(a: &Runner<'_>, b: &Runner<'_>, scale: f64) -> Vec<f64> {
         _ => f64::NAN,
     };
     pairs.map(gap).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lost_and_doubled_particles_count() {
+        assert_eq!(lost(&[1, 2, 3], &[1, 2, 3]), 0);
+        assert_eq!(lost(&[1, 2, 3], &[1, 3]), 1);
+        assert_eq!(lost(&[1, 2, 3], &[1, 2, 3, 7]), 1);
+        assert_eq!(lost(&[1, 2, 3], &[1, 2, 9]), 2);
+        assert_eq!(lost(&[1, 2, 3], &[1, 2, 2]), 1);
+    }
+
+    #[test]
+    fn what_is_no_number_is_the_largest() {
+        assert_eq!(largest([1.0, 3.0, 2.0]), 3.0);
+        assert!(largest([1.0, f64::NAN, 2.0]).is_nan());
+    }
 }
