@@ -295,6 +295,10 @@ impl Results<'_> {
         parts.push(Part::Answers(findings.to_vec()));
         parts.push(Part::Heading("Cases".into()));
         parts.push(self.verdicts());
+        if let Some(tests) = self.tests() {
+            parts.push(Part::Subheading("Held by tests".into()));
+            parts.push(tests);
+        }
         if !self.limits.is_empty() {
             parts.push(Part::Heading("Limits".into()));
             parts.push(Part::Table(self.limit_table()));
@@ -315,7 +319,7 @@ impl Results<'_> {
         parts
     }
 
-    /// Case by case: marks, refusals, tests.
+    /// Case by case: marks and refusals.
     fn verdicts(&self) -> Part {
         let rows = self.rows();
         let mut out = Vec::new();
@@ -323,28 +327,23 @@ impl Results<'_> {
             let head = [case.number.to_string(), case.name.clone()];
             let line = |cells: [String; 6]| head.iter().cloned().chain(cells).collect::<Vec<_>>();
             match &case.held {
-                Held::Test(command) => out.push((
-                    Tone::Plain,
-                    line([
-                        String::new(),
-                        command.clone(),
-                        String::new(),
-                        String::new(),
-                        String::new(),
-                        "held by this test".into(),
-                    ]),
-                )),
+                Held::Test(_) => {}
                 Held::Refusal { words, attempts } => {
                     for (attempt, record) in attempts.iter().zip(records) {
                         let verdict = refusal_verdict(record, words);
                         let said = record.run.ended.clone();
+                        let of = |device| match (attempt.device == device, &said) {
+                            (false, _) => String::new(),
+                            (true, Some(_)) => "yes".to_owned(),
+                            (true, None) => "no".to_owned(),
+                        };
                         let cells = [
                             attempt.method.name().to_owned(),
                             "refused".to_owned(),
-                            said.unwrap_or_else(|| "not refused".to_owned()),
-                            attempt.device.name().to_owned(),
-                            words.join(" … "),
-                            verdict.words().to_owned(),
+                            of(CaseDevice::Gpu),
+                            of(CaseDevice::Cpu),
+                            "refused".to_owned(),
+                            format!("{}: {}", verdict.words(), said.unwrap_or_default()),
                         ];
                         out.push((tone(verdict), line(cells)));
                     }
@@ -375,10 +374,35 @@ impl Results<'_> {
         let titles = [
             "", "case", "solver", "measured", "GPU", "CPU, f64", "mark", "verdict",
         ];
+        // A case's name stands once, over its rows.
+        for k in (1..out.len()).rev() {
+            let same = out[k].1[..2] == out[k - 1].1[..2];
+            out[k].1[..2]
+                .iter_mut()
+                .filter(|_| same)
+                .for_each(String::clear);
+        }
         Part::Verdicts {
             titles: titles.map(str::to_owned).to_vec(),
             rows: out,
         }
+    }
+
+    /// Cases that tests hold, with the command that runs each.
+    fn tests(&self) -> Option<Part> {
+        let mut table = vec![["", "case", "held by"].map(str::to_owned).to_vec()];
+        for case in &self.stability.cases {
+            if let Held::Test(command) = &case.held {
+                let number = case.number.to_string();
+                table.push(vec![number, case.name.clone(), command.clone()]);
+            }
+        }
+        let rows = table.split_off(1);
+        let rows: Vec<_> = rows.into_iter().map(|row| (Tone::Plain, row)).collect();
+        (!rows.is_empty()).then(|| Part::Verdicts {
+            titles: table.remove(0),
+            rows,
+        })
     }
 
     fn limit_table(&self) -> Vec<Vec<String>> {
