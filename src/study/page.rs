@@ -64,7 +64,7 @@ h1,h2{font-weight:600}table{border-collapse:collapse;font-variant-numeric:tabula
 th,td{padding:.25em .8em;border-bottom:1px solid #ddd;text-align:right}\
 th:first-child,td:first-child{text-align:left}dt{font-weight:600;margin-top:.6em}dd{margin:0}\
 .pictures{display:grid;gap:.4em;align-items:center}.pictures img{width:100%;display:block}\
-.curves{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:1em}\
+.curves{display:grid;grid-template-columns:repeat(auto-fill,minmax(420px,1fr));gap:1em}\
 .verdicts td,.verdicts th{text-align:left;vertical-align:top}.verdicts td:last-child{border-left:6px solid #ddd;min-width:18em}.verdicts td:nth-child(2){min-width:12em}\
 .good td:last-child{border-left-color:#009e73}.bad td:last-child{border-left-color:#d55e00;font-weight:600}\
 .known td:last-child{border-left-color:#e69f00}h3{margin:1.4em 0 .3em;font-weight:600}\

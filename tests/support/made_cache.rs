@@ -82,6 +82,8 @@ pub fn report(frame: u32) -> Value {
         max_speed: 1.0,
         capped: 0,
         searched: 0,
+        boundary_work: 0.0,
+        volume: None,
         projection: None,
     })
     .unwrap()

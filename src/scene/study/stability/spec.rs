@@ -297,7 +297,7 @@ fn mark(doc: &Document<'_>, spec: &Spanned<MarkSpec>, others: usize) -> Result<M
         if !of.about().takes_since {
             return Err(doc.fault_at(since.span(), format!("{word:?} does not take since")));
         }
-        if !(*since.get_ref() >= 0.0) {
+        if !(0.0..f64::INFINITY).contains(since.get_ref()) {
             return Err(doc.fault_at(since.span(), "out of range"));
         }
     }

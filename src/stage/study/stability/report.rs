@@ -72,7 +72,7 @@ impl Row<'_> {
 pub(super) fn number(value: f64) -> String {
     match value.abs() {
         0.0 => "0".to_owned(),
-        size if size >= 1e5 || size < 1e-3 => format!("{value:.2e}"),
+        size if !(1e-3..1e5).contains(&size) => format!("{value:.2e}"),
         size if size >= 100.0 => format!("{value:.0}"),
         size => {
             let digits = (2.0 - size.log10().floor()).max(0.0) as usize;
@@ -360,7 +360,7 @@ impl Results<'_> {
                         let why = why.map_or(String::new(), |why| format!(": {why}"));
                         let cells = [
                             row.method.name().to_owned(),
-                            row.mark.of.about().title.to_owned(),
+                            format!("{}{}", row.mark.of.about().title, when(row.mark)),
                             row.value(CaseDevice::Gpu),
                             row.value(CaseDevice::Cpu),
                             bound(row.mark.bound),
@@ -431,12 +431,14 @@ impl Results<'_> {
         let mut parts = Vec::new();
         for case in &self.stability.cases {
             let own = || rows.iter().filter(|row| std::ptr::eq(row.case, case));
-            let mut quantities: Vec<Quantity> = own().map(|row| row.mark.of).collect();
+            // One chart each, and one more of what is held against a later state.
+            let of = |row: &Row<'_>| (row.mark.of, row.mark.since.map(f64::to_bits));
+            let mut quantities: Vec<_> = own().map(of).collect();
             quantities.sort_unstable();
             quantities.dedup();
             let charts: Vec<String> = quantities
                 .into_iter()
-                .filter_map(|of| chart(of, own().filter(|row| row.mark.of == of)))
+                .filter_map(|which| chart(which.0, own().filter(|row| of(row) == which)))
                 .collect();
             if charts.is_empty() && case.note.is_none() {
                 continue;
@@ -510,11 +512,22 @@ fn tone(verdict: Verdict) -> Tone {
     }
 }
 
+/// The frames that count, where not all do.
+fn when(mark: &Mark) -> String {
+    match mark.since {
+        Some(since) => format!(", against that at {} s", number(since)),
+        None if mark.after > 0.0 => format!(", after {} s", number(mark.after)),
+        None => String::new(),
+    }
+}
+
 /// `None` where nothing changes.
 fn chart<'a>(of: Quantity, rows: impl Iterator<Item = &'a Row<'a>>) -> Option<String> {
     let mut series = Vec::new();
     let mut marks: Vec<f64> = Vec::new();
+    let mut span = String::new();
     for row in rows {
+        span = when(row.mark);
         for (device, _, record, place) in &row.on {
             let points = record.run.measured.get(*place)?.curve.clone();
             series.push(Series {
@@ -546,7 +559,7 @@ fn chart<'a>(of: Quantity, rows: impl Iterator<Item = &'a Row<'a>>) -> Option<St
         });
     }
     let chart = Chart {
-        title: of.name().to_owned(),
+        title: format!("{}{span}", of.name()),
         x_label: "time, s".into(),
         y_label: of.about().title.to_owned(),
         series,
