@@ -19,10 +19,7 @@ use crate::{
     },
 };
 
-use super::Failure;
-
-/// Exit code where something is out of tolerance.
-const OUT_OF_TOLERANCE: u8 = 1;
+use super::{Failure, OUT_OF_TOLERANCE};
 
 /// Lines of one kind that are printed before the rest is counted.
 const MOST_LINES: usize = 10;

@@ -11,7 +11,7 @@ use crate::{
 };
 
 use super::{
-    Failure, bake,
+    Failure, OUT_OF_TOLERANCE, bake,
     interrupt::{self, Interrupt},
     progress::{Mode, Progress},
     render,
@@ -90,9 +90,12 @@ pub(super) fn run(args: &StudyArgs) -> Result<ExitCode, Failure> {
     };
     say(
         &format!("{}\npage: {}", outcome.findings.join("\n"), page.display()),
-        json!({ "event": "end", "page": page, "findings": outcome.findings, "interrupted": false }),
+        json!({ "event": "end", "page": page, "findings": outcome.findings, "missed": outcome.missed, "interrupted": false }),
     );
-    Ok(ExitCode::SUCCESS)
+    Ok(match outcome.missed[..] {
+        [] => ExitCode::SUCCESS,
+        _ => ExitCode::from(OUT_OF_TOLERANCE),
+    })
 }
 
 /// A point's line, and the same for farms.

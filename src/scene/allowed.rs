@@ -60,6 +60,12 @@ const COARSER: &str = "an array of overrides of the scene that make the last val
      finest run or of a projection";
 const VALUES: &str = "two or more values of the key, from coarse to fine, here or for all methods";
 
+const SOLVERS: &str = "an array of \"pbf\" and \"flip\"; both if left out";
+const DEVICES: &str = "an array of \"gpu\" and \"cpu\"; both if left out";
+const MARK: &str = "an array of tables [[mark]] of of and at_most or at_least";
+const MEASURED: &str =
+    "a name of swell::scene::study::stability::Quantity, such as \"least_spacing\"";
+
 const TABLE: &[(&str, &str)] = &[
     ("shot", "a table with name, frames, frames_per_second"),
     (
@@ -79,7 +85,7 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "water",
-        "a table with rest_density, gravity, block and mesh",
+        "a table with rest_density, gravity, block, mesh and particles",
     ),
     ("water.rest_density", "a number above 0, up to 1e6, kg/m³"),
     ("water.gravity", "three finite numbers up to 1e4, m/s²"),
@@ -101,6 +107,15 @@ const TABLE: &[(&str, &str)] = &[
     ("water.mesh.translate", TRANSLATE),
     ("water.mesh.rotate_degrees", ROTATE),
     ("water.mesh.scale", SCALE),
+    ("water.particles", "an array of tables [[water.particles]]"),
+    (
+        "water.particles.at",
+        "an array of [x, y, z], metres, in the domain",
+    ),
+    (
+        "water.particles.velocity",
+        "three finite numbers up to 1e4, m/s, of all of them; 0 if left out",
+    ),
     ("solid", "an array of tables [[solid]]"),
     (
         "solid.mesh",
@@ -310,7 +325,7 @@ const TABLE: &[(&str, &str)] = &[
         "[x, z] of an elevation or [x, y, z] of a pressure, metres, in the domain",
     ),
     // Of a study file.
-    ("kind", "\"solver_comparison\" or \"sweep\""),
+    ("kind", "\"solver_comparison\", \"sweep\" or \"stability\""),
     ("scene", "a scene file, relative to the study file"),
     ("about", "an array of paragraphs for the page"),
     ("set", SET),
@@ -360,6 +375,54 @@ const TABLE: &[(&str, &str)] = &[
         "pictures",
         "frames to render, such as \"60-240x60\", within the shot",
     ),
+    ("case", "an array of tables [[case]]"),
+    (
+        "case.number",
+        "a whole number; name and number together each once",
+    ),
+    (
+        "case.name",
+        "words, other than those of a case of the same number",
+    ),
+    (
+        "case.scene",
+        "a scene file, relative to the study file; or test",
+    ),
+    (
+        "case.test",
+        "the command that runs a test that holds the case, in place of scene",
+    ),
+    ("case.set", SET),
+    ("case.solvers", SOLVERS),
+    ("case.devices", DEVICES),
+    ("case.frames", "a whole number of frames within the shot"),
+    (
+        "case.refused",
+        "an array of words that stand in the message of a refusal",
+    ),
+    ("case.against.set", SET),
+    ("case.against.device", "\"gpu\" or \"cpu\""),
+    (
+        "case.against.scale",
+        "a number above 0: the lengths of the other run over those of the case",
+    ),
+    ("case.mark", MARK),
+    ("case.mark.of", MEASURED),
+    ("case.mark.at_most", "a number; or at_least"),
+    ("case.mark.solvers", SOLVERS),
+    ("case.mark.devices", DEVICES),
+    ("limit", "an array of tables [[limit]]"),
+    ("limit.set", SET),
+    ("limit.solvers", SOLVERS),
+    ("limit.passes", "a number above 0"),
+    ("limit.fails", "a number above 0"),
+    ("limit.ratio", "a number above 1"),
+    ("limit.seconds", "a number above 0"),
+    ("limit.mark", MARK),
+    ("limit.mark.of", MEASURED),
+    ("limit.mark.at_most", "a number; or at_least"),
+    ("limit.mark.solvers", SOLVERS),
+    ("limit.mark.devices", DEVICES),
     // Of a tolerance file.
     ("position", "a table of max, rms, p99"),
     ("velocity", "a table of max, rms, p99"),

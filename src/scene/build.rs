@@ -8,13 +8,13 @@ use glam::DVec3;
 use toml::Spanned;
 
 use super::{
-    PlacedMesh, Placement, Scene, Shot, Water, budget,
+    PlacedMesh, Placement, Scene, Shot, Swarm, Water, budget,
     document::Document,
     error::SceneError,
     grids,
     moving_solid::{self, MAX_MOVING_SOLIDS},
     origin, probe,
-    spec::{BoxSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, WaterSpec},
+    spec::{BoxSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, SwarmSpec, WaterSpec},
     wave_maker,
 };
 use crate::domain::{
@@ -250,6 +250,36 @@ fn water(
         gravity: vector_or(doc, &spec.gravity, DVec3::new(0.0, -9.81, 0.0), 1e4)?,
         blocks,
         meshes,
+        particles: spec
+            .particles
+            .iter()
+            .map(|swarm| self::swarm(doc, swarm, domain))
+            .collect::<Result<_>>()?,
+    })
+}
+
+fn swarm(doc: &Document<'_>, spec: &SwarmSpec, domain: &Bounds) -> Result<Swarm> {
+    let at: Vec<_> = spec
+        .at
+        .get_ref()
+        .iter()
+        .copied()
+        .map(DVec3::from_array)
+        .collect();
+    // NaN is in no box.
+    if let Some(p) = at.iter().find(|p| !domain.contains(**p)) {
+        let problem = format!(
+            "[{}, {}, {}] is not in the domain, {}",
+            p.x,
+            p.y,
+            p.z,
+            extent(Some(*domain))
+        );
+        return Err(doc.fault_at(spec.at.span(), problem));
+    }
+    Ok(Swarm {
+        at,
+        velocity: vector_or(doc, &spec.velocity, DVec3::ZERO, 1e4)?,
     })
 }
 
@@ -333,7 +363,8 @@ fn check_particle_count(
         .filter_map(|m| m.mesh.bounds())
         .map(|b| b.volume() / d.powi(3))
         .sum::<f64>();
-    let count = in_blocks + in_meshes;
+    let placed: usize = water.particles.iter().map(|swarm| swarm.at.len()).sum();
+    let count = in_blocks + in_meshes + placed as f64;
     if count > MAX_PARTICLES {
         let problem = format!("the water would take about {count:.3e} particles {d} m apart");
         return Err(doc.fault_at(lattice.span.clone(), problem));

@@ -96,6 +96,9 @@ max = [4, 1, 4]
 [[water.mesh]]
 file = "cube.obj"
 translate = [1.0, 2.0, 1.0]
+[[water.particles]]
+at = [[5.0, 3.0, 2.0], [5.0, 3.0, 2.0]]
+velocity = [1.0, 0.0, -2.0]
 [[solid]]
 mesh = "cube.obj"
 translate = [8.0, 0.0, 2.0]

@@ -130,6 +130,17 @@ pub struct Water {
     pub blocks: Vec<Bounds>,
     /// Closed meshes filled with water at rest.
     pub meshes: Vec<PlacedMesh>,
+    /// Particles at places of their own.
+    pub particles: Vec<Swarm>,
+}
+
+/// Particles that the scene places one by one; they are taken as they are, also where others stand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Swarm {
+    /// World positions, metres.
+    pub at: Vec<DVec3>,
+    /// Of all of them, m/s.
+    pub velocity: DVec3,
 }
 
 /// A static solid.

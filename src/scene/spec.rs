@@ -50,6 +50,15 @@ pub(super) struct WaterSpec {
     pub(super) block: Vec<BoxSpec>,
     #[serde(default)]
     pub(super) mesh: Vec<WaterMeshSpec>,
+    #[serde(default)]
+    pub(super) particles: Vec<SwarmSpec>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SwarmSpec {
+    pub(super) at: Spanned<Vec<[f64; 3]>>,
+    pub(super) velocity: Option<Spanned<[f64; 3]>>,
 }
 
 #[derive(Deserialize)]

@@ -77,6 +77,12 @@ impl Scene {
             writeln!(out, "\n[[water.mesh]]")?;
             write_mesh(out, "file", mesh, mesh_path)?;
         }
+        for swarm in &self.water.particles {
+            writeln!(out, "\n[[water.particles]]")?;
+            let at: Vec<_> = swarm.at.iter().map(DVec3::to_array).collect();
+            writeln!(out, "at = {at:?}")?;
+            writeln!(out, "velocity = {}", vector(swarm.velocity))?;
+        }
         for solid in &self.solids {
             writeln!(out, "\n[[solid]]")?;
             write_mesh(out, "mesh", solid, mesh_path)?;

@@ -55,6 +55,13 @@ impl Start {
             spacing,
         )?;
         let mut particles = fill.particles;
+        for swarm in &scene.water.particles {
+            for at in &swarm.at {
+                particles.id.push(particles.id.len() as u32);
+                particles.position.push(at.as_vec3().to_array());
+                particles.velocity.push(swarm.velocity.as_vec3().to_array());
+            }
+        }
         for name in scene.declared_attributes() {
             let zeros = vec![0.0; particles.len()];
             particles.attributes.insert((*name).to_owned(), zeros);

@@ -2,7 +2,7 @@
 //!
 //! Pure functions from particles to numbers, and from numbers to text; `stage::study` reads the
 //! caches, draws the pictures and writes the files. A kind of study is one file: [`comparison`] sets
-//! two solvers side by side; a sweep draws [`work_precision`], finds the [`knee`] and, for the paper's Table 1, the
+//! two solvers side by side; [`stability`] measures what is hard on a solver; a sweep draws [`work_precision`], finds the [`knee`] and, for the paper's Table 1, the
 //! [`convergence_point`]. [`measure`], [`chart`] and [`page`] serve every kind.
 
 pub mod chart;
@@ -13,6 +13,7 @@ pub mod measure;
 pub mod page;
 pub mod picture;
 pub mod raster;
+pub mod stability;
 pub mod work_precision;
 
 pub use crate::domain::statistics::{median, percentile};

@@ -7,12 +7,21 @@ use std::fmt::Write as _;
 pub enum Part {
     /// A heading.
     Heading(String),
+    /// A smaller one.
+    Subheading(String),
     /// A paragraph.
     Text(String),
     /// Question and answer, one after another.
     Answers(Vec<(String, String)>),
     /// The first row are titles, the first column too.
     Table(Vec<Vec<String>>),
+    /// A table whose rows are coloured.
+    Verdicts {
+        /// Of the columns.
+        titles: Vec<String>,
+        /// As many cells as titles.
+        rows: Vec<(Tone, Vec<String>)>,
+    },
     /// Pictures: titles of the columns, then rows of a title and one address a column.
     Pictures {
         /// One a column.
@@ -26,12 +35,39 @@ pub enum Part {
     Code(String),
 }
 
+/// How a row looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// Like any other.
+    Plain,
+    /// As it should be.
+    Good,
+    /// Not as it should be.
+    Bad,
+    /// Not as it should be, and known.
+    Known,
+}
+
+impl Tone {
+    fn class(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Good => "good",
+            Self::Bad => "bad",
+            Self::Known => "known",
+        }
+    }
+}
+
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1300px;margin:2em auto;padding:0 1em;color:#222}\
 h1,h2{font-weight:600}table{border-collapse:collapse;font-variant-numeric:tabular-nums}\
 th,td{padding:.25em .8em;border-bottom:1px solid #ddd;text-align:right}\
 th:first-child,td:first-child{text-align:left}dt{font-weight:600;margin-top:.6em}dd{margin:0}\
 .pictures{display:grid;gap:.4em;align-items:center}.pictures img{width:100%;display:block}\
-.curves{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:1em}\
+.curves{display:grid;grid-template-columns:repeat(auto-fill,minmax(420px,1fr));gap:1em}\
+.verdicts td,.verdicts th{text-align:left;vertical-align:top}.verdicts td:last-child{border-left:6px solid #ddd;min-width:18em}.verdicts td:nth-child(2){min-width:12em}\
+.good td:last-child{border-left-color:#009e73}.bad td:last-child{border-left-color:#d55e00;font-weight:600}\
+.known td:last-child{border-left-color:#e69f00}h3{margin:1.4em 0 .3em;font-weight:600}\
 pre{background:#f4f4f4;padding:.8em;overflow-x:auto}";
 
 /// The page.
@@ -51,6 +87,7 @@ pub fn html(title: &str, parts: &[Part]) -> String {
 fn write_part(out: &mut String, part: &Part) -> std::fmt::Result {
     match part {
         Part::Heading(text) => writeln!(out, "<h2>{}</h2>", escaped(text)),
+        Part::Subheading(text) => writeln!(out, "<h3>{}</h3>", escaped(text)),
         Part::Text(text) => writeln!(out, "<p>{}</p>", escaped(text)),
         Part::Code(text) => writeln!(out, "<pre>{}</pre>", escaped(text)),
         Part::Curves(curves) => writeln!(out, "<div class=\"curves\">\n{}</div>", curves.concat()),
@@ -72,6 +109,20 @@ fn write_part(out: &mut String, part: &Part) -> std::fmt::Result {
                 let tag = if index == 0 { "th" } else { "td" };
                 let cells = row.iter().map(|c| format!("<{tag}>{}</{tag}>", escaped(c)));
                 writeln!(out, "<tr>{}</tr>", cells.collect::<String>())?;
+            }
+            writeln!(out, "</table>")
+        }
+        Part::Verdicts { titles, rows } => {
+            let cells = |tag: &str, cells: &[String]| {
+                let cells = cells.iter();
+                let cells = cells.map(|c| format!("<{tag}>{}</{tag}>", escaped(c)));
+                cells.collect::<String>()
+            };
+            let head = cells("th", titles);
+            writeln!(out, "<table class=\"verdicts\">\n<tr>{head}</tr>")?;
+            for (tone, row) in rows {
+                let (class, row) = (tone.class(), cells("td", row));
+                writeln!(out, "<tr class=\"{class}\">{row}</tr>")?;
             }
             writeln!(out, "</table>")
         }
@@ -112,6 +163,11 @@ mod tests {
         let evil = "<script>\"&".to_owned();
         let parts = [
             Part::Heading(evil.clone()),
+            Part::Subheading(evil.clone()),
+            Part::Verdicts {
+                titles: vec![evil.clone()],
+                rows: vec![(Tone::Bad, vec![evil.clone()])],
+            },
             Part::Text(evil.clone()),
             Part::Code(evil.clone()),
             Part::Answers(vec![(evil.clone(), evil.clone())]),
@@ -124,7 +180,7 @@ mod tests {
         ];
         let page = html(&evil, &parts);
         assert!(!page.contains("<script>"));
-        assert!(page.matches("&lt;script&gt;&quot;&amp;").count() >= 9);
+        assert!(page.matches("&lt;script&gt;&quot;&amp;").count() >= 12);
         for piece in ["<th>", "<td>", "<dt>", "src=\"data:b\"", "<svg>", "<pre>"] {
             assert!(page.contains(piece), "{piece}");
         }

@@ -1,19 +1,25 @@
 //! Study files: what is to be compared, on which scene.
 //!
 //! One file a kind: [`comparison`] sets two solvers side by side, [`sweep`] runs a scene over and over, with one
-//! setting changed at a time.
+//! setting changed at a time, [`stability`] runs scenes that are hard on a solver.
 
 pub mod comparison;
+pub mod stability;
 pub mod sweep;
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Reach, document::Document, error::SceneError, look::LookError};
+use super::{Fault, Place, Reach, Scene, document::Document, error::SceneError, look::LookError};
 
 use comparison::SolverComparison;
+use stability::Stability;
 use sweep::Sweep;
 
 /// A validated study: every file that it names read.
@@ -23,6 +29,8 @@ pub enum Study {
     SolverComparison(Box<SolverComparison>),
     /// `kind = "sweep"`.
     Sweep(Box<Sweep>),
+    /// `kind = "stability"`.
+    Stability(Box<Stability>),
 }
 
 /// Why a study could not be loaded.
@@ -90,6 +98,10 @@ impl Study {
                 Ok(Self::SolverComparison(Box::new(comparison)))
             }
             "sweep" => Ok(Self::Sweep(Box::new(sweep::parse(&doc, root, base_dir)?))),
+            "stability" => {
+                let stability = stability::parse(&doc, root, base_dir)?;
+                Ok(Self::Stability(Box::new(stability)))
+            }
             other => {
                 let problem = format!("{other:?} is no kind of study");
                 Err(doc.fault_at(told.kind.span(), problem).into())
@@ -109,6 +121,51 @@ fn unreadable(
     doc.fault_at(named.span(), problem)
 }
 
+/// A scene file that a study names.
+struct SceneFile<'a> {
+    named: &'a Spanned<String>,
+    path: PathBuf,
+}
+
+impl<'a> SceneFile<'a> {
+    fn new(named: &'a Spanned<String>, base_dir: &Path) -> Self {
+        let path = base_dir.join(named.get_ref());
+        Self { named, path }
+    }
+}
+
+/// The scene with overrides; what is wrong with one of them, or with the name of its file, is said at its place in the
+/// study file.
+fn load_with(
+    doc: &Document<'_>,
+    file: &SceneFile<'_>,
+    overrides: impl Iterator<Item = (String, Range<usize>)>,
+) -> Result<Scene, SceneError> {
+    let (overrides, spans): (Vec<_>, Vec<_>) = overrides.unzip();
+    Scene::load_within(&file.path, &overrides, doc.reach()).map_err(|error| {
+        let (text, message) = match &error {
+            SceneError::Read { source, .. } => {
+                return unreadable(doc, file.named, &file.path, source);
+            }
+            SceneError::Fault(fault) => match fault.as_ref() {
+                Fault {
+                    place: Place::Override(text),
+                    key,
+                    message,
+                    ..
+                } => (text, format!("{key}: {message}")),
+                _ => return error,
+            },
+            SceneError::Override { text, reason } => (text, reason.clone()),
+            _ => return error,
+        };
+        let place = overrides.iter().position(|known| known == text);
+        place.map_or(error, |place| {
+            doc.fault_plain(spans[place].clone(), message)
+        })
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::{super::Method, *};
@@ -116,7 +173,7 @@ mod tests {
     #[test]
     fn the_studies_that_ship_fit_their_scenes() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
-        let (mut comparisons, mut sweeps) = (0, 0);
+        let (mut comparisons, mut sweeps, mut stabilities) = (0, 0, 0);
         for entry in fs::read_dir(folder).expect("studies") {
             let file = entry.expect("a study").path();
             match Study::load(&file).unwrap_or_else(|error| panic!("{error}")) {
@@ -129,8 +186,12 @@ mod tests {
                     assert!(sweep.lines.iter().all(|line| line.points.len() >= 2));
                     sweeps += 1;
                 }
+                Study::Stability(stability) => {
+                    assert!(!stability.cases.is_empty());
+                    stabilities += 1;
+                }
             }
         }
-        assert_eq!((comparisons, sweeps), (2, 9));
+        assert_eq!((comparisons, sweeps, stabilities), (2, 9, 1));
     }
 }

@@ -29,8 +29,8 @@ use serde::Deserialize;
 use toml::{Spanned, Value, de::DeTable};
 
 use super::{
-    super::{Fault, Method, Place, Scene, document::Document, error::SceneError, physics_hash},
-    StudyFileError, unreadable,
+    super::{Method, Scene, document::Document, error::SceneError, physics_hash},
+    SceneFile, StudyFileError, load_with,
 };
 use fit::{check_coarser, check_converged, check_fit};
 
@@ -491,7 +491,7 @@ fn line(
     })
 }
 
-/// The scene with overrides; what is wrong with one of them is said at its place in the study file.
+/// The scene with what is set and swept.
 fn load(
     doc: &Document<'_>,
     spec: &SweepSpec,
@@ -499,29 +499,9 @@ fn load(
     fixed: &[&Spanned<String>],
     swept: Option<(String, Range<usize>)>,
 ) -> Result<Scene, SceneError> {
-    let file = base_dir.join(spec.scene.get_ref());
     let fixed = fixed.iter().map(|set| (set.get_ref().clone(), set.span()));
-    let (overrides, spans): (Vec<_>, Vec<_>) = fixed.chain(swept).unzip();
-    Scene::load_within(&file, &overrides, doc.reach()).map_err(|error| {
-        let (text, message) = match &error {
-            SceneError::Read { source, .. } => return unreadable(doc, &spec.scene, &file, source),
-            SceneError::Fault(fault) => match fault.as_ref() {
-                Fault {
-                    place: Place::Override(text),
-                    key,
-                    message,
-                    ..
-                } => (text, format!("{key}: {message}")),
-                _ => return error,
-            },
-            SceneError::Override { text, reason } => (text, reason.clone()),
-            _ => return error,
-        };
-        let place = overrides.iter().position(|known| known == text);
-        place.map_or(error, |place| {
-            doc.fault_plain(spans[place].clone(), message)
-        })
-    })
+    let file = SceneFile::new(&spec.scene, base_dir);
+    load_with(doc, &file, fixed.chain(swept))
 }
 
 /// FLIP's `pic_blend` is a part of the velocity a frame: over as many seconds each rate is to take the same part,

@@ -60,6 +60,7 @@ pub(super) fn run(
     Ok(Outcome {
         page: Some(file),
         findings: findings.into_iter().map(|found| found.text).collect(),
+        missed: Vec::new(),
     })
 }
 

@@ -1,6 +1,8 @@
 //! `study`: runs what a study asks for, measures it, and writes the page.
 
 mod comparison;
+mod ledger;
+pub mod stability;
 mod sweep;
 
 use std::{
@@ -87,6 +89,8 @@ pub struct Outcome {
     pub page: Option<PathBuf>,
     /// What was found, in words.
     pub findings: Vec<String>,
+    /// Marks that are missed and not known to be; only of a study that has marks.
+    pub missed: Vec<String>,
 }
 
 /// Why a study failed.
@@ -191,6 +195,7 @@ pub fn study(
     match &request.study {
         Study::SolverComparison(comparison) => comparison::run(request, comparison, stop, tell),
         Study::Sweep(sweep) => sweep::run(request, sweep, stop, tell),
+        Study::Stability(stability) => stability::run(request, stability, stop, tell),
     }
 }
 
@@ -236,4 +241,16 @@ fn write(file: &Path, text: impl AsRef<[u8]>) -> Result<(), StudyError> {
         file: file.to_owned(),
         source,
     })
+}
+
+/// Rows with commas between cells, quoted where they have to be.
+fn csv(rows: &[Vec<String>]) -> String {
+    let quoted = |cell: &String| match cell.contains([',', '"', '\n']) {
+        true => format!("\"{}\"", cell.replace('"', "\"\"")),
+        false => cell.clone(),
+    };
+    let joined = rows
+        .iter()
+        .map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n");
+    joined.collect()
 }

@@ -1,15 +1,8 @@
-//! `results.jsonl`: one line a finished point.
-
-use std::{
-    collections::BTreeMap,
-    fs::{self, File, OpenOptions},
-    io::Write,
-    path::{Path, PathBuf},
-};
+//! A point of a sweep as its line holds it.
 
 use serde::{Deserialize, Serialize};
 
-use super::super::StudyError;
+use super::super::ledger::Line;
 use crate::study::median;
 
 /// A point and what became of it.
@@ -102,73 +95,17 @@ impl Run {
     }
 }
 
-/// The file, open for more lines.
-pub(super) struct Ledger {
-    path: PathBuf,
-    file: File,
-    records: BTreeMap<String, Record>,
-}
-
-impl Ledger {
-    /// Opens the directory's results, or begins them; a torn last line is cut off.
-    pub(super) fn open(directory: &Path) -> Result<Self, StudyError> {
-        let path = directory.join("results.jsonl");
-        let fault = |source| StudyError::File {
-            file: path.clone(),
-            source,
-        };
-        fs::create_dir_all(directory).map_err(fault)?;
-        let text = match fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(error) => return Err(fault(error)),
-        };
-        let whole = text.rfind('\n').map_or(0, |end| end + 1);
-        let mut records = BTreeMap::new();
-        for (index, line) in text[..whole].lines().enumerate() {
-            let record: Record =
-                serde_json::from_str(line).map_err(|error| StudyError::Ledger {
-                    file: path.clone(),
-                    line: index + 1,
-                    what: error.to_string(),
-                })?;
-            records.insert(record.hash.clone(), record);
-        }
-        let file = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&path)
-            .map_err(fault)?;
-        file.set_len(whole as u64).map_err(fault)?;
-        Ok(Self {
-            file,
-            records,
-            path,
-        })
-    }
-
-    pub(super) fn find(&self, hash: &str) -> Option<&Record> {
-        self.records.get(hash)
-    }
-
-    /// Adds a line; it is on the disk when this returns.
-    pub(super) fn append(&mut self, record: &Record) -> Result<(), StudyError> {
-        // Finite numbers, strings and lists alone: nothing that JSON cannot hold.
-        let line = serde_json::to_string(record).map_err(std::io::Error::other);
-        let written = line.and_then(|line| {
-            self.file.write_all(format!("{line}\n").as_bytes())?;
-            self.file.sync_data()
-        });
-        written.map_err(|source| StudyError::File {
-            file: self.path.clone(),
-            source,
-        })
+impl Line for Record {
+    fn hash(&self) -> &str {
+        &self.hash
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::fs;
+
+    use super::{super::super::ledger::Ledger, *};
 
     #[test]
     fn a_torn_line_is_cut_off_and_a_spoiled_one_is_named() {
@@ -180,19 +117,19 @@ mod tests {
             setting: "4".into(),
             verdict: Verdict::Failed("too fast".into()),
         };
-        let mut ledger = Ledger::open(folder.path()).expect("new");
+        let mut ledger = Ledger::<Record>::open(folder.path()).expect("new");
         ledger.append(&record("a")).expect("written");
         ledger.append(&record("b")).expect("written");
         let path = folder.path().join("results.jsonl");
         let text = fs::read_to_string(&path).expect("text");
         fs::write(&path, &text[..text.len() - 9]).expect("written");
-        let mut ledger = Ledger::open(folder.path()).expect("torn");
+        let mut ledger = Ledger::<Record>::open(folder.path()).expect("torn");
         assert_eq!(ledger.find("a"), Some(&record("a")));
         assert_eq!(ledger.find("b"), None);
         ledger.append(&record("b")).expect("written");
         assert_eq!(fs::read_to_string(&path).expect("text"), text);
         fs::write(&path, format!("{text}{{}}\n")).expect("written");
-        let error = Ledger::open(folder.path())
+        let error = Ledger::<Record>::open(folder.path())
             .err()
             .expect("spoiled")
             .to_string();

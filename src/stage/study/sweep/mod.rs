@@ -27,9 +27,11 @@ use super::{
         device::{Opened, SolverError, needs},
         prepare::Start,
     },
-    Event, Outcome, PointEvent, PointStatus, Request, StudyError, direction, still_level,
+    Event, Outcome, PointEvent, PointStatus, Request, StudyError, direction,
+    ledger::Ledger,
+    still_level,
 };
-use ledger::{Ledger, Record, Run, Verdict};
+use ledger::{Record, Run, Verdict};
 use projection::Projections;
 
 /// Changes whenever what a line holds does.
@@ -140,7 +142,7 @@ impl Bench<'_> {
     /// A point's line: the one that stands, or a new one; `None` where `stop` ended it before it was done.
     fn record(
         &mut self,
-        ledger: &mut Ledger,
+        ledger: &mut Ledger<Record>,
         line: &Line,
         opened: &Opened,
         point: &Point,

@@ -19,7 +19,7 @@ use crate::{
 };
 
 use super::{
-    super::{Outcome, Request, StudyError, write},
+    super::{Outcome, Request, StudyError, csv, write},
     Devices, errors,
     ledger::{Record, Run, Verdict},
 };
@@ -89,6 +89,7 @@ pub(super) fn write_all(
     Ok(Outcome {
         page: Some(file),
         findings: told.collect(),
+        missed: Vec::new(),
     })
 }
 
@@ -293,14 +294,7 @@ impl Results<'_> {
     fn csv(&self) -> String {
         let mut rows = vec![self.titles()];
         rows.extend(self.rows());
-        let quoted = |cell: &String| match cell.contains([',', '"', '\n']) {
-            true => format!("\"{}\"", cell.replace('"', "\"\"")),
-            false => cell.clone(),
-        };
-        let joined = rows
-            .iter()
-            .map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n");
-        joined.collect()
+        csv(&rows)
     }
 
     fn titles(&self) -> Vec<String> {

@@ -1,0 +1,471 @@
+//! The study as it is written, and how it becomes runs.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use serde::Deserialize;
+use toml::{Spanned, de::DeTable};
+
+use super::{
+    super::{
+        super::{Method, Reach, Scene, document::Document, error::SceneError},
+        SceneFile, StudyFileError, load_with,
+    },
+    Attempt, Bound, Case, CaseDevice, Held, Limit, Mark, Other, Quantity, Search, Stability, Trial,
+};
+use crate::domain::bounds::Bounds;
+
+type Result<T> = std::result::Result<T, SceneError>;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StabilitySpec {
+    #[serde(rename = "kind")]
+    _kind: String,
+    about: Option<Vec<String>>,
+    case: Vec<Spanned<CaseSpec>>,
+    #[serde(default)]
+    limit: Vec<Spanned<LimitSpec>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CaseSpec {
+    number: u32,
+    name: Spanned<String>,
+    note: Option<String>,
+    test: Option<Spanned<String>>,
+    scene: Option<Spanned<String>>,
+    #[serde(default)]
+    set: Vec<Spanned<String>>,
+    solvers: Option<Vec<Spanned<String>>>,
+    devices: Option<Vec<Spanned<String>>>,
+    frames: Option<Spanned<i64>>,
+    refused: Option<Spanned<Vec<String>>>,
+    #[serde(default)]
+    against: Vec<OtherSpec>,
+    #[serde(default)]
+    mark: Vec<Spanned<MarkSpec>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OtherSpec {
+    #[serde(default)]
+    set: Vec<Spanned<String>>,
+    device: Option<Spanned<String>>,
+    scale: Option<Spanned<f64>>,
+    shift: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MarkSpec {
+    of: Spanned<String>,
+    at_most: Option<f64>,
+    at_least: Option<f64>,
+    after: Option<f64>,
+    since: Option<Spanned<f64>>,
+    region: Option<Spanned<[[f64; 3]; 2]>>,
+    solvers: Option<Vec<Spanned<String>>>,
+    devices: Option<Vec<Spanned<String>>>,
+    known_failure: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LimitSpec {
+    name: String,
+    note: Option<String>,
+    unit: Option<String>,
+    scene: Spanned<String>,
+    set: Vec<Spanned<String>>,
+    solvers: Option<Vec<Spanned<String>>>,
+    passes: Spanned<f64>,
+    fails: Spanned<f64>,
+    ratio: Spanned<f64>,
+    seconds: Spanned<f64>,
+    mark: Vec<Spanned<MarkSpec>>,
+}
+
+/// What a value of a limit becomes a run by.
+#[derive(Clone, Debug)]
+pub(super) struct Template {
+    file: PathBuf,
+    reach: Reach,
+    set: Vec<String>,
+    seconds: f64,
+    marks: Vec<Mark>,
+}
+
+/// The rest of a document of this kind; files are relative to `base_dir`.
+pub(in super::super) fn parse(
+    doc: &Document<'_>,
+    root: Spanned<DeTable<'_>>,
+    base_dir: &Path,
+) -> std::result::Result<Stability, StudyFileError> {
+    let spec = StabilitySpec::deserialize(toml::Deserializer::from(root))
+        .map_err(|error| doc.translate(&error))?;
+    let mut cases: Vec<Case> = Vec::new();
+    for spec in &spec.case {
+        let case = case(doc, spec, base_dir)?;
+        let is_same = |other: &Case| (other.number, &other.name) == (case.number, &case.name);
+        if cases.iter().any(is_same) {
+            let problem = format!(
+                "{:?} is the name of another case {}",
+                case.name, case.number
+            );
+            return Err(doc.fault_at(spec.get_ref().name.span(), problem).into());
+        }
+        cases.push(case);
+    }
+    let limits = spec.limit.iter();
+    Ok(Stability {
+        about: spec.about.unwrap_or_default(),
+        cases,
+        limits: limits
+            .map(|spec| limit(doc, spec.get_ref(), base_dir))
+            .collect::<Result<_>>()?,
+    })
+}
+
+fn case(doc: &Document<'_>, spec: &Spanned<CaseSpec>, base_dir: &Path) -> Result<Case> {
+    let at = spec.span();
+    let spec = spec.get_ref();
+    let held = match (&spec.test, &spec.scene) {
+        (Some(test), None) => Held::Test(test.get_ref().clone()),
+        (Some(test), Some(_)) => {
+            return Err(doc.fault_at(test.span(), "given together with scene"));
+        }
+        (None, None) => return Err(doc.missing(at, "scene")),
+        (None, Some(scene)) => {
+            let file = SceneFile::new(scene, base_dir);
+            match &spec.refused {
+                Some(words) => Held::Refusal {
+                    attempts: attempts(doc, spec, &file)?,
+                    words: words.get_ref().clone(),
+                },
+                None => Held::Runs(trials(doc, spec, &file)?),
+            }
+        }
+    };
+    Ok(Case {
+        number: spec.number,
+        name: spec.name.get_ref().clone(),
+        note: spec.note.clone(),
+        held,
+    })
+}
+
+fn attempts(doc: &Document<'_>, spec: &CaseSpec, file: &SceneFile<'_>) -> Result<Vec<Attempt>> {
+    let mut attempts = Vec::new();
+    for method in methods(doc, &spec.solvers)? {
+        for device in devices(doc, &spec.devices)? {
+            let sets: Vec<_> = spec.set.iter().map(|set| set.get_ref().clone()).collect();
+            let overrides = [&sets[..], &[method.as_override()]].concat();
+            attempts.push(Attempt {
+                method,
+                device,
+                scene: match Scene::load_within(&file.path, &overrides, doc.reach()) {
+                    Ok(scene) => Ok(Box::new(scene)),
+                    // A file that is not there is refused for a reason of its own.
+                    Err(error @ SceneError::Read { .. }) => return Err(error),
+                    Err(error) => Err(error.to_string()),
+                },
+            });
+        }
+    }
+    Ok(attempts)
+}
+
+fn trials(doc: &Document<'_>, spec: &CaseSpec, file: &SceneFile<'_>) -> Result<Vec<Trial>> {
+    let mut trials = Vec::new();
+    for method in methods(doc, &spec.solvers)? {
+        for device in devices(doc, &spec.devices)? {
+            let set: Vec<_> = spec.set.iter().collect();
+            let scene = load(doc, file, &set, method)?;
+            let frames = match &spec.frames {
+                None => scene.shot.frames,
+                Some(frames) => u32::try_from(*frames.get_ref())
+                    .ok()
+                    .filter(|count| (1..=scene.shot.frames).contains(count))
+                    .ok_or_else(|| {
+                        let problem = format!("the shot has frames 1 to {}", scene.shot.frames);
+                        doc.fault_at(frames.span(), problem)
+                    })?,
+            };
+            let mut others = Vec::new();
+            for spec in &spec.against {
+                others.push(other(doc, spec, file, (&set, method, device), &scene)?);
+            }
+            trials.push(Trial {
+                device,
+                frames,
+                marks: marks(doc, &spec.mark, method, device, others.len())?,
+                others,
+                scene,
+            });
+        }
+    }
+    Ok(trials)
+}
+
+fn other(
+    doc: &Document<'_>,
+    spec: &OtherSpec,
+    file: &SceneFile<'_>,
+    (set, method, device): (&[&Spanned<String>], Method, CaseDevice),
+    beside: &Scene,
+) -> Result<Other> {
+    let set: Vec<_> = set.iter().copied().chain(&spec.set).collect();
+    let scene = load(doc, file, &set, method)?;
+    let scale = match &spec.scale {
+        None => 1.0,
+        Some(scale) if *scale.get_ref() > 0.0 => *scale.get_ref(),
+        Some(scale) => return Err(doc.fault_at(scale.span(), "out of range")),
+    };
+    // Runs go frame by frame; Froude's law has times as the root of lengths.
+    let rate = beside.shot.frames_per_second / scale.sqrt();
+    if (scene.shot.frames_per_second / rate - 1.0).abs() > 1e-9 {
+        let place = spec.scale.as_ref().map(Spanned::span);
+        let place = place
+            .or(spec.set.first().map(Spanned::span))
+            .unwrap_or(0..0);
+        let problem = format!(
+            "its shot.frames_per_second is {}, and at this scale it has to be {rate}",
+            scene.shot.frames_per_second
+        );
+        return Err(doc.fault_plain(place, problem));
+    }
+    Ok(Other {
+        device: match &spec.device {
+            Some(word) => self::device(doc, word)?,
+            None => device,
+        },
+        scene,
+        scale,
+        shift: DVec3::from_array(spec.shift.unwrap_or_default()),
+    })
+}
+
+/// Marks of a run, those of every run first.
+fn marks(
+    doc: &Document<'_>,
+    specs: &[Spanned<MarkSpec>],
+    method: Method,
+    device: CaseDevice,
+    others: usize,
+) -> Result<Vec<Mark>> {
+    let always = Quantity::ALWAYS.map(|of| Mark {
+        of,
+        bound: Bound::AtMost(0.0),
+        after: 0.0,
+        since: None,
+        region: None,
+        known_failure: None,
+    });
+    let mut marks = always.to_vec();
+    for spec in specs {
+        let mark = mark(doc, spec, others)?;
+        let spec = spec.get_ref();
+        if methods(doc, &spec.solvers)?.contains(&method)
+            && devices(doc, &spec.devices)?.contains(&device)
+        {
+            marks.push(mark);
+        }
+    }
+    Ok(marks)
+}
+
+fn mark(doc: &Document<'_>, spec: &Spanned<MarkSpec>, others: usize) -> Result<Mark> {
+    let at = spec.span();
+    let spec = spec.get_ref();
+    let fault = |problem: String| doc.fault_at(spec.of.span(), problem);
+    let word = spec.of.get_ref();
+    let named = Quantity::ALL.into_iter().find(|of| of.name() == word);
+    let of = named.ok_or_else(|| fault(format!("{word:?} is nothing that is measured")))?;
+    if of.about().others > others {
+        let problem = format!(
+            "{word:?} takes {} [[case.against]], and there are {others}",
+            of.about().others
+        );
+        return Err(fault(problem));
+    }
+    if spec.region.is_some() != of.about().takes_region && of != Quantity::Difference {
+        return Err(fault(format!("{word:?} and region do not go together")));
+    }
+    if let Some(since) = &spec.since {
+        if !of.about().takes_since {
+            return Err(doc.fault_at(since.span(), format!("{word:?} does not take since")));
+        }
+        if !(0.0..f64::INFINITY).contains(since.get_ref()) {
+            return Err(doc.fault_at(since.span(), "out of range"));
+        }
+    }
+    let bound = match (spec.at_most, spec.at_least) {
+        (Some(most), None) => Bound::AtMost(most),
+        (None, Some(least)) => Bound::AtLeast(least),
+        (Some(_), Some(_)) => return Err(fault(format!("{word:?} has at_most and at_least"))),
+        (None, None) => return Err(doc.missing(at, "at_most")),
+    };
+    Ok(Mark {
+        of,
+        bound,
+        after: spec.after.unwrap_or(0.0),
+        since: spec.since.as_ref().map(|since| *since.get_ref()),
+        region: spec.region.as_ref().map(|corners| {
+            let [min, max] = corners.get_ref().map(DVec3::from_array);
+            Bounds { min, max }
+        }),
+        known_failure: spec.known_failure.clone(),
+    })
+}
+
+fn limit(doc: &Document<'_>, spec: &LimitSpec, base_dir: &Path) -> Result<Limit> {
+    let value = |value: &Spanned<f64>, least: f64| {
+        let number = *value.get_ref();
+        match number > least && number.is_finite() {
+            true => Ok(number),
+            false => Err(doc.fault_at(value.span(), format!("{number} is out of range"))),
+        }
+    };
+    let mut searches = Vec::new();
+    for method in methods(doc, &spec.solvers)? {
+        let template = Template {
+            file: base_dir.join(spec.scene.get_ref()),
+            reach: doc.reach(),
+            set: spec.set.iter().map(|set| set.get_ref().clone()).collect(),
+            seconds: value(&spec.seconds, 0.0)?,
+            marks: marks(doc, &spec.mark, method, CaseDevice::Gpu, 0)?,
+        };
+        // Where the bracket begins the scene has to be sound; further on it may become impossible.
+        template.trial(method, value(&spec.passes, 0.0)?)?;
+        searches.push(Search { method, template });
+    }
+    Ok(Limit {
+        name: spec.name.clone(),
+        note: spec.note.clone(),
+        unit: spec.unit.clone().unwrap_or_default(),
+        searches,
+        passes: value(&spec.passes, 0.0)?,
+        fails: value(&spec.fails, 0.0)?,
+        ratio: value(&spec.ratio, 1.0)?,
+    })
+}
+
+impl Template {
+    pub(super) fn trial(&self, method: Method, value: f64) -> Result<Trial> {
+        let mut overrides = Vec::new();
+        for set in &self.set {
+            overrides.push(filled(set, value).map_err(|reason| SceneError::Override {
+                text: set.clone(),
+                reason,
+            })?);
+        }
+        overrides.push(method.as_override());
+        let scene = Scene::load_within(&self.file, &overrides, self.reach)?;
+        let frames = (self.seconds * scene.shot.frames_per_second)
+            .ceil()
+            .max(1.0);
+        Ok(Trial {
+            device: CaseDevice::Gpu,
+            scene,
+            frames: frames as u32,
+            others: Vec::new(),
+            marks: self.marks.clone(),
+        })
+    }
+}
+
+/// An override with the value in its braces: `{}` is the value, `{2*}` twice it, `{2/}` two over it. Other braces are
+/// tables of the override's own.
+fn filled(set: &str, value: f64) -> std::result::Result<String, String> {
+    let mut out = String::new();
+    let mut rest = set;
+    while let Some(close) = rest.find('}') {
+        let (before, after) = rest.split_at(close);
+        let open = before.rfind('{').unwrap_or(before.len());
+        let (before, term) = before.split_at(open);
+        let factor = |text: &str| {
+            text.parse::<f64>()
+                .map_err(|_| format!("{{{text}}} is none of {{}}, {{2*}}, {{2/}}"))
+        };
+        out.push_str(before);
+        match term.strip_prefix('{') {
+            Some("") => out.push_str(&format!("{value:?}")),
+            Some(inner) => match (inner.strip_suffix('*'), inner.strip_suffix('/')) {
+                (Some(times), _) => out.push_str(&format!("{:?}", factor(times)? * value)),
+                (_, Some(over)) => out.push_str(&format!("{:?}", factor(over)? / value)),
+                _ => out.push_str(&format!("{term}}}")),
+            },
+            None => out.push('}'),
+        }
+        rest = &after[1..];
+    }
+    out.push_str(rest);
+    match out.matches('{').count() == out.matches('}').count() {
+        true => Ok(out),
+        false => Err("a brace is not closed".to_owned()),
+    }
+}
+
+fn methods(doc: &Document<'_>, words: &Option<Vec<Spanned<String>>>) -> Result<Vec<Method>> {
+    let Some(words) = words else {
+        return Ok(vec![Method::Pbf, Method::Flip]);
+    };
+    let of = |word: &Spanned<String>| {
+        let named = Method::NAMED
+            .iter()
+            .find(|(name, _)| name == word.get_ref());
+        let fault = || doc.fault_at(word.span(), format!("{:?} is no solver", word.get_ref()));
+        named.map(|(_, method)| *method).ok_or_else(fault)
+    };
+    words.iter().map(of).collect()
+}
+
+fn devices(doc: &Document<'_>, words: &Option<Vec<Spanned<String>>>) -> Result<Vec<CaseDevice>> {
+    match words {
+        None => Ok(vec![CaseDevice::Gpu, CaseDevice::Cpu]),
+        Some(words) => words.iter().map(|word| device(doc, word)).collect(),
+    }
+}
+
+fn device(doc: &Document<'_>, word: &Spanned<String>) -> Result<CaseDevice> {
+    match word.get_ref().as_str() {
+        "gpu" => Ok(CaseDevice::Gpu),
+        "cpu" => Ok(CaseDevice::Cpu),
+        other => Err(doc.fault_at(word.span(), format!("{other:?} is no device"))),
+    }
+}
+
+/// The scene with overrides and a solver.
+fn load(
+    doc: &Document<'_>,
+    file: &SceneFile<'_>,
+    set: &[&Spanned<String>],
+    method: Method,
+) -> Result<Scene> {
+    let set = set.iter().map(|set| (set.get_ref().clone(), set.span()));
+    load_with(doc, file, set.chain([(method.as_override(), 0..0)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::filled;
+
+    #[test]
+    fn values_go_into_braces() {
+        let fill = |text: &str| filled(text, 0.5);
+        assert_eq!(
+            fill("a=[{}, {3*}, {2/}]").as_deref(),
+            Ok("a=[0.5, 1.5, 4.0]")
+        );
+        assert_eq!(fill("a={ b = 1 }").as_deref(), Ok("a={ b = 1 }"));
+        assert_eq!(
+            fill("a=[{ b = { c = 1 }, d = {2*} }]").as_deref(),
+            Ok("a=[{ b = { c = 1 }, d = 1.0 }]")
+        );
+        assert!(fill("a={x*}").is_err());
+        assert!(fill("a={").is_err());
+    }
+}
