@@ -21,7 +21,9 @@ pub(super) fn of(path: &str) -> Option<&'static str> {
 /// Every key of a scene, tables included, without indices: all but those of studies and tolerances.
 #[cfg(test)]
 pub(super) fn scene_keys() -> impl Iterator<Item = &'static str> {
-    const OTHERS: [&str; 21] = [
+    const OTHERS: [&str; 23] = [
+        "case",
+        "limit",
         "coarser",
         "kind",
         "scene",
