@@ -638,4 +638,22 @@ fn the_command_tells_each_point() {
         .collect();
     assert_eq!(events[3]["status"], "stands there");
     assert_eq!(events[3]["count"], 4);
+
+    // While another writes there, and where anything else lies, a study does not begin.
+    let results = fs::File::open(job.folder.path().join("out/results.jsonl")).unwrap();
+    results.lock().unwrap();
+    let output = run("plain");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(4), "{said}");
+    assert!(said.contains("another study writes here"), "{said}");
+    results.unlock().unwrap();
+    assert!(run("plain").status.success());
+    fs::remove_file(job.folder.path().join("out/results.jsonl")).unwrap();
+    let page = job.folder.path().join("out/index.html");
+    fs::write(&page, "mine").unwrap();
+    let output = run("plain");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(4), "{said}");
+    assert!(said.contains("what is no study's"), "{said}");
+    assert_eq!(fs::read_to_string(page).unwrap(), "mine");
 }

@@ -330,3 +330,20 @@ fn scenes_and_looks_stay_in_their_folders_unless_told() {
     );
     assert!(!job.path("out").exists());
 }
+
+/// A pipe would be read for ever.
+#[cfg(unix)]
+#[test]
+fn a_mesh_that_is_a_pipe_is_refused() {
+    let job = Job::new();
+    let made = std::process::Command::new("mkfifo")
+        .arg(job.path("pipe.obj"))
+        .status();
+    assert!(made.unwrap().success());
+    job.edit("small.toml", "box.obj", "pipe.obj");
+    let said = job.expect(2, "inspect small.toml");
+    assert!(
+        said.contains("not a plain file") && said.contains("small.toml:"),
+        "{said}"
+    );
+}

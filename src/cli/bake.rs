@@ -47,7 +47,7 @@ pub(super) struct BakeArgs {
     /// Override a scene key, such as solver.pbf.iterations=8.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Go on after the last frame of the cache's ledger, if there is one; a damaged frame is refused by name.
+    /// Go on after the last frame of the cache's ledger, if there is one. That frame is read whole, the others are looked for.
     #[arg(long)]
     resume: bool,
     /// Take meshes and tables that lie outside of the scene's folder.

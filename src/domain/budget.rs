@@ -178,6 +178,11 @@ impl fmt::Display for Breach {
         match watched {
             Watched::NotFinite | Watched::Particles => write!(f, ": {measured} {words}")?,
             Watched::Substeps => write!(f, ": {measured} {words}, and {name} is {limit}")?,
+            // The limit as the scene says it, and the value in full where a few digits would read as the limit.
+            _ if Short(self.measured).to_string() == Short(self.limit).to_string() => {
+                let [measured, limit] = [self.measured, self.limit];
+                write!(f, ": {words} is {measured}, and budget.{name} is {limit}")?;
+            }
             _ => write!(f, ": {words} is {measured}, and budget.{name} is {limit}")?,
         }
         match &self.detail {
@@ -207,6 +212,12 @@ mod tests {
         assert_eq!(
             breach.to_string(),
             "frame 7, substep 2: the relative residual of the projection is 0.0340, and budget.residual is 0.0100"
+        );
+        // A value that a few digits round to the limit.
+        let close = check(0.010_000_4, Some(0.01)).unwrap_err().to_string();
+        assert!(
+            close.contains("is 0.0100004, and budget.residual is 0.01"),
+            "{close}"
         );
         // What is no number is over every limit, and over none as well.
         for limit in [Some(0.01), None] {

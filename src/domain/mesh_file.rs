@@ -95,12 +95,15 @@ type Raw = (Vec<DVec3>, Vec<[u64; 3]>);
 /// The bytes of a mesh file, at most [`MAX_FILE_BYTES`].
 ///
 /// # Errors
-/// [`MeshError::Read`] and [`MeshError::TooLarge`].
+/// [`MeshError::Read`], also of what is no plain file (a pipe would not end); [`MeshError::TooLarge`].
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshError> {
     let fail = |source| MeshError::Read {
         file: path.to_owned(),
         source,
     };
+    if !path.metadata().map_err(fail)?.is_file() {
+        return Err(fail(io::Error::other("not a plain file")));
+    }
     let mut bytes = Vec::new();
     File::open(path)
         .map_err(fail)?

@@ -80,7 +80,10 @@ const TABLE: &[(&str, &str)] = &[
         "a number above 0, up to 100000, per second",
     ),
     ("domain", "a table with min and max"),
-    ("domain.min", "three finite numbers, metres, below max"),
+    (
+        "domain.min",
+        "three finite numbers, metres, from -1e6, below max",
+    ),
     (
         "domain.max",
         "three finite numbers, metres, above min, up to 1e6",

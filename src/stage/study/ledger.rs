@@ -25,7 +25,8 @@ pub(super) struct Ledger<R> {
 }
 
 impl<R: Line> Ledger<R> {
-    /// Opens the directory's results, or begins them; a torn last line is cut off.
+    /// Opens the directory's results, or begins them; a torn last line is cut off. A directory that holds anything but
+    /// a study's results is refused, and so is one that another process writes to.
     pub(super) fn open(directory: &Path) -> Result<Self, StudyError> {
         let path = directory.join("results.jsonl");
         let fault = |source| StudyError::File {
@@ -33,6 +34,13 @@ impl<R: Line> Ledger<R> {
             source,
         };
         fs::create_dir_all(directory).map_err(fault)?;
+        let is_used = fs::read_dir(directory).map_err(fault)?.next().is_some();
+        if is_used && !path.exists() {
+            return Err(StudyError::File {
+                file: directory.to_owned(),
+                source: std::io::Error::other("it holds what is no study's: choose another -o"),
+            });
+        }
         let text = match fs::read_to_string(&path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
@@ -53,6 +61,8 @@ impl<R: Line> Ledger<R> {
             .append(true)
             .open(&path)
             .map_err(fault)?;
+        let busy = |_| std::io::Error::other("another study writes here");
+        file.try_lock().map_err(busy).map_err(fault)?;
         file.set_len(whole as u64).map_err(fault)?;
         Ok(Self {
             file,
