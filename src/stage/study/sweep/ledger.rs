@@ -123,11 +123,15 @@ mod tests {
         let path = folder.path().join("results.jsonl");
         let text = fs::read_to_string(&path).expect("text");
         fs::write(&path, &text[..text.len() - 9]).expect("written");
+        let busy = Ledger::<Record>::open(folder.path()).err();
+        assert!(busy.is_some(), "two at once");
+        drop(ledger);
         let mut ledger = Ledger::<Record>::open(folder.path()).expect("torn");
         assert_eq!(ledger.find("a"), Some(&record("a")));
         assert_eq!(ledger.find("b"), None);
         ledger.append(&record("b")).expect("written");
         assert_eq!(fs::read_to_string(&path).expect("text"), text);
+        drop(ledger);
         fs::write(&path, format!("{text}{{}}\n")).expect("written");
         let error = Ledger::<Record>::open(folder.path())
             .err()
