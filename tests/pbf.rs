@@ -237,7 +237,7 @@ fn colours_and_stops_converge() {
 }
 
 /// What a colour buys: mean density error of a column compressed by 3 %, red/black against Jacobi, for as many
-/// iterations and the same work. `--nocapture` prints the table that README and solve::iteration refer to.
+/// iterations and the same work. `--nocapture` prints the table that docs/reliability.md and solve::iteration refer to.
 #[test]
 fn red_black_leaves_less_error_than_jacobi() {
     let context = context();

@@ -333,7 +333,7 @@ fn no_adapter_names_the_package() {
     assert!(said.contains("mesa-vulkan-drivers"), "{said}");
 }
 
-/// The table of exit codes in the README: what is not there is a cache's fault, a scene's where it is named like one.
+/// The table of exit codes in docs/commands.md: what is not there is a cache's fault, a scene's where it is named like one.
 #[test]
 fn what_is_missing_ends_as_the_table_says() {
     let job = Job::new();

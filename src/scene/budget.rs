@@ -33,7 +33,7 @@ pub struct Budget {
     pub energy: Option<f64>,
 }
 
-/// Defaults: a few times what the shipped scenes come to, of which the README has the largest.
+/// Defaults: a few times what the shipped scenes come to, of which docs/scene.md has the largest.
 const SPEED: f64 = 4.0;
 const DENSITY_ERROR_MEAN: f64 = 0.5;
 const DENSITY_ERROR_P99: f64 = 5.0;

@@ -2,7 +2,7 @@
 //!
 //! With G = ∇C of the compressed particles, their masses equal, an iteration of PBF takes the diagonal of
 //! G Gᵀ + εI for the whole; here the whole is factorised (faer's sparse Cholesky). A row has the particles within 2h,
-//! 250 of them at h = 2d, and the factor fills in between: what that costs stands in the README.
+//! 250 of them at h = 2d, and the factor fills in between: docs/accuracy.md has what that costs.
 
 use std::{collections::BTreeMap, fmt::Debug};
 
