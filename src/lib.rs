@@ -23,6 +23,8 @@ pub mod cli;
 pub mod compare;
 pub mod domain;
 pub mod gpu;
+#[cfg(feature = "mutants")]
+pub mod mutants;
 pub mod reference;
 pub mod render;
 pub mod scene;

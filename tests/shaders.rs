@@ -95,6 +95,25 @@ fn every_pass_validates_in_every_variant() {
     }
 }
 
+/// The renderer's passes as well, which have textures and are not reflected.
+#[test]
+fn every_pass_parses() {
+    let refused = |text: &str| {
+        naga::front::wgsl::parse_str(text)
+            .err()
+            .map(|e| e.to_string())
+    };
+    for pass in shader::pass_files() {
+        for defines in VARIANTS.iter().chain(&[&["AOVS", "SPRAY"][..]]) {
+            if is_meaningful(&pass, defines) {
+                let text = shader::compose(&pass, defines).unwrap();
+                assert_eq!(refused(&text), None, "{pass} {defines:?}");
+            }
+        }
+    }
+    assert!(refused("fn f() -> f32 { return x; }").is_some());
+}
+
 fn check(
     layouts: &[Layout],
     name: &str,

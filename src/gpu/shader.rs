@@ -1,6 +1,6 @@
 //! Shader composition: `#import "path"`, `#ifdef NAME`, `#else`, `#endif`, embedded in the binary.
 
-use std::collections::BTreeSet;
+use std::{borrow::Cow, collections::BTreeSet};
 
 use include_dir::{Dir, include_dir};
 
@@ -14,6 +14,11 @@ pub fn pass_files() -> Vec<String> {
         .dirs()
         .filter(|dir| dir.path() != std::path::Path::new("shared"))
         .flat_map(|dir| dir.files())
+        .filter(|file| {
+            file.path()
+                .extension()
+                .is_some_and(|extension| extension == "wgsl")
+        })
         .map(|file| {
             file.path()
                 .with_extension("")
@@ -36,6 +41,14 @@ pub fn compose(name: &str, defines: &[&str]) -> Result<String, GpuError> {
     Ok(out)
 }
 
+fn source(path: &str) -> Option<Cow<'static, str>> {
+    #[cfg(feature = "mutants")]
+    if let Some(text) = crate::mutants::shader(path) {
+        return Some(Cow::Owned(text));
+    }
+    Some(Cow::Borrowed(SHADERS.get_file(path)?.contents_utf8()?))
+}
+
 fn append(
     path: &str,
     defines: &[&str],
@@ -49,10 +62,7 @@ fn append(
         name: path.to_owned(),
         message: format!("line {line}: {what}"),
     };
-    let text = SHADERS
-        .get_file(path)
-        .and_then(|file| file.contents_utf8())
-        .ok_or_else(|| fault(0, "no such file"))?;
+    let text = source(path).ok_or_else(|| fault(0, "no such file"))?;
     let mut open: Vec<(usize, bool)> = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();

@@ -1,0 +1,87 @@
+"""The copy of the tree that holds every Rust fault, and its test binaries."""
+
+import json
+import os
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from .lists import Mistake, Mutant
+
+
+@dataclass(frozen=True)
+class Tree:
+    """The copy: `root` holds sources with the Rust faults in them, `shaders` plain ones, `target` the build."""
+
+    root: Path
+    shaders: Path
+    work: Path
+    target: Path
+
+
+def copy(root: Path, mutants: list[Mutant]) -> Tree:
+    """Copies what git tracks or would track; a file is written only where it differs, so that cargo rebuilds little."""
+    work = Path(os.environ.get("CARGO_TARGET_DIR", root / "target")).resolve() / "mutants"
+    tree = Tree(work / "tree", work / "tree/shaders", work / "run", work / "build")
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=root, check=True, capture_output=True
+    )
+    names = {name for name in listed.stdout.decode().split("\0") if name and (root / name).is_file()}
+    if tree.root.exists():
+        for path in tree.root.rglob("*"):
+            relative = path.relative_to(tree.root).as_posix()
+            if path.is_file() and relative not in names and not relative.startswith(("cache/", "renders/")):
+                path.unlink()
+    by_file: dict[str, list[Mutant]] = {}
+    for mutant in mutants:
+        if not mutant.is_shader:
+            by_file.setdefault(mutant.file, []).append(mutant)
+    for name in sorted(names):
+        source, target = root / name, tree.root / name
+        data = source.read_bytes()
+        if name in by_file:
+            data = with_switches(data.decode(), by_file[name]).encode()
+        if name == "src/lib.rs":
+            # Warnings would be of the switches: parentheses, a unit in both arms.
+            data = b"#![allow(warnings)]\n" + data
+        if not target.exists() or target.read_bytes() != data:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(data)
+            shutil.copymode(source, target)
+    return tree
+
+
+def with_switches(text: str, mutants: list[Mutant]) -> str:
+    """Each expression with its fault beside it, chosen at run time."""
+    spans = sorted((text.index(m.before), m) for m in mutants)
+    for (at, one), (next_at, other) in zip(spans, spans[1:]):
+        if at + len(one.before) > next_at:
+            raise Mistake(f"{one.name} and {other.name} change the same text of {one.file}")
+    for at, mutant in reversed(spans):
+        switch = f"(if crate::mutants::on({mutant.number}) {{ {mutant.after} }} else {{ {mutant.before} }})"
+        text = text[:at] + switch + text[at + len(mutant.before) :]
+    return text
+
+
+def compile(tree: Tree, tests: set[str]) -> dict[str, Path]:
+    """Test binary of each name that `tests` begin with."""
+    binaries = sorted({name.split("::")[0] for name in tests} | {"shaders"})
+    targets = [word for name in binaries for word in (["--lib"] if name == "lib" else ["--test", name])]
+    command = ["cargo", "test", "--release", "--locked", "--features", "mutants", "--no-run"]
+    command += ["--message-format=json-render-diagnostics", *targets]
+    print(f"compiling {len(binaries)} test binaries with every fault in them", flush=True)
+    environment = os.environ | {"CARGO_TARGET_DIR": str(tree.target), "CARGO_INCREMENTAL": "1"}
+    done = subprocess.run(command, cwd=tree.root, env=environment, stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        raise Mistake("the tree with the faults in it does not compile; a Rust `from` has to be a complete expression")
+    found: dict[str, Path] = {}
+    for line in done.stdout.splitlines():
+        message = json.loads(line)
+        if message.get("reason") == "compiler-artifact" and message["profile"]["test"] and message["executable"]:
+            is_unit = "lib" in message["target"]["kind"]
+            found["lib" if is_unit else message["target"]["name"]] = Path(message["executable"])
+    missing = [name for name in binaries if name not in found]
+    if missing:
+        raise Mistake(f"no test binary {', '.join(missing)}")
+    return found

@@ -1,0 +1,79 @@
+"""The lists in tests/mutants: read and checked against the tree."""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+KEYS = {"name", "file", "from", "to", "caught_by", "survives"}
+
+
+class Mistake(Exception):
+    """What is wrong with a list, the build or a test, so that no result could be trusted."""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One fault: `before` stands exactly once in `file`, on one line, and `after` takes its place."""
+
+    number: int
+    area: str
+    name: str
+    file: str
+    before: str
+    after: str
+    caught_by: tuple[str, ...]
+    reason: str | None
+
+    @property
+    def is_shader(self) -> bool:
+        return self.file.endswith(".wgsl")
+
+
+def read(root: Path) -> list[Mutant]:
+    """All mutants of all lists, numbered from 1. Raises Mistake with every fault that was found."""
+    mutants: list[Mutant] = []
+    faults: list[str] = []
+    for path in sorted((root / "tests/mutants").glob("*.toml")):
+        for entry in tomllib.loads(path.read_text()).get("mutant", []):
+            unknown = set(entry) - KEYS
+            missing = {"name", "file", "from", "to"} - set(entry)
+            if unknown or missing:
+                faults.append(f"{path.name}: {entry.get('name')}: unknown {unknown or '-'}, missing {missing or '-'}")
+                continue
+            mutant = Mutant(
+                len(mutants) + 1,
+                path.stem,
+                entry["name"],
+                entry["file"],
+                entry["from"],
+                entry["to"],
+                tuple(entry.get("caught_by", [])),
+                entry.get("survives"),
+            )
+            fault = fault_of(root, mutant)
+            if fault:
+                faults.append(f"{path.name}: {mutant.name}: {fault}")
+            mutants.append(mutant)
+    names = [mutant.name for mutant in mutants]
+    faults += [f"{name} is there twice" for name in sorted({n for n in names if names.count(n) > 1})]
+    if faults:
+        raise Mistake("the lists are not in order:\n  " + "\n  ".join(faults))
+    return mutants
+
+
+def fault_of(root: Path, mutant: Mutant) -> str | None:
+    """What is wrong with one entry, in words; None where nothing is."""
+    if not mutant.file.startswith(("src/", "shaders/")) or not (root / mutant.file).is_file():
+        return f"{mutant.file} is no file under src/ or shaders/"
+    if "\n" in mutant.before + mutant.after or not mutant.before.strip():
+        return "`from` and `to` are parts of one line"
+    count = (root / mutant.file).read_text().count(mutant.before)
+    if count != 1:
+        return f"`{mutant.before}` stands {count} times in {mutant.file}, and has to stand there once"
+    if mutant.before == mutant.after:
+        return "`to` is `from`"
+    if bool(mutant.caught_by) == bool(mutant.reason):
+        return "either caught_by or survives"
+    if any("::" not in name for name in mutant.caught_by):
+        return "caught_by is TEST_BINARY::test::path"
+    return None
