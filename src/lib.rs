@@ -18,6 +18,9 @@
 //! - [`stage`]: wires the rooms into jobs; no terminal.
 //! - [`cli`]: arguments in, terminal out.
 
+// One way to print, which takes care of writes that fail: cli::output.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 pub mod cache;
 pub mod cli;
 pub mod compare;

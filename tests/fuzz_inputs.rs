@@ -13,7 +13,7 @@ use swell::{
 };
 
 use mutate::mutate;
-use scene_faults::{FAULTS, FLIP_FAULTS, SCENE};
+use scene_faults::{FLIP_FAULTS, KEY_FAULTS, SCENE, VALUE_FAULTS};
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
@@ -49,7 +49,8 @@ fn each_fault_names_file_line_key_and_what_is_allowed() {
     parse(SCENE, &[]).expect("the good scene is good");
     parse(SCENE, &flip).expect("the good scene is good for FLIP");
     let mut wrong = Vec::new();
-    let of_pbf = FAULTS.iter().map(|fault| (fault, &[][..]));
+    let of_pbf = KEY_FAULTS.iter().chain(VALUE_FAULTS);
+    let of_pbf = of_pbf.map(|fault| (fault, &[][..]));
     let of_flip = FLIP_FAULTS.iter().map(|fault| (fault, &flip[..]));
     for ((old, new, line, expected), overrides) in of_pbf.chain(of_flip) {
         assert!(SCENE.contains(old), "{old}");
@@ -93,6 +94,125 @@ fn a_missing_table_and_a_missing_file_are_named() {
     );
     let error = Scene::load(&dir.path().join("none.toml"), &[]).expect_err("no file");
     assert!(matches!(error, SceneError::Read { .. }), "{error}");
+}
+
+/// Every key of a scene that is a number with a fraction: an override with `{}` for it, and whether its range alone
+/// decides.
+const NUMBERS: &[(&str, &str, bool)] = &[
+    ("shot.frames_per_second", "{}", true),
+    ("domain.min", "[{}, 0, 0]", false),
+    ("domain.max", "[25, {}, 15]", false),
+    ("water.rest_density", "{}", true),
+    ("water.gravity", "[0, {}, 0]", true),
+    ("water.particles[0].velocity", "[{}, 0, 0]", true),
+    ("solid[0].translate", "[{}, 0, 7]", false),
+    ("solid[0].rotate_degrees", "[0, {}, 0]", true),
+    ("solid[0].scale", "{}", false),
+    ("solid[1].direction", "[1, {}, 0]", true),
+    ("solid[1].motion.velocity", "{}", false),
+    ("wave_maker[0].motion.stroke", "{}", false),
+    ("wave_maker[0].motion.period", "{}", false),
+    ("wave_maker[0].motion.ramp", "{}", true),
+    ("wave_maker[1].motion.velocity", "{}", false),
+    ("wave_maker[1].motion.until", "{}", false),
+    ("wave_maker[2].motion.height", "{}", false),
+    ("wave_maker[2].motion.depth", "{}", false),
+    ("solver.pbf.particle_spacing", "{}", false),
+    ("solver.pbf.support_ratio", "{}", true),
+    ("solver.pbf.spectral_radius", "{}", true),
+    ("solver.pbf.density_error", "{}", true),
+    ("solver.pbf.cfl", "{}", true),
+    ("solver.pbf.relaxation", "{}", true),
+    ("solver.pbf.artificial_pressure", "{}", true),
+    ("solver.flip.cell_size", "{}", false),
+    ("solver.flip.pic_blend", "{}", true),
+    ("solver.flip.cfl", "{}", true),
+    ("solver.flip.pressure.tolerance", "{}", true),
+    ("budget.speed", "{}", true),
+    ("budget.density_error_mean", "{}", true),
+    ("budget.density_error_p99", "{}", true),
+    ("budget.capped", "{}", true),
+    ("budget.residual", "{}", false),
+    ("budget.divergence", "{}", true),
+    ("budget.volume", "{}", true),
+    ("budget.energy", "{}", true),
+    ("effects.viscosity.xsph", "{}", true),
+    ("effects.vorticity_confinement.strength", "{}", true),
+];
+
+/// The good scene with all that [`NUMBERS`] changes in it.
+fn numbered() -> String {
+    let makers = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
+        [[wave_maker]]\nwall = \"+z\"\nmotion = { kind = \"solitary\", height = 0.1, depth = 1.0 }\n";
+    let more = "[[water.particles]]\nat = [[20.0, 3.0, 3.0]]\nvelocity = [1.0, 0.0, 0.0]\n[[solid]]\nmesh = \"cube.obj\"\n\
+        translate = [15.0, 3.0, 3.0]\ndirection = [1.0, 0.0, 0.0]\n\
+        motion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n";
+    SCENE
+        .replace("[solver]\n", &format!("{makers}{more}[solver]\n"))
+        .replace("particle_spacing = 0.1\niterations = 4\n", "particle_spacing = 0.1\niteration = \"chebyshev\"\ndensity_error = 0.01\nmax_iterations = 9\n")
+}
+
+/// A range that its end points keep and what is just beyond them does not, where it says so itself: "from A to B".
+fn range_of(message: &str) -> Option<[f64; 2]> {
+    let mut words = message.rsplit_once(" from ")?.1.split_whitespace();
+    let least = words.next()?.parse().ok()?;
+    let most = words.nth(1)?.trim_end_matches([',', ';', ':']);
+    Some([least, most.parse().ok()?])
+}
+
+/// What is no number, and what would overflow or vanish in the first product, is refused with key, value and range, and the
+/// range is the one that holds.
+#[test]
+fn every_number_has_a_range_and_says_it() {
+    let dir = assets();
+    let text = numbered();
+    let load = |set: &str| {
+        let set = [set.to_owned(), Method::Flip.as_override()];
+        Scene::parse(&text, Path::new("s.toml"), dir.path(), &set)
+    };
+    load("shot.frames=240").expect("the scene is good");
+    for (key, value, is_free) in NUMBERS {
+        let set = |number: &str| format!("{key}={}", value.replace("{}", number));
+        let refused = |number: &str| {
+            let set = set(number);
+            let said = load(&set).map(|_| ()).expect_err(&set).to_string();
+            let words = said.rsplit_once(&format!(": {key}: "));
+            let (_, words) = words.unwrap_or_else(|| panic!("{set}: {said}"));
+            assert!(words.contains("; allowed: "), "{set}: {said}");
+            assert!(words.len() < 300, "{set}: {said}");
+            words.to_owned()
+        };
+        let said = refused("1e308");
+        assert!(said.contains("1e308"), "{said}");
+        let Some([least, most]) = range_of(&said) else {
+            panic!("{key} says no range: {said}");
+        };
+        for number in ["-1e308", "inf", "-inf", "nan"] {
+            refused(number);
+        }
+        if least > 0.0 {
+            assert!(refused("1e-300").contains("1e-300"), "{key}");
+        }
+        refused(&format!("{:?}", most * (1.0 + 1e-9)));
+        refused(&match least {
+            0.0 => "-1e-9".to_owned(),
+            least => format!("{:?}", least - 1e-9 * least.abs()),
+        });
+        if *is_free {
+            for end in [least, most] {
+                let set = set(&format!("{end:?}"));
+                load(&set).unwrap_or_else(|error| panic!("{set}: {error}"));
+            }
+        }
+    }
+}
+
+/// Every key of [`NUMBERS`] that takes 0 besides its range.
+#[test]
+fn a_wall_without_a_ramp_is_one() {
+    let dir = assets();
+    let set = ["wave_maker[0].motion.ramp=0".to_owned()];
+    Scene::parse(SCENE, Path::new("s.toml"), dir.path(), &set).expect("0 is none");
 }
 
 const STUDY: &str = r#"kind = "solver_comparison"
@@ -187,6 +307,77 @@ fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
             Err(error) => error.to_string(),
         };
         assert!(message.contains(expected), "{message}\n  wanted {expected}");
+    }
+}
+
+/// Every number with a fraction that a study of stability may have: its key, the text that it stands in, and the number
+/// there.
+const STUDY_NUMBERS: &[(&str, &str, &str)] = &[
+    ("case[0].against[0].scale", "scale = 1.0", "1.0"),
+    ("case[0].against[0].shift", "shift = [0.5,", "0.5"),
+    ("case[0].mark[0].at_most", "at_most = 0.25", "0.25"),
+    ("case[0].mark[0].after", "after = 0.01", "0.01"),
+    ("case[0].mark[0].since", "since = 0.02", "0.02"),
+    ("case[0].mark[1].at_least", "at_least = 0.75", "0.75"),
+    ("case[0].mark[1].region", "region = [[0.0,", "0.0"),
+    ("limit[0].passes", "passes = 0.5", "0.5"),
+    ("limit[0].fails", "fails = 8.0", "8.0"),
+    ("limit[0].ratio", "ratio = 1.5", "1.5"),
+    ("limit[0].seconds", "seconds = 0.125", "0.125"),
+];
+
+const STABILITY: &str = r#"kind = "stability"
+[[case]]
+number = 1
+name = "a"
+scene = "scene.toml"
+solvers = ["pbf"]
+devices = ["cpu"]
+frames = 3
+[[case.against]]
+scale = 1.0
+shift = [0.5, 0, 0]
+[[case.mark]]
+of = "sinking"
+at_most = 0.25
+after = 0.01
+since = 0.02
+[[case.mark]]
+of = "in_region"
+at_least = 0.75
+region = [[0.0, 0, 0], [1, 1, 1]]
+[[limit]]
+name = "b"
+scene = "scene.toml"
+solvers = ["pbf"]
+set = ["solver.pbf.cfl={}"]
+passes = 0.5
+fails = 8.0
+ratio = 1.5
+seconds = 0.125
+[[limit.mark]]
+of = "speed"
+at_most = 100.0
+"#;
+
+#[test]
+fn every_number_of_a_study_has_a_range_and_says_it() {
+    let dir = assets();
+    std::fs::write(dir.path().join("scene.toml"), SCENE).expect("written");
+    let parse = |text: &str| Study::parse(text, Path::new("s.toml"), dir.path());
+    parse(STABILITY).unwrap_or_else(|error| panic!("the good study is good: {error}"));
+    for (key, place, old) in STUDY_NUMBERS {
+        assert_eq!(STABILITY.matches(place).count(), 1, "{place}");
+        for number in ["1e308", "-1e308", "inf", "nan"] {
+            let text = STABILITY.replace(place, &place.replace(old, number));
+            let said = parse(&text).map(|_| ()).expect_err(&text).to_string();
+            let (_, words) = said
+                .split_once(&format!(": {key}: "))
+                .unwrap_or_else(|| panic!("{key} = {number}: {said}"));
+            assert!(words.contains("; allowed: "), "{said}");
+            assert!(words.contains(" from ") && words.contains(" to "), "{said}");
+            assert!(said.len() < 200, "{said}");
+        }
     }
 }
 

@@ -3,7 +3,6 @@
 use std::{
     cell::OnceCell,
     path::{Path, PathBuf},
-    process::ExitCode,
 };
 
 use clap::{Args, ValueEnum};
@@ -22,6 +21,7 @@ use crate::{
 use super::{
     Failure,
     interrupt::{self, Interrupt},
+    output,
     progress::{Mode, Progress},
     size,
 };
@@ -56,7 +56,7 @@ pub(super) struct BakeArgs {
     /// What to solve on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
     #[arg(long, value_enum, default_value_t, value_name = "DEVICE")]
     device: DeviceKind,
-    /// Index or part of the name of the adapter (see `swell inspect --adapters`); of --device gpu alone.
+    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`); of --device gpu alone.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Time each pass on the device and print a table; passes then run one by one.
@@ -132,7 +132,7 @@ fn load_lengthened(args: &BakeArgs) -> Result<Scene, SceneError> {
     }
 }
 
-pub(super) fn run(args: &BakeArgs) -> Result<ExitCode, Failure> {
+pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
     let device = args.device()?;
     let scene = load_lengthened(args)?;
     let method = scene.solver.method.name();
@@ -173,17 +173,19 @@ pub(super) fn run(args: &BakeArgs) -> Result<ExitCode, Failure> {
         ),
         json!({
             "event": "end", "last_frame": outcome.last_frame, "frames": outcome.frames, "bytes": outcome.bytes,
-            "interrupted": outcome.interrupted, "directory": request.directory,
+            "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
     for (pass, seconds, runs) in &outcome.passes {
         let each = 1e3 * seconds / *runs as f64;
-        println!("{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s");
+        output::print(&format!(
+            "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s\n"
+        ));
     }
     Ok(if outcome.interrupted {
-        ExitCode::from(interrupt::EXIT_CODE as u8)
+        interrupt::EXIT_CODE as u8
     } else {
-        ExitCode::SUCCESS
+        0
     })
 }
 

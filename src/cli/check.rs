@@ -1,8 +1,6 @@
 //! `swell check CACHE|SCENE`
 
-use std::{
-    cell::OnceCell, collections::BTreeMap, fmt::Write as _, path::PathBuf, process::ExitCode,
-};
+use std::{cell::OnceCell, collections::BTreeMap, fmt::Write as _, path::PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -19,7 +17,7 @@ use crate::{
 use super::{
     Failure, bake,
     interrupt::{self, Interrupt},
-    is_cache,
+    is_cache, output,
     progress::{Mode, Progress},
 };
 
@@ -44,7 +42,7 @@ pub(super) struct CheckArgs {
     /// The result as one JSON object on standard output.
     #[arg(long)]
     json: bool,
-    /// Index or part of the name of the adapter (see `swell inspect --adapters`).
+    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// How to tell progress.
@@ -55,15 +53,15 @@ pub(super) struct CheckArgs {
 /// What an option is for, where it is for the other kind of source.
 #[derive(Debug, thiserror::Error)]
 #[error("{option} is for {what}; {} is {is}", .source_file.display())]
-struct Misplaced {
-    option: &'static str,
-    what: &'static str,
-    is: &'static str,
-    source_file: PathBuf,
+pub(super) struct Misplaced {
+    pub(super) option: &'static str,
+    pub(super) what: &'static str,
+    pub(super) is: &'static str,
+    pub(super) source_file: PathBuf,
 }
 
 /// What a failed bake left, computed again: the line that the bake ended with, or that it now goes well.
-fn run_failed(args: &CheckArgs) -> Result<ExitCode, Failure> {
+fn run_failed(args: &CheckArgs) -> Result<u8, Failure> {
     if args.frames.is_some() || args.solver.is_some() || !args.set.is_empty() {
         let error = Misplaced {
             option: "--frames, --solver or --set",
@@ -78,8 +76,8 @@ fn run_failed(args: &CheckArgs) -> Result<ExitCode, Failure> {
     }
     let Replayed { frame, failure } = replay_failed(&args.source, args.adapter.clone())?;
     let Some(failure) = failure else {
-        println!("frame {frame} keeps its budgets now");
-        return Ok(ExitCode::SUCCESS);
+        output::print(&format!("frame {frame} keeps its budgets now\n"));
+        return Ok(0);
     };
     Err(Failure {
         code: 5,
@@ -87,7 +85,7 @@ fn run_failed(args: &CheckArgs) -> Result<ExitCode, Failure> {
     })
 }
 
-pub(super) fn run(args: &CheckArgs) -> Result<ExitCode, Failure> {
+pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     if is_failed(&args.source) {
         return run_failed(args);
     }
@@ -105,15 +103,14 @@ pub(super) fn run(args: &CheckArgs) -> Result<ExitCode, Failure> {
     }
     let outcome = outcome?;
     if args.json {
-        println!("{}", to_json(&outcome));
+        output::print(&format!("{}\n", to_json(&outcome)));
     } else {
-        print!("{}", show(&outcome.table));
-        println!("{}", verdict(&outcome));
+        output::print(&format!("{}{}\n", show(&outcome.table), verdict(&outcome)));
     }
     Ok(if outcome.interrupted {
-        ExitCode::from(interrupt::EXIT_CODE as u8)
+        interrupt::EXIT_CODE as u8
     } else {
-        ExitCode::from(u8::from(outcome.first_over.is_some()))
+        u8::from(outcome.first_over.is_some())
     })
 }
 

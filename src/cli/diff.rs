@@ -1,11 +1,6 @@
 //! `swell diff A B`
 
-use std::{
-    fmt::Write as _,
-    io::{self, Write as _},
-    path::PathBuf,
-    process::ExitCode,
-};
+use std::{fmt::Write as _, path::PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -19,7 +14,7 @@ use crate::{
     },
 };
 
-use super::{Failure, OUT_OF_TOLERANCE};
+use super::{Failure, OUT_OF_TOLERANCE, output};
 
 /// Lines of one kind that are printed before the rest is counted.
 const MOST_LINES: usize = 10;
@@ -58,14 +53,14 @@ fn gain(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(super) fn run(args: &DiffArgs) -> Result<ExitCode, Failure> {
+pub(super) fn run(args: &DiffArgs) -> Result<u8, Failure> {
     let b = match (&args.b, &args.write_baseline) {
         (Some(b), _) => b,
         (None, Some(file)) => {
             let written = write_baseline(&args.a, file, args.frames.as_ref())?;
             let text = show_written(file, &written);
             print(&text, args.json.then(|| json!(written)));
-            return Ok(ExitCode::SUCCESS);
+            return Ok(0);
         }
         (None, None) => unreachable!("clap asks for one of them"),
     };
@@ -98,22 +93,17 @@ pub(super) fn run(args: &DiffArgs) -> Result<ExitCode, Failure> {
         _ => "within tolerance",
     };
     let _ = writeln!(text, "\n{verdict}");
-    let object = json!({ "a": request.a, "b": request.b, "is_within": is_within, "diff": outcome });
-    print(&text, args.json.then_some(object));
-    Ok(if is_within {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(OUT_OF_TOLERANCE)
-    })
+    let (a, b) = (output::path(&request.a), output::path(&request.b));
+    let object = || json!({ "a": a, "b": b, "is_within": is_within, "diff": outcome });
+    print(&text, args.json.then(object));
+    Ok(if is_within { 0 } else { OUT_OF_TOLERANCE })
 }
 
-/// A closed pipe (`swell diff A B | head`) must not hide the result, which is the exit code.
 fn print(text: &str, object: Option<serde_json::Value>) {
-    let mut out = io::stdout().lock();
-    let _ = match object {
-        Some(object) => writeln!(out, "{object}"),
-        None => out.write_all(text.as_bytes()),
-    };
+    match object {
+        Some(object) => output::print(&format!("{object}\n")),
+        None => output::print(text),
+    }
 }
 
 fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {

@@ -1,9 +1,8 @@
 //! `swell inspect SCENE|CACHE|--adapters`
 
 use std::{
-    io::{self, Write},
-    path::PathBuf,
-    process::ExitCode,
+    fmt::{self, Write},
+    path::{Path, PathBuf},
 };
 
 use clap::Args;
@@ -13,7 +12,7 @@ use crate::{
     stage::inspect::{Adapter, Entry, Manifest, ScenePlan, adapters, cache, plan, plot},
 };
 
-use super::{Failure, bake, is_cache, size};
+use super::{Failure, bake, check::Misplaced, is_cache, output, size};
 
 #[derive(Args, Debug)]
 pub(super) struct InspectArgs {
@@ -36,12 +35,13 @@ pub(super) struct InspectArgs {
     #[arg(long)]
     allow_outside: bool,
     /// Plan for the limits of this adapter.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", requires = "subject")]
     adapter: Option<String>,
 }
 
-pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
-    let mut text = Vec::new();
+pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
+    // Writing to a String cannot fail.
+    let mut text = String::new();
     let mut misfit = None;
     let plotted = match (&args.plot, &args.subject) {
         (Some(folder), Some(directory)) => plot(directory, folder)?,
@@ -49,32 +49,49 @@ pub(super) fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     };
     if args.adapters {
         for adapter in adapters()? {
-            show_adapter(&mut text, &adapter)?;
+            let _ = show_adapter(&mut text, &adapter);
         }
     }
     match &args.subject {
         Some(directory) if is_cache(directory) => {
+            refuse_scene_options(args, directory)?;
             let (manifest, entries) = cache(directory)?;
-            show_cache(&mut text, &manifest, &entries)?;
-            show_probes(&mut text, &manifest, &entries)?;
+            let _ = show_cache(&mut text, &manifest, &entries);
+            let _ = show_probes(&mut text, &manifest, &entries);
         }
         Some(file) => {
             let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
             let planned = plan(&scene, args.adapter.as_deref())?;
-            show_plan(&mut text, &scene, &planned)?;
+            let _ = show_plan(&mut text, &scene, &planned);
             misfit = planned.misfit;
         }
         None => {}
     }
     for file in plotted {
-        writeln!(text, "{}", file.display()).map_err(Unprintable::from)?;
+        text += &format!("{}\n", file.display());
     }
-    // A closed pipe (`swell inspect | head`) is no fault.
-    let _ = io::stdout().write_all(&text);
-    misfit.map_or(Ok(ExitCode::SUCCESS), |misfit| Err(misfit.into()))
+    output::print(&text);
+    misfit.map_or(Ok(0), |misfit| Err(misfit.into()))
 }
 
-fn show_adapter(out: &mut impl Write, adapter: &Adapter) -> Result<(), Unprintable> {
+/// A cache says itself what it was baked with, and on what.
+fn refuse_scene_options(args: &InspectArgs, directory: &Path) -> Result<(), Failure> {
+    if args.set.is_empty() && args.solver.is_none() && args.adapter.is_none() {
+        return Ok(());
+    }
+    let error = Misplaced {
+        option: "--set, --solver or --adapter",
+        what: "scenes",
+        is: "a cache: it says what it was baked with",
+        source_file: directory.to_owned(),
+    };
+    Err(Failure {
+        code: 2,
+        error: Box::new(error),
+    })
+}
+
+fn show_adapter(out: &mut String, adapter: &Adapter) -> fmt::Result {
     writeln!(
         out,
         "{}: {} ({}), driver {}",
@@ -96,7 +113,7 @@ fn show_adapter(out: &mut impl Write, adapter: &Adapter) -> Result<(), Unprintab
     Ok(())
 }
 
-fn show_plan(out: &mut impl Write, scene: &Scene, planned: &ScenePlan) -> Result<(), Unprintable> {
+fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Result {
     let plan = &planned.plan;
     let shot = &scene.shot;
     writeln!(
@@ -154,11 +171,7 @@ fn show_plan(out: &mut impl Write, scene: &Scene, planned: &ScenePlan) -> Result
     Ok(())
 }
 
-fn show_cache(
-    out: &mut impl Write,
-    manifest: &Manifest,
-    entries: &[Entry],
-) -> Result<(), Unprintable> {
+fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::Result {
     writeln!(
         out,
         "{}: {} by {} {}",
@@ -217,11 +230,7 @@ fn show_cache(
 }
 
 /// A line a column of each probe: its least, greatest and last value.
-fn show_probes(
-    out: &mut impl Write,
-    manifest: &Manifest,
-    entries: &[Entry],
-) -> Result<(), Unprintable> {
+fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::Result {
     if manifest.probes.is_empty() {
         return Ok(());
     }
@@ -262,15 +271,4 @@ fn projection_columns(entry: &Entry) -> String {
         number(of(projection, "missed")),
         number(of(projection, "pockets"))
     )
-}
-
-/// Writing to memory does not fail; the type keeps `?` honest.
-#[derive(Debug, thiserror::Error)]
-#[error(transparent)]
-struct Unprintable(#[from] io::Error);
-
-impl From<&Unprintable> for crate::stage::Blame {
-    fn from(_: &Unprintable) -> Self {
-        Self::Files
-    }
 }

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::output;
+
 /// What a process that ended at a signal gives by custom (128 + SIGINT).
 pub const EXIT_CODE: i32 = 130;
 
@@ -26,7 +28,7 @@ impl Interrupt {
                 // The process ends with its temporary files in place; resuming clears them.
                 std::process::exit(EXIT_CODE);
             }
-            eprintln!("ends after the current frame, resumably; once more to end at once");
+            output::say("ends after the current frame, resumably; once more to end at once");
         })?;
         Ok(interrupt)
     }
@@ -35,9 +37,9 @@ impl Interrupt {
     /// frames survive.
     pub fn install_or_warn() -> Self {
         Self::install().unwrap_or_else(|error| {
-            eprintln!(
+            output::say(&format!(
                 "warning: a signal will end this at once, without finishing its frame: {error}"
-            );
+            ));
             Self::default()
         })
     }

@@ -5,12 +5,18 @@ mod check;
 mod diff;
 mod inspect;
 pub mod interrupt;
+mod output;
 mod progress;
 mod render;
 mod study;
 pub mod verify;
 
-use std::{error::Error, path::Path, process::ExitCode};
+use std::{
+    error::Error,
+    io::{self, Write as _},
+    path::Path,
+    process::ExitCode,
+};
 
 use clap::{Parser, Subcommand};
 
@@ -21,7 +27,8 @@ const OUT_OF_TOLERANCE: u8 = 1;
 
 const AFTER: &str = "Exit codes: 0 done; 1 a comparison is out of tolerance; 2 usage, scene or look at fault; \
     3 no usable device, or device lost; 4 a cache or picture is damaged, missing, in use, of another scene, or cannot be read or \
-    written; 5 the numbers failed, last good frame kept; 130 ended by a signal, resumable.";
+    written, standard output included (a closed pipe, as of `| head`, is no fault); 5 the numbers failed, last good frame kept; \
+    130 ended by a signal, resumable.";
 
 /// Offline, film-quality fluid pipeline for ocean-wave shots.
 #[derive(Parser, Debug)]
@@ -76,20 +83,36 @@ where
 
 /// Parses the command line, runs the command, prints what went wrong with all its causes.
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let code = match Cli::try_parse() {
+        Ok(cli) => run(cli.command),
+        Err(told) => tell(&told),
+    };
+    output::exit_code(code)
+}
+
+/// Prints what clap has to tell: help, the version, or what is wrong with the arguments.
+fn tell(told: &clap::Error) -> u8 {
+    let stream = match told.use_stderr() {
+        true => "standard error",
+        false => "standard output",
+    };
+    output::note(stream, told.print().and_then(|()| io::stdout().flush()));
+    told.exit_code() as u8
+}
+
+fn run(command: Command) -> u8 {
+    let result = match command {
         Command::Bake(args) => bake::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Study(args) => study::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Diff(args) => diff::run(&args),
-        Command::Verify(args) => verify::run(&args)
-            .map(|()| ExitCode::SUCCESS)
-            .map_err(Failure::from),
+        Command::Verify(args) => verify::run(&args).map(|()| 0).map_err(Failure::from),
     };
     result.unwrap_or_else(|failure| {
-        eprintln!("swell: {}", chain(failure.error.as_ref()));
-        ExitCode::from(failure.code)
+        output::say(&format!("swell: {}", chain(failure.error.as_ref())));
+        failure.code
     })
 }
 

@@ -1,10 +1,12 @@
 //! Progress: a bar on a terminal, plain lines otherwise, JSON lines for farms.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal as _;
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
+
+use super::output;
 
 /// How progress is told.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -54,11 +56,11 @@ impl Progress {
     /// A line that is no frame; `event` is what farms read.
     pub(super) fn say(&self, text: &str, event: Value) {
         match self.mode {
-            Mode::Json => json(&event),
+            Mode::Json => output::print(&format!("{event}\n")),
             Mode::None => {}
             _ => match &self.bar {
                 Some(bar) => bar.println(text),
-                None => eprintln!("{text}"),
+                None => output::say(text),
             },
         }
     }
@@ -87,9 +89,4 @@ impl Progress {
             bar.finish_and_clear();
         }
     }
-}
-
-fn json(event: &Value) {
-    // A closed pipe must not end a bake.
-    let _ = writeln!(std::io::stdout().lock(), "{event}");
 }

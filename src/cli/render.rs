@@ -1,6 +1,6 @@
 //! `swell render CACHE --look LOOK`
 
-use std::{cell::OnceCell, path::PathBuf, process::ExitCode};
+use std::{cell::OnceCell, path::PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -14,6 +14,7 @@ use crate::{
 use super::{
     Failure, bake,
     interrupt::{self, Interrupt},
+    output,
     progress::{Mode, Progress},
 };
 
@@ -30,7 +31,7 @@ pub(super) struct RenderArgs {
     /// Frames to render, such as 1-240x2; all that are cached where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
-    /// Index or part of the name of the adapter (see `swell inspect --adapters`).
+    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Take a panorama that lies outside of the look's folder.
@@ -44,7 +45,7 @@ pub(super) struct RenderArgs {
     progress: Mode,
 }
 
-pub(super) fn run(args: &RenderArgs) -> Result<ExitCode, Failure> {
+pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
     let look = Look::load_within(&args.look, bake::reach(args.allow_outside))?;
     let directory = match &args.output {
         Some(directory) => directory.clone(),
@@ -86,13 +87,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<ExitCode, Failure> {
         ),
         json!({
             "event": "end", "rendered": outcome.rendered, "skipped": outcome.skipped,
-            "interrupted": outcome.interrupted, "directory": request.directory,
+            "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
     Ok(if outcome.interrupted {
-        ExitCode::from(interrupt::EXIT_CODE as u8)
+        interrupt::EXIT_CODE as u8
     } else {
-        ExitCode::SUCCESS
+        0
     })
 }
 

@@ -1,6 +1,6 @@
 //! `swell study STUDY`
 
-use std::{cell::OnceCell, path::PathBuf, process::ExitCode};
+use std::{cell::OnceCell, path::PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -13,6 +13,7 @@ use crate::{
 use super::{
     Failure, OUT_OF_TOLERANCE, bake,
     interrupt::{self, Interrupt},
+    output,
     progress::{Mode, Progress},
     render,
 };
@@ -24,7 +25,7 @@ pub(super) struct StudyArgs {
     /// Where caches, pictures, table and page go; studies/NAME where left out. What stands there is gone on with.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Index or part of the name of the adapter (see `swell inspect --adapters`).
+    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Take meshes, tables and panoramas that lie outside of the folders of the scene and the look.
@@ -35,7 +36,7 @@ pub(super) struct StudyArgs {
     progress: Mode,
 }
 
-pub(super) fn run(args: &StudyArgs) -> Result<ExitCode, Failure> {
+pub(super) fn run(args: &StudyArgs) -> Result<u8, Failure> {
     let default = || PathBuf::from("studies").join(args.study.file_stem().unwrap_or_default());
     let directory = args.output.clone().unwrap_or_else(default);
     let request = Request {
@@ -86,15 +87,15 @@ pub(super) fn run(args: &StudyArgs) -> Result<ExitCode, Failure> {
             "ended by a signal; the same command goes on",
             json!({ "event": "end", "interrupted": true }),
         );
-        return Ok(ExitCode::from(interrupt::EXIT_CODE as u8));
+        return Ok(interrupt::EXIT_CODE as u8);
     };
     say(
         &format!("{}\npage: {}", outcome.findings.join("\n"), page.display()),
-        json!({ "event": "end", "page": page, "findings": outcome.findings, "missed": outcome.missed, "interrupted": false }),
+        json!({ "event": "end", "page": output::path(&page), "findings": outcome.findings, "missed": outcome.missed, "interrupted": false }),
     );
     Ok(match outcome.missed[..] {
-        [] => ExitCode::SUCCESS,
-        _ => ExitCode::from(OUT_OF_TOLERANCE),
+        [] => 0,
+        _ => OUT_OF_TOLERANCE,
     })
 }
 

@@ -1,11 +1,10 @@
 //! `swell verify CACHE`
 
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::size;
+use super::{output, size};
 use crate::stage::verify::{CacheError, VerifyReport, verify};
 
 /// Look at every checksum of a cache.
@@ -22,25 +21,23 @@ pub struct VerifyArgs {
 /// The first problem as [`CacheError::Damaged`]; [`CacheError`] where there is no cache to look at.
 pub fn run(args: &VerifyArgs) -> Result<(), CacheError> {
     let report = verify(&args.cache)?;
-    // A closed pipe (`swell verify | head -1`) must not hide the result, which is the exit code.
-    let _ = show(&mut io::stdout().lock(), &report);
+    output::print(&show(&report));
     report.into_result().map(|_| ())
 }
 
-fn show(out: &mut impl Write, report: &VerifyReport) -> io::Result<()> {
-    for problem in &report.problems {
-        writeln!(out, "{}: {}", problem.file.display(), problem.what)?;
-    }
+fn show(report: &VerifyReport) -> String {
     if report.problems.is_empty() {
         let plural = if report.frames == 1 { "" } else { "s" };
-        writeln!(
-            out,
-            "ok: {} frame{plural}, {}",
+        return format!(
+            "ok: {} frame{plural}, {}\n",
             report.frames,
             size(report.bytes)
-        )?;
+        );
     }
-    Ok(())
+    let problems = report.problems.iter();
+    problems
+        .map(|problem| format!("{}: {}\n", problem.file.display(), problem.what))
+        .collect()
 }
 
 #[cfg(test)]
@@ -49,12 +46,6 @@ mod tests {
     use super::*;
     use crate::stage::verify::Problem;
 
-    fn shown(report: &VerifyReport) -> String {
-        let mut out = Vec::new();
-        show(&mut out, report).unwrap();
-        String::from_utf8(out).unwrap()
-    }
-
     #[test]
     fn one_line_a_problem_or_one_line() {
         let mut report = VerifyReport {
@@ -62,14 +53,14 @@ mod tests {
             bytes: 1_234_000_000,
             problems: vec![],
         };
-        assert_eq!(shown(&report), "ok: 72 frames, 1.2 GB\n");
+        assert_eq!(show(&report), "ok: 72 frames, 1.2 GB\n");
         for name in ["a", "b"] {
             report.problems.push(Problem {
                 file: name.into(),
                 what: "it is missing".to_owned(),
             });
         }
-        assert_eq!(shown(&report), "a: it is missing\nb: it is missing\n");
+        assert_eq!(show(&report), "a: it is missing\nb: it is missing\n");
         assert!(report.into_result().is_err());
     }
 

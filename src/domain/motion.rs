@@ -470,6 +470,107 @@ mod tests {
         assert!((motion.velocity(goring.crest_time()) - peak).abs() < 1e-12);
     }
 
+    /// Goring 1978 in closed form, without the code's own quantities: the stroke √(16 H d / 3), the wall's greatest speed
+    /// c H / (d + H) with c = √(g (d + H)), and the time from a quarter of the stroke to three.
+    #[test]
+    fn the_solitary_piston_has_gorings_stroke_celerity_and_duration() {
+        let (height, depth, gravity) = (0.3, 1.0, 9.81);
+        let motion = Motion::Solitary {
+            height,
+            depth,
+            gravity,
+        };
+        // It starts at χ = −6, where tanh is 1 − 1.2e-5.
+        let stroke = (16.0_f64 * height * depth / 3.0).sqrt();
+        let end = motion.displacement(60.0);
+        assert!((end / stroke - 1.0).abs() < 1e-5, "{end} {stroke}");
+        let celerity = (9.81_f64 * 1.3).sqrt();
+        let fastest = (0..60_000)
+            .map(|i| motion.velocity(1e-4 * f64::from(i)))
+            .fold(0.0, f64::max);
+        // At the crest the speed is flat: half a step of 1e-4 s takes 1e-8 of it.
+        let expected = celerity * 0.3 / 1.3;
+        assert!((fastest / expected - 1.0).abs() < 1e-7, "{fastest}");
+        assert!((motion.peak_speed(0.0, 60.0) / expected - 1.0).abs() < 1e-12);
+        // Bisected: when the wall has come that far.
+        let when = |x: f64| {
+            let (mut low, mut high) = (0.0, 60.0);
+            for _ in 0..80 {
+                let middle = 0.5 * (low + high);
+                if motion.displacement(middle) < x {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            low
+        };
+        // tanh χ goes from −½ to ½: c Δt = ΔX + 2 artanh(½) d / K, and 2 artanh(½) = ln 3, d / K = S d / 2H.
+        let took = when(0.75 * stroke) - when(0.25 * stroke);
+        let expected = (0.5 * stroke + 3f64.ln() * stroke * depth / (2.0 * height)) / celerity;
+        assert!((took / expected - 1.0).abs() < 1e-4, "{took} {expected}");
+    }
+
+    /// A sine between its ends: all of the stroke at half a period, half at a quarter, where the wall is fastest.
+    #[test]
+    fn a_sine_goes_the_whole_stroke_and_its_ramp_is_the_quintic() {
+        let sine = |ramp| Motion::Sine {
+            stroke: 1.2,
+            period: 4.0,
+            ramp,
+        };
+        let full = sine(0.0);
+        for (t, x, v) in [
+            (1.0, 0.6, 0.15 * TAU),
+            (2.0, 1.2, 0.0),
+            (3.0, 0.6, -0.15 * TAU),
+            (4.0, 0.0, 0.0),
+            (10.0, 1.2, 0.0),
+        ] {
+            assert!((full.displacement(t) - x).abs() < 1e-14, "{t}");
+            assert!((full.velocity(t) - v).abs() < 1e-14, "{t}");
+        }
+        // 6u⁵ − 15u⁴ + 10u³ at a quarter is 106/1024, at a half one half, at three quarters 918/1024.
+        let slow = sine(8.0);
+        for (t, part) in [(2.0, 106.0 / 1024.0), (4.0, 0.5), (6.0, 918.0 / 1024.0)] {
+            assert!(
+                (slow.displacement(t) - part * full.displacement(t)).abs() < 1e-14,
+                "{t}"
+            );
+        }
+        assert_eq!(slow.displacement(9.0), full.displacement(9.0));
+    }
+
+    #[test]
+    fn a_steady_wall_goes_its_speed_times_the_time_and_stands() {
+        let motion = Motion::ConstantVelocity {
+            velocity: 2.0,
+            until: Some(1.5),
+        };
+        for (t, x, v) in [
+            (0.5, 1.0, 2.0),
+            (1.25, 2.5, 2.0),
+            (1.5, 3.0, 0.0),
+            (9.0, 3.0, 0.0),
+        ] {
+            assert_eq!((motion.displacement(t), motion.velocity(t)), (x, v));
+        }
+    }
+
+    /// Fritsch and Butland 1984: chords of 1 and ½ m/s over 1 and 2 s have the weighted harmonic mean 9/13 m/s.
+    #[test]
+    fn a_table_has_fritsch_and_butlands_slopes() {
+        let motion = Motion::Table {
+            points: vec![[0.0, 0.0], [1.0, 1.0], [3.0, 2.0]],
+        };
+        assert!((motion.velocity(1.0) - 9.0 / 13.0).abs() < 1e-15);
+        assert!((motion.velocity(1.0 - 1e-9) - 9.0 / 13.0).abs() < 1e-8);
+        assert_eq!((motion.velocity(0.0), motion.velocity(3.0)), (0.0, 0.0));
+        // Half-way a cubic of slopes 0 and m has come to ½ − m/8.
+        let half = 0.5 - 9.0 / 13.0 / 8.0;
+        assert!((motion.displacement(0.5) - half).abs() < 1e-15);
+    }
+
     #[test]
     fn a_table_passes_its_points_without_overshoot() {
         let points = vec![[0.0, 0.0], [0.5, 0.2], [0.9, 2.0], [2.0, 2.0], [5.0, 0.5]];

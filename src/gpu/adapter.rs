@@ -14,11 +14,14 @@ pub enum GpuError {
     )]
     NoAdapter,
     /// `--adapter` matches nothing.
-    #[error("no adapter matches `{request}`; this machine has {}", available.join(", "))]
+    #[error(
+        "no adapter `{request}`; allowed is the number of one of these, or a part of its name:{}",
+        list(available)
+    )]
     NoSuchAdapter {
         /// What was asked for.
         request: String,
-        /// What there is.
+        /// Names of those that there are, in the order of their numbers.
         available: Vec<String>,
     },
     /// The adapter refused to open.
@@ -140,6 +143,53 @@ pub fn has_timestamps(adapter: &Adapter) -> bool {
     adapter.features().contains(Features::TIMESTAMP_QUERY)
 }
 
+/// A line each: number and name.
+fn list(names: &[String]) -> String {
+    let lines = names.iter().enumerate();
+    lines
+        .map(|(index, name)| format!("\n  {index}: {name}"))
+        .collect()
+}
+
+/// Which of `names` a request is for. Digits alone are a number and never a part of a name: names hold versions, as in
+/// "llvmpipe (LLVM 15.0.6, 256 bits)".
+fn position(names: &[String], request: &str) -> Option<usize> {
+    let wanted = request.trim().to_lowercase();
+    if wanted.is_empty() {
+        return None;
+    }
+    if wanted.bytes().all(|byte| byte.is_ascii_digit()) {
+        let index = wanted.parse().ok()?;
+        return (index < names.len()).then_some(index);
+    }
+    let mut lower = names.iter().map(|name| name.to_lowercase());
+    lower.position(|name| name.contains(&wanted))
+}
+
+fn names(adapters: &[Adapter]) -> Vec<String> {
+    let names = adapters.iter().map(|adapter| adapter.get_info().name);
+    names.collect()
+}
+
+fn find(names: Vec<String>, request: &str) -> Result<usize, GpuError> {
+    position(&names, request).ok_or_else(|| GpuError::NoSuchAdapter {
+        request: request.to_owned(),
+        available: names,
+    })
+}
+
+/// Whether this machine has the adapter that `request` names; nothing is opened.
+///
+/// # Errors
+/// [`GpuError::NoAdapter`], [`GpuError::NoSuchAdapter`].
+pub fn check_request(request: &str) -> Result<(), GpuError> {
+    let adapters = enumerate();
+    if adapters.is_empty() {
+        return Err(GpuError::NoAdapter);
+    }
+    find(names(&adapters), request).map(|_| ())
+}
+
 fn choose(mut adapters: Vec<Adapter>, request: Option<&str>) -> Result<Adapter, GpuError> {
     if adapters.is_empty() {
         return Err(GpuError::NoAdapter);
@@ -154,34 +204,13 @@ fn choose(mut adapters: Vec<Adapter>, request: Option<&str>) -> Result<Adapter, 
         });
         return Ok(adapters.swap_remove(0));
     };
-    let names: Vec<String> = adapters
-        .iter()
-        .map(|adapter| adapter.get_info().name)
-        .collect();
-    let found = request
-        .parse::<usize>()
-        .ok()
-        .filter(|&index| index < names.len())
-        .or_else(|| {
-            names
-                .iter()
-                .position(|name| name.to_lowercase().contains(&request.to_lowercase()))
-        });
-    match found {
-        Some(index) => Ok(adapters.swap_remove(index)),
-        None => Err(GpuError::NoSuchAdapter {
-            request: request.to_owned(),
-            available: names
-                .iter()
-                .enumerate()
-                .map(|(index, name)| format!("{index}: {name}"))
-                .collect(),
-        }),
-    }
+    let index = find(names(&adapters), request)?;
+    Ok(adapters.swap_remove(index))
 }
 
 impl Context {
-    /// Opens the adapter that `request` names (an index, or part of a name), or the best there is.
+    /// Opens the adapter that `request` names (digits alone are its number, anything else a part of its name), or the best
+    /// there is.
     ///
     /// # Errors
     /// [`GpuError::NoAdapter`], [`GpuError::NoSuchAdapter`], [`GpuError::Open`].
@@ -283,6 +312,42 @@ fn record(fault: &Mutex<Option<String>>, message: String) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn digits_are_a_number_and_words_a_part_of_a_name() {
+        let names =
+            ["llvmpipe (LLVM 15.0.6, 256 bits)", "NVIDIA L4", "AMD 780M"].map(str::to_owned);
+        for (request, expected) in [
+            ("0", Some(0)),
+            ("1", Some(1)),
+            ("02", Some(2)),
+            // In the first name's version, in the second's and third's model.
+            ("5", None),
+            ("15", None),
+            ("256", None),
+            ("4", None),
+            ("780", None),
+            ("99999999999999999999999", None),
+            ("15.0", Some(0)),
+            ("llvmpipe", Some(0)),
+            ("nvidia", Some(1)),
+            ("780m", Some(2)),
+            ("-1", None),
+            ("+1", None),
+            ("", None),
+            (" ", None),
+        ] {
+            assert_eq!(position(&names, request), expected, "{request:?}");
+        }
+        let two = names[..2].to_vec();
+        let said = find(two, "5").expect_err("there is no 5").to_string();
+        let lines: Vec<&str> = said.lines().collect();
+        assert!(lines[0].contains("no adapter `5`"), "{said}");
+        assert_eq!(
+            lines[1..],
+            ["  0: llvmpipe (LLVM 15.0.6, 256 bits)", "  1: NVIDIA L4"]
+        );
+    }
 
     #[test]
     fn f64_is_enabled_where_asked_for_and_refused_where_missing() {

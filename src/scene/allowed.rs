@@ -50,9 +50,9 @@ pub(super) fn scene_keys() -> impl Iterator<Item = &'static str> {
     keys.filter(|key| !OTHERS.contains(&key.split('.').next().unwrap_or(key)))
 }
 
-const TRANSLATE: &str = "three finite numbers, metres";
-const ROTATE: &str = "three finite numbers, degrees about x, then y, then z";
-const SCALE: &str = "a number other than 0, or three of them";
+const TRANSLATE: &str = "three numbers from -1e9 to 1e9, metres";
+const ROTATE: &str = "three numbers from -1e6 to 1e6, degrees about x, then y, then z";
+const SCALE: &str = "a number from 1e-6 to 1e6, or three of them; negative ones mirror";
 const BLAKE3: &str = "the BLAKE3 of the file in hex, or nothing";
 
 const SET: &str = "an array of overrides of the scene, such as [\"solver.pbf.iterations=8\"]";
@@ -62,6 +62,10 @@ const COARSER: &str = "an array of overrides of the scene that make the last val
      finest run or of a projection";
 const VALUES: &str = "two or more values of the key, from coarse to fine, here or for all methods";
 
+const BOUND: &str = "a number from -1e12 to 1e12; one of at_most and at_least";
+const AFTER: &str = "a number from 0 to 1e8, seconds";
+const SHIFT: &str = "three numbers from -1e9 to 1e9, metres";
+const REGION: &str = "two corners, each three numbers from -1e9 to 1e9, metres";
 const SOLVERS: &str = "an array of \"pbf\" and \"flip\"; both if left out";
 const DEVICES: &str = "an array of \"gpu\" and \"cpu\"; both if left out";
 const MARK: &str = "an array of tables [[mark]] of of and at_most or at_least";
@@ -77,31 +81,31 @@ const TABLE: &[(&str, &str)] = &[
     ("shot.frames", "a whole number from 1 to 1000000"),
     (
         "shot.frames_per_second",
-        "a number above 0, up to 100000, per second",
+        "a number from 0.01 to 100000, per second",
     ),
     ("domain", "a table with min and max"),
     (
         "domain.min",
-        "three finite numbers, metres, from -1e6, below max",
+        "three numbers from -1e6 to 1e6, metres, each below max by 1e-8 at least",
     ),
     (
         "domain.max",
-        "three finite numbers, metres, above min, up to 1e6",
+        "three numbers from -1e6 to 1e6, metres, each above min by 1e-8 at least",
     ),
     (
         "water",
         "a table with rest_density, gravity, block, mesh and particles",
     ),
-    ("water.rest_density", "a number above 0, up to 1e6, kg/m³"),
-    ("water.gravity", "three finite numbers up to 1e4, m/s²"),
+    ("water.rest_density", "a number from 0.01 to 100000, kg/m³"),
+    ("water.gravity", "three numbers from -10000 to 10000, m/s²"),
     ("water.block", "an array of tables [[water.block]]"),
     (
         "water.block.min",
-        "three finite numbers, metres, in the domain and below max",
+        "three numbers, metres, in the domain and below max",
     ),
     (
         "water.block.max",
-        "three finite numbers, metres, in the domain and above min",
+        "three numbers, metres, in the domain and above min",
     ),
     ("water.mesh", "an array of tables [[water.mesh]]"),
     (
@@ -119,7 +123,7 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "water.particles.velocity",
-        "three finite numbers up to 1e4, m/s, of all of them; 0 if left out",
+        "three numbers from -10000 to 10000, m/s, of all of them; 0 if left out",
     ),
     ("solid", "an array of tables [[solid]]"),
     (
@@ -132,7 +136,7 @@ const TABLE: &[(&str, &str)] = &[
     ("solid.scale", SCALE),
     (
         "solid.direction",
-        "three finite numbers, not all 0, with motion; their length does not count",
+        "three numbers from -1e6 to 1e6, not all 0, with motion; their length does not count",
     ),
     (
         "solid.motion",
@@ -144,14 +148,14 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "solid.motion.velocity",
-        "a number above 0, m/s along direction",
+        "a number from 1e-9 to 100000, m/s along direction",
     ),
-    ("solid.motion.until", "a number above 0, seconds"),
-    ("solid.motion.stroke", "a number above 0, metres"),
-    ("solid.motion.period", "a number above 0, seconds"),
+    ("solid.motion.until", "a number from 1e-6 to 1e9, seconds"),
+    ("solid.motion.stroke", "a number from 1e-9 to 1e6, metres"),
+    ("solid.motion.period", "a number from 1e-4 to 1e6, seconds"),
     (
         "solid.motion.ramp",
-        "a number from 0, seconds; one period if left out",
+        "0 or a number from 1e-4 to 1e6, seconds; one period if left out",
     ),
     (
         "solid.motion.file",
@@ -159,7 +163,8 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "solid.motion.points",
-        "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0",
+        "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0, all up to 1e9, no faster \
+         than 100000 m/s",
     ),
     ("wave_maker", "an array of tables [[wave_maker]]"),
     (
@@ -175,26 +180,42 @@ const TABLE: &[(&str, &str)] = &[
         "wave_maker.motion.kind",
         "\"constant_velocity\", \"sine\", \"solitary\" or \"table\"",
     ),
-    ("wave_maker.motion.velocity", "a number above 0, m/s inward"),
-    ("wave_maker.motion.until", "a number above 0, seconds"),
-    ("wave_maker.motion.stroke", "a number above 0, metres"),
-    ("wave_maker.motion.period", "a number above 0, seconds"),
+    (
+        "wave_maker.motion.velocity",
+        "a number from 1e-9 to 100000, m/s inward",
+    ),
+    (
+        "wave_maker.motion.until",
+        "a number from 1e-6 to 1e9, seconds",
+    ),
+    (
+        "wave_maker.motion.stroke",
+        "a number from 1e-9 to 1e6, metres",
+    ),
+    (
+        "wave_maker.motion.period",
+        "a number from 1e-4 to 1e6, seconds",
+    ),
     (
         "wave_maker.motion.ramp",
-        "a number from 0, seconds; one period if left out",
+        "0 or a number from 1e-4 to 1e6, seconds; one period if left out",
     ),
     (
         "wave_maker.motion.height",
-        "a number above 0, at most the depth, metres",
+        "a number from 1e-9 to 1e6, at most the depth, metres",
     ),
-    ("wave_maker.motion.depth", "a number above 0, metres"),
+    (
+        "wave_maker.motion.depth",
+        "a number from 1e-9 to 1e6, metres",
+    ),
     (
         "wave_maker.motion.file",
         "a CSV of time,displacement (seconds, metres), relative to the scene file",
     ),
     (
         "wave_maker.motion.points",
-        "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0",
+        "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0, all up to 1e9, no faster \
+         than 100000 m/s",
     ),
     ("solver", "a table with method, pbf and flip"),
     (
@@ -205,7 +226,7 @@ const TABLE: &[(&str, &str)] = &[
     ("solver.pbf", "a table with at least particle_spacing"),
     (
         "solver.pbf.particle_spacing",
-        "a number above 0, metres, with at most 65536 cells along an axis, 2147483647 cells and \
+        "a number from 1e-8 to 100000, metres, with at most 65536 cells along an axis, 2147483647 cells and \
          134217728 particles",
     ),
     ("solver.pbf.support_ratio", "a number from 1.5 to 4"),
@@ -219,24 +240,24 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "solver.pbf.density_error",
-        "a number above 0 and below 1, with max_iterations",
+        "a number from 1e-7 to 0.99, with max_iterations",
     ),
     (
         "solver.pbf.max_iterations",
         "a whole number from 1 to 10000, with density_error",
     ),
-    ("solver.pbf.cfl", "a number above 0, up to 5"),
+    ("solver.pbf.cfl", "a number from 1e-5 to 5"),
     (
         "solver.pbf.spectral_radius",
-        "a number between 0 and 1, with iteration = \"chebyshev\"",
+        "a number from 0.01 to 0.9999, with iteration = \"chebyshev\"",
     ),
-    ("solver.pbf.relaxation", "a number above 0, up to 1.5"),
+    ("solver.pbf.relaxation", "a number from 0.01 to 1.5"),
     ("solver.pbf.artificial_pressure", "a number from 0 to 10"),
     ("solver.pbf.max_substeps", "a whole number from 1 to 10000"),
     ("solver.flip", "a table with at least cell_size"),
     (
         "solver.flip.cell_size",
-        "a number above 0, metres, with at least 3 and at most 65536 cells along each axis, 68719476736 \
+        "a number from 1e-8 to 100000, metres, with at least 3 and at most 65536 cells along each axis, 68719476736 \
          cells and 134217728 particles",
     ),
     (
@@ -245,7 +266,7 @@ const TABLE: &[(&str, &str)] = &[
     ),
     ("solver.flip.transfer", "\"flip\" or \"apic\""),
     ("solver.flip.pic_blend", "a number from 0 to 1"),
-    ("solver.flip.cfl", "a number above 0, up to 5"),
+    ("solver.flip.cfl", "a number from 1e-5 to 5"),
     ("solver.flip.max_substeps", "a whole number from 1 to 10000"),
     ("solver.flip.surface", "\"voxel\" or \"ghost_fluid\""),
     ("solver.flip.density_correction", "true or false"),
@@ -263,7 +284,7 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "solver.flip.pressure.tolerance",
-        "a number above 0 and below 1, of the right-hand side's norm",
+        "a number from 1e-14 to 0.99, of the right-hand side's norm",
     ),
     (
         "solver.flip.pressure.max_iterations",
@@ -285,34 +306,34 @@ const TABLE: &[(&str, &str)] = &[
     ),
     ("grids.precision", "\"half\" or \"float\""),
     ("budget", "a table of limits, each a number or false"),
-    ("budget.speed", "a number above 0, m/s, or false"),
+    ("budget.speed", "a number from 1e-12 to 1e12, m/s, or false"),
     (
         "budget.density_error_mean",
-        "a number above 0, of the rest density, or false",
+        "a number from 1e-12 to 1e12, of the rest density, or false",
     ),
     (
         "budget.density_error_p99",
-        "a number above 0, of the rest density, or false",
+        "a number from 1e-12 to 1e12, of the rest density, or false",
     ),
     (
         "budget.capped",
-        "a number above 0, of all particles in all substeps, or false",
+        "a number from 1e-12 to 1e12, of all particles in all substeps, or false",
     ),
     (
         "budget.residual",
-        "a number from solver.flip.pressure.tolerance on, of the right-hand side's norm, or false",
+        "a number from 1e-12 to 1e12, at least solver.flip.pressure.tolerance, of the right-hand side's norm, or false",
     ),
     (
         "budget.divergence",
-        "a number above 0, of a cell's volume in a substep, or false",
+        "a number from 1e-12 to 1e12, of a cell's volume in a substep, or false",
     ),
     (
         "budget.volume",
-        "a number above 0, of the volume at the start, or false",
+        "a number from 1e-12 to 1e12, of the volume at the start, or false",
     ),
     (
         "budget.energy",
-        "a number above 0, of the total energy in a frame, or false",
+        "a number from 1e-12 to 1e12, of the total energy in a frame, or false",
     ),
     ("probe", "an array of tables [[probe]]"),
     (
@@ -322,8 +343,8 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "probe.name",
-        "1 to 100 letters, digits, \"_\", \"-\" and \".\", the first a letter or digit, each name once; the kind with a \
-         number if left out",
+        "1 to 100 letters, digits, \"_\", \"-\" and \".\", the first a letter or digit, each name once, upper and lower \
+         case taken alike; the kind with a number if left out",
     ),
     (
         "probe.at",
@@ -409,23 +430,32 @@ const TABLE: &[(&str, &str)] = &[
     ("case.against.device", "\"gpu\" or \"cpu\""),
     (
         "case.against.scale",
-        "a number above 0: the lengths of the other run over those of the case",
+        "a number from 1e-6 to 1e6: the lengths of the other run over those of the case",
     ),
     ("case.mark", MARK),
     ("case.mark.of", MEASURED),
-    ("case.mark.at_most", "a number; or at_least"),
+    ("case.against.shift", SHIFT),
+    ("case.mark.at_most", BOUND),
+    ("case.mark.at_least", BOUND),
+    ("case.mark.after", AFTER),
+    ("case.mark.since", AFTER),
+    ("case.mark.region", REGION),
     ("case.mark.solvers", SOLVERS),
     ("case.mark.devices", DEVICES),
     ("limit", "an array of tables [[limit]]"),
     ("limit.set", SET),
     ("limit.solvers", SOLVERS),
-    ("limit.passes", "a number above 0"),
-    ("limit.fails", "a number above 0"),
-    ("limit.ratio", "a number above 1"),
-    ("limit.seconds", "a number above 0"),
+    ("limit.passes", "a number from 1e-12 to 1e12"),
+    ("limit.fails", "a number from 1e-12 to 1e12"),
+    ("limit.ratio", "a number from 1.001 to 1e12"),
+    ("limit.seconds", "a number from 1e-6 to 1e8"),
     ("limit.mark", MARK),
     ("limit.mark.of", MEASURED),
-    ("limit.mark.at_most", "a number; or at_least"),
+    ("limit.mark.at_most", BOUND),
+    ("limit.mark.at_least", BOUND),
+    ("limit.mark.after", AFTER),
+    ("limit.mark.since", AFTER),
+    ("limit.mark.region", REGION),
     ("limit.mark.solvers", SOLVERS),
     ("limit.mark.devices", DEVICES),
     // Of a tolerance file.

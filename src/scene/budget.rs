@@ -5,7 +5,10 @@ use std::fmt::{self, Write as _};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Method, Scene, Shot, Solver, document::Document, error::SceneError};
+use super::{
+    Method, Scene, Shot, Solver, document::Document, error::SceneError, ranges::BUDGET,
+    words::shown,
+};
 use crate::domain::{
     budget::{Breach, Watched},
     solver::StepReport,
@@ -73,7 +76,7 @@ enum LimitSpec {
     Limit(f64),
 }
 
-/// A number of at least `least`, or `false`.
+/// A number of the budget's range and of at least `least`, or `false`.
 fn limit(
     doc: &Document<'_>,
     value: &Option<Spanned<LimitSpec>>,
@@ -86,11 +89,9 @@ fn limit(
     match *value.get_ref() {
         LimitSpec::Switch(false) => Ok(None),
         LimitSpec::Switch(true) => Err(doc.fault_at(value.span(), "true is no limit")),
-        LimitSpec::Limit(limit) if limit.is_finite() && limit > 0.0 && limit >= least => {
-            Ok(Some(limit))
-        }
+        LimitSpec::Limit(limit) if BUDGET.contains(&limit) && limit >= least => Ok(Some(limit)),
         LimitSpec::Limit(limit) => {
-            Err(doc.fault_at(value.span(), format!("{limit} is out of range")))
+            Err(doc.fault_at(value.span(), format!("{} is out of range", shown(limit))))
         }
     }
 }

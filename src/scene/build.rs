@@ -14,8 +14,10 @@ use super::{
     grids,
     moving_solid::{self, MAX_MOVING_SOLIDS},
     origin, probe,
+    ranges::{self, Interval},
     spec::{BoxSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, SwarmSpec, WaterSpec},
     wave_maker,
+    words::{shown, shown_all},
 };
 use crate::domain::{
     bounds::Bounds,
@@ -44,7 +46,7 @@ struct Lattice {
 /// Builds the scene.
 pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Result<Scene> {
     let shot = shot(doc, &spec.shot)?;
-    let domain = bounds(doc, &spec.domain)?;
+    let domain = domain(doc, &spec.domain)?;
     let origin = origin::of(&domain);
     let (solver, lattice) = solver::solver(doc, &spec.solver, &domain)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
@@ -81,8 +83,8 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         }
     }
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
-    if let Some((key, allowed)) = spec.effects.fault() {
-        return Err(doc.fault_of(&key, allowed));
+    if let Some((key, value, allowed)) = spec.effects.fault() {
+        return Err(doc.fault_of(&key, value, allowed));
     }
     let grids = spec
         .grids
@@ -116,29 +118,31 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     Ok(scene.into_local())
 }
 
-/// The value, if `is_allowed`; NaN never is.
-pub(super) fn number(
-    doc: &Document<'_>,
-    value: &Spanned<f64>,
-    is_allowed: impl Fn(f64) -> bool,
-) -> Result<f64> {
+/// The value, if it is in the range; NaN never is.
+pub(super) fn number(doc: &Document<'_>, value: &Spanned<f64>, range: &Interval) -> Result<f64> {
     let v = *value.get_ref();
-    if v.is_finite() && is_allowed(v) {
+    if range.contains(&v) {
         Ok(v)
     } else {
-        Err(doc.fault_at(value.span(), format!("{v} is out of range")))
+        Err(out_of_range(doc, value))
     }
+}
+
+/// That a number is not what its key allows.
+pub(super) fn out_of_range(doc: &Document<'_>, value: &Spanned<f64>) -> SceneError {
+    let problem = format!("{} is out of range", shown(*value.get_ref()));
+    doc.fault_at(value.span(), problem)
 }
 
 fn number_or(
     doc: &Document<'_>,
     value: &Option<Spanned<f64>>,
     default: f64,
-    is_allowed: impl Fn(f64) -> bool,
+    range: &Interval,
 ) -> Result<f64> {
     value
         .as_ref()
-        .map_or(Ok(default), |value| number(doc, value, is_allowed))
+        .map_or(Ok(default), |value| number(doc, value, range))
 }
 
 fn whole(doc: &Document<'_>, value: &Spanned<i64>, max: u32) -> Result<u32> {
@@ -156,7 +160,7 @@ pub(super) fn vector(doc: &Document<'_>, value: &Spanned<[f64; 3]>, limit: f64) 
     } else {
         Err(doc.fault_at(
             value.span(),
-            format!("[{}, {}, {}] is out of range", v.x, v.y, v.z),
+            format!("{} is out of range", shown_all(&v.to_array())),
         ))
     }
 }
@@ -189,8 +193,19 @@ fn shot(doc: &Document<'_>, spec: &ShotSpec) -> Result<Shot> {
     Ok(Shot {
         name: name.clone(),
         frames: whole(doc, &spec.frames, 1_000_000)?,
-        frames_per_second: number(doc, &spec.frames_per_second, |v| v > 0.0 && v <= 1e5)?,
+        frames_per_second: number(doc, &spec.frames_per_second, &ranges::FRAMES_PER_SECOND)?,
     })
+}
+
+/// The box of the whole scene.
+fn domain(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
+    let domain = bounds(doc, spec)?;
+    let size = domain.size();
+    if ranges::EDGE.contains(&size.min_element()) {
+        return Ok(domain);
+    }
+    let problem = format!("its edges are {} m", shown_all(&size.to_array()));
+    Err(doc.fault_at(spec.max.span(), problem))
 }
 
 /// A box with positive edges.
@@ -201,7 +216,8 @@ fn bounds(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
         if min[axis] >= max[axis] {
             let problem = format!(
                 "the box is inverted: {name} ends at {} but starts at {}",
-                max[axis], min[axis]
+                shown(max[axis]),
+                shown(min[axis])
             );
             return Err(doc.fault_at(spec.max.span(), problem));
         }
@@ -246,7 +262,7 @@ fn water(
         })
         .collect::<Result<_>>()?;
     Ok(Water {
-        rest_density: number_or(doc, &spec.rest_density, 1000.0, |v| v > 0.0 && v <= 1e6)?,
+        rest_density: number_or(doc, &spec.rest_density, 1000.0, &ranges::REST_DENSITY)?,
         gravity: vector_or(doc, &spec.gravity, DVec3::new(0.0, -9.81, 0.0), 1e4)?,
         blocks,
         meshes,
@@ -269,10 +285,8 @@ fn swarm(doc: &Document<'_>, spec: &SwarmSpec, domain: &Bounds) -> Result<Swarm>
     // NaN is in no box.
     if let Some(p) = at.iter().find(|p| !domain.contains(**p)) {
         let problem = format!(
-            "[{}, {}, {}] is not in the domain, {}",
-            p.x,
-            p.y,
-            p.z,
+            "{} is not in the domain, {}",
+            shown_all(&p.to_array()),
             extent(Some(*domain))
         );
         return Err(doc.fault_at(spec.at.span(), problem));
@@ -314,7 +328,10 @@ fn water_block(
         let size = block.size();
         let problem = format!(
             "the block, {} × {} × {} m, is too thin for one layer of particles {} m apart",
-            size.x, size.y, size.z, lattice.spacing
+            shown(size.x),
+            shown(size.y),
+            shown(size.z),
+            shown(lattice.spacing)
         );
         return Err(doc.fault_at(spec.max.span(), problem));
     }
@@ -331,10 +348,8 @@ pub(super) fn extent(bounds: Option<Bounds>) -> String {
     bounds.map_or_else(
         || "nothing".to_owned(),
         |b| {
-            format!(
-                "[{}, {}, {}] to [{}, {}, {}]",
-                b.min.x, b.min.y, b.min.z, b.max.x, b.max.y, b.max.z
-            )
+            let [min, max] = [b.min, b.max].map(|corner| shown_all(&corner.to_array()));
+            format!("{min} to {max}")
         },
     )
 }
@@ -366,7 +381,10 @@ fn check_particle_count(
     let placed: usize = water.particles.iter().map(|swarm| swarm.at.len()).sum();
     let count = in_blocks + in_meshes + placed as f64;
     if count > MAX_PARTICLES {
-        let problem = format!("the water would take about {count:.3e} particles {d} m apart");
+        let problem = format!(
+            "the water would take about {count:.3e} particles {} m apart",
+            shown(d)
+        );
         return Err(doc.fault_at(lattice.span.clone(), problem));
     }
     Ok(())
@@ -458,7 +476,7 @@ fn scale(doc: &Document<'_>, spec: &Option<Spanned<ScaleSpec>>) -> Result<DVec3>
     } else {
         Err(doc.fault_at(
             spec.span(),
-            format!("[{}, {}, {}] is out of range", scale.x, scale.y, scale.z),
+            format!("{} is out of range", shown_all(&scale.to_array())),
         ))
     }
 }

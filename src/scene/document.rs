@@ -14,6 +14,7 @@ use toml::{
 use super::{
     error::{Fault, Place, SceneError},
     reach::Reach,
+    words::{duplicate, plain_types, shown},
 };
 
 /// Bytes set aside for the spans of one override, beyond the end of the text.
@@ -53,8 +54,13 @@ impl<'a> Document<'a> {
             entries: Vec::new(),
             reach: Reach::Folder,
         };
-        let mut root = DeTable::parse(text)
-            .map_err(|e| document.fault(e.span(), String::new(), e.message().to_owned()))?;
+        let mut root = DeTable::parse(text).map_err(|error| match duplicate(text, &error) {
+            Some(key) => {
+                let message = "a second key of this name in its table".to_owned();
+                document.fault(error.span(), key.to_owned(), message)
+            }
+            None => document.fault(error.span(), String::new(), error.message().to_owned()),
+        })?;
         for (index, entry) in overrides.iter().enumerate() {
             let mut spans = OverrideSpans {
                 start: text.len() + 1 + index * OVERRIDE_SPAN,
@@ -108,13 +114,13 @@ impl<'a> Document<'a> {
     }
 
     /// A fault of the value of the key at `path`, which allows what `allowed` says.
-    pub(super) fn fault_of(&self, path: &str, allowed: &str) -> SceneError {
+    pub(super) fn fault_of(&self, path: &str, value: f64, allowed: &str) -> SceneError {
         let span = self
             .entries
             .iter()
             .find(|e| e.path == path)
             .map(|e| e.value.clone());
-        let message = format!("out of range; allowed: {allowed}");
+        let message = format!("{} is out of range; allowed: {allowed}", shown(value));
         self.fault(span, path.to_owned(), message)
     }
 
@@ -176,7 +182,7 @@ impl<'a> Document<'a> {
         } else {
             message
         };
-        let message = with_allowed(problem.to_owned(), &path);
+        let message = with_allowed(plain_types(problem), &path);
         self.fault(span, path, message)
     }
 

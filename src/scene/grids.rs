@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Method, Solver, build::number, document::Document, error::SceneError};
+use super::{Method, Solver, build::out_of_range, document::Document, error::SceneError};
 use crate::domain::{
     bounds::Bounds,
     sparse_grid::{EDGE, Precision},
@@ -61,7 +61,11 @@ pub(super) fn build(
                     let bricks = (domain.size() / (v * f64::from(EDGE))).ceil();
                     bricks.element_product() <= MAX_BRICKS
                 };
-                number(doc, size, |v| size_in_spacings(v) && size_fits(v))?
+                let v = *size.get_ref();
+                if !(size_in_spacings(v) && size_fits(v)) {
+                    return Err(out_of_range(doc, size));
+                }
+                v
             }
         },
         precision: match table.precision.as_ref() {

@@ -202,6 +202,72 @@ vorticity_confinement = { strength = 0.1 }
         );
     }
 
+    /// Numbers of the README, one by one.
+    #[test]
+    fn what_a_scene_leaves_out_is_what_the_readme_says() {
+        let text = "[shot]\nname = \"a\"\nframes = 10\nframes_per_second = 50\n\
+            [domain]\nmin = [0, 0, 0]\nmax = [4, 3, 12]\n[solver]\nmethod = \"pbf\"\n\
+            [solver.pbf]\nparticle_spacing = 0.1\n[solver.flip]\ncell_size = 0.2\n\
+            [grids]\nsurface = true\n[[wave_maker]]\nwall = \"-x\"\n\
+            motion = { kind = \"sine\", stroke = 0.5, period = 2.0 }\n";
+        let load = |set: &[&str]| parse(Path::new(""), text, set).expect("valid");
+        let scene = load(&[]);
+        assert_eq!(scene.water.rest_density, 1000.0);
+        assert_eq!(scene.water.gravity, DVec3::new(0.0, -9.81, 0.0));
+        let pbf = scene.solver.pbf();
+        assert_eq!(pbf.stop, Stop::Iterations(4));
+        assert_eq!(pbf.iteration, Iteration::RedBlack);
+        let numbers = [
+            pbf.support_ratio,
+            pbf.cfl,
+            pbf.relaxation,
+            pbf.artificial_pressure,
+        ];
+        assert_eq!((numbers, pbf.max_substeps), ([2.0, 1.0, 1.0, 0.0], 32));
+        let flip = scene.solver.flip();
+        let pressure = &flip.pressure;
+        assert_eq!(
+            (flip.cfl, flip.pic_blend, pressure.tolerance),
+            (3.0, 0.05, 1e-5)
+        );
+        assert_eq!((flip.max_substeps, pressure.max_iterations), (32, 400));
+        assert_eq!(pressure.preconditioner, Preconditioner::Multigrid);
+        let voxels = |scene: &Scene| scene.grids.as_ref().map(|grids| grids.voxel_size);
+        assert_eq!(voxels(&scene), Some(0.2), "two particle spacings");
+        // One period of ramp.
+        let sine = Motion::Sine {
+            stroke: 0.5,
+            period: 2.0,
+            ramp: 2.0,
+        };
+        assert_eq!(scene.wave_makers[0].motion, sine);
+        let chebyshev = load(&["solver.pbf.iteration=chebyshev"]);
+        let pbf = chebyshev.solver.pbf();
+        assert_eq!((pbf.relaxation, pbf.spectral_radius), (0.7, 0.98));
+        // The diagonal of 4 × 3 × 12 m is 13 m. The wall: π stroke / period at the most, and the bound of an interval as
+        // long as the shot, 0.2 s of the ramp, lies below.
+        let speed = scene.budget.speed.expect("a limit");
+        let fall = (2.0 * 9.81 * 13.0_f64).sqrt();
+        let push = scene.wave_makers[0].motion.peak_speed(0.0, 0.2);
+        assert!(
+            (speed / (4.0 * (fall + push)) - 1.0).abs() < 1e-14,
+            "{speed}"
+        );
+        assert!(push < 0.25 * std::f64::consts::PI);
+        let limits = |scene: &Scene| {
+            let b = &scene.budget;
+            let of_reports = [b.density_error_mean, b.density_error_p99, b.capped];
+            (of_reports, [b.residual, b.divergence, b.energy, b.volume])
+        };
+        let of_reports = [0.5, 5.0, 0.01].map(Some);
+        let of_pbf = [Some(0.01), Some(0.1), Some(0.25), None];
+        assert_eq!(limits(&scene), (of_reports, of_pbf));
+        let flip = load(&["solver.method=flip"]);
+        assert_eq!(limits(&flip).1[2], Some(0.1));
+        assert_eq!(voxels(&flip), Some(0.2), "its cells");
+        assert_eq!(flip.budget.speed, scene.budget.speed);
+    }
+
     #[test]
     fn either_solver_of_a_scene_can_be_chosen() {
         let dir = assets();

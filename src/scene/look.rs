@@ -4,12 +4,12 @@ pub mod spec;
 
 mod fault;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::Reach;
+use super::{Reach, words::shown};
 
 pub use fault::LookError;
 pub use spec::{
@@ -18,19 +18,31 @@ pub use spec::{
     WaterSpec, WindowsSpec,
 };
 
+/// The key of the panorama's file.
+const PANORAMA: &str = "sky.file";
+
 /// A validated look: every value in its range, every file that it names read.
 #[derive(Clone, Debug)]
 pub struct Look {
     spec: LookSpec,
-    panorama: Option<Arc<[u8]>>,
+    panorama: Option<Panorama>,
     hash: String,
+}
+
+/// A sky's picture, and where the look names it.
+#[derive(Clone, Debug)]
+struct Panorama {
+    bytes: Arc<[u8]>,
+    path: PathBuf,
+    look: PathBuf,
+    line: usize,
 }
 
 impl Look {
     /// Reads, parses and validates a look file.
     ///
     /// # Errors
-    /// [`LookError::Read`] for the file or its panorama, [`LookError::Fault`] with line and key.
+    /// [`LookError::Read`] for the file, [`LookError::Fault`] with line and key.
     pub fn load(path: &Path) -> Result<Self, LookError> {
         Self::load_within(path, Reach::Folder)
     }
@@ -63,18 +75,21 @@ impl Look {
         let panorama = match &spec.sky {
             SkySpec::Panorama { file: name, .. } => {
                 let folder = file.parent().unwrap_or(Path::new("."));
-                let path = reach
-                    .find(folder, name)
-                    .map_err(|message| fault::at_path(file, text, "sky.file", &message))?;
-                let bytes = std::fs::read(&path).map_err(|source| LookError::Read {
-                    file: path.clone(),
-                    source,
-                })?;
-                Some(Arc::from(bytes))
+                let refuse = |message: String| fault::at_path(file, text, PANORAMA, &message);
+                let path = reach.find(folder, name).map_err(refuse)?;
+                let bytes = std::fs::read(&path)
+                    .map_err(|error| refuse(format!("cannot read {}: {error}", path.display())))?;
+                Some(Panorama {
+                    bytes: Arc::from(bytes),
+                    path,
+                    look: file.to_owned(),
+                    line: fault::line_of(text, PANORAMA),
+                })
             }
             SkySpec::HosekWilkie { .. } => None,
         };
-        let hash = canonical_hash(&spec, panorama.as_deref());
+        let bytes = panorama.as_ref().map(|sky| sky.bytes.as_ref());
+        let hash = canonical_hash(&spec, bytes);
         Ok(Self {
             spec,
             panorama,
@@ -89,7 +104,18 @@ impl Look {
 
     /// Bytes of the sky panorama's EXR, where the look has one.
     pub fn panorama(&self) -> Option<&[u8]> {
-        self.panorama.as_deref()
+        self.panorama.as_ref().map(|sky| sky.bytes.as_ref())
+    }
+
+    /// That its panorama is no picture that can be used, in the words of who tried; `None` where it has none.
+    pub fn panorama_fault(&self, problem: &str) -> Option<LookError> {
+        let sky = self.panorama.as_ref()?;
+        Some(LookError::Fault {
+            file: sky.look.clone(),
+            line: sky.line,
+            key: PANORAMA.to_owned(),
+            message: format!("the panorama {}: {problem}", sky.path.display()),
+        })
     }
 
     /// BLAKE3, hex, over the content: every value with its default, and the panorama's bytes, whatever
@@ -137,7 +163,12 @@ fn in_range(path: &str, value: f64, least: f64, most: f64, unit: &str) -> Result
     }
     Err((
         path.to_owned(),
-        format!("is {value}; allowed is {least} to {most}{unit}"),
+        format!(
+            "is {}; allowed is {} to {}{unit}",
+            shown(value),
+            shown(least),
+            shown(most)
+        ),
     ))
 }
 

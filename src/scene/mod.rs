@@ -19,9 +19,11 @@ mod document;
 mod error;
 mod load;
 mod origin;
+mod ranges;
 mod reach;
 mod spec;
 mod wave_maker;
+mod words;
 mod write;
 
 use std::path::PathBuf;

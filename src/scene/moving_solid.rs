@@ -11,6 +11,7 @@ use super::{
     document::Document,
     error::SceneError,
     wave_maker,
+    words::shown,
 };
 use crate::domain::{bounds::Bounds, motion::Motion};
 
@@ -102,9 +103,10 @@ fn check_way(
     let size = domain.size().max_element();
     if farthest > FAR * size {
         let problem = format!(
-            "within the {} s of the shot the solid moves {farthest} m, and the domain is {size} m \
-             long",
-            shot.duration()
+            "within the {} s of the shot the solid moves {} m, and the domain is {} m long",
+            shown(shot.duration()),
+            shown(farthest),
+            shown(size)
         );
         return Err(doc.fault_at(span, problem));
     }

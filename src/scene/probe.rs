@@ -112,16 +112,24 @@ pub(super) fn build_all(
         if !is_file_stem(&probe.name) {
             return Err(doc.fault_at(span, format!("{:?} is no safe file name", probe.name)));
         }
-        if probes
-            .iter()
-            .any(|known| known.name.eq_ignore_ascii_case(&probe.name))
-        {
-            let problem = format!("a second probe of the name {:?}", probe.name);
-            return Err(doc.fault_at(span, problem));
+        let is_alike = |known: &&Probe| known.name.eq_ignore_ascii_case(&probe.name);
+        if let Some(known) = probes.iter().find(is_alike) {
+            return Err(doc.fault_at(span, second(&known.name, &probe.name)));
         }
         probes.push(probe);
     }
     Ok(probes)
+}
+
+/// Why a probe cannot have a name beside another probe's.
+fn second(known: &str, name: &str) -> String {
+    let mut problem = format!("a second probe of the name {name:?}");
+    if known != name {
+        problem += &format!(
+            ": {known:?} is the same file where upper and lower case are not told apart, as on Windows and macOS"
+        );
+    }
+    problem
 }
 
 fn kind(

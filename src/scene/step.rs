@@ -171,3 +171,161 @@ impl Scene {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// Spacing 0.1 m, cells of 0.2 m, g = 10 m/s²; the wall -x moves at 3 m/s for one second, +z not at all.
+    const SCENE: &str = r#"
+[shot]
+name = "a"
+frames = 100
+frames_per_second = 5
+[domain]
+min = [0, 0, 0]
+max = [10, 4, 2]
+[water]
+gravity = [0, -10, 0]
+[solver]
+method = "pbf"
+[solver.pbf]
+particle_spacing = 0.1
+max_substeps = 40
+[solver.flip]
+cell_size = 0.2
+max_substeps = 5
+[effects]
+viscosity = { xsph = 0.2 }
+"#;
+
+    const WALL: &str = r#"wave_maker=[{ wall = "-x", motion = { kind = "constant_velocity", velocity = 3.0, until = 1.0 } },
+        { wall = "+z", motion = { kind = "constant_velocity", velocity = 0.1, until = 5.0 } }]"#;
+
+    fn scene(set: &[&str]) -> Scene {
+        let set: Vec<String> = set.iter().map(|&text| text.to_owned()).collect();
+        Scene::parse(SCENE, Path::new("s.toml"), Path::new(""), &set).expect("valid")
+    }
+
+    #[test]
+    fn pbf_takes_as_many_substeps_as_the_way_has_cfl_lengths() {
+        // In a frame of 0.2 s gravity adds 2 m/s. The way is (v + 2 m/s) 0.2 s, a substep's is cfl × 0.1 m.
+        for (cfl, speed, substeps) in [
+            // 0.4 m by 0.02006 m is 19.94, by 0.01994 m 20.06.
+            (0.2006, 0.0, 20),
+            (0.1994, 0.0, 21),
+            // 1.4 m by 0.05015 m is 27.92, by 0.04985 m 28.08.
+            (0.5015, 5.0, 28),
+            (0.4985, 5.0, 29),
+            // A way of less than a substep's is one substep.
+            (5.0, 0.1, 1),
+        ] {
+            let found = scene(&[&format!("solver.pbf.cfl={cfl}")]).pbf_substeps(0, speed);
+            assert_eq!(found.ok(), Some(substeps), "cfl {cfl}, {speed} m/s");
+        }
+        let still = scene(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=1.0"]);
+        assert_eq!(still.pbf_substeps(0, 0.0).ok(), Some(1));
+    }
+
+    #[test]
+    fn pbf_refuses_more_substeps_than_it_may_take_and_takes_as_many() {
+        // (v + 2 m/s) 0.2 s by 0.1 m: 38 m/s are 80 spacings.
+        let most = |count: u32| scene(&[&format!("solver.pbf.max_substeps={count}")]);
+        assert_eq!(most(81).pbf_substeps(3, 38.01).ok(), Some(81));
+        assert_eq!(most(82).pbf_substeps(3, 38.01).ok(), Some(81));
+        let breach = most(80).pbf_substeps(3, 38.01).expect_err("81 are asked");
+        let said = breach.to_string();
+        assert!(
+            said.contains("frame 4") && said.contains("81") && said.contains("80"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn a_wall_counts_in_the_frames_in_which_it_moves_and_only_there() {
+        // Without gravity 3 m/s are 6 spacings in a frame of 0.2 s, 1 m/s two; frame 5 begins when the wall stands, and
+        // water beside it is not faster for it.
+        let scene = scene(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=0.999", WALL]);
+        let counts: Vec<_> = (0..7)
+            .map(|frame| scene.pbf_substeps(frame, 1.0).ok())
+            .collect();
+        let expected = [7, 7, 7, 7, 7, 3, 3].map(Some);
+        assert_eq!(counts, expected);
+        // The faster of the two, not both.
+        assert_eq!(scene.pbf_substeps(0, 4.0).ok(), Some(9));
+    }
+
+    #[test]
+    fn flip_takes_substeps_in_which_nothing_moves_further_than_cfl_cells() {
+        // v t + g t² = 3 × 0.2 m with 4 m/s and 10 m/s²: t = (√(16 + 24) − 4) / 20 s.
+        let scene = scene(&["solver.method=flip"]);
+        let longest = (40f64.sqrt() - 4.0) / 20.0;
+        for (part, count) in [(0.9995, 4.0), (1.0005, 5.0)] {
+            let remaining = 4.0 * longest * part;
+            let (wanted, substep) = scene
+                .flip_substep(1, 0.3, remaining, 4.0, 0)
+                .expect("few enough");
+            assert_eq!(wanted, count, "{part}");
+            // Equal parts, of which this is the first.
+            let length = remaining / count;
+            let cells = (4.0 + 10.0 * length) * length / 0.2;
+            assert!((substep.length / length - 1.0).abs() < 1e-15);
+            assert!((substep.displacement / cells - 1.0).abs() < 1e-14);
+            assert!(substep.start == 0.3 && substep.displacement <= 3.0);
+        }
+    }
+
+    #[test]
+    fn flip_counts_the_substeps_that_are_over_and_walls() {
+        let scene = scene(&["solver.method=flip", "water.gravity=[0, 0, 0]", WALL]);
+        // 3.99 m/s for 0.3 s are 5.985 cells, two substeps of at most 3.
+        let count = |speed, done| scene.flip_substep(1, 1.0, 0.3, speed, done);
+        assert_eq!(count(3.99, 0).ok().map(|found| found.0), Some(2.0));
+        assert_eq!(count(3.99, 3).ok().map(|found| found.0), Some(2.0));
+        assert!(count(3.99, 4).is_err(), "six, and five may be");
+        // Before a second is over the wall is faster than the water: 3 m/s for 0.41 s are 6.15 cells.
+        let beside = |start| scene.flip_substep(1, start, 0.41, 0.0, 0).ok();
+        assert_eq!(beside(0.5).map(|found| found.0), Some(3.0));
+        assert_eq!(beside(1.0).map(|found| found.0), Some(1.0));
+    }
+
+    #[test]
+    fn walls_stand_where_their_motions_have_brought_them() {
+        let scene = scene(&[WALL]);
+        for (time, x, z) in [(0.0, 0.0, 2.0), (0.5, 1.5, 1.95), (2.0, 3.0, 1.8)] {
+            let walls = scene.walls(time);
+            let (min, max) = (DVec3::new(x, 0.0, 0.0), DVec3::new(10.0, 4.0, z));
+            assert!((walls.min - min).length() < 1e-14, "{time}: {walls:?}");
+            assert!((walls.max - max).length() < 1e-14, "{time}: {walls:?}");
+        }
+        // Over a step that the wall stops in half-way: half its speed.
+        let velocity = scene.wall_velocity(1.1, 0.2);
+        assert!((velocity.min - DVec3::new(1.5, 0.0, 0.0)).length() < 1e-13);
+        assert!((velocity.max - DVec3::new(0.0, 0.0, -0.1)).length() < 1e-13);
+        assert_eq!(scene.wall_velocity(0.5, 0.0).min, DVec3::ZERO);
+    }
+
+    #[test]
+    fn substeps_of_a_frame_take_together_what_the_frame_takes() {
+        // pic_blend 0.05 and XSPH's 0.2 leave 0.95 × 0.8 of what the particles had.
+        let scene = scene(&["solver.method=flip"]);
+        let frame = 0.2;
+        for parts in [[0.2, 0.0, 0.0], [0.1, 0.05, 0.05], [0.19, 0.005, 0.005]] {
+            assert!((parts.iter().sum::<f64>() - frame).abs() < 1e-15);
+            let left: f64 = parts
+                .iter()
+                .map(|&length| 1.0 - scene.substep_pic_blend(length))
+                .product();
+            assert!((left - 0.95 * 0.8).abs() < 1e-14, "{parts:?}: {left}");
+        }
+    }
+
+    #[test]
+    fn a_shot_lasts_as_many_frames_as_it_has() {
+        let shot = scene(&["shot.frames_per_second=24", "shot.frames=36"]).shot;
+        assert_eq!(shot.duration(), 1.5);
+        assert!((24.0 * shot.frame_seconds() - 1.0).abs() < 1e-15);
+    }
+}

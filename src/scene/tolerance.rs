@@ -1,6 +1,6 @@
 //! Tolerance files: how far apart two caches or two pictures may be.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{collections::BTreeMap, fs, ops::RangeInclusive, path::Path};
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -8,6 +8,7 @@ use toml::Spanned;
 use super::{
     document::{Document, unknown_key},
     error::SceneError,
+    words::shown,
 };
 use crate::domain::{
     aggregates::Aggregates,
@@ -15,6 +16,12 @@ use crate::domain::{
 };
 
 type Number = Option<Spanned<f64>>;
+
+/// What a difference may be; sums of them are finite.
+const LIMIT: RangeInclusive<f64> = 0.0..=1e300;
+
+/// What the perceptual score may be: pictures that have nothing in common have negative ones.
+const SCORE: RangeInclusive<f64> = -1e6..=100.0;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -140,10 +147,13 @@ fn pictures(doc: &Document<'_>, spec: Option<&PictureSpec>) -> Result<PictureLim
     };
     let perceptual = &spec.perceptual;
     if let Some(score) = perceptual
-        && (score.get_ref().is_nan() || *score.get_ref() > 100.0)
+        && !SCORE.contains(score.get_ref())
     {
-        let message = "out of range; allowed: a score up to 100, which is no visible difference";
-        return Err(doc.fault_plain(score.span(), message.to_owned()));
+        let message = format!(
+            "{} is out of range; allowed: a score from -1e6 to 100, which is no visible difference",
+            shown(*score.get_ref())
+        );
+        return Err(doc.fault_plain(score.span(), message));
     }
     Ok(PictureLimits {
         mean: from_zero(doc, &spec.mean)?,
@@ -155,8 +165,11 @@ fn pictures(doc: &Document<'_>, spec: Option<&PictureSpec>) -> Result<PictureLim
 
 fn from_zero(doc: &Document<'_>, number: &Number) -> Result<Option<f64>, SceneError> {
     match number {
-        Some(number) if !(number.get_ref().is_finite() && *number.get_ref() >= 0.0) => {
-            let message = "out of range; allowed: a finite number from 0".to_owned();
+        Some(number) if !LIMIT.contains(number.get_ref()) => {
+            let message = format!(
+                "{} is out of range; allowed: a number from 0 to 1e300",
+                shown(*number.get_ref())
+            );
             Err(doc.fault_plain(number.span(), message))
         }
         other => Ok(other.as_ref().map(|number| *number.get_ref())),
@@ -207,7 +220,7 @@ mod tests {
             ),
             (
                 "[velocity]\nrms = \"x\"",
-                &["t.toml:2: velocity.rms", "f64"],
+                &["t.toml:2: velocity.rms", "expected a number"],
             ),
             (
                 "[aggregates]\nvolum = { relative = 1 }",

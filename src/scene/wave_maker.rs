@@ -1,6 +1,6 @@
 //! Wave-makers: which keys a motion takes, its table, and whether the walls stay apart.
 
-use std::{fs::File, io::Read as _, path::Path};
+use std::{f64::consts::PI, fs::File, io::Read as _, path::Path};
 
 use glam::DVec3;
 use toml::Spanned;
@@ -10,7 +10,9 @@ use super::{
     build::{chain, number},
     document::{Document, unknown_key},
     error::SceneError,
+    ranges::{Interval, LENGTH, PERIOD, SPEED, UNTIL},
     spec::{MotionSpec, WaveMakerSpec},
+    words::{shown, shown_all},
 };
 use crate::domain::{bounds::Bounds, motion::Motion};
 
@@ -48,10 +50,11 @@ pub(super) fn build_all(
         let reach = motion.peak_displacement(around.shot.duration());
         if reach > room {
             let problem = format!(
-                "the wall {} crosses the whole domain: within the {} s of the shot it moves {reach} \
-                 m of {size} m",
+                "the wall {} crosses the whole domain: within the {} s of the shot it moves {} m of {} m",
                 wall.name(),
-                around.shot.duration()
+                shown(around.shot.duration()),
+                shown(reach),
+                shown(size)
             );
             return Err(doc.fault_at(spec.motion.span(), problem));
         }
@@ -100,9 +103,9 @@ struct Keys<'a, 'b> {
 }
 
 impl Keys<'_, '_> {
-    fn positive(&self, value: &Option<Spanned<f64>>, name: &str) -> Result<f64> {
+    fn needed(&self, value: &Option<Spanned<f64>>, name: &str, range: &Interval) -> Result<f64> {
         match value {
-            Some(value) => number(self.doc, value, |v| v > 0.0 && v <= 1e9),
+            Some(value) => number(self.doc, value, range),
             None => Err(self.doc.missing(self.motion.span(), name)),
         }
     }
@@ -151,33 +154,41 @@ pub(super) fn motion(
         "constant_velocity" => {
             keys.only(&["velocity", "until"])?;
             Ok(Motion::ConstantVelocity {
-                velocity: keys.positive(&m.velocity, "velocity")?,
-                until: match m.until {
-                    Some(_) => Some(keys.positive(&m.until, "until")?),
+                velocity: keys.needed(&m.velocity, "velocity", &SPEED)?,
+                until: match &m.until {
+                    Some(until) => Some(number(doc, until, &UNTIL)?),
                     None => None,
                 },
             })
         }
         "sine" => {
             keys.only(&["stroke", "period", "ramp"])?;
-            let period = keys.positive(&m.period, "period")?;
+            let period = keys.needed(&m.period, "period", &PERIOD)?;
+            let stroke = keys.needed(&m.stroke, "stroke", &LENGTH)?;
+            check_speed(PI * stroke / period)
+                .map_err(|problem| doc.fault_plain(spec.span(), problem))?;
             Ok(Motion::Sine {
-                stroke: keys.positive(&m.stroke, "stroke")?,
+                stroke,
                 period,
                 ramp: match &m.ramp {
-                    Some(ramp) => number(doc, ramp, |v| v >= 0.0)?,
+                    Some(ramp) if *ramp.get_ref() != 0.0 => number(doc, ramp, &PERIOD)?,
+                    Some(_) => 0.0,
                     None => period,
                 },
             })
         }
         "solitary" => {
             keys.only(&["height", "depth"])?;
-            let depth = keys.positive(&m.depth, "depth")?;
-            let height = keys.positive(&m.height, "height")?;
+            let depth = keys.needed(&m.depth, "depth", &LENGTH)?;
+            let height = keys.needed(&m.height, "height", &LENGTH)?;
             if let Some(span) = m.height.as_ref().map(Spanned::span)
                 && height > depth
             {
-                let problem = format!("a wave of {height} m on {depth} m of water");
+                let problem = format!(
+                    "a wave of {} m on {} m of water",
+                    shown(height),
+                    shown(depth)
+                );
                 return Err(doc.fault_at(span, problem));
             }
             if gravity.length() == 0.0 {
@@ -224,23 +235,40 @@ fn check_points(points: &[[f64; 2]]) -> std::result::Result<(), String> {
     for (i, [t, x]) in points.iter().enumerate() {
         // 1e9 keeps sums and products of them finite.
         if !((0.0..=1e9).contains(t) && (0.0..=1e9).contains(x)) {
-            return Err(format!("point {i}, [{t}, {x}], is out of range"));
+            return Err(format!(
+                "point {i}, {}, is out of range",
+                shown_all(&[*t, *x])
+            ));
         }
     }
     if points[0][1] != 0.0 {
-        return Err(format!("the first displacement is {}", points[0][1]));
+        return Err(format!("the first displacement is {}", shown(points[0][1])));
     }
     for (i, pair) in points.windows(2).enumerate() {
         if pair[1][0] - pair[0][0] < 1e-6 {
             return Err(format!(
                 "the time of point {}, {} s, is not a microsecond after {} s",
                 i + 1,
-                pair[1][0],
-                pair[0][0]
+                shown(pair[1][0]),
+                shown(pair[0][0])
             ));
         }
+        check_speed((pair[1][1] - pair[0][1]).abs() / (pair[1][0] - pair[0][0]))
+            .map_err(|problem| format!("up to point {}, {problem}", i + 1))?;
     }
     Ok(())
+}
+
+/// What a motion's keys together come to has the range that a velocity has.
+fn check_speed(speed: f64) -> std::result::Result<(), String> {
+    if speed <= *SPEED.end() {
+        return Ok(());
+    }
+    Err(format!(
+        "it moves at {} m/s; allowed: up to {} m/s",
+        shown(speed),
+        shown(*SPEED.end())
+    ))
 }
 
 /// `time,displacement` a line; empty lines, those that start with `#`, and one line of titles are

@@ -19,7 +19,7 @@ use crate::{
     },
     scene::{
         Scene, SceneError,
-        look::{FormatSpec, Look},
+        look::{FormatSpec, Look, LookError},
     },
 };
 
@@ -85,6 +85,9 @@ pub enum RenderJobError {
     /// The scene in the cache.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
+    /// What the look names.
+    #[error(transparent)]
+    Look(#[from] LookError),
     /// The device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -109,6 +112,7 @@ impl From<&RenderJobError> for Blame {
         match error {
             RenderJobError::Cache(error) => error.into(),
             RenderJobError::Scene(_) | RenderJobError::Directory { .. } => Self::Files,
+            RenderJobError::Look(error) => error.into(),
             RenderJobError::Gpu(error) => error.into(),
             RenderJobError::Render(RenderError::Gpu(error)) => error.into(),
             RenderJobError::Render(RenderError::Panorama(_) | RenderError::Scene(_))
@@ -181,7 +185,8 @@ pub fn render(
         }
         let mut renderer = match kept.take() {
             Some(renderer) => renderer,
-            None => Renderer::new(&context, &request.look, &render_scene(&scene, frame))?,
+            None => Renderer::new(&context, &request.look, &render_scene(&scene, frame))
+                .map_err(|error| told(error, &request.look))?,
         };
         fs::create_dir_all(&request.directory).map_err(|source| RenderJobError::Directory {
             directory: request.directory.clone(),
@@ -202,6 +207,15 @@ pub fn render(
         });
     }
     Ok(outcome)
+}
+
+/// A renderer's fault; that of a panorama at its place in the look.
+fn told(error: RenderError, look: &Look) -> RenderJobError {
+    let fault = match &error {
+        RenderError::Panorama(problem) => look.panorama_fault(problem),
+        _ => None,
+    };
+    fault.map_or_else(|| error.into(), RenderJobError::Look)
 }
 
 /// Whether a folder is, or would be, within another.

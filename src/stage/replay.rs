@@ -20,7 +20,10 @@ use crate::{
         signed_distance::SignedDistanceError,
         solver::StepReport,
     },
-    gpu::{adapter::GpuError, recording::Moment},
+    gpu::{
+        adapter::{GpuError, check_request},
+        recording::Moment,
+    },
     scene::{self, Method, Scene, SceneError},
     solve::{
         SolveError,
@@ -436,6 +439,9 @@ pub fn replay_failed(directory: &Path, adapter: Option<String>) -> Result<Replay
     let cache: PathBuf = directory.join("..");
     let scene = Scene::parse(&scene_toml, &directory.join("scene.toml"), &cache, &[])?;
     let start = Start::of_cache::<ReplayError>(&scene, &CacheReader::open(&cache)?)?;
+    if let Some(adapter) = &adapter {
+        check_request(adapter)?;
+    }
     let device = match report["device"].as_str() {
         Some("cpu") => Device::Cpu,
         _ => Device::Gpu(adapter),

@@ -8,7 +8,9 @@ use super::{
         Iteration, Method, Pbf, Solver, Stop,
         document::Document,
         flip::{Flip, Precision, Preconditioner, Pressure, Surface, Transfer},
+        ranges,
         spec::{FlipSpec, PbfSpec, PressureSpec, SolverSpec},
+        words::shown,
     },
     Lattice, Result, number, number_or, whole,
 };
@@ -125,8 +127,8 @@ fn whole_or(
 const CHEBYSHEV_RELAXATION: f64 = 0.7;
 
 fn pbf(doc: &Document<'_>, spec: &PbfSpec) -> Result<Pbf> {
-    let particle_spacing = number(doc, &spec.particle_spacing, |v| v > 0.0)?;
-    let support_ratio = number_or(doc, &spec.support_ratio, 2.0, |v| (1.5..=4.0).contains(&v))?;
+    let particle_spacing = number(doc, &spec.particle_spacing, &ranges::SPACING)?;
+    let support_ratio = number_or(doc, &spec.support_ratio, 2.0, &ranges::SUPPORT_RATIO)?;
     let iteration = choice_or(
         doc,
         &spec.iteration,
@@ -148,13 +150,16 @@ fn pbf(doc: &Document<'_>, spec: &PbfSpec) -> Result<Pbf> {
         particle_spacing,
         support_ratio,
         iteration,
-        spectral_radius: number_or(doc, &spec.spectral_radius, 0.98, |v| v > 0.0 && v < 1.0)?,
+        spectral_radius: number_or(doc, &spec.spectral_radius, 0.98, &ranges::SPECTRAL_RADIUS)?,
         stop: stop(doc, spec)?,
-        cfl: number_or(doc, &spec.cfl, 1.0, |v| v > 0.0 && v <= 5.0)?,
-        relaxation: number_or(doc, &spec.relaxation, relaxation, |v| v > 0.0 && v <= 1.5)?,
-        artificial_pressure: number_or(doc, &spec.artificial_pressure, 0.0, |v| {
-            (0.0..=10.0).contains(&v)
-        })?,
+        cfl: number_or(doc, &spec.cfl, 1.0, &ranges::CFL)?,
+        relaxation: number_or(doc, &spec.relaxation, relaxation, &ranges::RELAXATION)?,
+        artificial_pressure: number_or(
+            doc,
+            &spec.artificial_pressure,
+            0.0,
+            &ranges::ARTIFICIAL_PRESSURE,
+        )?,
         max_substeps: whole_or(doc, &spec.max_substeps, 32, 10_000)?,
     })
 }
@@ -164,7 +169,7 @@ fn stop(doc: &Document<'_>, spec: &PbfSpec) -> Result<Stop> {
         (None, None, None) => Ok(Stop::Iterations(4)),
         (Some(iterations), None, None) => Ok(Stop::Iterations(whole(doc, iterations, 10_000)?)),
         (None, Some(density_error), Some(max_iterations)) => Ok(Stop::DensityError {
-            density_error: number(doc, density_error, |v| v > 0.0 && v < 1.0)?,
+            density_error: number(doc, density_error, &ranges::DENSITY_ERROR)?,
             max_iterations: whole(doc, max_iterations, 10_000)?,
         }),
         (Some(iterations), _, _) => {
@@ -195,7 +200,7 @@ fn particles_per_cell(doc: &Document<'_>, value: &Option<Spanned<i64>>) -> Resul
 }
 
 fn flip(doc: &Document<'_>, spec: &FlipSpec) -> Result<Flip> {
-    let cell_size = number(doc, &spec.cell_size, |v| v > 0.0)?;
+    let cell_size = number(doc, &spec.cell_size, &ranges::SPACING)?;
     Ok(Flip {
         cell_size,
         particles_per_cell: particles_per_cell(doc, &spec.particles_per_cell)?,
@@ -206,8 +211,8 @@ fn flip(doc: &Document<'_>, spec: &FlipSpec) -> Result<Flip> {
             &Transfer::NAMED,
             Transfer::Flip,
         )?,
-        pic_blend: number_or(doc, &spec.pic_blend, 0.05, |v| (0.0..=1.0).contains(&v))?,
-        cfl: number_or(doc, &spec.cfl, 3.0, |v| v > 0.0 && v <= 5.0)?,
+        pic_blend: number_or(doc, &spec.pic_blend, 0.05, &ranges::PART)?,
+        cfl: number_or(doc, &spec.cfl, 3.0, &ranges::CFL)?,
         max_substeps: whole_or(doc, &spec.max_substeps, 32, 10_000)?,
         surface: choice_or(
             doc,
@@ -237,9 +242,14 @@ fn pressure(doc: &Document<'_>, spec: &PressureSpec) -> Result<Pressure> {
             &Precision::NAMED,
             Precision::F32Refined,
         )?,
-        tolerance: number_or(doc, &spec.tolerance, 1e-5, |v| v > 0.0 && v < 1.0)?,
+        tolerance: number_or(doc, &spec.tolerance, 1e-5, &ranges::TOLERANCE)?,
         max_iterations: whole_or(doc, &spec.max_iterations, 400, 10_000)?,
     })
+}
+
+fn metres(domain: &Bounds) -> String {
+    let [x, y, z] = domain.size().to_array().map(shown);
+    format!("{x} × {y} × {z} m")
 }
 
 /// A cell that touches no wall on either side, along every axis.
@@ -250,14 +260,12 @@ fn check_interior(doc: &Document<'_>, cell_size: &Spanned<f64>, domain: &Bounds)
         return Ok(());
     }
     let problem = format!(
-        "no interior cell: a domain of {} × {} × {} m is {:.3} × {:.3} × {:.3} cells of {} m",
-        domain.size().x,
-        domain.size().y,
-        domain.size().z,
+        "no interior cell: a domain of {} is {:.3} × {:.3} × {:.3} cells of {} m",
+        metres(domain),
         cells.x,
         cells.y,
         cells.z,
-        cell_size.get_ref()
+        shown(*cell_size.get_ref())
     );
     Err(doc.fault_at(cell_size.span(), problem))
 }
@@ -276,14 +284,13 @@ fn check_grid(
     let axis = cells.max_element();
     if all > max_cells || axis > MAX_AXIS_CELLS {
         let problem = format!(
-            "the grid would overflow: a domain of {} × {} × {} m takes {:.3e} × {:.3e} × {:.3e} \
-             = {all:.3e} cells of {cell_size} m",
-            domain.size().x,
-            domain.size().y,
-            domain.size().z,
+            "the grid would overflow: a domain of {} takes {:.3e} × {:.3e} × {:.3e} \
+             = {all:.3e} cells of {} m",
+            metres(domain),
             cells.x,
             cells.y,
-            cells.z
+            cells.z,
+            shown(cell_size)
         );
         return Err(doc.fault_at(span, problem));
     }

@@ -70,11 +70,11 @@ macro_rules! effects {
                 plans
             }
 
-            /// The first setting that is out of its range: dotted key and what is allowed.
-            pub fn fault(&self) -> Option<(String, &'static str)> {
+            /// The first setting that is out of its range: dotted key, its value, and what is allowed.
+            pub fn fault(&self) -> Option<(String, f64, &'static str)> {
                 $(
-                    if let Some((key, allowed)) = self.$name.as_ref().and_then($name::Settings::fault) {
-                        return Some((format!("effects.{}.{key}", stringify!($name)), allowed));
+                    if let Some((key, value, allowed)) = self.$name.as_ref().and_then($name::Settings::fault) {
+                        return Some((format!("effects.{}.{key}", stringify!($name)), value, allowed));
                     }
                 )+
                 None

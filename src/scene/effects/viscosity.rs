@@ -17,8 +17,9 @@ pub struct Settings {
 }
 
 impl Settings {
-    pub(super) fn fault(&self) -> Option<(&'static str, &'static str)> {
-        (!(self.xsph > 0.0 && self.xsph <= 1.0)).then_some(("xsph", "a number above 0, at most 1"))
+    /// A millionth is what a frame of 32-bit velocities hardly shows.
+    pub(super) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
+        (!(1e-6..=1.0).contains(&self.xsph)).then_some(("xsph", self.xsph, "a number from 1e-6 to 1"))
     }
 
     pub(super) fn plan(&self, particles: usize) -> (Vec<PassSpec>, Vec<BufferSpec>) {

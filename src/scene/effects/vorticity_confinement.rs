@@ -16,8 +16,9 @@ pub struct Settings {
 }
 
 impl Settings {
-    pub(super) fn fault(&self) -> Option<(&'static str, &'static str)> {
-        (!(self.strength > 0.0 && self.strength <= 100.0)).then_some(("strength", "a number above 0, at most 100"))
+    /// A millionth is what a frame of 32-bit velocities hardly shows.
+    pub(super) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
+        (!(1e-6..=100.0).contains(&self.strength)).then_some(("strength", self.strength, "a number from 1e-6 to 100"))
     }
 
     pub(super) fn plan(&self, particles: usize) -> (Vec<PassSpec>, Vec<BufferSpec>) {

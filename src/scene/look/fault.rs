@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 
 use toml::de::{DeTable, DeValue};
 
+use super::super::words::{duplicate, plain_types};
+
 /// Why a look cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LookError {
-    /// The file, or one that it names, cannot be read.
+    /// The file cannot be read.
     #[error("{}: {source}", file.display())]
     Read {
         /// Which file.
@@ -86,30 +88,75 @@ fn key_at(text: &str, span: &Range<usize>) -> Option<String> {
     walk(document.get_ref(), span, &mut path).then(|| path.join("."))
 }
 
+/// The keys that a look cannot do without, or that a table of it cannot. No two have the same last name.
+const NEEDED: [(&str, &str); 15] = [
+    (
+        "camera",
+        "a table [camera] with focal_length_mm, position and target, or [[camera.keyframe]]",
+    ),
+    ("camera.focal_length_mm", "a number from 1 to 5000 mm"),
+    ("camera.keyframe.frame", "a number, the frame of the pose"),
+    ("camera.keyframe.position", "three numbers, metres"),
+    ("camera.keyframe.target", "three numbers, metres"),
+    (
+        "sky",
+        "a table [sky] with model = \"hosek_wilkie\", or model = \"panorama\" and file",
+    ),
+    ("sky.model", "\"hosek_wilkie\" or \"panorama\""),
+    ("sky.file", "an EXR file, relative to the look file"),
+    (
+        "surface.ripple.wavelength_m",
+        "a number from 0.001 to 1000 m",
+    ),
+    ("surface.ripple.slope", "a number from 0 to 1"),
+    (
+        "water.spray.density_per_metre",
+        "a number from 0 to 10000 1/m",
+    ),
+    (
+        "water.spray.speed_m_per_s",
+        "a number from 0.001 to 10000 m/s",
+    ),
+    ("basin.height_m", "a number from 0.001 to 1000 m"),
+    ("solids.windows.storey_m", "a number from 0.001 to 1000 m"),
+    ("solids.windows.bay_m", "a number from 0.001 to 1000 m"),
+];
+
+/// Key and message where `name` is missing. Its table is known by its name: the span that serde gives is that of a table
+/// only where the table has one.
+fn missing(name: &str) -> Option<(String, String)> {
+    let mut needed = NEEDED.iter();
+    let (key, words) = needed.find(|(key, _)| key.rsplit('.').next() == Some(name))?;
+    Some(((*key).to_owned(), format!("missing; allowed is {words}")))
+}
+
+fn join(table: &str, name: &str) -> String {
+    match table {
+        "" => name.to_owned(),
+        table => format!("{table}.{name}"),
+    }
+}
+
 /// Turns a TOML or serde error into file, line, key and the nearest allowed key.
 pub(super) fn from_toml(file: &Path, text: &str, error: &toml::de::Error) -> LookError {
     let span = error.span().unwrap_or(0..0);
     let line = line_at(text, span.start);
-    let raw = error.message().lines().collect::<Vec<_>>().join("; ");
-    let words = quoted(&raw);
+    let mut message = plain_types(error.message());
+    let words = quoted(error.message());
     let located = key_at(text, &span).unwrap_or_else(|| key_on_line(text, line));
-    let is_key = raw.starts_with("unknown field");
-    let key = match words.first() {
-        Some(&word) if is_key && located.rsplit('.').next() != Some(word) => {
-            if located.is_empty() {
-                word.to_owned()
-            } else {
-                format!("{located}.{word}")
-            }
+    let is_key = message.starts_with("unknown field");
+    let mut key = located;
+    if let Some(name) = duplicate(text, error) {
+        key = name.to_owned();
+        message = "a second key of this name in its table".to_owned();
+    } else if let Some(&word) = words.first() {
+        if is_key && key.rsplit('.').next() != Some(word) {
+            key = join(&key, word);
+        } else if message.starts_with("missing field") {
+            (key, message) = missing(word).unwrap_or_else(|| (join(&key, word), message));
         }
-        Some(&word) if raw.starts_with("missing field") && !located.is_empty() => {
-            format!("{located}.{word}")
-        }
-        Some(&word) if raw.starts_with("missing field") => word.to_owned(),
-        _ => located,
-    };
-    let mut message = raw.clone();
-    if (is_key || raw.starts_with("unknown variant"))
+    }
+    if (is_key || message.starts_with("unknown variant"))
         && let Some(found) = words
             .split_first()
             .and_then(|(word, allowed)| nearest(word, allowed))
@@ -124,40 +171,44 @@ pub(super) fn from_toml(file: &Path, text: &str, error: &toml::de::Error) -> Loo
     }
 }
 
+/// The line of the value that `path` leads to, with indices as numbers; of what the file leaves out, that of the table
+/// that should hold it.
+pub(super) fn line_of(text: &str, path: &str) -> usize {
+    let Ok(document) = DeTable::parse(text) else {
+        return 1;
+    };
+    let mut parts = path.split('.');
+    let Some((key, found)) = parts
+        .next()
+        .and_then(|part| document.get_ref().get_key_value(part))
+    else {
+        return 1;
+    };
+    let (mut line, mut value) = (line_at(text, key.span().start), found.get_ref());
+    for part in parts {
+        let next = match value {
+            DeValue::Table(table) => table
+                .get_key_value(part)
+                .map(|(key, found)| (key.span(), found.get_ref())),
+            DeValue::Array(items) => part
+                .parse::<usize>()
+                .ok()
+                .and_then(|index| items.get(index))
+                .map(|found| (found.span(), found.get_ref())),
+            _ => None,
+        };
+        let Some((span, found)) = next else { break };
+        line = line_at(text, span.start);
+        value = found;
+    }
+    line
+}
+
 /// A value that is well-formed but not allowed; `path` leads to it, with indices as numbers.
 pub(super) fn at_path(file: &Path, text: &str, path: &str, message: &str) -> LookError {
-    let mut line = 1;
-    if let Ok(document) = DeTable::parse(text) {
-        let mut parts = path.split('.');
-        let mut value: Option<&DeValue<'_>> = None;
-        if let Some((key, found)) = parts
-            .next()
-            .and_then(|part| document.get_ref().get_key_value(part))
-        {
-            line = line_at(text, key.span().start);
-            value = Some(found.get_ref());
-        }
-        for part in parts {
-            let next = match value {
-                Some(DeValue::Table(table)) => table
-                    .get_key_value(part)
-                    .map(|(key, found)| (key.span(), found.get_ref())),
-                Some(DeValue::Array(items)) => part
-                    .parse::<usize>()
-                    .ok()
-                    .and_then(|index| items.get(index))
-                    .map(|found| (found.span(), found.get_ref())),
-                _ => None,
-            };
-            // What the file leaves out is reported at the table that should hold it.
-            let Some((span, found)) = next else { break };
-            line = line_at(text, span.start);
-            value = Some(found);
-        }
-    }
     LookError::Fault {
         file: file.to_owned(),
-        line,
+        line: line_of(text, path),
         key: path.to_owned(),
         message: message.to_owned(),
     }

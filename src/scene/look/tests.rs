@@ -72,6 +72,165 @@ fn a_missing_key_names_its_table() {
 }
 
 #[test]
+fn a_missing_table_is_named_itself_with_what_it_takes() {
+    let sky = PLAIN.find("[sky]").unwrap();
+    let (_, key, message) = fault(&PLAIN[..sky]);
+    assert_eq!(key, "sky");
+    assert!(message.contains("[sky] with model"), "{message}");
+    let (_, key, message) = fault(&PLAIN[PLAIN.find("[image]").unwrap()..]);
+    assert_eq!(key, "camera");
+    assert!(
+        message.contains("[camera] with focal_length_mm"),
+        "{message}"
+    );
+    // Nor does the table that the text begins with take it.
+    let (_, key, _) = fault("[image]\nwidth = 64\n[sky]\nmodel = \"hosek_wilkie\"\n");
+    assert_eq!(key, "camera");
+    for (from, to, expected, words) in [
+        (
+            "model = \"hosek_wilkie\"\n",
+            "",
+            "sky.model",
+            "\"panorama\"",
+        ),
+        ("\"hosek_wilkie\"", "\"panorama\"", "sky.file", "EXR file"),
+        (
+            "[image]",
+            "[surface]\nripple = { slope = 0.1 }\n[image]",
+            "surface.ripple.wavelength_m",
+            "from 0.001 to 1000 m",
+        ),
+        (
+            "[image]",
+            "[basin]\nthickness_m = 1.0\n[image]",
+            "basin.height_m",
+            "from 0.001 to 1000 m",
+        ),
+        (
+            "[image]",
+            "[[camera.keyframe]]\nframe = 1\ntarget = [0, 0, 0]\n[image]",
+            "camera.keyframe.position",
+            "three numbers",
+        ),
+    ] {
+        assert!(PLAIN.contains(from), "{from}");
+        let (_, key, message) = fault(&PLAIN.replace(from, to));
+        assert_eq!(key, expected, "{to}");
+        assert!(
+            message.contains("missing") && message.contains(words),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn a_second_key_and_a_number_of_300_digits_are_named_in_few_words() {
+    let (line, key, message) = fault(&PLAIN.replace("width = 64", "width = 64\nwidth = 65"));
+    assert_eq!((line, key.as_str()), (7, "width"));
+    assert!(message.contains("second key"), "{message}");
+    let (_, key, message) = fault(&PLAIN.replace("35.0", "1e308"));
+    assert_eq!(key, "camera.focal_length_mm");
+    assert!(
+        message.starts_with("is 1e308; allowed is 1 to 5000 mm"),
+        "{message}"
+    );
+    let (_, _, message) = fault(&PLAIN.replace("width = 64", "width = 6.4"));
+    assert!(message.contains("expected a whole number"), "{message}");
+}
+
+#[test]
+fn a_panorama_that_is_not_there_is_a_fault_of_its_key() {
+    let text = PLAIN.replace("\"hosek_wilkie\"", "\"panorama\"\nfile = \"none.exr\"");
+    let (line, key, message) = fault(&text);
+    assert_eq!((line, key.as_str()), (10, "sky.file"));
+    assert!(
+        message.contains("cannot read none.exr: No such file"),
+        "{message}"
+    );
+    // What is there and is no picture is found by who reads it, and told at the same place.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("none.exr"), b"nonsense").unwrap();
+    let look = Look::parse(&text, &folder.path().join("look.toml")).unwrap();
+    let told = look.panorama_fault("no EXR").unwrap().to_string();
+    let place = format!(
+        "{}:10: `sky.file`",
+        folder.path().join("look.toml").display()
+    );
+    assert!(told.starts_with(&place), "{told}");
+    assert!(told.contains("none.exr: no EXR"), "{told}");
+    let plain = Look::parse(PLAIN, Path::new("a.toml")).unwrap();
+    assert!(plain.panorama_fault("no EXR").is_none());
+}
+
+/// Numbers that no key of a look takes; each is refused with its key and the range.
+#[test]
+fn every_number_of_a_look_has_a_range() {
+    for (table, key, value) in [
+        ("camera", "focal_length_mm", "{}"),
+        ("camera", "film_back_mm", "[{}, 20.25]"),
+        ("camera", "position", "[0.0, {}, 0.0]"),
+        ("camera", "target", "[10.0, {}, 0.0]"),
+        ("camera", "up", "[0.0, {}, 0.0]"),
+        ("image", "shutter", "{}"),
+        ("surface", "radius_m", "{}"),
+        ("surface", "smoothing_width_m", "{}"),
+        ("surface", "roughness", "{}"),
+        ("surface.ripple", "wavelength_m", "{}\nslope = 0.1"),
+        ("surface.ripple", "slope", "{}\nwavelength_m = 1.0"),
+        ("water", "index", "{}"),
+        ("water", "absorption_per_metre", "[{}, 0.0, 0.0]"),
+        ("water", "scattering_per_metre", "[0.0, {}, 0.0]"),
+        (
+            "water.spray",
+            "density_per_metre",
+            "{}\nspeed_m_per_s = 1.0",
+        ),
+        (
+            "water.spray",
+            "speed_m_per_s",
+            "{}\ndensity_per_metre = 1.0",
+        ),
+        ("sun", "azimuth_degrees", "{}"),
+        ("sun", "elevation_degrees", "{}"),
+        ("sun", "intensity", "{}"),
+        ("sky", "turbidity", "{}"),
+        ("sky", "albedo", "[{}, 0.0, 0.0]"),
+        ("ground", "colour", "[{}, 0.0, 0.0]"),
+        ("ground", "variation", "{}"),
+        ("ground", "haze_m", "{}"),
+        ("basin", "height_m", "{}"),
+        ("basin", "thickness_m", "{}\nheight_m = 1.0"),
+        ("solids", "colour", "[{}, 0.0, 0.0]"),
+        ("solids.windows", "storey_m", "{}\nbay_m = 1.0"),
+        ("solids.windows", "bay_m", "{}\nstorey_m = 1.0"),
+        ("solids.windows", "lit", "{}\nstorey_m = 1.0\nbay_m = 1.0"),
+        ("view", "exposure_stops", "{}"),
+        ("view", "saturation", "{}"),
+        ("view", "contrast", "{}"),
+    ] {
+        for number in ["1e308", "-1e308", "inf", "nan"] {
+            let line = format!("{key} = {}\n", value.replace("{}", number));
+            let head = format!("[{table}]\n");
+            let mut text = PLAIN.to_owned();
+            if let Some(old) = PLAIN.lines().find(|l| l.starts_with(&format!("{key} ="))) {
+                text = text.replace(&format!("{old}\n"), "");
+            }
+            text = match text.contains(&head) {
+                true => text.replace(&head, &format!("{head}{line}")),
+                false => format!("{text}{head}{line}"),
+            };
+            let (_, found, message) = fault(&text);
+            assert_eq!(found, format!("{table}.{key}"), "{text}");
+            assert!(
+                message.contains("; allowed is "),
+                "{table}.{key}: {message}"
+            );
+            assert!(message.len() < 100, "{message}");
+        }
+    }
+}
+
+#[test]
 fn an_unknown_variant_names_its_neighbour() {
     let (line, key, message) = fault(&format!("{PLAIN}[surface]\nfilter = \"curvature_flo\"\n"));
     assert_eq!((line, key.as_str()), (11, "surface.filter"));

@@ -188,6 +188,14 @@ mod tests {
                 }
                 Study::Stability(stability) => {
                     assert!(!stability.cases.is_empty());
+                    // As far as a search goes, no range of a key is in its way.
+                    for limit in &stability.limits {
+                        for value in [limit.passes, limit.fails] {
+                            let loaded = limit.searches.iter().map(|search| search.trial(value));
+                            let loaded: Result<Vec<_>, _> = loaded.collect();
+                            loaded.unwrap_or_else(|e| panic!("{} at {value}: {e}", limit.name));
+                        }
+                    }
                     stabilities += 1;
                 }
             }

@@ -29,7 +29,7 @@ use serde::Deserialize;
 use toml::{Spanned, Value, de::DeTable};
 
 use super::{
-    super::{Method, Scene, document::Document, error::SceneError, physics_hash},
+    super::{Method, Scene, document::Document, error::SceneError, physics_hash, words::shown},
     SceneFile, StudyFileError, load_with,
 };
 use fit::{check_coarser, check_converged, check_fit};
@@ -526,7 +526,11 @@ fn frames(doc: &Document<'_>, spec: &SweepSpec, scene: &Scene) -> Result<u32, Sc
     let frames = seconds.get_ref() * rate;
     let is_whole = (frames - frames.round()).abs() <= 1e-6 * frames;
     if !is_whole || !(1.0..=1e6).contains(&frames.round()) {
-        let problem = format!("at {rate} frames a second these are {frames} frames");
+        let problem = format!(
+            "at {} frames a second these are {} frames",
+            shown(rate),
+            shown(frames)
+        );
         return Err(doc.fault_at(seconds.span(), problem));
     }
     Ok(frames.round() as u32)

@@ -7,7 +7,7 @@ use std::{
 };
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::{DiffError, Images, Request};
 use crate::{
@@ -41,8 +41,16 @@ pub struct PairDiff {
     pub diff: Option<PictureDiff>,
     /// What is out of tolerance.
     pub faults: Vec<PictureFault>,
-    /// Where its difference image went.
+    /// Where its difference image went; written out, bytes that are no UTF-8 become U+FFFD.
+    #[serde(serialize_with = "as_text")]
     pub image: Option<PathBuf>,
+}
+
+/// A path of any bytes: serde's own way refuses those that are no UTF-8.
+fn as_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
+    path.as_deref()
+        .map(Path::to_string_lossy)
+        .serialize(serializer)
 }
 
 impl PicturesDiff {

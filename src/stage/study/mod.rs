@@ -14,7 +14,7 @@ use std::{
 use crate::{
     cache::{CacheError, CacheReader},
     domain::signed_distance::SignedDistanceError,
-    gpu::adapter::GpuError,
+    gpu::adapter::{self, GpuError},
     reference::ReferenceError,
     scene::{Scene, SceneError, study::Study},
     solve::SolveError,
@@ -192,6 +192,10 @@ pub fn study(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, StudyError> {
+    // Also where no point needs it: a name that is none is not passed over.
+    if let Some(adapter) = &request.adapter {
+        adapter::check_request(adapter)?;
+    }
     match &request.study {
         Study::SolverComparison(comparison) => comparison::run(request, comparison, stop, tell),
         Study::Sweep(sweep) => sweep::run(request, sweep, stop, tell),

@@ -8,12 +8,22 @@ use toml::{Spanned, de::DeTable};
 
 use super::{
     super::{
-        super::{Method, Reach, Scene, document::Document, error::SceneError},
+        super::{
+            Method, Reach, Scene,
+            build::{number, vector},
+            document::Document,
+            error::SceneError,
+            ranges::{BOUND, RATIO, SCALE, SEARCHED, SECONDS},
+            words::shown,
+        },
         SceneFile, StudyFileError, load_with,
     },
     Attempt, Bound, Case, CaseDevice, Held, Limit, Mark, Other, Quantity, Search, Stability, Trial,
 };
 use crate::domain::bounds::Bounds;
+
+/// Largest coordinate of a region or a shift, metres.
+const FARTHEST: f64 = 1e9;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
@@ -55,16 +65,16 @@ struct OtherSpec {
     set: Vec<Spanned<String>>,
     device: Option<Spanned<String>>,
     scale: Option<Spanned<f64>>,
-    shift: Option<[f64; 3]>,
+    shift: Option<Spanned<[f64; 3]>>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MarkSpec {
     of: Spanned<String>,
-    at_most: Option<f64>,
-    at_least: Option<f64>,
-    after: Option<f64>,
+    at_most: Option<Spanned<f64>>,
+    at_least: Option<Spanned<f64>>,
+    after: Option<Spanned<f64>>,
     since: Option<Spanned<f64>>,
     region: Option<Spanned<[[f64; 3]; 2]>>,
     solvers: Option<Vec<Spanned<String>>>,
@@ -221,8 +231,7 @@ fn other(
     let scene = load(doc, file, &set, method)?;
     let scale = match &spec.scale {
         None => 1.0,
-        Some(scale) if *scale.get_ref() > 0.0 => *scale.get_ref(),
-        Some(scale) => return Err(doc.fault_at(scale.span(), "out of range")),
+        Some(scale) => number(doc, scale, &SCALE)?,
     };
     // Runs go frame by frame; Froude's law has times as the root of lengths.
     let rate = beside.shot.frames_per_second / scale.sqrt();
@@ -244,7 +253,10 @@ fn other(
         },
         scene,
         scale,
-        shift: DVec3::from_array(spec.shift.unwrap_or_default()),
+        shift: match &spec.shift {
+            Some(shift) => vector(doc, shift, FARTHEST)?,
+            None => DVec3::ZERO,
+        },
     })
 }
 
@@ -294,52 +306,60 @@ fn mark(doc: &Document<'_>, spec: &Spanned<MarkSpec>, others: usize) -> Result<M
     if spec.region.is_some() != of.about().takes_region && of != Quantity::Difference {
         return Err(fault(format!("{word:?} and region do not go together")));
     }
-    if let Some(since) = &spec.since {
-        if !of.about().takes_since {
-            return Err(doc.fault_at(since.span(), format!("{word:?} does not take since")));
-        }
-        if !(0.0..f64::INFINITY).contains(since.get_ref()) {
-            return Err(doc.fault_at(since.span(), "out of range"));
-        }
+    if let Some(since) = &spec.since
+        && !of.about().takes_since
+    {
+        return Err(doc.fault_at(since.span(), format!("{word:?} does not take since")));
     }
-    let bound = match (spec.at_most, spec.at_least) {
-        (Some(most), None) => Bound::AtMost(most),
-        (None, Some(least)) => Bound::AtLeast(least),
+    let bound = match (&spec.at_most, &spec.at_least) {
+        (Some(most), None) => Bound::AtMost(number(doc, most, &BOUND)?),
+        (None, Some(least)) => Bound::AtLeast(number(doc, least, &BOUND)?),
         (Some(_), Some(_)) => return Err(fault(format!("{word:?} has at_most and at_least"))),
         (None, None) => return Err(doc.missing(at, "at_most")),
     };
     Ok(Mark {
         of,
         bound,
-        after: spec.after.unwrap_or(0.0),
-        since: spec.since.as_ref().map(|since| *since.get_ref()),
-        region: spec.region.as_ref().map(|corners| {
-            let [min, max] = corners.get_ref().map(DVec3::from_array);
-            Bounds { min, max }
-        }),
+        after: seconds(doc, &spec.after)?.unwrap_or(0.0),
+        since: seconds(doc, &spec.since)?,
+        region: match &spec.region {
+            Some(corners) => Some(region(doc, corners)?),
+            None => None,
+        },
         known_failure: spec.known_failure.clone(),
     })
 }
 
+fn seconds(doc: &Document<'_>, value: &Option<Spanned<f64>>) -> Result<Option<f64>> {
+    match value {
+        Some(value) => number(doc, value, &(0.0..=*SECONDS.end())).map(Some),
+        None => Ok(None),
+    }
+}
+
+fn region(doc: &Document<'_>, corners: &Spanned<[[f64; 3]; 2]>) -> Result<Bounds> {
+    let within = -FARTHEST..=FARTHEST;
+    let mut numbers = corners.get_ref().as_flattened().iter();
+    if let Some(&far) = numbers.find(|x| !within.contains(x)) {
+        let problem = format!("{} is out of range", shown(far));
+        return Err(doc.fault_at(corners.span(), problem));
+    }
+    let [min, max] = corners.get_ref().map(DVec3::from_array);
+    Ok(Bounds { min, max })
+}
+
 fn limit(doc: &Document<'_>, spec: &LimitSpec, base_dir: &Path) -> Result<Limit> {
-    let value = |value: &Spanned<f64>, least: f64| {
-        let number = *value.get_ref();
-        match number > least && number.is_finite() {
-            true => Ok(number),
-            false => Err(doc.fault_at(value.span(), format!("{number} is out of range"))),
-        }
-    };
     let mut searches = Vec::new();
     for method in methods(doc, &spec.solvers)? {
         let template = Template {
             file: base_dir.join(spec.scene.get_ref()),
             reach: doc.reach(),
             set: spec.set.iter().map(|set| set.get_ref().clone()).collect(),
-            seconds: value(&spec.seconds, 0.0)?,
+            seconds: number(doc, &spec.seconds, &SECONDS)?,
             marks: marks(doc, &spec.mark, method, CaseDevice::Gpu, 0)?,
         };
         // Where the bracket begins the scene has to be sound; further on it may become impossible.
-        template.trial(method, value(&spec.passes, 0.0)?)?;
+        template.trial(method, number(doc, &spec.passes, &SEARCHED)?)?;
         searches.push(Search { method, template });
     }
     Ok(Limit {
@@ -347,9 +367,9 @@ fn limit(doc: &Document<'_>, spec: &LimitSpec, base_dir: &Path) -> Result<Limit>
         note: spec.note.clone(),
         unit: spec.unit.clone().unwrap_or_default(),
         searches,
-        passes: value(&spec.passes, 0.0)?,
-        fails: value(&spec.fails, 0.0)?,
-        ratio: value(&spec.ratio, 1.0)?,
+        passes: number(doc, &spec.passes, &SEARCHED)?,
+        fails: number(doc, &spec.fails, &SEARCHED)?,
+        ratio: number(doc, &spec.ratio, &RATIO)?,
     })
 }
 

@@ -1,0 +1,112 @@
+//! Numbers and types in messages, as a user would write them.
+
+/// A number in few digits: `1e308` has 309 when it is written out.
+pub(super) fn shown(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".to_owned(),
+        size if (1e-4..1e7).contains(&size) || !size.is_finite() => format!("{value}"),
+        _ => format!("{value:e}"),
+    }
+}
+
+/// Several of them, as TOML has them.
+pub(super) fn shown_all(values: &[f64]) -> String {
+    let words: Vec<_> = values.iter().map(|&value| shown(value)).collect();
+    format!("[{}]", words.join(", "))
+}
+
+/// Rust's names of types and what a user calls them, longer names before those that they begin with.
+const TYPES: [(&str, &str); 11] = [
+    ("a boolean", "true or false"),
+    ("a sequence", "an array"),
+    ("a map", "a table"),
+    ("f64", "a number"),
+    ("f32", "a number"),
+    ("i64", "a whole number"),
+    ("u64", "a whole number from 0"),
+    ("u32", "a whole number from 0"),
+    ("usize", "a whole number from 0"),
+    ("internally tagged enum ", "a table"),
+    ("struct ", "a table"),
+];
+
+/// serde's complaint about a type without Rust's names: "invalid type: string \"fine\", expected a number".
+pub(super) fn plain_types(message: &str) -> String {
+    let lines = message.lines().collect::<Vec<_>>().join("; ");
+    let Some((before, expected)) = lines.rsplit_once("expected ") else {
+        return lines;
+    };
+    let found = TYPES.iter().find(|(name, _)| expected.starts_with(name));
+    let Some((name, word)) = found else {
+        return lines;
+    };
+    // A table's name is Rust's as well.
+    let rest = match name.ends_with(' ') {
+        true => "",
+        false => &expected[name.len()..],
+    };
+    let before = before.replace("floating point", "number");
+    format!("{before}expected {word}{rest}")
+}
+
+/// The key that stands at a place twice, where that is what a TOML error is about: the parser does not name it.
+pub(super) fn duplicate<'a>(text: &'a str, error: &toml::de::Error) -> Option<&'a str> {
+    let key = text.get(error.span()?)?;
+    error
+        .message()
+        .starts_with("duplicate key")
+        .then(|| key.trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-3.0, "-3"),
+            (0.25, "0.25"),
+            (1e5, "100000"),
+            (1e308, "1e308"),
+            (-1.5e300, "-1.5e300"),
+            (1e-5, "1e-5"),
+            (5e-324, "5e-324"),
+            (f64::NAN, "NaN"),
+            (f64::NEG_INFINITY, "-inf"),
+        ] {
+            assert_eq!(shown(value), text);
+        }
+        assert_eq!(shown_all(&[0.0, 1e308]), "[0, 1e308]");
+    }
+
+    #[test]
+    fn types_are_called_what_a_user_calls_them() {
+        for (raw, plain) in [
+            (
+                "invalid type: string \"fine\", expected f64",
+                "invalid type: string \"fine\", expected a number",
+            ),
+            (
+                "invalid type: floating point `1.5`, expected i64",
+                "invalid type: number `1.5`, expected a whole number",
+            ),
+            (
+                "invalid type: integer `1`, expected a boolean",
+                "invalid type: integer `1`, expected true or false",
+            ),
+            (
+                "invalid type: string \"x\", expected struct ShotSpec",
+                "invalid type: string \"x\", expected a table",
+            ),
+            (
+                "invalid length 2, expected an array of length 3",
+                "invalid length 2, expected an array of length 3",
+            ),
+            ("something else", "something else"),
+        ] {
+            assert_eq!(plain_types(raw), plain);
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! What only the solver FLIP finds wrong.
+
+use super::Fault;
+
+/// The same with `solver.method=flip` laid over.
+pub const FLIP_FAULTS: &[Fault] = &[
+    (
+        "cell_size = 0.2",
+        "cell_size = 0",
+        36,
+        &["solver.flip.cell_size: 0 is out of range"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 4.3",
+        36,
+        &[
+            "solver.flip.cell_size: no interior cell",
+            "5.814 × 2.930 × 3.488 cells of 4.3 m",
+            "at least 3",
+        ],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 4.2\nparticles_per_cell = 64",
+        36,
+        &[],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 4.2\nparticles_per_cell = 4",
+        15,
+        &["water.block[0].max", "too thin for one layer"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 0.021",
+        36,
+        &["particles 0.0105 m apart", "134217728"],
+    ),
+    (
+        "cell_size = 0.2",
+        "cell_size = 0.001",
+        36,
+        &["the grid would overflow", "cells of 0.001 m"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "transfer = \"pic\"",
+        37,
+        &["\"pic\" is no transfer; the nearest is \"apic\""],
+    ),
+    (
+        "transfer = \"flip\"",
+        "pic_blend = 1.1",
+        37,
+        &["solver.flip.pic_blend: 1.1 is out of range", "from 0 to 1"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "cfl = 5.5",
+        37,
+        &["solver.flip.cfl: 5.5 is out of range", "from 1e-5 to 5"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "particles_per_cell = 0",
+        37,
+        &["particles_per_cell: 0 is out of range"],
+    ),
+    (
+        "transfer = \"flip\"",
+        "density_correction = 1",
+        37,
+        &["density_correction: invalid type: integer `1`, expected true or false"],
+    ),
+    (
+        "surface = \"voxel\"",
+        "surface = \"ghost\"",
+        38,
+        &["\"ghost\" is no surface", "ghost_fluid"],
+    ),
+    (
+        "\"ipp\"",
+        "\"multigird\"",
+        39,
+        &[
+            "solver.flip.pressure.preconditioner: \"multigird\" is no preconditioner; \
+             the nearest is \"multigrid\"",
+            "\"none\"",
+        ],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = 0",
+        39,
+        &[
+            "pressure.tolerance: 0 is out of range",
+            "from 1e-14 to 0.99",
+        ],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = -1e-4",
+        39,
+        &["pressure.tolerance: -0.0001 is out of range"],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = 1.0",
+        39,
+        &["pressure.tolerance: 1 is out of range"],
+    ),
+    (
+        "tolerance = 1e-4",
+        "tolerance = 1e-4, residual_limit = 0.05",
+        39,
+        &["pressure.residual_limit: unknown key"],
+    ),
+    (
+        "tolerance = 1e-4",
+        "max_iterations = 0",
+        39,
+        &["pressure.max_iterations: 0 is out of range"],
+    ),
+    // 0.5 m are left: five particle spacings, but fewer than three cells.
+    (
+        "stroke = 1.5",
+        "stroke = 24.5",
+        24,
+        &[
+            "wave_maker[0].motion: the wall -x crosses",
+            "three cells (FLIP)",
+        ],
+    ),
+];

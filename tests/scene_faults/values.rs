@@ -1,0 +1,366 @@
+//! Values that are none of what a key allows, and parts that do not fit together.
+
+use super::Fault;
+
+/// Values, with the scene as it stands: PBF.
+pub const VALUE_FAULTS: &[Fault] = &[
+    // Ranges.
+    (
+        "= 0.1\n",
+        "= -0.1\n",
+        29,
+        &[
+            "solver.pbf.particle_spacing: -0.1 is out of range",
+            "a number from 1e-8 to 100000, metres",
+        ],
+    ),
+    (
+        "= 0.1\n",
+        "= 0\n",
+        29,
+        &["particle_spacing: 0 is out of range"],
+    ),
+    (
+        "= 0.1\n",
+        "= nan\n",
+        29,
+        &["particle_spacing: NaN is out of range"],
+    ),
+    (
+        "= 0.1\n",
+        "= inf\n",
+        29,
+        &["particle_spacing: inf is out of range"],
+    ),
+    (
+        "frames = 240",
+        "frames = 0",
+        3,
+        &["shot.frames: 0 is out of range"],
+    ),
+    (
+        "frames = 240",
+        "frames = -5",
+        3,
+        &["shot.frames: -5 is out of range"],
+    ),
+    (
+        "second = 60",
+        "second = 0",
+        4,
+        &["frames_per_second: 0 is out of range"],
+    ),
+    (
+        "\"base\"",
+        "\"../up\"",
+        2,
+        &["shot.name: \"../up\" is no safe file name", "letters"],
+    ),
+    ("\"base\"", "\"\"", 2, &["shot.name: \"\" is no safe"]),
+    (
+        "iterations = 4",
+        "iterations = 0",
+        30,
+        &["iterations: 0 is out of range"],
+    ),
+    (
+        "iterations = 4",
+        "iterations = 4\ndensity_error = 0.01",
+        30,
+        &["given together with density_error"],
+    ),
+    (
+        "iterations = 4",
+        "density_error = 0.01",
+        30,
+        &["given without max_iterations"],
+    ),
+    (
+        "iterations = 4",
+        "support_ratio = 1",
+        30,
+        &["support_ratio: 1 is out of range", "from 1.5 to 4"],
+    ),
+    (
+        "iterations = 4",
+        "relaxation = 2",
+        30,
+        &["relaxation: 2 is out of range"],
+    ),
+    (
+        "iterations = 4",
+        "iteration = \"gauss\"",
+        30,
+        &["\"gauss\" is no iteration", "red_black"],
+    ),
+    (
+        "\"pbf\"",
+        "\"sph\"",
+        27,
+        &[
+            "solver.method: \"sph\" is no method; the nearest is \"pbf\"",
+            "[solver.flip]",
+        ],
+    ),
+    (
+        "gravity = [0.0, -9.81, 0.0]",
+        "gravity = [0.0, nan, 0.0]",
+        12,
+        &["water.gravity", "out of range"],
+    ),
+    (
+        "scale = 2.0",
+        "scale = 0",
+        20,
+        &["solid[0].scale", "out of range"],
+    ),
+    (
+        "[shot]",
+        "[shot]\n[shot]",
+        2,
+        &["shot: a second key of this name in its table"],
+    ),
+    (
+        "stroke = 1.5",
+        "stroke = 1.5, stroke = 2",
+        24,
+        &["stroke: a second key of this name in its table"],
+    ),
+    (
+        "frames = 240",
+        "frames = \"many\"",
+        3,
+        &["shot.frames: invalid type: string \"many\", expected a whole number;"],
+    ),
+    (
+        "[shot]\nname = \"base\"\nframes = 240\nframes_per_second = 60\n",
+        "shot = 3\n",
+        1,
+        &["shot: invalid type: integer `3`, expected a table;"],
+    ),
+    // Boxes.
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 1e-9, 15.0]",
+        8,
+        &[
+            "domain.max: its edges are [25, 1e-9, 15] m",
+            "above min by 1e-8",
+        ],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, -1.0, 15.0]",
+        8,
+        &["domain.max: the box is inverted: y ends at -1 but starts at 0"],
+    ),
+    (
+        "max = [13.4, 1.0, 15.0]",
+        "max = [13.4, 0.0, 15.0]",
+        15,
+        &["water.block[0].max: the box is inverted"],
+    ),
+    (
+        "max = [13.4, 1.0, 15.0]",
+        "max = [13.4, 1.0, 15.1]",
+        15,
+        &[
+            "water.block[0].max: the water does not fit",
+            "[25, 12.6, 15]",
+        ],
+    ),
+    (
+        "min = [0.0, 0.0, 0.0]\nmax = [13.4",
+        "min = [0.0, -0.5, 0.0]\nmax = [13.4",
+        14,
+        &["water.block[0].min: the water does not fit"],
+    ),
+    (
+        "max = [13.4, 1.0, 15.0]",
+        "max = [13.4, 0.01, 15.0]",
+        15,
+        &["too thin for one layer"],
+    ),
+    // Size.
+    (
+        "= 0.1\n",
+        "= 0.001\n",
+        29,
+        &[
+            "the grid would overflow",
+            "25 × 12.6 × 15 m",
+            "at most 65536 cells",
+        ],
+    ),
+    ("= 0.1\n", "= 1e-7\n", 29, &["the grid would overflow"]),
+    (
+        "= 0.1\n",
+        "= 1e-9\n",
+        29,
+        &["particle_spacing: 1e-9 is out of range", "from 1e-8"],
+    ),
+    (
+        "= 0.1\n",
+        "= 0.0105\n",
+        29,
+        &["particles 0.0105 m apart", "134217728"],
+    ),
+    // Meshes.
+    (
+        "cube.obj",
+        "missing.obj",
+        18,
+        &[
+            "solid[0].mesh: cannot read mesh",
+            "missing.obj",
+            "No such file",
+        ],
+    ),
+    (
+        "cube.obj",
+        "broken.obj",
+        18,
+        &[
+            "solid[0].mesh: mesh",
+            "line 2: a vertex needs three numbers",
+        ],
+    ),
+    ("cube.obj", "empty.stl", 18, &["not an STL: too short"]),
+    ("cube.obj", "cube.fbx", 18, &["unknown extension"]),
+    (
+        "cube.obj",
+        "sheet.obj",
+        18,
+        // Edges by their end points, where the scene puts them: scaled by 2 and moved.
+        &[
+            "solid[0].mesh",
+            "3 open edges",
+            "(18.0000, 0.0000, 7.0000)-(20.0000, 0.0000, 7.0000)",
+            "close the mesh",
+        ],
+    ),
+    (
+        "[18.0, 0.0, 7.0]",
+        "[80.0, 0.0, 7.0]",
+        18,
+        &["solid[0].mesh: the mesh lies outside of the domain"],
+    ),
+    (
+        "scale = 2.0",
+        "blake3 = \"00\"",
+        20,
+        &["solid[0].blake3", "has BLAKE3"],
+    ),
+    ("[[solid]]\nmesh = ", "[[water.mesh]]\nfile = ", 18, &[]),
+    // Wave makers.
+    (
+        "\"-x\"",
+        "\"left\"",
+        23,
+        &["wave_maker[0].wall: \"left\" is no wall", "\"+z\""],
+    ),
+    (
+        "stroke = 1.5",
+        "stroke = 24.9",
+        24,
+        &[
+            "wave_maker[0].motion: the wall -x crosses the whole domain",
+            "of 25 m",
+        ],
+    ),
+    // Two spacings are left: 24.8 m.
+    ("stroke = 1.5", "stroke = 24.79", 24, &[]),
+    (
+        "stroke = 1.5",
+        "stroke = 24.81",
+        24,
+        &["the wall -x crosses the whole domain"],
+    ),
+    // At 1 and 6 m/s they have used up 24.8 m after 3.543 s.
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0 }",
+        "kind = \"constant_velocity\", velocity = 1.0 }\n[[wave_maker]]\nwall = \"+x\"\n\
+         motion = { kind = \"constant_velocity\", velocity = 6.0 }",
+        27,
+        &["wave_maker[1].motion: the walls -x and +x collide 3.54"],
+    ),
+    (
+        "stroke = 1.5, period = 3.0",
+        "stroke = 10.0, period = 3e-4",
+        24,
+        &[
+            "wave_maker[0].motion: it moves at 104719.",
+            "up to 100000 m/s",
+        ],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\", points = [[0, 0], [1e-6, 0.2]]",
+        24,
+        &[
+            "motion.points: up to point 1, it moves at ",
+            "up to 100000 m/s",
+        ],
+    ),
+    (
+        "stroke = 1.5",
+        "stroke = -1.5",
+        24,
+        &["motion.stroke: -1.5 is out of range"],
+    ),
+    (
+        "ramp = 1.0 }",
+        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"-x\"\nmotion = { kind = \"constant_velocity\", velocity = 1.0 }",
+        26,
+        &["wave_maker[1].wall: a second wave maker on the wall -x"],
+    ),
+    (
+        "ramp = 1.0 }",
+        "ramp = 1.0 }\n[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 6.0 }",
+        27,
+        &["wave_maker[1].motion: the walls -x and +x collide 3."],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"wobble\"",
+        24,
+        &["motion.kind: \"wobble\" is no kind of motion", "solitary"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"solitary\", height = 2, depth = 1",
+        24,
+        &["motion.height: a wave of 2 m on 1 m"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\", file = \"push.csv\"",
+        24,
+        &["motion.file", "line 2: \"1,one\" is not time,displacement"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\", file = \"back.csv\"",
+        24,
+        &["the time of point 2, 0.5 s"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\", points = [[0, 1], [1, 2]]",
+        24,
+        &["the first displacement is 1"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\"",
+        24,
+        &["motion.points: missing"],
+    ),
+    // Effects.
+    (
+        "xsph = 0.01",
+        "xsph = -1",
+        33,
+        &["effects.viscosity.xsph: -1 is out of range; allowed: a number from 1e-6 to 1"],
+    ),
+];
