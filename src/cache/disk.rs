@@ -189,7 +189,17 @@ pub(super) fn read_exactly(path: &Path, bytes: u64) -> Result<Vec<u8>, CacheErro
     Ok(content)
 }
 
-pub(super) fn check_length(path: &Path, expected: u64, found: u64) -> Result<(), CacheError> {
+/// Whether a file is there with the length that was written.
+pub(super) fn check_length_on_disk(path: &Path, expected: u64) -> Result<(), CacheError> {
+    match path.metadata() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            Err(CacheError::damaged(path, "it is missing"))
+        }
+        other => check_length(path, expected, other.at(path)?.len()),
+    }
+}
+
+fn check_length(path: &Path, expected: u64, found: u64) -> Result<(), CacheError> {
     if found == expected {
         return Ok(());
     }
