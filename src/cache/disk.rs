@@ -107,6 +107,11 @@ pub(super) fn has_our_lock(dir: &Path) -> bool {
     fs::read(dir.join(LOCK)).is_ok_and(|text| text.is_empty() || text == LOCK_TEXT)
 }
 
+/// Whether a bake has taken `dir` for its cache, by the lock's text alone.
+pub(super) fn is_begun(dir: &Path) -> bool {
+    fs::read(dir.join(LOCK)).is_ok_and(|text| text == LOCK_TEXT)
+}
+
 /// Names in `dir`, sorted.
 pub(super) fn names(dir: &Path) -> Result<Vec<String>, CacheError> {
     let mut names = Vec::new();

@@ -174,8 +174,8 @@ impl CacheReader {
     /// # Errors
     /// [`CacheError::NoFrame`], [`CacheError::Damaged`] (also for a missing file), [`CacheError::Io`].
     pub fn check_grids(&self, frame: u32) -> Result<(), CacheError> {
-        let grids = self.entry(frame)?.grids.iter();
-        grids.map(|record| record.check(&self.dir)).collect()
+        let mut grids = self.entry(frame)?.grids.iter();
+        grids.try_for_each(|record| record.check(&self.dir))
     }
 
     /// Looks at the probes' files: each has to be, byte for byte, what the ledger says.
