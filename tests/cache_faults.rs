@@ -15,8 +15,9 @@ use std::sync::OnceLock;
 use proptest::prelude::*;
 use serde_json::Value;
 use swell::cache::{
-    self, CacheError, CacheReader, CacheWriter, Clock, Manifest, Parent, directory_hash,
+    self, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, Parent, directory_hash,
 };
+use swell::domain::sparse_grid::Precision;
 use tempfile::TempDir;
 
 use stand_in::*;
@@ -184,6 +185,98 @@ fn a_damaged_frame_stops_a_resume_untouched() {
     assert_eq!(damaged_file(resume(dir.path(), 6)), path);
 }
 
+/// A cache whose meshes are not those that were baked is none to read from, nor to go on with.
+#[test]
+fn a_damaged_asset_stops_readers_and_a_resume_untouched() {
+    let dir = copied();
+    let d = dir.path();
+    for (name, other) in [
+        ("city.obj", "tables/stroke.csv"),
+        ("tables/stroke.csv", "city.obj"),
+    ] {
+        let [path, other] = [name, other].map(|name| d.join("assets").join(name));
+        let sound = fs::read(&path).unwrap();
+        let refused = || {
+            let before = directory_hash(d).unwrap();
+            assert_eq!(damaged_file(CacheReader::open(d)), path);
+            assert_eq!(damaged_file(resume(d, 6)), path);
+            assert_eq!(directory_hash(d).unwrap(), before);
+        };
+        for bit in 0..8 * sound.len() {
+            let mut bytes = sound.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            fs::write(&path, bytes).unwrap();
+            refused();
+        }
+        fs::remove_file(&path).unwrap();
+        refused();
+        // All that is off is told, not the first alone.
+        let sound_other = fs::read(&other).unwrap();
+        fs::write(&other, "").unwrap();
+        let problems = cache::survey(d).unwrap().problems;
+        let files: Vec<_> = problems.into_iter().map(|problem| problem.file).collect();
+        assert!(files.len() == 2 && files.contains(&path) && files.contains(&other));
+        fs::write(&other, sound_other).unwrap();
+        fs::write(&path, sound).unwrap();
+    }
+    assert_eq!(resume(d, 6).unwrap().last_frame, 6, "control");
+}
+
+/// For readers that use what stands beside the particles.
+#[test]
+fn a_frames_further_files_are_checked_for_who_asks() {
+    let dir = tempfile::tempdir().unwrap();
+    let d = dir.path();
+    let mut given = manifest();
+    given.grids = Some(GridRecord {
+        surface: true,
+        velocity: false,
+        voxel_size: 0.6,
+        origin: [0.0; 3],
+        precision: Precision::Half,
+    });
+    let clock = Clock::default();
+    let writer =
+        CacheWriter::create(d, given, SCENE, &assets(), clock, &start(), &seen(clock)).unwrap();
+    go_on(writer, clock, start(), 2).unwrap();
+    let reader = CacheReader::open(d).unwrap();
+    let check = || (0..3).try_for_each(|frame| reader.check_grids(frame));
+    check().unwrap();
+    reader.check_probes().unwrap();
+    assert!(matches!(
+        reader.check_grids(3),
+        Err(CacheError::NoFrame { .. })
+    ));
+    for (name, is_grid) in [
+        ("grids/tank.0001.vdb", true),
+        ("grids/tank.0002.vdb", true),
+        ("probes/gauge.csv", false),
+        ("probes/energy-1.csv", false),
+    ] {
+        let path = d.join(name);
+        let sound = fs::read(&path).unwrap();
+        let mut bytes = sound.clone();
+        bytes[sound.len() / 2] ^= 1;
+        for spoiled in [Some(bytes), Some(sound[1..].to_vec()), None] {
+            match spoiled {
+                Some(bytes) => fs::write(&path, bytes).unwrap(),
+                None => fs::remove_file(&path).unwrap(),
+            }
+            let (grids, probes) = (check(), reader.check_probes());
+            let (found, other) = if is_grid {
+                (grids, probes)
+            } else {
+                (probes, grids)
+            };
+            assert_eq!(damaged_file(found), path);
+            other.unwrap();
+        }
+        fs::write(&path, sound).unwrap();
+    }
+    // A cache without grids has none that could be off.
+    CacheReader::open(baked()).unwrap().check_grids(1).unwrap();
+}
+
 #[test]
 fn a_damaged_middle_of_the_ledger_stops_a_resume() {
     let dir = copied();
@@ -204,6 +297,50 @@ fn a_damaged_middle_of_the_ledger_stops_a_resume() {
     }
     fs::write(d.join(LEDGER), &ledger).unwrap();
     assert!(resume(d, 6).is_ok(), "control");
+}
+
+/// Each line is whole, the manifest is the same, and the frames belong to two histories.
+#[test]
+fn a_ledger_spliced_from_two_bakes_is_refused() {
+    let other = tempfile::tempdir().unwrap();
+    let mut writer = create(other.path());
+    let (mut clock, mut particles) = (Clock::default(), start());
+    for frame in 1..=4 {
+        (clock, particles, _) = step(&particles, clock, frame);
+        let report = serde_json::json!({ "another": frame });
+        writer
+            .submit(clock, particles.clone(), seen(clock), report, Value::Null)
+            .unwrap();
+    }
+    writer.finish().unwrap();
+    let lines = |d: &Path| -> Vec<String> {
+        let text = fs::read_to_string(d.join(LEDGER)).unwrap();
+        text.split_inclusive('\n').map(str::to_owned).collect()
+    };
+    let (ours, theirs) = (lines(baked()), lines(other.path()));
+    assert_eq!(ours[0], theirs[0]);
+    let dir = copied();
+    let d = dir.path();
+    for taken in 1..=4 {
+        fs::write(d.join(LEDGER), ours.concat()).unwrap();
+        assert!(CacheReader::open(d).is_ok(), "control");
+        let mut spliced = ours.clone();
+        spliced[taken] = theirs[taken].clone();
+        fs::write(d.join(LEDGER), spliced.concat()).unwrap();
+        // Of the first line after the start either history is the whole one so far; the next line tells.
+        if taken == 1 {
+            spliced.truncate(2);
+            fs::write(d.join(LEDGER), spliced.concat()).unwrap();
+            assert!(CacheReader::open(d).is_ok(), "a bake that stopped there");
+            fs::write(d.join(LEDGER), [&spliced[..], &ours[2..]].concat().concat()).unwrap();
+        }
+        assert_eq!(
+            damaged_file(CacheReader::open(d)),
+            d.join(LEDGER),
+            "{taken}"
+        );
+        assert_eq!(damaged_file(resume(d, 6)), d.join(LEDGER), "{taken}");
+    }
 }
 
 #[test]

@@ -305,12 +305,20 @@ fn a_flipped_bit_in_any_file_is_named_or_does_not_matter() {
         "refused {refused:?}\nmended or of no account {mended:?}\nleft as they are, and named {passed:?}"
     );
     let has = |set: &BTreeSet<PathBuf>, name: &str| set.contains(Path::new(name));
+    let is_mesh = |file: &&PathBuf| file.starts_with("assets");
+    let mesh = files(&part)
+        .iter()
+        .find(is_mesh)
+        .unwrap()
+        .display()
+        .to_string();
     for name in [
         "manifest.json",
         "scene.toml",
         "frames.jsonl",
         "frames/small.0003.ply",
         "grids/small.0003.vdb",
+        &mesh,
     ] {
         assert!(has(&refused, name), "{name}: what the bake goes on from");
     }

@@ -407,6 +407,48 @@ fn chunked_lists_and_no_lists() {
     assert!(gap < 0.02 * D, "{gap}");
 }
 
+/// What the ledger has of a frame beside its state: lists that overflowed, and particles slowed to the cap.
+#[test]
+fn lists_that_overflow_and_particles_that_are_slowed_are_counted() {
+    let context = context();
+    let mut scene = scene([2.0, 2.0, 2.0]);
+    scene.water.gravity = DVec3::ZERO;
+    const CAP: f64 = 0.2;
+    scene.solver.pbf.as_mut().unwrap().cfl = CAP;
+    let (frame, mut counted) = (scene.shot.frame_seconds(), Vec::new());
+    // Particles far apart, and a knot in which each has all others as neighbours: more than a list holds, or fewer.
+    for knot in [[5, 4, 3], [4, 5, 2]] {
+        let mut particles = lattice([0.0; 3], [4, 4, 2], [0.4; 3]);
+        for at in lattice([1.0, 1.0, 1.4], knot, [0.01; 3]).position {
+            particles.position.push(at);
+            particles.velocity.push([0.0; 3]);
+            particles.id.push(particles.id.len() as u32);
+        }
+        let mut solver = solver(&context, &scene, &particles, &Boundary::default());
+        let (state, report) = solver.advance().unwrap();
+        assert_eq!(report.substeps, 1, "from rest");
+        let crowd: usize = knot.iter().product();
+        let expected = if crowd - 1 > LIST_CAPACITY as usize {
+            crowd
+        } else {
+            0
+        };
+        assert_eq!(report.searched, expected as u64);
+        // In one substep from rest the way is the velocity's; ten roundings.
+        let is_slowed = |v: &&[f32; 3]| {
+            let way = glam::Vec3::from_array(**v).as_dvec3().length() * frame;
+            way > CAP * D * (1.0 - 10.0 * f64::from(f32::EPSILON))
+        };
+        let slowed = state.velocity.iter().filter(is_slowed).count();
+        assert_eq!(report.capped, slowed as u64);
+        counted.push((expected, slowed));
+    }
+    assert!(
+        counted[0].0 > 0 && counted[1].0 == 0 && counted.iter().any(|c| c.1 > 0),
+        "{counted:?}"
+    );
+}
+
 #[test]
 fn coincident_particles_part() {
     let context = context();

@@ -143,6 +143,26 @@ fn a_study_bakes_renders_measures_and_tells() {
         "{said}"
     );
     assert_eq!((read("results.csv"), read("index.html")), (csv, page));
+    // Damage in its caches ends it by name, and so does another look.
+    let assets = job.path("out/cache/pbf/assets");
+    let mesh = fs::read_dir(&assets).unwrap().next().unwrap().unwrap();
+    for file in [
+        mesh.path(),
+        job.path("out/cache/flip/frames/small.0003.ply"),
+    ] {
+        let sound = fs::read(&file).unwrap();
+        let mut bytes = sound.clone();
+        bytes[sound.len() / 2] ^= 1;
+        fs::write(&file, bytes).unwrap();
+        let said = job.expect(4, "study study.toml -o out");
+        let name = file.file_name().unwrap().to_string_lossy();
+        assert!(said.contains(&*name), "{said}");
+        fs::write(&file, sound).unwrap();
+    }
+    job.edit("look.toml", "35.0", "24.0");
+    let said = job.expect(4, "study study.toml -o out");
+    assert!(said.contains("another look"), "{said}");
+    job.edit("look.toml", "24.0", "35.0");
     // A cache of another scene is left alone.
     job.edit("small.toml", "cell_size = 0.2", "cell_size = 0.25");
     let said = job.expect(4, "study study.toml -o out");
@@ -383,7 +403,8 @@ fn a_new_look_leaves_the_cache_as_it_is() {
     assert!(!job.path("wide/small.0003.png").exists());
     assert!(job.path("day/small.0003.exr").exists());
 
-    // What stands there with the same hashes is left; a picture of another look, or a torn one, is made again.
+    // What stands there with the same hashes is left; a torn picture is made again; one of another look is
+    // with --overwrite.
     let first = png("day", 1);
     assert!(
         job.expect(0, "render cache --look look.toml -o day")
@@ -393,7 +414,9 @@ fn a_new_look_leaves_the_cache_as_it_is() {
     let said = job.expect(0, "render cache --look look.toml -o day");
     assert!(said.contains("1 frames rendered, 3 stood there"), "{said}");
     assert_eq!(png("day", 1), first);
-    let said = job.expect(0, "render cache --look wide.toml -o day");
+    job.expect(4, "render cache --look wide.toml -o day");
+    assert_eq!(png("day", 1), first);
+    let said = job.expect(0, "render cache --look wide.toml -o day --overwrite");
     assert!(said.contains("4 frames rendered"), "{said}");
     assert_ne!(png("day", 1), first);
 

@@ -107,6 +107,11 @@ pub(super) fn has_our_lock(dir: &Path) -> bool {
     fs::read(dir.join(LOCK)).is_ok_and(|text| text.is_empty() || text == LOCK_TEXT)
 }
 
+/// Whether a bake has taken `dir` for its cache, by the lock's text alone.
+pub(super) fn is_begun(dir: &Path) -> bool {
+    fs::read(dir.join(LOCK)).is_ok_and(|text| text == LOCK_TEXT)
+}
+
 /// Names in `dir`, sorted.
 pub(super) fn names(dir: &Path) -> Result<Vec<String>, CacheError> {
     let mut names = Vec::new();
@@ -189,7 +194,17 @@ pub(super) fn read_exactly(path: &Path, bytes: u64) -> Result<Vec<u8>, CacheErro
     Ok(content)
 }
 
-pub(super) fn check_length(path: &Path, expected: u64, found: u64) -> Result<(), CacheError> {
+/// Whether a file is there with the length that was written.
+pub(super) fn check_length_on_disk(path: &Path, expected: u64) -> Result<(), CacheError> {
+    match path.metadata() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            Err(CacheError::damaged(path, "it is missing"))
+        }
+        other => check_length(path, expected, other.at(path)?.len()),
+    }
+}
+
+fn check_length(path: &Path, expected: u64, found: u64) -> Result<(), CacheError> {
     if found == expected {
         return Ok(());
     }

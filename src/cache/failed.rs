@@ -1,16 +1,18 @@
 //! `failed/` in a cache's folder: what the step that could not be made began with, so that it can be made again.
 //!
-//! No ledger names it and no checksum covers it; a bake that gets past the frame removes it.
+//! No ledger names it. Its report, written last, has the checksums of the other two files and one of itself; a bake that
+//! gets past the frame removes the folder.
 
 use std::{fs, path::Path};
 
-use serde_json::Value;
+use serde::Deserialize as _;
+use serde_json::{Map, Value, json};
 
 use super::{
     disk,
     error::{AtPath, CacheError},
     frame::{self, Stamp},
-    manifest,
+    manifest::{self, FileRecord},
 };
 use crate::domain::particles::Particles;
 
@@ -18,6 +20,10 @@ use crate::domain::particles::Particles;
 pub const FAILED: &str = "failed";
 const REPORT: &str = "report.json";
 const START: &str = "start.ply";
+/// Key of the report: records of the other files.
+const FILES: &str = "files";
+/// Key of the report: BLAKE3 of all that it says beside this.
+const CHECKSUM: &str = "blake3";
 
 /// A frame that could not be computed.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +34,7 @@ pub struct Failed {
     pub start: Particles,
     /// The last good frame.
     pub last_frame: u32,
-    /// What was seen, for a machine.
+    /// What was seen, for a machine: an object. On the disk it has `files` and `blake3` as well.
     pub report: Value,
 }
 
@@ -40,7 +46,7 @@ pub fn is_failed(dir: &Path) -> bool {
 /// Writes `failed/` in the cache at `cache`, in place of one that stands there.
 ///
 /// # Errors
-/// [`CacheError::Io`].
+/// [`CacheError::Io`]; [`CacheError::Unfit`] where the report is no object.
 pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), CacheError> {
     remove(cache)?;
     let dir = cache.join(FAILED);
@@ -48,37 +54,68 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
     let file = |name: &str, bytes: &[u8]| {
         disk::write_whole(&dir.join(name), |out| std::io::Write::write_all(out, bytes))
     };
-    file(manifest::SCENE, failed.scene_toml.as_bytes())?;
-    disk::write_whole(&dir.join(START), |out| {
+    let scene = failed.scene_toml.as_bytes();
+    file(manifest::SCENE, scene)?;
+    let start = disk::write_whole(&dir.join(START), |out| {
         frame::encode(out, stamp, &failed.start)
     })?;
+    let start = FileRecord {
+        file: START.to_owned(),
+        bytes: start.bytes,
+        blake3: start.hash.to_hex().to_string(),
+    };
+    let mut report = failed.report.clone();
+    let fields = report
+        .as_object_mut()
+        .ok_or_else(|| CacheError::Unfit("a report that is no object".to_owned()))?;
+    let files = [FileRecord::new(manifest::SCENE, scene), start];
+    fields.insert(FILES.to_owned(), json!(files));
+    let checksum = checksum(fields);
+    fields.insert(CHECKSUM.to_owned(), checksum.into());
     // Last: it is what makes the folder one to replay.
-    file(REPORT, format!("{:#}\n", failed.report).as_bytes())
+    file(REPORT, text(fields).as_bytes())
+}
+
+/// As it stands in the file, in the order of the names.
+fn text(fields: &Map<String, Value>) -> String {
+    format!("{:#}\n", Value::Object(fields.clone()))
+}
+
+fn checksum(fields: &Map<String, Value>) -> String {
+    blake3::hash(text(fields).as_bytes()).to_hex().to_string()
 }
 
 /// Reads what [`write()`] wrote to `dir`, the folder itself.
 ///
 /// # Errors
-/// [`CacheError::Damaged`], [`CacheError::Io`].
+/// [`CacheError::Damaged`] for a file that is missing or whose checksum is off, [`CacheError::Io`].
 pub fn read(dir: &Path) -> Result<Failed, CacheError> {
-    let bytes = |name: &str| {
-        let path = dir.join(name);
-        fs::read(&path).at(&path)
-    };
     let path = dir.join(REPORT);
-    let report: Value = serde_json::from_slice(&bytes(REPORT)?)
-        .map_err(|error| CacheError::damaged(&path, error.to_string()))?;
-    let last_frame = report["last_frame"].as_u64();
+    let damaged = |what: &str| CacheError::damaged(&path, what);
+    let bytes = fs::read(&path).at(&path)?;
+    let mut fields: Map<String, Value> =
+        serde_json::from_slice(&bytes).map_err(|error| damaged(&error.to_string()))?;
+    // Digits may change that no f64 holds: the text is compared as well.
+    let is_as_written = text(&fields).as_bytes() == bytes;
+    let recorded = fields.remove(CHECKSUM);
+    if !is_as_written || recorded != Some(checksum(&fields).into()) {
+        return Err(damaged("its BLAKE3 is off"));
+    }
+    let files = fields.remove(FILES).unwrap_or_default();
+    let [scene, start] = <[FileRecord; 2]>::deserialize(files)
+        .ok()
+        .filter(|[scene, start]| scene.file == manifest::SCENE && start.file == START)
+        .ok_or_else(|| damaged("it names other files"))?;
+    let last_frame = fields.get("last_frame").and_then(Value::as_u64);
     let last_frame = last_frame
         .and_then(|frame| u32::try_from(frame).ok())
-        .ok_or_else(|| CacheError::damaged(&path, "it names no last_frame"))?;
-    let scene = dir.join(manifest::SCENE);
+        .ok_or_else(|| damaged("it names no last_frame"))?;
     Ok(Failed {
-        scene_toml: String::from_utf8(bytes(manifest::SCENE)?)
-            .map_err(|_| CacheError::damaged(scene, "it is not UTF-8"))?,
-        start: frame::decode(&bytes(START)?, &dir.join(START))?,
+        scene_toml: String::from_utf8(scene.read(dir)?)
+            .map_err(|_| CacheError::damaged(dir.join(manifest::SCENE), "it is not UTF-8"))?,
+        start: frame::decode(&start.read(dir)?, &dir.join(START))?,
         last_frame,
-        report,
+        report: Value::Object(fields),
     })
 }
 
@@ -91,5 +128,60 @@ pub fn remove(cache: &Path) -> Result<(), CacheError> {
     match fs::remove_dir_all(&dir) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
         other => other.at(&dir),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    fn failed() -> Failed {
+        Failed {
+            scene_toml: "[shot]\nname = \"tank\"\n".to_owned(),
+            start: Particles {
+                position: vec![[0.5, 0.25, -1.0]],
+                velocity: vec![[0.0, -3.0, 0.1]],
+                id: vec![7],
+                ..Particles::default()
+            },
+            last_frame: 12,
+            report: json!({ "last_frame": 12, "measured": 0.1 + 0.2, "limit": null, "pass": { "name": "flip/advect" } }),
+        }
+    }
+
+    #[test]
+    fn it_is_read_as_it_was_written_and_refused_with_any_bit_off() {
+        let cache = tempfile::tempdir().unwrap();
+        let stamp = Stamp {
+            program: "swell",
+            program_version: "0.1.0",
+            shot: "tank",
+            frame: 12,
+            time: 0.2,
+            origin: DVec3::ZERO,
+        };
+        write(cache.path(), &failed(), &stamp).unwrap();
+        let dir = cache.path().join(FAILED);
+        assert!(is_failed(&dir));
+        assert_eq!(read(&dir).unwrap(), failed());
+        for name in [manifest::SCENE, START, REPORT] {
+            let path = dir.join(name);
+            let sound = fs::read(&path).unwrap();
+            for bit in 0..8 * sound.len() {
+                let mut bytes = sound.clone();
+                bytes[bit / 8] ^= 1 << (bit % 8);
+                fs::write(&path, bytes).unwrap();
+                match read(&dir) {
+                    Err(CacheError::Damaged { file, .. }) => assert_eq!(file, path, "{bit}"),
+                    other => panic!("{name}, bit {bit}: {other:?}"),
+                }
+            }
+            fs::remove_file(&path).unwrap();
+            assert!(read(&dir).is_err(), "{name} is missing");
+            fs::write(&path, sound).unwrap();
+        }
+        assert_eq!(read(&dir).unwrap(), failed(), "control");
     }
 }

@@ -121,6 +121,16 @@ impl FileRecord {
         }
     }
 
+    /// Refuses the file where it is not the one recorded, without taking it into memory.
+    pub(super) fn check(&self, dir: &Path) -> Result<(), CacheError> {
+        let path = dir.join(&self.file);
+        disk::check_length_on_disk(&path, self.bytes)?;
+        if disk::file_hash(&path)? != self.blake3 {
+            return Err(CacheError::damaged(path, "its BLAKE3 is off"));
+        }
+        Ok(())
+    }
+
     /// Reads the file and refuses it where it is not the one recorded.
     pub(super) fn read(&self, dir: &Path) -> Result<Vec<u8>, CacheError> {
         let path = dir.join(&self.file);
@@ -201,6 +211,11 @@ impl Manifest {
             .iter()
             .find(|record| record.file == SCENE)
             .ok_or_else(|| CacheError::damaged(dir.join(FILE), "it names no scene.toml"))
+    }
+
+    /// Refuses `scene.toml` and the assets where one is missing or not what was written.
+    pub(super) fn check_files(&self, dir: &Path) -> Result<(), CacheError> {
+        self.files.iter().try_for_each(|record| record.check(dir))
     }
 
     /// What is written must be read back, and no name may lead out of the cache.

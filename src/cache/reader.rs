@@ -13,7 +13,7 @@ use super::manifest::{FileRecord, Manifest};
 use super::probes;
 use crate::domain::particles::Particles;
 
-/// An open cache: its manifest, its scene and its ledger, all checked; the frames are checked as they
+/// An open cache: its manifest, its ledger, its scene and the scene's files, all checked; the frames are checked as they
 /// are read. A bake may go on meanwhile: a line that is just being written is not seen.
 #[derive(Debug)]
 pub struct CacheReader {
@@ -61,7 +61,7 @@ impl VerifyReport {
 /// # Errors
 /// [`CacheError::NotACache`], [`CacheError::Format`], [`CacheError::Io`]; damage stands in the report.
 pub fn survey(dir: &Path) -> Result<VerifyReport, CacheError> {
-    match CacheReader::open(dir) {
+    match CacheReader::open_without_assets(dir) {
         Ok(reader) => Ok(reader.survey()),
         Err(CacheError::Damaged { file, what }) => Ok(VerifyReport {
             problems: vec![Problem { file, what }],
@@ -76,8 +76,15 @@ impl CacheReader {
     ///
     /// # Errors
     /// [`CacheError::NotACache`], [`CacheError::Format`], [`CacheError::Damaged`] for the manifest, the
-    /// scene or the ledger, [`CacheError::Io`].
+    /// ledger, the scene or one of its files in `assets/`, [`CacheError::Io`].
     pub fn open(dir: &Path) -> Result<Self, CacheError> {
+        let reader = Self::open_without_assets(dir)?;
+        reader.manifest.check_files(dir)?;
+        Ok(reader)
+    }
+
+    /// As [`Self::open`], the assets unseen.
+    fn open_without_assets(dir: &Path) -> Result<Self, CacheError> {
         let (manifest, seed) = Manifest::read(dir)?;
         let ledger = Ledger::read(dir, &manifest, &seed)?;
         let record = manifest.scene_record(dir)?;
@@ -161,6 +168,36 @@ impl CacheReader {
         read_frame(&self.dir, &self.manifest, self.entry(frame)?)
     }
 
+    /// Looks at the files that a frame has beside its particles: its grids, by length and checksum. Of a cache without
+    /// grids nothing is looked at.
+    ///
+    /// # Errors
+    /// [`CacheError::NoFrame`], [`CacheError::Damaged`] (also for a missing file), [`CacheError::Io`].
+    pub fn check_grids(&self, frame: u32) -> Result<(), CacheError> {
+        let mut grids = self.entry(frame)?.grids.iter();
+        grids.try_for_each(|record| record.check(&self.dir))
+    }
+
+    /// Looks at the probes' files: each has to be, byte for byte, what the ledger says.
+    ///
+    /// # Errors
+    /// [`CacheError::Damaged`] for the first that is not, or is missing.
+    pub fn check_probes(&self) -> Result<(), CacheError> {
+        match self.probe_problems().next() {
+            None => Ok(()),
+            Some(Problem { file, what }) => Err(CacheError::damaged(file, what)),
+        }
+    }
+
+    fn probe_problems(&self) -> impl Iterator<Item = Problem> {
+        let records = self.manifest.probes.iter().enumerate();
+        records.filter_map(|(index, record)| {
+            let what = probes::problem(&self.dir, index, record, self.entries())?;
+            let file = record.path(&self.dir);
+            Some(Problem { file, what })
+        })
+    }
+
     /// Seconds that the bake of each frame took, where they are known: `timings.jsonl` is in no
     /// checksum, and lines that are not whole are passed over.
     ///
@@ -208,12 +245,7 @@ impl CacheReader {
             .filter_map(|record| self.problem(&record))
             .collect();
         problems.extend(frames);
-        let records = self.manifest.probes.iter().enumerate();
-        problems.extend(records.filter_map(|(index, record)| {
-            let what = probes::problem(&self.dir, index, record, entries)?;
-            let file = record.path(&self.dir);
-            Some(Problem { file, what })
-        }));
+        problems.extend(self.probe_problems());
         VerifyReport {
             frames: self.last_frame() - self.first_frame(),
             bytes: entries.iter().flat_map(Entry::files).map(|f| f.bytes).sum(),
@@ -231,30 +263,13 @@ impl CacheReader {
 
     fn problem(&self, record: &FileRecord) -> Option<Problem> {
         let path = self.dir.join(&record.file);
-        let found = check_length_on_disk(&path, record.bytes).and_then(|()| {
-            if disk::file_hash(&path)? == record.blake3 {
-                Ok(())
-            } else {
-                Err(CacheError::damaged(&path, "its BLAKE3 is off"))
-            }
-        });
-        let what = match found {
+        let what = match record.check(&self.dir) {
             Ok(()) => return None,
             Err(CacheError::Damaged { what, .. }) => what,
             Err(CacheError::Io { source, .. }) => format!("it cannot be read: {source}"),
             Err(other) => other.to_string(),
         };
         Some(Problem { file: path, what })
-    }
-}
-
-/// Whether a file is there with the length that was written.
-pub(super) fn check_length_on_disk(path: &Path, expected: u64) -> Result<(), CacheError> {
-    match path.metadata() {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            Err(CacheError::damaged(path, "it is missing"))
-        }
-        other => disk::check_length(path, expected, other.at(path)?.len()),
     }
 }
 

@@ -16,7 +16,7 @@ use super::frame::{self, Stamp};
 use super::ledger::{self, Clock, Contents, Entry, Ledger};
 use super::manifest::{self, FileRecord, Manifest};
 use super::probes::{self, ProbeValues};
-use super::reader::{check_length_on_disk, read_frame};
+use super::reader::read_frame;
 use super::vdb;
 use crate::domain::particles::Particles;
 
@@ -144,7 +144,7 @@ impl CacheWriter {
     /// [`CacheError::NotACache`]; [`CacheError::Format`]; [`CacheError::OtherScene`] for the first
     /// field of the manifest that differs from `given` (`files` and `start_particles` are not
     /// compared); [`CacheError::Locked`]; [`CacheError::Damaged`], with the cache untouched, for the
-    /// manifest, scene, ledger, the last frame, or an earlier frame that is missing or of another
+    /// manifest, scene, assets, ledger, the last frame, or an earlier frame that is missing or of another
     /// length; [`CacheError::Io`].
     pub fn resume(dir: &Path, given: &Manifest) -> Result<(Self, Entry, Particles), CacheError> {
         let (manifest, seed) = Manifest::read(dir)?;
@@ -156,9 +156,10 @@ impl CacheWriter {
             whole_bytes,
             torn_bytes,
         } = Ledger::read(dir, &manifest, &seed)?;
-        manifest.scene_record(dir)?.read(dir)?;
+        manifest.scene_record(dir)?;
+        manifest.check_files(dir)?;
         for record in entries.iter().flat_map(Entry::files) {
-            check_length_on_disk(&dir.join(&record.file), record.bytes)?;
+            disk::check_length_on_disk(&dir.join(&record.file), record.bytes)?;
         }
         let Some(last) = entries.pop() else {
             return Err(CacheError::damaged(dir.join(ledger::FILE), "it is empty"));

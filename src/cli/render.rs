@@ -37,7 +37,7 @@ pub(super) struct RenderArgs {
     /// Take a panorama that lies outside of the look's folder.
     #[arg(long)]
     allow_outside: bool,
-    /// Render frames again that stand there with the same cache and look.
+    /// Render frames again that stand there, also those of another cache or look.
     #[arg(long)]
     overwrite: bool,
     /// How to tell progress.
@@ -110,6 +110,14 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
                 &format!("on {device}\n{frames} frames of {width} × {height}"),
                 json!({ "event": "ready", "device": device, "width": width, "height": height, "frames": frames }),
             );
+        }
+        Event::Waiting { frames } => {
+            if let Some(progress) = progress.get() {
+                progress.say(
+                    &format!("waiting for {frames} frames that other processes render"),
+                    json!({ "event": "waiting", "frames": frames }),
+                );
+            }
         }
         Event::Frame {
             frame,

@@ -94,6 +94,19 @@ impl Attributes {
     }
 }
 
+/// The attributes in the header of a PNG or EXR, by the file's ending; the pixels are not looked at. `None` for a file
+/// of another ending.
+///
+/// # Errors
+/// [`RenderError::Write`] or [`RenderError::Format`] where it cannot be opened, or its header is none.
+pub fn read_header(path: &Path) -> Result<Option<Attributes>, RenderError> {
+    match path.extension().and_then(|ending| ending.to_str()) {
+        Some("png") => png_file::read_png_header(path).map(Some),
+        Some("exr") => exr_file::read_exr_header(path).map(Some),
+        _ => Ok(None),
+    }
+}
+
 /// Writes beside the file and renames, so that a picture that exists is whole.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RenderError> {
     let fault = |source| RenderError::Write {

@@ -328,4 +328,37 @@ viscosity = { xsph = 0.2 }
         assert_eq!(shot.duration(), 1.5);
         assert!((24.0 * shot.frame_seconds() - 1.0).abs() < 1e-15);
     }
+
+    #[test]
+    fn a_report_has_the_tails_of_the_density_and_the_energies() {
+        let text = r#"
+            shot = { name = "tank", frames = 4, frames_per_second = 60 }
+            domain = { min = [0, -1, 0], max = [1, 1, 1] }
+            solver = { method = "pbf", pbf = { particle_spacing = 0.1 } }
+            [[water.block]]
+            min = [0, -1, 0]
+            max = [1, 0, 1]
+        "#;
+        let scene = Scene::parse(text, Path::new("s.toml"), Path::new(""), &[]).expect("valid");
+        let state = Particles {
+            position: vec![[0.5, -0.5, 0.5], [0.5, 0.25, 0.5]],
+            velocity: vec![[3.0, 0.0, -4.0], [0.0, 2.0, 0.0]],
+            id: vec![0, 1],
+            ..Particles::default()
+        };
+        // 0.900 to 1.099 in no order: what is below 1 is no error.
+        let density = |k: u32| 0.9 + 0.001 * f64::from(k);
+        let shuffled = (0..200).map(|k| density(37 * k % 200));
+        let report = scene.report(&state, shuffled);
+        assert_eq!(report.density_error_p99, density(197) - 1.0);
+        assert_eq!(report.density_error_max, density(199) - 1.0);
+        // A sum of 200 values up to 0.1 in another order.
+        let mean = 0.001 * f64::from((0..100).sum::<u32>()) / 200.0;
+        assert!((report.density_error_mean - mean).abs() < 200.0 * f64::EPSILON);
+        assert_eq!(report.max_speed, 5.0);
+        // 1 kg each, but for the roundings of 1000 · 0.1³; heights are above the floor.
+        let near = |value: f64, expected: f64| (value / expected - 1.0).abs() < 8.0 * f64::EPSILON;
+        assert!(near(report.kinetic_energy, 0.5 * (25.0 + 4.0)));
+        assert!(near(report.potential_energy, 9.81 * (0.5 + 1.25)));
+    }
 }

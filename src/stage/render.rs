@@ -1,16 +1,19 @@
 //! `render`: a particle cache and a look to an image sequence. The cache is only read.
+//!
+//! Several processes may render one look of one cache into one folder: each frame is rendered by one of them.
+
+mod folder;
 
 use std::{
-    fs,
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use glam::DAffine3;
 
 use crate::{
-    cache::{CacheError, CacheReader},
+    cache::{self, CacheError, CacheReader},
     domain::frame_range::FrameRange,
     gpu::adapter::{Context, GpuError},
     render::{
@@ -23,7 +26,13 @@ use crate::{
     },
 };
 
+use self::folder::{Folder, Owner, Wanted};
 use super::Blame;
+
+pub use self::folder::FolderError;
+
+/// Between two looks at frames that other processes render.
+const POLL: Duration = Duration::from_millis(50);
 
 /// What to render, and where to.
 #[derive(Clone, Debug)]
@@ -38,7 +47,7 @@ pub struct Request {
     pub frames: Option<FrameRange>,
     /// Index or part of the name of an adapter.
     pub adapter: Option<String>,
-    /// Whether frames that stand there already are made again.
+    /// Whether frames that stand there already are made again, also those of another look or cache.
     pub overwrite: bool,
 }
 
@@ -60,8 +69,13 @@ pub enum Event {
         frame: u32,
         /// Wall clock; 0 for a frame that stood there with the same hashes.
         seconds: f64,
-        /// Whether it stood there.
+        /// Whether it stood there, or another process rendered it meanwhile.
         skipped: bool,
+    },
+    /// All other frames are done, and these are being rendered by other processes.
+    Waiting {
+        /// How many.
+        frames: usize,
     },
 }
 
@@ -70,7 +84,7 @@ pub enum Event {
 pub struct Outcome {
     /// Frames rendered now.
     pub rendered: u32,
-    /// Frames that stood there.
+    /// Frames that stood there, or that another process rendered meanwhile.
     pub skipped: u32,
     /// Whether a signal ended it.
     pub interrupted: bool,
@@ -95,28 +109,28 @@ pub enum RenderJobError {
     #[error(transparent)]
     Render(#[from] RenderError),
     /// The output folder.
-    #[error("{directory}: {source}", directory = .directory.display())]
-    Directory {
-        /// Which.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The output would go into a cache.
+    #[error("{} is in the cache {}: choose another -o", directory.display(), cache.display())]
+    IntoCache {
+        /// Where images were to go.
         directory: PathBuf,
-        /// The system's words.
-        source: std::io::Error,
+        /// This cache or another.
+        cache: PathBuf,
     },
-    /// The output would go into the cache.
-    #[error("{} is in the cache itself: choose another -o", .0.display())]
-    IntoCache(PathBuf),
 }
 
 impl From<&RenderJobError> for Blame {
     fn from(error: &RenderJobError) -> Self {
         match error {
             RenderJobError::Cache(error) => error.into(),
-            RenderJobError::Scene(_) | RenderJobError::Directory { .. } => Self::Files,
+            RenderJobError::Scene(_) | RenderJobError::Folder(_) => Self::Files,
             RenderJobError::Look(error) => error.into(),
             RenderJobError::Gpu(error) => error.into(),
             RenderJobError::Render(RenderError::Gpu(error)) => error.into(),
             RenderJobError::Render(RenderError::Panorama(_) | RenderError::Scene(_))
-            | RenderJobError::IntoCache(_) => Self::Input,
+            | RenderJobError::IntoCache { .. } => Self::Input,
             RenderJobError::Render(
                 RenderError::NotFinite { .. }
                 | RenderError::Write { .. }
@@ -126,20 +140,25 @@ impl From<&RenderJobError> for Blame {
     }
 }
 
-/// Renders the frames that are wanted; `tell` hears of progress, and `stop` ends it after the current frame.
+/// Renders the frames that are wanted; `tell` hears of progress, and `stop` ends it after the current frame. Frames that
+/// another process renders into the same folder are left to it, and waited for at the end; those of one that was killed
+/// are rendered here.
 ///
 /// # Errors
-/// [`RenderJobError`]; a missing cache frame is one before anything is rendered.
+/// [`RenderJobError`]; a missing cache frame is one before anything is rendered, and so is a folder that cannot be shared.
 pub fn render(
     request: &Request,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, RenderJobError> {
     let cache = CacheReader::open(&request.cache)?;
-    if is_inside(&request.directory, &request.cache) {
-        return Err(RenderJobError::IntoCache(request.directory.clone()));
+    if let Some(cache) = cache::around(&request.directory) {
+        return Err(RenderJobError::IntoCache {
+            directory: request.directory.clone(),
+            cache,
+        });
     }
-    let frames: Vec<u32> = match &request.frames {
+    let mut frames: Vec<u32> = match &request.frames {
         Some(frames) => frames.iter().collect(),
         None => (cache.first_frame() + 1..=cache.last_frame()).collect(),
     };
@@ -154,57 +173,57 @@ pub fn render(
         &[],
     )?;
     let context = Context::open(request.adapter.as_deref())?;
+    let folder = enter(request, &cache, &frames)?;
     let image = &request.look.spec().image;
     tell(Event::Ready {
         device: context.info.name.clone(),
         size: [image.width, image.height],
         frames: frames.len(),
     });
-    let mut kept = None;
+    let mut job = Job {
+        request,
+        folder,
+        cache,
+        scene,
+        context,
+        kept: None,
+    };
     let mut outcome = Outcome::default();
-    for frame in frames {
-        if stop.load(Ordering::Relaxed) {
-            outcome.interrupted = true;
-            break;
-        }
-        let begin = Instant::now();
-        let attributes = attributes(&cache, &request.look, frame)?;
-        let files = files(request, &attributes, cache.last_frame());
-        if !request.overwrite
-            && files
-                .iter()
-                .all(|(file, format)| is_current(file, *format, &attributes))
-        {
-            outcome.skipped += 1;
+    let mut is_told = false;
+    while !frames.is_empty() {
+        let mut elsewhere = Vec::new();
+        for &frame in &frames {
+            if stop.load(Ordering::Relaxed) {
+                outcome.interrupted = true;
+                return Ok(outcome);
+            }
+            let begin = Instant::now();
+            let (seconds, skipped) = match job.frame(frame)? {
+                Done::Rendered => (begin.elapsed().as_secs_f64(), false),
+                Done::Stands => (0.0, true),
+                Done::Elsewhere => {
+                    elsewhere.push(frame);
+                    continue;
+                }
+            };
+            outcome.rendered += u32::from(!skipped);
+            outcome.skipped += u32::from(skipped);
             tell(Event::Frame {
                 frame,
-                seconds: 0.0,
-                skipped: true,
+                seconds,
+                skipped,
             });
-            continue;
         }
-        let mut renderer = match kept.take() {
-            Some(renderer) => renderer,
-            None => Renderer::new(&context, &request.look, &render_scene(&scene, frame))
-                .map_err(|error| told(error, &request.look))?,
-        };
-        fs::create_dir_all(&request.directory).map_err(|source| RenderJobError::Directory {
-            directory: request.directory.clone(),
-            source,
-        })?;
-        let picture = renderer.render(frame, &cache.read(frame)?)?;
-        // Solids that move are drawn where they stand at the frame's time, not blurred over its shutter:
-        // a renderer draws its solids once.
-        kept = scene.moving_solids.is_empty().then_some(renderer);
-        for (file, format) in &files {
-            write(file, *format, &picture, &attributes, &request.look)?;
+        if elsewhere.len() == frames.len() {
+            if !is_told {
+                tell(Event::Waiting {
+                    frames: frames.len(),
+                });
+                is_told = true;
+            }
+            std::thread::sleep(POLL);
         }
-        outcome.rendered += 1;
-        tell(Event::Frame {
-            frame,
-            seconds: begin.elapsed().as_secs_f64(),
-            skipped: false,
-        });
+        frames = elsewhere;
     }
     Ok(outcome)
 }
@@ -218,19 +237,90 @@ fn told(error: RenderError, look: &Look) -> RenderJobError {
     fault.map_or_else(|| error.into(), RenderJobError::Look)
 }
 
-/// Whether a folder is, or would be, within another.
-fn is_inside(directory: &Path, other: &Path) -> bool {
-    let Ok(other) = other.canonicalize() else {
-        return false;
+/// Takes this process's place in the output folder.
+fn enter(request: &Request, cache: &CacheReader, frames: &[u32]) -> Result<Folder, RenderJobError> {
+    let first = attributes(cache, &request.look, cache.first_frame())?;
+    let mut names = Vec::new();
+    for &frame in frames {
+        names.extend(pictures(cache, &request.look, frame));
+    }
+    let wanted = Wanted {
+        owner: Owner {
+            cache: cache.entry(cache.first_frame())?.chain.clone(),
+            software: first.software,
+            shot: first.shot,
+            scene_hash: first.scene_hash,
+            look_hash: first.look_hash,
+        },
+        names: names.into_iter().map(|(name, _)| name).collect(),
+        overwrite: request.overwrite,
+        frame_hash: &|frame| cache.entry(frame).ok().map(|entry| entry.blake3.clone()),
     };
-    let mut ancestor = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
-    loop {
-        if let Ok(real) = ancestor.canonicalize() {
-            return real.starts_with(&other);
+    Ok(Folder::enter(&request.directory, &wanted)?)
+}
+
+/// What became of a frame.
+enum Done {
+    Rendered,
+    Stands,
+    /// Another process is at it.
+    Elsewhere,
+}
+
+/// A render under way.
+struct Job<'a> {
+    request: &'a Request,
+    folder: Folder,
+    cache: CacheReader,
+    scene: Scene,
+    context: Context,
+    /// Of the frame before, where it can draw another.
+    kept: Option<Renderer>,
+}
+
+impl Job<'_> {
+    fn frame(&mut self, frame: u32) -> Result<Done, RenderJobError> {
+        let request = self.request;
+        let attributes = attributes(&self.cache, &request.look, frame)?;
+        let pictures = pictures(&self.cache, &request.look, frame);
+        let stands = || {
+            let is_there = |(name, format): &(String, FormatSpec)| {
+                is_current(&request.directory.join(name), *format, &attributes)
+            };
+            !request.overwrite && pictures.iter().all(is_there)
+        };
+        if stands() {
+            return Ok(Done::Stands);
         }
-        if !ancestor.pop() {
-            return false;
+        let number = name(&attributes.shot, frame, self.cache.last_frame());
+        let Some(_claim) = self.folder.claim(&number)? else {
+            return Ok(Done::Elsewhere);
+        };
+        // Another process may have come to its end with it between the two.
+        if stands() {
+            return Ok(Done::Stands);
         }
+        let picture = self.draw(frame)?;
+        for (name, format) in &pictures {
+            let draft = self.folder.draft(name);
+            write(&draft, *format, &picture, &attributes, &request.look)?;
+            self.folder.publish(name)?;
+        }
+        Ok(Done::Rendered)
+    }
+
+    fn draw(&mut self, frame: u32) -> Result<Image, RenderJobError> {
+        let look = &self.request.look;
+        let mut renderer = match self.kept.take() {
+            Some(renderer) => renderer,
+            None => Renderer::new(&self.context, look, &render_scene(&self.scene, frame))
+                .map_err(|error| told(error, look))?,
+        };
+        let picture = renderer.render(frame, &self.cache.read(frame)?)?;
+        // Solids that move are drawn where they stand at the frame's time, not blurred over its shutter:
+        // a renderer draws its solids once.
+        self.kept = self.scene.moving_solids.is_empty().then_some(renderer);
+        Ok(picture)
     }
 }
 
@@ -263,35 +353,32 @@ fn attributes(cache: &CacheReader, look: &Look, frame: u32) -> Result<Attributes
     })
 }
 
-/// `SHOT.0001.png`, with as many digits as the last cached frame needs, at least four.
-fn name(shot: &str, frame: u32, last_frame: u32, extension: &str) -> String {
+/// `SHOT.0001`, with as many digits as the last cached frame needs, at least four.
+fn name(shot: &str, frame: u32, last_frame: u32) -> String {
     let digits = last_frame.to_string().len().max(4);
-    format!("{shot}.{frame:0digits$}.{extension}")
+    format!("{shot}.{frame:0digits$}")
+}
+
+fn ending(format: FormatSpec) -> &'static str {
+    match format {
+        FormatSpec::Png => "png",
+        FormatSpec::Exr => "exr",
+    }
+}
+
+/// Names of a frame's pictures, and in which format each.
+fn pictures(cache: &CacheReader, look: &Look, frame: u32) -> Vec<(String, FormatSpec)> {
+    let name = name(&cache.manifest().shot, frame, cache.last_frame());
+    let formats = look.spec().output.formats.iter();
+    formats
+        .map(|&format| (format!("{name}.{}", ending(format)), format))
+        .collect()
 }
 
 /// Name of the PNG of a frame of a cache.
 pub(super) fn picture_name(cache: &CacheReader, frame: u32) -> String {
-    name(&cache.manifest().shot, frame, cache.last_frame(), "png")
-}
-
-/// Where a frame's pictures go, and in which format each.
-fn files(
-    request: &Request,
-    attributes: &Attributes,
-    last_frame: u32,
-) -> Vec<(PathBuf, FormatSpec)> {
-    let formats = &request.look.spec().output.formats;
-    formats
-        .iter()
-        .map(|&format| {
-            let extension = match format {
-                FormatSpec::Png => "png",
-                FormatSpec::Exr => "exr",
-            };
-            let name = name(&attributes.shot, attributes.frame, last_frame, extension);
-            (request.directory.join(name), format)
-        })
-        .collect()
+    let name = name(&cache.manifest().shot, frame, cache.last_frame());
+    format!("{name}.{}", ending(FormatSpec::Png))
 }
 
 fn is_current(file: &Path, format: FormatSpec, attributes: &Attributes) -> bool {

@@ -1,9 +1,6 @@
 //! A frame that broke a budget, computed again from the state before it: which pass first went wrong.
 
-use std::{
-    fmt,
-    path::{Path, PathBuf},
-};
+use std::{fmt, path::Path};
 
 use glam::{DVec3, Vec3};
 use serde_json::json;
@@ -436,9 +433,10 @@ pub fn replay_failed(directory: &Path, adapter: Option<String>) -> Result<Replay
         report,
     } = failed::read(directory)?;
     // Mesh files stand in the cache, whose folder this one is in.
-    let cache: PathBuf = directory.join("..");
-    let scene = Scene::parse(&scene_toml, &directory.join("scene.toml"), &cache, &[])?;
-    let start = Start::of_cache::<ReplayError>(&scene, &CacheReader::open(&cache)?)?;
+    let cached = CacheReader::open(&directory.join(".."))?;
+    let file = directory.join("scene.toml");
+    let scene = Scene::parse(&scene_toml, &file, cached.dir(), &[])?;
+    let start = Start::of_cache::<ReplayError>(&scene, &cached)?;
     if let Some(adapter) = &adapter {
         check_request(adapter)?;
     }

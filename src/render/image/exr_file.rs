@@ -128,18 +128,23 @@ fn sort_attributes(bytes: &mut [u8]) -> Option<()> {
     Some(())
 }
 
-/// The attributes of an EXR, or what of them is there; the pixels are not read.
+/// The attributes of an EXR, or what of them is there; all of it is decoded, so that a torn one is known.
 ///
 /// # Errors
-/// [`RenderError::Format`] where it cannot be opened or is no EXR.
+/// [`RenderError::Format`] where it cannot be opened or is no whole EXR.
 pub fn read_exr_attributes(path: &Path) -> Result<Attributes, RenderError> {
-    let fault = |error: exr::error::Error| RenderError::Format {
-        file: path.to_owned(),
-        message: error.to_string(),
-    };
-    let whole = exr::prelude::read_all_data_from_file(path).map_err(fault)?;
-    drop(whole);
-    let meta = exr::meta::MetaData::read_from_file(path, true).map_err(fault)?;
+    let whole = exr::prelude::read_all_data_from_file(path);
+    whole.map_err(|error| undecoded(path, &error))?;
+    read_exr_header(path)
+}
+
+/// The attributes in an EXR's header alone.
+///
+/// # Errors
+/// [`RenderError::Format`] where it cannot be opened or its header is none.
+pub(super) fn read_exr_header(path: &Path) -> Result<Attributes, RenderError> {
+    let meta = exr::meta::MetaData::read_from_file(path, true);
+    let meta = meta.map_err(|error| undecoded(path, &error))?;
     let mut attributes = Attributes::default();
     for header in &meta.headers {
         if let Some(software) = &header.own_attributes.software_name {
@@ -159,4 +164,11 @@ pub fn read_exr_attributes(path: &Path) -> Result<Attributes, RenderError> {
         }
     }
     Ok(attributes)
+}
+
+fn undecoded(path: &Path, error: &exr::error::Error) -> RenderError {
+    RenderError::Format {
+        file: path.to_owned(),
+        message: error.to_string(),
+    }
 }

@@ -1,6 +1,6 @@
 //! 8-bit PNG through the view transform.
 
-use std::path::Path;
+use std::{fs::File, io::BufReader, path::Path};
 
 use rayon::prelude::*;
 
@@ -86,27 +86,45 @@ fn write(
 /// # Errors
 /// [`RenderError::Write`] where it cannot be opened, [`RenderError::Format`] where it is no whole PNG.
 pub fn read_png_attributes(path: &Path) -> Result<Attributes, RenderError> {
-    let file = std::fs::File::open(path).map_err(|source| RenderError::Write {
+    let (mut reader, attributes) = open(path)?;
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap_or(0)];
+    reader
+        .next_frame(&mut pixels)
+        .map_err(|error| undecoded(path, &error))?;
+    Ok(attributes)
+}
+
+/// The attributes in a PNG's header alone.
+///
+/// # Errors
+/// [`RenderError::Write`] where it cannot be opened, [`RenderError::Format`] where its header is none.
+pub(super) fn read_png_header(path: &Path) -> Result<Attributes, RenderError> {
+    open(path).map(|(_, attributes)| attributes)
+}
+
+fn open(path: &Path) -> Result<(png::Reader<BufReader<File>>, Attributes), RenderError> {
+    let file = File::open(path).map_err(|source| RenderError::Write {
         file: path.to_owned(),
         source,
     })?;
-    let fault = |error: png::DecodingError| RenderError::Format {
-        file: path.to_owned(),
-        message: error.to_string(),
-    };
-    let mut reader = png::Decoder::new(std::io::BufReader::new(file))
+    let reader = png::Decoder::new(BufReader::new(file))
         .read_info()
-        .map_err(fault)?;
-    let mut pixels = vec![0; reader.output_buffer_size().unwrap_or(0)];
-    reader.next_frame(&mut pixels).map_err(fault)?;
+        .map_err(|error| undecoded(path, &error))?;
     let mut attributes = Attributes::default();
     for chunk in &reader.info().utf8_text {
-        let value = chunk.get_text().map_err(fault)?;
+        let value = chunk.get_text().map_err(|error| undecoded(path, &error))?;
         if chunk.keyword == "frame" {
             attributes.frame = value.parse().unwrap_or(0);
         } else {
             attributes.set(&chunk.keyword, value);
         }
     }
-    Ok(attributes)
+    Ok((reader, attributes))
+}
+
+fn undecoded(path: &Path, error: &png::DecodingError) -> RenderError {
+    RenderError::Format {
+        file: path.to_owned(),
+        message: error.to_string(),
+    }
 }
