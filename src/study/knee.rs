@@ -227,7 +227,7 @@ mod tests {
         );
         let label = |error| first_of_no_account(&steady, error).map(|p| p.label.as_str());
         assert_eq!(
-            (label(4.0), label(3.9), label(1.0)),
+            (label(4.0), label(3.97), label(1.0)),
             (Some("s1"), Some("s2"), Some("s2"))
         );
         assert_eq!((label(0.02), label(0.019)), (Some("s4"), None));
