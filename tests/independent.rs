@@ -173,8 +173,8 @@ fn one_iteration_is_the_papers() {
         for ((state, report), tolerance) in both(&scene, &particles, 1).into_iter().zip(tolerances)
         {
             assert_eq!((report.substeps, report.iterations), (1, 1));
-            for k in 0..state.len() {
-                let off = (position(&state, k) - start[k] - moves[k]).length();
+            for (k, (start, moved)) in start.iter().zip(&moves).enumerate() {
+                let off = (position(&state, k) - *start - *moved).length();
                 assert!(off < tolerance, "{part}, particle {k}: {off} {tolerance}");
             }
         }
