@@ -288,6 +288,24 @@ mod tests {
         assert_eq!(difference_image(&a, &b, 4.0)[5], [128, 0, 0]);
     }
 
+    /// IEC 61966-2-1: half of the code is 0.2140 of the light, and the straight part meets the curve.
+    #[test]
+    fn light_is_that_of_srgb() {
+        let one = |value: f32, alpha: f32| light([value, 0.0, 0.0, alpha], Encoding::Srgb)[0];
+        for (code, linear) in [(0.5, 0.214_041_14), (1.0, 1.0), (0.02, 0.02 / 12.92)] {
+            // Powers err by a few units of f32.
+            assert!((one(code, 1.0) - linear).abs() < 4.0 * f32::EPSILON * linear);
+        }
+        let edge: f32 = 0.04045;
+        let [below, above] = [edge, f32::from_bits(edge.to_bits() + 1)].map(linear_from_srgb);
+        assert!((below - above).abs() < 1e-7, "{below} {above}");
+        assert_eq!(one(0.5, 0.5), 0.5 * one(0.5, 1.0));
+        assert_eq!(
+            light([0.5, f32::NAN, 2.0, 0.5], Encoding::Linear),
+            [0.5, 0.0, 1.0]
+        );
+    }
+
     #[test]
     fn a_tiny_picture_has_no_score_and_fails_a_limit_on_it() {
         let tiny = Picture {

@@ -72,14 +72,14 @@ pub struct WallError {
 
 impl WallError {
     /// Of `faces` within reach, when a wall's place is rounded by `place` support radii. q errs by that and 8 u;
-    /// the fraction's slope is at most 1.23, that of the slope 3.2, and each polynomial adds 16 u.
+    /// the fraction's slope is at most 315/256, that of the slope 405/128, and each polynomial adds 16 u.
     pub fn of(faces: usize, place: f64) -> Self {
         let faces = faces as f64;
         let q = place + 8.0 * U;
-        let density = faces * (1.23 * q + 16.0 * U);
+        let density = faces * (315.0 / 256.0 * q + 16.0 * U);
         Self {
             density,
-            gradient: faces * (3.2 * q + 20.0 * U + 1.5 * density),
+            gradient: faces * (405.0 / 128.0 * q + 20.0 * U + 1.5 * density),
         }
     }
 }
@@ -97,6 +97,58 @@ pub fn squares(own: f64, own_error: f64, neighbors_error: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::sph::half_space_fraction;
+
+    #[test]
+    fn units_are_half_the_distance_from_1_to_the_next_number() {
+        assert_eq!(U, f64::from(1.0f32.next_up() - 1.0) / 2.0);
+        assert_eq!(U64, (1.0f64.next_up() - 1.0) / 2.0);
+    }
+
+    /// A wall's place that is off by far more than U counts by the steepest slope that there is: by differences over 1e-6
+    /// at 2000 places, to a part in 1e-5.
+    #[test]
+    fn walls_err_by_their_steepest_slope() {
+        let e = 1e-6;
+        let steepest = |f: &dyn Fn(f64) -> f64| {
+            let slopes = (0..2000).map(|k| {
+                let q = f64::from(k) / 2000.0;
+                (f(q + e) - f(q)).abs() / e
+            });
+            slopes.fold(0.0, f64::max)
+        };
+        let bound = WallError::of(1, 1.0);
+        let spiky = |q: f64| 1.5 * (1.0 - q).powi(4) * (1.0 + 4.0 * q);
+        for (found, steepest) in [
+            (bound.density, steepest(&half_space_fraction)),
+            (bound.gradient - 1.5 * bound.density, steepest(&spiky)),
+        ] {
+            // No less than the slope, but for what the differences err by.
+            let part = found / steepest;
+            assert!((1.0 - 1e-9..1.0 + 1e-5).contains(&part), "{part}");
+        }
+        let three = WallError::of(3, 1.0);
+        assert!((three.density / bound.density - 3.0).abs() < 1e-12);
+    }
+
+    /// λ and Σ|∇C|² with their inputs off to the worst side, by far more than U: the bounds are first-order, and these
+    /// 1e-4 of second order and U beside them.
+    #[test]
+    fn bounds_are_met_by_the_worst_inputs() {
+        let (excess, denominator) = (0.05, 700.0);
+        let value = -excess / denominator;
+        let [density_error, square_error] = [1e-5 * excess, 1e-5 * denominator];
+        let worst = -(excess + density_error) / (denominator - square_error);
+        let bound = lambda(value, denominator, density_error, square_error);
+        let part = bound / (worst - value).abs();
+        // 8 u |λ| of 2e-5 |λ| are 2.4e-2 of it.
+        let rounded = 8.0 * U / 2e-5;
+        assert!((part - 1.0 - rounded).abs() < 1e-4, "{part}");
+        let (own, error) = (3.0, 1e-3);
+        let grown = (own + error) * (own + error) - own * own;
+        let part = squares(own, error, 0.5 * grown) / (1.5 * grown);
+        assert!((part - 1.0).abs() < 1e-3, "{part}");
+    }
 
     /// The sums of 200 neighbours computed in f32 as the passes do, against f64: within the bound, and the bound is
     /// within a factor of 1000 of what is seen (it is a worst case over the signs of 200 × 10 roundings).

@@ -52,3 +52,26 @@ impl Aggregates {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each value stands under its own name.
+    #[test]
+    fn values_stand_in_the_order_of_their_names() {
+        for (k, (name, _)) in Aggregates::NAMES.into_iter().enumerate() {
+            let mut table = serde_json::json!({
+                "kinetic_energy": 0.0, "potential_energy": 0.0, "volume": 0.0, "crest_height": 0.0,
+                "front": 0.0, "splash_height": 0.0, "airborne": 0.0, "density_error": 0.0,
+            });
+            table[name] = 1.0.into();
+            let values = serde_json::from_value::<Aggregates>(table)
+                .unwrap()
+                .values();
+            for (at, value) in values.into_iter().enumerate() {
+                assert_eq!(value, Some(f64::from(u8::from(at == k))), "{name}");
+            }
+        }
+    }
+}

@@ -69,3 +69,68 @@ impl Gauge<'_> {
         (self.kind[element], self.pressure[element])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A box of 8 × 8 × 8 cells with water below cell 6 and air above; the pressure is linear.
+    fn at(slope: DVec3, places: &[DVec3]) -> Vec<Option<f64>> {
+        let bricks = Bricks::new([8; 3], &[true], 0, 1);
+        let cell_size = 0.25;
+        let elements = bricks.slots() * CELLS as usize;
+        let (mut kind, mut pressure) = (vec![SOLID; elements], vec![0.0; elements]);
+        for element in CELLS..2 * CELLS {
+            let center = cell_size * (DVec3::from_array(bricks.cell(element).map(f64::from)) + 0.5);
+            let is_water = center.y < 6.0 * cell_size;
+            kind[element as usize] = if is_water { FLUID } else { AIR };
+            pressure[element as usize] = if is_water {
+                40.0 + slope.dot(center)
+            } else {
+                0.0
+            };
+        }
+        let gauge = Gauge {
+            bricks: &bricks,
+            cells: [8; 3],
+            cell_size,
+            kind: &kind,
+            pressure: &pressure,
+        };
+        places.iter().map(|&place| gauge.at(place)).collect()
+    }
+
+    /// A linear pressure comes back to rounding between centres and up to walls and corners.
+    #[test]
+    fn a_linear_pressure_is_met_up_to_the_walls() {
+        let slope = DVec3::new(3.0, -20.0, 5.0);
+        let places = [
+            DVec3::splat(0.9),
+            DVec3::new(0.0, 0.7, 1.93),
+            DVec3::new(2.0, 0.0, 0.0),
+            DVec3::new(0.31, 1.2, 1.999),
+        ];
+        for (found, place) in at(slope, &places).into_iter().zip(places) {
+            let expected = 40.0 + slope.dot(place);
+            assert!(
+                (found.unwrap() - expected).abs() < 1e-12,
+                "{place}: {found:?}"
+            );
+        }
+    }
+
+    /// By hand: from 12 Pa at the last centre of water, 1.375 m up, to none at the centre of air a cell above.
+    #[test]
+    fn air_is_no_pressure_and_no_water_none() {
+        let slope = DVec3::new(0.0, -28.0 / 1.375, 0.0);
+        let places = [1.375, 1.45, 1.49, 1.51].map(|y| DVec3::new(1.0, y, 1.0));
+        let found = at(slope, &places);
+        for (found, expected) in found.iter().zip([12.0, 12.0 * 0.7, 12.0 * 0.54]) {
+            assert!(
+                (found.unwrap() - expected).abs() < 1e-12,
+                "{found:?} {expected}"
+            );
+        }
+        assert_eq!(found[3], None);
+    }
+}

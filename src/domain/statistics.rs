@@ -25,5 +25,14 @@ mod tests {
         assert_eq!(percentile(thousand.clone(), 0.999), Some(999.0));
         assert_eq!(percentile(thousand, 1.0), Some(1000.0));
         assert_eq!(percentile(Vec::new(), 0.5), None);
+        // By hand: 4 of these 7 are a part of 0.571, and 5 one of 0.714.
+        let seven = vec![9.0, 2.0, 4.0, 7.0, 3.0, 8.0, 5.0];
+        let at = |p| percentile(seven.clone(), p);
+        assert_eq!(
+            [at(0.57), at(0.572), at(0.71), at(0.72)].map(Option::unwrap),
+            [5.0, 7.0, 7.0, 8.0]
+        );
+        assert_eq!((at(0.01), at(0.99)), (Some(2.0), Some(9.0)));
+        assert_eq!(median(seven[..6].to_vec()), Some(7.0));
     }
 }

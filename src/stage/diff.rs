@@ -19,6 +19,7 @@ use crate::{
         aggregates::Aggregates,
         frame_range::FrameRange,
         particles::Particles,
+        probe::energies,
         solver::StepReport,
         tolerance::{PictureLimits, Tolerance},
     },
@@ -372,21 +373,13 @@ fn aggregates(
     let manifest = cache.manifest();
     let spacing = manifest.particle_spacing;
     let mass = manifest.rest_density * spacing.powi(3);
-    let squares = particles
-        .velocity
-        .iter()
-        .map(|&v| vector(v).length_squared());
-    let corner = gauge.corner();
-    let heights = particles
-        .position
-        .iter()
-        .map(|&x| -gravity.dot(vector(x) - corner));
+    let (kinetic, potential) = energies(particles, mass, gravity, gauge.corner());
     let measures = gauge.measure(&particles.position, spacing);
     let report = cache.entry(frame)?.report.clone();
     let report: Option<StepReport> = serde_json::from_value(report).ok();
     Ok(Aggregates {
-        kinetic_energy: 0.5 * mass * squares.sum::<f64>(),
-        potential_energy: mass * heights.sum::<f64>(),
+        kinetic_energy: kinetic,
+        potential_energy: potential,
         volume: measures.volume,
         crest_height: measures.crest_height,
         front: measures.front,
@@ -394,8 +387,4 @@ fn aggregates(
         airborne: measures.airborne,
         density_error: report.map(|report| report.density_error_mean),
     })
-}
-
-fn vector(value: [f32; 3]) -> glam::DVec3 {
-    glam::Vec3::from_array(value).as_dvec3()
 }

@@ -393,6 +393,13 @@ mod tests {
         let mut alike = vec![None; 5];
         alike.push(flip);
         assert_eq!(verdicts(&pair(1.0, 1.04)), alike);
+        // A twentieth of the greater: 1 of 1 / 0.95 = 1.052632.
+        assert_eq!(verdicts(&pair(1.0, 1.0526)), alike);
+        assert!(
+            verdicts(&pair(1.0, 1.0527))[..5]
+                .iter()
+                .all(Option::is_some)
+        );
 
         let courses = pair(1.0, 1.5);
         let found = findings(&courses, Impact::of(&courses, 11.0));

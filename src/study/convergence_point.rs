@@ -100,6 +100,31 @@ mod tests {
         assert_eq!(convergence_point(&errors, Reading::Error), None);
     }
 
+    /// The same so slowly that a hundredth of the bound, and one step of the window, are many steps. Below 0.005 from
+    /// the first m with 0.006 rᵐ < 0.005 on, r = 0.9999; the window's earliest is 50 before. With e = rᵐ, r = 0.999, the
+    /// change from the earliest x = rᵐ is x (1 − r⁵⁰), below 0.005 (1 + x) for x < 0.005 / (1 − r⁵⁰ − 0.005).
+    #[test]
+    fn a_slow_decay_converges_where_it_is_known_to() {
+        let decay =
+            |from: f64, rate: f64| -> Vec<f64> { (0..4000).map(|k| from * rate.powi(k)).collect() };
+        let first = |part: f64, rate: f64| (part.ln() / rate.ln()).ceil() as usize + 50 + 1;
+        let bound = first(0.005 / 0.006, 0.9999);
+        let slow = decay(0.006, 0.9999);
+        assert_eq!(convergence_point(&slow, Reading::Bound), Some(bound));
+        let least = 0.005 / (1.0 - 0.999f64.powi(50) - 0.005);
+        let density = first(least, 0.999);
+        assert_eq!(
+            convergence_point(&decay(1.0, 0.999), Reading::Density),
+            Some(density)
+        );
+        // Against itself over 50 steps it falls by 0.499 % at r = 0.9999, and by 0.504 % at 0.999899.
+        assert_eq!(convergence_point(&slow, Reading::Error), Some(WINDOW + 1));
+        assert_eq!(
+            convergence_point(&decay(0.006, 0.999_899), Reading::Error),
+            None
+        );
+    }
+
     #[test]
     fn what_never_settles_has_no_point() {
         let swing: Vec<f64> = (0..400)

@@ -227,7 +227,7 @@ mod tests {
         );
         let label = |error| first_of_no_account(&steady, error).map(|p| p.label.as_str());
         assert_eq!(
-            (label(4.0), label(3.9), label(1.0)),
+            (label(4.0), label(3.97), label(1.0)),
             (Some("s1"), Some("s2"), Some("s2"))
         );
         assert_eq!((label(0.02), label(0.019)), (Some("s4"), None));
@@ -248,9 +248,9 @@ mod tests {
         let slow = line("slow", &[(1.0, 1.0), (4.0, 0.25), (16.0, 0.0625)]);
         let fast = line(
             "fast",
-            &[(0.5, 3.0), (2.0, 0.25), (8.0, 0.0625), (32.0, 0.01)],
+            &[(0.5, 3.0), (2.5, 0.2), (8.0, 0.0625), (32.0, 0.01)],
         );
-        // Error 1/t: at 2 it is 0.5, at 8 0.125.
+        // Error 1/t: at 2.5 it is 0.4, at 8 0.125.
         let lines = [slow, fast];
         let found = rivalry(&lines, 1);
         let ratio = |k: usize| found[k].ratios[0];

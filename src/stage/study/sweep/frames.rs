@@ -175,3 +175,17 @@ pub(super) fn products(preconditioner: Preconditioner) -> f64 {
         Preconditioner::Multigrid => 1.0 + 2.0 * 8.0 / 7.0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand, beside the iteration's own product: four half-products on each level, which has an eighth of the cells of the one before.
+    #[test]
+    fn a_v_cycle_s_products_are_counted_over_its_levels() {
+        let cycle: f64 = (0..20).map(|level| 4.0 * 0.5 / 8f64.powi(level)).sum();
+        assert!((products(Preconditioner::Multigrid) - 1.0 - cycle).abs() < 1e-12);
+        assert_eq!(products(Preconditioner::Ipp), 2.0);
+        assert_eq!(products(Preconditioner::Jacobi), 1.0);
+    }
+}
