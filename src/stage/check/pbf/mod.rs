@@ -289,23 +289,20 @@ impl<'a> Checker<'a> {
                     v_error += (error + confined.error + U * x.length()) / step;
                 }
                 let (at, then) = passes::predict(&self.model, &self.substep, x, v);
-                (
+                let v_tolerance = v_error + 4.0 * U * then.length();
+                let pairs = (
                     pair(i, wide(&predicted[n + i]), at, confined.error),
-                    pair(
-                        i,
-                        wide(&velocity[i]),
-                        then,
-                        v_error + 4.0 * U * then.length(),
-                    ),
-                )
+                    pair(i, wide(&velocity[i]), then, v_tolerance),
+                );
+                (pairs, confined.push_error)
             })
             .collect();
-        let (positions, velocities): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+        let (pairs, push_errors): (Vec<_>, Vec<f64>) = all.into_iter().unzip();
+        let (positions, velocities): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
         self.table.add(&PREDICT_POSITION, &positions, 0);
         self.table.add(&PREDICT_VELOCITY, &velocities, 0);
         if self.scene.has_movers() {
-            let tolerance: Vec<f64> = positions.iter().map(|pair| pair.tolerance).collect();
-            self.predict_work(traced, &tolerance)?;
+            self.predict_work(traced, &push_errors)?;
         }
         Ok(())
     }
@@ -432,12 +429,14 @@ impl<'a> Checker<'a> {
             // On one spot a hash decides where they part, by sines that WGSL leaves open.
             let is_coincident = (neighbors.all(i))
                 .any(|j| points[i].distance_squared(points[j as usize]) < 2e-12 * h * h);
-            let step = twin[i] - points[i];
+            // The bound follows the correction from before walls and solids push, as they bend what it errs by.
+            let to = twin[i].free;
+            let step = to - points[i];
             let mut error = bounds.delta(i, &lambda) + 16.0 * U * step.length();
             if momentum.is_some() {
                 let last = points[i] - before[i];
                 // Whether the semi-iteration goes on is decided before it adds to the step.
-                let own = plain[i] - points[i];
+                let own = plain[i].free - points[i];
                 let across = own.dot(last).abs() <= 2.0 * error * last.length();
                 if is_coincident || (factor != 1.0 && across && last != DVec3::ZERO) {
                     return (None, carried);
@@ -446,8 +445,9 @@ impl<'a> Checker<'a> {
             } else if is_coincident {
                 return (None, carried);
             }
-            let confined = bounds.confine(twin[i], error + U * points[i].length());
-            (Some(pair(i, wide(value), twin[i], confined.error)), carried)
+            let confined = bounds.confine(to, error + U * points[i].length());
+            let moved = pair(i, wide(value), twin[i].position, confined.error);
+            (Some(moved), carried)
         };
         let all: Vec<_> = handled(&phase).into_par_iter().map(one).collect();
         let count = all.len();

@@ -31,11 +31,11 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// By the prediction: `tolerance` of each particle's position, metres.
+    /// By the prediction: `push_error` of what the walls add to each particle's position, metres.
     pub(super) fn predict_work(
         &mut self,
         traced: Traced<'_>,
-        tolerance: &[f64],
+        push_error: &[f64],
     ) -> Result<(), SolveError> {
         let n = self.n();
         let work = traced.read::<f32>("wall_work", 2 * n)?;
@@ -45,7 +45,7 @@ impl Checker<'_> {
             .map(|i| {
                 let (x, v) = (wide(&position[i]), wide(&velocity[i]));
                 let (_, _, twin) = passes::predict_and_work(&self.model, &self.substep, x, v);
-                let error = 3.0 * speed * (tolerance[i] + U * x.length()) + 4.0 * U * twin.abs();
+                let error = 3.0 * speed * (push_error[i] + U * x.length()) + 4.0 * U * twin.abs();
                 pair_of(i, f64::from(work[n + i]), twin, error)
             })
             .collect();
@@ -63,7 +63,7 @@ impl Checker<'_> {
         let (points, lambda) = self.stored(&phase);
         let is_plain = self.scene.solver.pbf().iteration != Iteration::Chebyshev;
         let inputs = self.inputs(&points, neighbors);
-        let twin = passes::compute_delta_and_work(inputs, Colour::All, None, &lambda);
+        let twin = passes::compute_delta(inputs, Colour::All, None, &lambda);
         let after = traced.read::<f32>("wall_work", self.n())?;
         let bounds = Bounds(inputs);
         let h = self.model.calibration.support_radius;
@@ -75,11 +75,11 @@ impl Checker<'_> {
                 return None;
             }
             let (before, after) = (f64::from(self.work[i]), f64::from(after[i]));
-            let (to, added) = twin[i];
+            let (to, added) = (twin[i].free, twin[i].work);
             let step = (to - points[i]).length();
             let error = bounds.delta(i, &lambda) + 16.0 * U * step;
             let confined = bounds.confine(to, error + U * points[i].length());
-            let tolerance = 3.0 * speed * (error + confined.error + U * points[i].length())
+            let tolerance = 3.0 * speed * (error + confined.push_error + U * points[i].length())
                 + 2.0 * U * (before.abs() + after.abs())
                 + 16.0 * U * added.abs();
             Some(pair_of(i, after, before + added, tolerance))
