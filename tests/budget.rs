@@ -1,6 +1,7 @@
 //! `[budget]`: what holds, what breaks it, what is kept of a frame that could not be made, and which pass was at fault.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
+mod budget_replay;
 #[path = "support/job.rs"]
 mod job;
 

@@ -2,12 +2,13 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
 mod check_controls;
+mod check_frames;
 mod support;
 
 use swell::{
     domain::{
         motion::Motion, particles::Particles, sampling::BoundarySample,
-        signed_distance::SignedDistance,
+        signed_distance::SignedDistance, substep::Which,
     },
     gpu::adapter::{Context, Needs, Spoil},
     scene::{
@@ -199,8 +200,10 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
     moved.samples[4].area *= 1.00001;
     let plan = start.plan(&scene, device_limits(&context));
     let boundaries = [&start.boundary, &moved];
-    let table = pbf::check(&context, &scene, plan, boundaries, 0, &start.particles).unwrap();
-    let found = over(&table);
+    let state = (0, &start.particles);
+    let first = Which::default();
+    let checked = pbf::check(&context, &scene, plan, boundaries, state, first).unwrap();
+    let found = over(&checked.table);
     assert!(
         found.contains(&("upload of solids", "sample positions")),
         "{found:?}"
@@ -328,14 +331,10 @@ fn pbf_lists_in_chunks_and_none() {
         assert_eq!((plan.chunks.len(), plan.has_lists), (chunks, has_lists));
         let checked = |context: &Context| {
             let boundaries = [&start.boundary; 2];
-            pbf::check(
-                context,
-                &scene,
-                plan.clone(),
-                boundaries,
-                0,
-                &start.particles,
-            )
+            let state = (0, &start.particles);
+            let plan = plan.clone();
+            let first = Which::default();
+            Ok(pbf::check(context, &scene, plan, boundaries, state, first)?.table)
         };
         all += &faults(&context, &checked, controls).1;
     }

@@ -388,6 +388,35 @@ fn a_check_without_water_is_refused() {
     }
 }
 
+/// Which substep is checked is said; one that the frame does not have is refused with how many there are.
+#[test]
+fn a_check_takes_any_substep_of_a_frame() {
+    let job = Job::new();
+    for (solver, cfl) in [("pbf", 0.01), ("flip", 0.01)] {
+        let set = format!("--set solver.{solver}.cfl={cfl} --progress none");
+        let check = format!("check small.toml --solver {solver} {set}");
+        let said = job.expect(2, &format!("{check} --substep 9999"));
+        let (_, count) = said.split_once("the frame after frame 0 has ").unwrap();
+        let count: u32 = count.trim().parse().unwrap();
+        assert!(count > 1, "{said}");
+        let said = job.expect(0, &format!("{check} --substep last"));
+        assert!(
+            said.contains(&format!("substep {count} after frame 0\n")),
+            "{said}"
+        );
+        let json = job.json(0, &format!("{check} --substep {count}"));
+        assert_eq!(
+            (&json["frames"], &json["substeps"]),
+            (&serde_json::json!([0]), &serde_json::json!([count]))
+        );
+        job.expect(2, &format!("{check} --substep {}", count + 1));
+    }
+    let said = job.expect(0, "check small.toml");
+    assert!(said.contains("substep 1 after frame 0\n"), "{said}");
+    let said = job.expect(2, "check small.toml --substep 0");
+    assert!(said.contains("from 1 on, or last"), "{said}");
+}
+
 #[test]
 fn a_new_look_leaves_the_cache_as_it_is() {
     let job = Job::new();

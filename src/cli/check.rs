@@ -6,10 +6,10 @@ use clap::Args;
 use serde_json::json;
 
 use crate::{
-    domain::frame_range::FrameRange,
+    domain::{frame_range::FrameRange, substep::Which},
     scene::Method,
     stage::{
-        check::{Event, Outcome, Request, Row, Source, Table, check},
+        check::{Event, FirstOver, Outcome, Request, Row, Source, Table, check},
         replay::{Replayed, is_failed, replay_failed},
     },
 };
@@ -30,6 +30,10 @@ pub(super) struct CheckArgs {
     /// Frames of the cache from which the step is taken, such as 1,30,72; its last where left out.
     #[arg(long, value_name = "FRAMES")]
     frames: Option<FrameRange>,
+    /// Substep of the frame after each that is checked: a number from 1 on, or last. The ones before it run, and are not
+    /// compared. With 1, the default, a frame of a cache is itself what the passes read.
+    #[arg(long, value_name = "N|last")]
+    substep: Option<Which>,
     /// Of a scene: which solver, pbf or flip.
     #[arg(long, value_name = "SOLVER", value_parser = bake::method)]
     solver: Option<Method>,
@@ -62,9 +66,10 @@ pub(super) struct Misplaced {
 
 /// What a failed bake left, computed again: the line that the bake ended with, or that it now goes well.
 fn run_failed(args: &CheckArgs) -> Result<u8, Failure> {
-    if args.frames.is_some() || args.solver.is_some() || !args.set.is_empty() {
+    let has_solver = args.solver.is_some() || !args.set.is_empty();
+    if args.frames.is_some() || args.substep.is_some() || has_solver {
         let error = Misplaced {
-            option: "--frames, --solver or --set",
+            option: "--frames, --substep, --solver or --set",
             what: "caches or scenes",
             is: "a frame that failed: it says itself how it was baked",
             source_file: args.source.clone(),
@@ -91,6 +96,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     }
     let request = Request {
         source: source(args)?,
+        substep: args.substep.unwrap_or_default(),
         adapter: args.adapter.clone(),
     };
     let interrupt = Interrupt::install_or_warn();
@@ -105,7 +111,9 @@ pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     if args.json {
         output::print(&format!("{}\n", to_json(&outcome)));
     } else {
-        output::print(&format!("{}{}\n", show(&outcome.table), verdict(&outcome)));
+        let table = show(&outcome.table);
+        let substeps = show_substeps(&outcome);
+        output::print(&format!("{substeps}{table}{}\n", verdict(&outcome)));
     }
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
@@ -161,20 +169,26 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: &Event<'_>) {
         }
         Event::Frame {
             frame,
-            table,
+            checked,
             seconds,
         } => {
             let Some(progress) = progress.get() else {
                 return;
             };
-            let over = table.rows.iter().filter(|row| !row.is_within()).count();
+            let rows = &checked.table.rows;
+            let over = rows.iter().filter(|row| !row.is_within()).count();
+            let substep = checked
+                .substep
+                .map(|substep| format!(", substep {substep}"));
             progress.frame(
                 &format!(
-                    "frame {frame:4}  {seconds:6.2} s  {} rows, {over} out of tolerance",
-                    table.rows.len()
+                    "frame {frame:4}{}  {seconds:6.2} s  {} rows, {over} out of tolerance",
+                    substep.unwrap_or_default(),
+                    rows.len()
                 ),
                 json!({
-                    "event": "frame", "frame": frame, "seconds": seconds, "rows": table.rows.len(), "over": over,
+                    "event": "frame", "frame": frame, "substep": checked.substep, "seconds": seconds, "rows": rows.len(),
+                    "over": over,
                 }),
             );
         }
@@ -184,9 +198,14 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: &Event<'_>) {
 fn to_json(outcome: &Outcome) -> serde_json::Value {
     let first = outcome
         .first_over
-        .map(|(frame, pass, field)| json!({ "frame": frame, "pass": pass, "field": field }));
+        .map(|first| {
+            json!({
+                "frame": first.frame, "substep": first.substep, "pass": first.pass, "field": first.field,
+            })
+        });
     json!({
         "frames": outcome.frames,
+        "substeps": outcome.substeps,
         "interrupted": outcome.interrupted,
         "within": outcome.first_over.is_none(),
         "first_over": first,
@@ -239,20 +258,41 @@ fn show(table: &Table) -> String {
     text
 }
 
+/// Which substeps the table is of.
+fn show_substeps(outcome: &Outcome) -> String {
+    let checked = outcome.frames.iter().zip(&outcome.substeps);
+    let all: Vec<String> = checked
+        .map(|(frame, substep)| match substep {
+            Some(substep) => format!("substep {substep} after frame {frame}"),
+            None => format!("no water in frame {frame}"),
+        })
+        .collect();
+    match all.is_empty() {
+        true => String::new(),
+        false => format!("{}\n", all.join(", ")),
+    }
+}
+
 fn verdict(outcome: &Outcome) -> String {
     match outcome.first_over {
         None if outcome.interrupted => {
             format!("ended by a signal after {} frames", outcome.frames.len())
         }
         None => "all within tolerance".into(),
-        Some((frame, pass, field)) => {
+        Some(FirstOver {
+            frame,
+            substep,
+            pass,
+            field,
+        }) => {
             let rows = &outcome.table.rows;
             let row = rows
                 .iter()
                 .find(|row| row.field.pass == pass && row.field.name == field);
             let why = row.map_or("", |row| row.field.derivation);
             format!(
-                "out of tolerance: {pass} first, its {field}, in the step after frame {frame}; allowed there: {why}"
+                "out of tolerance: {pass} first, its {field}, in substep {} after frame {frame}; allowed there: {why}",
+                substep.unwrap_or_default()
             )
         }
     }

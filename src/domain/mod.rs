@@ -22,6 +22,7 @@ pub mod solver;
 pub mod sparse_grid;
 pub mod sph;
 pub mod statistics;
+pub mod substep;
 pub mod surface;
 pub mod tolerance;
 mod voxels;

@@ -26,8 +26,8 @@ pub struct Binding {
     pub index: u32,
     /// Uniform or storage.
     pub access: Access,
-    /// Whether it is an array of floats or of vectors of them.
-    pub is_float: bool,
+    /// Bytes of a float, where it is an array of floats or of vectors of them.
+    pub float_bytes: Option<u8>,
 }
 
 /// A `struct` of the shader as WGSL lays it out.
@@ -56,12 +56,13 @@ pub struct Reflection {
     pub has_f64: bool,
 }
 
-fn is_float(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
+fn float_bytes(module: &naga::Module, ty: naga::Handle<naga::Type>) -> Option<u8> {
     let scalar = match module.types[ty].inner {
         TypeInner::Array { base, .. } => module.types[base].inner.scalar(),
         _ => None,
     };
-    scalar.is_some_and(|scalar| scalar.kind == naga::ScalarKind::Float)
+    let float = scalar.filter(|scalar| scalar.kind == naga::ScalarKind::Float)?;
+    Some(float.width)
 }
 
 /// Reads the single compute entry point of `wgsl`.
@@ -116,7 +117,7 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
             name,
             index: place.binding,
             access,
-            is_float: is_float(&module, variable.ty),
+            float_bytes: float_bytes(&module, variable.ty),
         });
     }
     bindings.sort_by_key(|binding| binding.index);

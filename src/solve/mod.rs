@@ -47,6 +47,16 @@ pub enum SolveError {
         /// Particles of the state.
         given: usize,
     },
+    /// A substep that a frame does not have.
+    #[error("substep {asked} was asked for, and the frame after frame {frame} has {count}")]
+    NoSubstep {
+        /// From 1.
+        asked: u32,
+        /// The frame before.
+        frame: u32,
+        /// Substeps that the frame has.
+        count: u32,
+    },
     /// The numbers failed; the state before this frame stands.
     #[error(transparent)]
     Numbers(#[from] Breach),

@@ -1,4 +1,5 @@
-//! Rust mirrors of the uniforms; a test holds them against naga's layout of the WGSL structs.
+//! Rust mirrors of the uniforms, which a test holds against naga's layout of the WGSL structs, and of the words that
+//! passes count in.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -179,3 +180,33 @@ mirror!(
         padding: [u32; 2],
     }
 );
+
+/// `counters`, which passes of both solvers add to over a frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Counters {
+    /// Times that a particle was slowed to the displacement cap.
+    pub capped: u32,
+    /// Times that a particle of PBF had more neighbours than its list holds.
+    pub searched: u32,
+    /// Iterations of PBF until a density error.
+    pub iterations: u32,
+    /// Values that are not finite.
+    pub not_finite: u32,
+}
+
+/// `control` of PBF's iteration until a density error; pbf/decide ends it by emptying the dispatches to come.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct IterationControl {
+    /// 1 once the error is small enough.
+    pub is_done: u32,
+    /// Iterations so far.
+    pub iterations: u32,
+    /// 0.
+    pub unused: [u32; 2],
+    /// Workgroups of a dispatch over all particles, and 0.
+    pub all: [u32; 4],
+    /// Of one over a colour.
+    pub colour: [u32; 4],
+}

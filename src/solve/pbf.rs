@@ -11,6 +11,7 @@ use crate::{
         probe::fitted,
         solver::{Solver, StepReport},
         sph::Calibration,
+        substep::Which,
     },
     gpu::{
         adapter::Context,
@@ -27,9 +28,9 @@ use crate::{
 use super::{
     SolveError,
     iteration::Builder,
-    params::Params,
+    params::{Counters, IterationControl, Params},
     state::{check_finite, check_ids, slots_by_id, take_over, upload},
-    trace::{TraceFrame, Traced, trace},
+    trace::{Begun, Observe, Span, TraceFrame, Traced, trace},
 };
 
 /// Far from everything, and still finite when squared.
@@ -160,7 +161,7 @@ impl Pbf {
 
     /// Zeroes what adds up over a frame.
     fn begin_frame(&self) {
-        self.program.upload("counters", 0, &[0u32; 4]);
+        self.program.upload("counters", 0, &[Counters::default()]);
         if self.scene.has_movers() {
             let groups = self.plan.counts.particles.div_ceil(64);
             self.program
@@ -182,30 +183,13 @@ impl Pbf {
     fn prepare_substep(&self, time: f64, step: f64) {
         self.program.upload("params", 0, &[self.params(time, step)]);
         if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {
-            self.program.upload("control", 0, &self.control());
+            self.program.upload("control", 0, &[self.control()]);
         }
     }
 
     fn run_substep(&mut self, time: f64, step: f64) -> Result<(), SolveError> {
         self.prepare_substep(time, step);
         Ok(self.substep.run(&self.program, self.timer.as_mut())?)
-    }
-
-    /// Runs the first substep after the loaded state, and the measurement of a frame's end, one dispatch at a time.
-    /// The solver then has to be loaded anew.
-    ///
-    /// # Errors
-    /// The device, more substeps than are allowed, and what `observe` returns.
-    pub fn trace(
-        &self,
-        observe: &mut dyn FnMut(Traced<'_>) -> Result<(), SolveError>,
-    ) -> Result<(), SolveError> {
-        let (time, step) = self.substep_of(self.substeps()?, 1);
-        self.begin_frame();
-        self.prepare_substep(time, step);
-        trace(&[&self.substep], &self.program, observe)?;
-        self.program.upload("params", 0, &[self.params(time, 0.0)]);
-        trace(&[&self.measure], &self.program, observe)
     }
 
     /// Substeps of the next frame.
@@ -222,7 +206,7 @@ impl Pbf {
     }
 
     /// A fresh `control`: not done, no iterations, and the groups of the largest chunk over all and over a colour.
-    fn control(&self) -> [u32; 12] {
+    fn control(&self) -> IterationControl {
         let largest = self
             .plan
             .chunks
@@ -232,7 +216,11 @@ impl Pbf {
             .unwrap_or(0);
         let [x, y, z] = spread(&self.program.context, 64, largest);
         let [half_x, half_y, half_z] = spread(&self.program.context, 64, largest.div_ceil(2));
-        [0, 0, 0, 0, x, y, z, 0, half_x, half_y, half_z, 0]
+        IterationControl {
+            all: [x, y, z, 0],
+            colour: [half_x, half_y, half_z, 0],
+            ..IterationControl::default()
+        }
     }
 
     /// As [`Calibration::pressure_scale`] has it from Σ λ; in sorted order, before the state is uploaded again.
@@ -253,22 +241,21 @@ impl Pbf {
     }
 
     /// Sorts at the frame's last positions, measures density there, and reads everything back.
-    fn read_state(&mut self, time: f64) -> Result<(Vec<f64>, [u32; 4]), SolveError> {
+    fn read_state(&mut self, time: f64) -> Result<(Vec<f64>, Counters), SolveError> {
         self.program.upload("params", 0, &[self.params(time, 0.0)]);
         self.measure.run(&self.program, self.timer.as_mut())?;
         let n = self.plan.counts.particles;
         let vectors = self
             .program
             .download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
-        let words =
-            self.program
-                .download::<u32>(&[("id", n), ("sorted_id", n), ("counters", 4)])?;
+        let wanted = [("id", n), ("sorted_id", n), ("counters", 4)];
+        let words = self.program.download::<u32>(&wanted)?;
         let ([position, velocity], [id, sorted_id, counters]) =
             (vectors.as_slice(), words.as_slice())
         else {
             unreachable!("one vector a buffer");
         };
-        let counters = [counters[0], counters[1], counters[2], counters[3]];
+        let counters = bytemuck::pod_read_unaligned(bytemuck::cast_slice(counters));
         let density = self.field::<f32>("density", n)?;
 
         check_ids(self.frame + 1, &self.state.id, id)?;
@@ -316,14 +303,14 @@ impl Solver for Pbf {
             let (time, step) = self.substep_of(substeps, k);
             self.run_substep(time, step)?;
         }
-        let (density, [capped, searched, adaptive_iterations, not_finite]) =
-            self.read_state(start + length)?;
+        let (density, counters) = self.read_state(start + length)?;
         if !self.scene.pressure_points().is_empty() {
             self.pressed = self.particle_pressures(length / f64::from(substeps))?;
         }
         self.frame += 1;
-        if not_finite > 0 {
-            return Err(Breach::not_finite(self.frame, not_finite.into(), None).into());
+        if counters.not_finite > 0 {
+            let count = counters.not_finite.into();
+            return Err(Breach::not_finite(self.frame, count, None).into());
         }
         check_finite(self.frame, &self.state, Some(&density))?;
         if self.scene.domain.min != DVec3::ZERO {
@@ -332,13 +319,13 @@ impl Solver for Pbf {
         }
         let iterations = match self.scene.solver.pbf().stop {
             Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
-            Stop::DensityError { .. } => u64::from(adaptive_iterations),
+            Stop::DensityError { .. } => u64::from(counters.iterations),
         };
         let report = StepReport {
             substeps,
             iterations,
-            capped: u64::from(capped),
-            searched: u64::from(searched),
+            capped: u64::from(counters.capped),
+            searched: u64::from(counters.searched),
             boundary_work: self.boundary_work(length / f64::from(substeps))?,
             ..self.scene.report(&self.state, density.into_iter())
         };
@@ -366,27 +353,38 @@ impl Solver for Pbf {
 }
 
 impl TraceFrame for Pbf {
-    fn trace_frame(
-        &mut self,
-        from: u32,
-        observe: &mut dyn FnMut(u32, Traced<'_>) -> Result<(), SolveError>,
-    ) -> Result<(), SolveError> {
-        let substeps = self.substeps()?;
-        self.begin_frame();
-        for k in 1..=substeps {
-            let (time, step) = self.substep_of(substeps, k);
-            if k < from {
-                self.run_substep(time, step)?;
-                continue;
-            }
-            self.prepare_substep(time, step);
-            let told = &mut |traced: Traced<'_>| observe(k, traced);
-            trace(&[&self.substep], &self.program, told)?;
+    fn trace_frame(&mut self, span: Span, observe: &mut Observe<'_>) -> Result<u32, SolveError> {
+        let count = self.substeps()?;
+        let (first, last) = match span {
+            Span::From(first) => (first, count),
+            Span::Only(Which::Last) => (count, count),
+            Span::Only(Which::Number(number)) => (number, number),
+        };
+        if last > count {
+            return Err(SolveError::NoSubstep {
+                asked: last,
+                frame: self.frame,
+                count,
+            });
         }
-        let end = f64::from(self.frame + 1) * self.scene.shot.frame_seconds();
-        self.program.upload("params", 0, &[self.params(end, 0.0)]);
-        let told = &mut |traced: Traced<'_>| observe(substeps, traced);
-        trace(&[&self.measure], &self.program, told)
+        self.begin_frame();
+        for number in 1..first {
+            let (time, step) = self.substep_of(count, number);
+            self.run_substep(time, step)?;
+        }
+        for number in first..=last {
+            let (time, step) = self.substep_of(count, number);
+            let elapsed = f64::from(number - 1) * step;
+            let begun = Begun { number, elapsed };
+            let told = &mut |traced: Traced<'_>| observe(begun, traced);
+            self.prepare_substep(time, step);
+            trace(&[&self.substep], &self.program, told)?;
+            if number == last {
+                self.program.upload("params", 0, &[self.params(time, 0.0)]);
+                trace(&[&self.measure], &self.program, told)?;
+            }
+        }
+        Ok(last)
     }
 }
 

@@ -1,15 +1,20 @@
 //! A substep run dispatch by dispatch, for whoever holds each pass against its f64 twin.
 
 use crate::{
-    domain::solver::Solver,
+    domain::{solver::Solver, substep::Which},
     gpu::{
         program::Program,
         recording::{Bind, Moment, Recording},
-        reflect::Access,
+        reflect::{Access, Binding},
     },
+    scene::flip::Precision,
 };
 
-use super::SolveError;
+use super::{
+    SolveError,
+    params::{Counters, IterationControl},
+    pressure::{PressureControl64, PressureStats, control_words, widen_control},
+};
 
 /// A dispatch of a traced substep, just before or after it runs.
 #[derive(Clone, Copy)]
@@ -30,6 +35,44 @@ impl Traced<'_> {
     /// The device.
     pub fn read<T: bytemuck::Pod>(&self, buffer: &str, count: usize) -> Result<Vec<T>, SolveError> {
         Ok(self.program.download(&[(buffer, count)])?.remove(0))
+    }
+
+    /// What stands in a buffer of one struct, or in front of others.
+    fn one<T: bytemuck::Pod>(&self, buffer: &str) -> Result<T, SolveError> {
+        Ok(self.read(buffer, 1)?.remove(0))
+    }
+
+    /// What passes have counted.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn counters(&self) -> Result<Counters, SolveError> {
+        self.one("counters")
+    }
+
+    /// PBF's iteration until a density error.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn iteration_control(&self) -> Result<IterationControl, SolveError> {
+        self.one("control")
+    }
+
+    /// The scalars of a projection in `precision`, on which their layout depends.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn pressure_control(&self, precision: Precision) -> Result<PressureControl64, SolveError> {
+        let words: Vec<u32> = self.read("pressure_control", control_words(precision))?;
+        Ok(widen_control(&words, precision))
+    }
+
+    /// What a projection has noted.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn pressure_stats(&self) -> Result<PressureStats, SolveError> {
+        self.one("pressure_stats")
     }
 
     /// Name of the buffer that a variable is bound to.
@@ -53,19 +96,16 @@ impl Traced<'_> {
 }
 
 impl Traced<'_> {
-    /// Names of the buffers that the dispatch writes, of floats or of all.
-    fn written(&self, floats_only: bool) -> impl Iterator<Item = &str> {
+    /// What the dispatch writes.
+    fn written(&self) -> impl Iterator<Item = &Binding> {
         let bindings = self.program.pass(self.pass).bindings.iter();
-        bindings
-            .filter(move |binding| {
-                binding.access == Access::ReadWrite && (binding.is_float || !floats_only)
-            })
-            .map(|binding| self.buffer(&binding.name))
+        bindings.filter(|binding| binding.access == Access::ReadWrite)
     }
 
     /// Whether the dispatch writes a buffer.
     pub fn writes(&self, buffer: &str) -> bool {
-        self.written(false).any(|written| written == buffer)
+        self.written()
+            .any(|binding| self.buffer(&binding.name) == buffer)
     }
 
     /// How many values of `T` a buffer holds.
@@ -78,9 +118,13 @@ impl Traced<'_> {
     /// # Errors
     /// The device.
     pub fn first_not_finite(&self) -> Result<Option<String>, SolveError> {
-        for buffer in self.written(true) {
-            let values: Vec<f32> = self.read(buffer, self.length::<f32>(buffer))?;
-            if !values.iter().all(|value| value.is_finite()) {
+        for binding in self.written() {
+            let Some(bytes) = binding.float_bytes else {
+                continue;
+            };
+            let buffer = self.buffer(&binding.name);
+            let words: Vec<u32> = self.read(buffer, self.length::<u32>(buffer))?;
+            if !are_finite(&words, bytes) {
                 return Ok(Some(buffer.to_owned()));
             }
         }
@@ -88,18 +132,46 @@ impl Traced<'_> {
     }
 }
 
+/// Whether floats of so many bytes are finite, by their exponents: the higher word of an f64 holds it.
+fn are_finite(words: &[u32], bytes: u8) -> bool {
+    let (width, exponent) = match bytes {
+        8 => (2, 0x7ff0_0000),
+        _ => (1, 0x7f80_0000),
+    };
+    let mut high = words.iter().skip(width - 1).step_by(width);
+    high.all(|word| word & exponent != exponent)
+}
+
+/// Which substeps of a frame are traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Span {
+    /// From one on, counted from 1, to the frame's end.
+    From(u32),
+    /// One.
+    Only(Which),
+}
+
+/// A substep that is traced.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Begun {
+    /// From 1.
+    pub number: u32,
+    /// Seconds of the frame that were over when it began.
+    pub elapsed: f64,
+}
+
+/// What a trace tells.
+pub type Observe<'a> = dyn FnMut(Begun, Traced<'_>) -> Result<(), SolveError> + 'a;
+
 /// A solver whose frames can be run dispatch by dispatch.
 pub trait TraceFrame: Solver {
-    /// Runs the frame after the loaded state, from substep `from` on, counted from 1, one dispatch at a time; `observe`
-    /// is told the substep. The solver then has to be loaded anew.
+    /// Runs the frame after the loaded state: what comes before `span` at once, and its substeps one dispatch at a time, with
+    /// PBF the measurement of a frame's end after the last of them too. Returns that one's number. The solver then has to
+    /// be loaded anew.
     ///
     /// # Errors
-    /// The device, the numbers, and what `observe` returns.
-    fn trace_frame(
-        &mut self,
-        from: u32,
-        observe: &mut dyn FnMut(u32, Traced<'_>) -> Result<(), SolveError>,
-    ) -> Result<(), SolveError>;
+    /// The device, the numbers, fewer substeps than were asked for, and what `observe` returns.
+    fn trace_frame(&mut self, span: Span, observe: &mut Observe<'_>) -> Result<u32, SolveError>;
 }
 
 /// What runs recordings one after the other: at once, timed, or traced.
@@ -121,4 +193,26 @@ pub(super) fn trace(
             })
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floats_are_finite_by_the_word_that_holds_their_exponent() {
+        let wide = |value: f64| [value.to_bits() as u32, (value.to_bits() >> 32) as u32];
+        // The lower word of this number is an f32 that is none.
+        let odd = f64::from_bits(0x3ff0_0000_7fc0_0000);
+        assert!(are_finite(
+            &[wide(1.0), wide(odd), wide(-f64::MAX)].concat(),
+            8
+        ));
+        assert!(!are_finite(&wide(odd), 4));
+        for value in [f64::NAN, f64::NEG_INFINITY] {
+            assert!(!are_finite(&[wide(1.0), wide(value)].concat(), 8));
+            assert!(!are_finite(&[(value as f32).to_bits()], 4));
+        }
+        assert!(are_finite(&[f32::MAX.to_bits(), 0], 4));
+    }
 }

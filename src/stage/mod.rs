@@ -55,6 +55,7 @@ impl From<&SolveError> for Blame {
         match error {
             SolveError::Gpu(error) => error.into(),
             SolveError::Count { .. } => Self::Files,
+            SolveError::NoSubstep { .. } => Self::Input,
             SolveError::Numbers(_) => Self::Numbers,
         }
     }

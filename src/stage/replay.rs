@@ -12,6 +12,7 @@ use crate::{
         frame::Stamp,
     },
     domain::{
+        bricks::CELLS,
         budget::{Breach, Watched},
         particles::Particles,
         signed_distance::SignedDistanceError,
@@ -27,8 +28,8 @@ use crate::{
         flip::Flip,
         params::FlipParams,
         pbf::{Pbf, device_limits},
-        pressure::PressureControl,
-        trace::{TraceFrame, Traced},
+        pressure::DONE,
+        trace::{Begun, Span, TraceFrame, Traced},
     },
 };
 
@@ -122,7 +123,7 @@ pub fn replay(
         made,
         energy,
         start_volume,
-        is_projected: false,
+        is_correcting: false,
         place: None,
     };
     let plan = start.plan(scene, device_limits(context));
@@ -144,13 +145,13 @@ struct Finder<'a> {
     made: Option<StepReport>,
     energy: f64,
     start_volume: Option<f64>,
-    /// Whether the substep's projection is over: what is solved then is the density correction.
-    is_projected: bool,
+    /// Whether the substep has come to the density correction: its residual has no budget.
+    is_correcting: bool,
     place: Option<Place>,
 }
 
-/// State of a solve that is over, of shared/pressure_control.wgsl.
-const DONE: u32 = 2;
+/// Unit roundoff of f32.
+const U: f64 = 1.0 / (1 << 24) as f64;
 
 impl Finder<'_> {
     fn trace(
@@ -161,21 +162,22 @@ impl Finder<'_> {
         solver.load(last, self.state)?;
         // PBF counts over a frame, so that the substep may not be known.
         let from = self.breach.substep.unwrap_or(1);
-        let traced = solver.trace_frame(from, &mut |substep, traced| self.observe(substep, traced));
+        let span = Span::From(from);
+        let traced = solver.trace_frame(span, &mut |begun, traced| self.observe(begun, traced));
         match traced {
             // Found, or the solver came upon it itself.
-            Ok(()) | Err(SolveError::Numbers(_)) => Ok(()),
+            Ok(_) | Err(SolveError::Numbers(_)) => Ok(()),
             Err(error) => Err(error),
         }
     }
 
-    fn observe(&mut self, substep: u32, traced: Traced<'_>) -> Result<(), SolveError> {
+    fn observe(&mut self, begun: Begun, traced: Traced<'_>) -> Result<(), SolveError> {
         if traced.moment == Moment::Before {
             return Ok(());
         }
         match traced.pass {
-            "flip/survey" => self.is_projected = false,
-            "pressure/project" => self.is_projected = true,
+            "flip/survey" => self.is_correcting = false,
+            "pressure/density_source" => self.is_correcting = true,
             _ => {}
         }
         let found = match traced.first_not_finite()? {
@@ -186,7 +188,7 @@ impl Finder<'_> {
             return Ok(());
         };
         self.place = Some(Place {
-            substep,
+            substep: begun.number,
             pass: traced.pass,
             buffer,
         });
@@ -213,10 +215,14 @@ impl Finder<'_> {
                 }
                 Ok(None)
             }
-            Watched::DensityErrorMean | Watched::DensityErrorP99 if traced.writes("density") => {
+            Watched::DensityErrorMean | Watched::DensityErrorP99 if is_measured(traced.pass) => {
                 let count = match self.scene.solver.method {
                     Method::Pbf => n,
-                    Method::Flip => traced.length::<f32>("density"),
+                    // Beyond the water of this substep stands that of others.
+                    Method::Flip => {
+                        let params: Vec<FlipParams> = traced.read("params", 1)?;
+                        (params[0].wet_cells + CELLS) as usize
+                    }
                 };
                 let mut density: Vec<f32> = traced.read("density", count)?;
                 if self.scene.solver.method == Method::Flip {
@@ -230,16 +236,17 @@ impl Finder<'_> {
                 };
                 Ok((measured > limit).then_some("density"))
             }
-            Watched::Residual if traced.pass == "pressure/reduce" && !self.is_projected => {
-                let control: Vec<PressureControl> = traced.read("pressure_control", 1)?;
-                let [r, b] = [control[0].residual_square, control[0].rhs_square].map(f64::from);
-                let is_over = control[0].state == DONE && r > limit * limit * b;
+            Watched::Residual if traced.pass == "pressure/reduce" && !self.is_correcting => {
+                let precision = self.scene.solver.flip().pressure.precision;
+                let control = traced.pressure_control(precision)?;
+                let is_over = control.state == DONE && control.residual() > limit;
                 Ok(is_over.then_some("pressure_control"))
             }
             Watched::Divergence if traced.pass == "pressure/measure_divergence" => {
-                let stats: Vec<f32> = traced.read("pressure_stats", 2)?;
+                let divergence = f64::from(traced.pressure_stats()?.divergence_after);
                 let params: Vec<FlipParams> = traced.read("params", 1)?;
-                let change = f64::from(stats[1]) * f64::from(params[0].time_step);
+                // The device's step is the rounded one.
+                let change = divergence * f64::from(params[0].time_step) * (1.0 + U);
                 Ok((change > limit).then_some("pressure_stats"))
             }
             Watched::Volume if traced.writes("position") => {
@@ -261,10 +268,10 @@ impl Finder<'_> {
                 Ok((energy > allowed).then_some("velocity"))
             }
             Watched::Capped if traced.writes("counters") => {
-                let counters: Vec<u32> = traced.read("counters", 1)?;
+                let capped = f64::from(traced.counters()?.capped);
                 let substeps = self.made.as_ref().map_or(1, |report| report.substeps);
                 let most = limit * n as f64 * f64::from(substeps);
-                Ok((f64::from(counters[0]) > most).then_some("counters"))
+                Ok((capped > most).then_some("counters"))
             }
             _ => Ok(None),
         }
@@ -315,6 +322,11 @@ impl Finder<'_> {
         let report = self.scene.report(&state, [].into_iter());
         Ok(self.scene.total_energy(state.len(), &report))
     }
+}
+
+/// Whether a pass leaves the densities that a frame's report is of: in an iteration those of PBF are not yet what it leaves.
+fn is_measured(pass: &str) -> bool {
+    matches!(pass, "pbf/measure_density" | "flip/gather_centers")
 }
 
 fn vector(v: &[f32; 4]) -> DVec3 {

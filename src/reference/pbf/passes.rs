@@ -170,6 +170,17 @@ pub struct Momentum<'a> {
     pub before: &'a [DVec3],
 }
 
+/// Where a correction takes a particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corrected {
+    /// Before walls and solids push it, metres.
+    pub free: DVec3,
+    /// After that, metres.
+    pub position: DVec3,
+    /// Work of moving walls on it, over m / Δt².
+    pub work: f64,
+}
+
 /// Δx_i = Σ_j (λ_i + λ_j + s_corr) ∇W / ρ0, metres, relaxed, bounded, and what walls and solids leave of it
 /// (pbf/compute_delta; Macklin and Müller 2013, eq. 14): the new positions of one colour, the others' as they are.
 pub fn compute_delta(
@@ -177,25 +188,18 @@ pub fn compute_delta(
     colour: Colour,
     momentum: Option<Momentum<'_>>,
     lambda: &[f64],
-) -> Vec<DVec3> {
-    let moved = compute_delta_and_work(inputs, colour, momentum, lambda);
-    moved.into_iter().map(|(x, _)| x).collect()
-}
-
-/// The same, and what moving walls did on each particle by it, over m / Δt².
-pub fn compute_delta_and_work(
-    inputs: Inputs<'_>,
-    colour: Colour,
-    momentum: Option<Momentum<'_>>,
-    lambda: &[f64],
-) -> Vec<(DVec3, f64)> {
+) -> Vec<Corrected> {
     let model = inputs.model;
     let part = |step: DVec3| (model.max_correction() / step.length().max(1e-30)).min(1.0);
     let bounded = |step: DVec3| step * part(step);
     let one = |i: usize| {
         let x = inputs.points[i];
         if !colour.holds(i) {
-            return (x, 0.0);
+            return Corrected {
+                free: x,
+                position: x,
+                work: 0.0,
+            };
         }
         let (_, wall) = model.wall_term(x, &inputs.substep.walls);
         let pairs = pair_corrections(inputs, i, lambda);
@@ -212,8 +216,14 @@ pub fn compute_delta_and_work(
                 work *= 2.0 * factor - 1.0;
             }
         }
-        let (x, push) = model.confine_by(x + delta, &inputs.substep.walls);
-        (x, work + inputs.substep.work_of_push(push))
+        let free = x + delta;
+        let (position, push) = model.confine_by(free, &inputs.substep.walls);
+        work += inputs.substep.work_of_push(push);
+        Corrected {
+            free,
+            position,
+            work,
+        }
     };
     (0..lambda.len())
         .into_par_iter()

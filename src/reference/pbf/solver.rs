@@ -137,7 +137,7 @@ impl Corrector<'_> {
         let before = &self.before[..];
         let momentum = factor.map(|factor| Momentum { factor, before });
         let moved = self.timings.time("pbf/compute_delta", || {
-            passes::compute_delta_and_work(inputs, colour, momentum, &self.lambda)
+            passes::compute_delta(inputs, colour, momentum, &self.lambda)
         });
         let sums = self.sorted.lambda_sum.iter_mut().zip(&self.lambda);
         for (_, (sum, lambda)) in sums.enumerate().filter(|(i, _)| colour.holds(*i)) {
@@ -148,9 +148,9 @@ impl Corrector<'_> {
             self.before.copy_from_slice(now);
         }
         let mut work = 0.0;
-        for (now, (x, of_walls)) in now.iter_mut().zip(moved) {
-            *now = x;
-            work += of_walls;
+        for (now, corrected) in now.iter_mut().zip(moved) {
+            *now = corrected.position;
+            work += corrected.work;
         }
         self.sorted.wall_work += work;
     }

@@ -18,6 +18,7 @@ use crate::{
         gauge::Gauge,
         particles::Particles,
         solver::{Projection, Solver, StepReport},
+        substep::Which,
     },
     gpu::{
         adapter::Context,
@@ -35,9 +36,10 @@ use crate::{
 use super::{
     SolveError,
     boundary::Movers,
+    params::Counters,
     pressure::{self, PressureSolver},
     state::{check_finite, check_ids, slots_by_id, take_over, upload},
-    trace::{Run, TraceFrame, Traced, trace},
+    trace::{Begun, Observe, Run, Span, TraceFrame, trace},
 };
 use record::{Recordings, groups, windows};
 use room::{bricks, capacity_of, no_water};
@@ -46,10 +48,6 @@ pub use room::capacity;
 
 /// Words of `survey` before the flags.
 const SURVEY_HEAD: usize = 4;
-
-/// Words of `counters`, and the one that counts what is not finite.
-const COUNTERS: usize = 4;
-const NOT_FINITE: usize = 3;
 
 /// FLIP on a device.
 pub struct Flip {
@@ -83,6 +81,8 @@ struct Told {
     projection: Projection,
     /// Joule.
     work: f64,
+    /// Of the frame, seconds.
+    elapsed: f64,
 }
 
 impl Told {
@@ -346,57 +346,48 @@ impl Flip {
             true => self.bricks.wet as usize * (CELLS / 64) as usize,
             false => 0,
         };
-        let mut wanted = vec![("counters", COUNTERS)];
+        let mut wanted = vec![("counters", size_of::<Counters>() / 4)];
         if groups > 0 {
             wanted.push(("boundary_work", groups));
         }
         let words = self.program.download::<u32>(&wanted)?;
-        match words[0][NOT_FINITE] {
-            0 => {}
-            count => {
-                let breach = Breach::not_finite(self.frame + 1, count.into(), None);
-                return Err(breach.in_substep(substep).into());
-            }
+        let counters: Counters = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&words[0]));
+        if counters.not_finite > 0 {
+            let breach = Breach::not_finite(self.frame + 1, counters.not_finite.into(), None);
+            return Err(breach.in_substep(substep).into());
         }
         let sums = words.get(1).into_iter().flatten();
         Ok(sums.map(|&bits| f64::from(f32::from_bits(bits))).sum())
     }
 
-    /// Runs the first substep after the loaded state one dispatch at a time. The solver then has to be loaded anew.
-    ///
-    /// # Errors
-    /// The device, the numbers, and what `observe` returns.
-    pub fn trace(
+    /// What the next substep is, and whether it is the frame's last.
+    fn look(
         &mut self,
-        observe: &mut dyn FnMut(Traced<'_>) -> Result<(), SolveError>,
-    ) -> Result<(), SolveError> {
-        let run: &mut Run<'_> = &mut |program, recordings| trace(recordings, program, observe);
-        self.program.upload("counters", 0, &[0u32; 4]);
-        let (survey, substep) = self.first_substep(run)?;
-        let mut told = Told {
-            substeps: 1,
-            ..Told::default()
-        };
-        self.run_substep(&survey.is_wet, &substep, &mut told, run)
+        told: &Told,
+        run: &mut Run<'_>,
+    ) -> Result<(Survey, Substep, bool), SolveError> {
+        let length = self.scene.shot.frame_seconds();
+        let start = f64::from(self.frame) * length + told.elapsed;
+        let survey = self.survey(run)?;
+        let (wanted, substep) =
+            self.choose(&survey, start, length - told.elapsed, told.substeps)?;
+        Ok((survey, substep, wanted <= 1.0))
+    }
+
+    /// The next substep; true where it was the frame's last.
+    fn go_on(&mut self, told: &mut Told, run: &mut Run<'_>) -> Result<bool, SolveError> {
+        let (survey, substep, is_last) = self.look(told, run)?;
+        told.substeps += 1;
+        self.run_substep(&survey.is_wet, &substep, told, run)?;
+        told.elapsed += substep.length;
+        Ok(is_last)
     }
 
     /// Substeps through one frame.
     fn run_substeps(&mut self, run: &mut Run<'_>) -> Result<Told, SolveError> {
-        let length = self.scene.shot.frame_seconds();
-        let start = f64::from(self.frame) * length;
         let mut told = Told::default();
-        let mut elapsed = 0.0;
-        loop {
-            let survey = self.survey(run)?;
-            let (wanted, substep) =
-                self.choose(&survey, start + elapsed, length - elapsed, told.substeps)?;
-            told.substeps += 1;
-            self.run_substep(&survey.is_wet, &substep, &mut told, run)?;
-            elapsed += substep.length;
-            if wanted <= 1.0 {
-                return Ok(told);
-            }
-        }
+        while !self.go_on(&mut told, run)? {}
+        Ok(told)
     }
 
     fn upload_state(&self) {
@@ -476,7 +467,7 @@ impl Solver for Flip {
     }
 
     fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
-        self.program.upload("counters", 0, &[0u32; COUNTERS]);
+        self.program.upload("counters", 0, &[Counters::default()]);
         let told = if self.state.is_empty() {
             Told::default()
         } else {
@@ -492,7 +483,7 @@ impl Solver for Flip {
         } else {
             self.densities()?
         };
-        let capped = self.field::<u32>("counters", 1)?[0];
+        let capped = self.field::<Counters>("counters", 1)?[0].capped;
         self.frame += 1;
         if self.scene.domain.min != DVec3::ZERO {
             // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
@@ -538,23 +529,42 @@ impl Solver for Flip {
 }
 
 impl TraceFrame for Flip {
-    fn trace_frame(
-        &mut self,
-        from: u32,
-        observe: &mut dyn FnMut(u32, Traced<'_>) -> Result<(), SolveError>,
-    ) -> Result<(), SolveError> {
-        let mut substep = 0;
-        let run: &mut Run<'_> = &mut |program, recordings| {
-            // Each substep begins with one.
-            let first = recordings.first().and_then(|first| first.passes().next());
-            substep += u32::from(first == Some("flip/survey"));
-            if substep < from {
-                return Ok(Recording::run_all(recordings, program, None)?);
+    fn trace_frame(&mut self, span: Span, observe: &mut Observe<'_>) -> Result<u32, SolveError> {
+        let plain: &mut Run<'_> =
+            &mut |program, recordings| Ok(Recording::run_all(recordings, program, None)?);
+        self.program.upload("counters", 0, &[Counters::default()]);
+        let mut told = Told::default();
+        loop {
+            let begun = Begun {
+                number: told.substeps + 1,
+                elapsed: told.elapsed,
+            };
+            let is_traced = match span {
+                Span::From(first) => begun.number >= first,
+                Span::Only(Which::Number(number)) => begun.number == number,
+                // A look ahead: the substep's own finds the same.
+                Span::Only(Which::Last) => self.look(&told, plain)?.2,
+            };
+            let is_last = if is_traced {
+                self.go_on(&mut told, &mut |program, recordings| {
+                    trace(recordings, program, &mut |traced| observe(begun, traced))
+                })?
+            } else {
+                self.go_on(&mut told, plain)?
+            };
+            match span {
+                Span::Only(_) if is_traced => return Ok(begun.number),
+                Span::Only(Which::Number(asked)) if is_last => {
+                    return Err(SolveError::NoSubstep {
+                        asked,
+                        frame: self.frame,
+                        count: told.substeps,
+                    });
+                }
+                _ if is_last => return Ok(told.substeps),
+                _ => {}
             }
-            trace(recordings, program, &mut |traced| observe(substep, traced))
-        };
-        self.program.upload("counters", 0, &[0u32; COUNTERS]);
-        self.run_substeps(run).map(|_| ())
+        }
     }
 }
 

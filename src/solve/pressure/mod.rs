@@ -53,7 +53,7 @@ use crate::{
 use super::{SolveError, trace::Run};
 
 pub use crate::domain::poisson::{AIR, FLUID, SOLID};
-pub use params::{PressureBrick, PressureControl, PressureControl64, PressurePhase};
+pub use params::{PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats};
 pub use plan::{buffers, passes};
 
 pub use plan::control_words;
@@ -66,13 +66,14 @@ pub const LEVELS: usize = 8;
 /// Relative residual of the density correction.
 pub const CORRECTION_TOLERANCE: f64 = 1e-2;
 
-/// Words of `pressure_stats`: the largest |∇·u| before and after and the largest mean over a pocket (bits of
-/// floats), dropped cells, pockets.
-const STATS: usize = 8;
-
-/// States of a solve, as in shared/pressure_control.wgsl.
-const DONE: u32 = 2;
-const WANTS_POCKETS: u32 = 3;
+/// `state` of a solve that iterates, as in shared/pressure_control.wgsl.
+pub const ITERATING: u32 = 0;
+/// Of one whose residual is computed afresh.
+pub const VERIFYING: u32 = 1;
+/// Of one that has ended.
+pub const DONE: u32 = 2;
+/// Of one that waits for the host to list the pockets.
+pub const WANTS_POCKETS: u32 = 3;
 
 /// Iterations submitted at once at most: a device that is done skips the rest, but not for nothing.
 const MOST_AT_ONCE: u32 = 64;
@@ -246,13 +247,12 @@ impl PressureSolver {
         self.pockets = 0;
         let tolerance = self.settings.tolerance;
         let (solved, stats) = self.solve(program, Task::Project, tolerance, run)?;
-        let measured = |k: usize| f64::from(f32::from_bits(stats[k]));
         Ok(Projected {
             solved,
-            divergence_before: measured(0),
-            divergence_after: measured(1),
-            incompatible: measured(2),
-            dropped: stats[3],
+            divergence_before: stats.divergence_before.into(),
+            divergence_after: stats.divergence_after.into(),
+            incompatible: stats.incompatible.into(),
+            dropped: stats.dropped,
             pockets: self.pockets,
         })
     }
@@ -316,7 +316,7 @@ impl PressureSolver {
         task: Task,
         tolerance: f64,
         run: &mut Run<'_>,
-    ) -> Result<(Solved, [u32; STATS]), SolveError> {
+    ) -> Result<(Solved, PressureStats), SolveError> {
         if self.phase.levels[0][1] == 0 {
             return Ok(Default::default());
         }
@@ -436,8 +436,7 @@ pub fn blocked(element: u32) -> usize {
 }
 
 fn solved(control: &PressureControl64, tolerance: f64) -> Solved {
-    let [r, b] = [control.residual_square, control.rhs_square];
-    let residual = if b == 0.0 { 0.0 } else { (r / b).sqrt() };
+    let residual = control.residual();
     Solved {
         iterations: control.iterations,
         residual,
@@ -449,14 +448,12 @@ fn solved(control: &PressureControl64, tolerance: f64) -> Solved {
 fn read(
     program: &Program,
     precision: Precision,
-) -> Result<(PressureControl64, [u32; STATS]), SolveError> {
-    let words = control_words(precision);
+) -> Result<(PressureControl64, PressureStats), SolveError> {
+    let words = [control_words(precision), size_of::<PressureStats>() / 4];
     let read =
-        program.download::<u32>(&[("pressure_control", words), ("pressure_stats", STATS)])?;
-    let control = widen_control(&read[0], precision);
-    let mut stats = [0; STATS];
-    stats.copy_from_slice(&read[1]);
-    Ok((control, stats))
+        program.download::<u32>(&[("pressure_control", words[0]), ("pressure_stats", words[1])])?;
+    let stats = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&read[1]));
+    Ok((widen_control(&read[0], precision), stats))
 }
 
 /// The room's own records: face neighbours, and the way up to the next level, of the first `levels` levels.

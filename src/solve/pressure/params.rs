@@ -76,6 +76,34 @@ control!(
     f64
 );
 
+impl PressureControl64 {
+    /// ‖r‖ / ‖b‖; 0 where b = 0.
+    pub fn residual(&self) -> f64 {
+        match self.rhs_square {
+            0.0 => 0.0,
+            square => (self.residual_square / square).sqrt(),
+        }
+    }
+}
+
+/// `pressure_stats`: f32 whatever the solve is in.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PressureStats {
+    /// Largest |∇·u| in a cell of water before the projection, 1/s.
+    pub divergence_before: f32,
+    /// The same after it.
+    pub divergence_after: f32,
+    /// Largest |mean of ∇·u| over a pocket, 1/s.
+    pub incompatible: f32,
+    /// Cells of water without an open face.
+    pub dropped: u32,
+    /// Bodies of water that no air touches.
+    pub pockets: u32,
+    /// 0.
+    pub unused: [u32; 3],
+}
+
 mirror!(
     /// `PressureBrick` of shared/pressure_site.wgsl.
     PressureBrick {

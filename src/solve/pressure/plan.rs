@@ -12,7 +12,7 @@ use crate::{
 
 use super::{
     LEVELS,
-    params::{PressureBrick, PressureControl, PressureControl64, PressurePhase},
+    params::{PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats},
 };
 
 /// Bytes between two phases in `pressure_phases`.
@@ -203,7 +203,7 @@ pub fn buffers(settings: &Pressure, has_correction: bool, capacity: usize) -> Ve
         // A sum a workgroup, and room for those that a dispatch in two dimensions adds.
         storage("pressure_sums", 4 * real * (capacity as u64 + 1024)),
         storage("pressure_control", 4 * control_words(precision) as u64),
-        storage("pressure_stats", 4 * super::STATS as u64),
+        storage("pressure_stats", size_of::<PressureStats>() as u64),
         storage("pressure_sizes", 16 * SIZES as u64),
         storage("pressure_groups", 3 * 16 * SIZES as u64),
         BufferSpec {

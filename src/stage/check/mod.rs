@@ -15,7 +15,10 @@ use glam::{DVec3, Vec4};
 use crate::{
     cache::{CacheError, CacheReader},
     compare::check::Pair,
-    domain::{frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError},
+    domain::{
+        frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
+        substep::Which,
+    },
     gpu::adapter::{Context, GpuError},
     scene::{Method, Scene, SceneError},
     solve::{SolveError, pbf::device_limits},
@@ -39,8 +42,32 @@ pub enum Source {
 pub struct Request {
     /// Inputs.
     pub source: Source,
+    /// Which substep of the frame after each.
+    pub substep: Which,
     /// Index or part of the name of an adapter.
     pub adapter: Option<String>,
+}
+
+/// A substep held against its twins.
+#[derive(Clone, Debug, Default)]
+pub struct Checked {
+    /// What was found; empty where there is no water.
+    pub table: Table,
+    /// Which substep of its frame it was, from 1; `None` where there is no water.
+    pub substep: Option<u32>,
+}
+
+/// The first row out of tolerance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FirstOver {
+    /// Frame that the step started from.
+    pub frame: u32,
+    /// Substep of the frame after it.
+    pub substep: Option<u32>,
+    /// Of the row.
+    pub pass: &'static str,
+    /// Of the row.
+    pub field: &'static str,
 }
 
 /// What a check has to tell while it runs.
@@ -61,8 +88,8 @@ pub enum Event<'a> {
     Frame {
         /// The frame that it started from.
         frame: u32,
-        /// What was found.
-        table: &'a Table,
+        /// What was found, and in which substep.
+        checked: &'a Checked,
         /// Wall clock for it.
         seconds: f64,
     },
@@ -73,10 +100,12 @@ pub enum Event<'a> {
 pub struct Outcome {
     /// All frames in one: of each row the value that is furthest out.
     pub table: Table,
-    /// The first frame with a row out of tolerance, and that row's pass and field.
-    pub first_over: Option<(u32, &'static str, &'static str)>,
+    /// The first row out of tolerance.
+    pub first_over: Option<FirstOver>,
     /// Frames checked.
     pub frames: Vec<u32>,
+    /// Of each, the substep of the frame after it that was checked.
+    pub substeps: Vec<Option<u32>>,
     /// Whether a signal ended it.
     pub interrupted: bool,
 }
@@ -150,16 +179,24 @@ pub fn check(
             Some(cache) => cache.read(frame)?,
             None => start.particles.clone(),
         };
-        let table = check_frame(&context, &scene, &start, frame, &particles)?;
+        let which = request.substep;
+        let checked = check_substep(&context, &scene, &start, frame, &particles, which)?;
         tell(Event::Frame {
             frame,
-            table: &table,
+            checked: &checked,
             seconds: begin.elapsed().as_secs_f64(),
         });
+        let Checked { table, substep } = checked;
         if let (None, Some(row)) = (outcome.first_over, table.first_over()) {
-            outcome.first_over = Some((frame, row.field.pass, row.field.name));
+            outcome.first_over = Some(FirstOver {
+                frame,
+                substep,
+                pass: row.field.pass,
+                field: row.field.name,
+            });
         }
         outcome.frames.push(frame);
+        outcome.substeps.push(substep);
         outcome.table.absorb(table);
     }
     if outcome.table.rows.is_empty() && !outcome.interrupted {
@@ -188,11 +225,10 @@ fn open(source: &Source) -> Result<(Scene, Option<CacheReader>, Vec<u32>), Check
     }
 }
 
-/// Checks the first substep after `particles`, the state at the end of `frame`; with PBF the measurement at a
-/// frame's end too.
+/// The first substep of [`check_substep`].
 ///
 /// # Errors
-/// The device, or the numbers of the solver.
+/// Likewise.
 pub fn check_frame(
     context: &Context,
     scene: &Scene,
@@ -200,11 +236,34 @@ pub fn check_frame(
     frame: u32,
     particles: &Particles,
 ) -> Result<Table, SolveError> {
+    let first = Which::default();
+    Ok(check_substep(context, scene, start, frame, particles, first)?.table)
+}
+
+/// Checks a substep of the frame after `particles`, the state at the end of `frame`: those before it run at once. With PBF
+/// the measurement at a frame's end too, as if the frame ended there.
+///
+/// # Errors
+/// The device, the numbers of the solver, and a substep that the frame does not have.
+pub fn check_substep(
+    context: &Context,
+    scene: &Scene,
+    start: &Start,
+    frame: u32,
+    particles: &Particles,
+    which: Which,
+) -> Result<Checked, SolveError> {
+    if particles.is_empty() {
+        return Ok(Checked::default());
+    }
     let plan = start.plan(scene, device_limits(context));
-    let boundaries = [&start.boundary; 2];
+    let boundary = &start.boundary;
     match scene.solver.method {
-        Method::Pbf => pbf::check(context, scene, plan, boundaries, frame, particles),
-        Method::Flip => flip::check(context, scene, plan, &start.boundary, frame, particles),
+        Method::Pbf => {
+            let boundaries = [boundary; 2];
+            pbf::check(context, scene, plan, boundaries, (frame, particles), which)
+        }
+        Method::Flip => flip::check(context, scene, plan, boundary, (frame, particles), which),
     }
 }
 

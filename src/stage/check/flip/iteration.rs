@@ -18,16 +18,14 @@ use crate::{
     scene::flip::Preconditioner,
     solve::{
         SolveError,
-        pressure::{PressureControl64, PressurePhase, blocked, control_words, widen_control},
+        pressure::{
+            DONE, ITERATING, PressureControl64, PressurePhase, VERIFYING, WANTS_POCKETS, blocked,
+        },
         trace::Traced,
     },
 };
 
-/// States of a solve and steps of `pressure/reduce`, as in the shaders.
-const ITERATING: u32 = 0;
-const VERIFYING: u32 = 1;
-const DONE: u32 = 2;
-const WANTS_POCKETS: u32 = 3;
+/// Steps of `pressure/reduce`, as in the shader.
 const BEGIN: u32 = 0;
 const DIRECTION: u32 = 1;
 const LENGTH: u32 = 2;
@@ -98,8 +96,7 @@ impl Checker<'_> {
     }
 
     fn control(&self, traced: Traced<'_>) -> Result<PressureControl64, SolveError> {
-        let words = traced.read::<u32>("pressure_control", control_words(self.precision()))?;
-        Ok(widen_control(&words, self.precision()))
+        traced.pressure_control(self.precision())
     }
 
     fn before(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
@@ -354,7 +351,7 @@ impl Checker<'_> {
     /// A pocket's cells have its least element for a label, all else 0.
     fn pockets(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
         let labels = self.cells::<u32>(traced, "pressure_label")?;
-        let counted = traced.read::<u32>("pressure_stats", 5)?[4];
+        let counted = traced.pressure_stats()?.pockets;
         let wet = (CELLS * (self.layout().bricks.wet + 1)) as usize;
         let system = &self.built().system;
         let pockets = system.pockets();
@@ -386,7 +383,7 @@ impl Checker<'_> {
             return Ok(());
         };
         let after = self.control(traced)?;
-        let found = traced.read::<u32>("pressure_stats", 5)?[4];
+        let found = traced.pressure_stats()?.pockets;
         // Of a brick's 8 cells a thread, its 64 threads, and the bricks.
         let (terms, unit) = (f64::from(phase.sum_count) / 256.0 + 60.0, self.unit());
         let expected = Expected::new(

@@ -18,15 +18,21 @@ use crate::{
         particles::Particles,
         poisson::FLUID,
         solver::Solver,
+        substep::Which,
     },
     gpu::{adapter::Context, recording::Moment},
     reference::flip::{Cloud, Faces, Given, Model, Room, Sorted, Step, assign_cells, survey},
     scene::{Scene, flip::Transfer, plan::Plan, step::Substep},
-    solve::{SolveError, flip::Flip, params::FlipParams, trace::Traced},
+    solve::{
+        SolveError,
+        flip::Flip,
+        params::FlipParams,
+        trace::{Begun, Span, TraceFrame, Traced},
+    },
 };
 
 use super::{
-    pair, pair_of,
+    Checked, pair, pair_of,
     sort::{SortCheck, check_slots},
     wide,
 };
@@ -51,21 +57,18 @@ const EXCEPTIONS: [(&str, &str); 6] = [
 const BOTH_HALVES: &str = "the twin of flip/gather_faces and flip/gather_centers does both halves";
 const LABELLED: &str = "what they make is held against its twin after pressure/count_pockets";
 
-/// Traces the first substep after `particles`, the state at the end of `frame`, and holds it against the reference.
+/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and holds it against the reference.
 ///
 /// # Errors
-/// The device, or the numbers of the solver.
+/// The device, the numbers of the solver, or a substep that the frame does not have.
 pub fn check(
     context: &Context,
     scene: &Scene,
     plan: Plan,
     boundary: &Boundary,
-    frame: u32,
-    particles: &Particles,
-) -> Result<Table, SolveError> {
-    if particles.is_empty() {
-        return Ok(Table::default());
-    }
+    (frame, particles): (u32, &Particles),
+    which: Which,
+) -> Result<Checked, SolveError> {
     let mut solver = Flip::new(context, scene, plan, boundary, false)?;
     solver.load(frame, particles)?;
     let mut checker = Checker {
@@ -74,6 +77,8 @@ pub fn check(
         model: Model::new(scene, boundary),
         n: particles.len(),
         frame,
+        begun: Begun::default(),
+        capped: 0,
         table: Table::default(),
         sort: SortCheck::default(),
         ran: Vec::new(),
@@ -88,8 +93,14 @@ pub fn check(
         is_done: false,
         iteration: iteration::Iteration::default(),
     };
-    solver.trace(&mut |traced| checker.observe(traced))?;
-    Ok(checker.finish())
+    let traced = solver.trace_frame(Span::Only(which), &mut |begun, traced| {
+        checker.begun = begun;
+        checker.observe(traced)
+    })?;
+    Ok(Checked {
+        table: checker.finish(),
+        substep: Some(traced),
+    })
 }
 
 /// Where the elements of a substep lie.
@@ -108,6 +119,9 @@ struct Checker<'a> {
     model: Model,
     n: usize,
     frame: u32,
+    begun: Begun,
+    /// Particles that substeps before have slowed.
+    capped: u32,
     table: Table,
     sort: SortCheck,
     ran: Vec<&'static str>,
@@ -148,6 +162,10 @@ impl Checker<'_> {
             (Moment::After, "flip/find_change") => self.find_change(traced),
             (Moment::After, "flip/extrapolate") => self.extrapolate(traced),
             (Moment::After, "flip/grid_to_particle") => self.grid_to_particle(traced),
+            (Moment::Before, "flip/advect") => {
+                self.capped = traced.counters()?.capped;
+                Ok(())
+            }
             (Moment::After, "flip/advect") => self.advect(traced),
             (Moment::After, "flip/boundary_work") => self.boundary_work(traced),
             (_, pass) if pass.starts_with("pressure/") => self.pressure(traced),
@@ -256,11 +274,12 @@ impl Checker<'_> {
         let is_wet: Vec<u32> = twin.is_wet.iter().map(|&wet| u32::from(wet)).collect();
         self.table.add_exact(&WET, &words[4..], &is_wet);
         // What the device found is what its substep follows.
+        let Begun { number, elapsed } = self.begun;
         let length = self.scene.shot.frame_seconds();
-        let start = f64::from(self.frame) * length;
-        let (_, substep) =
-            self.scene
-                .flip_substep(self.frame + 1, start, length, fastest.sqrt(), 0)?;
+        let start = f64::from(self.frame) * length + elapsed;
+        let (frame, remaining, speed) = (self.frame + 1, length - elapsed, fastest.sqrt());
+        let chosen = (self.scene).flip_substep(frame, start, remaining, speed, number - 1)?;
+        let substep = chosen.1;
         let flags: Vec<bool> = words[4..].iter().map(|&flag| flag != 0).collect();
         let bricks = self.model.bricks(&flags, self.model.step(&substep).layers);
         self.layout = Some(Layout {

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::{Checker, Layout, fields::*, pair, pair_of};
 use crate::{
     compare::{
+        check::Pair,
         deviation::relative,
         rounding::{U, U64},
     },
@@ -20,13 +21,10 @@ use crate::{
     scene::flip::{Precision, Preconditioner, Surface},
     solve::{
         SolveError,
-        pressure::{CORRECTION_TOLERANCE, blocked, widen},
+        pressure::{CORRECTION_TOLERANCE, DONE, blocked, widen},
         trace::Traced,
     },
 };
-
-/// `state` of a solve that has ended, as in shared/pressure_control.wgsl.
-const DONE: u32 = 2;
 
 /// Runs of an iteration's pass that are compared: each is as good as any.
 pub(super) const PRODUCTS: usize = 3;
@@ -96,7 +94,7 @@ impl Checker<'_> {
             (Moment::After, "pressure/multiply") => self.multiply(traced),
             (Moment::After, "pressure/density_source") => self.density_source(traced),
             (Moment::Before, "pressure/project" | "pressure/displace") => {
-                self.is_done = traced.read::<u32>("pressure_control", 1)?[0] == DONE;
+                self.is_done = traced.pressure_control(self.precision())?.state == DONE;
                 self.old = self.planes(traced, "face_velocity")?;
                 Ok(())
             }
@@ -244,24 +242,12 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// The largest of two divergences that the device noted, in place `k`, against `rows`.
-    fn noted(
-        &self,
-        traced: Traced<'_>,
-        k: usize,
-        rows: &[f64],
-        flow: &[f64],
-    ) -> Result<crate::compare::check::Pair<f64>, SolveError> {
-        let bits = traced.read::<u32>("pressure_stats", k + 1)?[k];
+    /// The largest divergence that the device noted, against `rows`.
+    fn noted(&self, found: f32, rows: &[f64], flow: &[f64]) -> Pair<f64> {
         let size = self.model.cell_size();
         let largest = |of: &[f64]| of.iter().fold(0.0, |most: f64, v| most.max(v.abs())) / size;
         let tolerance = 10.0 * U * largest(flow) + 4.0 * U * largest(rows);
-        Ok(pair_of(
-            k,
-            f64::from(f32::from_bits(bits)),
-            largest(rows),
-            tolerance,
-        ))
+        pair_of(0, f64::from(found), largest(rows), tolerance)
     }
 
     fn divergence(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
@@ -276,7 +262,7 @@ impl Checker<'_> {
                 pair_of(element, rhs[row], twin[row], 10.0 * self.unit() * flow[row])
             })
             .collect();
-        let noted = self.noted(traced, 0, &twin, &flow)?;
+        let noted = self.noted(traced.pressure_stats()?.divergence_before, &twin, &flow);
         self.table.add(&RHS, &pairs, 0);
         self.table.add(&BEFORE, &[noted], 0);
         Ok(())
@@ -396,7 +382,7 @@ impl Checker<'_> {
         let built = self.built();
         let twin = self.waters(built).divergence(&built.system, &velocity);
         let flow = flow(&self.layout().bricks, self.room(), &built.system, &velocity);
-        let noted = self.noted(traced, 1, &twin, &flow)?;
+        let noted = self.noted(traced.pressure_stats()?.divergence_after, &twin, &flow);
         self.table.add(&AFTER, &[noted], 0);
         self.is_done = false;
         Ok(())

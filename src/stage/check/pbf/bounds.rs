@@ -15,6 +15,8 @@ pub(super) struct Bounds<'a>(pub(super) Inputs<'a>);
 pub(super) struct Confined {
     /// Metres.
     pub(super) error: f64,
+    /// Of what the walls alone added to it, metres.
+    pub(super) push_error: f64,
     /// Whether they pushed, or may have by rounding alone.
     pub(super) is_touched: bool,
 }
@@ -100,8 +102,9 @@ impl Bounds<'_> {
                 + lambda[i].abs() * walls)
     }
 
-    /// Of what walls and solids make of `x`, which errs by `error`. Solids bend the way: the bound is what the twin
-    /// answers when `x` moves by its error, and by that of its place in the distance grid, along each axis.
+    /// Of what walls and solids make of `x`, the position before they push, which errs by `error`. Solids bend the way: the
+    /// bound is what the twin answers when `x` moves by its error, and by that of its place in the distance grid, along each
+    /// axis. Where the push has taken it the answer is smaller: a curved solid turns a deep push by more.
     pub(super) fn confine(&self, x: DVec3, error: f64) -> Confined {
         let (model, walls) = (self.0.model, &self.0.substep.walls);
         let contact = CONTACT * model.settings.particle_spacing;
@@ -120,27 +123,34 @@ impl Bounds<'_> {
             let low = walls.min + contact + slack;
             let high = walls.max - contact - slack;
             let is_touched = x.cmplt(low).any() || x.cmpgt(high).any();
-            let error = error + if is_touched { place } else { 0.0 };
-            return Confined { error, is_touched };
+            return Confined {
+                error: error + if is_touched { place } else { 0.0 },
+                push_error: error + place,
+                is_touched,
+            };
         }
-        let centre = model.confine(x, walls);
-        let mut moved = 0.0;
+        let (centre, push) = model.confine_by(x, walls);
+        let (mut moved, mut pushed) = (0.0, 0.0);
         let mut is_touched = centre != x;
         for axis in DVec3::AXES {
-            let mut most: f64 = 0.0;
+            let (mut most, mut most_pushed) = (0.0f64, 0.0f64);
             for side in [axis * reach, -axis * reach] {
-                let found = model.confine(x + side, walls);
+                let (found, other) = model.confine_by(x + side, walls);
                 is_touched |= found != x + side;
                 most = most.max(found.distance(centre));
+                most_pushed = most_pushed.max(other.distance(push));
             }
             moved += most;
+            pushed += most_pushed;
         }
+        let rounding = place + U * x.length();
         Confined {
             error: if is_touched {
-                moved.max(error) + place + U * x.length()
+                moved.max(error) + rounding
             } else {
                 error
             },
+            push_error: pushed.max(error) + rounding,
             is_touched,
         }
     }

@@ -11,7 +11,7 @@ fields! {
     PREDICT_VELOCITY = "pbf/predict", "velocity", "m/s",
         "3 u of each term; where walls or solids took part of the way, the positions' tolerance over Δt";
     PREDICT_WORK = "pbf/predict", "work of walls", "m²/s",
-        "3 times the walls' speed times the position's tolerance + u |x|, + 4 u";
+        "3 times the walls' speed times the tolerance of what they push + u |x|, + 4 u";
     CELL = "pbf/assign_cells", "cell", "",
         "equal; within 4 u |x|/h of a cell's face either cell is right";
     COUNTS = "pbf/assign_cells", "particles in cells", "", "whole numbers: equal";
@@ -31,11 +31,12 @@ fields! {
          solids as in pbf/predict; Chebyshev: ω times that, and where Δx is across the last step by rounding alone, a tie";
     CARRIED = "pbf/compute_delta", "lambda carried along", "m²", "a copy: equal";
     DELTA_WORK = "pbf/compute_delta", "work of walls", "m²/s",
-        "3 times the walls' speed times the corrected position's tolerance, + 16 u of what is added and 2 u of the sums";
+        "3 times the walls' speed times (2 ω − 1) times the correction's tolerance + that of what they push + u |x|, + 16 u of \
+         what is added and 2 u of the sums; Chebyshev: ties as above";
     WORK = "pbf/boundary_work", "shares of the work", "m²/s", "66 sums: 66 u Σ|w|, + u of what was there";
     ERROR_SUMS = "pbf/sum_error", "sums of density error", "", "eight sums in a row: 9 u of the sum";
     DECISION = "pbf/decide", "done, iterations", "",
-        "equal; a tie where the sum is within (n/65536 + 10) u of the threshold";
+        "equal, and what is counted over the frame; a tie where the sum is within (n/65536 + 10) u of the threshold";
     UPDATE_POSITION = "pbf/update_velocity", "position", "m",
         "equal; of a particle that is slowed u |x| + Δt times its velocity's tolerance";
     UPDATE_VELOCITY = "pbf/update_velocity", "velocity", "m/s",

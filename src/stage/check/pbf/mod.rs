@@ -4,6 +4,7 @@ mod bounds;
 mod effects;
 mod fields;
 mod lists;
+mod stop;
 mod whole;
 mod work;
 
@@ -14,7 +15,7 @@ use rayon::prelude::*;
 
 use crate::{
     compare::{check::Table, rounding::U},
-    domain::{boundary::Boundary, particles::Particles, solver::Solver},
+    domain::{boundary::Boundary, particles::Particles, solver::Solver, substep::Which},
     gpu::{adapter::Context, recording::Moment},
     reference::{
         neighbors::Neighbors,
@@ -24,11 +25,16 @@ use crate::{
         },
     },
     scene::{Iteration, Scene, Stop, plan::Plan},
-    solve::{SolveError, params::Phase, pbf::Pbf, trace::Traced},
+    solve::{
+        SolveError,
+        params::{Counters, IterationControl, Phase},
+        pbf::Pbf,
+        trace::{Span, TraceFrame, Traced},
+    },
 };
 
 use super::{
-    pair, pair_of,
+    Checked, pair, pair_of,
     sort::{SortCheck, check_slots},
     wide,
 };
@@ -55,32 +61,38 @@ const READS: [(&str, &[&str], &[&str]); 10] = [
     ("pbf/decide", &[], &[]),
 ];
 
-/// Traces the first substep after `particles`, the state at the end of `frame`, and holds it against the reference.
+/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and holds it against the reference.
 /// `boundary` is what the reference knows of the solids, `uploaded` what the device does: they differ in tests alone.
 ///
 /// # Errors
-/// The device, or the numbers of the solver.
+/// The device, the numbers of the solver, or a substep that the frame does not have.
 pub fn check(
     context: &Context,
     scene: &Scene,
     plan: Plan,
     [boundary, uploaded]: [&Boundary; 2],
-    frame: u32,
-    particles: &Particles,
-) -> Result<Table, SolveError> {
-    if particles.is_empty() {
-        return Ok(Table::default());
-    }
+    (frame, particles): (u32, &Particles),
+    which: Which,
+) -> Result<Checked, SolveError> {
     let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
     solver.load(frame, particles)?;
     let substeps = scene.pbf_substeps(frame, particles.max_speed())?;
     let length = scene.shot.frame_seconds();
     let time_step = length / f64::from(substeps);
-    let substep = Substep::new(scene, f64::from(frame) * length + time_step, time_step);
+    let number = match which {
+        Which::Number(number) => number,
+        Which::Last => substeps,
+    };
+    let end = f64::from(frame) * length + f64::from(number) * time_step;
+    let substep = Substep::new(scene, end, time_step);
     let mut checker = Checker::new(scene, plan, boundary, substep);
     checker.take_samples(&solver)?;
-    solver.trace(&mut |traced| checker.observe(traced))?;
-    checker.finish(boundary)
+    let span = Span::Only(which);
+    let traced = solver.trace_frame(span, &mut |_, traced| checker.observe(traced))?;
+    Ok(Checked {
+        table: checker.finish(boundary)?,
+        substep: Some(traced),
+    })
 }
 
 struct Checker<'a> {
@@ -98,6 +110,9 @@ struct Checker<'a> {
     floats: Vec<f32>,
     /// What a pass adds to.
     work: Vec<f32>,
+    counters: Counters,
+    /// Of an iteration until a density error.
+    control: IterationControl,
 }
 
 impl<'a> Checker<'a> {
@@ -116,6 +131,8 @@ impl<'a> Checker<'a> {
             words: BTreeMap::new(),
             floats: Vec::new(),
             work: Vec::new(),
+            counters: Counters::default(),
+            control: IterationControl::default(),
         }
     }
 
@@ -173,6 +190,9 @@ impl<'a> Checker<'a> {
         if self.scene.has_movers() {
             self.read_work(traced)?;
         }
+        if traced.writes("counters") {
+            self.counters = traced.counters()?;
+        }
         // A frame's measurement begins with a prediction of no length.
         if traced.pass == "pbf/predict" && self.ran.contains(&"pbf/update_velocity") {
             self.substep.time_step = 0.0;
@@ -203,7 +223,7 @@ impl<'a> Checker<'a> {
             self.words.insert(name, traced.read(name, n)?);
         }
         if self.is_adaptive() {
-            self.words.insert("control", traced.read("control", 12)?);
+            self.control = traced.iteration_control()?;
             if traced.pass == "pbf/decide" {
                 self.floats = traced.read("error_sums", n.div_ceil(256))?;
             }
@@ -217,7 +237,7 @@ impl<'a> Checker<'a> {
 
     /// Whether an iteration that has ended empties the dispatch.
     fn is_idle(&self) -> bool {
-        self.is_adaptive() && self.words["control"][0] == 1
+        self.is_adaptive() && self.control.is_done == 1
     }
 
     fn compare(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
@@ -289,23 +309,20 @@ impl<'a> Checker<'a> {
                     v_error += (error + confined.error + U * x.length()) / step;
                 }
                 let (at, then) = passes::predict(&self.model, &self.substep, x, v);
-                (
+                let v_tolerance = v_error + 4.0 * U * then.length();
+                let pairs = (
                     pair(i, wide(&predicted[n + i]), at, confined.error),
-                    pair(
-                        i,
-                        wide(&velocity[i]),
-                        then,
-                        v_error + 4.0 * U * then.length(),
-                    ),
-                )
+                    pair(i, wide(&velocity[i]), then, v_tolerance),
+                );
+                (pairs, confined.push_error)
             })
             .collect();
-        let (positions, velocities): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+        let (pairs, push_errors): (Vec<_>, Vec<f64>) = all.into_iter().unzip();
+        let (positions, velocities): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
         self.table.add(&PREDICT_POSITION, &positions, 0);
         self.table.add(&PREDICT_VELOCITY, &velocities, 0);
         if self.scene.has_movers() {
-            let tolerance: Vec<f64> = positions.iter().map(|pair| pair.tolerance).collect();
-            self.predict_work(traced, &tolerance)?;
+            self.predict_work(traced, &push_errors)?;
         }
         Ok(())
     }
@@ -424,6 +441,10 @@ impl<'a> Checker<'a> {
             None => plain.clone(),
         };
         let after = traced.read::<[f32; 4]>("predicted", 2 * n)?;
+        let works = match self.scene.has_movers() {
+            true => traced.read::<f32>("wall_work", n)?,
+            false => Vec::new(),
+        };
         let bounds = Bounds(inputs);
         let h = self.model.calibration.support_radius;
         let one = |i: usize| {
@@ -432,12 +453,16 @@ impl<'a> Checker<'a> {
             // On one spot a hash decides where they part, by sines that WGSL leaves open.
             let is_coincident = (neighbors.all(i))
                 .any(|j| points[i].distance_squared(points[j as usize]) < 2e-12 * h * h);
-            let step = twin[i] - points[i];
+            // The bound follows the correction from before walls and solids push, as they bend what it errs by.
+            let to = twin[i].free;
+            let step = to - points[i];
             let mut error = bounds.delta(i, &lambda) + 16.0 * U * step.length();
+            // A semi-iteration counts the walls' part of this step for that of the last one too.
+            let work_error = (2.0 * factor - 1.0) * error;
             if momentum.is_some() {
                 let last = points[i] - before[i];
                 // Whether the semi-iteration goes on is decided before it adds to the step.
-                let own = plain[i] - points[i];
+                let own = plain[i].free - points[i];
                 let across = own.dot(last).abs() <= 2.0 * error * last.length();
                 if is_coincident || (factor != 1.0 && across && last != DVec3::ZERO) {
                     return (None, carried);
@@ -446,56 +471,24 @@ impl<'a> Checker<'a> {
             } else if is_coincident {
                 return (None, carried);
             }
-            let confined = bounds.confine(twin[i], error + U * points[i].length());
-            (Some(pair(i, wide(value), twin[i], confined.error)), carried)
+            let rounding = U * points[i].length();
+            let confined = bounds.confine(to, error + rounding);
+            let moved = pair(i, wide(value), twin[i].position, confined.error);
+            let work_error = work_error + confined.push_error + rounding;
+            let work =
+                (works.get(i)).map(|&after| self.delta_work(i, after, twin[i].work, work_error));
+            (Some((moved, work)), carried)
         };
         let all: Vec<_> = handled(&phase).into_par_iter().map(one).collect();
         let count = all.len();
         let (moved, carried): (Vec<_>, Vec<_>) = all.into_iter().unzip();
-        let moved: Vec<_> = moved.into_iter().flatten().collect();
-        self.table.add(&DELTA, &moved, count - moved.len());
+        let (moved, works): (Vec<_>, Vec<_>) = moved.into_iter().flatten().unzip();
+        let ties = count - moved.len();
+        self.table.add(&DELTA, &moved, ties);
         self.table.add(&CARRIED, &carried, 0);
         if self.scene.has_movers() {
-            self.delta_work(traced, &neighbors)?;
-        }
-        Ok(())
-    }
-
-    fn sum_error(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
-        let sums = traced.read::<f32>("error_sums", self.n().div_ceil(256))?;
-        let pairs: Vec<_> = (self.floats.chunks(256).zip(&sums).enumerate())
-            .map(|(k, (block, &sum))| {
-                let exact: f64 = block
-                    .iter()
-                    .map(|&rho| (f64::from(rho) - 1.0).max(0.0))
-                    .sum();
-                pair_of(k, f64::from(sum), exact, 9.0 * U * exact)
-            })
-            .collect();
-        self.table.add(&ERROR_SUMS, &pairs, 0);
-        Ok(())
-    }
-
-    fn decide(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
-        let Stop::DensityError { density_error, .. } = self.scene.solver.pbf().stop else {
-            return Ok(());
-        };
-        let n = self.n() as f64;
-        let before = &self.words["control"];
-        let after = traced.read::<u32>("control", 12)?;
-        let sum: f64 = self.floats.iter().map(|&value| f64::from(value)).sum();
-        let mut expected = before.clone();
-        let is_tie = (sum - density_error * n).abs() <= (n / 65536.0 + 10.0) * U * sum;
-        if before[0] == 0 && sum <= density_error * n {
-            expected[0] = 1;
-            expected[4..].fill(0);
-        } else if before[0] == 0 {
-            expected[1] += 1;
-        }
-        if is_tie {
-            self.table.add::<f64>(&DECISION, &[], 1);
-        } else {
-            self.table.add_exact(&DECISION, &after, &expected);
+            let works: Vec<_> = works.into_iter().flatten().collect();
+            self.table.add(&DELTA_WORK, &works, ties);
         }
         Ok(())
     }
@@ -504,7 +497,7 @@ impl<'a> Checker<'a> {
         let n = self.n();
         let phase = traced.uniform::<Phase>("phase")?;
         let source = match self.is_adaptive() {
-            true => n * (self.words["control"][1] % 2) as usize,
+            true => n * (self.control.iterations % 2) as usize,
             false => phase.read_even as usize,
         };
         let ends: Vec<DVec3> = self.vectors["predicted"][source..source + n]
@@ -539,7 +532,7 @@ impl<'a> Checker<'a> {
         self.whole.end(ends);
         self.table.add(&UPDATE_POSITION, &x_pairs, 0);
         self.table.add(&UPDATE_VELOCITY, &v_pairs, 0);
-        let counted = f64::from(traced.read::<u32>("counters", 1)?[0]);
+        let counted = f64::from(traced.counters()?.capped) - f64::from(self.counters.capped);
         self.table
             .add(&CAPPED, &[pair_of(0, counted, capped, near)], 0);
         let ids = &self.words["sorted_id"];

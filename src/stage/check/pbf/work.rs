@@ -1,18 +1,12 @@
 //! What moving walls do on the particles, over m / Δt².
 
-use rayon::prelude::*;
-
 use crate::{
     compare::{check::Pair, rounding::U},
-    reference::{
-        neighbors::Neighbors,
-        pbf::{Colour, passes},
-    },
-    scene::Iteration,
-    solve::{SolveError, params::Phase, trace::Traced},
+    reference::pbf::passes,
+    solve::{SolveError, trace::Traced},
 };
 
-use super::{Checker, bounds::Bounds, fields::*, handled, pair_of, wide};
+use super::{Checker, fields::*, pair_of, wide};
 
 impl Checker<'_> {
     /// Largest speed of a wall, m/s.
@@ -31,11 +25,11 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// By the prediction: `tolerance` of each particle's position, metres.
+    /// By the prediction: `push_error` of what the walls add to each particle's position, metres.
     pub(super) fn predict_work(
         &mut self,
         traced: Traced<'_>,
-        tolerance: &[f64],
+        push_error: &[f64],
     ) -> Result<(), SolveError> {
         let n = self.n();
         let work = traced.read::<f32>("wall_work", 2 * n)?;
@@ -45,7 +39,7 @@ impl Checker<'_> {
             .map(|i| {
                 let (x, v) = (wide(&position[i]), wide(&velocity[i]));
                 let (_, _, twin) = passes::predict_and_work(&self.model, &self.substep, x, v);
-                let error = 3.0 * speed * (tolerance[i] + U * x.length()) + 4.0 * U * twin.abs();
+                let error = 3.0 * speed * (push_error[i] + U * x.length()) + 4.0 * U * twin.abs();
                 pair_of(i, f64::from(work[n + i]), twin, error)
             })
             .collect();
@@ -53,42 +47,14 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// By a correction. With Chebyshev what is compared are the particles of which nothing is carried on.
-    pub(super) fn delta_work(
-        &mut self,
-        traced: Traced<'_>,
-        neighbors: &Neighbors,
-    ) -> Result<(), SolveError> {
-        let phase = traced.uniform::<Phase>("phase")?;
-        let (points, lambda) = self.stored(&phase);
-        let is_plain = self.scene.solver.pbf().iteration != Iteration::Chebyshev;
-        let inputs = self.inputs(&points, neighbors);
-        let twin = passes::compute_delta_and_work(inputs, Colour::All, None, &lambda);
-        let after = traced.read::<f32>("wall_work", self.n())?;
-        let bounds = Bounds(inputs);
-        let h = self.model.calibration.support_radius;
-        let speed = self.wall_speed();
-        let one = |i: usize| {
-            let is_coincident = (neighbors.all(i))
-                .any(|j| points[i].distance_squared(points[j as usize]) < 2e-12 * h * h);
-            if is_coincident || !(is_plain || phase.acceleration == 1.0) {
-                return None;
-            }
-            let (before, after) = (f64::from(self.work[i]), f64::from(after[i]));
-            let (to, added) = twin[i];
-            let step = (to - points[i]).length();
-            let error = bounds.delta(i, &lambda) + 16.0 * U * step;
-            let confined = bounds.confine(to, error + U * points[i].length());
-            let tolerance = 3.0 * speed * (error + confined.error + U * points[i].length())
-                + 2.0 * U * (before.abs() + after.abs())
-                + 16.0 * U * added.abs();
-            Some(pair_of(i, after, before + added, tolerance))
-        };
-        let all: Vec<_> = handled(&phase).into_par_iter().map(one).collect();
-        let count = all.len();
-        let pairs: Vec<_> = all.into_iter().flatten().collect();
-        self.table.add(&DELTA_WORK, &pairs, count - pairs.len());
-        Ok(())
+    /// By a correction of particle `i`, after which `wall_work` is `after`: the twin added `added`. `error` is that of the
+    /// correction and of what the walls push, metres.
+    pub(super) fn delta_work(&self, i: usize, after: f32, added: f64, error: f64) -> Pair<f64> {
+        let (before, after) = (f64::from(self.work[i]), f64::from(after));
+        let tolerance = 3.0 * self.wall_speed() * error
+            + 2.0 * U * (before.abs() + after.abs())
+            + 16.0 * U * added.abs();
+        pair_of(i, after, before + added, tolerance)
     }
 
     pub(super) fn boundary_work(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {

@@ -1,0 +1,70 @@
+//! Which substep of a frame is meant.
+
+use std::{fmt, str::FromStr};
+
+/// A substep of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Which {
+    /// Counted from 1.
+    Number(u32),
+    /// The frame's last, whichever it is.
+    Last,
+}
+
+impl Default for Which {
+    fn default() -> Self {
+        Self::Number(1)
+    }
+}
+
+impl fmt::Display for Which {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Last => write!(f, "last"),
+        }
+    }
+}
+
+/// What is no substep.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is no substep: it is a number from 1 on, or last")]
+pub struct NoSubstep(String);
+
+impl FromStr for Which {
+    type Err = NoSubstep;
+
+    fn from_str(text: &str) -> Result<Self, NoSubstep> {
+        let fault = || NoSubstep(text.to_owned());
+        if text == "last" {
+            return Ok(Self::Last);
+        }
+        // `parse` alone would take `+1`.
+        if !text.bytes().all(|byte| byte.is_ascii_digit()) {
+            return Err(fault());
+        }
+        let number = text.parse().ok().filter(|&number| number > 0);
+        number.map(Self::Number).ok_or_else(fault)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_substep_is_a_number_from_1_on_or_last() {
+        for (text, which) in [
+            ("1", Which::Number(1)),
+            ("12", Which::Number(12)),
+            ("last", Which::Last),
+        ] {
+            assert_eq!(text.parse(), Ok(which));
+            assert_eq!(which.to_string(), text);
+        }
+        for text in ["", "0", "-1", "+1", "1.5", "first", "Last", "4294967296"] {
+            let error = text.parse::<Which>().unwrap_err().to_string();
+            assert!(error.contains("from 1 on, or last"), "{text}: {error}");
+        }
+    }
+}
