@@ -143,6 +143,11 @@ fn content(grids: &vdb::Grids, precision: Precision) -> Option<blake3::Hash> {
     written.ok().map(|written| written.hash)
 }
 
+/// Whether a bake began with this frame: it has no report of it, and no value of a probe that looks at the solver's work.
+fn is_start(entry: &Entry) -> bool {
+    entry.report.is_null()
+}
+
 /// Rows of the probes that both have, by name.
 fn probes(
     caches: [&CacheReader; 2],
@@ -164,16 +169,24 @@ fn probes(
         let mut found = streams::keys("kind", &json!(a.kind), &json!(b.kind));
         found.extend(streams::keys("at", &json!(a.at), &json!(b.at)));
         let row = |columns, values| Row { columns, values };
-        found.extend(streams::rows(row(&a.columns, &x), row(&b.columns, &y)));
+        let mut rows = streams::rows(row(&a.columns, &x), row(&b.columns, &y));
+        let [starts_a, starts_b] = entries.map(is_start);
+        rows.retain(|difference| match difference {
+            Difference::Value { a, b, .. } => {
+                (!starts_a || !a.is_null()) && (!starts_b || !b.is_null())
+            }
+            _ => true,
+        });
+        found.extend(rows);
         push(format!("probe {}", a.name), [a.file(), b.file()], found);
     }
 }
 
-/// The clock, and what the solver reports; a frame that a bake began with has no report.
+/// The clock, and what the solver reports.
 fn lines([a, b]: [&Entry; 2]) -> Vec<Difference> {
     let [x, y] = [a, b].map(|entry| json!(entry.clock));
     let mut found = streams::keys("clock", &x, &y);
-    if !a.report.is_null() && !b.report.is_null() {
+    if !is_start(a) && !is_start(b) {
         found.extend(streams::keys("report", &a.report, &b.report));
     }
     found
