@@ -6,6 +6,10 @@
 mod job;
 #[path = "support/made_cache.rs"]
 mod made_cache;
+#[path = "diff/spread.rs"]
+mod spread;
+#[path = "diff/streams.rs"]
+mod streams;
 
 use std::fs;
 
@@ -181,7 +185,7 @@ fn ids_frames_and_settings_that_differ_are_told() {
             "solver.pbf.iterations was 4.0, is now 7.0",
             "frames in B alone: 4",
             "frame 1: 799 in both, 0 in A alone, 1 in B alone (first id 40)",
-            "no other bit in what both have",
+            "no other bit in the particles that both have",
             "frame 1, particles: 1 on one side alone",
         ],
     );

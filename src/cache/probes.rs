@@ -68,9 +68,14 @@ impl ProbeRecord {
         }
     }
 
+    /// Path of its file from the cache's folder, with `/`.
+    pub fn file(&self) -> String {
+        format!("{FOLDER}/{}{ENDING}", self.name)
+    }
+
     /// Where its file is in the cache `dir`.
     pub(super) fn path(&self, dir: &Path) -> PathBuf {
-        dir.join(FOLDER).join(format!("{}{ENDING}", self.name))
+        dir.join(self.file())
     }
 
     fn header(&self) -> String {

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 
 use super::disk;
 use super::error::{AtPath, CacheError};
-use super::frame;
+use super::frame::{self, Stamp};
 use super::ledger::{self, Entry, Ledger};
 use super::manifest::{FileRecord, Manifest};
 use super::probes;
+use super::vdb::{self, Grids};
 use crate::domain::particles::Particles;
 
 /// An open cache: its manifest, its ledger, its scene and the scene's files, all checked; the frames are checked as they
@@ -72,6 +73,9 @@ pub fn survey(dir: &Path) -> Result<VerifyReport, CacheError> {
 }
 
 impl CacheReader {
+    /// The ledger's file, from the cache's folder.
+    pub const LEDGER: &str = ledger::FILE;
+
     /// Opens the cache in `dir`.
     ///
     /// # Errors
@@ -168,31 +172,68 @@ impl CacheReader {
         read_frame(&self.dir, &self.manifest, self.entry(frame)?)
     }
 
-    /// Looks at the files that a frame has beside its particles: its grids, by length and checksum. Of a cache without
-    /// grids nothing is looked at.
+    /// The grids in a frame's file, computed anew from its particles; `None` where the frame has none, or where its file
+    /// is not what this program makes of the particles.
     ///
     /// # Errors
-    /// [`CacheError::NoFrame`], [`CacheError::Damaged`] (also for a missing file), [`CacheError::Io`].
-    pub fn check_grids(&self, frame: u32) -> Result<(), CacheError> {
-        let mut grids = self.entry(frame)?.grids.iter();
-        grids.try_for_each(|record| record.check(&self.dir))
+    /// [`CacheError::Io`].
+    pub fn grids(&self, entry: &Entry, particles: &Particles) -> Result<Option<Grids>, CacheError> {
+        let manifest = &self.manifest;
+        let (Some(asked), Some(record)) = (&manifest.grids, &entry.grids) else {
+            return Ok(None);
+        };
+        let stamp = Stamp {
+            program: &manifest.program,
+            program_version: &manifest.program_version,
+            shot: &manifest.shot,
+            frame: entry.frame,
+            time: entry.clock.time,
+            origin: manifest.origin.into(),
+        };
+        let grids = asked
+            .grids(particles, manifest.particle_spacing)
+            .moved(manifest.origin.into());
+        let written = vdb::encode(&mut std::io::sink(), &stamp, &grids, asked.precision);
+        let hash = written.at(&self.dir.join(&record.file))?.hash;
+        Ok((hash.to_hex().as_str() == record.blake3).then_some(grids))
     }
 
-    /// Looks at the probes' files: each has to be, byte for byte, what the ledger says.
+    /// Looks at what stands beside the particles of these frames: at their grid files, and at every probe's file, which
+    /// has to be what the ledger says.
     ///
     /// # Errors
-    /// [`CacheError::Damaged`] for the first that is not, or is missing.
-    pub fn check_probes(&self) -> Result<(), CacheError> {
-        match self.probe_problems().next() {
-            None => Ok(()),
-            Some(Problem { file, what }) => Err(CacheError::damaged(file, what)),
-        }
+    /// [`CacheError::NoFrame`]; [`CacheError::Damaged`] for the first file that is off or cannot be read.
+    pub fn check_beside(&self, frames: &[u32]) -> Result<(), CacheError> {
+        let records = frames
+            .iter()
+            .map(|&frame| Ok(self.entry(frame)?.grids.as_ref()));
+        let records: Vec<Option<&FileRecord>> = records.collect::<Result<_, CacheError>>()?;
+        let problems: Vec<Problem> = records
+            .into_par_iter()
+            .flatten()
+            .filter_map(|record| self.problem(record))
+            .collect();
+        let first = problems.into_iter().next();
+        let first = first.or_else(|| {
+            let found = self.probe_problems(self.entries()).next()?;
+            // A bake that goes on has written rows since this cache was opened.
+            match Self::open(&self.dir) {
+                Ok(now) if now.entries().len() > self.entries().len() => {
+                    self.probe_problems(now.entries()).next()
+                }
+                _ => Some(found),
+            }
+        });
+        first.map_or(Ok(()), |found| {
+            Err(CacheError::damaged(found.file, found.what))
+        })
     }
 
-    fn probe_problems(&self) -> impl Iterator<Item = Problem> {
+    /// Files of probes that are not what these lines of the ledger say.
+    fn probe_problems<'a>(&'a self, entries: &'a [Entry]) -> impl Iterator<Item = Problem> + 'a {
         let records = self.manifest.probes.iter().enumerate();
-        records.filter_map(|(index, record)| {
-            let what = probes::problem(&self.dir, index, record, self.entries())?;
+        records.filter_map(move |(index, record)| {
+            let what = probes::problem(&self.dir, index, record, entries)?;
             let file = record.path(&self.dir);
             Some(Problem { file, what })
         })
@@ -245,7 +286,7 @@ impl CacheReader {
             .filter_map(|record| self.problem(&record))
             .collect();
         problems.extend(frames);
-        problems.extend(self.probe_problems());
+        problems.extend(self.probe_problems(entries));
         VerifyReport {
             frames: self.last_frame() - self.first_frame(),
             bytes: entries.iter().flat_map(Entry::files).map(|f| f.bytes).sum(),

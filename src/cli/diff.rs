@@ -1,5 +1,7 @@
 //! `swell diff A B`
 
+mod streams;
+
 use std::{fmt::Write as _, path::PathBuf};
 
 use clap::Args;
@@ -41,9 +43,16 @@ pub(super) struct DiffArgs {
     /// What differences are multiplied by in difference images.
     #[arg(long, default_value = "10", requires = "output", value_parser = gain)]
     gain: f64,
+    /// Judge a baseline's aggregates alone, as on an adapter that it has no hashes of.
+    #[arg(long)]
+    ignore_hashes: bool,
     /// Write cache A as a baseline, or add its adapter to the one that stands there.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["b", "tolerance", "output"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["b", "tolerance", "output", "ignore_hashes"])]
     write_baseline: Option<PathBuf>,
+    /// With --write-baseline: a bake that differs from cache A in roundings alone; the limits are taken from how far these
+    /// come apart.
+    #[arg(long, value_name = "CACHE", requires = "write_baseline")]
+    spread: Vec<PathBuf>,
 }
 
 fn gain(text: &str) -> Result<f64, String> {
@@ -57,7 +66,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<u8, Failure> {
     let b = match (&args.b, &args.write_baseline) {
         (Some(b), _) => b,
         (None, Some(file)) => {
-            let written = write_baseline(&args.a, file, args.frames.as_ref())?;
+            let written = write_baseline(&args.a, file, args.frames.as_ref(), &args.spread)?;
             let text = show_written(file, &written);
             print(&text, args.json.then(|| json!(written)));
             return Ok(0);
@@ -73,6 +82,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<u8, Failure> {
             path,
             gain: args.gain,
         }),
+        ignores_hashes: args.ignore_hashes,
     };
     let outcome = diff(&request)?;
     let mut text = format!(
@@ -135,6 +145,7 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
         .collect();
     show_aggregates(out, &aggregate_peaks(&pairs), |_| None)?;
     show_first_difference(out, diff)?;
+    streams::show(out, diff)?;
     let faults = diff.frames.iter().flat_map(|frame| {
         let of_frame = |fault| (frame.frame, fault);
         frame.faults.iter().map(of_frame)
@@ -253,7 +264,7 @@ fn show_first_difference(out: &mut String, diff: &CacheDiff) -> std::fmt::Result
             "\nfirst other bit: frame {frame}, {field} of particle {}: A {:?}, B {:?}",
             parting.particle, parting.a, parting.b
         ),
-        None => writeln!(out, "\nno other bit in what both have"),
+        None => writeln!(out, "\nno other bit in the particles that both have"),
     }
 }
 
@@ -299,7 +310,13 @@ fn show_baseline(out: &mut String, diff: &BaselineDiff) -> std::fmt::Result {
     writeln!(out, "A is {}", diff.bake)?;
     show_physics(out, diff.physics.as_deref())?;
     match diff.basis {
-        Basis::Hashes => writeln!(out, "by hashes: the baseline knows this adapter")?,
+        Basis::Hashes => writeln!(
+            out,
+            "by hashes, and by aggregates: the baseline knows this adapter"
+        )?,
+        Basis::Aggregates if diff.ignores_hashes => {
+            writeln!(out, "by aggregates: hashes are ignored, as asked")?;
+        }
         Basis::Aggregates => writeln!(
             out,
             "by aggregates: the baseline has no hashes of this adapter, but of {}",
@@ -316,7 +333,8 @@ fn show_baseline(out: &mut String, diff: &BaselineDiff) -> std::fmt::Result {
         .map(|f| (f.frame, f.aggregates))
         .collect();
     show_aggregates(out, &aggregate_peaks(&pairs), |peak| {
-        let limit = diff.limits.get(peak.name)?;
+        let frame = diff.frames.iter().find(|f| f.frame == peak.frame)?;
+        let limit = frame.limits.get(peak.name)?;
         Some(limit.allowed(peak.b.unwrap_or(0.0)))
     })?;
     show_faults(out, diff.faults.iter().map(|f| (f.frame, &f.fault)))?;
@@ -352,6 +370,14 @@ fn show_written(file: &std::path::Path, written: &Written) -> String {
         if !names.is_empty() {
             text += &format!("{what}: {}\n", names.join("; "));
         }
+    }
+    if !written.spread_from.is_empty() {
+        let from = written.spread_from.join("; ");
+        text += &format!("limits from the spread of bakes with: {from}\n");
+    }
+    if written.is_spread_dropped {
+        text += "spreads of another scene or other frames dropped: the limits are those of any scene; --spread measures \
+                 them anew\n";
     }
     text
 }

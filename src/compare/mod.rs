@@ -9,5 +9,7 @@ pub mod deviation;
 pub mod frames;
 pub mod pictures;
 pub mod rounding;
+pub mod spread;
+pub mod streams;
 
 pub use deviation::{Deviation, Value};

@@ -2,6 +2,7 @@
 
 mod against_baseline;
 mod pictures;
+mod streams;
 
 use std::{
     fs,
@@ -31,6 +32,7 @@ use crate::{
 pub use crate::compare::{
     baseline::{BaselineFault, Basis},
     frames::{AggregatePeak, Fault, FieldDiff, FrameDiff, Parting, aggregate_peaks},
+    streams::{Difference, GridDiff, StreamDiff},
 };
 pub use against_baseline::{BaselineDiff, FramePair, Written, ranges, write_baseline};
 pub use pictures::{PairDiff, PicturesDiff};
@@ -48,6 +50,8 @@ pub struct Request {
     pub tolerance: Option<Tolerance>,
     /// Where difference images go.
     pub images: Option<Images>,
+    /// Whether a baseline is to judge as if it did not know the adapter.
+    pub ignores_hashes: bool,
 }
 
 /// Difference images.
@@ -84,17 +88,33 @@ pub struct CacheDiff {
     pub only_b: Vec<u32>,
     /// Frames of both.
     pub frames: Vec<FrameDiff>,
+    /// Streams that a alone has: `grids`, `grid NAME`, `probe NAME`.
+    pub streams_only_a: Vec<String>,
+    /// Streams that b alone has.
+    pub streams_only_b: Vec<String>,
+    /// What differs beside the particles, by frame.
+    pub streams: Vec<StreamDiff>,
+    /// Whether those count: without a tolerance they do, and with one nothing in it names them.
+    pub streams_judged: bool,
+}
+
+impl CacheDiff {
+    fn is_within(&self) -> bool {
+        let same_streams = self.streams.is_empty()
+            && self.streams_only_a.is_empty()
+            && self.streams_only_b.is_empty();
+        self.only_a.is_empty()
+            && self.only_b.is_empty()
+            && self.frames.iter().all(|frame| frame.faults.is_empty())
+            && (same_streams || !self.streams_judged)
+    }
 }
 
 impl Outcome {
     /// Whether nothing is out of tolerance and nothing is missing on one side.
     pub fn is_within(&self) -> bool {
         match self {
-            Self::Caches(diff) => {
-                diff.only_a.is_empty()
-                    && diff.only_b.is_empty()
-                    && diff.frames.iter().all(|frame| frame.faults.is_empty())
-            }
+            Self::Caches(diff) => diff.is_within(),
             Self::Baseline(diff) => diff.faults.is_empty() && diff.only_baseline.is_empty(),
             Self::Pictures(diff) => diff.is_within(),
         }
@@ -215,6 +235,10 @@ pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
         let message = "--output takes difference images, of two renders; these are caches";
         return Err(DiffError::Usage(message.to_owned()));
     }
+    if request.ignores_hashes && !matches!(subjects.1, Subject::Baseline(_)) {
+        let message = "--ignore-hashes is for a cache and a baseline: nothing else has hashes";
+        return Err(DiffError::Usage(message.to_owned()));
+    }
     if let (Some(tolerance), Subject::Folder | Subject::Picture) = (&request.tolerance, &subjects.0)
         && tolerance.pictures == PictureLimits::default()
     {
@@ -229,7 +253,8 @@ pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
                 return Err(DiffError::Usage(message.to_owned()));
             }
             let frames = request.frames.as_ref();
-            let found = against_baseline::compare(&a, &b, &request.b, frames)?;
+            let ignores_hashes = request.ignores_hashes;
+            let found = against_baseline::compare(&a, &b, &request.b, frames, ignores_hashes)?;
             Ok(Outcome::Baseline(found))
         }
         (Subject::Folder, Subject::Folder) => {
@@ -297,33 +322,40 @@ fn caches(a: &CacheReader, b: &CacheReader, request: &Request) -> Result<CacheDi
             )
         }
     };
+    let chosen: Vec<u32> = chosen;
+    for cache in [a, b] {
+        cache.check_beside(&chosen)?;
+    }
     let gauge = gauge(&scene_of(b)?, &[b, a])?;
     let (gravity_a, gravity_b) = (scene_of(a)?.water.gravity, scene_of(b)?.water.gravity);
     let frame = |&frame: &u32| {
         let [from, to] = [a, b].map(|cache| cache.manifest().origin.into());
-        let (of_a, of_b) = (a.read(frame)?.about(from, to), b.read(frame)?);
+        let (of_a, of_b) = (a.read(frame)?, b.read(frame)?);
+        let beside = streams::of_frame([a, b], frame, [&of_a, &of_b])?;
+        let of_a = of_a.about(from, to);
         let aggregates = [
             aggregates(a, &gauge, gravity_a, frame, &of_a)?,
             aggregates(b, &gauge, gravity_b, frame, &of_b)?,
         ];
         let tolerance = request.tolerance.as_ref();
-        Ok(frames::compare(
-            frame,
-            [&of_a, &of_b],
-            aggregates,
-            tolerance,
-        ))
+        let found = frames::compare(frame, [&of_a, &of_b], aggregates, tolerance);
+        Ok((found, beside))
     };
-    let chosen: Vec<u32> = chosen;
+    let found: Vec<(FrameDiff, Vec<StreamDiff>)> = chosen
+        .par_iter()
+        .map(frame)
+        .collect::<Result<_, CacheError>>()?;
+    let (frames, beside): (_, Vec<_>) = found.into_iter().unzip();
     Ok(CacheDiff {
         bakes: [a, b].map(|cache| bake_of(cache.manifest())),
         physics: physics(b.dir(), b.scene_toml(), a.scene_toml())?,
         only_a,
         only_b,
-        frames: chosen
-            .par_iter()
-            .map(frame)
-            .collect::<Result<_, CacheError>>()?,
+        frames,
+        streams_only_a: streams::lone(a, b),
+        streams_only_b: streams::lone(b, a),
+        streams: beside.into_iter().flatten().collect(),
+        streams_judged: request.tolerance.is_none(),
     })
 }
 

@@ -10,8 +10,8 @@ use std::path::Path;
 
 use serde_json::Value;
 use swell::{
-    cache::{CacheWriter, Clock, Manifest},
-    domain::{particles::Particles, solver::StepReport},
+    cache::{CacheWriter, Clock, GridRecord, Manifest, ProbeRecord, ProbeValues},
+    domain::{particles::Particles, solver::StepReport, sparse_grid::Precision},
     scene::{Scene, physics_hash},
 };
 
@@ -42,6 +42,12 @@ pub struct Made<'a> {
     pub device: &'a str,
     pub last: u32,
     pub spoil: &'a dyn Fn(u32, &mut Particles),
+    pub version: &'a str,
+    pub grids: Option<GridRecord>,
+    pub probes: Vec<ProbeRecord>,
+    /// Of frame, probe and column.
+    pub seen: &'a dyn Fn(u32, usize, usize) -> Option<f64>,
+    pub report: &'a dyn Fn(u32) -> Value,
 }
 
 impl Default for Made<'_> {
@@ -51,8 +57,44 @@ impl Default for Made<'_> {
             device: "a device",
             last: 4,
             spoil: &|_, _| {},
+            version: "0.1.0",
+            grids: None,
+            probes: Vec::new(),
+            seen: &seen,
+            report: &report,
         }
     }
+}
+
+impl Made<'_> {
+    /// With both grids, and two probes.
+    pub fn watched() -> Self {
+        let probe = |name: &str, columns: &[&str]| ProbeRecord {
+            name: name.to_owned(),
+            kind: "energy".to_owned(),
+            at: Vec::new(),
+            columns: columns.iter().map(|&column| column.to_owned()).collect(),
+        };
+        Self {
+            grids: Some(GridRecord {
+                surface: true,
+                velocity: true,
+                voxel_size: 0.1,
+                origin: [-1.0, 0.5, 0.25],
+                precision: Precision::Float,
+            }),
+            probes: vec![
+                probe("near", &["kinetic_j", "potential_j"]),
+                probe("far", &["depth_m"]),
+            ],
+            ..Self::default()
+        }
+    }
+}
+
+/// What the probes of a made cache see: nothing at the far one before frame 2.
+pub fn seen(frame: u32, probe: usize, column: usize) -> Option<f64> {
+    (probe == 0 || frame >= 2).then(|| f64::from(frame) + 0.5 * column as f64)
 }
 
 /// A stand-in for a solver: a block of 8 × 10 × 10 particles that slides along x and sinks a little.
@@ -95,7 +137,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
     let manifest = Manifest {
         format_version: Manifest::FORMAT_VERSION,
         program: "swell".to_owned(),
-        program_version: "0.1.0".to_owned(),
+        program_version: made.version.to_owned(),
         shot: scene.shot.name.clone(),
         scene_hash: physics_hash(&scene),
         solver: "pbf".to_owned(),
@@ -106,8 +148,8 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         particle_spacing: 0.1,
         rest_density: 1000.0,
         origin: [0.0; 3],
-        grids: None,
-        probes: Vec::new(),
+        grids: made.grids.clone(),
+        probes: made.probes.clone(),
         attributes: Vec::new(),
         parent: None,
         start_particles: 0,
@@ -118,6 +160,16 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         (made.spoil)(frame, &mut particles);
         particles
     };
+    let rows = |frame| -> ProbeValues {
+        let probes = made.probes.iter().enumerate();
+        let row = |(index, probe): (usize, &ProbeRecord)| {
+            let columns = 0..probe.columns.len();
+            columns
+                .map(|column| (made.seen)(frame, index, column))
+                .collect()
+        };
+        probes.map(row).collect()
+    };
     let toml = scene.to_toml(&|_, hash| hash.to_owned());
     let mut writer = CacheWriter::create(
         path,
@@ -126,7 +178,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         &[],
         Clock::default(),
         &of(0),
-        &Vec::new(),
+        &rows(0),
     )
     .unwrap();
     for frame in 1..=made.last {
@@ -137,7 +189,13 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
             steps: frame.into(),
         };
         writer
-            .submit(clock, of(frame), Vec::new(), report(frame), Value::Null)
+            .submit(
+                clock,
+                of(frame),
+                rows(frame),
+                (made.report)(frame),
+                Value::Null,
+            )
             .unwrap();
     }
     writer.finish().unwrap();

@@ -1,6 +1,10 @@
 //! A cache against a stored baseline, and the baseline's writing.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -8,9 +12,12 @@ use serde::Serialize;
 use super::{DiffError, adapter_of, aggregates, bake_of, gauge, physics, scene_of};
 use crate::{
     cache::{CacheError, CacheReader},
-    compare::baseline::{
-        Baseline, BaselineFault, BaselineFrame, Basis, FORMAT_VERSION, Measured,
-        default_tolerances, particles_hash,
+    compare::{
+        baseline::{
+            Baseline, BaselineFault, BaselineFrame, Basis, FORMAT_VERSION, Measured,
+            default_tolerances, particles_hash,
+        },
+        spread,
     },
     domain::{aggregates::Aggregates, frame_range::FrameRange, tolerance::Limit},
 };
@@ -20,8 +27,10 @@ use crate::{
 pub struct BaselineDiff {
     /// What baked the cache, and on what.
     pub bake: String,
-    /// Whether the baseline knows the cache's adapter, so that hashes decide.
+    /// Whether the baseline knows the cache's adapter, so that hashes decide as well.
     pub basis: Basis,
+    /// Whether hashes were to be ignored.
+    pub ignores_hashes: bool,
     /// Adapters whose hashes the baseline holds.
     pub known_adapters: Vec<String>,
     /// The adapter that the baseline's aggregates are from.
@@ -32,19 +41,19 @@ pub struct BaselineDiff {
     pub only_baseline: Vec<u32>,
     /// What was compared.
     pub frames: Vec<FramePair>,
-    /// Of the aggregates, by name.
-    pub limits: BTreeMap<String, Limit>,
     /// In the order of the frames.
     pub faults: Vec<BaselineFault>,
 }
 
 /// One frame's aggregates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FramePair {
     /// Output frame.
     pub frame: u32,
     /// Of the cache and of the baseline.
     pub aggregates: [Aggregates; 2],
+    /// What they may differ by, by name.
+    pub limits: BTreeMap<String, Limit>,
 }
 
 /// What became of a baseline that was written.
@@ -60,6 +69,10 @@ pub struct Written {
     pub kept: Vec<String>,
     /// Adapters whose hashes went, as they are of another scene or of other frames.
     pub dropped: Vec<String>,
+    /// Whether spreads went for the same reason, and with them the limits that they stood for.
+    pub is_spread_dropped: bool,
+    /// What differs in the bakes that the spreads are from; empty where none was measured.
+    pub spread_from: Vec<String>,
 }
 
 /// Reads a baseline.
@@ -82,6 +95,7 @@ pub(super) fn compare(
     baseline: &Baseline,
     file: &Path,
     frames: Option<&FrameRange>,
+    ignores_hashes: bool,
 ) -> Result<BaselineDiff, DiffError> {
     let known = baseline.frames.iter().map(|frame| frame.frame);
     let wanted: Vec<u32> = match frames {
@@ -109,31 +123,34 @@ pub(super) fn compare(
         .partition(|&frame| cache.entry(frame).is_ok());
     let measured = measure(cache, &there)?;
     let adapter = adapter_of(cache.manifest());
-    let (basis, faults) = baseline.compare(&adapter, &measured);
+    let adapter = (!ignores_hashes).then_some(adapter.as_str());
+    let (basis, faults) = baseline.compare(adapter, &measured);
     let pair = |found: &Measured| {
         let frame = found.frame.frame;
         let expected = baseline.frames.iter().find(|f| f.frame == frame)?;
         Some(FramePair {
             frame,
             aggregates: [found.frame.aggregates, expected.aggregates],
+            limits: baseline.limits(adapter, found),
         })
     };
     Ok(BaselineDiff {
         bake: bake_of(cache.manifest()),
         basis,
+        ignores_hashes,
         known_adapters: baseline.hashes.keys().cloned().collect(),
         aggregates_from: baseline.aggregates_from.clone(),
         physics: physics(file, &baseline.scene.join("\n"), cache.scene_toml())?,
         only_baseline,
-        limits: baseline.limits(),
         frames: measured.iter().filter_map(pair).collect(),
         faults,
     })
 }
 
-/// Writes the baseline of a cache. In a file that stands there, tolerances stay as they are; hashes of other
-/// adapters stay where scene and frames are the same; aggregates stay where these are within tolerance of
-/// them and of an adapter that the file did not know.
+/// Writes the baseline of a cache. In a file that stands there, tolerances and spreads stay as they are where scene and
+/// frames are the same, and so do hashes of other adapters; aggregates stay where these are within tolerance of them and
+/// of an adapter that the file did not know. Caches in `spread` differ from this one in roundings alone: they give the
+/// spreads, and the tolerances, anew.
 ///
 /// # Errors
 /// [`DiffError`]; a file that is there and no baseline is left alone.
@@ -141,6 +158,7 @@ pub fn write_baseline(
     cache: &Path,
     file: &Path,
     frames: Option<&FrameRange>,
+    spread: &[PathBuf],
 ) -> Result<Written, DiffError> {
     let cache = CacheReader::open(cache)?;
     let before = match file.try_exists() {
@@ -155,7 +173,6 @@ pub fn write_baseline(
     let adapter = adapter_of(cache.manifest());
     let hashes: Vec<String> = measured.iter().map(|m| m.hash.clone()).collect();
     let of_before = before.as_ref().and_then(|b| b.hashes.get(&adapter));
-    let is_new_adapter = of_before.is_none();
     let is_unchanged = of_before == Some(&hashes);
     let mut baseline = Baseline {
         format_version: FORMAT_VERSION,
@@ -163,27 +180,30 @@ pub fn write_baseline(
         solver: cache.manifest().solver.clone(),
         scene: cache.scene_toml().lines().map(str::to_owned).collect(),
         tolerances: default_tolerances(cache.manifest().particle_spacing),
+        spread_from: Vec::new(),
         aggregates_from: adapter.clone(),
         frames: measured.iter().map(|m| m.frame.clone()).collect(),
         hashes: BTreeMap::new(),
     };
     let mut dropped = Vec::new();
+    let mut is_spread_dropped = false;
     if let Some(before) = before {
         let old_scene = before.scene.join("\n");
         let is_same_scene = physics(file, &old_scene, cache.scene_toml())?.is_none();
         let numbers = before.frames.iter().map(|frame| frame.frame);
         if is_same_scene && numbers.eq(frames.iter().copied()) {
-            let (basis, faults) = before.compare(&adapter, &measured);
-            if is_new_adapter && basis == Basis::Aggregates && faults.is_empty() {
-                baseline.aggregates_from = before.aggregates_from;
-                baseline.frames = before.frames;
-            }
-            baseline.hashes = before.hashes;
+            carry_over(&mut baseline, before, &measured);
         } else {
+            is_spread_dropped = spread.is_empty() && !before.spread_from.is_empty();
+            if before.spread_from.is_empty() {
+                baseline.tolerances = before.tolerances;
+            }
             dropped = before.hashes.into_keys().collect();
             dropped.retain(|other| *other != adapter);
         }
-        baseline.tolerances = before.tolerances;
+    }
+    if !spread.is_empty() {
+        take_spread(&mut baseline, &cache, spread, &frames)?;
     }
     baseline.hashes.insert(adapter.clone(), hashes);
     write(file, &baseline)?;
@@ -194,7 +214,75 @@ pub fn write_baseline(
         frames: frames.len(),
         is_unchanged,
         dropped,
+        is_spread_dropped,
+        spread_from: baseline.spread_from,
     })
+}
+
+/// What stays of a baseline of the same scene and frames.
+fn carry_over(baseline: &mut Baseline, before: Baseline, measured: &[Measured]) {
+    let adapter = baseline.aggregates_from.clone();
+    let (basis, faults) = before.compare(Some(&adapter), measured);
+    let is_new_adapter = !before.hashes.contains_key(&adapter);
+    if is_new_adapter && basis == Basis::Aggregates && faults.is_empty() {
+        baseline.aggregates_from = before.aggregates_from;
+        baseline.frames = before.frames;
+    } else {
+        for (frame, old) in baseline.frames.iter_mut().zip(before.frames) {
+            frame.spread = old.spread;
+        }
+    }
+    baseline.hashes = before.hashes;
+    baseline.tolerances = before.tolerances;
+    baseline.spread_from = before.spread_from;
+}
+
+/// Measures how far the frames of `cache` and those of bakes that differ in roundings alone come apart.
+fn take_spread(
+    baseline: &mut Baseline,
+    cache: &CacheReader,
+    others: &[PathBuf],
+    frames: &[u32],
+) -> Result<(), DiffError> {
+    let expected = measure(cache, frames)?;
+    let expected: Vec<BaselineFrame> = expected.into_iter().map(|m| m.frame).collect();
+    let mut bakes = Vec::new();
+    baseline.spread_from.clear();
+    for path in others {
+        let other = CacheReader::open(path)?;
+        let bake: Vec<BaselineFrame> = measure(&other, frames)?
+            .into_iter()
+            .map(|m| m.frame)
+            .collect();
+        let adapter = adapter_of(other.manifest());
+        let changed = physics(cache.dir(), cache.scene_toml(), other.scene_toml())?;
+        let refuse = |why: &str| {
+            let path = path.display();
+            Err(DiffError::Usage(format!("--spread {path}: {why}")))
+        };
+        if other.manifest().solver != cache.manifest().solver {
+            return refuse("another solver is no rounding");
+        }
+        let counts = |frames: &[BaselineFrame]| frames.first().map(|frame| frame.particles);
+        if counts(&bake) != counts(&expected) {
+            return refuse("another number of particles is no rounding");
+        }
+        let from = match changed {
+            Some(key) => key,
+            None if adapter != adapter_of(cache.manifest()) => adapter,
+            None => return refuse("the same scene on the same adapter has no spread"),
+        };
+        baseline.spread_from.push(from);
+        bakes.push(bake);
+    }
+    let spreads = spread::of(&expected, &bakes);
+    let particles = expected.first().map_or(0, |frame| frame.particles);
+    let spacing = cache.manifest().particle_spacing;
+    baseline.tolerances = spread::tolerances(&spreads, spacing, particles);
+    for (frame, spread) in baseline.frames.iter_mut().zip(spreads) {
+        frame.spread = Some(spread);
+    }
+    Ok(())
 }
 
 fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
@@ -208,6 +296,7 @@ fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
 }
 
 fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffError> {
+    cache.check_beside(frames)?;
     let scene = scene_of(cache)?;
     let gauge = gauge(&scene, &[cache])?;
     let one = |&frame: &u32| {
@@ -218,6 +307,7 @@ fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffErr
                 frame,
                 particles: particles.len(),
                 aggregates: aggregates(cache, &gauge, scene.water.gravity, frame, &particles)?,
+                spread: None,
             },
         })
     };

@@ -1,0 +1,92 @@
+//! What differs beside the particles, in words.
+
+use std::fmt::Write as _;
+
+use crate::stage::diff::{CacheDiff, Difference, GridDiff, StreamDiff, ranges};
+
+use super::number;
+
+/// Differences of one frame that are printed before the rest is counted.
+const MOST: usize = 3;
+
+/// A stream a line: in which frames it differs, and how in the first of them.
+pub(super) fn show(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
+    let mark = if diff.streams_judged { "out: " } else { "" };
+    let lone = [("A", &diff.streams_only_a), ("B", &diff.streams_only_b)];
+    for (side, names) in lone {
+        for name in names {
+            writeln!(out, "{mark}{name} in {side} alone")?;
+        }
+    }
+    for first in firsts(&diff.streams) {
+        let same = diff.streams.iter().filter(|d| d.stream == first.stream);
+        let frames: Vec<u32> = same.map(|d| d.frame).collect();
+        let [a, b] = &first.files;
+        let files = if a == b {
+            a.clone()
+        } else {
+            format!("{a} and {b}")
+        };
+        writeln!(
+            out,
+            "{mark}{} not the same in frames {}; frame {}, {files}: {}",
+            first.stream,
+            ranges(&frames),
+            first.frame,
+            describe_all(&first.differences)
+        )?;
+    }
+    let is_shown = !diff.streams.is_empty() || lone.iter().any(|(_, names)| !names.is_empty());
+    if is_shown && !diff.streams_judged {
+        writeln!(out, "not judged: the tolerance file names none of these")?;
+    }
+    Ok(())
+}
+
+/// Of each stream the first frame in which it differs.
+fn firsts(streams: &[StreamDiff]) -> Vec<&StreamDiff> {
+    let mut found: Vec<&StreamDiff> = Vec::new();
+    for diff in streams {
+        if found.iter().all(|other| other.stream != diff.stream) {
+            found.push(diff);
+        }
+    }
+    found
+}
+
+fn describe_all(differences: &[Difference]) -> String {
+    let words: Vec<String> = differences.iter().take(MOST).map(describe).collect();
+    let mut text = words.join("; ");
+    if let Some(more @ 1..) = differences.len().checked_sub(MOST) {
+        // Writing to a String cannot fail.
+        let _ = write!(text, "; {more} more");
+    }
+    text
+}
+
+fn describe(difference: &Difference) -> String {
+    match difference {
+        Difference::Value { key, a, b } => format!("{key}: A {a}, B {b}"),
+        Difference::Bytes { a, b } => {
+            format!("other bytes ({a} and {b} of them)")
+        }
+        Difference::Grid(grid) => describe_grid(grid),
+    }
+}
+
+fn describe_grid(diff: &GridDiff) -> String {
+    let [a, b] = diff.active;
+    let unit = match diff.grid.as_str() {
+        "surface" => " m",
+        "vel" => " m/s",
+        _ => "",
+    };
+    let place = diff.largest_at.map_or(String::new(), |at| {
+        let largest = number(diff.largest);
+        format!(", the largest difference {largest}{unit} at {at:?}")
+    });
+    format!(
+        "{}: {} voxels differ of {a} and {b}{place}",
+        diff.grid, diff.different
+    )
+}

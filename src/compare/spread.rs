@@ -1,0 +1,206 @@
+//! What the aggregates of a baseline may differ by on an adapter that it has no hashes of: a multiple of how far
+//! bakes come apart that differ in roundings alone, frame by frame.
+//!
+//! Trajectories part exponentially, so a limit for the last frame says little of the first ones, in which a changed
+//! constant shows best. For the shipped scenes the bakes are those of `tools/regress --limits`: gravity one last place
+//! up and down and tilted by 10⁻⁷, the scene in three other places, and the f64 reference in place of the adapter.
+//! FLIP's kinetic energy spreads by 2·10⁻⁷ to 10⁻³ of itself; PBF's by 10⁻⁶ to 3·10⁻⁵ in the first frame, by up to 5 %
+//! to 30 % in later ones. A bake in a fourth place, which no limit was taken from, stays within them in all scenes with both solvers.
+//! What a change of 1 % comes to, in limits: `solver.flip.pic_blend` 2 to 84 in every scene; `solver.pbf.relaxation`
+//! 4 to 280 in every scene; `effects.viscosity` 2 to 8 in three scenes with FLIP, 4 in one with PBF; the strength of
+//! `effects.vorticity_confinement` stays below 1 with both.
+
+use std::collections::BTreeMap;
+
+use super::{
+    baseline::{BaselineFrame, StatedLimit},
+    frames::aggregate_error,
+};
+use crate::domain::aggregates::Aggregates;
+
+/// Multiples of the spread that are allowed. A second adapter is as far from exact arithmetic as the first, so they
+/// may be twice as far from each other as one of them is from f64; the rest is room for chaos, of which the spread is
+/// the largest of a few samples.
+const SPREADS: f64 = 5.0;
+
+/// Eight roundings of a 32-bit value: what sums of such values are good to where no bake shows a spread.
+const ROUNDINGS: f64 = 8.0 * f32::EPSILON as f64;
+
+/// By name of the aggregate.
+pub type Spread = BTreeMap<String, f64>;
+
+/// What an aggregate cannot be told from, whatever was measured: name, absolute, relative, why. Particles are
+/// `spacing` metres apart at rest; lengths and volumes come from cubes two spacings wide, which hold 8 of them
+/// (see `study::measure`).
+fn resolution(spacing: f64, particles: usize) -> [(&'static str, f64, f64, &'static str); 8] {
+    let cube = (2.0 * spacing).powi(3);
+    let drops = 8.0 / particles.max(1) as f64;
+    [
+        ("kinetic_energy", 0.0, ROUNDINGS, "8 roundings of 32 bits"),
+        ("potential_energy", 0.0, ROUNDINGS, "8 roundings of 32 bits"),
+        ("volume", 2.0 * cube, 0.0, "2 cubes of the measure"),
+        (
+            "crest_height",
+            0.25 * spacing,
+            0.0,
+            "a particle more in a column's top cube",
+        ),
+        (
+            "front",
+            0.25 * spacing,
+            0.0,
+            "a particle more in a column's top cube",
+        ),
+        (
+            "splash_height",
+            0.01 * spacing,
+            0.0,
+            "a hundredth of a spacing: the next particle by height",
+        ),
+        ("airborne", drops, 0.0, "the 8 particles of a cube"),
+        (
+            "density_error",
+            ROUNDINGS,
+            0.0,
+            "8 roundings of 32 bits of a relative density",
+        ),
+    ]
+}
+
+/// By frame of `expected`: the largest |a − b| of each aggregate in this frame or an earlier one, over all of `bakes`,
+/// whose frames are those of `expected`. What one side alone has is left out, as it is where a baseline is compared.
+pub fn of(expected: &[BaselineFrame], bakes: &[Vec<BaselineFrame>]) -> Vec<Spread> {
+    let names = Aggregates::NAMES.map(|(name, _)| name);
+    let mut most = [0.0; Aggregates::NAMES.len()];
+    let mut spread = |(index, expected): (usize, &BaselineFrame)| {
+        let b = expected.aggregates.values();
+        for bake in bakes {
+            let a = bake[index].aggregates.values();
+            for ((most, a), b) in most.iter_mut().zip(a).zip(b) {
+                let error = aggregate_error(a, b);
+                if error.is_finite() {
+                    *most = error.max(*most);
+                }
+            }
+        }
+        let pairs = names.into_iter().zip(most);
+        pairs
+            .map(|(name, most)| (name.to_owned(), rounded_up(most)))
+            .collect()
+    };
+    expected.iter().enumerate().map(&mut spread).collect()
+}
+
+/// Limits for frames with these spreads.
+pub fn tolerances(
+    spreads: &[Spread],
+    spacing: f64,
+    particles: usize,
+) -> BTreeMap<String, StatedLimit> {
+    let units = BTreeMap::from(Aggregates::NAMES);
+    let stated = |(name, absolute, relative, why): (&'static str, f64, f64, &str)| {
+        let last = spreads.last().and_then(|spread| spread.get(name));
+        let most = last.copied().unwrap_or(0.0);
+        let unit = units.get(name).copied().unwrap_or_default();
+        let most = match (most, unit) {
+            (0.0, _) => "none".to_owned(),
+            (most, "") => format!("{most:e}"),
+            (most, unit) => format!("{most:e} {unit}"),
+        };
+        let reason = format!(
+            "{SPREADS} times the frame's spread between bakes that differ in roundings alone (in the last frame \
+             {most}), and what the measure cannot tell: {why}"
+        );
+        let limit = StatedLimit {
+            absolute,
+            relative,
+            spreads: SPREADS,
+            reason,
+        };
+        (name.to_owned(), limit)
+    };
+    resolution(spacing, particles)
+        .into_iter()
+        .map(stated)
+        .collect()
+}
+
+/// To three digits, never less than it is.
+fn rounded_up(value: f64) -> f64 {
+    if value == 0.0 {
+        return 0.0;
+    }
+    let unit = 10f64.powi(value.log10().floor() as i32 - 2);
+    let digits = (value / unit).ceil();
+    // As text: products of powers of ten leave digits behind.
+    format!("{digits}e{}", unit.log10().round())
+        .parse()
+        .unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(number: u32, energy: f64, front: Option<f64>) -> BaselineFrame {
+        BaselineFrame {
+            frame: number,
+            particles: 10,
+            aggregates: Aggregates {
+                kinetic_energy: energy,
+                front,
+                ..Aggregates::default()
+            },
+            spread: None,
+        }
+    }
+
+    #[test]
+    fn the_spread_is_the_largest_so_far() {
+        let base = [
+            frame(0, 0.0, None),
+            frame(1, 10.0, Some(1.0)),
+            frame(2, 20.0, Some(2.0)),
+        ];
+        let bakes = [
+            vec![
+                frame(0, 0.0, None),
+                frame(1, 10.5, None),
+                frame(2, 20.25, Some(2.125)),
+            ],
+            vec![
+                frame(0, 0.0, None),
+                frame(1, 9.75, Some(1.0625)),
+                frame(2, 20.0, Some(2.0)),
+            ],
+        ];
+        let found = of(&base, &bakes);
+        let energies: Vec<f64> = found
+            .iter()
+            .map(|spread| spread["kinetic_energy"])
+            .collect();
+        assert_eq!(energies, [0.0, 0.5, 0.5]);
+        // A front on one side alone counts nowhere.
+        let fronts: Vec<f64> = found.iter().map(|spread| spread["front"]).collect();
+        assert_eq!(fronts, [0.0, 0.0625, 0.125]);
+        let limits = tolerances(&found, 0.1, 10);
+        assert_eq!(limits.len(), Aggregates::NAMES.len());
+        let energy = &limits["kinetic_energy"];
+        assert_eq!((energy.spreads, energy.absolute), (SPREADS, 0.0));
+        assert!(energy.reason.contains("5e-1 J"), "{}", energy.reason);
+    }
+
+    #[test]
+    fn digits_are_cut_upwards() {
+        for (value, expected) in [
+            (0.0, 0.0),
+            (0.5, 0.5),
+            (1.0001, 1.01),
+            (123.4, 124.0),
+            (9.999e-9, 1e-8),
+            (4.0e7, 4.0e7),
+        ] {
+            assert_eq!(rounded_up(value), expected, "{value}");
+        }
+    }
+}
