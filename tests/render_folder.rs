@@ -104,7 +104,10 @@ fn processes_share_a_range_and_make_up_for_a_killed_one() {
         }
         let rendered: u64 = counted.iter().map(|count| count[0]).sum();
         // Without a kill each frame is rendered by one process alone.
-        assert!(rendered <= u64::from(LAST) && rendered >= all, "{counted:?}");
+        assert!(
+            rendered <= u64::from(LAST) && rendered >= all,
+            "{counted:?}"
+        );
         shared += u32::from(counted.iter().filter(|count| count[0] > 0).count() > 1);
         assert!(
             pictures(&folder) == alone,
