@@ -107,6 +107,9 @@ fn show_plan(out: &mut impl Write, scene: &Scene, planned: &ScenePlan) -> Result
         shot.frames_per_second,
         scene.solver.method.name()
     )?;
+    for warning in scene.warnings() {
+        writeln!(out, "warning: {warning}")?;
+    }
     let samples = match plan.counts.boundary_samples {
         0 => String::new(),
         count => format!("{count} boundary samples, "),
@@ -172,6 +175,9 @@ fn show_cache(
     writeln!(out, "scene {}", manifest.scene_hash)?;
     if let Some(parent) = &manifest.parent {
         writeln!(out, "begins from {parent}")?;
+    }
+    for warning in &manifest.warnings {
+        writeln!(out, "warning: {warning}")?;
     }
     writeln!(
         out,

@@ -110,6 +110,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         probes: Vec::new(),
         attributes: Vec::new(),
         parent: None,
+        warnings: Vec::new(),
         start_particles: 0,
         files: Vec::new(),
     };
