@@ -240,18 +240,17 @@ fn a_frames_further_files_are_checked_for_who_asks() {
         CacheWriter::create(d, given, SCENE, &assets(), clock, &start(), &seen(clock)).unwrap();
     go_on(writer, clock, start(), 2).unwrap();
     let reader = CacheReader::open(d).unwrap();
-    let check = || (0..3).try_for_each(|frame| reader.check_grids(frame));
+    let check = || reader.check_beside(&[0, 1, 2]);
     check().unwrap();
-    reader.check_probes().unwrap();
     assert!(matches!(
-        reader.check_grids(3),
+        reader.check_beside(&[3]),
         Err(CacheError::NoFrame { .. })
     ));
-    for (name, is_grid) in [
-        ("grids/tank.0001.vdb", true),
-        ("grids/tank.0002.vdb", true),
-        ("probes/gauge.csv", false),
-        ("probes/energy-1.csv", false),
+    for name in [
+        "grids/tank.0001.vdb",
+        "grids/tank.0002.vdb",
+        "probes/gauge.csv",
+        "probes/energy-1.csv",
     ] {
         let path = d.join(name);
         let sound = fs::read(&path).unwrap();
@@ -262,19 +261,19 @@ fn a_frames_further_files_are_checked_for_who_asks() {
                 Some(bytes) => fs::write(&path, bytes).unwrap(),
                 None => fs::remove_file(&path).unwrap(),
             }
-            let (grids, probes) = (check(), reader.check_probes());
-            let (found, other) = if is_grid {
-                (grids, probes)
-            } else {
-                (probes, grids)
-            };
-            assert_eq!(damaged_file(found), path);
-            other.unwrap();
+            assert_eq!(damaged_file(check()), path);
         }
         fs::write(&path, sound).unwrap();
+        check().unwrap();
     }
+    // Frames that were not asked for are not looked at.
+    fs::remove_file(d.join("grids/tank.0002.vdb")).unwrap();
+    reader.check_beside(&[0, 1]).unwrap();
     // A cache without grids has none that could be off.
-    CacheReader::open(baked()).unwrap().check_grids(1).unwrap();
+    CacheReader::open(baked())
+        .unwrap()
+        .check_beside(&[1])
+        .unwrap();
 }
 
 #[test]

@@ -230,8 +230,9 @@ fn plates_without_thickness_are_refused_with_their_place_and_thin_ones_are_not_i
     let bounds = sheet.bounds().unwrap().grown(0.5);
     for mesh in [&sheet, &two_sided] {
         match SignedDistance::from_mesh(mesh, &bounds, 0.1).unwrap_err() {
-            SignedDistanceError::NoInside(NoInside::Open { count: 4, edges }) => {
-                assert_named(mesh, &edges);
+            SignedDistanceError::NoInside(NoInside::Open { holes, .. }) => {
+                assert_eq!((holes.0.len(), holes.edges()), (1, 4));
+                assert_eq!(holes.0[0].centre, DVec3::new(1.0, 0.5, 0.5));
             }
             SignedDistanceError::NoInside(NoInside::Flat { place }) => {
                 assert_eq!(place, "(0.0000, 0.5000, 0.0000)");

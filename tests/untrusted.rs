@@ -22,6 +22,7 @@ use proptest::prelude::*;
 use swell::{
     cache::{self, CacheReader, CacheWriter, frame},
     domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
+    scene::study::Study,
 };
 
 /// Remembers the largest allocation of each thread.
@@ -346,4 +347,52 @@ fn a_mesh_that_is_a_pipe_is_refused() {
         said.contains("not a plain file") && said.contains("small.toml:"),
         "{said}"
     );
+}
+
+/// One rule: holes that face one another are refused, others are taken and told of by every command, and in the cache.
+#[test]
+fn an_open_mesh_is_told_of_everywhere_and_a_tube_is_refused() {
+    let job = Job::new();
+    job.expect(0, "bake small.toml --device cpu --frames 1 -o closed");
+    // The cache has its own copy, of a name of its own.
+    let told = ".obj is open and taken as closed: 1 hole: 4 open edges about (0.5000, 0.5000, 0.7000), 0.5657 m \
+                across; inside is where its winding number is above one half";
+    let manifest = |cache: &str| fs::read_to_string(job.path(cache).join("manifest.json")).unwrap();
+    assert!(!manifest("closed").contains("warnings"));
+    assert!(!job.expect(0, "inspect small.toml").contains("warning"));
+    // A house without its floor.
+    job.edit("box.obj", "f 1 2 6 5\n", "");
+    for words in [
+        "inspect small.toml",
+        "bake small.toml --device cpu --frames 1 -o open",
+        "bake small.toml --device cpu --frames 1 -o json --progress json",
+        "inspect open",
+        "check small.toml",
+        "check open",
+    ] {
+        let said = job.expect(0, words);
+        assert!(said.contains(told), "{words}: {said}");
+    }
+    assert!(manifest("open").contains(told));
+    let study = Study::load(&job.path("study.toml")).unwrap();
+    let [warning] = &study.warnings()[..] else {
+        panic!("{:?}", study.warnings());
+    };
+    assert!(warning.contains(told), "{warning}");
+    // And without its roof: what two holes leave open does not cancel.
+    job.edit("box.obj", "f 4 8 7 3\n", "");
+    for words in [
+        "inspect small.toml",
+        "check small.toml",
+        "bake small.toml -o tube",
+    ] {
+        let said = job.expect(2, words);
+        for part in [
+            "small.toml:16: solid[0].mesh",
+            "its holes face one another through it, as in a tube; 2 holes with 8 open edges: 4 open edges about \
+             (0.5000, 0.5000, 0.7000), 0.5657 m across, 4 open edges about (0.5000, 1.0000, 0.7000), 0.5657 m across",
+        ] {
+            assert!(said.contains(part), "{words}: {said}");
+        }
+    }
 }

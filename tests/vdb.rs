@@ -277,6 +277,7 @@ fn manifest(grids: Option<GridRecord>) -> Manifest {
         grids,
         probes: Vec::new(),
         parent: None,
+        warnings: Vec::new(),
         start_particles: 0,
         files: Vec::new(),
     }

@@ -62,6 +62,9 @@ pub struct Manifest {
     /// The frame of another cache that this bake began from; absent where it began from its scene's start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<Parent>,
+    /// What its user was told of the scene before the bake, a sentence each; absent where there was nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// Particles at the start; filled in by `create`.
     pub start_particles: u64,
     /// `scene.toml` and the assets; filled in by `create`.

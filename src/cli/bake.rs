@@ -202,6 +202,7 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             last,
             parent,
             notes,
+            warnings,
         } => {
             let frames = u64::from((last + 1).saturating_sub(first));
             let progress = progress.get_or_init(|| Progress::new(mode, frames));
@@ -210,6 +211,10 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
                     "warning: the scene holds no water",
                     json!({ "event": "warning", "what": "no water" }),
                 );
+            }
+            for warning in &warnings {
+                let (text, event) = warned(warning);
+                progress.say(&text, event);
             }
             let span = if first > last {
                 "nothing left to bake".into()
@@ -286,6 +291,14 @@ fn line(frame: u32, report: &StepReport, seconds: f64) -> String {
         100.0 * report.density_error_max,
         report.max_speed,
         report.capped
+    )
+}
+
+/// What a user has to know of a scene, as a line, and the same for farms.
+pub(super) fn warned(warning: &str) -> (String, Value) {
+    (
+        format!("warning: {warning}"),
+        json!({ "event": "warning", "what": "scene", "text": warning }),
     )
 }
 

@@ -157,10 +157,14 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: &Event<'_>) {
             solver,
             particles,
             frames,
+            warnings,
         } => {
-            progress
-                .get_or_init(|| Progress::new(mode, *frames as u64))
-                .say(
+            let progress = progress.get_or_init(|| Progress::new(mode, *frames as u64));
+            for warning in warnings {
+                let (text, event) = bake::warned(warning);
+                progress.say(&text, event);
+            }
+            progress.say(
                     &format!("{solver} on {device} against f64, {particles} particles at the start"),
                     json!({
                         "event": "ready", "solver": solver, "device": device, "particles": particles, "frames": frames,

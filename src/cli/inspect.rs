@@ -124,6 +124,9 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
         shot.frames_per_second,
         scene.solver.method.name()
     )?;
+    for warning in scene.warnings() {
+        writeln!(out, "warning: {warning}")?;
+    }
     let samples = match plan.counts.boundary_samples {
         0 => String::new(),
         count => format!("{count} boundary samples, "),
@@ -185,6 +188,9 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
     writeln!(out, "scene {}", manifest.scene_hash)?;
     if let Some(parent) = &manifest.parent {
         writeln!(out, "begins from {parent}")?;
+    }
+    for warning in &manifest.warnings {
+        writeln!(out, "warning: {warning}")?;
     }
     writeln!(
         out,

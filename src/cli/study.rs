@@ -53,11 +53,11 @@ pub(super) fn run(args: &StudyArgs) -> Result<u8, Failure> {
     let say = |text: &str, event| Progress::new(args.progress.lines(), 0).say(text, event);
     let mut progress = OnceCell::new();
     let outcome = study(&request, interrupt.flag(), &mut |event| {
-        let is_new = matches!(
-            event,
-            Event::Bake(crate::stage::bake::Event::Ready { .. })
-                | Event::Render(crate::stage::render::Event::Ready { .. })
-        );
+        let is_new = match &event {
+            Event::Bake(event) => matches!(**event, crate::stage::bake::Event::Ready { .. }),
+            Event::Render(event) => matches!(event, crate::stage::render::Event::Ready { .. }),
+            _ => false,
+        };
         if is_new && let Some(before) = progress.take() {
             Progress::finish(&before);
         }
@@ -66,7 +66,11 @@ pub(super) fn run(args: &StudyArgs) -> Result<u8, Failure> {
                 &format!("solver {name}"),
                 json!({ "event": "solver", "solver": name }),
             ),
-            Event::Bake(event) => bake::tell(args.progress, &progress, event),
+            Event::Warning(warning) => {
+                let (text, event) = bake::warned(&warning);
+                say(&text, event);
+            }
+            Event::Bake(event) => bake::tell(args.progress, &progress, *event),
             Event::Render(event) => render::tell(args.progress, &progress, event),
             Event::Point(event) => {
                 let bar = progress.get_or_init(|| Progress::new(args.progress, event.count as u64));

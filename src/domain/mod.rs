@@ -9,6 +9,7 @@ pub mod bvh;
 pub mod flip;
 pub mod frame_range;
 pub mod gauge;
+pub mod holes;
 pub mod mesh;
 pub mod mesh_file;
 pub mod motion;

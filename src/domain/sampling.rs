@@ -531,6 +531,22 @@ mod tests {
     }
 
     #[test]
+    fn a_share_is_one_over_the_sum_of_the_kernel_on_its_own_side() {
+        // A row one spacing apart on one side, and a sample of the other side at the middle's place.
+        let row = [-0.1, 0.0, 0.1, 0.0].map(|x| DVec3::new(x, 0.0, 0.0));
+        let normals = [DVec3::Y, DVec3::Y, DVec3::Y, -DVec3::Y];
+        // 1 − r/R with R two spacings: 1 of itself, ½ of each neighbour; from end to end r = R.
+        let expected = [1.0 / 1.5, 1.0 / 2.0, 1.0 / 1.5, 1.0];
+        for (share, exact) in surface_shares(&row, &normals, 0.1).iter().zip(expected) {
+            // A handful of operations, each rounded once.
+            assert!(
+                (share - exact).abs() < 8.0 * f64::EPSILON,
+                "{share} {exact}"
+            );
+        }
+    }
+
+    #[test]
     fn samples_outside_the_domain_and_on_its_floor_are_left_out() {
         let domain = cuboid([0.0; 3], [2.0; 3]);
         let tower = box_mesh(cuboid([0.5, 0.0, 0.5], [1.0, 3.0, 1.0]));

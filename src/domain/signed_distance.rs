@@ -318,6 +318,25 @@ mod tests {
     }
 
     #[test]
+    fn the_inside_of_a_house_without_its_floor_ends_where_the_floor_was() {
+        let mut house = box_mesh(Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::new(2.0, 4.0, 2.0),
+        });
+        house.triangles.drain(4..6);
+        // Two nodes 5 mm to each side of the hole's middle. A square of half edge a takes up 4 asin(a²/(a² + h²)) as seen
+        // from h above it: there the winding number is 0.5 ± 0.002, and a threshold 1 % off would move the floor.
+        let middle = Bounds {
+            min: DVec3::new(1.0, -0.005, 1.0),
+            max: DVec3::new(1.01, 0.005, 1.01),
+        };
+        let field = SignedDistance::from_mesh(&house, &middle, 0.01).expect("nearly closed");
+        for (p, value) in nodes(&field) {
+            assert_eq!(value < 0.0, p.y > 0.0, "{p} {value}");
+        }
+    }
+
+    #[test]
     fn halfway_between_two_near_surfaces_is_outside() {
         // Hard case 29: two boxes 0.04 apart on a grid of 0.1.
         let left = box_mesh(Bounds {

@@ -452,13 +452,15 @@ fn placed_mesh(doc: &Document<'_>, base_dir: &Path, spec: &MeshSpec<'_>) -> Resu
         scale: scale(doc, spec.scale)?,
     };
     let mesh = in_file.transformed(&placement.world_from_file());
-    mesh.check_inside()
+    let holes = mesh
+        .check_inside()
         .map_err(|error| fail(format!("{}: {error}", file.display())))?;
     Ok(PlacedMesh {
         file,
         file_hash,
         placement,
         mesh,
+        holes,
     })
 }
 

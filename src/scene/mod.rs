@@ -30,7 +30,7 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DQuat, DVec3};
 
-use crate::domain::{bounds::Bounds, mesh::TriangleMesh, motion::Motion};
+use crate::domain::{bounds::Bounds, holes::Holes, mesh::TriangleMesh, motion::Motion};
 
 pub use budget::Budget;
 pub use difference::{physics_difference, physics_hash};
@@ -159,6 +159,34 @@ pub struct PlacedMesh {
     pub placement: Placement,
     /// Metres, about the scene's origin.
     pub mesh: TriangleMesh,
+    /// Holes that it is taken with; world coordinates, metres.
+    pub holes: Holes,
+}
+
+impl PlacedMesh {
+    /// That it is open, with its holes; `None` for a closed mesh.
+    fn warning(&self) -> Option<String> {
+        let name = self.file.file_name().unwrap_or_default().to_string_lossy();
+        (!self.holes.0.is_empty()).then(|| {
+            format!(
+                "{name} is open and taken as closed: {}; inside is where its winding number is above one half, about \
+                 as if a flat cap closed each hole",
+                self.holes
+            )
+        })
+    }
+}
+
+impl Scene {
+    /// What a user has to know of a scene that is taken all the same, a sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let placed = self.water.meshes.iter().chain(&self.solids);
+        let moving = self.moving_solids.iter().map(|solid| &solid.placed);
+        placed
+            .chain(moving)
+            .filter_map(PlacedMesh::warning)
+            .collect()
+    }
 }
 
 /// Scale first, then rotation, then translation.

@@ -75,6 +75,8 @@ pub enum Event {
         parent: Option<Parent>,
         /// What a user has to know of such a beginning, a sentence each.
         notes: Vec<String>,
+        /// What a user has to know of the scene, a sentence each.
+        warnings: Vec<String>,
     },
     /// A frame was computed.
     Frame {
@@ -214,6 +216,7 @@ pub fn bake(
         last,
         parent,
         notes,
+        warnings: scene.warnings(),
     });
     solver.load(clock.frame, &state)?;
     let mut watch = Watch::new(scene, &start.particles, clock.frame, &state);
@@ -408,6 +411,7 @@ fn open_cache(
         grids: scene.grids.map(|grids| grid_record(scene, &grids)),
         probes: probes::records(scene),
         parent: parent.clone(),
+        warnings: scene.warnings(),
         start_particles: 0,
         files: Vec::new(),
     };

@@ -41,6 +41,7 @@ pub fn manifest() -> Manifest {
         grids: None,
         probes: probes(),
         parent: None,
+        warnings: Vec::new(),
         attributes: vec!["foam".to_owned(), "age".to_owned()],
         start_particles: 0,
         files: Vec::new(),

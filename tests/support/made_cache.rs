@@ -152,6 +152,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         probes: made.probes.clone(),
         attributes: Vec::new(),
         parent: None,
+        warnings: Vec::new(),
         start_particles: 0,
         files: Vec::new(),
     };

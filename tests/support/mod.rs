@@ -186,6 +186,7 @@ pub fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
             file_hash: String::new(),
             placement: Placement::default(),
             mesh: box_mesh(bounds),
+            holes: Default::default(),
         },
         direction,
         motion,

@@ -161,7 +161,10 @@ fn every_fault_is_named() {
             ply(&SQUARE_PLY.replace("float x", "float w")),
             "vertex 0 lacks one of x, y, z",
         ),
-        (ply("not a ply"), "Expected magic number"),
+        (
+            ply("not a ply"),
+            "not a PLY: it begins with \"not a ply\", not with \"ply\"",
+        ),
         (parse(MeshFormat::Stl, b"junk"), "not an STL: too short"),
         (
             parse(MeshFormat::Stl, &[0xff; 200]),
@@ -189,4 +192,210 @@ fn an_endless_promise_of_nothing_is_refused() {
         end_header\n";
     let message = parse(MeshFormat::Ply, bytes).expect_err("a false promise");
     assert!(message.contains("promises"), "{message}");
+}
+
+fn moved(mesh: &TriangleMesh, by: f64) -> TriangleMesh {
+    mesh.transformed(&glam::DAffine3::from_translation(DVec3::X * by))
+}
+
+/// What two cubes have, one of them moved.
+#[track_caller]
+fn assert_two_cubes(found: Result<TriangleMesh, String>) {
+    let mesh = found.expect("two cubes");
+    assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (16, 24));
+    // Twenty-four terms of at most 7/6 that round on their own.
+    assert!((mesh.signed_volume() - 2.0).abs() < 24.0 * 7.0 / 6.0 * f64::EPSILON);
+}
+
+#[test]
+fn every_solid_of_a_text_is_read() {
+    let mut text = stl_of(&cube(), true);
+    text.extend(b"\n");
+    text.extend(stl_of(&moved(&cube(), 6.0), true));
+    assert_two_cubes(parse(MeshFormat::Stl, &text));
+    // As some exporters write them: capitals, tabs, Windows' and old Macs' line ends, a mark before, a control
+    // character behind, normals that are no numbers.
+    let text = String::from_utf8(text).expect("text");
+    for changed in [
+        text.to_uppercase(),
+        text.replace("facet", "Facet").replace("solid", "Solid"),
+        text.replace("vertex ", "\t\tvertex\t"),
+        text.replace('\n', " \r\n"),
+        text.replace('\n', "\r"),
+        format!("\u{feff}{text}"),
+        format!("\n{text}\n\u{1a}"),
+        text.replace("normal 0 0 0", "normal nan nan -nan(ind)"),
+        text.replace("vertex 1 ", "vertex 1.0E+00 "),
+    ] {
+        assert_two_cubes(parse(MeshFormat::Stl, changed.as_bytes()));
+    }
+    // A binary one may begin with the word.
+    let mut binary = stl_of(&cube(), false);
+    assert!(binary.starts_with(b"solid "));
+    assert!(parse(MeshFormat::Stl, &binary).is_ok());
+    binary.pop();
+    let message = parse(MeshFormat::Stl, &binary).expect_err("a byte less");
+    assert!(
+        message.ends_with(
+            "begins with \"solid\", but is no text, and 12 triangles need 684 bytes of 683"
+        ),
+        "{message}"
+    );
+}
+
+#[test]
+fn every_group_of_an_obj_is_read_with_comments_marks_and_joined_lines() {
+    let lines = |mesh: &TriangleMesh, name: &str, base: u32| {
+        let mut text = format!("g {name}\n");
+        for v in &mesh.vertices {
+            text += &format!("v {} {} {}\n", v.x, v.y, v.z);
+        }
+        text += &format!("o {name}\n");
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|v| v + base);
+            text += &format!("f {a} {b} {c}\n");
+        }
+        text
+    };
+    let text = lines(&cube(), "a", 1) + &lines(&moved(&cube(), 6.0), "b", 9);
+    for changed in [
+        text.clone(),
+        format!("\u{feff}{text}"),
+        text.replace('\n', " # a comment\n"),
+        text.replace('\n', "# C:\\meshes\\\n"),
+        text.replace('\n', "\r\n"),
+        text.replace('\n', "\r"),
+        text.replace("f ", "f \\\n\t"),
+        text.replace("f ", "f \\ \r\n "),
+    ] {
+        assert_two_cubes(parse(MeshFormat::Obj, changed.as_bytes()));
+    }
+    // Line numbers are the file's, also after joined lines.
+    let message = parse(MeshFormat::Obj, b"v 0 \\\n0 0\n# \\\nf 1 2 x").expect_err("no x");
+    assert_eq!(message, "mesh m: line 4: \"x\" names no vertex");
+    let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let message = parse(MeshFormat::Obj, &[&b"\xff\xfe"[..], &wide].concat()).expect_err("UTF-16");
+    assert!(message.contains("UTF-16"), "{message}");
+}
+
+#[test]
+fn a_ply_is_read_with_any_line_ends_marks_and_numbers() {
+    let square = parse(MeshFormat::Ply, SQUARE_PLY.as_bytes()).expect("valid PLY");
+    for changed in [
+        format!("\u{feff}{SQUARE_PLY}"),
+        SQUARE_PLY.replace('\n', "\r\n"),
+        SQUARE_PLY.replace('\n', " \t\n"),
+        SQUARE_PLY.replace('\n', "\r"),
+        SQUARE_PLY.replace("\n2 0 0", "\n2.e0 -.0 0"),
+        SQUARE_PLY.replace("element vertex", "comment caf\u{e9}\nelement vertex"),
+    ] {
+        let mesh = parse(MeshFormat::Ply, changed.as_bytes());
+        assert_eq!(mesh.as_ref(), Ok(&square), "{changed:?}");
+    }
+    // A comment in Latin-1, before a binary body.
+    let binary = ply_of(&cube(), true);
+    let at = binary
+        .windows(7)
+        .position(|w| w == b"element")
+        .expect("an element");
+    let latin = [&binary[..at], b"comment caf\xe9\r\n", &binary[at..]].concat();
+    assert_eq!(
+        parse(MeshFormat::Ply, &latin),
+        parse(MeshFormat::Ply, &binary)
+    );
+}
+
+#[test]
+fn faults_of_text_files_are_told_in_one_line_with_their_place() {
+    let ply = |from: &str, to: &str| {
+        assert!(SQUARE_PLY.contains(from), "{from}");
+        parse(MeshFormat::Ply, SQUARE_PLY.replacen(from, to, 1).as_bytes())
+    };
+    let cube = String::from_utf8(stl_of(&cube(), true)).expect("text");
+    let stl = |from: &str, to: &str| {
+        assert!(cube.contains(from), "{from}");
+        parse(MeshFormat::Stl, cube.replacen(from, to, 1).as_bytes())
+    };
+    let cases = [
+        (
+            ply("property float x", "propety float x"),
+            "line 4: \"propety float x\": Couldn't parse line",
+        ),
+        (ply("format ascii 1.0\n", ""), "No format line found."),
+        (
+            ply("end_header\n", ""),
+            "the header has no line \"end_header\"",
+        ),
+        (
+            ply("2 2 0 255", "2 two 0 255"),
+            "line 13, element \"vertex\": \"2 two 0 255\": \"two\" is no number",
+        ),
+        (
+            ply("2 2 0 255", "2 nan 0 255"),
+            "line 13, element \"vertex\": \"2 nan 0 255\": \"nan\" is no number",
+        ),
+        (
+            ply("2 2 0 255", "2 2 0"),
+            "line 13, element \"vertex\": \"2 2 0\": it has fewer values than the header says",
+        ),
+        (
+            ply("2 2 0 255", "2 2 0 256"),
+            "line 13, element \"vertex\": \"2 2 0 256\": 256 does not fit into its property's type",
+        ),
+        (
+            ply("4 0 1 2 3", "5 0 1 2 3"),
+            "line 15, element \"face\": \"5 0 1 2 3\": it has fewer values than the header says",
+        ),
+        (
+            ply("4 0 1 2 3\n", ""),
+            "promises 1 of element \"face\", which need 2 bytes, but 0 are left",
+        ),
+        (
+            ply("element face 1", "element face 2"),
+            "the file ends within element \"face\", of which the header promises 2",
+        ),
+        (
+            ply("element face 1", "element face 1\nelement face 1"),
+            "line 9: \"element face 1\" is declared a second time",
+        ),
+        (
+            ply("property double y", "property double x"),
+            "line 5: \"property double x\" is declared a second time",
+        ),
+        (
+            ply("element face", "element tristrips"),
+            "no element \"face\" among \"vertex\", \"tristrips\"",
+        ),
+        (
+            stl("vertex 0 0 0", "vertex 0 0 x"),
+            "the facet that begins in line 2: invalid float literal",
+        ),
+        (
+            stl("endfacet\n", "endfacet\nfast\n"),
+            "the facet that begins in line 9: invalid facet header: [\"fast\"]",
+        ),
+        (
+            stl("endsolid", "solid"),
+            "line 86: a solid begins within another: no line \"endsolid\"",
+        ),
+        (
+            stl("endsolid cube\n", ""),
+            "the last solid has no line \"endsolid\"",
+        ),
+        (
+            stl("endsolid cube\n", "endsolid\nthe end\n"),
+            "line 87: \"the end\" outside of a solid",
+        ),
+    ];
+    for (result, expected) in cases {
+        let message = result.expect_err(expected);
+        assert!(
+            message.ends_with(expected),
+            "{message}\n  wanted {expected}"
+        );
+        assert!(
+            !message.contains('\n') && message.starts_with("mesh m: "),
+            "{message}"
+        );
+    }
 }

@@ -110,6 +110,31 @@ impl Study {
     }
 }
 
+impl Study {
+    /// What a user has to know of its scenes, each sentence once.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings: Vec<String> = Vec::new();
+        let mut of = |scene: &Scene| {
+            for warning in scene.warnings() {
+                if !warnings.contains(&warning) {
+                    warnings.push(warning);
+                }
+            }
+        };
+        match self {
+            Self::SolverComparison(comparison) => comparison.scenes.iter().for_each(of),
+            Self::Sweep(sweep) => {
+                let points = sweep.lines.iter().flat_map(|line| &line.points);
+                points
+                    .chain(&sweep.state)
+                    .for_each(|point| of(&point.scene));
+            }
+            Self::Stability(stability) => stability.for_each_scene(of),
+        }
+        warnings
+    }
+}
+
 /// That the scene which a study names cannot be read, at its place in the study.
 fn unreadable(
     doc: &Document<'_>,

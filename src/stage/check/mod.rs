@@ -83,6 +83,8 @@ pub enum Event<'a> {
         particles: usize,
         /// Frames that will be checked.
         frames: usize,
+        /// What a user has to know of the scene, a sentence each.
+        warnings: Vec<String>,
     },
     /// The step after a frame was checked.
     Frame {
@@ -167,6 +169,7 @@ pub fn check(
         solver: scene.solver.method.name(),
         particles: start.particles.len(),
         frames: frames.len(),
+        warnings: scene.warnings(),
     });
     let mut outcome = Outcome::default();
     for frame in frames {

@@ -19,7 +19,7 @@ use crate::{
 
 use super::{
     super::{bake, device::Device, render},
-    Event, Outcome, Request, StudyError, direction, gauge, write,
+    Event, Outcome, Request, StudyError, direction, gauge, what_was_run, write,
 };
 
 /// Runs it; what stands in the directory already is gone on with.
@@ -83,7 +83,7 @@ fn bake_and_render(
         device: Device::Gpu(request.adapter.clone()),
         time_passes: false,
     };
-    if bake::bake(&bake, stop, &mut |event| tell(Event::Bake(event)))?.interrupted {
+    if bake::bake(&bake, stop, &mut |event| tell(Event::Bake(Box::new(event))))?.interrupted {
         return Ok(true);
     }
     let render = render::Request {
@@ -169,7 +169,7 @@ fn parts(
         .map(|found| (found.question.to_owned(), found.text.clone()))
         .collect();
     let curves = comparison::charts(courses, impact);
-    Ok(vec![
+    let mut parts = vec![
         Part::Text(comparison::CLAIMS.into()),
         Part::Text(comparison::summary(findings)),
         Part::Text(when),
@@ -180,12 +180,15 @@ fn parts(
         Part::Curves(curves.iter().map(|chart| chart.to_svg()).collect()),
         Part::Heading("What was run".into()),
         Part::Table(run_table(caches, courses)),
-        Part::Code(request.command.clone()),
+    ];
+    parts.extend(what_was_run(request));
+    parts.extend([
         // Both tables of solvers are in it.
         Part::Code(caches[0].scene_toml().to_owned()),
         Part::Heading("How it was measured".into()),
         Part::Text(MEASURED.into()),
-    ])
+    ]);
+    Ok(parts)
 }
 
 /// For the reader of the page; the definitions stand at `swell::study::measure`.

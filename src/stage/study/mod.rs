@@ -20,6 +20,7 @@ use crate::{
     solve::SolveError,
     study::{
         measure::{Direction, Gauge},
+        page::Part,
         picture::PictureError,
         raster::RasterError,
     },
@@ -50,8 +51,10 @@ pub struct Request {
 pub enum Event {
     /// A bake begins or goes on.
     Solver(&'static str),
+    /// What a user has to know of a scene of the study.
+    Warning(String),
     /// A bake tells.
-    Bake(bake::Event),
+    Bake(Box<bake::Event>),
     /// A render tells.
     Render(render::Event),
     /// A point of a sweep.
@@ -196,11 +199,24 @@ pub fn study(
     if let Some(adapter) = &request.adapter {
         adapter::check_request(adapter)?;
     }
+    for warning in request.study.warnings() {
+        tell(Event::Warning(warning));
+    }
     match &request.study {
         Study::SolverComparison(comparison) => comparison::run(request, comparison, stop, tell),
         Study::Sweep(sweep) => sweep::run(request, sweep, stop, tell),
         Study::Stability(stability) => stability::run(request, stability, stop, tell),
     }
+}
+
+/// What was typed, and what was told of the scenes.
+fn what_was_run(request: &Request) -> Vec<Part> {
+    let warnings = request.study.warnings().into_iter();
+    let told = warnings.map(|warning| Part::Text(format!("Warning: {warning}")));
+    [Part::Code(request.command.clone())]
+        .into_iter()
+        .chain(told)
+        .collect()
 }
 
 /// The wave runs away from the first wave maker; towards greater x where there is none.

@@ -63,6 +63,25 @@ pub struct Stability {
     pub limits: Vec<Limit>,
 }
 
+impl Stability {
+    /// Visits the scenes of its cases, and of its limits where they should pass.
+    pub(super) fn for_each_scene(&self, mut visit: impl FnMut(&Scene)) {
+        for case in &self.cases {
+            match &case.held {
+                Held::Test(_) | Held::Refusal { .. } => {}
+                Held::Runs(trials) => trials.iter().for_each(|trial| visit(&trial.scene)),
+            }
+        }
+        for limit in &self.limits {
+            let trials = limit
+                .searches
+                .iter()
+                .map(|search| search.trial(limit.passes));
+            trials.flatten().for_each(|trial| visit(&trial.scene));
+        }
+    }
+}
+
 /// Something hard.
 #[derive(Clone, Debug)]
 pub struct Case {

@@ -12,7 +12,7 @@ use crate::{
 };
 
 use super::{
-    super::{Outcome, Request, StudyError, csv, write},
+    super::{Outcome, Request, StudyError, csv, what_was_run, write},
     Record, Results, Verdict,
 };
 
@@ -311,7 +311,7 @@ impl Results<'_> {
         parts.push(Part::Heading("Curves".into()));
         parts.extend(self.curves());
         parts.push(Part::Heading("What was run".into()));
-        parts.push(Part::Code(request.command.clone()));
+        parts.extend(what_was_run(request));
         parts.push(Part::Text(self.where_run()));
         parts.push(Part::Table(self.runs()));
         parts.push(Part::Heading("How it was measured".into()));

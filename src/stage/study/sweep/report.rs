@@ -19,7 +19,7 @@ use crate::{
 };
 
 use super::{
-    super::{Outcome, Request, StudyError, csv, write},
+    super::{Outcome, Request, StudyError, csv, what_was_run, write},
     Devices, errors,
     ledger::{Record, Run, Verdict},
 };
@@ -413,7 +413,7 @@ impl Results<'_> {
             [self.titles()].into_iter().chain(self.rows()).collect(),
         ));
         parts.push(Part::Heading("What was run".into()));
-        parts.push(Part::Code(request.command.clone()));
+        parts.extend(what_was_run(request));
         parts.push(Part::Text(format!(
             "{} By {} {}. {}",
             self.where_run(),

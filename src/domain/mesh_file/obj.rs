@@ -1,0 +1,128 @@
+//! OBJ through tobj, which sees `v` and `f` lines only, and of a corner `v/vt/vn` only `v`.
+//!
+//! The rest carries no geometry, and is where tobj can still be driven out of bounds (normal and
+//! texture indices near the largest integer wrap around) or asked to open other files. Objects and
+//! groups are names alone: all of them are one mesh.
+
+use std::{fmt::Write as _, io::Cursor};
+
+use glam::DVec3;
+
+use super::{Raw, lines_of, quoted, without_mark};
+
+/// Vertices and triangles of all objects and groups.
+pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
+    let text = lines_of(without_mark(bytes)?);
+    let mut geometry = Geometry::default();
+    // A line that ends in a backslash goes on in the next; the number is that of the first.
+    let mut joined = String::new();
+    let mut first = 1;
+    for (index, line) in text.lines().chain([""]).enumerate() {
+        if joined.is_empty() {
+            first = index + 1;
+        }
+        let line = line.split('#').next().unwrap_or_default().trim_end();
+        if let Some(part) = line.strip_suffix('\\') {
+            joined += part;
+            joined.push(' ');
+            continue;
+        }
+        joined += line;
+        geometry.add(first, &joined)?;
+        joined.clear();
+    }
+    geometry.read()
+}
+
+/// What is handed on to tobj.
+#[derive(Default)]
+struct Geometry {
+    text: String,
+    vertices: i64,
+    /// Greatest index of a face's corner, and its line.
+    greatest: (i64, usize),
+}
+
+impl Geometry {
+    /// Takes a line without its comment.
+    fn add(&mut self, number: usize, line: &str) -> Result<(), String> {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => {
+                let words: Vec<_> = words.collect();
+                // Six or seven words: a colour follows. Four: a weight.
+                let used = if words.len() == 4 { 4 } else { 3 };
+                let is_number = |word: &&str| word.parse::<f32>().is_ok();
+                if words.len() < 3 || !words[..used].iter().all(is_number) {
+                    return Err(format!(
+                        "line {number}: a vertex needs three numbers: {}",
+                        quoted(line)
+                    ));
+                }
+                self.vertices += 1;
+                writeln!(self.text, "v {}", words[..used].join(" ")).map_err(|e| e.to_string())?;
+            }
+            Some("f") => {
+                self.text.push('f');
+                let mut corners = 0;
+                for word in words {
+                    let index = vertex_index(word, self.vertices).ok_or_else(|| {
+                        format!("line {number}: {} names no vertex", quoted(word))
+                    })?;
+                    self.greatest = self.greatest.max((index, number));
+                    corners += 1;
+                    write!(self.text, " {index}").map_err(|e| e.to_string())?;
+                }
+                if corners < 3 {
+                    return Err(format!("line {number}: a face needs three corners"));
+                }
+                self.text.push('\n');
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn read(self) -> Result<Raw, String> {
+        // Faces may stand before their vertices.
+        if self.greatest.0 > self.vertices {
+            let (index, number) = self.greatest;
+            return Err(format!(
+                "line {number}: the face refers to vertex {index}, but there are {}",
+                self.vertices
+            ));
+        }
+        let options = tobj::LoadOptions {
+            single_index: true,
+            triangulate: true,
+            ignore_points: true,
+            ignore_lines: true,
+        };
+        let (models, _) = tobj::load_obj_buf(&mut Cursor::new(self.text), &options, |_| {
+            Err(tobj::LoadError::GenericFailure)
+        })
+        .map_err(|e| e.to_string())?;
+        let mut raw: Raw = Default::default();
+        for model in models {
+            let base = raw.0.len() as u64;
+            let place = |p: &[f32]| DVec3::new(p[0].into(), p[1].into(), p[2].into());
+            raw.0
+                .extend(model.mesh.positions.chunks_exact(3).map(place));
+            let corners = |t: &[u32]| [t[0], t[1], t[2]].map(|i| base + u64::from(i));
+            raw.1
+                .extend(model.mesh.indices.chunks_exact(3).map(corners));
+        }
+        Ok(raw)
+    }
+}
+
+/// A face corner's vertex, counted from 1; negative ones count back from the vertices so far.
+fn vertex_index(word: &str, vertex_count: i64) -> Option<i64> {
+    let index: i64 = word.split('/').next()?.parse().ok()?;
+    let index = if index < 0 {
+        vertex_count + 1 + index.max(-i64::from(u32::MAX))
+    } else {
+        index
+    };
+    (index > 0).then_some(index)
+}

@@ -1,0 +1,131 @@
+//! STL through stl_io, which reads one solid of a text in lower case; the text is brought to that.
+
+use std::io::Cursor;
+
+use glam::DVec3;
+
+use super::{Raw, lines_of, quoted, without_mark};
+
+/// Bytes before a binary file's triangles: a free text, and how many there are.
+const HEADER: usize = 84;
+
+/// Vertices and triangles of all solids.
+pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
+    let promised = bytes
+        .get(80..HEADER)
+        .and_then(|b| b.try_into().ok())
+        .map(|b| u64::from(u32::from_le_bytes(b)));
+    if promised.is_some_and(|n| bytes.len() as u64 == HEADER as u64 + 50 * n) {
+        return read_binary(bytes);
+    }
+    // Some exporters end a text as old systems did, with a control character.
+    let text = without_mark(bytes)?;
+    let end = text
+        .iter()
+        .rposition(|b| !matches!(b, 0 | 0x1a | b' ' | b'\t'..=b'\r'));
+    let text = &text[..end.map_or(0, |end| end + 1)];
+    let is_named = |name: &[u8]| name.eq_ignore_ascii_case(b"solid");
+    let is_solid = text.trim_ascii_start().get(..5).is_some_and(is_named);
+    if is_solid && !text.contains(&0) {
+        return read_text(&lines_of(text));
+    }
+    let why = if is_solid {
+        "begins with \"solid\", but is no text"
+    } else {
+        "not an STL: no \"solid\" line"
+    };
+    Err(match promised {
+        Some(n) => format!(
+            "{why}, and {n} triangles need {} bytes of {}",
+            HEADER as u64 + 50 * n,
+            bytes.len()
+        ),
+        None if is_solid => why.into(),
+        None => "not an STL: too short".into(),
+    })
+}
+
+fn read_binary(bytes: &[u8]) -> Result<Raw, String> {
+    let mut bytes = bytes.to_vec();
+    // stl_io takes every file that starts with "solid " for text; some binary ones do.
+    bytes[..80].fill(0);
+    let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|e| e.to_string())?;
+    Ok((
+        mesh.vertices
+            .iter()
+            .map(|v| DVec3::from_array(v.0.map(f64::from)))
+            .collect(),
+        mesh.faces
+            .iter()
+            .map(|f| f.vertices.map(|i| i as u64))
+            .collect(),
+    ))
+}
+
+fn read_text(text: &str) -> Result<Raw, String> {
+    let Joined { solid, begins } = join(text)?;
+    let mut solid = Cursor::new(solid);
+    let facets = stl_io::create_stl_reader(&mut solid).map_err(|e| e.to_string())?;
+    let mut raw: Raw = Default::default();
+    for (index, facet) in facets.enumerate() {
+        let facet = facet.map_err(|error| {
+            let line = begins.get(index).copied().unwrap_or_default();
+            format!("the facet that begins in line {line}: {error}")
+        })?;
+        let first = raw.0.len() as u64;
+        let place = |v: &stl_io::Vertex| DVec3::from_array(v.0.map(f64::from));
+        raw.0.extend(facet.vertices.iter().map(place));
+        raw.1.push([first, first + 1, first + 2]);
+    }
+    Ok(raw)
+}
+
+/// All solids of a text as one.
+struct Joined {
+    solid: String,
+    /// Line in which each facet begins.
+    begins: Vec<usize>,
+}
+
+fn join(text: &str) -> Result<Joined, String> {
+    let mut solid = String::from("solid all\n");
+    let mut begins = Vec::new();
+    let (mut is_within, mut is_between) = (false, true);
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim().to_ascii_lowercase();
+        let fault = |what: &str| format!("line {}: {what}", index + 1);
+        if line.is_empty() {
+            continue;
+        }
+        if line.starts_with("solid") {
+            if is_within {
+                return Err(fault("a solid begins within another: no line \"endsolid\""));
+            }
+            is_within = true;
+            continue;
+        }
+        if !is_within {
+            return Err(fault(&format!("{} outside of a solid", quoted(&line))));
+        }
+        if line.starts_with("endsolid") {
+            is_within = false;
+            continue;
+        }
+        if is_between {
+            begins.push(index + 1);
+        }
+        is_between = line == "endfacet";
+        // Normals are not used, and where a triangle has no area they may be no numbers.
+        let words: Vec<_> = line.split_whitespace().collect();
+        match words[..] {
+            ["facet", "normal", _, _, _] => solid += "facet normal 0 0 0",
+            _ => solid += &line,
+        }
+        solid.push('\n');
+    }
+    if is_within {
+        return Err("the last solid has no line \"endsolid\"".into());
+    }
+    solid += "endsolid all\n";
+    Ok(Joined { solid, begins })
+}
