@@ -1,5 +1,7 @@
 // Sun, sky, shadow, and what the set looks like under them. Needs the bindings `shading`, `sky`,
 // `sky_sampler`, `shadow_map` and `shadow_sampler` of whoever imports it.
+#import "shared/ssfr_noise.wgsl"
+#import "shared/ssfr_optics.wgsl"
 
 struct Shading {
     // To the sun.
@@ -33,8 +35,6 @@ struct Shading {
     shadow_from_world: mat4x4f,
 }
 
-const PI: f32 = 3.14159265;
-
 fn sky_radiance(direction: vec3f) -> vec3f {
     let d = normalize(direction);
     let uv = vec2f(atan2(d.z, d.x) / (2.0 * PI) + 0.5, acos(clamp(d.y, -1.0, 1.0)) / PI);
@@ -67,24 +67,6 @@ fn sunlit(world: vec3f, n: vec3f) -> f32 {
         sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + offset, p.z - 0.0004);
     }
     return 0.25 * sum;
-}
-
-fn hash2(p: vec2i) -> f32 {
-    var h = bitcast<u32>(p.x) * 0x9E3779B1u ^ bitcast<u32>(p.y) * 0x85EBCA77u;
-    h = (h ^ (h >> 15u)) * 0x2C1B3C6Du;
-    h = (h ^ (h >> 12u)) * 0x297A2D39u;
-    return f32((h ^ (h >> 15u)) >> 8u) / 16777216.0;
-}
-
-fn value_noise(p: vec2f) -> f32 {
-    let i = vec2i(floor(p));
-    let f = fract(p);
-    let s = f * f * (3.0 - 2.0 * f);
-    return mix(
-        mix(hash2(i), hash2(i + vec2i(1, 0)), s.x),
-        mix(hash2(i + vec2i(0, 1)), hash2(i + vec2i(1, 1)), s.x),
-        s.y,
-    );
 }
 
 struct Surface {

@@ -1,5 +1,7 @@
 // What happens to light at and in water.
 
+const PI: f32 = 3.14159265;
+
 // Unpolarised reflectance from air onto a medium of refractive index n, c = cosine of incidence.
 // Exact: Schlick's fit is off by 0.06 near grazing, where waves are seen.
 fn fresnel(c: f32, n: f32) -> f32 {
@@ -21,7 +23,7 @@ fn glitter(n: vec3f, v: vec3f, l: vec3f, slope_variance: f32, index: f32) -> f32
     let a2 = clamp(2.0 * slope_variance, 1e-5, 1.0);
     let nh = clamp(dot(n, h), 0.0, 1.0);
     let t = nh * nh * (a2 - 1.0) + 1.0;
-    let density = a2 / (3.14159265 * t * t);
+    let density = a2 / (PI * t * t);
     let mask_l = nl + sqrt(a2 + (1.0 - a2) * nl * nl);
     let mask_v = nv + sqrt(a2 + (1.0 - a2) * nv * nv);
     return density * fresnel(clamp(dot(v, h), 0.0, 1.0), index) * nl / (mask_l * mask_v);

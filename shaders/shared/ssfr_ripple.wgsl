@@ -1,4 +1,6 @@
 // Waves finer than the particles, as normals: a sum of sines that obey ω² = g k, world-anchored.
+#import "shared/ssfr_noise.wgsl"
+#import "shared/ssfr_optics.wgsl"
 
 struct Ripple {
     // d(height)/d(x, z).

@@ -301,6 +301,13 @@ fn shade_water(pixel: vec2i, z: f32, ray: vec3f, view: vec3f, straight: Behind) 
 }
 
 #ifdef AOVS
+// Where `next`, in the eye space of the next frame, stands in its picture less where `pixel` is, in pixels; rightward and
+// upward are positive, as motion vectors are counted in compositing (rows of the picture are counted downward).
+fn motion_to(next: vec3f, pixel: vec2i) -> vec2f {
+    let shift = project(next_camera, vec3f(next.xy, max(next.z, 1e-3))) - (vec2f(pixel) + 0.5);
+    return vec2f(shift.x, -shift.y);
+}
+
 fn store(at: u32, depth: f32, normal: vec3f, position: vec3f, motion: vec2f, through: f32) {
     let base = 10u * at;
     output[base] = depth;
@@ -339,17 +346,20 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let particle = owner[at];
         if particle < camera.particle_count {
             let moved = position + particles[particle].velocity * camera.frame_seconds;
-            let next = eye_from_world(next_camera, moved);
-            motion = project(next_camera, vec3f(next.xy, max(next.z, 1e-3))) - (vec2f(pixel) + 0.5);
+            motion = motion_to(eye_from_world(next_camera, moved), pixel);
         }
         store(out, z, normal, position, motion, through);
         return;
     }
-    // The sky moves as something infinitely far does.
+    // The sky is infinitely far: only where the next camera looks moves it, not where it stands.
+    let sky_next = vec3f(
+        dot(direction, next_camera.right),
+        dot(direction, next_camera.up),
+        dot(direction, next_camera.forward),
+    );
     let seen = straight.depth < 0.1 * FAR;
-    let place = select(camera.position * 0.0 + direction * 1e6, straight.surface.position, seen);
-    let next = eye_from_world(next_camera, place);
-    let motion = project(next_camera, vec3f(next.xy, max(next.z, 1e-3))) - (vec2f(pixel) + 0.5);
+    let next = select(sky_next, eye_from_world(next_camera, straight.surface.position), seen);
+    let motion = motion_to(next, pixel);
     store(out, straight.depth, straight.surface.normal, straight.surface.position, motion, through);
 #else
     var colour: vec3f;

@@ -248,6 +248,23 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
     })
 }
 
+/// WGSL of pass `name`, composed from `file`, with the context's fault where it is one of this pass.
+///
+/// # Errors
+/// As [`shader::compose`]; a fault whose text is not in the pass.
+pub fn source(
+    context: &Context,
+    name: &str,
+    file: &str,
+    defines: &[&str],
+) -> Result<String, GpuError> {
+    let source = shader::compose(file, defines)?;
+    match context.spoil.filter(|spoil| spoil.pass == name) {
+        Some(spoil) => spoiled(&source, &spoil),
+        None => Ok(source),
+    }
+}
+
 fn spoiled(source: &str, spoil: &Spoil) -> Result<String, GpuError> {
     if !source.contains(spoil.from) {
         return Err(GpuError::Shader {
@@ -263,10 +280,7 @@ fn compile(
     spec: &PassSpec,
     shared: &[(&'static str, f64)],
 ) -> Result<Pass, GpuError> {
-    let mut source = shader::compose(spec.name, &spec.defines)?;
-    if let Some(spoil) = context.spoil.filter(|spoil| spoil.pass == spec.name) {
-        source = spoiled(&source, &spoil)?;
-    }
+    let source = source(context, spec.name, spec.name, &spec.defines)?;
     let reflection = reflect(spec.name, &source)?;
     if reflection.has_f64 && !context.has_f64 {
         return Err(GpuError::NoF64 {

@@ -224,6 +224,30 @@ mod tests {
     }
 
     #[test]
+    fn clocks_count_seconds_from_frame_zero() {
+        let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 1.0, 0.0]\n";
+        let setting = Setting {
+            origin: DVec3::ZERO,
+            size: [192, 128],
+            margin: [16, 19],
+            particle_count: 0,
+            radius: 0.1,
+            frames_per_second: 24.0,
+        };
+        let sample = Sample {
+            jitter: [0.0; 2],
+            instant: 0.25,
+            weight: 1.0,
+        };
+        let found = camera(&look(text), &setting, 48.0, sample, 0);
+        // Frame 48 at 24 a second, a quarter of a frame later.
+        assert_eq!(found.clock, (48.25f64 / 24.0) as f32);
+        assert_eq!(found.seconds, (0.25f64 / 24.0) as f32);
+        assert_eq!(found.frame_seconds, (1.0f64 / 24.0) as f32);
+        assert_eq!(found.centre, [16.0 + 80.0, 19.0 + 45.0]);
+    }
+
+    #[test]
     fn samples_are_centred_on_pixel_and_shutter() {
         for count in [1, 2, 3, 4, 16] {
             let samples = samples(count, 0.5);

@@ -35,7 +35,8 @@ pub struct Aovs {
     pub n: Option<Vec<[f32; 3]>>,
     /// World position of the first surface, metres; zero in the sky.
     pub p: Option<Vec<[f32; 3]>>,
-    /// Where the first surface will be in the next frame's picture less where it is, pixels; v points down.
+    /// Where the first surface will be in the next frame's picture less where it is, pixels; u points
+    /// right and v up, as compositing programs read it.
     pub forward: Option<Vec<[f32; 2]>>,
     /// Water along the line of sight in front of what is solid, metres.
     pub thickness: Option<Vec<f32>>,

@@ -10,7 +10,7 @@ use wgpu::{
 };
 
 use crate::gpu::adapter::{Context, GpuError};
-use crate::gpu::shader;
+use crate::gpu::program::source;
 
 /// What stands at a binding; bindings count up from 0 in group 0.
 #[derive(Clone, Copy)]
@@ -83,12 +83,14 @@ pub(super) fn bind(
         })
 }
 
+/// Pass `name`, compiled from the shader `file`.
 pub(super) fn module(
     context: &Context,
     name: &str,
+    file: &str,
     defines: &[&str],
 ) -> Result<wgpu::ShaderModule, GpuError> {
-    let text = shader::compose(name, defines)?;
+    let text = source(context, name, file, defines)?;
     // A fault is reported here with its place, not later as a lost device.
     naga::front::wgsl::parse_str(&text).map_err(|error| GpuError::Shader {
         name: name.to_owned(),
@@ -118,7 +120,7 @@ impl ComputePass {
         defines: &[&str],
         slots: &[Slot],
     ) -> Result<Self, GpuError> {
-        let module = module(context, file, defines)?;
+        let module = module(context, name, file, defines)?;
         let layout = layout(context, name, ShaderStages::COMPUTE, slots);
         let pipeline_layout =
             context

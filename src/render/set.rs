@@ -196,7 +196,7 @@ fn pipeline(
     context: &Context,
     raster: &Raster<'_>,
 ) -> Result<(wgpu::RenderPipeline, wgpu::BindGroupLayout), GpuError> {
-    let module = module(context, raster.name, &[])?;
+    let module = module(context, raster.name, raster.name, &[])?;
     let layout = layout(
         context,
         raster.name,

@@ -109,6 +109,69 @@ mod tests {
         assert!((grey(&plain, 0.214_041) - 0.5).abs() < 1e-5);
     }
 
+    /// Sobotka's curve itself, of light in log2 from 10 stops below middle grey to 6.5 above: a sigmoid through (10/16.5, 1/2)
+    /// of slope 2 there, whose toe bends by a power of 3 and whose shoulder by one of 3.25.
+    fn sigmoid(x: f64) -> f64 {
+        const PIVOT: f64 = 10.0 / 16.5;
+        let half = |run: f64, power: f64| {
+            let limit =
+                ((2.0 * run).powf(-power) * ((4.0 * run).powf(power) - 1.0)).powf(-1.0 / power);
+            move |distance: f64| {
+                let term = 2.0 * distance / limit;
+                limit * term / (1.0 + term.powf(power)).powf(1.0 / power)
+            }
+        };
+        if x < PIVOT {
+            0.5 - half(PIVOT, 3.0)(PIVOT - x)
+        } else {
+            0.5 + half(1.0 - PIVOT, 3.25)(x - PIVOT)
+        }
+    }
+
+    #[test]
+    fn grey_follows_agx_over_sixteen_stops() {
+        let off = |factor: f64| {
+            (0..=330)
+                .map(|step| {
+                    let x = f64::from(step) / 330.0;
+                    let light = 0.18 * (16.5 * x - 10.0).exp2();
+                    let expected = srgb_encode(sigmoid(x).max(0.0).powf(2.2));
+                    (grey(&ViewSpec::default(), (factor * light) as f32) - expected).abs()
+                })
+                .fold(0.0, f64::max)
+        };
+        // The polynomial is within 0.0056 of the curve; the rows of the matrices add 2e-4.
+        assert!(off(1.0) < 0.006, "{}", off(1.0));
+        // The control: an eighth of a stop.
+        assert!(off(0.125f64.exp2()) > 0.012, "{}", off(0.125f64.exp2()));
+    }
+
+    #[test]
+    fn contrast_and_saturation_turn_about_grey() {
+        let view = |contrast, saturation| ViewSpec {
+            transform: TransformSpec::Srgb,
+            contrast,
+            saturation,
+            ..ViewSpec::default()
+        };
+        let colour = [0.09f32, 0.36, 0.18];
+        let found = apply(&view(2.0, 1.0), colour);
+        // (x / 0.18)² × 0.18.
+        for (found, linear) in found.into_iter().zip([0.045, 0.72, 0.18]) {
+            assert!(
+                (found - srgb_encode(linear)).abs() < 1e-6,
+                "{found} {linear}"
+            );
+        }
+        // Rec. 709 luminance: 0.2126 × 0.09 + 0.7152 × 0.36 + 0.0722 × 0.18 = 0.289 602.
+        for found in apply(&view(1.0, 0.0), colour) {
+            assert!((found - srgb_encode(0.289_602)).abs() < 1e-6, "{found}");
+        }
+        let [r, ..] = apply(&view(1.0, 2.0), [0.25, 0.3, 0.3]);
+        // 0.289 37 − 2 × 0.039 37.
+        assert!((r - srgb_encode(0.210_63)).abs() < 1e-6, "{r}");
+    }
+
     #[test]
     fn brighter_is_never_darker_and_a_stop_is_a_factor_of_two() {
         let view = ViewSpec::default();

@@ -124,7 +124,7 @@ pub enum FilterSpec {
 pub struct SurfaceSpec {
     /// Which filter.
     pub filter: FilterSpec,
-    /// Splat radius, metres; 0.85 particle spacings where left out.
+    /// Splat radius, metres; 0.87 particle spacings where left out.
     pub radius_m: Option<f64>,
     /// Standard deviation of the smoothing, metres in the world; 1.6 particle spacings where left out.
     pub smoothing_width_m: Option<f64>,
@@ -374,7 +374,7 @@ pub enum AovSpec {
     N,
     /// World position of the first surface, metres.
     P,
-    /// Screen motion to the next frame, pixels.
+    /// Screen motion to the next frame, pixels: u to the right, v upward.
     #[serde(rename = "forward")]
     Forward,
     /// Water along the line of sight, metres.

@@ -1,0 +1,344 @@
+//! Cameras, skies and waters that are known, and the renderer's pictures of them.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use glam::{DVec2, DVec3};
+use swell::domain::bounds::Bounds;
+use swell::domain::particles::Particles;
+use swell::gpu::adapter::{Context, Spoil};
+use swell::render::{Image, RenderScene, Renderer};
+use swell::scene::look::Look;
+use wgpu::util::DeviceExt;
+
+/// One device for all tests of this binary.
+pub(crate) fn context() -> Context {
+    static CONTEXT: OnceLock<Context> = OnceLock::new();
+    CONTEXT.get_or_init(|| Context::open(None).unwrap()).clone()
+}
+
+/// A context whose pass `pass` has `to` for `from`: the negative controls.
+pub(crate) fn spoiled(pass: &'static str, from: &'static str, to: &'static str) -> Context {
+    let mut context = context();
+    context.spoil = Some(Spoil { pass, from, to });
+    context
+}
+
+/// Width of the film, mm.
+const FILM: f64 = 9.0;
+
+/// A pinhole camera; its picture is square.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Eye {
+    pub(crate) position: DVec3,
+    pub(crate) target: DVec3,
+    pub(crate) up: DVec3,
+    /// Focal length in pixels.
+    pub(crate) focal: f64,
+    pub(crate) size: u32,
+}
+
+impl Eye {
+    pub(crate) fn new(position: [f64; 3], target: [f64; 3], focal: f64) -> Self {
+        Self {
+            position: position.into(),
+            target: target.into(),
+            up: DVec3::Y,
+            focal,
+            size: 64,
+        }
+    }
+
+    pub(crate) fn focal_length_mm(&self) -> f64 {
+        self.focal * FILM / f64::from(self.size)
+    }
+
+    /// The look's table of this camera, standing still.
+    fn table(&self) -> String {
+        format!(
+            "[camera]\nfocal_length_mm = {:?}\nfilm_back_mm = [{FILM:?}, {FILM:?}]\nup = {:?}\n\
+             position = {:?}\ntarget = {:?}\n",
+            self.focal_length_mm(),
+            self.up.to_array(),
+            self.position.to_array(),
+            self.target.to_array()
+        )
+    }
+
+    /// The look's table of a camera that stands as `self` at frame 1 and as `next` at frame 2.
+    fn moving_table(&self, next: &Self) -> String {
+        let key = |frame: u32, eye: &Self| {
+            format!(
+                "[[camera.keyframe]]\nframe = {frame}\nposition = {:?}\ntarget = {:?}\n\
+                 focal_length_mm = {:?}\n",
+                eye.position.to_array(),
+                eye.target.to_array(),
+                eye.focal_length_mm()
+            )
+        };
+        format!(
+            "[camera]\nfocal_length_mm = 1.0\nfilm_back_mm = [{FILM:?}, {FILM:?}]\nup = {:?}\n{}{}",
+            self.up.to_array(),
+            key(1, self),
+            key(2, next)
+        )
+    }
+
+    /// Right, up and forward, unit length.
+    fn axes(&self) -> [DVec3; 3] {
+        let forward = (self.target - self.position).normalize();
+        let right = forward.cross(self.up).normalize();
+        [right, right.cross(forward), forward]
+    }
+
+    pub(crate) fn forward(&self) -> DVec3 {
+        self.axes()[2]
+    }
+
+    /// Unit vector through the centre of pixel `i`, rows from the top.
+    pub(crate) fn direction(&self, i: usize) -> DVec3 {
+        let [right, up, forward] = self.axes();
+        let side = self.size as usize;
+        let x = (i % side) as f64 + 0.5 - 0.5 * side as f64;
+        let y = 0.5 * side as f64 - (i / side) as f64 - 0.5;
+        (forward * self.focal + right * x + up * y).normalize()
+    }
+
+    /// Where something in this direction from the eye stands, pixels right and up from the middle.
+    pub(crate) fn place(&self, direction: DVec3) -> DVec2 {
+        let [right, up, forward] = self.axes();
+        DVec2::new(direction.dot(right), direction.dot(up)) * self.focal / direction.dot(forward)
+    }
+}
+
+/// A look in parts; what is left as it is throws no light and hides nothing.
+#[derive(Clone, Debug)]
+pub(crate) struct Setup {
+    pub(crate) eye: Eye,
+    /// The camera a frame later.
+    pub(crate) next: Option<Eye>,
+    pub(crate) samples: u32,
+    pub(crate) shutter: f64,
+    /// Lines of `[surface]` and `[water]`.
+    pub(crate) surface: String,
+    pub(crate) water: String,
+    /// Degrees, degrees, factor.
+    pub(crate) sun: [f64; 3],
+    /// Lines of `[sky]`.
+    pub(crate) sky: String,
+    pub(crate) ground: [f64; 3],
+    pub(crate) haze: f64,
+    pub(crate) solids: [f64; 3],
+    pub(crate) background: bool,
+}
+
+pub(crate) const PANORAMA: &str = "model = \"panorama\"\nfile = \"sky.exr\"\n";
+
+impl Setup {
+    pub(crate) fn new(eye: Eye) -> Self {
+        Self {
+            eye,
+            next: None,
+            samples: 1,
+            shutter: 0.0,
+            surface: "smoothing_width_m = 0.0\n".to_owned(),
+            water: String::new(),
+            sun: [0.0, 45.0, 0.0],
+            sky: PANORAMA.to_owned(),
+            ground: [0.0; 3],
+            haze: 1e7,
+            solids: [1.0; 3],
+            background: true,
+        }
+    }
+
+    fn text(&self) -> String {
+        let camera = match &self.next {
+            Some(next) => self.eye.moving_table(next),
+            None => self.eye.table(),
+        };
+        let side = self.eye.size;
+        let [azimuth, elevation, intensity] = self.sun;
+        format!(
+            "{camera}[image]\nwidth = {side}\nheight = {side}\nsamples = {}\nshutter = {:?}\n\
+             [surface]\n{}[water]\n{}[sun]\nazimuth_degrees = {azimuth:?}\n\
+             elevation_degrees = {elevation:?}\nintensity = {intensity:?}\n[sky]\n{}\
+             [ground]\ncolour = {:?}\nvariation = 0.0\nhaze_m = {:?}\n[solids]\ncolour = {:?}\n\
+             [output]\nformats = [\"exr\"]\nbackground = {}\n\
+             aovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n",
+            self.samples,
+            self.shutter,
+            self.surface,
+            self.water,
+            self.sky,
+            self.ground,
+            self.haze,
+            self.solids,
+            self.background,
+        )
+    }
+}
+
+/// Draws one frame. `sky` is the panorama's radiance over direction and over (u, v) in 0..1; where the look has
+/// another sky it is not used.
+pub(crate) fn draw(
+    context: &Context,
+    setup: &Setup,
+    sky: &dyn Fn(DVec3, DVec2) -> [f64; 3],
+    scene: &RenderScene,
+    water: &Particles,
+    frame: u32,
+) -> Image {
+    let folder = tempfile::tempdir().unwrap();
+    write_sky(&folder.path().join("sky.exr"), sky);
+    let look = Look::parse(&setup.text(), &folder.path().join("look.toml")).unwrap();
+    let mut renderer = Renderer::new(context, &look, scene).unwrap();
+    renderer.render(frame, water).unwrap()
+}
+
+/// Texels around the horizon; half as many from zenith to nadir. Their (u, v) are exact in half precision.
+pub(crate) const SKY_WIDTH: usize = 256;
+
+/// A latitude-longitude panorama: the first row is the zenith, the middle of a row looks along +x, and three quarters
+/// of it along +z.
+fn write_sky(file: &Path, sky: &dyn Fn(DVec3, DVec2) -> [f64; 3]) {
+    let (width, height) = (SKY_WIDTH, SKY_WIDTH / 2);
+    let texels: Vec<[f32; 3]> = (0..width * height)
+        .map(|i| {
+            let u = ((i % width) as f64 + 0.5) / width as f64;
+            let v = ((i / width) as f64 + 0.5) / height as f64;
+            let azimuth = (u - 0.5) * std::f64::consts::TAU;
+            let polar = v * std::f64::consts::PI;
+            let direction = DVec3::new(
+                polar.sin() * azimuth.cos(),
+                polar.cos(),
+                polar.sin() * azimuth.sin(),
+            );
+            sky(direction, DVec2::new(u, v)).map(|x| x as f32)
+        })
+        .collect();
+    exr::prelude::write_rgb_file(file, width, height, |x, y| {
+        let [r, g, b] = texels[y * width + x];
+        (r, g, b)
+    })
+    .unwrap();
+}
+
+/// Where a direction lies in such a panorama.
+pub(crate) fn sky_place(direction: DVec3) -> DVec2 {
+    DVec2::new(
+        direction.z.atan2(direction.x) / std::f64::consts::TAU + 0.5,
+        direction.normalize().y.acos() / std::f64::consts::PI,
+    )
+}
+
+/// Radiance 1 everywhere, which lights every face with π.
+pub(crate) fn uniform_sky(_: DVec3, _: DVec2) -> [f64; 3] {
+    [1.0; 3]
+}
+
+/// Red is u and green is v, so that a colour tells where it comes from. The renderer's own filtering reads such a ramp
+/// exactly, up to the eight bits of a texture unit's weights.
+pub(crate) fn ramp_sky(_: DVec3, place: DVec2) -> [f64; 3] {
+    [place.x, place.y, 1.0]
+}
+
+/// What reads [`ramp_sky`] may be off by: a texel's step in 256 parts and half of that again for rounding, and 4096 ulp of a
+/// number up to 1, which Vulkan allows to arc functions.
+pub(crate) const RAMP_ERROR: f64 = 1.5 / 256.0 / (SKY_WIDTH / 2) as f64 + 4096.0 / 16_777_216.0;
+
+/// An open box of 10 m without solids, whose particles are balls of `radius` metres and stand for `filled` times their
+/// balls' volume.
+pub(crate) fn scene(radius: f64, filled: f64) -> RenderScene {
+    RenderScene {
+        origin: DVec3::ZERO,
+        domain: Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::splat(10.0),
+        },
+        solids: Vec::new(),
+        particle_spacing: radius * (filled * 4.0 / 3.0 * std::f64::consts::PI).cbrt(),
+        frames_per_second: 24.0,
+    }
+}
+
+pub(crate) fn ball(centre: DVec3, velocity: DVec3) -> Particles {
+    Particles {
+        position: vec![centre.as_vec3().to_array()],
+        velocity: vec![velocity.as_vec3().to_array()],
+        id: vec![0],
+        ..Particles::default()
+    }
+}
+
+pub(crate) fn luminance(c: [f32; 4]) -> f64 {
+    0.2126 * f64::from(c[0]) + 0.7152 * f64::from(c[1]) + 0.0722 * f64::from(c[2])
+}
+
+pub(crate) fn wide(v: [f32; 3]) -> DVec3 {
+    DVec3::from(v.map(f64::from))
+}
+
+/// Runs `body`, the text of a function of `vec4f` to `vec4f`, on each input, with a shared shader file pasted before.
+pub(crate) fn kernel(
+    context: &Context,
+    import: &str,
+    body: &str,
+    input: &[[f32; 4]],
+) -> Vec<[f32; 4]> {
+    let shared = swell::gpu::shader::compose(import, &[]).unwrap();
+    let count = input.len();
+    let text = format!(
+        "{shared}
+        @group(0) @binding(0) var<storage, read_write> values: array<vec4f>;
+        fn evaluate(value: vec4f) -> vec4f {{ {body} }}
+        @compute @workgroup_size(64)
+        fn main(@builtin(global_invocation_id) id: vec3u) {{
+            if id.x < {count}u {{ values[id.x] = evaluate(values[id.x]); }}
+        }}"
+    );
+    let device = &context.device;
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl(text.into()),
+    });
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: None,
+        layout: None,
+        module: &module,
+        entry_point: Some("main"),
+        compilation_options: Default::default(),
+        cache: None,
+    });
+    let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: None,
+        contents: bytemuck::cast_slice(input),
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+    });
+    let staging = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: buffer.size(),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &[wgpu::BindGroupEntry {
+            binding: 0,
+            resource: buffer.as_entire_binding(),
+        }],
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let mut pass = encoder.begin_compute_pass(&Default::default());
+    pass.set_pipeline(&pipeline);
+    pass.set_bind_group(0, &group, &[]);
+    pass.dispatch_workgroups(count.div_ceil(64) as u32, 1, 1);
+    drop(pass);
+    encoder.copy_buffer_to_buffer(&buffer, 0, &staging, 0, buffer.size());
+    context.queue.submit([encoder.finish()]);
+    staging.map_async(wgpu::MapMode::Read, .., |_| {});
+    context.wait().unwrap();
+    let bytes = staging.get_mapped_range(..).unwrap();
+    bytemuck::pod_collect_to_vec(&bytes)
+}
