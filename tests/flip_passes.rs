@@ -1,6 +1,7 @@
 //! FLIP's passes against naive f64 twins and against analysis.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
+mod flip_exact;
 #[path = "support/flip.rs"]
 mod rig;
 mod support;

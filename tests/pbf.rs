@@ -1,6 +1,7 @@
 //! PBF on the GPU: against a naive f64 twin, against analysis, and what must hold in any run.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
+mod pbf_pairs;
 mod support;
 
 use glam::DVec3;

@@ -1,7 +1,9 @@
 //! Pressure room: rows against the f64 builder, iteration counts, honest residuals, pockets.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
+mod pressure_bodies;
 mod pressure_precision;
+mod pressure_stops;
 #[path = "support/pressure.rs"]
 mod rig;
 
@@ -15,7 +17,7 @@ use swell::{
             remove_means,
         },
     },
-    gpu::adapter::Context,
+    gpu::adapter::{Context, Spoil},
     reference::poisson::gradients::{Precondition, norm, solve},
     scene::flip::Preconditioner,
     solve::pressure::blocked,
@@ -128,29 +130,52 @@ fn right_hand_sides_are_those_of_the_f64_builder() {
     assert!((projected.divergence_after * rig.case.cell_size - worst).abs() < 1e-5);
 }
 
-/// Scaled IPP within 10 % of what another program counted in f64 (see `domain::poisson`), and at most 15 with
-/// multigrid, to 1e-6.
+/// Iterations to 1e-6 on the tank, voxel and ghost-fluid surface: the README's table, measured with lavapipe. One more or
+/// less is allowed: the residual falls by a few percent an iteration at least, and on a device that rounds otherwise (fused
+/// products, sums of other widths) it may pass the target one iteration sooner or later, but what is computed wrongly costs
+/// more: a multigrid whose last level is swept once and not eight times takes 13 in place of 9.
+const COUNTS: [(Preconditioner, u32, [u32; 2]); 10] = [
+    (Preconditioner::None, 16, [88, 168]),
+    (Preconditioner::None, 32, [177, 477]),
+    (Preconditioner::Jacobi, 16, [84, 84]),
+    (Preconditioner::Jacobi, 32, [173, 171]),
+    (Preconditioner::Ipp, 16, [45, 44]),
+    (Preconditioner::Ipp, 32, [91, 90]),
+    (Preconditioner::Ipp, 64, [186, 185]),
+    (Preconditioner::Multigrid, 16, [9, 9]),
+    (Preconditioner::Multigrid, 32, [9, 10]),
+    (Preconditioner::Multigrid, 64, [10, 10]),
+];
+
 #[test]
 fn iteration_counts_are_those_on_record() {
     let context = context();
-    for (n, ipp) in [(16, 45), (32, 93), (64, 190)] {
-        for surface in SURFACES {
-            let case = tank(n, surface, false);
-            let mut multigrid = rig(&context, case.clone(), Preconditioner::Multigrid, 1e-6);
-            let b = tank_rhs(&case, &multigrid.system);
-            let solved = multigrid.solve(&b);
+    let mut off = Vec::new();
+    for (preconditioner, n, counts) in COUNTS {
+        for (surface, count) in SURFACES.into_iter().zip(counts) {
+            let mut rig = rig(&context, tank(n, surface, false), preconditioner, 1e-6);
+            let solved = rig.solve(&tank_rhs(&rig.case, &rig.system));
             assert!(
-                solved.iterations <= 15 && !solved.is_missed,
-                "{n} {surface:?} {solved:?}"
+                !solved.is_missed,
+                "{preconditioner:?} {n} {surface:?} {solved:?}"
             );
-            let solved = rig(&context, case, Preconditioner::Ipp, 1e-6).solve(&b);
-            let ratio = f64::from(solved.iterations) / f64::from(ipp);
-            assert!(
-                (0.9..=1.1).contains(&ratio) && !solved.is_missed,
-                "{n} {surface:?} {solved:?}"
-            );
+            if solved.iterations.abs_diff(count) > 1 {
+                off.push((preconditioner, n, surface, count, solved.iterations));
+            }
         }
     }
+    assert!(off.is_empty(), "{off:?}");
+    // Negative control: the multigrid's last level is swept once and not eight times.
+    let mut spoiled = context.clone();
+    spoiled.spoil = Some(Spoil {
+        pass: "pressure/solve_coarse",
+        from: "const SWEEPS = 8u;",
+        to: "const SWEEPS = 1u;",
+    });
+    let case = tank(16, Surface::Voxel, false);
+    let mut rig = rig(&spoiled, case, Preconditioner::Multigrid, 1e-6);
+    let solved = rig.solve(&tank_rhs(&rig.case, &rig.system));
+    assert!(solved.iterations > 11, "{solved:?}");
 }
 
 /// Negative control of the counts: without its coarse levels the same solver takes several times as many.

@@ -27,6 +27,7 @@ pub const SYSTEM: &[&str] = &[
     "pressure/smooth",
     "pressure/smooth_corrected",
     "pressure/restrict",
+    "pressure/solve_coarse",
 ];
 
 pub const FLIP: &[Control] = &[
@@ -422,6 +423,21 @@ pub const FLIP: &[Control] = &[
         "0.5001 * sum_pair(flow)",
         "pressure/restrict",
         &["residual of the coarser level"],
+    ),
+    // More of it, where there is something to restrict and to sweep, in the variant of a channel.
+    control(
+        "pressure/solve_coarse",
+        "wr + w * (",
+        "wr - w * (",
+        "pressure/solve_coarse",
+        &["correction"],
+    ),
+    control(
+        "pressure/solve_coarse",
+        "= 0.5 * sum_pair(flow);",
+        "= 0.5 * sum_pair(flow) + 1e-3;",
+        "pressure/solve_coarse",
+        &["residuals of the coarser levels"],
     ),
     control(
         "pressure/direction",

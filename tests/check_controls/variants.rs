@@ -87,6 +87,14 @@ fn pocket(scene: &mut Scene, start: &mut Start) {
     stir(&mut start.particles);
 }
 
+/// Four bricks in a row, so that two levels, of two bricks and of one, are left to the multigrid's last workgroup.
+fn channel(scene: &mut Scene, start: &mut Start) {
+    scene.domain.max = DVec3::new(6.2, 1.4, 1.4);
+    start.boundary = Boundary::default();
+    start.particles = lattice([0.0; 3], [60, 6, 10], [D; 3]);
+    stir(&mut start.particles);
+}
+
 /// Water nearer to the floor than it may end, where a solid of distances half as steep as they should be stands upon it:
 /// each push goes half of the way, and none of it upwards.
 fn corner(_: &mut Scene, start: &mut Start) {
@@ -213,6 +221,48 @@ pub const VARIANTS: &[Variant] = &[
                 "atomicAdd(&pressure_stats[4], 2u)",
                 "pressure/count_pockets",
                 &["pockets"],
+            ),
+        ],
+    },
+    Variant {
+        name: "channel",
+        change: channel,
+        controls: &[
+            control(
+                "pressure/solve_coarse",
+                "about.xu += above.upper.x;",
+                "about.xu += 1.01 * above.upper.x;",
+                "pressure/solve_coarse",
+                &["correction"],
+            ),
+            control(
+                "pressure/solve_coarse",
+                "0.5 * sum_pair(flow)",
+                "0.505 * sum_pair(flow)",
+                "pressure/solve_coarse",
+                &["residuals of the coarser levels"],
+            ),
+            // The way back up left out, the wrong colour restricted, one sweep in place of eight.
+            control(
+                "pressure/solve_coarse",
+                "let above = above_about(s);",
+                "let above = Above(vec3r(0.0), vec3r(0.0));",
+                "pressure/solve_coarse",
+                &["correction"],
+            ),
+            control(
+                "pressure/solve_coarse",
+                "restrict_at(site_of(level, i, 0u));",
+                "restrict_at(site_of(level, i, 1u));",
+                "pressure/solve_coarse",
+                &["correction", "residuals of the coarser levels"],
+            ),
+            control(
+                "pressure/solve_coarse",
+                "const SWEEPS = 8u;",
+                "const SWEEPS = 1u;",
+                "pressure/solve_coarse",
+                &["correction"],
             ),
         ],
     },

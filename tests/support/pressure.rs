@@ -79,6 +79,12 @@ impl Rig {
             .set_topology(&self.program, &case.bricks, case.cell_size);
     }
 
+    /// Solves by other settings of the same preconditioner and precision from now on.
+    pub fn set(&mut self, settings: &Pressure) {
+        self.solver = PressureSolver::new(settings, true, self.capacity);
+        self.upload_case();
+    }
+
     /// Planes of the case's stride into those of the capacity's.
     pub fn upload_planes(&self, name: &str, values: &[f32]) {
         let stride = 4 * self.capacity as u64 * u64::from(CELLS);

@@ -1,5 +1,7 @@
 //! The multigrid's passes: each block's exact solution in f64 from the values that the device had about it.
 
+mod coarse;
+
 use rayon::prelude::*;
 
 use super::{Checker, fields::*, pair_of};
@@ -20,6 +22,7 @@ const LEAST_PIVOT: f64 = 2e-5;
 const MOST_AIR: f64 = 4.0;
 
 /// Rows of all levels as the device has them; a cell is named by its place in the arrays.
+#[derive(Clone)]
 struct Levels {
     phase: PressurePhase,
     bricks: Vec<PressureBrick>,
@@ -68,6 +71,33 @@ impl Levels {
     fn slots(&self) -> std::ops::Range<u32> {
         let [first, count, ..] = self.phase.levels[self.phase.level as usize];
         first..first + count
+    }
+
+    /// Blocks of the phase's colour with their slots.
+    fn coloured(&self) -> Vec<(u32, u32)> {
+        let colour = self.phase.colour;
+        let is_of =
+            move |block: &u32| ((block & 1) + (block >> 2 & 1) + (block >> 4 & 1)) % 2 == colour;
+        self.slots()
+            .flat_map(|slot| (0..64).filter(is_of).map(move |block| (slot, block)))
+            .collect()
+    }
+
+    /// Of the cells above a block of the first colour and above its neighbour along x: half of what has flowed into the
+    /// former since it was solved, and how much that may be off by; nothing from the latter, which was solved last.
+    fn restricted(&self, slot: u32, block: u32) -> [(usize, f64, f64); 2] {
+        let found = self.block(slot, block, About::Corrections);
+        let above = self.bricks[slot as usize].above;
+        let at = |block: u32| (above + above_offset(block)) as usize;
+        let sum: f64 = found.inflow.iter().sum();
+        // Residuals apart, that is what its size is made of.
+        let size: f64 = (0..8)
+            .map(|c| found.size[c] - self.residual[place(slot, block, c)].abs())
+            .sum();
+        [
+            (at(block), 0.5 * sum, 4.0 * self.unit * size),
+            (at(block ^ 1), 0.0, 0.0),
+        ]
     }
 
     /// The block beyond the face of a block; in slot 0 where there is none.
@@ -169,13 +199,13 @@ impl Block {
 
     /// The solution and what may be off by `unit`, the roundoff: elimination solves a matrix and a right-hand side that are 40 u off
     /// (Higham 2002, theorem 9.3; its factors have no greater entries than an M-matrix itself), and the inverse has no
-    /// negative entry.
-    fn solution(&self, unit: f64) -> Option<[[f64; 2]; 8]> {
+    /// negative entry. The right-hand side itself is `rhs_error` off.
+    fn solution(&self, unit: f64, rhs_error: [f64; 8]) -> Option<[[f64; 2]; 8]> {
         let exact = self.solve(self.rhs.map(|b| [b]))?;
         let off = std::array::from_fn(|c| {
             let terms = self.matrix[c].iter().zip(&exact);
             let row: f64 = terms.map(|(a, [z])| (a * z).abs()).sum();
-            [40.0 * unit * (row + self.size[c])]
+            [rhs_error[c] + 40.0 * unit * (row + self.size[c])]
         });
         let off = self.solve(off)?;
         Some(std::array::from_fn(|c| [exact[c][0], off[c][0]]))
@@ -191,6 +221,7 @@ impl Checker<'_> {
             "pressure/smooth_corrected" => &SMOOTHED_CORRECTED,
             "pressure/restrict" => &RESTRICTED,
             "pressure/coarsen" => &COARSE_AIR,
+            "pressure/solve_coarse" => &COARSE_SOLVED,
             _ => return Ok(()),
         };
         let phase = traced.uniform::<PressurePhase>("phase")?;
@@ -201,6 +232,7 @@ impl Checker<'_> {
         match traced.pass {
             "pressure/restrict" => self.restrict(&levels),
             "pressure/coarsen" => self.coarsen(traced, &levels)?,
+            "pressure/solve_coarse" => self.solve_coarse(&levels),
             _ => self.smooth(&levels, field),
         }
         Ok(())
@@ -222,26 +254,16 @@ impl Checker<'_> {
         })
     }
 
-    /// Blocks of the phase's colour with their slots.
-    fn coloured(levels: &Levels) -> Vec<(u32, u32)> {
-        let colour = levels.phase.colour;
-        let is_of =
-            move |block: &u32| ((block & 1) + (block >> 2 & 1) + (block >> 4 & 1)) % 2 == colour;
-        levels
-            .slots()
-            .flat_map(|slot| (0..64).filter(is_of).map(move |block| (slot, block)))
-            .collect()
-    }
-
     fn smooth(&mut self, levels: &Levels, field: &'static Field) {
         let about = match field.pass {
             "pressure/smooth_first" => About::Nothing,
             "pressure/smooth_corrected" => About::WithAbove,
             _ => About::Corrections,
         };
-        let blocks = Self::coloured(levels);
+        let blocks = levels.coloured();
         let one = |&(slot, block): &(u32, u32)| {
-            let solution = levels.block(slot, block, about).solution(levels.unit)?;
+            let found = levels.block(slot, block, about);
+            let solution = found.solution(levels.unit, [0.0; 8])?;
             Some([0, 1, 2, 3, 4, 5, 6, 7].map(|c| {
                 let at = place(slot, block, c);
                 let [exact, off] = solution[c];
@@ -253,25 +275,14 @@ impl Checker<'_> {
         self.table.add(field, &pairs, 8 * found.len() - pairs.len());
     }
 
-    /// Half of what has flowed into the first colour's blocks since; nothing from the second's.
     fn restrict(&mut self, levels: &Levels) {
-        let mut pairs = Vec::new();
-        for (slot, block) in Self::coloured(levels) {
-            let found = levels.block(slot, block, About::Corrections);
-            let above = levels.bricks[slot as usize].above;
-            let sum: f64 = found.inflow.iter().sum();
-            // Residuals apart, that is what its size is made of.
-            let size: f64 = (0..8)
-                .map(|c| found.size[c] - levels.residual[place(slot, block, c)].abs())
-                .sum();
-            for (block, exact, tolerance) in [
-                (block, 0.5 * sum, 4.0 * levels.unit * size),
-                (block ^ 1, 0.0, 0.0),
-            ] {
-                let at = (above + above_offset(block)) as usize;
-                pairs.push(pair_of(at, levels.residual[at], exact, tolerance));
-            }
-        }
+        let blocks = levels.coloured();
+        let found = blocks
+            .iter()
+            .flat_map(|&(slot, block)| levels.restricted(slot, block));
+        let pairs: Vec<_> = found
+            .map(|(at, exact, tolerance)| pair_of(at, levels.residual[at], exact, tolerance))
+            .collect();
         self.table.add(&RESTRICTED, &pairs, 0);
     }
 

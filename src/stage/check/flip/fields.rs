@@ -52,6 +52,11 @@ fields! {
     SMOOTHED = "pressure/smooth", "correction", "", "likewise";
     SMOOTHED_CORRECTED = "pressure/smooth_corrected", "correction", "", "likewise";
     RESTRICTED = "pressure/restrict", "residual of the coarser level", "", "products and 6 sums: 8 u of half the sum of magnitudes";
+    COARSE_SOLVED = "pressure/solve_coarse", "correction", "",
+        "the same steps in f64 with a bound beside each value: a block's 40 u as of pressure/smooth and a restriction's 8 u, each \
+         carried on through the blocks after it, whose inverses have no negative entry; a tie where a pivot is below 2e-5 of its \
+         diagonal";
+    COARSE_RESIDUAL = "pressure/solve_coarse", "residuals of the coarser levels", "", "likewise";
     DIRECTED = "pressure/direction", "direction", "", "2 u (|z| + |β p|)";
     ADVANCED_SOLUTION = "pressure/advance", "solution, both words", "",
         "u of the lesser word, and 4 u of what the greater one rounds off and of α p beyond its factors' leading 12 bits, 2⁻⁹";

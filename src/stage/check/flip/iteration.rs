@@ -34,12 +34,13 @@ const VERIFIED: u32 = 4;
 const MOST_RESTARTS: u32 = 16;
 
 /// Passes of the multigrid.
-const MULTIGRID: [&str; 5] = [
+const MULTIGRID: [&str; 6] = [
     "pressure/coarsen",
     "pressure/smooth_first",
     "pressure/smooth",
     "pressure/smooth_corrected",
     "pressure/restrict",
+    "pressure/solve_coarse",
 ];
 
 /// What a pass had before it ran.

@@ -39,7 +39,7 @@ use super::{
 use fields::*;
 
 /// Passes without a row of their own, and where they are checked.
-const EXCEPTIONS: [(&str, &str); 6] = [
+const EXCEPTIONS: [(&str, &str); 5] = [
     (
         "flip/find_not_finite",
         "it counts what is not finite, which is nothing here",
@@ -48,10 +48,6 @@ const EXCEPTIONS: [(&str, &str); 6] = [
     ("flip/spread_centers", BOTH_HALVES),
     ("pressure/label_cells", LABELLED),
     ("pressure/merge_labels", LABELLED),
-    (
-        "pressure/solve_coarse",
-        "the other multigrid passes' steps in one workgroup: a wrong one shows in the iterations alone",
-    ),
 ];
 
 const BOTH_HALVES: &str = "the twin of flip/gather_faces and flip/gather_centers does both halves";
