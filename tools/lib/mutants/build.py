@@ -53,14 +53,17 @@ def copy(root: Path, mutants: list[Mutant]) -> Tree:
 
 
 def with_switches(text: str, mutants: list[Mutant]) -> str:
-    """Each expression with its fault beside it, chosen at run time."""
-    spans = sorted((text.index(m.before), m) for m in mutants)
-    for (at, one), (next_at, other) in zip(spans, spans[1:]):
-        if at + len(one.before) > next_at:
-            raise Mistake(f"{one.name} and {other.name} change the same text of {one.file}")
-    for at, mutant in reversed(spans):
-        switch = f"(if crate::mutants::on({mutant.number}) {{ {mutant.after} }} else {{ {mutant.before} }})"
-        text = text[:at] + switch + text[at + len(mutant.before) :]
+    """Each expression with its faults beside it, chosen at run time."""
+    places: dict[str, list[Mutant]] = {}
+    for mutant in mutants:
+        places.setdefault(mutant.before, []).append(mutant)
+    spans = sorted((text.index(before), before) for before in places)
+    for (at, before), (next_at, other) in zip(spans, spans[1:]):
+        if at + len(before) > next_at:
+            raise Mistake(f"{places[before][0].name} and {places[other][0].name} change overlapping text of {mutants[0].file}")
+    for at, before in reversed(spans):
+        faults = "".join(f"if crate::mutants::on({m.number}) {{ {m.after} }} else " for m in places[before])
+        text = text[:at] + f"({faults}{{ {before} }})" + text[at + len(before) :]
     return text
 
 
