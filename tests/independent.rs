@@ -173,8 +173,8 @@ fn one_iteration_is_the_papers() {
         for ((state, report), tolerance) in both(&scene, &particles, 1).into_iter().zip(tolerances)
         {
             assert_eq!((report.substeps, report.iterations), (1, 1));
-            for k in 0..state.len() {
-                let off = (position(&state, k) - start[k] - moves[k]).length();
+            for (k, (start, moved)) in start.iter().zip(&moves).enumerate() {
+                let off = (position(&state, k) - *start - *moved).length();
                 assert!(off < tolerance, "{part}, particle {k}: {off} {tolerance}");
             }
         }
@@ -336,7 +336,8 @@ fn traced(scene: &Scene, particles: &Particles, length: f64) -> swell::reference
 fn a_tank_s_cells_are_full_up_to_its_surface() {
     let (scene, particles) = rig::tank([8, 10, 8], 6);
     let trace = traced(&scene, &particles, 0.01);
-    let at = |y: i64| trace.bricks.element([3, y, 0]) as usize;
+    // Beside the upper wall along z, and for y = 0 the lower one along y.
+    let at = |y: i64| trace.bricks.element([3, y, 7]) as usize;
     let centers = &trace.centers;
     // The least weight of a hat, 2.4e-7, in each of 8 particles' 27 hats; places are rounded to f32.
     for y in 0..5 {
@@ -517,8 +518,8 @@ fn errors(densities: &[f64]) -> [f64; 3] {
 }
 
 /// What a cache's ledger says of a frame is what its particles come to, by sums of this file's own, on either device. f32
-/// sums of 34 terms err by 42 ε (tests/pbf.rs), walls by 5e-7; FLIP's hats by 2.4e-7 each of 27 · 8, and more where little
-/// room is left.
+/// sums of 34 terms err by 42 ε (tests/pbf.rs), walls by 5e-7. FLIP's hats have 2.4e-7 more each, of 72 that count in a sum
+/// of 8, over the 0.67 of it that corners leave: 3.2e-6, and f32 some 10 ε.
 #[test]
 fn ledgers_say_what_their_frames_come_to() {
     let job = Job::of(&[("dam.toml", DAM)]);
@@ -580,7 +581,7 @@ fn ledgers_say_what_their_frames_come_to() {
             ];
             let expected = errors(&densities);
             println!("{cache}, frame {frame}: {found:?} {expected:?}");
-            let tolerance = if solver == "pbf" { 6e-6 } else { 5e-5 };
+            let tolerance = if solver == "pbf" { 6e-6 } else { 1e-5 };
             for (found, expected) in found.into_iter().zip(expected) {
                 assert!((found - expected).abs() < tolerance, "{found} {expected}");
                 // A hundredth more of any would be seen.

@@ -248,9 +248,9 @@ mod tests {
         let slow = line("slow", &[(1.0, 1.0), (4.0, 0.25), (16.0, 0.0625)]);
         let fast = line(
             "fast",
-            &[(0.5, 3.0), (2.0, 0.25), (8.0, 0.0625), (32.0, 0.01)],
+            &[(0.5, 3.0), (2.5, 0.2), (8.0, 0.0625), (32.0, 0.01)],
         );
-        // Error 1/t: at 2 it is 0.5, at 8 0.125.
+        // Error 1/t: at 2.5 it is 0.4, at 8 0.125.
         let lines = [slow, fast];
         let found = rivalry(&lines, 1);
         let ratio = |k: usize| found[k].ratios[0];
