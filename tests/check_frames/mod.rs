@@ -100,6 +100,7 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
         file_hash: String::new(),
         placement: Placement::default(),
         mesh: sphere(DVec3::new(0.63, 0.31, 0.57), 0.26),
+        holes: Default::default(),
     };
     match speed {
         0.0 => scene.solids.push(placed),
