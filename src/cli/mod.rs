@@ -26,7 +26,7 @@ use crate::stage::Blame;
 const OUT_OF_TOLERANCE: u8 = 1;
 
 const AFTER: &str = "Exit codes: 0 done; 1 a comparison is out of tolerance; 2 usage, scene or look at fault; \
-    3 no usable device, or device lost; 4 a cache or picture is damaged, missing, in use, of another scene, or cannot be read or \
+    3 no usable device, or device lost; 4 a cache or picture is damaged, missing, in use, of another scene or look, or cannot be read or \
     written, standard output included (a closed pipe, as of `| head`, is no fault); 5 the numbers failed, last good frame kept; \
     130 ended by a signal, resumable.";
 
