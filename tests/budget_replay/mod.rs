@@ -13,15 +13,19 @@ use crate::{Failure, SOLVERS, bake, is_caught, load, opened, spoil};
 fn a_replay_names_the_pass_of_a_residual_in_each_precision() {
     let needs = Needs { f64: true };
     let context = Context::open_for(None, needs).expect("an adapter with f64, as lavapipe is");
-    // One iteration, from which no solve comes near; and more than are submitted at once, to a tolerance that rounding does
-    // not reach.
+    // One iteration, from which no solve comes near; and more than are submitted at once, to a tolerance that as many plain
+    // iterations do not reach.
     let single = (
         "budget.residual=1e-5",
-        ["max_iterations=1", "preconditioner=none"],
+        ["max_iterations=1", "preconditioner=none", "tolerance=1e-5"],
     );
     let batches = (
-        "budget.residual=1e-17",
-        ["max_iterations=20", "tolerance=1e-17"],
+        "budget.residual=1e-12",
+        [
+            "max_iterations=20",
+            "preconditioner=none",
+            "tolerance=1e-14",
+        ],
     );
     for (precision, (budget, settings)) in [
         ("f32", single),
@@ -30,8 +34,8 @@ fn a_replay_names_the_pass_of_a_residual_in_each_precision() {
         ("f64", batches),
     ] {
         let precision = format!("solver.flip.pressure.precision={precision}");
-        let [a, b] = settings.map(|set| format!("solver.flip.pressure.{set}"));
-        let sets = [SOLVERS[1], budget, &precision, &a, &b];
+        let [a, b, c] = settings.map(|set| format!("solver.flip.pressure.{set}"));
+        let sets = [SOLVERS[1], budget, &precision, &a, &b, &c];
         let broken = bake(&opened(&context), &load("34-not-a-number", &sets), "1-2");
         let Failure { breach, place } = broken.failure();
         assert_eq!(breach.watched, Watched::Residual, "{sets:?}: {breach}");
