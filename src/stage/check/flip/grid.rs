@@ -127,17 +127,11 @@ impl Checker<'_> {
             let tolerance = 6.0 * base * speed + through;
             fluxes.push(pair_of(e, flux[e], twin.solid_flux[e], tolerance));
             if has_moving {
-                // Of an open face it is never read: what stands there depends on which of two nodes as near is looked at.
-                let is_closed = open[e].cmpeq(DVec3::ZERO);
-                let of = |velocity: DVec3| DVec3::select(is_closed, velocity, DVec3::ZERO);
-                let exact = of(twin.closed_velocity[e]);
-                if others
-                    .iter()
-                    .any(|other| of(other.closed_velocity[e]) != exact)
-                {
+                let exact = twin.closed_velocity[e];
+                if others.iter().any(|other| other.closed_velocity[e] != exact) {
                     turned += 1;
                 } else {
-                    closings.push(pair(e, of(closed[e]), exact, 2.0 * U * exact.length()));
+                    closings.push(pair(e, closed[e], exact, 2.0 * U * exact.length()));
                 }
             }
             if has_solids {
