@@ -21,7 +21,7 @@ fields! {
     FLUX = "flip/cut_cells", "flux of solids", "m/s",
         "the open fractions' tolerance times the walls' speed, 6 faces; and so for solids";
     VOLUME = "flip/cut_cells", "open volume", "", "as the open fraction";
-    CLOSED = "flip/cut_cells", "velocity of closed faces", "m/s", "a solid's: 2 u; a tie where another turns out to be nearest";
+    CLOSED = "flip/cut_cells", "velocity of closed faces", "m/s", "a solid's: 2 u; a tie where another turns out to be nearest, or none, as distances and nodes move by their rounding";
     OLD = "flip/gather_faces", "velocity at faces", "m/s",
         "12 u N (particles about) / (their weight), at most 1, of the range of their velocities, + u (particles + 20) |v|";
     NEW = "flip/gather_faces", "velocity with gravity", "m/s", "the same + 2 u g Δt";

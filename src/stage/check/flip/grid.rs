@@ -49,9 +49,10 @@ fn about(bricks: &Bricks, sorted: &Sorted, element: u32, cell_size: f64) -> Abou
     about
 }
 
-/// Solids whose distances are off by `shift`, metres.
-fn shifted(model: &Model, checker: &Checker<'_>, shift: f64) -> Model {
+/// Solids whose distances are off by `shift` and whose nodes by `place`, metres.
+fn shifted(model: &Model, checker: &Checker<'_>, shift: f64, place: DVec3) -> Model {
     let moved = |grid: &SignedDistance| SignedDistance {
+        origin: grid.origin + place,
         values: grid.values.iter().map(|&v| v + shift as f32).collect(),
         ..grid.clone()
     };
@@ -82,14 +83,15 @@ impl Checker<'_> {
         let (step, sorted) = (self.step(), self.sorted());
         let twin = cut_cells(&self.model, &step, &layout.bricks, sorted);
         let error = self.distance_error();
+        let room_of = |shift: f64, place: DVec3| {
+            let model = shifted(&self.model, self, shift, place);
+            let step = model.step(&layout.substep);
+            cut_cells(&model, &step, &layout.bricks, sorted)
+        };
         let others: Vec<Room> = [-error, error]
             .into_iter()
             .filter(|_| has_solids)
-            .map(|shift| {
-                let model = shifted(&self.model, self, shift);
-                let step = model.step(&layout.substep);
-                cut_cells(&model, &step, &layout.bricks, sorted)
-            })
+            .map(|shift| room_of(shift, DVec3::ZERO))
             .collect();
         let kind = self.cells::<u32>(traced, "cell_kind")?;
         let open = self.planes(traced, "face_open")?;
@@ -99,6 +101,13 @@ impl Checker<'_> {
             false => twin.volume.clone(),
         };
         let has_moving = !self.boundary.moving.is_empty();
+        // Which of nodes that are as near to a cell's centre is looked at tells whether a solid is near at all, and so whether
+        // its velocity stands at faces that it does not touch.
+        let side = |k: usize, axis: usize| if k >> axis & 1 == 0 { error } else { -error };
+        let rounded: Vec<Room> = (0..8)
+            .filter(|_| has_moving)
+            .map(|k| room_of(0.0, DVec3::new(side(k, 0), side(k, 1), side(k, 2))))
+            .collect();
         let closed = match has_moving {
             false => twin.closed_velocity.clone(),
             true => self.planes(traced, "closed_velocity")?,
@@ -127,17 +136,12 @@ impl Checker<'_> {
             let tolerance = 6.0 * base * speed + through;
             fluxes.push(pair_of(e, flux[e], twin.solid_flux[e], tolerance));
             if has_moving {
-                // Of an open face it is never read: what stands there depends on which of two nodes as near is looked at.
-                let is_closed = open[e].cmpeq(DVec3::ZERO);
-                let of = |velocity: DVec3| DVec3::select(is_closed, velocity, DVec3::ZERO);
-                let exact = of(twin.closed_velocity[e]);
-                if others
-                    .iter()
-                    .any(|other| of(other.closed_velocity[e]) != exact)
-                {
+                let exact = twin.closed_velocity[e];
+                let mut answers = others.iter().chain(&rounded);
+                if answers.any(|other| other.closed_velocity[e] != exact) {
                     turned += 1;
                 } else {
-                    closings.push(pair(e, of(closed[e]), exact, 2.0 * U * exact.length()));
+                    closings.push(pair(e, closed[e], exact, 2.0 * U * exact.length()));
                 }
             }
             if has_solids {
