@@ -18,6 +18,9 @@ fn damage(job: &Job, file: &str) {
     fs::write(&path, bytes).unwrap();
 }
 
+/// A file, and what is done to it.
+type Damage<'a> = (&'static str, &'a dyn Fn(&str));
+
 #[test]
 fn a_damaged_grid_or_probe_file_is_named() {
     let job = Job::of(&[]);
@@ -28,7 +31,7 @@ fn a_damaged_grid_or_probe_file_is_named() {
     job.expect(0, "diff b --write-baseline base.json");
     job.write("loose.toml", "[velocity]\nmax = 1\n");
     let text = |name: &str| fs::read(job.path(name)).unwrap();
-    let damages: [(&str, &dyn Fn(&str)); 5] = [
+    let damages: [Damage<'_>; 5] = [
         ("grids/small.0002.vdb", &|file| damage(&job, file)),
         ("probes/far.csv", &|file| damage(&job, file)),
         ("probes/near.csv", &|file| {

@@ -74,7 +74,7 @@ def compile(tree: Tree, tests: set[str]) -> dict[str, Path]:
     command = ["cargo", "test", "--release", "--locked", "--features", "mutants", "--no-run"]
     command += ["--message-format=json-render-diagnostics", *targets]
     print(f"compiling {len(binaries)} test binaries with every fault in them", flush=True)
-    environment = os.environ | {"CARGO_TARGET_DIR": str(tree.target), "CARGO_INCREMENTAL": "1"}
+    environment = os.environ | {"CARGO_TARGET_DIR": str(tree.target)}
     done = subprocess.run(command, cwd=tree.root, env=environment, stdout=subprocess.PIPE, text=True)
     if done.returncode:
         raise Mistake("the tree with the faults in it does not compile; a Rust `from` has to be a complete expression")
