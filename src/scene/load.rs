@@ -204,7 +204,7 @@ vorticity_confinement = { strength = 0.1 }
 
     /// Numbers of the README, one by one.
     #[test]
-    fn what_a_scene_leaves_out_is_what_the_readme_says() {
+    fn what_a_scene_leaves_out_is_what_its_page_says() {
         let text = "[shot]\nname = \"a\"\nframes = 10\nframes_per_second = 50\n\
             [domain]\nmin = [0, 0, 0]\nmax = [4, 3, 12]\n[solver]\nmethod = \"pbf\"\n\
             [solver.pbf]\nparticle_spacing = 0.1\n[solver.flip]\ncell_size = 0.2\n\

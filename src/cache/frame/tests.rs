@@ -21,9 +21,9 @@ fn water(n: u32, attributes: &[&str]) -> Particles {
         position: (0..n).map(|i| [0, 1, 2].map(|k| value(i, k))).collect(),
         velocity: (0..n).map(|i| [3, 4, 5].map(|k| value(i, k))).collect(),
         id: (0..n).map(|i| 2 * i + 1).collect(),
-        attributes: attributes
-            .iter()
-            .map(|name| ((*name).to_owned(), (0..n).map(|i| value(i, 6)).collect()))
+        attributes: (6..)
+            .zip(attributes)
+            .map(|(k, name)| ((*name).to_owned(), (0..n).map(|i| value(i, k)).collect()))
             .collect(),
     }
 }
