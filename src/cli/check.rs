@@ -293,9 +293,13 @@ fn verdict(outcome: &Outcome) -> String {
             let row = rows
                 .iter()
                 .find(|row| row.field.pass == pass && row.field.name == field);
-            let why = row.map_or("", |row| row.field.derivation);
+            let why = row.map_or_else(String::new, |row| {
+                let [error, tolerance] = [row.worst.error, row.worst.tolerance].map(short);
+                let derivation = row.field.derivation;
+                format!("; off by {error} where {tolerance} is allowed: {derivation}")
+            });
             format!(
-                "out of tolerance: {pass} first, its {field}, in substep {} after frame {frame}; allowed there: {why}",
+                "out of tolerance: {pass} first, its {field}, in substep {} after frame {frame}{why}",
                 substep.unwrap_or_default()
             )
         }

@@ -164,16 +164,25 @@ pub fn iterate(
     sorted: &mut Sorted,
     timings: &mut Timings,
 ) -> u32 {
-    iterate_among(model, substep, sorted, timings, &mut |_| None)
+    iterate_among(
+        model,
+        substep,
+        sorted,
+        timings,
+        &mut |_| None,
+        &mut |_, _| {},
+    )
 }
 
-/// The same, where whom a pass visits may change from pass to pass.
+/// The same, where whom a pass visits may change from pass to pass, and where `disturb` may move the particles before each
+/// iteration, which it is told by its number from 0.
 pub fn iterate_among<'a>(
     model: &'a Model,
     substep: &'a Substep,
     sorted: &'a mut Sorted,
     timings: &'a mut Timings,
     visit: &'a mut Visit<'a>,
+    disturb: &mut dyn FnMut(u32, &mut [DVec3]),
 ) -> u32 {
     let n = sorted.order.len();
     let settings = &model.settings;
@@ -190,6 +199,7 @@ pub fn iterate_among<'a>(
     };
     let most = settings.stop.most_iterations();
     for k in 0..most {
+        disturb(k, &mut corrector.sorted.points[..n]);
         // Black λ of the iteration before still hold for red's correction: only the first needs all.
         corrector.lambda(match settings.iteration {
             Iteration::RedBlack if k > 0 => Colour::Red,

@@ -46,8 +46,10 @@ fields! {
         "equal, but for those within 30 u of the cap";
     MEASURED = "pbf/measure_density", "relative density", "", "as that of pbf/compute_lambda";
     WHOLE_DELTA = "whole solve", "corrections, RMS error", "m",
-        "accumulated: 4 √k times the RMS by which the f64 solve of k iterations answers when every start coordinate moves by \
-         ± 2 u of the domain's diagonal";
-    WHOLE_DENSITY = "whole solve", "relative density, RMS error", "", "accumulated: as the corrections";
-    WHOLE_LAMBDA = "whole solve", "lambda, RMS error", "m²", "accumulated: as the corrections";
+        "accumulated: 4 times the RMS by which the corrections of the f64 solve answer when every coordinate moves by ± 2 u \
+         of the domain's diagonal before each iteration, each particle on its own or each layer of particles alike";
+    WHOLE_DENSITY = "whole solve", "relative density, RMS error", "",
+        "accumulated: 4 times the RMS by which the density after the f64 solve answers to the same moves";
+    WHOLE_LAMBDA = "whole solve", "lambda, RMS error", "m²",
+        "accumulated: 4 times the RMS by which λ after the f64 solve answers to the same moves";
 }
