@@ -46,6 +46,9 @@ impl Whole {
     }
 }
 
+/// How far a solve is off the exact one, in one of its fields.
+type Measure<'a> = &'a dyn Fn(&Outcome) -> Deviation;
+
 /// What a solve came to: positions, relative densities, λ.
 struct Outcome {
     position: Vec<[f64; 3]>,
@@ -89,7 +92,7 @@ impl Checker<'_> {
         let position = |of: &Outcome| Deviation::between(&of.position, &exact.position);
         let density = |of: &Outcome| Deviation::between(&of.density, &exact.density);
         let lambda = |of: &Outcome| Deviation::between(&of.lambda, &exact.lambda);
-        let rows: [(_, &dyn Fn(&Outcome) -> Deviation); 3] = [
+        let rows: [(_, Measure<'_>); 3] = [
             (&WHOLE_DELTA, &position),
             (&WHOLE_DENSITY, &density),
             (&WHOLE_LAMBDA, &lambda),
