@@ -331,7 +331,15 @@ fn caches(a: &CacheReader, b: &CacheReader, request: &Request) -> Result<CacheDi
     let frame = |&frame: &u32| {
         let [from, to] = [a, b].map(|cache| cache.manifest().origin.into());
         let (of_a, of_b) = (a.read(frame)?, b.read(frame)?);
-        let beside = streams::of_frame([a, b], frame, [&of_a, &of_b])?;
+        let side = |cache, particles| -> Result<_, CacheError> {
+            let entry = CacheReader::entry(cache, frame)?;
+            Ok(streams::Side {
+                cache,
+                entry,
+                particles,
+            })
+        };
+        let beside = streams::of_frame([side(a, &of_a)?, side(b, &of_b)?])?;
         let of_a = of_a.about(from, to);
         let aggregates = [
             aggregates(a, &gauge, gravity_a, frame, &of_a)?,
