@@ -61,6 +61,7 @@ pub use params::{
 };
 use plan::{PHASE_COUNT, Phase, SIZE_COUNT, Size};
 pub use plan::{passes, planned};
+pub(super) use stages::all_commands;
 use stages::{SINGLE, Shape, Stages};
 
 /// Levels of bricks that the multigrid uses at most: pass it to [`Bricks::new`] as depth.
@@ -123,7 +124,7 @@ pub struct PressureSolver {
     settings: Pressure,
     has_correction: bool,
     capacity: usize,
-    stages: BTreeMap<Shape, Stages>,
+    stages: BTreeMap<Shape, Stages<Recording>>,
     shape: Shape,
     phase: PressurePhase,
     sizes: [Workgroups; SIZE_COUNT],
@@ -353,10 +354,10 @@ impl PressureSolver {
         }
     }
 
-    fn stages(&mut self, program: &Program) -> &Stages {
+    fn stages(&mut self, program: &Program) -> &Stages<Recording> {
         let (preconditioner, has_correction) = (self.settings.preconditioner, self.has_correction);
         self.stages.entry(self.shape).or_insert_with_key(|&shape| {
-            Stages::new(program, preconditioner, has_correction, shape)
+            Stages::new(preconditioner, has_correction, shape).bind(program)
         })
     }
 

@@ -14,12 +14,11 @@ use swell::{
         Method, Scene,
         flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
         moving_solid::MovingSolid,
-        plan::{Counts, SOLID_GRIDS_BYTES},
     },
     solve::{
         flip::{Flip, capacity},
         params::SolidGrids,
-        pbf::device_limits,
+        plan::{Counts, Plan, device_limits},
     },
 };
 
@@ -66,7 +65,7 @@ fn solver(context: &Context, scene: &Scene, particles: &Particles) -> Flip {
         bricks: capacity(scene, particles),
         ..boundary.counts()
     };
-    let plan = swell::solve::plan(scene, counts, device_limits(context));
+    let plan = Plan::new(scene, counts, device_limits(context));
     Flip::new(context, scene, plan, &boundary, false).unwrap()
 }
 
@@ -344,7 +343,7 @@ fn scenes_without_moving_solids_have_nothing_for_them() {
             bricks: capacity(scene, &particles),
             ..boundary.counts()
         };
-        let plan = swell::solve::plan(scene, counts, device_limits(&context));
+        let plan = Plan::new(scene, counts, device_limits(&context));
         let is_moving = plan
             .passes
             .iter()

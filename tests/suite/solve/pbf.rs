@@ -16,11 +16,8 @@ use swell::{
         solver::Solver,
         sph::{Calibration, half_space_fraction},
     },
-    scene::{Iteration, Scene, Stop, Wall, WaveMaker, effects, plan::*},
-    solve::{
-        SolveError,
-        pbf::{Pbf, device_limits},
-    },
+    scene::{Iteration, Scene, Stop, Wall, WaveMaker, effects},
+    solve::{SolveError, pbf::Pbf, plan::*},
 };
 
 /// One Jacobi iteration from rest without gravity, by O(n²) search in f64: the model's formulas once more,

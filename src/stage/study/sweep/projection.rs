@@ -16,7 +16,7 @@ use crate::{
         poisson::{self, gradients::norm},
     },
     scene::{flip::Surface, study::sweep::Point},
-    solve::{SolveError, flip::Flip, pbf::device_limits},
+    solve::{SolveError, flip::Flip, plan::device_limits},
 };
 
 use super::{
