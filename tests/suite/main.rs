@@ -32,6 +32,7 @@ mod compare {
     mod renders;
 }
 mod domain {
+    mod circles;
     mod signed_distance;
 }
 mod experiment {
