@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use clap::{Args, ValueEnum};
+use clap::{
+    Args, ValueEnum,
+    builder::{OsStringValueParser, TypedValueParser as _},
+};
 use serde_json::{Value, json};
 
 use crate::{
@@ -38,7 +41,7 @@ pub(super) struct BakeArgs {
     solver: Option<Method>,
     /// Begin from a frame of another cache, such as cache/wave-city/pbf:120, of the same solver, spacing and frame
     /// rate; numbers and time go on from there.
-    #[arg(long, value_name = "CACHE:FRAME")]
+    #[arg(long, value_name = "CACHE:FRAME", value_parser = OsStringValueParser::new().try_map(BranchPoint::try_from))]
     from: Option<BranchPoint>,
     /// Frames to bake, such as 1-30; the whole shot where left out. With --resume past the end of the shot, which is then
     /// longer.
