@@ -19,7 +19,7 @@ use crate::{
 };
 
 use super::{
-    Failure,
+    Failure, GpuArgs,
     interrupt::{self, Interrupt},
     output,
     progress::{Mode, Progress},
@@ -56,9 +56,8 @@ pub(super) struct BakeArgs {
     /// What to solve on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
     #[arg(long, value_enum, default_value_t, value_name = "DEVICE")]
     device: DeviceKind,
-    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`); of --device gpu alone.
-    #[arg(long, value_name = "NAME")]
-    adapter: Option<String>,
+    #[command(flatten)]
+    gpu: GpuArgs,
     /// Time each pass on the device and print a table; passes then run one by one.
     #[arg(long)]
     time_passes: bool,
@@ -76,14 +75,17 @@ enum DeviceKind {
 
 impl BakeArgs {
     fn device(&self) -> Result<Device, Failure> {
-        match (self.device, &self.adapter) {
-            (DeviceKind::Gpu, adapter) => Ok(Device::Gpu(adapter.clone())),
-            (DeviceKind::Cpu, None) => Ok(Device::Cpu),
-            (DeviceKind::Cpu, Some(name)) => Err(Failure {
-                code: 2,
-                error: format!("--adapter {name} names a GPU, and --device is cpu").into(),
-            }),
-        }
+        let GpuArgs { adapter, shaders } = &self.gpu;
+        let fault = match (self.device, adapter, shaders) {
+            (DeviceKind::Gpu, ..) => return Ok(Device::Gpu(self.gpu.read()?)),
+            (DeviceKind::Cpu, None, None) => return Ok(Device::Cpu),
+            (DeviceKind::Cpu, Some(name), _) => format!("--adapter {name} names a GPU"),
+            (DeviceKind::Cpu, None, Some(_)) => "--shaders run on a GPU".to_owned(),
+        };
+        Err(Failure {
+            code: 2,
+            error: format!("{fault}, and --device is cpu").into(),
+        })
     }
 }
 
