@@ -8,6 +8,9 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|bytes: &[u8]| {
     let manifest = cache::MANIFEST.as_bytes();
     let lines = bytes.split(|&b| b == b'\n').map(<[u8]>::to_vec);
-    let lines: Vec<_> = [cache::first_line(manifest)].into_iter().chain(lines).collect();
+    let lines: Vec<_> = [cache::first_line(manifest)]
+        .into_iter()
+        .chain(lines)
+        .collect();
     cache::read(manifest, &lines);
 });
