@@ -53,7 +53,7 @@ pub(super) struct BakeArgs {
     /// Take meshes and tables that lie outside of the scene's folder.
     #[arg(long)]
     allow_outside: bool,
-    /// What to solve on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
+    /// Device to solve on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
     #[arg(long, value_enum, default_value_t, value_name = "DEVICE")]
     device: DeviceKind,
     #[command(flatten)]
@@ -296,7 +296,7 @@ fn line(frame: u32, report: &StepReport, seconds: f64) -> String {
     )
 }
 
-/// What a user has to know of a scene, as a line, and the same for farms.
+/// A warning about the scene, as a line and as a JSON event.
 pub(super) fn warned(warning: &str) -> (String, Value) {
     (
         format!("warning: {warning}"),
@@ -310,7 +310,7 @@ const DENSE: f64 = 0.15;
 /// Mean divergence of a pocket against the largest anywhere, above which it is not rounding.
 const INCOMPATIBLE: f64 = 1e-3;
 
-/// What must not be passed over, and the same for farms.
+/// Warnings about a frame, each as a line and as a JSON event.
 fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
     let mut warnings = Vec::new();
     if report.density_error_mean > DENSE {

@@ -84,7 +84,7 @@ where
     }
 }
 
-/// What a command runs on.
+/// Adapter and shaders of a command.
 #[derive(Args, Debug)]
 struct GpuArgs {
     /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).

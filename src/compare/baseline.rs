@@ -16,8 +16,8 @@ use crate::domain::{aggregates::Aggregates, particles::Particles, tolerance::Lim
 /// The format that this program writes and reads.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// For a scene whose spread was not measured ([`super::spread`]): name, absolute limit in particle spacings of lengths
-/// and plain of the others, relative limit, reason. Wide enough for water after an impact with either solver: the
+/// Limits for a scene whose spread was not measured ([`super::spread`]): name, absolute limit (lengths in particle
+/// spacings, all else in its own unit), relative limit, reason. Wide enough for water after an impact with either solver: the
 /// measurements are the largest over the shipped scenes in the frames that `tools/regress` bakes, with gravity changed
 /// in its last place (-9.81 to -9.810001, `swell diff --json`).
 const DEFAULT_TOLERANCES: [(&str, f64, f64, &str); 8] = [
@@ -85,14 +85,14 @@ pub struct Baseline {
     pub scene: Vec<String>,
     /// Limits of the aggregates by name, each with its reason.
     pub tolerances: BTreeMap<String, StatedLimit>,
-    /// What differs in the bakes that the frames' spreads are from; empty where none was measured.
+    /// Descriptions of the bakes that the frames' spreads are from; empty where none was measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spread_from: Vec<String>,
     /// The adapter on which the aggregates were taken.
     pub aggregates_from: String,
-    /// From the start, 0, on.
+    /// Frames in order, from the start, 0.
     pub frames: Vec<BaselineFrame>,
-    /// By adapter and driver: [`particles_hash`] of each frame of `frames`.
+    /// [`particles_hash`] of each frame of `frames`, by adapter and driver.
     pub hashes: BTreeMap<String, Vec<String>>,
 }
 
@@ -102,9 +102,9 @@ pub struct Baseline {
 pub struct BaselineFrame {
     /// Output frame.
     pub frame: u32,
-    /// How many.
+    /// Number of particles.
     pub particles: usize,
-    /// What they sum up to.
+    /// Sums and shapes over them.
     pub aggregates: Aggregates,
     /// How far bakes that differ in roundings alone had come apart by then; absent where that was not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -115,14 +115,14 @@ pub struct BaselineFrame {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StatedLimit {
-    /// In the aggregate's unit.
+    /// Absolute part, in the aggregate's unit.
     pub absolute: f64,
-    /// Of the baseline's value.
+    /// Part relative to the baseline's value.
     pub relative: f64,
-    /// Of the frame's spread. The three add up.
+    /// Multiples of the frame's spread. The three parts add up.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub spreads: f64,
-    /// In words.
+    /// The reason, in words.
     pub reason: String,
 }
 
@@ -154,7 +154,7 @@ pub enum Basis {
 pub struct BaselineFault {
     /// Output frame.
     pub frame: u32,
-    /// What is off.
+    /// The fault.
     pub fault: Fault,
 }
 
@@ -183,7 +183,7 @@ fn update(hasher: &mut blake3::Hasher, values: impl Iterator<Item = [u8; 4]>) {
     hasher.update(&bytes);
 }
 
-/// What a new baseline allows its aggregates; particles are `spacing` metres apart at rest.
+/// Limits that a new baseline sets its aggregates; particles are `spacing` metres apart at rest.
 pub fn default_tolerances(spacing: f64) -> BTreeMap<String, StatedLimit> {
     let is_length = |name: &str| Aggregates::NAMES.contains(&(name, "m"));
     let stated = |&(name, absolute, relative, reason): &(&str, f64, f64, &str)| {
@@ -247,8 +247,8 @@ impl Baseline {
         hashes.and_then(|hashes| hashes.get(index)) == Some(&found.hash)
     }
 
-    /// What the aggregates of a frame may differ by; none of a frame that the baseline has not. Of the particles that they
-    /// were taken from it is the rounding of a sum of n terms of one sign, n ε of the sum (Higham 2002, eq. 4.4).
+    /// Limits of a frame's aggregates; empty for a frame that the baseline does not have. Where the particles are the same
+    /// bit for bit, the limit is the rounding of a sum of n terms of one sign, n ε of the sum (Higham 2002, eq. 4.4).
     pub fn limits(&self, adapter: Option<&str>, found: &Measured) -> BTreeMap<String, Limit> {
         let mut frames = self.frames.iter().enumerate();
         let Some((index, expected)) = frames.find(|(_, f)| f.frame == found.frame.frame) else {
@@ -276,10 +276,10 @@ impl Baseline {
         self.tolerances.iter().map(limit).collect()
     }
 
-    /// What is off with a baseline that was read.
+    /// Refuses a baseline, just read, that is not consistent.
     ///
     /// # Errors
-    /// The first thing, in words.
+    /// The first fault, in words.
     pub fn check(&self) -> Result<(), String> {
         if self.format_version != FORMAT_VERSION {
             return Err(format!(
