@@ -8,7 +8,6 @@ use super::{
     adapter::{Context, GpuError, Spoil},
     buffer::{Buf, Element, Wanted, Windows},
     reflect::{Access, Binding, reflect},
-    shader,
 };
 
 /// A buffer to be.
@@ -73,7 +72,10 @@ impl Program {
         check_sizes(context, buffers)?;
         let passes = passes
             .iter()
-            .map(|spec| Ok((spec.name, compile(context, spec, shared)?)))
+            .map(|spec| match compile(context, spec, shared) {
+                Ok(pass) => Ok((spec.name, pass)),
+                Err(error) => Err(context.shaders.blamed(error)),
+            })
             .collect::<Result<_, GpuError>>()?;
         let buffers = buffers
             .iter()
@@ -268,14 +270,15 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
 /// WGSL of pass `name`, composed from `file`, with the context's fault where it is one of this pass.
 ///
 /// # Errors
-/// As [`shader::compose`]; a fault whose text is not in the pass.
+/// As [`Shaders::compose`](super::shader::Shaders::compose); a fault whose text is not in the pass.
 pub fn source(
     context: &Context,
     name: &str,
     file: &str,
     defines: &[&str],
 ) -> Result<String, GpuError> {
-    let source = shader::compose(file, defines)?;
+    let composed = context.shaders.compose(file, defines);
+    let source = composed.map_err(|error| context.shaders.blamed(error))?;
     match context.spoil.filter(|spoil| spoil.pass == name) {
         Some(spoil) => spoiled(&source, &spoil),
         None => Ok(source),
@@ -340,7 +343,7 @@ fn compile(
         ..wgpu::ShaderRuntimeChecks::checked()
     };
     // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is fixed
-    // before it starts. All other checks stay on.
+    // before it starts. All other checks stay on. Who edits shaders keeps to that, as whoever edits this source.
     let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(spec.name),

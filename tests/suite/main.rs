@@ -24,6 +24,7 @@ mod cache {
 mod check;
 mod cli {
     mod pipeline;
+    mod shaders;
     #[cfg(target_os = "linux")]
     mod terminal;
 }
