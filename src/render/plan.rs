@@ -1,37 +1,204 @@
-//! Which passes a look calls for. What it does not name is neither built nor run.
+//! What a look's frames take on the device: buffers, textures and the commands that use them, made without a device.
+//!
+//! The renderer builds this and nothing more. Passes are those of the commands: no list of them is kept beside.
 
-use crate::scene::look::{AovSpec, FilterSpec, Look};
+use std::collections::BTreeMap;
 
-/// Names of the passes that a frame takes, sorted; `has_solids` is whether anything opaque stands in the scene
-/// or the look.
-pub fn passes(look: &Look, has_solids: bool) -> Vec<&'static str> {
-    let spec = look.spec();
-    let mut names = vec![
-        "ssfr/fill",
-        "ssfr/splat_depth",
-        "ssfr/splat_thickness",
-        "ssfr/shade",
-    ];
-    match spec.surface.filter {
-        FilterSpec::CurvatureFlow => names.extend([
-            "ssfr/flow_restrict",
-            "ssfr/curvature_flow",
-            "ssfr/flow_prolong",
-        ]),
-        FilterSpec::NarrowRange => names.push("ssfr/narrow_range"),
-    }
-    if has_solids {
-        names.extend(["ssfr/solid", "ssfr/shadow"]);
-    }
-    if spec.water.spray.is_some() {
-        names.push("ssfr/splat_spray");
-    }
-    if !spec.output.aovs.is_empty() {
-        names.push("ssfr/shade_aovs");
-    }
-    if look.wants(AovSpec::Forward) {
-        names.push("ssfr/splat_owner");
-    }
-    names.sort_unstable();
-    names
+use bytemuck::NoUninit;
+
+use super::{RenderError, frame::Extent, uniform::Fill};
+use crate::gpu::{
+    adapter::Context,
+    program::{BufferSpec, PassSpec, Program},
+    raster::RasterSpec,
+    recording::{Bind, Command, Groups, WINDOW},
+    sort,
+    texture::{SamplerSpec, TextureSpec},
+};
+
+/// What of the device decides how a frame is divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Largest storage buffer that can be bound, bytes.
+    pub storage: u64,
+    /// Texels along a side of the largest texture.
+    pub texture: u32,
+    /// Pixels along a side of what is drawn at once: bands of the picture, tiles of the solids.
+    pub tile: u32,
 }
+
+impl Limits {
+    /// An adapter's own.
+    pub fn of(context: &Context) -> Self {
+        let limits = &context.limits;
+        Self {
+            storage: (limits.max_storage_buffer_binding_size).min(limits.max_buffer_size),
+            texture: limits.max_texture_dimension_2d,
+            tile: limits.max_texture_dimension_2d,
+        }
+    }
+}
+
+/// How often a pass runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Runs {
+    /// Before the first frame.
+    pub once: usize,
+    /// For each sample of a frame.
+    pub sample: usize,
+    /// For the channels beside a frame's picture.
+    pub aovs: usize,
+}
+
+/// Buffers, textures and commands of a look.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    /// Every buffer.
+    pub buffers: Vec<BufferSpec>,
+    /// Every texture.
+    pub textures: Vec<TextureSpec>,
+    pub(super) samplers: Vec<SamplerSpec>,
+    /// Before the first frame.
+    pub(super) once: Vec<Command>,
+    /// For each sample of a frame.
+    pub(super) sample: Vec<Command>,
+    /// For the channels beside the picture; nothing where the look asks for none.
+    pub(super) aovs: Vec<Command>,
+    pub(super) extent: Extent,
+    /// Rows of the picture in each of its buffers.
+    pub(super) bands: Vec<u32>,
+    /// Of a splat, metres.
+    pub(super) radius: f64,
+    pub(super) defines: BTreeMap<&'static str, Vec<&'static str>>,
+    pub(super) fills: Vec<Fill>,
+    pub(super) contents: Vec<(String, Vec<u8>)>,
+    pub(super) texels: Vec<(String, Vec<u8>)>,
+}
+
+impl Plan {
+    /// Passes by name, with how often each runs.
+    pub fn passes(&self) -> BTreeMap<&'static str, Runs> {
+        let mut passes: BTreeMap<&'static str, Runs> = BTreeMap::new();
+        let mut add = |commands: &[Command], count: fn(&mut Runs) -> &mut usize| {
+            for name in commands.iter().filter_map(Command::pass) {
+                *count(passes.entry(name).or_default()) += 1;
+            }
+        };
+        add(&self.once, |runs| &mut runs.once);
+        add(&self.sample, |runs| &mut runs.sample);
+        add(&self.aovs, |runs| &mut runs.aovs);
+        passes
+    }
+
+    /// Bytes of all buffers and textures.
+    pub fn bytes(&self) -> u64 {
+        let buffers = self.buffers.iter().map(|buffer| buffer.bytes);
+        let textures = self.textures.iter().map(TextureSpec::bytes);
+        buffers.sum::<u64>() + textures.sum::<u64>()
+    }
+
+    /// Builds it on a device, with what does not change from frame to frame.
+    pub(super) fn program(&self, context: &Context) -> Result<Program, RenderError> {
+        let commands = || [&self.once, &self.sample, &self.aovs].into_iter().flatten();
+        let mut rasters: BTreeMap<&'static str, RasterSpec> = BTreeMap::new();
+        let mut passes: BTreeMap<&'static str, PassSpec> = BTreeMap::new();
+        for command in commands() {
+            match command {
+                Command::Draw(draw) => {
+                    rasters.insert(draw.raster.name, draw.raster);
+                }
+                Command::Dispatch { pass, .. } => {
+                    let spec = PassSpec {
+                        name: pass,
+                        defines: self.defines.get(pass).cloned().unwrap_or_default(),
+                        constants: Vec::new(),
+                    };
+                    passes.insert(pass, spec);
+                }
+                _ => {}
+            }
+        }
+        let passes: Vec<PassSpec> = passes.into_values().collect();
+        let rasters: Vec<RasterSpec> = rasters.into_values().collect();
+        let program = Program::new(context, &self.buffers, &passes, &[])?
+            .with_rasters(&rasters)?
+            .with_textures(&self.textures, &self.samplers)?;
+        for (name, bytes) in &self.contents {
+            program.upload(name, 0, bytes);
+        }
+        for (name, bytes) in &self.texels {
+            program.upload_texture(name, bytes);
+        }
+        Ok(program)
+    }
+
+    /// A storage buffer.
+    pub(super) fn storage(&mut self, name: impl Into<String>, bytes: u64) {
+        self.buffers.push(sort::storage(&name.into(), bytes));
+    }
+
+    /// A storage buffer of these values.
+    pub(super) fn stored<T: NoUninit>(&mut self, name: &str, values: &[T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(values);
+        self.storage(name, bytes.len() as u64);
+        self.contents.push((name.to_owned(), bytes.to_vec()));
+    }
+
+    fn uniform_of(&mut self, name: &str, bytes: Vec<u8>) {
+        self.buffers.push(BufferSpec {
+            name: name.to_owned(),
+            bytes: bytes.len() as u64,
+            is_uniform: true,
+        });
+        self.contents.push((name.to_owned(), bytes));
+    }
+
+    /// A uniform of one value.
+    pub(super) fn uniform<T: NoUninit>(&mut self, name: &str, value: &T) {
+        self.uniform_of(name, bytemuck::bytes_of(value).to_vec());
+    }
+
+    /// A uniform of many, one a [`Bind::window`].
+    pub(super) fn windows<T: NoUninit>(&mut self, name: &str, values: &[T]) {
+        let mut bytes = vec![0; WINDOW as usize * values.len()];
+        for (window, value) in bytes.chunks_exact_mut(WINDOW as usize).zip(values) {
+            window[..size_of::<T>()].copy_from_slice(bytemuck::bytes_of(value));
+        }
+        self.uniform_of(name, bytes);
+    }
+
+    /// A texture with these texels.
+    pub(super) fn texture(&mut self, spec: TextureSpec, texels: Vec<u8>) {
+        self.texels.push((spec.name.clone(), texels));
+        self.textures.push(spec);
+    }
+
+    /// Sets a condition in a pass.
+    pub(super) fn define(&mut self, pass: &'static str, condition: &'static str) {
+        self.defines.entry(pass).or_default().push(condition);
+    }
+
+    /// Sets each of a buffer's first `count` words.
+    pub(super) fn fill(&mut self, buffer: &'static str, word: u32, count: u64) -> Command {
+        let index = self.fills.len();
+        self.fills.push(Fill {
+            word,
+            count: u32::try_from(count).unwrap_or(u32::MAX),
+            pad0: 0,
+            pad1: 0,
+        });
+        let binds = vec![
+            Bind::window::<Fill>("params", FILLS, index),
+            Bind::to("words", buffer),
+        ];
+        Command::in_groups("ssfr/fill", Groups::Threads(count), binds)
+    }
+
+    /// Lays out what [`Self::fill`] was asked for; after the last of them.
+    pub(super) fn end_fills(&mut self) {
+        let fills = std::mem::take(&mut self.fills);
+        self.windows(FILLS, &fills);
+    }
+}
+
+const FILLS: &str = "fills";

@@ -3,26 +3,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::scene::moving_solid::MAX_MOVING_SOLIDS;
-
-/// Declares a `repr(C)` mirror together with its field names and offsets.
-macro_rules! mirror {
-    ($(#[$meta:meta])* $name:ident { $($(#[$field_meta:meta])* $field:ident: $ty:ty),+ $(,)? }) => {
-        $(#[$meta])*
-        #[repr(C)]
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-        pub struct $name { $($(#[$field_meta])* pub $field: $ty),+ }
-
-        impl $name {
-            /// Field names and byte offsets, in order.
-            pub fn members() -> Vec<(String, u32)> {
-                vec![$((stringify!($field).to_owned(), std::mem::offset_of!($name, $field) as u32)),+]
-            }
-        }
-    };
-}
-
-pub(super) use mirror;
+use crate::{gpu::reflect::mirror, scene::moving_solid::MAX_MOVING_SOLIDS};
 
 mirror!(
     /// `Params` of shared/pbf_params.wgsl; lengths in metres, positions relative to the domain's least corner.

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::params::mirror;
+use crate::gpu::reflect::mirror;
 
 mirror!(
     /// `PressurePhase` of shared/pressure_phase.wgsl.
