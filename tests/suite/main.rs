@@ -40,6 +40,7 @@ mod experiment {
 }
 mod gpu {
     mod device_faults;
+    mod raster;
     mod shaders;
     mod sort;
 }
