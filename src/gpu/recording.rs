@@ -16,7 +16,7 @@ pub use super::timer::Timer;
 pub struct Bind {
     /// WGSL variable.
     pub variable: &'static str,
-    /// Buffer name.
+    /// Name of the buffer, texture or sampler.
     pub buffer: String,
     /// Byte offset and length; the whole buffer where `None`.
     pub window: Option<(u64, u64)>,
@@ -123,7 +123,9 @@ pub(super) enum Step {
         size: Size,
     },
     Draw(Drawn),
-    Other(Command),
+    Clear(&'static str),
+    ClearDepth(Target),
+    CopyTexture(CopyTexture),
 }
 
 pub(super) enum Size {
@@ -224,30 +226,20 @@ impl Recording {
 
 pub(super) fn encode(steps: &[Step], program: &Program, encoder: &mut CommandEncoder) {
     let mut steps = steps.iter().peekable();
-    while let Some(step) = steps.peek() {
-        if !matches!(step, Step::Dispatch { .. }) {
-            beside(step, program, encoder);
-            steps.next();
-            continue;
+    while let Some(step) = steps.next() {
+        match step {
+            Step::Draw(drawn) => drawn.encode(program, encoder, None),
+            Step::Clear(buffer) => encoder.clear_buffer(program.buffer(buffer), 0, None),
+            Step::ClearDepth(target) => raster::clear_depth(program, encoder, target),
+            Step::CopyTexture(copy) => raster::copy(program, encoder, copy),
+            Step::Dispatch { .. } => {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                dispatch(program, &mut pass, step);
+                while let Some(next) = steps.next_if(|next| matches!(next, Step::Dispatch { .. })) {
+                    dispatch(program, &mut pass, next);
+                }
+            }
         }
-        let mut pass = encoder.begin_compute_pass(&Default::default());
-        while let Some(step @ Step::Dispatch { .. }) = steps.peek() {
-            dispatch(program, &mut pass, step);
-            steps.next();
-        }
-    }
-}
-
-/// Encodes a step that is no dispatch.
-fn beside(step: &Step, program: &Program, encoder: &mut CommandEncoder) {
-    match step {
-        Step::Draw(drawn) => drawn.encode(program, encoder, None),
-        Step::Other(Command::Clear(buffer)) => {
-            encoder.clear_buffer(program.buffer(buffer), 0, None)
-        }
-        Step::Other(Command::ClearDepth(target)) => raster::clear_depth(program, encoder, target),
-        Step::Other(Command::CopyTexture(copy)) => raster::copy(program, encoder, copy),
-        Step::Other(Command::Dispatch { .. } | Command::Draw(_)) | Step::Dispatch { .. } => {}
     }
 }
 
@@ -256,7 +248,7 @@ impl Step {
         match self {
             Self::Dispatch { pass, .. } => Some(pass),
             Self::Draw(drawn) => Some(drawn.draw.raster.name),
-            Self::Other(_) => None,
+            Self::Clear(_) | Self::ClearDepth(_) | Self::CopyTexture(_) => None,
         }
     }
 }
@@ -264,9 +256,9 @@ impl Step {
 fn record(program: &Program, command: &Command) -> Option<Step> {
     match command {
         Command::Draw(draw) => Some(Step::Draw(Drawn::new(program, draw))),
-        Command::Clear(_) | Command::ClearDepth(_) | Command::CopyTexture(_) => {
-            Some(Step::Other(command.clone()))
-        }
+        Command::Clear(buffer) => Some(Step::Clear(buffer)),
+        Command::ClearDepth(target) => Some(Step::ClearDepth(target.clone())),
+        Command::CopyTexture(copy) => Some(Step::CopyTexture(copy.clone())),
         Command::Dispatch {
             pass: name,
             binds,

@@ -181,7 +181,7 @@ impl Queries {
                 };
                 drawn.encode(program, encoder, Some(timestamps));
             }
-            Step::Other(_) => {
+            Step::Clear(_) | Step::ClearDepth(_) | Step::CopyTexture(_) => {
                 encode(std::slice::from_ref(step), program, encoder);
                 return false;
             }
