@@ -61,7 +61,7 @@ pub struct CopyTexture {
     /// From here, all of it; four bytes a texel.
     pub texture: String,
     /// Into this buffer.
-    pub buffer: &'static str,
+    pub buffer: String,
     /// Where its first row begins there, bytes.
     pub offset: u64,
     /// From one row to the next there, bytes: a multiple of 256.
@@ -260,7 +260,7 @@ pub(super) fn copy(program: &Program, encoder: &mut CommandEncoder, copy: &CopyT
     encoder.copy_texture_to_buffer(
         texture.as_image_copy(),
         wgpu::TexelCopyBufferInfo {
-            buffer: program.buffer(copy.buffer),
+            buffer: program.buffer(&copy.buffer),
             layout: wgpu::TexelCopyBufferLayout {
                 offset: copy.offset,
                 bytes_per_row: Some(copy.bytes_per_row),

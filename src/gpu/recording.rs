@@ -4,6 +4,7 @@ use wgpu::{BindGroup, BindGroupLayout, BindingResource, CommandEncoder, ComputeP
 
 use super::{
     adapter::{Context, GpuError},
+    buffer::{Buf, Workgroups},
     program::Program,
     raster::{self, CopyTexture, Draw, Drawn, Target},
     reflect::{Access, Binding},
@@ -22,24 +23,13 @@ pub struct Bind {
     pub window: Option<(u64, u64)>,
 }
 
-/// Bytes from one window of a uniform to the next: what every adapter can bind at.
-pub const WINDOW: u64 = 256;
-
 impl Bind {
-    /// A whole buffer, or a texture or sampler.
-    pub fn to(variable: &'static str, name: impl Into<String>) -> Self {
+    /// `variable` in all of `buffer`.
+    pub fn whole<T>(variable: &'static str, buffer: &Buf<T>) -> Self {
         Self {
             variable,
-            buffer: name.into(),
+            buffer: buffer.name().to_owned(),
             window: None,
-        }
-    }
-
-    /// The window of number `index` of a uniform, each of which holds a `T`.
-    pub fn window<T>(variable: &'static str, buffer: impl Into<String>, index: usize) -> Self {
-        Self {
-            window: Some((WINDOW * index as u64, size_of::<T>() as u64)),
-            ..Self::to(variable, buffer)
         }
     }
 }
@@ -51,8 +41,28 @@ pub enum Groups {
     Threads(u64),
     /// Enough for a thread a pixel of a picture.
     Pixels([u32; 2]),
-    /// Three `u32` at a byte offset of a buffer; zeros make the dispatch empty.
-    Indirect(&'static str, u64),
+    /// [`Workgroups`] that stand in a buffer at a byte offset; zeros make the dispatch empty.
+    Indirect {
+        /// Buffer name.
+        buffer: String,
+        /// Bytes.
+        offset: u64,
+    },
+}
+
+impl Groups {
+    /// Those that stand in a buffer.
+    pub fn at(buffer: &Buf<Workgroups>, index: usize) -> Self {
+        Self::within(buffer, index * size_of::<Workgroups>())
+    }
+
+    /// Those that are a member of a struct, so many bytes from its beginning, in a buffer.
+    pub fn within<T>(buffer: &Buf<T>, member: usize) -> Self {
+        Self::Indirect {
+            buffer: buffer.name().to_owned(),
+            offset: member as u64,
+        }
+    }
 }
 
 /// One thing for the device to do.
@@ -68,7 +78,7 @@ pub enum Command {
         groups: Groups,
     },
     /// Zeroes a buffer.
-    Clear(&'static str),
+    Clear(String),
     /// Runs a raster pass.
     Draw(Draw),
     /// Sets every texel of a depth texture.
@@ -78,6 +88,11 @@ pub enum Command {
 }
 
 impl Command {
+    /// Zeroes `buffer`.
+    pub fn clear<T>(buffer: &Buf<T>) -> Self {
+        Self::Clear(buffer.name().to_owned())
+    }
+
     /// Runs `pass` in so many workgroups.
     pub fn in_groups(pass: &'static str, groups: Groups, binds: Vec<Bind>) -> Self {
         Self::Dispatch {
@@ -123,14 +138,14 @@ pub(super) enum Step {
         size: Size,
     },
     Draw(Drawn),
-    Clear(&'static str),
+    Clear(String),
     ClearDepth(Target),
     CopyTexture(CopyTexture),
 }
 
 pub(super) enum Size {
     Direct([u32; 3]),
-    Indirect(&'static str, u64),
+    Indirect(String, u64),
 }
 
 /// Where a traced recording stands.
@@ -256,7 +271,7 @@ impl Step {
 fn record(program: &Program, command: &Command) -> Option<Step> {
     match command {
         Command::Draw(draw) => Some(Step::Draw(Drawn::new(program, draw))),
-        Command::Clear(buffer) => Some(Step::Clear(buffer)),
+        Command::Clear(buffer) => Some(Step::Clear(buffer.clone())),
         Command::ClearDepth(target) => Some(Step::ClearDepth(target.clone())),
         Command::CopyTexture(copy) => Some(Step::CopyTexture(copy.clone())),
         Command::Dispatch {
@@ -274,7 +289,7 @@ fn record(program: &Program, command: &Command) -> Option<Step> {
                 Groups::Pixels([width, height]) => {
                     Size::Direct([width.div_ceil(columns), height.div_ceil(rows), 1])
                 }
-                Groups::Indirect(buffer, offset) => Size::Indirect(buffer, *offset),
+                Groups::Indirect { buffer, offset } => Size::Indirect(buffer.clone(), *offset),
             };
             Some(Step::Dispatch {
                 pass: name,

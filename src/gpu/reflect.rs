@@ -6,7 +6,7 @@ use naga::{
     AddressSpace, ImageClass, ImageDimension, ScalarKind, ShaderStage, StorageAccess, TypeInner,
 };
 
-use super::adapter::GpuError;
+use super::{adapter::GpuError, buffer::Scalar};
 
 /// How a buffer, texture or sampler is bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,8 +55,23 @@ pub struct Binding {
     pub index: u32,
     /// Uniform or storage.
     pub access: Access,
-    /// Bytes of a float, where it is an array of floats or of vectors of them.
-    pub float_bytes: Option<u8>,
+    /// What it is an array of, behind its head where it has one; what it is where it is no array.
+    pub element: ElementType,
+}
+
+/// A type as WGSL lays it out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ElementType {
+    /// Bytes from one element of the array to the next.
+    pub stride: u32,
+    /// What it is made of.
+    pub scalar: Scalar,
+    /// Its name where it is a struct.
+    pub name: Option<String>,
+    /// Bytes of a scalar; 0 of a mixed one.
+    pub scalar_bytes: u8,
+    /// Bytes before the array.
+    pub head: u32,
 }
 
 /// A `struct` of the shader as WGSL lays it out.
@@ -83,17 +98,53 @@ pub struct Reflection {
     pub layouts: Vec<Layout>,
     /// Names of its `override` constants.
     pub overrides: Vec<String>,
+    /// Its constants of u32.
+    pub constants: Vec<(String, u32)>,
     /// Whether it computes in f64.
     pub has_f64: bool,
 }
 
-fn float_bytes(module: &naga::Module, ty: naga::Handle<naga::Type>) -> Option<u8> {
-    let scalar = match module.types[ty].inner {
-        TypeInner::Array { base, .. } => module.types[base].inner.scalar(),
-        _ => None,
-    };
-    let float = scalar.filter(|scalar| scalar.kind == ScalarKind::Float)?;
-    Some(float.width)
+/// What a binding of type `ty` consists of.
+fn element_of(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
+    match &module.types[ty].inner {
+        TypeInner::Array { base, stride, .. } => ElementType {
+            stride: *stride,
+            ..element(module, *base)
+        },
+        // A struct that ends in an array without a length is that array's head.
+        TypeInner::Struct { members, .. } => match members.last() {
+            Some(last) if is_unsized(module, last.ty) => ElementType {
+                head: last.offset,
+                ..element_of(module, last.ty)
+            },
+            _ => element(module, ty),
+        },
+        _ => element(module, ty),
+    }
+}
+
+fn is_unsized(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
+    let size = naga::ArraySize::Dynamic;
+    matches!(&module.types[ty].inner, TypeInner::Array { size: of, .. } if *of == size)
+}
+
+fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
+    let inner = &module.types[ty].inner;
+    let kind = inner.scalar();
+    ElementType {
+        stride: inner.size(module.to_ctx()),
+        scalar: match kind.map(|scalar| scalar.kind) {
+            Some(ScalarKind::Float) => Scalar::Float,
+            Some(ScalarKind::Uint) => Scalar::Uint,
+            _ => Scalar::Mixed,
+        },
+        name: match inner {
+            TypeInner::Struct { .. } => module.types[ty].name.clone(),
+            _ => None,
+        },
+        scalar_bytes: kind.map_or(0, |scalar| scalar.width),
+        head: 0,
+    }
 }
 
 fn stage(module: &naga::Module) -> Option<Stage> {
@@ -179,7 +230,7 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
             name,
             index: place.binding,
             access,
-            float_bytes: float_bytes(&module, variable.ty),
+            element: element_of(&module, variable.ty),
         });
     }
     bindings.sort_by_key(|binding| binding.index);
@@ -203,6 +254,18 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
         .iter()
         .filter_map(|(_, constant)| constant.name.clone())
         .collect();
+    let constants = module
+        .constants
+        .iter()
+        .filter_map(|(_, constant)| {
+            let naga::Expression::Literal(naga::Literal::U32(value)) =
+                module.global_expressions[constant.init]
+            else {
+                return None;
+            };
+            Some((constant.name.clone()?, value))
+        })
+        .collect();
     let has_f64 = module.types.iter().any(|(_, ty)| {
         let scalar = ty.inner.scalar();
         scalar.is_some_and(|scalar| scalar.kind == ScalarKind::Float && scalar.width == 8)
@@ -213,27 +276,7 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
         bindings,
         workgroup_size: module.entry_points[0].workgroup_size,
         layouts,
+        constants,
         overrides,
     })
 }
-
-/// Declares a `repr(C)` mirror of a WGSL struct together with its field names and offsets, which a test holds against
-/// [`Layout`].
-macro_rules! mirror {
-    ($(#[$meta:meta])* $name:ident { $($(#[$field_meta:meta])* $field:ident: $ty:ty),+ $(,)? }) => {
-        $(#[$meta])*
-        #[repr(C)]
-        #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-        pub struct $name { $($(#[$field_meta])* pub $field: $ty),+ }
-
-        impl $name {
-            /// Field names and byte offsets, in order.
-            #[allow(dead_code, reason = "tests alone read it, of some mirrors")]
-            pub fn members() -> Vec<(String, u32)> {
-                vec![$((stringify!($field).to_owned(), std::mem::offset_of!($name, $field) as u32)),+]
-            }
-        }
-    };
-}
-
-pub(crate) use mirror;

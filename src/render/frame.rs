@@ -27,8 +27,8 @@ impl Extent {
         }
     }
 
-    pub(super) fn pixels(&self) -> u64 {
-        u64::from(self.size[0]) * u64::from(self.size[1])
+    pub(super) fn pixels(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize
     }
 }
 

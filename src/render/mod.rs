@@ -7,6 +7,7 @@
 //! averaged, depths never are.
 
 mod aeration;
+mod buffers;
 mod camera;
 mod frame;
 pub mod image;
@@ -31,6 +32,7 @@ use crate::gpu::adapter::GpuError;
 pub use image::{Attributes, Image};
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::Renderer;
+pub use uniform::mirrors;
 
 /// What of a scene a picture needs beside the particles.
 #[derive(Clone, Debug)]

@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 
 use bytemuck::NoUninit;
 
-use super::{RenderError, frame::Extent, uniform::Fill};
+use super::{RenderError, buffers::FILLS, frame::Extent, uniform::Fill};
 use crate::gpu::{
     adapter::Context,
+    buffer::{Buf, Element, Windows},
     program::{BufferSpec, PassSpec, Program},
     raster::RasterSpec,
-    recording::{Bind, Command, Groups, WINDOW},
-    sort,
+    recording::{Bind, Command},
     texture::{SamplerSpec, TextureSpec},
 };
 
@@ -124,7 +124,7 @@ impl Plan {
             .with_rasters(&rasters)?
             .with_textures(&self.textures, &self.samplers)?;
         for (name, bytes) in &self.contents {
-            program.upload(name, 0, bytes);
+            program.upload(Buf::named(name.clone()), 0, bytes);
         }
         for (name, bytes) in &self.texels {
             program.upload_texture(name, bytes);
@@ -132,39 +132,23 @@ impl Plan {
         Ok(program)
     }
 
-    /// A storage buffer.
-    pub(super) fn storage(&mut self, name: impl Into<String>, bytes: u64) {
-        self.buffers.push(sort::storage(&name.into(), bytes));
+    /// A buffer that holds `count` values, of zeros.
+    pub(super) fn buffer<T>(&mut self, buffer: &Buf<T>, count: usize) {
+        self.buffers.push(buffer.sized(count));
     }
 
-    /// A storage buffer of these values.
-    pub(super) fn stored<T: NoUninit>(&mut self, name: &str, values: &[T]) {
-        let bytes: &[u8] = bytemuck::cast_slice(values);
-        self.storage(name, bytes.len() as u64);
-        self.contents.push((name.to_owned(), bytes.to_vec()));
+    /// A buffer of these values.
+    pub(super) fn values<T: NoUninit>(&mut self, buffer: &Buf<T>, values: &[T]) {
+        self.buffer(buffer, values.len());
+        let bytes = bytemuck::cast_slice(values).to_vec();
+        self.contents.push((buffer.name().to_owned(), bytes));
     }
 
-    fn uniform_of(&mut self, name: &str, bytes: Vec<u8>) {
-        self.buffers.push(BufferSpec {
-            name: name.to_owned(),
-            bytes: bytes.len() as u64,
-            is_uniform: true,
-        });
-        self.contents.push((name.to_owned(), bytes));
-    }
-
-    /// A uniform of one value.
-    pub(super) fn uniform<T: NoUninit>(&mut self, name: &str, value: &T) {
-        self.uniform_of(name, bytemuck::bytes_of(value).to_vec());
-    }
-
-    /// A uniform of many, one a [`Bind::window`].
-    pub(super) fn windows<T: NoUninit>(&mut self, name: &str, values: &[T]) {
-        let mut bytes = vec![0; WINDOW as usize * values.len()];
-        for (window, value) in bytes.chunks_exact_mut(WINDOW as usize).zip(values) {
-            window[..size_of::<T>()].copy_from_slice(bytemuck::bytes_of(value));
-        }
-        self.uniform_of(name, bytes);
+    /// A uniform of which each dispatch binds one of these values.
+    pub(super) fn windows<T: Element>(&mut self, windows: &Windows<T>, values: &[T]) {
+        self.buffers.push(windows.sized(values.len()));
+        let bytes = Windows::bytes(values);
+        self.contents.push((windows.name().to_owned(), bytes));
     }
 
     /// A texture with these texels.
@@ -179,26 +163,20 @@ impl Plan {
     }
 
     /// Sets each of a buffer's first `count` words.
-    pub(super) fn fill(&mut self, buffer: &'static str, word: u32, count: u64) -> Command {
+    pub(super) fn fill<T>(&mut self, buffer: &Buf<T>, word: u32, count: usize) -> Command {
         let index = self.fills.len();
         self.fills.push(Fill {
             word,
             count: u32::try_from(count).unwrap_or(u32::MAX),
-            pad0: 0,
-            pad1: 0,
+            ..Fill::default()
         });
-        let binds = vec![
-            Bind::window::<Fill>("params", FILLS, index),
-            Bind::to("words", buffer),
-        ];
-        Command::in_groups("ssfr/fill", Groups::Threads(count), binds)
+        let binds = vec![FILLS.bind(index), Bind::whole("words", buffer)];
+        Command::with("ssfr/fill", count, binds)
     }
 
     /// Lays out what [`Self::fill`] was asked for; after the last of them.
     pub(super) fn end_fills(&mut self) {
         let fills = std::mem::take(&mut self.fills);
-        self.windows(FILLS, &fills);
+        self.windows(&FILLS, &fills);
     }
 }
-
-const FILLS: &str = "fills";

@@ -3,24 +3,20 @@
 use glam::{DVec3, Mat4, Vec3};
 use wgpu::{CompareFunction, TextureFormat};
 
+use super::buffers::{SHADOW_FROM_WORLD, SOLID_DEPTH, SOLID_PACKED, TILES, TRIANGLES};
 use super::frame::FAR;
 use super::plan::{Limits, Plan};
 use super::uniform::{Tile, Triangle};
 use super::{RenderError, RenderScene};
 use crate::gpu::{
     raster::{CopyTexture, DEPTH, Draw, RasterSpec, Target},
-    recording::{Bind, Command},
+    recording::Command,
     texture::TextureSpec,
 };
 use crate::scene::look::Look;
 
 /// Texels along a side of the shadow map.
 const SHADOW_SIZE: u32 = 2048;
-
-/// Depth of the solids over the whole frame.
-const SOLID_DEPTH: &str = "solid_depth";
-/// Their normals and materials.
-const SOLID_PACKED: &str = "solid_packed";
 
 /// Scene solids and quay walls, relative to the domain's least corner.
 pub(super) fn triangles(look: &Look, scene: &RenderScene) -> Result<Vec<Triangle>, RenderError> {
@@ -167,8 +163,8 @@ pub(super) fn plan_solids(
     limits: &Limits,
 ) -> Vec<Command> {
     let pixels = plan.extent.pixels();
-    plan.storage(SOLID_DEPTH, 4 * pixels);
-    plan.storage(SOLID_PACKED, 4 * pixels);
+    plan.buffer(&SOLID_DEPTH, pixels);
+    plan.buffer(&SOLID_PACKED, pixels);
     let side = match triangles.is_empty() {
         true => 1,
         false => SHADOW_SIZE.min(limits.texture),
@@ -185,10 +181,10 @@ pub(super) fn plan_solids(
     };
     if triangles.is_empty() {
         plan.once.push(Command::ClearDepth(shadow_map));
-        return vec![plan.fill(SOLID_DEPTH, FAR.to_bits(), pixels)];
+        return vec![plan.fill(&SOLID_DEPTH, FAR.to_bits(), pixels)];
     }
-    plan.stored("triangles", triangles);
-    plan.uniform("shadow_from_world", &shadow_from_world.to_cols_array_2d());
+    plan.values(&TRIANGLES, triangles);
+    plan.values(&SHADOW_FROM_WORLD, &[shadow_from_world.to_cols_array_2d()]);
     plan.once.push(Command::Draw(Draw {
         raster: SHADOW,
         binds: Vec::new(),
@@ -212,7 +208,7 @@ pub(super) fn plan_solids(
             size: float(size),
         })
         .collect();
-    plan.windows("tiles", &uniforms);
+    plan.windows(&TILES, &uniforms);
     let vertices = 6 * triangles.len() as u32;
     tiles
         .into_iter()
@@ -246,18 +242,21 @@ fn draw_tile(
     let packed = target("solid_packed", SOLID.colours[1], 0.0, true);
     let order = target("solid_order", DEPTH, 0.0, false);
     let width = plan.extent.size[0];
-    let copy = |target: &Target, buffer| {
+    let copy = |target: &Target, buffer: &str| {
         Command::CopyTexture(CopyTexture {
             texture: target.texture.clone(),
-            buffer,
+            buffer: buffer.to_owned(),
             offset: 4 * (u64::from(y) * u64::from(width) + u64::from(x)),
             bytes_per_row: 4 * width,
         })
     };
-    let copies = [copy(&depth, SOLID_DEPTH), copy(&packed, SOLID_PACKED)];
+    let copies = [
+        copy(&depth, SOLID_DEPTH.name()),
+        copy(&packed, SOLID_PACKED.name()),
+    ];
     let draw = Command::Draw(Draw {
         raster: SOLID,
-        binds: vec![Bind::window::<Tile>("tile", "tiles", index)],
+        binds: vec![TILES.bind(index)],
         vertices,
         colours: vec![depth, packed],
         depth: order,

@@ -1,8 +1,12 @@
 //! From splat depth to a smooth surface.
 
+use super::buffers::{DEPTHS, FLOW, FLOW_LEVELS, NARROW_RANGE};
 use super::plan::Plan;
 use super::uniform::{Flow, FlowLevel, Narrow};
-use crate::gpu::recording::{Bind, Command, Groups};
+use crate::gpu::{
+    buffer::Buf,
+    recording::{Bind, Command, Groups},
+};
 
 /// How wide a surface is smoothed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,26 +61,23 @@ impl FlowSettings {
     }
 }
 
-/// The two buffers of the whole frame that hold depths: splats go into the first.
-pub(super) const DEPTHS: [&str; 2] = ["depth", "smoothed_depth"];
-
 /// What smooths the first of [`DEPTHS`].
 pub(super) struct Smoothing {
     pub(super) commands: Vec<Command>,
     /// Which of [`DEPTHS`] then holds the surface.
-    pub(super) surface: &'static str,
+    pub(super) surface: Buf<f32>,
 }
 
 /// Depths of a level of the pyramid: what restriction left, and two buffers to work in.
 struct Level {
     size: [u32; 2],
-    original: String,
-    work: [String; 2],
+    original: Buf<f32>,
+    work: [Buf<f32>; 2],
 }
 
 impl Level {
     fn all(plan: &mut Plan, count: u32, size: [u32; 2]) -> Vec<Self> {
-        let [depth, other] = DEPTHS.map(str::to_owned);
+        let [depth, other] = DEPTHS;
         let mut levels = vec![Self {
             size,
             original: depth.clone(),
@@ -84,11 +85,12 @@ impl Level {
         }];
         for index in 1..count as usize {
             let size = levels[index - 1].size.map(|side| side.div_ceil(2));
-            let names = ["", ".a", ".b"].map(|part| format!("coarse_depth.{index}{part}"));
-            for name in &names {
-                plan.storage(name, 4 * u64::from(size[0]) * u64::from(size[1]));
+            let buffers =
+                ["", ".a", ".b"].map(|part| Buf::named(format!("coarse_depth.{index}{part}")));
+            for buffer in &buffers {
+                plan.buffer(buffer, size[0] as usize * size[1] as usize);
             }
-            let [original, first, second] = names;
+            let [original, first, second] = buffers;
             levels.push(Self {
                 size,
                 original,
@@ -119,18 +121,14 @@ pub(super) fn curvature_flow(
         pad0: 0,
         pad1: 0,
     };
-    plan.uniform("flow", &params);
+    plan.values(&FLOW, &[params]);
     let levels = Level::all(plan, settings.levels, size);
     let mut windows = Vec::new();
     let mut commands = Vec::new();
     // A pass over the cells of level `over`, told of step `index` of level `at`.
     let mut run = |pass, over: usize, (at, index): (usize, u32), mut binds: Vec<Bind>| {
-        binds.push(Bind::to("params", "flow"));
-        binds.push(Bind::window::<FlowLevel>(
-            "level",
-            "flow_levels",
-            windows.len(),
-        ));
+        binds.push(Bind::whole("params", &FLOW));
+        binds.push(FLOW_LEVELS.bind(windows.len()));
         windows.push(FlowLevel {
             size: levels[at].size,
             level: at as u32,
@@ -142,22 +140,22 @@ pub(super) fn curvature_flow(
     let top = levels.len() - 1;
     for (l, pair) in levels.windows(2).enumerate() {
         let binds = vec![
-            Bind::to("fine", &pair[0].original),
-            Bind::to("coarse", &pair[1].original),
+            Bind::whole("fine", &pair[0].original),
+            Bind::whole("coarse", &pair[1].original),
         ];
         run("ssfr/flow_restrict", l + 1, (l, 0), binds);
     }
-    let mut surface: Option<&str> = None;
+    let mut surface: Option<&Buf<f32>> = None;
     for (l, level) in levels.iter().enumerate().rev() {
-        let mut source = level.original.as_str();
+        let mut source = &level.original;
         let mut into = level.work.iter().cycle();
         if let Some(after) = surface {
             let corrected = &level.work[0];
             let binds = vec![
-                Bind::to("coarse_before", &levels[l + 1].original),
-                Bind::to("coarse_after", after),
-                Bind::to("fine", source),
-                Bind::to("corrected", corrected),
+                Bind::whole("coarse_before", &levels[l + 1].original),
+                Bind::whole("coarse_after", after),
+                Bind::whole("fine", source),
+                Bind::whole("corrected", corrected),
             ];
             run("ssfr/flow_prolong", l, (l, 0), binds);
             source = corrected;
@@ -168,17 +166,16 @@ pub(super) fn curvature_flow(
             false => settings.steps,
         };
         for (index, into) in (0..count).zip(into) {
-            let binds = vec![Bind::to("source", source), Bind::to("smoothed", into)];
+            let binds = vec![Bind::whole("source", source), Bind::whole("smoothed", into)];
             run("ssfr/curvature_flow", l, (l, index), binds);
             source = into;
         }
         surface = Some(source);
     }
-    plan.windows("flow_levels", &windows);
-    let is_in_second = surface == Some(DEPTHS[1]);
+    plan.windows(&FLOW_LEVELS, &windows);
     Smoothing {
+        surface: surface.unwrap_or(&levels[0].original).clone(),
         commands,
-        surface: DEPTHS[usize::from(is_in_second)],
     }
 }
 
@@ -191,18 +188,18 @@ pub(super) fn narrow_range(plan: &mut Plan, width: f64, radius: f64, size: [u32;
         offset: radius as f32,
         axis,
     });
-    plan.windows("narrow_range", &params);
+    plan.windows(&NARROW_RANGE, &params);
     let along = |axis: usize| {
         let binds = vec![
-            Bind::window::<Narrow>("params", "narrow_range", axis),
-            Bind::to("source", DEPTHS[axis]),
-            Bind::to("smoothed", DEPTHS[1 - axis]),
+            NARROW_RANGE.bind(axis),
+            Bind::whole("source", &DEPTHS[axis]),
+            Bind::whole("smoothed", &DEPTHS[1 - axis]),
         ];
         Command::in_groups("ssfr/narrow_range", Groups::Pixels(size), binds)
     };
     Smoothing {
         commands: vec![along(0), along(1)],
-        surface: DEPTHS[0],
+        surface: DEPTHS[0].clone(),
     }
 }
 

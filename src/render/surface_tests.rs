@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::gpu::{adapter::Context, recording::Recording};
-use crate::render::uniform::Camera;
+use crate::render::{buffers::CAMERA, uniform::Camera};
 
 const SIZE: [u32; 2] = [192, 192];
 const FOCAL: f64 = 300.0;
@@ -33,16 +33,15 @@ fn camera() -> Camera {
 /// What `plan_smoothing` makes of a frame's depths.
 fn run(depth: &[f32], plan_smoothing: impl FnOnce(&mut Plan) -> Smoothing) -> Vec<f32> {
     let mut plan = Plan::default();
-    plan.uniform("camera", &camera());
-    plan.stored(DEPTHS[0], depth);
-    plan.storage(DEPTHS[1], 4 * depth.len() as u64);
+    plan.values(&CAMERA, &[camera()]);
+    plan.values(&DEPTHS[0], depth);
+    plan.buffer(&DEPTHS[1], depth.len());
     let smoothing = plan_smoothing(&mut plan);
     plan.sample = smoothing.commands;
     let program = plan.program(&Context::open(None).unwrap()).unwrap();
     let recording = Recording::new(&program, &plan.sample);
     recording.run(&program, None).unwrap();
-    let read = program.download(&[(smoothing.surface, depth.len())]);
-    read.unwrap().concat()
+    program.read(smoothing.surface, depth.len()).unwrap()
 }
 
 fn smooth(settings: &FlowSettings, depth: &[f32]) -> Vec<f32> {

@@ -1,14 +1,14 @@
 //! Channels beside the picture, back from the device.
 
-use super::{Renderer, shade::aov_band};
+use super::Renderer;
 use crate::{
-    render::{RenderError, frame::FAR, image::Aovs},
+    render::{RenderError, buffers::aovs, frame::FAR, image::Aovs},
     scene::look::AovSpec,
 };
 
 impl Renderer {
     pub(super) fn read_aovs(&self) -> Result<Aovs, RenderError> {
-        let values: Vec<[f32; 10]> = self.read_bands(aov_band)?;
+        let values: Vec<[f32; 10]> = self.read_bands(aovs)?;
         let origin = self.scene.origin + self.scene.domain.min;
         let seen = |v: &[f32; 10]| v[0] < 0.1 * FAR;
         let wants = |aov| self.look.wants(aov);

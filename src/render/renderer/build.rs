@@ -4,14 +4,14 @@ use super::{shade::plan_shade, splats::plan_splats};
 use crate::{
     render::{
         RenderError, RenderScene,
+        buffers::{CAMERA, DEPTHS, NEXT_CAMERA, SHADING},
         camera::longest_focal_px,
         frame::{Extent, bands},
         lighting::{plan_light, shading},
         plan::{Limits, Plan},
         set::{plan_solids, shadow_from_world, triangles},
         sky::Sky,
-        surface::{DEPTHS, FlowSettings, Smoothing, curvature_flow, narrow_range},
-        uniform::Camera,
+        surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
     },
     scene::look::{FilterSpec, Look},
 };
@@ -44,23 +44,24 @@ impl Plan {
             radius,
             ..Self::default()
         };
-        plan.uniform("camera", &Camera::default());
+        plan.buffer(&CAMERA, 1);
         if has_aovs {
-            plan.uniform("next_camera", &Camera::default());
+            plan.buffer(&NEXT_CAMERA, 1);
         }
-        for depth in DEPTHS {
-            plan.storage(depth, 4 * extent.pixels());
+        for depth in &DEPTHS {
+            plan.buffer(depth, extent.pixels());
         }
         let opaque = triangles(look, scene)?;
         let matrix = shadow_from_world(&opaque, scene.domain.size(), look.sun_direction());
         let sky = Sky::new(look, limits.texture)?;
         plan_light(&mut plan, &sky);
-        plan.uniform("shading", &shading(look, &sky, matrix.to_cols_array_2d()));
+        let light = shading(look, &sky, matrix.to_cols_array_2d());
+        plan.values(&SHADING, &[light]);
         let solids = plan_solids(&mut plan, &opaque, &matrix, limits);
         let Smoothing { commands, surface } = smoothing(&mut plan, look, scene);
         let spacing = scene.particle_spacing;
-        let splats = plan_splats(&mut plan, look, particles, spacing, radius, surface);
-        let shade = plan_shade(&mut plan, look, surface);
+        let splats = plan_splats(&mut plan, look, particles, spacing, radius, &surface);
+        let shade = plan_shade(&mut plan, look, &surface);
         plan.end_fills();
         if has_aovs {
             let splats = [splats.body.clone(), splats.owner];

@@ -5,8 +5,10 @@ mod build;
 mod shade;
 mod splats;
 
+use bytemuck::Pod;
 use rayon::prelude::*;
 
+use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, picture};
 use super::camera::{Sample, Setting, camera, pose, samples};
 use super::image::Image;
 use super::plan::{Limits, Plan};
@@ -14,13 +16,11 @@ use super::{RenderError, RenderScene, aeration, uniform};
 use crate::domain::particles::Particles;
 use crate::gpu::{
     adapter::Context,
+    buffer::Buf,
     program::Program,
     recording::{Recording, Timer, spread},
-    sort::storage,
 };
 use crate::scene::look::Look;
-use shade::picture_band;
-use splats::{PARTICLE_GROUPS, PARTICLES, particle_bytes};
 
 /// Renders frames of one scene with one look.
 pub struct Renderer {
@@ -128,30 +128,23 @@ impl Renderer {
                 weight: 1.0,
             };
             let next = camera(&self.look, &setting, f64::from(frame) + 1.0, still, 0);
-            self.program.upload("next_camera", 0, &[next]);
+            self.program.upload(NEXT_CAMERA, 0, &[next]);
             let camera = camera(&self.look, &setting, frame.into(), still, 0);
             self.sample(&camera, true)?;
             image.aovs = self.read_aovs()?;
         }
-        image.beauty = self.read_bands(picture_band)?;
+        image.beauty = self.read_bands(picture)?;
         Ok(image)
     }
 
-    /// Every pixel of what is kept in the buffers that `name` gives for each band.
-    fn read_bands<T: bytemuck::Pod>(
-        &self,
-        name: fn(usize) -> String,
-    ) -> Result<Vec<T>, RenderError> {
-        let width = self.plan.extent.picture[0];
-        let bands = self.plan.bands.iter().enumerate();
-        let bands: Vec<(String, usize)> = bands
-            .map(|(index, &rows)| (name(index), width as usize * rows as usize))
-            .collect();
-        let wanted: Vec<(&str, usize)> = bands
-            .iter()
-            .map(|(n, count)| (n.as_str(), *count))
-            .collect();
-        Ok(self.program.download(&wanted)?.concat())
+    /// Every pixel of what is kept in the buffers that `of` gives for each band.
+    fn read_bands<T: Pod>(&self, of: fn(usize) -> Buf<T>) -> Result<Vec<T>, RenderError> {
+        let width = self.plan.extent.picture[0] as usize;
+        let mut pixels = Vec::new();
+        for (band, &rows) in self.plan.bands.iter().enumerate() {
+            pixels.extend(self.program.read(of(band), width * rows as usize)?);
+        }
+        Ok(pixels)
     }
 
     /// Moves a frame's particles to the device, relative to the domain's least corner.
@@ -187,7 +180,7 @@ impl Renderer {
         });
         self.reserve(packed.len())?;
         let groups = spread(&self.program.context, 1, packed.len() as u64);
-        self.program.upload(PARTICLE_GROUPS, 0, &groups);
+        self.program.upload(PARTICLE_GROUPS, 0, &[groups.into()]);
         self.program.upload(PARTICLES, 0, &packed);
         Ok(packed.len() as u32)
     }
@@ -198,8 +191,7 @@ impl Renderer {
             return Ok(());
         }
         let capacity = particles.next_power_of_two();
-        let bytes = particle_bytes(capacity);
-        self.program.resize(&[storage(PARTICLES, bytes)])?;
+        self.program.resize(&[PARTICLES.sized(capacity)])?;
         self.capacity = capacity;
         self.sample = Recording::new(&self.program, &self.plan.sample);
         self.aovs = Recording::new(&self.program, &self.plan.aovs);
@@ -216,7 +208,7 @@ impl Renderer {
 
     /// Draws one sample, into the picture's mean or, with `aovs`, into the channels beside it.
     fn sample(&mut self, camera: &uniform::Camera, aovs: bool) -> Result<(), RenderError> {
-        self.program.upload("camera", 0, &[*camera]);
+        self.program.upload(CAMERA, 0, &[*camera]);
         let recording = if aovs { &self.aovs } else { &self.sample };
         recording.run(&self.program, self.timer.as_mut())?;
         self.program.context.wait()?;

@@ -1,9 +1,12 @@
 //! What shades the picture, and the channels beside it.
 
 use crate::{
-    gpu::recording::{Bind, Command, Groups},
+    gpu::{
+        buffer::Buf,
+        recording::{Bind, Command, Groups},
+    },
     render::{
-        frame::{AOV_BYTES, COLOUR_BYTES},
+        buffers::{BANDS, OWNER, THICKNESS, aovs, picture},
         plan::Plan,
         uniform::Band,
     },
@@ -17,18 +20,8 @@ pub(super) struct Shade {
     pub(super) aovs: Vec<Command>,
 }
 
-/// Name of the buffer that holds a band of the picture.
-pub(super) fn picture_band(index: usize) -> String {
-    format!("picture.{index}")
-}
-
-/// Name of the buffer that holds a band of the channels beside it.
-pub(super) fn aov_band(index: usize) -> String {
-    format!("aovs.{index}")
-}
-
 /// Plans the shading of the plan's bands; `surface` is where the smoothed depth stands.
-pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &'static str) -> Shade {
+pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
     let has_aovs = !look.spec().output.aovs.is_empty();
     if look.spec().water.spray.is_some() {
         plan.define("ssfr/shade", "SPRAY");
@@ -49,40 +42,38 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &'static str) ->
             })
         })
         .collect();
-    plan.windows("bands", &bands);
+    plan.windows(&BANDS, &bands);
     let width = plan.extent.picture[0];
-    let mut shade = |pass, pixel_bytes, name: fn(usize) -> String, more: &[Bind]| {
-        let commands = bands.iter().enumerate().map(|(index, band)| {
-            let output = name(index);
-            plan.storage(
-                &output,
-                pixel_bytes * u64::from(width) * u64::from(band.rows),
-            );
-            let mut binds = vec![
-                Bind::window::<Band>("band", "bands", index),
-                Bind::to("surface", surface),
-                Bind::to("output", output),
-            ];
-            binds.extend_from_slice(more);
-            Command::in_groups(pass, Groups::Pixels([width, band.rows]), binds)
-        });
-        commands.collect()
-    };
     // Without `forward` no one is asked for, and any buffer of words stands in.
     let owner = match look.wants(AovSpec::Forward) {
-        true => "owner",
-        false => "thickness",
+        true => OWNER,
+        false => THICKNESS,
     };
-    Shade {
-        picture: shade("ssfr/shade", COLOUR_BYTES, picture_band, &[]),
-        aovs: match has_aovs {
-            true => shade(
-                "ssfr/shade_aovs",
-                AOV_BYTES,
-                aov_band,
-                &[Bind::to("owner", owner)],
-            ),
-            false => Vec::new(),
-        },
+    let mut shade = Shade {
+        picture: Vec::new(),
+        aovs: Vec::new(),
+    };
+    for (index, band) in bands.iter().enumerate() {
+        let pixels = width as usize * band.rows as usize;
+        let binds = |output| {
+            vec![
+                BANDS.bind(index),
+                Bind::whole("surface", surface),
+                output,
+                Bind::whole("owner", &owner),
+            ]
+        };
+        let groups = Groups::Pixels([width, band.rows]);
+        plan.buffer(&picture(index), pixels);
+        let output = Bind::whole("output", &picture(index));
+        let command = Command::in_groups("ssfr/shade", groups.clone(), binds(output));
+        shade.picture.push(command);
+        if has_aovs {
+            plan.buffer(&aovs(index), pixels);
+            let output = Bind::whole("output", &aovs(index));
+            let command = Command::in_groups("ssfr/shade_aovs", groups, binds(output));
+            shade.aovs.push(command);
+        }
     }
+    shade
 }

@@ -1,21 +1,18 @@
 //! What splats particles into the frame.
 
 use crate::{
-    gpu::recording::{Bind, Command, Groups},
+    gpu::{
+        buffer::Buf,
+        recording::{Bind, Command, Groups},
+    },
     render::{
+        buffers::{DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, SPRAY, THICKNESS, THICKNESS_PARAMS},
         frame::FAR,
         plan::Plan,
-        surface::DEPTHS,
-        uniform::{Particle, Thickness},
+        uniform::Thickness,
     },
     scene::look::{AovSpec, Look},
 };
-
-/// Particles of a frame.
-pub(super) const PARTICLES: &str = "particles";
-
-/// Workgroups of a dispatch of one a particle: three words, and one unused.
-pub(super) const PARTICLE_GROUPS: &str = "particle_groups";
 
 /// Commands that go over particles.
 pub(super) struct Splats {
@@ -27,11 +24,6 @@ pub(super) struct Splats {
     pub(super) spray: Vec<Command>,
 }
 
-/// Bytes of so many particles.
-pub(super) fn particle_bytes(particles: usize) -> u64 {
-    particles as u64 * size_of::<Particle>() as u64
-}
-
 /// Plans the splats that the look calls for, of `particles` particles of a spacing and a splat radius, metres; `surface`
 /// is where the smoothed depth stands.
 pub(super) fn plan_splats(
@@ -40,33 +32,32 @@ pub(super) fn plan_splats(
     particles: usize,
     spacing: f64,
     radius: f64,
-    surface: &'static str,
+    surface: &Buf<f32>,
 ) -> Splats {
     let pixels = plan.extent.pixels();
     let over_particles =
-        |pass, binds| Command::in_groups(pass, Groups::Indirect(PARTICLE_GROUPS, 0), binds);
-    let params = || Bind::to("params", "thickness_params");
+        |pass, binds| Command::in_groups(pass, Groups::at(&PARTICLE_GROUPS, 0), binds);
+    let params = || Bind::whole("params", &THICKNESS_PARAMS);
     let volume = spacing.powi(3) / (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3));
     let scale = Thickness {
         scale: volume as f32,
         ..Thickness::default()
     };
-    plan.storage(PARTICLES, particle_bytes(particles));
-    plan.storage(PARTICLE_GROUPS, 16);
-    plan.uniform("thickness_params", &scale);
-    // Half the resolution on both sides, four bytes a cell.
-    plan.storage("thickness", pixels);
+    plan.buffer(&PARTICLES, particles);
+    plan.buffer(&PARTICLE_GROUPS, 1);
+    plan.values(&THICKNESS_PARAMS, &[scale]);
+    plan.buffer(&THICKNESS, pixels / 4);
     let body = vec![
-        plan.fill(DEPTHS[0], FAR.to_bits(), pixels),
-        Command::Clear("thickness"),
+        plan.fill(&DEPTHS[0], FAR.to_bits(), pixels),
+        Command::clear(&THICKNESS),
         over_particles("ssfr/splat_depth", Vec::new()),
         over_particles("ssfr/splat_thickness", vec![params()]),
     ];
     let owner = match look.wants(AovSpec::Forward) {
         true => {
-            plan.storage("owner", 4 * pixels);
+            plan.buffer(&OWNER, pixels);
             vec![
-                plan.fill("owner", u32::MAX, pixels),
+                plan.fill(&OWNER, u32::MAX, pixels),
                 over_particles("ssfr/splat_owner", Vec::new()),
             ]
         }
@@ -74,10 +65,10 @@ pub(super) fn plan_splats(
     };
     let spray = match look.spec().water.spray {
         Some(_) => {
-            plan.storage("spray", pixels);
-            let binds = vec![params(), Bind::to("surface", surface)];
+            plan.buffer(&SPRAY, pixels / 4);
+            let binds = vec![params(), Bind::whole("surface", surface)];
             vec![
-                Command::Clear("spray"),
+                Command::clear(&SPRAY),
                 over_particles("ssfr/splat_spray", binds),
             ]
         }

@@ -231,8 +231,8 @@ fn pbf_until_a_density_error() {
         ),
         control(
             "pbf/decide",
-            "control[1] += 1u",
-            "control[1] += 2u",
+            "control.iterations += 1u",
+            "control.iterations += 2u",
             "pbf/decide",
             &["done, iterations"],
         ),

@@ -2,13 +2,17 @@
 
 use swell::gpu::{
     adapter::{Context, GpuError},
-    program::{BufferSpec, Program},
+    buffer::Buf,
+    program::Program,
     raster::{CopyTexture, DEPTH, Draw, RasterSpec, Target},
     recording::{Command, Recording},
-    sort::storage,
     texture::TextureSpec,
 };
 
+const MATRIX: Buf<[f32; 16]> = Buf::uniform("shadow_from_world");
+/// Corners of a triangle, each with a word of padding.
+const TRIANGLE: Buf<[f32; 4]> = Buf::new("triangles");
+const COPY: Buf<f32> = Buf::new("copy");
 const SIZE: [u32; 2] = [64, 8];
 
 const SHADOW: RasterSpec = RasterSpec {
@@ -20,23 +24,14 @@ const SHADOW: RasterSpec = RasterSpec {
 /// Depths of the picture after a triangle over its lower left half was drawn at depth 0.25 before a far 0.5.
 fn drawn(raster: RasterSpec) -> Vec<f32> {
     let context = Context::open(None).unwrap();
-    let pixels = u64::from(SIZE[0] * SIZE[1]);
-    let matrix = BufferSpec {
-        name: "shadow_from_world".into(),
-        bytes: 64,
-        is_uniform: true,
-    };
-    let buffers = [
-        matrix,
-        storage("triangles", 48),
-        storage("copy", 4 * pixels),
-    ];
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
+    let buffers = [MATRIX.sized(1), TRIANGLE.sized(3), COPY.sized(pixels)];
     let map = TextureSpec {
         name: "map".into(),
         size: SIZE,
         format: DEPTH,
     };
-    assert_eq!(map.bytes(), 4 * pixels);
+    assert_eq!(map.bytes(), 4 * pixels as u64);
     let program = Program::new(&context, &buffers, &[], &[])
         .unwrap()
         .with_rasters(&[raster])
@@ -44,10 +39,10 @@ fn drawn(raster: RasterSpec) -> Vec<f32> {
         .with_textures(&[map], &[])
         .unwrap();
     let identity: [f32; 16] = std::array::from_fn(|i| if i % 5 == 0 { 1.0 } else { 0.0 });
-    program.upload("shadow_from_world", 0, &identity);
+    program.upload(MATRIX, 0, &[identity]);
     let corner = |x: f32, y: f32| [x, y, 0.25, 0.0];
     let triangle = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0)];
-    program.upload("triangles", 0, &triangle.concat());
+    program.upload(TRIANGLE, 0, &triangle);
     let commands = [
         Command::Draw(Draw {
             raster,
@@ -62,7 +57,7 @@ fn drawn(raster: RasterSpec) -> Vec<f32> {
         }),
         Command::CopyTexture(CopyTexture {
             texture: "map".into(),
-            buffer: "copy",
+            buffer: COPY.name().into(),
             offset: 0,
             bytes_per_row: 4 * SIZE[0],
         }),
@@ -70,8 +65,7 @@ fn drawn(raster: RasterSpec) -> Vec<f32> {
     let recording = Recording::new(&program, &commands);
     assert_eq!(recording.passes().collect::<Vec<_>>(), ["ssfr/shadow"]);
     recording.run(&program, None).unwrap();
-    let read = program.download(&[("copy", pixels as usize)]);
-    read.unwrap().concat()
+    program.read(COPY, pixels).unwrap()
 }
 
 #[test]

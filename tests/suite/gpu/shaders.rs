@@ -6,9 +6,10 @@ use swell::{
         reflect::{Access, Layout, Stage, reflect},
         shader,
     },
+    render,
     solve::{
-        params::{FlipParams, Params, Phase, SolidGrid, SolidGrids},
-        pressure::{PressureBrick, PressureControl, PressureControl64, PressurePhase},
+        self,
+        pressure::{DONE, ITERATING, ReduceStep, VERIFYING, WANTS_POCKETS},
     },
 };
 
@@ -128,113 +129,88 @@ fn reflection_refuses_what_no_pass_binds() {
     }
 }
 
-fn check(
-    layouts: &[Layout],
-    name: &str,
-    size: usize,
-    members: &[(String, u32)],
-) -> Result<bool, String> {
-    let Some(layout) = layouts.iter().find(|layout| layout.name == name) else {
-        return Ok(false);
-    };
-    if layout.size as usize != size {
-        return Err(format!(
-            "{name}: {} bytes in WGSL, {size} in Rust",
-            layout.size
-        ));
+/// Where a shader's struct is none of the mirrors of its name.
+fn check(found: &Layout, mirrors: &[Layout]) -> Result<(), String> {
+    let mut named = mirrors.iter().filter(|mirror| mirror.name == found.name);
+    if named.clone().next().is_none() || named.any(|mirror| mirror == found) {
+        return Ok(());
     }
-    if layout.members != members {
-        return Err(format!(
-            "{name}: {:?} in WGSL, {members:?} in Rust",
-            layout.members
-        ));
-    }
-    Ok(true)
+    let named: Vec<_> = mirrors.iter().filter(|m| m.name == found.name).collect();
+    Err(format!("{found:?} in WGSL, {named:?} in Rust"))
 }
 
+/// Every struct that is bound has a mirror, and every mirror is its struct: by size, names and offsets.
 #[test]
 fn mirrors_match_naga() {
-    let mut found = [0; 8];
-    let variants = ["NEIGHBOR_LIST", "MOVING_SOLIDS"];
-    let passes = shader::pass_files();
-    let all = variants.map(|name| passes.iter().map(move |pass| (pass, ["SOLIDS", name])));
-    for (pass, defines) in all
-        .into_iter()
-        .flatten()
-        .filter(|(pass, defines)| is_meaningful(pass, defines))
-    {
-        let text = shader::compose(pass, &defines).unwrap();
-        let layouts = reflect(pass, &text).unwrap().layouts;
-        let seen = [
-            check(&layouts, "Params", size_of::<Params>(), &Params::members()),
-            check(
-                &layouts,
-                "FlipParams",
-                size_of::<FlipParams>(),
-                &FlipParams::members(),
-            ),
-            check(&layouts, "Phase", size_of::<Phase>(), &Phase::members()),
-            check(
-                &layouts,
-                "SolidGrid",
-                size_of::<SolidGrid>(),
-                &SolidGrid::members(),
-            ),
-            check(
-                &layouts,
-                "SolidGrids",
-                size_of::<SolidGrids>(),
-                &SolidGrids::members(),
-            ),
-            check(
-                &layouts,
-                "PressurePhase",
-                size_of::<PressurePhase>(),
-                &PressurePhase::members(),
-            ),
-            check(
-                &layouts,
-                "PressureControl",
-                size_of::<PressureControl>(),
-                &PressureControl::members(),
-            ),
-            check(
-                &layouts,
-                "PressureBrick",
-                size_of::<PressureBrick>(),
-                &PressureBrick::members(),
-            ),
-        ];
-        for (count, result) in found.iter_mut().zip(seen) {
-            *count += usize::from(result.unwrap_or_else(|message| panic!("{pass}: {message}")));
+    let mirrors = [solve::mirrors(), render::mirrors()].concat();
+    let mut seen = vec![false; mirrors.len()];
+    for pass in &shader::pass_files() {
+        for defines in VARIANTS
+            .iter()
+            .filter(|defines| is_meaningful(pass, defines))
+        {
+            let reflection = reflect(pass, &shader::compose(pass, defines).unwrap()).unwrap();
+            for found in &reflection.layouts {
+                check(found, &mirrors).unwrap_or_else(|message| panic!("{pass}: {message}"));
+                for (seen, mirror) in seen.iter_mut().zip(&mirrors) {
+                    *seen |= mirror == found;
+                }
+            }
+            for binding in reflection.bindings {
+                let name = binding.element.name;
+                let is_mirrored = |name: &String| mirrors.iter().any(|m| m.name == *name);
+                assert!(
+                    name.iter().all(is_mirrored),
+                    "{pass}: {name:?} has no mirror"
+                );
+            }
         }
     }
-    assert!(
-        found.iter().all(|&count| count > 0),
-        "a mirror without its struct: {found:?}"
-    );
-
-    // The one struct whose members are wider where the projection is in f64.
-    let wide = shader::compose("pressure/advance", &["F64"]).unwrap();
-    let layouts = reflect("pressure/advance", &wide).unwrap().layouts;
-    let (size, members) = (size_of::<PressureControl64>(), PressureControl64::members());
-    assert_eq!(check(&layouts, "PressureControl", size, &members), Ok(true));
-    let (size, members) = (size_of::<PressureControl>(), PressureControl::members());
-    check(&layouts, "PressureControl", size, &members).unwrap_err();
+    let unseen = mirrors.iter().zip(&seen).filter(|(_, seen)| !**seen);
+    assert_eq!(unseen.count(), 0, "a mirror without its struct: {seen:?}");
 
     // Negative controls: a member out of place and a wrong size are seen.
     let text = shader::compose("pbf/predict", &[]).unwrap();
     let layouts = reflect("pbf/predict", &text).unwrap().layouts;
-    let mut spoiled = Params::members();
-    spoiled.swap(1, 2);
-    check(&layouts, "Params", size_of::<Params>(), &spoiled).unwrap_err();
-    check(
-        &layouts,
-        "Params",
-        size_of::<Params>() + 4,
-        &Params::members(),
-    )
-    .unwrap_err();
+    let params = layouts.iter().find(|layout| layout.name == "Params");
+    let params = params.unwrap();
+    check(params, &mirrors).unwrap();
+    let mut spoiled = params.clone();
+    spoiled.members.swap(1, 2);
+    check(&spoiled, &mirrors).unwrap_err();
+    spoiled = params.clone();
+    spoiled.size += 4;
+    check(&spoiled, &mirrors).unwrap_err();
+}
+
+/// What the host and the shaders number alike.
+#[test]
+fn numbers_match_naga() {
+    let reduce = reflect(
+        "pressure/reduce",
+        &shader::compose("pressure/reduce", &[]).unwrap(),
+    );
+    let constants = reduce.unwrap().constants;
+    let value = |name: &str| constants.iter().find(|(of, _)| of == name).unwrap().1;
+    for (name, state) in [
+        ("ITERATING", ITERATING),
+        ("VERIFYING", VERIFYING),
+        ("DONE", DONE),
+        ("WANTS_POCKETS", WANTS_POCKETS),
+    ] {
+        assert_eq!(value(name), state, "{name}");
+    }
+    for (name, step) in [
+        ("BEGIN", ReduceStep::Begin),
+        ("DIRECTION", ReduceStep::Direction),
+        ("LENGTH", ReduceStep::Length),
+        ("CHECK", ReduceStep::Check),
+        ("VERIFIED", ReduceStep::Verified),
+    ] {
+        assert_eq!(value(name), step as u32, "{name}");
+    }
+    // Negative control.
+    assert_ne!(value("VERIFIED"), ReduceStep::Check as u32);
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Scan and stable counting sort against the CPU, up to dispatches of two dimensions.
 use swell::gpu::{
     adapter::Context,
+    buffer::Buf,
     program::Program,
     recording::{Command, Recording},
-    sort,
+    sort::{self, CELL_OF, CELL_START, ELEMENT_COUNT, ID, ORDER, PLACED, SLOT_IN_CELL},
 };
 
 /// Deterministic and well mixed (splitmix64).
@@ -23,26 +24,17 @@ fn context() -> Context {
 }
 
 fn gpu_scan(context: &Context, values: &[u32]) -> Vec<u32> {
-    let mut buffers = sort::scan_buffers("values_to_scan", values.len());
-    buffers.push(sort::storage(
-        "values_to_scan",
-        4 * (values.len() as u64 + 1),
-    ));
+    const VALUES: Buf<u32> = Buf::new("values_to_scan");
+    let mut buffers = sort::scan_buffers(&VALUES, values.len());
+    buffers.push(VALUES.sized(values.len() + 1));
     let passes = sort::SCAN_PASSES.map(sort::plain_pass);
     let program = Program::new(context, &buffers, &passes, &[]).unwrap();
-    program.upload("values_to_scan", 0, values);
-    program.upload(
-        "values_to_scan.lengths",
-        0,
-        &sort::scan_lengths(values.len()),
-    );
-    Recording::new(&program, &sort::scan("values_to_scan", values.len()))
+    program.upload(VALUES, 0, values);
+    sort::upload_lengths(&program, &VALUES, values.len());
+    Recording::new(&program, &sort::scan(&VALUES, values.len()))
         .run(&program, None)
         .unwrap();
-    program
-        .download(&[("values_to_scan", values.len() + 1)])
-        .unwrap()
-        .remove(0)
+    program.read(VALUES, values.len() + 1).unwrap()
 }
 
 fn cpu_scan(values: &[u32]) -> Vec<u32> {
@@ -59,16 +51,10 @@ fn cpu_scan(values: &[u32]) -> Vec<u32> {
 /// Sorts elements with `keys` and `ids` as the solver does, except that keys are counted here.
 fn gpu_sort(context: &Context, keys: &[u32], ids: &[u32], cells: usize) -> Vec<u32> {
     let n = keys.len();
-    let mut buffers = sort::scan_buffers("cell_start", cells);
-    buffers.push(sort::storage("cell_start", 4 * (cells as u64 + 1)));
-    for name in ["cell_of", "slot_in_cell", "placed", "order", "id"] {
-        buffers.push(sort::storage(name, 4 * n as u64));
-    }
-    buffers.push(swell::gpu::program::BufferSpec {
-        name: "element_count".into(),
-        bytes: 16,
-        is_uniform: true,
-    });
+    let mut buffers = sort::scan_buffers(&CELL_START, cells);
+    buffers.push(CELL_START.sized(cells + 1));
+    buffers.extend([CELL_OF, SLOT_IN_CELL, PLACED, ORDER, ID].map(|buffer| buffer.sized(n)));
+    buffers.push(ELEMENT_COUNT.sized(1));
     let passes: Vec<_> = sort::SCAN_PASSES
         .into_iter()
         .chain(sort::SORT_PASSES)
@@ -83,18 +69,18 @@ fn gpu_sort(context: &Context, keys: &[u32], ids: &[u32], cells: usize) -> Vec<u
         slots[k] = counts[keys[k] as usize];
         counts[keys[k] as usize] += 1;
     }
-    program.upload("cell_start", 0, &counts);
-    program.upload("cell_start.lengths", 0, &sort::scan_lengths(cells));
-    program.upload("cell_of", 0, keys);
-    program.upload("slot_in_cell", 0, &slots);
-    program.upload("id", 0, ids);
-    program.upload("element_count", 0, &[n as u32, 0, 0, 0]);
-    let mut commands = sort::scan("cell_start", cells);
+    program.upload(CELL_START, 0, &counts);
+    sort::upload_lengths(&program, &CELL_START, cells);
+    program.upload(CELL_OF, 0, keys);
+    program.upload(SLOT_IN_CELL, 0, &slots);
+    program.upload(ID, 0, ids);
+    program.upload(ELEMENT_COUNT, 0, &[[n as u32, 0, 0, 0]]);
+    let mut commands = sort::scan(&CELL_START, cells);
     commands.extend(sort::SORT_PASSES.map(|pass| Command::over(pass, n)));
     Recording::new(&program, &commands)
         .run(&program, None)
         .unwrap();
-    program.download(&[("order", n)]).unwrap().remove(0)
+    program.read(ORDER, n).unwrap()
 }
 
 /// 4.2 million 64-thread groups' worth of elements and more go out in two dimensions.

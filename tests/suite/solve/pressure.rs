@@ -16,7 +16,13 @@ use swell::{
     gpu::adapter::{Context, Spoil},
     reference::poisson::gradients::{Precondition, norm, solve},
     scene::flip::Preconditioner,
-    solve::pressure::blocked,
+    solve::{
+        flip::buffers::{DENSITY_EXCESS, FACE_VELOCITY, SOLID_FLUX},
+        pressure::{
+            blocked,
+            buffers::{BLOCK, COEFFICIENT, DIRECTION, DIRICHLET, FACE_DISPLACEMENT, RHS},
+        },
+    },
 };
 
 const SURFACES: [Surface; 2] = [Surface::Voxel, Surface::GhostFluid];
@@ -36,24 +42,22 @@ fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
 /// Rows of the device that part from the f64 system's by more than rounding: θ and its inverse are rounded a few
 /// times at ε = 6e-8, and so is their sum.
 fn wrong_rows(rig: &Rig, system: &System) -> usize {
-    let cells = 4 * 512 * (rig.case.bricks.slots() + 3);
-    let read = rig
-        .program
-        .download::<f32>(&[
-            ("pressure_coefficient", 3 * cells / 4),
-            ("pressure_dirichlet", cells / 4),
-        ])
-        .unwrap();
+    let cells = 512 * (rig.case.bricks.slots() + 3);
+    let wanted = COEFFICIENT.first(3 * cells);
+    let coefficient = rig.program.download(wanted).unwrap();
+    // The rig's precision is one of f32.
+    let wanted = DIRICHLET.retyped::<f32>().first(cells);
+    let dirichlet = rig.program.download(wanted).unwrap();
     let is_off = |found: f32, expected: f64| (f64::from(found) - expected).abs() > 1e-6 * expected;
-    let mut is_row = vec![false; cells / 4];
+    let mut is_row = vec![false; cells];
     let mut wrong = 0;
     for (row, &element) in system.cell.iter().enumerate() {
         let place = blocked(element);
         is_row[place] = true;
-        let is_wrong = is_off(read[1][place], system.dirichlet[row])
+        let is_wrong = is_off(dirichlet[place], system.dirichlet[row])
             || (0..3).any(|axis| {
                 is_off(
-                    read[0][axis * cells / 4 + place],
+                    coefficient[axis * cells + place],
                     system.coefficient[row][2 * axis],
                 )
             });
@@ -61,7 +65,8 @@ fn wrong_rows(rig: &Rig, system: &System) -> usize {
     }
     let wet = 512..512 * (rig.case.bricks.wet as usize + 1);
     let beyond = wet.filter(|&e| {
-        !is_row[e] && (read[1][e] != 0.0 || (0..3).any(|axis| read[0][axis * cells / 4 + e] != 0.0))
+        !is_row[e]
+            && (dirichlet[e] != 0.0 || (0..3).any(|axis| coefficient[axis * cells + e] != 0.0))
     });
     wrong + beyond.count()
 }
@@ -98,11 +103,11 @@ fn right_hand_sides_are_those_of_the_f64_builder() {
     let noise = white_noise(4 * rig.case.kind.len());
     let noise: Vec<f32> = noise.iter().map(|&x| x as f32).collect();
     let (flux, velocity) = noise.split_at(rig.case.kind.len());
-    rig.program.upload("solid_flux", 0, flux);
-    rig.upload_planes("face_velocity", velocity);
+    rig.program.upload(SOLID_FLUX, 0, flux);
+    rig.upload_planes(FACE_VELOCITY, velocity);
     let projected = rig.project(None);
     let expected = rig.system.rhs(rig.case.cells(), velocity, flux);
-    let found = rig.by_row("pressure_rhs");
+    let found = rig.by_row(RHS);
     // Seven terms below 1, each product and sum rounded at 6e-8.
     for (found, expected) in found.iter().zip(&expected) {
         assert!((found - expected).abs() < 1e-6, "{found} {expected}");
@@ -115,7 +120,7 @@ fn right_hand_sides_are_those_of_the_f64_builder() {
     // The projection takes the gradient off: what is left is the residual, by the f64 builder's own account.
     let after = rig
         .system
-        .rhs(rig.case.cells(), &rig.planes("face_velocity"), flux);
+        .rhs(rig.case.cells(), &rig.planes(FACE_VELOCITY), flux);
     let left = norm(&after) / norm(&expected);
     assert!(
         (left - projected.solved.residual).abs() < 1e-5,
@@ -182,13 +187,12 @@ fn the_coarse_levels_do_the_work() {
     let mut rig = rig(&context, case, Preconditioner::Multigrid, 1e-6);
     rig.solve(&tank_rhs(&rig.case, &rig.system));
     let excess = vec![0.1f32; rig.case.kind.len()];
-    rig.program.upload("density_excess", 0, &excess);
+    rig.program.upload(DENSITY_EXCESS, 0, &excess);
     let whole = rig.solver.correct(&rig.program, None).unwrap();
     // A block without a row has no say.
     let coarse = rig.case.bricks.levels[1].start as usize;
     let nothing = vec![0u32; 64 * (rig.case.bricks.slots() - coarse)];
-    rig.program
-        .upload("pressure_block", 4 * 64 * coarse as u64, &nothing);
+    rig.program.upload(BLOCK, 64 * coarse, &nothing);
     let spoiled = rig.solver.correct(&rig.program, None).unwrap();
     assert!(
         !whole.is_missed && spoiled.iterations > 3 * whole.iterations,
@@ -469,7 +473,7 @@ fn the_same_bytes_twice() {
         // Submitted with another number of iterations at once.
         assert_eq!(rig.solve(&b), first);
         assert!(rig.solution() == solution);
-        (first, solution, rig.planes("face_velocity"))
+        (first, solution, rig.planes(FACE_VELOCITY))
     };
     for preconditioner in [Preconditioner::Multigrid, Preconditioner::Ipp] {
         assert!(run(preconditioner) == run(preconditioner));
@@ -494,7 +498,7 @@ fn preconditioners_are_symmetric_and_positive() {
         let (x, y) = noise.split_at(rows);
         let mut image = |b: &[f64]| {
             rig.solve(b);
-            rig.by_row("pressure_direction")
+            rig.by_row(DIRECTION)
         };
         let (mx, my) = (image(x), image(y));
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -522,7 +526,7 @@ fn the_correction_carries_the_excess_out() {
         1e-5,
     );
     rig.solve(&tank_rhs(&rig.case, &rig.system));
-    let velocity = rig.planes("face_velocity");
+    let velocity = rig.planes(FACE_VELOCITY);
     let mut excess = vec![0.5f32; rig.case.kind.len()];
     for (&element, &value) in rig
         .system
@@ -532,13 +536,13 @@ fn the_correction_carries_the_excess_out() {
     {
         excess[element as usize] = 0.1 * value as f32;
     }
-    rig.program.upload("density_excess", 0, &excess);
+    rig.program.upload(DENSITY_EXCESS, 0, &excess);
     let solved = rig.solver.correct(&rig.program, None).unwrap();
     assert!(
         solved.iterations > 0 && solved.residual <= 1e-2,
         "{solved:?}"
     );
-    let displacement = rig.planes("face_displacement");
+    let displacement = rig.planes(FACE_DISPLACEMENT);
     let none = vec![0.0; rig.case.kind.len()];
     let carried = rig.system.rhs(rig.case.cells(), &displacement, &none);
     let wanted: Vec<f64> = rig
@@ -549,7 +553,7 @@ fn the_correction_carries_the_excess_out() {
         .collect();
     let left = norm(&difference(&carried, &wanted)) / norm(&wanted);
     assert!((left - solved.residual).abs() < 1e-5, "{left} {solved:?}");
-    assert!(rig.planes("face_velocity") == velocity);
+    assert!(rig.planes(FACE_VELOCITY) == velocity);
     for (face, &d) in displacement.iter().enumerate() {
         assert!(d == 0.0 || rig.case.open[face] > 0.0);
     }
@@ -567,10 +571,10 @@ fn other_faces_keep_their_velocity() {
     );
     let stride = rig.case.kind.len();
     let before: Vec<f32> = white_noise(3 * stride).iter().map(|&x| x as f32).collect();
-    rig.upload_planes("face_velocity", &before);
-    rig.program.upload("solid_flux", 0, &vec![0.0f32; stride]);
+    rig.upload_planes(FACE_VELOCITY, &before);
+    rig.program.upload(SOLID_FLUX, 0, &vec![0.0f32; stride]);
     rig.project(None);
-    let after = rig.planes("face_velocity");
+    let after = rig.planes(FACE_VELOCITY);
     let cells = rig.case.cells();
     let mut changed = 0;
     for element in CELLS..CELLS * (rig.case.bricks.active + 1) {

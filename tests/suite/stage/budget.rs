@@ -169,7 +169,7 @@ fn too_many_slowed_particles_end_a_bake() {
         let count = spoil(
             pass,
             "if distance > params.max_displacement {",
-            "atomicAdd(&counters[0], 1u); if distance > params.max_displacement {",
+            "atomicAdd(&counters.capped, 1u); if distance > params.max_displacement {",
         );
         let slowed = bake(&spoiled(&context, count), &scene, "1-2");
         let Failure { breach, place } = slowed.failure();

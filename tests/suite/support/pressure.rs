@@ -7,9 +7,15 @@ use swell::{
             cases::{Case, Surface as CaseSurface},
         },
     },
-    gpu::{adapter::Context, program::Program, recording::Timer, sort::storage},
+    gpu::{adapter::Context, buffer::Buf, program::Program, recording::Timer},
     scene::flip::{Precision, Preconditioner, Pressure, Surface},
-    solve::pressure::{self, PressureSolver, Projected, Solved, Step, blocked},
+    solve::{
+        flip::buffers::*,
+        pressure::{
+            self, PressureSolver, Projected, Solved, Step, blocked,
+            buffers::{Real, SOLUTION, read_reals},
+        },
+    },
 };
 
 pub struct Rig {
@@ -33,20 +39,20 @@ pub fn settings(preconditioner: Preconditioner, tolerance: f64) -> Pressure {
 impl Rig {
     pub fn new(context: &Context, case: Case, settings: &Pressure) -> Self {
         let capacity = case.bricks.slots() + 3;
-        let cells = 4 * capacity as u64 * u64::from(CELLS);
+        let cells = capacity * CELLS as usize;
         let surface = match case.surface {
             CaseSurface::Voxel => Surface::Voxel,
             CaseSurface::GhostFluid => Surface::GhostFluid,
         };
-        let mut specs = pressure::buffers(settings, true, capacity);
+        let mut specs = pressure::planned(settings, true, capacity);
         specs.extend([
-            storage("bricks", 160 * capacity as u64),
-            storage("cell_kind", cells),
-            storage("face_open", 3 * cells),
-            storage("face_velocity", 3 * cells),
-            storage("solid_flux", cells),
-            storage("liquid_distance", cells),
-            storage("density_excess", cells),
+            BRICKS.sized(capacity),
+            CELL_KIND.sized(cells),
+            FACE_OPEN.sized(3 * cells),
+            FACE_VELOCITY.sized(3 * cells),
+            SOLID_FLUX.sized(cells),
+            LIQUID_DISTANCE.sized(cells),
+            DENSITY_EXCESS.sized(cells),
         ]);
         let passes = pressure::passes(settings, surface, true);
         let program = Program::new(context, &specs, &passes, &[]).unwrap();
@@ -64,10 +70,10 @@ impl Rig {
 
     pub fn upload_case(&mut self) {
         let case = &self.case;
-        self.program.upload("bricks", 0, &case.bricks.records);
-        self.program.upload("cell_kind", 0, &case.kind);
-        self.program.upload("liquid_distance", 0, &case.distance);
-        self.upload_planes("face_open", &case.open);
+        self.program.upload(BRICKS, 0, &case.bricks.records);
+        self.program.upload(CELL_KIND, 0, &case.kind);
+        self.program.upload(LIQUID_DISTANCE, 0, &case.distance);
+        self.upload_planes(FACE_OPEN, &case.open);
         self.solver
             .set_topology(&self.program, &case.bricks, case.cell_size);
     }
@@ -79,18 +85,18 @@ impl Rig {
     }
 
     /// Planes of the case's stride into those of the capacity's.
-    pub fn upload_planes(&self, name: &str, values: &[f32]) {
-        let stride = 4 * self.capacity as u64 * u64::from(CELLS);
+    pub fn upload_planes(&self, buffer: Buf<f32>, values: &[f32]) {
+        let stride = self.capacity * CELLS as usize;
         for (axis, plane) in values.chunks_exact(self.case.kind.len()).enumerate() {
-            self.program.upload(name, axis as u64 * stride, plane);
+            self.program.upload(buffer.clone(), axis * stride, plane);
         }
     }
 
-    pub fn planes(&self, name: &str) -> Vec<f32> {
+    pub fn planes(&self, buffer: Buf<f32>) -> Vec<f32> {
         let stride = self.capacity * CELLS as usize;
-        let all = self.program.download::<f32>(&[(name, 3 * stride)]).unwrap();
+        let all = self.program.read(buffer, 3 * stride).unwrap();
         (0..3)
-            .flat_map(|axis| all[0][axis * stride..][..self.case.kind.len()].to_vec())
+            .flat_map(|axis| all[axis * stride..][..self.case.kind.len()].to_vec())
             .collect()
     }
 
@@ -100,8 +106,8 @@ impl Rig {
         for (&element, &b) in self.system.cell.iter().zip(b) {
             flux[element as usize] = -b as f32;
         }
-        self.program.upload("solid_flux", 0, &flux);
-        self.upload_planes("face_velocity", &vec![0.0; 3 * self.case.kind.len()]);
+        self.program.upload(SOLID_FLUX, 0, &flux);
+        self.upload_planes(FACE_VELOCITY, &vec![0.0; 3 * self.case.kind.len()]);
     }
 
     pub fn project(&mut self, timer: Option<&mut Timer>) -> Projected {
@@ -118,22 +124,21 @@ impl Rig {
     }
 
     /// `planes` arrays of the room's own precision, added up, by row.
-    fn sum(&self, name: &str, planes: usize) -> Vec<f64> {
+    fn sum(&self, buffer: Buf<Real>, planes: usize) -> Vec<f64> {
         let cells = self.capacity * CELLS as usize;
-        let words = planes * cells * self.precision.words();
-        let values = self.program.download::<u32>(&[(name, words)]).unwrap();
-        let values = pressure::widen(&values[0], self.precision);
+        let read = read_reals(&self.program, &buffer, self.precision, planes * cells);
+        let values = read.unwrap();
         let at = |e: usize| (0..planes).map(|k| values[k * cells + e]).sum();
         self.system.cell.iter().map(|&e| at(blocked(e))).collect()
     }
 
     /// An array of the room, by row.
-    pub fn by_row(&self, name: &str) -> Vec<f64> {
-        self.sum(name, 1)
+    pub fn by_row(&self, buffer: Buf<Real>) -> Vec<f64> {
+        self.sum(buffer, 1)
     }
 
     /// All terms of the solution, by row.
     pub fn solution(&self) -> Vec<f64> {
-        self.sum("pressure_solution", self.precision.terms())
+        self.sum(SOLUTION, self.precision.terms())
     }
 }

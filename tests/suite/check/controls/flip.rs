@@ -232,8 +232,8 @@ pub const FLIP: &[Control] = &[
     ]),
     control(
         "flip/survey",
-        "atomicMax(&survey[0], bitcast<u32>(fastest));",
-        "atomicMax(&survey[0], bitcast<u32>(fastest)); atomicStore(&survey[16u], 1u);",
+        "atomicMax(&survey.head.speed_square, bitcast<u32>(fastest));",
+        "atomicMax(&survey.head.speed_square, bitcast<u32>(fastest)); atomicStore(&survey.is_wet[12u], 1u);",
         "flip/survey",
         &["bricks with water"],
     ),
@@ -362,8 +362,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/advect",
-        "atomicAdd(&counters[0], 1u)",
-        "atomicAdd(&counters[0], 3u)",
+        "atomicAdd(&counters.capped, 1u)",
+        "atomicAdd(&counters.capped, 3u)",
         "flip/advect",
         &["particles slowed"],
     ),

@@ -168,8 +168,8 @@ pub const PBF: &[Control] = &[
     ),
     control(
         "pbf/update_velocity",
-        "atomicAdd(&counters[0], 1u)",
-        "atomicAdd(&counters[0], 3u)",
+        "atomicAdd(&counters.capped, 1u)",
+        "atomicAdd(&counters.capped, 3u)",
         "pbf/update_velocity",
         &["particles slowed"],
     ),

@@ -217,8 +217,8 @@ pub const VARIANTS: &[Variant] = &[
             .and(&["pressure/center", "pressure/reduce"]),
             control(
                 "pressure/count_pockets",
-                "atomicAdd(&pressure_stats[4], 1u)",
-                "atomicAdd(&pressure_stats[4], 2u)",
+                "atomicAdd(&pressure_stats.pockets, 1u)",
+                "atomicAdd(&pressure_stats.pockets, 2u)",
                 "pressure/count_pockets",
                 &["pockets"],
             ),

@@ -8,7 +8,7 @@ use swell::{
     },
     gpu::adapter::{Context, Spoil},
     scene::flip::Preconditioner,
-    solve::pressure::blocked,
+    solve::pressure::{blocked, buffers::LABEL},
 };
 
 use super::context;
@@ -126,8 +126,7 @@ impl Grid {
         rig.set_rhs(&none);
         let counted = rig.project(None).pockets;
         let cells = rig.case.kind.len();
-        let labels = rig.program.download::<u32>(&[("pressure_label", cells)]);
-        let labels = labels.unwrap().remove(0);
+        let labels = rig.program.read(LABEL, cells).unwrap();
         let place = |index: usize| {
             let element = rig.case.bricks.element(self.cell(index).map(i64::from));
             blocked(element)

@@ -11,7 +11,13 @@ use swell::{
     },
     reference::poisson::gradients::{Precondition, norm, solve},
     scene::flip::{Precision, Preconditioner, Pressure, Surface as SceneSurface},
-    solve::pressure::{buffers, passes},
+    solve::{
+        flip::buffers::DENSITY_EXCESS,
+        pressure::{
+            buffers::{RHS, SOLUTION},
+            passes, planned,
+        },
+    },
     stage::Blame,
 };
 
@@ -101,7 +107,7 @@ fn f64_takes_pockets_and_corrections() {
         );
         assert_eq!(projected.pockets, 1);
         rig.program
-            .upload("density_excess", 0, &vec![0.01f32; rig.case.kind.len()]);
+            .upload(DENSITY_EXCESS, 0, &vec![0.01f32; rig.case.kind.len()]);
         let corrected = rig.solver.correct(&rig.program, None).unwrap();
         assert!(!corrected.is_missed, "{preconditioner:?} {corrected:?}");
     }
@@ -113,10 +119,10 @@ fn a_precision_takes_its_own_bytes_and_features() {
     let slots = 10;
     let bytes = |precision| {
         let settings = in_precision(precision, 1e-5);
-        let all = buffers(&settings, true, slots);
+        let all = planned(&settings, true, slots);
         let of = |name: &str| all.iter().find(|spec| spec.name == name).unwrap().bytes;
         let total: u64 = all.iter().map(|spec| spec.bytes).sum();
-        (of("pressure_solution"), of("pressure_rhs"), total)
+        (of(SOLUTION.name()), of(RHS.name()), total)
     };
     let cells = 4 * 512 * slots as u64;
     let [plain, refined, double] =

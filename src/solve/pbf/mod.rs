@@ -1,5 +1,8 @@
 //! Position-based fluids (Macklin and Müller 2013) with the red/black iteration.
 
+pub mod buffers;
+mod iteration;
+
 use glam::DVec3;
 
 use crate::{
@@ -15,6 +18,7 @@ use crate::{
     },
     gpu::{
         adapter::Context,
+        buffer::Buf,
         program::Program,
         recording::{Command, Recording, Timer, spread},
         sort,
@@ -27,11 +31,12 @@ use crate::{
 
 use super::{
     SolveError,
-    iteration::Builder,
     params::{Counters, IterationControl, Params},
     state::{check_finite, check_ids, slots_by_id, take_over, upload},
     trace::{Begun, Observe, Span, TraceFrame, Traced, trace},
 };
+use buffers::*;
+use iteration::Builder;
 
 /// Far from everything, and still finite when squared.
 const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
@@ -78,15 +83,11 @@ impl Pbf {
         let mut builder = Builder::new(&plan);
         let substep = Recording::new(&program, &substep_commands(&plan, scene, &mut builder));
         let measure = Recording::new(&program, &measure_commands(&plan, &mut builder));
-        program.upload("phases", 0, &builder.phase_slots());
-        program.upload(
-            "cell_start.lengths",
-            0,
-            &sort::scan_lengths(cell_count(&plan)),
-        );
-        program.upload("element_count", 0, &[particles as u32, 0, 0, 0]);
+        builder.upload_phases(&program);
+        sort::upload_lengths(&program, &CELL_START, cell_count(&plan));
+        program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
         let last = 2 * particles + counts.boundary_samples;
-        program.upload("predicted", 16 * last as u64, &[NOBODY]);
+        program.upload(PREDICTED, last, &[NOBODY]);
         boundary.upload(&program, scene, &plan, &calibration);
         Ok(Self {
             timer: is_timed.then(|| Timer::new(context)),
@@ -117,12 +118,16 @@ impl Pbf {
         self.program.names()
     }
 
-    /// The named buffer's first `count` values, such as `lambda` or `density`, in sorted order.
+    /// A buffer's first `count` values.
     ///
     /// # Errors
     /// The device.
-    pub fn field<T: bytemuck::Pod>(&self, name: &str, count: usize) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.download(&[(name, count)])?.remove(0))
+    pub fn field<T: bytemuck::Pod>(
+        &self,
+        buffer: impl Into<Buf<T>>,
+        count: usize,
+    ) -> Result<Vec<T>, SolveError> {
+        Ok(self.program.read(buffer.into(), count)?)
     }
 
     fn params(&self, time: f64, step: f64) -> Params {
@@ -161,11 +166,10 @@ impl Pbf {
 
     /// Zeroes what adds up over a frame.
     fn begin_frame(&self) {
-        self.program.upload("counters", 0, &[Counters::default()]);
+        self.program.upload(COUNTERS, 0, &[Counters::default()]);
         if self.scene.has_movers() {
             let groups = self.plan.counts.particles.div_ceil(64);
-            self.program
-                .upload("boundary_work", 0, &vec![0.0f32; groups]);
+            self.program.upload(BOUNDARY_WORK, 0, &vec![0.0; groups]);
         }
     }
 
@@ -175,15 +179,15 @@ impl Pbf {
             return Ok(0.0);
         }
         let groups = self.plan.counts.particles.div_ceil(64);
-        let sums = self.field::<f32>("boundary_work", groups)?;
+        let sums = self.field(BOUNDARY_WORK, groups)?;
         let sum: f64 = sums.into_iter().map(f64::from).sum();
         Ok(self.scene.particle_mass() / step * sum)
     }
 
     fn prepare_substep(&self, time: f64, step: f64) {
-        self.program.upload("params", 0, &[self.params(time, step)]);
+        self.program.upload(PARAMS, 0, &[self.params(time, step)]);
         if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {
-            self.program.upload("control", 0, &[self.control()]);
+            self.program.upload(CONTROL, 0, &[self.control()]);
         }
     }
 
@@ -214,11 +218,10 @@ impl Pbf {
             .map(|chunk| chunk.count as u64)
             .max()
             .unwrap_or(0);
-        let [x, y, z] = spread(&self.program.context, 64, largest);
-        let [half_x, half_y, half_z] = spread(&self.program.context, 64, largest.div_ceil(2));
+        let groups = |threads| spread(&self.program.context, 64, threads).into();
         IterationControl {
-            all: [x, y, z, 0],
-            colour: [half_x, half_y, half_z, 0],
+            all: groups(largest),
+            colour: groups(largest.div_ceil(2)),
             ..IterationControl::default()
         }
     }
@@ -226,8 +229,8 @@ impl Pbf {
     /// As [`Calibration::pressure_scale`] has it from Σ λ; in sorted order, before the state is uploaded again.
     fn particle_pressures(&self, step: f64) -> Result<Vec<(DVec3, f64)>, SolveError> {
         let n = self.plan.counts.particles;
-        let position = self.field::<[f32; 4]>("position", n)?;
-        let lambda = self.field::<f32>("lambda_sum", n)?;
+        let wanted = (POSITION.first(n), LAMBDA_SUM.first(n));
+        let (position, lambda) = self.program.download(wanted)?;
         let relaxation = self.scene.solver.pbf().relaxation;
         let density = self.scene.water.rest_density;
         let scale = self.calibration.pressure_scale(density, relaxation, step);
@@ -242,38 +245,29 @@ impl Pbf {
 
     /// Sorts at the frame's last positions, measures density there, and reads everything back.
     fn read_state(&mut self, time: f64) -> Result<(Vec<f64>, Counters), SolveError> {
-        self.program.upload("params", 0, &[self.params(time, 0.0)]);
+        self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
         self.measure.run(&self.program, self.timer.as_mut())?;
         let n = self.plan.counts.particles;
-        let vectors = self
-            .program
-            .download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
-        let wanted = [("id", n), ("sorted_id", n), ("counters", 4)];
-        let words = self.program.download::<u32>(&wanted)?;
-        let ([position, velocity], [id, sorted_id, counters]) =
-            (vectors.as_slice(), words.as_slice())
-        else {
-            unreachable!("one vector a buffer");
-        };
-        let counters = bytemuck::pod_read_unaligned(bytemuck::cast_slice(counters));
-        let density = self.field::<f32>("density", n)?;
-
-        check_ids(self.frame + 1, &self.state.id, id)?;
-        check_ids(self.frame + 1, &self.state.id, sorted_id)?;
+        let state = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
+        let measured = (SORTED_ID.first(n), DENSITY.first(n), COUNTERS.first(1));
+        let ((position, velocity, id), (sorted_id, density, counters)) =
+            self.program.download((state, measured))?;
+        check_ids(self.frame + 1, &self.state.id, &id)?;
+        check_ids(self.frame + 1, &self.state.id, &sorted_id)?;
         let slot_of = slots_by_id(&self.state.id);
         take_over(
             &mut self.state,
             &self.scene,
             &slot_of,
-            id,
-            position,
-            velocity,
+            &id,
+            &position,
+            &velocity,
         );
         let mut by_slot = vec![0.0; n];
         for (&id, &value) in sorted_id.iter().zip(&density) {
             by_slot[slot_of(id)] = f64::from(value);
         }
-        Ok((by_slot, counters))
+        Ok((by_slot, counters[0]))
     }
 }
 
@@ -375,7 +369,7 @@ impl TraceFrame for Pbf {
             self.prepare_substep(time, step);
             trace(&[&self.substep], &self.program, told)?;
             if number == last {
-                self.program.upload("params", 0, &[self.params(time, 0.0)]);
+                self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
                 trace(&[&self.measure], &self.program, told)?;
             }
         }
@@ -399,10 +393,10 @@ fn cell_count(plan: &Plan) -> usize {
 fn sort_commands(plan: &Plan) -> Vec<Command> {
     let n = plan.counts.particles;
     let mut commands = vec![
-        Command::Clear("cell_start"),
+        Command::clear(&CELL_START),
         Command::over("pbf/assign_cells", n),
     ];
-    commands.extend(sort::scan("cell_start", cell_count(plan)));
+    commands.extend(sort::scan(&CELL_START, cell_count(plan)));
     commands.extend(sort::SORT_PASSES.map(|pass| Command::over(pass, n)));
     commands.push(Command::over("pbf/reorder", n));
     commands
@@ -412,10 +406,10 @@ fn substep_commands(plan: &Plan, scene: &Scene, builder: &mut Builder<'_>) -> Ve
     let pbf = scene.solver.pbf();
     let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
     if !scene.pressure_points().is_empty() {
-        commands.push(Command::Clear("lambda_sum"));
+        commands.push(Command::clear(&LAMBDA_SUM));
     }
     if scene.has_movers() {
-        commands.insert(0, Command::Clear("wall_work"));
+        commands.insert(0, Command::clear(&WALL_WORK));
     }
     commands.extend(sort_commands(plan));
     if plan.has_lists {
