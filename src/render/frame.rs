@@ -4,6 +4,8 @@
 //! frame, four bytes a pixel, so no filter ever meets a tile's edge. Textures are drawn into only in
 //! tiles, and the picture itself is gathered in bands of rows: those two are what limits apply to.
 
+use super::buffers::{aovs, picture};
+
 /// Sizes in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Extent {
@@ -32,17 +34,14 @@ impl Extent {
     }
 }
 
-/// Bytes of one pixel's AOVs: ten floats.
-pub(super) const AOV_BYTES: u64 = 40;
-
-/// Bytes of one pixel of the picture.
-pub(super) const COLOUR_BYTES: u64 = 16;
-
 /// Rows of each band of the picture: as many as a storage buffer of `most` bytes holds, but no more than `row_limit`.
 pub(super) fn bands(extent: &Extent, has_aovs: bool, most: u64, row_limit: u32) -> Vec<u32> {
     let [width, height] = extent.picture;
-    let pixel = if has_aovs { AOV_BYTES } else { COLOUR_BYTES };
-    let fitting = u32::try_from(most / (pixel * u64::from(width))).unwrap_or(u32::MAX);
+    let row = match has_aovs {
+        true => aovs(0).sized(width as usize),
+        false => picture(0).sized(width as usize),
+    };
+    let fitting = u32::try_from(most / row.bytes).unwrap_or(u32::MAX);
     let rows = fitting.min(row_limit).max(1);
     (0..height)
         .step_by(rows as usize)

@@ -60,7 +60,7 @@ impl Plan {
         let solids = plan_solids(&mut plan, &opaque, &matrix, limits);
         let Smoothing { commands, surface } = smoothing(&mut plan, look, scene);
         let spacing = scene.particle_spacing;
-        let splats = plan_splats(&mut plan, look, particles, spacing, radius, &surface);
+        let splats = plan_splats(&mut plan, look, room(particles), spacing, radius, &surface);
         let shade = plan_shade(&mut plan, look, &surface);
         plan.end_fills();
         if has_aovs {
@@ -76,6 +76,11 @@ impl Plan {
         plan.sample = [solids, splats.body, commands, splats.spray, shade.picture].concat();
         Ok(plan)
     }
+}
+
+/// How many particles there is room for where so many are asked for: frames differ, and few of them then need more.
+pub(super) fn room(particles: usize) -> usize {
+    particles.next_power_of_two()
 }
 
 fn smoothing(plan: &mut Plan, look: &Look, scene: &RenderScene) -> Smoothing {

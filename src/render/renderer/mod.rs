@@ -21,6 +21,7 @@ use crate::gpu::{
     recording::{Recording, Timer, spread},
 };
 use crate::scene::look::Look;
+use build::room;
 
 /// Renders frames of one scene with one look.
 pub struct Renderer {
@@ -63,8 +64,7 @@ impl Renderer {
             tile: tile_limit.clamp(16, whole.texture),
             ..whole
         };
-        let capacity = 1;
-        let plan = Plan::new(look, scene, capacity, &limits)?;
+        let plan = Plan::new(look, scene, 0, &limits)?;
         let program = plan.program(context)?;
         let record = |commands| Recording::new(&program, commands);
         let renderer = Self {
@@ -75,7 +75,7 @@ impl Renderer {
             aovs: record(&plan.aovs),
             plan,
             program,
-            capacity,
+            capacity: room(0),
             timer: None,
         };
         context.wait()?;
@@ -190,7 +190,7 @@ impl Renderer {
         if particles <= self.capacity {
             return Ok(());
         }
-        let capacity = particles.next_power_of_two();
+        let capacity = room(particles);
         self.program.resize(&[PARTICLES.sized(capacity)])?;
         self.capacity = capacity;
         self.sample = Recording::new(&self.program, &self.plan.sample);
