@@ -180,3 +180,136 @@ impl Plan {
         self.windows(&FILLS, &fills);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+    use std::{collections::BTreeSet, path::Path};
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::{
+        domain::bounds::Bounds,
+        gpu::{
+            raster::Draw,
+            recording::Groups,
+            reflect::{Access, reflect},
+            shader::compose,
+        },
+        render::RenderScene,
+        scene::look::Look,
+    };
+
+    const LIMITS: Limits = Limits {
+        storage: 1 << 27,
+        texture: 8192,
+        tile: 64,
+    };
+
+    fn plan(surface: &str, more: &str) -> Plan {
+        let text = format!(
+            "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 18.0]\nposition = [-2.0, 3.0, 2.5]\n\
+             target = [0.0, 1.0, 0.75]\n[image]\nwidth = 96\nheight = 48\n[surface]\nfilter = \"{surface}\"\n\
+             [sky]\nmodel = \"hosek_wilkie\"\n[sun]\nazimuth_degrees = 120.0\nelevation_degrees = 35.0\n{more}"
+        );
+        let look = Look::parse(&text, Path::new("look.toml")).unwrap();
+        let scene = RenderScene {
+            origin: DVec3::ZERO,
+            domain: Bounds {
+                min: DVec3::ZERO,
+                max: DVec3::ONE,
+            },
+            solids: Vec::new(),
+            particle_spacing: 0.1,
+            frames_per_second: 24.0,
+        };
+        Plan::new(&look, &scene, 9, &LIMITS).unwrap()
+    }
+
+    /// Names of buffers, textures and samplers that commands use.
+    fn used(plan: &Plan) -> BTreeSet<String> {
+        let mut used = BTreeSet::new();
+        for command in [&plan.once, &plan.sample, &plan.aovs].into_iter().flatten() {
+            let binds = match command {
+                Command::Dispatch { binds, groups, .. } => {
+                    if let Groups::Indirect { buffer, .. } = groups {
+                        used.insert(buffer.clone());
+                    }
+                    binds
+                }
+                Command::Draw(Draw {
+                    binds,
+                    colours,
+                    depth,
+                    ..
+                }) => {
+                    used.extend(colours.iter().chain([depth]).map(|t| t.texture.clone()));
+                    binds
+                }
+                Command::Clear(buffer) => {
+                    used.insert(buffer.clone());
+                    continue;
+                }
+                Command::ClearDepth(target) => {
+                    used.insert(target.texture.clone());
+                    continue;
+                }
+                Command::CopyTexture(copy) => {
+                    used.extend([copy.texture.clone(), copy.buffer.clone()]);
+                    continue;
+                }
+            };
+            let pass = command.pass().unwrap();
+            let defines = plan.defines.get(pass).cloned().unwrap_or_default();
+            for binding in reflect(pass, &compose(pass, &defines).unwrap())
+                .unwrap()
+                .bindings
+            {
+                let bind = binds.iter().find(|bind| bind.variable == binding.name);
+                let name = bind.map_or(&binding.name, |bind| &bind.buffer);
+                if let Some(buffer) = plan.buffers.iter().find(|buffer| buffer.name == *name) {
+                    let is_uniform = binding.access == Access::Uniform;
+                    assert_eq!(is_uniform, buffer.is_uniform, "{pass}: {name}");
+                    let window = bind.and_then(|bind| bind.window);
+                    let bytes = window.map_or(buffer.bytes, |(_, bytes)| bytes);
+                    let least = u64::from(binding.element.stride);
+                    assert!(bytes >= least, "{pass}: {name}");
+                }
+                used.insert(name.clone());
+            }
+        }
+        used
+    }
+
+    fn planned(plan: &Plan) -> BTreeSet<String> {
+        let buffers = plan.buffers.iter().map(|buffer| buffer.name.clone());
+        let textures = plan.textures.iter().map(|texture| texture.name.clone());
+        let samplers = plan.samplers.iter().map(|spec| spec.name.to_owned());
+        buffers.chain(textures).chain(samplers).collect()
+    }
+
+    #[test]
+    fn what_is_planned_is_what_commands_use() {
+        const ALL: &str = "[output]\naovs = [\"Z\", \"forward\"]\n[basin]\nheight_m = 0.5\n\
+            [water]\nspray = { density_per_metre = 9.0, speed_m_per_s = 5.5 }\n";
+        let depth_alone = "[output]\naovs = [\"Z\"]\n";
+        let mut sizes = BTreeSet::new();
+        for surface in ["curvature_flow", "narrow_range"] {
+            for more in ["", depth_alone, ALL] {
+                let plan = plan(surface, more);
+                assert_eq!(used(&plan), planned(&plan), "{surface} {more}");
+                sizes.insert(plan.bytes());
+            }
+        }
+        assert_eq!(sizes.len(), 6, "each look takes what it needs: {sizes:?}");
+        // Controls: a buffer that nothing uses, and a command whose buffer is not planned.
+        let mut spare = plan("narrow_range", "");
+        spare.buffer(&crate::render::buffers::SPRAY, 1);
+        assert_ne!(used(&spare), planned(&spare));
+        let mut lacking = plan("narrow_range", "");
+        lacking.buffers.retain(|buffer| buffer.name != "particles");
+        assert_ne!(used(&lacking), planned(&lacking));
+    }
+}
