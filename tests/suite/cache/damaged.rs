@@ -129,11 +129,19 @@ fn what_a_failed_frame_began_with_is_refused_damaged() {
     files.push(only(&job.path("cache/assets")));
     for file in files {
         let sound = flip(&file);
-        let said = job.expect(4, "check cache/failed");
-        assert!(said.contains(&name(&file)), "{said}");
+        for command in ["check cache/failed", "verify cache"] {
+            let said = job.expect(4, command);
+            assert!(said.contains(&name(&file)), "{command}: {said}");
+        }
         fs::write(&file, sound).unwrap();
     }
     job.expect(5, "check cache/failed");
+    let said = job.expect(0, "verify cache");
+    assert!(said.contains("and the frame that failed"), "{said}");
+    // Killed before the report, which is written last.
+    fs::remove_file(failed.join("report.json")).unwrap();
+    let said = job.expect(4, "verify cache");
+    assert!(said.contains("report.json: it is missing"), "{said}");
 }
 
 /// Of a bake from the start and of one that went on.

@@ -7,9 +7,8 @@ use std::sync::OnceLock;
 use proptest::prelude::*;
 use serde_json::Value;
 use swell::cache::{
-    self, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, Parent, directory_hash,
+    self, CacheError, CacheReader, CacheWriter, Clock, Manifest, Parent, directory_hash,
 };
-use swell::domain::sparse_grid::Precision;
 use tempfile::TempDir;
 
 use crate::support::cache::*;
@@ -219,18 +218,7 @@ fn a_damaged_asset_stops_readers_and_a_resume_untouched() {
 fn a_frames_further_files_are_checked_for_who_asks() {
     let dir = tempfile::tempdir().unwrap();
     let d = dir.path();
-    let mut given = manifest();
-    given.grids = Some(GridRecord {
-        surface: true,
-        velocity: false,
-        voxel_size: 0.6,
-        origin: [0.0; 3],
-        precision: Precision::Half,
-    });
-    let clock = Clock::default();
-    let writer =
-        CacheWriter::create(d, given, SCENE, &assets(), clock, &start(), &seen(clock)).unwrap();
-    go_on(writer, clock, start(), 2).unwrap();
+    bake_all_streams(d, 2);
     let reader = CacheReader::open(d).unwrap();
     let check = || reader.check_beside(&[0, 1, 2]);
     check().unwrap();

@@ -5,7 +5,9 @@ use std::path::Path;
 
 use serde_json::Value;
 use swell::cache::{
-    Asset, CacheError, CacheReader, CacheWriter, Clock, Manifest, ProbeValues, directory_hash,
+    Asset, CacheError, CacheReader, CacheWriter, Clock, Entry, Manifest, ProbeValues,
+    directory_hash,
+    stream::{GRIDS, PARTICLES, PROBES, STREAMS},
 };
 use swell::domain::particles::Particles;
 use tempfile::TempDir;
@@ -36,7 +38,10 @@ fn what_goes_in_comes_out() {
         let entry = reader.entry(frame).unwrap();
         assert_eq!(entry.clock.time.to_bits(), clock.time.to_bits());
         assert_eq!((entry.clock, &entry.report), (clock, &report));
-        assert_eq!(entry.file, format!("frames/tank.000{frame}.ply"));
+        assert_eq!(
+            entry.file(PARTICLES).unwrap().file,
+            format!("frames/tank.000{frame}.ply")
+        );
         assert_eq!(entry.particles, 7);
         let back = reader.read(frame).unwrap();
         assert_eq!(back, particles);
@@ -44,7 +49,9 @@ fn what_goes_in_comes_out() {
     }
     assert_eq!(
         summary.bytes,
-        (1..=3).map(|f| reader.entry(f).unwrap().bytes).sum::<u64>()
+        (1..=3)
+            .map(|f| reader.entry(f).unwrap().file(PARTICLES).unwrap().bytes)
+            .sum::<u64>()
     );
     assert!(matches!(
         reader.read(4),
@@ -265,15 +272,180 @@ fn another_format_is_named_not_guessed_at() {
     let dir = copied();
     let path = dir.path().join("manifest.json");
     let text = fs::read_to_string(&path).unwrap();
-    let newer = text.replacen("\"format_version\": 1", "\"format_version\": 2", 1);
-    fs::write(&path, newer).unwrap();
-    match CacheReader::open(dir.path()) {
-        Err(CacheError::Format {
-            found, supported, ..
-        }) => {
-            assert_eq!((found.as_str(), supported), ("2", 1));
+    for version in ["0", "3", "4294967298", "-1", "1.5", "\"2\""] {
+        let other = text.replacen(
+            "\"format_version\": 2",
+            &format!("\"format_version\": {version}"),
+            1,
+        );
+        assert_ne!(other, text);
+        fs::write(&path, other).unwrap();
+        let error = CacheReader::open(dir.path()).unwrap_err();
+        assert!(matches!(error, CacheError::Format { .. }), "{error:?}");
+        let said = error.to_string();
+        let expected =
+            format!("cache format {version}, and this program reads 1 to 2: bake it anew");
+        assert!(said.contains(&expected) && !said.contains('\n'), "{said}");
+    }
+}
+
+/// A line as the program wrote it before a line listed its files by stream.
+fn line_of_format_1(entry: &Entry, manifest: Option<&str>) -> Vec<u8> {
+    let particles = entry.file(PARTICLES).unwrap();
+    let grids = entry.file(GRIDS).unwrap();
+    let rows = serde_json::to_string(&entry.rows[PROBES]).unwrap();
+    let manifest = manifest.map_or(String::new(), |hash| format!(r#""manifest":"{hash}","#));
+    format!(
+        r#"{{"frame":{frame},"file":"frames/tank.{frame:04}.ply","bytes":{},"blake3":"{}","particles":{},"grids":{{"file":"grids/tank.{frame:04}.vdb","bytes":{},"blake3":"{}"}},"probes":{rows},{manifest}"clock":{},"report":{}}}"#,
+        particles.bytes,
+        particles.blake3,
+        entry.particles,
+        grids.bytes,
+        grids.blake3,
+        serde_json::to_string(&entry.clock).unwrap(),
+        entry.report,
+        frame = entry.frame,
+    )
+    .into_bytes()
+}
+
+#[test]
+fn a_cache_of_the_first_format_is_read_and_not_gone_on_with() {
+    let dir = tempfile::tempdir().unwrap();
+    let d = dir.path();
+    bake_all_streams(d, 3);
+    let now = CacheReader::open(d).unwrap();
+    let text = fs::read_to_string(d.join("manifest.json")).unwrap();
+    let old = text.replacen("\"format_version\": 2", "\"format_version\": 1", 1);
+    let hash = blake3::hash(old.as_bytes()).to_hex();
+    let lines = |of: &dyn Fn(&Entry, Option<&str>) -> Vec<u8>| -> Vec<Vec<u8>> {
+        let entries = now.entries().iter();
+        entries
+            .map(|entry| of(entry, (entry.frame == 0).then_some(hash.as_str())))
+            .collect()
+    };
+    let write = |lines: &[Vec<u8>]| {
+        fs::write(d.join("manifest.json"), &old).unwrap();
+        fs::write(d.join(LEDGER), chained(old.as_bytes(), lines)).unwrap();
+    };
+    write(&lines(&line_of_format_1));
+    let reader = CacheReader::open(d).unwrap();
+    assert_eq!(reader.manifest().format_version, 1);
+    let report = reader.verify().unwrap();
+    assert_eq!(report, CacheReader::verify(&now).unwrap());
+    reader.check_beside(&[0, 1, 2, 3]).unwrap();
+    for (old, new) in reader.entries().iter().zip(now.entries()) {
+        let unchained = |entry: &Entry| Entry {
+            chain: String::new(),
+            manifest: None,
+            ..entry.clone()
+        };
+        assert_eq!(unchained(old), unchained(new));
+        assert_eq!(
+            reader.read(old.frame).unwrap(),
+            now.read(old.frame).unwrap()
+        );
+    }
+    // What its lines vouch for is still looked at.
+    let grids = d.join("grids/tank.0002.vdb");
+    let sound = fs::read(&grids).unwrap();
+    fs::write(&grids, &sound[1..]).unwrap();
+    assert_eq!(first_problem(d), grids);
+    fs::write(&grids, sound).unwrap();
+
+    let before = directory_hash(d).unwrap();
+    let refused = CacheWriter::resume(d, &manifest_of_all_streams()).unwrap_err();
+    let said = refused.to_string();
+    assert!(
+        said.contains("was baked with format_version = 1, and this run has 2; choose another -o"),
+        "{said}"
+    );
+    assert_eq!(directory_hash(d).unwrap(), before);
+
+    // A line of one format in a cache of the other is none.
+    let no_grids = |entry: &Entry, hash: Option<&str>| {
+        let line = String::from_utf8(line_of_format_1(entry, hash)).unwrap();
+        line.replace("\"grids\":", "\"meshes\":").into_bytes()
+    };
+    write(&lines(&no_grids));
+    assert_eq!(damaged_file(CacheReader::open(d)), d.join(LEDGER));
+    let newer = |entry: &Entry, _: Option<&str>| {
+        let files = serde_json::to_string(&entry.files).unwrap();
+        format!(
+            r#"{{"frame":{},"particles":7,"files":{files}}}"#,
+            entry.frame
+        )
+        .into_bytes()
+    };
+    write(&lines(&newer));
+    assert_eq!(damaged_file(CacheReader::open(d)), d.join(LEDGER));
+}
+
+/// Whatever stream the table gets, its files are verified, refused on resume, and cleared where a crash left them.
+#[test]
+fn every_stream_of_the_table_is_verified_and_resumed() {
+    let whole = tempfile::tempdir().unwrap();
+    bake_all_streams(whole.path(), 3);
+    let expected = directory_hash(whole.path()).unwrap();
+    for stream in &STREAMS {
+        assert!(stream.is_in(&manifest_of_all_streams()), "{}", stream.name);
+        let dir = tempfile::tempdir().unwrap();
+        let d = dir.path();
+        bake_all_streams(d, 2);
+        let folder = d.join(stream.folder);
+        // The last in the order of the names: of a stream with a file a frame the last frame's.
+        let path = folder.join(files(&folder).pop().unwrap());
+        let sound = fs::read(&path).unwrap();
+        let mut flipped = sound.clone();
+        flipped[sound.len() / 2] ^= 1;
+        fs::write(&path, flipped).unwrap();
+        assert_eq!(first_problem(d), path);
+        if stream.is_by_frame() {
+            let refused = CacheWriter::resume(d, &manifest_of_all_streams());
+            assert_eq!(damaged_file(refused), path);
+            fs::write(&path, sound).unwrap();
+            let of_3 = d.join(stream.frame_file("tank", 3));
+            fs::write(of_3, "a frame without a line").unwrap();
         }
-        other => panic!("{other:?}"),
+        fs::write(folder.join("half.tmp"), "half").unwrap();
+        let (writer, last, particles) = CacheWriter::resume(d, &manifest_of_all_streams()).unwrap();
+        assert_eq!(last.frame, 2);
+        go_on(writer, last.clock, particles, 3).unwrap();
+        assert_eq!(directory_hash(d).unwrap(), expected, "{}", stream.name);
+    }
+}
+
+#[test]
+fn a_line_lists_the_files_that_the_manifest_announces() {
+    let dir = tempfile::tempdir().unwrap();
+    let d = dir.path();
+    bake_all_streams(d, 1);
+    let manifest = fs::read(d.join("manifest.json")).unwrap();
+    let text = fs::read_to_string(d.join(LEDGER)).unwrap();
+    let content = |line: &str| format!("{}}}", &line[..line.rfind(",\"chain\":").unwrap()]);
+    let opened = |edit: &dyn Fn(&str) -> String| {
+        let lines: Vec<_> = text
+            .lines()
+            .map(|line| edit(&content(line)).into_bytes())
+            .collect();
+        fs::write(d.join(LEDGER), chained(&manifest, &lines)).unwrap();
+        CacheReader::open(d)
+    };
+    opened(&str::to_owned).unwrap();
+    let record = r#"{"file":"frames/tank.0001.ply","bytes":1,"blake3":""}"#;
+    let changes: [(&str, String); 7] = [
+        ("\"grids\":", "\"meshes\":".to_owned()),
+        ("\"particles\":{", "\"spray\":{".to_owned()),
+        ("\"files\":{", format!("\"files\":{{\"meshes\":{record},")),
+        ("grids/tank.0001", "../tank.0001".to_owned()),
+        ("frames/tank.0001", "frames/tank.0000".to_owned()),
+        ("\"rows\":{", "\"rows\":{\"spray\":[[1.0]],".to_owned()),
+        ("\"probes\":", "\"gauges\":".to_owned()),
+    ];
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        let refused = opened(&|line| line.replace(from, &to));
+        assert_eq!(damaged_file(refused), d.join(LEDGER), "{to}");
     }
 }
 

@@ -8,6 +8,7 @@ use swell::{
     cache::{
         CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, directory_hash,
         frame::Stamp,
+        stream::{GRIDS, PARTICLES},
         vdb::{self, Grids},
     },
     domain::{
@@ -329,13 +330,13 @@ fn a_cache_keeps_the_grids_of_each_frame_and_a_resumed_one_has_the_same_bytes() 
     let report = reader.verify().unwrap();
     let mut bytes = 0;
     for entry in reader.entries() {
-        let grids = entry.grids.as_ref().unwrap();
+        let grids = entry.file(GRIDS).unwrap();
         assert_eq!(grids.file, format!("grids/ball.{:04}.vdb", entry.frame));
         let content = fs::read(whole.path().join(&grids.file)).unwrap();
         assert_eq!(grids.bytes, content.len() as u64);
         assert_eq!(grids.blake3, blake3::hash(&content).to_hex().as_str());
         assert_eq!(vdb_print(&content).unwrap().len(), 2);
-        bytes += entry.bytes + grids.bytes;
+        bytes += entry.file(PARTICLES).unwrap().bytes + grids.bytes;
     }
     assert_eq!(report.bytes, bytes);
 

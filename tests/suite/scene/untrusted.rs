@@ -122,22 +122,6 @@ fn a_promise_of_a_trillion_is_refused_without_memory_for_it() {
     assert!(largest(|| drop(Vec::<u8>::with_capacity(2 * MODEST))) >= 2 * MODEST);
 }
 
-/// A ledger of lines with these contents, chained as ours are to a manifest with these bytes.
-fn chained(manifest: &[u8], lines: &[Vec<u8>]) -> Vec<u8> {
-    let mut chain = blake3::hash(manifest);
-    let mut ledger = Vec::new();
-    for line in lines {
-        let mut hasher = blake3::Hasher::new();
-        hasher.update(chain.as_bytes());
-        hasher.update(line);
-        chain = hasher.finalize();
-        let open = line.strip_suffix(b"}").unwrap_or(line);
-        ledger.extend_from_slice(open);
-        ledger.extend_from_slice(format!(",\"chain\":\"{}\"}}\n", chain.to_hex()).as_bytes());
-    }
-    ledger
-}
-
 /// Contents of the baked cache's ledger, line by line, with another manifest's hash.
 fn contents(manifest: &[u8]) -> Vec<Vec<u8>> {
     let text = fs::read_to_string(stand_in::baked().join("frames.jsonl")).unwrap();
@@ -169,7 +153,7 @@ fn read_all(manifest: &[u8], ledger: &[u8]) {
 #[test]
 fn the_seeds_are_a_cache() {
     let manifest = fs::read(stand_in::baked().join("manifest.json")).unwrap();
-    let ledger = chained(&manifest, &contents(&manifest));
+    let ledger = stand_in::chained(&manifest, &contents(&manifest));
     assert_eq!(
         ledger,
         fs::read(stand_in::baked().join("frames.jsonl")).unwrap()
@@ -183,7 +167,7 @@ fn the_seeds_are_a_cache() {
     fs::write(dir.path().join("manifest.json"), &other).unwrap();
     fs::write(
         dir.path().join("frames.jsonl"),
-        chained(&other, &contents(&other)),
+        stand_in::chained(&other, &contents(&other)),
     )
     .unwrap();
     CacheReader::open(dir.path()).unwrap().verify().unwrap();
@@ -195,7 +179,7 @@ proptest! {
     #[test]
     fn no_mutation_of_a_manifest_makes_a_reader_panic(edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6)) {
         let manifest = mutate(fs::read(stand_in::baked().join("manifest.json")).unwrap(), &edits);
-        read_all(&manifest, &chained(&manifest, &contents(&manifest)));
+        read_all(&manifest, &stand_in::chained(&manifest, &contents(&manifest)));
     }
 
     /// With chains that hold, so that each line gets as far as its own checks.
@@ -208,7 +192,7 @@ proptest! {
         let mut lines = contents(&manifest);
         let line = which.index(lines.len());
         lines[line] = mutate(std::mem::take(&mut lines[line]), &edits);
-        read_all(&manifest, &chained(&manifest, &lines));
+        read_all(&manifest, &stand_in::chained(&manifest, &lines));
     }
 
     #[test]
@@ -231,17 +215,20 @@ fn a_parent_at_the_last_frame_number_is_read_or_refused() {
         .replace("\"start_particles\"", &parent)
         .into_bytes();
     let lines = contents(&manifest);
-    read_all(&manifest, &chained(&manifest, &lines));
+    read_all(&manifest, &stand_in::chained(&manifest, &lines));
     let renumber = |line: &Vec<u8>, frame: u32| {
         let text = String::from_utf8(line.clone()).unwrap();
         let text = text.replace("\"frame\":0,", &format!("\"frame\":{frame},"));
         text.replace("tank.0000.", &format!("tank.{frame}."))
             .into_bytes()
     };
-    read_all(&manifest, &chained(&manifest, &[renumber(&lines[0], last)]));
     read_all(
         &manifest,
-        &chained(&manifest, &[renumber(&lines[0], last), lines[1].clone()]),
+        &stand_in::chained(&manifest, &[renumber(&lines[0], last)]),
+    );
+    read_all(
+        &manifest,
+        &stand_in::chained(&manifest, &[renumber(&lines[0], last), lines[1].clone()]),
     );
 }
 

@@ -6,10 +6,10 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 use swell::cache::{
-    self, Asset, CacheError, CacheReader, CacheWriter, Clock, Manifest, ProbeRecord, ProbeValues,
-    Summary,
+    self, Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, ProbeRecord,
+    ProbeValues, Summary,
 };
-use swell::domain::particles::Particles;
+use swell::domain::{particles::Particles, sparse_grid::Precision};
 use tempfile::TempDir;
 
 pub const SCENE: &str = "[shot]\nname = \"tank\"\n";
@@ -59,6 +59,36 @@ pub fn seen(clock: Clock) -> ProbeValues {
     let wet = !clock.frame.is_multiple_of(3);
     let at = |scale: f64| Some(scale * (1.0 + clock.time).ln());
     vec![vec![at(0.1).filter(|_| wet)], vec![at(1e20), at(-1e-7)]]
+}
+
+/// With every stream of the table.
+pub fn manifest_of_all_streams() -> Manifest {
+    let grids = GridRecord {
+        surface: true,
+        velocity: true,
+        voxel_size: 0.6,
+        origin: [0.0; 3],
+        precision: Precision::Half,
+    };
+    Manifest {
+        grids: Some(grids),
+        ..manifest()
+    }
+}
+
+pub fn bake_all_streams(dir: &Path, last: u32) {
+    let clock = Clock::default();
+    let manifest = manifest_of_all_streams();
+    let writer = CacheWriter::create(
+        dir,
+        manifest,
+        SCENE,
+        &assets(),
+        clock,
+        &start(),
+        &seen(clock),
+    );
+    go_on(writer.unwrap(), clock, start(), last).unwrap();
 }
 
 pub fn assets() -> Vec<Asset> {
@@ -204,4 +234,20 @@ pub fn ledger_holds(dir: &Path) -> u32 {
         reader.read(entry.frame).unwrap();
     }
     reader.last_frame()
+}
+
+/// A ledger of lines with these contents, chained as ours are to a manifest with these bytes.
+pub fn chained(manifest: &[u8], lines: &[Vec<u8>]) -> Vec<u8> {
+    let mut chain = blake3::hash(manifest);
+    let mut ledger = Vec::new();
+    for line in lines {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(chain.as_bytes());
+        hasher.update(line);
+        chain = hasher.finalize();
+        let open = line.strip_suffix(b"}").unwrap_or(line);
+        ledger.extend_from_slice(open);
+        ledger.extend_from_slice(format!(",\"chain\":\"{}\"}}\n", chain.to_hex()).as_bytes());
+    }
+    ledger
 }
