@@ -93,6 +93,7 @@ fn bake_and_render(
         frames: Some(comparison.pictures.clone()),
         gpu: request.adapter.clone().into(),
         overwrite: false,
+        time_passes: false,
     };
     Ok(render::render(&render, stop, &mut |event| tell(Event::Render(event)))?.interrupted)
 }
