@@ -12,7 +12,7 @@ use std::{
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Blame, study::gauge};
+use super::{Blame, gauge::of_caches};
 use crate::{
     cache::{self, CacheError, CacheReader, Manifest},
     compare::{baseline::Baseline, frames},
@@ -326,7 +326,7 @@ fn caches(a: &CacheReader, b: &CacheReader, request: &Request) -> Result<CacheDi
     for cache in [a, b] {
         cache.check_beside(&chosen)?;
     }
-    let gauge = gauge(&scene_of(b)?, &[b, a])?;
+    let gauge = of_caches(&scene_of(b)?, &[b, a])?;
     let (gravity_a, gravity_b) = (scene_of(a)?.water.gravity, scene_of(b)?.water.gravity);
     let frame = |&frame: &u32| {
         let [from, to] = [a, b].map(|cache| cache.manifest().origin.into());
