@@ -8,11 +8,11 @@ use clap::Args;
 use serde_json::json;
 
 use crate::{
-    domain::frame_range::FrameRange,
+    domain::frame_range::{FrameRange, ranges},
     scene::tolerance,
     stage::diff::{
         AggregatePeak, BaselineDiff, Basis, CacheDiff, Fault, Images, Outcome, PairDiff,
-        PicturesDiff, Request, Written, aggregate_peaks, diff, ranges, write_baseline,
+        PicturesDiff, Request, Written, aggregate_peaks, diff, write_baseline,
     },
 };
 

@@ -198,7 +198,51 @@ pub fn default_tolerances(spacing: f64) -> BTreeMap<String, StatedLimit> {
     DEFAULT_TOLERANCES.iter().map(stated).collect()
 }
 
+/// What a baseline that is written anew no longer has of the one before.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Lost {
+    /// Adapters whose hashes were of another scene or of other frames.
+    pub hashes: Vec<String>,
+    /// Whether spreads were, and with them the limits that they stood for.
+    pub has_spread: bool,
+}
+
 impl Baseline {
+    /// Takes over what holds on of the baseline that stood in its place. Of the same scene and frames that is all but the
+    /// aggregates, and these as well where they agree and are of an adapter that the old one did not know.
+    pub fn inherit(&mut self, before: Self, is_same_scene: bool, measured: &[Measured]) -> Lost {
+        let adapter = self.aggregates_from.clone();
+        let number = |frame: &BaselineFrame| frame.frame;
+        let has_spread = !before.spread_from.is_empty();
+        let is_same_frames = before
+            .frames
+            .iter()
+            .map(number)
+            .eq(self.frames.iter().map(number));
+        if !is_same_scene || !is_same_frames {
+            if !has_spread {
+                self.tolerances = before.tolerances;
+            }
+            let mut hashes: Vec<String> = before.hashes.into_keys().collect();
+            hashes.retain(|other| *other != adapter);
+            return Lost { hashes, has_spread };
+        }
+        let (basis, faults) = before.compare(Some(&adapter), measured);
+        let is_new_adapter = !before.hashes.contains_key(&adapter);
+        if is_new_adapter && basis == Basis::Aggregates && faults.is_empty() {
+            self.aggregates_from = before.aggregates_from;
+            self.frames = before.frames;
+        } else {
+            for (frame, old) in self.frames.iter_mut().zip(before.frames) {
+                frame.spread = old.spread;
+            }
+        }
+        self.hashes = before.hashes;
+        self.tolerances = before.tolerances;
+        self.spread_from = before.spread_from;
+        Lost::default()
+    }
+
     /// Compares frames with the baseline's, those that both have. On an `adapter` that it knows the hashes have to be the
     /// same; the aggregates are judged there as well, and tell a rounding from a change. `None` ignores the hashes.
     pub fn compare(

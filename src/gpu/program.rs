@@ -6,6 +6,7 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
     adapter::{Context, GpuError, Spoil},
+    buffer::{Buf, Element, Wanted, Windows},
     reflect::{Access, Binding, reflect},
     shader,
 };
@@ -130,29 +131,47 @@ impl Program {
         )
     }
 
-    /// Writes `data` at `offset` bytes of a buffer, before whatever is submitted next.
-    pub fn upload<T: bytemuck::NoUninit>(&self, name: &str, offset: u64, data: &[T]) {
-        if !data.is_empty() {
-            self.context
-                .queue
-                .write_buffer(self.buffer(name), offset, bytemuck::cast_slice(data));
+    /// Writes `data` from value `first` of a buffer on, before whatever is submitted next.
+    pub fn upload<T: bytemuck::NoUninit>(&self, buffer: Buf<T>, first: usize, data: &[T]) {
+        self.write(
+            buffer.name(),
+            buffer.place(first),
+            bytemuck::cast_slice(data),
+        );
+    }
+
+    /// Writes `values` into the first windows of a uniform, before whatever is submitted next.
+    pub fn upload_windows<T: Element>(&self, windows: &Windows<T>, values: &[T]) {
+        self.write(windows.name(), 0, &Windows::bytes(values));
+    }
+
+    fn write(&self, name: &str, offset: u64, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            let queue = &self.context.queue;
+            queue.write_buffer(self.buffer(name), offset, bytes);
         }
     }
 
-    /// Reads the first `counts[k]` values of `T` from buffer `names[k]`, waiting for the device once.
+    /// The first `count` values of a buffer; waits for the device.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
-    pub fn download<T: bytemuck::Pod>(
-        &self,
-        wanted: &[(&str, usize)],
-    ) -> Result<Vec<Vec<T>>, GpuError> {
+    pub fn read<T: bytemuck::Pod>(&self, buffer: Buf<T>, count: usize) -> Result<Vec<T>, GpuError> {
+        self.download(buffer.first(count))
+    }
+
+    /// The first values of several buffers, waiting for the device once.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn download<W: Wanted>(&self, wanted: W) -> Result<W::Values, GpuError> {
         let context = &self.context;
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        let staging: Vec<Option<Buffer>> = wanted
+        let spans = wanted.spans();
+        let staging: Vec<Option<Buffer>> = spans
             .iter()
-            .map(|&(name, count)| {
-                let bytes = (count * size_of::<T>()).next_multiple_of(4) as u64;
+            .map(|&(name, offset, bytes)| {
+                let bytes = bytes.next_multiple_of(4) as u64;
                 (bytes > 0).then(|| {
                     let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
                         label: Some("readback"),
@@ -160,7 +179,7 @@ impl Program {
                         usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
                         mapped_at_creation: false,
                     });
-                    encoder.copy_buffer_to_buffer(self.buffer(name), 0, &buffer, 0, bytes);
+                    encoder.copy_buffer_to_buffer(self.buffer(name), offset, &buffer, 0, bytes);
                     buffer
                 })
             })
@@ -171,20 +190,18 @@ impl Program {
             buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         }
         context.wait()?;
-        let mut out = Vec::with_capacity(wanted.len());
-        for (buffer, &(_, count)) in staging.iter().zip(wanted) {
-            let Some(buffer) = buffer else {
-                out.push(Vec::new());
-                continue;
-            };
-            let view = buffer
-                .get_mapped_range(..)
-                .map_err(|error| GpuError::Lost(error.to_string()))?;
-            out.push(bytemuck::pod_collect_to_vec(
-                &view[..count * size_of::<T>()],
-            ));
-        }
-        Ok(out)
+        let views = staging
+            .iter()
+            .map(|buffer| buffer.as_ref().map(|buffer| buffer.get_mapped_range(..)));
+        let views = views
+            .map(Option::transpose)
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|error| GpuError::Lost(error.to_string()))?;
+        let mut bytes = views
+            .iter()
+            .zip(&spans)
+            .map(|(view, &(_, _, bytes))| view.as_ref().map_or(&[][..], |view| &view[..bytes]));
+        Ok(W::values(&mut bytes))
     }
 }
 

@@ -224,12 +224,10 @@ pub fn bake(
             report,
             ..
         } = step;
-        clock = Clock {
-            frame,
-            time: f64::from(frame) / scene.shot.frames_per_second,
-            substeps: report.substeps,
-            steps: clock.steps + u64::from(report.substeps),
-        };
+        clock.frame = frame;
+        clock.time = f64::from(clock.frame) / scene.shot.frames_per_second;
+        clock.substeps = report.substeps;
+        clock.steps += u64::from(report.substeps);
         let extra = json!({ "seconds": seconds });
         writer.submit(clock, particles, seen, to_json(&report), extra)?;
         if frame == first {

@@ -126,7 +126,7 @@ impl Branch {
             solver: manifest.solver.clone(),
             scene_hash: manifest.scene_hash.clone(),
             frame: from.frame,
-            blake3: entry.blake3.clone(),
+            blake3: cache.frame_hash(from.frame)?.to_owned(),
         };
         let mut notes = Vec::new();
         if origin != scene.origin {

@@ -254,7 +254,7 @@ fn enter(request: &Request, cache: &CacheReader, frames: &[u32]) -> Result<Folde
         },
         names: names.into_iter().map(|(name, _)| name).collect(),
         overwrite: request.overwrite,
-        frame_hash: &|frame| cache.entry(frame).ok().map(|entry| entry.blake3.clone()),
+        frame_hash: &|frame| cache.frame_hash(frame).ok().map(str::to_owned),
     };
     Ok(Folder::enter(&request.directory, &wanted)?)
 }
@@ -348,7 +348,7 @@ fn attributes(cache: &CacheReader, look: &Look, frame: u32) -> Result<Attributes
         shot: manifest.shot.clone(),
         software: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
         scene_hash: manifest.scene_hash.clone(),
-        cache_hash: cache.entry(frame)?.blake3.clone(),
+        cache_hash: cache.frame_hash(frame)?.to_owned(),
         look_hash: look.hash(),
     })
 }

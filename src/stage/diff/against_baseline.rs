@@ -9,17 +9,21 @@ use std::{
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{DiffError, adapter_of, aggregates, bake_of, of_caches, physics, scene_of};
+use super::{DiffError, Request, adapter_of, aggregates, bake_of, of_caches, physics, scene_of};
 use crate::{
     cache::{CacheError, CacheReader},
     compare::{
         baseline::{
-            Baseline, BaselineFault, BaselineFrame, Basis, FORMAT_VERSION, Measured,
+            Baseline, BaselineFault, BaselineFrame, Basis, FORMAT_VERSION, Lost, Measured,
             default_tolerances, particles_hash,
         },
         spread,
     },
-    domain::{aggregates::Aggregates, frame_range::FrameRange, tolerance::Limit},
+    domain::{
+        aggregates::Aggregates,
+        frame_range::{FrameRange, ranges},
+        tolerance::Limit,
+    },
 };
 
 /// What differs between a cache and a baseline.
@@ -77,53 +81,41 @@ pub struct Written {
 
 /// Reads a baseline.
 pub(super) fn read(file: &Path) -> Result<Baseline, DiffError> {
-    let fault = |what: String| DiffError::Baseline {
+    let text = fs::read_to_string(file).map_err(DiffError::at(file))?;
+    let found: Result<Baseline, String> =
+        serde_json::from_str(&text).map_err(|error| error.to_string());
+    let checked = found.and_then(|found| found.check().map(|()| found));
+    checked.map_err(|what| DiffError::Baseline {
         file: file.to_owned(),
         what,
-    };
-    let text = fs::read_to_string(file).map_err(|source| DiffError::File {
-        file: file.to_owned(),
-        source,
-    })?;
-    let found: Baseline = serde_json::from_str(&text).map_err(|error| fault(error.to_string()))?;
-    found.check().map_err(fault)?;
-    Ok(found)
+    })
 }
 
 pub(super) fn compare(
     cache: &CacheReader,
     baseline: &Baseline,
-    file: &Path,
-    frames: Option<&FrameRange>,
-    ignores_hashes: bool,
+    request: &Request,
 ) -> Result<BaselineDiff, DiffError> {
-    let known = baseline.frames.iter().map(|frame| frame.frame);
-    let wanted: Vec<u32> = match frames {
-        Some(frames) => frames.iter().collect(),
-        None => known.clone().collect(),
-    };
-    if let Some(frame) = wanted
-        .iter()
-        .find(|&&frame| !known.clone().any(|k| k == frame))
-    {
-        return Err(DiffError::Usage(format!(
-            "--frames {frame}: {} has frames {}",
-            file.display(),
-            ranges(&known.collect::<Vec<_>>())
-        )));
-    }
-    if frames.is_some() {
+    let known: Vec<u32> = baseline.frames.iter().map(|frame| frame.frame).collect();
+    let asked: Option<Vec<u32>> = request.frames.as_ref().map(|range| range.iter().collect());
+    for &frame in asked.iter().flatten() {
+        if !known.contains(&frame) {
+            return Err(DiffError::usage(format!(
+                "--frames {frame}: {} has frames {}",
+                request.b.display(),
+                ranges(&known)
+            )));
+        }
         // Asked for by number: missing is an error and no difference.
-        wanted
-            .iter()
-            .try_for_each(|&frame| cache.entry(frame).map(|_| ()))?;
+        cache.entry(frame)?;
     }
-    let (there, only_baseline): (Vec<u32>, Vec<u32>) = wanted
+    let (there, only_baseline): (Vec<u32>, Vec<u32>) = asked
+        .unwrap_or(known)
         .into_iter()
         .partition(|&frame| cache.entry(frame).is_ok());
     let measured = measure(cache, &there)?;
     let adapter = adapter_of(cache.manifest());
-    let adapter = (!ignores_hashes).then_some(adapter.as_str());
+    let adapter = (!request.ignores_hashes).then_some(adapter.as_str());
     let (basis, faults) = baseline.compare(adapter, &measured);
     let pair = |found: &Measured| {
         let frame = found.frame.frame;
@@ -137,10 +129,10 @@ pub(super) fn compare(
     Ok(BaselineDiff {
         bake: bake_of(cache.manifest()),
         basis,
-        ignores_hashes,
+        ignores_hashes: request.ignores_hashes,
         known_adapters: baseline.hashes.keys().cloned().collect(),
         aggregates_from: baseline.aggregates_from.clone(),
-        physics: physics(file, &baseline.scene.join("\n"), cache.scene_toml())?,
+        physics: physics(&request.b, &baseline.scene.join("\n"), cache.scene_toml())?,
         only_baseline,
         frames: measured.iter().filter_map(pair).collect(),
         faults,
@@ -185,22 +177,11 @@ pub fn write_baseline(
         frames: measured.iter().map(|m| m.frame.clone()).collect(),
         hashes: BTreeMap::new(),
     };
-    let mut dropped = Vec::new();
-    let mut is_spread_dropped = false;
+    let mut lost = Lost::default();
     if let Some(before) = before {
         let old_scene = before.scene.join("\n");
         let is_same_scene = physics(file, &old_scene, cache.scene_toml())?.is_none();
-        let numbers = before.frames.iter().map(|frame| frame.frame);
-        if is_same_scene && numbers.eq(frames.iter().copied()) {
-            carry_over(&mut baseline, before, &measured);
-        } else {
-            is_spread_dropped = spread.is_empty() && !before.spread_from.is_empty();
-            if before.spread_from.is_empty() {
-                baseline.tolerances = before.tolerances;
-            }
-            dropped = before.hashes.into_keys().collect();
-            dropped.retain(|other| *other != adapter);
-        }
+        lost = baseline.inherit(before, is_same_scene, &measured);
     }
     if !spread.is_empty() {
         take_spread(&mut baseline, &cache, spread, &frames)?;
@@ -213,28 +194,10 @@ pub fn write_baseline(
         adapter,
         frames: frames.len(),
         is_unchanged,
-        dropped,
-        is_spread_dropped,
+        dropped: lost.hashes,
+        is_spread_dropped: lost.has_spread && spread.is_empty(),
         spread_from: baseline.spread_from,
     })
-}
-
-/// What stays of a baseline of the same scene and frames.
-fn carry_over(baseline: &mut Baseline, before: Baseline, measured: &[Measured]) {
-    let adapter = baseline.aggregates_from.clone();
-    let (basis, faults) = before.compare(Some(&adapter), measured);
-    let is_new_adapter = !before.hashes.contains_key(&adapter);
-    if is_new_adapter && basis == Basis::Aggregates && faults.is_empty() {
-        baseline.aggregates_from = before.aggregates_from;
-        baseline.frames = before.frames;
-    } else {
-        for (frame, old) in baseline.frames.iter_mut().zip(before.frames) {
-            frame.spread = old.spread;
-        }
-    }
-    baseline.hashes = before.hashes;
-    baseline.tolerances = before.tolerances;
-    baseline.spread_from = before.spread_from;
 }
 
 /// Measures how far the frames of `cache` and those of bakes that differ in roundings alone come apart.
@@ -258,7 +221,7 @@ fn take_spread(
         let changed = physics(cache.dir(), cache.scene_toml(), other.scene_toml())?;
         let refuse = |why: &str| {
             let path = path.display();
-            Err(DiffError::Usage(format!("--spread {path}: {why}")))
+            Err(DiffError::usage(format!("--spread {path}: {why}")))
         };
         if other.manifest().solver != cache.manifest().solver {
             return refuse("another solver is no rounding");
@@ -286,10 +249,7 @@ fn take_spread(
 }
 
 fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
-    let fault = |source| DiffError::File {
-        file: file.to_owned(),
-        source,
-    };
+    let fault = DiffError::at(file);
     let mut text = serde_json::to_vec_pretty(baseline).map_err(|error| fault(error.into()))?;
     text.push(b'\n');
     fs::write(file, text).map_err(fault)
@@ -306,21 +266,11 @@ fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffErr
             frame: BaselineFrame {
                 frame,
                 particles: particles.len(),
-                aggregates: aggregates(cache, &gauge, scene.water.gravity, frame, &particles)?,
+                aggregates: aggregates(cache, &scene, &gauge, frame, &particles)?,
                 spread: None,
             },
         })
     };
     let measured: Result<_, CacheError> = frames.par_iter().map(one).collect();
     Ok(measured?)
-}
-
-/// Ascending numbers as a person writes them: `0-4, 7`.
-pub fn ranges(numbers: &[u32]) -> String {
-    let runs = numbers.chunk_by(|a, b| a.checked_add(1) == Some(*b));
-    let run = |run: &[u32]| match run {
-        [first, .., last] => format!("{first}-{last}"),
-        other => other.iter().map(u32::to_string).collect(),
-    };
-    runs.map(run).collect::<Vec<_>>().join(", ")
 }
