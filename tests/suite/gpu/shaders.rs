@@ -228,8 +228,8 @@ fn composition_faults_name_their_place() {
     assert!(fault.contains("test"), "{fault}");
 }
 
-/// Rooms that each room may import; `stage` and `cli` stand above them all.
-const MAY_IMPORT: [(&str, &[&str]); 11] = [
+/// Rooms that each room may import; `stage`, `experiment` and `cli` stand above them all.
+const MAY_IMPORT: [(&str, &[&str]); 12] = [
     ("domain", &[]),
     ("gpu", &[]),
     // The plan's rows are gpu's own plain descriptions: a copy of them would have to be kept in step.
@@ -254,7 +254,20 @@ const MAY_IMPORT: [(&str, &[&str]); 11] = [
             "study",
         ],
     ),
-    ("cli", &["stage", "scene", "domain"]),
+    (
+        "experiment",
+        &[
+            "domain",
+            "gpu",
+            "scene",
+            "cache",
+            "solve",
+            "reference",
+            "study",
+            "stage",
+        ],
+    ),
+    ("cli", &["stage", "experiment", "scene", "domain"]),
 ];
 
 /// Crates that only some rooms name.
