@@ -174,6 +174,14 @@ impl Plan {
         }
     }
 
+    /// Every command that a solver of this plan for `scene` may run.
+    pub fn commands(&self, scene: &Scene) -> Vec<Command> {
+        match scene.solver.method {
+            Method::Pbf => pbf::plan::commands(self, scene),
+            Method::Flip => flip::plan::commands(self, scene),
+        }
+    }
+
     /// One whose buffers and passes are yet to come.
     pub(super) fn bare(counts: Counts, grid_dims: [u32; 3]) -> Self {
         Self {
@@ -249,10 +257,7 @@ pub(super) fn in_order<'a>(
 ) -> impl Iterator<Item = &'static str> {
     let mut names: Vec<&'static str> = Vec::new();
     for command in commands {
-        match command {
-            Command::Dispatch { pass, .. } if !names.contains(pass) => names.push(pass),
-            Command::Dispatch { .. } | Command::Clear(_) => {}
-        }
+        names.extend(command.pass().filter(|pass| !names.contains(pass)));
     }
     names.into_iter()
 }

@@ -126,7 +126,7 @@ impl Flip {
         Ok(Self {
             recordings: recordings(&program, &plan, scene),
             pressure: pressure_solver(scene, &plan),
-            timer: if is_timed { Timer::new(context) } else { None },
+            timer: is_timed.then(|| Timer::new(context)),
             bricks,
             program,
             limits: device_limits(context),
@@ -303,14 +303,14 @@ impl Flip {
         substep: &Substep,
         run: &mut Run<'_>,
     ) -> Result<pressure::Projected, SolveError> {
-        let step = pressure::Step {
+        let scale = pressure::Scale {
             time_step: substep.length,
             rest_density: self.scene.water.rest_density,
         };
         let cell_size = self.scene.solver.flip().cell_size;
         self.pressure
             .set_topology(&self.program, &self.bricks, cell_size);
-        self.pressure.project_by(&self.program, step, run)
+        self.pressure.project_by(&self.program, scale, run)
     }
 
     fn run_substep(
@@ -523,12 +523,7 @@ impl Solver for Flip {
     }
 
     fn timings(&self) -> Vec<(&'static str, f64, u64)> {
-        let total = self.timer.as_ref().map(|timer| &timer.total);
-        total
-            .into_iter()
-            .flatten()
-            .map(|(&name, &(seconds, runs))| (name, seconds, runs))
-            .collect()
+        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
     }
 }
 

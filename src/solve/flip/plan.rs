@@ -5,7 +5,7 @@ use crate::{
         bricks::{CELLS, table_dims},
         flip::{layers, stored_cells},
     },
-    gpu::{program::PassSpec, sort},
+    gpu::{program::PassSpec, recording::Command, sort},
     scene::{
         Scene,
         flip::{Surface, Transfer},
@@ -58,6 +58,17 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts) -> Plan {
     );
     plan.add_passes(in_order(commands.after_projection()).map(&plain), &[]);
     plan
+}
+
+/// Every command of a substep, of projections of any shape among them.
+pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
+    let flip = scene.solver.flip();
+    let effects = effects::of_flip(&scene.effects, CELLS as usize * plan.counts.bricks.slots);
+    let commands = Commands::new(plan, scene, &effects);
+    let projection = pressure::all_commands(flip.pressure.preconditioner, flip.density_correction);
+    let before = commands.before_projection().cloned();
+    let after = commands.after_projection().cloned();
+    before.chain(projection).chain(after).collect()
 }
 
 /// Conditions that hold for the whole plan; a pass that does not ask ignores them.

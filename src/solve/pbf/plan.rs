@@ -2,7 +2,7 @@
 
 use crate::{
     domain::sph::Calibration,
-    gpu::{program::PassSpec, sort},
+    gpu::{program::PassSpec, recording::Command, sort},
     scene::{Iteration, Scene, Stop},
     solve::{
         effects,
@@ -49,6 +49,13 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits
     });
     plan.add_passes(specs, &effects);
     plan
+}
+
+/// Every command of a substep and of a frame's end.
+pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
+    let effects = effects::of_pbf(&scene.effects, plan.counts.particles);
+    let commands = Commands::new(plan, scene, &effects);
+    [commands.substep, commands.measure].concat()
 }
 
 fn choose_lists(plan: &mut Plan, limits: DeviceLimits) {

@@ -17,7 +17,6 @@ use swell::{
     },
     solve::{
         flip::{Flip, capacity},
-        params::SolidGrids,
         plan::{Counts, Plan, device_limits},
     },
 };
@@ -333,7 +332,6 @@ fn a_box_that_dips_into_a_tank_lifts_its_water_by_what_it_displaces() {
 
 #[test]
 fn scenes_without_moving_solids_have_nothing_for_them() {
-    assert_eq!(SOLID_GRIDS_BYTES, size_of::<SolidGrids>() as u64);
     let context = context();
     let mut scene = scene([8.0; 3]);
     let particles = water([0; 3], [4; 3], BOX);
