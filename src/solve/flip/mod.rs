@@ -173,10 +173,10 @@ impl Flip {
     /// The device.
     pub fn field<T: bytemuck::Pod>(
         &self,
-        buffer: impl Into<Buf<T>>,
+        buffer: Buf<T>,
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.read(buffer.into(), count)?)
+        Ok(self.program.read(buffer, count)?)
     }
 
     fn survey(&mut self, run: &mut Run<'_>) -> Result<Survey, SolveError> {

@@ -28,7 +28,7 @@ use crate::{
     solve::{
         SolveError,
         params::{Counters, IterationControl, Phase},
-        pbf::Pbf,
+        pbf::{Pbf, buffers::PREDICTED},
         plan::Plan,
         trace::{Span, TraceFrame, Traced},
     },
@@ -153,7 +153,7 @@ impl<'a> Checker<'a> {
     /// Samples on solids as the device has them are inputs of its passes; here they are outputs of the upload.
     fn take_samples(&mut self, solver: &Pbf) -> Result<(), SolveError> {
         let (n, samples) = (self.n(), self.plan.counts.boundary_samples);
-        let all = solver.field::<[f32; 4]>("predicted", 2 * n + samples)?;
+        let all = solver.field(PREDICTED, 2 * n + samples)?;
         if samples == 0 {
             return Ok(());
         }
