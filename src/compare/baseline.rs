@@ -31,14 +31,14 @@ pub struct Baseline {
     pub scene: Vec<String>,
     /// Limits of the aggregates by name, each with its reason.
     pub tolerances: BTreeMap<String, StatedLimit>,
-    /// What differs in the bakes that the frames' spreads are from; empty where none was measured.
+    /// Descriptions of the bakes that the frames' spreads are from; empty where none was measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spread_from: Vec<String>,
     /// The adapter on which the aggregates were taken.
     pub aggregates_from: String,
-    /// From the start, 0, on.
+    /// Frames in order, from the start, 0.
     pub frames: Vec<BaselineFrame>,
-    /// By adapter and driver: [`particles_hash`] of each frame of `frames`.
+    /// [`particles_hash`] of each frame of `frames`, by adapter and driver.
     pub hashes: BTreeMap<String, Vec<String>>,
 }
 
@@ -50,7 +50,7 @@ pub struct BaselineFrame {
     pub frame: u32,
     /// How many.
     pub particles: usize,
-    /// What they sum up to.
+    /// Sums and shapes over them.
     pub aggregates: Aggregates,
     /// How far bakes that differ in roundings alone had come apart by then; absent where that was not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -279,8 +279,8 @@ impl Baseline {
         hashes.and_then(|hashes| hashes.get(index)) == Some(&found.hash)
     }
 
-    /// What the aggregates of a frame may differ by; none of a frame that the baseline has not. Of the particles that they
-    /// were taken from it is the rounding of a sum of n terms of one sign, n ε of the sum (Higham 2002, eq. 4.4).
+    /// Limits of a frame's aggregates; empty for a frame that the baseline does not have. Where the particles are the same
+    /// bit for bit, the limit is the rounding of a sum of n terms of one sign, n ε of the sum (Higham 2002, eq. 4.4).
     pub fn limits(&self, adapter: Option<&str>, found: &Measured) -> BTreeMap<String, Limit> {
         let mut frames = self.frames.iter().enumerate();
         let Some((index, expected)) = frames.find(|(_, f)| f.frame == found.frame.frame) else {
@@ -308,10 +308,10 @@ impl Baseline {
         self.tolerances.iter().map(limit).collect()
     }
 
-    /// What is off with a baseline that was read.
+    /// Refuses a baseline, just read, that is not consistent.
     ///
     /// # Errors
-    /// The first thing, in words.
+    /// The first fault, in words.
     pub fn check(&self) -> Result<(), String> {
         if self.format_version != FORMAT_VERSION {
             return Err(format!(

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::domain::statistics::percentile;
 
-/// What can be compared: scalars and 3-vectors, f32 or f64.
+/// A type that can be compared: scalars and 3-vectors, f32 or f64.
 pub trait Value: Copy {
     /// The Euclidean norm.
     fn norm(self) -> f64;
@@ -84,7 +84,7 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// Of pairs of a value and its reference.
+    /// Measures pairs of a value and its reference.
     pub fn of<T: Value>(pairs: impl IntoIterator<Item = (T, T)>) -> Self {
         let mut reference_squares = 0.0;
         let mut this = Self::default();
@@ -111,7 +111,7 @@ impl Deviation {
         this
     }
 
-    /// Of one array against another.
+    /// Measures one array against another.
     ///
     /// # Panics
     /// The lengths differ.

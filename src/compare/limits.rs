@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::aggregates::Aggregates;
 
-/// For a scene whose spread was not measured ([`super::spread`]): name, absolute limit in particle spacings of lengths
-/// and plain of the others, relative limit, reason. Wide enough for water after an impact with either solver: the
+/// Limits for a scene whose spread was not measured ([`super::spread`]): name, absolute limit (lengths in particle
+/// spacings, all else in its own unit), relative limit, reason. Wide enough for water after an impact with either solver: the
 /// measurements are the largest over the shipped scenes in the frames that `tools/regress` bakes, with gravity changed
 /// in its last place (-9.81 to -9.810001, `swell diff --json`).
 const DEFAULT_TOLERANCES: [(&str, f64, f64, &str); 8] = [
@@ -65,11 +65,11 @@ const DEFAULT_TOLERANCES: [(&str, f64, f64, &str); 8] = [
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StatedLimit {
-    /// In the aggregate's unit.
+    /// Absolute part, in the aggregate's unit.
     pub absolute: f64,
-    /// Of the baseline's value.
+    /// Part relative to the baseline's value.
     pub relative: f64,
-    /// Of the frame's spread. The three add up.
+    /// Multiples of the frame's spread. The three parts add up.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub spreads: f64,
     /// In words.
@@ -80,7 +80,7 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// What a new baseline allows its aggregates; particles are `spacing` metres apart at rest.
+/// Limits that a new baseline sets its aggregates; particles are `spacing` metres apart at rest.
 pub fn default_tolerances(spacing: f64) -> BTreeMap<String, StatedLimit> {
     let is_length = |name: &str| Aggregates::NAMES.contains(&(name, "m"));
     let stated = |&(name, absolute, relative, reason): &(&str, f64, f64, &str)| {

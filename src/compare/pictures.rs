@@ -18,7 +18,7 @@ pub enum Encoding {
     Linear,
 }
 
-/// What is compared of a picture; rows from the top.
+/// A picture to compare; rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Pixels.
@@ -27,19 +27,19 @@ pub struct Picture {
     pub height: usize,
     /// Red, green, blue, alpha; `width × height`.
     pub pixels: Vec<[f32; 4]>,
-    /// What the values mean.
+    /// Meaning of the values.
     pub encoding: Encoding,
 }
 
-/// What differs between two pictures. A pixel's error is the largest |a − b| of its channels, in the
+/// Measures of how far two pictures differ. A pixel's error is the largest |a − b| of its channels, in the
 /// file's own values: of a PNG 1 is 255, of an EXR 1 is scene-linear white.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PictureDiff {
-    /// Mean over the pixels.
+    /// Mean error over the pixels.
     pub mean: f64,
     /// The error that 99 % of the pixels do not exceed.
     pub p99: f64,
-    /// Of the worst pixel; infinite (null in JSON) where a value is not finite.
+    /// Error of the worst pixel; infinite (null in JSON) where a value is not finite.
     pub max: f64,
     /// Column and row of the first such pixel, from the upper left; `None` where there is no error.
     pub max_at: Option<[usize; 2]>,
@@ -55,9 +55,9 @@ pub struct PictureDiff {
 pub struct PictureFault {
     /// `mean`, `p99`, `max`, `perceptual`, or `bits`.
     pub measure: &'static str,
-    /// As found.
+    /// The value found.
     pub value: f64,
-    /// As allowed; the least of a perceptual score.
+    /// The largest value allowed; the least, of a perceptual score.
     pub limit: f64,
 }
 
@@ -130,7 +130,7 @@ pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
 }
 
 impl PictureDiff {
-    /// What is out of the limits; without any, every bit has to be the same.
+    /// Lists the measures that are out of the limits; without limits, every bit has to be the same.
     pub fn faults(&self, limits: Option<&PictureLimits>) -> Vec<PictureFault> {
         let Some(limits) = limits else {
             let fault = PictureFault {

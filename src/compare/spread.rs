@@ -23,10 +23,10 @@ const SPREADS: f64 = 5.0;
 /// Eight roundings of a 32-bit value: what sums of such values are good to where no bake shows a spread.
 const ROUNDINGS: f64 = 8.0 * f32::EPSILON as f64;
 
-/// By name of the aggregate.
+/// Largest difference of each aggregate, by its name.
 pub type Spread = BTreeMap<String, f64>;
 
-/// What an aggregate cannot be told from, whatever was measured: name, absolute, relative, why. Particles are
+/// Least difference that can be told in each aggregate, whatever was measured: name, absolute, relative, why. Particles are
 /// `spacing` metres apart at rest; lengths and volumes come from cubes two spacings wide, which hold 8 of them
 /// (see `study::measure`).
 fn resolution(spacing: f64, particles: usize) -> [(&'static str, f64, f64, &'static str); 8] {
@@ -64,7 +64,7 @@ fn resolution(spacing: f64, particles: usize) -> [(&'static str, f64, f64, &'sta
     ]
 }
 
-/// By frame of `expected`: the largest |a − b| of each aggregate in this frame or an earlier one, over all of `bakes`,
+/// For each frame of `expected` the largest |a − b| of each aggregate in this frame or an earlier one, over all of `bakes`,
 /// whose frames are those of `expected`. What one side alone has is left out, as it is where a baseline is compared.
 pub fn of(expected: &[Aggregates], bakes: &[Vec<Aggregates>]) -> Vec<Spread> {
     let names = Aggregates::NAMES.map(|(name, _)| name);

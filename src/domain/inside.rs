@@ -15,7 +15,7 @@ pub enum NoInside {
     /// A tube, or a sheet.
     #[error("the mesh is open and has no inside: {why}; {holes}{parts}; close the mesh")]
     Open {
-        /// What is amiss with the part that they are in.
+        /// The fault of the part that they are in.
         why: &'static str,
         /// The holes of that part.
         holes: Holes,
@@ -38,7 +38,7 @@ pub enum NoInside {
         first: u32,
         /// Index of the other.
         second: u32,
-        /// Its end points.
+        /// End points of the edge.
         edge: String,
     },
 }

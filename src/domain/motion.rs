@@ -25,7 +25,7 @@ pub enum Motion {
     },
     /// x = stroke/2 · (1 − cos 2πt/period), grown from rest by a smooth ramp.
     Sine {
-        /// From the innermost to the outermost position, metres.
+        /// Distance from the innermost to the outermost position, metres.
         stroke: f64,
         /// Seconds.
         period: f64,

@@ -24,6 +24,7 @@ mod cache {
 mod check;
 mod cli {
     mod pipeline;
+    mod shaders;
     #[cfg(target_os = "linux")]
     mod terminal;
 }
@@ -41,6 +42,7 @@ mod experiment {
 }
 mod gpu {
     mod device_faults;
+    mod raster;
     mod shaders;
     mod sort;
 }
