@@ -76,7 +76,7 @@ fn bake_and_render(
         frames: FrameRange::inclusive(1, last),
         resume: true,
         from: None,
-        device: Device::Gpu(request.adapter.clone()),
+        device: Device::Gpu(request.adapter.clone().into()),
         time_passes: false,
     };
     let mut tell = |event| (bench.tell)(Event::Bake(Box::new(event)));
@@ -88,8 +88,9 @@ fn bake_and_render(
         look: comparison.look.clone(),
         directory: picture_directory(request, scene),
         frames: Some(comparison.pictures.clone()),
-        adapter: request.adapter.clone(),
+        gpu: request.adapter.clone().into(),
         overwrite: false,
+        time_passes: false,
     };
     let mut tell = |event| (bench.tell)(Event::Render(event));
     match render::render(&render, stop, &mut tell)?.interrupted {

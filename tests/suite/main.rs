@@ -24,6 +24,7 @@ mod cache {
 mod check;
 mod cli {
     mod pipeline;
+    mod shaders;
     #[cfg(target_os = "linux")]
     mod terminal;
 }
@@ -32,6 +33,7 @@ mod compare {
     mod renders;
 }
 mod domain {
+    mod circles;
     mod signed_distance;
 }
 mod experiment {
@@ -40,6 +42,7 @@ mod experiment {
 }
 mod gpu {
     mod device_faults;
+    mod raster;
     mod shaders;
     mod sort;
 }

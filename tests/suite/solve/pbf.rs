@@ -1,125 +1,19 @@
 //! PBF on the GPU: against a naive f64 twin, against analysis, and what must hold in any run.
+mod naive;
 mod pairs;
+mod solids;
 
+use self::naive::Naive;
 use crate::support::*;
 use glam::DVec3;
 use swell::{
-    domain::{
-        boundary::Boundary,
-        bounds::Bounds,
-        budget::Breach,
-        mesh::TriangleMesh,
-        motion::Motion,
-        particles::Particles,
-        sampling::boundary_samples,
-        signed_distance::SignedDistance,
-        solver::Solver,
-        sph::{Calibration, half_space_fraction},
-    },
-    scene::{Iteration, Scene, Stop, Wall, WaveMaker, effects, plan::*},
+    domain::{boundary::Boundary, budget::Breach, particles::Particles, solver::Solver},
+    scene::{Iteration, Scene, Stop, effects, plan::*},
     solve::{
         SolveError,
         pbf::{Pbf, device_limits},
     },
 };
-
-/// One Jacobi iteration from rest without gravity, by O(n²) search in f64: the model's formulas once more,
-/// written from the paper and not from the shaders.
-struct Naive {
-    positions: Vec<DVec3>,
-    size: DVec3,
-    calibration: Calibration,
-}
-
-impl Naive {
-    fn new(scene: &Scene, particles: &Particles) -> Self {
-        let pbf = scene.solver.pbf();
-        Self {
-            positions: particles
-                .position
-                .iter()
-                .map(|p| glam::Vec3::from_array(*p).as_dvec3())
-                .collect(),
-            size: scene.domain.size(),
-            calibration: Calibration::new(pbf.particle_spacing, pbf.support_ratio),
-        }
-    }
-
-    /// Density that the walls add, and its gradient.
-    fn walls(&self, x: DVec3) -> (f64, DVec3) {
-        let (h, scale) = (
-            self.calibration.support_radius,
-            self.calibration.wall_density_scale,
-        );
-        let free = |z: f64| 1.0 - scale * half_space_fraction(z / h);
-        let product = |p: DVec3| -> f64 {
-            (0..3)
-                .map(|k| free(p[k]) * free(self.size[k] - p[k]))
-                .product()
-        };
-        let slope = |z: f64| {
-            let q = (z / h).min(1.0);
-            scale * 1.5 * (1.0 - q).powi(4) * (1.0 + 4.0 * q) / h
-        };
-        let gradient = DVec3::from_array(std::array::from_fn(|k| {
-            let others: f64 = (0..3)
-                .filter(|&o| o != k)
-                .map(|o| free(x[o]) * free(self.size[o] - x[o]))
-                .product();
-            (slope(self.size[k] - x[k]) - slope(x[k])) * others
-        }));
-        (1.0 - product(x), gradient)
-    }
-
-    fn density(&self, i: usize) -> f64 {
-        let (h, x) = (self.calibration.support_radius, self.positions[i]);
-        let kernel: f64 = self
-            .positions
-            .iter()
-            .map(|y| (1.0 - x.distance_squared(*y) / (h * h)).max(0.0).powi(3))
-            .sum();
-        self.calibration.density_scale * kernel + self.walls(x).0
-    }
-
-    fn gradient(&self, i: usize, j: usize) -> DVec3 {
-        let (h, d) = (
-            self.calibration.support_radius,
-            self.positions[i] - self.positions[j],
-        );
-        let r = d.length();
-        if i == j || r >= h {
-            return DVec3::ZERO;
-        }
-        -self.calibration.gradient_scale * (1.0 - r / h).powi(2) * d / r
-    }
-
-    fn lambda(&self, i: usize) -> f64 {
-        let mut own = self.walls(self.positions[i]).1;
-        let mut squares = 0.0;
-        for j in 0..self.positions.len() {
-            let gradient = self.gradient(i, j);
-            own += gradient;
-            squares += gradient.length_squared();
-        }
-        let epsilon = 1e-3 * self.calibration.bulk_gradient_squares;
-        -(self.density(i) - 1.0).max(0.0) / (squares + own.length_squared() + epsilon)
-    }
-
-    fn corrected(&self) -> Vec<DVec3> {
-        let n = self.positions.len();
-        let lambda: Vec<f64> = (0..n).map(|i| self.lambda(i)).collect();
-        (0..n)
-            .map(|i| {
-                let walls = lambda[i] * self.walls(self.positions[i]).1;
-                let sum: DVec3 = (0..n)
-                    .map(|j| (lambda[i] + lambda[j]) * self.gradient(i, j))
-                    .sum();
-                let contact = DVec3::splat(0.25 * D);
-                (self.positions[i] + walls + sum).clamp(contact, self.size - contact)
-            })
-            .collect()
-    }
-}
 
 /// Compressed and jittered water that touches five walls.
 fn compressed() -> (Scene, Particles) {
@@ -467,111 +361,6 @@ fn coincident_particles_part() {
     // Twenty on one spot have to part at all: the artificial pressure that would space them is off.
     assert!(least > 0.2 * D, "{least}");
     assert!(state == run(&context, &scene, &particles, 30).0);
-}
-
-/// A box of `size` about `centre`, outward.
-fn box_mesh(min: DVec3, max: DVec3) -> TriangleMesh {
-    let corner = |k: usize| {
-        DVec3::new(
-            if k & 1 == 0 { min.x } else { max.x },
-            if k & 2 == 0 { min.y } else { max.y },
-            if k & 4 == 0 { min.z } else { max.z },
-        )
-    };
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    TriangleMesh {
-        vertices: (0..8).map(corner).collect(),
-        triangles: quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect(),
-    }
-}
-
-fn boundary_of(mesh: &TriangleMesh, domain: &Bounds) -> Boundary {
-    let bounds = mesh.bounds().unwrap().grown(4.0 * D);
-    Boundary {
-        samples: boundary_samples(mesh, domain, D),
-        distance: Some(SignedDistance::from_mesh(mesh, &bounds, D).unwrap()),
-        ..Boundary::default()
-    }
-}
-
-#[test]
-fn solids_hold_water_off() {
-    let context = context();
-    let scene = scene([2.0, 2.0, 1.0]);
-    let (min, max) = (DVec3::new(1.2, 0.0, 0.3), DVec3::new(1.6, 1.0, 0.7));
-    let mesh = box_mesh(min, max);
-    let boundary = boundary_of(&mesh, &scene.domain);
-    assert!(boundary.samples.len() > 150);
-    let mut particles = lattice([0.0; 3], [8, 12, 10], [D; 3]);
-    for velocity in &mut particles.velocity {
-        *velocity = [4.0, 0.0, 0.0];
-    }
-    let depth = |state: &Particles| {
-        let inside = |p: &[f32; 3]| {
-            let p = glam::Vec3::from_array(*p).as_dvec3();
-            (p - min).min(max - p).min_element()
-        };
-        state
-            .position
-            .iter()
-            .map(inside)
-            .fold(f64::NEG_INFINITY, f64::max)
-    };
-    let mut with = solver(&context, &scene, &particles, &boundary);
-    let mut without = solver(&context, &scene, &particles, &Boundary::default());
-    let (mut worst, mut control) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-    for _ in 0..40 {
-        worst = worst.max(depth(&with.advance().unwrap().0));
-        control = control.max(depth(&without.advance().unwrap().0));
-    }
-    // Trilinear distances cut edges and corners by at most (1 − 1/√3) of a node spacing less the contact
-    // distance: 0.42 d − 0.25 d.
-    assert!(worst < 0.17 * D, "{worst}");
-    assert!(control > D, "water came nowhere near: {control}");
-}
-
-#[test]
-fn nothing_stays_behind_a_piston() {
-    let context = context();
-    let mut scene = scene([3.0, 1.5, 0.6]);
-    scene.wave_makers.push(WaveMaker {
-        wall: Wall {
-            axis: 0,
-            is_max: false,
-        },
-        motion: Motion::ConstantVelocity {
-            velocity: 8.0,
-            until: None,
-        },
-    });
-    let particles = lattice([0.0; 3], [20, 6, 6], [D; 3]);
-    let mut solver = solver(&context, &scene, &particles, &Boundary::default());
-    for frame in 1..=12 {
-        let (state, report) = solver.advance().unwrap();
-        // 8 m/s for 10 ms is 0.8 d, and water ahead of it is faster.
-        assert!(report.substeps >= 1);
-        let wall = 0.08 * f64::from(frame);
-        let least = state
-            .position
-            .iter()
-            .map(|p| f64::from(p[0]))
-            .fold(f64::INFINITY, f64::min);
-        assert!(least > wall, "frame {frame}: {least} behind {wall}");
-    }
-    assert!(
-        run(&context, &scene, &particles, 12).1.substeps > 1,
-        "the piston counts in the CFL number"
-    );
 }
 
 #[test]
