@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use clap::{Args, ValueEnum};
+use clap::{
+    Args, ValueEnum,
+    builder::{OsStringValueParser, TypedValueParser as _},
+};
 use serde_json::{Value, json};
 
 use crate::{
@@ -38,7 +41,7 @@ pub(super) struct BakeArgs {
     solver: Option<Method>,
     /// Begin from a frame of another cache, such as cache/wave-city/pbf:120, of the same solver, spacing and frame
     /// rate; numbers and time go on from there.
-    #[arg(long, value_name = "CACHE:FRAME")]
+    #[arg(long, value_name = "CACHE:FRAME", value_parser = OsStringValueParser::new().try_map(BranchPoint::try_from))]
     from: Option<BranchPoint>,
     /// Frames to bake, such as 1-30; the whole shot where left out. With --resume past the end of the shot, which is then
     /// longer.
@@ -58,7 +61,7 @@ pub(super) struct BakeArgs {
     device: DeviceKind,
     #[command(flatten)]
     gpu: GpuArgs,
-    /// Time each pass on the device and print a table; passes then run one by one.
+    /// Time each pass and print a table; passes then run one by one.
     #[arg(long)]
     time_passes: bool,
     /// How to tell progress.
@@ -178,12 +181,7 @@ pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
-    for (pass, seconds, runs) in &outcome.passes {
-        let each = 1e3 * seconds / *runs as f64;
-        output::print(&format!(
-            "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s\n"
-        ));
-    }
+    output::print_pass_times(&outcome.passes);
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
     } else {

@@ -132,6 +132,16 @@ impl Deviation {
     }
 }
 
+/// Measures above their limits, with both; a measure without a limit is not judged.
+pub fn out_of_limits<const N: usize>(
+    measures: [(&'static str, f64, Option<f64>); N],
+) -> impl Iterator<Item = (&'static str, f64, f64)> {
+    let over = |(measure, value, limit): (&'static str, f64, Option<f64>)| {
+        Some((measure, value, limit.filter(|&limit| value > limit)?))
+    };
+    measures.into_iter().filter_map(over)
+}
+
 /// Error over scale; 0 for no error, whatever the scale, and infinite where the ratio is no number.
 pub fn relative(error: f64, scale: f64) -> f64 {
     if error == 0.0 {

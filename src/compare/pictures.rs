@@ -1,9 +1,11 @@
 //! Two pictures of one size.
 
-use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+use serde::{Serialize, Serializer};
 use ssimulacra2::{LinearRgb, compute_frame_ssimulacra2};
 
-use super::deviation::Value;
+use super::deviation::{Value, out_of_limits};
 use crate::domain::{statistics::percentile, tolerance::PictureLimits};
 
 /// How the values of a picture stand for light.
@@ -59,6 +61,48 @@ pub struct PictureFault {
     pub limit: f64,
 }
 
+/// What differs between two renders.
+#[derive(Clone, Debug, Serialize)]
+pub struct PicturesDiff {
+    /// Names that a alone has.
+    pub only_a: Vec<String>,
+    /// Names that b alone has.
+    pub only_b: Vec<String>,
+    /// By name.
+    pub pairs: Vec<PairDiff>,
+}
+
+/// Two pictures of one name.
+#[derive(Clone, Debug, Serialize)]
+pub struct PairDiff {
+    /// File name.
+    pub name: String,
+    /// Width and height of a and of b, pixels.
+    pub sizes: [[usize; 2]; 2],
+    /// `None` where the sizes differ.
+    pub diff: Option<PictureDiff>,
+    /// What is out of tolerance.
+    pub faults: Vec<PictureFault>,
+    /// Where its difference image went; written out, bytes that are no UTF-8 become U+FFFD.
+    #[serde(serialize_with = "as_text")]
+    pub image: Option<PathBuf>,
+}
+
+/// A path of any bytes: serde's own way refuses those that are no UTF-8.
+fn as_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
+    path.as_deref()
+        .map(Path::to_string_lossy)
+        .serialize(serializer)
+}
+
+impl PicturesDiff {
+    /// Whether nothing is out of tolerance, and nothing on one side alone.
+    pub fn is_within(&self) -> bool {
+        let is_within = |pair: &PairDiff| pair.diff.is_some() && pair.faults.is_empty();
+        self.only_a.is_empty() && self.only_b.is_empty() && self.pairs.iter().all(is_within)
+    }
+}
+
 /// Compares two pictures; b is the reference. `None` where sizes or encodings differ.
 pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
     if (a.width, a.height, a.encoding) != (b.width, b.height, b.encoding) {
@@ -105,15 +149,12 @@ impl PictureDiff {
             ("p99", self.p99, limits.p99),
             ("max", self.max, limits.max),
         ];
-        let fault = |(measure, value, limit): (&'static str, f64, Option<f64>)| {
-            let limit = limit.filter(|&limit| value > limit)?;
-            Some(PictureFault {
-                measure,
-                value,
-                limit,
-            })
+        let fault = |(measure, value, limit)| PictureFault {
+            measure,
+            value,
+            limit,
         };
-        let mut faults: Vec<_> = errors.into_iter().filter_map(fault).collect();
+        let mut faults: Vec<_> = out_of_limits(errors).map(fault).collect();
         // A picture too small for a score has the worst one.
         let score = self.perceptual.unwrap_or(f64::NEG_INFINITY);
         if let Some(limit) = limits.perceptual.filter(|&limit| score < limit) {

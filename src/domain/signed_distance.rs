@@ -10,11 +10,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{
-    bounds::Bounds,
-    bvh::Bvh,
-    mesh::{NoInside, TriangleMesh},
-};
+use super::{bounds::Bounds, bvh::Bvh, inside::NoInside, mesh::TriangleMesh};
 
 /// Most nodes in a grid: 4 GiB of values.
 pub const MAX_NODES: usize = 1 << 30;

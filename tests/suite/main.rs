@@ -33,6 +33,7 @@ mod compare {
     mod renders;
 }
 mod domain {
+    mod circles;
     mod signed_distance;
 }
 mod experiment {
@@ -41,6 +42,7 @@ mod experiment {
 }
 mod gpu {
     mod device_faults;
+    mod raster;
     mod shaders;
     mod sort;
 }
