@@ -9,7 +9,9 @@ use clap::Args;
 
 use crate::{
     scene::{Method, Scene},
-    stage::inspect::{Adapter, Entry, Manifest, ScenePlan, adapters, cache, plan, plot},
+    stage::inspect::{
+        Adapter, Entry, Manifest, PARTICLES, PROBES, ScenePlan, adapters, cache, plan, plot,
+    },
 };
 
 use super::{Failure, bake, check::Misplaced, is_cache, output, size};
@@ -185,6 +187,9 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
         "on {} ({}, {})",
         manifest.device, manifest.driver, manifest.backend
     )?;
+    if let Some(shaders) = &manifest.shaders {
+        writeln!(out, "shaders {shaders}: not the shipped ones")?;
+    }
     writeln!(out, "scene {}", manifest.scene_hash)?;
     if let Some(parent) = &manifest.parent {
         writeln!(out, "begins from {parent}")?;
@@ -228,7 +233,7 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
             "{:5}  {:9}  {:>10}  {:8}{columns}  {percent:>13}  {speed:>9}  {capped:>6}",
             entry.clock.frame,
             entry.particles,
-            size(entry.bytes),
+            size(entry.file(PARTICLES).map_or(0, |file| file.bytes)),
             entry.clock.substeps
         )?;
     }
@@ -247,7 +252,7 @@ fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt:
     )?;
     for (index, probe) in manifest.probes.iter().enumerate() {
         for (k, column) in probe.columns.iter().enumerate() {
-            let value = |entry: &Entry| *entry.probes.as_ref()?.get(index)?.get(k)?;
+            let value = |entry: &Entry| *entry.row(PROBES, index).get(k)?;
             let least = entries.iter().filter_map(value).min_by(f64::total_cmp);
             let greatest = entries.iter().filter_map(value).max_by(f64::total_cmp);
             let last = entries.last().and_then(value);

@@ -4,9 +4,11 @@
 //! In every comparison of two results b is the reference.
 
 pub mod baseline;
+pub mod caches;
 pub mod check;
 pub mod deviation;
 pub mod frames;
+pub mod limits;
 pub mod pictures;
 pub mod rounding;
 pub mod spread;

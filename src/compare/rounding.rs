@@ -15,7 +15,7 @@ pub const U: f64 = 1.0 / (1 << 24) as f64;
 /// Unit roundoff of f64.
 pub const U64: f64 = 1.0 / (1u64 << 53) as f64;
 
-/// Of a root, in u.
+/// Error of a square root, in u.
 pub const ROOT: f64 = 9.0;
 
 /// Magnitudes of the terms that a particle's neighbours add to its sums, each weighted: p = 1 − q² and s = 1 − q.
@@ -64,14 +64,14 @@ impl Sums {
 /// Walls as half-spaces: what f32 makes of the part of the density and of the gradient that they add.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WallError {
-    /// Of the relative density.
+    /// Error of the relative density.
     pub density: f64,
-    /// Of its gradient times h.
+    /// Error of its gradient times h.
     pub gradient: f64,
 }
 
 impl WallError {
-    /// Of `faces` within reach, when a wall's place is rounded by `place` support radii. q errs by that and 8 u;
+    /// Builds the errors for `faces` walls within reach, when a wall's place is rounded by `place` support radii. q errs by that and 8 u;
     /// the fraction's slope is at most 315/256, that of the slope 405/128, and each polynomial adds 16 u.
     pub fn of(faces: usize, place: f64) -> Self {
         let faces = faces as f64;

@@ -6,8 +6,8 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
     adapter::{Context, GpuError, Spoil},
+    buffer::{Buf, Element, Wanted, Windows},
     reflect::{Access, Binding, reflect},
-    shader,
 };
 
 /// A buffer to be.
@@ -72,7 +72,10 @@ impl Program {
         check_sizes(context, buffers)?;
         let passes = passes
             .iter()
-            .map(|spec| Ok((spec.name, compile(context, spec, shared)?)))
+            .map(|spec| match compile(context, spec, shared) {
+                Ok(pass) => Ok((spec.name, pass)),
+                Err(error) => Err(context.shaders.blamed(error)),
+            })
             .collect::<Result<_, GpuError>>()?;
         let buffers = buffers
             .iter()
@@ -130,29 +133,47 @@ impl Program {
         )
     }
 
-    /// Writes `data` at `offset` bytes of a buffer, before whatever is submitted next.
-    pub fn upload<T: bytemuck::NoUninit>(&self, name: &str, offset: u64, data: &[T]) {
-        if !data.is_empty() {
-            self.context
-                .queue
-                .write_buffer(self.buffer(name), offset, bytemuck::cast_slice(data));
+    /// Writes `data` from value `first` of a buffer on, before whatever is submitted next.
+    pub fn upload<T: bytemuck::NoUninit>(&self, buffer: Buf<T>, first: usize, data: &[T]) {
+        self.write(
+            buffer.name(),
+            buffer.place(first),
+            bytemuck::cast_slice(data),
+        );
+    }
+
+    /// Writes `values` into the first windows of a uniform, before whatever is submitted next.
+    pub fn upload_windows<T: Element>(&self, windows: &Windows<T>, values: &[T]) {
+        self.write(windows.name(), 0, &Windows::bytes(values));
+    }
+
+    fn write(&self, name: &str, offset: u64, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            let queue = &self.context.queue;
+            queue.write_buffer(self.buffer(name), offset, bytes);
         }
     }
 
-    /// Reads the first `counts[k]` values of `T` from buffer `names[k]`, waiting for the device once.
+    /// The first `count` values of a buffer; waits for the device.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
-    pub fn download<T: bytemuck::Pod>(
-        &self,
-        wanted: &[(&str, usize)],
-    ) -> Result<Vec<Vec<T>>, GpuError> {
+    pub fn read<T: bytemuck::Pod>(&self, buffer: Buf<T>, count: usize) -> Result<Vec<T>, GpuError> {
+        self.download(buffer.first(count))
+    }
+
+    /// The first values of several buffers, waiting for the device once.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn download<W: Wanted>(&self, wanted: W) -> Result<W::Values, GpuError> {
         let context = &self.context;
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        let staging: Vec<Option<Buffer>> = wanted
+        let spans = wanted.spans();
+        let staging: Vec<Option<Buffer>> = spans
             .iter()
-            .map(|&(name, count)| {
-                let bytes = (count * size_of::<T>()).next_multiple_of(4) as u64;
+            .map(|&(name, offset, bytes)| {
+                let bytes = bytes.next_multiple_of(4) as u64;
                 (bytes > 0).then(|| {
                     let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
                         label: Some("readback"),
@@ -160,7 +181,7 @@ impl Program {
                         usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
                         mapped_at_creation: false,
                     });
-                    encoder.copy_buffer_to_buffer(self.buffer(name), 0, &buffer, 0, bytes);
+                    encoder.copy_buffer_to_buffer(self.buffer(name), offset, &buffer, 0, bytes);
                     buffer
                 })
             })
@@ -171,20 +192,18 @@ impl Program {
             buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         }
         context.wait()?;
-        let mut out = Vec::with_capacity(wanted.len());
-        for (buffer, &(_, count)) in staging.iter().zip(wanted) {
-            let Some(buffer) = buffer else {
-                out.push(Vec::new());
-                continue;
-            };
-            let view = buffer
-                .get_mapped_range(..)
-                .map_err(|error| GpuError::Lost(error.to_string()))?;
-            out.push(bytemuck::pod_collect_to_vec(
-                &view[..count * size_of::<T>()],
-            ));
-        }
-        Ok(out)
+        let views = staging
+            .iter()
+            .map(|buffer| buffer.as_ref().map(|buffer| buffer.get_mapped_range(..)));
+        let views = views
+            .map(Option::transpose)
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|error| GpuError::Lost(error.to_string()))?;
+        let mut bytes = views
+            .iter()
+            .zip(&spans)
+            .map(|(view, &(_, _, bytes))| view.as_ref().map_or(&[][..], |view| &view[..bytes]));
+        Ok(W::values(&mut bytes))
     }
 }
 
@@ -251,14 +270,15 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
 /// WGSL of pass `name`, composed from `file`, with the context's fault where it is one of this pass.
 ///
 /// # Errors
-/// As [`shader::compose`]; a fault whose text is not in the pass.
+/// As [`Shaders::compose`](super::shader::Shaders::compose); a fault whose text is not in the pass.
 pub fn source(
     context: &Context,
     name: &str,
     file: &str,
     defines: &[&str],
 ) -> Result<String, GpuError> {
-    let source = shader::compose(file, defines)?;
+    let composed = context.shaders.compose(file, defines);
+    let source = composed.map_err(|error| context.shaders.blamed(error))?;
     match context.spoil.filter(|spoil| spoil.pass == name) {
         Some(spoil) => spoiled(&source, &spoil),
         None => Ok(source),
@@ -323,7 +343,7 @@ fn compile(
         ..wgpu::ShaderRuntimeChecks::checked()
     };
     // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is fixed
-    // before it starts. All other checks stay on.
+    // before it starts. All other checks stay on. Who edits shaders keeps to that, as whoever edits this source.
     let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(spec.name),

@@ -6,6 +6,7 @@ use wgpu::{BindGroup, CommandEncoder, ComputePass, QuerySet};
 
 use super::{
     adapter::{Context, GpuError},
+    buffer::{Buf, Workgroups},
     program::{Pass, Program},
 };
 
@@ -20,13 +21,44 @@ pub struct Bind {
     pub window: Option<(u64, u64)>,
 }
 
+impl Bind {
+    /// `variable` in all of `buffer`.
+    pub fn whole<T>(variable: &'static str, buffer: &Buf<T>) -> Self {
+        Self {
+            variable,
+            buffer: buffer.name().to_owned(),
+            window: None,
+        }
+    }
+}
+
 /// How many workgroups a dispatch has.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Groups {
     /// Enough for so many threads; past the limit of one dimension they go out in two.
     Threads(u64),
-    /// Three `u32` at a byte offset of a buffer; zeros make the dispatch empty.
-    Indirect(&'static str, u64),
+    /// [`Workgroups`] that stand in a buffer at a byte offset; zeros make the dispatch empty.
+    Indirect {
+        /// Buffer name.
+        buffer: String,
+        /// Bytes.
+        offset: u64,
+    },
+}
+
+impl Groups {
+    /// Those that stand in a buffer.
+    pub fn at(buffer: &Buf<Workgroups>, index: usize) -> Self {
+        Self::within(buffer, index * size_of::<Workgroups>())
+    }
+
+    /// Those that are a member of a struct, so many bytes from its beginning, in a buffer.
+    pub fn within<T>(buffer: &Buf<T>, member: usize) -> Self {
+        Self::Indirect {
+            buffer: buffer.name().to_owned(),
+            offset: member as u64,
+        }
+    }
 }
 
 /// One thing for the device to do.
@@ -42,10 +74,15 @@ pub enum Command {
         groups: Groups,
     },
     /// Zeroes a buffer.
-    Clear(&'static str),
+    Clear(String),
 }
 
 impl Command {
+    /// Zeroes `buffer`.
+    pub fn clear<T>(buffer: &Buf<T>) -> Self {
+        Self::Clear(buffer.name().to_owned())
+    }
+
     /// Runs `pass` over `threads` threads with every binding in the buffer of its own name.
     pub fn over(pass: &'static str, threads: usize) -> Self {
         Self::Dispatch {
@@ -72,12 +109,12 @@ enum Step {
         group: BindGroup,
         size: Size,
     },
-    Clear(&'static str),
+    Clear(String),
 }
 
 enum Size {
     Direct([u32; 3]),
-    Indirect(&'static str, u64),
+    Indirect(String, u64),
 }
 
 /// Where a traced recording stands.
@@ -192,7 +229,7 @@ fn encode(steps: &[Step], program: &Program, encoder: &mut CommandEncoder) {
 
 fn record(program: &Program, command: &Command) -> Option<Step> {
     match command {
-        Command::Clear(buffer) => Some(Step::Clear(buffer)),
+        Command::Clear(buffer) => Some(Step::Clear(buffer.clone())),
         Command::Dispatch {
             pass: name,
             binds,
@@ -204,7 +241,7 @@ fn record(program: &Program, command: &Command) -> Option<Step> {
                 Groups::Threads(threads) => {
                     Size::Direct(spread(&program.context, pass.workgroup_size, *threads))
                 }
-                Groups::Indirect(buffer, offset) => Size::Indirect(buffer, *offset),
+                Groups::Indirect { buffer, offset } => Size::Indirect(buffer.clone(), *offset),
             };
             Some(Step::Dispatch {
                 pass: name,

@@ -4,7 +4,7 @@
 
 use naga::{AddressSpace, ShaderStage, StorageAccess, TypeInner};
 
-use super::adapter::GpuError;
+use super::{adapter::GpuError, buffer::Scalar};
 
 /// How a buffer is bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +26,23 @@ pub struct Binding {
     pub index: u32,
     /// Uniform or storage.
     pub access: Access,
-    /// Bytes of a float, where it is an array of floats or of vectors of them.
-    pub float_bytes: Option<u8>,
+    /// What it is an array of, behind its head where it has one; what it is where it is no array.
+    pub element: ElementType,
+}
+
+/// A type as WGSL lays it out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ElementType {
+    /// Bytes from one element of the array to the next.
+    pub stride: u32,
+    /// What it is made of.
+    pub scalar: Scalar,
+    /// Its name where it is a struct.
+    pub name: Option<String>,
+    /// Bytes of a scalar; 0 of a mixed one.
+    pub scalar_bytes: u8,
+    /// Bytes before the array.
+    pub head: u32,
 }
 
 /// A `struct` of the shader as WGSL lays it out.
@@ -52,17 +67,53 @@ pub struct Reflection {
     pub layouts: Vec<Layout>,
     /// Names of its `override` constants.
     pub overrides: Vec<String>,
+    /// Its constants of u32.
+    pub constants: Vec<(String, u32)>,
     /// Whether it computes in f64.
     pub has_f64: bool,
 }
 
-fn float_bytes(module: &naga::Module, ty: naga::Handle<naga::Type>) -> Option<u8> {
-    let scalar = match module.types[ty].inner {
-        TypeInner::Array { base, .. } => module.types[base].inner.scalar(),
-        _ => None,
-    };
-    let float = scalar.filter(|scalar| scalar.kind == naga::ScalarKind::Float)?;
-    Some(float.width)
+/// What a binding of type `ty` consists of.
+fn element_of(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
+    match &module.types[ty].inner {
+        TypeInner::Array { base, stride, .. } => ElementType {
+            stride: *stride,
+            ..element(module, *base)
+        },
+        // A struct that ends in an array without a length is that array's head.
+        TypeInner::Struct { members, .. } => match members.last() {
+            Some(last) if is_unsized(module, last.ty) => ElementType {
+                head: last.offset,
+                ..element_of(module, last.ty)
+            },
+            _ => element(module, ty),
+        },
+        _ => element(module, ty),
+    }
+}
+
+fn is_unsized(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
+    let size = naga::ArraySize::Dynamic;
+    matches!(&module.types[ty].inner, TypeInner::Array { size: of, .. } if *of == size)
+}
+
+fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
+    let inner = &module.types[ty].inner;
+    let kind = inner.scalar();
+    ElementType {
+        stride: inner.size(module.to_ctx()),
+        scalar: match kind.map(|scalar| scalar.kind) {
+            Some(naga::ScalarKind::Float) => Scalar::Float,
+            Some(naga::ScalarKind::Uint) => Scalar::Uint,
+            _ => Scalar::Mixed,
+        },
+        name: match inner {
+            TypeInner::Struct { .. } => module.types[ty].name.clone(),
+            _ => None,
+        },
+        scalar_bytes: kind.map_or(0, |scalar| scalar.width),
+        head: 0,
+    }
 }
 
 /// Reads the single compute entry point of `wgsl`.
@@ -117,7 +168,7 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
             name,
             index: place.binding,
             access,
-            float_bytes: float_bytes(&module, variable.ty),
+            element: element_of(&module, variable.ty),
         });
     }
     bindings.sort_by_key(|binding| binding.index);
@@ -141,6 +192,18 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
         .iter()
         .filter_map(|(_, constant)| constant.name.clone())
         .collect();
+    let constants = module
+        .constants
+        .iter()
+        .filter_map(|(_, constant)| {
+            let naga::Expression::Literal(naga::Literal::U32(value)) =
+                module.global_expressions[constant.init]
+            else {
+                return None;
+            };
+            Some((constant.name.clone()?, value))
+        })
+        .collect();
     let has_f64 = module.types.iter().any(|(_, ty)| {
         let scalar = ty.inner.scalar();
         scalar.is_some_and(|scalar| scalar.kind == naga::ScalarKind::Float && scalar.width == 8)
@@ -150,6 +213,7 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
         bindings,
         workgroup_size: entry.workgroup_size,
         layouts,
+        constants,
         overrides,
     })
 }

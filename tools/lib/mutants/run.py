@@ -14,7 +14,7 @@ from .build import Tree
 from .lists import Mistake, Mutant
 
 # Every shader has to parse with the fault in it: what does not compile is caught by anything.
-PARSES = "shaders::every_pass_parses"
+PARSES = "suite::gpu::shaders::every_pass_parses"
 # How `gpu::program` refuses a spoil whose text a shader lacks.
 NOT_THERE = "which is to be replaced, is not in it"
 # A fault that turns a loop endless is caught as well; no test of the suite takes a tenth of it.

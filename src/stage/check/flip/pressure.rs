@@ -21,7 +21,7 @@ use crate::{
     scene::flip::{Precision, Preconditioner, Surface},
     solve::{
         SolveError,
-        pressure::{CORRECTION_TOLERANCE, DONE, blocked, widen},
+        pressure::{CORRECTION_TOLERANCE, DONE, blocked},
         trace::Traced,
     },
 };
@@ -133,8 +133,7 @@ impl Checker<'_> {
         name: &str,
         count: usize,
     ) -> Result<Vec<f64>, SolveError> {
-        let words = traced.read::<u32>(name, self.precision().words() * count)?;
-        Ok(widen(&words, self.precision()))
+        traced.reals(&name.into(), self.precision(), count)
     }
 
     /// An array of the pressure's own, by row.
