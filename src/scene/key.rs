@@ -297,8 +297,16 @@ impl Key {
         }
     }
 
-    /// What its value may be, in words.
+    /// What its value may be, in words, and what holds where it is left out and no other key says it.
     pub(super) fn allowed(&self) -> String {
+        match self.default {
+            Default::Computed(default) => format!("{}; {} if left out", self.values(), default()),
+            _ => self.values(),
+        }
+    }
+
+    /// What its value may be, in words.
+    pub(super) fn values(&self) -> String {
         let mut words = self.kind.words(self.name);
         if !self.unit.is_empty() {
             words += &format!(", {}", self.unit);
@@ -315,9 +323,6 @@ impl Key {
         words += self.also;
         if let Kind::NumberOrFalse(_) = self.kind {
             words += ", or false";
-        }
-        if let Default::Computed(default) = self.default {
-            words += &format!("; {} if left out", default());
         }
         words
     }

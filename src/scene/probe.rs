@@ -104,7 +104,8 @@ pub(super) fn build_all(
         let is_alike = |known: &&Probe| known.name.eq_ignore_ascii_case(&probe.name);
         if let Some(known) = probes.iter().find(is_alike) {
             let problem = second(&known.name, &probe.name);
-            return Err(doc.fault_of(&format!("{path}.name"), problem));
+            let key = if spec.name.is_some() { "name" } else { "kind" };
+            return Err(doc.fault_of(&format!("{path}.{key}"), problem));
         }
         probes.push(probe);
     }

@@ -121,6 +121,9 @@ impl Table<'_, '_> {
     ///
     /// # Errors
     /// That it has none.
+    ///
+    /// # Panics
+    /// Where a default is no TOML; a test lays down all of them.
     fn fill(&self, values: &mut DeTable<'_>, key: &Key) -> Result<()> {
         if values.contains_key(key.name) {
             return Ok(());
@@ -133,11 +136,9 @@ impl Table<'_, '_> {
             }
             Default::Value(toml) => {
                 let span = self.span.clone().unwrap_or_default();
-                // A test holds that every default is TOML.
-                if let Ok(value) = DeValue::parse(toml) {
-                    let name = Spanned::new(span.clone(), key.name.into());
-                    values.insert(name, Spanned::new(span, value.into_inner()));
-                }
+                let value = DeValue::parse(toml).expect("every default is TOML");
+                let name = Spanned::new(span.clone(), key.name.into());
+                values.insert(name, Spanned::new(span, value.into_inner()));
                 Ok(())
             }
             Default::Computed(_) | Default::Absent => Ok(()),

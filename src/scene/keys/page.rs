@@ -56,7 +56,7 @@ fn section(out: &mut String, file: File, head: &str, about: &str, keys: &'static
         };
         let cells = [
             format!("`{}`{star}", key.name),
-            cell(&key.allowed()),
+            cell(&key.values()),
             cell(&left_out(key)),
             cell(key.about),
         ];
