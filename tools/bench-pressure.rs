@@ -76,7 +76,7 @@ fn main() {
                     times[times.len() / 2]
                 );
                 if has_passes {
-                    let mut timer = Timer::new(&context).unwrap();
+                    let mut timer = Timer::new(&context);
                     rig.set_rhs(&b);
                     rig.project(Some(&mut timer));
                     for (name, (seconds, runs)) in &timer.total {

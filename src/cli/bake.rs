@@ -61,7 +61,7 @@ pub(super) struct BakeArgs {
     device: DeviceKind,
     #[command(flatten)]
     gpu: GpuArgs,
-    /// Time each pass on the device and print a table; passes then run one by one.
+    /// Time each pass and print a table; passes then run one by one.
     #[arg(long)]
     time_passes: bool,
     /// How to tell progress.
@@ -181,12 +181,7 @@ pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
-    for (pass, seconds, runs) in &outcome.passes {
-        let each = 1e3 * seconds / *runs as f64;
-        output::print(&format!(
-            "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s\n"
-        ));
-    }
+    output::print_pass_times(&outcome.passes);
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
     } else {

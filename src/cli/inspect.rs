@@ -1,4 +1,6 @@
-//! `swell inspect SCENE|CACHE|--adapters`
+//! `swell inspect SCENE|LOOK|CACHE|--adapters`
+
+mod look;
 
 use std::{
     fmt::{self, Write},
@@ -18,7 +20,7 @@ use super::{Failure, bake, check::Misplaced, is_cache, output, size};
 
 #[derive(Args, Debug)]
 pub(super) struct InspectArgs {
-    /// A scene file or a cache directory.
+    /// A scene file, a look file or a cache directory.
     #[arg(required_unless_present = "adapters")]
     subject: Option<PathBuf>,
     /// List this machine's adapters with the limits that matter here.
@@ -27,6 +29,9 @@ pub(super) struct InspectArgs {
     /// Draw what the cache's probes saw over time, an SVG a probe, into this folder.
     #[arg(long, value_name = "DIR", requires = "subject")]
     plot: Option<PathBuf>,
+    /// Plan a look for this scene or cache: its solids and its particles.
+    #[arg(long, value_name = "SCENE|CACHE", requires = "subject")]
+    scene: Option<PathBuf>,
     /// Override a scene key.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -45,6 +50,11 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     // Writing to a String cannot fail.
     let mut text = String::new();
     let mut misfit = None;
+    if let (Some(_), Some(subject)) = (&args.scene, &args.subject)
+        && !look::is_look(subject)
+    {
+        return Err(misplaced("--scene", "looks", "none", subject));
+    }
     let plotted = match (&args.plot, &args.subject) {
         (Some(folder), Some(directory)) => plot(directory, folder)?,
         _ => Vec::new(),
@@ -60,6 +70,9 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
             let (manifest, entries) = cache(directory)?;
             let _ = show_cache(&mut text, &manifest, &entries);
             let _ = show_probes(&mut text, &manifest, &entries);
+        }
+        Some(file) if look::is_look(file) => {
+            misfit = look::show(&mut text, args, file)?.misfit;
         }
         Some(file) => {
             let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
@@ -81,16 +94,25 @@ fn refuse_scene_options(args: &InspectArgs, directory: &Path) -> Result<(), Fail
     if args.set.is_empty() && args.solver.is_none() && args.adapter.is_none() {
         return Ok(());
     }
+    Err(misplaced(
+        "--set, --solver or --adapter",
+        "scenes",
+        "a cache: it says what it was baked with",
+        directory,
+    ))
+}
+
+fn misplaced(option: &'static str, what: &'static str, is: &'static str, file: &Path) -> Failure {
     let error = Misplaced {
-        option: "--set, --solver or --adapter",
-        what: "scenes",
-        is: "a cache: it says what it was baked with",
-        source_file: directory.to_owned(),
+        option,
+        what,
+        is,
+        source_file: file.to_owned(),
     };
-    Err(Failure {
+    Failure {
         code: 2,
         error: Box::new(error),
-    })
+    }
 }
 
 fn show_adapter(out: &mut String, adapter: &Adapter) -> fmt::Result {

@@ -22,6 +22,16 @@ pub(super) fn print(text: &str) {
     note("standard output", put(&mut io::stdout().lock(), text));
 }
 
+/// Prints a line a pass: milliseconds each, runs, seconds in all.
+pub(super) fn print_pass_times(passes: &[(&'static str, f64, u64)]) {
+    for (pass, seconds, runs) in passes {
+        let each = 1e3 * seconds / *runs as f64;
+        print(&format!(
+            "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s\n"
+        ));
+    }
+}
+
 /// Writes a line to standard error: progress, and what a user has to know.
 pub(super) fn say(line: &str) {
     note(

@@ -39,6 +39,9 @@ pub(super) struct RenderArgs {
     /// Render frames again that stand there, also those of another cache or look.
     #[arg(long)]
     overwrite: bool,
+    /// Time each pass and print a table; passes then run one by one.
+    #[arg(long)]
+    time_passes: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
     progress: Mode,
@@ -61,6 +64,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
         frames: args.frames.clone(),
         gpu: args.gpu.read()?,
         overwrite: args.overwrite,
+        time_passes: args.time_passes,
     };
     let interrupt = Interrupt::install_or_warn();
     let progress = OnceCell::new();
@@ -89,6 +93,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
+    output::print_pass_times(&outcome.passes);
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
     } else {

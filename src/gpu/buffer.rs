@@ -258,7 +258,7 @@ impl<T> Windows<T> {
 
 impl<T: Element> Windows<T> {
     /// Bytes of a buffer that holds `values`, one a window.
-    pub(super) fn bytes(values: &[T]) -> Vec<u8> {
+    pub fn bytes(values: &[T]) -> Vec<u8> {
         let mut bytes = vec![0; values.len() * STRIDE];
         for (window, value) in bytes.chunks_exact_mut(STRIDE).zip(values) {
             window[..size_of::<T>()].copy_from_slice(bytemuck::bytes_of(value));

@@ -3,7 +3,10 @@
 pub mod adapter;
 pub mod buffer;
 pub mod program;
+pub mod raster;
 pub mod recording;
 pub mod reflect;
 pub mod shader;
 pub mod sort;
+pub mod texture;
+mod timer;

@@ -7,7 +7,8 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 use super::{
     adapter::{Context, GpuError, Spoil},
     buffer::{Buf, Element, Wanted, Windows},
-    reflect::{Access, Binding, reflect},
+    raster::RasterPass,
+    reflect::{Access, Binding, Reflection, Stage, reflect},
 };
 
 /// A buffer to be.
@@ -43,17 +44,20 @@ pub struct Pass {
     pub layout: BindGroupLayout,
     /// Reflected bindings.
     pub bindings: Vec<Binding>,
-    /// Threads a workgroup.
-    pub workgroup_size: u32,
+    /// Threads a workgroup along each axis.
+    pub workgroup_size: [u32; 3],
 }
 
-/// Named passes and buffers on one device.
+/// Named passes, buffers, textures and samplers on one device.
 #[derive(Debug)]
 pub struct Program {
     /// The device.
     pub context: Context,
     passes: BTreeMap<&'static str, Pass>,
     buffers: BTreeMap<String, Buffer>,
+    pub(super) rasters: BTreeMap<&'static str, RasterPass>,
+    pub(super) textures: BTreeMap<String, wgpu::Texture>,
+    pub(super) samplers: BTreeMap<&'static str, wgpu::Sampler>,
 }
 
 impl Program {
@@ -86,6 +90,9 @@ impl Program {
             context: context.clone(),
             passes,
             buffers,
+            rasters: BTreeMap::new(),
+            textures: BTreeMap::new(),
+            samplers: BTreeMap::new(),
         })
     }
 
@@ -267,17 +274,9 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
     })
 }
 
-/// WGSL of pass `name`, composed from `file`, with the context's fault where it is one of this pass.
-///
-/// # Errors
-/// As [`Shaders::compose`](super::shader::Shaders::compose); a fault whose text is not in the pass.
-pub fn source(
-    context: &Context,
-    name: &str,
-    file: &str,
-    defines: &[&str],
-) -> Result<String, GpuError> {
-    let composed = context.shaders.compose(file, defines);
+/// WGSL of a pass, with the context's fault where it is one of this pass.
+fn source(context: &Context, name: &str, defines: &[&str]) -> Result<String, GpuError> {
+    let composed = context.shaders.compose(name, defines);
     let source = composed.map_err(|error| context.shaders.blamed(error))?;
     match context.spoil.filter(|spoil| spoil.pass == name) {
         Some(spoil) => spoiled(&source, &spoil),
@@ -295,83 +294,142 @@ fn spoiled(source: &str, spoil: &Spoil) -> Result<String, GpuError> {
     Ok(source.replace(spoil.from, spoil.to))
 }
 
-fn compile(
+/// A shader and the layout of its bindings: what a pipeline is made of.
+pub(super) struct Shader {
+    pub(super) module: wgpu::ShaderModule,
+    pub(super) layout: BindGroupLayout,
+    pub(super) pipeline_layout: wgpu::PipelineLayout,
+    pub(super) reflection: Reflection,
+}
+
+fn binding_type(access: Access) -> wgpu::BindingType {
+    let buffer = |ty| wgpu::BindingType::Buffer {
+        ty,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
+    let texture = |sample_type| wgpu::BindingType::Texture {
+        sample_type,
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
+    match access {
+        Access::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+        Access::Read => storage(true),
+        Access::ReadWrite => storage(false),
+        Access::Texture => texture(wgpu::TextureSampleType::Float { filterable: true }),
+        Access::DepthTexture => texture(wgpu::TextureSampleType::Depth),
+        Access::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+        Access::CompareSampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison),
+    }
+}
+
+/// Runs what makes objects of pass `name` on the device; its validation errors are that pass's.
+pub(super) fn checked<T>(
     context: &Context,
-    spec: &PassSpec,
-    shared: &[(&'static str, f64)],
-) -> Result<Pass, GpuError> {
-    let source = source(context, spec.name, spec.name, &spec.defines)?;
-    let reflection = reflect(spec.name, &source)?;
+    name: &str,
+    make: impl FnOnce() -> T,
+) -> Result<T, GpuError> {
+    let scope = context
+        .device
+        .push_error_scope(wgpu::ErrorFilter::Validation);
+    let made = make();
+    match pollster::block_on(scope.pop()) {
+        Some(error) => Err(GpuError::Shader {
+            name: name.to_owned(),
+            message: error.to_string(),
+        }),
+        None => Ok(made),
+    }
+}
+
+/// Composes and reflects the shader of pass `name`.
+///
+/// # Errors
+/// [`GpuError::Shader`]; [`GpuError::NoF64`].
+pub(super) fn shader(context: &Context, name: &str, defines: &[&str]) -> Result<Shader, GpuError> {
+    let source = source(context, name, defines)?;
+    let reflection = reflect(name, &source)?;
     if reflection.has_f64 && !context.has_f64 {
         return Err(GpuError::NoF64 {
             adapter: context.info.name.clone(),
         });
     }
+    let visibility = match reflection.stage {
+        Stage::Compute => wgpu::ShaderStages::COMPUTE,
+        Stage::Raster { .. } => wgpu::ShaderStages::VERTEX_FRAGMENT,
+    };
     let entries: Vec<wgpu::BindGroupLayoutEntry> = reflection
         .bindings
         .iter()
         .map(|binding| wgpu::BindGroupLayoutEntry {
             binding: binding.index,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: match binding.access {
-                    Access::Uniform => wgpu::BufferBindingType::Uniform,
-                    Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                    Access::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
-                },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
+            visibility,
+            ty: binding_type(binding.access),
             count: None,
         })
         .collect();
+    let device = &context.device;
+    let (module, layout, pipeline_layout) = checked(context, name, || {
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(name),
+            entries: &entries,
+        });
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(name),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        };
+        let checks = wgpu::ShaderRuntimeChecks {
+            force_loop_bounding: false,
+            ..wgpu::ShaderRuntimeChecks::checked()
+        };
+        // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is fixed
+        // before it starts. All other checks stay on. Who edits shaders keeps to that, as whoever edits this source.
+        let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(name),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        (module, layout, pipeline_layout)
+    })?;
+    Ok(Shader {
+        module,
+        layout,
+        pipeline_layout,
+        reflection,
+    })
+}
+
+fn compile(
+    context: &Context,
+    spec: &PassSpec,
+    shared: &[(&'static str, f64)],
+) -> Result<Pass, GpuError> {
+    let shader = shader(context, spec.name, &spec.defines)?;
+    let reflection = shader.reflection;
     let declared = |name: &str| reflection.overrides.iter().any(|constant| constant == name);
     let mut constants = spec.constants.clone();
     constants.extend(shared.iter().filter(|(name, _)| declared(name)));
-    let device = &context.device;
-    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some(spec.name),
-        entries: &entries,
-    });
-    let descriptor = wgpu::ShaderModuleDescriptor {
-        label: Some(spec.name),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    };
-    let checks = wgpu::ShaderRuntimeChecks {
-        force_loop_bounding: false,
-        ..wgpu::ShaderRuntimeChecks::checked()
-    };
-    // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is fixed
-    // before it starts. All other checks stay on. Who edits shaders keeps to that, as whoever edits this source.
-    let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
-    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(spec.name),
-        bind_group_layouts: &[Some(&layout)],
-        immediate_size: 0,
-    });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(spec.name),
-        layout: Some(&pipeline_layout),
-        module: &module,
-        entry_point: None,
-        compilation_options: wgpu::PipelineCompilationOptions {
-            constants: &constants,
-            zero_initialize_workgroup_memory: false,
-        },
-        cache: None,
-    });
-    if let Some(error) = pollster::block_on(scope.pop()) {
-        return Err(GpuError::Shader {
-            name: spec.name.to_owned(),
-            message: error.to_string(),
-        });
-    }
+    let pipeline = checked(context, spec.name, || {
+        (context.device).create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(spec.name),
+            layout: Some(&shader.pipeline_layout),
+            module: &shader.module,
+            entry_point: None,
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants,
+                zero_initialize_workgroup_memory: false,
+            },
+            cache: None,
+        })
+    })?;
     Ok(Pass {
         name: spec.name,
         pipeline,
-        layout,
+        layout: shader.layout,
         bindings: reflection.bindings,
-        workgroup_size: reflection.workgroup_size[0],
+        workgroup_size: reflection.workgroup_size,
     })
 }

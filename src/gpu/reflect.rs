@@ -2,11 +2,13 @@
 //!
 //! Bind groups are built from this, so no binding list is typed by hand.
 
-use naga::{AddressSpace, ShaderStage, StorageAccess, TypeInner};
+use naga::{
+    AddressSpace, ImageClass, ImageDimension, ScalarKind, ShaderStage, StorageAccess, TypeInner,
+};
 
 use super::{adapter::GpuError, buffer::Scalar};
 
-/// How a buffer is bound.
+/// How a buffer, texture or sampler is bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// `var<uniform>`.
@@ -15,9 +17,36 @@ pub enum Access {
     Read,
     /// `var<storage, read_write>`.
     ReadWrite,
+    /// `texture_2d<f32>`, of a format that filters.
+    Texture,
+    /// `texture_depth_2d`.
+    DepthTexture,
+    /// `sampler`.
+    Sampler,
+    /// `sampler_comparison`.
+    CompareSampler,
 }
 
-/// One buffer binding of group 0.
+impl Access {
+    /// Whether it counts against the adapter's limit of storage buffers.
+    pub fn is_storage(self) -> bool {
+        matches!(self, Self::Read | Self::ReadWrite)
+    }
+}
+
+/// What a shader is compiled into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// One compute entry point.
+    Compute,
+    /// A vertex entry point.
+    Raster {
+        /// Whether a fragment entry point stands beside it; without one, depth alone is drawn.
+        has_fragment: bool,
+    },
+}
+
+/// One binding of group 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Binding {
     /// The WGSL variable, which names the buffer too unless a step says otherwise.
@@ -59,9 +88,11 @@ pub struct Layout {
 /// Reflection of one pass.
 #[derive(Clone, Debug)]
 pub struct Reflection {
+    /// Its entry points.
+    pub stage: Stage,
     /// In order of binding index.
     pub bindings: Vec<Binding>,
-    /// Threads a workgroup.
+    /// Threads a workgroup along each axis; zeros of a raster pass.
     pub workgroup_size: [u32; 3],
     /// Every named struct.
     pub layouts: Vec<Layout>,
@@ -103,8 +134,8 @@ fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
     ElementType {
         stride: inner.size(module.to_ctx()),
         scalar: match kind.map(|scalar| scalar.kind) {
-            Some(naga::ScalarKind::Float) => Scalar::Float,
-            Some(naga::ScalarKind::Uint) => Scalar::Uint,
+            Some(ScalarKind::Float) => Scalar::Float,
+            Some(ScalarKind::Uint) => Scalar::Uint,
             _ => Scalar::Mixed,
         },
         name: match inner {
@@ -116,11 +147,53 @@ fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
     }
 }
 
-/// Reads the single compute entry point of `wgsl`.
+fn stage(module: &naga::Module) -> Option<Stage> {
+    let mut stages: Vec<ShaderStage> = module.entry_points.iter().map(|e| e.stage).collect();
+    stages.sort_by_key(|stage| *stage == ShaderStage::Fragment);
+    match stages.as_slice() {
+        [ShaderStage::Compute] => Some(Stage::Compute),
+        [ShaderStage::Vertex] => Some(Stage::Raster {
+            has_fragment: false,
+        }),
+        [ShaderStage::Vertex, ShaderStage::Fragment] => Some(Stage::Raster { has_fragment: true }),
+        _ => None,
+    }
+}
+
+/// How a global variable is bound; `None` where no pass may bind it.
+fn access(module: &naga::Module, variable: &naga::GlobalVariable) -> Option<Access> {
+    match variable.space {
+        AddressSpace::Uniform => Some(Access::Uniform),
+        AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
+            Some(Access::ReadWrite)
+        }
+        AddressSpace::Storage { .. } => Some(Access::Read),
+        AddressSpace::Handle => match module.types[variable.ty].inner {
+            TypeInner::Sampler { comparison: true } => Some(Access::CompareSampler),
+            TypeInner::Sampler { comparison: false } => Some(Access::Sampler),
+            TypeInner::Image {
+                dim: ImageDimension::D2,
+                arrayed: false,
+                class,
+            } => match class {
+                ImageClass::Sampled {
+                    kind: ScalarKind::Float,
+                    multi: false,
+                } => Some(Access::Texture),
+                ImageClass::Depth { multi: false } => Some(Access::DepthTexture),
+                _ => None,
+            },
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Reads the entry points of `wgsl`: one of compute, or one of vertices with or without one of fragments.
 ///
 /// # Errors
-/// [`GpuError::Shader`] where it does not parse or validate, has another number of entry points, or
-/// binds outside group 0.
+/// [`GpuError::Shader`] where it does not parse or validate, has other entry points, binds outside group 0, or binds
+/// anything but what [`Access`] lists.
 pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
     let fault = |message: String| GpuError::Shader {
         name: name.to_owned(),
@@ -135,28 +208,17 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
     validator
         .validate(&module)
         .map_err(|error| fault(error.emit_to_string(wgsl)))?;
-    let [entry] = module.entry_points.as_slice() else {
-        return Err(fault(format!(
-            "{} entry points, not one",
-            module.entry_points.len()
-        )));
-    };
-    if entry.stage != ShaderStage::Compute {
-        return Err(fault("not a compute pass".into()));
-    }
+    let stage = stage(&module).ok_or_else(|| {
+        let count = module.entry_points.len();
+        fault(format!("{count} entry points, which are no pass"))
+    })?;
     let mut bindings = Vec::new();
     for (_, variable) in module.global_variables.iter() {
         let Some(place) = variable.binding else {
             continue;
         };
-        let access = match variable.space {
-            AddressSpace::Uniform => Access::Uniform,
-            AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
-                Access::ReadWrite
-            }
-            AddressSpace::Storage { .. } => Access::Read,
-            _ => return Err(fault("only buffers are bound".into())),
-        };
+        let access = access(&module, variable)
+            .ok_or_else(|| fault(format!("{:?} is not bound by any pass", variable.name)))?;
         if place.group != 0 {
             return Err(fault(format!("group {} is not 0", place.group)));
         }
@@ -206,12 +268,13 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
         .collect();
     let has_f64 = module.types.iter().any(|(_, ty)| {
         let scalar = ty.inner.scalar();
-        scalar.is_some_and(|scalar| scalar.kind == naga::ScalarKind::Float && scalar.width == 8)
+        scalar.is_some_and(|scalar| scalar.kind == ScalarKind::Float && scalar.width == 8)
     });
     Ok(Reflection {
+        stage,
         has_f64,
         bindings,
-        workgroup_size: entry.workgroup_size,
+        workgroup_size: module.entry_points[0].workgroup_size,
         layouts,
         constants,
         overrides,

@@ -42,6 +42,7 @@ mod experiment {
 }
 mod gpu {
     mod device_faults;
+    mod raster;
     mod shaders;
     mod sort;
 }

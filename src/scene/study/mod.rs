@@ -35,6 +35,32 @@ pub enum Study {
     Stability(Box<Stability>),
 }
 
+/// What a run is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RunsOn {
+    /// The study's adapter, in f32.
+    Gpu,
+    /// The f64 reference.
+    Cpu,
+}
+
+impl RunsOn {
+    /// As studies name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gpu => "gpu",
+            Self::Cpu => "cpu",
+        }
+    }
+
+    /// What a word of a study names.
+    fn named(word: &str) -> Option<Self> {
+        [Self::Gpu, Self::Cpu]
+            .into_iter()
+            .find(|device| device.name() == word)
+    }
+}
+
 /// Why a study could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyFileError {
@@ -127,10 +153,9 @@ impl Study {
         match self {
             Self::SolverComparison(comparison) => comparison.scenes.iter().for_each(of),
             Self::Sweep(sweep) => {
-                let points = sweep.lines.iter().flat_map(|line| &line.points);
-                points
-                    .chain(&sweep.state)
-                    .for_each(|point| of(&point.scene));
+                let points = sweep.points();
+                let points = points.chain(&sweep.state);
+                points.for_each(|point| of(&point.scene));
             }
             Self::Stability(stability) => stability.for_each_scene(of),
         }

@@ -127,7 +127,7 @@ impl Flip {
         Ok(Self {
             recordings: Recordings::new(&program, &plan, scene),
             pressure: pressure_solver(scene, &plan),
-            timer: if is_timed { Timer::new(context) } else { None },
+            timer: is_timed.then(|| Timer::new(context)),
             bricks,
             program,
             limits: super::pbf::device_limits(context),
@@ -521,12 +521,7 @@ impl Solver for Flip {
     }
 
     fn timings(&self) -> Vec<(&'static str, f64, u64)> {
-        let total = self.timer.as_ref().map(|timer| &timer.total);
-        total
-            .into_iter()
-            .flatten()
-            .map(|(&name, &(seconds, runs))| (name, seconds, runs))
-            .collect()
+        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
     }
 }
 

@@ -90,7 +90,7 @@ impl Pbf {
         program.upload(PREDICTED, last, &[NOBODY]);
         boundary.upload(&program, scene, &plan, &calibration);
         Ok(Self {
-            timer: if is_timed { Timer::new(context) } else { None },
+            timer: is_timed.then(|| Timer::new(context)),
             program,
             plan,
             scene: scene.clone(),
@@ -337,12 +337,7 @@ impl Solver for Pbf {
     }
 
     fn timings(&self) -> Vec<(&'static str, f64, u64)> {
-        let total = self.timer.as_ref().map(|timer| &timer.total);
-        total
-            .into_iter()
-            .flatten()
-            .map(|(&name, &(seconds, runs))| (name, seconds, runs))
-            .collect()
+        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
     }
 }
 

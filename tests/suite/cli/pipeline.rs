@@ -481,6 +481,62 @@ fn inspect_shows_plan_and_frames() {
     assert!(shown("inspect --adapters").contains("max_storage_buffer_binding_size"));
 }
 
+/// Names in the first column of the table that begins with `heading`.
+fn column(shown: &str, heading: &str) -> Vec<String> {
+    let rows = shown.lines().skip_while(|line| !line.starts_with(heading));
+    let rows = rows.skip(1).take_while(|line| !line.is_empty());
+    rows.map(|line| line.split(' ').next().unwrap().to_owned())
+        .collect()
+}
+
+#[test]
+fn inspect_shows_the_passes_that_render_runs() {
+    let job = Job::new();
+    let bare = job.expect(0, "inspect look.toml");
+    assert!(
+        !bare.contains("ssfr/solid") && !bare.contains("triangles"),
+        "{bare}"
+    );
+    let of_scene = job.expect(0, "inspect look.toml --scene small.toml");
+    job.expect(0, "bake small.toml -o cache --frames 1-2");
+    let of_cache = job.expect(0, "inspect look.toml --scene cache");
+    let (passes, buffers) = (column(&of_cache, "pass "), column(&of_cache, "buffer "));
+    for (found, wanted) in [
+        (&passes, "ssfr/solid"),
+        (&passes, "ssfr/shade_aovs"),
+        (&buffers, "triangles"),
+        (&buffers, "particles"),
+    ] {
+        assert!(found.iter().any(|name| name == wanted), "{of_cache}");
+    }
+    assert_eq!(column(&of_scene, "pass "), passes);
+    assert_ne!(column(&bare, "pass "), passes, "the control");
+    assert!(column(&of_cache, "texture ").contains(&"shadow_map".to_owned()));
+
+    // What is timed is what was planned, and timing changes no picture.
+    let render = "render cache --look look.toml --progress none";
+    let timed = job.expect(0, &format!("{render} -o timed --time-passes"));
+    assert_eq!(column(&format!("pass \n{timed}"), "pass "), passes);
+    assert!(
+        !job.expect(0, &format!("{render} -o plain"))
+            .contains("ssfr/")
+    );
+    for name in ["small.0002.png", "small.0002.exr"] {
+        let bytes = |folder: &str| fs::read(job.path(folder).join(name)).unwrap();
+        assert!(bytes("timed") == bytes("plain"), "{name}");
+    }
+
+    for words in [
+        "inspect small.toml --scene small.toml",
+        "inspect look.toml --set shot.frames=2",
+        "inspect look.toml --scene cache --solver flip",
+        "inspect look.toml --scene look.toml",
+    ] {
+        job.expect(2, words);
+    }
+    job.expect(4, "inspect look.toml --scene missing");
+}
+
 #[test]
 fn shipped_scenes_load_and_plan() {
     let job = Job::new();

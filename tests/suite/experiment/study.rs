@@ -9,11 +9,11 @@ use std::{
 };
 
 use swell::{
+    experiment::{Event, Outcome, PointStatus, Request, StudyError, study},
     scene::{
         Stop,
         study::{Study, sweep::Sweep},
     },
-    stage::study::{Event, Outcome, PointStatus, Request, StudyError, study},
 };
 use tempfile::TempDir;
 
@@ -88,6 +88,7 @@ impl Job {
     /// What became of each point.
     fn run(&self, text: &str, stop: bool) -> Result<(Outcome, Vec<PointStatus>), StudyError> {
         let request = Request {
+            name: "tiny-study".into(),
             study: Study::Sweep(Box::new(self.load(text).unwrap())),
             directory: self.folder.path().join("out"),
             adapter: None,

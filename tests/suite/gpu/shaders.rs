@@ -3,17 +3,18 @@ use std::{fs, path::Path};
 
 use swell::{
     gpu::{
-        reflect::{Access, Layout, reflect},
+        reflect::{Access, Layout, Stage, reflect},
         shader,
     },
+    render,
     solve::{
-        mirrors,
+        self,
         pressure::{DONE, ITERATING, ReduceStep, VERIFYING, WANTS_POCKETS},
     },
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 14] = [
+const VARIANTS: [&[&str]; 16] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -34,14 +35,9 @@ const VARIANTS: [&[&str]; 14] = [
     &["TWO_WORDS"],
     &["GHOST_FLUID", "DIAGONAL", "F64"],
     &["F64"],
+    &["SPRAY"],
+    &["AOVS"],
 ];
-
-fn compute_passes() -> Vec<String> {
-    shader::pass_files()
-        .into_iter()
-        .filter(|name| !name.starts_with("ssfr/"))
-        .collect()
-}
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them.
 fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
@@ -50,8 +46,8 @@ fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
 
 #[test]
 fn every_pass_validates_in_every_variant() {
-    let passes = compute_passes();
-    assert!(passes.len() >= 18, "{passes:?}");
+    let passes = shader::pass_files();
+    assert!(passes.len() >= 30, "{passes:?}");
     for pass in &passes {
         for defines in VARIANTS
             .iter()
@@ -63,16 +59,19 @@ fn every_pass_validates_in_every_variant() {
             // Nothing but the projection may ask an adapter for f64, and that only where it is told to.
             let is_wide = pass.starts_with("pressure/") && defines.contains(&"F64");
             assert!(is_wide || !reflection.has_f64, "{pass} {defines:?}");
-            let [x, y, z] = reflection.workgroup_size;
-            assert!(
-                [64, 256].contains(&x) && (y, z) == (1, 1),
-                "{pass}: {:?}",
-                reflection.workgroup_size
-            );
+            let size = reflection.workgroup_size;
+            let is_known = match (pass.starts_with("ssfr/"), reflection.stage) {
+                (true, Stage::Raster { .. }) => true,
+                (true, Stage::Compute) => [[64, 1, 1], [32, 1, 1], [16, 4, 1]].contains(&size),
+                (false, stage) => {
+                    stage == Stage::Compute && [[64, 1, 1], [256, 1, 1]].contains(&size)
+                }
+            };
+            assert!(is_known, "{pass}: {size:?}");
             let storage = reflection
                 .bindings
                 .iter()
-                .filter(|binding| binding.access != Access::Uniform)
+                .filter(|binding| binding.access.is_storage())
                 .count();
             assert!(
                 storage <= 10,
@@ -93,23 +92,41 @@ fn every_pass_validates_in_every_variant() {
     }
 }
 
-/// The renderer's passes as well, which have textures and are not reflected.
 #[test]
-fn every_pass_parses() {
-    let refused = |text: &str| {
-        naga::front::wgsl::parse_str(text)
-            .err()
-            .map(|e| e.to_string())
-    };
-    for pass in shader::pass_files() {
-        for defines in VARIANTS.iter().chain(&[&["AOVS", "SPRAY"][..]]) {
-            if is_meaningful(&pass, defines) {
-                let text = shader::compose(&pass, defines).unwrap();
-                assert_eq!(refused(&text), None, "{pass} {defines:?}");
-            }
-        }
+fn reflection_refuses_what_no_pass_binds() {
+    let kinds = "@group(0) @binding(0) var<uniform> u: vec4f;
+        @group(0) @binding(1) var<storage, read> r: array<f32>;
+        @group(0) @binding(2) var t: texture_2d<f32>;
+        @group(0) @binding(3) var d: texture_depth_2d;
+        @group(0) @binding(4) var s: sampler;
+        @group(0) @binding(5) var c: sampler_comparison;
+        @vertex fn v() -> @builtin(position) vec4f { return u + r[0]; }";
+    let found = reflect("test", kinds).unwrap();
+    let raster = |has_fragment| Stage::Raster { has_fragment };
+    assert_eq!(found.stage, raster(false));
+    let accesses: Vec<Access> = found
+        .bindings
+        .iter()
+        .map(|binding| binding.access)
+        .collect();
+    let expected = [
+        Access::Uniform,
+        Access::Read,
+        Access::Texture,
+        Access::DepthTexture,
+        Access::Sampler,
+        Access::CompareSampler,
+    ];
+    assert_eq!(accesses, expected);
+    let fragment = "@fragment fn f() -> @location(0) vec4f { return vec4f(0.0); }";
+    let both = reflect("test", &format!("{kinds}\n{fragment}")).unwrap();
+    assert_eq!(both.stage, raster(true));
+    // Controls: a cube, a second group, a fragment shader alone, and no entry point at all.
+    let cube = kinds.replace("texture_2d<f32>", "texture_cube<f32>");
+    let group = kinds.replace("@group(0) @binding(5)", "@group(1) @binding(5)");
+    for refused in [cube.as_str(), group.as_str(), fragment, "fn f() {}"] {
+        assert!(reflect("test", refused).is_err(), "{refused}");
     }
-    assert!(refused("fn f() -> f32 { return x; }").is_some());
 }
 
 /// Where a shader's struct is none of the mirrors of its name.
@@ -125,9 +142,9 @@ fn check(found: &Layout, mirrors: &[Layout]) -> Result<(), String> {
 /// Every struct that is bound has a mirror, and every mirror is its struct: by size, names and offsets.
 #[test]
 fn mirrors_match_naga() {
-    let mirrors = mirrors();
+    let mirrors = [solve::mirrors(), render::mirrors()].concat();
     let mut seen = vec![false; mirrors.len()];
-    for pass in &compute_passes() {
+    for pass in &shader::pass_files() {
         for defines in VARIANTS
             .iter()
             .filter(|defines| is_meaningful(pass, defines))
@@ -211,8 +228,8 @@ fn composition_faults_name_their_place() {
     assert!(fault.contains("test"), "{fault}");
 }
 
-/// Rooms that each room may import; `stage` and `cli` stand above them all.
-const MAY_IMPORT: [(&str, &[&str]); 11] = [
+/// Rooms that each room may import; `stage`, `experiment` and `cli` stand above them all.
+const MAY_IMPORT: [(&str, &[&str]); 12] = [
     ("domain", &[]),
     ("gpu", &[]),
     // The plan's rows are gpu's own plain descriptions: a copy of them would have to be kept in step.
@@ -237,7 +254,20 @@ const MAY_IMPORT: [(&str, &[&str]); 11] = [
             "study",
         ],
     ),
-    ("cli", &["stage", "scene", "domain"]),
+    (
+        "experiment",
+        &[
+            "domain",
+            "gpu",
+            "scene",
+            "cache",
+            "solve",
+            "reference",
+            "study",
+            "stage",
+        ],
+    ),
+    ("cli", &["stage", "experiment", "scene", "domain"]),
 ];
 
 /// Crates that only some rooms name.

@@ -10,7 +10,7 @@ use swell::gpu::adapter::Context;
 use swell::render::image::{
     read_exr_attributes, read_png_attributes, write_exr, write_png, write_png_with_attributes,
 };
-use swell::render::{Attributes, Image, RenderError, RenderScene, Renderer, passes, view};
+use swell::render::{Attributes, Image, RenderError, RenderScene, Renderer, view};
 use swell::scene::look::Look;
 
 use super::scenes::{box_mesh, city_scene, city_water, slab};
@@ -262,11 +262,24 @@ fn what_ran_is_what_the_look_calls_for() {
     let (mut scene, water) = harbour();
     let names = |look: &Look, scene: &RenderScene| {
         let mut renderer = Renderer::new(&context(), look, scene).unwrap();
+        renderer.time_passes();
         renderer.render(1, &water).unwrap();
-        let has_solids = !scene.solids.is_empty() || look.spec().basin.is_some();
-        assert_eq!(renderer.passes(), passes(look, has_solids));
-        let ran: Vec<_> = renderer.times().iter().map(|time| time.name).collect();
-        assert_eq!(ran, renderer.passes());
+        let samples = look.spec().image.samples as usize;
+        let planned: Vec<_> = renderer
+            .plan()
+            .passes()
+            .into_iter()
+            .map(|(name, runs)| (name, runs.once + samples * runs.sample + runs.aovs))
+            .collect();
+        let times = renderer.times().into_iter();
+        let timed: Vec<_> = times
+            .map(|(name, seconds, runs)| {
+                assert!(seconds > 0.0, "{name}");
+                (name, runs as usize)
+            })
+            .collect();
+        assert_eq!(timed, planned);
+        let ran: Vec<_> = timed.into_iter().map(|(name, _)| name).collect();
         ran
     };
     let full = names(&look(&format!("{OBLIQUE}{ALL_AOVS}")), &scene);
@@ -557,14 +570,10 @@ fn pictures() {
         let started = std::time::Instant::now();
         let image = renderer.render(120, &water).unwrap();
         println!("{stem}: frame {:.3} s", started.elapsed().as_secs_f64());
-        renderer.time_one_by_one();
+        renderer.time_passes();
         renderer.render(120, &water).unwrap();
-        for time in renderer.times() {
-            println!(
-                "  {:24} {:8.1} ms a frame",
-                time.name,
-                1000.0 * time.seconds
-            );
+        for (name, seconds, _) in renderer.times() {
+            println!("  {name:24} {:8.1} ms a frame", 1000.0 * seconds);
         }
         let file = Path::new(&folder).join(format!("{stem}.png"));
         write_png(&file, &image, &look.spec().view).unwrap();

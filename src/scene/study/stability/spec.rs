@@ -9,9 +9,9 @@ use toml::{Spanned, de::DeTable};
 use super::{
     super::{
         super::{Method, Reach, Scene, document::Document, error::SceneError},
-        SceneFile, StudyFileError, load_with,
+        RunsOn, SceneFile, StudyFileError, load_with,
     },
-    Attempt, Bound, Case, CaseDevice, Held, Limit, Mark, Other, Quantity, Search, Stability, Trial,
+    Attempt, Bound, Case, Held, Limit, Mark, Other, Quantity, Search, Stability, Trial,
 };
 use crate::domain::bounds::Bounds;
 
@@ -214,7 +214,7 @@ fn other(
     doc: &Document<'_>,
     spec: &OtherSpec,
     file: &SceneFile<'_>,
-    (set, method, device): (&[&Spanned<String>], Method, CaseDevice),
+    (set, method, device): (&[&Spanned<String>], Method, RunsOn),
     beside: &Scene,
 ) -> Result<Other> {
     let set: Vec<_> = set.iter().copied().chain(&spec.set).collect();
@@ -249,7 +249,7 @@ fn marks(
     doc: &Document<'_>,
     specs: &[Spanned<MarkSpec>],
     method: Method,
-    device: CaseDevice,
+    device: RunsOn,
     others: usize,
 ) -> Result<Vec<Mark>> {
     let always = Quantity::ALWAYS.map(|of| Mark {
@@ -322,7 +322,7 @@ fn limit(doc: &Document<'_>, spec: &LimitSpec, base_dir: &Path) -> Result<Limit>
             reach: doc.reach(),
             set: spec.set.iter().map(|set| set.get_ref().clone()).collect(),
             seconds: spec.seconds,
-            marks: marks(doc, &spec.mark, method, CaseDevice::Gpu, 0)?,
+            marks: marks(doc, &spec.mark, method, RunsOn::Gpu, 0)?,
         };
         // Where the bracket begins the scene has to be sound; further on it may become impossible.
         template.trial(method, spec.passes)?;
@@ -354,7 +354,7 @@ impl Template {
             .ceil()
             .max(1.0);
         Ok(Trial {
-            device: CaseDevice::Gpu,
+            device: RunsOn::Gpu,
             scene,
             frames: frames as u32,
             others: Vec::new(),
@@ -409,19 +409,16 @@ fn methods(doc: &Document<'_>, words: &Option<Vec<Spanned<String>>>) -> Result<V
     words.iter().map(of).collect()
 }
 
-fn devices(doc: &Document<'_>, words: &Option<Vec<Spanned<String>>>) -> Result<Vec<CaseDevice>> {
+fn devices(doc: &Document<'_>, words: &Option<Vec<Spanned<String>>>) -> Result<Vec<RunsOn>> {
     match words {
-        None => Ok(vec![CaseDevice::Gpu, CaseDevice::Cpu]),
+        None => Ok(vec![RunsOn::Gpu, RunsOn::Cpu]),
         Some(words) => words.iter().map(|word| device(doc, word)).collect(),
     }
 }
 
-fn device(doc: &Document<'_>, word: &Spanned<String>) -> Result<CaseDevice> {
-    match word.get_ref().as_str() {
-        "gpu" => Ok(CaseDevice::Gpu),
-        "cpu" => Ok(CaseDevice::Cpu),
-        other => Err(doc.fault_at(word.span(), format!("{other:?} is no device"))),
-    }
+fn device(doc: &Document<'_>, word: &Spanned<String>) -> Result<RunsOn> {
+    let fault = || doc.fault_at(word.span(), format!("{:?} is no device", word.get_ref()));
+    RunsOn::named(word.get_ref()).ok_or_else(fault)
 }
 
 /// The scene with overrides and a solver.

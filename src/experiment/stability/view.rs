@@ -1,30 +1,22 @@
-//! One run, frame by frame.
+//! A run as its marks see it after each frame.
 
 use glam::DVec3;
 
 use crate::{
     domain::{
-        bounds::Bounds,
-        particles::Particles,
-        probe::elevation,
-        solver::{Solver, StepReport},
+        bounds::Bounds, particles::Particles, probe::elevation,
+        signed_distance::SignedDistanceError, solver::StepReport,
     },
     scene::{Method, Scene, probe::ProbeKind},
+    stage::{drive::Step, prepare::Start},
 };
 
-use super::super::super::{
-    device::{Opened, SolverError},
-    prepare::Start,
-};
-use super::super::StudyError;
-
-/// A scene on its way.
-pub(super) struct Runner<'a> {
+/// A scene and where its run stands.
+pub(super) struct View<'a> {
     pub(super) scene: &'a Scene,
     pub(super) start: Start,
-    solver: Box<dyn Solver<Error = SolverError>>,
     /// Frames that are done.
-    pub(super) frame: u32,
+    frame: u32,
     pub(super) state: Particles,
     /// Of the last frame; before the first there is none.
     pub(super) report: Option<StepReport>,
@@ -34,16 +26,13 @@ pub(super) struct Runner<'a> {
     pub(super) elevations: Vec<Option<f64>>,
 }
 
-impl<'a> Runner<'a> {
-    pub(super) fn new(opened: &Opened, scene: &'a Scene) -> Result<Self, StudyError> {
+impl<'a> View<'a> {
+    pub(super) fn new(scene: &'a Scene) -> Result<Self, SignedDistanceError> {
         let start = Start::of(scene)?;
-        let mut solver = opened.build(scene, &start, false)?.solver;
-        solver.load(0, &start.particles)?;
         Ok(Self {
             state: start.particles.clone(),
             start,
             scene,
-            solver,
             frame: 0,
             report: None,
             pressures: Vec::new(),
@@ -51,24 +40,19 @@ impl<'a> Runner<'a> {
         })
     }
 
-    pub(super) fn advance(&mut self) -> Result<(), StudyError> {
-        let (state, report) = self.solver.advance()?;
-        let points = self.scene.pressure_points();
-        if !points.is_empty() {
-            self.pressures = self.solver.pressures(&points)?;
-        }
-        let spacing = self.scene.particle_spacing();
+    /// Takes a frame over.
+    pub(super) fn take(&mut self, step: Step) {
+        let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
         let probes = self.scene.probes.iter();
-        let elevations = probes.filter_map(|probe| match probe.kind {
-            ProbeKind::Elevation { at } => Some(elevation(&state, spacing, &self.scene.domain, at)),
+        let levels = probes.filter_map(|probe| match probe.kind {
+            ProbeKind::Elevation { at } => Some(elevation(&step.particles, spacing, domain, at)),
             _ => None,
         });
-        let floor = self.scene.domain.min.y;
-        self.elevations = elevations.map(|level| Some(level? - floor)).collect();
-        self.state = state;
-        self.report = Some(report);
-        self.frame += 1;
-        Ok(())
+        self.elevations = levels.map(|level| Some(level? - domain.min.y)).collect();
+        self.pressures = step.pressures;
+        self.state = step.particles;
+        self.report = Some(step.report);
+        self.frame = step.frame;
     }
 
     /// Seconds of the shot that are over.

@@ -17,17 +17,21 @@ use crate::{
     },
     scene::{flip::Surface, study::sweep::Point},
     solve::{SolveError, flip::Flip, pbf::device_limits},
+    stage::{device::Opened, drive::Drive, prepare::Start},
 };
 
 use super::{
-    super::{super::prepare::Start, StudyError},
+    super::{
+        StudyError,
+        engine::{Bench, until_done},
+    },
     frames::products,
-    ledger::{ProjectionErrors, Run},
+    measured::{Measured, ProjectionErrors, Run},
 };
 
 /// Projections of one state.
-pub(super) struct Projections {
-    made_by: Point,
+pub(super) struct Projections<'a> {
+    made_by: &'a Point,
     /// Made when it is first needed.
     state: Option<Particles>,
     /// By a hash of the system and its right-hand side.
@@ -65,9 +69,9 @@ struct Grid {
     velocity: Vec<f32>,
 }
 
-impl Projections {
+impl<'a> Projections<'a> {
     /// Of the state at the end of this point's frames.
-    pub(super) fn new(made_by: Point) -> Self {
+    pub(super) fn new(made_by: &'a Point) -> Self {
         Self {
             made_by,
             state: None,
@@ -75,81 +79,88 @@ impl Projections {
         }
     }
 
-    fn state(&mut self, context: &Context) -> Result<&Particles, StudyError> {
+    fn state(&mut self, bench: &Bench<'_>) -> Result<&Particles, StudyError> {
         let state = match self.state.take() {
             Some(state) => state,
             None => {
-                let start = Start::of(&self.made_by.scene)?;
-                let mut solver = flip(context, &self.made_by, &start)?;
-                solver.load(0, &start.particles)?;
+                let Point { scene, frames, .. } = self.made_by;
+                let start = Start::of(scene)?;
+                let opened = bench.devices.of(self.made_by.device);
+                let mut drive = Drive::new(opened, scene, &start, false)?;
                 let mut state = start.particles;
-                for _ in 0..self.made_by.frames {
-                    state = solver.advance()?.0;
-                }
+                until_done(&mut drive, *frames, bench.stop, |step| {
+                    state = step.particles;
+                    Ok(())
+                })?;
                 state
             }
         };
         Ok(self.state.insert(state))
     }
 
+    /// A solver that stands where the state does.
+    fn loaded(&mut self, bench: &Bench<'_>, point: &Point) -> Result<Flip, StudyError> {
+        let frames = self.made_by.frames;
+        let state = self.state(bench)?;
+        let context = context(bench, point);
+        let start = Start::of(&point.scene)?;
+        let plan = start.plan(&point.scene, device_limits(context));
+        let mut solver = Flip::new(context, &point.scene, plan, &start.boundary, false)?;
+        solver.load(frames, state)?;
+        Ok(solver)
+    }
+
     /// Projects `repeats` times, after one that is not counted. A time is one projection, all in: system, solve,
     /// gradient, waiting for the device.
-    pub(super) fn run(
+    pub(super) fn measure(
         &mut self,
-        context: &Context,
+        bench: &Bench<'_>,
         point: &Point,
         repeats: u32,
     ) -> Result<Run, StudyError> {
-        let state = self.state(context)?.clone();
-        let start = Start::of(&point.scene)?;
-        let mut solver = flip(context, point, &start)?;
-        solver.load(self.made_by.frames, &state)?;
+        let mut solver = self.loaded(bench, point)?;
         let substep = solver.carry_to_grid()?;
         let grid = Grid::read(&solver, point)?;
         solver.project(&substep)?;
-        let mut run = Run {
-            particles: state.len(),
-            frames: 1,
+        let mut measured = Measured {
             substeps: 1,
-            ..Run::default()
+            ..Measured::default()
         };
+        let mut seconds = Vec::new();
         for _ in 0..repeats {
             solver.carry_to_grid()?;
-            context.wait().map_err(SolveError::from)?;
+            context(bench, point).wait().map_err(SolveError::from)?;
             let begin = Instant::now();
             let projected = solver.project(&substep)?;
-            run.seconds.push(begin.elapsed().as_secs_f64());
+            seconds.push(begin.elapsed().as_secs_f64());
             if !projected.solved.residual.is_finite() {
                 let detail = format!("a residual of {}", projected.solved.residual);
                 let breach = Breach::not_finite(self.made_by.frames + 1, 1, Some(detail));
                 return Err(SolveError::Numbers(breach).into());
             }
-            run.iterations = u64::from(projected.solved.iterations);
-            run.missed = u32::from(projected.solved.is_missed);
-            run.projection = Some(ProjectionErrors {
+            measured.iterations = u64::from(projected.solved.iterations);
+            measured.missed = u32::from(projected.solved.is_missed);
+            measured.projection = Some(ProjectionErrors {
                 divergence: projected.divergence_after * substep.length,
                 residual: projected.solved.residual,
                 ..self.errors(&solver, &grid)?
             });
         }
         let settings = &point.scene.solver.flip().pressure;
-        run.work = run.iterations as f64 * products(settings.preconditioner);
-        Ok(run)
+        measured.work = measured.iterations as f64 * products(settings.preconditioner);
+        self.one(bench, seconds, measured)
     }
 
     /// How far the exact projection of the state on `coarse` cells is from that on `fine` ones, half as large: velocities
     /// at faces against the mean of the four faces that make up each, q Δx at centres against the mean of eight.
     pub(super) fn coarser(
         &mut self,
-        context: &Context,
+        bench: &Bench<'_>,
         fine: &Point,
         coarse: &Point,
     ) -> Result<Run, StudyError> {
         let begin = Instant::now();
-        let [fine, coarse] = [
-            self.resolved(context, fine)?,
-            self.resolved(context, coarse)?,
-        ];
+        let [fine, coarse] = [self.resolved(bench, fine)?, self.resolved(bench, coarse)?];
         if (fine.step - coarse.step).abs() > 1e-9 * fine.step {
             let what = format!(
                 "the coarser cells take a substep of {} s, the others of {} s",
@@ -175,11 +186,8 @@ impl Projections {
             let (off, all): (Vec<f64>, Vec<f64>) = pairs.map(|(c, f)| (c - f, f)).unzip();
             norm(&off) / norm(&all)
         };
-        Ok(Run {
-            particles: self.state(context)?.len(),
-            frames: 1,
+        let measured = Measured {
             substeps: 1,
-            seconds: vec![begin.elapsed().as_secs_f64()],
             projection: Some(ProjectionErrors {
                 pressure: relative(true),
                 velocity: relative(false),
@@ -188,16 +196,30 @@ impl Projections {
                 has_factor: fine.has_factor && coarse.has_factor,
                 ..ProjectionErrors::default()
             }),
-            ..Run::default()
+            ..Measured::default()
+        };
+        self.one(bench, vec![begin.elapsed().as_secs_f64()], measured)
+    }
+
+    /// A run of one projection.
+    fn one(
+        &mut self,
+        bench: &Bench<'_>,
+        seconds: Vec<f64>,
+        measured: Measured,
+    ) -> Result<Run, StudyError> {
+        Ok(Run {
+            particles: self.state(bench)?.len(),
+            frames: 1,
+            seconds,
+            ended: None,
+            measured,
         })
     }
 
     /// The exact projection of the state as a point's grid has it.
-    fn resolved(&mut self, context: &Context, point: &Point) -> Result<Resolved, StudyError> {
-        let state = self.state(context)?.clone();
-        let start = Start::of(&point.scene)?;
-        let mut solver = flip(context, point, &start)?;
-        solver.load(self.made_by.frames, &state)?;
+    fn resolved(&mut self, bench: &Bench<'_>, point: &Point) -> Result<Resolved, StudyError> {
+        let mut solver = self.loaded(bench, point)?;
         let substep = solver.carry_to_grid()?;
         let grid = Grid::read(&solver, point)?;
         let cells = grid.cells(&solver);
@@ -282,9 +304,11 @@ impl Projections {
     }
 }
 
-fn flip(context: &Context, point: &Point, start: &Start) -> Result<Flip, SolveError> {
-    let plan = start.plan(&point.scene, device_limits(context));
-    Flip::new(context, &point.scene, plan, &start.boundary, false)
+fn context<'a>(bench: &'a Bench<'_>, point: &Point) -> &'a Context {
+    match bench.devices.of(point.device) {
+        Opened::Gpu(context) => context,
+        Opened::Cpu => unreachable!("refused where the study is loaded"),
+    }
 }
 
 impl Grid {

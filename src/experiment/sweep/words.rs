@@ -2,7 +2,7 @@
 
 use crate::scene::study::sweep::{FRAME_RATE, Measure, SAMPLES};
 
-use super::Results;
+use super::report::Results;
 
 impl Results<'_> {
     /// Paragraphs for the page.
@@ -24,8 +24,7 @@ impl Results<'_> {
                 1e-6. It is what further iterations would still have to move; its time is not in the run's."
                 .to_owned(),
             Measure::Projection => {
-                let rows = self.all().filter_map(|r| r.run()?.projection);
-                let rows: Vec<_> = rows.collect();
+                let rows: Vec<_> = self.done().filter_map(|run| run.measured.projection).collect();
                 let most = rows.iter().map(|p| p.rows).max().unwrap_or(0);
                 let worst = rows.iter().fold(0.0, |worst: f64, p| worst.max(p.exact_residual));
                 let by = if rows.iter().all(|p| p.has_factor) {
@@ -64,6 +63,19 @@ impl Results<'_> {
             texts.push(PIC_BLEND.to_owned());
         }
         texts
+    }
+
+    /// How times were taken.
+    pub(super) fn policy(&self) -> String {
+        let (repeats, warm) = match self.sweep.state {
+            Some(_) => ("projections", "one projection"),
+            None => ("runs", "one frame"),
+        };
+        format!(
+            "Times are wall clock, in the program, without files; a point is timed over {} {repeats}, and the median stands \
+             with the least and the greatest. Each point warms up with {warm} that does not count.",
+            self.sweep.repeats
+        )
     }
 
     fn coarser_words(&self, set: &str) -> String {

@@ -1,45 +1,16 @@
-//! What became of a run, as its line in `results.jsonl` holds it.
+//! How a run's marks came out.
 
 use serde::{Deserialize, Serialize};
 
-use super::super::ledger::Line;
 use crate::scene::study::stability::{Mark, Trial};
+
+use super::{super::PointStatus, report};
 
 /// Most points of a curve that a line keeps.
 const CURVE: usize = 160;
 
-/// A run, or an attempt that was to be refused.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
-    /// Of all that it depends on.
-    pub(super) hash: String,
-    /// For a reader of the file.
-    pub(super) name: String,
-    /// What became of it.
-    pub run: Run,
-}
-
-impl Line for Record {
-    fn hash(&self) -> &str {
-        &self.hash
-    }
-}
-
-/// What a run measured.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Run {
-    /// At the start.
-    pub particles: usize,
-    /// That were done.
-    pub frames: u32,
-    /// Wall clock of all frames.
-    pub seconds: f64,
-    /// One a mark, as [`Trial::marks`] has them.
-    pub measured: Vec<Measured>,
-    /// Why it ended before its last frame, or did not begin.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ended: Option<String>,
-}
+/// A run with what each of its marks was measured at, in the order of [`Trial::marks`]; or an attempt that was to be refused.
+pub type Run = super::super::Run<Vec<Measured>>;
 
 /// What a mark was measured at.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -98,6 +69,11 @@ impl Measured {
         }
     }
 
+    /// For a reader.
+    pub(super) fn words(&self) -> String {
+        self.value.map_or("no number".to_owned(), report::number)
+    }
+
     /// Against its mark, in a run that did not end early.
     fn holds(&self, mark: &Mark) -> bool {
         self.value.is_some_and(|value| mark.bound.holds(value))
@@ -122,5 +98,22 @@ impl Run {
     pub fn passes(&self, trial: &Trial) -> bool {
         let is_held = |v: &Verdict| matches!(v, Verdict::Passes | Verdict::PassesUnexpectedly);
         self.verdicts(trial).iter().all(is_held)
+    }
+
+    /// What a user is told of it.
+    pub(super) fn status(&self, trial: &Trial, stood: bool) -> PointStatus {
+        let marks = trial
+            .marks
+            .iter()
+            .zip(self.verdicts(trial))
+            .zip(&self.measured);
+        let missed = marks.filter(|((_, verdict), _)| *verdict == Verdict::Misses);
+        let told = missed.map(|((mark, _), m)| format!("{} is {}", mark.of.name(), m.words()));
+        match (&self.ended, told.collect::<Vec<_>>().join(", ")) {
+            (Some(message), _) => PointStatus::Failed(message.clone()),
+            (None, missed) if !missed.is_empty() => PointStatus::Failed(missed),
+            (None, _) if stood => PointStatus::Stands,
+            (None, _) => PointStatus::Done(1e3 * self.per_frame()[1], Vec::new()),
+        }
     }
 }

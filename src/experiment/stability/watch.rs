@@ -15,11 +15,11 @@ use crate::{
     study::stability::{Flight, filled_volume, least_spacing, matched, outside, point},
 };
 
-use super::runner::Runner;
+use super::view::View;
 
 /// A run beside the one that is measured, and who is who.
 pub(super) struct Beside<'a> {
-    pub(super) runner: Runner<'a>,
+    pub(super) view: View<'a>,
     pub(super) other: &'a Other,
     /// For each particle of the run its own; `None` where it has none there.
     pub(super) partner: Vec<Option<usize>>,
@@ -28,21 +28,21 @@ pub(super) struct Beside<'a> {
 }
 
 /// A place of the other run, about its own origin, where the run would have it, about its own.
-fn to_ours(p: DVec3, origin: DVec3, runner: &Runner<'_>, other: &Other) -> DVec3 {
-    (p + runner.scene.origin - other.shift) / other.scale - origin
+fn to_ours(p: DVec3, origin: DVec3, view: &View<'_>, other: &Other) -> DVec3 {
+    (p + view.scene.origin - other.shift) / other.scale - origin
 }
 
 impl<'a> Beside<'a> {
-    pub(super) fn new(runner: Runner<'a>, other: &'a Other, ours: &Runner<'_>) -> Self {
+    pub(super) fn new(view: View<'a>, other: &'a Other, ours: &View<'_>) -> Self {
         let partner = matched(
             &ours.state.position,
-            &runner.state.position,
-            |p| to_ours(p, ours.scene.origin, &runner, other),
+            &view.state.position,
+            |p| to_ours(p, ours.scene.origin, &view, other),
             ours.scene.particle_spacing(),
         );
         Self {
             origin: ours.scene.origin,
-            runner,
+            view,
             other,
             partner,
         }
@@ -50,11 +50,11 @@ impl<'a> Beside<'a> {
 
     /// Where a particle of the run would be if it went as here; its place at the start as well.
     fn places(&self, k: usize) -> Option<(DVec3, DVec3)> {
-        let of = |p: &[f32; 3]| to_ours(point(p), self.origin, &self.runner, self.other);
+        let of = |p: &[f32; 3]| to_ours(point(p), self.origin, &self.view, self.other);
         let partner = self.partner[k]?;
-        let start = &self.runner.start.particles;
+        let start = &self.view.start.particles;
         Some((
-            of(&self.runner.state.position[partner]),
+            of(&self.view.state.position[partner]),
             of(&start.position[partner]),
         ))
     }
@@ -86,7 +86,7 @@ enum Memory {
 }
 
 impl<'a> Watch<'a> {
-    pub(super) fn new(mark: &'a Mark, run: &Runner<'_>) -> Self {
+    pub(super) fn new(mark: &'a Mark, run: &View<'_>) -> Self {
         let start = &run.start.particles;
         let memory = match mark.of {
             Quantity::BallisticError => {
@@ -123,7 +123,7 @@ impl<'a> Watch<'a> {
     }
 
     /// After each frame.
-    pub(super) fn look(&mut self, run: &Runner<'_>, beside: &[Beside<'_>], report: &StepReport) {
+    pub(super) fn look(&mut self, run: &View<'_>, beside: &[Beside<'_>], report: &StepReport) {
         let from = self.mark.after.max(self.mark.since.unwrap_or(0.0));
         let counts = run.time() >= from * (1.0 - 1e-9);
         // What sums up the way from the start has to see all of it; means begin where the mark does.
@@ -145,7 +145,7 @@ impl<'a> Watch<'a> {
         self.value.filter(|value| value.is_finite())
     }
 
-    fn number(&mut self, run: &Runner<'_>, beside: &[Beside<'_>], report: &StepReport) -> f64 {
+    fn number(&mut self, run: &View<'_>, beside: &[Beside<'_>], report: &StepReport) -> f64 {
         let scene = run.scene;
         let spacing = scene.particle_spacing();
         let (start, now) = (&run.start.particles, &run.state);
@@ -194,7 +194,7 @@ impl<'a> Watch<'a> {
             Quantity::DisplacementError => displacement_error(run, beside),
             Quantity::GaugeDifference => match beside {
                 [other, ..] => {
-                    largest(gaps(run, &other.runner, other.other.scale)) / run.resolution()
+                    largest(gaps(run, &other.view, other.other.scale)) / run.resolution()
                 }
                 [] => f64::NAN,
             },
@@ -212,7 +212,7 @@ impl<'a> Watch<'a> {
     }
 
     /// Of quantities that depend on the frames before.
-    fn remembered(&mut self, run: &Runner<'_>, beside: &[Beside<'_>], report: &StepReport) -> f64 {
+    fn remembered(&mut self, run: &View<'_>, beside: &[Beside<'_>], report: &StepReport) -> f64 {
         let now = &run.state;
         match &mut self.memory {
             Memory::Flight(flight) => {
@@ -265,15 +265,15 @@ impl<'a> Watch<'a> {
             }
             Memory::Sums(sums) => match (self.mark.of, beside) {
                 (Quantity::IterationsRatio, [other, ..]) => {
-                    let theirs = other.runner.report.as_ref().map_or(0, |r| r.iterations);
+                    let theirs = other.view.report.as_ref().map_or(0, |r| r.iterations);
                     sums[0] += report.iterations as f64;
                     sums[1] += theirs as f64;
                     sums[0] / sums[1]
                 }
                 (Quantity::GaugeConvergence, [second, third, ..]) => {
                     let square = |gaps: Vec<f64>| gaps.iter().map(|gap| gap * gap).sum::<f64>();
-                    sums[0] += square(gaps(&second.runner, &third.runner, 1.0));
-                    sums[1] += square(gaps(run, &second.runner, second.other.scale));
+                    sums[0] += square(gaps(&second.view, &third.view, 1.0));
+                    sums[1] += square(gaps(run, &second.view, second.other.scale));
                     (sums[0] / sums[1]).sqrt()
                 }
                 _ => f64::NAN,
@@ -282,7 +282,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    fn difference(&self, run: &Runner<'_>, beside: &[Beside<'_>]) -> f64 {
+    fn difference(&self, run: &View<'_>, beside: &[Beside<'_>]) -> f64 {
         let [other, ..] = beside else {
             return f64::NAN;
         };
@@ -300,7 +300,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-fn displacement_error(run: &Runner<'_>, beside: &[Beside<'_>]) -> f64 {
+fn displacement_error(run: &View<'_>, beside: &[Beside<'_>]) -> f64 {
     let [other, ..] = beside else {
         return f64::NAN;
     };
@@ -365,7 +365,7 @@ fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, larger)
 }
 
-fn pressure_error(run: &Runner<'_>, pressures: impl Iterator<Item = f64>) -> f64 {
+fn pressure_error(run: &View<'_>, pressures: impl Iterator<Item = f64>) -> f64 {
     let scene = run.scene;
     let surface = top(&run.start.particles.position) + 0.5 * scene.particle_spacing();
     let weight = scene.water.rest_density * scene.water.gravity.length();
@@ -375,7 +375,7 @@ fn pressure_error(run: &Runner<'_>, pressures: impl Iterator<Item = f64>) -> f64
 }
 
 /// Of the probes of elevation, metres of the first run.
-fn gaps(a: &Runner<'_>, b: &Runner<'_>, scale: f64) -> Vec<f64> {
+fn gaps(a: &View<'_>, b: &View<'_>, scale: f64) -> Vec<f64> {
     let pairs = a.elevations.iter().zip(&b.elevations);
     let gap = |(a, b): (&Option<f64>, &Option<f64>)| match (a, b) {
         (Some(a), Some(b)) => (a - b / scale).abs(),

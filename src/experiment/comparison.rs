@@ -1,77 +1,73 @@
-//! Two solvers on one scene: bakes and renders both, measures them, and writes the page.
+//! Two solvers on one scene: bakes and renders both and measures them. What stands in their caches is resumed.
 
-use std::{fs, path::PathBuf, sync::atomic::AtomicBool};
+use std::{fs, path::PathBuf};
 
 use rayon::prelude::*;
 
 use crate::{
     cache::{CacheError, CacheReader, Manifest},
     domain::{frame_range::FrameRange, solver::StepReport},
+    gpu::adapter::Needs,
     scene::{Scene, Solid, study::comparison::SolverComparison},
+    stage::{bake, device::Device, gauge, render},
     study::{
         comparison::{self, Course, Finding, Impact, Row},
         measure::Gauge,
         median,
-        page::{self, Part},
+        page::Part,
         picture,
     },
 };
 
 use super::{
-    super::{bake, device::Device, render},
-    Event, Outcome, Request, StudyError, direction, gauge, what_was_run, write,
+    Event, Request, StudyError,
+    engine::{Bench, Kind},
+    report::{Report, what_was_run},
 };
 
-/// Runs it; what stands in the directory already is gone on with.
-pub(super) fn run(
-    request: &Request,
-    comparison: &SolverComparison,
-    stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
-) -> Result<Outcome, StudyError> {
-    for scene in &comparison.scenes {
-        tell(Event::Solver(scene.solver.method.name()));
-        if bake_and_render(request, comparison, scene, stop, tell)? {
-            return Ok(Outcome::default());
-        }
+impl Kind for SolverComparison {
+    /// Bakes and renders open the adapter themselves.
+    fn needs(&self) -> Option<Needs> {
+        None
     }
-    let [scene, other] = &comparison.scenes;
-    let open = |scene: &Scene| CacheReader::open(&cache_directory(request, scene));
-    let caches = [open(scene)?, open(other)?];
-    let [a, b] = &caches;
-    let gauge = gauge(scene, &[a, b])?;
-    let courses = [
-        course(a, &gauge, &comparison.frames)?,
-        course(b, &gauge, &comparison.frames)?,
-    ];
-    let impact = Impact::of(&courses, obstacle(scene, &gauge));
-    let findings = comparison::findings(&courses, impact);
-    write(
-        &request.directory.join("results.csv"),
-        comparison::to_csv(&courses),
-    )?;
-    let parts = parts(request, comparison, &caches, &courses, &findings, impact)?;
-    let title = format!(
-        "{}: {} and {}",
-        scene.shot.name, courses[0].solver, courses[1].solver
-    );
-    let file = request.directory.join("index.html");
-    write(&file, page::html(&title, &parts))?;
-    Ok(Outcome {
-        page: Some(file),
-        findings: findings.into_iter().map(|found| found.text).collect(),
-        missed: Vec::new(),
-    })
+
+    fn count(&self) -> usize {
+        self.scenes.len()
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
+        for scene in &self.scenes {
+            (bench.tell)(Event::Solver(scene.solver.method.name()));
+            bake_and_render(self, bench, scene)?;
+        }
+        let request = bench.request;
+        let [scene, other] = &self.scenes;
+        let open = |scene: &Scene| CacheReader::open(&cache_directory(request, scene));
+        let caches = [open(scene)?, open(other)?];
+        let [a, b] = &caches;
+        let gauge = gauge::of_caches(scene, &[a, b])?;
+        let courses = [
+            course(a, &gauge, &self.frames)?,
+            course(b, &gauge, &self.frames)?,
+        ];
+        let impact = Impact::of(&courses, obstacle(scene, &gauge));
+        let findings = comparison::findings(&courses, impact);
+        Ok(Report {
+            answer: comparison::summary(&findings),
+            parts: parts(request, self, &caches, &courses, &findings, impact)?,
+            table: comparison::table(&courses),
+            findings: findings.into_iter().map(|found| found.text).collect(),
+            ..Report::default()
+        })
+    }
 }
 
-/// Whether a signal ended it.
 fn bake_and_render(
-    request: &Request,
     comparison: &SolverComparison,
+    bench: &mut Bench<'_>,
     scene: &Scene,
-    stop: &AtomicBool,
-    tell: &mut dyn FnMut(Event),
-) -> Result<bool, StudyError> {
+) -> Result<(), StudyError> {
+    let (request, stop) = (bench.request, bench.stop);
     let last = comparison.frames.last().max(comparison.pictures.last());
     let cache = cache_directory(request, scene);
     let bake = bake::Request {
@@ -83,8 +79,9 @@ fn bake_and_render(
         device: Device::Gpu(request.adapter.clone().into()),
         time_passes: false,
     };
-    if bake::bake(&bake, stop, &mut |event| tell(Event::Bake(Box::new(event))))?.interrupted {
-        return Ok(true);
+    let mut tell = |event| (bench.tell)(Event::Bake(Box::new(event)));
+    if bake::bake(&bake, stop, &mut tell)?.interrupted {
+        return Err(StudyError::Stopped);
     }
     let render = render::Request {
         cache,
@@ -93,8 +90,13 @@ fn bake_and_render(
         frames: Some(comparison.pictures.clone()),
         gpu: request.adapter.clone().into(),
         overwrite: false,
+        time_passes: false,
     };
-    Ok(render::render(&render, stop, &mut |event| tell(Event::Render(event)))?.interrupted)
+    let mut tell = |event| (bench.tell)(Event::Render(event));
+    match render::render(&render, stop, &mut tell)?.interrupted {
+        true => Err(StudyError::Stopped),
+        false => Ok(()),
+    }
 }
 
 fn cache_directory(request: &Request, scene: &Scene) -> PathBuf {
@@ -115,7 +117,7 @@ fn obstacle(scene: &Scene, gauge: &Gauge) -> f64 {
         let distances = solid.mesh.vertices.iter().map(|&v| gauge.distance(v));
         distances.fold(f64::INFINITY, f64::min)
     };
-    let length = scene.domain.size()[direction(scene).axis];
+    let length = scene.domain.size()[gauge::direction(scene).axis];
     let places = scene.solids.iter().map(nearest).chain([length]);
     // A front is known to a cube.
     places.fold(f64::INFINITY, f64::min) - gauge.resolution()
@@ -164,31 +166,26 @@ fn parts(
         }
         None => "No wave meets anything: crest and splash are taken over all frames.".to_owned(),
     };
-    let answers = findings
-        .iter()
-        .map(|found| (found.question.to_owned(), found.text.clone()))
-        .collect();
+    let answer = |found: &Finding| vec![found.question.to_owned(), found.text.clone()];
+    let mut answers = vec![vec!["question".to_owned(), "answer".to_owned()]];
+    answers.extend(findings.iter().map(answer));
     let curves = comparison::charts(courses, impact);
-    let mut parts = vec![
-        Part::Text(comparison::CLAIMS.into()),
-        Part::Text(comparison::summary(findings)),
+    let mut run = vec![Part::Table(run_table(caches, courses))];
+    run.extend(what_was_run(request));
+    // Both tables of solvers are in it.
+    run.push(Part::Code(caches[0].scene_toml().to_owned()));
+    let measured = vec![Part::Text(MEASURED.into())];
+    Ok(vec![
+        Part::Words(answers),
         Part::Text(when),
-        Part::Answers(answers),
         Part::Heading("The same frames".into()),
         pictures(request, comparison, &caches[0])?,
         Part::Heading("Curves".into()),
         Part::Curves(curves.iter().map(|chart| chart.to_svg()).collect()),
-        Part::Heading("What was run".into()),
-        Part::Table(run_table(caches, courses)),
-    ];
-    parts.extend(what_was_run(request));
-    parts.extend([
-        // Both tables of solvers are in it.
-        Part::Code(caches[0].scene_toml().to_owned()),
-        Part::Heading("How it was measured".into()),
-        Part::Text(MEASURED.into()),
-    ]);
-    Ok(parts)
+        Part::Text(comparison::CLAIMS.into()),
+        Part::Folded("What was run".into(), run),
+        Part::Folded("How it was measured".into(), measured),
+    ])
 }
 
 /// For the reader of the page; the definitions stand at `swell::study::measure`.

@@ -1,14 +1,9 @@
 //! A point that is a run of frames.
 
-use std::{
-    sync::atomic::{AtomicBool, Ordering},
-    time::Instant,
-};
-
 use glam::{DVec3, Vec3};
 
 use crate::{
-    domain::{particles::Particles, solver::Solver},
+    domain::particles::Particles,
     reference::{
         neighbors::{Cells, Crowd, Neighbors},
         pbf::constraint::distance_to_converged,
@@ -16,122 +11,98 @@ use crate::{
     scene::{
         Method, Scene,
         flip::Preconditioner,
-        study::sweep::{Measure, Point, SAMPLES},
+        study::sweep::{Measure, Point, SAMPLES, Sweep},
+    },
+    stage::{
+        device::Opened,
+        drive::{Drive, Step},
+        prepare::Start,
     },
     study::measure::Gauge,
 };
 
 use super::{
     super::{
-        super::{
-            device::{Opened, SolverError},
-            prepare::Start,
-        },
         StudyError,
+        engine::{Bench, until_done},
     },
-    ledger::{Run, Sample},
-    specific_energy,
+    measured::{Measured, Run, Sample},
 };
 
 /// Compression at which constraints hold: Newton's next step would move particles by less than f32 tells apart.
 const CONVERGED: f64 = 1e-6;
 
-type AnySolver = Box<dyn Solver<Error = SolverError>>;
-
-/// Runs a point `repeats` times, each from the scene's start, after one frame that is not counted: it makes the
-/// device's programs ready. Samples are taken where there is a gauge; the distance to where the constraints hold is taken
-/// of the end alone, and its time is not the run's. `None` where `stop` ended it before.
-pub(super) fn run(
-    opened: &Opened,
+/// Runs a point as often as the sweep repeats, each time from the scene's start, after one frame that is not counted: it
+/// makes the device's programs ready. Samples are taken where there is a gauge; the distance to where the constraints hold
+/// is taken of the end alone, and its time is not the run's.
+pub(super) fn measure(
+    bench: &Bench<'_>,
     point: &Point,
-    repeats: u32,
-    measure: Measure,
+    sweep: &Sweep,
     gauge: Option<&Gauge>,
-    stop: &AtomicBool,
-) -> Result<Option<Run>, StudyError> {
+) -> Result<Run, StudyError> {
     let scene = &point.scene;
     let start = Start::of(scene)?;
-    let mut solver = opened.build(scene, &start, false)?.solver;
-    solver.load(0, &start.particles)?;
-    solver.advance()?;
+    let opened = bench.devices.of(point.device);
+    let mut drive = Drive::new(opened, scene, &start, false)?;
+    drive.advance()?;
     let mut run = Run {
         particles: start.particles.len(),
         frames: point.frames,
         ..Run::default()
     };
-    let once = |solver: &mut AnySolver, run: &mut Run, gauge| {
-        run_once(solver, point, &start.particles, run, gauge, stop)
-    };
-    let Some(mut end) = once(&mut solver, &mut run, gauge)? else {
-        return Ok(None);
-    };
-    for _ in 1..repeats {
-        // The same steps again: only their time is new.
-        let mut again = Run::default();
-        let Some(again_end) = once(&mut solver, &mut again, None)? else {
-            return Ok(None);
-        };
-        end = again_end;
-        run.seconds.append(&mut again.seconds);
+    let mut end = Particles::default();
+    for repeat in 0..sweep.repeats {
+        drive.load(0, &start.particles)?;
+        let mut seconds = 0.0;
+        until_done(&mut drive, point.frames, bench.stop, |step| {
+            seconds += step.seconds;
+            // The same steps again: only their time is new.
+            if repeat == 0 {
+                run.measured.look(point, gauge, &step);
+            }
+            end = step.particles;
+            Ok(())
+        })?;
+        run.seconds.push(seconds);
     }
-    if measure == Measure::Converged {
-        let distance =
-            distance_to_converged(scene, &start.boundary, point.frames, &end, CONVERGED)?;
-        run.distance = Some(distance);
+    let measured = &mut run.measured;
+    if sweep.errors[0].measure() == Measure::Converged {
+        let boundary = &start.boundary;
+        let distance = distance_to_converged(scene, boundary, point.frames, &end, CONVERGED)?;
+        measured.distance = Some(distance);
     }
-    run.work = match scene.solver.method {
-        Method::Pbf => neighbor_visits(scene, &end, &run),
-        Method::Flip => {
-            run.work
-                * match opened {
-                    Opened::Gpu(_) => products(scene.solver.flip().pressure.preconditioner),
-                    // The reference's incomplete Cholesky reads in its two halves what one product does, as IPP.
-                    Opened::Cpu => products(Preconditioner::Ipp),
-                }
+    match (scene.solver.method, opened) {
+        (Method::Pbf, _) => measured.work = neighbor_visits(scene, &end, measured),
+        (Method::Flip, Opened::Gpu(_)) => {
+            measured.work *= products(scene.solver.flip().pressure.preconditioner);
         }
-    };
-    Ok(Some(run))
+        // The reference's incomplete Cholesky reads in its two halves what one product does, as IPP.
+        (Method::Flip, Opened::Cpu) => measured.work *= products(Preconditioner::Ipp),
+    }
+    Ok(run)
 }
 
-/// All frames once; the state at the end, `None` where `stop` came before.
-fn run_once(
-    solver: &mut AnySolver,
-    point: &Point,
-    start: &Particles,
-    run: &mut Run,
-    gauge: Option<&Gauge>,
-    stop: &AtomicBool,
-) -> Result<Option<Particles>, StudyError> {
-    solver.load(0, start)?;
-    let mut state = Particles::default();
-    let mut seconds = 0.0;
-    for frame in 1..=point.frames {
-        if stop.load(Ordering::Relaxed) {
-            return Ok(None);
-        }
-        let begin = Instant::now();
-        let (particles, report) = solver.advance()?;
-        seconds += begin.elapsed().as_secs_f64();
-        run.substeps += u64::from(report.substeps);
-        run.iterations += report.iterations;
-        run.density.push([
+impl Measured {
+    fn look(&mut self, point: &Point, gauge: Option<&Gauge>, step: &Step) {
+        let report = &step.report;
+        self.substeps += u64::from(report.substeps);
+        self.iterations += report.iterations;
+        self.density.push([
             report.density_error_mean,
             report.density_error_p99,
             report.density_error_max,
         ]);
         if let Some(projection) = report.projection {
-            run.missed += projection.missed;
-            run.work += (report.iterations + projection.correction_iterations) as f64;
+            self.missed += projection.missed;
+            self.work += (report.iterations + projection.correction_iterations) as f64;
         }
-        if let Some(gauge) = gauge
-            && frame % (point.frames / SAMPLES) == 0
-        {
-            run.samples.push(sample(&point.scene, gauge, &particles));
+        let is_sampled = || step.frame % (point.frames / SAMPLES) == 0;
+        if let Some(gauge) = gauge.filter(|_| is_sampled()) {
+            self.samples
+                .push(sample(&point.scene, gauge, &step.particles));
         }
-        state = particles;
     }
-    run.seconds.push(seconds);
-    Ok(Some(state))
 }
 
 fn sample(scene: &Scene, gauge: &Gauge, particles: &Particles) -> Sample {
@@ -145,9 +116,20 @@ fn sample(scene: &Scene, gauge: &Gauge, particles: &Particles) -> Sample {
     }
 }
 
+/// Energy per mass, m²/s²: ½ v² + g h over the domain's least corner, mean over the particles.
+fn specific_energy(scene: &Scene, particles: &Particles) -> f64 {
+    let gravity = scene.water.gravity;
+    let of = |(x, v): (&[f32; 3], &[f32; 3])| {
+        let [x, v] = [x, v].map(|p| Vec3::from_array(*p).as_dvec3());
+        0.5 * v.length_squared() - gravity.dot(x - scene.domain.min)
+    };
+    let all = particles.position.iter().zip(&particles.velocity);
+    all.map(of).sum::<f64>() / particles.len().max(1) as f64
+}
+
 /// Neighbour visits of a PBF run: particles × mean neighbours × passes over them, which are one of λ and one of
 /// corrections an iteration and the search of each substep. The mean is that of the end.
-fn neighbor_visits(scene: &Scene, end: &Particles, run: &Run) -> f64 {
+fn neighbor_visits(scene: &Scene, end: &Particles, run: &Measured) -> f64 {
     let pbf = scene.solver.pbf();
     let radius = pbf.support_ratio * pbf.particle_spacing;
     let place = |x: &[f32; 3]| Vec3::from_array(*x).as_dvec3() - scene.domain.min;
