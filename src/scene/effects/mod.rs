@@ -1,9 +1,10 @@
 //! Effects that a scene may name under `[effects]`: one word in a list, one file here, and one a reference solver.
 //!
-//! An effect's file here holds its settings, what they may be, and what it adds to the plan of each solver. Its
+//! An effect's file here holds its settings, their keys, and what it adds to the plan of each solver. Its
 //! passes bind buffers by name and run in order: of PBF after the velocity update, of FLIP on the grid
 //! before the projection. Their f64 twins stand in a file of the same name in `reference`.
 
+use super::key::Key;
 use crate::gpu::program::{BufferSpec, PassSpec};
 
 /// What an effect adds to the plan.
@@ -46,6 +47,11 @@ macro_rules! effects {
             /// Keys of all effects.
             pub const NAMES: &[&str] = &[$(stringify!($name)),+];
 
+            /// Each with its own keys.
+            pub(super) const KEYS: &[Key] = &[
+                $(Key::inline(stringify!($name), $name::KEYS).absent().about($name::ABOUT)),+
+            ];
+
             /// What the named effects add for `particles` particles.
             pub fn plans(&self, particles: usize) -> Vec<EffectPlan> {
                 let mut plans = Vec::new();
@@ -68,16 +74,6 @@ macro_rules! effects {
                     }
                 )+
                 plans
-            }
-
-            /// The first setting that is out of its range: dotted key, its value, and what is allowed.
-            pub fn fault(&self) -> Option<(String, f64, &'static str)> {
-                $(
-                    if let Some((key, value, allowed)) = self.$name.as_ref().and_then($name::Settings::fault) {
-                        return Some((format!("effects.{}.{key}", stringify!($name)), value, allowed));
-                    }
-                )+
-                None
             }
         }
     };

@@ -2,10 +2,21 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::super::key::Key;
 use crate::gpu::{
     program::{BufferSpec, PassSpec},
     sort::storage,
 };
+
+/// What it is, for the page of keys.
+pub(super) const ABOUT: &str = "XSPH viscosity (Schechter and Bridson 2012)";
+
+/// Its keys.
+pub(super) const KEYS: &[Key] = &[
+    // A millionth is what a frame of 32-bit velocities hardly shows.
+    Key::number("xsph", 1e-6..=1.0)
+        .about("c, the part of the neighbours' mean relative velocity that a substep of PBF, or a frame of FLIP, takes over"),
+];
 
 /// `viscosity = { xsph = 0.01 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,11 +28,6 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// A millionth is what a frame of 32-bit velocities hardly shows.
-    pub(super) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
-        (!(1e-6..=1.0).contains(&self.xsph)).then_some(("xsph", self.xsph, "a number from 1e-6 to 1"))
-    }
-
     pub(super) fn plan(&self, particles: usize) -> (Vec<PassSpec>, Vec<BufferSpec>) {
         let gather = PassSpec {
             name: "effects/viscosity_gather",

@@ -2,10 +2,21 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::super::key::Key;
 use crate::gpu::{
     program::{BufferSpec, PassSpec},
     sort::storage,
 };
+
+/// What it is, for the page of keys.
+pub(super) const ABOUT: &str = "Vorticity confinement (Macklin and Müller 2013; on the grid Fedkiw et al. 2001)";
+
+/// Its keys.
+pub(super) const KEYS: &[Key] = &[
+    // A millionth is what a frame of 32-bit velocities hardly shows.
+    Key::number("strength", 1e-6..=100.0)
+        .about("ε, metres per second squared for each 1/s of vorticity and metre of support radius (PBF) or cell (FLIP)"),
+];
 
 /// `vorticity_confinement = { strength = 0.1 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,11 +27,6 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// A millionth is what a frame of 32-bit velocities hardly shows.
-    pub(super) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
-        (!(1e-6..=100.0).contains(&self.strength)).then_some(("strength", self.strength, "a number from 1e-6 to 100"))
-    }
-
     pub(super) fn plan(&self, particles: usize) -> (Vec<PassSpec>, Vec<BufferSpec>) {
         let curl = PassSpec { name: "effects/vorticity_curl", defines: Vec::new(), constants: Vec::new() };
         let force = PassSpec {
