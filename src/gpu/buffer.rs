@@ -306,7 +306,7 @@ pub trait Wanted {
     fn spans(&self) -> Vec<(&str, u64, usize)>;
 
     /// The values from the bytes of each, in the same order.
-    fn values<'a>(bytes: &mut dyn Iterator<Item = &'a [u8]>) -> Self::Values;
+    fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values;
 }
 
 impl<T: bytemuck::Pod> Wanted for First<T> {
@@ -317,7 +317,7 @@ impl<T: bytemuck::Pod> Wanted for First<T> {
         vec![(self.buffer.name(), self.buffer.offset, bytes)]
     }
 
-    fn values<'a>(bytes: &mut dyn Iterator<Item = &'a [u8]>) -> Vec<T> {
+    fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Vec<T> {
         bytemuck::pod_collect_to_vec(bytes.next().unwrap_or_default())
     }
 }
@@ -331,7 +331,7 @@ macro_rules! wanted_tuple {
                 [$(self.$place.spans()),+].concat()
             }
 
-            fn values<'a>(bytes: &mut dyn Iterator<Item = &'a [u8]>) -> Self::Values {
+            fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values {
                 ($($name::values(bytes),)+)
             }
         }

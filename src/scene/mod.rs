@@ -4,6 +4,7 @@ pub mod budget;
 pub mod effects;
 pub mod flip;
 pub mod grids;
+pub mod keys;
 pub mod look;
 pub mod moving_solid;
 pub mod probe;
@@ -11,15 +12,16 @@ pub mod step;
 pub mod study;
 pub mod tolerance;
 
-mod allowed;
 mod build;
 mod difference;
 mod document;
 mod error;
+mod key;
 mod load;
 mod origin;
-mod ranges;
+mod overrides;
 mod reach;
+mod settle;
 mod spec;
 mod wave_maker;
 mod words;
@@ -30,6 +32,8 @@ use std::path::PathBuf;
 use glam::{DAffine3, DQuat, DVec3};
 
 use crate::domain::{bounds::Bounds, holes::Holes, mesh::TriangleMesh, motion::Motion};
+
+use key::read_by_name;
 
 pub use budget::Budget;
 pub use difference::{physics_difference, physics_hash};
@@ -98,7 +102,8 @@ impl Scene {
 }
 
 /// Name and clock of a shot.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Shot {
     /// File-name safe.
     pub name: String,
@@ -386,3 +391,7 @@ impl Stop {
         }
     }
 }
+
+read_by_name!(Wall);
+read_by_name!(Method);
+read_by_name!(Iteration);

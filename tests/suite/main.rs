@@ -60,6 +60,7 @@ mod scene {
     mod edits;
     mod faults;
     mod fuzz_inputs;
+    mod imports;
     mod untrusted;
 }
 mod solve {

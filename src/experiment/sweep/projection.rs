@@ -18,7 +18,10 @@ use crate::{
     scene::{flip::Surface, study::sweep::Point},
     solve::{
         SolveError,
-        flip::{Flip, buffers::*},
+        flip::{
+            Flip,
+            buffers::{CELL_KIND, FACE_OPEN, FACE_VELOCITY, LIQUID_DISTANCE, SOLID_FLUX},
+        },
         plan::device_limits,
     },
     stage::{device::Opened, drive::Drive, prepare::Start},

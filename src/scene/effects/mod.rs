@@ -1,12 +1,16 @@
 //! Effects that a scene may name under `[effects]`: one word in a list, and a file in each room.
 //!
-//! An effect's file here holds its settings and what they may be. What it adds to each solver stands in a file of the
+//! An effect's file here holds its settings and their keys. What it adds to each solver stands in a file of the
 //! same name in `solve::effects`, its f64 twins in `reference`, and what holds the two against each other in `check`.
+
+use super::key::Key;
 
 /// What an effect's settings say of themselves.
 pub(super) trait Effect {
-    /// The first setting that is out of its range: key, its value, and what is allowed.
-    fn fault(&self) -> Option<(&'static str, f64, &'static str)>;
+    /// What it is, for the page of keys.
+    const ABOUT: &'static str;
+    /// Its keys, each with its range.
+    const KEYS: &'static [Key];
 
     /// Part of the velocity that a frame of FLIP takes from the grid for it.
     fn blend(&self) -> f64 {
@@ -41,21 +45,18 @@ macro_rules! effects {
             /// Keys of all effects.
             pub const NAMES: &[&str] = &[$(stringify!($name)),+];
 
+            /// Each with its own keys.
+            pub(super) const KEYS: &[Key] = &[$(
+                Key::inline(stringify!($name), <$name::Settings as Effect>::KEYS)
+                    .absent()
+                    .about(<$name::Settings as Effect>::ABOUT)
+            ),+];
+
             /// Part of the velocity that a frame of FLIP takes from the grid, of each of the named effects.
             pub(super) fn blends(&self) -> Vec<f64> {
                 let mut blends = Vec::new();
                 $(blends.extend(self.$name.as_ref().map(Effect::blend));)+
                 blends
-            }
-
-            /// The first setting that is out of its range: dotted key, its value, and what is allowed.
-            pub fn fault(&self) -> Option<(String, f64, &'static str)> {
-                $(
-                    if let Some((key, value, allowed)) = self.$name.as_ref().and_then(Effect::fault) {
-                        return Some((format!("effects.{}.{key}", stringify!($name)), value, allowed));
-                    }
-                )+
-                None
             }
         }
     };

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Effect;
+use super::{super::key::Key, Effect};
 
 /// `viscosity = { xsph = 0.01 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,14 +14,13 @@ pub struct Settings {
 }
 
 impl Effect for Settings {
-    /// A millionth is what a frame of 32-bit velocities hardly shows.
-    fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
-        (!(1e-6..=1.0).contains(&self.xsph)).then_some((
-            "xsph",
-            self.xsph,
-            "a number from 1e-6 to 1",
-        ))
-    }
+    const ABOUT: &'static str = "XSPH viscosity (Schechter and Bridson 2012)";
+
+    const KEYS: &'static [Key] = &[
+        // A millionth is what a frame of 32-bit velocities hardly shows.
+        Key::number("xsph", 1e-6..=1.0)
+            .about("c, the part of the neighbours' mean relative velocity that a substep of PBF, or a frame of FLIP, takes over"),
+    ];
 
     /// XSPH's mean of the neighbours' velocities is what the grid holds: c is a further part taken from it, without a
     /// pass of its own.

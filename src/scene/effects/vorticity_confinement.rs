@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Effect;
+use super::{super::key::Key, Effect};
 
 /// `vorticity_confinement = { strength = 0.1 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -13,12 +13,12 @@ pub struct Settings {
 }
 
 impl Effect for Settings {
-    /// A millionth is what a frame of 32-bit velocities hardly shows.
-    fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
-        (!(1e-6..=100.0).contains(&self.strength)).then_some((
-            "strength",
-            self.strength,
-            "a number from 1e-6 to 100",
-        ))
-    }
+    const ABOUT: &'static str =
+        "Vorticity confinement (Macklin and Müller 2013; on the grid Fedkiw et al. 2001)";
+
+    const KEYS: &'static [Key] = &[
+        // A millionth is what a frame of 32-bit velocities hardly shows.
+        Key::number("strength", 1e-6..=100.0)
+            .about("ε, metres per second squared for each 1/s of vorticity and metre of support radius (PBF) or cell (FLIP)"),
+    ];
 }

@@ -111,7 +111,7 @@ fn a_probe_that_cannot_be_is_told() {
             "kind = \"elevaton\"",
             &[],
             "probe[0].kind",
-            "\"elevaton\" is no probe; allowed: \"elevation\"",
+            "\"elevaton\" is no kind; the nearest is \"elevation\"; allowed: \"elevation\"",
         ),
         ("at = [0.0, 1.0]", &[], "probe[0].kind", "missing"),
         (
@@ -154,7 +154,7 @@ fn a_probe_that_cannot_be_is_told() {
             "kind = \"volume\"\nat = [0.0]",
             &[],
             "probe[0].at",
-            "a probe of volume has no place",
+            "does not go with kind = \"volume\"; allowed with it: name, kind",
         ),
         (
             "kind = \"energy\"\nname = \"../up\"",
