@@ -172,6 +172,14 @@ impl<T> Buf<T> {
         &self.name
     }
 
+    /// One of another name that holds the same.
+    pub fn renamed(&self, name: &str) -> Self {
+        Self {
+            name: Cow::Owned(name.to_owned()),
+            ..*self
+        }
+    }
+
     /// The same bytes as values of another type.
     pub fn retyped<U>(&self) -> Buf<U> {
         Buf {

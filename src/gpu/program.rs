@@ -79,10 +79,7 @@ impl Program {
         check_sizes(context, buffers)?;
         let passes = passes
             .iter()
-            .map(|spec| match compile(context, spec, shared) {
-                Ok(pass) => Ok((spec.name, pass)),
-                Err(error) => Err(context.shaders.blamed(error)),
-            })
+            .map(|spec| Ok((spec.name, compile(context, spec, shared)?)))
             .collect::<Result<_, GpuError>>()?;
         let buffers = buffers
             .iter()
@@ -414,6 +411,14 @@ pub(super) fn shader(context: &Context, name: &str, defines: &[&str]) -> Result<
 }
 
 fn compile(
+    context: &Context,
+    spec: &PassSpec,
+    shared: &[(&'static str, f64)],
+) -> Result<Pass, GpuError> {
+    compile_own(context, spec, shared).map_err(|error| context.shaders.blamed(error))
+}
+
+fn compile_own(
     context: &Context,
     spec: &PassSpec,
     shared: &[(&'static str, f64)],

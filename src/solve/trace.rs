@@ -64,7 +64,7 @@ impl Traced<'_> {
         variable: Buf<T>,
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
-        let buffer = Buf::named(self.buffer(variable.name()).to_owned());
+        let buffer = variable.renamed(self.buffer(variable.name()));
         Ok(self.program.read(buffer, count)?)
     }
 
