@@ -1,0 +1,415 @@
+//! The projection: its system, what goes in and what comes out, and the device's own system solved directly.
+
+use glam::DVec3;
+
+use crate::{
+    check::{
+        engine::{Io, Twin, twin},
+        table::{Entry, Table, pair},
+    },
+    compare::{
+        deviation::relative,
+        rounding::{U, U64},
+    },
+    domain::poisson::{System, remove_means},
+    reference::{
+        flip::{Centers, Waters, density_source as twin_density_source},
+        poisson::{
+            BUDGET, Solver,
+            gradients::norm,
+            iteration::{differences, least_eigenvalue, products},
+        },
+    },
+    scene::flip::{Precision, Preconditioner, Surface},
+    solve::{
+        SolveError,
+        pressure::{
+            CORRECTION_TOLERANCE, DONE, PressureControl64, PressureStats, blocked, control_words,
+            widen, widen_control,
+        },
+    },
+};
+
+use super::{FlipState, iteration::PRODUCTS, rows::*};
+
+/// Twins of what an iteration goes from and comes to.
+pub(super) const TWINS: &[Twin<FlipState>] = &[
+    twin("pressure/build_system", &[], build_system),
+    twin("pressure/divergence", &[], divergence),
+    twin("pressure/density_source", &[], density_source),
+    twin("pressure/multiply", &[], multiply),
+    twin("pressure/project", &["face_velocity"], project),
+    twin("pressure/measure_divergence", &[], measure_divergence),
+    twin("pressure/displace", &[], displace),
+];
+
+/// The device's own system.
+pub(super) struct Assembled {
+    pub(super) system: System,
+    centers: Centers,
+}
+
+fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// The solution that is the sum of `terms`.
+fn sum(terms: &[Vec<f64>]) -> Vec<f64> {
+    let all = |row: usize| terms.iter().map(|term| term[row]).sum();
+    (0..terms[0].len()).map(all).collect()
+}
+
+impl FlipState {
+    fn assembled(&self) -> &Assembled {
+        self.assembled
+            .as_ref()
+            .expect("after pressure/build_system")
+    }
+
+    pub(super) fn system(&self) -> &System {
+        &self.assembled().system
+    }
+
+    fn waters(&self) -> Waters<'_> {
+        let centers = &self.assembled().centers;
+        Waters::new(&self.model, &self.elements().bricks, self.room(), centers)
+    }
+
+    pub(super) fn precision(&self) -> Precision {
+        self.model.settings().pressure.precision
+    }
+
+    /// Unit roundoff of what the projection computes in.
+    pub(super) fn unit(&self) -> f64 {
+        match self.precision() {
+            Precision::F32 | Precision::F32Refined => U,
+            Precision::F64 => U64,
+        }
+    }
+
+    /// The scalars of the solve before the pass.
+    pub(super) fn control(&self, io: &Io<'_>) -> Result<PressureControl64, SolveError> {
+        let words = control_words(self.precision());
+        let words = io.before::<u32>("pressure_control", words)?;
+        Ok(widen_control(&words, self.precision()))
+    }
+
+    fn is_done(&self, io: &Io<'_>) -> Result<bool, SolveError> {
+        Ok(self.control(io)?.state == DONE)
+    }
+
+    /// The first `count` values of an array of the pressure's own, in the precision that it is kept in.
+    pub(super) fn reals(
+        &self,
+        io: &Io<'_>,
+        name: &str,
+        count: usize,
+    ) -> Result<Vec<f64>, SolveError> {
+        let words = io.after::<u32>(name, self.precision().words() * count)?;
+        Ok(widen(&words, self.precision()))
+    }
+
+    fn rows_of(&self, values: &[f64]) -> Vec<f64> {
+        let rows = self.system().cell.iter();
+        rows.map(|&e| values[blocked(e)]).collect()
+    }
+
+    /// An array of the pressure's own, by row.
+    pub(super) fn by_row(&self, io: &Io<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
+        Ok(self.rows_of(&self.reals(io, name, self.elements().cells)?))
+    }
+
+    /// The same from before the pass.
+    pub(super) fn by_row_before(&self, io: &Io<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
+        let count = self.precision().words() * self.elements().cells;
+        let words = io.before::<u32>(name, count)?;
+        Ok(self.rows_of(&widen(&words, self.precision())))
+    }
+
+    /// The terms that the solution is the sum of, by row, before the pass or after it.
+    pub(super) fn terms(&self, io: &Io<'_>, is_before: bool) -> Result<Vec<Vec<f64>>, SolveError> {
+        let (stride, terms) = (self.elements().stride, self.precision().terms());
+        let count = stride * (terms - 1) + self.elements().cells;
+        let words = self.precision().words() * count;
+        let words = match is_before {
+            true => io.before::<u32>("pressure_solution", words)?,
+            false => io.after::<u32>("pressure_solution", words)?,
+        };
+        let values = widen(&words, self.precision());
+        let term = |k: usize| self.rows_of(&values[k * stride..]);
+        Ok((0..terms).map(term).collect())
+    }
+
+    /// [`OF_DIFFERENCE`] of all terms, by element.
+    fn difference_errors(&self, terms: &[Vec<f64>]) -> Vec<f64> {
+        let waters = self.waters();
+        let mut errors = vec![0.0; self.elements().cells];
+        for term in terms {
+            let differences = waters.displace(&waters.by_element(self.system(), term));
+            for (error, difference) in errors.iter_mut().zip(&differences) {
+                *error += OF_DIFFERENCE.of([self.unit(), difference.length()]);
+            }
+        }
+        errors
+    }
+
+    /// Σ |f u| and the solids' flux of each row.
+    fn flow(&self, velocity: &[DVec3]) -> Vec<f64> {
+        let (bricks, room) = (&self.elements().bricks, self.room());
+        let of_row = |&element: &u32| {
+            let through = |e: u32, axis: usize| {
+                let e = e as usize;
+                (room.open[e][axis] * velocity[e][axis]).abs()
+            };
+            let sum: f64 = (0..3)
+                .map(|axis| {
+                    let mut up = [0; 3];
+                    up[axis] = 1;
+                    through(element, axis) + through(bricks.near(element, up), axis)
+                })
+                .sum();
+            sum + room.solid_flux[element as usize].abs()
+        };
+        self.system().cell.iter().map(of_row).collect()
+    }
+
+    /// Adds a value a row.
+    pub(super) fn add_rows<const N: usize>(
+        &self,
+        table: &mut Table,
+        entry: &'static Entry<N>,
+        one: impl Fn(usize) -> (f64, f64, [f64; N]) + Send + Sync,
+    ) {
+        let cells = &self.system().cell;
+        table.each(entry, 0..cells.len(), |row| {
+            let (value, exact, magnitudes) = one(row);
+            pair(cells[row] as usize, value, exact, magnitudes)
+        });
+    }
+
+    /// Adds the largest divergence that the device noted, against `rows`.
+    fn add_noted(
+        &self,
+        table: &mut Table,
+        entry: &'static Entry<2>,
+        found: f32,
+        [rows, flow]: [&[f64]; 2],
+    ) {
+        let size = self.model.cell_size();
+        let largest = |of: &[f64]| of.iter().fold(0.0, |most: f64, v| most.max(v.abs())) / size;
+        let most = largest(rows);
+        table.add(entry, [pair(0, found, most, [largest(flow), most])]);
+    }
+
+    /// ‖b − A x‖ / ‖b‖, and [`ALLOWED`] where `asked` was asked for.
+    fn residual(&self, b: &[f64], x: &[f64], asked: f64) -> [f64; 2] {
+        let size = norm(b);
+        let residual = relative(norm(&minus(b, &self.system().apply(x))), size);
+        let spread = norm(&differences(self.system(), x));
+        [residual, ALLOWED.of([asked, self.unit(), spread, size])]
+    }
+}
+
+fn build_system(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+    let settings = state.model.settings();
+    let elements = state.elements();
+    let cells = elements.cells;
+    let centers = Centers {
+        density: Vec::new(),
+        excess: match settings.density_correction {
+            true => elements.scalars(io, "density_excess")?,
+            false => Vec::new(),
+        },
+        distance: match settings.surface {
+            Surface::GhostFluid => elements.scalars(io, "liquid_distance")?,
+            Surface::Voxel => Vec::new(),
+        },
+    };
+    let has_diagonal = matches!(
+        settings.pressure.preconditioner,
+        Preconditioner::Jacobi | Preconditioner::Ipp
+    );
+    let system = Waters::new(&state.model, &elements.bricks, state.room(), &centers).system();
+    let coefficient = io.after::<f32>("pressure_coefficient", 2 * elements.stride + cells)?;
+    let block = io.after::<u32>("pressure_block", cells / 8)?;
+    let (stride, wet) = (elements.stride, elements.wet());
+    let is_row = |e: usize| {
+        let place = blocked(e as u32);
+        block[place / 512 * 64 + place % 64] >> (8 + place % 512 / 64) & 1
+    };
+    let mut expected = vec![0; wet.len()];
+    for &element in &system.cell {
+        expected[element as usize - wet.start] = 1;
+    }
+    state.assembled = Some(Assembled { system, centers });
+    let (system, unit) = (state.system(), state.unit());
+    let dirichlet = state.by_row(io, "pressure_dirichlet")?;
+    state.add_rows(table, &DIRICHLET, |row| {
+        let exact = system.dirichlet[row];
+        (dirichlet[row], exact, [unit, exact])
+    });
+    table.each(&COEFFICIENT, 0..system.cell.len(), |row| {
+        let element = system.cell[row];
+        let found = |axis: usize| f64::from(coefficient[axis * stride + blocked(element)]);
+        let twin = |axis: usize| system.coefficient[row][2 * axis];
+        let [found, twin] = [
+            DVec3::new(found(0), found(1), found(2)),
+            DVec3::new(twin(0), twin(1), twin(2)),
+        ];
+        pair(element as usize, found, twin, [])
+    });
+    table.add_exact(&ROWS, &wet.map(is_row).collect::<Vec<_>>(), &expected);
+    if has_diagonal {
+        let inverse = state.by_row(io, "pressure_inverse_diagonal")?;
+        state.add_rows(table, &INVERSE, |row| {
+            let exact = 1.0 / system.diagonal[row];
+            (inverse[row], exact, [unit, exact])
+        });
+    }
+    Ok(())
+}
+
+fn divergence(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+    state.note_sum(io, ["pressure_rhs"; 2])?;
+    let velocity = state.elements().planes_before(io, "face_velocity")?;
+    let twin = state.waters().divergence(state.system(), &velocity);
+    let flow = state.flow(&velocity);
+    let (rhs, unit) = (state.by_row(io, "pressure_rhs")?, state.unit());
+    state.add_rows(table, &RHS, |row| (rhs[row], twin[row], [unit, flow[row]]));
+    let found = io.one::<PressureStats>("pressure_stats")?.divergence_before;
+    state.add_noted(table, &BEFORE, found, [&twin, &flow]);
+    Ok(())
+}
+
+fn density_source(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+    state.note_sum(io, ["pressure_rhs"; 2])?;
+    let rhs = state.by_row(io, "pressure_rhs")?;
+    let centers = &state.assembled().centers;
+    let twin = twin_density_source(&state.model, state.system(), centers);
+    state.add_rows(table, &SOURCE, |row| {
+        (rhs[row], twin[row], [twin[row].abs()])
+    });
+    Ok(())
+}
+
+fn multiply(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+    if state.is_turn(io)? && state.is_due(io, 0) {
+        state.note_sum(io, ["pressure_direction", "pressure_product"])?;
+    }
+    if state.products == PRODUCTS {
+        return Ok(());
+    }
+    let direction = state.by_row(io, "pressure_direction")?;
+    if direction.iter().all(|&value| value == 0.0) {
+        return Ok(());
+    }
+    let product = state.by_row(io, "pressure_product")?;
+    let (system, unit) = (state.system(), state.unit());
+    let (twin, errors) = (system.apply(&direction), differences(system, &direction));
+    state.add_rows(table, &PRODUCT, |row| {
+        (product[row], twin[row], [unit, errors[row]])
+    });
+    state.products += 1;
+    Ok(())
+}
+
+fn project(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+    if !state.is_done(io)? {
+        return Ok(());
+    }
+    let elements = state.elements();
+    let terms = state.terms(io, false)?;
+    let (errors, x) = (state.difference_errors(&terms), sum(&terms));
+    let waters = state.waters();
+    let mut twin = elements.planes_before(io, "face_velocity")?;
+    waters.project(&waters.by_element(state.system(), &x), &mut twin);
+    let velocity = elements.planes(io, "face_velocity")?;
+    table.each(&PROJECTED, elements.active(), |e| {
+        pair(e, velocity[e], twin[e], [errors[e], twin[e].length()])
+    });
+    let pressure = elements.scalars(io, "pressure")?;
+    let scale = state.scene.water.rest_density * state.model.cell_size() / elements.substep.length;
+    state.add_rows(table, &PRESSURE, |row| {
+        let exact = scale * x[row];
+        let found = pressure[state.system().cell[row] as usize];
+        (found, exact, [exact.abs()])
+    });
+    whole(state, io, x, &velocity, table)
+}
+
+/// The device's own system solved directly, against what its iterations came to.
+fn whole(
+    state: &FlipState,
+    io: &Io<'_>,
+    mut x: Vec<f64>,
+    velocity: &[DVec3],
+    table: &mut Table,
+) -> Result<(), SolveError> {
+    let mut b = state.by_row(io, "pressure_rhs")?;
+    let system = state.system();
+    let solver = match Solver::new(system, BUDGET) {
+        Ok(solver) => solver,
+        Err(_) => {
+            let why = "the direct factor of its system could not be made";
+            table.unchecked.push(("whole projection", why));
+            return Ok(());
+        }
+    };
+    remove_means(&mut b, solver.pockets());
+    remove_means(&mut x, solver.pockets());
+    let exact = solver.solve(&b).x;
+    let size = norm(&b);
+    let asked = state.model.settings().pressure.tolerance;
+    let [residual, allowed] = state.residual(&b, &x, asked);
+    let off = minus(&x, &exact);
+    let least = least_eigenvalue(&solver, b.len());
+    let energy = products(&off, &system.apply(&off)).value.max(0.0).sqrt();
+    let mut after = state.waters().divergence(system, velocity);
+    remove_means(&mut after, solver.pockets());
+    let (flow, spread) = (norm(&state.flow(velocity)), norm(&differences(system, &x)));
+    let far = FAR.of([allowed, size]);
+    let apart = relative(norm(&off), norm(&exact));
+    let left = relative(norm(&after), size);
+    table.add(&RESIDUAL, [pair(0, residual, 0.0, [allowed])]);
+    table.add(&SOLUTION, [pair(0, apart, 0.0, [far, least, norm(&exact)])]);
+    table.add(&ENERGY, [pair(0, energy, 0.0, [far, least])]);
+    table.add(
+        &DIVERGENCE,
+        [pair(0, left, 0.0, [allowed, flow, spread, size])],
+    );
+    Ok(())
+}
+
+fn measure_divergence(
+    state: &mut FlipState,
+    io: &Io<'_>,
+    table: &mut Table,
+) -> Result<(), SolveError> {
+    if !state.is_done(io)? {
+        return Ok(());
+    }
+    let velocity = state.elements().planes_before(io, "face_velocity")?;
+    let twin = state.waters().divergence(state.system(), &velocity);
+    let found = io.one::<PressureStats>("pressure_stats")?.divergence_after;
+    state.add_noted(table, &AFTER, found, [&twin, &state.flow(&velocity)]);
+    Ok(())
+}
+
+fn displace(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+    if !state.is_done(io)? {
+        return Ok(());
+    }
+    let terms = state.terms(io, false)?;
+    let (errors, x) = (state.difference_errors(&terms), sum(&terms));
+    let waters = state.waters();
+    let twin = waters.displace(&waters.by_element(state.system(), &x));
+    let found = state.elements().planes(io, "face_displacement")?;
+    table.each(&DISPLACEMENT, state.elements().active(), |e| {
+        pair(e, found[e], twin[e], [errors[e], twin[e].length()])
+    });
+    let mut b = state.by_row(io, "pressure_rhs")?;
+    remove_means(&mut b, &state.system().pockets());
+    let [residual, allowed] = state.residual(&b, &x, CORRECTION_TOLERANCE);
+    table.add(&CORRECTION, [pair(0, residual, 0.0, [allowed])]);
+    Ok(())
+}
