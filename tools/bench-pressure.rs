@@ -7,7 +7,8 @@
 //! adds each pass's time by the device's clock.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a program")]
 
-#[path = "../tests/support/pressure.rs"]
+#[path = "../tests/suite/support/pressure.rs"]
+#[allow(dead_code, unreachable_pub, reason = "tests have more of it")]
 mod support;
 
 use std::time::Instant;
@@ -75,7 +76,7 @@ fn main() {
                     times[times.len() / 2]
                 );
                 if has_passes {
-                    let mut timer = Timer::new(&context).unwrap();
+                    let mut timer = Timer::new(&context);
                     rig.set_rhs(&b);
                     rig.project(Some(&mut timer));
                     for (name, (seconds, runs)) in &timer.total {

@@ -6,7 +6,7 @@ use std::{fs, path::Path, sync::OnceLock};
 use swell::cache::{CacheReader, survey};
 
 /// As a bake writes it, in fewer lines.
-pub const MANIFEST: &str = r#"{"format_version":1,"program":"swell","program_version":"0.1.0","shot":"a","scene_hash":"5c",
+pub const MANIFEST: &str = r#"{"format_version":2,"program":"swell","program_version":"0.1.0","shot":"a","scene_hash":"5c",
 "solver":"pbf","device":"d","driver":"d","backend":"Vulkan","frames_per_second":60.0,"particle_spacing":0.1,
 "rest_density":1000.0,"attributes":[],"start_particles":1,"probes":[{"name":"e","kind":"energy","at":[],
 "columns":["kinetic_J"]}],"files":[{"file":"scene.toml","bytes":0,
@@ -14,8 +14,29 @@ pub const MANIFEST: &str = r#"{"format_version":1,"program":"swell","program_ver
 
 /// Contents of frame 0's line.
 pub fn first_line(manifest: &[u8]) -> Vec<u8> {
+    line_of(
+        manifest,
+        "\"files\":{\"particles\":{\"file\":\"frames/a.0000.ply\",\"bytes\":1,\"blake3\":\"\"}},\
+         \"rows\":{\"probes\":[[1.0]]}",
+    )
+}
+
+/// [`MANIFEST`] as format 1 has it.
+pub fn manifest_of_format_1() -> String {
+    MANIFEST.replacen("\"format_version\":2", "\"format_version\":1", 1)
+}
+
+/// Contents of frame 0's line, as format 1 has it.
+pub fn first_line_of_format_1(manifest: &[u8]) -> Vec<u8> {
+    line_of(
+        manifest,
+        "\"file\":\"frames/a.0000.ply\",\"bytes\":1,\"blake3\":\"\",\"probes\":[[1.0]]",
+    )
+}
+
+fn line_of(manifest: &[u8], files: &str) -> Vec<u8> {
     format!(
-        "{{\"frame\":0,\"file\":\"frames/a.0000.ply\",\"bytes\":1,\"blake3\":\"\",\"particles\":1,\"probes\":[[1.0]],\
+        "{{\"frame\":0,\"particles\":1,{files},\
          \"manifest\":\"{}\",\"clock\":{{\"frame\":0,\"time\":0.0,\"substeps\":0,\"steps\":0}},\"report\":null}}",
         blake3::hash(manifest).to_hex()
     )
@@ -28,7 +49,11 @@ pub fn read(manifest: &[u8], lines: &[Vec<u8>]) {
     let folder = FOLDER.get_or_init(|| {
         // In memory where the machine has such a place.
         let memory = Path::new("/dev/shm");
-        let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
+        let folder = if memory.is_dir() {
+            tempfile::tempdir_in(memory)
+        } else {
+            tempfile::tempdir()
+        };
         folder.expect("a temporary folder")
     });
     let path = folder.path();

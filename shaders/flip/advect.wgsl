@@ -2,6 +2,7 @@
 // and by the density correction's displacement; they are kept out of solids and walls, and lose what velocity they
 // have into them. One that would move farther than the cap is slowed and counted.
 #import "shared/thread.wgsl"
+#import "shared/counters.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_element.wgsl"
 #import "shared/flip_carried.wgsl"
@@ -18,8 +19,8 @@
 @group(0) @binding(6) var<storage, read_write> position: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> velocity: array<vec4f>;
 @group(0) @binding(10) var<storage, read_write> id: array<u32>;
-// 0: particles slowed; 3: values that are not finite, which clamping would hide.
-@group(0) @binding(11) var<storage, read_write> counters: array<atomic<u32>>;
+// Of particles slowed, and of what is not finite, which clamping would hide.
+@group(0) @binding(11) var<storage, read_write> counters: Counters;
 
 fn slot_at(brick: vec3i) -> u32 {
     let dims = vec3i(params.table_dims);
@@ -110,12 +111,12 @@ fn main(
     way += vec3f(carried[first + 3u], carried[first + 4u], carried[first + 5u]);
 #endif
     if !is_finite(start + way) {
-        atomicAdd(&counters[3], 1u);
+        atomicAdd(&counters.not_finite, 1u);
     }
     let distance = length(way);
     if distance > params.max_displacement {
         way *= params.max_displacement / distance;
-        atomicAdd(&counters[0], 1u);
+        atomicAdd(&counters.capped, 1u);
     }
     let low = params.wall_min + params.contact_distance;
     let high = params.wall_max - params.contact_distance;

@@ -1,9 +1,9 @@
 // Counts what is not finite in one of a substep's arrays: what clamps, maxima and comparisons behind it would hide.
 #import "shared/thread.wgsl"
+#import "shared/counters.wgsl"
 
 @group(0) @binding(0) var<storage, read> values: array<vec4u>;
-// 3: values that are not finite.
-@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(1) var<storage, read_write> counters: Counters;
 
 // Values of a thread, in fours.
 const RUN = 4u;
@@ -22,6 +22,6 @@ fn main(
     }
     let count = bad.x + bad.y + bad.z + bad.w;
     if count > 0u {
-        atomicAdd(&counters[3], count);
+        atomicAdd(&counters.not_finite, count);
     }
 }

@@ -6,6 +6,7 @@
 #import "shared/flip_axis.wgsl"
 #import "shared/flip_walls.wgsl"
 #import "shared/finite.wgsl"
+#import "shared/counters.wgsl"
 
 @group(0) @binding(2) var<storage, read> partial_momentum: array<f32>;
 @group(0) @binding(3) var<storage, read> partial_weight: array<f32>;
@@ -19,8 +20,8 @@
 @group(0) @binding(10) var<storage, read> closed_velocity: array<f32>;
 #endif
 
-// 3: values that are not finite, which a comparison would hide.
-@group(0) @binding(11) var<storage, read_write> counters: array<atomic<u32>>;
+// Of what is not finite, which a comparison would hide.
+@group(0) @binding(11) var<storage, read_write> counters: Counters;
 
 @compute @workgroup_size(64)
 fn main(
@@ -57,7 +58,7 @@ fn main(
         }
     }
     if !is_finite(vec3f(momentum, weight, 0.0)) {
-        atomicAdd(&counters[3], 1u);
+        atomicAdd(&counters.not_finite, 1u);
     }
     let is_known = weight > 0.0;
     let velocity = select(0.0, momentum / max(weight, 1e-30), is_known);

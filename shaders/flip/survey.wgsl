@@ -6,8 +6,21 @@
 
 @group(0) @binding(1) var<storage, read> position: array<vec4f>;
 @group(0) @binding(2) var<storage, read> velocity: array<vec4f>;
-// Bits of the largest speed squared, values that are not finite, two unused words; then a flag a brick.
-@group(0) @binding(3) var<storage, read_write> survey: array<atomic<u32>>;
+
+// `SurveyHead` of solve/params.rs.
+struct SurveyHead {
+    // Bits of the largest speed squared.
+    speed_square: atomic<u32>,
+    not_finite: atomic<u32>,
+    padding: vec2u,
+}
+
+struct Survey {
+    head: SurveyHead,
+    // A flag a brick.
+    is_wet: array<atomic<u32>>,
+}
+@group(0) @binding(3) var<storage, read_write> survey: Survey;
 
 // Particles of a thread: one atomic for so many, and in sorted order few bricks.
 const RUN = 16u;
@@ -31,21 +44,21 @@ fn main(
         let cell = cell_of_place(x * params.inverse_cell_size);
         let index = table_index(cell);
         if index != last {
-            atomicStore(&survey[4u + index], 1u);
+            atomicStore(&survey.is_wet[index], 1u);
             last = index;
         }
         // The outermost cells may be too thin to hold particles, and are water all the same.
         let outer = select(cell, cell + 1u, cell + 2u == params.cells);
         if any((outer & vec3u(7u)) < (cell & vec3u(7u))) {
-            atomicStore(&survey[4u + table_index(vec3u(outer.x, cell.yz))], 1u);
-            atomicStore(&survey[4u + table_index(vec3u(cell.x, outer.y, cell.z))], 1u);
-            atomicStore(&survey[4u + table_index(vec3u(cell.xy, outer.z))], 1u);
+            atomicStore(&survey.is_wet[table_index(vec3u(outer.x, cell.yz))], 1u);
+            atomicStore(&survey.is_wet[table_index(vec3u(cell.x, outer.y, cell.z))], 1u);
+            atomicStore(&survey.is_wet[table_index(vec3u(cell.xy, outer.z))], 1u);
         }
     }
     if first < end {
-        atomicMax(&survey[0], bitcast<u32>(fastest));
+        atomicMax(&survey.head.speed_square, bitcast<u32>(fastest));
         if not_finite > 0u {
-            atomicAdd(&survey[1], not_finite);
+            atomicAdd(&survey.head.not_finite, not_finite);
         }
     }
 }

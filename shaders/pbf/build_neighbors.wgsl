@@ -4,6 +4,7 @@
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/neighbor_list.wgsl"
+#import "shared/counters.wgsl"
 
 @group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
@@ -12,7 +13,7 @@
 #endif
 @group(0) @binding(4) var<storage, read_write> neighbor_list: array<vec4u>;
 @group(0) @binding(5) var<storage, read_write> neighbor_count: array<u32>;
-@group(0) @binding(10) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(10) var<storage, read_write> counters: Counters;
 
 var<private> word: u32;
 var<private> four: vec4u;
@@ -79,6 +80,6 @@ fn main(
     }
     neighbor_count[i] = count;
     if count > LIST_CAPACITY {
-        atomicAdd(&counters[1], 1u);
+        atomicAdd(&counters.searched, 1u);
     }
 }

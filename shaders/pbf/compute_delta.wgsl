@@ -1,6 +1,7 @@
 // Δx_i = Σ_j (λ_i + λ_j + s_corr) ∇W / ρ0 (Macklin and Müller 2013, eq. 14), bounded: physical masses
 // with the formula verbatim blow up.
 #import "shared/thread.wgsl"
+#import "shared/counters.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/neighbors.wgsl"
@@ -13,8 +14,8 @@
 #endif
 
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
-// 3: values that are not finite, which clamping would hide.
-@group(0) @binding(11) var<storage, read_write> counters: array<atomic<u32>>;
+// Of what is not finite, which clamping would hide.
+@group(0) @binding(11) var<storage, read_write> counters: Counters;
 #ifdef PRESSURE
 // Σ λ over the substep's corrections: the pressure that they stand for.
 @group(0) @binding(12) var<storage, read_write> lambda_sum: array<f32>;
@@ -84,7 +85,7 @@ fn main(
     lambda_sum[i] += own_lambda;
 #endif
     if !is_finite(current.xyz + delta) {
-        atomicAdd(&counters[3], 1u);
+        atomicAdd(&counters.not_finite, 1u);
     }
 #ifdef WALL_WORK
     let kept = min(1.0, params.max_correction / max(length(delta), 1e-30));

@@ -1,12 +1,13 @@
 // Ends the iteration once the mean density error is small enough, by emptying the dispatches to come.
-// control: 0 done, 1 iterations, 4–6 groups of a dispatch over all, 8–10 over one colour.
 #import "shared/pbf_params.wgsl"
+#import "shared/counters.wgsl"
+#import "shared/iteration_control.wgsl"
 
 override DENSITY_ERROR: f32;
 
 @group(0) @binding(10) var<storage, read> error_sums: array<f32>;
-@group(0) @binding(11) var<storage, read_write> control: array<u32>;
-@group(0) @binding(12) var<storage, read_write> counters: array<u32>;
+@group(0) @binding(11) var<storage, read_write> control: IterationControl;
+@group(0) @binding(12) var<storage, read_write> counters: Counters;
 
 var<workgroup> partial: array<f32, 256>;
 
@@ -25,15 +26,14 @@ fn main(@builtin(local_invocation_index) local: u32) {
         }
         workgroupBarrier();
     }
-    if local == 0u && control[0] == 0u {
+    if local == 0u && control.is_done == 0u {
         if partial[0] <= DENSITY_ERROR * f32(params.particle_count) {
-            control[0] = 1u;
-            for (var k = 4u; k < 12u; k++) {
-                control[k] = 0u;
-            }
+            control.is_done = 1u;
+            control.all = vec4u(0u);
+            control.colour = vec4u(0u);
         } else {
-            control[1] += 1u;
-            counters[2] += 1u;
+            control.iterations += 1u;
+            atomicAdd(&counters.iterations, 1u);
         }
     }
 }

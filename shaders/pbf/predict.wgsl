@@ -2,6 +2,7 @@
 // second half of `predicted`; the sort moves it to the first. What walls and solids take of the way is taken
 // from the velocity.
 #import "shared/thread.wgsl"
+#import "shared/counters.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/confine.wgsl"
 #import "shared/finite.wgsl"
@@ -12,8 +13,8 @@
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
 @group(0) @binding(10) var<storage, read> position: array<vec4f>;
 @group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
-// 3: values that are not finite, which clamping would hide.
-@group(0) @binding(12) var<storage, read_write> counters: array<atomic<u32>>;
+// Of what is not finite, which clamping would hide.
+@group(0) @binding(12) var<storage, read_write> counters: Counters;
 
 @compute @workgroup_size(64)
 fn main(
@@ -27,7 +28,7 @@ fn main(
     }
     var v = velocity[thread].xyz + params.velocity_step;
     if !is_finite(v) || !is_finite(position[thread].xyz) {
-        atomicAdd(&counters[3], 1u);
+        atomicAdd(&counters.not_finite, 1u);
     }
     v *= min(1.0, params.max_displacement / max(params.time_step * length(v), 1e-30));
     let free = position[thread].xyz + params.time_step * v;

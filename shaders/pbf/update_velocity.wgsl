@@ -4,6 +4,8 @@
 #import "shared/thread.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
+#import "shared/counters.wgsl"
+#import "shared/iteration_control.wgsl"
 
 @group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
 @group(0) @binding(10) var<storage, read> start_position: array<vec4f>;
@@ -12,9 +14,9 @@
 @group(0) @binding(12) var<storage, read_write> position: array<vec4f>;
 @group(0) @binding(13) var<storage, read_write> velocity: array<vec4f>;
 @group(0) @binding(14) var<storage, read_write> id: array<u32>;
-@group(0) @binding(15) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(15) var<storage, read_write> counters: Counters;
 #ifdef ADAPTIVE
-@group(0) @binding(16) var<storage, read> control: array<u32>;
+@group(0) @binding(16) var<storage, read> control: IterationControl;
 #endif
 
 @compute @workgroup_size(64)
@@ -28,7 +30,7 @@ fn main(
         return;
     }
 #ifdef ADAPTIVE
-    let source = thread + select(0u, params.particle_count, (control[1] & 1u) == 1u);
+    let source = thread + select(0u, params.particle_count, (control.iterations & 1u) == 1u);
 #else
     let source = thread + phase.read_even;
 #endif
@@ -39,7 +41,7 @@ fn main(
         let excess = v * (1.0 - params.max_displacement / distance);
         v -= excess;
         x -= excess * params.time_step;
-        atomicAdd(&counters[0], 1u);
+        atomicAdd(&counters.capped, 1u);
     }
     position[thread] = vec4f(x, 1.0);
     velocity[thread] = vec4f(v, 0.0);

@@ -1,5 +1,8 @@
 // Rows of the finest level (Batty et al. 2007, Enright et al. 2003): the twin of `domain::poisson::System`.
 #import "shared/pressure_site.wgsl"
+#import "shared/pressure_stats.wgsl"
+
+alias note = atomic<u32>;
 
 @group(0) @binding(2) var<storage, read_write> pressure_coefficient: array<f32>;
 @group(0) @binding(3) var<storage, read_write> pressure_dirichlet: array<real>;
@@ -9,7 +12,7 @@
 #ifdef GHOST_FLUID
 @group(0) @binding(7) var<storage, read> liquid_distance: array<f32>;
 #endif
-@group(0) @binding(8) var<storage, read_write> pressure_stats: array<atomic<u32>>;
+@group(0) @binding(8) var<storage, read_write> pressure_stats: PressureStats;
 #ifdef DIAGONAL
 @group(0) @binding(9) var<storage, read_write> pressure_inverse_diagonal: array<real>;
 #endif
@@ -111,6 +114,6 @@ fn main(
     let kind = select(select(2u, 1u, full == 8u), 0u, rows == 0u);
     pressure_block[64u * s.slot + s.block] = kind | (rows << 8u);
     if dropped > 0u {
-        atomicAdd(&pressure_stats[3], dropped);
+        atomicAdd(&pressure_stats.dropped, dropped);
     }
 }

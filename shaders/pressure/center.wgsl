@@ -1,12 +1,15 @@
 // Removes the mean over each pocket, where the system is singular; one workgroup a pocket, sums in a fixed order.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_real.wgsl"
+#import "shared/pressure_stats.wgsl"
+
+alias note = atomic<u32>;
 
 @group(0) @binding(1) var<storage, read> pressure_pocket_cells: array<u32>;
 // First and past the last of each pocket's cells.
 @group(0) @binding(2) var<storage, read> pressure_pocket_ranges: array<vec2u>;
 @group(0) @binding(3) var<storage, read_write> values: array<real>;
-@group(0) @binding(4) var<storage, read_write> pressure_stats: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> pressure_stats: PressureStats;
 
 var<workgroup> terms: array<real, 256>;
 
@@ -34,6 +37,6 @@ fn main(
         values[pressure_pocket_cells[k]] -= mean;
     }
     if local == 0u && phase.step == 1u {
-        atomicMax(&pressure_stats[2], bitcast<u32>(f32(abs(mean)) / phase.cell_size));
+        atomicMax(&pressure_stats.incompatible, bitcast<u32>(f32(abs(mean)) / phase.cell_size));
     }
 }

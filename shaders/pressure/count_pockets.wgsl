@@ -1,8 +1,11 @@
 // Gives each cell its body's label, 0 where air touches it, and counts the bodies that none touches.
 #import "shared/pressure_phase.wgsl"
+#import "shared/pressure_stats.wgsl"
+
+alias note = atomic<u32>;
 
 @group(0) @binding(1) var<storage, read_write> pressure_label: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read_write> pressure_stats: array<atomic<u32>>;
+@group(0) @binding(2) var<storage, read_write> pressure_stats: PressureStats;
 
 const MOST = 1u << 26u;
 
@@ -30,7 +33,7 @@ fn main(
         // Others may walk through this cell meanwhile: its root leads them on as well.
         atomicStore(&pressure_label[e], at);
         if at == e {
-            atomicAdd(&pressure_stats[4], 1u);
+            atomicAdd(&pressure_stats.pockets, 1u);
         }
     }
 }

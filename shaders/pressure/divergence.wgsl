@@ -18,7 +18,10 @@ fn main(
     let slot = select(0u, range.x + i / 64u, i / 64u < range.y);
     let s = site_at(slot, i & 63u, range.z);
     let b = outflow(s);
-    note_divergence(b, local, 0u);
+    let most = largest_divergence(b, local);
+    if local == 0u {
+        atomicMax(&pressure_stats.divergence_before, most);
+    }
     let own = blocked(s.slot, s.block);
     for (var c = 0u; c < 4u; c++) {
         pressure_rhs[own + 64u * c] = -b.lo[c];

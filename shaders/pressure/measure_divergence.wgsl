@@ -10,5 +10,8 @@ fn main(
     let i = thread_index(workgroup, workgroups, local, 64u);
     let range = phase.levels[0];
     let slot = select(0u, range.x + i / 64u, i / 64u < range.y);
-    note_divergence(outflow(site_at(slot, i & 63u, range.z)), local, 1u);
+    let most = largest_divergence(outflow(site_at(slot, i & 63u, range.z)), local);
+    if local == 0u {
+        atomicMax(&pressure_stats.divergence_after, most);
+    }
 }

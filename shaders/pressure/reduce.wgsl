@@ -2,14 +2,17 @@
 // always runs, since it may not take its size from a buffer that it writes, and does nothing out of its turn.
 #import "shared/pressure_phase.wgsl"
 #import "shared/pressure_control.wgsl"
+#import "shared/pressure_stats.wgsl"
+
+alias note = u32;
 
 @group(0) @binding(1) var<storage, read_write> pressure_control: PressureControl;
 @group(0) @binding(2) var<storage, read> pressure_sums: array<real>;
 // Pockets that pressure/count_pockets found.
-@group(0) @binding(3) var<storage, read> pressure_stats: array<u32>;
-@group(0) @binding(4) var<storage, read> pressure_sizes: array<u32>;
+@group(0) @binding(3) var<storage, read> pressure_stats: PressureStats;
+@group(0) @binding(4) var<storage, read> pressure_sizes: array<vec4u>;
 // The same sizes three times: of iterations, of the verification, and of what follows; 0 while it is not their turn.
-@group(0) @binding(5) var<storage, read_write> pressure_groups: array<u32>;
+@group(0) @binding(5) var<storage, read_write> pressure_groups: array<vec4u>;
 
 const BEGIN = 0u;
 const DIRECTION = 1u;
@@ -34,7 +37,7 @@ fn is_positive(x: real) -> bool {
 
 fn begin(sum: real) {
     pressure_control = PressureControl(ITERATING, 0u, 1u, 0u, sum, sum, 0.0, 0.0, 0.0);
-    if phase.has_pockets == 0u && pressure_stats[4] > 0u {
+    if phase.has_pockets == 0u && pressure_stats.pockets > 0u {
         pressure_control.state = WANTS_POCKETS;
     } else if !is_positive(sum) {
         pressure_control.state = DONE;
@@ -115,6 +118,6 @@ fn main(@builtin(local_invocation_index) local: u32) {
     let state = pressure_control.state;
     let sizes = arrayLength(&pressure_sizes);
     for (var k = local; k < 3u * sizes; k += 256u) {
-        pressure_groups[k] = select(0u, pressure_sizes[k % sizes], k / sizes == state);
+        pressure_groups[k] = select(vec4u(0u), pressure_sizes[k % sizes], k / sizes == state);
     }
 }

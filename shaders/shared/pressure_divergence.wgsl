@@ -1,11 +1,14 @@
 // What flows out of the cells of a block.
 #import "shared/pressure_site.wgsl"
+#import "shared/pressure_stats.wgsl"
+
+alias note = atomic<u32>;
 
 @group(0) @binding(2) var<storage, read> pressure_block: array<u32>;
 @group(0) @binding(3) var<storage, read> face_open: array<f32>;
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
 @group(0) @binding(5) var<storage, read> solid_flux: array<f32>;
-@group(0) @binding(10) var<storage, read_write> pressure_stats: array<atomic<u32>>;
+@group(0) @binding(10) var<storage, read_write> pressure_stats: PressureStats;
 
 var<workgroup> largest: array<f32, 64>;
 
@@ -48,16 +51,16 @@ fn outflow(s: Site) -> Pair {
     );
 }
 
-// Keeps the largest |∇·u|, 1/s, in `pressure_stats[place]`; the bits of positive floats order as the floats do.
-fn note_divergence(flow: Pair, local: u32, place: u32) {
+// Bits of the workgroup's largest |∇·u|, 1/s, for its first thread.
+fn largest_divergence(flow: Pair, local: u32) -> u32 {
     let most = max(abs(flow.lo), abs(flow.hi));
     largest[local] = f32(max(max(most.x, most.y), max(most.z, most.w)));
     workgroupBarrier();
+    var worst = 0.0;
     if local == 0u {
-        var worst = 0.0;
         for (var k = 0u; k < 64u; k++) {
             worst = max(worst, largest[k]);
         }
-        atomicMax(&pressure_stats[place], bitcast<u32>(worst / phase.cell_size));
     }
+    return bitcast<u32>(worst / phase.cell_size);
 }

@@ -49,6 +49,11 @@ pub(super) fn write_whole<T>(
     Ok(filled)
 }
 
+/// [`write_whole`] of what is there already.
+pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), CacheError> {
+    write_whole(path, |file| file.write_all(bytes))
+}
+
 /// Flushes the directory that holds `path`, without which a rename may not outlive a power cut.
 fn sync_parent(path: &Path) -> Result<(), CacheError> {
     match path.parent() {

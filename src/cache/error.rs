@@ -87,14 +87,20 @@ pub enum CacheError {
         given: String,
     },
     /// Written in a format that this program does not read.
-    #[error("{} has cache format {found}, and this program reads {supported}", dir.display())]
+    #[error(
+        "{} has cache format {found}, and this program reads {oldest} to {newest}: bake it anew, or use the program \
+         that wrote it",
+        dir.display()
+    )]
     Format {
         /// The directory.
         dir: PathBuf,
         /// `format_version` as it stands.
         found: String,
-        /// Ours.
-        supported: u32,
+        /// The first that this program reads.
+        oldest: u32,
+        /// The last one, which it writes.
+        newest: u32,
     },
     /// A file is not what was written.
     #[error("{} is damaged: {what}", file.display())]

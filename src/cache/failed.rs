@@ -12,7 +12,8 @@ use super::{
     disk,
     error::{AtPath, CacheError},
     frame::{self, Stamp},
-    manifest::{self, FileRecord},
+    manifest,
+    record::FileRecord,
 };
 use crate::domain::particles::Particles;
 
@@ -51,19 +52,13 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
     remove(cache)?;
     let dir = cache.join(FAILED);
     disk::create_directory(&dir)?;
-    let file = |name: &str, bytes: &[u8]| {
-        disk::write_whole(&dir.join(name), |out| std::io::Write::write_all(out, bytes))
-    };
+    let file = |name: &str, bytes: &[u8]| disk::write_bytes(&dir.join(name), bytes);
     let scene = failed.scene_toml.as_bytes();
     file(manifest::SCENE, scene)?;
     let start = disk::write_whole(&dir.join(START), |out| {
         frame::encode(out, stamp, &failed.start)
     })?;
-    let start = FileRecord {
-        file: START.to_owned(),
-        bytes: start.bytes,
-        blake3: start.hash.to_hex().to_string(),
-    };
+    let start = FileRecord::of_written(START, &start);
     let mut report = failed.report.clone();
     let fields = report
         .as_object_mut()
@@ -92,7 +87,13 @@ fn checksum(fields: &Map<String, Value>) -> String {
 pub fn read(dir: &Path) -> Result<Failed, CacheError> {
     let path = dir.join(REPORT);
     let damaged = |what: &str| CacheError::damaged(&path, what);
-    let bytes = fs::read(&path).at(&path)?;
+    let bytes = match fs::read(&path) {
+        // Written last: a bake was stopped while it wrote the folder.
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            return Err(damaged("it is missing"));
+        }
+        other => other.at(&path)?,
+    };
     let mut fields: Map<String, Value> =
         serde_json::from_slice(&bytes).map_err(|error| damaged(&error.to_string()))?;
     // Digits may change that no f64 holds: the text is compared as well.

@@ -38,11 +38,6 @@ const ROWS_AT_ONCE: usize = 16_384;
 /// A header of ours has a few hundred bytes; a file without line ends is not read as one line.
 const HEADER_LIMIT: usize = 1 << 16;
 
-/// Path of a frame from the cache's folder, with `/`: `frames/wave-city.0001.ply`.
-pub fn file_name(shot: &str, frame: u32) -> String {
-    format!("frames/{shot}.{frame:04}.ply")
-}
-
 /// What a frame file says of itself in comments.
 #[derive(Clone, Copy, Debug)]
 pub struct Stamp<'a> {

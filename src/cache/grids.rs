@@ -37,6 +37,14 @@ impl GridRecord {
         }
     }
 
+    /// Names of the grids in each file.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> + use<> {
+        let grids = [(self.surface, "surface"), (self.velocity, "vel")];
+        grids
+            .into_iter()
+            .filter_map(|(is_kept, name)| is_kept.then_some(name))
+    }
+
     /// Refuses what no scene asks for.
     pub(super) fn check(&self) -> Result<(), String> {
         let size = self.voxel_size;

@@ -1,5 +1,6 @@
 //! `frames.jsonl`: one line a frame, each chained to the one before.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::Path;
@@ -9,10 +10,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::{AtPath, CacheError};
-use super::frame;
-use super::manifest::{self, FileRecord, Manifest};
-use super::probes::{self, ProbeValues};
-use super::vdb;
+use super::manifest::{self, Manifest};
+use super::probes::ProbeValues;
+use super::record::FileRecord;
+use super::stream::{self, STREAMS, Stream};
 
 /// Its file.
 pub(super) const FILE: &str = "frames.jsonl";
@@ -34,26 +35,25 @@ pub struct Clock {
     pub steps: u64,
 }
 
+/// Files of a frame by the names of their streams.
+pub type Files = BTreeMap<String, FileRecord>;
+
+/// Values of a frame by the names of their streams, then by table and column; `None` where there is nothing to measure.
+pub type Rows = BTreeMap<String, ProbeValues>;
+
 /// One line of the ledger.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
     /// 0 is the start.
     pub frame: u32,
-    /// Path from the cache's folder, with `/`.
-    pub file: String,
-    /// Length of the file.
-    pub bytes: u64,
-    /// Of the file, hex.
-    pub blake3: String,
-    /// In the file.
+    /// In the file of the particles.
     pub particles: u64,
-    /// Its grids; absent where the scene asks for none.
+    /// Of each stream with a file a frame that the manifest announces, and so of the particles at least.
+    pub files: Files,
+    /// Of each stream with a row a frame that the manifest announces; absent where there is none.
     #[serde(default)]
-    pub grids: Option<FileRecord>,
-    /// What the probes saw; absent where the scene has none.
-    #[serde(default)]
-    pub probes: Option<ProbeValues>,
+    pub rows: Rows,
     /// BLAKE3 of `manifest.json`, hex; the first frame alone has it, so that a changed manifest is told from a
     /// changed first line.
     #[serde(default)]
@@ -68,34 +68,133 @@ pub struct Entry {
     pub chain: String,
 }
 
+/// A line as format 1 has it: the streams of that time, each with a place of its own.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EntryOfFormat1 {
+    frame: u32,
+    file: String,
+    bytes: u64,
+    blake3: String,
+    particles: u64,
+    #[serde(default)]
+    grids: Option<FileRecord>,
+    #[serde(default)]
+    probes: Option<ProbeValues>,
+    #[serde(default)]
+    manifest: Option<String>,
+    clock: Clock,
+    report: Value,
+    chain: String,
+}
+
+impl From<EntryOfFormat1> for Entry {
+    fn from(old: EntryOfFormat1) -> Self {
+        let particles = FileRecord {
+            file: old.file,
+            bytes: old.bytes,
+            blake3: old.blake3,
+        };
+        let files = [
+            (stream::PARTICLES, Some(particles)),
+            (stream::GRIDS, old.grids),
+        ];
+        let files = files.into_iter();
+        let rows = old.probes.map(|rows| (stream::PROBES.to_owned(), rows));
+        Self {
+            frame: old.frame,
+            particles: old.particles,
+            files: files
+                .filter_map(|(name, record)| Some((name.to_owned(), record?)))
+                .collect(),
+            rows: rows.into_iter().collect(),
+            manifest: old.manifest,
+            clock: old.clock,
+            report: old.report,
+            chain: old.chain,
+        }
+    }
+}
+
 impl Entry {
-    /// The frame's own file.
-    pub(super) fn record(&self) -> FileRecord {
-        FileRecord {
-            file: self.file.clone(),
-            bytes: self.bytes,
-            blake3: self.blake3.clone(),
+    fn parse(line: &[u8], format_version: u32) -> serde_json::Result<Self> {
+        match format_version {
+            1 => serde_json::from_slice::<EntryOfFormat1>(line).map(Self::from),
+            _ => serde_json::from_slice(line),
         }
     }
 
-    /// The frame's own file, and that of its grids where it has any.
-    pub fn files(&self) -> impl Iterator<Item = FileRecord> + use<> {
-        std::iter::once(self.record()).chain(self.grids.clone())
+    /// The frame's file of a stream; `None` where the manifest does not announce it.
+    pub fn file(&self, stream: &str) -> Option<&FileRecord> {
+        self.files.get(stream)
     }
+
+    /// The frame's files, the particles first.
+    pub fn all_files(&self) -> impl Iterator<Item = &FileRecord> {
+        STREAMS.iter().filter_map(|stream| self.file(stream.name))
+    }
+
+    /// The frame's files but that of the particles.
+    pub fn files_beside(&self) -> impl Iterator<Item = &FileRecord> {
+        let beside = STREAMS.iter().filter(|s| s.name != stream::PARTICLES);
+        beside.filter_map(|stream| self.file(stream.name))
+    }
+
+    /// The frame's row of a stream's table, by its index in the manifest; empty where there is none.
+    pub fn row(&self, stream: &str, table: usize) -> &[Option<f64>] {
+        let row = self.rows.get(stream).and_then(|rows| rows.get(table));
+        row.map_or(&[], Vec::as_slice)
+    }
+
+    /// Why it cannot be the line of this frame in a cache with this manifest.
+    fn misfit(&self, manifest: &Manifest, frame: u32) -> Option<String> {
+        if self.frame != frame || self.clock.frame != frame {
+            return Some(format!("it is not frame {frame}"));
+        }
+        let announced = |stream: &&Stream| stream.is_by_frame() && stream.is_in(manifest);
+        for stream in STREAMS.iter().filter(announced) {
+            let expected = stream.frame_file(&manifest.shot, frame);
+            if self.file(stream.name).map(|record| &record.file) != Some(&expected) {
+                return Some(format!("its {} are not {expected}", stream.name));
+            }
+        }
+        if self.files.len() > STREAMS.iter().filter(announced).count() {
+            return Some("it names files that the manifest does not announce".to_owned());
+        }
+        rows_misfit(manifest, &self.rows)
+    }
+}
+
+/// Why these rows cannot stand in a line of a cache with this manifest.
+pub(super) fn rows_misfit(manifest: &Manifest, rows: &Rows) -> Option<String> {
+    let mut expected = 0;
+    for stream in &STREAMS {
+        let tables = stream.tables(manifest);
+        expected += usize::from(!tables.is_empty());
+        let found = rows.get(stream.name).map_or(&[][..], Vec::as_slice);
+        let widths = found.iter().map(Vec::len);
+        if !widths.eq(tables.iter().map(|table| table.columns.len())) {
+            let name = stream.name;
+            return Some(format!(
+                "its {name} are not those that the manifest announces"
+            ));
+        }
+        let mut values = found.iter().flatten().flatten();
+        if let Some(value) = values.find(|value| !value.is_finite()) {
+            return Some(format!("{value} among its {}", stream.name));
+        }
+    }
+    (rows.len() != expected).then(|| "it has rows that the manifest does not announce".to_owned())
 }
 
 /// An [`Entry`] without its chain, as the chain is taken over it.
 #[derive(Serialize)]
 pub(super) struct Contents<'a> {
     pub(super) frame: u32,
-    pub(super) file: &'a str,
-    pub(super) bytes: u64,
-    pub(super) blake3: &'a str,
     pub(super) particles: u64,
+    pub(super) files: &'a Files,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) grids: Option<&'a FileRecord>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) probes: Option<&'a ProbeValues>,
+    pub(super) rows: Option<&'a Rows>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) manifest: Option<&'a str>,
     pub(super) clock: Clock,
@@ -176,8 +275,8 @@ impl Ledger {
         let number = self.entries.len() + 1;
         let damaged =
             |what: &str| CacheError::damaged(dir.join(FILE), format!("line {number}: {what}"));
-        let entry: Entry =
-            serde_json::from_slice(line).map_err(|error| damaged(&error.to_string()))?;
+        let entry = Entry::parse(line, manifest.format_version)
+            .map_err(|error| damaged(&error.to_string()))?;
         let (contents, tail) = line.split_at(line.len().saturating_sub(CHAIN_LEN));
         if !tail.starts_with(CHAIN_KEY) {
             return Err(damaged("it does not end with its chained hash"));
@@ -207,18 +306,7 @@ impl Ledger {
             .ok()
             .and_then(|index| index.checked_add(manifest.first_frame()))
             .ok_or_else(|| damaged("too many frames"))?;
-        let file = frame::file_name(&manifest.shot, frame);
-        if entry.frame != frame || entry.clock.frame != frame || entry.file != file {
-            return Err(damaged(&format!("it is not frame {frame} in {file}")));
-        }
-        let grids = manifest.grids.as_ref();
-        let grids = grids.map(|_| vdb::file_name(&manifest.shot, frame));
-        if entry.grids.as_ref().map(|record| &record.file) != grids.as_ref() {
-            return Err(damaged(
-                "its grids are not those that the manifest announces",
-            ));
-        }
-        if let Some(misfit) = probes::misfit(&manifest.probes, entry.probes.as_ref()) {
+        if let Some(misfit) = entry.misfit(manifest, frame) {
             return Err(damaged(&misfit));
         }
         self.chain = chain;
@@ -256,12 +344,9 @@ mod tests {
     fn line(time: f64, report: &Value) -> Result<Vec<u8>, CacheError> {
         let contents = Contents {
             frame: 1,
-            file: "frames/a.0001.ply",
-            bytes: 1,
-            blake3: "",
             particles: 1,
-            grids: None,
-            probes: None,
+            files: &Files::new(),
+            rows: None,
             manifest: None,
             clock: Clock {
                 time,

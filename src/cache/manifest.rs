@@ -2,15 +2,16 @@
 
 use std::fmt;
 use std::fs;
-use std::path::{Component, Path};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::disk;
 use super::error::{AtPath, CacheError};
+use super::frame::Stamp;
 use super::grids::GridRecord;
 use super::probes::ProbeRecord;
+use super::record::{FileRecord, is_file_stem, is_relative};
 
 /// Its file.
 pub(super) const FILE: &str = "manifest.json";
@@ -19,16 +20,24 @@ pub(super) const SCENE: &str = "scene.toml";
 /// Folder of the scene's own files.
 pub(super) const ASSETS: &str = "assets";
 
+/// Whether `dir` holds a cache whose creation was finished, so that a bake must resume it or leave it.
+pub fn exists(dir: &Path) -> bool {
+    dir.join(FILE).is_file()
+}
+
 /// `manifest.json`: written once, and hashed into the first line of the ledger.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// [`Manifest::FORMAT_VERSION`] when it was written.
+    /// [`Manifest::FORMAT_VERSION`] of the program that wrote it.
     pub format_version: u32,
     /// `swell`.
     pub program: String,
     /// Its version.
     pub program_version: String,
+    /// BLAKE3 of the shaders that were read from a folder, hex; absent where they were the program's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shaders: Option<String>,
     /// Shot name, which the frame files carry: letters, digits, `.`, `_`, `-`.
     pub shot: String,
     /// Hash of all that decides the physics, hex.
@@ -103,54 +112,13 @@ fn is_zero(origin: &[f64; 3]) -> bool {
     *origin == [0.0; 3]
 }
 
-/// A file that stands in the cache beside the frames.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FileRecord {
-    /// Path from the cache's folder, with `/`.
-    pub file: String,
-    /// Length.
-    pub bytes: u64,
-    /// BLAKE3, hex.
-    pub blake3: String,
-}
-
-impl FileRecord {
-    pub(super) fn new(file: impl Into<String>, content: &[u8]) -> Self {
-        Self {
-            file: file.into(),
-            bytes: content.len() as u64,
-            blake3: blake3::hash(content).to_hex().to_string(),
-        }
-    }
-
-    /// Refuses the file where it is not the one recorded, without taking it into memory.
-    pub(super) fn check(&self, dir: &Path) -> Result<(), CacheError> {
-        let path = dir.join(&self.file);
-        disk::check_length_on_disk(&path, self.bytes)?;
-        if disk::file_hash(&path)? != self.blake3 {
-            return Err(CacheError::damaged(path, "its BLAKE3 is off"));
-        }
-        Ok(())
-    }
-
-    /// Reads the file and refuses it where it is not the one recorded.
-    pub(super) fn read(&self, dir: &Path) -> Result<Vec<u8>, CacheError> {
-        let path = dir.join(&self.file);
-        let content = disk::read_exactly(&path, self.bytes)?;
-        if blake3::hash(&content).to_hex().as_str() != self.blake3 {
-            return Err(CacheError::damaged(path, "its BLAKE3 is off"));
-        }
-        Ok(content)
-    }
-}
-
 /// What a resumed bake must have in common with the cache, the most telling first. The scene's hash
 /// comes last: it differs where any of the fields above it that a scene sets does.
-const COMPARED: [&str; 14] = [
+const COMPARED: [&str; 15] = [
     "format_version",
     "program",
     "program_version",
+    "shaders",
     "solver",
     "device",
     "driver",
@@ -165,12 +133,27 @@ const COMPARED: [&str; 14] = [
 ];
 
 impl Manifest {
-    /// The format that this program writes and reads.
-    pub const FORMAT_VERSION: u32 = 1;
+    /// The format that this program writes. Since 2 a line of the ledger lists its files and its rows by stream.
+    pub const FORMAT_VERSION: u32 = 2;
+
+    /// The oldest format that it reads. A bake in an older one than [`Self::FORMAT_VERSION`] is not gone on with.
+    pub const OLDEST_FORMAT: u32 = 1;
 
     /// Number of the first frame: 0 is a scene's own start.
     pub fn first_frame(&self) -> u32 {
         self.parent.as_ref().map_or(0, |parent| parent.frame)
+    }
+
+    /// What the frame of this number says of itself, at `time` seconds.
+    pub(super) fn stamp(&self, frame: u32, time: f64) -> Stamp<'_> {
+        Stamp {
+            program: &self.program,
+            program_version: &self.program_version,
+            shot: &self.shot,
+            frame,
+            time,
+            origin: self.origin.into(),
+        }
     }
 
     /// Bytes of `manifest.json`.
@@ -183,7 +166,7 @@ impl Manifest {
 
     /// Reads `manifest.json` and its hash.
     pub(super) fn read(dir: &Path) -> Result<(Self, blake3::Hash), CacheError> {
-        if !super::exists(dir) {
+        if !exists(dir) {
             return Err(CacheError::NotACache {
                 dir: dir.to_owned(),
             });
@@ -193,11 +176,13 @@ impl Manifest {
         let value: Value = serde_json::from_slice(&bytes)
             .map_err(|error| CacheError::damaged(&path, error.to_string()))?;
         let found = &value["format_version"];
-        if found != Self::FORMAT_VERSION {
+        let formats = u64::from(Self::OLDEST_FORMAT)..=u64::from(Self::FORMAT_VERSION);
+        if !found.as_u64().is_some_and(|found| formats.contains(&found)) {
             return Err(CacheError::Format {
                 dir: dir.to_owned(),
                 found: found.to_string(),
-                supported: Self::FORMAT_VERSION,
+                oldest: Self::OLDEST_FORMAT,
+                newest: Self::FORMAT_VERSION,
             });
         }
         let manifest: Self = serde_json::from_value(value)
@@ -289,52 +274,6 @@ impl Manifest {
                 cached: cached[field].to_string(),
                 given: given_fields[field].to_string(),
             }),
-        }
-    }
-}
-
-pub(super) fn is_file_stem(name: &str) -> bool {
-    !name.is_empty()
-        && !name.starts_with(['.', '-'])
-        && name
-            .bytes()
-            .all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
-}
-
-/// A path of plain names, so that it stays below the folder that it is joined to.
-fn is_relative(path: &str) -> bool {
-    !path.contains('\\')
-        && path.split('/').all(|part| !part.is_empty())
-        && Path::new(path)
-            .components()
-            .all(|c| matches!(c, Component::Normal(_)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_that_lead_out_of_the_cache_are_refused() {
-        for good in ["city.obj", "meshes/city.obj", "wave 1.csv"] {
-            assert!(is_relative(good), "{good}");
-        }
-        for bad in [
-            "",
-            "/etc/passwd",
-            "../a",
-            "a/../../b",
-            "a//b",
-            "a\\..\\b",
-            "a/",
-        ] {
-            assert!(!is_relative(bad), "{bad}");
-        }
-        for good in ["wave-city", "v1.2_a"] {
-            assert!(is_file_stem(good), "{good}");
-        }
-        for bad in ["", "..", ".a", "a/b", "a b", "-x", "a\nb"] {
-            assert!(!is_file_stem(bad), "{bad}");
         }
     }
 }

@@ -17,7 +17,8 @@
 //!
 //! The same scene, binary and adapter give the same bytes in every file but `timings.jsonl`; `failed/` has checksums of its own, and goes when a bake gets past its frame.
 //!
-//! A frame, and its grids, go to a temporary file, to the platter, to their name, and only then into the ledger. So
+//! What there is of each frame, and in which folder, is a table: [`stream::STREAMS`]. The files of a frame go to a
+//! temporary file, to the platter, to their name, and only then into the ledger. So
 //! the ledger never names a frame that is not whole, whatever kills the process, and what a crash can
 //! leave (a temporary file, a frame without a line, half a line) is cleared by
 //! [`CacheWriter::resume`].
@@ -28,44 +29,28 @@
 mod disk;
 mod error;
 pub mod failed;
+mod folder;
 pub mod frame;
 mod grids;
 mod ledger;
 mod manifest;
 mod probes;
 mod reader;
+mod record;
+mod sink;
+pub mod stream;
+mod tables;
 pub mod vdb;
 mod writer;
 
 pub use disk::directory_hash;
 pub use error::CacheError;
-pub use frame::file_name;
+pub use folder::around;
 pub use grids::GridRecord;
-pub use ledger::{Clock, Entry};
-pub use manifest::{FileRecord, Manifest, Parent};
+pub use ledger::{Clock, Entry, Files, Rows};
+pub use manifest::{Manifest, Parent, exists};
 pub use probes::{ProbeRecord, ProbeValues};
 pub use reader::{CacheReader, Problem, VerifyReport, survey};
-pub use writer::{Asset, CacheWriter, Summary};
-
-use std::path::{Path, PathBuf};
-
-/// Whether `dir` holds a cache whose creation was finished, so that a bake must resume it or leave it.
-pub fn exists(dir: &Path) -> bool {
-    dir.join(manifest::FILE).is_file()
-}
-
-/// The cache that a path lies in, or would lie in, links followed; also one whose creation has only begun.
-pub fn around(path: &Path) -> Option<PathBuf> {
-    let mut real = std::path::absolute(path).ok()?;
-    // What is not there yet lies in the first folder above it that is.
-    while real.canonicalize().map(|found| real = found).is_err() {
-        if !real.pop() {
-            return None;
-        }
-    }
-    let is_cache =
-        |dir: &Path| (exists(dir) && dir.join(ledger::FILE).is_file()) || disk::is_begun(dir);
-    real.ancestors()
-        .find(|dir| is_cache(dir))
-        .map(Path::to_owned)
-}
+pub use record::FileRecord;
+pub use sink::Summary;
+pub use writer::{Asset, CacheWriter};

@@ -7,10 +7,13 @@ use rayon::prelude::*;
 
 use super::disk;
 use super::error::{AtPath, CacheError};
-use super::frame::{self, Stamp};
+use super::failed;
+use super::frame;
 use super::ledger::{self, Entry, Ledger};
-use super::manifest::{FileRecord, Manifest};
-use super::probes;
+use super::manifest::{self, Manifest};
+use super::record::FileRecord;
+use super::stream;
+use super::tables;
 use super::vdb::{self, Grids};
 use crate::domain::particles::Particles;
 
@@ -38,8 +41,10 @@ pub struct Problem {
 pub struct VerifyReport {
     /// Baked frames in the ledger; the start is not counted.
     pub frames: u32,
-    /// Length of the frame files and their grids, the start's too, as the ledger has it.
+    /// Length of the frames' files, the start's too, as the ledger has it.
     pub bytes: u64,
+    /// Whether the cache has `failed/`, and all of it is sound.
+    pub failed: bool,
     /// In the order of the files; empty for a sound cache.
     pub problems: Vec<Problem>,
 }
@@ -64,8 +69,8 @@ impl VerifyReport {
 pub fn survey(dir: &Path) -> Result<VerifyReport, CacheError> {
     match CacheReader::open_without_assets(dir) {
         Ok(reader) => Ok(reader.survey()),
-        Err(CacheError::Damaged { file, what }) => Ok(VerifyReport {
-            problems: vec![Problem { file, what }],
+        Err(error @ CacheError::Damaged { .. }) => Ok(VerifyReport {
+            problems: vec![Problem::of(error, dir)],
             ..VerifyReport::default()
         }),
         Err(error) => Err(error),
@@ -123,7 +128,7 @@ impl CacheReader {
     /// # Errors
     /// [`CacheError::Damaged`], also where the cache has no such asset; [`CacheError::Io`].
     pub fn asset(&self, name: &str) -> Result<Vec<u8>, CacheError> {
-        let file = format!("{}/{name}", super::manifest::ASSETS);
+        let file = format!("{}/{name}", manifest::ASSETS);
         let record = self.manifest.files.iter().find(|r| r.file == file);
         record
             .ok_or_else(|| {
@@ -179,17 +184,10 @@ impl CacheReader {
     /// [`CacheError::Io`].
     pub fn grids(&self, entry: &Entry, particles: &Particles) -> Result<Option<Grids>, CacheError> {
         let manifest = &self.manifest;
-        let (Some(asked), Some(record)) = (&manifest.grids, &entry.grids) else {
+        let (Some(asked), Some(record)) = (&manifest.grids, entry.file(stream::GRIDS)) else {
             return Ok(None);
         };
-        let stamp = Stamp {
-            program: &manifest.program,
-            program_version: &manifest.program_version,
-            shot: &manifest.shot,
-            frame: entry.frame,
-            time: entry.clock.time,
-            origin: manifest.origin.into(),
-        };
+        let stamp = manifest.stamp(entry.frame, entry.clock.time);
         let grids = asked
             .grids(particles, manifest.particle_spacing)
             .moved(manifest.origin.into());
@@ -198,28 +196,35 @@ impl CacheReader {
         Ok((hash.to_hex().as_str() == record.blake3).then_some(grids))
     }
 
-    /// Looks at what stands beside the particles of these frames: at their grid files, and at every probe's file, which
-    /// has to be what the ledger says.
+    /// BLAKE3 of the file of a frame's particles, hex.
+    ///
+    /// # Errors
+    /// [`CacheError::NoFrame`].
+    pub fn frame_hash(&self, frame: u32) -> Result<&str, CacheError> {
+        let record = particles_record(&self.dir, self.entry(frame)?)?;
+        Ok(&record.blake3)
+    }
+
+    /// Looks at what stands beside the particles: at the other files of these frames, and at all files of streams with a
+    /// row a frame, which have to be what the ledger says.
     ///
     /// # Errors
     /// [`CacheError::NoFrame`]; [`CacheError::Damaged`] for the first file that is off or cannot be read.
     pub fn check_beside(&self, frames: &[u32]) -> Result<(), CacheError> {
-        let records = frames
-            .iter()
-            .map(|&frame| Ok(self.entry(frame)?.grids.as_ref()));
-        let records: Vec<Option<&FileRecord>> = records.collect::<Result<_, CacheError>>()?;
-        let problems: Vec<Problem> = records
+        let entries = frames.iter().map(|&frame| self.entry(frame));
+        let entries: Vec<&Entry> = entries.collect::<Result<_, CacheError>>()?;
+        let problems: Vec<Problem> = entries
             .into_par_iter()
-            .flatten()
+            .flat_map_iter(Entry::files_beside)
             .filter_map(|record| self.problem(record))
             .collect();
         let first = problems.into_iter().next();
         let first = first.or_else(|| {
-            let found = self.probe_problems(self.entries()).next()?;
+            let found = self.table_problems(self.entries()).next()?;
             // A bake that goes on has written rows since this cache was opened.
             match Self::open(&self.dir) {
                 Ok(now) if now.entries().len() > self.entries().len() => {
-                    self.probe_problems(now.entries()).next()
+                    self.table_problems(now.entries()).next()
                 }
                 _ => Some(found),
             }
@@ -229,14 +234,10 @@ impl CacheReader {
         })
     }
 
-    /// Files of probes that are not what these lines of the ledger say.
-    fn probe_problems<'a>(&'a self, entries: &'a [Entry]) -> impl Iterator<Item = Problem> + 'a {
-        let records = self.manifest.probes.iter().enumerate();
-        records.filter_map(move |(index, record)| {
-            let what = probes::problem(&self.dir, index, record, entries)?;
-            let file = record.path(&self.dir);
-            Some(Problem { file, what })
-        })
+    /// Tables that are not what these lines of the ledger say.
+    fn table_problems<'a>(&'a self, entries: &'a [Entry]) -> impl Iterator<Item = Problem> + 'a {
+        let problems = tables::problems(&self.dir, &self.manifest, entries);
+        problems.map(|(file, what)| Problem { file, what })
     }
 
     /// Seconds that the bake of each frame took, where they are known: `timings.jsonl` is in no
@@ -258,9 +259,8 @@ impl CacheReader {
         Ok(text.lines().filter_map(seconds).collect())
     }
 
-    /// Looks at every checksum: scene, assets, frames; and at the probes' files, which have to be what the ledger says.
-    /// The manifest and the ledger's chain were
-    /// checked when the cache was opened.
+    /// Looks at every checksum: scene, assets, each frame's files; at tables, which have to be what the ledger says; and
+    /// at `failed/`, where a bake broke off. The manifest and the ledger's chain were checked when the cache was opened.
     /// A file that cannot be read stands in the report as well.
     pub fn survey(&self) -> VerifyReport {
         let entries = self.entries();
@@ -282,14 +282,24 @@ impl CacheReader {
         }
         let frames: Vec<Problem> = entries
             .par_iter()
-            .flat_map_iter(Entry::files)
-            .filter_map(|record| self.problem(&record))
+            .flat_map_iter(Entry::all_files)
+            .filter_map(|record| self.problem(record))
             .collect();
         problems.extend(frames);
-        problems.extend(self.probe_problems(entries));
+        problems.extend(self.table_problems(entries));
+        let failed = self.dir.join(failed::FAILED);
+        let has_failed = failed.exists();
+        let of_failed = has_failed.then(|| failed::read(&failed).err()).flatten();
+        let failed = has_failed && of_failed.is_none();
+        problems.extend(of_failed.map(|error| Problem::of(error, &self.dir)));
         VerifyReport {
             frames: self.last_frame() - self.first_frame(),
-            bytes: entries.iter().flat_map(Entry::files).map(|f| f.bytes).sum(),
+            bytes: entries
+                .iter()
+                .flat_map(Entry::all_files)
+                .map(|f| f.bytes)
+                .sum(),
+            failed,
             problems,
         }
     }
@@ -303,15 +313,30 @@ impl CacheReader {
     }
 
     fn problem(&self, record: &FileRecord) -> Option<Problem> {
-        let path = self.dir.join(&record.file);
-        let what = match record.check(&self.dir) {
-            Ok(()) => return None,
-            Err(CacheError::Damaged { what, .. }) => what,
-            Err(CacheError::Io { source, .. }) => format!("it cannot be read: {source}"),
-            Err(other) => other.to_string(),
-        };
-        Some(Problem { file: path, what })
+        let error = record.check(&self.dir).err()?;
+        Some(Problem::of(error, &self.dir.join(&record.file)))
     }
+}
+
+impl Problem {
+    /// What went wrong with a file; `file` where the error names none.
+    fn of(error: CacheError, file: &Path) -> Self {
+        let (file, what) = match error {
+            CacheError::Damaged { file, what } => (file, what),
+            CacheError::Io { path, source } => (path, format!("it cannot be read: {source}")),
+            other => (file.to_owned(), other.to_string()),
+        };
+        Self { file, what }
+    }
+}
+
+/// The record of a frame's particles, which no line is read without.
+fn particles_record<'a>(dir: &Path, entry: &'a Entry) -> Result<&'a FileRecord, CacheError> {
+    let no_particles = || {
+        let what = format!("frame {} has no particles", entry.frame);
+        CacheError::damaged(dir.join(ledger::FILE), what)
+    };
+    entry.file(stream::PARTICLES).ok_or_else(no_particles)
 }
 
 /// Reads and checks the frame of a ledger line.
@@ -320,8 +345,9 @@ pub(super) fn read_frame(
     manifest: &Manifest,
     entry: &Entry,
 ) -> Result<Particles, CacheError> {
-    let path = dir.join(&entry.file);
-    let bytes = entry.record().read(dir)?;
+    let record = particles_record(dir, entry)?;
+    let path = dir.join(&record.file);
+    let bytes = record.read(dir)?;
     let particles = frame::decode(&bytes, &path)?;
     if particles.len() as u64 != entry.particles {
         return Err(CacheError::damaged(

@@ -4,13 +4,19 @@ use glam::DVec3;
 
 use crate::{
     compare::{rounding::U, tolerance::bounds},
-    solve::SolveError,
+    gpu::buffer::{Buf, Windows},
+    solve::buffers,
 };
 
 use super::{
-    engine::{Io, State, Twin, twin},
+    engine::{Io, NONE, Outcome, State, Twin, names, twin},
     table::{Entry, Table, entries, pair},
 };
+
+/// Variables of the scan.
+const VALUES: Buf<u32> = Buf::new("values");
+const BLOCK_SUMS: Buf<u32> = Buf::new("block_sums");
+const LENGTH: Windows<[u32; 4]> = Windows::new("length", "");
 
 /// Values that one workgroup scans.
 const BLOCK: usize = 1024;
@@ -40,25 +46,19 @@ pub(super) type Twins<S> = [Twin<S>; 4];
 
 pub(super) fn twins<S: State>() -> Twins<S> {
     [
-        twin("sort/scan_blocks", &["values"], |_, io, table| {
-            scan(io, table)
-        }),
-        twin("sort/add_block_sums", &["values"], |_, io, table| {
-            add(io, table)
-        }),
-        twin("sort/place", &[], |state, io, table| {
-            place(state.particles(), io, table)
-        }),
-        twin("sort/stabilize", &[], |state, io, table| {
-            stabilize(state.particles(), io, table)
+        twin("sort/scan_blocks", || names![VALUES], |_, io| scan(io)),
+        twin("sort/add_block_sums", || names![VALUES], |_, io| add(io)),
+        twin("sort/place", NONE, |state, io| place(state.particles(), io)),
+        twin("sort/stabilize", NONE, |state, io| {
+            stabilize(state.particles(), io)
         }),
     ]
 }
 
-fn scan(io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    let length = io.uniform::<u32>("length")? as usize;
+fn scan(io: &mut Io<'_>) -> Outcome {
+    let length = io.window(&LENGTH)?[0] as usize;
     let (mut scanned, mut totals) = (Vec::with_capacity(length), Vec::new());
-    for block in io.before::<u32>("values", length)?.chunks(BLOCK) {
+    for block in io.before(VALUES, length)?.chunks(BLOCK) {
         let mut sum = 0u32;
         for value in block {
             scanned.push(sum);
@@ -66,28 +66,31 @@ fn scan(io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
         }
         totals.push(sum);
     }
-    table.add_exact(&SCAN, &io.after("values", length)?, &scanned);
-    table.add_exact(&SCAN, &io.after("block_sums", totals.len())?, &totals);
+    io.table
+        .add_exact(&SCAN, &io.after(VALUES, length)?, &scanned);
+    io.table
+        .add_exact(&SCAN, &io.after(BLOCK_SUMS, totals.len())?, &totals);
     Ok(())
 }
 
-fn add(io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    let length = io.uniform::<u32>("length")? as usize;
-    let sums = io.before::<u32>("block_sums", length.div_ceil(BLOCK))?;
-    let mut values = io.before::<u32>("values", length)?;
+fn add(io: &mut Io<'_>) -> Outcome {
+    let length = io.window(&LENGTH)?[0] as usize;
+    let sums = io.before(BLOCK_SUMS, length.div_ceil(BLOCK))?;
+    let mut values = io.before(VALUES, length)?;
     for (k, value) in values.iter_mut().enumerate() {
         *value = value.wrapping_add(sums[k / BLOCK]);
     }
-    table.add_exact(&ADD, &io.after("values", length)?, &values);
+    io.table
+        .add_exact(&ADD, &io.after(VALUES, length)?, &values);
     Ok(())
 }
 
-fn place(n: usize, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    let cell_of = io.before::<u32>("cell_of", n)?;
-    let slot = io.before::<u32>("slot_in_cell", n)?;
+fn place(n: usize, io: &mut Io<'_>) -> Outcome {
+    let cell_of = io.before(buffers::CELL_OF, n)?;
+    let slot = io.before(buffers::SLOT_IN_CELL, n)?;
     // `cell_start` as far as the keys reach.
     let cells = cell_of.iter().max().map_or(0, |&cell| cell as usize + 1);
-    let start = io.before::<u32>("cell_start", cells)?;
+    let start = io.before(buffers::CELL_START, cells)?;
     let mut placed = vec![u32::MAX; n];
     for i in 0..n {
         let place = start[cell_of[i] as usize] + slot[i];
@@ -95,16 +98,18 @@ fn place(n: usize, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
             *place = i as u32;
         }
     }
-    table.add_exact(&PLACE, &io.after("placed", n)?, &placed);
+    io.table
+        .add_exact(&PLACE, &io.after(buffers::PLACED, n)?, &placed);
     Ok(())
 }
 
-fn stabilize(n: usize, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    let cell_of = io.before::<u32>("cell_of", n)?;
-    let id = io.before::<u32>("id", n)?;
-    let mut order = io.before::<u32>("placed", n)?;
+fn stabilize(n: usize, io: &mut Io<'_>) -> Outcome {
+    let cell_of = io.before(buffers::CELL_OF, n)?;
+    let id = io.before(buffers::ID, n)?;
+    let mut order = io.before(buffers::PLACED, n)?;
     order.sort_by_key(|&k| (cell_of[k as usize], id[k as usize]));
-    table.add_exact(&STABILIZE, &io.after("order", n)?, &order);
+    io.table
+        .add_exact(&STABILIZE, &io.after(buffers::ORDER, n)?, &order);
     Ok(())
 }
 

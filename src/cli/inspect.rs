@@ -1,4 +1,6 @@
-//! `swell inspect SCENE|CACHE|--adapters`
+//! `swell inspect SCENE|LOOK|CACHE|--adapters`
+
+mod look;
 
 use std::{
     fmt::{self, Write},
@@ -9,14 +11,16 @@ use clap::Args;
 
 use crate::{
     scene::{Method, Scene},
-    stage::inspect::{Adapter, Entry, Manifest, ScenePlan, adapters, cache, plan, plot},
+    stage::inspect::{
+        Adapter, Entry, Manifest, PARTICLES, PROBES, ScenePlan, adapters, cache, plan, plot,
+    },
 };
 
 use super::{Failure, bake, check::Misplaced, is_cache, output, size};
 
 #[derive(Args, Debug)]
 pub(super) struct InspectArgs {
-    /// A scene file or a cache directory.
+    /// A scene file, a look file or a cache directory.
     #[arg(required_unless_present = "adapters")]
     subject: Option<PathBuf>,
     /// List this machine's adapters with the limits that matter here.
@@ -25,6 +29,9 @@ pub(super) struct InspectArgs {
     /// Draw what the cache's probes saw over time, an SVG a probe, into this folder.
     #[arg(long, value_name = "DIR", requires = "subject")]
     plot: Option<PathBuf>,
+    /// Plan a look for this scene or cache: its solids and its particles.
+    #[arg(long, value_name = "SCENE|CACHE", requires = "subject")]
+    scene: Option<PathBuf>,
     /// Override a scene key.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -43,6 +50,11 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     // Writing to a String cannot fail.
     let mut text = String::new();
     let mut misfit = None;
+    if let (Some(_), Some(subject)) = (&args.scene, &args.subject)
+        && !look::is_look(subject)
+    {
+        return Err(misplaced("--scene", "looks", "none", subject));
+    }
     let plotted = match (&args.plot, &args.subject) {
         (Some(folder), Some(directory)) => plot(directory, folder)?,
         _ => Vec::new(),
@@ -58,6 +70,9 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
             let (manifest, entries) = cache(directory)?;
             let _ = show_cache(&mut text, &manifest, &entries);
             let _ = show_probes(&mut text, &manifest, &entries);
+        }
+        Some(file) if look::is_look(file) => {
+            misfit = look::show(&mut text, args, file)?.misfit;
         }
         Some(file) => {
             let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
@@ -79,16 +94,25 @@ fn refuse_scene_options(args: &InspectArgs, directory: &Path) -> Result<(), Fail
     if args.set.is_empty() && args.solver.is_none() && args.adapter.is_none() {
         return Ok(());
     }
+    Err(misplaced(
+        "--set, --solver or --adapter",
+        "scenes",
+        "a cache: it says what it was baked with",
+        directory,
+    ))
+}
+
+fn misplaced(option: &'static str, what: &'static str, is: &'static str, file: &Path) -> Failure {
     let error = Misplaced {
-        option: "--set, --solver or --adapter",
-        what: "scenes",
-        is: "a cache: it says what it was baked with",
-        source_file: directory.to_owned(),
+        option,
+        what,
+        is,
+        source_file: file.to_owned(),
     };
-    Err(Failure {
+    Failure {
         code: 2,
         error: Box::new(error),
-    })
+    }
 }
 
 fn show_adapter(out: &mut String, adapter: &Adapter) -> fmt::Result {
@@ -185,6 +209,9 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
         "on {} ({}, {})",
         manifest.device, manifest.driver, manifest.backend
     )?;
+    if let Some(shaders) = &manifest.shaders {
+        writeln!(out, "shaders {shaders}: not the shipped ones")?;
+    }
     writeln!(out, "scene {}", manifest.scene_hash)?;
     if let Some(parent) = &manifest.parent {
         writeln!(out, "begins from {parent}")?;
@@ -228,7 +255,7 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
             "{:5}  {:9}  {:>10}  {:8}{columns}  {percent:>13}  {speed:>9}  {capped:>6}",
             entry.clock.frame,
             entry.particles,
-            size(entry.bytes),
+            size(entry.file(PARTICLES).map_or(0, |file| file.bytes)),
             entry.clock.substeps
         )?;
     }
@@ -247,7 +274,7 @@ fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt:
     )?;
     for (index, probe) in manifest.probes.iter().enumerate() {
         for (k, column) in probe.columns.iter().enumerate() {
-            let value = |entry: &Entry| *entry.probes.as_ref()?.get(index)?.get(k)?;
+            let value = |entry: &Entry| *entry.row(PROBES, index).get(k)?;
             let least = entries.iter().filter_map(value).min_by(f64::total_cmp);
             let greatest = entries.iter().filter_map(value).max_by(f64::total_cmp);
             let last = entries.last().and_then(value);

@@ -14,13 +14,16 @@ pub mod verify;
 use std::{
     error::Error,
     io::{self, Write as _},
-    path::Path,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 
-use crate::stage::Blame;
+use crate::stage::{
+    Blame,
+    device::{Gpu, Shaders},
+};
 
 /// Exit code where something is out of tolerance.
 const OUT_OF_TOLERANCE: u8 = 1;
@@ -48,7 +51,7 @@ enum Command {
     Study(study::StudyArgs),
     /// Hold a step on the GPU against the f64 reference, pass by pass.
     Check(check::CheckArgs),
-    /// Show a scene's plan, a cache's frames, or this machine's adapters.
+    /// Show a scene's plan, a look's plan, a cache's frames, or this machine's adapters.
     Inspect(inspect::InspectArgs),
     /// Compare two caches, a cache and a baseline, or two renders: where they part, and by how much.
     Diff(diff::DiffArgs),
@@ -78,6 +81,28 @@ where
             code,
             error: Box::new(error),
         }
+    }
+}
+
+/// Adapter and shaders of a command.
+#[derive(Args, Debug)]
+struct GpuArgs {
+    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Read all shaders from this folder, an edited copy of the folder shaders/ of swell's source. What is made with them is
+    /// recorded as not by the shipped ones. An endless loop in them can hang the device.
+    #[arg(long, value_name = "DIR")]
+    shaders: Option<PathBuf>,
+}
+
+impl GpuArgs {
+    fn read(&self) -> Result<Gpu, Failure> {
+        let shaders = self.shaders.as_deref().map(Shaders::read).transpose()?;
+        Ok(Gpu {
+            adapter: self.adapter.clone(),
+            shaders: shaders.unwrap_or_default(),
+        })
     }
 }
 

@@ -22,6 +22,16 @@ pub(super) fn print(text: &str) {
     note("standard output", put(&mut io::stdout().lock(), text));
 }
 
+/// Prints a line a pass: milliseconds each, runs, seconds in all.
+pub(super) fn print_pass_times(passes: &[(&'static str, f64, u64)]) {
+    for (pass, seconds, runs) in passes {
+        let each = 1e3 * seconds / *runs as f64;
+        print(&format!(
+            "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s\n"
+        ));
+    }
+}
+
 /// Writes a line to standard error: progress, and what a user has to know.
 pub(super) fn say(line: &str) {
     note(
@@ -46,8 +56,8 @@ fn put(out: &mut impl Write, text: &str) -> io::Result<()> {
     out.flush()
 }
 
-/// What the process ends with where its work ends with `code`: 4 in place of 0 and 1 where something could not be written. A
-/// code that tells of a graver fault stays.
+/// Exit code of the process whose work ended with `code`: 4 in place of 0 and 1 where something could not be written. A
+/// code of a graver fault stays.
 pub(super) fn exit_code(code: u8) -> ExitCode {
     let failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner).take();
     let Some((stream, error)) = failed else {

@@ -12,7 +12,7 @@ use crate::{
 };
 
 use super::{
-    Failure, bake,
+    Failure, GpuArgs, bake,
     interrupt::{self, Interrupt},
     output,
     progress::{Mode, Progress},
@@ -31,15 +31,17 @@ pub(super) struct RenderArgs {
     /// Frames to render, such as 1-240x2; all that are cached where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
-    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
-    #[arg(long, value_name = "NAME")]
-    adapter: Option<String>,
+    #[command(flatten)]
+    gpu: GpuArgs,
     /// Take a panorama that lies outside of the look's folder.
     #[arg(long)]
     allow_outside: bool,
     /// Render frames again that stand there, also those of another cache or look.
     #[arg(long)]
     overwrite: bool,
+    /// Time each pass and print a table; passes then run one by one.
+    #[arg(long)]
+    time_passes: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
     progress: Mode,
@@ -60,8 +62,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
         look,
         directory,
         frames: args.frames.clone(),
-        adapter: args.adapter.clone(),
+        gpu: args.gpu.read()?,
         overwrite: args.overwrite,
+        time_passes: args.time_passes,
     };
     let interrupt = Interrupt::install_or_warn();
     let progress = OnceCell::new();
@@ -90,6 +93,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
+    output::print_pass_times(&outcome.passes);
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
     } else {

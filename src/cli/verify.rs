@@ -28,8 +28,13 @@ pub fn run(args: &VerifyArgs) -> Result<(), CacheError> {
 fn show(report: &VerifyReport) -> String {
     if report.problems.is_empty() {
         let plural = if report.frames == 1 { "" } else { "s" };
+        let failed = if report.failed {
+            ", and the frame that failed"
+        } else {
+            ""
+        };
         return format!(
-            "ok: {} frame{plural}, {}\n",
+            "ok: {} frame{plural}, {}{failed}\n",
             report.frames,
             size(report.bytes)
         );
@@ -51,9 +56,13 @@ mod tests {
         let mut report = VerifyReport {
             frames: 72,
             bytes: 1_234_000_000,
+            failed: false,
             problems: vec![],
         };
         assert_eq!(show(&report), "ok: 72 frames, 1.2 GB\n");
+        report.failed = true;
+        let said = "ok: 72 frames, 1.2 GB, and the frame that failed\n";
+        assert_eq!(show(&report), said);
         for name in ["a", "b"] {
             report.problems.push(Problem {
                 file: name.into(),

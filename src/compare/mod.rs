@@ -4,8 +4,10 @@
 //! In every comparison of two results b is the reference.
 
 pub mod baseline;
+pub mod caches;
 pub mod deviation;
 pub mod frames;
+pub mod limits;
 pub mod pictures;
 pub mod rounding;
 pub mod spread;

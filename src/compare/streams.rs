@@ -141,7 +141,8 @@ pub fn rows(a: Row<'_>, b: Row<'_>) -> Vec<Difference> {
     found
 }
 
-/// Keys below `key` at which two JSON values differ, with dots between their parts.
+/// Keys below `key`, or of the values themselves where it is empty, at which two JSON values differ, with dots between
+/// their parts.
 pub fn keys(key: &str, a: &Json, b: &Json) -> Vec<Difference> {
     let (Json::Object(x), Json::Object(y)) = (a, b) else {
         let different = (a != b).then(|| Difference::Value {
@@ -153,7 +154,11 @@ pub fn keys(key: &str, a: &Json, b: &Json) -> Vec<Difference> {
     };
     let below = |name: &String| {
         let of = |map: &serde_json::Map<String, Json>| map.get(name).cloned().unwrap_or_default();
-        keys(&format!("{key}.{name}"), &of(x), &of(y))
+        let path = match key {
+            "" => name.clone(),
+            _ => format!("{key}.{name}"),
+        };
+        keys(&path, &of(x), &of(y))
     };
     let is_new = |name: &&String| !x.contains_key(*name);
     let names = x.keys().chain(y.keys().filter(is_new));

@@ -8,7 +8,7 @@ use std::str::FromStr;
 pub struct FrameRange {
     /// Sorted, each once, never empty.
     frames: Vec<u32>,
-    /// As given.
+    /// The text as given.
     text: String,
 }
 
@@ -20,7 +20,7 @@ pub struct FrameRange {
 pub struct FrameRangeError {
     /// The part of the list at fault.
     pub part: String,
-    /// What is off with it.
+    /// The reason.
     pub what: String,
 }
 
@@ -28,7 +28,7 @@ pub struct FrameRangeError {
 const MOST: u64 = 10_000_000;
 
 impl FrameRange {
-    /// From `first` to `last`, both included; `None` where `last` comes before `first` or there are
+    /// The frames from `first` to `last`, both included; `None` where `last` comes before `first` or there are
     /// more than 10⁷.
     pub fn inclusive(first: u32, last: u32) -> Option<Self> {
         format!("{first}-{last}").parse().ok()
@@ -62,6 +62,16 @@ impl FrameRange {
     pub fn len(&self) -> usize {
         self.frames.len()
     }
+}
+
+/// Ascending numbers as a person writes them: `0-4, 7`.
+pub fn ranges(numbers: &[u32]) -> String {
+    let runs = numbers.chunk_by(|a, b| a.checked_add(1) == Some(*b));
+    let run = |run: &[u32]| match run {
+        [first, .., last] => format!("{first}-{last}"),
+        other => other.iter().map(u32::to_string).collect(),
+    };
+    runs.map(run).collect::<Vec<_>>().join(", ")
 }
 
 impl fmt::Display for FrameRange {

@@ -1,8 +1,12 @@
 //! Everything that touches the device and knows nothing of fluids.
 
 pub mod adapter;
+pub mod buffer;
 pub mod program;
+pub mod raster;
 pub mod recording;
 pub mod reflect;
 pub mod shader;
 pub mod sort;
+pub mod texture;
+mod timer;

@@ -6,8 +6,9 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
     adapter::{Context, GpuError, Spoil},
-    reflect::{Access, Binding, reflect},
-    shader,
+    buffer::{Buf, Element, Wanted, Windows},
+    raster::RasterPass,
+    reflect::{Access, Binding, Reflection, Stage, reflect},
 };
 
 /// A buffer to be.
@@ -43,17 +44,20 @@ pub struct Pass {
     pub layout: BindGroupLayout,
     /// Reflected bindings.
     pub bindings: Vec<Binding>,
-    /// Threads a workgroup.
-    pub workgroup_size: u32,
+    /// Threads a workgroup along each axis.
+    pub workgroup_size: [u32; 3],
 }
 
-/// Named passes and buffers on one device.
+/// Named passes, buffers, textures and samplers on one device.
 #[derive(Debug)]
 pub struct Program {
     /// The device.
     pub context: Context,
     passes: BTreeMap<&'static str, Pass>,
     buffers: BTreeMap<String, Buffer>,
+    pub(super) rasters: BTreeMap<&'static str, RasterPass>,
+    pub(super) textures: BTreeMap<String, wgpu::Texture>,
+    pub(super) samplers: BTreeMap<&'static str, wgpu::Sampler>,
 }
 
 impl Program {
@@ -72,7 +76,10 @@ impl Program {
         check_sizes(context, buffers)?;
         let passes = passes
             .iter()
-            .map(|spec| Ok((spec.name, compile(context, spec, shared)?)))
+            .map(|spec| match compile(context, spec, shared) {
+                Ok(pass) => Ok((spec.name, pass)),
+                Err(error) => Err(context.shaders.blamed(error)),
+            })
             .collect::<Result<_, GpuError>>()?;
         let buffers = buffers
             .iter()
@@ -83,6 +90,9 @@ impl Program {
             context: context.clone(),
             passes,
             buffers,
+            rasters: BTreeMap::new(),
+            textures: BTreeMap::new(),
+            samplers: BTreeMap::new(),
         })
     }
 
@@ -130,29 +140,47 @@ impl Program {
         )
     }
 
-    /// Writes `data` at `offset` bytes of a buffer, before whatever is submitted next.
-    pub fn upload<T: bytemuck::NoUninit>(&self, name: &str, offset: u64, data: &[T]) {
-        if !data.is_empty() {
-            self.context
-                .queue
-                .write_buffer(self.buffer(name), offset, bytemuck::cast_slice(data));
+    /// Writes `data` from value `first` of a buffer on, before whatever is submitted next.
+    pub fn upload<T: bytemuck::NoUninit>(&self, buffer: Buf<T>, first: usize, data: &[T]) {
+        self.write(
+            buffer.name(),
+            buffer.place(first),
+            bytemuck::cast_slice(data),
+        );
+    }
+
+    /// Writes `values` into the first windows of a uniform, before whatever is submitted next.
+    pub fn upload_windows<T: Element>(&self, windows: &Windows<T>, values: &[T]) {
+        self.write(windows.name(), 0, &Windows::bytes(values));
+    }
+
+    fn write(&self, name: &str, offset: u64, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            let queue = &self.context.queue;
+            queue.write_buffer(self.buffer(name), offset, bytes);
         }
     }
 
-    /// Reads the first `counts[k]` values of `T` from buffer `names[k]`, waiting for the device once.
+    /// The first `count` values of a buffer; waits for the device.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
-    pub fn download<T: bytemuck::Pod>(
-        &self,
-        wanted: &[(&str, usize)],
-    ) -> Result<Vec<Vec<T>>, GpuError> {
+    pub fn read<T: bytemuck::Pod>(&self, buffer: Buf<T>, count: usize) -> Result<Vec<T>, GpuError> {
+        self.download(buffer.first(count))
+    }
+
+    /// The first values of several buffers, waiting for the device once.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn download<W: Wanted>(&self, wanted: W) -> Result<W::Values, GpuError> {
         let context = &self.context;
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        let staging: Vec<Option<Buffer>> = wanted
+        let spans = wanted.spans();
+        let staging: Vec<Option<Buffer>> = spans
             .iter()
-            .map(|&(name, count)| {
-                let bytes = (count * size_of::<T>()).next_multiple_of(4) as u64;
+            .map(|&(name, offset, bytes)| {
+                let bytes = bytes.next_multiple_of(4) as u64;
                 (bytes > 0).then(|| {
                     let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
                         label: Some("readback"),
@@ -160,7 +188,7 @@ impl Program {
                         usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
                         mapped_at_creation: false,
                     });
-                    encoder.copy_buffer_to_buffer(self.buffer(name), 0, &buffer, 0, bytes);
+                    encoder.copy_buffer_to_buffer(self.buffer(name), offset, &buffer, 0, bytes);
                     buffer
                 })
             })
@@ -171,20 +199,18 @@ impl Program {
             buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         }
         context.wait()?;
-        let mut out = Vec::with_capacity(wanted.len());
-        for (buffer, &(_, count)) in staging.iter().zip(wanted) {
-            let Some(buffer) = buffer else {
-                out.push(Vec::new());
-                continue;
-            };
-            let view = buffer
-                .get_mapped_range(..)
-                .map_err(|error| GpuError::Lost(error.to_string()))?;
-            out.push(bytemuck::pod_collect_to_vec(
-                &view[..count * size_of::<T>()],
-            ));
-        }
-        Ok(out)
+        let views = staging
+            .iter()
+            .map(|buffer| buffer.as_ref().map(|buffer| buffer.get_mapped_range(..)));
+        let views = views
+            .map(Option::transpose)
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|error| GpuError::Lost(error.to_string()))?;
+        let mut bytes = views
+            .iter()
+            .zip(&spans)
+            .map(|(view, &(_, _, bytes))| view.as_ref().map_or(&[][..], |view| &view[..bytes]));
+        Ok(W::values(&mut bytes))
     }
 }
 
@@ -248,17 +274,10 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
     })
 }
 
-/// WGSL of pass `name`, composed from `file`, with the context's fault where it is one of this pass.
-///
-/// # Errors
-/// As [`shader::compose`]; a fault whose text is not in the pass.
-pub fn source(
-    context: &Context,
-    name: &str,
-    file: &str,
-    defines: &[&str],
-) -> Result<String, GpuError> {
-    let source = shader::compose(file, defines)?;
+/// WGSL of a pass, with the context's fault where it is one of this pass.
+fn source(context: &Context, name: &str, defines: &[&str]) -> Result<String, GpuError> {
+    let composed = context.shaders.compose(name, defines);
+    let source = composed.map_err(|error| context.shaders.blamed(error))?;
     match context.spoil.filter(|spoil| spoil.pass == name) {
         Some(spoil) => spoiled(&source, &spoil),
         None => Ok(source),
@@ -275,83 +294,142 @@ fn spoiled(source: &str, spoil: &Spoil) -> Result<String, GpuError> {
     Ok(source.replace(spoil.from, spoil.to))
 }
 
-fn compile(
+/// A shader and the layout of its bindings: what a pipeline is made of.
+pub(super) struct Shader {
+    pub(super) module: wgpu::ShaderModule,
+    pub(super) layout: BindGroupLayout,
+    pub(super) pipeline_layout: wgpu::PipelineLayout,
+    pub(super) reflection: Reflection,
+}
+
+fn binding_type(access: Access) -> wgpu::BindingType {
+    let buffer = |ty| wgpu::BindingType::Buffer {
+        ty,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
+    let texture = |sample_type| wgpu::BindingType::Texture {
+        sample_type,
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
+    match access {
+        Access::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+        Access::Read => storage(true),
+        Access::ReadWrite => storage(false),
+        Access::Texture => texture(wgpu::TextureSampleType::Float { filterable: true }),
+        Access::DepthTexture => texture(wgpu::TextureSampleType::Depth),
+        Access::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+        Access::CompareSampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison),
+    }
+}
+
+/// Runs what makes objects of pass `name` on the device; its validation errors are that pass's.
+pub(super) fn checked<T>(
     context: &Context,
-    spec: &PassSpec,
-    shared: &[(&'static str, f64)],
-) -> Result<Pass, GpuError> {
-    let source = source(context, spec.name, spec.name, &spec.defines)?;
-    let reflection = reflect(spec.name, &source)?;
+    name: &str,
+    make: impl FnOnce() -> T,
+) -> Result<T, GpuError> {
+    let scope = context
+        .device
+        .push_error_scope(wgpu::ErrorFilter::Validation);
+    let made = make();
+    match pollster::block_on(scope.pop()) {
+        Some(error) => Err(GpuError::Shader {
+            name: name.to_owned(),
+            message: error.to_string(),
+        }),
+        None => Ok(made),
+    }
+}
+
+/// Composes and reflects the shader of pass `name`.
+///
+/// # Errors
+/// [`GpuError::Shader`]; [`GpuError::NoF64`].
+pub(super) fn shader(context: &Context, name: &str, defines: &[&str]) -> Result<Shader, GpuError> {
+    let source = source(context, name, defines)?;
+    let reflection = reflect(name, &source)?;
     if reflection.has_f64 && !context.has_f64 {
         return Err(GpuError::NoF64 {
             adapter: context.info.name.clone(),
         });
     }
+    let visibility = match reflection.stage {
+        Stage::Compute => wgpu::ShaderStages::COMPUTE,
+        Stage::Raster { .. } => wgpu::ShaderStages::VERTEX_FRAGMENT,
+    };
     let entries: Vec<wgpu::BindGroupLayoutEntry> = reflection
         .bindings
         .iter()
         .map(|binding| wgpu::BindGroupLayoutEntry {
             binding: binding.index,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: match binding.access {
-                    Access::Uniform => wgpu::BufferBindingType::Uniform,
-                    Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                    Access::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
-                },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
+            visibility,
+            ty: binding_type(binding.access),
             count: None,
         })
         .collect();
+    let device = &context.device;
+    let (module, layout, pipeline_layout) = checked(context, name, || {
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(name),
+            entries: &entries,
+        });
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(name),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        };
+        let checks = wgpu::ShaderRuntimeChecks {
+            force_loop_bounding: false,
+            ..wgpu::ShaderRuntimeChecks::checked()
+        };
+        // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is fixed
+        // before it starts. All other checks stay on. Who edits shaders keeps to that, as whoever edits this source.
+        let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(name),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        (module, layout, pipeline_layout)
+    })?;
+    Ok(Shader {
+        module,
+        layout,
+        pipeline_layout,
+        reflection,
+    })
+}
+
+fn compile(
+    context: &Context,
+    spec: &PassSpec,
+    shared: &[(&'static str, f64)],
+) -> Result<Pass, GpuError> {
+    let shader = shader(context, spec.name, &spec.defines)?;
+    let reflection = shader.reflection;
     let declared = |name: &str| reflection.overrides.iter().any(|constant| constant == name);
     let mut constants = spec.constants.clone();
     constants.extend(shared.iter().filter(|(name, _)| declared(name)));
-    let device = &context.device;
-    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some(spec.name),
-        entries: &entries,
-    });
-    let descriptor = wgpu::ShaderModuleDescriptor {
-        label: Some(spec.name),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    };
-    let checks = wgpu::ShaderRuntimeChecks {
-        force_loop_bounding: false,
-        ..wgpu::ShaderRuntimeChecks::checked()
-    };
-    // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is fixed
-    // before it starts. All other checks stay on.
-    let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
-    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(spec.name),
-        bind_group_layouts: &[Some(&layout)],
-        immediate_size: 0,
-    });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(spec.name),
-        layout: Some(&pipeline_layout),
-        module: &module,
-        entry_point: None,
-        compilation_options: wgpu::PipelineCompilationOptions {
-            constants: &constants,
-            zero_initialize_workgroup_memory: false,
-        },
-        cache: None,
-    });
-    if let Some(error) = pollster::block_on(scope.pop()) {
-        return Err(GpuError::Shader {
-            name: spec.name.to_owned(),
-            message: error.to_string(),
-        });
-    }
+    let pipeline = checked(context, spec.name, || {
+        (context.device).create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(spec.name),
+            layout: Some(&shader.pipeline_layout),
+            module: &shader.module,
+            entry_point: None,
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants,
+                zero_initialize_workgroup_memory: false,
+            },
+            cache: None,
+        })
+    })?;
     Ok(Pass {
         name: spec.name,
         pipeline,
-        layout,
+        layout: shader.layout,
         bindings: reflection.bindings,
-        workgroup_size: reflection.workgroup_size[0],
+        workgroup_size: reflection.workgroup_size,
     })
 }

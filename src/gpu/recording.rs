@@ -1,23 +1,37 @@
 //! Passes recorded as data, and the one executor that runs them.
 
-use std::collections::BTreeMap;
-
-use wgpu::{BindGroup, CommandEncoder, ComputePass, QuerySet};
+use wgpu::{BindGroup, BindGroupLayout, BindingResource, CommandEncoder, ComputePass, TextureView};
 
 use super::{
     adapter::{Context, GpuError},
-    program::{Pass, Program},
+    buffer::{Buf, Workgroups},
+    program::Program,
+    raster::{self, CopyTexture, Draw, Drawn, Target},
+    reflect::{Access, Binding},
 };
 
-/// Where a shader variable finds its data, when not in the buffer of its own name.
+pub use super::timer::Timer;
+
+/// Where a shader variable finds its data, when not in the buffer, texture or sampler of its own name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bind {
     /// WGSL variable.
     pub variable: &'static str,
-    /// Buffer name.
+    /// Name of the buffer, texture or sampler.
     pub buffer: String,
     /// Byte offset and length; the whole buffer where `None`.
     pub window: Option<(u64, u64)>,
+}
+
+impl Bind {
+    /// `variable` in all of `buffer`.
+    pub fn whole<T>(variable: &'static str, buffer: &Buf<T>) -> Self {
+        Self {
+            variable,
+            buffer: buffer.name().to_owned(),
+            window: None,
+        }
+    }
 }
 
 /// How many workgroups a dispatch has.
@@ -25,12 +39,34 @@ pub struct Bind {
 pub enum Groups {
     /// Enough for so many threads; past the limit of one dimension they go out in two.
     Threads(u64),
-    /// Three `u32` at a byte offset of a buffer; zeros make the dispatch empty.
-    Indirect(&'static str, u64),
+    /// Enough for a thread a pixel of a picture.
+    Pixels([u32; 2]),
+    /// [`Workgroups`] that stand in a buffer at a byte offset; zeros make the dispatch empty.
+    Indirect {
+        /// Buffer name.
+        buffer: String,
+        /// Bytes.
+        offset: u64,
+    },
+}
+
+impl Groups {
+    /// Those that stand in a buffer.
+    pub fn at(buffer: &Buf<Workgroups>, index: usize) -> Self {
+        Self::within(buffer, index * size_of::<Workgroups>())
+    }
+
+    /// Those that are a member of a struct, so many bytes from its beginning, in a buffer.
+    pub fn within<T>(buffer: &Buf<T>, member: usize) -> Self {
+        Self::Indirect {
+            buffer: buffer.name().to_owned(),
+            offset: member as u64,
+        }
+    }
 }
 
 /// One thing for the device to do.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Command {
     /// Runs a pass.
     Dispatch {
@@ -42,10 +78,39 @@ pub enum Command {
         groups: Groups,
     },
     /// Zeroes a buffer.
-    Clear(&'static str),
+    Clear(String),
+    /// Runs a raster pass.
+    Draw(Draw),
+    /// Sets every texel of a depth texture.
+    ClearDepth(Target),
+    /// Copies a texture into a buffer.
+    CopyTexture(CopyTexture),
 }
 
 impl Command {
+    /// Zeroes `buffer`.
+    pub fn clear<T>(buffer: &Buf<T>) -> Self {
+        Self::Clear(buffer.name().to_owned())
+    }
+
+    /// Runs `pass` in so many workgroups.
+    pub fn in_groups(pass: &'static str, groups: Groups, binds: Vec<Bind>) -> Self {
+        Self::Dispatch {
+            pass,
+            binds,
+            groups,
+        }
+    }
+
+    /// Name of the pass that it runs.
+    pub fn pass(&self) -> Option<&'static str> {
+        match self {
+            Self::Dispatch { pass, .. } => Some(pass),
+            Self::Draw(draw) => Some(draw.raster.name),
+            Self::Clear(_) | Self::ClearDepth(_) | Self::CopyTexture(_) => None,
+        }
+    }
+
     /// Runs `pass` over `threads` threads with every binding in the buffer of its own name.
     pub fn over(pass: &'static str, threads: usize) -> Self {
         Self::Dispatch {
@@ -65,19 +130,22 @@ impl Command {
     }
 }
 
-enum Step {
+pub(super) enum Step {
     Dispatch {
         pass: &'static str,
         binds: Vec<Bind>,
         group: BindGroup,
         size: Size,
     },
-    Clear(&'static str),
+    Draw(Drawn),
+    Clear(String),
+    ClearDepth(Target),
+    CopyTexture(CopyTexture),
 }
 
-enum Size {
+pub(super) enum Size {
     Direct([u32; 3]),
-    Indirect(&'static str, u64),
+    Indirect(String, u64),
 }
 
 /// Where a traced recording stands.
@@ -91,7 +159,7 @@ pub enum Moment {
 
 /// Commands with their bind groups, to be run many times.
 pub struct Recording {
-    steps: Vec<Step>,
+    pub(super) steps: Vec<Step>,
 }
 
 impl Recording {
@@ -107,10 +175,7 @@ impl Recording {
 
     /// Names of the passes that it runs, in order.
     pub fn passes(&self) -> impl Iterator<Item = &'static str> {
-        self.steps.iter().filter_map(|step| match step {
-            Step::Dispatch { pass, .. } => Some(*pass),
-            Step::Clear(_) => None,
-        })
+        self.steps.iter().filter_map(Step::pass)
     }
 
     /// Submits all of it; returns without waiting unless `timer` measures.
@@ -174,42 +239,62 @@ impl Recording {
     }
 }
 
-fn encode(steps: &[Step], program: &Program, encoder: &mut CommandEncoder) {
+pub(super) fn encode(steps: &[Step], program: &Program, encoder: &mut CommandEncoder) {
     let mut steps = steps.iter().peekable();
-    while let Some(step) = steps.peek() {
-        if let Step::Clear(buffer) = step {
-            encoder.clear_buffer(program.buffer(buffer), 0, None);
-            steps.next();
-            continue;
+    while let Some(step) = steps.next() {
+        match step {
+            Step::Draw(drawn) => drawn.encode(program, encoder, None),
+            Step::Clear(buffer) => encoder.clear_buffer(program.buffer(buffer), 0, None),
+            Step::ClearDepth(target) => raster::clear_depth(program, encoder, target),
+            Step::CopyTexture(copy) => raster::copy(program, encoder, copy),
+            Step::Dispatch { .. } => {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                dispatch(program, &mut pass, step);
+                while let Some(next) = steps.next_if(|next| matches!(next, Step::Dispatch { .. })) {
+                    dispatch(program, &mut pass, next);
+                }
+            }
         }
-        let mut pass = encoder.begin_compute_pass(&Default::default());
-        while let Some(step @ Step::Dispatch { .. }) = steps.peek() {
-            dispatch(program, &mut pass, step);
-            steps.next();
+    }
+}
+
+impl Step {
+    pub(super) fn pass(&self) -> Option<&'static str> {
+        match self {
+            Self::Dispatch { pass, .. } => Some(pass),
+            Self::Draw(drawn) => Some(drawn.draw.raster.name),
+            Self::Clear(_) | Self::ClearDepth(_) | Self::CopyTexture(_) => None,
         }
     }
 }
 
 fn record(program: &Program, command: &Command) -> Option<Step> {
     match command {
-        Command::Clear(buffer) => Some(Step::Clear(buffer)),
+        Command::Draw(draw) => Some(Step::Draw(Drawn::new(program, draw))),
+        Command::Clear(buffer) => Some(Step::Clear(buffer.clone())),
+        Command::ClearDepth(target) => Some(Step::ClearDepth(target.clone())),
+        Command::CopyTexture(copy) => Some(Step::CopyTexture(copy.clone())),
         Command::Dispatch {
             pass: name,
             binds,
             groups,
         } => {
             let pass = program.pass(name);
+            let [columns, rows, _] = pass.workgroup_size;
             let size = match groups {
                 Groups::Threads(0) => return None,
                 Groups::Threads(threads) => {
-                    Size::Direct(spread(&program.context, pass.workgroup_size, *threads))
+                    Size::Direct(spread(&program.context, columns, *threads))
                 }
-                Groups::Indirect(buffer, offset) => Size::Indirect(buffer, *offset),
+                Groups::Pixels([width, height]) => {
+                    Size::Direct([width.div_ceil(columns), height.div_ceil(rows), 1])
+                }
+                Groups::Indirect { buffer, offset } => Size::Indirect(buffer.clone(), *offset),
             };
             Some(Step::Dispatch {
                 pass: name,
                 binds: binds.clone(),
-                group: bind(program, pass, binds),
+                group: bind(program, name, &pass.layout, &pass.bindings, binds),
                 size,
             })
         }
@@ -220,40 +305,65 @@ fn record(program: &Program, command: &Command) -> Option<Step> {
 pub fn spread(context: &Context, workgroup_size: u32, threads: u64) -> [u32; 3] {
     let groups = threads.div_ceil(u64::from(workgroup_size));
     let most = u64::from(context.limits.max_compute_workgroups_per_dimension);
-    let rows = groups.div_ceil(most);
+    let rows = groups.div_ceil(most).max(1);
     [groups.div_ceil(rows) as u32, rows as u32, 1]
 }
 
-fn bind(program: &Program, pass: &Pass, binds: &[Bind]) -> BindGroup {
-    let entries: Vec<wgpu::BindGroupEntry<'_>> = pass
-        .bindings
+/// The bind group of pass `name`.
+pub(super) fn bind(
+    program: &Program,
+    name: &str,
+    layout: &BindGroupLayout,
+    bindings: &[Binding],
+    binds: &[Bind],
+) -> BindGroup {
+    let found = |binding: &Binding| binds.iter().find(|bind| bind.variable == binding.name);
+    let target = |binding: &Binding| match found(binding) {
+        Some(bind) => bind.buffer.clone(),
+        None => binding.name.clone(),
+    };
+    // Entries borrow their views.
+    let views: Vec<Option<TextureView>> = bindings
         .iter()
         .map(|binding| {
-            let special = binds.iter().find(|bind| bind.variable == binding.name);
-            let buffer =
-                program.buffer(special.map_or(binding.name.as_str(), |bind| bind.buffer.as_str()));
-            let window = special.and_then(|bind| bind.window);
-            wgpu::BindGroupEntry {
-                binding: binding.index,
-                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                    buffer,
-                    offset: window.map_or(0, |(offset, _)| offset),
-                    size: window.and_then(|(_, size)| std::num::NonZeroU64::new(size)),
-                }),
-            }
+            let is_texture = matches!(binding.access, Access::Texture | Access::DepthTexture);
+            let texture = is_texture.then(|| program.texture(&target(binding)));
+            texture.map(|texture| texture.create_view(&Default::default()))
         })
         .collect();
-    program
-        .context
-        .device
-        .create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(pass.name),
-            layout: &pass.layout,
-            entries: &entries,
+    let resource = |binding: &Binding| match binding.access {
+        Access::Sampler | Access::CompareSampler => {
+            BindingResource::Sampler(program.sampler(&target(binding)))
+        }
+        _ => {
+            let window = found(binding).and_then(|bind| bind.window);
+            BindingResource::Buffer(wgpu::BufferBinding {
+                buffer: program.buffer(&target(binding)),
+                offset: window.map_or(0, |(offset, _)| offset),
+                size: window.and_then(|(_, size)| std::num::NonZeroU64::new(size)),
+            })
+        }
+    };
+    let entries: Vec<wgpu::BindGroupEntry<'_>> = bindings
+        .iter()
+        .zip(&views)
+        .map(|(binding, view)| wgpu::BindGroupEntry {
+            binding: binding.index,
+            resource: match view {
+                Some(view) => BindingResource::TextureView(view),
+                None => resource(binding),
+            },
         })
+        .collect();
+    let descriptor = wgpu::BindGroupDescriptor {
+        label: Some(name),
+        layout,
+        entries: &entries,
+    };
+    program.context.device.create_bind_group(&descriptor)
 }
 
-fn dispatch(program: &Program, compute: &mut ComputePass<'_>, step: &Step) {
+pub(super) fn dispatch(program: &Program, compute: &mut ComputePass<'_>, step: &Step) {
     let Step::Dispatch {
         pass, group, size, ..
     } = step
@@ -267,99 +377,5 @@ fn dispatch(program: &Program, compute: &mut ComputePass<'_>, step: &Step) {
         Size::Indirect(buffer, offset) => {
             compute.dispatch_workgroups_indirect(program.buffer(buffer), *offset)
         }
-    }
-}
-
-/// Time per pass on the device's own clock, summed over runs.
-pub struct Timer {
-    queries: QuerySet,
-    resolved: wgpu::Buffer,
-    staging: wgpu::Buffer,
-    seconds_per_tick: f64,
-    /// Seconds and runs by pass name.
-    pub total: BTreeMap<&'static str, (f64, u64)>,
-}
-
-/// Dispatches between two readings; two queries each.
-const TIMED_AT_ONCE: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
-
-impl Timer {
-    /// `None` where the adapter has no timestamp queries.
-    pub fn new(context: &Context) -> Option<Self> {
-        if !context.has_timestamps {
-            return None;
-        }
-        let device = &context.device;
-        let bytes = u64::from(wgpu::QUERY_SET_MAX_QUERIES) * 8;
-        let buffer = |usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("timestamps"),
-                size: bytes,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        Some(Self {
-            queries: device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("pass times"),
-                ty: wgpu::QueryType::Timestamp,
-                count: wgpu::QUERY_SET_MAX_QUERIES,
-            }),
-            resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
-            staging: buffer(wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ),
-            seconds_per_tick: f64::from(context.queue.get_timestamp_period()) * 1e-9,
-            total: BTreeMap::new(),
-        })
-    }
-
-    fn run(&mut self, recording: &Recording, program: &Program) -> Result<(), GpuError> {
-        for steps in recording.steps.chunks(TIMED_AT_ONCE) {
-            self.run_some(steps, program)?;
-        }
-        Ok(())
-    }
-
-    fn run_some(&mut self, steps: &[Step], program: &Program) -> Result<(), GpuError> {
-        let context = &program.context;
-        let mut encoder = context.device.create_command_encoder(&Default::default());
-        let mut names = Vec::new();
-        for step in steps {
-            match step {
-                Step::Clear(buffer) => encoder.clear_buffer(program.buffer(buffer), 0, None),
-                Step::Dispatch { pass: name, .. } => {
-                    let first = 2 * names.len() as u32;
-                    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                        label: Some(name),
-                        timestamp_writes: Some(wgpu::ComputePassTimestampWrites {
-                            query_set: &self.queries,
-                            beginning_of_pass_write_index: Some(first),
-                            end_of_pass_write_index: Some(first + 1),
-                        }),
-                    });
-                    dispatch(program, &mut pass, step);
-                    names.push(*name);
-                }
-            }
-        }
-        let count = 2 * names.len();
-        encoder.resolve_query_set(&self.queries, 0..count as u32, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.staging, 0, 8 * count as u64);
-        context.queue.submit([encoder.finish()]);
-        self.staging.map_async(wgpu::MapMode::Read, .., |_| {});
-        context.wait()?;
-        {
-            let view = self
-                .staging
-                .get_mapped_range(..)
-                .map_err(|error| GpuError::Lost(error.to_string()))?;
-            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&view[..8 * count]);
-            for (name, pair) in names.iter().zip(ticks.chunks_exact(2)) {
-                let entry = self.total.entry(name).or_default();
-                entry.0 += pair[1].saturating_sub(pair[0]) as f64 * self.seconds_per_tick;
-                entry.1 += 1;
-            }
-        }
-        self.staging.unmap();
-        Ok(())
     }
 }

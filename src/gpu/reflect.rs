@@ -2,11 +2,13 @@
 //!
 //! Bind groups are built from this, so no binding list is typed by hand.
 
-use naga::{AddressSpace, ShaderStage, StorageAccess, TypeInner};
+use naga::{
+    AddressSpace, ImageClass, ImageDimension, ScalarKind, ShaderStage, StorageAccess, TypeInner,
+};
 
-use super::adapter::GpuError;
+use super::{adapter::GpuError, buffer::Scalar};
 
-/// How a buffer is bound.
+/// How a buffer, texture or sampler is bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// `var<uniform>`.
@@ -15,9 +17,36 @@ pub enum Access {
     Read,
     /// `var<storage, read_write>`.
     ReadWrite,
+    /// `texture_2d<f32>`, of a format that filters.
+    Texture,
+    /// `texture_depth_2d`.
+    DepthTexture,
+    /// `sampler`.
+    Sampler,
+    /// `sampler_comparison`.
+    CompareSampler,
 }
 
-/// One buffer binding of group 0.
+impl Access {
+    /// Whether it counts against the adapter's limit of storage buffers.
+    pub fn is_storage(self) -> bool {
+        matches!(self, Self::Read | Self::ReadWrite)
+    }
+}
+
+/// What a shader is compiled into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// One compute entry point.
+    Compute,
+    /// A vertex entry point.
+    Raster {
+        /// Whether a fragment entry point stands beside it; without one, depth alone is drawn.
+        has_fragment: bool,
+    },
+}
+
+/// One binding of group 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Binding {
     /// The WGSL variable, which names the buffer too unless a step says otherwise.
@@ -26,8 +55,23 @@ pub struct Binding {
     pub index: u32,
     /// Uniform or storage.
     pub access: Access,
-    /// Bytes of a float, where it is an array of floats or of vectors of them.
-    pub float_bytes: Option<u8>,
+    /// What it is an array of, behind its head where it has one; what it is where it is no array.
+    pub element: ElementType,
+}
+
+/// A type as WGSL lays it out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ElementType {
+    /// Bytes from one element of the array to the next.
+    pub stride: u32,
+    /// What it is made of.
+    pub scalar: Scalar,
+    /// Its name where it is a struct.
+    pub name: Option<String>,
+    /// Bytes of a scalar; 0 of a mixed one.
+    pub scalar_bytes: u8,
+    /// Bytes before the array.
+    pub head: u32,
 }
 
 /// A `struct` of the shader as WGSL lays it out.
@@ -44,32 +88,112 @@ pub struct Layout {
 /// Reflection of one pass.
 #[derive(Clone, Debug)]
 pub struct Reflection {
+    /// Its entry points.
+    pub stage: Stage,
     /// In order of binding index.
     pub bindings: Vec<Binding>,
-    /// Threads a workgroup.
+    /// Threads a workgroup along each axis; zeros of a raster pass.
     pub workgroup_size: [u32; 3],
     /// Every named struct.
     pub layouts: Vec<Layout>,
     /// Names of its `override` constants.
     pub overrides: Vec<String>,
+    /// Its constants of u32.
+    pub constants: Vec<(String, u32)>,
     /// Whether it computes in f64.
     pub has_f64: bool,
 }
 
-fn float_bytes(module: &naga::Module, ty: naga::Handle<naga::Type>) -> Option<u8> {
-    let scalar = match module.types[ty].inner {
-        TypeInner::Array { base, .. } => module.types[base].inner.scalar(),
-        _ => None,
-    };
-    let float = scalar.filter(|scalar| scalar.kind == naga::ScalarKind::Float)?;
-    Some(float.width)
+/// What a binding of type `ty` consists of.
+fn element_of(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
+    match &module.types[ty].inner {
+        TypeInner::Array { base, stride, .. } => ElementType {
+            stride: *stride,
+            ..element(module, *base)
+        },
+        // A struct that ends in an array without a length is that array's head.
+        TypeInner::Struct { members, .. } => match members.last() {
+            Some(last) if is_unsized(module, last.ty) => ElementType {
+                head: last.offset,
+                ..element_of(module, last.ty)
+            },
+            _ => element(module, ty),
+        },
+        _ => element(module, ty),
+    }
 }
 
-/// Reads the single compute entry point of `wgsl`.
+fn is_unsized(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
+    let size = naga::ArraySize::Dynamic;
+    matches!(&module.types[ty].inner, TypeInner::Array { size: of, .. } if *of == size)
+}
+
+fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
+    let inner = &module.types[ty].inner;
+    let kind = inner.scalar();
+    ElementType {
+        stride: inner.size(module.to_ctx()),
+        scalar: match kind.map(|scalar| scalar.kind) {
+            Some(ScalarKind::Float) => Scalar::Float,
+            Some(ScalarKind::Uint) => Scalar::Uint,
+            _ => Scalar::Mixed,
+        },
+        name: match inner {
+            TypeInner::Struct { .. } => module.types[ty].name.clone(),
+            _ => None,
+        },
+        scalar_bytes: kind.map_or(0, |scalar| scalar.width),
+        head: 0,
+    }
+}
+
+fn stage(module: &naga::Module) -> Option<Stage> {
+    let mut stages: Vec<ShaderStage> = module.entry_points.iter().map(|e| e.stage).collect();
+    stages.sort_by_key(|stage| *stage == ShaderStage::Fragment);
+    match stages.as_slice() {
+        [ShaderStage::Compute] => Some(Stage::Compute),
+        [ShaderStage::Vertex] => Some(Stage::Raster {
+            has_fragment: false,
+        }),
+        [ShaderStage::Vertex, ShaderStage::Fragment] => Some(Stage::Raster { has_fragment: true }),
+        _ => None,
+    }
+}
+
+/// How a global variable is bound; `None` where no pass may bind it.
+fn access(module: &naga::Module, variable: &naga::GlobalVariable) -> Option<Access> {
+    match variable.space {
+        AddressSpace::Uniform => Some(Access::Uniform),
+        AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
+            Some(Access::ReadWrite)
+        }
+        AddressSpace::Storage { .. } => Some(Access::Read),
+        AddressSpace::Handle => match module.types[variable.ty].inner {
+            TypeInner::Sampler { comparison: true } => Some(Access::CompareSampler),
+            TypeInner::Sampler { comparison: false } => Some(Access::Sampler),
+            TypeInner::Image {
+                dim: ImageDimension::D2,
+                arrayed: false,
+                class,
+            } => match class {
+                ImageClass::Sampled {
+                    kind: ScalarKind::Float,
+                    multi: false,
+                } => Some(Access::Texture),
+                ImageClass::Depth { multi: false } => Some(Access::DepthTexture),
+                _ => None,
+            },
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Reads the entry points of `wgsl`: one of compute, or one of vertices with or without one of fragments.
 ///
 /// # Errors
-/// [`GpuError::Shader`] where it does not parse or validate, has another number of entry points, or
-/// binds outside group 0.
+/// [`GpuError::Shader`] where it does not parse or validate, has other entry points, binds outside group 0, or binds
+/// anything but what [`Access`] lists.
 pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
     let fault = |message: String| GpuError::Shader {
         name: name.to_owned(),
@@ -84,28 +208,17 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
     validator
         .validate(&module)
         .map_err(|error| fault(error.emit_to_string(wgsl)))?;
-    let [entry] = module.entry_points.as_slice() else {
-        return Err(fault(format!(
-            "{} entry points, not one",
-            module.entry_points.len()
-        )));
-    };
-    if entry.stage != ShaderStage::Compute {
-        return Err(fault("not a compute pass".into()));
-    }
+    let stage = stage(&module).ok_or_else(|| {
+        let count = module.entry_points.len();
+        fault(format!("{count} entry points, which are no pass"))
+    })?;
     let mut bindings = Vec::new();
     for (_, variable) in module.global_variables.iter() {
         let Some(place) = variable.binding else {
             continue;
         };
-        let access = match variable.space {
-            AddressSpace::Uniform => Access::Uniform,
-            AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
-                Access::ReadWrite
-            }
-            AddressSpace::Storage { .. } => Access::Read,
-            _ => return Err(fault("only buffers are bound".into())),
-        };
+        let access = access(&module, variable)
+            .ok_or_else(|| fault(format!("{:?} is not bound by any pass", variable.name)))?;
         if place.group != 0 {
             return Err(fault(format!("group {} is not 0", place.group)));
         }
@@ -117,7 +230,7 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
             name,
             index: place.binding,
             access,
-            float_bytes: float_bytes(&module, variable.ty),
+            element: element_of(&module, variable.ty),
         });
     }
     bindings.sort_by_key(|binding| binding.index);
@@ -141,15 +254,29 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
         .iter()
         .filter_map(|(_, constant)| constant.name.clone())
         .collect();
+    let constants = module
+        .constants
+        .iter()
+        .filter_map(|(_, constant)| {
+            let naga::Expression::Literal(naga::Literal::U32(value)) =
+                module.global_expressions[constant.init]
+            else {
+                return None;
+            };
+            Some((constant.name.clone()?, value))
+        })
+        .collect();
     let has_f64 = module.types.iter().any(|(_, ty)| {
         let scalar = ty.inner.scalar();
-        scalar.is_some_and(|scalar| scalar.kind == naga::ScalarKind::Float && scalar.width == 8)
+        scalar.is_some_and(|scalar| scalar.kind == ScalarKind::Float && scalar.width == 8)
     });
     Ok(Reflection {
+        stage,
         has_f64,
         bindings,
-        workgroup_size: entry.workgroup_size,
+        workgroup_size: module.entry_points[0].workgroup_size,
         layouts,
+        constants,
         overrides,
     })
 }

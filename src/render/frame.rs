@@ -4,15 +4,10 @@
 //! frame, four bytes a pixel, so no filter ever meets a tile's edge. Textures are drawn into only in
 //! tiles, and the picture itself is gathered in bands of rows: those two are what limits apply to.
 
-use wgpu::{BindGroup, Buffer};
-
-use super::RenderError;
-use super::pass::{ComputePass, Slot, Timer, folded, storage, uniform};
-use super::uniform::{Band as BandUniform, Fill};
-use crate::gpu::adapter::Context;
+use super::buffers::{aovs, picture};
 
 /// Sizes in pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Extent {
     pub(super) picture: [u32; 2],
     /// With a margin on all sides, so that filters have neighbours at the picture's edge. The width is a
@@ -34,112 +29,24 @@ impl Extent {
         }
     }
 
-    pub(super) fn pixels(&self) -> u64 {
-        u64::from(self.size[0]) * u64::from(self.size[1])
+    pub(super) fn pixels(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize
     }
 }
 
-/// Rows of the picture that share a buffer.
-pub(super) struct Band {
-    pub(super) rows: u32,
-    pub(super) uniform: Buffer,
-    pub(super) colour: Buffer,
-    /// Ten floats a pixel; only where the look asks for AOVs.
-    pub(super) aovs: Option<Buffer>,
-}
-
-/// Bytes of one pixel's AOVs.
-pub(super) const AOV_BYTES: u64 = 40;
-
-/// `row_limit` is the most rows in a band.
-pub(super) fn bands(
-    context: &Context,
-    extent: &Extent,
-    aovs: bool,
-    row_limit: u32,
-) -> Result<Vec<Band>, RenderError> {
+/// Rows of each band of the picture: as many as a storage buffer of `most` bytes holds, but no more than `row_limit`.
+pub(super) fn bands(extent: &Extent, has_aovs: bool, most: u64, row_limit: u32) -> Vec<u32> {
     let [width, height] = extent.picture;
-    let pixel = if aovs { AOV_BYTES } else { 16 };
-    let binding = context.limits.max_storage_buffer_binding_size;
-    let bytes = binding.min(context.limits.max_buffer_size);
-    let fitting = u32::try_from(bytes / (pixel * u64::from(width))).unwrap_or(u32::MAX);
+    let row = match has_aovs {
+        true => aovs(0).sized(width as usize),
+        false => picture(0).sized(width as usize),
+    };
+    let fitting = u32::try_from(most / row.bytes).unwrap_or(u32::MAX);
     let rows = fitting.min(row_limit).max(1);
     (0..height)
         .step_by(rows as usize)
-        .map(|row| {
-            let rows = rows.min(height - row);
-            let pixels = u64::from(width) * u64::from(rows);
-            Ok(Band {
-                rows,
-                uniform: uniform(
-                    context,
-                    "band",
-                    &BandUniform {
-                        row,
-                        rows,
-                        pad: [0; 2],
-                    },
-                ),
-                colour: storage(context, "picture band", 16 * pixels)?,
-                aovs: match aovs {
-                    true => Some(storage(context, "AOV band", AOV_BYTES * pixels)?),
-                    false => None,
-                },
-            })
-        })
+        .map(|row| rows.min(height - row))
         .collect()
-}
-
-/// Sets every word of a buffer.
-pub(super) struct Filler {
-    pass: ComputePass,
-}
-
-pub(super) struct Filling {
-    group: BindGroup,
-    groups: [u32; 2],
-}
-
-impl Filler {
-    pub(super) fn new(context: &Context) -> Result<Self, RenderError> {
-        let slots = [Slot::Uniform, Slot::Write];
-        let pass = ComputePass::new(context, "ssfr/fill", "ssfr/fill", &[], &slots)?;
-        Ok(Self { pass })
-    }
-
-    pub(super) fn prepare(
-        &self,
-        context: &Context,
-        buffer: &Buffer,
-        word: u32,
-        count: u64,
-    ) -> Filling {
-        let count = u32::try_from(count).unwrap_or(u32::MAX);
-        let params = Fill {
-            word,
-            count,
-            pad: [0; 2],
-        };
-        let params = uniform(context, "fill", &params);
-        let group = self.pass.bind(
-            context,
-            vec![params.as_entire_binding(), buffer.as_entire_binding()],
-        );
-        Filling {
-            group,
-            groups: folded(count.div_ceil(64)),
-        }
-    }
-
-    pub(super) fn run(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        timer: &mut Timer,
-        filling: &Filling,
-    ) {
-        self.pass
-            .run(encoder, timer, &filling.group, filling.groups);
-    }
 }
 
 /// `FAR` of `camera.wgsl`.

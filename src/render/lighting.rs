@@ -1,10 +1,9 @@
 //! What the shading pass is given: the look as a uniform, the sky as a texture.
 
-use wgpu::TextureView;
-
+use super::plan::Plan;
 use super::sky::Sky;
 use super::uniform;
-use crate::gpu::adapter::Context;
+use crate::gpu::texture::{SamplerSpec, TextureSpec};
 use crate::scene::look::Look;
 
 pub(super) fn shading(
@@ -49,53 +48,23 @@ pub(super) fn shading(
     }
 }
 
-pub(super) fn sky_texture(context: &Context, sky: &Sky) -> TextureView {
-    let size = wgpu::Extent3d {
-        width: sky.size[0],
-        height: sky.size[1],
-        depth_or_array_layers: 1,
-    };
-    let texture = context.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("sky"),
-        size,
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
+/// Plans the textures and samplers that light comes from, but for the shadow map itself.
+pub(super) fn plan_light(plan: &mut Plan, sky: &Sky) {
+    let spec = TextureSpec {
+        name: "sky".into(),
+        size: sky.size,
         format: wgpu::TextureFormat::Rgba16Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
+    };
+    let texels: Vec<u16> = sky.texels.iter().flatten().map(|x| x.to_bits()).collect();
+    plan.texture(spec, bytemuck::cast_slice(&texels).to_vec());
+    plan.samplers.push(SamplerSpec {
+        name: "sky_sampler",
+        repeats_x: true,
+        compare: None,
     });
-    let bytes: Vec<u16> = sky.texels.iter().flatten().map(|x| x.to_bits()).collect();
-    context.queue.write_texture(
-        texture.as_image_copy(),
-        bytemuck::cast_slice(&bytes),
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(8 * sky.size[0]),
-            rows_per_image: None,
-        },
-        size,
-    );
-    texture.create_view(&Default::default())
-}
-
-pub(super) fn sky_sampler(context: &Context) -> wgpu::Sampler {
-    context.device.create_sampler(&wgpu::SamplerDescriptor {
-        label: Some("sky"),
-        address_mode_u: wgpu::AddressMode::Repeat,
-        address_mode_v: wgpu::AddressMode::ClampToEdge,
-        mag_filter: wgpu::FilterMode::Linear,
-        min_filter: wgpu::FilterMode::Linear,
-        ..Default::default()
-    })
-}
-
-pub(super) fn shadow_sampler(context: &Context) -> wgpu::Sampler {
-    context.device.create_sampler(&wgpu::SamplerDescriptor {
-        label: Some("shadow"),
-        mag_filter: wgpu::FilterMode::Linear,
-        min_filter: wgpu::FilterMode::Linear,
+    plan.samplers.push(SamplerSpec {
+        name: "shadow_sampler",
+        repeats_x: false,
         compare: Some(wgpu::CompareFunction::LessEqual),
-        ..Default::default()
-    })
+    });
 }

@@ -7,16 +7,17 @@
 //! averaged, depths never are.
 
 mod aeration;
+mod buffers;
 mod camera;
 mod frame;
 pub mod image;
 mod lighting;
-mod pass;
 mod plan;
 mod renderer;
 mod set;
 mod sky;
 mod surface;
+#[expect(unreachable_pub, reason = "mirrors are declared public")]
 mod uniform;
 pub mod view;
 
@@ -29,8 +30,9 @@ use crate::domain::mesh::TriangleMesh;
 use crate::gpu::adapter::GpuError;
 
 pub use image::{Attributes, Image};
-pub use plan::passes;
-pub use renderer::{PassTime, Renderer};
+pub use plan::{Limits, Plan, Runs};
+pub use renderer::Renderer;
+pub use uniform::mirrors;
 
 /// What of a scene a picture needs beside the particles.
 #[derive(Clone, Debug)]

@@ -1,37 +1,315 @@
-//! Which passes a look calls for. What it does not name is neither built nor run.
+//! What a look's frames take on the device: buffers, textures and the commands that use them, made without a device.
+//!
+//! The renderer builds this and nothing more. Passes are those of the commands: no list of them is kept beside.
 
-use crate::scene::look::{AovSpec, FilterSpec, Look};
+use std::collections::BTreeMap;
 
-/// Names of the passes that a frame takes, sorted; `has_solids` is whether anything opaque stands in the scene
-/// or the look.
-pub fn passes(look: &Look, has_solids: bool) -> Vec<&'static str> {
-    let spec = look.spec();
-    let mut names = vec![
-        "ssfr/fill",
-        "ssfr/splat_depth",
-        "ssfr/splat_thickness",
-        "ssfr/shade",
-    ];
-    match spec.surface.filter {
-        FilterSpec::CurvatureFlow => names.extend([
-            "ssfr/flow_restrict",
-            "ssfr/curvature_flow",
-            "ssfr/flow_prolong",
-        ]),
-        FilterSpec::NarrowRange => names.push("ssfr/narrow_range"),
+use bytemuck::NoUninit;
+
+use super::{RenderError, buffers::FILLS, frame::Extent, uniform::Fill};
+use crate::gpu::{
+    adapter::Context,
+    buffer::{Buf, Element, Windows},
+    program::{BufferSpec, PassSpec, Program},
+    raster::RasterSpec,
+    recording::{Bind, Command},
+    texture::{SamplerSpec, TextureSpec},
+};
+
+/// What of the device decides how a frame is divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Largest storage buffer that can be bound, bytes.
+    pub storage: u64,
+    /// Texels along a side of the largest texture.
+    pub texture: u32,
+    /// Pixels along a side of what is drawn at once: bands of the picture, tiles of the solids.
+    pub tile: u32,
+}
+
+impl Limits {
+    /// An adapter's own.
+    pub fn of(context: &Context) -> Self {
+        let limits = &context.limits;
+        Self {
+            storage: (limits.max_storage_buffer_binding_size).min(limits.max_buffer_size),
+            texture: limits.max_texture_dimension_2d,
+            tile: limits.max_texture_dimension_2d,
+        }
     }
-    if has_solids {
-        names.extend(["ssfr/solid", "ssfr/shadow"]);
+}
+
+/// How often a pass runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Runs {
+    /// Before the first frame.
+    pub once: usize,
+    /// For each sample of a frame.
+    pub sample: usize,
+    /// For the channels beside a frame's picture.
+    pub aovs: usize,
+}
+
+/// Buffers, textures and commands of a look.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    /// Every buffer.
+    pub buffers: Vec<BufferSpec>,
+    /// Every texture.
+    pub textures: Vec<TextureSpec>,
+    pub(super) samplers: Vec<SamplerSpec>,
+    /// Before the first frame.
+    pub(super) once: Vec<Command>,
+    /// For each sample of a frame.
+    pub(super) sample: Vec<Command>,
+    /// For the channels beside the picture; nothing where the look asks for none.
+    pub(super) aovs: Vec<Command>,
+    pub(super) extent: Extent,
+    /// Rows of the picture in each of its buffers.
+    pub(super) bands: Vec<u32>,
+    /// Of a splat, metres.
+    pub(super) radius: f64,
+    pub(super) defines: BTreeMap<&'static str, Vec<&'static str>>,
+    pub(super) fills: Vec<Fill>,
+    pub(super) contents: Vec<(String, Vec<u8>)>,
+    pub(super) texels: Vec<(String, Vec<u8>)>,
+}
+
+impl Plan {
+    /// Passes by name, with how often each runs.
+    pub fn passes(&self) -> BTreeMap<&'static str, Runs> {
+        let mut passes: BTreeMap<&'static str, Runs> = BTreeMap::new();
+        let mut add = |commands: &[Command], count: fn(&mut Runs) -> &mut usize| {
+            for name in commands.iter().filter_map(Command::pass) {
+                *count(passes.entry(name).or_default()) += 1;
+            }
+        };
+        add(&self.once, |runs| &mut runs.once);
+        add(&self.sample, |runs| &mut runs.sample);
+        add(&self.aovs, |runs| &mut runs.aovs);
+        passes
     }
-    if spec.water.spray.is_some() {
-        names.push("ssfr/splat_spray");
+
+    /// Bytes of all buffers and textures.
+    pub fn bytes(&self) -> u64 {
+        let buffers = self.buffers.iter().map(|buffer| buffer.bytes);
+        let textures = self.textures.iter().map(TextureSpec::bytes);
+        buffers.sum::<u64>() + textures.sum::<u64>()
     }
-    if !spec.output.aovs.is_empty() {
-        names.push("ssfr/shade_aovs");
+
+    /// Builds it on a device, with what does not change from frame to frame.
+    pub(super) fn program(&self, context: &Context) -> Result<Program, RenderError> {
+        let commands = || [&self.once, &self.sample, &self.aovs].into_iter().flatten();
+        let mut rasters: BTreeMap<&'static str, RasterSpec> = BTreeMap::new();
+        let mut passes: BTreeMap<&'static str, PassSpec> = BTreeMap::new();
+        for command in commands() {
+            match command {
+                Command::Draw(draw) => {
+                    rasters.insert(draw.raster.name, draw.raster);
+                }
+                Command::Dispatch { pass, .. } => {
+                    let spec = PassSpec {
+                        name: pass,
+                        defines: self.defines.get(pass).cloned().unwrap_or_default(),
+                        constants: Vec::new(),
+                    };
+                    passes.insert(pass, spec);
+                }
+                _ => {}
+            }
+        }
+        let passes: Vec<PassSpec> = passes.into_values().collect();
+        let rasters: Vec<RasterSpec> = rasters.into_values().collect();
+        let program = Program::new(context, &self.buffers, &passes, &[])?
+            .with_rasters(&rasters)?
+            .with_textures(&self.textures, &self.samplers)?;
+        for (name, bytes) in &self.contents {
+            program.upload(Buf::named(name.clone()), 0, bytes);
+        }
+        for (name, bytes) in &self.texels {
+            program.upload_texture(name, bytes);
+        }
+        Ok(program)
     }
-    if look.wants(AovSpec::Forward) {
-        names.push("ssfr/splat_owner");
+
+    /// A buffer that holds `count` values, of zeros.
+    pub(super) fn buffer<T>(&mut self, buffer: &Buf<T>, count: usize) {
+        self.buffers.push(buffer.sized(count));
     }
-    names.sort_unstable();
-    names
+
+    /// A buffer of these values.
+    pub(super) fn values<T: NoUninit>(&mut self, buffer: &Buf<T>, values: &[T]) {
+        self.buffer(buffer, values.len());
+        let bytes = bytemuck::cast_slice(values).to_vec();
+        self.contents.push((buffer.name().to_owned(), bytes));
+    }
+
+    /// A uniform of which each dispatch binds one of these values.
+    pub(super) fn windows<T: Element>(&mut self, windows: &Windows<T>, values: &[T]) {
+        self.buffers.push(windows.sized(values.len()));
+        let bytes = Windows::bytes(values);
+        self.contents.push((windows.name().to_owned(), bytes));
+    }
+
+    /// A texture with these texels.
+    pub(super) fn texture(&mut self, spec: TextureSpec, texels: Vec<u8>) {
+        self.texels.push((spec.name.clone(), texels));
+        self.textures.push(spec);
+    }
+
+    /// Sets a condition in a pass.
+    pub(super) fn define(&mut self, pass: &'static str, condition: &'static str) {
+        self.defines.entry(pass).or_default().push(condition);
+    }
+
+    /// Sets each of a buffer's first `count` words.
+    pub(super) fn fill<T>(&mut self, buffer: &Buf<T>, word: u32, count: usize) -> Command {
+        let index = self.fills.len();
+        self.fills.push(Fill {
+            word,
+            count: u32::try_from(count).unwrap_or(u32::MAX),
+            ..Fill::default()
+        });
+        let binds = vec![FILLS.bind(index), Bind::whole("words", buffer)];
+        Command::with("ssfr/fill", count, binds)
+    }
+
+    /// Lays out what [`Self::fill`] was asked for; after the last of them.
+    pub(super) fn end_fills(&mut self) {
+        let fills = std::mem::take(&mut self.fills);
+        self.windows(&FILLS, &fills);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+    use std::{collections::BTreeSet, path::Path};
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::{
+        domain::bounds::Bounds,
+        gpu::{
+            raster::Draw,
+            recording::Groups,
+            reflect::{Access, reflect},
+            shader::compose,
+        },
+        render::RenderScene,
+        scene::look::Look,
+    };
+
+    const LIMITS: Limits = Limits {
+        storage: 1 << 27,
+        texture: 8192,
+        tile: 64,
+    };
+
+    fn plan(surface: &str, more: &str) -> Plan {
+        let text = format!(
+            "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 18.0]\nposition = [-2.0, 3.0, 2.5]\n\
+             target = [0.0, 1.0, 0.75]\n[image]\nwidth = 96\nheight = 48\n[surface]\nfilter = \"{surface}\"\n\
+             [sky]\nmodel = \"hosek_wilkie\"\n[sun]\nazimuth_degrees = 120.0\nelevation_degrees = 35.0\n{more}"
+        );
+        let look = Look::parse(&text, Path::new("look.toml")).unwrap();
+        let scene = RenderScene {
+            origin: DVec3::ZERO,
+            domain: Bounds {
+                min: DVec3::ZERO,
+                max: DVec3::ONE,
+            },
+            solids: Vec::new(),
+            particle_spacing: 0.1,
+            frames_per_second: 24.0,
+        };
+        Plan::new(&look, &scene, 9, &LIMITS).unwrap()
+    }
+
+    /// Names of buffers, textures and samplers that commands use.
+    fn used(plan: &Plan) -> BTreeSet<String> {
+        let mut used = BTreeSet::new();
+        for command in [&plan.once, &plan.sample, &plan.aovs].into_iter().flatten() {
+            let binds = match command {
+                Command::Dispatch { binds, groups, .. } => {
+                    if let Groups::Indirect { buffer, .. } = groups {
+                        used.insert(buffer.clone());
+                    }
+                    binds
+                }
+                Command::Draw(Draw {
+                    binds,
+                    colours,
+                    depth,
+                    ..
+                }) => {
+                    used.extend(colours.iter().chain([depth]).map(|t| t.texture.clone()));
+                    binds
+                }
+                Command::Clear(buffer) => {
+                    used.insert(buffer.clone());
+                    continue;
+                }
+                Command::ClearDepth(target) => {
+                    used.insert(target.texture.clone());
+                    continue;
+                }
+                Command::CopyTexture(copy) => {
+                    used.extend([copy.texture.clone(), copy.buffer.clone()]);
+                    continue;
+                }
+            };
+            let pass = command.pass().unwrap();
+            let defines = plan.defines.get(pass).cloned().unwrap_or_default();
+            for binding in reflect(pass, &compose(pass, &defines).unwrap())
+                .unwrap()
+                .bindings
+            {
+                let bind = binds.iter().find(|bind| bind.variable == binding.name);
+                let name = bind.map_or(&binding.name, |bind| &bind.buffer);
+                if let Some(buffer) = plan.buffers.iter().find(|buffer| buffer.name == *name) {
+                    let is_uniform = binding.access == Access::Uniform;
+                    assert_eq!(is_uniform, buffer.is_uniform, "{pass}: {name}");
+                    let window = bind.and_then(|bind| bind.window);
+                    let bytes = window.map_or(buffer.bytes, |(_, bytes)| bytes);
+                    let least = u64::from(binding.element.stride);
+                    assert!(bytes >= least, "{pass}: {name}");
+                }
+                used.insert(name.clone());
+            }
+        }
+        used
+    }
+
+    fn planned(plan: &Plan) -> BTreeSet<String> {
+        let buffers = plan.buffers.iter().map(|buffer| buffer.name.clone());
+        let textures = plan.textures.iter().map(|texture| texture.name.clone());
+        let samplers = plan.samplers.iter().map(|spec| spec.name.to_owned());
+        buffers.chain(textures).chain(samplers).collect()
+    }
+
+    #[test]
+    fn what_is_planned_is_what_commands_use() {
+        const ALL: &str = "[output]\naovs = [\"Z\", \"forward\"]\n[basin]\nheight_m = 0.5\n\
+            [water]\nspray = { density_per_metre = 9.0, speed_m_per_s = 5.5 }\n";
+        let depth_alone = "[output]\naovs = [\"Z\"]\n";
+        let mut sizes = BTreeSet::new();
+        for surface in ["curvature_flow", "narrow_range"] {
+            for more in ["", depth_alone, ALL] {
+                let plan = plan(surface, more);
+                assert_eq!(used(&plan), planned(&plan), "{surface} {more}");
+                sizes.insert(plan.bytes());
+            }
+        }
+        assert_eq!(sizes.len(), 6, "each look takes what it needs: {sizes:?}");
+        // Controls: a buffer that nothing uses, and a command whose buffer is not planned.
+        let mut spare = plan("narrow_range", "");
+        spare.buffer(&crate::render::buffers::SPRAY, 1);
+        assert_ne!(used(&spare), planned(&spare));
+        let mut lacking = plan("narrow_range", "");
+        lacking.buffers.retain(|buffer| buffer.name != "particles");
+        assert_ne!(used(&lacking), planned(&lacking));
+    }
 }

@@ -1,14 +1,18 @@
 //! What is opaque: the scene's solids and the look's quay walls, drawn and in the sun's shadow map.
 
 use glam::{DVec3, Mat4, Vec3};
-use wgpu::util::DeviceExt;
-use wgpu::{Buffer, CommandEncoder, ShaderStages, TextureFormat, TextureUsages, TextureView};
+use wgpu::{CompareFunction, TextureFormat};
 
-use super::frame::{Extent, FAR};
-use super::pass::{Slot, Timer, bind, layout, module, uniform};
+use super::buffers::{SHADOW_FROM_WORLD, SOLID_DEPTH, SOLID_PACKED, TILES, TRIANGLES};
+use super::frame::FAR;
+use super::plan::{Limits, Plan};
 use super::uniform::{Tile, Triangle};
 use super::{RenderError, RenderScene};
-use crate::gpu::adapter::{Context, GpuError};
+use crate::gpu::{
+    raster::{CopyTexture, DEPTH, Draw, RasterSpec, Target},
+    recording::Command,
+    texture::TextureSpec,
+};
 use crate::scene::look::Look;
 
 /// Texels along a side of the shadow map.
@@ -135,319 +139,128 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
     .transpose()
 }
 
-struct TileTargets {
-    corner: [u32; 2],
+/// Depth, normal and material of the solids in a tile.
+const SOLID: RasterSpec = RasterSpec {
+    name: "ssfr/solid",
+    colours: &[TextureFormat::R32Float, TextureFormat::R32Uint],
+    // Near over depth: the nearest is the greatest.
+    compare: CompareFunction::Greater,
+};
+
+/// Depth alone, as the sun sees it.
+const SHADOW: RasterSpec = RasterSpec {
+    name: "ssfr/shadow",
+    colours: &[],
+    compare: CompareFunction::Less,
+};
+
+/// Plans the shadow map, drawn once since solids do not move, and gives what draws the solids into the frame's buffers,
+/// tile by tile. Without solids the map is one texel that shades nothing.
+pub(super) fn plan_solids(
+    plan: &mut Plan,
+    triangles: &[Triangle],
+    shadow_from_world: &Mat4,
+    limits: &Limits,
+) -> Vec<Command> {
+    let pixels = plan.extent.pixels();
+    plan.buffer(&SOLID_DEPTH, pixels);
+    plan.buffer(&SOLID_PACKED, pixels);
+    let side = match triangles.is_empty() {
+        true => 1,
+        false => SHADOW_SIZE.min(limits.texture),
+    };
+    plan.textures.push(TextureSpec {
+        name: "shadow_map".into(),
+        size: [side, side],
+        format: DEPTH,
+    });
+    let shadow_map = Target {
+        texture: "shadow_map".into(),
+        clear: 1.0,
+        is_kept: true,
+    };
+    if triangles.is_empty() {
+        plan.once.push(Command::ClearDepth(shadow_map));
+        return vec![plan.fill(&SOLID_DEPTH, FAR.to_bits(), pixels)];
+    }
+    plan.values(&TRIANGLES, triangles);
+    plan.values(&SHADOW_FROM_WORLD, &[shadow_from_world.to_cols_array_2d()]);
+    plan.once.push(Command::Draw(Draw {
+        raster: SHADOW,
+        binds: Vec::new(),
+        vertices: 3 * triangles.len() as u32,
+        colours: Vec::new(),
+        depth: shadow_map,
+    }));
+    let mut tiles = Vec::new();
+    let [width, height] = plan.extent.size;
+    for y in (0..height).step_by(limits.tile as usize) {
+        for x in (0..width).step_by(limits.tile as usize) {
+            let size = [limits.tile.min(width - x), limits.tile.min(height - y)];
+            tiles.push(([x, y], size));
+        }
+    }
+    let float = |[x, y]: [u32; 2]| [x as f32, y as f32];
+    let uniforms: Vec<Tile> = tiles
+        .iter()
+        .map(|&(corner, size)| Tile {
+            corner: float(corner),
+            size: float(size),
+        })
+        .collect();
+    plan.windows(&TILES, &uniforms);
+    let vertices = 6 * triangles.len() as u32;
+    tiles
+        .into_iter()
+        .enumerate()
+        .flat_map(|(index, (corner, size))| draw_tile(plan, index, corner, size, vertices))
+        .collect()
+}
+
+/// Draws one tile and copies it to its place in the frame.
+fn draw_tile(
+    plan: &mut Plan,
+    index: usize,
+    [x, y]: [u32; 2],
     size: [u32; 2],
-    group: wgpu::BindGroup,
-    depth: wgpu::Texture,
-    packed: wgpu::Texture,
-    order: TextureView,
-}
-
-/// Draws the solids, tile by tile, into the frame's buffers.
-pub(super) struct Set {
-    pipeline: wgpu::RenderPipeline,
-    tiles: Vec<TileTargets>,
     vertices: u32,
-}
-
-fn texture(
-    context: &Context,
-    label: &str,
-    [width, height]: [u32; 2],
-    format: TextureFormat,
-    usage: TextureUsages,
-) -> wgpu::Texture {
-    context.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    })
-}
-
-pub(super) fn upload(context: &Context, triangles: &[Triangle]) -> Buffer {
-    context
-        .device
-        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("triangles"),
-            contents: bytemuck::cast_slice(triangles),
-            usage: wgpu::BufferUsages::STORAGE,
+) -> [Command; 3] {
+    let mut target = |part: &str, format, clear, is_kept| {
+        let texture = format!("{part}.{index}");
+        plan.textures.push(TextureSpec {
+            name: texture.clone(),
+            size,
+            format,
+        });
+        Target {
+            texture,
+            clear,
+            is_kept,
+        }
+    };
+    let depth = target("solid_depth", SOLID.colours[0], f64::from(FAR), true);
+    let packed = target("solid_packed", SOLID.colours[1], 0.0, true);
+    let order = target("solid_order", DEPTH, 0.0, false);
+    let width = plan.extent.size[0];
+    let copy = |target: &Target, buffer: &str| {
+        Command::CopyTexture(CopyTexture {
+            texture: target.texture.clone(),
+            buffer: buffer.to_owned(),
+            offset: 4 * (u64::from(y) * u64::from(width) + u64::from(x)),
+            bytes_per_row: 4 * width,
         })
-}
-
-struct Raster<'a> {
-    name: &'static str,
-    slots: &'a [Slot],
-    targets: &'a [Option<wgpu::ColorTargetState>],
-    compare: wgpu::CompareFunction,
-    has_fragment: bool,
-}
-
-fn pipeline(
-    context: &Context,
-    raster: &Raster<'_>,
-) -> Result<(wgpu::RenderPipeline, wgpu::BindGroupLayout), GpuError> {
-    let module = module(context, raster.name, raster.name, &[])?;
-    let layout = layout(
-        context,
-        raster.name,
-        ShaderStages::VERTEX_FRAGMENT,
-        raster.slots,
-    );
-    let device = &context.device;
-    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(raster.name),
-        bind_group_layouts: &[Some(&layout)],
-        immediate_size: 0,
-    });
-    let options = wgpu::PipelineCompilationOptions::default;
-    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(raster.name),
-        layout: Some(&pipeline_layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: options(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: TextureFormat::Depth32Float,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(raster.compare),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState::default(),
-        fragment: raster.has_fragment.then(|| wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: options(),
-            targets: raster.targets,
-        }),
-        multiview_mask: None,
-        cache: None,
-    });
-    Ok((pipeline, layout))
-}
-
-impl Set {
-    /// `tile_limit` is the most texels along a side of a texture.
-    pub(super) fn new(
-        context: &Context,
-        extent: &Extent,
-        tile_limit: u32,
-        camera: &Buffer,
-        triangles: &Buffer,
-        count: usize,
-    ) -> Result<Self, RenderError> {
-        let target = |format: TextureFormat| Some(wgpu::ColorTargetState::from(format));
-        let (pipeline, layout) = pipeline(
-            context,
-            &Raster {
-                name: "ssfr/solid",
-                slots: &[Slot::Uniform, Slot::Uniform, Slot::Read],
-                targets: &[
-                    target(TextureFormat::R32Float),
-                    target(TextureFormat::R32Uint),
-                ],
-                // Near over depth: the nearest is the greatest.
-                compare: wgpu::CompareFunction::Greater,
-                has_fragment: true,
-            },
-        )?;
-        let mut tiles = Vec::new();
-        for y in (0..extent.size[1]).step_by(tile_limit as usize) {
-            for x in (0..extent.size[0]).step_by(tile_limit as usize) {
-                let size = [
-                    tile_limit.min(extent.size[0] - x),
-                    tile_limit.min(extent.size[1] - y),
-                ];
-                let tile = uniform(
-                    context,
-                    "tile",
-                    &Tile {
-                        corner: [x as f32, y as f32],
-                        size: [size[0] as f32, size[1] as f32],
-                    },
-                );
-                let buffers = [camera, &tile, triangles];
-                let drawn = TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
-                let order = texture(
-                    context,
-                    "solid order",
-                    size,
-                    TextureFormat::Depth32Float,
-                    TextureUsages::RENDER_ATTACHMENT,
-                );
-                tiles.push(TileTargets {
-                    corner: [x, y],
-                    size,
-                    group: bind(
-                        context,
-                        &layout,
-                        buffers.map(Buffer::as_entire_binding).to_vec(),
-                    ),
-                    depth: texture(context, "solid depth", size, TextureFormat::R32Float, drawn),
-                    packed: texture(context, "solid normal", size, TextureFormat::R32Uint, drawn),
-                    order: order.create_view(&Default::default()),
-                });
-            }
-        }
-        Ok(Self {
-            pipeline,
-            tiles,
-            vertices: 6 * count as u32,
-        })
-    }
-
-    pub(super) fn run(
-        &self,
-        encoder: &mut CommandEncoder,
-        timer: &mut Timer,
-        extent: &Extent,
-        [depth, packed]: [&Buffer; 2],
-    ) {
-        for tile in &self.tiles {
-            let views = [&tile.depth, &tile.packed].map(|t| t.create_view(&Default::default()));
-            let attachment = |view, clear| {
-                Some(wgpu::RenderPassColorAttachment {
-                    view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color {
-                            r: clear,
-                            ..wgpu::Color::BLACK
-                        }),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })
-            };
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("ssfr/solid"),
-                color_attachments: &[
-                    attachment(&views[0], f64::from(FAR)),
-                    attachment(&views[1], 0.0),
-                ],
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &tile.order,
-                    depth_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(0.0),
-                        store: wgpu::StoreOp::Discard,
-                    }),
-                    stencil_ops: None,
-                }),
-                timestamp_writes: timer.render("ssfr/solid"),
-                occlusion_query_set: None,
-                multiview_mask: None,
-            });
-            pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, &tile.group, &[]);
-            pass.draw(0..self.vertices, 0..1);
-            drop(pass);
-            timer.split("ssfr/solid", encoder);
-            for (texture, buffer) in [(&tile.depth, depth), (&tile.packed, packed)] {
-                let at = u64::from(tile.corner[1]) * u64::from(extent.size[0])
-                    + u64::from(tile.corner[0]);
-                encoder.copy_texture_to_buffer(
-                    texture.as_image_copy(),
-                    wgpu::TexelCopyBufferInfo {
-                        buffer,
-                        layout: wgpu::TexelCopyBufferLayout {
-                            offset: 4 * at,
-                            bytes_per_row: Some(4 * extent.size[0]),
-                            rows_per_image: None,
-                        },
-                    },
-                    wgpu::Extent3d {
-                        width: tile.size[0],
-                        height: tile.size[1],
-                        depth_or_array_layers: 1,
-                    },
-                );
-            }
-        }
-    }
-}
-
-/// Draws the shadow map once; solids do not move. Without solids it is one texel that shades nothing.
-pub(super) fn shadow_map(
-    context: &Context,
-    timer: &mut Timer,
-    matrix: &Mat4,
-    triangles: Option<(&Buffer, usize)>,
-) -> Result<TextureView, RenderError> {
-    let side = match triangles {
-        Some(_) => SHADOW_SIZE.min(context.limits.max_texture_dimension_2d),
-        None => 1,
     };
-    let map = texture(
-        context,
-        "shadow map",
-        [side, side],
-        TextureFormat::Depth32Float,
-        TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
-    );
-    let view = map.create_view(&Default::default());
-    let recorded = match triangles {
-        Some((buffer, count)) => {
-            let raster = Raster {
-                name: "ssfr/shadow",
-                slots: &[Slot::Uniform, Slot::Read],
-                targets: &[],
-                compare: wgpu::CompareFunction::Less,
-                has_fragment: false,
-            };
-            let (pipeline, layout) = pipeline(context, &raster)?;
-            let matrix = uniform(context, "shadow", &matrix.to_cols_array_2d());
-            let buffers = [&matrix, buffer];
-            let group = bind(
-                context,
-                &layout,
-                buffers.map(Buffer::as_entire_binding).to_vec(),
-            );
-            Some((pipeline, group, 3 * count as u32))
-        }
-        None => None,
-    };
-    let mut encoder = context.device.create_command_encoder(&Default::default());
-    let timestamps = match recorded {
-        Some(_) => timer.render("ssfr/shadow"),
-        None => None,
-    };
-    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("ssfr/shadow"),
-        color_attachments: &[],
-        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-            view: &view,
-            depth_ops: Some(wgpu::Operations {
-                load: wgpu::LoadOp::Clear(1.0),
-                store: wgpu::StoreOp::Store,
-            }),
-            stencil_ops: None,
-        }),
-        timestamp_writes: timestamps,
-        occlusion_query_set: None,
-        multiview_mask: None,
+    let copies = [
+        copy(&depth, SOLID_DEPTH.name()),
+        copy(&packed, SOLID_PACKED.name()),
+    ];
+    let draw = Command::Draw(Draw {
+        raster: SOLID,
+        binds: vec![TILES.bind(index)],
+        vertices,
+        colours: vec![depth, packed],
+        depth: order,
     });
-    if let Some((pipeline, group, vertices)) = &recorded {
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, group, &[]);
-        pass.draw(0..*vertices, 0..1);
-    }
-    drop(pass);
-    timer.resolve(&mut encoder);
-    context.queue.submit([encoder.finish()]);
-    timer.collect(context)?;
-    Ok(view)
+    let [copy_depth, copy_packed] = copies;
+    [draw, copy_depth, copy_packed]
 }

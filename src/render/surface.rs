@@ -1,11 +1,12 @@
 //! From splat depth to a smooth surface.
 
-use wgpu::{BindGroup, Buffer, CommandEncoder};
-
-use super::RenderError;
-use super::pass::{ComputePass, Slot, Timer, storage, tiles, uniform};
+use super::buffers::{DEPTHS, FLOW, FLOW_LEVELS, NARROW_RANGE};
+use super::plan::Plan;
 use super::uniform::{Flow, FlowLevel, Narrow};
-use crate::gpu::adapter::Context;
+use crate::gpu::{
+    buffer::Buf,
+    recording::{Bind, Command, Groups},
+};
 
 /// How wide a surface is smoothed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,240 +61,145 @@ impl FlowSettings {
     }
 }
 
-struct Step {
-    group: BindGroup,
-    groups: [u32; 2],
+/// What smooths the first of [`DEPTHS`].
+pub(super) struct Smoothing {
+    pub(super) commands: Vec<Command>,
+    /// Which of [`DEPTHS`] then holds the surface.
+    pub(super) surface: Buf<f32>,
 }
 
-/// The curvature flow over a pyramid, recorded once.
-pub(super) struct CurvatureFlow {
-    restrict: ComputePass,
-    flow: ComputePass,
-    prolong: ComputePass,
-    down: Vec<Step>,
-    /// From the coarsest level to the finest: the correction from the level below, then the steps.
-    up: Vec<(Option<Step>, Vec<Step>)>,
-    _buffers: Vec<Buffer>,
-    in_second: bool,
+/// Depths of a level of the pyramid: what restriction left, and two buffers to work in.
+struct Level {
+    size: [u32; 2],
+    original: Buf<f32>,
+    work: [Buf<f32>; 2],
 }
 
-impl CurvatureFlow {
-    /// Smooths `depth`, which has `size` cells; `other` is as large, and which of the two holds the result
-    /// [`Self::result_is_in_other`] tells.
-    pub(super) fn new(
-        context: &Context,
-        settings: &FlowSettings,
-        camera: &Buffer,
-        [depth, other]: [&Buffer; 2],
-        size: [u32; 2],
-    ) -> Result<Self, RenderError> {
-        use Slot::{Read, Uniform, Write};
-        let pass = |name, slots: &[Slot]| ComputePass::new(context, name, name, &[], slots);
-        let restrict = pass(
-            "ssfr/flow_restrict",
-            &[Uniform, Uniform, Uniform, Read, Write],
-        )?;
-        let flow = pass(
-            "ssfr/curvature_flow",
-            &[Uniform, Uniform, Uniform, Read, Write],
-        )?;
-        let prolong = pass(
-            "ssfr/flow_prolong",
-            &[Uniform, Uniform, Uniform, Read, Read, Read, Write],
-        )?;
-        let (width, world) = match settings.width {
-            Width::World(metres) => (metres, 1),
-            Width::Pixels(pixels) => (pixels, 0),
-        };
-        let params = uniform(
-            context,
-            "flow",
-            &Flow {
-                width: width as f32,
-                world,
-                fraction: settings.fraction as f32,
-                edge: settings.edge as f32,
-                steps: settings.steps,
-                levels: settings.levels,
-                pad: [0; 2],
-            },
-        );
-        let mut sizes = vec![size];
-        for _ in 1..settings.levels {
-            let [w, h] = sizes[sizes.len() - 1];
-            sizes.push([w.div_ceil(2), h.div_ceil(2)]);
-        }
-        // Per level: what restriction left, and two to work in.
-        let mut originals = vec![depth.clone()];
-        let mut work: Vec<[Buffer; 2]> = vec![[other.clone(), depth.clone()]];
-        for [w, h] in &sizes[1..] {
-            let bytes = 4 * u64::from(*w) * u64::from(*h);
-            originals.push(storage(context, "coarse depth", bytes)?);
-            work.push([
-                storage(context, "coarse depth", bytes)?,
-                storage(context, "coarse depth", bytes)?,
-            ]);
-        }
-        let level = |level: usize, index: u32| {
-            uniform(
-                context,
-                "flow level",
-                &FlowLevel {
-                    size: sizes[level],
-                    level: level as u32,
-                    index,
-                },
-            )
-        };
-        let step = |pass: &ComputePass, at: usize, index: u32, buffers: &[&Buffer]| {
-            let level = level(at, index);
-            let mut all = vec![camera, &params, &level];
-            all.extend(buffers);
-            let resources = all
-                .iter()
-                .map(|buffer| buffer.as_entire_binding())
-                .collect();
-            pass.bind(context, resources)
-        };
-        let top = settings.levels as usize - 1;
-        let down = (0..top)
-            .map(|l| Step {
-                group: step(&restrict, l, 0, &[&originals[l], &originals[l + 1]]),
-                groups: tiles(sizes[l + 1]),
-            })
-            .collect();
-        let mut up = Vec::new();
-        let mut after: Option<Buffer> = None;
-        for l in (0..=top).rev() {
-            let groups = tiles(sizes[l]);
-            let mut source = originals[l].clone();
-            let mut next = 0;
-            let correction = after.take().map(|after| {
-                let buffers = [&originals[l + 1], &after, &originals[l], &work[l][0]];
-                let group = step(&prolong, l, 0, &buffers);
-                source = work[l][0].clone();
-                next = 1;
-                Step { group, groups }
+impl Level {
+    fn all(plan: &mut Plan, count: u32, size: [u32; 2]) -> Vec<Self> {
+        let [depth, other] = DEPTHS;
+        let mut levels = vec![Self {
+            size,
+            original: depth.clone(),
+            work: [other, depth],
+        }];
+        for index in 1..count as usize {
+            let size = levels[index - 1].size.map(|side| side.div_ceil(2));
+            let buffers =
+                ["", ".a", ".b"].map(|part| Buf::named(format!("coarse_depth.{index}{part}")));
+            for buffer in &buffers {
+                plan.buffer(buffer, size[0] as usize * size[1] as usize);
+            }
+            let [original, first, second] = buffers;
+            levels.push(Self {
+                size,
+                original,
+                work: [first, second],
             });
-            let count = if l == top {
-                settings.last_steps
-            } else {
-                settings.steps
-            };
-            let steps = (0..count)
-                .map(|index| {
-                    let into = work[l][next].clone();
-                    next = 1 - next;
-                    let group = step(&flow, l, index, &[&source, &into]);
-                    source = into;
-                    Step { group, groups }
-                })
-                .collect();
-            up.push((correction, steps));
-            after = Some(source);
         }
-        let in_second = after.as_ref() == Some(other);
-        Ok(Self {
-            restrict,
-            flow,
-            prolong,
-            down,
-            up,
-            _buffers: originals,
-            in_second,
-        })
-    }
-
-    pub(super) fn result_is_in_other(&self) -> bool {
-        self.in_second
-    }
-
-    pub(super) fn run(&self, encoder: &mut CommandEncoder, timer: &mut Timer) {
-        for step in &self.down {
-            self.restrict.run(encoder, timer, &step.group, step.groups);
-        }
-        for (correction, steps) in &self.up {
-            if let Some(step) = correction {
-                self.prolong.run(encoder, timer, &step.group, step.groups);
-            }
-            for step in steps {
-                self.flow.run(encoder, timer, &step.group, step.groups);
-            }
-        }
+        levels
     }
 }
 
-/// The narrow-range filter: along x, then along y.
-pub(super) struct NarrowRange {
-    pass: ComputePass,
-    groups: [BindGroup; 2],
-    tiles: [u32; 2],
-}
-
-impl NarrowRange {
-    /// Smooths `depth` by way of `other`; the result is in `depth`.
-    pub(super) fn new(
-        context: &Context,
-        width: f64,
-        radius: f64,
-        camera: &Buffer,
-        [depth, other]: [&Buffer; 2],
-        size: [u32; 2],
-    ) -> Result<Self, RenderError> {
-        let slots = [Slot::Uniform, Slot::Uniform, Slot::Read, Slot::Write];
-        let name = "ssfr/narrow_range";
-        let pass = ComputePass::new(context, name, name, &[], &slots)?;
-        let groups = [0u32, 1].map(|axis| {
-            let params = Narrow {
-                width: width as f32,
-                // The paper's choice: δ = 10 r, μ = r.
-                range: 10.0 * radius as f32,
-                offset: radius as f32,
-                axis,
-            };
-            let params = uniform(context, name, &params);
-            let (from, to) = if axis == 0 {
-                (depth, other)
-            } else {
-                (other, depth)
-            };
-            let buffers = [camera, &params, from, to];
-            pass.bind(context, buffers.map(Buffer::as_entire_binding).to_vec())
+/// Curvature flow over a pyramid, of a frame of `size` cells.
+pub(super) fn curvature_flow(
+    plan: &mut Plan,
+    settings: &FlowSettings,
+    size: [u32; 2],
+) -> Smoothing {
+    let (width, world) = match settings.width {
+        Width::World(metres) => (metres, 1),
+        Width::Pixels(pixels) => (pixels, 0),
+    };
+    let params = Flow {
+        width: width as f32,
+        world,
+        fraction: settings.fraction as f32,
+        edge: settings.edge as f32,
+        steps: settings.steps,
+        levels: settings.levels,
+        pad0: 0,
+        pad1: 0,
+    };
+    plan.values(&FLOW, &[params]);
+    let levels = Level::all(plan, settings.levels, size);
+    let mut windows = Vec::new();
+    let mut commands = Vec::new();
+    // A pass over the cells of level `over`, told of step `index` of level `at`.
+    let mut run = |pass, over: usize, (at, index): (usize, u32), mut binds: Vec<Bind>| {
+        binds.push(Bind::whole("params", &FLOW));
+        binds.push(FLOW_LEVELS.bind(windows.len()));
+        windows.push(FlowLevel {
+            size: levels[at].size,
+            level: at as u32,
+            index,
         });
-        Ok(Self {
-            pass,
-            groups,
-            tiles: tiles(size),
-        })
+        let groups = Groups::Pixels(levels[over].size);
+        commands.push(Command::in_groups(pass, groups, binds));
+    };
+    let top = levels.len() - 1;
+    for (l, pair) in levels.windows(2).enumerate() {
+        let binds = vec![
+            Bind::whole("fine", &pair[0].original),
+            Bind::whole("coarse", &pair[1].original),
+        ];
+        run("ssfr/flow_restrict", l + 1, (l, 0), binds);
     }
-
-    pub(super) fn run(&self, encoder: &mut CommandEncoder, timer: &mut Timer) {
-        for group in &self.groups {
-            self.pass.run(encoder, timer, group, self.tiles);
+    let mut surface: Option<&Buf<f32>> = None;
+    for (l, level) in levels.iter().enumerate().rev() {
+        let mut source = &level.original;
+        let mut into = level.work.iter().cycle();
+        if let Some(after) = surface {
+            let corrected = &level.work[0];
+            let binds = vec![
+                Bind::whole("coarse_before", &levels[l + 1].original),
+                Bind::whole("coarse_after", after),
+                Bind::whole("fine", source),
+                Bind::whole("corrected", corrected),
+            ];
+            run("ssfr/flow_prolong", l, (l, 0), binds);
+            source = corrected;
+            into.next();
         }
+        let count = match l == top {
+            true => settings.last_steps,
+            false => settings.steps,
+        };
+        for (index, into) in (0..count).zip(into) {
+            let binds = vec![Bind::whole("source", source), Bind::whole("smoothed", into)];
+            run("ssfr/curvature_flow", l, (l, index), binds);
+            source = into;
+        }
+        surface = Some(source);
+    }
+    plan.windows(&FLOW_LEVELS, &windows);
+    Smoothing {
+        surface: surface.unwrap_or(&levels[0].original).clone(),
+        commands,
     }
 }
 
-/// The look's filter.
-pub(super) enum Filter {
-    Flow(Box<CurvatureFlow>),
-    Narrow(NarrowRange),
-}
-
-impl Filter {
-    pub(super) fn run(&self, encoder: &mut CommandEncoder, timer: &mut Timer) {
-        match self {
-            Self::Flow(flow) => flow.run(encoder, timer),
-            Self::Narrow(narrow) => narrow.run(encoder, timer),
-        }
-    }
-
-    /// Which of the two depth buffers holds the surface.
-    pub(super) fn result_is_in_other(&self) -> bool {
-        match self {
-            Self::Flow(flow) => flow.result_is_in_other(),
-            Self::Narrow(_) => false,
-        }
+/// The narrow-range filter: along x, then along y, by way of the second depth.
+pub(super) fn narrow_range(plan: &mut Plan, width: f64, radius: f64, size: [u32; 2]) -> Smoothing {
+    let params = [0, 1].map(|axis| Narrow {
+        width: width as f32,
+        // The paper's choice: δ = 10 r, μ = r.
+        range: 10.0 * radius as f32,
+        offset: radius as f32,
+        axis,
+    });
+    plan.windows(&NARROW_RANGE, &params);
+    let along = |axis: usize| {
+        let binds = vec![
+            NARROW_RANGE.bind(axis),
+            Bind::whole("source", &DEPTHS[axis]),
+            Bind::whole("smoothed", &DEPTHS[1 - axis]),
+        ];
+        Command::in_groups("ssfr/narrow_range", Groups::Pixels(size), binds)
+    };
+    Smoothing {
+        commands: vec![along(0), along(1)],
+        surface: DEPTHS[0].clone(),
     }
 }
 

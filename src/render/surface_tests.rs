@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use super::*;
-use crate::render::pass::read;
-use crate::render::uniform::Camera;
+use crate::gpu::{adapter::Context, recording::Recording};
+use crate::render::{buffers::CAMERA, uniform::Camera};
 
 const SIZE: [u32; 2] = [192, 192];
 const FOCAL: f64 = 300.0;
@@ -30,25 +30,22 @@ fn camera() -> Camera {
     }
 }
 
+/// What `plan_smoothing` makes of a frame's depths.
+fn run(depth: &[f32], plan_smoothing: impl FnOnce(&mut Plan) -> Smoothing) -> Vec<f32> {
+    let mut plan = Plan::default();
+    plan.values(&CAMERA, &[camera()]);
+    plan.values(&DEPTHS[0], depth);
+    plan.buffer(&DEPTHS[1], depth.len());
+    let smoothing = plan_smoothing(&mut plan);
+    plan.sample = smoothing.commands;
+    let program = plan.program(&Context::open(None).unwrap()).unwrap();
+    let recording = Recording::new(&program, &plan.sample);
+    recording.run(&program, None).unwrap();
+    program.read(smoothing.surface, depth.len()).unwrap()
+}
+
 fn smooth(settings: &FlowSettings, depth: &[f32]) -> Vec<f32> {
-    let context = Context::open(None).unwrap();
-    let camera = uniform(&context, "camera", &camera());
-    let bytes = 4 * depth.len() as u64;
-    let first = storage(&context, "first", bytes).unwrap();
-    let second = storage(&context, "second", bytes).unwrap();
-    context
-        .queue
-        .write_buffer(&first, 0, bytemuck::cast_slice(depth));
-    let flow = CurvatureFlow::new(&context, settings, &camera, [&first, &second], SIZE).unwrap();
-    let mut encoder = context.device.create_command_encoder(&Default::default());
-    flow.run(&mut encoder, &mut Timer::new(&context));
-    context.queue.submit([encoder.finish()]);
-    let result = if flow.result_is_in_other() {
-        &second
-    } else {
-        &first
-    };
-    read(&context, result, bytes).unwrap()
+    run(depth, |plan| curvature_flow(plan, settings, SIZE))
 }
 
 fn explicit(width: Width, steps: u32) -> FlowSettings {
@@ -197,8 +194,6 @@ fn no_flow_crosses_an_edge() {
 
 #[test]
 fn the_narrow_range_filter_smooths_a_wall_and_keeps_an_edge() {
-    let context = Context::open(None).unwrap();
-    let camera = uniform(&context, "camera", &camera());
     let distance = 6.0;
     let mut depth = noise(distance);
     for (i, z) in depth.iter_mut().enumerate() {
@@ -206,16 +201,7 @@ fn the_narrow_range_filter_smooths_a_wall_and_keeps_an_edge() {
             *z += 30.0;
         }
     }
-    let bytes = 4 * depth.len() as u64;
-    let [first, second] = [0, 1].map(|_| storage(&context, "depth", bytes).unwrap());
-    context
-        .queue
-        .write_buffer(&first, 0, bytemuck::cast_slice(&depth));
-    let filter = NarrowRange::new(&context, 0.1, 0.1, &camera, [&first, &second], SIZE).unwrap();
-    let mut encoder = context.device.create_command_encoder(&Default::default());
-    filter.run(&mut encoder, &mut Timer::new(&context));
-    context.queue.submit([encoder.finish()]);
-    let after: Vec<f32> = read(&context, &first, bytes).unwrap();
+    let after = run(&depth, |plan| narrow_range(plan, 0.1, 0.1, SIZE));
     let row = |depth: &[f32]| roughness(&depth[96 * 192 + 10..96 * 192 + 80]);
     assert!(row(&after) < 0.05 * row(&depth));
     // A sample beyond the range counts as μ behind the centre, one radius: the edge moves by no more.

@@ -13,7 +13,12 @@ use crate::{
     },
 };
 
-use super::params::{SolidGrid, SolidGrids};
+use super::{
+    buffers::{SOLID_DISTANCE, SOLID_GRID},
+    flip::buffers::SOLID_GRIDS,
+    params::{SolidGrid, SolidGrids},
+    pbf::buffers::{BOUNDARY_CELL_START, PREDICTED},
+};
 
 impl Boundary {
     /// Samples and grid nodes; no particles.
@@ -74,8 +79,8 @@ impl Boundary {
                 [x.x, x.y, x.z, weight as f32]
             })
             .collect();
-        program.upload("predicted", 32 * plan.counts.particles as u64, &packed);
-        program.upload("boundary_cell_start", 0, &start);
+        program.upload(PREDICTED, 2 * plan.counts.particles, &packed);
+        program.upload(BOUNDARY_CELL_START, 0, &start);
         self.upload_distance(program, scene);
     }
 
@@ -83,11 +88,11 @@ impl Boundary {
     pub(super) fn upload_distance(&self, program: &Program, scene: &Scene) {
         let mut first = 0;
         for grid in self.grids() {
-            program.upload("solid_distance", 4 * first as u64, &grid.values);
+            program.upload(SOLID_DISTANCE, first, &grid.values);
             first += grid.values.len();
         }
         if let (Some(grid), []) = (&self.distance, &self.moving[..]) {
-            program.upload("solid_grid", 0, &[solid_grid(grid, scene.domain.min, 0)]);
+            program.upload(SOLID_GRID, 0, &[solid_grid(grid, scene.domain.min, 0)]);
         }
     }
 
@@ -131,7 +136,7 @@ impl Movers {
             grids.velocities[k] = velocity.as_vec3().extend(0.0).to_array();
             grids.fastest = grids.fastest.max(velocity.length() as f32);
         }
-        program.upload("solid_grids", 0, &[grids]);
+        program.upload(SOLID_GRIDS, 0, &[grids]);
     }
 }
 

@@ -1,8 +1,8 @@
 //! Particle solvers on the GPU.
 
 pub mod boundary;
+pub mod buffers;
 pub mod flip;
-mod iteration;
 pub mod params;
 pub mod pbf;
 pub mod pressure;
@@ -10,13 +10,18 @@ mod state;
 pub mod trace;
 
 use crate::{
-    domain::budget::Breach,
-    gpu::adapter::GpuError,
+    domain::{bricks::Brick, budget::Breach},
+    gpu::{adapter::GpuError, buffer::Mirror, reflect::Layout},
     scene::{
         Method, Scene,
         plan::{Counts, DeviceLimits, Plan},
     },
 };
+
+use params::{
+    Counters, FlipParams, IterationControl, Params, Phase, SolidGrid, SolidGrids, SurveyHead,
+};
+use pressure::{PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats};
 
 /// What `scene`'s solver needs on a device with these limits.
 pub fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
@@ -26,11 +31,31 @@ pub fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
         Method::Flip => {
             let flip = scene.solver.flip();
             let (settings, has_correction) = (&flip.pressure, flip.density_correction);
-            let buffers = pressure::buffers(settings, has_correction, counts.bricks.slots);
+            let buffers = pressure::planned(settings, has_correction, counts.bricks.slots);
             let passes = pressure::passes(settings, flip.surface, has_correction);
             plan.with("pressure", buffers, passes)
         }
     }
+}
+
+/// Every struct that the host and the shaders share, by the name that it has in WGSL.
+pub fn mirrors() -> Vec<Layout> {
+    vec![
+        Params::layout(),
+        Phase::layout(),
+        FlipParams::layout(),
+        SolidGrid::layout(),
+        SolidGrids::layout(),
+        Counters::layout(),
+        IterationControl::layout(),
+        SurveyHead::layout(),
+        Brick::layout(),
+        PressurePhase::layout(),
+        PressureControl::layout(),
+        PressureControl64::layout(),
+        PressureStats::layout(),
+        PressureBrick::layout(),
+    ]
 }
 
 /// What stops a solve.

@@ -1,28 +1,14 @@
 //! Rust mirrors of the uniforms, which a test holds against naga's layout of the WGSL structs, and of the words that
 //! passes count in.
 
-use bytemuck::{Pod, Zeroable};
-
-use crate::scene::moving_solid::MAX_MOVING_SOLIDS;
-
-/// Declares a `repr(C)` mirror together with its field names and offsets.
-macro_rules! mirror {
-    ($(#[$meta:meta])* $name:ident { $($(#[$field_meta:meta])* $field:ident: $ty:ty),+ $(,)? }) => {
-        $(#[$meta])*
-        #[repr(C)]
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-        pub struct $name { $($(#[$field_meta])* pub $field: $ty),+ }
-
-        impl $name {
-            /// Field names and byte offsets, in order.
-            pub fn members() -> Vec<(String, u32)> {
-                vec![$((stringify!($field).to_owned(), std::mem::offset_of!($name, $field) as u32)),+]
-            }
-        }
-    };
-}
-
-pub(super) use mirror;
+use crate::{
+    domain::bricks::Brick,
+    gpu::{
+        buffer::{Element, Mirror, Scalar, Workgroups, mirror},
+        reflect::Layout,
+    },
+    scene::moving_solid::MAX_MOVING_SOLIDS,
+};
 
 mirror!(
     /// `Params` of shared/pbf_params.wgsl; lengths in metres, positions relative to the domain's least corner.
@@ -172,7 +158,7 @@ mirror!(
         grids: [SolidGrid; MAX_MOVING_SOLIDS + 1],
         /// m/s.
         velocities: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
-        /// Of them.
+        /// Grids in use.
         count: u32,
         /// The greatest speed, m/s.
         fastest: f32,
@@ -181,32 +167,66 @@ mirror!(
     }
 );
 
-/// `counters`, which passes of both solvers add to over a frame.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct Counters {
-    /// Times that a particle was slowed to the displacement cap.
-    pub capped: u32,
-    /// Times that a particle of PBF had more neighbours than its list holds.
-    pub searched: u32,
-    /// Iterations of PBF until a density error.
-    pub iterations: u32,
-    /// Values that are not finite.
-    pub not_finite: u32,
+mirror!(
+    /// `Counters` of shared/counters.wgsl, which passes of both solvers add to over a frame.
+    Counters {
+        /// Times that a particle was slowed to the displacement cap.
+        capped: u32,
+        /// Times that a particle of PBF had more neighbours than its list holds.
+        searched: u32,
+        /// Iterations of PBF until a density error.
+        iterations: u32,
+        /// Values that are not finite.
+        not_finite: u32,
+    }
+);
+
+mirror!(
+    /// `IterationControl` of shared/iteration_control.wgsl: PBF's iteration until a density error, which pbf/decide ends
+    /// by emptying the dispatches to come.
+    IterationControl {
+        /// 1 once the error is small enough.
+        is_done: u32,
+        /// Iterations so far.
+        iterations: u32,
+        /// Unused.
+        padding: [u32; 2],
+        /// Of a dispatch over all particles.
+        all: Workgroups,
+        /// Of one over a colour.
+        colour: Workgroups,
+    }
+);
+
+mirror!(
+    /// `SurveyHead` of flip/survey.
+    SurveyHead {
+        /// Bits of the largest speed squared, (m/s)²: those of floats that are not negative order as the floats do.
+        speed_square: f32,
+        /// Particles that are not finite.
+        not_finite: u32,
+        /// Unused.
+        padding: [u32; 2],
+    }
+);
+
+impl Element for Brick {
+    const SCALAR: Scalar = Scalar::Mixed;
 }
 
-/// `control` of PBF's iteration until a density error; pbf/decide ends it by emptying the dispatches to come.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct IterationControl {
-    /// 1 once the error is small enough.
-    pub is_done: u32,
-    /// Iterations so far.
-    pub iterations: u32,
-    /// 0.
-    pub unused: [u32; 2],
-    /// Workgroups of a dispatch over all particles, and 0.
-    pub all: [u32; 4],
-    /// Of one over a colour.
-    pub colour: [u32; 4],
+impl Mirror for Brick {
+    fn layout() -> Layout {
+        let member = |name: &str, offset: usize| (name.to_owned(), offset as u32);
+        Layout {
+            name: "Brick".to_owned(),
+            size: size_of::<Self>() as u32,
+            members: vec![
+                member("coordinate", std::mem::offset_of!(Self, coordinate)),
+                member("level", std::mem::offset_of!(Self, level)),
+                member("neighbors", std::mem::offset_of!(Self, neighbors)),
+                member("parent", std::mem::offset_of!(Self, parent)),
+                member("children", std::mem::offset_of!(Self, children)),
+            ],
+        }
+    }
 }

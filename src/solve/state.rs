@@ -11,6 +11,8 @@ use crate::{
     scene::Scene,
 };
 
+use super::buffers::{ID, POSITION, VELOCITY};
+
 /// Positions go up relative to the domain's least corner.
 pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
     let origin = scene.domain.min;
@@ -24,9 +26,9 @@ pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
         .iter()
         .map(|v| [v[0], v[1], v[2], 0.0])
         .collect();
-    program.upload("position", 0, &position);
-    program.upload("velocity", 0, &velocity);
-    program.upload("id", 0, &state.id);
+    program.upload(POSITION, 0, &position);
+    program.upload(VELOCITY, 0, &velocity);
+    program.upload(ID, 0, &state.id);
 }
 
 /// What came back from the device, in any order, into the order of the ids.

@@ -3,6 +3,7 @@
 use crate::{
     domain::{solver::Solver, substep::Which},
     gpu::{
+        buffer::{Buf, Scalar, Windows},
         program::Program,
         recording::{Bind, Moment, Recording},
         reflect::{Access, Binding},
@@ -12,8 +13,13 @@ use crate::{
 
 use super::{
     SolveError,
+    buffers::COUNTERS,
     params::{Counters, IterationControl},
-    pressure::{PressureControl64, PressureStats, control_words, widen_control},
+    pbf,
+    pressure::{
+        PressureControl64, PressureStats,
+        buffers::{Real, STATS, read_control, read_reals},
+    },
 };
 
 /// A dispatch of a traced substep, just before or after it runs.
@@ -33,13 +39,46 @@ impl Traced<'_> {
     ///
     /// # Errors
     /// The device.
-    pub fn read<T: bytemuck::Pod>(&self, buffer: &str, count: usize) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.download(&[(buffer, count)])?.remove(0))
+    pub fn read<T: bytemuck::Pod>(
+        &self,
+        buffer: impl Into<Buf<T>>,
+        count: usize,
+    ) -> Result<Vec<T>, SolveError> {
+        Ok(self.program.read(buffer.into(), count)?)
     }
 
     /// What stands in a buffer of one struct, or in front of others.
-    fn one<T: bytemuck::Pod>(&self, buffer: &str) -> Result<T, SolveError> {
-        Ok(self.read(buffer, 1)?.remove(0))
+    ///
+    /// # Errors
+    /// The device.
+    pub fn one<T: bytemuck::Pod>(&self, buffer: Buf<T>) -> Result<T, SolveError> {
+        Ok(self.program.read(buffer, 1)?.remove(0))
+    }
+
+    /// The first `count` values of the buffer that the variable of `variable`'s name is bound to.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn bound<T: bytemuck::Pod>(
+        &self,
+        variable: Buf<T>,
+        count: usize,
+    ) -> Result<Vec<T>, SolveError> {
+        let buffer = Buf::named(self.buffer(variable.name()).to_owned());
+        Ok(self.program.read(buffer, count)?)
+    }
+
+    /// The first `count` values of an array of a projection's own precision.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn reals(
+        &self,
+        buffer: &Buf<Real>,
+        precision: Precision,
+        count: usize,
+    ) -> Result<Vec<f64>, SolveError> {
+        read_reals(self.program, buffer, precision, count)
     }
 
     /// What passes have counted.
@@ -47,7 +86,7 @@ impl Traced<'_> {
     /// # Errors
     /// The device.
     pub fn counters(&self) -> Result<Counters, SolveError> {
-        self.one("counters")
+        self.one(COUNTERS)
     }
 
     /// PBF's iteration until a density error.
@@ -55,7 +94,7 @@ impl Traced<'_> {
     /// # Errors
     /// The device.
     pub fn iteration_control(&self) -> Result<IterationControl, SolveError> {
-        self.one("control")
+        self.one(pbf::buffers::CONTROL)
     }
 
     /// The scalars of a projection in `precision`, on which their layout depends.
@@ -63,8 +102,7 @@ impl Traced<'_> {
     /// # Errors
     /// The device.
     pub fn pressure_control(&self, precision: Precision) -> Result<PressureControl64, SolveError> {
-        let words: Vec<u32> = self.read("pressure_control", control_words(precision))?;
-        Ok(widen_control(&words, precision))
+        Ok(read_control(self.program, precision)?.0)
     }
 
     /// What a projection has noted.
@@ -72,7 +110,7 @@ impl Traced<'_> {
     /// # Errors
     /// The device.
     pub fn pressure_stats(&self) -> Result<PressureStats, SolveError> {
-        self.one("pressure_stats")
+        self.one(STATS)
     }
 
     /// Name of the buffer that a variable is bound to.
@@ -92,6 +130,14 @@ impl Traced<'_> {
             .map_or(0, |window| window.0) as usize;
         let bytes: Vec<u8> = self.read(self.buffer(variable), offset + size_of::<T>())?;
         Ok(bytemuck::pod_read_unaligned(&bytes[offset..]))
+    }
+
+    /// The window of `windows` that the dispatch is bound to.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn window<T: bytemuck::Pod>(&self, windows: &Windows<T>) -> Result<T, SolveError> {
+        self.uniform(windows.variable())
     }
 }
 
@@ -119,12 +165,13 @@ impl Traced<'_> {
     /// The device.
     pub fn first_not_finite(&self) -> Result<Option<String>, SolveError> {
         for binding in self.written() {
-            let Some(bytes) = binding.float_bytes else {
+            let element = &binding.element;
+            if element.scalar != Scalar::Float {
                 continue;
-            };
+            }
             let buffer = self.buffer(&binding.name);
-            let words: Vec<u32> = self.read(buffer, self.length::<u32>(buffer))?;
-            if !are_finite(&words, bytes) {
+            let words = self.read::<u32>(buffer, self.length::<u32>(buffer))?;
+            if !are_finite(&words, element.scalar_bytes) {
                 return Ok(Some(buffer.to_owned()));
             }
         }

@@ -397,6 +397,7 @@ fn open_cache(
         format_version: Manifest::FORMAT_VERSION,
         program: env!("CARGO_PKG_NAME").into(),
         program_version: env!("CARGO_PKG_VERSION").into(),
+        shaders: device.shaders.clone(),
         shot: scene.shot.name.clone(),
         scene_hash: scene::physics_hash(scene),
         solver: scene.solver.method.name().into(),

@@ -18,7 +18,11 @@ use crate::{
     solve::{SolveError, pbf::device_limits},
 };
 
-use super::{Blame, device::needs, prepare::Start};
+use super::{
+    Blame,
+    device::{Gpu, needs, shaders_note},
+    prepare::Start,
+};
 
 pub use crate::check::{Checked, Row, Table};
 
@@ -39,7 +43,7 @@ pub struct Request {
     /// Which substep of the frame after each.
     pub substep: Which,
     /// Index or part of the name of an adapter.
-    pub adapter: Option<String>,
+    pub gpu: Gpu,
 }
 
 /// The first row out of tolerance.
@@ -93,6 +97,8 @@ pub struct Outcome {
     pub frames: Vec<u32>,
     /// Of each, the substep of the frame after it that was checked.
     pub substeps: Vec<Option<u32>>,
+    /// Hash of the shaders where they are not the shipped ones.
+    pub shaders: Option<String>,
     /// Whether a signal ended it.
     pub interrupted: bool,
 }
@@ -147,16 +153,26 @@ pub fn check(
         None => Start::of(&scene)?,
         Some(cache) => Start::of_cache::<CheckError>(&scene, cache)?,
     };
-    let context = Context::open_for(request.adapter.as_deref(), needs(&scene))?;
+    let context = request.gpu.open(needs(&scene))?;
+    let shaders = context.shaders.edited().map(str::to_owned);
     let info = &context.info;
     tell(Event::Ready {
-        device: format!("{} ({} {})", info.name, info.driver, info.driver_info),
+        device: format!(
+            "{} ({} {}){}",
+            info.name,
+            info.driver,
+            info.driver_info,
+            shaders_note(shaders.as_deref())
+        ),
         solver: scene.solver.method.name(),
         particles: start.particles.len(),
         frames: frames.len(),
         warnings: scene.warnings(),
     });
-    let mut outcome = Outcome::default();
+    let mut outcome = Outcome {
+        shaders,
+        ..Outcome::default()
+    };
     for frame in frames {
         outcome.interrupted = stop.load(Ordering::Relaxed);
         if outcome.interrupted {

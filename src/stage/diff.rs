@@ -1,6 +1,7 @@
 //! `diff`: two caches, a cache and a baseline, or two renders: where they part, and by how much.
 
 mod against_baseline;
+mod caches;
 mod pictures;
 mod streams;
 
@@ -9,18 +10,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Blame, study::gauge};
 use crate::{
     cache::{self, CacheError, CacheReader, Manifest},
-    compare::{baseline::Baseline, frames},
+    compare::baseline::Baseline,
     domain::{
         aggregates::Aggregates,
         frame_range::FrameRange,
         particles::Particles,
-        probe::energies,
         solver::StepReport,
         tolerance::{PictureLimits, Tolerance},
     },
@@ -30,12 +29,13 @@ use crate::{
 };
 
 pub use crate::compare::{
-    baseline::{BaselineFault, Basis},
+    baseline::{BaselineDiff, BaselineFault, Basis, FramePair},
+    caches::CacheDiff,
     frames::{AggregatePeak, Fault, FieldDiff, FrameDiff, Parting, aggregate_peaks},
+    pictures::{PairDiff, PicturesDiff},
     streams::{Difference, GridDiff, StreamDiff},
 };
-pub use against_baseline::{BaselineDiff, FramePair, Written, ranges, write_baseline};
-pub use pictures::{PairDiff, PicturesDiff};
+pub use against_baseline::{Written, write_baseline};
 
 /// What to compare with what.
 #[derive(Clone, Debug)]
@@ -75,47 +75,12 @@ pub enum Outcome {
     Pictures(PicturesDiff),
 }
 
-/// What differs between two caches.
-#[derive(Clone, Debug, Serialize)]
-pub struct CacheDiff {
-    /// What baked each, and on what.
-    pub bakes: [String; 2],
-    /// The first key of the scenes that differs, with b's value and then a's.
-    pub physics: Option<String>,
-    /// Frames that a alone has, of those that were asked for.
-    pub only_a: Vec<u32>,
-    /// Frames that b alone has.
-    pub only_b: Vec<u32>,
-    /// Frames of both.
-    pub frames: Vec<FrameDiff>,
-    /// Streams that a alone has: `grids`, `grid NAME`, `probe NAME`.
-    pub streams_only_a: Vec<String>,
-    /// Streams that b alone has.
-    pub streams_only_b: Vec<String>,
-    /// What differs beside the particles, by frame.
-    pub streams: Vec<StreamDiff>,
-    /// Whether those count: without a tolerance they do, and with one nothing in it names them.
-    pub streams_judged: bool,
-}
-
-impl CacheDiff {
-    fn is_within(&self) -> bool {
-        let same_streams = self.streams.is_empty()
-            && self.streams_only_a.is_empty()
-            && self.streams_only_b.is_empty();
-        self.only_a.is_empty()
-            && self.only_b.is_empty()
-            && self.frames.iter().all(|frame| frame.faults.is_empty())
-            && (same_streams || !self.streams_judged)
-    }
-}
-
 impl Outcome {
     /// Whether nothing is out of tolerance and nothing is missing on one side.
     pub fn is_within(&self) -> bool {
         match self {
             Self::Caches(diff) => diff.is_within(),
-            Self::Baseline(diff) => diff.faults.is_empty() && diff.only_baseline.is_empty(),
+            Self::Baseline(diff) => diff.is_within(),
             Self::Pictures(diff) => diff.is_within(),
         }
     }
@@ -162,6 +127,20 @@ pub enum DiffError {
     Usage(String),
 }
 
+impl DiffError {
+    fn usage(message: impl Into<String>) -> Self {
+        Self::Usage(message.into())
+    }
+
+    /// Names the file that an [`std::io::Error`] keeps to itself.
+    fn at(file: &Path) -> impl Fn(std::io::Error) -> Self {
+        move |source| Self::File {
+            file: file.to_owned(),
+            source,
+        }
+    }
+}
+
 impl From<&DiffError> for Blame {
     fn from(error: &DiffError) -> Self {
         match error {
@@ -186,30 +165,24 @@ enum Subject {
 
 impl Subject {
     fn of(path: &Path) -> Result<Self, DiffError> {
-        let meta = fs::metadata(path).map_err(|source| DiffError::File {
-            file: path.to_owned(),
-            source,
-        })?;
-        if meta.is_dir() {
-            if cache::exists(path) {
-                return Ok(Self::Cache(Box::new(CacheReader::open(path)?)));
-            }
-            if pictures::in_folder(path, None)?.is_empty() {
-                return Err(DiffError::Empty(path.to_owned()));
-            }
+        let is_folder = fs::metadata(path).map_err(DiffError::at(path))?.is_dir();
+        if is_folder && cache::exists(path) {
+            return Ok(Self::Cache(Box::new(CacheReader::open(path)?)));
+        }
+        if is_folder && pictures::in_folder(path, None)?.is_empty() {
+            return Err(DiffError::Empty(path.to_owned()));
+        }
+        if is_folder {
             return Ok(Self::Folder);
         }
         if pictures::is_picture(path) {
             return Ok(Self::Picture);
         }
-        if path
-            .extension()
-            .is_some_and(|extension| extension == "json")
-        {
+        if path.extension().is_some_and(|ending| ending == "json") {
             let baseline = against_baseline::read(path)?;
             return Ok(Self::Baseline(Box::new(baseline)));
         }
-        Err(DiffError::Usage(format!(
+        Err(DiffError::usage(format!(
             "{} is no cache folder, baseline (.json) or picture (.png, .exr)",
             path.display()
         )))
@@ -230,132 +203,54 @@ impl Subject {
 /// # Errors
 /// [`DiffError`]; what differs is none.
 pub fn diff(request: &Request) -> Result<Outcome, DiffError> {
-    let subjects = (Subject::of(&request.a)?, Subject::of(&request.b)?);
-    if request.images.is_some() && !matches!(subjects.0, Subject::Folder | Subject::Picture) {
-        let message = "--output takes difference images, of two renders; these are caches";
-        return Err(DiffError::Usage(message.to_owned()));
+    let (a, b) = (Subject::of(&request.a)?, Subject::of(&request.b)?);
+    let is_render = matches!(a, Subject::Folder | Subject::Picture);
+    let is_baseline = matches!(b, Subject::Baseline(_));
+    let tolerance = request.tolerance.as_ref();
+    let misfits = [
+        (
+            request.images.is_some() && !is_render,
+            "--output takes difference images, of two renders; these are caches",
+        ),
+        (
+            request.ignores_hashes && !is_baseline,
+            "--ignore-hashes is for a cache and a baseline: nothing else has hashes",
+        ),
+        (
+            is_render && tolerance.is_some_and(|t| t.pictures == PictureLimits::default()),
+            "the tolerance file has no [pictures]",
+        ),
+        (
+            matches!(a, Subject::Cache(_)) && is_baseline && tolerance.is_some(),
+            "--tolerance is for two caches or two renders; a baseline states its own tolerances",
+        ),
+    ];
+    if let Some((_, message)) = misfits.into_iter().find(|(is_off, _)| *is_off) {
+        return Err(DiffError::usage(message));
     }
-    if request.ignores_hashes && !matches!(subjects.1, Subject::Baseline(_)) {
-        let message = "--ignore-hashes is for a cache and a baseline: nothing else has hashes";
-        return Err(DiffError::Usage(message.to_owned()));
-    }
-    if let (Some(tolerance), Subject::Folder | Subject::Picture) = (&request.tolerance, &subjects.0)
-        && tolerance.pictures == PictureLimits::default()
-    {
-        let message = "the tolerance file has no [pictures]";
-        return Err(DiffError::Usage(message.to_owned()));
-    }
-    match subjects {
-        (Subject::Cache(a), Subject::Cache(b)) => Ok(Outcome::Caches(caches(&a, &b, request)?)),
+    Ok(match (a, b) {
+        (Subject::Cache(a), Subject::Cache(b)) => {
+            Outcome::Caches(caches::compare([&a, &b], request)?)
+        }
         (Subject::Cache(a), Subject::Baseline(b)) => {
-            if request.tolerance.is_some() {
-                let message = "--tolerance is for two caches or two renders; a baseline states its own tolerances";
-                return Err(DiffError::Usage(message.to_owned()));
-            }
-            let frames = request.frames.as_ref();
-            let ignores_hashes = request.ignores_hashes;
-            let found = against_baseline::compare(&a, &b, &request.b, frames, ignores_hashes)?;
-            Ok(Outcome::Baseline(found))
+            Outcome::Baseline(against_baseline::compare(&a, &b, request)?)
         }
         (Subject::Folder, Subject::Folder) => {
-            Ok(Outcome::Pictures(pictures::compare_folders(request)?))
+            Outcome::Pictures(pictures::compare_folders(request)?)
         }
         (Subject::Picture, Subject::Picture) => {
-            Ok(Outcome::Pictures(pictures::compare_files(request)?))
+            Outcome::Pictures(pictures::compare_files(request)?)
         }
-        (a, b) => Err(DiffError::Usage(format!(
-            "{} is {}, and {} is {}; two caches, a cache and then a baseline, two folders of pictures or two pictures \
-             can be compared",
-            request.a.display(),
-            a.kind(),
-            request.b.display(),
-            b.kind()
-        ))),
-    }
-}
-
-/// A tolerance that judges nothing here would pass anything.
-fn check_tolerance(tolerance: &Tolerance, caches: [&CacheReader; 2]) -> Result<(), DiffError> {
-    if tolerance.fields.is_empty() && tolerance.aggregates.is_empty() {
-        let message = "the tolerance file has [pictures] alone; two caches need [position], [velocity], \
-            [attributes.NAME] or [aggregates]";
-        return Err(DiffError::Usage(message.to_owned()));
-    }
-    let mut known = vec!["position", "velocity"];
-    known.extend(
-        caches
-            .iter()
-            .flat_map(|c| c.manifest().attributes.iter().map(String::as_str)),
-    );
-    match tolerance
-        .fields
-        .keys()
-        .find(|name| !known.contains(&name.as_str()))
-    {
-        Some(name) => Err(DiffError::Usage(format!(
-            "the tolerance file limits {name}, which neither cache has; they have {}",
-            known.join(", ")
-        ))),
-        None => Ok(()),
-    }
-}
-
-fn caches(a: &CacheReader, b: &CacheReader, request: &Request) -> Result<CacheDiff, DiffError> {
-    if let Some(tolerance) = &request.tolerance {
-        check_tolerance(tolerance, [a, b])?;
-    }
-    let all =
-        |cache: &CacheReader| -> Vec<u32> { (cache.first_frame()..=cache.last_frame()).collect() };
-    let [in_a, in_b] = [a, b].map(all);
-    let (chosen, only_a, only_b) = match &request.frames {
-        Some(frames) => (frames.iter().collect(), Vec::new(), Vec::new()),
-        None => {
-            let pick = |x: &[u32], y: &[u32], is_in: bool| -> Vec<u32> {
-                let frames = x.iter().copied();
-                frames.filter(|frame| y.contains(frame) == is_in).collect()
-            };
-            let only = |x: &[u32], y: &[u32]| pick(x, y, false);
-            (
-                pick(&in_a, &in_b, true),
-                only(&in_a, &in_b),
-                only(&in_b, &in_a),
-            )
+        (a, b) => {
+            return Err(DiffError::usage(format!(
+                "{} is {}, and {} is {}; two caches, a cache and then a baseline, two folders of pictures or two \
+                 pictures can be compared",
+                request.a.display(),
+                a.kind(),
+                request.b.display(),
+                b.kind()
+            )));
         }
-    };
-    let chosen: Vec<u32> = chosen;
-    for cache in [a, b] {
-        cache.check_beside(&chosen)?;
-    }
-    let gauge = gauge(&scene_of(b)?, &[b, a])?;
-    let (gravity_a, gravity_b) = (scene_of(a)?.water.gravity, scene_of(b)?.water.gravity);
-    let frame = |&frame: &u32| {
-        let [from, to] = [a, b].map(|cache| cache.manifest().origin.into());
-        let (of_a, of_b) = (a.read(frame)?, b.read(frame)?);
-        let beside = streams::of_frame([a, b], frame, [&of_a, &of_b])?;
-        let of_a = of_a.about(from, to);
-        let aggregates = [
-            aggregates(a, &gauge, gravity_a, frame, &of_a)?,
-            aggregates(b, &gauge, gravity_b, frame, &of_b)?,
-        ];
-        let tolerance = request.tolerance.as_ref();
-        let found = frames::compare(frame, [&of_a, &of_b], aggregates, tolerance);
-        Ok((found, beside))
-    };
-    let found: Vec<(FrameDiff, Vec<StreamDiff>)> = chosen
-        .par_iter()
-        .map(frame)
-        .collect::<Result<_, CacheError>>()?;
-    let (frames, beside): (_, Vec<_>) = found.into_iter().unzip();
-    Ok(CacheDiff {
-        bakes: [a, b].map(|cache| bake_of(cache.manifest())),
-        physics: physics(b.dir(), b.scene_toml(), a.scene_toml())?,
-        only_a,
-        only_b,
-        frames,
-        streams_only_a: streams::lone(a, b),
-        streams_only_b: streams::lone(b, a),
-        streams: beside.into_iter().flatten().collect(),
-        streams_judged: request.tolerance.is_none(),
     })
 }
 
@@ -395,28 +290,20 @@ fn adapter_of(manifest: &Manifest) -> String {
     )
 }
 
+/// What the particles of a frame sum up to, and what its report says of them.
 fn aggregates(
     cache: &CacheReader,
+    scene: &Scene,
     gauge: &Gauge,
-    gravity: glam::DVec3,
     frame: u32,
     particles: &Particles,
 ) -> Result<Aggregates, CacheError> {
     let manifest = cache.manifest();
-    let spacing = manifest.particle_spacing;
-    let mass = manifest.rest_density * spacing.powi(3);
-    let (kinetic, potential) = energies(particles, mass, gravity, gauge.corner());
-    let measures = gauge.measure(&particles.position, spacing);
     let report = cache.entry(frame)?.report.clone();
     let report: Option<StepReport> = serde_json::from_value(report).ok();
+    let (spacing, density) = (manifest.particle_spacing, manifest.rest_density);
     Ok(Aggregates {
-        kinetic_energy: kinetic,
-        potential_energy: potential,
-        volume: measures.volume,
-        crest_height: measures.crest_height,
-        front: measures.front,
-        splash_height: measures.splash_height,
-        airborne: measures.airborne,
         density_error: report.map(|report| report.density_error_mean),
+        ..gauge.aggregates(particles, spacing, density, scene.water.gravity)
     })
 }

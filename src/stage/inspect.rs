@@ -21,7 +21,10 @@ use crate::{
 
 use super::{Blame, device::needs, prepare::Start, probes};
 
-pub use crate::cache::{Entry, Manifest};
+pub use crate::cache::{
+    Entry, Manifest,
+    stream::{PARTICLES, PROBES},
+};
 
 /// One adapter of this machine.
 #[derive(Clone, Debug)]

@@ -17,7 +17,7 @@ mod watch;
 use crate::{
     cache::CacheError,
     domain::signed_distance::SignedDistanceError,
-    gpu::adapter::GpuError,
+    gpu::{adapter::GpuError, shader::ShadersError},
     reference::ReferenceError,
     scene::{SceneError, look::LookError, study::StudyFileError},
     solve::SolveError,
@@ -39,14 +39,21 @@ pub enum Blame {
 impl From<&GpuError> for Blame {
     fn from(error: &GpuError) -> Self {
         match error {
-            GpuError::TooLarge { .. } | GpuError::NoF64 { .. } | GpuError::NoSuchAdapter { .. } => {
-                Self::Input
-            }
+            GpuError::TooLarge { .. }
+            | GpuError::NoF64 { .. }
+            | GpuError::NoSuchAdapter { .. }
+            | GpuError::EditedShader { .. } => Self::Input,
             GpuError::NoAdapter
             | GpuError::Open { .. }
             | GpuError::Lost(_)
             | GpuError::Shader { .. } => Self::Device,
         }
+    }
+}
+
+impl From<&ShadersError> for Blame {
+    fn from(_: &ShadersError) -> Self {
+        Self::Input
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a scene's probes see of a frame.
 
 use crate::{
-    cache::{Entry, ProbeRecord, ProbeValues},
+    cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES},
     domain::{
         particles::Particles,
         probe::{elevation, energies, volume},
@@ -50,7 +50,7 @@ pub(super) fn look(scene: &Scene, particles: &Particles, pressures: &[Option<f64
 /// What the probe of `index` saw over time as a chart, one line a column.
 pub(super) fn chart(shot: &str, record: &ProbeRecord, index: usize, entries: &[Entry]) -> Chart {
     let columns = || record.columns.iter().map(|column| column.rsplit_once('_'));
-    let value = |entry: &Entry, column: usize| *entry.probes.as_ref()?.get(index)?.get(column)?;
+    let value = |entry: &Entry, column: usize| *entry.row(PROBES, index).get(column)?;
     let series = columns().enumerate().map(|(column, parts)| Series {
         name: parts.map_or_else(String::new, |(quantity, _)| quantity.to_owned()),
         points: entries

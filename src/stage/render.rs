@@ -3,8 +3,10 @@
 //! Several processes may render one look of one cache into one folder: each frame is rendered by one of them.
 
 mod folder;
+mod plan;
 
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
@@ -14,8 +16,8 @@ use glam::DAffine3;
 
 use crate::{
     cache::{self, CacheError, CacheReader},
-    domain::frame_range::FrameRange,
-    gpu::adapter::{Context, GpuError},
+    domain::{frame_range::FrameRange, signed_distance::SignedDistanceError},
+    gpu::adapter::{Context, GpuError, Needs},
     render::{
         Attributes, Image, RenderError, RenderScene, Renderer,
         image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
@@ -27,9 +29,15 @@ use crate::{
 };
 
 use self::folder::{Folder, Owner, Wanted};
-use super::Blame;
+use super::{
+    Blame,
+    device::{Gpu, shaders_note},
+};
 
-pub use self::folder::FolderError;
+pub use self::{
+    folder::FolderError,
+    plan::{LookPlan, Subject, plan},
+};
 
 /// Between two looks at frames that other processes render.
 const POLL: Duration = Duration::from_millis(50);
@@ -45,10 +53,12 @@ pub struct Request {
     pub directory: PathBuf,
     /// Frames wanted; all that are cached where `None`.
     pub frames: Option<FrameRange>,
-    /// Index or part of the name of an adapter.
-    pub adapter: Option<String>,
+    /// What to render on.
+    pub gpu: Gpu,
     /// Whether frames that stand there already are made again, also those of another look or cache.
     pub overwrite: bool,
+    /// Whether passes are timed, which runs them one by one.
+    pub time_passes: bool,
 }
 
 /// What a render has to tell while it runs.
@@ -88,6 +98,8 @@ pub struct Outcome {
     pub skipped: u32,
     /// Whether a signal ended it.
     pub interrupted: bool,
+    /// Pass, seconds, runs, by name, of the frames rendered now; nothing unless that was asked for.
+    pub passes: Vec<(&'static str, f64, u64)>,
 }
 
 /// Why a render failed.
@@ -99,6 +111,9 @@ pub enum RenderJobError {
     /// The scene in the cache.
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
+    /// The solids of a scene that is planned for.
+    #[error(transparent)]
+    Solid(#[from] SignedDistanceError),
     /// What the look names.
     #[error(transparent)]
     Look(#[from] LookError),
@@ -126,6 +141,7 @@ impl From<&RenderJobError> for Blame {
         match error {
             RenderJobError::Cache(error) => error.into(),
             RenderJobError::Scene(_) | RenderJobError::Folder(_) => Self::Files,
+            RenderJobError::Solid(error) => error.into(),
             RenderJobError::Look(error) => error.into(),
             RenderJobError::Gpu(error) => error.into(),
             RenderJobError::Render(RenderError::Gpu(error)) => error.into(),
@@ -158,25 +174,23 @@ pub fn render(
             cache,
         });
     }
-    let mut frames: Vec<u32> = match &request.frames {
+    let frames: Vec<u32> = match &request.frames {
         Some(frames) => frames.iter().collect(),
         None => (cache.first_frame() + 1..=cache.last_frame()).collect(),
     };
     for &frame in &frames {
         cache.entry(frame)?;
     }
-    // The cache's own copy: what was baked, wherever the cache has been moved to.
-    let scene = Scene::parse(
-        cache.scene_toml(),
-        &request.cache.join("scene.toml"),
-        &request.cache,
-        &[],
-    )?;
-    let context = Context::open(request.adapter.as_deref())?;
+    let scene = baked_scene(&cache, &request.cache)?;
+    let context = request.gpu.open(Needs::default())?;
     let folder = enter(request, &cache, &frames)?;
     let image = &request.look.spec().image;
     tell(Event::Ready {
-        device: context.info.name.clone(),
+        device: format!(
+            "{}{}",
+            context.info.name,
+            shaders_note(request.gpu.shaders.edited())
+        ),
         size: [image.width, image.height],
         frames: frames.len(),
     });
@@ -187,45 +201,17 @@ pub fn render(
         scene,
         context,
         kept: None,
+        times: BTreeMap::new(),
     };
-    let mut outcome = Outcome::default();
-    let mut is_told = false;
-    while !frames.is_empty() {
-        let mut elsewhere = Vec::new();
-        for &frame in &frames {
-            if stop.load(Ordering::Relaxed) {
-                outcome.interrupted = true;
-                return Ok(outcome);
-            }
-            let begin = Instant::now();
-            let (seconds, skipped) = match job.frame(frame)? {
-                Done::Rendered => (begin.elapsed().as_secs_f64(), false),
-                Done::Stands => (0.0, true),
-                Done::Elsewhere => {
-                    elsewhere.push(frame);
-                    continue;
-                }
-            };
-            outcome.rendered += u32::from(!skipped);
-            outcome.skipped += u32::from(skipped);
-            tell(Event::Frame {
-                frame,
-                seconds,
-                skipped,
-            });
-        }
-        if elsewhere.len() == frames.len() {
-            if !is_told {
-                tell(Event::Waiting {
-                    frames: frames.len(),
-                });
-                is_told = true;
-            }
-            std::thread::sleep(POLL);
-        }
-        frames = elsewhere;
-    }
+    let mut outcome = job.run(frames, stop, tell)?;
+    outcome.passes = job.times.into_values().collect();
     Ok(outcome)
+}
+
+/// The cache's own copy of its scene: what was baked, wherever the cache has been moved to.
+fn baked_scene(cache: &CacheReader, directory: &Path) -> Result<Scene, SceneError> {
+    let file = directory.join("scene.toml");
+    Scene::parse(cache.scene_toml(), &file, directory, &[])
 }
 
 /// A renderer's fault; that of a panorama at its place in the look.
@@ -239,7 +225,7 @@ fn told(error: RenderError, look: &Look) -> RenderJobError {
 
 /// Takes this process's place in the output folder.
 fn enter(request: &Request, cache: &CacheReader, frames: &[u32]) -> Result<Folder, RenderJobError> {
-    let first = attributes(cache, &request.look, cache.first_frame())?;
+    let first = attributes(cache, request, cache.first_frame())?;
     let mut names = Vec::new();
     for &frame in frames {
         names.extend(pictures(cache, &request.look, frame));
@@ -254,7 +240,7 @@ fn enter(request: &Request, cache: &CacheReader, frames: &[u32]) -> Result<Folde
         },
         names: names.into_iter().map(|(name, _)| name).collect(),
         overwrite: request.overwrite,
-        frame_hash: &|frame| cache.entry(frame).ok().map(|entry| entry.blake3.clone()),
+        frame_hash: &|frame| cache.frame_hash(frame).ok().map(str::to_owned),
     };
     Ok(Folder::enter(&request.directory, &wanted)?)
 }
@@ -276,12 +262,60 @@ struct Job<'a> {
     context: Context,
     /// Of the frame before, where it can draw another.
     kept: Option<Renderer>,
+    /// What passes took so far.
+    times: BTreeMap<&'static str, (&'static str, f64, u64)>,
 }
 
 impl Job<'_> {
+    fn run(
+        &mut self,
+        mut frames: Vec<u32>,
+        stop: &AtomicBool,
+        tell: &mut dyn FnMut(Event),
+    ) -> Result<Outcome, RenderJobError> {
+        let mut outcome = Outcome::default();
+        let mut is_told = false;
+        while !frames.is_empty() {
+            let mut elsewhere = Vec::new();
+            for &frame in &frames {
+                if stop.load(Ordering::Relaxed) {
+                    outcome.interrupted = true;
+                    return Ok(outcome);
+                }
+                let begin = Instant::now();
+                let (seconds, skipped) = match self.frame(frame)? {
+                    Done::Rendered => (begin.elapsed().as_secs_f64(), false),
+                    Done::Stands => (0.0, true),
+                    Done::Elsewhere => {
+                        elsewhere.push(frame);
+                        continue;
+                    }
+                };
+                outcome.rendered += u32::from(!skipped);
+                outcome.skipped += u32::from(skipped);
+                tell(Event::Frame {
+                    frame,
+                    seconds,
+                    skipped,
+                });
+            }
+            if elsewhere.len() == frames.len() {
+                if !is_told {
+                    tell(Event::Waiting {
+                        frames: frames.len(),
+                    });
+                    is_told = true;
+                }
+                std::thread::sleep(POLL);
+            }
+            frames = elsewhere;
+        }
+        Ok(outcome)
+    }
+
     fn frame(&mut self, frame: u32) -> Result<Done, RenderJobError> {
         let request = self.request;
-        let attributes = attributes(&self.cache, &request.look, frame)?;
+        let attributes = attributes(&self.cache, request, frame)?;
         let pictures = pictures(&self.cache, &request.look, frame);
         let stands = || {
             let is_there = |(name, format): &(String, FormatSpec)| {
@@ -316,7 +350,15 @@ impl Job<'_> {
             None => Renderer::new(&self.context, look, &render_scene(&self.scene, frame))
                 .map_err(|error| told(error, look))?,
         };
+        if self.request.time_passes {
+            renderer.time_passes();
+        }
         let picture = renderer.render(frame, &self.cache.read(frame)?)?;
+        for (name, seconds, runs) in renderer.times() {
+            let total = self.times.entry(name).or_insert((name, 0.0, 0));
+            total.1 += seconds;
+            total.2 += runs;
+        }
         // Solids that move are drawn where they stand at the frame's time, not blurred over its shutter:
         // a renderer draws its solids once.
         self.kept = self.scene.moving_solids.is_empty().then_some(renderer);
@@ -341,15 +383,24 @@ fn render_scene(scene: &Scene, frame: u32) -> RenderScene {
     }
 }
 
-fn attributes(cache: &CacheReader, look: &Look, frame: u32) -> Result<Attributes, CacheError> {
+fn attributes(
+    cache: &CacheReader,
+    request: &Request,
+    frame: u32,
+) -> Result<Attributes, CacheError> {
     let manifest = cache.manifest();
     Ok(Attributes {
         frame,
         shot: manifest.shot.clone(),
-        software: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
+        software: format!(
+            "{} {}{}",
+            env!("CARGO_PKG_NAME"),
+            env!("CARGO_PKG_VERSION"),
+            shaders_note(request.gpu.shaders.edited())
+        ),
         scene_hash: manifest.scene_hash.clone(),
-        cache_hash: cache.entry(frame)?.blake3.clone(),
-        look_hash: look.hash(),
+        cache_hash: cache.frame_hash(frame)?.to_owned(),
+        look_hash: request.look.hash(),
     })
 }
 

@@ -35,7 +35,7 @@ use crate::{
 
 use super::{
     Blame,
-    device::{Built, Device, Opened, SolverError, needs},
+    device::{Built, Device, Gpu, Opened, SolverError, needs},
     prepare::Start,
     watch::{Watch, volume_of},
 };
@@ -437,7 +437,7 @@ pub struct Replayed {
 ///
 /// # Errors
 /// [`ReplayError`]; a breach is none, but in the result.
-pub fn replay_failed(directory: &Path, adapter: Option<String>) -> Result<Replayed, ReplayError> {
+pub fn replay_failed(directory: &Path, gpu: &Gpu) -> Result<Replayed, ReplayError> {
     let Failed {
         scene_toml,
         start: state,
@@ -449,12 +449,12 @@ pub fn replay_failed(directory: &Path, adapter: Option<String>) -> Result<Replay
     let file = directory.join("scene.toml");
     let scene = Scene::parse(&scene_toml, &file, cached.dir(), &[])?;
     let start = Start::of_cache::<ReplayError>(&scene, &cached)?;
-    if let Some(adapter) = &adapter {
+    if let Some(adapter) = &gpu.adapter {
         check_request(adapter)?;
     }
     let device = match report["device"].as_str() {
         Some("cpu") => Device::Cpu,
-        _ => Device::Gpu(adapter),
+        _ => Device::Gpu(gpu.clone()),
     };
     let failure = replay(
         &device.open(needs(&scene))?,

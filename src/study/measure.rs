@@ -10,7 +10,9 @@
 use rayon::prelude::*;
 
 use super::{median, percentile};
-use crate::domain::bounds::Bounds;
+use crate::domain::{
+    aggregates::Aggregates, bounds::Bounds, particles::Particles, probe::energies,
+};
 
 /// Most cubes; a larger domain is measured with larger ones.
 const MAX_CUBES: f64 = (1u64 << 27) as f64;
@@ -127,9 +129,29 @@ impl Gauge {
             .collect()
     }
 
-    /// The domain's least corner, metres.
-    pub fn corner(&self) -> glam::DVec3 {
-        self.domain.min
+    /// What a frame is compared by. Particles are `spacing` metres apart at `rest_density` kg/m³; gravity in m/s². No
+    /// density error: the solver alone knows it.
+    pub fn aggregates(
+        &self,
+        particles: &Particles,
+        spacing: f64,
+        rest_density: f64,
+        gravity: glam::DVec3,
+    ) -> Aggregates {
+        let mass = rest_density * spacing.powi(3);
+        let (kinetic_energy, potential_energy) =
+            energies(particles, mass, gravity, self.domain.min);
+        let measures = self.measure(&particles.position, spacing);
+        Aggregates {
+            kinetic_energy,
+            potential_energy,
+            volume: measures.volume,
+            crest_height: measures.crest_height,
+            front: measures.front,
+            splash_height: measures.splash_height,
+            airborne: measures.airborne,
+            density_error: None,
+        }
     }
 
     /// Edge of the cubes, metres: what lengths are good to.

@@ -206,13 +206,6 @@ fn far_from_the_origin_positions_are_the_worlds_in_64_bits() {
 }
 
 #[test]
-fn names_are_wide_enough() {
-    assert_eq!(file_name("a", 1), "frames/a.0001.ply");
-    assert_eq!(file_name("a", 9999), "frames/a.9999.ply");
-    assert_eq!(file_name("a", 10_000), "frames/a.10000.ply");
-}
-
-#[test]
 fn a_huge_promise_is_refused_at_once() {
     let particles = water(2, &[]);
     for count in [

@@ -26,11 +26,6 @@ const LIBRARY_VERSION: [u32; 2] = [10, 0];
 /// `COMPRESS_ZIP | COMPRESS_ACTIVE_MASK`, which every build of OpenVDB reads; Blosc is optional.
 const COMPRESSION: u32 = 0x1 | 0x2;
 
-/// Path of a frame's grids from the cache's folder, with `/`: `grids/wave-city.0001.vdb`.
-pub fn file_name(shot: &str, frame: u32) -> String {
-    format!("grids/{shot}.{frame:04}.vdb")
-}
-
 /// Grids of one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grids {
@@ -89,6 +84,19 @@ pub fn encode(
         bytes: bytes.len() as u64,
         hash: blake3::hash(&bytes),
     })
+}
+
+/// A hash of the values as a file of this precision keeps them, whatever wrote it and of which frame.
+pub fn content_hash(grids: &Grids, precision: Precision) -> io::Result<blake3::Hash> {
+    let stamp = Stamp {
+        program: "",
+        program_version: "",
+        shot: "",
+        frame: 0,
+        time: 0.0,
+        origin: DVec3::ZERO,
+    };
+    encode(&mut io::sink(), &stamp, grids, precision).map(|written| written.hash)
 }
 
 /// Bytes of [`header`].

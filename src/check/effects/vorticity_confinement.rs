@@ -4,10 +4,10 @@ use glam::DVec3;
 
 use crate::{
     check::{
-        engine::{Io, State, Twin, twin},
+        engine::{Io, NONE, Outcome, State, Twin, names, twin},
         flip::FlipState,
         pbf::{PbfState, bounds::{Bounds, relative_speed}},
-        table::{Table, each, entries, pair},
+        table::{each, entries, pair},
     },
     compare::{
         rounding::{GRADIENT, ROOT, U},
@@ -17,8 +17,12 @@ use crate::{
         flip::{grid_confinement, grid_curl},
         pbf::effects::vorticity_confinement::{vorticity_curl, vorticity_force},
     },
-    solve::SolveError,
+    gpu::buffer::Buf,
+    solve::{flip, pbf},
 };
+
+/// Vorticity and its length, of particles or of cells.
+const VORTICITY: Buf<[f32; 4]> = Buf::new("vorticity");
 
 bounds! {
     ROTATION = [scale: "twice the gradient's scale, for the two products of a cross product",
@@ -54,51 +58,51 @@ entries! {
 }
 
 pub(super) const PBF: &[Twin<PbfState>] = &[
-    twin("effects/vorticity_curl", &[], curl),
-    twin("effects/vorticity_force", &["velocity"], force),
+    twin("effects/vorticity_curl", NONE, curl),
+    twin("effects/vorticity_force", || names![pbf::buffers::VELOCITY], force),
 ];
 
 pub(super) const FLIP: &[Twin<FlipState>] = &[
-    twin("effects/grid_curl", &[], curl_on_grid),
-    twin("effects/grid_confinement", &["face_velocity"], confine_on_grid),
+    twin("effects/grid_curl", NONE, curl_on_grid),
+    twin("effects/grid_confinement", || names![flip::buffers::FACE_VELOCITY], confine_on_grid),
 ];
 
-fn curl(state: &mut PbfState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let (points, velocity) = (state.moved(io)?, io.vectors_before("velocity", n)?);
+    let (points, velocity) = (state.moved(io)?, io.vectors_before(pbf::buffers::VELOCITY, n)?);
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = vorticity_curl(inputs, &velocity);
     let scale = 2.0 * inputs.model.calibration.gradient_scale;
-    let found = io.after::<[f32; 4]>("vorticity", n)?;
-    let vectors = io.vectors("vorticity", n)?;
+    let found = io.after(VORTICITY, n)?;
+    let vectors = io.vectors(VORTICITY, n)?;
     let errors = each(0..n, |i| {
         let sums = Bounds(inputs).sums(i, relative_speed(&velocity, i));
         ROTATION.of([scale, sums.gradient()])
     });
-    table.each(&CURL, 0..n, |i| pair(i, vectors[i], twin[i], [errors[i]]));
-    table.each(&LENGTH, 0..n, |i| {
+    io.table.each(&CURL, 0..n, |i| pair(i, vectors[i], twin[i], [errors[i]]));
+    io.table.each(&LENGTH, 0..n, |i| {
         let exact = twin[i].length();
         pair(i, found[i][3], exact, [errors[i], exact])
     });
     Ok(())
 }
 
-fn force(state: &mut PbfState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let Some(settings) = state.scene.effects.vorticity_confinement.clone() else {
         return Ok(());
     };
     let n = state.particles();
-    let (points, velocity) = (state.moved(io)?, io.vectors_before("velocity", n)?);
-    let vorticity = io.vectors_before("vorticity", n)?;
+    let (points, velocity) = (state.moved(io)?, io.vectors_before(pbf::buffers::VELOCITY, n)?);
+    let vorticity = io.vectors_before(VORTICITY, n)?;
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = vorticity_force(inputs, settings.strength, &vorticity, &velocity);
     let strength: Vec<f64> = vorticity.iter().map(|w| w.length()).collect();
     let scale = inputs.model.calibration.gradient_scale;
     let h = inputs.model.calibration.support_radius;
-    let found = io.vectors("velocity", n)?;
-    table.each(&VELOCITY, 0..n, |i| {
+    let found = io.vectors(pbf::buffers::VELOCITY, n)?;
+    io.table.each(&VELOCITY, 0..n, |i| {
         let bounds = Bounds(inputs);
         let other = |j: usize| strength.get(j).copied();
         let change = |j: usize| other(j).map_or(0.0, |w| (w - strength[i]).abs());
@@ -137,15 +141,11 @@ fn slope(bounds: &Bounds<'_>, strength: &[f64], i: usize) -> f64 {
     sum.length()
 }
 
-fn curl_on_grid(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let velocity = elements.planes_before(io, "face_velocity")?;
-    let found = io.after::<[f32; 4]>("vorticity", elements.cells)?;
-    let vectors = io.vectors("vorticity", elements.cells)?;
+    let velocity = elements.planes_before(io, flip::buffers::FACE_VELOCITY)?;
+    let found = io.after(VORTICITY, elements.cells)?;
+    let vectors = io.vectors(VORTICITY, elements.cells)?;
     let twin = grid_curl(&state.model, &elements.bricks, state.room(), &velocity);
     let size = state.model.cell_size();
     let error = |e: usize| {
@@ -155,28 +155,24 @@ fn curl_on_grid(
     };
     let errors = each(elements.active(), error);
     let error = |e: usize| errors[e - elements.active().start];
-    table.each(&GRID_VORTICITY, elements.active(), |e| {
+    io.table.each(&GRID_VORTICITY, elements.active(), |e| {
         pair(e, vectors[e], twin[e], [error(e)])
     });
-    table.each(&GRID_LENGTH, elements.active(), |e| {
+    io.table.each(&GRID_LENGTH, elements.active(), |e| {
         let exact = twin[e].length();
         pair(e, found[e][3], exact, [error(e), exact])
     });
     Ok(())
 }
 
-fn confine_on_grid(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let Some(settings) = &state.scene.effects.vorticity_confinement else {
         return Ok(());
     };
     let elements = state.elements();
-    let omega = io.vectors("vorticity", elements.cells)?;
-    let before = elements.planes_before(io, "face_velocity")?;
-    let found = elements.planes(io, "face_velocity")?;
+    let omega = io.vectors(VORTICITY, elements.cells)?;
+    let before = elements.planes_before(io, flip::buffers::FACE_VELOCITY)?;
+    let found = elements.planes(io, flip::buffers::FACE_VELOCITY)?;
     let step = state.step();
     let (model, room, strength) = (&state.model, state.room(), settings.strength);
     let twin = |omega: &[DVec3]| {
@@ -194,7 +190,7 @@ fn confine_on_grid(
     };
     let others = [1.0, -1.0].map(|sign| twin(&grown(sign)));
     let scale = step.length * strength * model.cell_size();
-    table.each(&GRID_VELOCITY, elements.active(), |e| {
+    io.table.each(&GRID_VELOCITY, elements.active(), |e| {
         let force = scale * elements.largest_about(e, |e| omega[e].length());
         let moved = others.iter().map(|other| other[e].distance(exact[e]));
         let moved = moved.fold(0.0, f64::max);

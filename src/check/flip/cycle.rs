@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use crate::{
     check::{
-        engine::{Io, Twin, twin},
-        table::{Entry, Table, each, pair},
+        engine::{Io, NONE, Outcome, Twin, twin},
+        table::{Entry, each, pair},
     },
     domain::bricks::CELLS,
     reference::poisson::multigrid::{
@@ -13,7 +13,7 @@ use crate::{
     },
     solve::{
         SolveError,
-        pressure::{PressureBrick, PressurePhase},
+        pressure::{PressureBrick, PressurePhase, buffers as solved},
     },
 };
 
@@ -21,23 +21,45 @@ use super::{FlipState, rows::*};
 
 /// Twins of the multigrid's passes.
 pub(super) const TWINS: &[Twin<FlipState>] = &[
-    twin("pressure/coarsen", &[], coarsen),
-    twin("pressure/smooth_first", &[], |state, io, table| {
-        smooth(state, io, table, &SMOOTHED_FIRST, About::Nothing)
+    of_level("pressure/coarsen", coarsen),
+    of_level("pressure/smooth_first", |state, io| {
+        smooth(state, io, &SMOOTHED_FIRST, About::Nothing)
     }),
-    twin("pressure/smooth", &[], |state, io, table| {
-        // The last sweep of a cycle leaves the sums; a cycle has any number of them.
-        if state.is_turn(io)? && state.is_early() {
-            state.note_sum(io, ["pressure_residual", "pressure_correction"])?;
-        }
-        smooth(state, io, table, &SMOOTHED, About::Corrections)
+    Twin {
+        is_due: |state, io| {
+            // The last sweep of a cycle leaves the sums; a cycle has any number of them.
+            if state.is_turn(io)? && state.is_early() {
+                state.note_sum(io, solved::RESIDUAL, solved::CORRECTION)?;
+            }
+            is_due(state, io)
+        },
+        ..twin("pressure/smooth", NONE, |state, io| {
+            smooth(state, io, &SMOOTHED, About::Corrections)
+        })
+    },
+    of_level("pressure/smooth_corrected", |state, io| {
+        smooth(state, io, &SMOOTHED_CORRECTED, About::WithAbove)
     }),
-    twin("pressure/smooth_corrected", &[], |state, io, table| {
-        smooth(state, io, table, &SMOOTHED_CORRECTED, About::WithAbove)
-    }),
-    twin("pressure/restrict", &[], restrict),
-    twin("pressure/solve_coarse", &[], solve_coarse),
+    of_level("pressure/restrict", restrict),
+    of_level("pressure/solve_coarse", solve_coarse),
 ];
+
+/// A twin of which the first few runs on each level are compared.
+const fn of_level(
+    pass: &'static str,
+    compare: fn(&mut FlipState, &mut Io<'_>) -> Outcome,
+) -> Twin<FlipState> {
+    Twin {
+        is_due,
+        ..twin(pass, NONE, compare)
+    }
+}
+
+fn is_due(state: &mut FlipState, io: &Io<'_>) -> Result<bool, SolveError> {
+    let level = io.window(&solved::PHASES)?.level;
+    let is_turn = io.pass() == "pressure/coarsen" || state.is_turn(io)?;
+    Ok(is_turn && state.is_due(io, level))
+}
 
 /// The levels as the pass left them.
 struct Cycle {
@@ -47,40 +69,36 @@ struct Cycle {
 }
 
 impl Cycle {
-    /// What the pass runs on, as often on each level as other passes are compared; `None` where it is not its turn.
-    fn of(state: &mut FlipState, io: &Io<'_>) -> Result<Option<Self>, SolveError> {
-        let phase = io.uniform::<PressurePhase>("phase")?;
-        let is_turn = io.pass() == "pressure/coarsen" || state.is_turn(io)?;
-        if !(is_turn && state.is_due(io, phase.level)) {
-            return Ok(None);
-        }
+    fn of(state: &FlipState, io: &Io<'_>) -> Result<Self, SolveError> {
+        let phase = io.window(&solved::PHASES)?;
+        let reals = |buffer, cells| io.reals(&buffer, state.precision(), cells);
         let level = |&[first, count, ..]: &[u32; 4]| first..first + count;
         let all = &phase.levels[..=phase.last_level as usize];
         let levels: Vec<Range<u32>> = all.iter().map(level).collect();
         let slots = levels[phase.last_level as usize].end as usize;
         let (cells, stride) = (slots * CELLS as usize, phase.stride as usize);
-        let planes = io.after::<f32>("pressure_coefficient", 2 * stride + cells)?;
-        let bricks = io.after::<PressureBrick>("pressure_bricks", slots)?;
+        let planes = io.after(solved::COEFFICIENT, 2 * stride + cells)?;
+        let bricks = io.after(solved::BRICKS, slots)?;
         let brick = |brick: &PressureBrick| Brick {
             faces: brick.faces,
             above: brick.above,
         };
-        Ok(Some(Self {
+        Ok(Self {
             phase,
             levels: Levels {
                 levels,
                 bricks: bricks.iter().map(brick).collect(),
                 coefficient: [0, 1, 2].map(|axis| planes[axis * stride..][..cells].to_vec()),
-                dirichlet: state.reals(io, "pressure_dirichlet", cells)?,
-                residual: state.reals(io, "pressure_residual", cells)?,
-                correction: state.reals(io, "pressure_correction", cells)?,
+                dirichlet: reals(solved::DIRICHLET, cells)?,
+                residual: reals(solved::RESIDUAL, cells)?,
+                correction: reals(solved::CORRECTION, cells)?,
             },
             rounding: Rounding {
                 unit: state.unit(),
                 block: OF_BLOCK.of,
                 restricted: OF_RESTRICTION.of,
             },
-        }))
+        })
     }
 
     fn level(&self) -> usize {
@@ -93,16 +111,8 @@ impl Cycle {
     }
 }
 
-fn smooth(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-    entry: &'static Entry<1>,
-    about: About,
-) -> Result<(), SolveError> {
-    let Some(cycle) = Cycle::of(state, io)? else {
-        return Ok(());
-    };
+fn smooth(state: &FlipState, io: &mut Io<'_>, entry: &'static Entry<1>, about: About) -> Outcome {
+    let cycle = Cycle::of(state, io)?;
     let (levels, blocks) = (&cycle.levels, cycle.blocks());
     let solved = each(0..blocks.len(), |k| {
         let solved = levels.solved(cycle.level(), blocks[k], about, cycle.rounding, [0.0; 8]);
@@ -114,55 +124,49 @@ fn smooth(
         });
         pairs.unwrap_or([None; 8])
     });
-    table.add(entry, solved.into_iter().flatten());
+    io.table.add(entry, solved.into_iter().flatten());
     Ok(())
 }
 
-fn restrict(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    let Some(cycle) = Cycle::of(state, io)? else {
-        return Ok(());
-    };
+fn restrict(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let cycle = Cycle::of(state, io)?;
     let blocks = cycle.blocks().into_iter();
     let above = |block| (cycle.levels).restricted(cycle.level(), block, cycle.rounding);
     let pairs = blocks.flat_map(above).map(|cell| {
         let found = cycle.levels.residual[cell.place];
         pair(cell.place, found, cell.value, [cell.error])
     });
-    table.add(&RESTRICTED, pairs);
+    io.table.add(&RESTRICTED, pairs);
     Ok(())
 }
 
 /// All corrections that the pass leaves, and the residuals that it hands down.
-fn solve_coarse(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    let Some(cycle) = Cycle::of(state, io)? else {
-        return Ok(());
-    };
+fn solve_coarse(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let cycle = Cycle::of(state, io)?;
     let levels = &cycle.levels;
     let Range { start, end } = levels.levels[cycle.level()];
     let [corrections, residuals] =
         [start, end].map(|slot| (CELLS * slot) as usize..levels.correction.len());
     let Some([values, errors]) = levels.solve_coarse(cycle.level(), cycle.rounding) else {
-        table.leave_out(&COARSE_SOLVED, corrections.len());
-        table.leave_out(&COARSE_RESIDUAL, residuals.len());
+        io.table.leave_out(&COARSE_SOLVED, corrections.len());
+        io.table.leave_out(&COARSE_RESIDUAL, residuals.len());
         return Ok(());
     };
-    table.each(&COARSE_SOLVED, corrections, |at| {
+    io.table.each(&COARSE_SOLVED, corrections, |at| {
         let found = levels.correction[at];
         pair(at, found, values.correction[at], [errors.correction[at]])
     });
-    table.each(&COARSE_RESIDUAL, residuals, |at| {
+    io.table.each(&COARSE_RESIDUAL, residuals, |at| {
         let found = levels.residual[at];
         pair(at, found, values.residual[at], [errors.residual[at]])
     });
     Ok(())
 }
 
-fn coarsen(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    let Some(cycle) = Cycle::of(state, io)? else {
-        return Ok(());
-    };
+fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let cycle = Cycle::of(state, io)?;
     let (levels, unit) = (&cycle.levels, state.unit());
-    let kinds = io.after::<u32>("pressure_block", levels.bricks.len() * 64)?;
+    let kinds = io.after(solved::BLOCK, levels.bricks.len() * 64)?;
     let (mut shared, mut airs) = (Vec::new(), Vec::new());
     let mut full = vec![[true; 2]; kinds.len()];
     let mut is_child = vec![false; kinds.len()];
@@ -194,8 +198,8 @@ fn coarsen(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), 
             _ => 2,
         })
         .collect();
-    table.add(&COARSE_COEFFICIENT, shared);
-    table.add(&COARSE_AIR, airs);
-    table.add_exact(&COARSE_KIND, &found, &expected);
+    io.table.add(&COARSE_COEFFICIENT, shared);
+    io.table.add(&COARSE_AIR, airs);
+    io.table.add_exact(&COARSE_KIND, &found, &expected);
     Ok(())
 }

@@ -5,15 +5,22 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::{
-    check::engine::Io,
+    check::engine::{Io, names},
     domain::bricks::{Bricks, CELLS},
+    gpu::buffer::Buf,
     reference::flip::Faces,
     scene::step::Substep,
-    solve::SolveError,
+    solve::{SolveError, flip::buffers},
 };
 
 /// What [`Elements::faces_before`] reads.
-pub(super) const FACES: &[&str] = &["face_velocity", "face_change", "face_layer"];
+pub(super) fn faces_kept() -> Vec<String> {
+    names![
+        buffers::FACE_VELOCITY,
+        buffers::FACE_CHANGE,
+        buffers::FACE_LAYER
+    ]
+}
 
 /// Where the elements of a substep lie.
 pub(in crate::check) struct Elements {
@@ -48,26 +55,26 @@ impl Elements {
     }
 
     /// An array of cells.
-    pub(super) fn scalars(&self, io: &Io<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
-        io.scalars(name, self.cells)
+    pub(super) fn scalars(&self, io: &Io<'_>, buffer: Buf<f32>) -> Result<Vec<f64>, SolveError> {
+        io.scalars(buffer, self.cells)
     }
 
     /// Three planes as one vector a cell.
     pub(in crate::check) fn planes(
         &self,
         io: &Io<'_>,
-        name: &str,
+        buffer: Buf<f32>,
     ) -> Result<Vec<DVec3>, SolveError> {
-        Ok(self.joined(&io.after(name, 2 * self.stride + self.cells)?))
+        Ok(self.joined(&io.after(buffer, 2 * self.stride + self.cells)?))
     }
 
     /// The same from before the pass.
     pub(in crate::check) fn planes_before(
         &self,
         io: &Io<'_>,
-        name: &str,
+        buffer: Buf<f32>,
     ) -> Result<Vec<DVec3>, SolveError> {
-        Ok(self.joined(&io.before(name, 2 * self.stride + self.cells)?))
+        Ok(self.joined(&io.before(buffer, 2 * self.stride + self.cells)?))
     }
 
     fn joined(&self, values: &[f32]) -> Vec<DVec3> {
@@ -80,9 +87,9 @@ impl Elements {
     /// Velocities, changes and layers at faces.
     pub(super) fn faces(&self, io: &Io<'_>) -> Result<Faces, SolveError> {
         Ok(Faces {
-            velocity: self.planes(io, "face_velocity")?,
-            change: self.planes(io, "face_change")?,
-            layer: io.after("face_layer", self.cells)?,
+            velocity: self.planes(io, buffers::FACE_VELOCITY)?,
+            change: self.planes(io, buffers::FACE_CHANGE)?,
+            layer: io.after(buffers::FACE_LAYER, self.cells)?,
             weight: Vec::new(),
         })
     }
@@ -90,9 +97,9 @@ impl Elements {
     /// The same from before the pass.
     pub(super) fn faces_before(&self, io: &Io<'_>) -> Result<Faces, SolveError> {
         Ok(Faces {
-            velocity: self.planes_before(io, "face_velocity")?,
-            change: self.planes_before(io, "face_change")?,
-            layer: io.before("face_layer", self.cells)?,
+            velocity: self.planes_before(io, buffers::FACE_VELOCITY)?,
+            change: self.planes_before(io, buffers::FACE_CHANGE)?,
+            layer: io.before(buffers::FACE_LAYER, self.cells)?,
             weight: Vec::new(),
         })
     }

@@ -4,9 +4,9 @@ use glam::DVec3;
 
 use crate::{
     check::{
-        engine::Io,
+        engine::{Io, Outcome},
         pbf::GRID,
-        table::{Table, each, pair},
+        table::{each, pair},
     },
     domain::{boundary::Boundary, signed_distance::SignedDistance},
     reference::flip::{
@@ -15,7 +15,7 @@ use crate::{
         gather_faces as twin_gather_faces,
     },
     scene::flip::Surface,
-    solve::SolveError,
+    solve::flip::buffers,
 };
 
 use super::{FlipState, elements::neighborhood, rows::*};
@@ -82,11 +82,7 @@ impl FlipState {
     }
 }
 
-pub(super) fn cut_cells(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let has_moving = !state.boundary.moving.is_empty();
     let has_solids = state.boundary.distance.is_some() || has_moving;
     let (elements, step) = (state.elements(), state.step());
@@ -105,15 +101,15 @@ pub(super) fn cut_cells(
         .map(|k| state.shifted_room(0.0, DVec3::new(side(k, 0), side(k, 1), side(k, 2))))
         .collect();
     let room = Room {
-        kind: io.after("cell_kind", elements.cells)?,
-        open: elements.planes(io, "face_open")?,
-        solid_flux: elements.scalars(io, "solid_flux")?,
+        kind: io.after(buffers::CELL_KIND, elements.cells)?,
+        open: elements.planes(io, buffers::FACE_OPEN)?,
+        solid_flux: elements.scalars(io, buffers::SOLID_FLUX)?,
         volume: match has_solids {
-            true => elements.scalars(io, "open_volume")?,
+            true => elements.scalars(io, buffers::OPEN_VOLUME)?,
             false => twin.volume.clone(),
         },
         closed_velocity: match has_moving {
-            true => elements.planes(io, "closed_velocity")?,
+            true => elements.planes(io, buffers::CLOSED_VELOCITY)?,
             false => twin.closed_velocity.clone(),
         },
     };
@@ -122,15 +118,15 @@ pub(super) fn cut_cells(
     let solid = step.solids.iter().map(|s| s.velocity.length());
     let speed = solid.fold(wall[0].max(wall[1]), f64::max);
     let moved = |of: &dyn Fn(&Room) -> f64| others.iter().map(of).fold(0.0, f64::max);
-    table.each(&KIND, elements.active(), |e| {
+    io.table.each(&KIND, elements.active(), |e| {
         let is_tie = others.iter().any(|other| other.kind[e] != twin.kind[e]);
         (!is_tie).then(|| pair(e, room.kind[e], f64::from(twin.kind[e]), []))
     });
-    table.each(&OPEN, elements.active(), |e| {
+    io.table.each(&OPEN, elements.active(), |e| {
         let moved = moved(&|other| other.open[e].distance(twin.open[e]));
         pair(e, room.open[e], twin.open[e], [cut, moved])
     });
-    table.each(&FLUX, elements.active(), |e| {
+    io.table.each(&FLUX, elements.active(), |e| {
         let moved = moved(&|other| (other.solid_flux[e] - twin.solid_flux[e]).abs());
         pair(
             e,
@@ -140,13 +136,13 @@ pub(super) fn cut_cells(
         )
     });
     if has_solids {
-        table.each(&VOLUME, elements.active(), |e| {
+        io.table.each(&VOLUME, elements.active(), |e| {
             let moved = moved(&|other| (other.volume[e] - twin.volume[e]).abs());
             pair(e, room.volume[e], twin.volume[e], [cut, moved])
         });
     }
     if has_moving {
-        table.each(&CLOSED, elements.active(), |e| {
+        io.table.each(&CLOSED, elements.active(), |e| {
             let exact = twin.closed_velocity[e];
             let mut answers = others.iter().chain(&rounded);
             let is_tie = answers.any(|other| other.closed_velocity[e] != exact);
@@ -158,12 +154,8 @@ pub(super) fn cut_cells(
 }
 
 /// After the last of the three axes.
-pub(super) fn gather_faces(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
-    if io.uniform::<u32>("axis")? < 2 {
+pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    if io.window(&buffers::AXES)?[0] < 2 {
         return Ok(());
     }
     let (elements, step) = (state.elements(), state.step());
@@ -186,10 +178,10 @@ pub(super) fn gather_faces(
     let active = elements.active();
     let errors = each(active.clone(), error);
     let error = |e: usize| errors[e - active.start];
-    table.each(&OLD, active.clone(), |e| {
+    io.table.each(&OLD, active.clone(), |e| {
         pair(e, found.change[e], twin.change[e], [error(e)])
     });
-    table.each(&NEW, active.clone(), |e| {
+    io.table.each(&NEW, active.clone(), |e| {
         let magnitudes = [
             error(e),
             step.velocity_step.length(),
@@ -197,15 +189,12 @@ pub(super) fn gather_faces(
         ];
         pair(e, found.velocity[e], twin.velocity[e], magnitudes)
     });
-    table.add_exact(&KNOWN, &found.layer[active.clone()], &twin.layer[active]);
+    io.table
+        .add_exact(&KNOWN, &found.layer[active.clone()], &twin.layer[active]);
     Ok(())
 }
 
-pub(super) fn gather_centers(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let settings = state.model.settings();
     let (elements, step, room) = (state.elements(), state.step(), state.room());
     let bricks = &elements.bricks;
@@ -229,19 +218,19 @@ pub(super) fn gather_centers(
     let active = elements.active();
     let errors = each(active.clone(), error);
     let error = |e: usize| errors[e - active.start];
-    let density = elements.scalars(io, "density")?;
-    table.each(&RELATIVE_DENSITY, active.clone(), |e| {
+    let density = elements.scalars(io, buffers::DENSITY)?;
+    io.table.each(&RELATIVE_DENSITY, active.clone(), |e| {
         pair(e, density[e], twin.density[e], [error(e)])
     });
     if settings.density_correction {
-        let excess = elements.scalars(io, "density_excess")?;
-        table.each(&EXCESS, active.clone(), |e| {
+        let excess = elements.scalars(io, buffers::DENSITY_EXCESS)?;
+        io.table.each(&EXCESS, active.clone(), |e| {
             pair(e, excess[e], twin.excess[e], [error(e)])
         });
     }
     if settings.surface == Surface::GhostFluid {
-        let distance = elements.scalars(io, "liquid_distance")?;
-        table.each(&DISTANCE, active.clone(), |e| {
+        let distance = elements.scalars(io, buffers::LIQUID_DISTANCE)?;
+        io.table.each(&DISTANCE, active.clone(), |e| {
             let exact = twin.distance[e];
             let moved = surface_moved(exact / size, error(e));
             pair(e, distance[e], exact, [moved, size])
@@ -250,31 +239,24 @@ pub(super) fn gather_centers(
     Ok(())
 }
 
-pub(super) fn find_change(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
     let mut twin = elements.faces_before(io)?;
     let before = twin.change.clone();
     twin_find_change(&state.model, &elements.bricks, state.room(), &mut twin);
     let found = elements.faces(io)?;
     let active = elements.active();
-    table.each(&CHANGE, active.clone(), |e| {
+    io.table.each(&CHANGE, active.clone(), |e| {
         let size = twin.velocity[e].length() + before[e].length();
         pair(e, found.change[e], twin.change[e], [size])
     });
-    table.add_exact(&LAYER, &found.layer[active.clone()], &twin.layer[active]);
+    io.table
+        .add_exact(&LAYER, &found.layer[active.clone()], &twin.layer[active]);
     Ok(())
 }
 
-pub(super) fn extrapolate(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
-    let layer = io.uniform::<u32>("layer")?;
+pub(super) fn extrapolate(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let layer = io.window(&buffers::LAYERS)?[0];
     let (elements, step) = (state.elements(), state.step());
     if layer > step.layers as u32 {
         return Ok(());
@@ -295,13 +277,13 @@ pub(super) fn extrapolate(
         sides.fold(step.velocity_step.length(), f64::max)
     };
     let active = elements.active();
-    table.each(&SPREAD_VELOCITY, active.clone(), |e| {
+    io.table.each(&SPREAD_VELOCITY, active.clone(), |e| {
         pair(e, found.velocity[e], twin.velocity[e], [largest(e)])
     });
-    table.each(&SPREAD_CHANGE, active.clone(), |e| {
+    io.table.each(&SPREAD_CHANGE, active.clone(), |e| {
         pair(e, found.change[e], twin.change[e], [largest(e)])
     });
-    table.add_exact(
+    io.table.add_exact(
         &SPREAD_LAYER,
         &found.layer[active.clone()],
         &twin.layer[active],

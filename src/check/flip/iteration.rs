@@ -2,10 +2,11 @@
 
 use crate::{
     check::{
-        engine::{Io, Twin, twin},
-        table::{Table, pair},
+        engine::{Io, NONE, Outcome, Twin, names, twin},
+        table::pair,
     },
     domain::{bricks::CELLS, poisson::remove_means},
+    gpu::buffer::Buf,
     reference::poisson::iteration::{
         Decision, Limits, Progress, SolveState, Sum, differences, ipp_lower as twin_ipp_lower,
         ipp_upper as twin_ipp_upper, products, verify as twin_verify,
@@ -14,8 +15,8 @@ use crate::{
     solve::{
         SolveError,
         pressure::{
-            DONE, ITERATING, PressureControl64, PressurePhase, PressureStats, VERIFYING,
-            WANTS_POCKETS, blocked, control_words, widen_control,
+            DONE, ITERATING, PressureControl64, ReduceStep, VERIFYING, WANTS_POCKETS, blocked,
+            buffers::{self as solved, Real},
         },
     },
 };
@@ -24,30 +25,51 @@ use super::{FlipState, rows::*};
 
 /// Twins of the passes of an iteration.
 pub(super) const TWINS: &[Twin<FlipState>] = &[
-    twin("pressure/precondition", &[], precondition),
-    twin("pressure/ipp_lower", &[], ipp_lower),
-    twin("pressure/ipp_upper", &[], ipp_upper),
-    twin("pressure/direction", &["pressure_direction"], direction),
-    twin(
+    early("pressure/precondition", NONE, precondition),
+    early("pressure/ipp_lower", NONE, ipp_lower),
+    early("pressure/ipp_upper", NONE, ipp_upper),
+    early(
+        "pressure/direction",
+        || names![solved::DIRECTION],
+        direction,
+    ),
+    early(
         "pressure/advance",
-        &["pressure_solution", "pressure_residual"],
+        || names![solved::SOLUTION, solved::RESIDUAL],
         advance,
     ),
-    twin("pressure/verify", &[], verify),
-    twin("pressure/center", &["values"], center),
-    twin("pressure/reduce", &["pressure_control"], reduce),
-    twin("pressure/count_pockets", &[], count_pockets),
+    early("pressure/verify", NONE, verify),
+    early("pressure/center", || names![VALUES], center),
+    twin("pressure/reduce", || names![solved::CONTROL], reduce),
+    twin("pressure/count_pockets", NONE, count_pockets),
 ];
+
+/// What `pressure/center` takes the mean of.
+const VALUES: Buf<Real> = Buf::new("values");
+
+/// A twin of which the first few runs that are not empty are compared.
+const fn early(
+    pass: &'static str,
+    keeps: fn() -> Vec<String>,
+    compare: fn(&mut FlipState, &mut Io<'_>) -> Outcome,
+) -> Twin<FlipState> {
+    Twin {
+        is_due: |state, io| Ok(state.is_turn(io)? && state.is_due(io, 0)),
+        ..twin(pass, keeps, compare)
+    }
+}
 
 /// Runs of an iteration's pass that are compared: each is as good as any.
 pub(super) const PRODUCTS: usize = 3;
 
-/// Steps of `pressure/reduce`, as in the shader.
-const BEGIN: u32 = 0;
-const DIRECTION: u32 = 1;
-const LENGTH: u32 = 2;
-const CHECK: u32 = 3;
-const VERIFIED: u32 = 4;
+/// Steps of `pressure/reduce` by their numbers.
+const STEPS: [ReduceStep; 5] = [
+    ReduceStep::Begin,
+    ReduceStep::Direction,
+    ReduceStep::Length,
+    ReduceStep::Check,
+    ReduceStep::Verified,
+];
 
 // The device's states have the twin's numbers.
 const _: () = assert!(
@@ -77,97 +99,84 @@ impl FlipState {
         Ok(match io.pass() {
             // A solve among pockets begins with a verification.
             "pressure/verify" => state == VERIFYING || io.last == "pressure/center",
-            "pressure/center" => match (io.buffer("values"), io.last) {
-                ("pressure_rhs", _) => true,
-                ("pressure_residual", "pressure/verify") => state == VERIFYING,
-                _ => state == ITERATING,
-            },
+            "pressure/center" => {
+                let values = VALUES;
+                let buffer = io.buffer(values.name());
+                let is_verified = io.last == "pressure/verify" && buffer == solved::RESIDUAL.name();
+                let wanted = if is_verified { VERIFYING } else { ITERATING };
+                buffer == solved::RHS.name() || state == wanted
+            }
             _ => state == ITERATING,
         })
     }
 
     /// What the bricks' sums of products of two arrays come to.
-    pub(super) fn note_sum(&mut self, io: &Io<'_>, names: [&str; 2]) -> Result<(), SolveError> {
-        let [a, b] = [self.by_row(io, names[0])?, self.by_row(io, names[1])?];
+    pub(super) fn note_sum(&mut self, io: &Io<'_>, a: Buf<Real>, b: Buf<Real>) -> Outcome {
+        let [a, b] = [self.by_row(io, a)?, self.by_row(io, b)?];
         self.sum = Some(products(&a, &b));
         Ok(())
     }
 }
 
-fn precondition(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    if !(state.is_turn(io)? && state.is_due(io, 0)) {
-        return Ok(());
-    }
+fn precondition(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let unit = state.unit();
-    let r = state.by_row(io, "pressure_residual")?;
-    let z = state.by_row(io, "pressure_correction")?;
+    let r = state.by_row(io, solved::RESIDUAL)?;
+    let z = state.by_row(io, solved::CORRECTION)?;
     if state.model.settings().pressure.preconditioner == Preconditioner::Jacobi {
-        let d = state.by_row(io, "pressure_inverse_diagonal")?;
-        state.add_rows(table, &PRECONDITIONED, |i| {
+        let d = state.by_row(io, solved::INVERSE_DIAGONAL)?;
+        state.add_rows(io.table, &PRECONDITIONED, |i| {
             (z[i], d[i] * r[i], [unit, (d[i] * r[i]).abs()])
         });
     } else {
-        state.add_rows(table, &PRECONDITIONED, |i| (z[i], r[i], [unit, 0.0]));
+        state.add_rows(io.table, &PRECONDITIONED, |i| (z[i], r[i], [unit, 0.0]));
     }
     state.sum = Some(products(&r, &z));
     Ok(())
 }
 
-fn ipp_lower(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    if !(state.is_turn(io)? && state.is_due(io, 0)) {
-        return Ok(());
-    }
+fn ipp_lower(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let unit = state.unit();
-    let r = state.by_row(io, "pressure_residual")?;
-    let d = state.by_row(io, "pressure_inverse_diagonal")?;
-    let half = state.by_row(io, "pressure_product")?;
+    let r = state.by_row(io, solved::RESIDUAL)?;
+    let d = state.by_row(io, solved::INVERSE_DIAGONAL)?;
+    let half = state.by_row(io, solved::PRODUCT)?;
     let twin = twin_ipp_lower(state.system(), &d, &r);
-    state.add_rows(table, &IPP_LOWER, |i| {
+    state.add_rows(io.table, &IPP_LOWER, |i| {
         (half[i], twin[i].value, [unit, d[i], twin[i].size])
     });
     Ok(())
 }
 
-fn ipp_upper(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    if !(state.is_turn(io)? && state.is_due(io, 0)) {
-        return Ok(());
-    }
+fn ipp_upper(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let unit = state.unit();
-    let d = state.by_row(io, "pressure_inverse_diagonal")?;
-    let half = state.by_row(io, "pressure_product")?;
-    let z = state.by_row(io, "pressure_correction")?;
+    let d = state.by_row(io, solved::INVERSE_DIAGONAL)?;
+    let half = state.by_row(io, solved::PRODUCT)?;
+    let z = state.by_row(io, solved::CORRECTION)?;
     let twin = twin_ipp_upper(state.system(), &d, &half);
-    state.add_rows(table, &IPP_UPPER, |i| {
+    state.add_rows(io.table, &IPP_UPPER, |i| {
         (z[i], twin[i].value, [unit, twin[i].size])
     });
-    state.note_sum(io, ["pressure_residual", "pressure_correction"])
+    state.note_sum(io, solved::RESIDUAL, solved::CORRECTION)
 }
 
-fn direction(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    if !(state.is_turn(io)? && state.is_due(io, 0)) {
-        return Ok(());
-    }
+fn direction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (unit, beta) = (state.unit(), state.control(io)?.beta);
-    let before = state.by_row_before(io, "pressure_direction")?;
-    let z = state.by_row(io, "pressure_correction")?;
-    let p = state.by_row(io, "pressure_direction")?;
-    state.add_rows(table, &DIRECTED, |i| {
+    let before = state.by_row_before(io, solved::DIRECTION)?;
+    let z = state.by_row(io, solved::CORRECTION)?;
+    let p = state.by_row(io, solved::DIRECTION)?;
+    state.add_rows(io.table, &DIRECTED, |i| {
         let kept = beta * before[i];
         (p[i], z[i] + kept, [unit, z[i].abs() + kept.abs()])
     });
     Ok(())
 }
 
-fn advance(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    if !(state.is_turn(io)? && state.is_due(io, 0)) {
-        return Ok(());
-    }
+fn advance(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (unit, alpha) = (state.unit(), state.control(io)?.alpha);
-    let p = state.by_row(io, "pressure_direction")?;
-    let q = state.by_row(io, "pressure_product")?;
-    let [before, terms] = [state.terms(io, true)?, state.terms(io, false)?];
+    let p = state.by_row(io, solved::DIRECTION)?;
+    let q = state.by_row(io, solved::PRODUCT)?;
+    let [before, terms] = [state.terms_before(io)?, state.terms(io)?];
     let at = |terms: &[Vec<f64>], i: usize| terms.iter().map(|term| term[i]).sum::<f64>();
-    state.add_rows(table, &ADVANCED_SOLUTION, |i| {
+    state.add_rows(io.table, &ADVANCED_SOLUTION, |i| {
         let way = alpha * p[i];
         let magnitudes = match &terms[..] {
             [large, small, ..] => {
@@ -178,9 +187,9 @@ fn advance(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), 
         };
         (at(&terms, i), at(&before, i) + way, magnitudes)
     });
-    let old = state.by_row_before(io, "pressure_residual")?;
-    let r = state.by_row(io, "pressure_residual")?;
-    state.add_rows(table, &ADVANCED_RESIDUAL, |i| {
+    let old = state.by_row_before(io, solved::RESIDUAL)?;
+    let r = state.by_row(io, solved::RESIDUAL)?;
+    state.add_rows(io.table, &ADVANCED_RESIDUAL, |i| {
         let way = alpha * q[i];
         (r[i], old[i] - way, [unit, old[i].abs() + way.abs()])
     });
@@ -188,17 +197,14 @@ fn advance(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), 
     Ok(())
 }
 
-fn verify(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    if !(state.is_turn(io)? && state.is_due(io, 0)) {
-        return Ok(());
-    }
-    let (terms, unit) = (state.terms(io, false)?, state.unit());
-    let b = state.by_row(io, "pressure_rhs")?;
-    let r = state.by_row(io, "pressure_residual")?;
+fn verify(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let (terms, unit) = (state.terms(io)?, state.unit());
+    let b = state.by_row(io, solved::RHS)?;
+    let r = state.by_row(io, solved::RESIDUAL)?;
     let system = state.system();
     let twin = twin_verify(system, &b, &terms);
     let errors: Vec<_> = terms.iter().map(|term| differences(system, term)).collect();
-    state.add_rows(table, &VERIFIED_RESIDUAL, |i| {
+    state.add_rows(io.table, &VERIFIED_RESIDUAL, |i| {
         let error = errors.iter().map(|error| error[i]).sum();
         (r[i], twin[i].value, [unit, error, twin[i].size])
     });
@@ -206,13 +212,10 @@ fn verify(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), S
     Ok(())
 }
 
-fn center(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    if !(state.is_turn(io)? && state.is_due(io, 0)) {
-        return Ok(());
-    }
+fn center(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let unit = state.unit();
-    let before = state.by_row_before(io, "values")?;
-    let found = state.by_row(io, "values")?;
+    let before = state.by_row_before(io, VALUES)?;
+    let found = state.by_row(io, VALUES)?;
     let pockets = state.system().pockets();
     let mut exact = before.clone();
     remove_means(&mut exact, &pockets);
@@ -223,7 +226,7 @@ fn center(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), S
             means[i as usize] = [pocket.len() as f64, size];
         }
     }
-    state.add_rows(table, &CENTERED, |i| {
+    state.add_rows(io.table, &CENTERED, |i| {
         let [n, size] = means[i];
         // Outside of pockets nothing is done.
         let value = if size > 0.0 { before[i].abs() } else { 0.0 };
@@ -233,10 +236,10 @@ fn center(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), S
 }
 
 /// A pocket's cells have its least element for a label, all else 0.
-fn count_pockets(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+fn count_pockets(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let wet = state.elements().wet();
-    let labels = io.after::<u32>("pressure_label", wet.end)?;
-    let counted = io.one::<PressureStats>("pressure_stats")?.pockets;
+    let labels = io.after(solved::LABEL, wet.end)?;
+    let counted = io.one(solved::STATS)?.pockets;
     let system = state.system();
     let pockets = system.pockets();
     let mut expected = vec![0; wet.end];
@@ -248,26 +251,28 @@ fn count_pockets(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Resul
         }
     }
     let first = CELLS as usize;
-    table.add_exact(&LABELS, &labels[first..], &expected[first..]);
-    table.add_exact(&POCKETS, &[counted], &[pockets.len() as u32]);
+    io.table
+        .add_exact(&LABELS, &labels[first..], &expected[first..]);
+    io.table
+        .add_exact(&POCKETS, &[counted], &[pockets.len() as u32]);
     Ok(())
 }
 
 /// The bricks' sums and what follows from them.
-fn reduce(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    let phase = io.uniform::<PressurePhase>("phase")?;
+fn reduce(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let phase = io.window(&solved::PHASES)?;
     let before = state.control(io)?;
-    let wanted = match phase.step {
-        VERIFIED => VERIFYING,
+    let step = STEPS[phase.step as usize];
+    let wanted = match step {
+        ReduceStep::Verified => VERIFYING,
         _ => ITERATING,
     };
-    let is_turn = phase.step == BEGIN || before.state == wanted;
+    let is_turn = matches!(step, ReduceStep::Begin) || before.state == wanted;
     let Some(Sum { value, size }) = state.sum.take().filter(|_| is_turn) else {
         return Ok(());
     };
-    let words = io.after::<u32>("pressure_control", control_words(state.precision()))?;
-    let after = widen_control(&words, state.precision());
-    let found = io.one::<PressureStats>("pressure_stats")?.pockets;
+    let after = io.control(state.precision())?;
+    let found = io.one(solved::STATS)?.pockets;
     let unit = state.unit();
     let slack = OF_SUM.of([unit, f64::from(phase.sum_count), size]);
     let target = f64::from(phase.tolerance_square) * before.rhs_square;
@@ -276,13 +281,13 @@ fn reduce(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), S
         iterations: phase.max_iterations,
     };
     let sum = |found: f64| (found, value, [slack, 0.0, 0.0]);
-    let (decision, scalars, near) = match phase.step {
-        BEGIN => {
+    let (decision, scalars, near) = match step {
+        ReduceStep::Begin => {
             let wants_pockets = phase.has_pockets == 0 && found > 0;
             let scalars = vec![sum(after.rhs_square), sum(after.residual_square)];
             (Decision::Begin { wants_pockets }, scalars, None)
         }
-        DIRECTION => {
+        ReduceStep::Direction => {
             let [beta, error] = match before.is_first {
                 1 => [0.0; 2],
                 _ => {
@@ -293,23 +298,23 @@ fn reduce(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), S
             let scalars = vec![sum(after.product), (after.beta, beta, [0.0, 0.0, error])];
             (Decision::Direction, scalars, Some(0.0))
         }
-        LENGTH => {
+        ReduceStep::Length => {
             let alpha = before.product / value;
             let error = OF_ALPHA.of([alpha.abs(), QUOTIENT.of([slack, value, unit])]);
             let scalars = vec![(after.alpha, alpha, [0.0, error, 0.0])];
             (Decision::Length, scalars, Some(0.0))
         }
-        CHECK => {
+        ReduceStep::Check => {
             let scalars = vec![sum(after.residual_square)];
             (Decision::Check(limits), scalars, Some(target))
         }
-        _ => {
+        ReduceStep::Verified => {
             let scalars = vec![sum(after.residual_square)];
             (Decision::Verified(limits), scalars, Some(target))
         }
     };
     let pairs = scalars.into_iter().enumerate();
-    table.add(
+    io.table.add(
         &SCALARS,
         pairs.map(|(k, (found, exact, magnitudes))| pair(k, found, exact, magnitudes)),
     );
@@ -318,7 +323,7 @@ fn reduce(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), S
         value - target <= room && (target == 0.0 || target - value <= room)
     };
     if near.is_some_and(is_near) {
-        table.leave_out(&DECIDED, 1);
+        io.table.leave_out(&DECIDED, 1);
         return Ok(());
     }
     let expected = progress(&before).after(decision, value);
@@ -334,7 +339,7 @@ fn reduce(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), S
         after.is_first,
         after.restarts,
     ];
-    table.add_exact(&DECIDED, &decided, &expected);
+    io.table.add_exact(&DECIDED, &decided, &expected);
     Ok(())
 }
 

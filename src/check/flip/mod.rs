@@ -16,19 +16,23 @@ use crate::{
         boundary::Boundary, particles::Particles, poisson::FLUID, solver::Solver, substep::Which,
     },
     gpu::adapter::Context,
-    reference::flip::{Given, Model, Room, Sorted, Step},
+    reference::{
+        flip::{Given, Model, Room, Sorted, Step},
+        poisson::iteration::Sum,
+    },
     scene::{Scene, plan::Plan},
     solve::{
         SolveError,
-        flip::Flip,
+        flip::{Flip, buffers},
+        pressure::buffers as solved,
         trace::{Begun, Span, TraceFrame},
     },
 };
 
 use super::{
     Checked, effects,
-    engine::{Engine, Io, State, Twin, twin},
-    table::{Table, pair},
+    engine::{Engine, Io, NONE, Outcome, State, Twin, names, twin},
+    table::pair,
 };
 use elements::Elements;
 use pressure::Assembled;
@@ -36,17 +40,21 @@ use rows::{PLACE, WORK};
 
 /// Twins of FLIP's own passes.
 const TWINS: &[Twin<FlipState>] = &[
-    twin("flip/survey", &[], sort::survey),
-    twin("flip/assign_cells", &[], sort::assign_cells),
-    twin("flip/reorder", &[], sort::reorder),
-    twin("flip/cut_cells", &[], grid::cut_cells),
-    twin("flip/gather_faces", &[], grid::gather_faces),
-    twin("flip/gather_centers", &[], grid::gather_centers),
-    twin("flip/find_change", elements::FACES, grid::find_change),
-    twin("flip/extrapolate", elements::FACES, grid::extrapolate),
-    twin("flip/grid_to_particle", &[], particles::grid_to_particle),
-    twin("flip/advect", &["counters"], particles::advect),
-    twin("flip/boundary_work", &[], boundary_work),
+    twin("flip/survey", NONE, sort::survey),
+    twin("flip/assign_cells", NONE, sort::assign_cells),
+    twin("flip/reorder", NONE, sort::reorder),
+    twin("flip/cut_cells", NONE, grid::cut_cells),
+    twin("flip/gather_faces", NONE, grid::gather_faces),
+    twin("flip/gather_centers", NONE, grid::gather_centers),
+    twin("flip/find_change", elements::faces_kept, grid::find_change),
+    twin("flip/extrapolate", elements::faces_kept, grid::extrapolate),
+    twin("flip/grid_to_particle", NONE, particles::grid_to_particle),
+    twin(
+        "flip/advect",
+        || names![buffers::COUNTERS],
+        particles::advect,
+    ),
+    twin("flip/boundary_work", NONE, boundary_work),
 ];
 
 /// Passes without a row of their own, and where what they make is compared.
@@ -111,7 +119,7 @@ pub(super) struct FlipState {
     /// Runs of pressure/multiply that were compared.
     products: usize,
     /// What the bricks' sums of the latest pass that made any come to.
-    sum: Option<crate::reference::poisson::iteration::Sum>,
+    sum: Option<Sum>,
 }
 
 impl State for FlipState {
@@ -161,18 +169,18 @@ impl FlipState {
 }
 
 /// From the pressure and the flux that the device has.
-fn boundary_work(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let pressure = elements.scalars(io, "pressure")?;
-    let flux = elements.scalars(io, "solid_flux")?;
-    let kind = io.before::<u32>("cell_kind", elements.cells)?;
+    let pressure = elements.scalars(io, solved::PRESSURE)?;
+    let flux = elements.scalars(io, buffers::SOLID_FLUX)?;
+    let kind = io.before(buffers::CELL_KIND, elements.cells)?;
     let wet = elements.wet();
-    let sums = io.after::<f32>("boundary_work", wet.len() / 64)?;
+    let sums = io.after(buffers::BOUNDARY_WORK, wet.len() / 64)?;
     let term = |e: usize| match kind[e] {
         FLUID => -pressure[e] * flux[e],
         _ => 0.0,
     };
-    table.each(&WORK, 0..sums.len(), |group| {
+    io.table.each(&WORK, 0..sums.len(), |group| {
         let first = wet.start + 64 * group;
         let terms = (first..first + 64).map(term);
         let sizes: f64 = terms.clone().map(f64::abs).sum();

@@ -5,14 +5,14 @@ use rayon::prelude::*;
 
 use crate::{
     check::{
-        engine::Io,
-        table::{Table, pair},
+        engine::{Io, Outcome},
+        table::pair,
     },
     domain::bricks::Bricks,
     reference::flip::{
         Given, Moved, advect as twin_advect, grid_to_particle as twin_grid_to_particle,
     },
-    solve::{SolveError, params::Counters},
+    solve::{SolveError, flip::buffers, pressure::buffers as solved},
 };
 
 use super::{FlipState, elements::neighborhood, rows::*};
@@ -29,15 +29,11 @@ fn of_faces(bricks: &Bricks, values: &[DVec3], element: u32, place: f64) -> f64 
     DVec3::from_array([0, 1, 2].map(error)).length()
 }
 
-pub(super) fn grid_to_particle(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
     let faces = elements.faces_before(io)?;
     let shift = match state.model.settings().density_correction {
-        true => Some(elements.planes_before(io, "face_displacement")?),
+        true => Some(elements.planes_before(io, solved::FACE_DISPLACEMENT)?),
         false => None,
     };
     let (bricks, step, sorted) = (&elements.bricks, state.step(), state.sorted());
@@ -66,7 +62,7 @@ pub(super) fn grid_to_particle(
         .flat_map_iter(of_cell)
         .collect();
     let all = || errors.iter().copied();
-    table.add(
+    io.table.add(
         &GIVEN,
         all().map(|(i, [velocity, change, _])| {
             let came = sorted.cloud.velocity[i].length();
@@ -78,14 +74,14 @@ pub(super) fn grid_to_particle(
             )
         }),
     );
-    table.add(
+    io.table.add(
         &CARRIED,
         all().map(|(i, [velocity, ..])| pair(i, given.carried[i], twin.carried[i], [velocity])),
     );
     if !given.affine.is_empty() {
         let size = state.model.cell_size();
         let rows = all().flat_map(|one| [0, 1, 2].map(|row| (one, row)));
-        table.add(
+        io.table.add(
             &GIVEN_AFFINE,
             rows.map(|((i, [velocity, ..]), row)| {
                 let [found, exact] = [&given, &twin].map(|of| of.affine[i].row(row));
@@ -94,7 +90,7 @@ pub(super) fn grid_to_particle(
         );
     }
     if shift.is_some() {
-        table.add(
+        io.table.add(
             &SHIFT,
             all().map(|(i, [.., error])| {
                 pair(i, given.displacement[i], twin.displacement[i], [error])
@@ -111,7 +107,7 @@ fn given(state: &FlipState, io: &Io<'_>) -> Result<Given, SolveError> {
         true => 6,
         false => 3,
     };
-    let values = io.scalars("carried", width * state.n)?;
+    let values = io.scalars(buffers::CARRIED, width * state.n)?;
     let at = |first: usize| -> Vec<DVec3> {
         let rows = values.chunks_exact(width);
         rows.map(|row| {
@@ -129,16 +125,12 @@ fn given(state: &FlipState, io: &Io<'_>) -> Result<Given, SolveError> {
     })
 }
 
-pub(super) fn advect(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let Some(given) = state.given.take() else {
         return Ok(());
     };
     let (n, elements) = (state.n, state.elements());
-    let faces = elements.planes_before(io, "face_velocity")?;
+    let faces = elements.planes_before(io, buffers::FACE_VELOCITY)?;
     let (step, start) = (state.step(), &state.sorted().cloud.position);
     let go = |start: &[DVec3]| {
         let (model, bricks) = (&state.model, &elements.bricks);
@@ -162,9 +154,9 @@ pub(super) fn advect(
         let sides = answers.chunks(2);
         sides.map(|pair| of(&pair[0]).max(of(&pair[1]))).sum()
     };
-    let position = io.vectors("position", n)?;
-    let velocity = io.vectors("velocity", n)?;
-    table.each(&MOVED, 0..n, |i| {
+    let position = io.vectors(buffers::POSITION, n)?;
+    let velocity = io.vectors(buffers::VELOCITY, n)?;
+    io.table.each(&MOVED, 0..n, |i| {
         let x = twin.position[i];
         let moved = answer(&|moved| moved.position[i].distance(x));
         pair(i, position[i], x, [moved, x.length()])
@@ -173,18 +165,20 @@ pub(super) fn advect(
     let among = f64::from(u8::from(!step.solids.is_empty()));
     let solids = step.solids.iter().map(|s| s.velocity.length());
     let solids = solids.fold(0.0, f64::max);
-    table.each(&ADVECTED, 0..n, |i| {
+    io.table.each(&ADVECTED, 0..n, |i| {
         let v = twin.velocity[i];
         let moved = answer(&|moved| moved.velocity[i].distance(v));
         let came = among * (given.velocity[i].length() + solids);
         pair(i, velocity[i], v, [moved, v.length() + came])
     });
-    let [before, after]: [Counters; 2] = [io.one_before("counters")?, io.one("counters")?];
+    let before = io.one_before(buffers::COUNTERS)?;
+    let after = io.one(buffers::COUNTERS)?;
     let slowed = f64::from(after.capped) - f64::from(before.capped);
     let exact = twin.capped as f64;
     let slack = answer(&|moved| (moved.capped as f64 - exact).abs());
-    table.add(&SLOWED, [pair(0, slowed, exact, [slack])]);
-    let ids = io.after::<u32>("id", n)?;
-    table.add_exact(&MOVED_ID, &ids, &state.sorted().cloud.id);
+    io.table.add(&SLOWED, [pair(0, slowed, exact, [slack])]);
+    let ids = io.after(buffers::ID, n)?;
+    io.table
+        .add_exact(&MOVED_ID, &ids, &state.sorted().cloud.id);
     Ok(())
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     check::{
-        engine::{Io, Twin, twin},
+        engine::{Io, NONE, Outcome, Twin, names, twin},
         table::{Entry, Table, pair},
     },
     compare::{
@@ -12,6 +12,7 @@ use crate::{
         rounding::{U, U64},
     },
     domain::poisson::{System, remove_means},
+    gpu::buffer::Buf,
     reference::{
         flip::{Centers, Waters, density_source as twin_density_source},
         poisson::{
@@ -23,9 +24,10 @@ use crate::{
     scene::flip::{Precision, Preconditioner, Surface},
     solve::{
         SolveError,
+        flip::buffers,
         pressure::{
-            CORRECTION_TOLERANCE, DONE, PressureControl64, PressureStats, blocked, control_words,
-            widen, widen_control,
+            CORRECTION_TOLERANCE, DONE, PressureControl64, blocked,
+            buffers::{self as solved, Real},
         },
     },
 };
@@ -34,13 +36,26 @@ use super::{FlipState, iteration::PRODUCTS, rows::*};
 
 /// Twins of what an iteration goes from and comes to.
 pub(super) const TWINS: &[Twin<FlipState>] = &[
-    twin("pressure/build_system", &[], build_system),
-    twin("pressure/divergence", &[], divergence),
-    twin("pressure/density_source", &[], density_source),
-    twin("pressure/multiply", &[], multiply),
-    twin("pressure/project", &["face_velocity"], project),
-    twin("pressure/measure_divergence", &[], measure_divergence),
-    twin("pressure/displace", &[], displace),
+    twin("pressure/build_system", NONE, build_system),
+    twin("pressure/divergence", NONE, divergence),
+    twin("pressure/density_source", NONE, density_source),
+    twin("pressure/multiply", NONE, multiply),
+    Twin {
+        is_due: FlipState::is_done,
+        ..twin(
+            "pressure/project",
+            || names![buffers::FACE_VELOCITY],
+            project,
+        )
+    },
+    Twin {
+        is_due: FlipState::is_done,
+        ..twin("pressure/measure_divergence", NONE, measure_divergence)
+    },
+    Twin {
+        is_due: FlipState::is_done,
+        ..twin("pressure/displace", NONE, displace)
+    },
 ];
 
 /// The device's own system.
@@ -89,24 +104,15 @@ impl FlipState {
 
     /// The scalars of the solve before the pass.
     pub(super) fn control(&self, io: &Io<'_>) -> Result<PressureControl64, SolveError> {
-        let words = control_words(self.precision());
-        let words = io.before::<u32>("pressure_control", words)?;
-        Ok(widen_control(&words, self.precision()))
+        match io.pass() {
+            "pressure/reduce" => io.control_before(self.precision()),
+            _ => io.control(self.precision()),
+        }
     }
 
-    fn is_done(&self, io: &Io<'_>) -> Result<bool, SolveError> {
+    /// Whether the solve has ended before the pass.
+    fn is_done(&mut self, io: &Io<'_>) -> Result<bool, SolveError> {
         Ok(self.control(io)?.state == DONE)
-    }
-
-    /// The first `count` values of an array of the pressure's own, in the precision that it is kept in.
-    pub(super) fn reals(
-        &self,
-        io: &Io<'_>,
-        name: &str,
-        count: usize,
-    ) -> Result<Vec<f64>, SolveError> {
-        let words = io.after::<u32>(name, self.precision().words() * count)?;
-        Ok(widen(&words, self.precision()))
     }
 
     fn rows_of(&self, values: &[f64]) -> Vec<f64> {
@@ -115,29 +121,40 @@ impl FlipState {
     }
 
     /// An array of the pressure's own, by row.
-    pub(super) fn by_row(&self, io: &Io<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
-        Ok(self.rows_of(&self.reals(io, name, self.elements().cells)?))
+    pub(super) fn by_row(&self, io: &Io<'_>, buffer: Buf<Real>) -> Result<Vec<f64>, SolveError> {
+        let values = io.reals(&buffer, self.precision(), self.elements().cells)?;
+        Ok(self.rows_of(&values))
     }
 
     /// The same from before the pass.
-    pub(super) fn by_row_before(&self, io: &Io<'_>, name: &str) -> Result<Vec<f64>, SolveError> {
-        let count = self.precision().words() * self.elements().cells;
-        let words = io.before::<u32>(name, count)?;
-        Ok(self.rows_of(&widen(&words, self.precision())))
+    pub(super) fn by_row_before(
+        &self,
+        io: &Io<'_>,
+        buffer: Buf<Real>,
+    ) -> Result<Vec<f64>, SolveError> {
+        let values = io.reals_before(&buffer, self.precision(), self.elements().cells)?;
+        Ok(self.rows_of(&values))
     }
 
-    /// The terms that the solution is the sum of, by row, before the pass or after it.
-    pub(super) fn terms(&self, io: &Io<'_>, is_before: bool) -> Result<Vec<Vec<f64>>, SolveError> {
-        let (stride, terms) = (self.elements().stride, self.precision().terms());
-        let count = stride * (terms - 1) + self.elements().cells;
-        let words = self.precision().words() * count;
-        let words = match is_before {
-            true => io.before::<u32>("pressure_solution", words)?,
-            false => io.after::<u32>("pressure_solution", words)?,
-        };
-        let values = widen(&words, self.precision());
-        let term = |k: usize| self.rows_of(&values[k * stride..]);
-        Ok((0..terms).map(term).collect())
+    /// The terms that the solution is the sum of, by row.
+    pub(super) fn terms(&self, io: &Io<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
+        let values = io.reals(&solved::SOLUTION, self.precision(), self.term_values())?;
+        Ok(self.terms_of(&values))
+    }
+
+    /// The same from before the pass.
+    pub(super) fn terms_before(&self, io: &Io<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
+        let values = io.reals_before(&solved::SOLUTION, self.precision(), self.term_values())?;
+        Ok(self.terms_of(&values))
+    }
+
+    fn term_values(&self) -> usize {
+        self.elements().stride * (self.precision().terms() - 1) + self.elements().cells
+    }
+
+    fn terms_of(&self, values: &[f64]) -> Vec<Vec<f64>> {
+        let term = |k: usize| self.rows_of(&values[k * self.elements().stride..]);
+        (0..self.precision().terms()).map(term).collect()
     }
 
     /// [`OF_DIFFERENCE`] of all terms, by element.
@@ -210,18 +227,18 @@ impl FlipState {
     }
 }
 
-fn build_system(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let settings = state.model.settings();
     let elements = state.elements();
     let cells = elements.cells;
     let centers = Centers {
         density: Vec::new(),
         excess: match settings.density_correction {
-            true => elements.scalars(io, "density_excess")?,
+            true => elements.scalars(io, buffers::DENSITY_EXCESS)?,
             false => Vec::new(),
         },
         distance: match settings.surface {
-            Surface::GhostFluid => elements.scalars(io, "liquid_distance")?,
+            Surface::GhostFluid => elements.scalars(io, buffers::LIQUID_DISTANCE)?,
             Surface::Voxel => Vec::new(),
         },
     };
@@ -230,8 +247,8 @@ fn build_system(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result
         Preconditioner::Jacobi | Preconditioner::Ipp
     );
     let system = Waters::new(&state.model, &elements.bricks, state.room(), &centers).system();
-    let coefficient = io.after::<f32>("pressure_coefficient", 2 * elements.stride + cells)?;
-    let block = io.after::<u32>("pressure_block", cells / 8)?;
+    let coefficient = io.after(solved::COEFFICIENT, 2 * elements.stride + cells)?;
+    let block = io.after(solved::BLOCK, cells / 8)?;
     let (stride, wet) = (elements.stride, elements.wet());
     let is_row = |e: usize| {
         let place = blocked(e as u32);
@@ -243,12 +260,12 @@ fn build_system(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result
     }
     state.assembled = Some(Assembled { system, centers });
     let (system, unit) = (state.system(), state.unit());
-    let dirichlet = state.by_row(io, "pressure_dirichlet")?;
-    state.add_rows(table, &DIRICHLET, |row| {
+    let dirichlet = state.by_row(io, solved::DIRICHLET)?;
+    state.add_rows(io.table, &DIRICHLET, |row| {
         let exact = system.dirichlet[row];
         (dirichlet[row], exact, [unit, exact])
     });
-    table.each(&COEFFICIENT, 0..system.cell.len(), |row| {
+    io.table.each(&COEFFICIENT, 0..system.cell.len(), |row| {
         let element = system.cell[row];
         let found = |axis: usize| f64::from(coefficient[axis * stride + blocked(element)]);
         let twin = |axis: usize| system.coefficient[row][2 * axis];
@@ -258,10 +275,11 @@ fn build_system(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result
         ];
         pair(element as usize, found, twin, [])
     });
-    table.add_exact(&ROWS, &wet.map(is_row).collect::<Vec<_>>(), &expected);
+    io.table
+        .add_exact(&ROWS, &wet.map(is_row).collect::<Vec<_>>(), &expected);
     if has_diagonal {
-        let inverse = state.by_row(io, "pressure_inverse_diagonal")?;
-        state.add_rows(table, &INVERSE, |row| {
+        let inverse = state.by_row(io, solved::INVERSE_DIAGONAL)?;
+        state.add_rows(io.table, &INVERSE, |row| {
             let exact = 1.0 / system.diagonal[row];
             (inverse[row], exact, [unit, exact])
         });
@@ -269,89 +287,82 @@ fn build_system(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result
     Ok(())
 }
 
-fn divergence(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    state.note_sum(io, ["pressure_rhs"; 2])?;
-    let velocity = state.elements().planes_before(io, "face_velocity")?;
+fn divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    state.note_sum(io, solved::RHS, solved::RHS)?;
+    let velocity = state.elements().planes_before(io, buffers::FACE_VELOCITY)?;
     let twin = state.waters().divergence(state.system(), &velocity);
     let flow = state.flow(&velocity);
-    let (rhs, unit) = (state.by_row(io, "pressure_rhs")?, state.unit());
-    state.add_rows(table, &RHS, |row| (rhs[row], twin[row], [unit, flow[row]]));
-    let found = io.one::<PressureStats>("pressure_stats")?.divergence_before;
-    state.add_noted(table, &BEFORE, found, [&twin, &flow]);
+    let (rhs, unit) = (state.by_row(io, solved::RHS)?, state.unit());
+    state.add_rows(io.table, &RHS, |row| {
+        (rhs[row], twin[row], [unit, flow[row]])
+    });
+    let found = io.one(solved::STATS)?.divergence_before;
+    state.add_noted(io.table, &BEFORE, found, [&twin, &flow]);
     Ok(())
 }
 
-fn density_source(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    state.note_sum(io, ["pressure_rhs"; 2])?;
-    let rhs = state.by_row(io, "pressure_rhs")?;
+fn density_source(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    state.note_sum(io, solved::RHS, solved::RHS)?;
+    let rhs = state.by_row(io, solved::RHS)?;
     let centers = &state.assembled().centers;
     let twin = twin_density_source(&state.model, state.system(), centers);
-    state.add_rows(table, &SOURCE, |row| {
+    state.add_rows(io.table, &SOURCE, |row| {
         (rhs[row], twin[row], [twin[row].abs()])
     });
     Ok(())
 }
 
-fn multiply(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
+fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     if state.is_turn(io)? && state.is_due(io, 0) {
-        state.note_sum(io, ["pressure_direction", "pressure_product"])?;
+        state.note_sum(io, solved::DIRECTION, solved::PRODUCT)?;
     }
     if state.products == PRODUCTS {
         return Ok(());
     }
-    let direction = state.by_row(io, "pressure_direction")?;
+    let direction = state.by_row(io, solved::DIRECTION)?;
     if direction.iter().all(|&value| value == 0.0) {
         return Ok(());
     }
-    let product = state.by_row(io, "pressure_product")?;
+    let product = state.by_row(io, solved::PRODUCT)?;
     let (system, unit) = (state.system(), state.unit());
     let (twin, errors) = (system.apply(&direction), differences(system, &direction));
-    state.add_rows(table, &PRODUCT, |row| {
+    state.add_rows(io.table, &PRODUCT, |row| {
         (product[row], twin[row], [unit, errors[row]])
     });
     state.products += 1;
     Ok(())
 }
 
-fn project(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    if !state.is_done(io)? {
-        return Ok(());
-    }
+fn project(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let terms = state.terms(io, false)?;
+    let terms = state.terms(io)?;
     let (errors, x) = (state.difference_errors(&terms), sum(&terms));
     let waters = state.waters();
-    let mut twin = elements.planes_before(io, "face_velocity")?;
+    let mut twin = elements.planes_before(io, buffers::FACE_VELOCITY)?;
     waters.project(&waters.by_element(state.system(), &x), &mut twin);
-    let velocity = elements.planes(io, "face_velocity")?;
-    table.each(&PROJECTED, elements.active(), |e| {
+    let velocity = elements.planes(io, buffers::FACE_VELOCITY)?;
+    io.table.each(&PROJECTED, elements.active(), |e| {
         pair(e, velocity[e], twin[e], [errors[e], twin[e].length()])
     });
-    let pressure = elements.scalars(io, "pressure")?;
+    let pressure = elements.scalars(io, solved::PRESSURE)?;
     let scale = state.scene.water.rest_density * state.model.cell_size() / elements.substep.length;
-    state.add_rows(table, &PRESSURE, |row| {
+    state.add_rows(io.table, &PRESSURE, |row| {
         let exact = scale * x[row];
         let found = pressure[state.system().cell[row] as usize];
         (found, exact, [exact.abs()])
     });
-    whole(state, io, x, &velocity, table)
+    whole(state, x, &velocity, io)
 }
 
 /// The device's own system solved directly, against what its iterations came to.
-fn whole(
-    state: &FlipState,
-    io: &Io<'_>,
-    mut x: Vec<f64>,
-    velocity: &[DVec3],
-    table: &mut Table,
-) -> Result<(), SolveError> {
-    let mut b = state.by_row(io, "pressure_rhs")?;
+fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>) -> Outcome {
+    let mut b = state.by_row(io, solved::RHS)?;
     let system = state.system();
     let solver = match Solver::new(system, BUDGET) {
         Ok(solver) => solver,
         Err(_) => {
             let why = "the direct factor of its system could not be made";
-            table.unchecked.push(("whole projection", why));
+            io.table.unchecked.push(("whole projection", why));
             return Ok(());
         }
     };
@@ -370,46 +381,39 @@ fn whole(
     let far = FAR.of([allowed, size]);
     let apart = relative(norm(&off), norm(&exact));
     let left = relative(norm(&after), size);
-    table.add(&RESIDUAL, [pair(0, residual, 0.0, [allowed])]);
-    table.add(&SOLUTION, [pair(0, apart, 0.0, [far, least, norm(&exact)])]);
-    table.add(&ENERGY, [pair(0, energy, 0.0, [far, least])]);
-    table.add(
+    io.table.add(&RESIDUAL, [pair(0, residual, 0.0, [allowed])]);
+    io.table
+        .add(&SOLUTION, [pair(0, apart, 0.0, [far, least, norm(&exact)])]);
+    io.table.add(&ENERGY, [pair(0, energy, 0.0, [far, least])]);
+    io.table.add(
         &DIVERGENCE,
         [pair(0, left, 0.0, [allowed, flow, spread, size])],
     );
     Ok(())
 }
 
-fn measure_divergence(
-    state: &mut FlipState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
-    if !state.is_done(io)? {
-        return Ok(());
-    }
-    let velocity = state.elements().planes_before(io, "face_velocity")?;
+fn measure_divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let velocity = state.elements().planes_before(io, buffers::FACE_VELOCITY)?;
     let twin = state.waters().divergence(state.system(), &velocity);
-    let found = io.one::<PressureStats>("pressure_stats")?.divergence_after;
-    state.add_noted(table, &AFTER, found, [&twin, &state.flow(&velocity)]);
+    let found = io.one(solved::STATS)?.divergence_after;
+    state.add_noted(io.table, &AFTER, found, [&twin, &state.flow(&velocity)]);
     Ok(())
 }
 
-fn displace(state: &mut FlipState, io: &Io<'_>, table: &mut Table) -> Result<(), SolveError> {
-    if !state.is_done(io)? {
-        return Ok(());
-    }
-    let terms = state.terms(io, false)?;
+fn displace(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let terms = state.terms(io)?;
     let (errors, x) = (state.difference_errors(&terms), sum(&terms));
     let waters = state.waters();
     let twin = waters.displace(&waters.by_element(state.system(), &x));
-    let found = state.elements().planes(io, "face_displacement")?;
-    table.each(&DISPLACEMENT, state.elements().active(), |e| {
-        pair(e, found[e], twin[e], [errors[e], twin[e].length()])
-    });
-    let mut b = state.by_row(io, "pressure_rhs")?;
+    let found = state.elements().planes(io, solved::FACE_DISPLACEMENT)?;
+    io.table
+        .each(&DISPLACEMENT, state.elements().active(), |e| {
+            pair(e, found[e], twin[e], [errors[e], twin[e].length()])
+        });
+    let mut b = state.by_row(io, solved::RHS)?;
     remove_means(&mut b, &state.system().pockets());
     let [residual, allowed] = state.residual(&b, &x, CORRECTION_TOLERANCE);
-    table.add(&CORRECTION, [pair(0, residual, 0.0, [allowed])]);
+    io.table
+        .add(&CORRECTION, [pair(0, residual, 0.0, [allowed])]);
     Ok(())
 }

@@ -7,12 +7,12 @@ use rayon::prelude::*;
 
 use crate::{
     check::{
-        engine::Io,
-        table::{Table, pair},
+        engine::{Io, Outcome},
+        table::pair,
     },
     reference::neighbors::{Crowd, Neighbors},
     scene::plan::{LIST_CAPACITY, Plan},
-    solve::{SolveError, params::Phase},
+    solve::{SolveError, pbf::buffers},
 };
 
 use super::{
@@ -103,7 +103,7 @@ impl PbfState {
         }
         if self.lists.start.is_empty() {
             let count: usize = self.model.cells.dims.iter().product();
-            self.lists.start = io.before("cell_start", count + 1)?;
+            self.lists.start = io.before(buffers::CELL_START, count + 1)?;
         }
         Ok(Arc::new(self.searched(points)))
     }
@@ -146,19 +146,15 @@ impl PbfState {
     }
 }
 
-pub(super) fn build_neighbors(
-    state: &mut PbfState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let phase = io.uniform::<Phase>("phase")?;
+    let phase = io.window(&buffers::PHASES)?;
     let (points, _) = state.stored(io, &phase)?;
     let (first, count) = (phase.first as usize, phase.count as usize);
     let capacity = LIST_CAPACITY as usize;
     let words = count.next_multiple_of(STRIDE) * capacity;
-    let list = io.after::<u32>("neighbor_list", words)?;
-    let counts = io.after::<u32>("neighbor_count", n)?;
+    let list = io.after(buffers::NEIGHBOR_LIST.retyped::<u32>(), words)?;
+    let counts = io.after(buffers::NEIGHBOR_COUNT, n)?;
     let member = |local: usize, k: usize| {
         let lane = local % STRIDE;
         let base = local / STRIDE * STRIDE * (capacity / 4) + (lane >> 1) + ((lane & 1) << 6);
@@ -206,8 +202,10 @@ pub(super) fn build_neighbors(
     let found: Vec<_> = (0..count).into_par_iter().map(one).collect();
     let wrong =
         |(local, one): (usize, &(usize, usize, _))| pair(first + local, one.0 as f64, 0.0, []);
-    table.add(&NEIGHBORS, found.iter().enumerate().map(wrong));
-    table.add_ties(&NEIGHBORS, found.iter().map(|one| one.1).sum());
+    io.table
+        .add(&NEIGHBORS, found.iter().enumerate().map(wrong));
+    io.table
+        .add_ties(&NEIGHBORS, found.iter().map(|one| one.1).sum());
     for (local, (_, _, all)) in found.into_iter().enumerate() {
         state.lists.is_searched[first + local] = counts[first + local] > LIST_CAPACITY;
         state.lists.members[first + local] = all;

@@ -23,14 +23,14 @@ use crate::{
     solve::{
         SolveError,
         params::{IterationControl, Phase},
-        pbf::Pbf,
+        pbf::{Pbf, buffers},
         trace::{Span, TraceFrame},
     },
 };
 
 use super::{
     Checked, effects,
-    engine::{Engine, Io, State, Twin, twin, wide},
+    engine::{Engine, Io, NONE, State, Twin, names, twin, wide},
     table::{Table, pair},
 };
 use lists::Lists;
@@ -39,25 +39,41 @@ use whole::Whole;
 
 /// Twins of PBF's own passes.
 const TWINS: &[Twin<PbfState>] = &[
-    twin("pbf/predict", &["velocity"], passes::predict),
-    twin("pbf/assign_cells", &[], passes::assign_cells),
-    twin("pbf/reorder", &["predicted"], passes::reorder),
-    twin("pbf/build_neighbors", &[], lists::build_neighbors),
-    twin("pbf/compute_lambda", &["predicted"], passes::compute_lambda),
+    twin("pbf/predict", || names![buffers::VELOCITY], passes::predict),
+    twin("pbf/assign_cells", NONE, passes::assign_cells),
+    twin(
+        "pbf/reorder",
+        || names![buffers::PREDICTED],
+        passes::reorder,
+    ),
+    twin("pbf/build_neighbors", NONE, lists::build_neighbors),
+    twin(
+        "pbf/compute_lambda",
+        || names![buffers::PREDICTED],
+        passes::compute_lambda,
+    ),
     twin(
         "pbf/compute_delta",
-        &["predicted", "wall_work"],
+        || names![buffers::PREDICTED, buffers::WALL_WORK],
         passes::compute_delta,
     ),
-    twin("pbf/sum_error", &[], stop::sum_error),
-    twin("pbf/decide", &["control", "counters"], stop::decide),
+    twin("pbf/sum_error", NONE, stop::sum_error),
+    twin(
+        "pbf/decide",
+        || names![buffers::CONTROL, buffers::COUNTERS],
+        stop::decide,
+    ),
     twin(
         "pbf/update_velocity",
-        &["counters"],
+        || names![buffers::COUNTERS],
         passes::update_velocity,
     ),
-    twin("pbf/measure_density", &[], passes::measure_density),
-    twin("pbf/boundary_work", &["boundary_work"], work::boundary_work),
+    twin("pbf/measure_density", NONE, passes::measure_density),
+    twin(
+        "pbf/boundary_work",
+        || names![buffers::BOUNDARY_WORK],
+        work::boundary_work,
+    ),
 ];
 
 /// Traces a substep of the frame after `particles`, the state at the end of `frame`, and holds it against the reference.
@@ -146,7 +162,7 @@ impl PbfState {
         if samples == 0 {
             return Ok(());
         }
-        let all = solver.field::<[f32; 4]>("predicted", 2 * n + samples)?;
+        let all = solver.field(buffers::PREDICTED, 2 * n + samples)?;
         let (found, model) = (&all[2 * n..], &mut self.model);
         let places = wide(found);
         let weights: Vec<f64> = found.iter().map(|value| f64::from(value[3])).collect();
@@ -165,7 +181,7 @@ impl PbfState {
     /// How the iteration until a density error stands before the pass; `None` where their number is given.
     fn control(&self, io: &Io<'_>) -> Result<Option<IterationControl>, SolveError> {
         match self.scene.solver.pbf().stop {
-            Stop::DensityError { .. } => Ok(Some(io.one_before("control")?)),
+            Stop::DensityError { .. } => Ok(Some(io.one_before(buffers::CONTROL)?)),
             _ => Ok(None),
         }
     }
@@ -173,7 +189,7 @@ impl PbfState {
     /// The positions that a phase reads, then the samples; and the λ beside them.
     fn stored(&self, io: &Io<'_>, phase: &Phase) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
         let n = self.particles();
-        let predicted = io.before::<[f32; 4]>("predicted", 2 * n)?;
+        let predicted = io.before(buffers::PREDICTED, 2 * n)?;
         let half = |j: usize| predicted[j + [phase.read_even, phase.read_odd][j % 2] as usize];
         let read: Vec<[f32; 4]> = (0..n).map(half).collect();
         let mut points = wide(&read);
@@ -184,7 +200,7 @@ impl PbfState {
 
     /// Positions with the samples behind them, as effects see them.
     pub(super) fn moved(&self, io: &Io<'_>) -> Result<Vec<DVec3>, SolveError> {
-        let mut points = io.vectors_before("position", self.particles())?;
+        let mut points = io.vectors_before(buffers::POSITION, self.particles())?;
         points.extend(&self.model.samples);
         Ok(points)
     }

@@ -4,9 +4,9 @@ use glam::DVec3;
 
 use crate::{
     check::{
-        engine::Io,
+        engine::{Io, Outcome},
         sort::{check_cells, check_slots},
-        table::{Table, each, pair},
+        table::{each, pair},
     },
     reference::{
         neighbors::Neighbors,
@@ -16,19 +16,12 @@ use crate::{
         },
     },
     scene::Iteration,
-    solve::{
-        SolveError,
-        params::{Counters, Phase},
-    },
+    solve::{params::Phase, pbf::buffers},
 };
 
 use super::{PbfState, State, bounds::Bounds, rows::*};
 
-pub(super) fn predict(
-    state: &mut PbfState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     if state.is_over {
         // A frame's measurement begins with a prediction of no length.
@@ -36,13 +29,13 @@ pub(super) fn predict(
         state.substep.wall_velocity = Default::default();
     }
     let (x, v) = (
-        io.vectors_before("position", n)?,
-        io.vectors_before("velocity", n)?,
+        io.vectors_before(buffers::POSITION, n)?,
+        io.vectors_before(buffers::VELOCITY, n)?,
     );
-    let predicted = io.vectors("predicted", 2 * n)?;
-    let velocity = io.vectors("velocity", n)?;
+    let predicted = io.vectors(buffers::PREDICTED, 2 * n)?;
+    let velocity = io.vectors(buffers::VELOCITY, n)?;
     let works = match state.scene.has_movers() {
-        true => io.after::<f32>("wall_work", 2 * n)?,
+        true => io.after(buffers::WALL_WORK, 2 * n)?,
         false => Vec::new(),
     };
     let none = Neighbors::listed(0, |_, _| [0; 2]);
@@ -77,68 +70,59 @@ pub(super) fn predict(
         (position, velocity, work)
     };
     let all = each(0..n, one);
-    table.add(&PREDICT_POSITION, all.iter().map(|pairs| pairs.0));
-    table.add(&PREDICT_VELOCITY, all.iter().map(|pairs| pairs.1));
+    io.table
+        .add(&PREDICT_POSITION, all.iter().map(|pairs| pairs.0));
+    io.table
+        .add(&PREDICT_VELOCITY, all.iter().map(|pairs| pairs.1));
     if !works.is_empty() {
-        table.add(&PREDICT_WORK, all.iter().map(|pairs| pairs.2));
+        io.table.add(&PREDICT_WORK, all.iter().map(|pairs| pairs.2));
     }
     Ok(())
 }
 
-pub(super) fn assign_cells(
-    state: &mut PbfState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn assign_cells(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let cells = &state.model.cells;
-    let points = &io.vectors_before("predicted", 2 * n)?[n..];
+    let points = &io.vectors_before(buffers::PREDICTED, 2 * n)?[n..];
     let exact: Vec<u32> = points.iter().map(|&x| cells.index(x) as u32).collect();
-    let cell_of = io.after::<u32>("cell_of", n)?;
-    check_cells(&CELL, points, cells.edge, &cell_of, &exact, table);
-    let slot = io.after::<u32>("slot_in_cell", n)?;
-    let counts = io.after::<u32>("cell_start", cells.dims.iter().product())?;
-    check_slots([&COUNTS, &SLOTS], &cell_of, &slot, &counts, table);
+    let cell_of = io.after(buffers::CELL_OF, n)?;
+    check_cells(&CELL, points, cells.edge, &cell_of, &exact, io.table);
+    let slot = io.after(buffers::SLOT_IN_CELL, n)?;
+    let counts = io.after(buffers::CELL_START, cells.dims.iter().product())?;
+    check_slots([&COUNTS, &SLOTS], &cell_of, &slot, &counts, io.table);
     Ok(())
 }
 
-pub(super) fn reorder(
-    state: &mut PbfState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let order = io.before::<u32>("order", n)?;
-    let predicted = io.vectors_before("predicted", 2 * n)?;
-    let velocity = io.vectors_before("velocity", n)?;
-    let ids = io.before::<u32>("id", n)?;
+    let order = io.before(buffers::ORDER, n)?;
+    let predicted = io.vectors_before(buffers::PREDICTED, 2 * n)?;
+    let velocity = io.vectors_before(buffers::VELOCITY, n)?;
+    let ids = io.before(buffers::ID, n)?;
     let at = |i: usize| order[i] as usize;
-    for name in ["predicted", "start_position"] {
-        let found = io.vectors(name, n)?;
-        table.each(&REORDER_POSITION, 0..n, |i| {
+    for buffer in [buffers::PREDICTED, buffers::START_POSITION] {
+        let found = io.vectors(buffer, n)?;
+        io.table.each(&REORDER_POSITION, 0..n, |i| {
             pair(i, found[i], predicted[n + at(i)], [])
         });
     }
-    let found = io.vectors("sorted_velocity", n)?;
-    table.each(&REORDER_VELOCITY, 0..n, |i| {
+    let found = io.vectors(buffers::SORTED_VELOCITY, n)?;
+    io.table.each(&REORDER_VELOCITY, 0..n, |i| {
         pair(i, found[i], velocity[at(i)], [])
     });
     let expected: Vec<u32> = (0..n).map(|i| ids[at(i)]).collect();
-    table.add_exact(&REORDER_ID, &io.after("sorted_id", n)?, &expected);
+    io.table
+        .add_exact(&REORDER_ID, &io.after(buffers::SORTED_ID, n)?, &expected);
     Ok(())
 }
 
-pub(super) fn compute_lambda(
-    state: &mut PbfState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let control = state.control(io)?;
     if control.is_some_and(|control| control.is_done == 1) {
         return Ok(());
     }
     let n = state.particles();
-    let phase = io.uniform::<Phase>("phase")?;
+    let phase = io.window(&buffers::PHASES)?;
     let (points, mut twin) = state.stored(io, &phase)?;
     let neighbors = state.visited(io, &points)?;
     if !state.whole.has_start() {
@@ -149,17 +133,17 @@ pub(super) fn compute_lambda(
     let mut dense = vec![0.0; n];
     passes::compute_lambda(inputs, Colour::All, &mut twin, &mut dense);
     let bounds = Bounds(inputs);
-    let after = io.after::<[f32; 4]>("predicted", 2 * n)?;
+    let after = io.after(buffers::PREDICTED, 2 * n)?;
     let handled = handled(&phase);
-    table.each(&OF_LAMBDA, 0..handled.len(), |k| {
+    io.table.each(&OF_LAMBDA, 0..handled.len(), |k| {
         let i = handled[k];
         let stored = i + [phase.read_even, phase.read_odd][i % 2] as usize;
         let error = bounds.lambda(i, &passes::row(inputs, i), twin[i]);
         pair(i, after[stored][3], twin[i], [error])
     });
     if control.is_some() {
-        let density = io.after::<f32>("density", n)?;
-        table.each(&DENSITY_OF_LAMBDA, 0..handled.len(), |k| {
+        let density = io.after(buffers::DENSITY, n)?;
+        io.table.each(&DENSITY_OF_LAMBDA, 0..handled.len(), |k| {
             let i = handled[k];
             pair(i, density[i], dense[i], [bounds.density(i, dense[i])])
         });
@@ -167,20 +151,16 @@ pub(super) fn compute_lambda(
     Ok(())
 }
 
-pub(super) fn compute_delta(
-    state: &mut PbfState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     if (state.control(io)?).is_some_and(|control| control.is_done == 1) {
         return Ok(());
     }
     let n = state.particles();
-    let phase = io.uniform::<Phase>("phase")?;
+    let phase = io.window(&buffers::PHASES)?;
     let (points, lambda) = state.stored(io, &phase)?;
     let neighbors = state.visited(io, &points)?;
     let write = phase.write as usize;
-    let before = &io.vectors_before("predicted", 2 * n)?[write..write + n];
+    let before = &io.vectors_before(buffers::PREDICTED, 2 * n)?[write..write + n];
     let factor = f64::from(phase.acceleration);
     let is_chebyshev = state.scene.solver.pbf().iteration == Iteration::Chebyshev;
     let momentum = is_chebyshev.then_some(Momentum { factor, before });
@@ -190,12 +170,12 @@ pub(super) fn compute_delta(
         Some(_) => passes::compute_delta(inputs, Colour::All, momentum, &lambda),
         None => plain.clone(),
     };
-    let after = io.after::<[f32; 4]>("predicted", 2 * n)?;
-    let moved = io.vectors("predicted", 2 * n)?;
+    let after = io.after(buffers::PREDICTED, 2 * n)?;
+    let moved = io.vectors(buffers::PREDICTED, 2 * n)?;
     let works = match state.scene.has_movers() {
         true => Some([
-            io.before::<f32>("wall_work", n)?,
-            io.after::<f32>("wall_work", n)?,
+            io.before(buffers::WALL_WORK, n)?,
+            io.after(buffers::WALL_WORK, n)?,
         ]),
         false => None,
     };
@@ -234,37 +214,33 @@ pub(super) fn compute_delta(
     };
     let handled = handled(&phase);
     let all = each(0..handled.len(), |k| one(handled[k]));
-    table.add(
+    io.table.add(
         &OF_DELTA,
         all.iter().map(|pairs| pairs.map(|pairs| pairs.0)),
     );
-    table.each(&CARRIED, 0..handled.len(), |k| {
+    io.table.each(&CARRIED, 0..handled.len(), |k| {
         let i = handled[k];
         pair(i, after[write + i][3], lambda[i], [])
     });
     if works.is_some() {
         let works = all.iter().map(|pairs| pairs.and_then(|pairs| pairs.1));
-        table.add(&DELTA_WORK, works);
+        io.table.add(&DELTA_WORK, works);
     }
     Ok(())
 }
 
-pub(super) fn update_velocity(
-    state: &mut PbfState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let phase = io.uniform::<Phase>("phase")?;
+    let phase = io.window(&buffers::PHASES)?;
     let source = match state.control(io)? {
         Some(control) => n * (control.iterations % 2) as usize,
         None => phase.read_even as usize,
     };
-    let ends = io.vectors_before("predicted", 2 * n)?[source..source + n].to_vec();
-    let starts = io.vectors_before("start_position", n)?;
-    let velocities = io.vectors_before("sorted_velocity", n)?;
-    let position = io.vectors("position", n)?;
-    let velocity = io.vectors("velocity", n)?;
+    let ends = io.vectors_before(buffers::PREDICTED, 2 * n)?[source..source + n].to_vec();
+    let starts = io.vectors_before(buffers::START_POSITION, n)?;
+    let velocities = io.vectors_before(buffers::SORTED_VELOCITY, n)?;
+    let position = io.vectors(buffers::POSITION, n)?;
+    let velocity = io.vectors(buffers::VELOCITY, n)?;
     let (model, substep) = (&state.model, &state.substep);
     let (cap, step) = (model.max_displacement(), substep.time_step);
     let one = |i: usize| {
@@ -286,32 +262,31 @@ pub(super) fn update_velocity(
     };
     let all = each(0..n, one);
     let count = |which: usize| all.iter().filter(|one| one.2[which]).count() as f64;
-    table.add(&UPDATE_POSITION, all.iter().map(|one| one.0));
-    table.add(&UPDATE_VELOCITY, all.iter().map(|one| one.1));
-    let [before, after]: [Counters; 2] = [io.one_before("counters")?, io.one("counters")?];
+    io.table.add(&UPDATE_POSITION, all.iter().map(|one| one.0));
+    io.table.add(&UPDATE_VELOCITY, all.iter().map(|one| one.1));
+    let before = io.one_before(buffers::COUNTERS)?;
+    let after = io.one(buffers::COUNTERS)?;
     let counted = f64::from(after.capped) - f64::from(before.capped);
-    table.add(&CAPPED, [pair(0, counted, count(0), [count(1)])]);
-    let ids = io.before::<u32>("sorted_id", n)?;
-    table.add_exact(&UPDATE_ID, &io.after("id", n)?, &ids);
+    io.table
+        .add(&CAPPED, [pair(0, counted, count(0), [count(1)])]);
+    let ids = io.before(buffers::SORTED_ID, n)?;
+    io.table
+        .add_exact(&UPDATE_ID, &io.after(buffers::ID, n)?, &ids);
     state.whole.end(ends);
     state.is_over = true;
     Ok(())
 }
 
-pub(super) fn measure_density(
-    state: &mut PbfState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn measure_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let mut points = io.vectors_before("predicted", n)?;
+    let mut points = io.vectors_before(buffers::PREDICTED, n)?;
     points.extend(&state.model.samples);
     let neighbors = state.search(&points);
     let inputs = state.inputs(&points, &neighbors);
     let twin = passes::measure_density(inputs);
-    let density = io.after::<f32>("density", n)?;
+    let density = io.after(buffers::DENSITY, n)?;
     let bounds = Bounds(inputs);
-    table.each(&MEASURED, 0..n, |i| {
+    io.table.each(&MEASURED, 0..n, |i| {
         pair(i, density[i], twin[i], [bounds.density(i, twin[i])])
     });
     Ok(())

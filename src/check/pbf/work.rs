@@ -2,10 +2,10 @@
 
 use crate::{
     check::{
-        engine::Io,
-        table::{Table, pair},
+        engine::{Io, Outcome},
+        table::pair,
     },
-    solve::SolveError,
+    solve::pbf::buffers,
 };
 
 use super::{PbfState, State, rows::WORK};
@@ -18,17 +18,13 @@ impl PbfState {
     }
 }
 
-pub(super) fn boundary_work(
-    state: &mut PbfState,
-    io: &Io<'_>,
-    table: &mut Table,
-) -> Result<(), SolveError> {
+pub(super) fn boundary_work(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let groups = n.div_ceil(64);
-    let work = io.before::<f32>("wall_work", 2 * n)?;
-    let before = io.before::<f32>("boundary_work", groups)?;
-    let after = io.after::<f32>("boundary_work", groups)?;
-    table.each(&WORK, 0..groups, |group| {
+    let work = io.before(buffers::WALL_WORK, 2 * n)?;
+    let before = io.before(buffers::BOUNDARY_WORK, groups)?;
+    let after = io.after(buffers::BOUNDARY_WORK, groups)?;
+    io.table.each(&WORK, 0..groups, |group| {
         let terms = 64 * group..(64 * group + 64).min(n);
         let term = |i: usize| f64::from(work[i]) + f64::from(work[n + i]);
         let sum: f64 = terms.clone().map(term).sum();

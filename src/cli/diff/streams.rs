@@ -2,7 +2,10 @@
 
 use std::fmt::Write as _;
 
-use crate::stage::diff::{CacheDiff, Difference, GridDiff, StreamDiff, ranges};
+use crate::{
+    domain::frame_range::ranges,
+    stage::diff::{CacheDiff, Difference, GridDiff, StreamDiff},
+};
 
 use super::number;
 

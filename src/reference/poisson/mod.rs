@@ -214,7 +214,7 @@ mod tests {
         assert!(gap(&again[1].x, &direct.x) < 1e-10);
     }
 
-    /// Second order in p, as of the GPU in tests/pressure.rs.
+    /// Second order in p, as of the GPU in tests/suite/solve/pressure.rs.
     #[test]
     fn manufactured_pressure_converges_with_second_order() {
         let error = |n: u32, surface: Surface| {

@@ -2,24 +2,13 @@
 
 use super::Renderer;
 use crate::{
-    render::{
-        RenderError,
-        frame::{AOV_BYTES, FAR},
-        image::Aovs,
-        pass::read,
-    },
+    render::{RenderError, buffers::aovs, frame::FAR, image::Aovs},
     scene::look::AovSpec,
 };
 
 impl Renderer {
     pub(super) fn read_aovs(&self) -> Result<Aovs, RenderError> {
-        let mut values: Vec<[f32; 10]> = Vec::new();
-        for band in &self.bands {
-            if let Some(buffer) = &band.aovs {
-                let bytes = AOV_BYTES * u64::from(self.extent.picture[0]) * u64::from(band.rows);
-                values.extend(read::<[f32; 10]>(&self.context, buffer, bytes)?);
-            }
-        }
+        let values: Vec<[f32; 10]> = self.read_bands(aovs)?;
         let origin = self.scene.origin + self.scene.domain.min;
         let seen = |v: &[f32; 10]| v[0] < 0.1 * FAR;
         let wants = |aov| self.look.wants(aov);

@@ -1,22 +1,17 @@
-//! A renderer from a look and a scene.
+//! A plan from a look and a scene.
 
-use wgpu::Buffer;
-
-use super::{
-    Renderer,
-    buffers::{Buffers, camera_buffer},
-    shade::Shade,
-    splats::Splats,
-};
+use super::{shade::plan_shade, splats::plan_splats};
 use crate::{
-    gpu::adapter::Context,
     render::{
         RenderError, RenderScene,
+        buffers::{CAMERA, DEPTHS, NEXT_CAMERA, SHADING},
         camera::longest_focal_px,
-        frame::{Extent, FAR, Filler, bands},
-        pass::Timer,
-        set::{Set, shadow_from_world, shadow_map, triangles, upload},
-        surface::{CurvatureFlow, Filter, FlowSettings, NarrowRange},
+        frame::{Extent, bands},
+        lighting::{plan_light, shading},
+        plan::{Limits, Plan},
+        set::{plan_solids, shadow_from_world, triangles},
+        sky::Sky,
+        surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
     },
     scene::look::{FilterSpec, Look},
 };
@@ -27,113 +22,80 @@ const RADIUS: f64 = 0.87;
 /// Smoothing width over particle spacing where the look leaves it out.
 const SMOOTHING: f64 = 1.6;
 
-impl Renderer {
-    /// Builds what the look calls for and nothing more.
+impl Plan {
+    /// Plans what the look calls for and nothing more, with room for `particles` particles.
     ///
     /// # Errors
-    /// A frame larger than the adapter's buffers, a damaged panorama, a mesh that names vertices it lacks.
-    pub fn new(context: &Context, look: &Look, scene: &RenderScene) -> Result<Self, RenderError> {
-        let most = context.limits.max_texture_dimension_2d;
-        Self::with_tile_limit(context, look, scene, most)
-    }
-
-    /// As [`Renderer::new`], with textures and bands of the picture no larger than `tile_limit` pixels along a
-    /// side. The picture is the same at any limit.
-    ///
-    /// # Errors
-    /// As [`Renderer::new`].
-    pub fn with_tile_limit(
-        context: &Context,
+    /// A damaged panorama, a domain or spacing that is none, a mesh that names vertices it lacks.
+    pub fn new(
         look: &Look,
         scene: &RenderScene,
-        tile_limit: u32,
+        particles: usize,
+        limits: &Limits,
     ) -> Result<Self, RenderError> {
         check(scene)?;
         let spec = look.spec();
-        let tile_limit = tile_limit.clamp(16, context.limits.max_texture_dimension_2d);
+        let has_aovs = !spec.output.aovs.is_empty();
         let extent = Extent::new(spec.image.width, spec.image.height);
-        let radius = spec
-            .surface
-            .radius_m
-            .unwrap_or(RADIUS * scene.particle_spacing);
-        let mut timer = Timer::new(context);
-        let camera = camera_buffer(context);
-        let buffers = Buffers::new(context, look, &extent)?;
-        let filler = Filler::new(context)?;
-        let fill = |buffer: &Buffer, word| filler.prepare(context, buffer, word, extent.pixels());
-
-        let opaque = triangles(look, scene)?;
-        let has_solids = !opaque.is_empty();
-        let matrix = shadow_from_world(&opaque, scene.domain.size(), look.sun_direction());
-        let uploaded = has_solids.then(|| upload(context, &opaque));
-        let drawn = uploaded.as_ref().map(|buffer| (buffer, opaque.len()));
-        let shadow = shadow_map(context, &mut timer, &matrix, drawn)?;
-        let set = match drawn {
-            Some((buffer, count)) => Some(Set::new(
-                context, &extent, tile_limit, &camera, buffer, count,
-            )?),
-            None => None,
-        };
-
-        let filter = filter(context, look, scene, radius, &camera, &buffers, &extent)?;
-        let shade = Shade::new(context, look, camera, shadow, matrix.to_cols_array_2d())?;
-        let bands = bands(context, &extent, shade.aovs.is_some(), tile_limit)?;
-        let mut renderer = Self {
-            context: context.clone(),
-            look: look.clone(),
-            scene: scene.clone(),
-            radius,
-            splats: Splats::new(context, look, scene.particle_spacing, radius)?,
-            clear_depth: fill(&buffers.depth[0], FAR.to_bits()),
-            clear_owner: buffers.owner.as_ref().map(|owner| fill(owner, u32::MAX)),
-            clear_solid: fill(&buffers.solid_depth, FAR.to_bits()),
+        let radius = (spec.surface.radius_m).unwrap_or(RADIUS * scene.particle_spacing);
+        let mut plan = Self {
             extent,
-            buffers,
-            bands,
-            filler,
-            set,
-            filter,
-            shade,
-            shade_groups: Vec::new(),
-            bound: None,
-            has_solids,
-            timer,
+            bands: bands(&extent, has_aovs, limits.storage, limits.tile),
+            radius,
+            ..Self::default()
         };
-        let surface = renderer.surface();
-        renderer.shade_groups =
-            renderer
-                .shade
-                .bind(context, &renderer.bands, &renderer.buffers, surface);
-        context.wait()?;
-        Ok(renderer)
+        plan.buffer(&CAMERA, 1);
+        if has_aovs {
+            plan.buffer(&NEXT_CAMERA, 1);
+        }
+        for depth in &DEPTHS {
+            plan.buffer(depth, extent.pixels());
+        }
+        let opaque = triangles(look, scene)?;
+        let matrix = shadow_from_world(&opaque, scene.domain.size(), look.sun_direction());
+        let sky = Sky::new(look, limits.texture)?;
+        plan_light(&mut plan, &sky);
+        let light = shading(look, &sky, matrix.to_cols_array_2d());
+        plan.values(&SHADING, &[light]);
+        let solids = plan_solids(&mut plan, &opaque, &matrix, limits);
+        let Smoothing { commands, surface } = smoothing(&mut plan, look, scene);
+        let spacing = scene.particle_spacing;
+        let splats = plan_splats(&mut plan, look, room(particles), spacing, radius, &surface);
+        let shade = plan_shade(&mut plan, look, &surface);
+        plan.end_fills();
+        if has_aovs {
+            let splats = [splats.body.clone(), splats.owner];
+            let all = [
+                solids.clone(),
+                splats.concat(),
+                commands.clone(),
+                shade.aovs,
+            ];
+            plan.aovs = all.concat();
+        }
+        plan.sample = [solids, splats.body, commands, splats.spray, shade.picture].concat();
+        Ok(plan)
     }
 }
 
-fn filter(
-    context: &Context,
-    look: &Look,
-    scene: &RenderScene,
-    radius: f64,
-    camera: &Buffer,
-    buffers: &Buffers,
-    extent: &Extent,
-) -> Result<Filter, RenderError> {
+/// How many particles there is room for where so many are asked for: frames differ, and few of them then need more.
+pub(super) fn room(particles: usize) -> usize {
+    particles.next_power_of_two()
+}
+
+fn smoothing(plan: &mut Plan, look: &Look, scene: &RenderScene) -> Smoothing {
     let surface = &look.spec().surface;
     let width = surface
         .smoothing_width_m
         .unwrap_or(SMOOTHING * scene.particle_spacing);
-    let depths = [&buffers.depth[0], &buffers.depth[1]];
-    let size = extent.size;
-    Ok(match surface.filter {
+    let (radius, size) = (plan.radius, plan.extent.size);
+    match surface.filter {
         FilterSpec::CurvatureFlow => {
             let settings = FlowSettings::for_width(width, radius, longest_focal_px(look));
-            let flow = CurvatureFlow::new(context, &settings, camera, depths, size)?;
-            Filter::Flow(Box::new(flow))
+            curvature_flow(plan, &settings, size)
         }
-        FilterSpec::NarrowRange => Filter::Narrow(NarrowRange::new(
-            context, width, radius, camera, depths, size,
-        )?),
-    })
+        FilterSpec::NarrowRange => narrow_range(plan, width, radius, size),
+    }
 }
 
 fn check(scene: &RenderScene) -> Result<(), RenderError> {

@@ -1,89 +1,100 @@
-//! One frame: samples over pixel and shutter, each a pass list over the whole frame.
+//! One frame: samples over pixel and shutter, each a recording over the whole frame.
 
 mod aovs;
-mod buffers;
 mod build;
 mod shade;
 mod splats;
 
+use bytemuck::Pod;
 use rayon::prelude::*;
-use wgpu::{BindGroup, Buffer};
 
+use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, picture};
 use super::camera::{Sample, Setting, camera, pose, samples};
-use super::frame::{Band, Extent, Filler, Filling};
 use super::image::Image;
-use super::pass::{Timer, folded, read, tiles};
-use super::set::Set;
-use super::surface::Filter;
-use super::{RenderError, RenderScene, aeration, plan, uniform};
+use super::plan::{Limits, Plan};
+use super::{RenderError, RenderScene, aeration, uniform};
 use crate::domain::particles::Particles;
-use crate::gpu::adapter::Context;
+use crate::gpu::{
+    adapter::Context,
+    buffer::Buf,
+    program::Program,
+    recording::{Recording, Timer, spread},
+};
 use crate::scene::look::Look;
-use buffers::Buffers;
-use shade::Shade;
-use splats::{Bound, Splats};
-
-/// Time that a pass took over all frames so far.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PassTime {
-    /// `ssfr/...`, as in [`super::passes`].
-    pub name: &'static str,
-    /// Seconds on the device; 0 where the adapter has no timestamps.
-    pub seconds: f64,
-    /// How often it ran.
-    pub runs: u32,
-}
+use build::room;
 
 /// Renders frames of one scene with one look.
 pub struct Renderer {
-    context: Context,
     look: Look,
     scene: RenderScene,
-    extent: Extent,
-    radius: f64,
-    buffers: Buffers,
-    bands: Vec<Band>,
-    filler: Filler,
-    clear_depth: Filling,
-    clear_owner: Option<Filling>,
-    clear_solid: Filling,
-    set: Option<Set>,
-    splats: Splats,
-    filter: Filter,
-    shade: Shade,
-    shade_groups: Vec<BindGroup>,
-    bound: Option<Bound>,
-    has_solids: bool,
-    timer: Timer,
+    plan: Plan,
+    program: Program,
+    /// Until the first frame.
+    once: Option<Recording>,
+    sample: Recording,
+    aovs: Recording,
+    /// Particles that there is room for.
+    capacity: usize,
+    timer: Option<Timer>,
 }
 
 impl Renderer {
-    fn surface(&self) -> &Buffer {
-        &self.buffers.depth[usize::from(self.filter.result_is_in_other())]
+    /// Builds what the look calls for and nothing more.
+    ///
+    /// # Errors
+    /// A frame larger than the adapter's buffers, a damaged panorama, a mesh that names vertices it lacks.
+    pub fn new(context: &Context, look: &Look, scene: &RenderScene) -> Result<Self, RenderError> {
+        let most = context.limits.max_texture_dimension_2d;
+        Self::with_tile_limit(context, look, scene, most)
     }
 
-    /// Names of the passes that a frame takes, as [`super::passes`] plans them.
-    pub fn passes(&self) -> Vec<&'static str> {
-        plan::passes(&self.look, self.has_solids)
+    /// As [`Renderer::new`], with textures and bands of the picture no larger than `tile_limit` pixels along a
+    /// side. The picture is the same at any limit.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn with_tile_limit(
+        context: &Context,
+        look: &Look,
+        scene: &RenderScene,
+        tile_limit: u32,
+    ) -> Result<Self, RenderError> {
+        let whole = Limits::of(context);
+        let limits = Limits {
+            tile: tile_limit.clamp(16, whole.texture),
+            ..whole
+        };
+        let plan = Plan::new(look, scene, 0, &limits)?;
+        let program = plan.program(context)?;
+        let record = |commands| Recording::new(&program, commands);
+        let renderer = Self {
+            look: look.clone(),
+            scene: scene.clone(),
+            once: Some(record(&plan.once)),
+            sample: record(&plan.sample),
+            aovs: record(&plan.aovs),
+            plan,
+            program,
+            capacity: room(0),
+            timer: None,
+        };
+        context.wait()?;
+        Ok(renderer)
     }
 
-    /// What each pass has cost since the renderer was built, by name.
-    pub fn times(&self) -> Vec<PassTime> {
-        self.timer
-            .totals
-            .iter()
-            .map(|(&name, &(seconds, runs))| PassTime {
-                name,
-                seconds,
-                runs,
-            })
-            .collect()
+    /// What it was built from.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
     }
 
-    /// Times passes one by one from here on, by the host's clock, and forgets earlier times: for software
-    /// adapters, whose timestamps tell when work was queued, not when it was done. The pictures are the same.
-    pub fn time_one_by_one(&mut self) {
-        self.timer.time_one_by_one();
+    /// Times each pass from here on, and forgets earlier times; passes then run one by one. The pictures are the same.
+    pub fn time_passes(&mut self) {
+        self.timer = Some(Timer::new(&self.program.context));
+    }
+
+    /// Pass, seconds and runs since [`Self::time_passes`], by name.
+    pub fn times(&self) -> Vec<(&'static str, f64, u64)> {
+        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
     }
 
     /// Renders one frame; the same frame, particles, look and adapter give the same bytes.
@@ -95,20 +106,21 @@ impl Renderer {
         let count = self.load(frame, particles)?;
         let setting = Setting {
             origin: self.scene.origin + self.scene.domain.min,
-            size: self.extent.size,
-            margin: self.extent.margin,
+            size: self.plan.extent.size,
+            margin: self.plan.extent.margin,
             particle_count: count,
-            radius: self.radius,
+            radius: self.plan.radius,
             frames_per_second: self.scene.frames_per_second,
         };
+        self.draw_once()?;
         let spec = self.look.spec().image.clone();
         for (index, sample) in (0u32..).zip(samples(spec.samples, spec.shutter)) {
             let camera = camera(&self.look, &setting, frame.into(), sample, index);
             self.sample(&camera, false)?;
         }
-        let [width, height] = self.extent.picture;
+        let [width, height] = self.plan.extent.picture;
         let mut image = Image::new(width, height);
-        if self.shade.aovs.is_some() {
+        if !self.plan.aovs.is_empty() {
             // Depths and normals have no mean: they are taken at pixel centres, at the frame's instant.
             let still = Sample {
                 jitter: [0.0; 2],
@@ -116,21 +128,23 @@ impl Renderer {
                 weight: 1.0,
             };
             let next = camera(&self.look, &setting, f64::from(frame) + 1.0, still, 0);
-            self.context
-                .queue
-                .write_buffer(&self.shade.next_camera, 0, bytemuck::bytes_of(&next));
+            self.program.upload(NEXT_CAMERA, 0, &[next]);
             let camera = camera(&self.look, &setting, frame.into(), still, 0);
             self.sample(&camera, true)?;
             image.aovs = self.read_aovs()?;
         }
-        image.beauty.clear();
-        for band in &self.bands {
-            let bytes = 16 * u64::from(width) * u64::from(band.rows);
-            image
-                .beauty
-                .extend(read::<[f32; 4]>(&self.context, &band.colour, bytes)?);
-        }
+        image.beauty = self.read_bands(picture)?;
         Ok(image)
+    }
+
+    /// Every pixel of what is kept in the buffers that `of` gives for each band.
+    fn read_bands<T: Pod>(&self, of: fn(usize) -> Buf<T>) -> Result<Vec<T>, RenderError> {
+        let width = self.plan.extent.picture[0] as usize;
+        let mut pixels = Vec::new();
+        for (band, &rows) in self.plan.bands.iter().enumerate() {
+            pixels.extend(self.program.read(of(band), width * rows as usize)?);
+        }
+        Ok(pixels)
     }
 
     /// Moves a frame's particles to the device, relative to the domain's least corner.
@@ -164,88 +178,40 @@ impl Renderer {
             let depth = |p: &uniform::Particle| glam::Vec3::from(p.position).dot(forward);
             depth(a).total_cmp(&depth(b)).then(a.tag.cmp(&b.tag))
         });
-        if self
-            .bound
-            .as_ref()
-            .is_none_or(|bound| bound.capacity < packed.len())
-        {
-            self.bound = Some(self.bind(packed.len().max(1).next_power_of_two())?);
-        }
-        if let Some(bound) = &self.bound {
-            let bytes = bytemuck::cast_slice(&packed);
-            self.context.queue.write_buffer(&bound.buffer, 0, bytes);
-        }
+        self.reserve(packed.len())?;
+        let groups = spread(&self.program.context, 1, packed.len() as u64);
+        self.program.upload(PARTICLE_GROUPS, 0, &[groups.into()]);
+        self.program.upload(PARTICLES, 0, &packed);
         Ok(packed.len() as u32)
     }
 
-    fn bind(&self, capacity: usize) -> Result<Bound, RenderError> {
-        let (context, frame, surface) = (&self.context, &self.buffers, self.surface());
-        let particles = Splats::particles(context, capacity)?;
-        let aovs = self
-            .shade
-            .bind_aovs(context, &self.bands, frame, surface, &particles);
-        let camera = &self.shade.camera;
-        let bound = (self.splats).bind(context, particles, capacity, camera, frame, surface);
-        Ok(Bound {
-            shade_aovs: aovs,
-            ..bound
-        })
+    /// Makes room for so many particles.
+    fn reserve(&mut self, particles: usize) -> Result<(), RenderError> {
+        if particles <= self.capacity {
+            return Ok(());
+        }
+        let capacity = room(particles);
+        self.program.resize(&[PARTICLES.sized(capacity)])?;
+        self.capacity = capacity;
+        self.sample = Recording::new(&self.program, &self.plan.sample);
+        self.aovs = Recording::new(&self.program, &self.plan.aovs);
+        Ok(())
+    }
+
+    /// Draws what does not change from frame to frame.
+    fn draw_once(&mut self) -> Result<(), RenderError> {
+        if let Some(once) = self.once.take() {
+            once.run(&self.program, self.timer.as_mut())?;
+        }
+        Ok(())
     }
 
     /// Draws one sample, into the picture's mean or, with `aovs`, into the channels beside it.
     fn sample(&mut self, camera: &uniform::Camera, aovs: bool) -> Result<(), RenderError> {
-        let Some(bound) = &self.bound else {
-            return Ok(());
-        };
-        let context = &self.context;
-        let timer = &mut self.timer;
-        let frame = &self.buffers;
-        let mut encoder = context.device.create_command_encoder(&Default::default());
-        context
-            .queue
-            .write_buffer(&self.shade.camera, 0, bytemuck::bytes_of(camera));
-        match &self.set {
-            Some(set) => {
-                let solids = [&frame.solid_depth, &frame.solid_packed];
-                set.run(&mut encoder, timer, &self.extent, solids);
-            }
-            None => self.filler.run(&mut encoder, timer, &self.clear_solid),
-        }
-        self.filler.run(&mut encoder, timer, &self.clear_depth);
-        encoder.clear_buffer(&frame.thickness, 0, None);
-        let groups = folded(camera.particle_count);
-        self.splats
-            .depth
-            .run(&mut encoder, timer, &bound.depth, groups);
-        self.splats
-            .thickness
-            .run(&mut encoder, timer, &bound.thickness, groups);
-        if let (true, Some(pass), Some(group), Some(clear)) =
-            (aovs, &self.splats.owner, &bound.owner, &self.clear_owner)
-        {
-            // Before the filter, while the depth is still that of the spheres.
-            self.filler.run(&mut encoder, timer, clear);
-            pass.run(&mut encoder, timer, group, groups);
-        }
-        self.filter.run(&mut encoder, timer);
-        if let (false, Some(pass), Some(group), Some(spray)) =
-            (aovs, &self.splats.spray, &bound.spray, &frame.spray)
-        {
-            encoder.clear_buffer(spray, 0, None);
-            pass.run(&mut encoder, timer, group, groups);
-        }
-        let (pass, shade_groups) = match (&self.shade.aovs, aovs) {
-            (Some(pass), true) => (pass, &bound.shade_aovs),
-            _ => (&self.shade.pass, &self.shade_groups),
-        };
-        for (band, group) in self.bands.iter().zip(shade_groups) {
-            let size = [self.extent.picture[0], band.rows];
-            pass.run(&mut encoder, timer, group, tiles(size));
-        }
-        timer.resolve(&mut encoder);
-        context.queue.submit([encoder.finish()]);
-        timer.collect(context)?;
-        context.wait()?;
+        self.program.upload(CAMERA, 0, &[*camera]);
+        let recording = if aovs { &self.aovs } else { &self.sample };
+        recording.run(&self.program, self.timer.as_mut())?;
+        self.program.context.wait()?;
         Ok(())
     }
 }

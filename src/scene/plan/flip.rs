@@ -93,7 +93,7 @@ impl Plan {
             "flip",
         );
         self.add_buffer("cell_start", 4 * (wet + 1), "sort");
-        self.add_specs(sort::scan_buffers("cell_start", wet as usize), "sort");
+        self.add_specs(sort::scan_buffers(&sort::CELL_START, wet as usize), "sort");
         self.add_buffer("partial_momentum", 4 * FACES * wet, "flip");
         self.add_buffer("partial_weight", 4 * CENTERS * wet, "flip");
         for name in ["face_velocity", "face_change", "face_open"] {

@@ -110,7 +110,7 @@ impl Plan {
     fn add_sort(&mut self) {
         let particles = self.counts.particles as u64;
         self.add_buffer("cell_start", 4 * (self.cells() as u64 + 1), "sort");
-        self.add_specs(sort::scan_buffers("cell_start", self.cells()), "sort");
+        self.add_specs(sort::scan_buffers(&sort::CELL_START, self.cells()), "sort");
         for name in ["cell_of", "slot_in_cell", "placed", "order"] {
             self.add_buffer(name, 4 * particles, "sort");
         }

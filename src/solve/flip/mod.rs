@@ -4,6 +4,7 @@
 //! their velocities to the grid, projects, carries the change back and moves them through the projected field.
 //! No grid outlives its substep: the state is positions, velocities, ids, and with APIC the affine rows.
 
+pub mod buffers;
 mod record;
 mod room;
 mod step;
@@ -22,6 +23,7 @@ use crate::{
     },
     gpu::{
         adapter::Context,
+        buffer::Buf,
         program::{BufferSpec, Program},
         recording::{Recording, Timer},
         sort,
@@ -41,13 +43,11 @@ use super::{
     state::{check_finite, check_ids, slots_by_id, take_over, upload},
     trace::{Begun, Observe, Run, Span, TraceFrame, trace},
 };
-use record::{Recordings, groups, windows};
+use buffers::*;
+use record::{Recordings, groups, numbers};
 use room::{bricks, capacity_of, no_water};
 
 pub use room::capacity;
-
-/// Words of `survey` before the flags.
-const SURVEY_HEAD: usize = 4;
 
 /// FLIP on a device.
 pub struct Flip {
@@ -123,11 +123,11 @@ impl Flip {
             length: scene.shot.frame_seconds(),
             displacement: 0.0,
         };
-        program.upload("params", 0, &[step::params(scene, &plan, &bricks, &frame)]);
+        program.upload(PARAMS, 0, &[step::params(scene, &plan, &bricks, &frame)]);
         Ok(Self {
             recordings: Recordings::new(&program, &plan, scene),
             pressure: pressure_solver(scene, &plan),
-            timer: if is_timed { Timer::new(context) } else { None },
+            timer: is_timed.then(|| Timer::new(context)),
             bricks,
             program,
             limits: super::pbf::device_limits(context),
@@ -168,21 +168,26 @@ impl Flip {
         self.program.names()
     }
 
-    /// The named buffer's first `count` values, such as `face_velocity` or `density`, as the last substep left it.
+    /// A buffer's first `count` values, as the last substep left it.
     ///
     /// # Errors
     /// The device.
-    pub fn field<T: bytemuck::Pod>(&self, name: &str, count: usize) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.download(&[(name, count)])?.remove(0))
+    pub fn field<T: bytemuck::Pod>(
+        &self,
+        buffer: impl Into<Buf<T>>,
+        count: usize,
+    ) -> Result<Vec<T>, SolveError> {
+        Ok(self.program.read(buffer.into(), count)?)
     }
 
     fn survey(&mut self, run: &mut Run<'_>) -> Result<Survey, SolveError> {
         run(&self.program, &[&self.recordings.survey])?;
-        let words = self.field::<u32>("survey", SURVEY_HEAD + no_water(&self.plan).len())?;
+        let flags = SURVEY_IS_WET.first(no_water(&self.plan).len());
+        let (head, is_wet) = self.program.download((SURVEY.first(1), flags))?;
         Ok(Survey {
-            speed: f64::from(f32::from_bits(words[0])).sqrt(),
-            not_finite: words[1],
-            is_wet: words[SURVEY_HEAD..].iter().map(|&flag| flag != 0).collect(),
+            speed: f64::from(head[0].speed_square).sqrt(),
+            not_finite: head[0].not_finite,
+            is_wet: is_wet.into_iter().map(|flag| flag != 0).collect(),
         })
     }
 
@@ -224,10 +229,10 @@ impl Flip {
         let bricks = &self.bricks;
         let params = step::params(&self.scene, &self.plan, bricks, substep);
         let groups = groups(&self.program, params.wet_cells, params.active_cells, layers);
-        self.program.upload("params", 0, &[params]);
-        self.program.upload("bricks", 0, &bricks.records);
-        self.program.upload("brick_slot", 0, &bricks.table);
-        self.program.upload("groups", 0, &groups);
+        self.program.upload(PARAMS, 0, &[params]);
+        self.program.upload(BRICKS, 0, &bricks.records);
+        self.program.upload(BRICK_SLOT, 0, &bricks.table);
+        self.program.upload(GROUPS, 0, &groups);
         if let Some(movers) = &self.movers {
             movers.upload(&self.program, &self.scene, substep.start, substep.length);
         }
@@ -346,18 +351,17 @@ impl Flip {
             true => self.bricks.wet as usize * (CELLS / 64) as usize,
             false => 0,
         };
-        let mut wanted = vec![("counters", size_of::<Counters>() / 4)];
-        if groups > 0 {
-            wanted.push(("boundary_work", groups));
-        }
-        let words = self.program.download::<u32>(&wanted)?;
-        let counters: Counters = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&words[0]));
-        if counters.not_finite > 0 {
-            let breach = Breach::not_finite(self.frame + 1, counters.not_finite.into(), None);
+        let wanted = (COUNTERS.first(1), BOUNDARY_WORK.first(groups));
+        let (counters, sums) = match groups {
+            // Without walls that move there is no such buffer.
+            0 => (self.program.read(COUNTERS, 1)?, Vec::new()),
+            _ => self.program.download(wanted)?,
+        };
+        if counters[0].not_finite > 0 {
+            let breach = Breach::not_finite(self.frame + 1, counters[0].not_finite.into(), None);
             return Err(breach.in_substep(substep).into());
         }
-        let sums = words.get(1).into_iter().flatten();
-        Ok(sums.map(|&bits| f64::from(f32::from_bits(bits))).sum())
+        Ok(sums.into_iter().map(f64::from).sum())
     }
 
     /// What the next substep is, and whether it is the frame's last.
@@ -401,16 +405,14 @@ impl Flip {
                     row[k] = *value;
                 }
             }
-            self.program.upload("affine", 0, &rows);
+            self.program.upload(AFFINE, 0, &rows);
         }
     }
 
     fn read_state(&mut self) -> Result<(), SolveError> {
         let n = self.state.len();
-        let vectors = self
-            .program
-            .download::<[f32; 4]>(&[("position", n), ("velocity", n)])?;
-        let id = self.field::<u32>("id", n)?;
+        let wanted = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
+        let (position, velocity, id) = self.program.download(wanted)?;
         check_ids(self.frame + 1, &self.state.id, &id)?;
         let slot_of = slots_by_id(&self.state.id);
         take_over(
@@ -418,12 +420,12 @@ impl Flip {
             &self.scene,
             &slot_of,
             &id,
-            &vectors[0],
-            &vectors[1],
+            &position,
+            &velocity,
         );
         let names = self.scene.solver.flip().attributes();
         if !names.is_empty() {
-            let rows = self.field::<f32>("affine", names.len() * n)?;
+            let rows = self.field(AFFINE, names.len() * n)?;
             for (k, name) in names.iter().enumerate() {
                 let mut values = vec![0.0; n];
                 for (row, id) in rows.chunks_exact(names.len()).zip(&id) {
@@ -443,7 +445,7 @@ impl Flip {
     /// Relative densities in cells of water, as the last substep found them.
     fn densities(&self) -> Result<Vec<f32>, SolveError> {
         let cells = (self.bricks.wet as usize + 1) * CELLS as usize;
-        let mut density = self.field::<f32>("density", cells)?;
+        let mut density = self.field(DENSITY, cells)?;
         density.retain(|&value| value != 0.0);
         Ok(density)
     }
@@ -467,7 +469,7 @@ impl Solver for Flip {
     }
 
     fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
-        self.program.upload("counters", 0, &[Counters::default()]);
+        self.program.upload(COUNTERS, 0, &[Counters::default()]);
         let told = if self.state.is_empty() {
             Told::default()
         } else {
@@ -483,7 +485,7 @@ impl Solver for Flip {
         } else {
             self.densities()?
         };
-        let capped = self.field::<Counters>("counters", 1)?[0].capped;
+        let capped = self.field(COUNTERS, 1)?[0].capped;
         self.frame += 1;
         if self.scene.domain.min != DVec3::ZERO {
             // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
@@ -504,8 +506,8 @@ impl Solver for Flip {
 
     /// The projection's, between cell centres.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
-        let kind: Vec<u32> = self.field("cell_kind", self.elements())?;
-        let pressure: Vec<f32> = self.field("pressure", self.elements())?;
+        let kind: Vec<u32> = self.field(CELL_KIND, self.elements())?;
+        let pressure: Vec<f32> = self.field(pressure::buffers::PRESSURE, self.elements())?;
         let pressure: Vec<f64> = pressure.into_iter().map(f64::from).collect();
         let gauge = Gauge {
             bricks: &self.bricks,
@@ -519,12 +521,7 @@ impl Solver for Flip {
     }
 
     fn timings(&self) -> Vec<(&'static str, f64, u64)> {
-        let total = self.timer.as_ref().map(|timer| &timer.total);
-        total
-            .into_iter()
-            .flatten()
-            .map(|(&name, &(seconds, runs))| (name, seconds, runs))
-            .collect()
+        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
     }
 }
 
@@ -532,7 +529,7 @@ impl TraceFrame for Flip {
     fn trace_frame(&mut self, span: Span, observe: &mut Observe<'_>) -> Result<u32, SolveError> {
         let plain: &mut Run<'_> =
             &mut |program, recordings| Ok(Recording::run_all(recordings, program, None)?);
-        self.program.upload("counters", 0, &[Counters::default()]);
+        self.program.upload(COUNTERS, 0, &[Counters::default()]);
         let mut told = Told::default();
         loop {
             let begun = Begun {
@@ -587,9 +584,9 @@ fn pressure_solver(scene: &Scene, plan: &Plan) -> PressureSolver {
 /// What does not change from substep to substep.
 fn upload_constants(program: &Program, plan: &Plan, scene: &Scene) {
     let cells = plan.counts.bricks.wet * CELLS as usize;
-    program.upload("cell_start.lengths", 0, &sort::scan_lengths(cells));
-    program.upload("element_count", 0, &[plan.counts.particles as u32, 0, 0, 0]);
-    program.upload("axes", 0, &windows(0, 3));
+    sort::upload_lengths(program, &CELL_START, cells);
+    program.upload(ELEMENT_COUNT, 0, &[[plan.counts.particles as u32, 0, 0, 0]]);
+    program.upload_windows(&AXES, &numbers(0, 3));
     // The first that is extrapolated is layer 2.
-    program.upload("layers", 0, &windows(2, layers(scene.solver.flip().cfl)));
+    program.upload_windows(&LAYERS, &numbers(2, layers(scene.solver.flip().cfl)));
 }

@@ -3,24 +3,27 @@
 use crate::{
     domain::bricks::CELLS,
     gpu::{
+        buffer::Workgroups,
         program::{BufferSpec, Program},
         recording::{Bind, Command, Groups, Recording, spread},
         sort,
     },
     scene::{
         Scene,
-        plan::{Plan, WINDOW_BYTES, layers},
+        plan::{Plan, layers},
     },
 };
 
-/// Where in `groups` the workgroups over cells of water stand.
-const WET: u64 = 0;
+use super::buffers::*;
+
+/// Where in [`GROUPS`] those over cells of water stand.
+const WET: usize = 0;
 
 /// Those over cells within reach too.
-const ACTIVE: u64 = 16;
+const ACTIVE: usize = 1;
 
 /// Those of the first extrapolated layer, one after the other.
-const LAYERS: u64 = 32;
+const FIRST_LAYER: usize = 2;
 
 /// Particles of a thread of `flip/survey`, its `RUN`.
 const SURVEY_RUN: usize = 16;
@@ -48,7 +51,7 @@ impl Recordings {
         let layers = layers(scene.solver.flip().cfl);
         let n = plan.counts.particles;
         let survey = [
-            Command::Clear("survey"),
+            Command::clear(&SURVEY),
             Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
         ];
         Self {
@@ -66,66 +69,43 @@ pub(super) fn groups(
     wet_cells: u32,
     active_cells: u32,
     layers: usize,
-) -> Vec<[u32; 4]> {
-    let of = |cells: u32| {
-        let [x, y, z] = spread(&program.context, WORKGROUP, u64::from(cells));
-        [x, y, z, 0]
-    };
+) -> Vec<Workgroups> {
+    let of = |cells: u32| spread(&program.context, WORKGROUP, u64::from(cells)).into();
     let mut all = vec![of(wet_cells), of(active_cells)];
     // Layer 1 is what the projection found.
-    all.resize(2 + layers.saturating_sub(1), of(active_cells));
+    all.resize(FIRST_LAYER + layers.saturating_sub(1), of(active_cells));
     all
 }
 
-/// Contents of a uniform whose windows each hold their own number, from `first` on.
-pub(super) fn windows(first: u32, count: usize) -> Vec<[u32; WINDOW_BYTES as usize / 4]> {
-    (0..count as u32)
-        .map(|k| {
-            let mut window = [0; WINDOW_BYTES as usize / 4];
-            window[0] = first + k;
-            window
-        })
-        .collect()
+/// Contents of windows that each hold their own number, from `first` on.
+pub(super) fn numbers(first: u32, count: usize) -> Vec<[u32; 4]> {
+    (first..).take(count).map(|k| [k, 0, 0, 0]).collect()
 }
 
-fn over(pass: &'static str, offset: u64) -> Command {
+fn over(pass: &'static str, size: usize) -> Command {
+    bound(pass, size, Vec::new())
+}
+
+fn bound(pass: &'static str, size: usize, binds: Vec<Bind>) -> Command {
     Command::Dispatch {
         pass,
-        binds: Vec::new(),
-        groups: Groups::Indirect("groups", offset),
+        binds,
+        groups: Groups::at(&GROUPS, size),
     }
 }
 
-fn window(
-    pass: &'static str,
-    offset: u64,
-    variable: &'static str,
-    buffer: &str,
-    k: usize,
-) -> Command {
-    Command::Dispatch {
-        pass,
-        binds: vec![Bind {
-            variable,
-            buffer: buffer.to_owned(),
-            window: Some((WINDOW_BYTES * k as u64, 16)),
-        }],
-        groups: Groups::Indirect("groups", offset),
-    }
-}
-
-fn along(pass: &'static str, offset: u64, axis: usize) -> Command {
-    window(pass, offset, "axis", "axes", axis)
+fn along(pass: &'static str, size: usize, axis: usize) -> Command {
+    bound(pass, size, vec![AXES.bind(axis)])
 }
 
 fn to_grid(plan: &Plan) -> Vec<Command> {
     let n = plan.counts.particles;
     let cells = plan.counts.bricks.wet * CELLS as usize;
     let mut commands = vec![
-        Command::Clear("cell_start"),
+        Command::clear(&CELL_START),
         Command::over("flip/assign_cells", n),
     ];
-    commands.extend(sort::scan("cell_start", cells));
+    commands.extend(sort::scan(&CELL_START, cells));
     commands.extend(sort::SORT_PASSES.map(|pass| Command::over(pass, n)));
     commands.push(Command::over("flip/reorder", n));
     commands.push(over("flip/cut_cells", ACTIVE));
@@ -161,8 +141,8 @@ fn watch(plan: &Plan, scene: &Scene) -> Vec<Command> {
 fn to_particles(plan: &Plan, layers: usize) -> Vec<Command> {
     let mut commands = vec![over("flip/find_change", ACTIVE)];
     for k in 0..layers.saturating_sub(1) {
-        let offset = LAYERS + 16 * k as u64;
-        commands.push(window("flip/extrapolate", offset, "layer", "layers", k));
+        let binds = vec![LAYERS.bind(k)];
+        commands.push(bound("flip/extrapolate", FIRST_LAYER + k, binds));
     }
     commands.push(over("flip/grid_to_particle", WET));
     commands.push(Command::over("flip/advect", plan.counts.particles));

@@ -34,6 +34,7 @@
 //! pressure.correct(&program, timer)                                    same system, density_excess -> face_displacement
 //! ```
 
+pub mod buffers;
 mod params;
 mod plan;
 mod pockets;
@@ -44,6 +45,7 @@ use std::collections::BTreeMap;
 use crate::{
     domain::bricks::{Bricks, CELLS, Level},
     gpu::{
+        buffer::Workgroups,
         program::Program,
         recording::{Recording, Timer, spread},
     },
@@ -53,11 +55,12 @@ use crate::{
 use super::{SolveError, trace::Run};
 
 pub use crate::domain::poisson::{AIR, FLUID, SOLID};
-pub use params::{PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats};
-pub use plan::{buffers, passes};
-
-pub use plan::control_words;
-use plan::{PHASE_STRIDE, PHASES, Phase, SIZES, Size};
+use buffers::{PHASES, SIZES, read_control, read_reals};
+pub use params::{
+    PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats, ReduceStep,
+};
+use plan::{PHASE_COUNT, Phase, SIZE_COUNT, Size};
+pub use plan::{passes, planned};
 use stages::{SINGLE, Shape, Stages};
 
 /// Levels of bricks that the multigrid uses at most: pass it to [`Bricks::new`] as depth.
@@ -123,7 +126,7 @@ pub struct PressureSolver {
     stages: BTreeMap<Shape, Stages>,
     shape: Shape,
     phase: PressurePhase,
-    sizes: [[u32; 4]; SIZES],
+    sizes: [Workgroups; SIZE_COUNT],
     pockets: u32,
     /// Iterations that the last projection and the last correction took: how many the next is submitted with.
     /// It changes when the device is waited for, and nothing else.
@@ -158,7 +161,7 @@ impl PressureSolver {
                 max_iterations: settings.max_iterations,
                 ..PressurePhase::default()
             },
-            sizes: [[0; 4]; SIZES],
+            sizes: [Workgroups::default(); SIZE_COUNT],
             pockets: 0,
             expected: [expected, expected / 2],
         }
@@ -192,25 +195,24 @@ impl PressureSolver {
             has_pockets: false,
         };
         self.set_sizes(program, bricks.active, used);
-        program.upload("pressure_bricks", 0, &brick_records(bricks, used.len()));
+        program.upload(buffers::BRICKS, 0, &brick_records(bricks, used.len()));
     }
 
     fn set_sizes(&mut self, program: &Program, active: u32, levels: &[Level]) {
         let groups = |threads: u32| {
             if threads == 0 {
-                return [0; 4];
+                return Workgroups::default();
             }
-            let [x, y, z] = spread(&program.context, 64, u64::from(threads));
-            [x, y, z, 0]
+            spread(&program.context, 64, u64::from(threads)).into()
         };
-        self.sizes = [[0; 4]; SIZES];
+        self.sizes = [Workgroups::default(); SIZE_COUNT];
         for (level, &Level { count, .. }) in levels.iter().enumerate() {
             self.sizes[Size::Full(level).index()] = groups(64 * count);
             self.sizes[Size::Half(level).index()] = groups(32 * count);
         }
-        self.sizes[Size::Single.index()] = [1, 1, 1, 0];
+        self.sizes[Size::Single.index()] = [1, 1, 1].into();
         self.sizes[Size::Active.index()] = groups(64 * active);
-        program.upload("pressure_sizes", 0, &self.sizes);
+        program.upload(SIZES, 0, &self.sizes);
     }
 
     /// Builds the system, solves it and makes `face_velocity` free of divergence; waits for the device.
@@ -297,9 +299,8 @@ impl PressureSolver {
     pub fn solution(&self, program: &Program, elements: &[u32]) -> Result<Vec<f64>, SolveError> {
         let precision = self.settings.precision;
         let stride = CELLS as usize * self.capacity;
-        let words = precision.terms() * stride * precision.words();
-        let words = program.download::<u32>(&[("pressure_solution", words)])?;
-        let values = widen(&words[0], precision);
+        let count = precision.terms() * stride;
+        let values = read_reals(program, &buffers::SOLUTION, precision, count)?;
         let at = |place: usize| {
             (0..precision.terms())
                 .map(|k| values[k * stride + place])
@@ -339,7 +340,7 @@ impl PressureSolver {
             recordings.push(&stages.verify);
             recordings.extend(finish);
             run(program, &recordings)?;
-            let (control, stats) = read(program, self.settings.precision)?;
+            let (control, stats) = read_control(program, self.settings.precision)?;
             is_first = control.state == WANTS_POCKETS;
             if is_first {
                 self.find_pockets(program)?;
@@ -361,68 +362,27 @@ impl PressureSolver {
 
     fn upload_phases(&self, program: &Program) {
         let has_halves = self.settings.preconditioner == Preconditioner::Multigrid;
-        let mut bytes = vec![0; PHASES * PHASE_STRIDE as usize];
-        for (index, slot) in bytes.chunks_exact_mut(PHASE_STRIDE as usize).enumerate() {
-            let phase = Phase::fill(index, self.phase, has_halves);
-            slot[..size_of::<PressurePhase>()].copy_from_slice(bytemuck::bytes_of(&phase));
-        }
-        program.upload("pressure_phases", 0, &bytes);
+        let phases: Vec<_> = (0..PHASE_COUNT)
+            .map(|index| Phase::fill(index, self.phase, has_halves))
+            .collect();
+        program.upload_windows(&PHASES, &phases);
     }
 
     /// Lists the cells of each pocket, which the device has counted and found to be there.
     fn find_pockets(&mut self, program: &Program) -> Result<(), SolveError> {
         let cells = (CELLS * (self.phase.levels[0][1] + 1)) as usize;
-        let labels = program
-            .download::<u32>(&[("pressure_label", cells)])?
-            .remove(0);
+        let labels = program.read(buffers::LABEL, cells)?;
         let (cells, ranges) = pockets::list(&labels);
-        program.upload("pressure_pocket_cells", 0, &cells);
-        program.upload("pressure_pocket_ranges", 0, &ranges);
+        program.upload(buffers::POCKET_CELLS, 0, &cells);
+        program.upload(buffers::POCKET_RANGES, 0, &ranges);
         self.pockets = ranges.len() as u32;
-        let [x, y, z] = spread(&program.context, 1, u64::from(self.pockets));
-        self.sizes[Size::Pockets.index()] = [x, y, z, 0];
-        program.upload("pressure_sizes", 0, &self.sizes);
+        self.sizes[Size::Pockets.index()] =
+            spread(&program.context, 1, u64::from(self.pockets)).into();
+        program.upload(SIZES, 0, &self.sizes);
         self.shape.has_pockets = true;
         self.phase.has_pockets = 1;
         self.upload_phases(program);
         Ok(())
-    }
-}
-
-/// What stands in `pressure_control`, in f64 whatever the device computes in, from its words of 32 bits.
-pub fn widen_control(words: &[u32], precision: Precision) -> PressureControl64 {
-    let bytes: &[u8] = bytemuck::cast_slice(words);
-    match precision {
-        Precision::F32 | Precision::F32Refined => {
-            let narrow: PressureControl = bytemuck::pod_read_unaligned(bytes);
-            PressureControl64 {
-                state: narrow.state,
-                iterations: narrow.iterations,
-                is_first: narrow.is_first,
-                restarts: narrow.restarts,
-                rhs_square: narrow.rhs_square.into(),
-                residual_square: narrow.residual_square.into(),
-                product: narrow.product.into(),
-                alpha: narrow.alpha.into(),
-                beta: narrow.beta.into(),
-            }
-        }
-        Precision::F64 => bytemuck::pod_read_unaligned(bytes),
-    }
-}
-
-/// Values that an array of the room's own holds in `precision`, from its words of 32 bits. `pressure_solution` has
-/// [`Precision::terms`] planes of them, whose sum it is.
-pub fn widen(words: &[u32], precision: Precision) -> Vec<f64> {
-    match precision {
-        Precision::F32 | Precision::F32Refined => {
-            let wide = |&bits: &u32| f64::from(f32::from_bits(bits));
-            words.iter().map(wide).collect()
-        }
-        Precision::F64 => {
-            let wide = |pair: &[u32]| f64::from_bits(u64::from(pair[1]) << 32 | u64::from(pair[0]));
-            words.chunks_exact(2).map(wide).collect()
-        }
     }
 }
 
@@ -443,17 +403,6 @@ fn solved(control: &PressureControl64, tolerance: f64) -> Solved {
         // The device compares squares, with the tolerance's in f32.
         is_missed: residual.is_nan() || residual > tolerance * (1.0 + 1e-6),
     }
-}
-
-fn read(
-    program: &Program,
-    precision: Precision,
-) -> Result<(PressureControl64, PressureStats), SolveError> {
-    let words = [control_words(precision), size_of::<PressureStats>() / 4];
-    let read =
-        program.download::<u32>(&[("pressure_control", words[0]), ("pressure_stats", words[1])])?;
-    let stats = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&read[1]));
-    Ok((widen_control(&read[0], precision), stats))
 }
 
 /// The room's own records: face neighbours, and the way up to the next level, of the first `levels` levels.

@@ -1,8 +1,6 @@
 //! Mirrors of the room's WGSL structs.
 
-use bytemuck::{Pod, Zeroable};
-
-use super::super::params::mirror;
+use crate::gpu::buffer::mirror;
 
 mirror!(
     /// `PressurePhase` of shared/pressure_phase.wgsl.
@@ -40,7 +38,7 @@ macro_rules! control {
     ($(#[$meta:meta])* $name:ident, $real:ty) => {
         mirror!(
             $(#[$meta])*
-            $name {
+            $name as "PressureControl" {
                 /// 0 iterating, 1 verifying, 2 done, 3 wants pockets.
                 state: u32,
                 /// So far.
@@ -76,6 +74,22 @@ control!(
     f64
 );
 
+impl From<PressureControl> for PressureControl64 {
+    fn from(narrow: PressureControl) -> Self {
+        Self {
+            state: narrow.state,
+            iterations: narrow.iterations,
+            is_first: narrow.is_first,
+            restarts: narrow.restarts,
+            rhs_square: narrow.rhs_square.into(),
+            residual_square: narrow.residual_square.into(),
+            product: narrow.product.into(),
+            alpha: narrow.alpha.into(),
+            beta: narrow.beta.into(),
+        }
+    }
+}
+
 impl PressureControl64 {
     /// ‖r‖ / ‖b‖; 0 where b = 0.
     pub fn residual(&self) -> f64 {
@@ -86,23 +100,23 @@ impl PressureControl64 {
     }
 }
 
-/// `pressure_stats`: f32 whatever the solve is in.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct PressureStats {
-    /// Largest |∇·u| in a cell of water before the projection, 1/s.
-    pub divergence_before: f32,
-    /// The same after it.
-    pub divergence_after: f32,
-    /// Largest |mean of ∇·u| over a pocket, 1/s.
-    pub incompatible: f32,
-    /// Cells of water without an open face.
-    pub dropped: u32,
-    /// Bodies of water that no air touches.
-    pub pockets: u32,
-    /// 0.
-    pub unused: [u32; 3],
-}
+mirror!(
+    /// `PressureStats` of shared/pressure_stats.wgsl: f32 whatever the solve is in.
+    PressureStats {
+        /// Largest |∇·u| in a cell of water before the projection, 1/s.
+        divergence_before: f32,
+        /// The same after it.
+        divergence_after: f32,
+        /// Largest |mean of ∇·u| over a pocket, 1/s.
+        incompatible: f32,
+        /// Cells of water without an open face.
+        dropped: u32,
+        /// Bodies of water that no air touches.
+        pockets: u32,
+        /// Unused.
+        padding: [u32; 3],
+    }
+);
 
 mirror!(
     /// `PressureBrick` of shared/pressure_site.wgsl.
@@ -115,3 +129,18 @@ mirror!(
         padding: u32,
     }
 );
+
+/// What `pressure/reduce` decides, by number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReduceStep {
+    /// Starts a solve.
+    Begin,
+    /// β.
+    Direction,
+    /// α.
+    Length,
+    /// Whether the residual is small enough.
+    Check,
+    /// Whether the true one is.
+    Verified,
+}

@@ -3,35 +3,18 @@
 use crate::{
     domain::bricks::CELLS,
     gpu::{
+        buffer::Buf,
         program::{BufferSpec, PassSpec},
         recording::{Bind, Command, Groups},
-        sort::storage,
     },
     scene::flip::{Precision, Preconditioner, Pressure, Surface},
 };
 
 use super::{
-    LEVELS,
-    params::{PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats},
+    DONE, ITERATING, LEVELS, VERIFYING,
+    buffers::*,
+    params::{PressurePhase, ReduceStep},
 };
-
-/// Bytes between two phases in `pressure_phases`.
-pub(super) const PHASE_STRIDE: u64 = 256;
-
-/// What `pressure/reduce` decides.
-#[derive(Clone, Copy)]
-pub(super) enum Step {
-    /// Starts a solve.
-    Begin,
-    /// β.
-    Direction,
-    /// α.
-    Length,
-    /// Whether the residual is small enough.
-    Check,
-    /// Whether the true one is.
-    Verified,
-}
 
 /// Places in `pressure_phases`.
 #[derive(Clone, Copy)]
@@ -39,13 +22,13 @@ pub(super) enum Phase {
     /// Of a level's blocks of one colour; other passes over that level take colour 0's.
     Level(usize, usize),
     /// Of `pressure/reduce`.
-    Reduce(Step),
+    Reduce(ReduceStep),
     /// Of `pressure/center`, noting the means or not.
     Center(bool),
 }
 
 /// Phases in all.
-pub(super) const PHASES: usize = 2 * LEVELS + 7;
+pub(super) const PHASE_COUNT: usize = 2 * LEVELS + 7;
 
 impl Phase {
     pub(super) fn index(self) -> usize {
@@ -65,7 +48,7 @@ impl Phase {
         } else if index < 2 * LEVELS + 5 {
             phase.step = (index - 2 * LEVELS) as u32;
             // The preconditioner's last two passes run over one colour each.
-            let is_half = half_sums && phase.step == Step::Direction as u32;
+            let is_half = half_sums && phase.step == ReduceStep::Direction as u32;
             phase.sum_count = if is_half { 2 * wet.div_ceil(2) } else { wet };
         } else {
             phase.step = (index - 2 * LEVELS - 5) as u32;
@@ -90,7 +73,7 @@ pub(super) enum Size {
 }
 
 /// Sizes in all.
-pub(super) const SIZES: usize = 2 * LEVELS + 3;
+pub(super) const SIZE_COUNT: usize = 2 * LEVELS + 3;
 
 impl Size {
     pub(super) fn index(self) -> usize {
@@ -130,28 +113,17 @@ pub(super) fn run_on(
     phase: Phase,
     when: When,
     size: Size,
-    values: Option<&str>,
+    values: Option<&Buf<Real>>,
 ) -> Command {
-    let mut binds = vec![Bind {
-        variable: "phase",
-        buffer: "pressure_phases".into(),
-        window: Some((
-            PHASE_STRIDE * phase.index() as u64,
-            size_of::<PressurePhase>() as u64,
-        )),
-    }];
-    binds.extend(values.map(|buffer| Bind {
-        variable: "values",
-        buffer: buffer.into(),
-        window: None,
-    }));
-    let offset = |section: usize| 16 * (section * SIZES + size.index()) as u64;
+    let mut binds = vec![PHASES.bind(phase.index())];
+    binds.extend(values.map(|buffer| Bind::whole("values", buffer)));
+    let section = |state: u32| Groups::at(&GROUPS, state as usize * SIZE_COUNT + size.index());
     let groups = match when {
-        When::Always => Groups::Indirect("pressure_sizes", offset(0)),
+        When::Always => Groups::at(&SIZES, size.index()),
         When::InTurn => Groups::Threads(1),
-        When::Iterating => Groups::Indirect("pressure_groups", offset(0)),
-        When::Verifying => Groups::Indirect("pressure_groups", offset(1)),
-        When::Done => Groups::Indirect("pressure_groups", offset(2)),
+        When::Iterating => section(ITERATING),
+        When::Verifying => section(VERIFYING),
+        When::Done => section(DONE),
     };
     Command::Dispatch {
         pass,
@@ -167,56 +139,45 @@ fn has_diagonal(settings: &Pressure) -> bool {
     )
 }
 
-/// Words of 32 bits of `pressure_control`.
-pub fn control_words(precision: Precision) -> usize {
-    match precision {
-        Precision::F32 | Precision::F32Refined => size_of::<PressureControl>() / 4,
-        Precision::F64 => size_of::<PressureControl64>() / 4,
-    }
-}
-
 /// Buffers that the room adds to its inputs (module docs); `capacity` is in slots.
-pub fn buffers(settings: &Pressure, has_correction: bool, capacity: usize) -> Vec<BufferSpec> {
-    let cells = 4 * capacity as u64 * u64::from(CELLS);
+pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Vec<BufferSpec> {
+    let cells = capacity * CELLS as usize;
     let precision = settings.precision;
-    // Of what the iterations compute with.
-    let real = precision.words() as u64;
-    let reals = real * cells;
+    let reals = |buffer: Buf<Real>, count: usize| match precision {
+        Precision::F32 | Precision::F32Refined => buffer.retyped::<f32>().sized(count),
+        Precision::F64 => buffer.retyped::<f64>().sized(count),
+    };
     let mut specs = vec![
-        storage("pressure", cells),
-        storage("pressure_coefficient", 3 * cells),
-        storage("pressure_dirichlet", reals),
-        storage("pressure_block", cells / 8),
-        storage("pressure_rhs", reals),
-        storage("pressure_residual", reals),
-        storage("pressure_correction", reals),
-        storage("pressure_direction", reals),
-        storage("pressure_product", reals),
-        storage("pressure_solution", precision.terms() as u64 * reals),
-        storage("pressure_label", cells),
-        storage("pressure_pocket_cells", cells),
-        storage("pressure_pocket_ranges", cells),
-        storage(
-            "pressure_bricks",
-            (capacity * size_of::<PressureBrick>()) as u64,
-        ),
+        PRESSURE.sized(cells),
+        COEFFICIENT.sized(3 * cells),
+        reals(DIRICHLET, cells),
+        BLOCK.sized(cells / 8),
+        reals(RHS, cells),
+        reals(RESIDUAL, cells),
+        reals(CORRECTION, cells),
+        reals(DIRECTION, cells),
+        reals(PRODUCT, cells),
+        reals(SOLUTION, precision.terms() * cells),
+        LABEL.sized(cells),
+        POCKET_CELLS.sized(cells),
+        POCKET_RANGES.sized(cells / 2),
+        BRICKS.sized(capacity),
         // A sum a workgroup, and room for those that a dispatch in two dimensions adds.
-        storage("pressure_sums", 4 * real * (capacity as u64 + 1024)),
-        storage("pressure_control", 4 * control_words(precision) as u64),
-        storage("pressure_stats", size_of::<PressureStats>() as u64),
-        storage("pressure_sizes", 16 * SIZES as u64),
-        storage("pressure_groups", 3 * 16 * SIZES as u64),
-        BufferSpec {
-            name: "pressure_phases".into(),
-            bytes: PHASE_STRIDE * PHASES as u64,
-            is_uniform: true,
+        reals(SUMS, 4 * (capacity + 1024)),
+        match precision {
+            Precision::F32 | Precision::F32Refined => CONTROL.sized(1),
+            Precision::F64 => CONTROL_F64.sized(1),
         },
+        STATS.sized(1),
+        SIZES.sized(SIZE_COUNT),
+        GROUPS.sized(3 * SIZE_COUNT),
+        PHASES.sized(PHASE_COUNT),
     ];
     if has_diagonal(settings) {
-        specs.push(storage("pressure_inverse_diagonal", reals));
+        specs.push(reals(INVERSE_DIAGONAL, cells));
     }
     if has_correction {
-        specs.push(storage("face_displacement", 3 * cells));
+        specs.push(FACE_DISPLACEMENT.sized(3 * cells));
     }
     specs
 }

@@ -2,13 +2,16 @@
 
 use crate::{
     gpu::{
+        buffer::Buf,
         program::Program,
         recording::{Command, Recording},
     },
     scene::flip::Preconditioner,
 };
 
-use super::plan::{Phase, Size, Step, When, run, run_on};
+use super::buffers::{CORRECTION, RESIDUAL, RHS, Real, STATS};
+use super::params::ReduceStep;
+use super::plan::{Phase, Size, When, run, run_on};
 
 /// Bricks of a level that one workgroup can take on together with all coarser ones.
 pub(super) const SINGLE: u32 = 4;
@@ -67,7 +70,7 @@ impl Stages {
     }
 }
 
-fn reduce(step: Step) -> Command {
+fn reduce(step: ReduceStep) -> Command {
     run(
         "pressure/reduce",
         Phase::Reduce(step),
@@ -76,7 +79,7 @@ fn reduce(step: Step) -> Command {
     )
 }
 
-fn center(values: &str, is_noted: bool, when: When) -> Command {
+fn center(values: &Buf<Real>, is_noted: bool, when: When) -> Command {
     run_on(
         "pressure/center",
         Phase::Center(is_noted),
@@ -88,10 +91,7 @@ fn center(values: &str, is_noted: bool, when: When) -> Command {
 
 fn build(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
     let finest = |pass| run(pass, Phase::Level(0, 0), When::Always, Size::Full(0));
-    let mut commands = vec![
-        Command::Clear("pressure_stats"),
-        finest("pressure/build_system"),
-    ];
+    let mut commands = vec![Command::clear(&STATS), finest("pressure/build_system")];
     if preconditioner == Preconditioner::Multigrid {
         commands.extend((1..shape.levels).map(|level| {
             run(
@@ -114,7 +114,7 @@ fn build(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
 fn begin(shape: Shape) -> Vec<Command> {
     let mut commands = Vec::new();
     if shape.has_pockets {
-        commands.push(center("pressure_rhs", true, When::Always));
+        commands.push(center(&RHS, true, When::Always));
         // From 0, the true residual is the right-hand side.
         commands.push(run(
             "pressure/verify",
@@ -123,7 +123,7 @@ fn begin(shape: Shape) -> Vec<Command> {
             Size::Full(0),
         ));
     }
-    commands.push(reduce(Step::Begin));
+    commands.push(reduce(ReduceStep::Begin));
     commands
 }
 
@@ -135,19 +135,19 @@ fn iteration(preconditioner: Preconditioner, shape: Shape) -> Vec<Command> {
         Preconditioner::Multigrid => cycle(shape),
     };
     if shape.has_pockets {
-        commands.push(center("pressure_correction", false, When::Iterating));
+        commands.push(center(&CORRECTION, false, When::Iterating));
     }
     commands.extend([
-        reduce(Step::Direction),
+        reduce(ReduceStep::Direction),
         finest("pressure/direction"),
         finest("pressure/multiply"),
-        reduce(Step::Length),
+        reduce(ReduceStep::Length),
         finest("pressure/advance"),
     ]);
     if shape.has_pockets {
-        commands.push(center("pressure_residual", false, When::Iterating));
+        commands.push(center(&RESIDUAL, false, When::Iterating));
     }
-    commands.push(reduce(Step::Check));
+    commands.push(reduce(ReduceStep::Check));
     commands
 }
 
@@ -199,8 +199,8 @@ fn verification(shape: Shape) -> Vec<Command> {
         Size::Full(0),
     )];
     if shape.has_pockets {
-        commands.push(center("pressure_residual", false, When::Verifying));
+        commands.push(center(&RESIDUAL, false, When::Verifying));
     }
-    commands.push(reduce(Step::Verified));
+    commands.push(reduce(ReduceStep::Verified));
     commands
 }

@@ -9,52 +9,17 @@ use std::{
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{DiffError, adapter_of, aggregates, bake_of, gauge, physics, scene_of};
+use super::{DiffError, Request, adapter_of, aggregates, bake_of, gauge, physics, scene_of};
 use crate::{
     cache::{CacheError, CacheReader},
     compare::{
         baseline::{
-            Baseline, BaselineFault, BaselineFrame, Basis, FORMAT_VERSION, Measured,
-            default_tolerances, particles_hash,
+            Baseline, BaselineDiff, BaselineFrame, FORMAT_VERSION, Lost, Measured, particles_hash,
         },
-        spread,
+        limits::default_tolerances,
     },
-    domain::{aggregates::Aggregates, frame_range::FrameRange, tolerance::Limit},
+    domain::frame_range::{FrameRange, ranges},
 };
-
-/// What differs between a cache and a baseline.
-#[derive(Clone, Debug, Serialize)]
-pub struct BaselineDiff {
-    /// What baked the cache, and on what.
-    pub bake: String,
-    /// Whether the baseline knows the cache's adapter, so that hashes decide as well.
-    pub basis: Basis,
-    /// Whether hashes were to be ignored.
-    pub ignores_hashes: bool,
-    /// Adapters whose hashes the baseline holds.
-    pub known_adapters: Vec<String>,
-    /// The adapter that the baseline's aggregates are from.
-    pub aggregates_from: String,
-    /// The first key of the scenes that differs, with the baseline's value and then the cache's.
-    pub physics: Option<String>,
-    /// Frames that the cache has not, of those that were asked for.
-    pub only_baseline: Vec<u32>,
-    /// What was compared.
-    pub frames: Vec<FramePair>,
-    /// In the order of the frames.
-    pub faults: Vec<BaselineFault>,
-}
-
-/// One frame's aggregates.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FramePair {
-    /// Output frame.
-    pub frame: u32,
-    /// Of the cache and of the baseline.
-    pub aggregates: [Aggregates; 2],
-    /// What they may differ by, by name.
-    pub limits: BTreeMap<String, Limit>,
-}
 
 /// What became of a baseline that was written.
 #[derive(Clone, Debug, Serialize)]
@@ -77,72 +42,51 @@ pub struct Written {
 
 /// Reads a baseline.
 pub(super) fn read(file: &Path) -> Result<Baseline, DiffError> {
-    let fault = |what: String| DiffError::Baseline {
+    let text = fs::read_to_string(file).map_err(DiffError::at(file))?;
+    let found: Result<Baseline, String> =
+        serde_json::from_str(&text).map_err(|error| error.to_string());
+    let checked = found.and_then(|found| found.check().map(|()| found));
+    checked.map_err(|what| DiffError::Baseline {
         file: file.to_owned(),
         what,
-    };
-    let text = fs::read_to_string(file).map_err(|source| DiffError::File {
-        file: file.to_owned(),
-        source,
-    })?;
-    let found: Baseline = serde_json::from_str(&text).map_err(|error| fault(error.to_string()))?;
-    found.check().map_err(fault)?;
-    Ok(found)
+    })
 }
 
 pub(super) fn compare(
     cache: &CacheReader,
     baseline: &Baseline,
-    file: &Path,
-    frames: Option<&FrameRange>,
-    ignores_hashes: bool,
+    request: &Request,
 ) -> Result<BaselineDiff, DiffError> {
-    let known = baseline.frames.iter().map(|frame| frame.frame);
-    let wanted: Vec<u32> = match frames {
-        Some(frames) => frames.iter().collect(),
-        None => known.clone().collect(),
-    };
-    if let Some(frame) = wanted
-        .iter()
-        .find(|&&frame| !known.clone().any(|k| k == frame))
-    {
-        return Err(DiffError::Usage(format!(
-            "--frames {frame}: {} has frames {}",
-            file.display(),
-            ranges(&known.collect::<Vec<_>>())
-        )));
-    }
-    if frames.is_some() {
+    let known: Vec<u32> = baseline.frames.iter().map(|frame| frame.frame).collect();
+    let asked: Option<Vec<u32>> = request.frames.as_ref().map(|range| range.iter().collect());
+    for &frame in asked.iter().flatten() {
+        if !known.contains(&frame) {
+            return Err(DiffError::usage(format!(
+                "--frames {frame}: {} has frames {}",
+                request.b.display(),
+                ranges(&known)
+            )));
+        }
         // Asked for by number: missing is an error and no difference.
-        wanted
-            .iter()
-            .try_for_each(|&frame| cache.entry(frame).map(|_| ()))?;
+        cache.entry(frame)?;
     }
-    let (there, only_baseline): (Vec<u32>, Vec<u32>) = wanted
+    let (there, only_baseline): (Vec<u32>, Vec<u32>) = asked
+        .unwrap_or(known)
         .into_iter()
         .partition(|&frame| cache.entry(frame).is_ok());
     let measured = measure(cache, &there)?;
     let adapter = adapter_of(cache.manifest());
-    let adapter = (!ignores_hashes).then_some(adapter.as_str());
+    let adapter = (!request.ignores_hashes).then_some(adapter.as_str());
     let (basis, faults) = baseline.compare(adapter, &measured);
-    let pair = |found: &Measured| {
-        let frame = found.frame.frame;
-        let expected = baseline.frames.iter().find(|f| f.frame == frame)?;
-        Some(FramePair {
-            frame,
-            aggregates: [found.frame.aggregates, expected.aggregates],
-            limits: baseline.limits(adapter, found),
-        })
-    };
     Ok(BaselineDiff {
         bake: bake_of(cache.manifest()),
         basis,
-        ignores_hashes,
+        ignores_hashes: request.ignores_hashes,
         known_adapters: baseline.hashes.keys().cloned().collect(),
         aggregates_from: baseline.aggregates_from.clone(),
-        physics: physics(file, &baseline.scene.join("\n"), cache.scene_toml())?,
+        physics: physics(&request.b, &baseline.scene.join("\n"), cache.scene_toml())?,
         only_baseline,
-        frames: measured.iter().filter_map(pair).collect(),
+        frames: baseline.pairs(adapter, &measured),
         faults,
     })
 }
@@ -185,22 +129,11 @@ pub fn write_baseline(
         frames: measured.iter().map(|m| m.frame.clone()).collect(),
         hashes: BTreeMap::new(),
     };
-    let mut dropped = Vec::new();
-    let mut is_spread_dropped = false;
+    let mut lost = Lost::default();
     if let Some(before) = before {
         let old_scene = before.scene.join("\n");
         let is_same_scene = physics(file, &old_scene, cache.scene_toml())?.is_none();
-        let numbers = before.frames.iter().map(|frame| frame.frame);
-        if is_same_scene && numbers.eq(frames.iter().copied()) {
-            carry_over(&mut baseline, before, &measured);
-        } else {
-            is_spread_dropped = spread.is_empty() && !before.spread_from.is_empty();
-            if before.spread_from.is_empty() {
-                baseline.tolerances = before.tolerances;
-            }
-            dropped = before.hashes.into_keys().collect();
-            dropped.retain(|other| *other != adapter);
-        }
+        lost = baseline.inherit(before, is_same_scene, &measured);
     }
     if !spread.is_empty() {
         take_spread(&mut baseline, &cache, spread, &frames)?;
@@ -213,28 +146,10 @@ pub fn write_baseline(
         adapter,
         frames: frames.len(),
         is_unchanged,
-        dropped,
-        is_spread_dropped,
+        dropped: lost.hashes,
+        is_spread_dropped: lost.has_spread && spread.is_empty(),
         spread_from: baseline.spread_from,
     })
-}
-
-/// What stays of a baseline of the same scene and frames.
-fn carry_over(baseline: &mut Baseline, before: Baseline, measured: &[Measured]) {
-    let adapter = baseline.aggregates_from.clone();
-    let (basis, faults) = before.compare(Some(&adapter), measured);
-    let is_new_adapter = !before.hashes.contains_key(&adapter);
-    if is_new_adapter && basis == Basis::Aggregates && faults.is_empty() {
-        baseline.aggregates_from = before.aggregates_from;
-        baseline.frames = before.frames;
-    } else {
-        for (frame, old) in baseline.frames.iter_mut().zip(before.frames) {
-            frame.spread = old.spread;
-        }
-    }
-    baseline.hashes = before.hashes;
-    baseline.tolerances = before.tolerances;
-    baseline.spread_from = before.spread_from;
 }
 
 /// Measures how far the frames of `cache` and those of bakes that differ in roundings alone come apart.
@@ -244,52 +159,41 @@ fn take_spread(
     others: &[PathBuf],
     frames: &[u32],
 ) -> Result<(), DiffError> {
-    let expected = measure(cache, frames)?;
-    let expected: Vec<BaselineFrame> = expected.into_iter().map(|m| m.frame).collect();
-    let mut bakes = Vec::new();
-    baseline.spread_from.clear();
-    for path in others {
-        let other = CacheReader::open(path)?;
-        let bake: Vec<BaselineFrame> = measure(&other, frames)?
+    let measured = |cache: &CacheReader| -> Result<Vec<BaselineFrame>, DiffError> {
+        Ok(measure(cache, frames)?
             .into_iter()
             .map(|m| m.frame)
-            .collect();
-        let adapter = adapter_of(other.manifest());
-        let changed = physics(cache.dir(), cache.scene_toml(), other.scene_toml())?;
+            .collect())
+    };
+    let expected = measured(cache)?;
+    let counts = |frames: &[BaselineFrame]| frames.first().map(|frame| frame.particles);
+    let bake = |path: &PathBuf| {
+        let other = CacheReader::open(path)?;
+        let bake = measured(&other)?;
         let refuse = |why: &str| {
             let path = path.display();
-            Err(DiffError::Usage(format!("--spread {path}: {why}")))
+            Err(DiffError::usage(format!("--spread {path}: {why}")))
         };
         if other.manifest().solver != cache.manifest().solver {
             return refuse("another solver is no rounding");
         }
-        let counts = |frames: &[BaselineFrame]| frames.first().map(|frame| frame.particles);
         if counts(&bake) != counts(&expected) {
             return refuse("another number of particles is no rounding");
         }
-        let from = match changed {
-            Some(key) => key,
-            None if adapter != adapter_of(cache.manifest()) => adapter,
-            None => return refuse("the same scene on the same adapter has no spread"),
-        };
-        baseline.spread_from.push(from);
-        bakes.push(bake);
-    }
-    let spreads = spread::of(&expected, &bakes);
-    let particles = expected.first().map_or(0, |frame| frame.particles);
-    let spacing = cache.manifest().particle_spacing;
-    baseline.tolerances = spread::tolerances(&spreads, spacing, particles);
-    for (frame, spread) in baseline.frames.iter_mut().zip(spreads) {
-        frame.spread = Some(spread);
-    }
+        let adapter = adapter_of(other.manifest());
+        match physics(cache.dir(), cache.scene_toml(), other.scene_toml())? {
+            Some(key) => Ok((key, bake)),
+            None if adapter != adapter_of(cache.manifest()) => Ok((adapter, bake)),
+            None => refuse("the same scene on the same adapter has no spread"),
+        }
+    };
+    let bakes: Vec<_> = others.iter().map(bake).collect::<Result<_, _>>()?;
+    baseline.take_spread(&expected, bakes, cache.manifest().particle_spacing);
     Ok(())
 }
 
 fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
-    let fault = |source| DiffError::File {
-        file: file.to_owned(),
-        source,
-    };
+    let fault = DiffError::at(file);
     let mut text = serde_json::to_vec_pretty(baseline).map_err(|error| fault(error.into()))?;
     text.push(b'\n');
     fs::write(file, text).map_err(fault)
@@ -306,21 +210,11 @@ fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffErr
             frame: BaselineFrame {
                 frame,
                 particles: particles.len(),
-                aggregates: aggregates(cache, &gauge, scene.water.gravity, frame, &particles)?,
+                aggregates: aggregates(cache, &scene, &gauge, frame, &particles)?,
                 spread: None,
             },
         })
     };
     let measured: Result<_, CacheError> = frames.par_iter().map(one).collect();
     Ok(measured?)
-}
-
-/// Ascending numbers as a person writes them: `0-4, 7`.
-pub fn ranges(numbers: &[u32]) -> String {
-    let runs = numbers.chunk_by(|a, b| a.checked_add(1) == Some(*b));
-    let run = |run: &[u32]| match run {
-        [first, .., last] => format!("{first}-{last}"),
-        other => other.iter().map(u32::to_string).collect(),
-    };
-    runs.map(run).collect::<Vec<_>>().join(", ")
 }

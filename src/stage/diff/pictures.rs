@@ -7,58 +7,16 @@ use std::{
 };
 
 use rayon::prelude::*;
-use serde::{Serialize, Serializer};
 
 use super::{DiffError, Images, Request};
 use crate::{
-    compare::pictures::{self, Encoding, Picture, PictureDiff, PictureFault, difference_image},
+    compare::pictures::{self, Encoding, PairDiff, Picture, PicturesDiff, difference_image},
     domain::{frame_range::FrameRange, tolerance::PictureLimits},
     render::{
         RenderError,
         image::{read_exr, read_png, write_rgb_png},
     },
 };
-
-/// What differs between two renders.
-#[derive(Clone, Debug, Serialize)]
-pub struct PicturesDiff {
-    /// Names that a alone has.
-    pub only_a: Vec<String>,
-    /// Names that b alone has.
-    pub only_b: Vec<String>,
-    /// By name.
-    pub pairs: Vec<PairDiff>,
-}
-
-/// Two pictures of one name.
-#[derive(Clone, Debug, Serialize)]
-pub struct PairDiff {
-    /// File name.
-    pub name: String,
-    /// Width and height of a and of b, pixels.
-    pub sizes: [[usize; 2]; 2],
-    /// `None` where the sizes differ.
-    pub diff: Option<PictureDiff>,
-    /// What is out of tolerance.
-    pub faults: Vec<PictureFault>,
-    /// Where its difference image went; written out, bytes that are no UTF-8 become U+FFFD.
-    #[serde(serialize_with = "as_text")]
-    pub image: Option<PathBuf>,
-}
-
-/// A path of any bytes: serde's own way refuses those that are no UTF-8.
-fn as_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
-    path.as_deref()
-        .map(Path::to_string_lossy)
-        .serialize(serializer)
-}
-
-impl PicturesDiff {
-    pub(super) fn is_within(&self) -> bool {
-        let is_within = |pair: &PairDiff| pair.diff.is_some() && pair.faults.is_empty();
-        self.only_a.is_empty() && self.only_b.is_empty() && self.pairs.iter().all(is_within)
-    }
-}
 
 fn encoding(path: &Path) -> Option<Encoding> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
@@ -85,13 +43,10 @@ pub(super) fn in_folder(
     folder: &Path,
     frames: Option<&FrameRange>,
 ) -> Result<BTreeMap<String, PathBuf>, DiffError> {
-    let fault = |source| DiffError::File {
-        file: folder.to_owned(),
-        source,
-    };
+    let fault = DiffError::at(folder);
     let mut found = BTreeMap::new();
-    for entry in fs::read_dir(folder).map_err(fault)? {
-        let path = entry.map_err(fault)?.path();
+    for entry in fs::read_dir(folder).map_err(&fault)? {
+        let path = entry.map_err(&fault)?.path();
         let is_wanted = |frames: &FrameRange| frame_of(&path).is_some_and(|f| frames.contains(f));
         if is_picture(&path) && path.is_file() && frames.is_none_or(is_wanted) {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -101,34 +56,32 @@ pub(super) fn in_folder(
     Ok(found)
 }
 
-pub(super) fn compare_folders(request: &Request) -> Result<PicturesDiff, DiffError> {
-    let frames = request.frames.as_ref();
-    let (a, b) = (
-        in_folder(&request.a, frames)?,
-        in_folder(&request.b, frames)?,
-    );
-    if let Some(frames) = frames {
-        let missing = |found: &BTreeMap<String, PathBuf>| {
-            let numbers: Vec<u32> = found.values().filter_map(|path| frame_of(path)).collect();
-            frames.iter().find(|frame| !numbers.contains(frame))
-        };
-        for (folder, found) in [(&request.a, &a), (&request.b, &b)] {
-            if let Some(frame) = missing(found) {
-                let folder = folder.display();
-                let message =
-                    format!("--frames {frames}: {folder} has no picture of frame {frame}");
-                return Err(DiffError::Usage(message));
-            }
-        }
+/// [`in_folder`], where each frame that is asked for by number has to be.
+fn wanted(
+    folder: &Path,
+    frames: Option<&FrameRange>,
+) -> Result<BTreeMap<String, PathBuf>, DiffError> {
+    let found = in_folder(folder, frames)?;
+    let numbers: Vec<u32> = found.values().filter_map(|path| frame_of(path)).collect();
+    let mut asked = frames.into_iter().flat_map(FrameRange::iter);
+    match asked.find(|frame| !numbers.contains(frame)) {
+        None => Ok(found),
+        Some(frame) => Err(DiffError::usage(format!(
+            "--frames {}: {} has no picture of frame {frame}",
+            frames.map(ToString::to_string).unwrap_or_default(),
+            folder.display()
+        ))),
     }
+}
+
+pub(super) fn compare_folders(request: &Request) -> Result<PicturesDiff, DiffError> {
+    let [a, b] = [&request.a, &request.b].map(|folder| wanted(folder, request.frames.as_ref()));
+    let (a, b) = (a?, b?);
     if let Some(images) = &request.images {
         for folder in [&request.a, &request.b] {
             refuse_same(&images.path, folder)?;
         }
-        fs::create_dir_all(&images.path).map_err(|source| DiffError::File {
-            file: images.path.clone(),
-            source,
-        })?;
+        fs::create_dir_all(&images.path).map_err(DiffError::at(&images.path))?;
     }
     let lone = |x: &BTreeMap<String, PathBuf>, y: &BTreeMap<String, PathBuf>| {
         let names = x.keys().filter(|name| !y.contains_key(*name));
@@ -155,18 +108,21 @@ pub(super) fn compare_folders(request: &Request) -> Result<PicturesDiff, DiffErr
 
 pub(super) fn compare_files(request: &Request) -> Result<PicturesDiff, DiffError> {
     if let Some(frames) = &request.frames {
-        let message = format!("--frames {frames}: two pictures have no frames to choose from");
-        return Err(DiffError::Usage(message));
+        return Err(DiffError::usage(format!(
+            "--frames {frames}: two pictures have no frames to choose from"
+        )));
     }
     if encoding(&request.a) != encoding(&request.b) {
-        let message =
-            "a PNG has gone through the look's view transform, an EXR has not: they do not compare";
-        return Err(DiffError::Usage(message.to_owned()));
+        return Err(DiffError::usage(
+            "a PNG has gone through the look's view transform, an EXR has not: they do not compare",
+        ));
     }
     if let Some(images) = &request.images {
         if encoding(&images.path) != Some(Encoding::Srgb) {
-            let message = format!("--output {}: it has to end in .png", images.path.display());
-            return Err(DiffError::Usage(message));
+            let path = images.path.display();
+            return Err(DiffError::usage(format!(
+                "--output {path}: it has to end in .png"
+            )));
         }
         for file in [&request.a, &request.b] {
             refuse_same(&images.path, file)?;
@@ -188,7 +144,7 @@ fn limits(request: &Request) -> Option<&PictureLimits> {
 
 fn refuse_same(output: &Path, input: &Path) -> Result<(), DiffError> {
     match (output.canonicalize(), input.canonicalize()) {
-        (Ok(output), Ok(input)) if output == input => Err(DiffError::Usage(format!(
+        (Ok(output), Ok(input)) if output == input => Err(DiffError::usage(format!(
             "--output {} is what is compared: choose another",
             input.display()
         ))),

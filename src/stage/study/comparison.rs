@@ -80,7 +80,7 @@ fn bake_and_render(
         frames: FrameRange::inclusive(1, last),
         resume: true,
         from: None,
-        device: Device::Gpu(request.adapter.clone()),
+        device: Device::Gpu(request.adapter.clone().into()),
         time_passes: false,
     };
     if bake::bake(&bake, stop, &mut |event| tell(Event::Bake(Box::new(event))))?.interrupted {
@@ -91,8 +91,9 @@ fn bake_and_render(
         look: comparison.look.clone(),
         directory: picture_directory(request, scene),
         frames: Some(comparison.pictures.clone()),
-        adapter: request.adapter.clone(),
+        gpu: request.adapter.clone().into(),
         overwrite: false,
+        time_passes: false,
     };
     Ok(render::render(&render, stop, &mut |event| tell(Event::Render(event)))?.interrupted)
 }

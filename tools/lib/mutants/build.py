@@ -69,7 +69,7 @@ def with_switches(text: str, mutants: list[Mutant]) -> str:
 
 def compile(tree: Tree, tests: set[str]) -> dict[str, Path]:
     """Test binary of each name that `tests` begin with."""
-    binaries = sorted({name.split("::")[0] for name in tests} | {"shaders"})
+    binaries = sorted({name.split("::")[0] for name in tests} | {"suite"})
     targets = [word for name in binaries for word in (["--lib"] if name == "lib" else ["--test", name])]
     command = ["cargo", "test", "--release", "--locked", "--features", "mutants", "--no-run"]
     command += ["--message-format=json-render-diagnostics", *targets]

@@ -74,6 +74,19 @@ def fault_of(root: Path, mutant: Mutant) -> str | None:
         return "`to` is `from`"
     if bool(mutant.caught_by) == bool(mutant.reason):
         return "either caught_by or survives"
-    if any("::" not in name for name in mutant.caught_by):
-        return "caught_by is TEST_BINARY::test::path"
+    for name in mutant.caught_by:
+        if not is_test(root, name):
+            return f"there is no test {name}; caught_by is TEST_BINARY::test::path"
     return None
+
+
+def is_test(root: Path, name: str) -> bool:
+    """Whether a function of that name stands in the file that the path before it leads to."""
+    binary, *modules, function = name.split("::")
+    folder = root / ("src" if binary == "lib" else f"tests/{binary}")
+    for depth in range(len(modules), 0, -1):
+        module = folder.joinpath(*modules[:depth])
+        for file in (module.with_suffix(".rs"), module / "mod.rs"):
+            if file.is_file():
+                return f"fn {function}(" in file.read_text()
+    return False

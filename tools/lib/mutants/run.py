@@ -13,8 +13,8 @@ from pathlib import Path
 from .build import Tree
 from .lists import Mistake, Mutant
 
-# Every shader has to parse with the fault in it: what does not compile is caught by anything.
-PARSES = "shaders::every_pass_parses"
+# Every shader has to parse and validate with the fault in it: what does not compile is caught by anything.
+VALIDATES = "suite::gpu::shaders::every_pass_validates_in_every_variant"
 # How `gpu::program` refuses a spoil whose text a shader lacks.
 NOT_THERE = "which is to be replaced, is not in it"
 # A fault that turns a loop endless is caught as well; no test of the suite takes a tenth of it.
@@ -65,8 +65,8 @@ def one_of(tree: Tree, binaries: dict[str, Path], mutant: Mutant) -> Result:
         file.write_text(file.read_text().replace(mutant.before, mutant.after))
         fault = {"SWELL_SHADERS": str(folder)}
     try:
-        if mutant.is_shader and not passes(tree, binaries, PARSES, fault):
-            raise Mistake(f"{mutant.name}: the shader with the fault in it does not parse")
+        if mutant.is_shader and not passes(tree, binaries, VALIDATES, fault):
+            raise Mistake(f"{mutant.name}: the shader with the fault in it does not validate")
         for test in mutant.caught_by:
             if not passes(tree, binaries, test, fault):
                 return Result(mutant, test, time.monotonic() - start)
@@ -78,7 +78,7 @@ def one_of(tree: Tree, binaries: dict[str, Path], mutant: Mutant) -> Result:
 
 def all_of(tree: Tree, mutants: list[Mutant], binaries: dict[str, Path], jobs: int) -> list[Result]:
     """Every test without a fault first, then every mutant, `jobs` at a time."""
-    tests = sorted({name for mutant in mutants for name in mutant.caught_by} | {PARSES})
+    tests = sorted({name for mutant in mutants for name in mutant.caught_by} | {VALIDATES})
     tree.work.mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(jobs) as pool:
         print(f"{len(tests)} tests without a fault", flush=True)

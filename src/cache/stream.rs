@@ -1,0 +1,215 @@
+//! The streams of a cache: what it keeps of every frame. Writer, reader, verification, resume and comparison know a
+//! stream by its line in [`STREAMS`].
+
+use std::io::{self, Write};
+
+use super::frame::{self, Stamp, Written};
+use super::grids::GridRecord;
+use super::manifest::Manifest;
+use super::probes::ProbeRecord;
+use super::vdb;
+use crate::domain::particles::Particles;
+
+/// Name of the stream that every cache has: a frame's particles, from which a bake goes on.
+pub const PARTICLES: &str = "particles";
+/// Name of the stream of level sets and velocity grids.
+pub const GRIDS: &str = "grids";
+/// Name of the stream of what probes measure.
+pub const PROBES: &str = "probes";
+
+/// The particles first: the other files of a frame follow from them.
+pub static STREAMS: [Stream; 3] = [
+    Stream {
+        name: PARTICLES,
+        folder: "frames",
+        extension: "ply",
+        content: Content::Particles,
+        layout: Layout::FileAFrame(|mut out, _, stamp, particles| {
+            frame::encode(&mut out, stamp, particles)
+        }),
+        part: "field",
+        parts: |_| vec!["position", "velocity"],
+    },
+    Stream {
+        name: GRIDS,
+        folder: "grids",
+        extension: "vdb",
+        content: Content::SparseGrids,
+        layout: Layout::FileAFrame(encode_grids),
+        part: "grid",
+        parts: |manifest| manifest.grids.iter().flat_map(GridRecord::names).collect(),
+    },
+    Stream {
+        name: PROBES,
+        folder: "probes",
+        extension: "csv",
+        content: Content::Columns,
+        layout: Layout::RowAFrame(|manifest| &manifest.probes),
+        part: "probe",
+        parts: |manifest| manifest.probes.iter().map(|probe| &*probe.name).collect(),
+    },
+];
+
+/// One kind of file that a cache keeps of its frames.
+#[derive(Debug)]
+pub struct Stream {
+    /// In the ledger, and where a difference is told.
+    pub name: &'static str,
+    /// Folder of its files, in the cache's.
+    pub folder: &'static str,
+    /// Ending of its files, without the dot.
+    pub extension: &'static str,
+    /// What it holds.
+    pub content: Content,
+    /// How its files grow with the bake.
+    pub(super) layout: Layout,
+    /// What a part of it is called before its name, where a difference is told.
+    pub part: &'static str,
+    /// Names of the parts that a bake with this manifest has of it; nothing where the bake has no such stream.
+    parts: fn(&Manifest) -> Vec<&str>,
+}
+
+/// What a stream holds, and so by what two of them are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// Particles, compared field by field and matched by their ids.
+    Particles,
+    /// Sparse grids, compared voxel by voxel.
+    SparseGrids,
+    /// Named columns, a row a frame, compared column by column.
+    Columns,
+}
+
+/// Writes the file of a frame.
+type Encode = fn(&mut dyn Write, &Manifest, &Stamp<'_>, &Particles) -> io::Result<Written>;
+
+/// How the files of a stream grow with the bake.
+#[derive(Debug)]
+pub(super) enum Layout {
+    /// `FOLDER/SHOT.0001.EXTENSION`: whole on the disk before the ledger names it with its checksum.
+    FileAFrame(Encode),
+    /// `FOLDER/TABLE.EXTENSION`, a file a table for the whole bake. The values stand in the ledger, each frame's in its
+    /// line, so that the files can be written anew from there.
+    RowAFrame(fn(&Manifest) -> &[ProbeRecord]),
+}
+
+impl Stream {
+    /// The line of [`STREAMS`] with this name.
+    pub fn of(name: &str) -> Option<&'static Self> {
+        STREAMS.iter().find(|stream| stream.name == name)
+    }
+
+    /// The streams of a bake with this manifest.
+    pub fn all(manifest: &Manifest) -> impl Iterator<Item = &'static Self> {
+        STREAMS.iter().filter(|stream| stream.is_in(manifest))
+    }
+
+    /// Whether a bake with this manifest has it.
+    pub fn is_in(&self, manifest: &Manifest) -> bool {
+        !(self.parts)(manifest).is_empty()
+    }
+
+    /// Whether it has a file a frame, which the ledger names.
+    pub fn is_by_frame(&self) -> bool {
+        matches!(self.layout, Layout::FileAFrame(_))
+    }
+
+    /// What `manifest` has of it and `other` has not: `grids`, `grid vel`, `probe gauge`.
+    pub fn lone(&self, manifest: &Manifest, other: &Manifest) -> Vec<String> {
+        if self.is_by_frame() && self.is_in(manifest) && !self.is_in(other) {
+            return vec![self.name.to_owned()];
+        }
+        let others = (self.parts)(other);
+        let parts = (self.parts)(manifest).into_iter();
+        let lone = parts.filter(|part| !others.contains(part));
+        lone.map(|name| format!("{} {name}", self.part)).collect()
+    }
+
+    /// Path of a frame's file from the cache's folder, with `/`: `frames/wave-city.0001.ply`.
+    pub fn frame_file(&self, shot: &str, frame: u32) -> String {
+        format!("{}/{shot}.{frame:04}.{}", self.folder, self.extension)
+    }
+
+    /// Path of a table's file from the cache's folder, with `/`: `probes/gauge.csv`.
+    pub fn table_file(&self, table: &str) -> String {
+        format!("{}/{table}.{}", self.folder, self.extension)
+    }
+
+    /// Its tables, of a bake with this manifest; none of a stream with a file a frame.
+    pub fn tables<'a>(&self, manifest: &'a Manifest) -> &'a [ProbeRecord] {
+        match self.layout {
+            Layout::FileAFrame(_) => &[],
+            Layout::RowAFrame(tables) => tables(manifest),
+        }
+    }
+}
+
+fn encode_grids(
+    mut out: &mut dyn Write,
+    manifest: &Manifest,
+    stamp: &Stamp<'_>,
+    particles: &Particles,
+) -> io::Result<Written> {
+    let Some(asked) = &manifest.grids else {
+        return Err(io::Error::other("no grids are asked for"));
+    };
+    let grids = asked
+        .grids(particles, manifest.particle_spacing)
+        .moved(manifest.origin.into());
+    vdb::encode(&mut out, stamp, &grids, asked.precision)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    /// Two streams in one folder would clear each other's files on resume.
+    #[test]
+    fn no_two_streams_share_a_name_or_a_folder() {
+        let names: BTreeSet<_> = STREAMS.iter().map(|stream| stream.name).collect();
+        let folders: BTreeSet<_> = STREAMS.iter().map(|stream| stream.folder).collect();
+        assert_eq!((names.len(), folders.len()), (STREAMS.len(), STREAMS.len()));
+        for stream in &STREAMS {
+            assert_eq!(
+                Stream::of(stream.name).map(|s| s.folder),
+                Some(stream.folder)
+            );
+        }
+        assert!(Stream::of("whitewater").is_none());
+    }
+
+    /// `diff` compares one stream of particles, with the tolerance's fields and the aggregates; a second one needs a place of its own there.
+    #[test]
+    fn one_stream_is_compared_as_particles() {
+        let particles = STREAMS.iter().filter(|s| s.content == Content::Particles);
+        let names: Vec<_> = particles.map(|stream| stream.name).collect();
+        assert_eq!(names, [PARTICLES]);
+    }
+
+    #[test]
+    fn names_of_files_are_those_that_scenes_and_scripts_know() {
+        let files = STREAMS.each_ref().map(|stream| match stream.layout {
+            Layout::FileAFrame(_) => stream.frame_file("wave-city", 7),
+            Layout::RowAFrame(_) => stream.table_file("gauge"),
+        });
+        assert_eq!(
+            files,
+            [
+                "frames/wave-city.0007.ply",
+                "grids/wave-city.0007.vdb",
+                "probes/gauge.csv"
+            ]
+        );
+        let wide = [1, 9999, 10_000].map(|frame| STREAMS[0].frame_file("a", frame));
+        assert_eq!(
+            wide,
+            [
+                "frames/a.0001.ply",
+                "frames/a.9999.ply",
+                "frames/a.10000.ply"
+            ]
+        );
+    }
+}

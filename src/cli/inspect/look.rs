@@ -1,0 +1,114 @@
+//! `swell inspect LOOK`
+
+use std::{
+    fmt::{self, Write},
+    fs,
+    path::Path,
+};
+
+use super::{InspectArgs, misplaced};
+use crate::{
+    cli::{Failure, bake, is_cache, size},
+    scene::look::Look,
+    stage::render::{LookPlan, Subject, plan},
+};
+
+/// Tables that a look has and a scene has not.
+const TABLES: [&str; 4] = ["[camera]", "[image]", "[sun]", "[output]"];
+
+/// Whether a file is a look: it has tables of one. What cannot be read is none.
+pub(super) fn is_look(file: &Path) -> bool {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    let mut lines = text
+        .lines()
+        .map(|line| line.split('#').next().unwrap_or(""));
+    lines.any(|line| TABLES.contains(&line.trim()))
+}
+
+/// Prints the plan of the look in `file`.
+pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<LookPlan, Failure> {
+    let look = Look::load_within(file, bake::reach(args.allow_outside))?;
+    let has_scene_options = !args.set.is_empty() || args.solver.is_some();
+    let subject = match &args.scene {
+        Some(cache) if is_cache(cache) && !has_scene_options => Subject::Cache(cache.clone()),
+        Some(scene) if !is_cache(scene) => {
+            let scene = bake::load(scene, &args.set, args.solver, args.allow_outside)?;
+            Subject::Scene(Box::new(scene))
+        }
+        None if !has_scene_options => Subject::Nothing,
+        _ => {
+            let is = "a look: --scene names its scene";
+            return Err(misplaced("--set or --solver", "scenes", is, file));
+        }
+    };
+    let planned = plan(&look, &subject, args.adapter.as_deref())?;
+    // Writing to a String cannot fail.
+    let _ = show_plan(out, &look, &subject, &planned, file);
+    Ok(planned)
+}
+
+fn show_plan(
+    out: &mut String,
+    look: &Look,
+    subject: &Subject,
+    planned: &LookPlan,
+    file: &Path,
+) -> fmt::Result {
+    let image = &look.spec().image;
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    writeln!(
+        out,
+        "{name}: {} × {} pixels, {} samples",
+        image.width, image.height, image.samples
+    )?;
+    match subject {
+        Subject::Nothing => writeln!(out, "for no scene: --scene adds solids and particles")?,
+        Subject::Scene(scene) => writeln!(
+            out,
+            "for {}: {} particles at its start",
+            scene.shot.name, planned.particles
+        )?,
+        Subject::Cache(cache) => {
+            let particles = planned.particles;
+            writeln!(
+                out,
+                "for {}: {particles} particles at most",
+                cache.display()
+            )?;
+        }
+    }
+    match &planned.adapter {
+        Some(name) => writeln!(out, "planned for {name}")?,
+        None => writeln!(out, "planned for common limits: no adapter here")?,
+    }
+    writeln!(
+        out,
+        "\npass                          once  each sample  for AOVs"
+    )?;
+    for (pass, runs) in &planned.passes {
+        writeln!(
+            out,
+            "{pass:28}  {:>4}  {:>11}  {:>8}",
+            runs.once, runs.sample, runs.aovs
+        )?;
+    }
+    writeln!(
+        out,
+        "\ntexture                       texels           format               bytes"
+    )?;
+    for (texture, [width, height], format, bytes) in &planned.textures {
+        let texels = format!("{width} × {height}");
+        writeln!(out, "{texture:28}  {texels:15}  {format:13} {bytes:>12}")?;
+    }
+    writeln!(out, "\nbuffer                               bytes")?;
+    for (buffer, bytes) in &planned.buffers {
+        writeln!(out, "{buffer:28}  {bytes:>12}")?;
+    }
+    let pixels = f64::from(image.width) * f64::from(image.height);
+    writeln!(
+        out,
+        "\n{} in all: {:.0} bytes a pixel",
+        size(planned.bytes),
+        planned.bytes as f64 / pixels
+    )
+}

@@ -1,0 +1,191 @@
+//! Time per pass.
+
+use std::{collections::BTreeMap, time::Instant};
+
+use wgpu::{CommandEncoder, QuerySet};
+
+use super::{
+    adapter::{Context, GpuError},
+    program::Program,
+    recording::{Recording, Step, dispatch, encode},
+};
+
+/// Time per pass, summed over runs.
+pub struct Timer {
+    clock: Clock,
+    /// Seconds and runs by pass name.
+    pub total: BTreeMap<&'static str, (f64, u64)>,
+}
+
+enum Clock {
+    /// The device's own.
+    Device(Queries),
+    /// The host's: each step is submitted and waited for by itself.
+    Host,
+}
+
+struct Queries {
+    set: QuerySet,
+    resolved: wgpu::Buffer,
+    staging: wgpu::Buffer,
+    seconds_per_tick: f64,
+}
+
+/// Steps between two readings; two queries each.
+const TIMED_AT_ONCE: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
+
+impl Timer {
+    /// By the device's clock; by the host's on adapters without timestamps and on those of software, whose timestamps say
+    /// when a pass was queued.
+    pub fn new(context: &Context) -> Self {
+        let is_software = context.info.device_type == wgpu::DeviceType::Cpu;
+        let clock = match context.has_timestamps && !is_software {
+            true => Clock::Device(Queries::new(context)),
+            false => Clock::Host,
+        };
+        Self {
+            clock,
+            total: BTreeMap::new(),
+        }
+    }
+
+    /// Pass, seconds, runs, by name.
+    pub fn times(&self) -> Vec<(&'static str, f64, u64)> {
+        let total = self.total.iter();
+        total
+            .map(|(&pass, &(seconds, runs))| (pass, seconds, runs))
+            .collect()
+    }
+
+    pub(super) fn run(&mut self, recording: &Recording, program: &Program) -> Result<(), GpuError> {
+        let mut add = |pass: &'static str, seconds: f64| {
+            let entry = self.total.entry(pass).or_default();
+            entry.0 += seconds;
+            entry.1 += 1;
+        };
+        match &self.clock {
+            Clock::Device(queries) => recording
+                .steps
+                .chunks(TIMED_AT_ONCE)
+                .try_for_each(|steps| queries.run(steps, program, &mut add)),
+            Clock::Host => recording
+                .steps
+                .iter()
+                .try_for_each(|step| run_alone(step, program, &mut add)),
+        }
+    }
+}
+
+fn run_alone(
+    step: &Step,
+    program: &Program,
+    add: &mut impl FnMut(&'static str, f64),
+) -> Result<(), GpuError> {
+    let context = &program.context;
+    let mut encoder = context.device.create_command_encoder(&Default::default());
+    encode(std::slice::from_ref(step), program, &mut encoder);
+    let begin = Instant::now();
+    context.queue.submit([encoder.finish()]);
+    context.wait()?;
+    if let Some(pass) = step.pass() {
+        add(pass, begin.elapsed().as_secs_f64());
+    }
+    Ok(())
+}
+
+impl Queries {
+    fn new(context: &Context) -> Self {
+        let device = &context.device;
+        let bytes = u64::from(wgpu::QUERY_SET_MAX_QUERIES) * 8;
+        let buffer = |usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("timestamps"),
+                size: bytes,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        Self {
+            set: device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("pass times"),
+                ty: wgpu::QueryType::Timestamp,
+                count: wgpu::QUERY_SET_MAX_QUERIES,
+            }),
+            resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
+            staging: buffer(wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ),
+            seconds_per_tick: f64::from(context.queue.get_timestamp_period()) * 1e-9,
+        }
+    }
+
+    fn run(
+        &self,
+        steps: &[Step],
+        program: &Program,
+        add: &mut impl FnMut(&'static str, f64),
+    ) -> Result<(), GpuError> {
+        let context = &program.context;
+        let mut encoder = context.device.create_command_encoder(&Default::default());
+        let mut names = Vec::new();
+        for step in steps {
+            if self.encode(step, program, &mut encoder, 2 * names.len() as u32) {
+                names.extend(step.pass());
+            }
+        }
+        let count = 2 * names.len();
+        encoder.resolve_query_set(&self.set, 0..count as u32, &self.resolved, 0);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.staging, 0, 8 * count as u64);
+        context.queue.submit([encoder.finish()]);
+        self.staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        context.wait()?;
+        {
+            let view = self
+                .staging
+                .get_mapped_range(..)
+                .map_err(|error| GpuError::Lost(error.to_string()))?;
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&view[..8 * count]);
+            for (name, pair) in names.iter().zip(ticks.chunks_exact(2)) {
+                let elapsed = pair[1].saturating_sub(pair[0]) as f64;
+                add(name, elapsed * self.seconds_per_tick);
+            }
+        }
+        self.staging.unmap();
+        Ok(())
+    }
+
+    /// Encodes a step; a pass writes its begin and end at the queries `first` and the one after. Whether it is one.
+    fn encode(
+        &self,
+        step: &Step,
+        program: &Program,
+        encoder: &mut CommandEncoder,
+        first: u32,
+    ) -> bool {
+        let (beginning, end) = (Some(first), Some(first + 1));
+        match step {
+            Step::Dispatch { pass: name, .. } => {
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                    label: Some(name),
+                    timestamp_writes: Some(wgpu::ComputePassTimestampWrites {
+                        query_set: &self.set,
+                        beginning_of_pass_write_index: beginning,
+                        end_of_pass_write_index: end,
+                    }),
+                });
+                dispatch(program, &mut pass, step);
+            }
+            Step::Draw(drawn) => {
+                let timestamps = wgpu::RenderPassTimestampWrites {
+                    query_set: &self.set,
+                    beginning_of_pass_write_index: beginning,
+                    end_of_pass_write_index: end,
+                };
+                drawn.encode(program, encoder, Some(timestamps));
+            }
+            Step::Clear(_) | Step::ClearDepth(_) | Step::CopyTexture(_) => {
+                encode(std::slice::from_ref(step), program, encoder);
+                return false;
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,61 @@
+//! Buffers of the renderer, and what each holds.
+
+use super::uniform::{
+    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Shading, Thickness, Tile, Triangle,
+};
+use crate::gpu::buffer::{Buf, Windows, Workgroups};
+
+/// The camera of the sample that is drawn.
+pub(super) const CAMERA: Buf<Camera> = Buf::uniform("camera");
+/// That of the frame after.
+pub(super) const NEXT_CAMERA: Buf<Camera> = Buf::uniform("next_camera");
+/// Light, water and set.
+pub(super) const SHADING: Buf<Shading> = Buf::uniform("shading");
+/// From the world to the shadow map.
+pub(super) const SHADOW_FROM_WORLD: Buf<[[f32; 4]; 4]> = Buf::uniform("shadow_from_world");
+
+/// What is opaque.
+pub(super) const TRIANGLES: Buf<Triangle> = Buf::new("triangles");
+/// Corner and size of each tile in which solids are drawn.
+pub(super) const TILES: Windows<Tile> = Windows::new("tile", "tiles");
+/// Depth of the solids, of each pixel of the padded frame.
+pub(super) const SOLID_DEPTH: Buf<f32> = Buf::new("solid_depth");
+/// Their normals and materials.
+pub(super) const SOLID_PACKED: Buf<u32> = Buf::new("solid_packed");
+
+/// Particles of a frame.
+pub(super) const PARTICLES: Buf<Particle> = Buf::new("particles");
+/// Workgroups of a dispatch of one a particle.
+pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
+/// What a particle adds to thickness and spray.
+pub(super) const THICKNESS_PARAMS: Buf<Thickness> = Buf::uniform("thickness_params");
+/// Length of the line of sight in water, at half the resolution on both sides.
+pub(super) const THICKNESS: Buf<u32> = Buf::new("thickness");
+/// Aerated water before the surface, as thickness.
+pub(super) const SPRAY: Buf<u32> = Buf::new("spray");
+/// Whose sphere is the nearest, of each pixel.
+pub(super) const OWNER: Buf<u32> = Buf::new("owner");
+
+/// Depths of the water, of each pixel of the padded frame: splats go into the first, and smoothing goes to and fro.
+pub(super) const DEPTHS: [Buf<f32>; 2] = [Buf::new("depth"), Buf::new("smoothed_depth")];
+/// Settings of the curvature flow.
+pub(super) const FLOW: Buf<Flow> = Buf::uniform("flow");
+/// Level and number of each of its dispatches.
+pub(super) const FLOW_LEVELS: Windows<FlowLevel> = Windows::new("level", "flow_levels");
+/// Settings of the narrow-range filter, of each axis.
+pub(super) const NARROW_RANGE: Windows<Narrow> = Windows::new("params", "narrow_range");
+
+/// Rows of each band of the picture.
+pub(super) const BANDS: Windows<Band> = Windows::new("band", "bands");
+/// Word and count of each fill.
+pub(super) const FILLS: Windows<Fill> = Windows::new("params", "fills");
+
+/// A band of the picture: linear radiance and coverage.
+pub(super) fn picture(band: usize) -> Buf<[f32; 4]> {
+    Buf::named(format!("picture.{band}"))
+}
+
+/// A band of the channels beside it: Z, N, P, forward, thickness.
+pub(super) fn aovs(band: usize) -> Buf<[f32; 10]> {
+    Buf::named(format!("aovs.{band}"))
+}

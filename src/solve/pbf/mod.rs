@@ -1,0 +1,434 @@
+//! Position-based fluids (Macklin and Müller 2013) with the red/black iteration.
+
+pub mod buffers;
+mod iteration;
+
+use glam::DVec3;
+
+use crate::{
+    domain::{
+        boundary::Boundary,
+        budget::Breach,
+        particles::Particles,
+        pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
+        probe::fitted,
+        solver::{Solver, StepReport},
+        sph::Calibration,
+        substep::Which,
+    },
+    gpu::{
+        adapter::Context,
+        buffer::Buf,
+        program::Program,
+        recording::{Command, Recording, Timer, spread},
+        sort,
+    },
+    scene::{
+        Scene, Stop,
+        plan::{DeviceLimits, LIST_BUDGET, Plan, SHARED_CONSTANTS},
+    },
+};
+
+use super::{
+    SolveError,
+    params::{Counters, IterationControl, Params},
+    state::{check_finite, check_ids, slots_by_id, take_over, upload},
+    trace::{Begun, Observe, Span, TraceFrame, Traced, trace},
+};
+use buffers::*;
+use iteration::Builder;
+
+/// Far from everything, and still finite when squared.
+const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
+
+/// PBF on a device.
+pub struct Pbf {
+    program: Program,
+    plan: Plan,
+    scene: Scene,
+    calibration: Calibration,
+    substep: Recording,
+    measure: Recording,
+    timer: Option<Timer>,
+    state: Particles,
+    frame: u32,
+    /// Positions relative to the domain's least corner, metres, and pressures, Pa, of the last substep's particles; empty
+    /// where the scene asks for none.
+    pressed: Vec<(DVec3, f64)>,
+}
+
+impl Pbf {
+    /// Builds what `plan` names, and nothing more. It must have been made for `scene` and `boundary`.
+    ///
+    /// # Errors
+    /// A buffer over the adapter's limits, with the figures; a shader or the device at fault.
+    pub fn new(
+        context: &Context,
+        scene: &Scene,
+        plan: Plan,
+        boundary: &Boundary,
+        is_timed: bool,
+    ) -> Result<Self, SolveError> {
+        let counts = plan.counts;
+        let particles = counts.particles;
+        let buffers: Vec<_> = plan
+            .buffers
+            .iter()
+            .map(|buffer| buffer.spec.clone())
+            .collect();
+        let passes: Vec<_> = plan.passes.iter().map(|pass| pass.spec.clone()).collect();
+        let program = Program::new(context, &buffers, &passes, &SHARED_CONSTANTS)?;
+        let pbf = scene.solver.pbf();
+        let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
+        let mut builder = Builder::new(&plan);
+        let substep = Recording::new(&program, &substep_commands(&plan, scene, &mut builder));
+        let measure = Recording::new(&program, &measure_commands(&plan, &mut builder));
+        builder.upload_phases(&program);
+        sort::upload_lengths(&program, &CELL_START, cell_count(&plan));
+        program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
+        let last = 2 * particles + counts.boundary_samples;
+        program.upload(PREDICTED, last, &[NOBODY]);
+        boundary.upload(&program, scene, &plan, &calibration);
+        Ok(Self {
+            timer: is_timed.then(|| Timer::new(context)),
+            program,
+            plan,
+            scene: scene.clone(),
+            calibration,
+            substep,
+            measure,
+            state: Particles::default(),
+            frame: 0,
+            pressed: Vec::new(),
+        })
+    }
+
+    /// What was built.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Names of the passes that a substep and a frame's measurement run, in order.
+    pub fn recorded_passes(&self) -> Vec<&'static str> {
+        self.substep.passes().chain(self.measure.passes()).collect()
+    }
+
+    /// Names of the passes and buffers that exist on the device, sorted.
+    pub fn built(&self) -> (Vec<&str>, Vec<&str>) {
+        self.program.names()
+    }
+
+    /// A buffer's first `count` values.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn field<T: bytemuck::Pod>(
+        &self,
+        buffer: impl Into<Buf<T>>,
+        count: usize,
+    ) -> Result<Vec<T>, SolveError> {
+        Ok(self.program.read(buffer.into(), count)?)
+    }
+
+    fn params(&self, time: f64, step: f64) -> Params {
+        let pbf = self.scene.solver.pbf();
+        let calibration = &self.calibration;
+        let walls = self.scene.walls(time);
+        let wall_velocity = self.scene.wall_velocity(time, step);
+        let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
+        Params {
+            velocity_step: (self.scene.water.gravity * step).as_vec3().to_array(),
+            particle_count: self.plan.counts.particles as u32,
+            grid_dims: self.plan.grid_dims,
+            max_correction: (MAX_CORRECTION * pbf.particle_spacing) as f32,
+            wall_min: walls.min.as_vec3().to_array(),
+            time_step: step as f32,
+            wall_max: walls.max.as_vec3().to_array(),
+            inverse_time_step: if step > 0.0 { (1.0 / step) as f32 } else { 0.0 },
+            support_radius: calibration.support_radius as f32,
+            inverse_support_radius: (1.0 / calibration.support_radius) as f32,
+            nobody: (self.plan.counts.particles + self.plan.counts.boundary_samples) as u32,
+            density_scale: calibration.density_scale as f32,
+            gradient_scale: calibration.gradient_scale as f32,
+            wall_density_scale: calibration.wall_density_scale as f32,
+            regularization: (REGULARIZATION * calibration.bulk_gradient_squares) as f32,
+            relaxation: pbf.relaxation as f32,
+            contact_distance: (CONTACT * pbf.particle_spacing) as f32,
+            max_displacement: (CAP * pbf.cfl * pbf.particle_spacing) as f32,
+            artificial_pressure: (pbf.artificial_pressure * natural_lambda) as f32,
+            padding: 0.0,
+            wall_velocity_min: wall_velocity.min.as_vec3().to_array(),
+            padding_min: 0.0,
+            wall_velocity_max: wall_velocity.max.as_vec3().to_array(),
+            padding_max: 0.0,
+        }
+    }
+
+    /// Zeroes what adds up over a frame.
+    fn begin_frame(&self) {
+        self.program.upload(COUNTERS, 0, &[Counters::default()]);
+        if self.scene.has_movers() {
+            let groups = self.plan.counts.particles.div_ceil(64);
+            self.program.upload(BOUNDARY_WORK, 0, &vec![0.0; groups]);
+        }
+    }
+
+    /// Done on the water by moving walls in the frame that ran last, joule; substeps were `step` seconds long.
+    fn boundary_work(&self, step: f64) -> Result<f64, SolveError> {
+        if !self.scene.has_movers() {
+            return Ok(0.0);
+        }
+        let groups = self.plan.counts.particles.div_ceil(64);
+        let sums = self.field(BOUNDARY_WORK, groups)?;
+        let sum: f64 = sums.into_iter().map(f64::from).sum();
+        Ok(self.scene.particle_mass() / step * sum)
+    }
+
+    fn prepare_substep(&self, time: f64, step: f64) {
+        self.program.upload(PARAMS, 0, &[self.params(time, step)]);
+        if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {
+            self.program.upload(CONTROL, 0, &[self.control()]);
+        }
+    }
+
+    fn run_substep(&mut self, time: f64, step: f64) -> Result<(), SolveError> {
+        self.prepare_substep(time, step);
+        Ok(self.substep.run(&self.program, self.timer.as_mut())?)
+    }
+
+    /// Substeps of the next frame.
+    fn substeps(&self) -> Result<u32, SolveError> {
+        let substeps = (self.scene).pbf_substeps(self.frame, self.state.max_speed())?;
+        Ok(substeps)
+    }
+
+    /// When the k-th of so many ends, and how long it is, seconds.
+    fn substep_of(&self, substeps: u32, k: u32) -> (f64, f64) {
+        let length = self.scene.shot.frame_seconds();
+        let step = length / f64::from(substeps);
+        (f64::from(self.frame) * length + f64::from(k) * step, step)
+    }
+
+    /// A fresh `control`: not done, no iterations, and the groups of the largest chunk over all and over a colour.
+    fn control(&self) -> IterationControl {
+        let largest = self
+            .plan
+            .chunks
+            .iter()
+            .map(|chunk| chunk.count as u64)
+            .max()
+            .unwrap_or(0);
+        let groups = |threads| spread(&self.program.context, 64, threads).into();
+        IterationControl {
+            all: groups(largest),
+            colour: groups(largest.div_ceil(2)),
+            ..IterationControl::default()
+        }
+    }
+
+    /// As [`Calibration::pressure_scale`] has it from Σ λ; in sorted order, before the state is uploaded again.
+    fn particle_pressures(&self, step: f64) -> Result<Vec<(DVec3, f64)>, SolveError> {
+        let n = self.plan.counts.particles;
+        let wanted = (POSITION.first(n), LAMBDA_SUM.first(n));
+        let (position, lambda) = self.program.download(wanted)?;
+        let relaxation = self.scene.solver.pbf().relaxation;
+        let density = self.scene.water.rest_density;
+        let scale = self.calibration.pressure_scale(density, relaxation, step);
+        let particles = position.iter().zip(&lambda);
+        Ok(particles
+            .map(|([x, y, z, _], lambda)| {
+                let x = DVec3::new(f64::from(*x), f64::from(*y), f64::from(*z));
+                (x, scale * f64::from(*lambda))
+            })
+            .collect())
+    }
+
+    /// Sorts at the frame's last positions, measures density there, and reads everything back.
+    fn read_state(&mut self, time: f64) -> Result<(Vec<f64>, Counters), SolveError> {
+        self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
+        self.measure.run(&self.program, self.timer.as_mut())?;
+        let n = self.plan.counts.particles;
+        let state = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
+        let measured = (SORTED_ID.first(n), DENSITY.first(n), COUNTERS.first(1));
+        let ((position, velocity, id), (sorted_id, density, counters)) =
+            self.program.download((state, measured))?;
+        check_ids(self.frame + 1, &self.state.id, &id)?;
+        check_ids(self.frame + 1, &self.state.id, &sorted_id)?;
+        let slot_of = slots_by_id(&self.state.id);
+        take_over(
+            &mut self.state,
+            &self.scene,
+            &slot_of,
+            &id,
+            &position,
+            &velocity,
+        );
+        let mut by_slot = vec![0.0; n];
+        for (&id, &value) in sorted_id.iter().zip(&density) {
+            by_slot[slot_of(id)] = f64::from(value);
+        }
+        Ok((by_slot, counters[0]))
+    }
+}
+
+impl Solver for Pbf {
+    type Error = SolveError;
+
+    fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), SolveError> {
+        let planned = self.plan.counts.particles;
+        if particles.len() != planned {
+            return Err(SolveError::Count {
+                planned,
+                given: particles.len(),
+            });
+        }
+        self.state = particles.clone();
+        self.frame = frame;
+        upload(&self.program, &self.scene, &self.state);
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
+        let length = self.scene.shot.frame_seconds();
+        let start = f64::from(self.frame) * length;
+        let substeps = self.substeps()?;
+        self.begin_frame();
+        for k in 1..=substeps {
+            let (time, step) = self.substep_of(substeps, k);
+            self.run_substep(time, step)?;
+        }
+        let (density, counters) = self.read_state(start + length)?;
+        if !self.scene.pressure_points().is_empty() {
+            self.pressed = self.particle_pressures(length / f64::from(substeps))?;
+        }
+        self.frame += 1;
+        if counters.not_finite > 0 {
+            let count = counters.not_finite.into();
+            return Err(Breach::not_finite(self.frame, count, None).into());
+        }
+        check_finite(self.frame, &self.state, Some(&density))?;
+        if self.scene.domain.min != DVec3::ZERO {
+            // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
+            upload(&self.program, &self.scene, &self.state);
+        }
+        let iterations = match self.scene.solver.pbf().stop {
+            Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
+            Stop::DensityError { .. } => u64::from(counters.iterations),
+        };
+        let report = StepReport {
+            substeps,
+            iterations,
+            capped: u64::from(counters.capped),
+            searched: u64::from(counters.searched),
+            boundary_work: self.boundary_work(length / f64::from(substeps))?,
+            ..self.scene.report(&self.state, density.into_iter())
+        };
+        Ok((self.state.clone(), report))
+    }
+
+    /// Of the particles about a point, by the plane that fits them best.
+    fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
+        let local = |at: &DVec3| *at - self.scene.domain.min;
+        let support = self.calibration.support_radius;
+        let points = points.iter().map(local);
+        Ok(points
+            .map(|at| fitted(self.pressed.iter().copied(), at, support))
+            .collect())
+    }
+
+    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
+    }
+}
+
+impl TraceFrame for Pbf {
+    fn trace_frame(&mut self, span: Span, observe: &mut Observe<'_>) -> Result<u32, SolveError> {
+        let count = self.substeps()?;
+        let (first, last) = match span {
+            Span::From(first) => (first, count),
+            Span::Only(Which::Last) => (count, count),
+            Span::Only(Which::Number(number)) => (number, number),
+        };
+        if last > count {
+            return Err(SolveError::NoSubstep {
+                asked: last,
+                frame: self.frame,
+                count,
+            });
+        }
+        self.begin_frame();
+        for number in 1..first {
+            let (time, step) = self.substep_of(count, number);
+            self.run_substep(time, step)?;
+        }
+        for number in first..=last {
+            let (time, step) = self.substep_of(count, number);
+            let elapsed = f64::from(number - 1) * step;
+            let begun = Begun { number, elapsed };
+            let told = &mut |traced: Traced<'_>| observe(begun, traced);
+            self.prepare_substep(time, step);
+            trace(&[&self.substep], &self.program, told)?;
+            if number == last {
+                self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
+                trace(&[&self.measure], &self.program, told)?;
+            }
+        }
+        Ok(last)
+    }
+}
+
+/// The limits of an open device that a plan depends on.
+pub fn device_limits(context: &Context) -> DeviceLimits {
+    DeviceLimits {
+        binding: context.limits.max_storage_buffer_binding_size,
+        buffer: context.limits.max_buffer_size,
+        list_budget: LIST_BUDGET,
+    }
+}
+
+fn cell_count(plan: &Plan) -> usize {
+    plan.grid_dims.iter().map(|&n| n as usize).product()
+}
+
+fn sort_commands(plan: &Plan) -> Vec<Command> {
+    let n = plan.counts.particles;
+    let mut commands = vec![
+        Command::clear(&CELL_START),
+        Command::over("pbf/assign_cells", n),
+    ];
+    commands.extend(sort::scan(&CELL_START, cell_count(plan)));
+    commands.extend(sort::SORT_PASSES.map(|pass| Command::over(pass, n)));
+    commands.push(Command::over("pbf/reorder", n));
+    commands
+}
+
+fn substep_commands(plan: &Plan, scene: &Scene, builder: &mut Builder<'_>) -> Vec<Command> {
+    let pbf = scene.solver.pbf();
+    let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
+    if !scene.pressure_points().is_empty() {
+        commands.push(Command::clear(&LAMBDA_SUM));
+    }
+    if scene.has_movers() {
+        commands.insert(0, Command::clear(&WALL_WORK));
+    }
+    commands.extend(sort_commands(plan));
+    if plan.has_lists {
+        builder.over_all("pbf/build_neighbors", &mut commands);
+    }
+    builder.iterations(pbf, &mut commands);
+    builder.finish(pbf, &mut commands);
+    if scene.has_movers() {
+        commands.push(Command::over("pbf/boundary_work", plan.counts.particles));
+    }
+    for effect in plan.effect_passes() {
+        builder.over_all(effect, &mut commands);
+    }
+    commands
+}
+
+fn measure_commands(plan: &Plan, builder: &mut Builder<'_>) -> Vec<Command> {
+    let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
+    commands.extend(sort_commands(plan));
+    builder.measure(&mut commands);
+    commands
+}

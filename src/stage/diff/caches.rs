@@ -1,0 +1,100 @@
+//! Two caches: their frames, the streams beside the particles, and the ledgers' lines.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+
+use super::{DiffError, Request, aggregates, bake_of, gauge, physics, scene_of, streams};
+use crate::{
+    cache::{CacheError, CacheReader},
+    compare::{
+        caches::CacheDiff,
+        frames::{self, FrameDiff},
+        streams::StreamDiff,
+    },
+    domain::tolerance::Tolerance,
+};
+
+/// A tolerance that judges nothing here would pass anything.
+fn check_tolerance(tolerance: &Tolerance, caches: [&CacheReader; 2]) -> Result<(), DiffError> {
+    if tolerance.fields.is_empty() && tolerance.aggregates.is_empty() {
+        return Err(DiffError::usage(
+            "the tolerance file has [pictures] alone; two caches need [position], [velocity], [attributes.NAME] or \
+             [aggregates]",
+        ));
+    }
+    let attributes = caches.iter().flat_map(|c| &c.manifest().attributes);
+    let known: Vec<&str> = ["position", "velocity"]
+        .into_iter()
+        .chain(attributes.map(String::as_str))
+        .collect();
+    let mut limited = tolerance.fields.keys();
+    match limited.find(|name| !known.contains(&name.as_str())) {
+        None => Ok(()),
+        Some(name) => Err(DiffError::usage(format!(
+            "the tolerance file limits {name}, which neither cache has; they have {}",
+            known.join(", ")
+        ))),
+    }
+}
+
+pub(super) fn compare(
+    [a, b]: [&CacheReader; 2],
+    request: &Request,
+) -> Result<CacheDiff, DiffError> {
+    let tolerance = request.tolerance.as_ref();
+    if let Some(tolerance) = tolerance {
+        check_tolerance(tolerance, [a, b])?;
+    }
+    let [in_a, in_b] = [a, b]
+        .map(|cache| -> BTreeSet<u32> { (cache.first_frame()..=cache.last_frame()).collect() });
+    let (chosen, only_a, only_b): (Vec<u32>, _, _) = match &request.frames {
+        Some(frames) => (frames.iter().collect(), Vec::new(), Vec::new()),
+        None => (
+            in_a.intersection(&in_b).copied().collect(),
+            in_a.difference(&in_b).copied().collect(),
+            in_b.difference(&in_a).copied().collect(),
+        ),
+    };
+    for cache in [a, b] {
+        cache.check_beside(&chosen)?;
+    }
+    let (scene_a, scene_b) = (scene_of(a)?, scene_of(b)?);
+    let gauge = gauge(&scene_b, &[b, a])?;
+    let frame = |&frame: &u32| {
+        let (of_a, of_b) = (a.read(frame)?, b.read(frame)?);
+        let side = |cache, particles| -> Result<_, CacheError> {
+            let entry = CacheReader::entry(cache, frame)?;
+            Ok(streams::Side {
+                cache,
+                entry,
+                particles,
+            })
+        };
+        let beside = streams::of_frame([side(a, &of_a)?, side(b, &of_b)?])?;
+        let [from, to] = [a, b].map(|cache| cache.manifest().origin.into());
+        let of_a = of_a.about(from, to);
+        let sums = [
+            aggregates(a, &scene_a, &gauge, frame, &of_a)?,
+            aggregates(b, &scene_b, &gauge, frame, &of_b)?,
+        ];
+        Ok((
+            frames::compare(frame, [&of_a, &of_b], sums, tolerance),
+            beside,
+        ))
+    };
+    let found: Result<Vec<(FrameDiff, Vec<StreamDiff>)>, CacheError> =
+        chosen.par_iter().map(frame).collect();
+    let (frames, beside): (_, Vec<_>) = found?.into_iter().unzip();
+    Ok(CacheDiff {
+        bakes: [a, b].map(|cache| bake_of(cache.manifest())),
+        physics: physics(b.dir(), b.scene_toml(), a.scene_toml())?,
+        only_a,
+        only_b,
+        frames,
+        streams_only_a: streams::lone(a, b),
+        streams_only_b: streams::lone(b, a),
+        streams: beside.into_iter().flatten().collect(),
+        streams_judged: tolerance.is_none(),
+    })
+}

@@ -1,0 +1,443 @@
+//! Probes: what a scene says of them, what they cost, and the files that they leave in a cache.
+
+use std::{fs, path::Path};
+
+use crate::support::job::Job;
+use crate::support::{self, D, context, lattice};
+use glam::{DVec2, DVec3};
+use swell::{
+    domain::{boundary::Boundary, solver::Solver},
+    scene::{
+        Method, Scene, SceneError, physics_difference, physics_hash,
+        plan::{Capacity, Counts, Plan},
+        probe::{Probe, ProbeKind},
+    },
+    solve::{
+        flip::Flip,
+        pbf::{Pbf, device_limits},
+    },
+    stage::prepare::Start,
+};
+
+const SCENE: &str = r#"
+[shot]
+name = "tank"
+frames = 6
+frames_per_second = 60
+
+[domain]
+min = [-1.0, 0.5, 0.25]
+max = [1.0, 2.5, 1.25]
+
+[[water.block]]
+min = [-1.0, 0.5, 0.25]
+max = [-0.2, 1.5, 1.25]
+
+[solver]
+method = "pbf"
+[solver.pbf]
+particle_spacing = 0.1
+[solver.flip]
+cell_size = 0.2
+"#;
+
+const PROBES: &str = r#"
+[[probe]]
+kind = "elevation"
+at = [-0.6, 0.75]
+[[probe]]
+kind = "elevation"
+name = "far"
+at = [0.9, 0.75]
+[[probe]]
+kind = "elevation"
+at = [0, 1]
+[[probe]]
+kind = "pressure"
+at = [-0.6, 0.8, 0.75]
+[[probe]]
+kind = "energy"
+[[probe]]
+kind = "volume"
+"#;
+
+fn parse(probes: &str, set: &[&str]) -> Result<Scene, SceneError> {
+    let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
+    let text = format!("{SCENE}{probes}");
+    Scene::parse(&text, Path::new("a.toml"), Path::new(""), &set)
+}
+
+#[test]
+fn scenes_say_what_is_measured() {
+    let plain = parse("", &[]).unwrap();
+    assert!(plain.probes.is_empty());
+    let text = |scene: &Scene| scene.to_toml(&|_, _| String::new());
+    assert!(!text(&plain).contains("probe"));
+    let scene = parse(PROBES, &[]).unwrap();
+    let names: Vec<&str> = scene
+        .probes
+        .iter()
+        .map(|probe| probe.name.as_str())
+        .collect();
+    assert_eq!(
+        names,
+        [
+            "elevation-1",
+            "far",
+            "elevation-3",
+            "pressure-1",
+            "energy-1",
+            "volume-1"
+        ]
+    );
+    let at = DVec2::new(0.0, 1.0);
+    assert_eq!(scene.probes[2].kind, ProbeKind::Elevation { at });
+    assert_eq!(scene.pressure_points(), [DVec3::new(-0.6, 0.8, 0.75)]);
+    let again = Scene::parse(&text(&scene), Path::new("b.toml"), Path::new(""), &[]).unwrap();
+    assert_eq!(again, scene);
+    // They look and do not touch.
+    assert_eq!(physics_hash(&scene), physics_hash(&plain));
+    assert_eq!(
+        physics_difference(&text(&scene), &text(&plain)).unwrap(),
+        None
+    );
+}
+
+#[test]
+fn a_probe_that_cannot_be_is_told() {
+    let pressure = "kind = \"pressure\"\nat = [0.0, 1.0, 1.0]";
+    let cases: &[(&str, &[&str], &str, &str)] = &[
+        (
+            "kind = \"elevaton\"",
+            &[],
+            "probe[0].kind",
+            "\"elevaton\" is no probe; allowed: \"elevation\"",
+        ),
+        ("at = [0.0, 1.0]", &[], "probe[0].kind", "missing"),
+        (
+            "kind = \"elevation\"",
+            &[],
+            "probe[0].at",
+            "missing; allowed: [x, z] of an elevation",
+        ),
+        (
+            "kind = \"elevation\"\nat = [0, 1, 1]",
+            &[],
+            "probe[0].at",
+            "3 numbers, and a probe of elevation takes 2",
+        ),
+        (
+            "kind = \"pressure\"\nat = [0.0, 1.0]",
+            &[],
+            "probe[0].at",
+            "2 numbers, and a probe of pressure takes 3",
+        ),
+        (
+            "kind = \"elevation\"\nat = [0.0, 1.5]",
+            &[],
+            "probe[0].at",
+            "outside of the domain",
+        ),
+        (
+            "kind = \"elevation\"\nat = [nan, 1.0]",
+            &[],
+            "probe[0].at",
+            "outside of the domain",
+        ),
+        (
+            "kind = \"pressure\"\nat = [0.0, 0.0, 1.0]",
+            &[],
+            "probe[0].at",
+            "outside of the domain",
+        ),
+        (
+            "kind = \"volume\"\nat = [0.0]",
+            &[],
+            "probe[0].at",
+            "a probe of volume has no place",
+        ),
+        (
+            "kind = \"energy\"\nname = \"../up\"",
+            &[],
+            "probe[0].name",
+            "no safe file name",
+        ),
+        (
+            "kind = \"energy\"\nname = \"\"",
+            &[],
+            "probe[0].name",
+            "no safe file name",
+        ),
+        (
+            "kind = \"energy\"\nplace = 1",
+            &[],
+            "probe[0].place",
+            "the nearest is \"name\"",
+        ),
+        (
+            "kind = \"energy\"\nname = \"a\"\n[[probe]]\nkind = \"volume\"\nname = \"A\"",
+            &[],
+            "probe[1].name",
+            "a second probe of the name",
+        ),
+        (
+            "kind = \"volume\"\nname = \"energy-1\"\n[[probe]]\nkind = \"energy\"",
+            &[],
+            "probe[1].kind",
+            "a second probe of the name \"energy-1\"",
+        ),
+        (
+            "kind = \"volume\"",
+            &[
+                "domain.max=[4000.0,4000.0,4000.0]",
+                "solver.method=flip",
+                "solver.flip.cell_size=1.0",
+                "solver.pbf.particle_spacing=10.0",
+            ],
+            "probe[0].kind",
+            "more than 268435456 bricks",
+        ),
+        (
+            pressure,
+            &["solver.pbf.iteration=chebyshev"],
+            "probe[0].kind",
+            "goes on from the one before",
+        ),
+        (
+            pressure,
+            &["solver.pbf.artificial_pressure=0.1"],
+            "probe[0].kind",
+            "held apart by a force",
+        ),
+    ];
+    for (table, set, key, words) in cases {
+        let error = parse(&format!("[[probe]]\n{table}\n"), set)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.starts_with("a.toml:") && error.contains(key) && error.contains(words),
+            "{table}: {error}"
+        );
+    }
+    // FLIP has a pressure whatever PBF's settings say.
+    let flip = ["solver.pbf.iteration=chebyshev", "solver.method=flip"];
+    assert!(parse(&format!("[[probe]]\n{pressure}\n"), &flip).is_ok());
+}
+
+/// Of all probes that of pressure alone costs the device anything, and only with PBF: four bytes a particle.
+#[test]
+fn only_a_pressure_costs_the_device_anything() {
+    let context = context();
+    let counts = Counts {
+        particles: 1000,
+        bricks: Capacity { wet: 4, slots: 8 },
+        ..Counts::default()
+    };
+    let others: String = PROBES
+        .split("[[probe]]")
+        .filter(|p| !p.contains("pressure"))
+        .collect::<Vec<_>>()
+        .join("[[probe]]");
+    for method in ["pbf", "flip"] {
+        let plan = |probes: &str| -> Plan {
+            let scene = parse(probes, &[&format!("solver.method={method}")]).unwrap();
+            swell::solve::plan(&scene, counts, device_limits(&context))
+        };
+        let bare = plan("");
+        assert_eq!(plan(&others), bare);
+        let asked = plan(PROBES);
+        if method == "flip" {
+            assert_eq!(asked, bare);
+            continue;
+        }
+        assert_eq!(asked.bytes().0 - bare.bytes().0, 4 * 1000);
+        let added = asked.buffers.iter().filter(|b| !bare.buffers.contains(b));
+        let added: Vec<_> = added.map(|b| (b.spec.name.as_str(), b.owner)).collect();
+        assert_eq!(added, [("lambda_sum", "probes")]);
+        let names = |plan: &Plan| -> Vec<_> { plan.passes.iter().map(|p| p.spec.name).collect() };
+        assert_eq!(names(&asked), names(&bare));
+        let changed = asked.passes.iter().filter(|p| !bare.passes.contains(p));
+        let changed: Vec<_> = changed.map(|p| p.spec.name).collect();
+        assert_eq!(changed, ["pbf/compute_delta"]);
+    }
+}
+
+/// Whoever looks changes nothing: the same particles to the last bit.
+#[test]
+fn probes_leave_the_water_as_it_is() {
+    let context = context();
+    let mut scene = support::scene([1.6, 1.6, 0.8]);
+    let particles = lattice([0.0; 3], [6, 10, 8], [D; 3]);
+    let plain = support::run(&context, &scene, &particles, 10).0;
+    assert_eq!(scene.solver.method, Method::Pbf);
+    scene.probes.push(Probe {
+        name: "p".to_owned(),
+        kind: ProbeKind::Pressure {
+            at: DVec3::splat(0.2),
+        },
+    });
+    let mut solver = support::solver(&context, &scene, &particles, &Boundary::default());
+    let mut state = particles;
+    for _ in 0..10 {
+        state = solver.advance().unwrap().0;
+    }
+    assert!(state == plain);
+}
+
+/// The f64 reference sees the same pressure: what f32 leaves of positions, 1e-7 m, is a hundredth of what a frame's
+/// corrections come to.
+#[test]
+fn the_reference_sees_the_same_pressure() {
+    let context = context();
+    let points = [
+        DVec3::new(-0.6, 0.7, 0.75),
+        DVec3::new(-0.83, 0.62, 0.41),
+        DVec3::new(0.9, 0.7, 0.75),
+    ];
+    let scene = |method: &str| parse(PROBES, &[&format!("solver.method={method}")]).unwrap();
+    fn seen<S: Solver>(mut solver: S, start: &Start, points: &[DVec3]) -> Vec<Option<f64>>
+    where
+        S::Error: std::fmt::Debug,
+    {
+        solver.load(0, &start.particles).unwrap();
+        for _ in 0..3 {
+            solver.advance().unwrap();
+        }
+        solver.pressures(points).unwrap()
+    }
+    for method in ["pbf", "flip"] {
+        let scene = scene(method);
+        let start = Start::of(&scene).unwrap();
+        let boundary = &start.boundary;
+        let plan = start.plan(&scene, device_limits(&context));
+        let [gpu, cpu] = if method == "pbf" {
+            let gpu = Pbf::new(&context, &scene, plan, boundary, false).unwrap();
+            let cpu = swell::reference::pbf::Pbf::new(&scene, boundary);
+            [seen(gpu, &start, &points), seen(cpu, &start, &points)]
+        } else {
+            let gpu = Flip::new(&context, &scene, plan, boundary, false).unwrap();
+            let cpu = swell::reference::flip::Flip::new(&scene, boundary);
+            [seen(gpu, &start, &points), seen(cpu, &start, &points)]
+        };
+        println!("{method}: {gpu:?} {cpu:?}");
+        for k in 0..2 {
+            let (gpu, cpu) = (gpu[k].unwrap(), cpu[k].unwrap());
+            assert!((gpu / cpu - 1.0).abs() < 0.01, "{method}: {gpu} {cpu}");
+        }
+        assert_eq!([gpu[2], cpu[2]], [None; 2], "no water there");
+        // Negative control: the other point's pressure is another.
+        assert!((gpu[1].unwrap() / cpu[0].unwrap() - 1.0).abs() > 0.05);
+    }
+}
+
+/// Rows of a probe's file, without the header.
+fn rows(job: &Job, file: &str) -> Vec<Vec<Option<f64>>> {
+    let text = fs::read_to_string(job.path(file)).unwrap();
+    let number = |field: &str| (!field.is_empty()).then(|| field.parse().unwrap());
+    text.lines()
+        .skip(1)
+        .map(|line| line.split(',').map(number).collect())
+        .collect()
+}
+
+fn a_bake_leaves_a_file_a_probe(solver: &str) {
+    let scene = format!("{SCENE}{PROBES}");
+    let job = Job::of(&[("tank.toml", &scene), ("plain.toml", SCENE)]);
+    let bake = format!("bake tank.toml --solver {solver} -o");
+    job.expect(0, &format!("{bake} whole"));
+    let said = job.expect(0, "verify whole");
+    assert!(said.contains('6'), "{said}");
+    let near = rows(&job, "whole/probes/elevation-1.csv");
+    assert_eq!(near.len(), 7);
+    // Before it falls, the water stands to y = 1.5 there; the far end is dry.
+    assert!((near[0][2].unwrap() - 1.5).abs() < 0.01, "{near:?}");
+    assert!((near[6][1].unwrap() - 0.1).abs() < 1e-12);
+    assert_eq!(rows(&job, "whole/probes/far.csv")[0][2], None);
+    // At most the 0.7 m of water above weigh on it, and less while they fall; PBF's water, not compressed at the start,
+    // only comes to press, and scatters. The start has no pressure yet.
+    let pressure = rows(&job, "whole/probes/pressure-1.csv");
+    assert_eq!(pressure[0][2], None);
+    let pressures: Vec<f64> = pressure[1..].iter().map(|row| row[2].unwrap()).collect();
+    assert!(
+        pressures.iter().all(|p| (-1.0..9810.0).contains(p)) && pressures[5] > 500.0,
+        "{pressures:?}"
+    );
+    // 0.8 m³ of water; 0.5 m above the floor on average.
+    let volume = rows(&job, "whole/probes/volume-1.csv");
+    assert!(
+        volume
+            .iter()
+            .all(|row| (row[2].unwrap() / 0.8 - 1.0).abs() < 0.06),
+        "{volume:?}"
+    );
+    let energy = rows(&job, "whole/probes/energy-1.csv");
+    assert_eq!(energy[0][2], Some(0.0));
+    assert!((energy[0][3].unwrap() / (800.0 * 9.81 * 0.5) - 1.0).abs() < 1e-6);
+    let ledger = fs::read_to_string(job.path("whole/frames.jsonl")).unwrap();
+    let last: serde_json::Value = serde_json::from_str(ledger.lines().last().unwrap()).unwrap();
+    for (column, key) in [(2, "kinetic_energy"), (3, "potential_energy")] {
+        assert_eq!(last["report"][key].as_f64(), energy[6][column], "{key}");
+    }
+
+    // Stopped and gone on with, it ends with the same bytes; rows past the ledger are gone.
+    job.expect(0, &format!("{bake} stopped --frames 1-3"));
+    let path = job.path("stopped/probes/far.csv");
+    fs::write(&path, fs::read_to_string(&path).unwrap() + "4,0.5,1.0\n").unwrap();
+    let said = job.expect(4, "verify stopped");
+    assert!(
+        said.contains("far.csv") && said.contains("line 6"),
+        "{said}"
+    );
+    job.expect(0, &format!("{bake} stopped --resume"));
+    assert_eq!(job.hash("stopped"), job.hash("whole"));
+
+    // With other probes it is another bake.
+    let said = job.expect(
+        4,
+        &format!("{bake} whole --resume --set probe[0].at=[0.0,1.0]"),
+    );
+    assert!(
+        said.contains("cannot be made up afterwards") && said.contains("[-0.6, 0.75]"),
+        "{said}"
+    );
+    let said = job.expect(
+        4,
+        &format!("bake plain.toml --solver {solver} -o whole --resume"),
+    );
+    assert!(said.contains("this run has no probes"), "{said}");
+    assert_eq!(job.hash("stopped"), job.hash("whole"));
+
+    let shown = job.expect(0, "inspect whole --plot plots");
+    assert!(
+        shown.contains("elevation_m") && shown.contains("plots/energy-1.svg"),
+        "{shown}"
+    );
+    let svg = fs::read_to_string(job.path("plots/energy-1.svg")).unwrap();
+    assert!(
+        svg.contains("kinetic") && svg.contains("tank: energy-1"),
+        "{svg}"
+    );
+    assert_eq!(fs::read_dir(job.path("plots")).unwrap().count(), 6);
+    assert_eq!(job.hash("stopped"), job.hash("whole"));
+
+    // Negative control: who asks for nothing gets nothing, and the same water.
+    job.expect(0, &format!("bake plain.toml --solver {solver} -o plain"));
+    assert!(!job.path("plain/probes").exists());
+    let frame = |cache: &str| fs::read(job.path(cache).join("frames/tank.0006.ply")).unwrap();
+    assert_eq!(frame("plain"), frame("whole"));
+    let said = job.expect(2, "inspect plain --plot none");
+    assert!(
+        said.contains("no probes to plot") && !job.path("none").exists(),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_pbf_bake_leaves_a_file_a_probe() {
+    a_bake_leaves_a_file_a_probe("pbf");
+}
+
+#[test]
+fn a_flip_bake_leaves_a_file_a_probe() {
+    a_bake_leaves_a_file_a_probe("flip");
+}

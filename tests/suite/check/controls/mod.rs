@@ -1,0 +1,36 @@
+//! A fault for each row of a check.
+pub(super) mod flip;
+pub(super) mod pbf;
+pub(super) mod variants;
+
+use swell::gpu::adapter::Spoil;
+
+/// A fault in one pass, and what must fail first by it.
+pub struct Control {
+    pub spoil: Spoil,
+    pub pass: &'static str,
+    pub fields: &'static [&'static str],
+    /// Passes that are handed what contradicts itself by it.
+    pub follow: &'static [&'static str],
+}
+
+impl Control {
+    pub const fn and(self, follow: &'static [&'static str]) -> Self {
+        Self { follow, ..self }
+    }
+}
+
+pub const fn control(
+    pass: &'static str,
+    from: &'static str,
+    to: &'static str,
+    fails: &'static str,
+    fields: &'static [&'static str],
+) -> Control {
+    Control {
+        spoil: Spoil { pass, from, to },
+        pass: fails,
+        fields,
+        follow: &[],
+    }
+}

@@ -1,0 +1,296 @@
+//! Faults in PBF's passes.
+
+use super::{Control, control};
+
+/// Who looks for neighbours in cells that do not hold them does not find them.
+const UNSORTED: [&str; 5] = [
+    "sort/place",
+    "sort/stabilize",
+    "pbf/build_neighbors",
+    "pbf/measure_density",
+    "pbf/assign_cells",
+];
+
+/// Of a scene whose walls move.
+pub const PBF_WALLS: &[Control] = &[
+    control(
+        "pbf/predict",
+        "= work_of_push(wall_push);",
+        "= 1.001 * work_of_push(wall_push);",
+        "pbf/predict",
+        &["work of walls"],
+    ),
+    control(
+        "pbf/compute_delta",
+        "of_high * params.wall_velocity_max - of_low",
+        "of_high * params.wall_velocity_max + of_low",
+        "pbf/compute_delta",
+        &["work of walls"],
+    ),
+    control(
+        "pbf/boundary_work",
+        "for (var k = 0u;",
+        "for (var k = 1u;",
+        "pbf/boundary_work",
+        &["shares of the work"],
+    ),
+];
+
+pub const PBF: &[Control] = &[
+    control(
+        "pbf/predict",
+        "params.time_step * v;",
+        "params.time_step * v * 1.0001;",
+        "pbf/predict",
+        &["predicted position"],
+    ),
+    control(
+        "pbf/predict",
+        "(x - free) * params.inverse_time_step",
+        "(free - x) * params.inverse_time_step",
+        "pbf/predict",
+        &["velocity"],
+    ),
+    control(
+        "pbf/assign_cells",
+        "cell_of[thread] = cell;",
+        "cell_of[thread] = cell ^ 1u;",
+        "pbf/assign_cells",
+        &["cell"],
+    )
+    .and(&UNSORTED),
+    control(
+        "pbf/assign_cells",
+        "atomicAdd(&cell_start[cell], 1u)",
+        "atomicAdd(&cell_start[cell], 1u) * 2u",
+        "pbf/assign_cells",
+        &["slots in cells"],
+    )
+    .and(&UNSORTED),
+    control(
+        "sort/scan_blocks",
+        "values[first + k] = base + own[k];",
+        "values[first + k] = base + own[k] + u32(first == 64u);",
+        "sort/scan_blocks",
+        &["sums within a block"],
+    ),
+    control(
+        "sort/add_block_sums",
+        "+= block_sums[i / 1024u]",
+        "+= block_sums[i / 1024u] * 0u",
+        "sort/add_block_sums",
+        &["sums"],
+    ),
+    control(
+        "sort/place",
+        "slot_in_cell[i]] = i",
+        "slot_in_cell[i]] = i ^ 1u",
+        "sort/place",
+        &["elements by cell"],
+    )
+    .and(&UNSORTED),
+    control(
+        "sort/stabilize",
+        "id[placed[k]] < own",
+        "id[placed[k]] > own",
+        "sort/stabilize",
+        &["elements by cell and id"],
+    ),
+    control(
+        "pbf/reorder",
+        "predicted[thread] = x;",
+        "predicted[thread] = x * 1.000001;",
+        "pbf/reorder",
+        &["position"],
+    ),
+    control(
+        "pbf/reorder",
+        "= velocity[source]",
+        "= -velocity[source]",
+        "pbf/reorder",
+        &["velocity"],
+    ),
+    control(
+        "pbf/reorder",
+        "= id[source]",
+        "= id[source] + 0u * source; sorted_id[thread] = id[source] ^ 1u",
+        "pbf/reorder",
+        &["id"],
+    ),
+    control(
+        "pbf/build_neighbors",
+        "dot(d, d) < h2 && j != i",
+        "dot(d, d) < 0.999 * h2 && j != i",
+        "pbf/build_neighbors",
+        &["wrong members of a list"],
+    ),
+    control(
+        "pbf/compute_lambda",
+        "kernel_sum += mass * p * p * p;",
+        "kernel_sum += mass * p * p * p * 1.0001;",
+        "pbf/compute_lambda",
+        &["lambda"],
+    ),
+    control(
+        "pbf/compute_lambda",
+        "own = wall.gradient - ",
+        "own = -wall.gradient - ",
+        "pbf/compute_lambda",
+        &["lambda"],
+    ),
+    control(
+        "pbf/compute_delta",
+        "delta = -params.gradient_scale * delta",
+        "delta = params.gradient_scale * delta",
+        "pbf/compute_delta",
+        &["corrected position"],
+    ),
+    control(
+        "pbf/compute_delta",
+        "confine(current.xyz + delta), current.w",
+        "confine(current.xyz + delta), current.w * 0.5",
+        "pbf/compute_delta",
+        &["lambda carried along"],
+    ),
+    control(
+        "pbf/update_velocity",
+        "* params.inverse_time_step;",
+        "* params.inverse_time_step * 1.001;",
+        "pbf/update_velocity",
+        &["velocity"],
+    ),
+    control(
+        "pbf/update_velocity",
+        "x -= excess * params.time_step",
+        "x += excess * params.time_step",
+        "pbf/update_velocity",
+        &["position"],
+    ),
+    control(
+        "pbf/update_velocity",
+        "atomicAdd(&counters.capped, 1u)",
+        "atomicAdd(&counters.capped, 3u)",
+        "pbf/update_velocity",
+        &["particles slowed"],
+    ),
+    control(
+        "pbf/update_velocity",
+        "= sorted_id[thread]",
+        "= sorted_id[thread] ^ 1u",
+        "pbf/update_velocity",
+        &["id"],
+    ),
+    control(
+        "pbf/measure_density",
+        "+ wall_term(xi).density",
+        "+ 0.999 * wall_term(xi).density",
+        "pbf/measure_density",
+        &["relative density"],
+    ),
+    control(
+        "effects/viscosity_gather",
+        "(p * p * p)",
+        "(p * p)",
+        "effects/viscosity_gather",
+        &["change of velocity"],
+    ),
+    control(
+        "effects/viscosity_apply",
+        "+=",
+        "-=",
+        "effects/viscosity_apply",
+        &["velocity"],
+    ),
+    control(
+        "effects/vorticity_curl",
+        "curl += cross",
+        "curl -= cross",
+        "effects/vorticity_curl",
+        &["vorticity"],
+    ),
+    control(
+        "effects/vorticity_curl",
+        "length(curl)",
+        "length(curl) * 1.001",
+        "effects/vorticity_curl",
+        &["its length"],
+    ),
+    control(
+        "effects/vorticity_force",
+        "cross(slope / steepness, own.xyz)",
+        "cross(own.xyz, slope / steepness)",
+        "effects/vorticity_force",
+        &["velocity"],
+    ),
+    control(
+        "pbf/assign_cells",
+        "atomicAdd(&cell_start[cell], 1u)",
+        "atomicAdd(&cell_start[cell ^ 1u], 1u)",
+        "pbf/assign_cells",
+        &["particles in cells"],
+    )
+    .and(&UNSORTED),
+    control(
+        "pbf/update_velocity",
+        "* params.inverse_time_step;",
+        "* params.inverse_time_step * 0.5;",
+        "pbf/update_velocity",
+        &["velocity"],
+    ),
+    control(
+        "pbf/build_neighbors",
+        "dot(d, d) < h2 && j != i",
+        "dot(d, d) < 0.9 * h2 && j != i",
+        "whole solve",
+        &[
+            "corrections, RMS error",
+            "relative density, RMS error",
+            "lambda, RMS error",
+        ],
+    )
+    .and(&["pbf/build_neighbors"]),
+];
+
+/// Faults that show only where a chunk is not the first.
+pub const CHUNKED: &[Control] = &[
+    control(
+        "pbf/build_neighbors",
+        "i - phase.first",
+        "i - phase.first / 2u",
+        "pbf/build_neighbors",
+        &["wrong members of a list"],
+    )
+    .and(&["pbf/compute_lambda", "pbf/compute_delta"]),
+    control(
+        "pbf/compute_lambda",
+        "i - phase.first",
+        "i - phase.first / 2u",
+        "pbf/compute_lambda",
+        &["lambda"],
+    ),
+    control(
+        "pbf/compute_delta",
+        "i - phase.first",
+        "i - phase.first / 2u",
+        "pbf/compute_delta",
+        &["corrected position"],
+    ),
+];
+
+/// Faults of the search that takes the place of lists.
+pub const SEARCHED: &[Control] = &[
+    control(
+        "pbf/compute_lambda",
+        "if j != i {",
+        "if j != i + 1u {",
+        "pbf/compute_lambda",
+        &["lambda"],
+    ),
+    control(
+        "pbf/compute_delta",
+        "let low = max(centre - 1, vec3i(0));",
+        "let low = max(centre, vec3i(0));",
+        "pbf/compute_delta",
+        &["corrected position"],
+    ),
+];

@@ -1,0 +1,341 @@
+//! What a scene may ask of FLIP beyond the common case, and faults in what it alone runs.
+
+use glam::DVec3;
+use swell::{
+    domain::{
+        boundary::Boundary, bounds::Bounds, motion::Motion, particles::Particles,
+        signed_distance::SignedDistance,
+    },
+    scene::{
+        Scene,
+        flip::{AFFINE, Flip, Preconditioner, Surface, Transfer},
+    },
+    stage::prepare::Start,
+};
+
+use super::{Control, control, flip::SYSTEM};
+use crate::support::{D, lattice, mover, noise};
+
+/// A change of the common case, and what must fail by which fault.
+pub struct Variant {
+    pub name: &'static str,
+    pub change: fn(&mut Scene, &mut Start),
+    pub controls: &'static [Control],
+}
+
+fn flip(scene: &mut Scene) -> &mut Flip {
+    scene.solver.flip.as_mut().unwrap()
+}
+
+/// Noise of 1 m/s.
+fn stir(particles: &mut Particles) {
+    for (k, v) in particles.velocity.iter_mut().enumerate() {
+        *v = std::array::from_fn(|axis| noise(3 * k as u64 + axis as u64 + 7) as f32);
+    }
+}
+
+fn apic(scene: &mut Scene, start: &mut Start) {
+    flip(scene).transfer = Transfer::Apic;
+    let n = start.particles.len();
+    for (c, name) in AFFINE.into_iter().enumerate() {
+        let slope = |k: usize| noise(50_000 + (9 * k + c) as u64) as f32;
+        let values = (0..n).map(slope).collect();
+        (start.particles.attributes).insert(name.to_owned(), values);
+    }
+}
+
+fn voxel(scene: &mut Scene, _: &mut Start) {
+    flip(scene).surface = Surface::Voxel;
+}
+
+/// A box within the water that moves on, with particles about it.
+fn moving_solid(scene: &mut Scene, start: &mut Start) {
+    let bounds = Bounds {
+        min: DVec3::new(0.33, 0.37, 0.21),
+        max: DVec3::new(0.61, 0.58, 0.43),
+    };
+    let motion = Motion::ConstantVelocity {
+        velocity: 0.8,
+        until: None,
+    };
+    let solid = mover(bounds, DVec3::new(1.0, 0.3, 0.2).normalize(), motion);
+    let grid = bounds.grown(4.0 * D);
+    let distance = SignedDistance::from_mesh(&solid.placed.mesh, &grid, D).unwrap();
+    scene.moving_solids.push(solid);
+    start.boundary.moving.push(distance);
+    let all = &start.particles;
+    let is_out = |x: &[f32; 3]| {
+        let x = DVec3::from_array(x.map(f64::from));
+        x.cmplt(bounds.min - 0.01).any() || x.cmpgt(bounds.max + 0.01).any()
+    };
+    let kept: Vec<usize> = (0..all.len())
+        .filter(|&k| is_out(&all.position[k]))
+        .collect();
+    start.particles = Particles {
+        position: kept.iter().map(|&k| all.position[k]).collect(),
+        velocity: kept.iter().map(|&k| all.velocity[k]).collect(),
+        id: (0..kept.len() as u32).collect(),
+        ..Particles::default()
+    };
+}
+
+/// A box of two bricks, full to its ceiling.
+fn pocket(scene: &mut Scene, start: &mut Start) {
+    scene.domain.max = DVec3::new(3.2, 0.8, 0.8);
+    start.boundary = Boundary::default();
+    start.particles = lattice([0.0; 3], [32, 8, 8], [D; 3]);
+    stir(&mut start.particles);
+}
+
+/// Four bricks in a row, so that two levels, of two bricks and of one, are left to the multigrid's last workgroup.
+fn channel(scene: &mut Scene, start: &mut Start) {
+    scene.domain.max = DVec3::new(6.2, 1.4, 1.4);
+    start.boundary = Boundary::default();
+    start.particles = lattice([0.0; 3], [60, 6, 10], [D; 3]);
+    stir(&mut start.particles);
+}
+
+/// Water nearer to the floor than it may end, where a solid of distances half as steep as they should be stands upon it:
+/// each push goes half of the way, and none of it upwards.
+fn corner(_: &mut Scene, start: &mut Start) {
+    let dims = [16, 10, 16];
+    let value = |k: usize| (0.5 * (0.5 - (0.1 * (k % 16) as f64 - 0.15))) as f32;
+    start.boundary.distance = Some(SignedDistance {
+        origin: DVec3::new(-0.15, -0.1, -0.15),
+        spacing: 0.1,
+        dims,
+        values: (0..dims.iter().product()).map(value).collect(),
+    });
+    start.particles = lattice([-0.01, -0.043, 0.0], [6, 6, 7], [0.09; 3]);
+    stir(&mut start.particles);
+}
+
+fn preconditioner(scene: &mut Scene, kind: Preconditioner) {
+    let pressure = &mut flip(scene).pressure;
+    (pressure.preconditioner, pressure.max_iterations) = (kind, 400);
+}
+
+pub const VARIANTS: &[Variant] = &[
+    Variant {
+        name: "APIC",
+        change: apic,
+        controls: &[
+            control(
+                "flip/reorder",
+                "= affine[9u * source + k]",
+                "= -affine[9u * source + k]",
+                "flip/reorder",
+                &["affine rows"],
+            ),
+            control(
+                "flip/spread_faces",
+                "v - slope.x * f.x",
+                "v + slope.x * f.x",
+                "flip/gather_faces",
+                &["velocity at faces"],
+            ),
+            control(
+                "flip/grid_to_particle",
+                "= scale * value_at(faces.speeds, a, b, of_c)",
+                "= -scale * value_at(faces.speeds, a, b, of_c)",
+                "flip/grid_to_particle",
+                &["affine rows"],
+            ),
+            control(
+                "flip/grid_to_particle",
+                "velocity[k] = u;",
+                "velocity[k] = 1.001 * u;",
+                "flip/grid_to_particle",
+                &["velocity"],
+            ),
+        ],
+    },
+    Variant {
+        name: "voxel surface",
+        change: voxel,
+        controls: &[control(
+            "pressure/build_system",
+            "return 1.0;",
+            "return 1.001;",
+            "pressure/build_system",
+            &["what air adds to the diagonal"],
+        )
+        .and(SYSTEM)],
+    },
+    Variant {
+        name: "moving solid",
+        change: moving_solid,
+        controls: &[
+            control(
+                "flip/cut_cells",
+                "(upper_of_walls - upper) * upper_velocity",
+                "(upper_of_walls - upper) * -upper_velocity",
+                "flip/cut_cells",
+                &["flux of solids"],
+            ),
+            control(
+                "flip/cut_cells",
+                "closed_velocity[element] = closing.x",
+                "closed_velocity[element] = 1.00001 * closing.x",
+                "flip/cut_cells",
+                &["velocity of closed faces"],
+            ),
+            control(
+                "flip/advect",
+                "f32(k + 1u) / f32(steps)",
+                "f32(k) / f32(steps)",
+                "flip/advect",
+                &["position"],
+            ),
+            control(
+                "flip/advect",
+                "v = solid_velocity + stopped",
+                "v = -solid_velocity + stopped",
+                "flip/advect",
+                &["velocity"],
+            ),
+        ],
+    },
+    Variant {
+        name: "pocket",
+        change: pocket,
+        controls: &[
+            control(
+                "pressure/center",
+                "-= mean",
+                "-= 1.1 * mean",
+                "pressure/center",
+                &["values less their mean"],
+            ),
+            control(
+                "pressure/merge_labels",
+                "across(own + x, lower.x + 64u + x, l.out.xl);",
+                "",
+                "pressure/count_pockets",
+                &["labels of water that no air touches", "pockets"],
+            )
+            .and(&["pressure/center", "pressure/reduce"]),
+            control(
+                "pressure/count_pockets",
+                "atomicAdd(&pressure_stats.pockets, 1u)",
+                "atomicAdd(&pressure_stats.pockets, 2u)",
+                "pressure/count_pockets",
+                &["pockets"],
+            ),
+        ],
+    },
+    Variant {
+        name: "channel",
+        change: channel,
+        controls: &[
+            control(
+                "pressure/solve_coarse",
+                "about.xu += above.upper.x;",
+                "about.xu += 1.01 * above.upper.x;",
+                "pressure/solve_coarse",
+                &["correction"],
+            ),
+            control(
+                "pressure/solve_coarse",
+                "0.5 * sum_pair(flow)",
+                "0.505 * sum_pair(flow)",
+                "pressure/solve_coarse",
+                &["residuals of the coarser levels"],
+            ),
+            // The way back up left out, the wrong colour restricted, one sweep in place of eight.
+            control(
+                "pressure/solve_coarse",
+                "let above = above_about(s);",
+                "let above = Above(vec3r(0.0), vec3r(0.0));",
+                "pressure/solve_coarse",
+                &["correction"],
+            ),
+            control(
+                "pressure/solve_coarse",
+                "restrict_at(site_of(level, i, 0u));",
+                "restrict_at(site_of(level, i, 1u));",
+                "pressure/solve_coarse",
+                &["correction", "residuals of the coarser levels"],
+            ),
+            control(
+                "pressure/solve_coarse",
+                "const SWEEPS = 8u;",
+                "const SWEEPS = 1u;",
+                "pressure/solve_coarse",
+                &["correction"],
+            ),
+        ],
+    },
+    Variant {
+        name: "no preconditioner",
+        change: |scene, _| preconditioner(scene, Preconditioner::None),
+        controls: &[control(
+            "pressure/precondition",
+            "let z = r;",
+            "let z = 1.001 * r;",
+            "pressure/precondition",
+            &["correction"],
+        )],
+    },
+    Variant {
+        name: "Jacobi",
+        change: |scene, _| preconditioner(scene, Preconditioner::Jacobi),
+        controls: &[
+            control(
+                "pressure/precondition",
+                "pressure_inverse_diagonal[e] * r",
+                "1.001 * pressure_inverse_diagonal[e] * r",
+                "pressure/precondition",
+                &["correction"],
+            ),
+            control(
+                "pressure/build_system",
+                "1.0 / row.diagonal",
+                "1.001 / row.diagonal",
+                "pressure/build_system",
+                &["inverse diagonal"],
+            ),
+        ],
+    },
+    Variant {
+        name: "IPP",
+        change: |scene, _| preconditioner(scene, Preconditioner::Ipp),
+        controls: &[
+            control(
+                "pressure/ipp_lower",
+                "r.hi[c] + flow.hi[c]",
+                "r.hi[c] - flow.hi[c]",
+                "pressure/ipp_lower",
+                &["first half"],
+            ),
+            control(
+                "pressure/ipp_upper",
+                "y.lo[c] + d.lo[c] * flow.lo[c]",
+                "y.lo[c] - d.lo[c] * flow.lo[c]",
+                "pressure/ipp_upper",
+                &["correction"],
+            ),
+        ],
+    },
+    Variant {
+        name: "corner of a wall and a solid",
+        change: corner,
+        controls: &[
+            // How often such a particle is pushed was asked again after each push.
+            control(
+                "flip/advect",
+                "k < rounds",
+                "k < select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high)))",
+                "flip/advect",
+                &["position"],
+            ),
+            control(
+                "flip/advect",
+                "gradient / steepness * (params.contact_distance - distance)",
+                "gradient / steepness * (params.contact_distance - 1.01 * distance)",
+                "flip/advect",
+                &["position"],
+            ),
+        ],
+    },
+];

@@ -1,0 +1,436 @@
+//! `check` passes on what the device computes, and each of its rows fails where that pass is spoiled.
+mod controls;
+mod frames;
+
+use swell::{
+    check::pbf,
+    domain::{
+        motion::Motion, particles::Particles, sampling::BoundarySample,
+        signed_distance::SignedDistance, substep::Which,
+    },
+    gpu::adapter::{Context, Needs, Spoil},
+    scene::{
+        Effects, Iteration, Method, Scene, Stop, Wall, WaveMaker,
+        effects::{viscosity, vorticity_confinement},
+        flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
+        plan::DeviceLimits,
+    },
+    solve::{SolveError, pbf::device_limits},
+    stage::{
+        check::{Table, check_frame},
+        prepare::Start,
+    },
+};
+
+use crate::support::{self, D, context, jitter, lattice, noise};
+use controls::{
+    Control, control,
+    flip::{FLIP, FLIP_WALLS},
+    pbf::{CHUNKED, PBF, PBF_WALLS, SEARCHED},
+    variants::{VARIANTS, Variant},
+};
+use glam::DVec3;
+
+/// A floor at 0.23 m as a solid: it cuts cells.
+fn floor() -> (Vec<BoundarySample>, SignedDistance) {
+    let samples = (0..144).map(|k| BoundarySample {
+        position: DVec3::new(
+            0.1 * f64::from(k % 12) + 0.05,
+            0.23,
+            0.1 * f64::from(k / 12) + 0.05,
+        ),
+        normal: DVec3::Y,
+        area: 0.01,
+    });
+    let dims = [16, 10, 16];
+    let value = |k: usize| (0.1 * (k / 16 % 10) as f64 - 0.1 - 0.23) as f32;
+    let distance = SignedDistance {
+        origin: DVec3::new(-0.15, -0.1, -0.15),
+        spacing: 0.1,
+        dims,
+        values: (0..dims.iter().product()).map(value).collect(),
+    };
+    (samples.collect(), distance)
+}
+
+/// So small that corrections take particles past the displacement cap.
+const CFL: f64 = 0.1;
+
+/// Moving water of 8 × 6 × 7 particles over a floor, pressed together, in a box of more than one block of cells.
+fn case(method: Method) -> (Scene, Start) {
+    let mut scene = support::scene([1.6, 6.4, 1.6]);
+    scene.solver.method = method;
+    scene.solver.flip = Some(swell::scene::flip::Flip {
+        cell_size: 2.0 * D,
+        particles_per_cell: 8,
+        transfer: Transfer::Flip,
+        pic_blend: 0.05,
+        cfl: CFL,
+        max_substeps: 32,
+        surface: Surface::GhostFluid,
+        density_correction: true,
+        pressure: Pressure {
+            preconditioner: Preconditioner::Multigrid,
+            precision: Precision::F32Refined,
+            tolerance: 1e-5,
+            max_iterations: 40,
+        },
+    });
+    scene.effects = Effects {
+        viscosity: Some(viscosity::Settings { xsph: 0.1 }),
+        vorticity_confinement: Some(vorticity_confinement::Settings { strength: 1.0 }),
+    };
+    scene.solver.pbf.as_mut().unwrap().cfl = CFL;
+    let mut particles = lattice([-0.01, 0.2, -0.01], [8, 6, 7], [0.9 * D; 3]);
+    jitter(&mut particles, 0.02 * D);
+    for (k, v) in particles.velocity.iter_mut().enumerate() {
+        *v = std::array::from_fn(|axis| noise(3 * k as u64 + axis as u64 + 7) as f32);
+    }
+    let (samples, distance) = floor();
+    let start = Start {
+        particles,
+        removed: 0,
+        boundary: swell::domain::boundary::Boundary {
+            samples: if method == Method::Pbf {
+                samples
+            } else {
+                Vec::new()
+            },
+            distance: Some(distance),
+            moving: Vec::new(),
+        },
+    };
+    (scene, start)
+}
+
+fn run(context: &Context, scene: &Scene, start: &Start) -> Table {
+    check_frame(context, scene, start, 0, &start.particles).unwrap()
+}
+
+fn over(table: &Table) -> Vec<(&'static str, &'static str)> {
+    let rows = table.rows.iter().filter(|row| !row.is_within());
+    rows.map(|row| (row.field.pass, row.field.name)).collect()
+}
+
+fn lines(table: &Table) -> String {
+    let line = |row: &swell::check::Row| {
+        format!(
+            "{} {}: {} values, {} ties, {} over, {:?}\n",
+            row.field.pass, row.field.name, row.values, row.ties, row.over, row.worst
+        )
+    };
+    table.rows.iter().map(line).collect()
+}
+
+/// Rows that other passes' faults may turn too: they follow from everything.
+const FOLLOW: [&str; 3] = ["whole solve", "whole projection", "whole correction"];
+
+/// What is checked, on a context whose shaders may be spoiled.
+type Checked<'a> = dyn Fn(&Context) -> Result<Table, SolveError> + 'a;
+
+/// The clean table, and which of the controls do not show where they should, or elsewhere too.
+fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (Table, String) {
+    let clean = checked(context).unwrap();
+    // Faults put into what is out of tolerance already would say nothing.
+    assert!(over(&clean).is_empty(), "{}", lines(&clean));
+    let mut faults = String::new();
+    let unknown = |(_, why): &&(&str, &str)| *why == "no f64 twin";
+    if let Some(pass) = clean.unchecked.iter().find(unknown) {
+        faults += &format!("{pass:?}\n");
+    }
+    for Control {
+        spoil,
+        pass,
+        fields,
+        follow,
+    } in controls
+    {
+        let mut spoiled = context.clone();
+        spoiled.spoil = Some(*spoil);
+        let table = match checked(&spoiled) {
+            Ok(table) => table,
+            Err(error) => {
+                faults += &format!("{spoil:?}: {error}\n");
+                continue;
+            }
+        };
+        let found = over(&table);
+        let is_seen = fields.iter().all(|field| found.contains(&(*pass, *field)));
+        // Each pass is given the inputs that the device had: no fault spreads.
+        let is_alone = found
+            .iter()
+            .all(|(other, _)| other == pass || FOLLOW.contains(other) || follow.contains(other));
+        if !is_seen || !is_alone {
+            faults += &format!("{spoil:?}: {found:?}\n");
+        }
+    }
+    (clean, faults)
+}
+
+/// Passes of `elsewhere` have their controls in another test.
+fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], elsewhere: &[&str]) {
+    let checked = |context: &Context| check_frame(context, scene, start, 0, &start.particles);
+    let (clean, mut faults) = faults(context, &checked, controls);
+    let covered = |row: &swell::check::Row| {
+        let field = row.field;
+        let is_of =
+            |control: &Control| control.pass == field.pass && control.fields.contains(&field.name);
+        controls.iter().any(is_of) || elsewhere.contains(&field.pass)
+    };
+    for row in clean.rows.iter().filter(|row| !covered(row)) {
+        faults += &format!("no control: {} {}\n", row.field.pass, row.field.name);
+    }
+    assert!(faults.is_empty(), "{faults}");
+}
+
+#[test]
+fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
+    let (scene, start) = case(Method::Pbf);
+    let context = context();
+    hold(&context, &scene, &start, PBF, &["upload of solids"]);
+    let clean = run(&context, &scene, &start);
+    assert!(clean.unchecked.is_empty(), "{:?}", clean.unchecked);
+
+    // A solid that is not where the reference has it.
+    let mut moved = start.boundary.clone();
+    moved.samples[3].position.x += 1e-6;
+    moved.samples[4].area *= 1.00001;
+    let plan = start.plan(&scene, device_limits(&context));
+    let boundaries = [&start.boundary, &moved];
+    let state = (0, &start.particles);
+    let first = Which::default();
+    let checked = pbf::check(&context, &scene, plan, boundaries, state, first).unwrap();
+    let found = over(&checked.table);
+    assert!(
+        found.contains(&("upload of solids", "sample positions")),
+        "{found:?}"
+    );
+    assert!(
+        found.contains(&("upload of solids", "sample weights")),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn pbf_until_a_density_error() {
+    let (mut scene, start) = case(Method::Pbf);
+    let settings = scene.solver.pbf.as_mut().unwrap();
+    settings.iteration = Iteration::Chebyshev;
+    settings.relaxation = 0.7;
+    settings.artificial_pressure = 0.1;
+    settings.stop = Stop::DensityError {
+        density_error: 0.04,
+        max_iterations: 8,
+    };
+    let controls = [
+        control(
+            "pbf/sum_error",
+            "max(density[i] - 1.0, 0.0)",
+            "abs(density[i] - 1.0)",
+            "pbf/sum_error",
+            &["sums of density error"],
+        ),
+        control(
+            "pbf/decide",
+            "control.iterations += 1u",
+            "control.iterations += 2u",
+            "pbf/decide",
+            &["done, iterations"],
+        ),
+        control(
+            "pbf/compute_lambda",
+            "density[i] = relative_density",
+            "density[i] = relative_density * 1.0001",
+            "pbf/compute_lambda",
+            &["relative density"],
+        ),
+        control(
+            "pbf/compute_delta",
+            "(phase.acceleration - 1.0) * last",
+            "phase.acceleration * last",
+            "pbf/compute_delta",
+            &["corrected position"],
+        ),
+        control(
+            "pbf/compute_delta",
+            "scale -= artificial_pressure",
+            "scale += artificial_pressure",
+            "pbf/compute_delta",
+            &["corrected position"],
+        ),
+    ];
+    let elsewhere: Vec<&str> = PBF.iter().map(|control| control.pass).collect();
+    hold(
+        &context(),
+        &scene,
+        &start,
+        &controls,
+        &[&elsewhere[..], &["upload of solids"]].concat(),
+    );
+}
+
+#[test]
+fn flip_is_within_tolerance_and_each_row_fails_where_it_should() {
+    let (scene, start) = case(Method::Flip);
+    let context = context();
+    let sort = [
+        "sort/scan_blocks",
+        "sort/add_block_sums",
+        "sort/place",
+        "sort/stabilize",
+    ];
+    hold(&context, &scene, &start, FLIP, &sort);
+}
+
+/// What a scene may ask of FLIP beyond the common case, each with faults in what it alone runs.
+#[test]
+fn flip_variants_are_within_tolerance_and_fail_where_they_should() {
+    let context = context();
+    let mut all = String::new();
+    for Variant {
+        name,
+        change,
+        controls,
+    } in VARIANTS
+    {
+        println!("{name}");
+        let (mut scene, mut start) = case(Method::Flip);
+        scene.effects = Effects::default();
+        change(&mut scene, &mut start);
+        let checked = |context: &Context| check_frame(context, &scene, &start, 0, &start.particles);
+        let (_, faults) = faults(&context, &checked, controls);
+        if !faults.is_empty() {
+            all += &format!("{name}:\n{faults}");
+        }
+    }
+    assert!(all.is_empty(), "{all}");
+}
+
+/// Lists in several bindings, and none where they do not fit.
+#[test]
+fn pbf_lists_in_chunks_and_none() {
+    let context = context();
+    let (mut scene, start) = case(Method::Pbf);
+    scene.effects = Effects::default();
+    let limits = device_limits(&context);
+    let chunked = DeviceLimits {
+        binding: 30_000,
+        ..limits
+    };
+    let none = DeviceLimits {
+        list_budget: 0,
+        ..limits
+    };
+    let mut all = String::new();
+    for (limits, chunks, has_lists, controls) in
+        [(chunked, 3, true, CHUNKED), (none, 1, false, SEARCHED)]
+    {
+        let plan = start.plan(&scene, limits);
+        assert_eq!((plan.chunks.len(), plan.has_lists), (chunks, has_lists));
+        let checked = |context: &Context| {
+            let boundaries = [&start.boundary; 2];
+            let state = (0, &start.particles);
+            let plan = plan.clone();
+            let first = Which::default();
+            Ok(pbf::check(context, &scene, plan, boundaries, state, first)?.table)
+        };
+        all += &faults(&context, &checked, controls).1;
+    }
+    assert!(all.is_empty(), "{all}");
+}
+
+/// The other precisions of the projection; in f64 with the tolerances of its own roundoff: a product that is off by 1e-9
+/// fails there, which f32 could not tell.
+#[test]
+fn flip_is_within_tolerance_in_each_precision_of_its_projection() {
+    let context = Context::open_for(None, Needs { f64: true })
+        .expect("this test needs an adapter with f64, as lavapipe is");
+    let (mut scene, start) = case(Method::Flip);
+    let off = |factor| {
+        control(
+            "pressure/multiply",
+            "pressure_product[own + 64u * c] = product.lo[c]",
+            factor,
+            "pressure/multiply",
+            &["system times direction"],
+        )
+        .and(&["pressure/reduce"])
+    };
+    let elsewhere: Vec<&str> = FLIP.iter().map(|control| control.pass).collect();
+    let sort = ["sort/scan_blocks", "sort/add_block_sums", "sort/place"];
+    let elsewhere = [&elsewhere[..], &sort, &["sort/stabilize"]].concat();
+    let slight = "pressure_product[own + 64u * c] = product.lo[c] * 1.000000001";
+    let controls = [
+        off(slight),
+        control(
+            "pressure/build_system",
+            "row.dirichlet += air",
+            "row.dirichlet += air * 1.000000001",
+            "pressure/build_system",
+            &["what air adds to the diagonal"],
+        )
+        .and(&["pressure/multiply", "pressure/verify"]),
+    ];
+    let precision = |scene: &mut Scene, precision| {
+        scene.solver.flip.as_mut().unwrap().pressure.precision = precision;
+    };
+    precision(&mut scene, Precision::F64);
+    hold(&context, &scene, &start, &controls, &elsewhere);
+    precision(&mut scene, Precision::F32);
+    let gross = "pressure_product[own + 64u * c] = product.lo[c] * 1.0001";
+    hold(&context, &scene, &start, &[off(gross)], &elsewhere);
+    // In f32 the slight fault is none: 1.000000001 rounds to 1.
+    let mut spoiled = context.clone();
+    spoiled.spoil = Some(off(slight).spoil);
+    assert!(over(&run(&spoiled, &scene, &start)).is_empty());
+}
+
+/// The same water between walls that close in: what they do on it.
+#[test]
+fn work_of_moving_walls_is_within_tolerance_and_fails_where_it_should() {
+    let context = context();
+    for (method, still, walls) in [
+        (Method::Pbf, PBF, PBF_WALLS),
+        (Method::Flip, FLIP, FLIP_WALLS),
+    ] {
+        let (mut scene, start) = case(method);
+        for (index, velocity) in [(0, 2.0), (5, 0.7)] {
+            scene.wave_makers.push(WaveMaker {
+                wall: Wall::NAMED[index].1,
+                motion: Motion::ConstantVelocity {
+                    velocity,
+                    until: None,
+                },
+            });
+        }
+        let elsewhere: Vec<&str> = still.iter().map(|control| control.pass).collect();
+        let others = [
+            "upload of solids",
+            "sort/scan_blocks",
+            "sort/add_block_sums",
+        ];
+        let others = [&elsewhere[..], &others, &["sort/place", "sort/stabilize"]].concat();
+        hold(&context, &scene, &start, walls, &others);
+        let clean = run(&context, &scene, &start);
+        let work = clean
+            .rows
+            .iter()
+            .find(|row| row.field.name == "shares of the work");
+        assert!(work.is_some_and(|row| row.values > 0), "{}", lines(&clean));
+    }
+}
+
+/// A fault that no longer fits its shader is an error, and not a control that passes.
+#[test]
+fn a_fault_has_to_occur() {
+    let (scene, start) = case(Method::Pbf);
+    let mut context = context();
+    context.spoil = Some(Spoil {
+        pass: "pbf/predict",
+        from: "no such text",
+        to: "",
+    });
+    let particles: &Particles = &start.particles;
+    let error = check_frame(&context, &scene, &start, 0, particles).unwrap_err();
+    assert!(error.to_string().contains("no such text"), "{error}");
+}

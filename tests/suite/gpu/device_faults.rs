@@ -1,0 +1,252 @@
+//! Adapters with little room, and a device that is lost in mid-bake.
+
+use std::{path::Path, sync::atomic::AtomicBool};
+
+use crate::support::job::Job;
+use swell::{
+    cache::CacheReader,
+    gpu::adapter::{Context, GpuError, Needs, Spoil},
+    scene::Scene,
+    solve::SolveError,
+    stage::{
+        Blame,
+        bake::{BakeError, Event, Request, bake},
+        device::{Device, SolverError},
+    },
+};
+
+/// The small scene with so many more particles that lists and grids fill more than one workgroup of each pass.
+fn request(job: &Job, solver: &str, cache: &str, context: &Context) -> Request {
+    let set = [
+        format!("solver.method={solver}"),
+        "solver.pbf.particle_spacing=0.05".to_owned(),
+        "solver.flip.cell_size=0.1".to_owned(),
+        "shot.frames=4".to_owned(),
+    ];
+    Request {
+        scene: Scene::load(&job.path("small.toml"), &set).unwrap(),
+        directory: job.path(cache),
+        frames: None,
+        resume: true,
+        from: None,
+        device: Device::Open(Box::new(context.clone())),
+        time_passes: false,
+    }
+}
+
+fn run(request: &Request) -> Result<(), BakeError> {
+    bake(request, &AtomicBool::new(false), &mut |_| {}).map(|_| ())
+}
+
+fn lost(error: &BakeError) -> bool {
+    matches!(
+        error,
+        BakeError::Gpu(GpuError::Lost(_))
+            | BakeError::Solve(SolverError::Gpu(SolveError::Gpu(GpuError::Lost(_))))
+    )
+}
+
+fn too_large(error: BakeError) -> (String, &'static str) {
+    let message = error.to_string();
+    assert_eq!(Blame::from(&error), Blame::Input, "exit code 2");
+    match error {
+        BakeError::Gpu(GpuError::TooLarge { limit, .. })
+        | BakeError::Solve(SolverError::Gpu(SolveError::Gpu(GpuError::TooLarge {
+            limit, ..
+        }))) => (message, limit),
+        _ => panic!("{message}"),
+    }
+}
+
+/// Groups a dimension that the small scene's dispatches pass many times over.
+const FEW_GROUPS: u32 = 12;
+
+/// Dispatches in two dimensions are those in one.
+#[test]
+fn few_workgroups_a_dimension_give_the_same_bytes() {
+    let whole = Context::open(None).unwrap();
+    let few = Context::open_lowered(None, Needs::default(), |limits| {
+        limits.max_compute_workgroups_per_dimension = FEW_GROUPS;
+    })
+    .unwrap();
+    let thread = "(workgroup.y * workgroups.x + workgroup.x)";
+    for (solver, pass) in [("pbf", "pbf/predict"), ("flip", "flip/advect")] {
+        let job = Job::new();
+        run(&request(&job, solver, "whole", &whole)).unwrap();
+        run(&request(&job, solver, "few", &few)).unwrap();
+        let start = CacheReader::open(&job.path("whole"))
+            .unwrap()
+            .read(0)
+            .unwrap();
+        assert!(
+            start.len() > 64 * FEW_GROUPS as usize,
+            "one dimension would do"
+        );
+        assert_eq!(job.hash("whole"), job.hash("few"), "{solver}");
+        // Negative control: a pass that knows one dimension alone is seen.
+        let mut spoiled = few.clone();
+        spoiled.spoil = Some(Spoil {
+            pass,
+            from: thread,
+            to: "workgroup.x",
+        });
+        let result = run(&request(&job, solver, "spoiled", &spoiled));
+        if result.is_ok() {
+            assert_ne!(job.hash("whole"), job.hash("spoiled"), "{solver}: control");
+        }
+    }
+}
+
+/// Neighbour lists that no binding holds whole go out in several.
+#[test]
+fn small_bindings_split_the_lists_and_give_the_same_bytes() {
+    let whole = Context::open(None).unwrap();
+    let job = Job::new();
+    run(&request(&job, "pbf", "whole", &whole)).unwrap();
+    let particles = CacheReader::open(&job.path("whole"))
+        .unwrap()
+        .read(0)
+        .unwrap()
+        .len() as u64;
+    // A list has 48 neighbours of four bytes: a third of all lists, and more than any other buffer of the plan.
+    let binding = (48 * 4 * particles / 3).next_multiple_of(256);
+    let small = Context::open_lowered(None, Needs::default(), |limits| {
+        limits.max_storage_buffer_binding_size = binding;
+    })
+    .unwrap();
+    let request = request(&job, "pbf", "small", &small);
+    let start = swell::stage::prepare::Start::of(&request.scene).unwrap();
+    let chunks = |context: &Context| {
+        let plan = start.plan(&request.scene, swell::solve::pbf::device_limits(context));
+        let lists = plan
+            .buffers
+            .iter()
+            .filter(|b| b.spec.name.starts_with("neighbor_list."));
+        lists.map(|b| b.spec.bytes).collect::<Vec<_>>()
+    };
+    assert_eq!(chunks(&whole).len(), 1);
+    let split = chunks(&small);
+    assert!(
+        split.len() >= 3 && split.iter().all(|&bytes| bytes <= binding),
+        "{split:?}"
+    );
+    run(&request).unwrap();
+    assert_eq!(job.hash("whole"), job.hash("small"));
+}
+
+/// What cannot be split is refused with the figures, and nothing is written.
+#[test]
+fn what_no_buffer_holds_is_refused_before_the_bake() {
+    for solver in ["pbf", "flip"] {
+        let job = Job::new();
+        for (limit, bytes) in [
+            ("max_storage_buffer_binding_size", 20_480),
+            ("max_buffer_size", 18_432),
+        ] {
+            let context = Context::open_lowered(None, Needs::default(), |limits| match limit {
+                "max_buffer_size" => {
+                    limits.max_buffer_size = bytes;
+                    limits.max_storage_buffer_binding_size = bytes;
+                }
+                _ => limits.max_storage_buffer_binding_size = bytes,
+            })
+            .unwrap();
+            let (message, found) =
+                too_large(run(&request(&job, solver, "refused", &context)).unwrap_err());
+            assert_eq!(found, limit);
+            assert!(
+                message.contains(&format!("allows {bytes} ({limit})")),
+                "{message}"
+            );
+            assert!(
+                message.contains(" bytes, and ") && message.contains("buffer `"),
+                "{message}"
+            );
+            assert!(!job.path("refused").exists());
+        }
+        // Control: with the adapter's own limits it bakes.
+        run(&request(
+            &job,
+            solver,
+            "refused",
+            &Context::open(None).unwrap(),
+        ))
+        .unwrap();
+    }
+}
+
+#[test]
+fn limits_above_the_adapters_own_do_not_open() {
+    let raised = Context::open_lowered(None, Needs::default(), |limits| {
+        limits.max_bind_groups = u32::MAX
+    });
+    assert!(matches!(raised, Err(GpuError::Open { .. })));
+}
+
+/// Destroys the device once the second frame is computed.
+fn lose(request: &Request, context: &Context) -> BakeError {
+    let stop = AtomicBool::new(false);
+    bake(request, &stop, &mut |event| {
+        if matches!(event, Event::Frame { frame: 2, .. }) {
+            context.device.destroy();
+        }
+    })
+    .unwrap_err()
+}
+
+fn frames(cache: &Path) -> u32 {
+    let reader = CacheReader::open(cache).unwrap();
+    reader.verify().unwrap();
+    reader.last_frame()
+}
+
+#[test]
+fn a_lost_device_ends_the_bake_and_a_resume_ends_with_the_same_bytes() {
+    for solver in ["pbf", "flip"] {
+        let job = Job::new();
+        run(&request(
+            &job,
+            solver,
+            "whole",
+            &Context::open(None).unwrap(),
+        ))
+        .unwrap();
+        let context = Context::open(None).unwrap();
+        let broken = request(&job, solver, "lost", &context);
+        let error = lose(&broken, &context);
+        assert!(lost(&error), "{error:?}");
+        assert_eq!(Blame::from(&error), Blame::Device, "exit code 3");
+        assert!(error.to_string().starts_with("device lost: "), "{error}");
+        // All that was computed is in the ledger.
+        assert_eq!(frames(&job.path("lost")), 2);
+        assert_ne!(job.hash("lost"), job.hash("whole"));
+        // Negative control: the device that is lost stays so, and loses nothing more.
+        let before = job.hash("lost");
+        assert!(lost(&run(&broken).unwrap_err()));
+        assert_eq!(job.hash("lost"), before);
+        run(&request(
+            &job,
+            solver,
+            "lost",
+            &Context::open(None).unwrap(),
+        ))
+        .unwrap();
+        assert_eq!(job.hash("lost"), job.hash("whole"));
+        // A device lost before the first frame leaves the start at most, which can be gone on from.
+        let context = Context::open(None).unwrap();
+        context.device.destroy();
+        let error = run(&request(&job, solver, "never", &context)).unwrap_err();
+        assert!(lost(&error), "{error:?}");
+        if job.path("never").exists() {
+            assert_eq!(frames(&job.path("never")), 0);
+        }
+        run(&request(
+            &job,
+            solver,
+            "never",
+            &Context::open(None).unwrap(),
+        ))
+        .unwrap();
+        assert_eq!(job.hash("never"), job.hash("whole"));
+    }
+}

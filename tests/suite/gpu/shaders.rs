@@ -1,0 +1,421 @@
+//! What can be said of shaders and rooms without a GPU.
+use std::{fs, path::Path};
+
+use swell::{
+    gpu::{
+        reflect::{Access, Layout, Stage, reflect},
+        shader,
+    },
+    render,
+    solve::{
+        self,
+        pressure::{DONE, ITERATING, ReduceStep, VERIFYING, WANTS_POCKETS},
+    },
+};
+
+/// Conditions that a plan can set; every pass must compose under each.
+const VARIANTS: [&[&str]; 16] = [
+    &[],
+    &["SOLIDS"],
+    &["NEIGHBOR_LIST"],
+    &[
+        "NEIGHBOR_LIST",
+        "SOLIDS",
+        "DENSITY",
+        "ADAPTIVE",
+        "ARTIFICIAL_PRESSURE",
+    ],
+    &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
+    &["NEIGHBOR_LIST", "SOLIDS", "PRESSURE"],
+    &["CORRECTION", "GHOST_FLUID"],
+    &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
+    &["SOLIDS", "MOVING_SOLIDS", "CORRECTION", "GHOST_FLUID"],
+    &["GHOST_FLUID", "DIAGONAL"],
+    &["GHOST_FLUID", "DIAGONAL", "TWO_WORDS"],
+    &["TWO_WORDS"],
+    &["GHOST_FLUID", "DIAGONAL", "F64"],
+    &["F64"],
+    &["SPRAY"],
+    &["AOVS"],
+];
+
+/// `neighbor_list` holds lists, so build_neighbors has no form without them.
+fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
+    pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST")
+}
+
+#[test]
+fn every_pass_validates_in_every_variant() {
+    let passes = shader::pass_files();
+    assert!(passes.len() >= 30, "{passes:?}");
+    for pass in &passes {
+        for defines in VARIANTS
+            .iter()
+            .filter(|defines| is_meaningful(pass, defines))
+        {
+            let text = shader::compose(pass, defines).unwrap();
+            let reflection =
+                reflect(pass, &text).unwrap_or_else(|error| panic!("{pass} {defines:?}: {error}"));
+            // Nothing but the projection may ask an adapter for f64, and that only where it is told to.
+            let is_wide = pass.starts_with("pressure/") && defines.contains(&"F64");
+            assert!(is_wide || !reflection.has_f64, "{pass} {defines:?}");
+            let size = reflection.workgroup_size;
+            let is_known = match (pass.starts_with("ssfr/"), reflection.stage) {
+                (true, Stage::Raster { .. }) => true,
+                (true, Stage::Compute) => [[64, 1, 1], [32, 1, 1], [16, 4, 1]].contains(&size),
+                (false, stage) => {
+                    stage == Stage::Compute && [[64, 1, 1], [256, 1, 1]].contains(&size)
+                }
+            };
+            assert!(is_known, "{pass}: {size:?}");
+            let storage = reflection
+                .bindings
+                .iter()
+                .filter(|binding| binding.access.is_storage())
+                .count();
+            assert!(
+                storage <= 10,
+                "{pass}: {storage} storage buffers, and WebGPU's common maximum is 10"
+            );
+            let mut indices: Vec<u32> = reflection
+                .bindings
+                .iter()
+                .map(|binding| binding.index)
+                .collect();
+            indices.dedup();
+            assert_eq!(
+                indices.len(),
+                reflection.bindings.len(),
+                "{pass}: a binding index twice"
+            );
+        }
+    }
+}
+
+#[test]
+fn reflection_refuses_what_no_pass_binds() {
+    let kinds = "@group(0) @binding(0) var<uniform> u: vec4f;
+        @group(0) @binding(1) var<storage, read> r: array<f32>;
+        @group(0) @binding(2) var t: texture_2d<f32>;
+        @group(0) @binding(3) var d: texture_depth_2d;
+        @group(0) @binding(4) var s: sampler;
+        @group(0) @binding(5) var c: sampler_comparison;
+        @vertex fn v() -> @builtin(position) vec4f { return u + r[0]; }";
+    let found = reflect("test", kinds).unwrap();
+    let raster = |has_fragment| Stage::Raster { has_fragment };
+    assert_eq!(found.stage, raster(false));
+    let accesses: Vec<Access> = found
+        .bindings
+        .iter()
+        .map(|binding| binding.access)
+        .collect();
+    let expected = [
+        Access::Uniform,
+        Access::Read,
+        Access::Texture,
+        Access::DepthTexture,
+        Access::Sampler,
+        Access::CompareSampler,
+    ];
+    assert_eq!(accesses, expected);
+    let fragment = "@fragment fn f() -> @location(0) vec4f { return vec4f(0.0); }";
+    let both = reflect("test", &format!("{kinds}\n{fragment}")).unwrap();
+    assert_eq!(both.stage, raster(true));
+    // Controls: a cube, a second group, a fragment shader alone, and no entry point at all.
+    let cube = kinds.replace("texture_2d<f32>", "texture_cube<f32>");
+    let group = kinds.replace("@group(0) @binding(5)", "@group(1) @binding(5)");
+    for refused in [cube.as_str(), group.as_str(), fragment, "fn f() {}"] {
+        assert!(reflect("test", refused).is_err(), "{refused}");
+    }
+}
+
+/// Where a shader's struct is none of the mirrors of its name.
+fn check(found: &Layout, mirrors: &[Layout]) -> Result<(), String> {
+    let mut named = mirrors.iter().filter(|mirror| mirror.name == found.name);
+    if named.clone().next().is_none() || named.any(|mirror| mirror == found) {
+        return Ok(());
+    }
+    let named: Vec<_> = mirrors.iter().filter(|m| m.name == found.name).collect();
+    Err(format!("{found:?} in WGSL, {named:?} in Rust"))
+}
+
+/// Every struct that is bound has a mirror, and every mirror is its struct: by size, names and offsets.
+#[test]
+fn mirrors_match_naga() {
+    let mirrors = [solve::mirrors(), render::mirrors()].concat();
+    let mut seen = vec![false; mirrors.len()];
+    for pass in &shader::pass_files() {
+        for defines in VARIANTS
+            .iter()
+            .filter(|defines| is_meaningful(pass, defines))
+        {
+            let reflection = reflect(pass, &shader::compose(pass, defines).unwrap()).unwrap();
+            for found in &reflection.layouts {
+                check(found, &mirrors).unwrap_or_else(|message| panic!("{pass}: {message}"));
+                for (seen, mirror) in seen.iter_mut().zip(&mirrors) {
+                    *seen |= mirror == found;
+                }
+            }
+            for binding in reflection.bindings {
+                let name = binding.element.name;
+                let is_mirrored = |name: &String| mirrors.iter().any(|m| m.name == *name);
+                assert!(
+                    name.iter().all(is_mirrored),
+                    "{pass}: {name:?} has no mirror"
+                );
+            }
+        }
+    }
+    let unseen = mirrors.iter().zip(&seen).filter(|(_, seen)| !**seen);
+    assert_eq!(unseen.count(), 0, "a mirror without its struct: {seen:?}");
+
+    // Negative controls: a member out of place and a wrong size are seen.
+    let text = shader::compose("pbf/predict", &[]).unwrap();
+    let layouts = reflect("pbf/predict", &text).unwrap().layouts;
+    let params = layouts.iter().find(|layout| layout.name == "Params");
+    let params = params.unwrap();
+    check(params, &mirrors).unwrap();
+    let mut spoiled = params.clone();
+    spoiled.members.swap(1, 2);
+    check(&spoiled, &mirrors).unwrap_err();
+    spoiled = params.clone();
+    spoiled.size += 4;
+    check(&spoiled, &mirrors).unwrap_err();
+}
+
+/// What the host and the shaders number alike.
+#[test]
+fn numbers_match_naga() {
+    let reduce = reflect(
+        "pressure/reduce",
+        &shader::compose("pressure/reduce", &[]).unwrap(),
+    );
+    let constants = reduce.unwrap().constants;
+    let value = |name: &str| constants.iter().find(|(of, _)| of == name).unwrap().1;
+    for (name, state) in [
+        ("ITERATING", ITERATING),
+        ("VERIFYING", VERIFYING),
+        ("DONE", DONE),
+        ("WANTS_POCKETS", WANTS_POCKETS),
+    ] {
+        assert_eq!(value(name), state, "{name}");
+    }
+    for (name, step) in [
+        ("BEGIN", ReduceStep::Begin),
+        ("DIRECTION", ReduceStep::Direction),
+        ("LENGTH", ReduceStep::Length),
+        ("CHECK", ReduceStep::Check),
+        ("VERIFIED", ReduceStep::Verified),
+    ] {
+        assert_eq!(value(name), step as u32, "{name}");
+    }
+    // Negative control.
+    assert_ne!(value("VERIFIED"), ReduceStep::Check as u32);
+}
+
+#[test]
+fn composition_faults_name_their_place() {
+    let fault = shader::compose("pbf/no_such_pass", &[])
+        .unwrap_err()
+        .to_string();
+    assert!(fault.contains("pbf/no_such_pass.wgsl"), "{fault}");
+    let fault = reflect(
+        "test",
+        "@compute @workgroup_size(1) fn main() { let x: u32 = 1.5; }",
+    )
+    .unwrap_err()
+    .to_string();
+    assert!(fault.contains("test"), "{fault}");
+}
+
+/// Rooms that each room may import; `stage` and `cli` stand above them all.
+const MAY_IMPORT: [(&str, &[&str]); 11] = [
+    ("domain", &[]),
+    ("gpu", &[]),
+    // The plan's rows are gpu's own plain descriptions: a copy of them would have to be kept in step.
+    ("scene", &["domain", "gpu"]),
+    ("cache", &["domain"]),
+    ("solve", &["gpu", "domain", "scene"]),
+    ("reference", &["domain", "scene"]),
+    ("render", &["gpu", "domain", "scene"]),
+    ("compare", &["domain"]),
+    ("study", &["domain", "compare"]),
+    (
+        "stage",
+        &[
+            "domain",
+            "gpu",
+            "scene",
+            "cache",
+            "solve",
+            "reference",
+            "render",
+            "compare",
+            "study",
+        ],
+    ),
+    ("cli", &["stage", "scene", "domain"]),
+];
+
+/// Crates that only some rooms name.
+const CRATES: [(&str, &[&str]); 3] = [
+    ("faer", &["reference"]),
+    ("wgpu", &["gpu", "solve", "render"]),
+    ("clap", &["cli", "main"]),
+];
+
+fn sources(dir: &Path, out: &mut Vec<std::path::PathBuf>) {
+    for entry in fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, out);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            out.push(path);
+        }
+    }
+}
+
+/// Rooms and crates that a text names in a path, comments aside.
+fn breaches(room: &str, text: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let code: String = text
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .collect::<Vec<_>>()
+        .join("\n");
+    let allowed = MAY_IMPORT
+        .iter()
+        .find(|(name, _)| *name == room)
+        .map_or(&[][..], |(_, rooms)| rooms);
+    for (other, _) in MAY_IMPORT {
+        if other != room && !allowed.contains(&other) && names_room(&code, other) {
+            found.push(format!("{room} imports {other}"));
+        }
+    }
+    for (name, rooms) in CRATES {
+        let named = code.contains(&format!("{name}::")) || code.contains(&format!("use {name};"));
+        if named && !rooms.contains(&room) {
+            found.push(format!("{room} names {name}"));
+        }
+    }
+    found
+}
+
+/// `crate::room`, or `room` inside the braces of a `use crate::{..}`.
+fn names_room(code: &str, room: &str) -> bool {
+    if code.contains(&format!("crate::{room}")) {
+        return true;
+    }
+    code.split("use crate::{").skip(1).any(|rest| {
+        let block = rest.split(";\n").next().unwrap_or("");
+        let mut depth = 0;
+        let mut top = String::new();
+        for c in block.chars() {
+            match c {
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                _ if depth == 0 => top.push(c),
+                _ => {}
+            }
+        }
+        top.split(',')
+            .any(|item| item.trim().split("::").next() == Some(room))
+    })
+}
+
+#[test]
+fn rooms_import_what_they_may() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let mut found = Vec::new();
+    for file in &files {
+        let relative = file.strip_prefix(&root).unwrap();
+        let room = relative
+            .iter()
+            .next()
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .trim_end_matches(".rs");
+        if room == "lib" {
+            continue;
+        }
+        for breach in breaches(room, &fs::read_to_string(file).unwrap()) {
+            found.push(format!("{}: {breach}", relative.display()));
+        }
+    }
+    assert!(files.len() > 20);
+    assert!(found.is_empty(), "{found:#?}");
+
+    // Negative controls.
+    assert_eq!(breaches("domain", "use crate::gpu::adapter;").len(), 1);
+    assert_eq!(
+        breaches(
+            "cache",
+            "use crate::{domain::mesh, solve::{pbf, params}};\n"
+        )
+        .len(),
+        1
+    );
+    assert_eq!(breaches("scene", "use wgpu::Device;").len(), 1);
+    assert!(breaches("solve", "use crate::{domain::mesh, gpu::adapter};\n").is_empty());
+}
+
+/// Files of an effect's own: its settings and plan, its f64 twins, and what holds the two
+/// against each other.
+const EFFECT_FILES: [&str; 5] = [
+    "scene/effects",
+    "reference/pbf/effects",
+    "stage/check/pbf/effects",
+    "reference/flip/effects",
+    "stage/check/flip/effects",
+];
+
+/// Lines that name an effect outside its own files, comments and tests aside.
+fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
+    let own = EFFECT_FILES.map(|folder| format!("{folder}/{effect}.rs"));
+    files
+        .iter()
+        .filter(|(file, _)| !own.contains(file))
+        .flat_map(|(file, text)| {
+            let code = text.split("#[cfg(test)]").next().unwrap_or("");
+            code.lines()
+                .filter(|line| !line.trim_start().starts_with("//") && line.contains(effect))
+                .map(move |line| format!("{file}: {line}"))
+        })
+        .collect()
+}
+
+#[test]
+fn an_effect_is_its_files_and_one_line() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut paths = Vec::new();
+    sources(&root, &mut paths);
+    let mut files: Vec<(String, String)> = paths
+        .iter()
+        .map(|path| {
+            let name = path
+                .strip_prefix(&root)
+                .unwrap()
+                .to_string_lossy()
+                .replace('\\', "/");
+            (name, fs::read_to_string(path).unwrap())
+        })
+        .collect();
+    assert!(swell::scene::Effects::NAMES.len() >= 2);
+    for effect in swell::scene::Effects::NAMES {
+        let found = mentions(&files, effect);
+        assert_eq!(found.len(), 1, "{effect}: {found:#?}");
+        assert!(found[0].contains("$callback!("), "{found:?}");
+        for folder in &EFFECT_FILES[..3] {
+            assert!(root.join(format!("{folder}/{effect}.rs")).exists());
+        }
+    }
+    // Negative control: a solver that knew an effect by name would be seen.
+    files.push((
+        "solve/special.rs".into(),
+        "if scene.effects.viscosity.is_some() {}".into(),
+    ));
+    assert_eq!(mentions(&files, "viscosity").len(), 2);
+}

@@ -1,0 +1,80 @@
+//! Tests of what crosses rooms, a module for each room; tests of one room alone stand in its own files.
+//!
+//! One crate, so that all of them are linked once. No test sets what its process shares: whatever needs an environment,
+//! a signal or a limit of its own runs `swell` as a process.
+#![allow(
+    clippy::unwrap_used,
+    unreachable_pub,
+    reason = "a failed unwrap is a failed test"
+)]
+
+mod support;
+
+mod cache {
+    mod damaged;
+    #[cfg(target_os = "linux")]
+    mod disk_faults;
+    #[cfg(unix)]
+    mod durability;
+    mod faults;
+    mod format;
+    mod probes;
+    mod vdb;
+}
+mod check;
+mod cli {
+    mod pipeline;
+    mod shaders;
+    #[cfg(target_os = "linux")]
+    mod terminal;
+}
+mod compare {
+    mod diff;
+    mod renders;
+}
+mod domain {
+    mod circles;
+    mod signed_distance;
+}
+mod experiment {
+    mod hard_cases;
+    mod study;
+}
+mod gpu {
+    mod device_faults;
+    mod raster;
+    mod shaders;
+    mod sort;
+}
+mod reference {
+    mod flip;
+    mod pbf;
+}
+mod render {
+    mod analytic;
+    mod folder;
+    mod pictures;
+    mod scenes;
+}
+mod scene {
+    mod edits;
+    mod faults;
+    mod fuzz_inputs;
+    mod untrusted;
+}
+mod solve {
+    mod analytic;
+    mod analytic_water;
+    mod flip;
+    mod flip_passes;
+    mod independent;
+    mod moving_solids;
+    mod pbf;
+    mod pressure;
+}
+mod stage {
+    mod branch;
+    mod budget;
+    mod device_cpu;
+    mod far_origin;
+}

@@ -1,0 +1,292 @@
+//! Several processes and one folder of pictures: each frame is rendered once, looks do not mix, and what is killed is made up
+//! for. SWELL_ROUNDS sets how often three processes share a range; in every second round one of them is killed.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::{BufRead, BufReader},
+    path::Path,
+    process::{Child, Stdio},
+    time::Duration,
+};
+
+use crate::support::job::{Job, LOOK, assert_has};
+use crate::support::made_cache::{Made, SCENE, write_cache};
+
+/// Frames of the caches.
+const LAST: u32 = 12;
+
+fn job(last: u32) -> Job {
+    let job = Job::of(&[
+        ("look.toml", LOOK),
+        ("wide.toml", &LOOK.replace("35.0", "24.0")),
+    ]);
+    let made = Made {
+        last,
+        ..Made::default()
+    };
+    write_cache(&job.path("cache"), &made);
+    job
+}
+
+/// Files of a folder with their bytes, but for the record of whose they are.
+fn pictures(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        assert!(path.is_file(), "{name} is left");
+        if name != "render.json" {
+            files.insert(name, fs::read(path).unwrap());
+        }
+    }
+    files
+}
+
+fn spawn(job: &Job, words: &str) -> Child {
+    let mut command = job.command(&format!("{words} --progress json"));
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+/// Frames that a process rendered, and those that others did; it must have gone well.
+fn counts(child: Child) -> [u64; 2] {
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    let fault = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}{fault}");
+    let end: serde_json::Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    ["rendered", "skipped"].map(|key| end[key].as_u64().unwrap())
+}
+
+/// Waits until a process has come so far.
+fn until(child: &mut Child, done: &dyn Fn() -> bool) {
+    while !done() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn processes_share_a_range_and_make_up_for_a_killed_one() {
+    let rounds = std::env::var("SWELL_ROUNDS").map_or(2, |text| text.parse().unwrap());
+    let job = job(LAST);
+    let render = "render cache --look look.toml -o";
+    job.expect(0, &format!("{render} alone"));
+    let alone = pictures(&job.path("alone"));
+    assert_eq!(alone.len(), 2 * LAST as usize);
+    let (mut shared, mut killed) = (0, 0);
+    for round in 0..rounds {
+        let folder = job.path(&format!("round{round}"));
+        let words = format!("{render} round{round}");
+        let mut children: Vec<Child> = (0..3).map(|_| spawn(&job, &words)).collect();
+        let mut all = u64::from(LAST);
+        if round % 2 == 1 {
+            // In mid-work: that frame is being rendered by one of them.
+            let number = format!("small.{:04}", 2 + round % 9);
+            let lock = folder.join(format!(".swell/{number}.lock"));
+            let mut victim = children.remove(round % 3);
+            until(&mut victim, &|| lock.exists());
+            victim.kill().unwrap();
+            let status = victim.wait().unwrap();
+            killed += u32::from(status.code().is_none());
+            all = 0;
+        }
+        let counted: Vec<[u64; 2]> = children.into_iter().map(counts).collect();
+        for [rendered, stood] in &counted {
+            assert_eq!(rendered + stood, u64::from(LAST), "{counted:?}");
+        }
+        let rendered: u64 = counted.iter().map(|count| count[0]).sum();
+        // Without a kill each frame is rendered by one process alone.
+        assert!(
+            rendered <= u64::from(LAST) && rendered >= all,
+            "{counted:?}"
+        );
+        shared += u32::from(counted.iter().filter(|count| count[0] > 0).count() > 1);
+        assert!(
+            pictures(&folder) == alone,
+            "round {round}: not the pictures of one process"
+        );
+    }
+    println!(
+        "{rounds} rounds of 3 processes: {shared} in which several rendered, {killed} with one killed"
+    );
+    assert!(
+        rounds < 2 || (shared > 0 && killed > 0),
+        "{shared} {killed}"
+    );
+}
+
+#[test]
+fn pictures_of_something_else_are_refused_and_left() {
+    let job = job(6);
+    let day = job.path("day");
+    let is_left = |code: i32, words: &str, says: &[&str]| {
+        let before = (pictures(&day), day.join("render.json").exists());
+        let said = job.expect(code, &format!("render {words} -o day"));
+        assert_has(&said, says);
+        assert!(before == (pictures(&day), day.join("render.json").exists()));
+    };
+    job.expect(0, "render cache --look look.toml -o day --frames 1-4");
+    let first = pictures(&day);
+    is_left(
+        4,
+        "cache --look wide.toml",
+        &["small.0001.exr", "another look", "--overwrite"],
+    );
+    is_left(
+        4,
+        "cache --look wide.toml --frames 5-6",
+        &["small.0001.exr", "another look"],
+    );
+    // Frame 4 would stay behind.
+    is_left(
+        4,
+        "cache --look wide.toml --frames 1-3 --overwrite",
+        &["small.0004.exr", "another look", "would leave it"],
+    );
+    let moved = Made {
+        last: 6,
+        spoil: &|_, particles| particles.position[0][1] += 0.01,
+        ..Made::default()
+    };
+    write_cache(&job.path("moved"), &moved);
+    is_left(4, "moved --look look.toml", &["another cache"]);
+    let viscous = format!("{SCENE}\n[effects]\nviscosity = {{ xsph = 0.1 }}\n");
+    for (name, scene, what) in [
+        (
+            "large",
+            SCENE.replace("\"small\"", "\"large\""),
+            "another shot",
+        ),
+        ("viscous", viscous, "another scene"),
+    ] {
+        let made = Made {
+            scene: &scene,
+            last: 6,
+            ..Made::default()
+        };
+        write_cache(&job.path(name), &made);
+        is_left(4, &format!("{name} --look look.toml"), &[what]);
+    }
+    // The record is a help, and what stands there decides.
+    fs::remove_file(day.join("render.json")).unwrap();
+    is_left(4, "cache --look wide.toml", &["small.0001.exr"]);
+    fs::write(day.join("render.json"), "{ half").unwrap();
+    is_left(4, "cache --look wide.toml", &["small.0001.exr"]);
+
+    // The same look goes on, whatever frames; what is not ours, and what a dead process left, hinders nobody.
+    fs::write(day.join("notes.png"), "mine").unwrap();
+    fs::write(day.join("small.0005.png.part"), "half").unwrap();
+    let said = job.expect(0, "render cache --look look.toml -o day --frames 3-6");
+    assert!(said.contains("2 frames rendered, 2 stood"), "{said}");
+    assert!(!day.join("small.0005.png.part").exists());
+    assert_eq!(fs::read_to_string(day.join("notes.png")).unwrap(), "mine");
+    let both = pictures(&day);
+    assert!(first.iter().all(|(name, bytes)| both[name] == *bytes));
+    // Someone's own picture under one of our names.
+    fs::write(day.join("small.0002.png"), "mine").unwrap();
+    fs::remove_file(day.join("render.json")).unwrap();
+    is_left(
+        4,
+        "cache --look look.toml",
+        &["small.0002.png", "no picture that can be read"],
+    );
+    job.expect(0, "render cache --look wide.toml -o day --overwrite");
+    job.expect(0, "render cache --look wide.toml -o wide");
+    fs::remove_file(day.join("notes.png")).unwrap();
+    assert!(pictures(&day) == pictures(&job.path("wide")));
+}
+
+/// A process in the middle of its work, standing still.
+#[cfg(unix)]
+fn stopped(job: &Job, words: &str) -> Child {
+    let mut child = spawn(job, words);
+    let said = BufReader::new(child.stdout.take().unwrap());
+    let mut lines = said.lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.contains("\"event\":\"frame\"")));
+    let stop = ["-STOP".to_owned(), child.id().to_string()];
+    let status = std::process::Command::new("kill").args(stop).status();
+    assert!(status.unwrap().success());
+    child
+}
+
+#[cfg(unix)]
+fn kill(mut child: Child) {
+    child.kill().unwrap();
+    assert_eq!(child.wait().unwrap().code(), None, "killed at work");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_in_use_is_shared_by_one_look_alone() {
+    let job = job(LAST);
+    let exists = |name: &str| job.path("busy").join(name).exists();
+    let render = "render cache --look look.toml -o busy";
+    let last = format!("{render} --frames {LAST}");
+    let child = stopped(&job, render);
+    let said = job.expect(4, "render cache --look wide.toml -o busy");
+    assert_has(&said, &["busy is in use", "another look"]);
+    for look in ["look.toml", "wide.toml"] {
+        let words = format!("render cache --look {look} -o busy --overwrite");
+        let said = job.expect(4, &words);
+        assert_has(&said, &["busy is in use", "--overwrite"]);
+    }
+    assert!(job.expect(0, &last).contains("1 frames rendered"));
+    assert!(exists(".swell/work"), "the first is still at work");
+    // The frame that it has is waited for, and rendered here once its process is dead.
+    let second = spawn(&job, render);
+    while !exists(&format!("small.{:04}.png", LAST - 1)) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    kill(child);
+    let [rendered, stood] = counts(second);
+    assert!(rendered > 0 && rendered + stood == u64::from(LAST));
+    assert!(!exists(".swell"), "the last one to leave clears it");
+    let all = pictures(&job.path("busy"));
+    assert_eq!(all.len(), 2 * LAST as usize);
+
+    // What a dead process left goes with the next one.
+    let child = stopped(&job, &format!("{render} --overwrite"));
+    let said = job.expect(4, &last);
+    assert_has(&said, &["busy is in use", "--overwrite"]);
+    kill(child);
+    assert!(exists(".swell/work"));
+    assert!(job.expect(0, &last).contains("0 frames rendered"));
+    assert!(!exists(".swell"));
+    assert!(pictures(&job.path("busy")) == all);
+}
+
+/// Whatever cache it is, and by whatever way.
+#[test]
+fn pictures_do_not_go_into_any_cache() {
+    let job = job(2);
+    let made = Made::default();
+    write_cache(&job.path("other"), &made);
+    fs::create_dir(job.path("begun")).unwrap();
+    fs::copy(job.path("other/lock"), job.path("begun/lock")).unwrap();
+    let mut targets = vec![
+        "cache",
+        "cache/pictures",
+        "other",
+        "other/frames",
+        "other/a/b",
+        "begun/a",
+    ];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(job.path("other"), job.path("link")).unwrap();
+        targets.push("link/pictures");
+    }
+    let hashes = || ["cache", "other", "begun"].map(|name| job.hash(name));
+    let before = hashes();
+    for target in targets {
+        let said = job.expect(2, &format!("render cache --look look.toml -o {target}"));
+        assert!(said.contains("is in the cache"), "{said}");
+    }
+    assert_eq!(hashes(), before);
+    // Beside them is well, also where a page's manifest stands above.
+    fs::create_dir(job.path("site")).unwrap();
+    fs::write(job.path("site/manifest.json"), "{}").unwrap();
+    job.expect(0, "render cache --look look.toml -o site/day --frames 1");
+}

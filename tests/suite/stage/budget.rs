@@ -1,0 +1,446 @@
+//! `[budget]`: what holds, what breaks it, what is kept of a frame that could not be made, and which pass was at fault.
+mod not_a_number;
+mod replay;
+
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
+
+use crate::support::job::Job;
+use swell::{
+    cache::CacheReader,
+    domain::{budget::Watched, solver::StepReport},
+    gpu::adapter::{Context, Spoil},
+    scene::Scene,
+    stage::{
+        bake::{self, BakeError, Event, Request},
+        device::Device,
+        replay::Failure,
+    },
+};
+use tempfile::TempDir;
+
+fn case(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hard_cases");
+    folder.join(name).with_extension("toml")
+}
+
+fn load(name: &str, set: &[&str]) -> Scene {
+    let set: Vec<String> = set.iter().map(|&set| set.to_owned()).collect();
+    Scene::load(&case(name), &set).unwrap()
+}
+
+fn opened(context: &Context) -> Device {
+    Device::Open(Box::new(context.clone()))
+}
+
+const fn spoil(pass: &'static str, from: &'static str, to: &'static str) -> Spoil {
+    Spoil { pass, from, to }
+}
+
+fn spoiled(context: &Context, spoil: Spoil) -> Device {
+    let mut context = context.clone();
+    context.spoil = Some(spoil);
+    opened(&context)
+}
+
+/// A bake into a folder of its own: what it reported, and how it ended.
+struct Baked {
+    folder: TempDir,
+    reports: Vec<StepReport>,
+    removed: usize,
+    particles: usize,
+    error: Option<BakeError>,
+}
+
+impl Baked {
+    fn cache(&self) -> PathBuf {
+        self.folder.path().join("cache")
+    }
+
+    fn go_on(&mut self, device: &Device, scene: &Scene, frames: &str) {
+        let request = Request {
+            scene: scene.clone(),
+            directory: self.cache(),
+            frames: Some(frames.parse().unwrap()),
+            resume: true,
+            device: device.clone(),
+            time_passes: false,
+            from: None,
+        };
+        let never = AtomicBool::new(false);
+        let ended = bake::bake(&request, &never, &mut |event| match event {
+            Event::Ready {
+                removed, particles, ..
+            } => (self.removed, self.particles) = (removed, particles),
+            Event::Frame { report, .. } => self.reports.push(report),
+        });
+        self.error = ended.err();
+    }
+
+    fn failure(&self) -> &Failure {
+        match &self.error {
+            Some(BakeError::Budget { failure, .. }) => failure,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+fn bake(opened: &Device, scene: &Scene, frames: &str) -> Baked {
+    let mut baked = Baked {
+        folder: TempDir::new().unwrap(),
+        reports: Vec::new(),
+        removed: 0,
+        particles: 0,
+        error: None,
+    };
+    baked.go_on(opened, scene, frames);
+    baked
+}
+
+fn whole(opened: &Device, scene: &Scene) -> Baked {
+    bake(opened, scene, &format!("1-{}", scene.shot.frames))
+}
+
+const SOLVERS: [&str; 2] = ["solver.method=pbf", "solver.method=flip"];
+
+/// What holds by default, and each limit broken where it is set too low, on the GPU and on the CPU.
+#[test]
+fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
+    let gpu = opened(&Context::open(None).unwrap());
+    let both = [
+        ("speed=0.01", Watched::Speed),
+        ("density_error_mean=1e-6", Watched::DensityErrorMean),
+        ("density_error_p99=1e-6", Watched::DensityErrorP99),
+        ("volume=1e-5", Watched::Volume),
+    ];
+    let of_flip = [
+        ("residual=1e-5", Watched::Residual),
+        ("divergence=1e-9", Watched::Divergence),
+    ];
+    for method in SOLVERS {
+        let scene = load("34-not-a-number", &[method]);
+        let (fine, on_cpu) = (whole(&gpu, &scene), whole(&Device::Cpu, &scene));
+        assert!(fine.error.is_none(), "{:?}", fine.error);
+        assert!(on_cpu.error.is_none(), "{:?}", on_cpu.error);
+        assert_eq!((fine.reports.len(), on_cpu.reports.len()), (4, 4));
+        assert!(!fine.cache().join("failed").exists());
+
+        let of_flip = of_flip.iter().filter(|_| method.ends_with("flip"));
+        for &(set, watched) in both.iter().chain(of_flip) {
+            let set = format!("budget.{set}");
+            let mut sets = vec![method, &set];
+            if watched == Watched::Residual {
+                // One iteration, from which no solve comes near.
+                sets.extend([
+                    "solver.flip.pressure.max_iterations=1",
+                    "solver.flip.pressure.preconditioner=none",
+                ]);
+            }
+            let scene = load("34-not-a-number", &sets);
+            let broken = bake(&gpu, &scene, "1-4");
+            let Failure { breach, place } = broken.failure();
+            assert_eq!(breach.watched, watched, "{breach}");
+            assert!(breach.measured > breach.limit, "{breach}");
+            assert_eq!(breach.frame as usize, 1 + broken.reports.len());
+            let place = place.as_ref().unwrap_or_else(|| panic!("{breach}"));
+            assert!(place.substep >= 1 && place.pass.contains('/'), "{place:?}");
+            let is_of_flip = matches!(watched, Watched::Residual | Watched::Divergence);
+            assert_eq!(breach.substep.is_some(), is_of_flip, "{breach}");
+            let on_cpu = bake(&Device::Cpu, &scene, "1-4");
+            if is_of_flip {
+                // Its solves come to the rounding of f64.
+                assert!(on_cpu.error.is_none(), "{:?}", on_cpu.error);
+                continue;
+            }
+            let Failure { breach, place } = on_cpu.failure();
+            assert_eq!((breach.watched, place), (watched, &None), "{breach}");
+        }
+    }
+}
+
+/// Particles that are slowed to the cap count, here all of them by a fault in who is.
+#[test]
+fn too_many_slowed_particles_end_a_bake() {
+    let context = Context::open(None).unwrap();
+    for (method, pass) in [
+        (SOLVERS[0], "pbf/update_velocity"),
+        (SOLVERS[1], "flip/advect"),
+    ] {
+        let scene = load("34-not-a-number", &[method]);
+        let count = spoil(
+            pass,
+            "if distance > params.max_displacement {",
+            "atomicAdd(&counters.capped, 1u); if distance > params.max_displacement {",
+        );
+        let slowed = bake(&spoiled(&context, count), &scene, "1-2");
+        let Failure { breach, place } = slowed.failure();
+        assert_eq!((breach.watched, breach.measured), (Watched::Capped, 1.0));
+        assert_eq!(place.as_ref().unwrap().pass, pass, "{breach}");
+        let off = load("34-not-a-number", &[method, "budget.capped=false"]);
+        let slowed = bake(&spoiled(&context, count), &off, "1-2");
+        assert!(slowed.error.is_none(), "{:?}", slowed.error);
+    }
+}
+
+/// The energy that walls bring in is what the water gains, and no more: with the work left out, or velocities made a
+/// little larger, the budget breaks.
+#[test]
+fn energy_rises_by_the_work_of_the_walls_alone() {
+    let context = Context::open(None).unwrap();
+    let gpu = opened(&context);
+    for (method, lost, grown) in [
+        (
+            SOLVERS[0],
+            Spoil {
+                pass: "pbf/boundary_work",
+                from: "+= sum;",
+                to: "+= 0.0 * sum;",
+            },
+            Spoil {
+                pass: "pbf/update_velocity",
+                from: "velocity[thread] = vec4f(v, 0.0);",
+                to: "velocity[thread] = vec4f(1.3 * v, 0.0);",
+            },
+        ),
+        (
+            SOLVERS[1],
+            Spoil {
+                pass: "flip/boundary_work",
+                from: "boundary_work[thread / 64u] = sum;",
+                to: "boundary_work[thread / 64u] = 0.0 * sum;",
+            },
+            Spoil {
+                pass: "flip/grid_to_particle",
+                from: "advanced + params.pic_blend",
+                to: "1.3 * advanced + params.pic_blend",
+            },
+        ),
+    ] {
+        // A piston: its work is most of the energy.
+        let scene = load("24-leaving", &[method]);
+        let fine = bake(&gpu, &scene, "1-9");
+        assert!(fine.error.is_none(), "{:?}", fine.error);
+        let total = |report: &StepReport| report.kinetic_energy + report.potential_energy;
+        let pairs = || fine.reports.iter().zip(&fine.reports[1..]);
+        let most =
+            |f: &dyn Fn((&StepReport, &StepReport)) -> f64| pairs().map(f).fold(f64::MIN, f64::max);
+        let raw = most(&|(a, b)| (total(b) - total(a)) / total(a));
+        let beyond = most(&|(a, b)| (total(b) - total(a) - b.boundary_work) / total(a));
+        println!(
+            "{method}: energy rises by up to {raw:.3} a frame, beyond the work by {beyond:.4}"
+        );
+        assert!(raw > 0.1, "{raw}");
+
+        let without = bake(&spoiled(&context, lost), &scene, "1-9");
+        assert_eq!(without.failure().breach.watched, Watched::Energy);
+        let larger = bake(&spoiled(&context, grown), &scene, "1-9");
+        let failure = larger.failure();
+        assert_eq!(failure.breach.watched, Watched::Energy, "{failure}");
+        assert_eq!(
+            failure.place.as_ref().unwrap().pass,
+            grown.pass,
+            "{failure}"
+        );
+    }
+}
+
+/// Both solvers tell the same work to the f64 reference's.
+#[test]
+fn the_work_of_walls_is_that_of_the_reference() {
+    let gpu = opened(&Context::open(None).unwrap());
+    for method in SOLVERS {
+        let scene = load("24-leaving", &[method]);
+        let work = |opened: &Device| -> f64 {
+            let reports = bake(opened, &scene, "1-4").reports;
+            reports.iter().map(|report| report.boundary_work).sum()
+        };
+        let (single, double) = (work(&gpu), work(&Device::Cpu));
+        println!("{method}: {single} J, {double} J in f64");
+        // Four frames of a splash part by more than rounding.
+        assert!(
+            double > 10.0 && (single - double).abs() < 0.01 * double,
+            "{single} {double}"
+        );
+    }
+}
+
+/// Hard case 14: the lid meets the water in frame 20.
+#[test]
+fn a_lid_on_sealed_water_is_reported_as_incompatible() {
+    let gpu = opened(&Context::open(None).unwrap());
+    for device in [&gpu, &Device::Cpu] {
+        let scene = load("14-sealed", &["budget.volume=false"]);
+        let pressed = whole(device, &scene);
+        assert!(pressed.error.is_none(), "{:?}", pressed.error);
+        let squeezed = |report: &StepReport| report.projection.unwrap().incompatible;
+        let (before, after) = pressed.reports.split_at(18);
+        assert!(before.iter().all(|report| squeezed(report) == 0.0));
+        // 0.5 m/s on 0.6 m.
+        let most = after.iter().map(squeezed).fold(0.0, f64::max);
+        assert!((0.4..1.6).contains(&most), "{most}");
+    }
+    // Until then the water keeps its volume to one part in a hundred.
+    let open = load("14-sealed", &["budget.volume=0.01"]);
+    let open = bake(&gpu, &open, "1-18");
+    assert!(open.error.is_none(), "{:?}", open.error);
+    assert_eq!(open.reports.len(), 18);
+    // PBF has no pressure to be incompatible: what is squeezed is too dense, and so is told.
+    let scene = load("14-sealed", &[SOLVERS[0], "budget.density_error_mean=0.1"]);
+    let pressed = whole(&gpu, &scene);
+    let breach = &pressed.failure().breach;
+    assert_eq!(breach.watched, Watched::DensityErrorMean, "{breach}");
+    assert!(breach.frame > 19, "{breach}");
+}
+
+/// Hard case 15.
+#[test]
+fn water_in_a_solid_is_left_out_and_counted() {
+    let gpu = opened(&Context::open(None).unwrap());
+    for method in SOLVERS {
+        let scene = load("15-solid-over-all", &[method]);
+        let none = whole(&gpu, &scene);
+        assert!(none.error.is_none(), "{:?}", none.error);
+        assert_eq!((none.particles, none.removed), (0, 64), "{method}");
+        // Control: with the solid elsewhere the water starts.
+        let scene = load(
+            "15-solid-over-all",
+            &[method, "solid[0].translate=[0.9,0.3,0.9]"],
+        );
+        let all = bake(&gpu, &scene, "1");
+        assert_eq!((all.particles, all.removed), (64, 0), "{method}");
+    }
+}
+
+/// Hard case 23.
+#[test]
+fn one_particle_at_extreme_speed_asks_for_substeps_and_is_told() {
+    let gpu = opened(&Context::open(None).unwrap());
+    for method in SOLVERS {
+        let scene = load("23-extreme-particle", &[method]);
+        let fallen = whole(&gpu, &scene);
+        assert!(fallen.error.is_none(), "{:?}", fallen.error);
+        let reports = &fallen.reports;
+        let fastest = reports
+            .iter()
+            .map(|report| report.max_speed)
+            .fold(0.0, f64::max);
+        assert!(fastest > 25.0, "{fastest}");
+        let capped: u64 = reports.iter().map(|report| report.capped).sum();
+        let steps: u64 = reports
+            .iter()
+            .map(|report| u64::from(report.substeps))
+            .sum();
+        assert!(
+            capped as f64 <= 1e-4 * steps as f64 * fallen.particles as f64,
+            "{capped}"
+        );
+        // The pool is not infected: what the drop brought is what it may have.
+        let last = reports.last().unwrap();
+        assert!(last.max_speed < fastest, "{} {fastest}", last.max_speed);
+        // A budget below its speed names it.
+        let scene = load("23-extreme-particle", &[method, "budget.speed=10"]);
+        let told = whole(&gpu, &scene);
+        let failure = told.failure();
+        assert_eq!(failure.breach.watched, Watched::Speed, "{failure}");
+        assert!((10.0..10.5).contains(&failure.breach.measured), "{failure}");
+    }
+}
+
+/// Hard case 24, and the ledger of particles.
+#[test]
+fn nothing_leaves_the_domain_and_a_ledger_that_does_not_close_ends_the_bake() {
+    let context = Context::open(None).unwrap();
+    let gpu = opened(&context);
+    for (method, out, twice) in [
+        (
+            SOLVERS[0],
+            spoil(
+                "pbf/update_velocity",
+                "position[thread] = vec4f(x, 1.0);",
+                "position[thread] = vec4f(x + 10.0, 1.0);",
+            ),
+            spoil(
+                "pbf/update_velocity",
+                "id[thread] = sorted_id[thread];",
+                "id[thread] = sorted_id[thread & 0xfffffffeu];",
+            ),
+        ),
+        (
+            SOLVERS[1],
+            spoil(
+                "flip/advect",
+                "position[i] = vec4f(clamp(x, low, high), 1.0);",
+                "position[i] = vec4f(x + 10.0, 1.0);",
+            ),
+            spoil(
+                "flip/advect",
+                "id[i] = sorted_id[i];",
+                "id[i] = sorted_id[i] + 7u;",
+            ),
+        ),
+    ] {
+        let scene = load("24-leaving", &[method]);
+        let thrown = whole(&gpu, &scene);
+        assert!(thrown.error.is_none(), "{:?}", thrown.error);
+        let cache = CacheReader::open(&thrown.cache()).unwrap();
+        let (first, last) = (cache.read(0).unwrap(), cache.read(20).unwrap());
+        assert_eq!(first.id, last.id);
+        for spoil in [out, twice] {
+            let broken = bake(&spoiled(&context, spoil), &scene, "1-2");
+            let failure = broken.failure();
+            assert_eq!(failure.breach.watched, Watched::Particles, "{failure}");
+        }
+    }
+}
+
+/// The whole program: exit code, line, what is kept, one command that computes it again, and going on.
+#[test]
+fn a_broken_budget_is_exit_5_a_folder_and_a_line_that_can_be_had_again() {
+    let job = Job::new();
+    for (name, flags) in [("gpu", "--solver flip"), ("cpu", "--device cpu")] {
+        let bake = format!("bake small.toml -o {name} {flags} --frames 1-3");
+        job.expect(
+            0,
+            &format!("bake small.toml -o {name} {flags} --frames 1-2"),
+        );
+        let sound = job.hash(name);
+        let said = job.expect(5, &format!("{bake} --resume --set budget.speed=0.2"));
+        let line = said.lines().last().unwrap();
+        let head = "swell: frame 3: the largest speed, m/s, is ";
+        assert!(
+            line.starts_with(head) && line.contains("and budget.speed is 0.2000; "),
+            "{line}"
+        );
+        assert_eq!(line.contains("first in flip/"), name == "gpu", "{line}");
+        for file in [
+            "failed/scene.toml",
+            "failed/start.ply",
+            "failed/report.json",
+        ] {
+            assert!(job.path(name).join(file).is_file(), "{file}");
+        }
+        let command = line
+            .split('`')
+            .nth(1)
+            .unwrap()
+            .strip_prefix("swell ")
+            .unwrap();
+        assert_eq!(command, format!("check {name}/failed"));
+        let again = job.expect(5, command);
+        let again = again.lines().last().unwrap();
+        assert!(line.starts_with(again), "{line}\n{again}");
+        job.expect(2, &format!("{command} --frames 1"));
+        // The cache is as it was, and goes on with another budget: none of them is physics.
+        job.expect(0, &format!("verify {name}"));
+        assert_ne!(job.hash(name), sound);
+        job.expect(0, &format!("{bake} --resume --set budget.speed=false"));
+        assert!(!job.path(name).join("failed").exists());
+        job.expect(
+            0,
+            &format!("bake small.toml -o {name}-whole {flags} --frames 1-3"),
+        );
+        assert_eq!(job.hash(name), job.hash(&format!("{name}-whole")));
+    }
+}

@@ -1,0 +1,65 @@
+//! What a replay names, in each precision of the projection.
+
+use swell::{
+    domain::budget::Watched,
+    gpu::adapter::{Context, Needs},
+    stage::replay::Failure,
+};
+
+use super::{SOLVERS, bake, load, not_a_number::is_caught, opened, spoil};
+
+/// A solve's scalars and arrays have another layout in f64. Read as f32, their words are no numbers here and there, and no
+/// residual. And a solve that takes more than one batch of iterations runs the passes behind it more than once, empty.
+#[test]
+fn a_replay_names_the_pass_of_a_residual_in_each_precision() {
+    let needs = Needs { f64: true };
+    let context = Context::open_for(None, needs).expect("an adapter with f64, as lavapipe is");
+    // One iteration, from which no solve comes near; and more than are submitted at once, to a tolerance that as many plain
+    // iterations do not reach.
+    let single = (
+        "budget.residual=1e-5",
+        ["max_iterations=1", "preconditioner=none", "tolerance=1e-5"],
+    );
+    let batches = (
+        "budget.residual=1e-12",
+        [
+            "max_iterations=20",
+            "preconditioner=none",
+            "tolerance=1e-14",
+        ],
+    );
+    for (precision, (budget, settings)) in [
+        ("f32", single),
+        ("f32_refined", batches),
+        ("f64", single),
+        ("f64", batches),
+    ] {
+        let precision = format!("solver.flip.pressure.precision={precision}");
+        let [a, b, c] = settings.map(|set| format!("solver.flip.pressure.{set}"));
+        let sets = [SOLVERS[1], budget, &precision, &a, &b, &c];
+        let broken = bake(&opened(&context), &load("34-not-a-number", &sets), "1-2");
+        let Failure { breach, place } = broken.failure();
+        assert_eq!(breach.watched, Watched::Residual, "{sets:?}: {breach}");
+        assert!(breach.substep.is_some(), "{breach}");
+        let place = (place.as_ref()).unwrap_or_else(|| panic!("{sets:?}: {breach}"));
+        let found = (Some(place.substep), place.pass, place.buffer.as_str());
+        let expected = (breach.substep, "pressure/reduce", "pressure_control");
+        assert_eq!(found, expected, "{sets:?}: {breach}");
+    }
+}
+
+/// The pass that writes what is no number is named where its words are those of f64.
+#[test]
+fn a_replay_names_the_pass_of_a_number_that_is_none_in_f64() {
+    let needs = Needs { f64: true };
+    let context = Context::open_for(None, needs).expect("an adapter with f64, as lavapipe is");
+    let sets = [SOLVERS[1], "solver.flip.pressure.precision=f64"];
+    let scene = load("34-not-a-number", &sets);
+    let sound = bake(&opened(&context), &scene, "1-2");
+    let spoil = spoil(
+        "pressure/divergence",
+        "pressure_rhs[own + 64u * c] = -b.lo[c]",
+        "pressure_rhs[own + 64u * c] = b.lo[c] * real(bitcast<f32>(0x7fc00000u | min(local, 1u)))",
+    );
+    is_caught(&context, &scene, &sound.cache(), spoil);
+}

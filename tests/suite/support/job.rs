@@ -1,0 +1,159 @@
+//! The whole program in a folder of its own.
+use std::{
+    fs,
+    path::PathBuf,
+    process::{Command, Output},
+};
+
+use swell::cache::directory_hash;
+use tempfile::TempDir;
+
+const SCENE: &str = r#"
+[shot]
+name = "small"
+frames = 8
+frames_per_second = 60
+
+[domain]
+min = [-1.0, 0.5, 0.25]
+max = [1.0, 2.5, 1.25]
+
+[[water.block]]
+min = [-1.0, 0.5, 0.25]
+max = [-0.2, 1.5, 1.25]
+
+[[solid]]
+mesh = "box.obj"
+
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "sine", stroke = 0.3, period = 0.5, ramp = 0.1 }
+
+[solver]
+method = "pbf"
+
+[solver.pbf]
+particle_spacing = 0.1
+
+[solver.flip]
+cell_size = 0.2
+
+[effects]
+viscosity = { xsph = 0.02 }
+"#;
+
+const BOX: &str = "v 0.3 0.5 0.5\nv 0.7 0.5 0.5\nv 0.7 1.0 0.5\nv 0.3 1.0 0.5\n\
+    v 0.3 0.5 0.9\nv 0.7 0.5 0.9\nv 0.7 1.0 0.9\nv 0.3 1.0 0.9\n\
+    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
+
+pub const LOOK: &str = r#"
+[camera]
+focal_length_mm = 35.0
+film_back_mm = [36.0, 20.25]
+position = [-2.0, 3.0, 2.5]
+target = [0.0, 1.0, 0.75]
+
+[image]
+width = 64
+height = 36
+samples = 1
+
+[sky]
+model = "hosek_wilkie"
+
+[sun]
+azimuth_degrees = 120.0
+elevation_degrees = 35.0
+
+[output]
+formats = ["png", "exr"]
+aovs = ["Z"]
+"#;
+
+const STUDY: &str = r#"
+kind = "solver_comparison"
+scene = "small.toml"
+look = "look.toml"
+solvers = ["pbf", "flip"]
+frames = "1-6"
+pictures = "3-6x3"
+"#;
+
+/// A folder with a scene, its mesh, two looks and a study, in which the program runs.
+pub struct Job {
+    pub folder: TempDir,
+}
+
+impl Job {
+    pub fn new() -> Self {
+        Self::of(&[
+            ("small.toml", SCENE),
+            ("box.obj", BOX),
+            ("look.toml", LOOK),
+            ("study.toml", STUDY),
+            ("wide.toml", &LOOK.replace("35.0", "24.0")),
+        ])
+    }
+
+    /// A folder with these files, each a name and a text.
+    pub fn of(files: &[(&str, &str)]) -> Self {
+        let job = Self {
+            folder: TempDir::new().unwrap(),
+        };
+        for (name, text) in files {
+            job.write(name, text);
+        }
+        job
+    }
+
+    pub fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn edit(&self, file: &str, from: &str, to: &str) {
+        let text = fs::read_to_string(self.path(file)).unwrap();
+        assert!(text.contains(from), "{from}");
+        fs::write(self.path(file), text.replace(from, to)).unwrap();
+    }
+
+    pub fn command(&self, words: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_swell"));
+        command
+            .current_dir(self.folder.path())
+            .args(words.split_whitespace());
+        command
+    }
+
+    pub fn run(&self, words: &str) -> Output {
+        self.command(words).output().unwrap()
+    }
+
+    /// Runs and expects an exit code; gives what was said, standard output first.
+    pub fn expect(&self, code: i32, words: &str) -> String {
+        let output = self.run(words);
+        let said = [output.stdout, output.stderr].concat();
+        let said = String::from_utf8_lossy(&said).into_owned();
+        assert_eq!(output.status.code(), Some(code), "swell {words}: {said}");
+        said
+    }
+
+    /// The same with `--json`.
+    pub fn json(&self, code: i32, words: &str) -> serde_json::Value {
+        serde_json::from_str(&self.expect(code, &format!("{words} --json"))).unwrap()
+    }
+
+    pub fn hash(&self, cache: &str) -> String {
+        directory_hash(&self.path(cache)).unwrap()
+    }
+}
+
+/// That all of `words` stand in what was said.
+pub fn assert_has(said: &str, words: &[&str]) {
+    for word in words {
+        assert!(said.contains(word), "no {word:?} in: {said}");
+    }
+}

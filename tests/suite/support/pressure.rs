@@ -1,0 +1,144 @@
+//! A pressure room on a case, as the FLIP solver drives it.
+use swell::{
+    domain::{
+        bricks::CELLS,
+        poisson::{
+            System,
+            cases::{Case, Surface as CaseSurface},
+        },
+    },
+    gpu::{adapter::Context, buffer::Buf, program::Program, recording::Timer},
+    scene::flip::{Precision, Preconditioner, Pressure, Surface},
+    solve::{
+        flip::buffers::*,
+        pressure::{
+            self, PressureSolver, Projected, Solved, Step, blocked,
+            buffers::{Real, SOLUTION, read_reals},
+        },
+    },
+};
+
+pub struct Rig {
+    pub program: Program,
+    pub solver: PressureSolver,
+    pub system: System,
+    pub case: Case,
+    capacity: usize,
+    precision: Precision,
+}
+
+pub fn settings(preconditioner: Preconditioner, tolerance: f64) -> Pressure {
+    Pressure {
+        preconditioner,
+        precision: Precision::F32Refined,
+        tolerance,
+        max_iterations: 3000,
+    }
+}
+
+impl Rig {
+    pub fn new(context: &Context, case: Case, settings: &Pressure) -> Self {
+        let capacity = case.bricks.slots() + 3;
+        let cells = capacity * CELLS as usize;
+        let surface = match case.surface {
+            CaseSurface::Voxel => Surface::Voxel,
+            CaseSurface::GhostFluid => Surface::GhostFluid,
+        };
+        let mut specs = pressure::planned(settings, true, capacity);
+        specs.extend([
+            BRICKS.sized(capacity),
+            CELL_KIND.sized(cells),
+            FACE_OPEN.sized(3 * cells),
+            FACE_VELOCITY.sized(3 * cells),
+            SOLID_FLUX.sized(cells),
+            LIQUID_DISTANCE.sized(cells),
+            DENSITY_EXCESS.sized(cells),
+        ]);
+        let passes = pressure::passes(settings, surface, true);
+        let program = Program::new(context, &specs, &passes, &[]).unwrap();
+        let mut rig = Self {
+            solver: PressureSolver::new(settings, true, capacity),
+            system: case.system(),
+            program,
+            case,
+            capacity,
+            precision: settings.precision,
+        };
+        rig.upload_case();
+        rig
+    }
+
+    pub fn upload_case(&mut self) {
+        let case = &self.case;
+        self.program.upload(BRICKS, 0, &case.bricks.records);
+        self.program.upload(CELL_KIND, 0, &case.kind);
+        self.program.upload(LIQUID_DISTANCE, 0, &case.distance);
+        self.upload_planes(FACE_OPEN, &case.open);
+        self.solver
+            .set_topology(&self.program, &case.bricks, case.cell_size);
+    }
+
+    /// Solves by other settings of the same preconditioner and precision from now on.
+    pub fn set(&mut self, settings: &Pressure) {
+        self.solver = PressureSolver::new(settings, true, self.capacity);
+        self.upload_case();
+    }
+
+    /// Planes of the case's stride into those of the capacity's.
+    pub fn upload_planes(&self, buffer: Buf<f32>, values: &[f32]) {
+        let stride = self.capacity * CELLS as usize;
+        for (axis, plane) in values.chunks_exact(self.case.kind.len()).enumerate() {
+            self.program.upload(buffer.clone(), axis * stride, plane);
+        }
+    }
+
+    pub fn planes(&self, buffer: Buf<f32>) -> Vec<f32> {
+        let stride = self.capacity * CELLS as usize;
+        let all = self.program.read(buffer, 3 * stride).unwrap();
+        (0..3)
+            .flat_map(|axis| all[axis * stride..][..self.case.kind.len()].to_vec())
+            .collect()
+    }
+
+    /// Gives each row its right-hand side, by way of the solid flux.
+    pub fn set_rhs(&self, b: &[f64]) {
+        let mut flux = vec![0.0f32; self.case.kind.len()];
+        for (&element, &b) in self.system.cell.iter().zip(b) {
+            flux[element as usize] = -b as f32;
+        }
+        self.program.upload(SOLID_FLUX, 0, &flux);
+        self.upload_planes(FACE_VELOCITY, &vec![0.0; 3 * self.case.kind.len()]);
+    }
+
+    pub fn project(&mut self, timer: Option<&mut Timer>) -> Projected {
+        let step = Step {
+            time_step: 1.0,
+            rest_density: 1.0 / self.case.cell_size,
+        };
+        self.solver.project(&self.program, step, timer).unwrap()
+    }
+
+    pub fn solve(&mut self, b: &[f64]) -> Solved {
+        self.set_rhs(b);
+        self.project(None).solved
+    }
+
+    /// `planes` arrays of the room's own precision, added up, by row.
+    fn sum(&self, buffer: Buf<Real>, planes: usize) -> Vec<f64> {
+        let cells = self.capacity * CELLS as usize;
+        let read = read_reals(&self.program, &buffer, self.precision, planes * cells);
+        let values = read.unwrap();
+        let at = |e: usize| (0..planes).map(|k| values[k * cells + e]).sum();
+        self.system.cell.iter().map(|&e| at(blocked(e))).collect()
+    }
+
+    /// An array of the room, by row.
+    pub fn by_row(&self, buffer: Buf<Real>) -> Vec<f64> {
+        self.sum(buffer, 1)
+    }
+
+    /// All terms of the solution, by row.
+    pub fn solution(&self) -> Vec<f64> {
+        self.sum(SOLUTION, self.precision.terms())
+    }
+}

@@ -1,0 +1,56 @@
+//! A small file system for a test.
+use std::{
+    io::{self, Write},
+    path::Path,
+    process::Command,
+};
+
+use tempfile::TempDir;
+
+/// Mounted until it is dropped.
+pub struct Tmpfs {
+    folder: TempDir,
+}
+
+impl Tmpfs {
+    /// `bytes` are taken up to whole pages. Where mounts are forbidden the reason goes past the test's captured output to
+    /// the terminal, with the name of the test that is not run.
+    pub fn mount(bytes: u64, test: &str) -> Option<Self> {
+        let folder = TempDir::new().unwrap();
+        match mount(&format!("size={bytes}"), folder.path()) {
+            Ok(()) => Some(Self { folder }),
+            Err(reason) => {
+                let _ = writeln!(
+                    io::stderr(),
+                    "SKIPPED {test}: this machine mounts no tmpfs for us ({reason})"
+                );
+                None
+            }
+        }
+    }
+
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Such as `size=4194304` or `ro`.
+    pub fn remount(&self, options: &str) {
+        mount(&format!("remount,{options}"), self.path()).unwrap();
+    }
+}
+
+impl Drop for Tmpfs {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(self.path()).status();
+    }
+}
+
+fn mount(options: &str, folder: &Path) -> Result<(), String> {
+    let words = ["-t", "tmpfs", "-o", options, "none"];
+    let output = Command::new("mount").args(words).arg(folder).output();
+    match output {
+        Ok(output) if output.status.success() => Ok(()),
+        Ok(output) => Err(String::from_utf8_lossy(&output.stderr).trim().to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
+}
