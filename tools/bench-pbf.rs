@@ -27,7 +27,7 @@ struct Options {
 
 fn options() -> Result<Options, String> {
     let mut options = Options {
-        device: Device::Gpu(None),
+        device: Device::Gpu(None.into()),
         frames: 8,
         counts: Vec::new(),
     };
@@ -35,7 +35,7 @@ fn options() -> Result<Options, String> {
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} wants a value"));
         match word.as_str() {
-            "--adapter" => options.device = Device::Gpu(Some(value()?)),
+            "--adapter" => options.device = Device::Gpu(Some(value()?).into()),
             "--device" => match value()?.as_str() {
                 "gpu" => {}
                 "cpu" => options.device = Device::Cpu,

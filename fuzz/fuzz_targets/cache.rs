@@ -49,7 +49,11 @@ pub fn read(manifest: &[u8], lines: &[Vec<u8>]) {
     let folder = FOLDER.get_or_init(|| {
         // In memory where the machine has such a place.
         let memory = Path::new("/dev/shm");
-        let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
+        let folder = if memory.is_dir() {
+            tempfile::tempdir_in(memory)
+        } else {
+            tempfile::tempdir()
+        };
         folder.expect("a temporary folder")
     });
     let path = folder.path();

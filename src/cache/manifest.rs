@@ -35,6 +35,9 @@ pub struct Manifest {
     pub program: String,
     /// Its version.
     pub program_version: String,
+    /// BLAKE3 of the shaders that were read from a folder, hex; absent where they were the program's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shaders: Option<String>,
     /// Shot name, which the frame files carry: letters, digits, `.`, `_`, `-`.
     pub shot: String,
     /// Hash of all that decides the physics, hex.
@@ -111,10 +114,11 @@ fn is_zero(origin: &[f64; 3]) -> bool {
 
 /// What a resumed bake must have in common with the cache, the most telling first. The scene's hash
 /// comes last: it differs where any of the fields above it that a scene sets does.
-const COMPARED: [&str; 14] = [
+const COMPARED: [&str; 15] = [
     "format_version",
     "program",
     "program_version",
+    "shaders",
     "solver",
     "device",
     "driver",

@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use clap::{Args, ValueEnum};
+use clap::{
+    Args, ValueEnum,
+    builder::{OsStringValueParser, TypedValueParser as _},
+};
 use serde_json::{Value, json};
 
 use crate::{
@@ -19,7 +22,7 @@ use crate::{
 };
 
 use super::{
-    Failure,
+    Failure, GpuArgs,
     interrupt::{self, Interrupt},
     output,
     progress::{Mode, Progress},
@@ -38,7 +41,7 @@ pub(super) struct BakeArgs {
     solver: Option<Method>,
     /// Begin from a frame of another cache, such as cache/wave-city/pbf:120, of the same solver, spacing and frame
     /// rate; numbers and time go on from there.
-    #[arg(long, value_name = "CACHE:FRAME")]
+    #[arg(long, value_name = "CACHE:FRAME", value_parser = OsStringValueParser::new().try_map(BranchPoint::try_from))]
     from: Option<BranchPoint>,
     /// Frames to bake, such as 1-30; the whole shot where left out. With --resume past the end of the shot, which is then
     /// longer.
@@ -53,12 +56,11 @@ pub(super) struct BakeArgs {
     /// Take meshes and tables that lie outside of the scene's folder.
     #[arg(long)]
     allow_outside: bool,
-    /// What to solve on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
+    /// Device to solve on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
     #[arg(long, value_enum, default_value_t, value_name = "DEVICE")]
     device: DeviceKind,
-    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`); of --device gpu alone.
-    #[arg(long, value_name = "NAME")]
-    adapter: Option<String>,
+    #[command(flatten)]
+    gpu: GpuArgs,
     /// Time each pass and print a table; passes then run one by one.
     #[arg(long)]
     time_passes: bool,
@@ -76,14 +78,17 @@ enum DeviceKind {
 
 impl BakeArgs {
     fn device(&self) -> Result<Device, Failure> {
-        match (self.device, &self.adapter) {
-            (DeviceKind::Gpu, adapter) => Ok(Device::Gpu(adapter.clone())),
-            (DeviceKind::Cpu, None) => Ok(Device::Cpu),
-            (DeviceKind::Cpu, Some(name)) => Err(Failure {
-                code: 2,
-                error: format!("--adapter {name} names a GPU, and --device is cpu").into(),
-            }),
-        }
+        let GpuArgs { adapter, shaders } = &self.gpu;
+        let fault = match (self.device, adapter, shaders) {
+            (DeviceKind::Gpu, ..) => return Ok(Device::Gpu(self.gpu.read()?)),
+            (DeviceKind::Cpu, None, None) => return Ok(Device::Cpu),
+            (DeviceKind::Cpu, Some(name), _) => format!("--adapter {name} names a GPU"),
+            (DeviceKind::Cpu, None, Some(_)) => "--shaders run on a GPU".to_owned(),
+        };
+        Err(Failure {
+            code: 2,
+            error: format!("{fault}, and --device is cpu").into(),
+        })
     }
 }
 
@@ -289,7 +294,7 @@ fn line(frame: u32, report: &StepReport, seconds: f64) -> String {
     )
 }
 
-/// What a user has to know of a scene, as a line, and the same for farms.
+/// A warning about the scene, as a line and as a JSON event.
 pub(super) fn warned(warning: &str) -> (String, Value) {
     (
         format!("warning: {warning}"),
@@ -303,7 +308,7 @@ const DENSE: f64 = 0.15;
 /// Mean divergence of a pocket against the largest anywhere, above which it is not rounding.
 const INCOMPATIBLE: f64 = 1e-3;
 
-/// What must not be passed over, and the same for farms.
+/// Warnings about a frame, each as a line and as a JSON event.
 fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
     let mut warnings = Vec::new();
     if report.density_error_mean > DENSE {

@@ -15,7 +15,7 @@ use crate::{
 };
 
 use super::{
-    Failure, bake,
+    Failure, GpuArgs, bake,
     interrupt::{self, Interrupt},
     is_cache, output,
     progress::{Mode, Progress},
@@ -46,9 +46,8 @@ pub(super) struct CheckArgs {
     /// The result as one JSON object on standard output.
     #[arg(long)]
     json: bool,
-    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
-    #[arg(long, value_name = "NAME")]
-    adapter: Option<String>,
+    #[command(flatten)]
+    gpu: GpuArgs,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
     progress: Mode,
@@ -79,7 +78,7 @@ fn run_failed(args: &CheckArgs) -> Result<u8, Failure> {
             error: Box::new(error),
         });
     }
-    let Replayed { frame, failure } = replay_failed(&args.source, args.adapter.clone())?;
+    let Replayed { frame, failure } = replay_failed(&args.source, &args.gpu.read()?)?;
     let Some(failure) = failure else {
         output::print(&format!("frame {frame} keeps its budgets now\n"));
         return Ok(0);
@@ -97,7 +96,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     let request = Request {
         source: source(args)?,
         substep: args.substep.unwrap_or_default(),
-        adapter: args.adapter.clone(),
+        gpu: args.gpu.read()?,
     };
     let interrupt = Interrupt::install_or_warn();
     let progress = OnceCell::new();
@@ -211,6 +210,7 @@ fn to_json(outcome: &Outcome) -> serde_json::Value {
         "frames": outcome.frames,
         "substeps": outcome.substeps,
         "interrupted": outcome.interrupted,
+        "shaders": outcome.shaders,
         "within": outcome.first_over.is_none(),
         "first_over": first,
         "rows": outcome.table.rows,
@@ -295,7 +295,7 @@ fn verdict(outcome: &Outcome) -> String {
                 .find(|row| row.field.pass == pass && row.field.name == field);
             let why = row.map_or_else(String::new, |row| {
                 let [error, tolerance] = [row.worst.error, row.worst.tolerance].map(short);
-                let derivation = row.field.derivation;
+                let derivation = &row.field.derivation;
                 format!("; off by {error} where {tolerance} is allowed: {derivation}")
             });
             format!(

@@ -147,8 +147,8 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     show_first_difference(out, diff)?;
     streams::show(out, diff)?;
     let faults = diff.frames.iter().flat_map(|frame| {
-        let of_frame = |fault| (frame.frame, fault);
-        frame.faults.iter().map(of_frame)
+        let describe = |fault| describe(frame.frame, fault);
+        frame.faults.iter().map(describe)
     });
     show_faults(out, faults)
 }
@@ -268,25 +268,19 @@ fn show_first_difference(out: &mut String, diff: &CacheDiff) -> std::fmt::Result
     }
 }
 
-fn show_faults<'a>(
-    out: &mut String,
-    faults: impl Iterator<Item = (u32, &'a Fault)>,
-) -> std::fmt::Result {
+/// A line a fault, the first ones alone.
+fn show_faults(out: &mut String, faults: impl Iterator<Item = String>) -> std::fmt::Result {
     let faults: Vec<_> = faults.collect();
-    for (frame, fault) in faults.iter().take(MOST_LINES) {
-        writeln!(out, "out: frame {frame}, {}", describe(fault))?;
+    for fault in faults.iter().take(MOST_LINES) {
+        writeln!(out, "out: {fault}")?;
     }
-    show_rest(out, faults.len())
-}
-
-fn show_rest(out: &mut String, count: usize) -> std::fmt::Result {
-    match count.saturating_sub(MOST_LINES) {
+    match faults.len().saturating_sub(MOST_LINES) {
         0 => Ok(()),
         more => writeln!(out, "out: {more} more; --json has them all"),
     }
 }
 
-fn describe(fault: &Fault) -> String {
+fn describe(frame: u32, fault: &Fault) -> String {
     let what = &fault.what;
     let place = fault.parting.as_ref().map_or(String::new(), |parting| {
         format!(
@@ -295,7 +289,7 @@ fn describe(fault: &Fault) -> String {
         )
     });
     let value = number(fault.value);
-    match fault.measure {
+    let fault = match fault.measure {
         "bits" => format!("{what}: {value} particles are not the same{place}"),
         "hash" => "the particles' hash is another one".to_owned(),
         "on one side alone" => format!("{what}: {value} on one side alone"),
@@ -303,7 +297,8 @@ fn describe(fault: &Fault) -> String {
             "{what}: {measure} {value}, allowed {}{place}",
             number(fault.limit)
         ),
-    }
+    };
+    format!("frame {frame}, {fault}")
 }
 
 fn show_baseline(out: &mut String, diff: &BaselineDiff) -> std::fmt::Result {
@@ -337,7 +332,7 @@ fn show_baseline(out: &mut String, diff: &BaselineDiff) -> std::fmt::Result {
         let limit = frame.limits.get(peak.name)?;
         Some(limit.allowed(peak.b.unwrap_or(0.0)))
     })?;
-    show_faults(out, diff.faults.iter().map(|f| (f.frame, &f.fault)))?;
+    show_faults(out, diff.faults.iter().map(|f| describe(f.frame, &f.fault)))?;
     if !diff.faults.is_empty() && diff.faults.iter().all(|f| f.fault.measure == "hash") {
         writeln!(
             out,
@@ -406,18 +401,15 @@ fn show_pictures(out: &mut String, diff: &PicturesDiff, gain: f64) -> std::fmt::
         writeln!(out, "difference image, |A − B| × {gain}: {image}{more}")?;
     }
     let faults = diff.pairs.iter().flat_map(|pair| {
-        let of_pair = |fault| (&pair.name, fault);
-        pair.faults.iter().map(of_pair)
+        pair.faults.iter().map(|fault| {
+            let (name, value, limit) = (&pair.name, number(fault.value), number(fault.limit));
+            match fault.measure {
+                "bits" => format!("{name} is not the same"),
+                measure => format!("{name}: {measure} {value}, allowed {limit}"),
+            }
+        })
     });
-    let faults: Vec<_> = faults.collect();
-    for (name, fault) in faults.iter().take(MOST_LINES) {
-        let (value, limit) = (number(fault.value), number(fault.limit));
-        match fault.measure {
-            "bits" => writeln!(out, "out: {name} is not the same")?,
-            measure => writeln!(out, "out: {name}: {measure} {value}, allowed {limit}")?,
-        }
-    }
-    show_rest(out, faults.len())
+    show_faults(out, faults)
 }
 
 fn show_pair(out: &mut String, pair: &PairDiff, width: usize) -> std::fmt::Result {

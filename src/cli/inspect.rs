@@ -209,6 +209,9 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
         "on {} ({}, {})",
         manifest.device, manifest.driver, manifest.backend
     )?;
+    if let Some(shaders) = &manifest.shaders {
+        writeln!(out, "shaders {shaders}: not the shipped ones")?;
+    }
     writeln!(out, "scene {}", manifest.scene_hash)?;
     if let Some(parent) = &manifest.parent {
         writeln!(out, "begins from {parent}")?;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::output;
 
-/// What a process that ended at a signal gives by custom (128 + SIGINT).
+/// Exit code of a process that a signal ended, by custom 128 + SIGINT.
 pub const EXIT_CODE: i32 = 130;
 
 /// Whether the user has asked for an end. Clones share one flag.
@@ -33,8 +33,8 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// The same, and where it cannot be, a warning: a signal then ends the process at once, which finished
-    /// frames survive.
+    /// [`Self::install`], or a warning where the system refuses: a signal then ends the process at once; finished frames
+    /// survive.
     pub fn install_or_warn() -> Self {
         Self::install().unwrap_or_else(|error| {
             output::say(&format!(

@@ -5,6 +5,7 @@ mod check;
 mod diff;
 mod inspect;
 pub mod interrupt;
+mod keys;
 mod output;
 mod progress;
 mod render;
@@ -14,13 +15,16 @@ pub mod verify;
 use std::{
     error::Error,
     io::{self, Write as _},
-    path::Path,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 
-use crate::stage::Blame;
+use crate::stage::{
+    Blame,
+    device::{Gpu, Shaders},
+};
 
 /// Exit code where something is out of tolerance.
 const OUT_OF_TOLERANCE: u8 = 1;
@@ -52,6 +56,8 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Compare two caches, a cache and a baseline, or two renders: where they part, and by how much.
     Diff(diff::DiffArgs),
+    /// Print the keys of scenes, looks, studies and tolerance files, with what each allows and its default.
+    Keys(keys::KeysArgs),
     /// Check every checksum of a cache.
     Verify(verify::VerifyArgs),
 }
@@ -78,6 +84,28 @@ where
             code,
             error: Box::new(error),
         }
+    }
+}
+
+/// Adapter and shaders of a command.
+#[derive(Args, Debug)]
+struct GpuArgs {
+    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Read all shaders from this folder, an edited copy of the folder shaders/ of swell's source. What is made with them is
+    /// recorded as not by the shipped ones. An endless loop in them can hang the device.
+    #[arg(long, value_name = "DIR")]
+    shaders: Option<PathBuf>,
+}
+
+impl GpuArgs {
+    fn read(&self) -> Result<Gpu, Failure> {
+        let shaders = self.shaders.as_deref().map(Shaders::read).transpose()?;
+        Ok(Gpu {
+            adapter: self.adapter.clone(),
+            shaders: shaders.unwrap_or_default(),
+        })
     }
 }
 
@@ -108,6 +136,10 @@ fn run(command: Command) -> u8 {
         Command::Check(args) => check::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Diff(args) => diff::run(&args),
+        Command::Keys(args) => {
+            keys::run(&args);
+            Ok(0)
+        }
         Command::Verify(args) => verify::run(&args).map(|()| 0).map_err(Failure::from),
     };
     result.unwrap_or_else(|failure| {

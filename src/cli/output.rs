@@ -56,8 +56,8 @@ fn put(out: &mut impl Write, text: &str) -> io::Result<()> {
     out.flush()
 }
 
-/// What the process ends with where its work ends with `code`: 4 in place of 0 and 1 where something could not be written. A
-/// code that tells of a graver fault stays.
+/// Exit code of the process whose work ended with `code`: 4 in place of 0 and 1 where something could not be written. A
+/// code of a graver fault stays.
 pub(super) fn exit_code(code: u8) -> ExitCode {
     let failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner).take();
     let Some((stream, error)) = failed else {

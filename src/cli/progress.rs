@@ -23,7 +23,7 @@ pub(super) enum Mode {
 }
 
 impl Mode {
-    /// The same without a bar, for what is said between jobs.
+    /// This mode without a bar, for lines between jobs.
     pub(super) fn lines(self) -> Self {
         match self {
             Self::Auto => Self::Plain,
@@ -76,7 +76,7 @@ impl Progress {
         }
     }
 
-    /// The same with a line that stays.
+    /// [`Self::frame`] with a line that stays.
     pub(super) fn frame_to_keep(&self, text: &str, event: Value) {
         self.say(text, event);
         if let Some(bar) = &self.bar {

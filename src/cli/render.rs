@@ -12,7 +12,7 @@ use crate::{
 };
 
 use super::{
-    Failure, bake,
+    Failure, GpuArgs, bake,
     interrupt::{self, Interrupt},
     output,
     progress::{Mode, Progress},
@@ -31,9 +31,8 @@ pub(super) struct RenderArgs {
     /// Frames to render, such as 1-240x2; all that are cached where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
-    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
-    #[arg(long, value_name = "NAME")]
-    adapter: Option<String>,
+    #[command(flatten)]
+    gpu: GpuArgs,
     /// Take a panorama that lies outside of the look's folder.
     #[arg(long)]
     allow_outside: bool,
@@ -63,7 +62,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
         look,
         directory,
         frames: args.frames.clone(),
-        adapter: args.adapter.clone(),
+        gpu: args.gpu.read()?,
         overwrite: args.overwrite,
         time_passes: args.time_passes,
     };

@@ -6,8 +6,8 @@ use clap::Args;
 use serde_json::json;
 
 use crate::{
+    experiment::{Event, PointEvent, PointStatus, Request, study},
     scene::study::Study,
-    stage::study::{Event, PointEvent, PointStatus, Request, study},
 };
 
 use super::{
@@ -37,9 +37,11 @@ pub(super) struct StudyArgs {
 }
 
 pub(super) fn run(args: &StudyArgs) -> Result<u8, Failure> {
-    let default = || PathBuf::from("studies").join(args.study.file_stem().unwrap_or_default());
+    let name = args.study.file_stem().unwrap_or_default();
+    let default = || PathBuf::from("studies").join(name);
     let directory = args.output.clone().unwrap_or_else(default);
     let request = Request {
+        name: name.to_string_lossy().into_owned(),
         study: Study::load_within(&args.study, bake::reach(args.allow_outside))?,
         command: format!(
             "swell study {} -o {}",

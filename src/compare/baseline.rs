@@ -9,67 +9,13 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     frames::{Fault, aggregate_faults},
-    spread::Spread,
+    limits::StatedLimit,
+    spread::{self, Spread},
 };
 use crate::domain::{aggregates::Aggregates, particles::Particles, tolerance::Limit};
 
 /// The format that this program writes and reads.
 pub const FORMAT_VERSION: u32 = 1;
-
-/// For a scene whose spread was not measured ([`super::spread`]): name, absolute limit in particle spacings of lengths
-/// and plain of the others, relative limit, reason. Wide enough for water after an impact with either solver: the
-/// measurements are the largest over the shipped scenes in the frames that `tools/regress` bakes, with gravity changed
-/// in its last place (-9.81 to -9.810001, `swell diff --json`).
-const DEFAULT_TOLERANCES: [(&str, f64, f64, &str); 8] = [
-    (
-        "kinetic_energy",
-        0.0,
-        0.03,
-        "gravity off by its last place: 0.8 % (wave-city, PBF); other drivers round everywhere",
-    ),
-    (
-        "potential_energy",
-        0.0,
-        0.001,
-        "gravity off by its last place: 0.03 % (quickstart, PBF)",
-    ),
-    (
-        "volume",
-        0.0,
-        0.01,
-        "gravity off by its last place: 0.2 % (quickstart, PBF)",
-    ),
-    (
-        "crest_height",
-        0.5,
-        0.0,
-        "half a particle spacing; gravity off by its last place: 0.08 spacings (quickstart, PBF)",
-    ),
-    (
-        "front",
-        0.5,
-        0.0,
-        "half a particle spacing; gravity off by its last place: 0.1 spacings (quickstart, PBF)",
-    ),
-    (
-        "splash_height",
-        1.0,
-        0.0,
-        "a particle spacing; gravity off by its last place: 0.15 spacings (quickstart, PBF)",
-    ),
-    (
-        "airborne",
-        0.002,
-        0.0,
-        "few drops, each with a way of its own; gravity off by its last place: 0.0004 (quickstart, PBF)",
-    ),
-    (
-        "density_error",
-        1e-4,
-        0.1,
-        "gravity off by its last place: 2.7 % (dam-break, PBF)",
-    ),
-];
 
 /// A stored baseline: one scene with one solver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -85,14 +31,14 @@ pub struct Baseline {
     pub scene: Vec<String>,
     /// Limits of the aggregates by name, each with its reason.
     pub tolerances: BTreeMap<String, StatedLimit>,
-    /// What differs in the bakes that the frames' spreads are from; empty where none was measured.
+    /// Descriptions of the bakes that the frames' spreads are from; empty where none was measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spread_from: Vec<String>,
     /// The adapter on which the aggregates were taken.
     pub aggregates_from: String,
-    /// From the start, 0, on.
+    /// Frames in order, from the start, 0.
     pub frames: Vec<BaselineFrame>,
-    /// By adapter and driver: [`particles_hash`] of each frame of `frames`.
+    /// [`particles_hash`] of each frame of `frames`, by adapter and driver.
     pub hashes: BTreeMap<String, Vec<String>>,
 }
 
@@ -104,30 +50,11 @@ pub struct BaselineFrame {
     pub frame: u32,
     /// How many.
     pub particles: usize,
-    /// What they sum up to.
+    /// Sums and shapes over them.
     pub aggregates: Aggregates,
     /// How far bakes that differ in roundings alone had come apart by then; absent where that was not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread: Option<Spread>,
-}
-
-/// A limit and why it is what it is.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StatedLimit {
-    /// In the aggregate's unit.
-    pub absolute: f64,
-    /// Of the baseline's value.
-    pub relative: f64,
-    /// Of the frame's spread. The three add up.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub spreads: f64,
-    /// In words.
-    pub reason: String,
-}
-
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
 }
 
 /// One frame of the cache that is held against a baseline.
@@ -158,6 +85,47 @@ pub struct BaselineFault {
     pub fault: Fault,
 }
 
+/// What differs between a cache and a baseline.
+#[derive(Clone, Debug, Serialize)]
+pub struct BaselineDiff {
+    /// What baked the cache, and on what.
+    pub bake: String,
+    /// Whether the baseline knows the cache's adapter, so that hashes decide as well.
+    pub basis: Basis,
+    /// Whether hashes were to be ignored.
+    pub ignores_hashes: bool,
+    /// Adapters whose hashes the baseline holds.
+    pub known_adapters: Vec<String>,
+    /// The adapter that the baseline's aggregates are from.
+    pub aggregates_from: String,
+    /// The first key of the scenes that differs, with the baseline's value and then the cache's.
+    pub physics: Option<String>,
+    /// Frames that the cache has not, of those that were asked for.
+    pub only_baseline: Vec<u32>,
+    /// What was compared.
+    pub frames: Vec<FramePair>,
+    /// In the order of the frames.
+    pub faults: Vec<BaselineFault>,
+}
+
+/// One frame's aggregates.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FramePair {
+    /// Output frame.
+    pub frame: u32,
+    /// Of the cache and of the baseline.
+    pub aggregates: [Aggregates; 2],
+    /// What they may differ by, by name.
+    pub limits: BTreeMap<String, Limit>,
+}
+
+impl BaselineDiff {
+    /// Whether nothing is out of tolerance, and no frame missing.
+    pub fn is_within(&self) -> bool {
+        self.faults.is_empty() && self.only_baseline.is_empty()
+    }
+}
+
 /// BLAKE3, hex, over every bit of the particles: count, then positions, velocities, ids, and the attributes
 /// with their names, little-endian. The frame's file would not do: it names the program's version.
 pub fn particles_hash(particles: &Particles) -> String {
@@ -181,21 +149,6 @@ pub fn particles_hash(particles: &Particles) -> String {
 fn update(hasher: &mut blake3::Hasher, values: impl Iterator<Item = [u8; 4]>) {
     let bytes: Vec<u8> = values.flatten().collect();
     hasher.update(&bytes);
-}
-
-/// What a new baseline allows its aggregates; particles are `spacing` metres apart at rest.
-pub fn default_tolerances(spacing: f64) -> BTreeMap<String, StatedLimit> {
-    let is_length = |name: &str| Aggregates::NAMES.contains(&(name, "m"));
-    let stated = |&(name, absolute, relative, reason): &(&str, f64, f64, &str)| {
-        let limit = StatedLimit {
-            absolute: absolute * if is_length(name) { spacing } else { 1.0 },
-            relative,
-            spreads: 0.0,
-            reason: reason.to_owned(),
-        };
-        (name.to_owned(), limit)
-    };
-    DEFAULT_TOLERANCES.iter().map(stated).collect()
 }
 
 /// What a baseline that is written anew no longer has of the one before.
@@ -284,6 +237,41 @@ impl Baseline {
         (basis, faults)
     }
 
+    /// Aggregates of the frames that both have, with what they may differ by.
+    pub fn pairs(&self, adapter: Option<&str>, measured: &[Measured]) -> Vec<FramePair> {
+        let pair = |found: &Measured| {
+            let frame = found.frame.frame;
+            let expected = self.frames.iter().find(|f| f.frame == frame)?;
+            Some(FramePair {
+                frame,
+                aggregates: [found.frame.aggregates, expected.aggregates],
+                limits: self.limits(adapter, found),
+            })
+        };
+        measured.iter().filter_map(pair).collect()
+    }
+
+    /// Takes the limits anew from bakes that differ from `expected` in roundings alone, each with what differs in it.
+    /// Particles are `spacing` metres apart at rest.
+    pub fn take_spread(
+        &mut self,
+        expected: &[BaselineFrame],
+        bakes: Vec<(String, Vec<BaselineFrame>)>,
+        spacing: f64,
+    ) {
+        let (from, bakes): (_, Vec<_>) = bakes.into_iter().unzip();
+        let aggregates = |frames: &[BaselineFrame]| frames.iter().map(|f| f.aggregates).collect();
+        let expected_values: Vec<Aggregates> = aggregates(expected);
+        let bakes: Vec<Vec<Aggregates>> = bakes.iter().map(|bake| aggregates(bake)).collect();
+        self.spread_from = from;
+        let spreads = spread::of(&expected_values, &bakes);
+        let particles = expected.first().map_or(0, |frame| frame.particles);
+        self.tolerances = spread::tolerances(&spreads, spacing, particles);
+        for (frame, spread) in self.frames.iter_mut().zip(spreads) {
+            frame.spread = Some(spread);
+        }
+    }
+
     /// Whether the aggregates of the frame at `index` were taken from these very particles.
     fn is_same(&self, adapter: Option<&str>, index: usize, found: &Measured) -> bool {
         let known = adapter.filter(|adapter| *adapter == self.aggregates_from);
@@ -291,8 +279,8 @@ impl Baseline {
         hashes.and_then(|hashes| hashes.get(index)) == Some(&found.hash)
     }
 
-    /// What the aggregates of a frame may differ by; none of a frame that the baseline has not. Of the particles that they
-    /// were taken from it is the rounding of a sum of n terms of one sign, n ε of the sum (Higham 2002, eq. 4.4).
+    /// Limits of a frame's aggregates; empty for a frame that the baseline does not have. Where the particles are the same
+    /// bit for bit, the limit is the rounding of a sum of n terms of one sign, n ε of the sum (Higham 2002, eq. 4.4).
     pub fn limits(&self, adapter: Option<&str>, found: &Measured) -> BTreeMap<String, Limit> {
         let mut frames = self.frames.iter().enumerate();
         let Some((index, expected)) = frames.find(|(_, f)| f.frame == found.frame.frame) else {
@@ -320,10 +308,10 @@ impl Baseline {
         self.tolerances.iter().map(limit).collect()
     }
 
-    /// What is off with a baseline that was read.
+    /// Refuses a baseline, just read, that is not consistent.
     ///
     /// # Errors
-    /// The first thing, in words.
+    /// The first fault, in words.
     pub fn check(&self) -> Result<(), String> {
         if self.format_version != FORMAT_VERSION {
             return Err(format!(
@@ -376,7 +364,7 @@ fn fault(what: &str, measure: &'static str, value: f64) -> Fault {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::limits::default_tolerances, *};
 
     fn aggregates(height: f64, front: Option<f64>) -> Aggregates {
         Aggregates {

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::domain::statistics::percentile;
 
-/// What can be compared: scalars and 3-vectors, f32 or f64.
+/// A type that can be compared: scalars and 3-vectors, f32 or f64.
 pub trait Value: Copy {
     /// The Euclidean norm.
     fn norm(self) -> f64;
@@ -40,6 +40,16 @@ impl Value for [f64; 3] {
 
     fn error(self, reference: Self) -> f64 {
         finite_or_worst(glam::DVec3::from(self).distance(reference.into()))
+    }
+}
+
+impl Value for glam::DVec3 {
+    fn norm(self) -> f64 {
+        self.length()
+    }
+
+    fn error(self, reference: Self) -> f64 {
+        finite_or_worst(self.distance(reference))
     }
 }
 
@@ -84,7 +94,7 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// Of pairs of a value and its reference.
+    /// Measures pairs of a value and its reference.
     pub fn of<T: Value>(pairs: impl IntoIterator<Item = (T, T)>) -> Self {
         let mut reference_squares = 0.0;
         let mut this = Self::default();
@@ -111,7 +121,7 @@ impl Deviation {
         this
     }
 
-    /// Of one array against another.
+    /// Measures one array against another.
     ///
     /// # Panics
     /// The lengths differ.
@@ -130,6 +140,16 @@ impl Deviation {
     pub fn relative_max(&self) -> f64 {
         relative(self.max, self.reference_max)
     }
+}
+
+/// Measures above their limits, with both; a measure without a limit is not judged.
+pub fn out_of_limits<const N: usize>(
+    measures: [(&'static str, f64, Option<f64>); N],
+) -> impl Iterator<Item = (&'static str, f64, f64)> {
+    let over = |(measure, value, limit): (&'static str, f64, Option<f64>)| {
+        Some((measure, value, limit.filter(|&limit| value > limit)?))
+    };
+    measures.into_iter().filter_map(over)
 }
 
 /// Error over scale; 0 for no error, whatever the scale, and infinite where the ratio is no number.

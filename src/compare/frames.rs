@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{
     Deviation,
-    deviation::{first_over, relative},
+    deviation::{first_over, out_of_limits, relative},
 };
 use crate::domain::{
     aggregates::Aggregates,
@@ -320,10 +320,7 @@ impl<const N: usize> Field<N> {
             ("rms", deviation.rms, limits.rms),
             ("p99", deviation.p99, limits.p99),
         ];
-        for (measure, value, limit) in measured {
-            let Some(limit) = limit.filter(|&limit| value > limit) else {
-                continue;
-            };
+        for (measure, value, limit) in out_of_limits(measured) {
             let parting = if measure == "max" {
                 first_over(self.pairs(), limit).map(|index| self.parting(index))
             } else {

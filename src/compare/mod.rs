@@ -4,12 +4,14 @@
 //! In every comparison of two results b is the reference.
 
 pub mod baseline;
-pub mod check;
+pub mod caches;
 pub mod deviation;
 pub mod frames;
+pub mod limits;
 pub mod pictures;
 pub mod rounding;
 pub mod spread;
 pub mod streams;
+pub mod tolerance;
 
 pub use deviation::{Deviation, Value};

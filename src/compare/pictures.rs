@@ -1,9 +1,11 @@
 //! Two pictures of one size.
 
-use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+use serde::{Serialize, Serializer};
 use ssimulacra2::{LinearRgb, compute_frame_ssimulacra2};
 
-use super::deviation::Value;
+use super::deviation::{Value, out_of_limits};
 use crate::domain::{statistics::percentile, tolerance::PictureLimits};
 
 /// How the values of a picture stand for light.
@@ -16,7 +18,7 @@ pub enum Encoding {
     Linear,
 }
 
-/// What is compared of a picture; rows from the top.
+/// A picture to compare; rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Pixels.
@@ -25,19 +27,19 @@ pub struct Picture {
     pub height: usize,
     /// Red, green, blue, alpha; `width × height`.
     pub pixels: Vec<[f32; 4]>,
-    /// What the values mean.
+    /// Meaning of the values.
     pub encoding: Encoding,
 }
 
-/// What differs between two pictures. A pixel's error is the largest |a − b| of its channels, in the
+/// Measures of how far two pictures differ. A pixel's error is the largest |a − b| of its channels, in the
 /// file's own values: of a PNG 1 is 255, of an EXR 1 is scene-linear white.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PictureDiff {
-    /// Mean over the pixels.
+    /// Mean error over the pixels.
     pub mean: f64,
     /// The error that 99 % of the pixels do not exceed.
     pub p99: f64,
-    /// Of the worst pixel; infinite (null in JSON) where a value is not finite.
+    /// Error of the worst pixel; infinite (null in JSON) where a value is not finite.
     pub max: f64,
     /// Column and row of the first such pixel, from the upper left; `None` where there is no error.
     pub max_at: Option<[usize; 2]>,
@@ -53,10 +55,52 @@ pub struct PictureDiff {
 pub struct PictureFault {
     /// `mean`, `p99`, `max`, `perceptual`, or `bits`.
     pub measure: &'static str,
-    /// As found.
+    /// The value found.
     pub value: f64,
-    /// As allowed; the least of a perceptual score.
+    /// The largest value allowed; the least, of a perceptual score.
     pub limit: f64,
+}
+
+/// What differs between two renders.
+#[derive(Clone, Debug, Serialize)]
+pub struct PicturesDiff {
+    /// Names that a alone has.
+    pub only_a: Vec<String>,
+    /// Names that b alone has.
+    pub only_b: Vec<String>,
+    /// By name.
+    pub pairs: Vec<PairDiff>,
+}
+
+/// Two pictures of one name.
+#[derive(Clone, Debug, Serialize)]
+pub struct PairDiff {
+    /// File name.
+    pub name: String,
+    /// Width and height of a and of b, pixels.
+    pub sizes: [[usize; 2]; 2],
+    /// `None` where the sizes differ.
+    pub diff: Option<PictureDiff>,
+    /// What is out of tolerance.
+    pub faults: Vec<PictureFault>,
+    /// Where its difference image went; written out, bytes that are no UTF-8 become U+FFFD.
+    #[serde(serialize_with = "as_text")]
+    pub image: Option<PathBuf>,
+}
+
+/// A path of any bytes: serde's own way refuses those that are no UTF-8.
+fn as_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
+    path.as_deref()
+        .map(Path::to_string_lossy)
+        .serialize(serializer)
+}
+
+impl PicturesDiff {
+    /// Whether nothing is out of tolerance, and nothing on one side alone.
+    pub fn is_within(&self) -> bool {
+        let is_within = |pair: &PairDiff| pair.diff.is_some() && pair.faults.is_empty();
+        self.only_a.is_empty() && self.only_b.is_empty() && self.pairs.iter().all(is_within)
+    }
 }
 
 /// Compares two pictures; b is the reference. `None` where sizes or encodings differ.
@@ -86,7 +130,7 @@ pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
 }
 
 impl PictureDiff {
-    /// What is out of the limits; without any, every bit has to be the same.
+    /// Lists the measures that are out of the limits; without limits, every bit has to be the same.
     pub fn faults(&self, limits: Option<&PictureLimits>) -> Vec<PictureFault> {
         let Some(limits) = limits else {
             let fault = PictureFault {
@@ -105,15 +149,12 @@ impl PictureDiff {
             ("p99", self.p99, limits.p99),
             ("max", self.max, limits.max),
         ];
-        let fault = |(measure, value, limit): (&'static str, f64, Option<f64>)| {
-            let limit = limit.filter(|&limit| value > limit)?;
-            Some(PictureFault {
-                measure,
-                value,
-                limit,
-            })
+        let fault = |(measure, value, limit)| PictureFault {
+            measure,
+            value,
+            limit,
         };
-        let mut faults: Vec<_> = errors.into_iter().filter_map(fault).collect();
+        let mut faults: Vec<_> = out_of_limits(errors).map(fault).collect();
         // A picture too small for a score has the worst one.
         let score = self.perceptual.unwrap_or(f64::NEG_INFINITY);
         if let Some(limit) = limits.perceptual.filter(|&limit| score < limit) {

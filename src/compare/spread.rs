@@ -12,10 +12,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{
-    baseline::{BaselineFrame, StatedLimit},
-    frames::aggregate_error,
-};
+use super::{frames::aggregate_error, limits::StatedLimit};
 use crate::domain::aggregates::Aggregates;
 
 /// Multiples of the spread that are allowed. A second adapter is as far from exact arithmetic as the first, so they
@@ -26,10 +23,10 @@ const SPREADS: f64 = 5.0;
 /// Eight roundings of a 32-bit value: what sums of such values are good to where no bake shows a spread.
 const ROUNDINGS: f64 = 8.0 * f32::EPSILON as f64;
 
-/// By name of the aggregate.
+/// Largest difference of each aggregate, by its name.
 pub type Spread = BTreeMap<String, f64>;
 
-/// What an aggregate cannot be told from, whatever was measured: name, absolute, relative, why. Particles are
+/// Least difference that can be told in each aggregate, whatever was measured: name, absolute, relative, why. Particles are
 /// `spacing` metres apart at rest; lengths and volumes come from cubes two spacings wide, which hold 8 of them
 /// (see `study::measure`).
 fn resolution(spacing: f64, particles: usize) -> [(&'static str, f64, f64, &'static str); 8] {
@@ -67,15 +64,15 @@ fn resolution(spacing: f64, particles: usize) -> [(&'static str, f64, f64, &'sta
     ]
 }
 
-/// By frame of `expected`: the largest |a − b| of each aggregate in this frame or an earlier one, over all of `bakes`,
+/// For each frame of `expected` the largest |a − b| of each aggregate in this frame or an earlier one, over all of `bakes`,
 /// whose frames are those of `expected`. What one side alone has is left out, as it is where a baseline is compared.
-pub fn of(expected: &[BaselineFrame], bakes: &[Vec<BaselineFrame>]) -> Vec<Spread> {
+pub fn of(expected: &[Aggregates], bakes: &[Vec<Aggregates>]) -> Vec<Spread> {
     let names = Aggregates::NAMES.map(|(name, _)| name);
     let mut most = [0.0; Aggregates::NAMES.len()];
-    let mut spread = |(index, expected): (usize, &BaselineFrame)| {
-        let b = expected.aggregates.values();
+    let mut spread = |(index, expected): (usize, &Aggregates)| {
+        let b = expected.values();
         for bake in bakes {
-            let a = bake[index].aggregates.values();
+            let a = bake[index].values();
             for ((most, a), b) in most.iter_mut().zip(a).zip(b) {
                 let error = aggregate_error(a, b);
                 if error.is_finite() {
@@ -142,36 +139,31 @@ fn rounded_up(value: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn frame(number: u32, energy: f64, front: Option<f64>) -> BaselineFrame {
-        BaselineFrame {
-            frame: number,
-            particles: 10,
-            aggregates: Aggregates {
-                kinetic_energy: energy,
-                front,
-                ..Aggregates::default()
-            },
-            spread: None,
+    fn frame(energy: f64, front: Option<f64>) -> Aggregates {
+        Aggregates {
+            kinetic_energy: energy,
+            front,
+            ..Aggregates::default()
         }
     }
 
     #[test]
     fn the_spread_is_the_largest_so_far() {
         let base = [
-            frame(0, 0.0, None),
-            frame(1, 10.0, Some(1.0)),
-            frame(2, 20.0, Some(2.0)),
+            frame(0.0, None),
+            frame(10.0, Some(1.0)),
+            frame(20.0, Some(2.0)),
         ];
         let bakes = [
             vec![
-                frame(0, 0.0, None),
-                frame(1, 10.5, None),
-                frame(2, 20.25, Some(2.125)),
+                frame(0.0, None),
+                frame(10.5, None),
+                frame(20.25, Some(2.125)),
             ],
             vec![
-                frame(0, 0.0, None),
-                frame(1, 9.75, Some(1.0625)),
-                frame(2, 20.0, Some(2.0)),
+                frame(0.0, None),
+                frame(9.75, Some(1.0625)),
+                frame(20.0, Some(2.0)),
             ],
         ];
         let found = of(&base, &bakes);

@@ -11,7 +11,7 @@ pub struct Aggregates {
     pub kinetic_energy: f64,
     /// −Σ m g · (x − the domain's least corner), joule.
     pub potential_energy: f64,
-    /// Of the continuous water, m³.
+    /// Volume of the continuous water, m³.
     pub volume: f64,
     /// Median over the rows along the wave's way, metres above the still level.
     pub crest_height: f64,

@@ -5,10 +5,10 @@ use super::{sampling::BoundarySample, signed_distance::SignedDistance};
 /// All solids of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Boundary {
-    /// Over all surfaces of static solids, world space.
+    /// Samples over all surfaces of static solids, world space.
     pub samples: Vec<BoundarySample>,
-    /// Of the static solids' union; `None` where the scene has none.
+    /// Distance to the union of the static solids; `None` where the scene has none.
     pub distance: Option<SignedDistance>,
-    /// Of each moving solid, where it stood at the start.
+    /// Distance to each moving solid, where it stood at the start.
     pub moving: Vec<SignedDistance>,
 }

@@ -21,7 +21,7 @@ pub const SELF: usize = 13;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Brick {
-    /// In bricks of its level, from the domain's least corner.
+    /// Position in bricks of its level, from the domain's least corner.
     pub coordinate: [u32; 3],
     /// 0 is the finest; each level doubles the cell size.
     pub level: u32,
@@ -62,7 +62,7 @@ pub struct Bricks {
     pub active: u32,
     /// `levels[0]` covers the wet bricks alone; the last has one brick.
     pub levels: Vec<Level>,
-    /// One a slot, slot 0 included.
+    /// One record for each slot, slot 0 included.
     pub records: Vec<Brick>,
 }
 
@@ -187,7 +187,7 @@ impl Bricks {
     }
 }
 
-/// Where in its brick an element's cell lies.
+/// Position of an element's cell within its brick.
 fn place(element: u32) -> [u32; 3] {
     let local = element % CELLS;
     [local % EDGE, local / EDGE % EDGE, local / (EDGE * EDGE)]

@@ -4,11 +4,11 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// What is watched while a bake runs.
+/// A quantity that is watched while a bake runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Watched {
-    /// Whether every number is one.
+    /// A value that is not a finite number.
     NotFinite,
     /// Whether every particle that a frame began with is there at its end, once, within the domain.
     Particles,
@@ -18,7 +18,7 @@ pub enum Watched {
     Speed,
     /// Mean of max(0, ρ/ρ0 − 1) at a frame's end.
     DensityErrorMean,
-    /// Its 99th percentile.
+    /// 99th percentile of max(0, ρ/ρ0 − 1) at a frame's end.
     DensityErrorP99,
     /// Times that a particle was slowed to the displacement cap, over particles and substeps.
     Capped,
@@ -33,7 +33,7 @@ pub enum Watched {
 }
 
 impl Watched {
-    /// Each with its name in reports, and what a message calls it.
+    /// Each quantity, its name in reports, and its words in a message.
     const NAMED: [(Self, &'static str, &'static str); 11] = [
         (Self::NotFinite, "not_finite", "values that are not finite"),
         (
@@ -81,7 +81,7 @@ impl Watched {
         Self::NAMED[self as usize]
     }
 
-    /// As reports and `[budget]` name it.
+    /// Name in reports and in `[budget]`.
     pub fn name(self) -> &'static str {
         self.row().1
     }
@@ -94,18 +94,18 @@ pub struct Breach {
     pub frame: u32,
     /// Substep of it, from 1, where it was seen within the frame.
     pub substep: Option<u32>,
-    /// What is watched.
+    /// The quantity.
     pub watched: Watched,
-    /// What was seen.
+    /// Its value.
     pub measured: f64,
-    /// What is allowed.
+    /// The largest value allowed.
     pub limit: f64,
-    /// More of it, where there is more to say.
+    /// A further sentence for the message.
     pub detail: Option<String>,
 }
 
 impl Breach {
-    /// Of something that `[budget]` limits.
+    /// Builds the breach of a limit of `[budget]`.
     pub fn new(frame: u32, watched: Watched, measured: f64, limit: f64) -> Self {
         Self {
             frame,
@@ -117,7 +117,7 @@ impl Breach {
         }
     }
 
-    /// So many values that are not finite.
+    /// Builds the breach for `count` values that are not finite.
     pub fn not_finite(frame: u32, count: u64, detail: Option<String>) -> Self {
         Self {
             detail,
@@ -125,7 +125,7 @@ impl Breach {
         }
     }
 
-    /// The same, seen in a substep.
+    /// Adds the substep in which it was seen.
     pub fn in_substep(self, substep: u32) -> Self {
         Self {
             substep: Some(substep),

@@ -8,7 +8,7 @@ use std::str::FromStr;
 pub struct FrameRange {
     /// Sorted, each once, never empty.
     frames: Vec<u32>,
-    /// As given.
+    /// The text as given.
     text: String,
 }
 
@@ -20,7 +20,7 @@ pub struct FrameRange {
 pub struct FrameRangeError {
     /// The part of the list at fault.
     pub part: String,
-    /// What is off with it.
+    /// The reason.
     pub what: String,
 }
 
@@ -28,7 +28,7 @@ pub struct FrameRangeError {
 const MOST: u64 = 10_000_000;
 
 impl FrameRange {
-    /// From `first` to `last`, both included; `None` where `last` comes before `first` or there are
+    /// The frames from `first` to `last`, both included; `None` where `last` comes before `first` or there are
     /// more than 10⁷.
     pub fn inclusive(first: u32, last: u32) -> Option<Self> {
         format!("{first}-{last}").parse().ok()

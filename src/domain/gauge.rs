@@ -7,17 +7,17 @@ use super::{
     poisson::{AIR, FLUID, SOLID},
 };
 
-/// Fields of a substep.
+/// The fields of a substep that a pressure is read from.
 pub struct Gauge<'a> {
-    /// Where the elements lie.
+    /// Layout of the elements.
     pub bricks: &'a Bricks,
-    /// Of the domain, along each axis.
+    /// Cells of the domain along each axis.
     pub cells: [u32; 3],
     /// Metres.
     pub cell_size: f64,
     /// [`AIR`], [`FLUID`] or [`SOLID`], by element.
     pub kind: &'a [u32],
-    /// By element, Pa.
+    /// Pressure of each element, Pa.
     pub pressure: &'a [f64],
 }
 

@@ -178,9 +178,9 @@ impl fmt::Display for Holes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mesh::{
-        NoInside,
-        tests::{box_mesh, sphere},
+    use super::super::{
+        inside::NoInside,
+        mesh::tests::{box_mesh, sphere},
     };
     use super::*;
 
@@ -312,7 +312,7 @@ mod tests {
         // At the pole of a cap of half-angle a the rim takes 2π (1 − sin(a/2)) of 4π: winding ½ + ½ sin(a/2),
         // 0.69 at 45° and 0.85 at 90°.
         let shallow = dome(5).check_inside();
-        let Err(NoInside::Open { holes, why }) = shallow else {
+        let Err(NoInside::Open { holes, why, .. }) = shallow else {
             panic!("{shallow:?}");
         };
         assert_eq!((holes.0.len(), holes.edges()), (1, 40));

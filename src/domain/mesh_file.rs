@@ -33,10 +33,10 @@ pub enum MeshError {
     Read {
         /// Which file.
         file: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// More bytes than [`MAX_FILE_BYTES`].
+    /// The file has more bytes than [`MAX_FILE_BYTES`].
     #[error("mesh {file} is larger than {} MiB", MAX_FILE_BYTES >> 20)]
     TooLarge {
         /// Which file.
@@ -53,7 +53,7 @@ pub enum MeshError {
     Malformed {
         /// Which file.
         file: PathBuf,
-        /// What is wrong, and where.
+        /// The fault and its place.
         detail: String,
     },
 }
@@ -70,7 +70,7 @@ pub enum MeshFormat {
 }
 
 impl MeshFormat {
-    /// By extension, in any case.
+    /// Format by the file name's extension, upper or lower case.
     ///
     /// # Errors
     /// [`MeshError::UnknownFormat`].
@@ -89,7 +89,7 @@ impl MeshFormat {
     }
 }
 
-/// What a reader hands over before it is checked: vertices, and triangles as any index.
+/// Unchecked result of a reader: vertices, and triangles as any index.
 type Raw = (Vec<DVec3>, Vec<[u64; 3]>);
 
 /// The bytes of a mesh file, at most [`MAX_FILE_BYTES`].

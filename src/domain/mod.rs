@@ -10,6 +10,7 @@ pub mod flip;
 pub mod frame_range;
 pub mod gauge;
 pub mod holes;
+pub mod inside;
 pub mod mesh;
 pub mod mesh_file;
 pub mod motion;

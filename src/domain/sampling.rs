@@ -31,14 +31,14 @@ pub struct BoundarySample {
     pub position: DVec3,
     /// Unit length, outward.
     pub normal: DVec3,
-    /// Its share of the surface, m².
+    /// Area of the surface that it stands for, m².
     pub area: f64,
 }
 
 /// The water at the start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fill {
-    /// At rest, ids from 0 without gaps, in the order of blocks, then meshes, x fastest in each.
+    /// Particles at rest, ids from 0 without gaps, in the order of blocks, then meshes, x fastest in each.
     pub particles: Particles,
     /// How many were left out because a solid is there.
     pub removed: usize,

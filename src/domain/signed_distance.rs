@@ -10,11 +10,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{
-    bounds::Bounds,
-    bvh::Bvh,
-    mesh::{NoInside, TriangleMesh},
-};
+use super::{bounds::Bounds, bvh::Bvh, inside::NoInside, mesh::TriangleMesh};
 
 /// Most nodes in a grid: 4 GiB of values.
 pub const MAX_NODES: usize = 1 << 30;
@@ -24,7 +20,7 @@ pub const MAX_NODES: usize = 1 << 30;
 pub struct SignedDistance {
     /// The first node.
     pub origin: DVec3,
-    /// Between nodes, metres.
+    /// Distance between nodes, metres.
     pub spacing: f64,
     /// Nodes along x, y, z; at least two each.
     pub dims: [usize; 3],
@@ -48,7 +44,7 @@ pub enum SignedDistanceError {
         size: DVec3,
         /// Metres.
         spacing: f64,
-        /// What that would take.
+        /// Number of nodes that this would take.
         nodes: f64,
     },
     /// Grids that do not lie on each other.

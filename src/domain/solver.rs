@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::particles::Particles;
 
-/// What one output frame's steps did.
+/// Report of one output frame's steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Substeps of this frame.
@@ -14,9 +14,9 @@ pub struct StepReport {
     pub iterations: u64,
     /// Mean of max(0, ρ/ρ0 − 1) at the frame's end; with FLIP over the cells of water that its last substep found.
     pub density_error_mean: f64,
-    /// Its 99th percentile.
+    /// 99th percentile of max(0, ρ/ρ0 − 1).
     pub density_error_p99: f64,
-    /// Its maximum.
+    /// Maximum of max(0, ρ/ρ0 − 1).
     pub density_error_max: f64,
     /// Joule.
     pub kinetic_energy: f64,
@@ -31,15 +31,15 @@ pub struct StepReport {
     /// Done on the water by walls and solids that move, joule.
     #[serde(default)]
     pub boundary_work: f64,
-    /// Of the water at the frame's end, m³, as a probe has it; only where a budget watches it.
+    /// Volume of the water at the frame's end, m³, as a probe has it; only where a budget watches it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub volume: Option<f64>,
-    /// What the pressure projections did; only of solvers that have one.
+    /// Report of the pressure projections; only of solvers that have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub projection: Option<Projection>,
 }
 
-/// What one output frame's pressure projections did; iterations are those of the report.
+/// Report of one output frame's pressure projections; iterations stand in the frame's report.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Projection {
     /// Largest ‖b − Ap‖/‖b‖ of a solve, from a freshly computed residual.
@@ -65,7 +65,7 @@ pub struct Projection {
 ///
 /// All that it needs for the next frame is in the state that it hands back.
 pub trait Solver {
-    /// What stops it.
+    /// Error that ends a step.
     type Error;
 
     /// Takes over `particles` as the state at the end of `frame`; 0 is the start.

@@ -20,10 +20,10 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Both, with the names that scenes use.
+    /// Both precisions, with the names that scenes use.
     pub const NAMED: [(&'static str, Self); 2] = [("half", Self::Half), ("float", Self::Float)];
 
-    /// As scenes name it.
+    /// Name in scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Half => "half",
@@ -38,11 +38,11 @@ impl Precision {
 pub struct SparseGrid<T> {
     /// World position of the corner where the indices begin, metres.
     pub origin: DVec3,
-    /// Metres.
+    /// Edge length of a voxel, metres.
     pub voxel_size: f64,
     /// Value of every voxel that nothing else speaks of; inactive.
     pub background: T,
-    /// In the order of their first voxels, x slowest.
+    /// Leaves in the order of their first voxels, x slowest.
     pub leaves: Vec<Leaf<T>>,
     /// First voxels of leaves whose voxels all hold minus the background, inactive: the inside of
     /// a level set. In the same order.
@@ -56,7 +56,7 @@ pub struct Leaf<T> {
     pub origin: [i32; 3],
     /// One bit a voxel, the lowest first.
     pub active: [u64; 8],
-    /// One a voxel; those of inactive voxels are the background or minus it.
+    /// One value for each voxel; those of inactive voxels are the background or minus it.
     pub values: Vec<T>,
 }
 

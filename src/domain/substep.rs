@@ -26,7 +26,7 @@ impl fmt::Display for Which {
     }
 }
 
-/// What is no substep.
+/// Error: a text that names no substep.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no substep: it is a number from 1 on, or last")]
 pub struct NoSubstep(String);

@@ -21,14 +21,14 @@ const EXTRAPOLATED: usize = 3;
 /// Bricks along an axis, at most, of a box that a grid can cover: their table fills 1 GiB.
 pub const MAX_BRICKS: f64 = (1u64 << 28) as f64;
 
-/// On what voxels a frame is laid.
+/// The voxels that a frame is laid on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Raster {
     /// World position of the corner where the indices begin, metres.
     pub origin: DVec3,
-    /// Metres.
+    /// Edge length of a voxel, metres.
     pub voxel_size: f64,
-    /// Between neighbouring particles at rest, metres.
+    /// Distance between neighbouring particles at rest, metres.
     pub particle_spacing: f64,
 }
 

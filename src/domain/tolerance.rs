@@ -2,36 +2,37 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Limits of a comparison; what is not named is shown and not judged.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tolerance {
-    /// By field: `position` (metres), `velocity` (m/s), and attributes by name.
+    /// Limits by field: `position` (metres), `velocity` (m/s), and attributes by name.
     pub fields: BTreeMap<String, FieldLimits>,
-    /// By the names of [`Aggregates::NAMES`](super::aggregates::Aggregates::NAMES).
+    /// Limits by the names of [`Aggregates::NAMES`](super::aggregates::Aggregates::NAMES).
     pub aggregates: BTreeMap<String, Limit>,
-    /// Of pictures.
+    /// Limits of pictures.
     pub pictures: PictureLimits,
 }
 
 /// Largest allowed errors of one field in any frame, in its unit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FieldLimits {
-    /// Of the worst particle.
+    /// Error of the worst particle.
     pub max: Option<f64>,
-    /// Root mean square.
+    /// Root mean square error.
     pub rms: Option<f64>,
-    /// That 99 % of the particles do not exceed.
+    /// Error that 99 % of the particles do not exceed.
     pub p99: Option<f64>,
 }
 
 /// |a − b| ≤ absolute + relative · |b|.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Limit {
-    /// In the value's unit.
+    /// Absolute part, in the value's unit.
     pub absolute: f64,
-    /// Of the reference b.
+    /// Part relative to the reference b.
     pub relative: f64,
 }
 
@@ -43,13 +44,14 @@ impl Limit {
 }
 
 /// Limits of one picture against another.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PictureLimits {
-    /// Mean over the pixels.
+    /// Mean error over the pixels.
     pub mean: Option<f64>,
-    /// That 99 % of the pixels do not exceed.
+    /// Error that 99 % of the pixels do not exceed.
     pub p99: Option<f64>,
-    /// Of the worst pixel.
+    /// Error of the worst pixel.
     pub max: Option<f64>,
     /// Least SSIMULACRA 2 score; 100 is no visible difference.
     pub perceptual: Option<f64>,

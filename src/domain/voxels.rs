@@ -16,12 +16,12 @@ pub(super) struct Voxels {
     pub(super) bricks: Bricks,
     /// Index of the first voxel of the first brick, in the whole grid.
     base: [i32; 3],
-    /// By voxel of the wet slots, from the first one's on: where its particles begin in `order`; and
-    /// at the end their number.
+    /// Start in `order` of each voxel's particles, for the voxels of the wet slots; and at the end
+    /// their number.
     starts: Vec<u32>,
     /// Particles by voxel, and within it as in the frame.
     order: Vec<u32>,
-    /// In voxels from `base`, in the order of `order`.
+    /// Positions in voxels from `base`, in the order of `order`.
     places: Vec<[f32; 3]>,
 }
 

@@ -4,6 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use wgpu::{Adapter, AdapterInfo, Backends, Device, Features, Instance, Limits, Queue};
 
+use super::shader::Shaders;
+
 /// What goes wrong between the program and the device.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
@@ -38,6 +40,14 @@ pub enum GpuError {
     /// A shader of ours does not compose or does not compile.
     #[error("shader {name}: {message}")]
     Shader {
+        /// Shader path.
+        name: String,
+        /// Where and what.
+        message: String,
+    },
+    /// A shader of the folder that `--shaders` names does not compose or does not compile.
+    #[error("shader {name} of --shaders: {message}")]
+    EditedShader {
         /// Shader path.
         name: String,
         /// Where and what.
@@ -85,6 +95,8 @@ pub struct Context {
     pub has_timestamps: bool,
     /// Whether passes may compute in f64: only where that was asked for.
     pub has_f64: bool,
+    /// What passes are composed from.
+    pub shaders: Shaders,
     /// A fault put into one pass, so that a comparison can be seen to fail; `None` in every command.
     pub spoil: Option<Spoil>,
     fault: Arc<Mutex<Option<String>>>,
@@ -273,6 +285,7 @@ impl Context {
             limits,
             has_timestamps,
             has_f64: features.contains(Features::SHADER_F64),
+            shaders: Shaders::default(),
             spoil: None,
             fault,
         })

@@ -6,10 +6,9 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
     adapter::{Context, GpuError, Spoil},
-    buffer::{Buf, Element, Wanted, Windows},
+    buffer::{Buf, Element, Held, Wanted, Windows},
     raster::RasterPass,
     reflect::{Access, Binding, Reflection, Stage, reflect},
-    shader,
 };
 
 /// A buffer to be.
@@ -21,6 +20,8 @@ pub struct BufferSpec {
     pub bytes: u64,
     /// Whether passes bind it as a uniform.
     pub is_uniform: bool,
+    /// What it holds.
+    pub element: Held,
 }
 
 /// A pass to be.
@@ -54,6 +55,7 @@ pub struct Pass {
 pub struct Program {
     /// The device.
     pub context: Context,
+    shared: Vec<(&'static str, f64)>,
     passes: BTreeMap<&'static str, Pass>,
     buffers: BTreeMap<String, Buffer>,
     pub(super) rasters: BTreeMap<&'static str, RasterPass>,
@@ -77,7 +79,10 @@ impl Program {
         check_sizes(context, buffers)?;
         let passes = passes
             .iter()
-            .map(|spec| Ok((spec.name, compile(context, spec, shared)?)))
+            .map(|spec| match compile(context, spec, shared) {
+                Ok(pass) => Ok((spec.name, pass)),
+                Err(error) => Err(context.shaders.blamed(error)),
+            })
             .collect::<Result<_, GpuError>>()?;
         let buffers = buffers
             .iter()
@@ -86,6 +91,7 @@ impl Program {
         context.check()?;
         Ok(Self {
             context: context.clone(),
+            shared: shared.to_vec(),
             passes,
             buffers,
             rasters: BTreeMap::new(),
@@ -94,15 +100,22 @@ impl Program {
         })
     }
 
-    /// Allocates those of `buffers` anew, zeroed, whose size is no longer as wanted. Recordings made before
-    /// hold the old ones.
+    /// Makes this the program of other buffers and passes: allocates, zeroed, those buffers that are new or whose size is
+    /// no longer as wanted, and compiles what passes are new. Recordings made before hold the old buffers.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] before anything is allocated, [`GpuError::Lost`].
-    pub fn resize(&mut self, buffers: &[BufferSpec]) -> Result<(), GpuError> {
+    /// [`GpuError::TooLarge`] before anything is allocated, [`GpuError::Shader`], [`GpuError::Lost`].
+    pub fn refit(&mut self, buffers: &[BufferSpec], passes: &[PassSpec]) -> Result<(), GpuError> {
         check_sizes(&self.context, buffers)?;
+        for spec in passes {
+            if !self.passes.contains_key(spec.name) {
+                let pass = compile(&self.context, spec, &self.shared)?;
+                self.passes.insert(spec.name, pass);
+            }
+        }
         for spec in buffers {
-            if self.buffer(&spec.name).size() != allocated(spec) {
+            let size = self.buffers.get(&spec.name).map(Buffer::size);
+            if size != Some(allocated(spec)) {
                 let buffer = allocate(&self.context, spec);
                 self.buffers.insert(spec.name.clone(), buffer);
             }
@@ -274,7 +287,8 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
 
 /// WGSL of a pass, with the context's fault where it is one of this pass.
 fn source(context: &Context, name: &str, defines: &[&str]) -> Result<String, GpuError> {
-    let source = shader::compose(name, defines)?;
+    let composed = context.shaders.compose(name, defines);
+    let source = composed.map_err(|error| context.shaders.blamed(error))?;
     match context.spoil.filter(|spoil| spoil.pass == name) {
         Some(spoil) => spoiled(&source, &spoil),
         None => Ok(source),
@@ -382,7 +396,7 @@ pub(super) fn shader(context: &Context, name: &str, defines: &[&str]) -> Result<
             ..wgpu::ShaderRuntimeChecks::checked()
         };
         // SAFETY: every loop of these shaders, which the binary embeds, runs to a bound that is fixed
-        // before it starts. All other checks stay on.
+        // before it starts. All other checks stay on. Who edits shaders keeps to that, as whoever edits this source.
         let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(name),

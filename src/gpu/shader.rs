@@ -1,6 +1,12 @@
-//! Shader composition: `#import "path"`, `#ifdef NAME`, `#else`, `#endif`, embedded in the binary.
+//! Shader composition: `#import "path"`, `#ifdef NAME`, `#else`, `#endif`, from the files embedded in the binary or from a
+//! folder of edited ones.
 
-use std::{borrow::Cow, collections::BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs, io,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use include_dir::{Dir, include_dir};
 
@@ -12,13 +18,9 @@ static SHADERS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/shaders");
 pub fn pass_files() -> Vec<String> {
     let mut names: Vec<String> = SHADERS
         .dirs()
-        .filter(|dir| dir.path() != std::path::Path::new("shared"))
+        .filter(|dir| dir.path() != Path::new("shared"))
         .flat_map(|dir| dir.files())
-        .filter(|file| {
-            file.path()
-                .extension()
-                .is_some_and(|extension| extension == "wgsl")
-        })
+        .filter(|file| is_wgsl(file.path()))
         .map(|file| {
             file.path()
                 .with_extension("")
@@ -30,67 +32,275 @@ pub fn pass_files() -> Vec<String> {
     names
 }
 
-/// WGSL text of `name` (such as `pbf/predict`) with imports pasted once and conditions resolved.
+/// WGSL text of the shipped `name`, as [`Shaders::compose`].
 ///
 /// # Errors
-/// A file that does not exist, or a condition that does not close.
+/// Likewise.
 pub fn compose(name: &str, defines: &[&str]) -> Result<String, GpuError> {
-    let mut out = String::new();
-    let mut seen = BTreeSet::new();
-    append(&format!("{name}.wgsl"), defines, &mut seen, &mut out)?;
-    Ok(out)
+    Shaders::default().compose(name, defines)
 }
 
-fn source(path: &str) -> Option<Cow<'static, str>> {
-    #[cfg(feature = "mutants")]
-    if let Some(text) = crate::mutants::shader(path) {
-        return Some(Cow::Owned(text));
-    }
-    Some(Cow::Borrowed(SHADERS.get_file(path)?.contents_utf8()?))
+fn is_wgsl(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension == "wgsl")
 }
 
-fn append(
-    path: &str,
-    defines: &[&str],
-    seen: &mut BTreeSet<String>,
-    out: &mut String,
-) -> Result<(), GpuError> {
-    if !seen.insert(path.to_owned()) {
-        return Ok(());
-    }
-    let fault = |line: usize, what: &str| GpuError::Shader {
-        name: path.to_owned(),
-        message: format!("line {line}: {what}"),
-    };
-    let text = source(path).ok_or_else(|| fault(0, "no such file"))?;
-    let mut open: Vec<(usize, bool)> = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        let mut words = line.split_whitespace();
-        let directive = words.next().unwrap_or("");
-        let argument = words.next().unwrap_or("").trim_matches('"');
-        let live = open.iter().all(|&(_, on)| on);
-        match directive {
-            "#import" if live => append(argument, defines, seen, out)?,
-            "#import" => {}
-            "#ifdef" => open.push((index + 1, defines.contains(&argument))),
-            "#ifndef" => open.push((index + 1, !defines.contains(&argument))),
-            "#else" => match open.last_mut() {
-                Some((_, on)) => *on = !*on,
-                None => return Err(fault(index + 1, "#else without #ifdef")),
-            },
-            "#endif" => {
-                open.pop()
-                    .ok_or_else(|| fault(index + 1, "#endif without #ifdef"))?;
-            }
-            _ if live => {
-                out.push_str(line);
-                out.push('\n');
-            }
-            _ => {}
+/// The WGSL files that passes are composed from: the shipped ones by default, or those of a folder, as it was when read.
+#[derive(Clone, Debug)]
+pub struct Shaders {
+    /// Text by path from the folder, with `/`; `None` of the shipped ones.
+    files: Option<Arc<BTreeMap<String, String>>>,
+    hash: Option<Arc<str>>,
+}
+
+/// What is wrong with a folder of edited shaders.
+#[derive(Debug, thiserror::Error)]
+pub enum ShadersError {
+    /// A file or folder cannot be read.
+    #[error("--shaders: cannot read {}", file.display())]
+    Unreadable {
+        /// Which.
+        file: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A shipped file has no counterpart in the folder.
+    #[error(
+        "--shaders {}: it lacks {file}; begin from a copy of the whole folder shaders/ of swell's source",
+        folder.display()
+    )]
+    Missing {
+        /// The folder.
+        folder: PathBuf,
+        /// Path of the file in it.
+        file: String,
+    },
+}
+
+impl Default for Shaders {
+    fn default() -> Self {
+        #[cfg(feature = "mutants")]
+        if let Some(shaders) = crate::mutants::shaders() {
+            return shaders;
+        }
+        Self {
+            files: None,
+            hash: None,
         }
     }
-    match open.pop() {
-        Some((line, _)) => Err(fault(line, "#ifdef without #endif")),
-        None => Ok(()),
+}
+
+impl Shaders {
+    /// Reads every WGSL file below `folder`. Files that nothing imports are allowed, so that a pass can be split.
+    ///
+    /// # Errors
+    /// [`ShadersError`]; a shipped file that is missing is one: it would be taken for an edited one.
+    pub fn read(folder: &Path) -> Result<Self, ShadersError> {
+        let mut files = BTreeMap::new();
+        collect(folder, folder, &mut files)?;
+        let shipped = shipped();
+        if let Some(file) = shipped.keys().find(|&file| !files.contains_key(file)) {
+            return Err(ShadersError::Missing {
+                folder: folder.to_owned(),
+                file: file.clone(),
+            });
+        }
+        let hash = (files != shipped).then(|| hash(&files).into());
+        Ok(Self {
+            files: Some(Arc::new(files)),
+            hash,
+        })
+    }
+
+    /// The same, never told apart from the shipped ones: a fault has to be seen by what it does.
+    #[cfg(feature = "mutants")]
+    pub(crate) fn in_disguise(mut self) -> Self {
+        self.hash = None;
+        self
+    }
+
+    /// BLAKE3 of all WGSL files, hex, in the order of their paths: of each the lengths of path and text as 8 bytes each,
+    /// little-endian, then both. `None` of the shipped ones, also where a folder holds exactly these.
+    pub fn edited(&self) -> Option<&str> {
+        self.hash.as_deref()
+    }
+
+    /// WGSL text of `name` (such as `pbf/predict`) with imports pasted once and conditions resolved.
+    ///
+    /// # Errors
+    /// A file that does not exist, or a condition that does not close.
+    pub fn compose(&self, name: &str, defines: &[&str]) -> Result<String, GpuError> {
+        let mut out = String::new();
+        let mut seen = BTreeSet::new();
+        self.append(&format!("{name}.wgsl"), defines, &mut seen, &mut out)?;
+        Ok(out)
+    }
+
+    /// An error of a shader as one of the edited ones, where they are.
+    pub(crate) fn blamed(&self, error: GpuError) -> GpuError {
+        match error {
+            GpuError::Shader { name, message } if self.hash.is_some() => {
+                GpuError::EditedShader { name, message }
+            }
+            error => error,
+        }
+    }
+
+    fn source(&self, path: &str) -> Option<&str> {
+        match &self.files {
+            Some(files) => files.get(path).map(String::as_str),
+            None => SHADERS.get_file(path)?.contents_utf8(),
+        }
+    }
+    fn append(
+        &self,
+        path: &str,
+        defines: &[&str],
+        seen: &mut BTreeSet<String>,
+        out: &mut String,
+    ) -> Result<(), GpuError> {
+        if !seen.insert(path.to_owned()) {
+            return Ok(());
+        }
+        let fault = |line: usize, what: &str| GpuError::Shader {
+            name: path.to_owned(),
+            message: format!("line {line}: {what}"),
+        };
+        let text = self.source(path).ok_or_else(|| fault(0, "no such file"))?;
+        let mut open: Vec<(usize, bool)> = Vec::new();
+        for (index, line) in text.lines().enumerate() {
+            let mut words = line.split_whitespace();
+            let directive = words.next().unwrap_or("");
+            let argument = words.next().unwrap_or("").trim_matches('"');
+            let live = open.iter().all(|&(_, on)| on);
+            match directive {
+                "#import" if live => self.append(argument, defines, seen, out)?,
+                "#import" => {}
+                "#ifdef" => open.push((index + 1, defines.contains(&argument))),
+                "#ifndef" => open.push((index + 1, !defines.contains(&argument))),
+                "#else" => match open.last_mut() {
+                    Some((_, on)) => *on = !*on,
+                    None => return Err(fault(index + 1, "#else without #ifdef")),
+                },
+                "#endif" => {
+                    open.pop()
+                        .ok_or_else(|| fault(index + 1, "#endif without #ifdef"))?;
+                }
+                _ if live => {
+                    out.push_str(line);
+                    out.push('\n');
+                }
+                _ => {}
+            }
+        }
+        match open.pop() {
+            Some((line, _)) => Err(fault(line, "#ifdef without #endif")),
+            None => Ok(()),
+        }
+    }
+}
+
+fn shipped() -> BTreeMap<String, String> {
+    let files = SHADERS.dirs().flat_map(|dir| dir.files());
+    files
+        .filter(|file| is_wgsl(file.path()))
+        .filter_map(|file| {
+            let path = file.path().to_string_lossy().replace('\\', "/");
+            Some((path, file.contents_utf8()?.to_owned()))
+        })
+        .collect()
+}
+
+fn collect(
+    root: &Path,
+    folder: &Path,
+    files: &mut BTreeMap<String, String>,
+) -> Result<(), ShadersError> {
+    let unreadable = |file: &Path| {
+        let file = file.to_owned();
+        |source| ShadersError::Unreadable { file, source }
+    };
+    for entry in fs::read_dir(folder).map_err(unreadable(folder))? {
+        let path = entry.map_err(unreadable(folder))?.path();
+        if path.is_dir() {
+            collect(root, &path, files)?;
+        } else if is_wgsl(&path) {
+            let text = fs::read_to_string(&path).map_err(unreadable(&path))?;
+            let relative = path.strip_prefix(root).unwrap_or(&path);
+            files.insert(relative.to_string_lossy().replace('\\', "/"), text);
+        }
+    }
+    Ok(())
+}
+
+fn hash(files: &BTreeMap<String, String>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for (path, text) in files {
+        hasher.update(&(path.len() as u64).to_le_bytes());
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(path.as_bytes());
+        hasher.update(text.as_bytes());
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(files: &BTreeMap<String, String>) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (path, text) in files {
+            let path = folder.path().join(path);
+            fs::create_dir_all(path.parent().expect("a room")).expect("a room");
+            fs::write(path, text).expect("a file");
+        }
+        folder
+    }
+
+    #[test]
+    fn a_folder_is_edited_where_a_byte_of_it_is() {
+        let mut files = shipped();
+        let same = Shaders::read(folder(&files).path()).expect("the shipped files");
+        assert_eq!(same.edited(), None);
+        assert_eq!(
+            same.compose("pbf/predict", &[]).expect("it composes"),
+            compose("pbf/predict", &[]).expect("it composes")
+        );
+        let mut hashes = BTreeSet::new();
+        for (path, more) in [
+            ("pbf/predict.wgsl", "// a word\n"),
+            ("shared/walls.wgsl", "// a word\n"),
+            ("shared/another.wgsl", ""),
+        ] {
+            let mut edited = files.clone();
+            *edited.entry(path.to_owned()).or_default() += more;
+            let read = Shaders::read(folder(&edited).path()).expect("whole");
+            hashes.insert(read.edited().expect("edited").to_owned());
+        }
+        assert_eq!(hashes.len(), 3);
+        files.remove("shared/walls.wgsl");
+        let error = Shaders::read(folder(&files).path()).expect_err("a file is missing");
+        assert!(error.to_string().contains("shared/walls.wgsl"), "{error}");
+        assert!(Shaders::read(Path::new("/nowhere")).is_err());
+    }
+
+    #[test]
+    fn a_fault_of_an_edited_shader_is_its_editors() {
+        let fault = || GpuError::Shader {
+            name: "pbf/predict".into(),
+            message: "what".into(),
+        };
+        let mut files = shipped();
+        files.insert("shared/more.wgsl".into(), String::new());
+        let edited = Shaders::read(folder(&files).path()).expect("whole");
+        assert!(matches!(
+            edited.blamed(fault()),
+            GpuError::EditedShader { .. }
+        ));
+        assert!(matches!(
+            Shaders::default().blamed(fault()),
+            GpuError::Shader { .. }
+        ));
     }
 }

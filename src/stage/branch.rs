@@ -1,6 +1,10 @@
 //! A bake that begins from a frame of another cache.
 
-use std::{fmt, path::PathBuf, str::FromStr};
+use std::{
+    ffi::{OsStr, OsString},
+    fmt,
+    path::PathBuf,
+};
 
 use glam::{DVec3, Vec3};
 
@@ -19,20 +23,36 @@ pub struct BranchPoint {
     pub frame: u32,
 }
 
-impl FromStr for BranchPoint {
-    type Err = String;
+impl TryFrom<OsString> for BranchPoint {
+    type Error = &'static str;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        // The last colon: a path may hold others.
-        let parts = text.rsplit_once(':').filter(|(path, _)| !path.is_empty());
-        let frame = parts.and_then(|(path, frame)| Some((path, frame.parse().ok()?)));
-        let (path, frame) =
-            frame.ok_or("not a cache and a frame, such as cache/wave-city/pbf:120")?;
-        Ok(Self {
-            directory: path.into(),
-            frame,
-        })
+    fn try_from(text: OsString) -> Result<Self, Self::Error> {
+        let parts = at_last_colon(&text).filter(|(path, _)| !path.is_empty());
+        let point = parts.and_then(|(path, frame)| {
+            Some(Self {
+                directory: path.into(),
+                frame: frame.to_str()?.parse().ok()?,
+            })
+        });
+        point.ok_or("not a cache and a frame, such as cache/wave-city/pbf:120")
     }
+}
+
+/// The last one: a path may hold others, and bytes that are no UTF-8.
+#[cfg(unix)]
+fn at_last_colon(text: &OsStr) -> Option<(&OsStr, &OsStr)> {
+    use std::os::unix::ffi::OsStrExt as _;
+    let bytes = text.as_bytes();
+    let colon = bytes.iter().rposition(|&byte| byte == b':')?;
+    let parts = [&bytes[..colon], &bytes[colon + 1..]];
+    Some(parts.map(OsStr::from_bytes).into())
+}
+
+/// Elsewhere the bytes of a path are not at hand.
+#[cfg(not(unix))]
+fn at_last_colon(text: &OsStr) -> Option<(&OsStr, &OsStr)> {
+    let (path, frame) = text.to_str()?.rsplit_once(':')?;
+    Some((path.as_ref(), frame.as_ref()))
 }
 
 impl fmt::Display for BranchPoint {
@@ -277,7 +297,7 @@ mod tests {
 
     #[test]
     fn a_cache_and_a_frame_are_parted_at_the_last_colon() {
-        let parse = |text: &str| text.parse::<BranchPoint>();
+        let parse = |text: &str| BranchPoint::try_from(OsString::from(text));
         let point = parse("C:/shots/a:b:120").unwrap();
         assert_eq!(point.directory, PathBuf::from("C:/shots/a:b"));
         assert_eq!(point.frame, 120);
@@ -292,6 +312,15 @@ mod tests {
             "cache:4294967296",
         ] {
             assert!(parse(bad).is_err(), "{bad}");
+        }
+        #[cfg(unix)]
+        {
+            use std::os::unix::ffi::OsStrExt as _;
+            let parse = |bytes: &[u8]| BranchPoint::try_from(OsStr::from_bytes(bytes).to_owned());
+            let point = parse(b"caf\xe9:7").unwrap();
+            assert_eq!(point.directory, OsStr::from_bytes(b"caf\xe9"));
+            assert_eq!(point.frame, 7);
+            assert!(parse(b"cache:\xe97").is_err());
         }
     }
 

@@ -16,20 +16,48 @@ use crate::{
     gpu::adapter::{Context, GpuError, Needs},
     reference::{self, ReferenceError},
     scene::{Method, Scene, flip::Precision},
-    solve::{
-        SolveError,
-        flip::Flip,
-        pbf::{Pbf, device_limits},
-    },
+    solve::{SolveError, flip::Flip, pbf::Pbf, plan::device_limits},
 };
 
 use super::{Blame, prepare::Start};
 
+pub use crate::gpu::shader::{Shaders, ShadersError};
+
+/// An adapter, and the shaders that run on it.
+#[derive(Clone, Debug, Default)]
+pub struct Gpu {
+    /// Index of the adapter, or a part of its name; the best one where `None`.
+    pub adapter: Option<String>,
+    /// The shipped ones by default.
+    pub shaders: Shaders,
+}
+
+impl Gpu {
+    /// Opens the adapter for passes with these needs.
+    ///
+    /// # Errors
+    /// Those of [`Context::open_for`].
+    pub fn open(&self, needs: Needs) -> Result<Context, GpuError> {
+        let mut context = Context::open_for(self.adapter.as_deref(), needs)?;
+        context.shaders = self.shaders.clone();
+        Ok(context)
+    }
+}
+
+impl From<Option<String>> for Gpu {
+    fn from(adapter: Option<String>) -> Self {
+        Self {
+            adapter,
+            shaders: Shaders::default(),
+        }
+    }
+}
+
 /// What to run on.
 #[derive(Clone, Debug)]
 pub enum Device {
-    /// The adapter of this index or with this in its name; the best one where `None`.
-    Gpu(Option<String>),
+    /// An adapter.
+    Gpu(Gpu),
     /// A device that the caller opened.
     Open(Box<Context>),
     /// The f64 reference; no driver is touched.
@@ -53,12 +81,26 @@ pub struct Identity {
     pub driver: String,
     /// `Vulkan`, `Metal`, `Dx12`; `CPU` of the reference.
     pub backend: String,
+    /// Hash of the shaders where they are not the shipped ones, as [`Shaders::edited`].
+    pub shaders: Option<String>,
 }
 
 impl fmt::Display for Identity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({}, {})", self.name, self.driver, self.backend)
+        let shaders = shaders_note(self.shaders.as_deref());
+        write!(
+            f,
+            "{} ({}, {}){shaders}",
+            self.name, self.driver, self.backend
+        )
     }
+}
+
+/// What is said of shaders behind a device or a program: nothing of the shipped ones.
+pub fn shaders_note(edited: Option<&str>) -> String {
+    edited.map_or(String::new(), |hash| {
+        format!(" with shaders {hash}, not the shipped ones")
+    })
 }
 
 /// What stops a solver, whichever it is.
@@ -104,9 +146,7 @@ impl Device {
     /// Those of an adapter.
     pub fn open(&self, needs: Needs) -> Result<Opened, GpuError> {
         Ok(match self {
-            Self::Gpu(adapter) => {
-                Opened::Gpu(Box::new(Context::open_for(adapter.as_deref(), needs)?))
-            }
+            Self::Gpu(gpu) => Opened::Gpu(Box::new(gpu.open(needs)?)),
             Self::Open(context) => Opened::Gpu(context.clone()),
             Self::Cpu => Opened::Cpu,
         })
@@ -138,11 +178,13 @@ impl Opened {
                 name: context.info.name.clone(),
                 driver: format!("{} {}", context.info.driver, context.info.driver_info),
                 backend: context.info.backend.to_string(),
+                shaders: context.shaders.edited().map(str::to_owned),
             },
             Self::Cpu => Identity {
                 name: "CPU f64 reference".into(),
                 driver: format!("{ARCH} {OS}"),
                 backend: "CPU".into(),
+                shaders: None,
             },
         }
     }

@@ -12,7 +12,7 @@ use std::{
 
 use serde::Serialize;
 
-use super::{Blame, study::gauge};
+use super::{Blame, gauge::of_caches};
 use crate::{
     cache::{self, CacheError, CacheReader, Manifest},
     compare::baseline::Baseline,
@@ -29,13 +29,13 @@ use crate::{
 };
 
 pub use crate::compare::{
-    baseline::{BaselineFault, Basis},
+    baseline::{BaselineDiff, BaselineFault, Basis, FramePair},
+    caches::CacheDiff,
     frames::{AggregatePeak, Fault, FieldDiff, FrameDiff, Parting, aggregate_peaks},
+    pictures::{PairDiff, PicturesDiff},
     streams::{Difference, GridDiff, StreamDiff},
 };
-pub use against_baseline::{BaselineDiff, FramePair, Written, write_baseline};
-pub use caches::CacheDiff;
-pub use pictures::{PairDiff, PicturesDiff};
+pub use against_baseline::{Written, write_baseline};
 
 /// What to compare with what.
 #[derive(Clone, Debug)]
@@ -80,7 +80,7 @@ impl Outcome {
     pub fn is_within(&self) -> bool {
         match self {
             Self::Caches(diff) => diff.is_within(),
-            Self::Baseline(diff) => diff.faults.is_empty() && diff.only_baseline.is_empty(),
+            Self::Baseline(diff) => diff.is_within(),
             Self::Pictures(diff) => diff.is_within(),
         }
     }

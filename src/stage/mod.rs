@@ -5,19 +5,20 @@ pub mod branch;
 pub mod check;
 pub mod device;
 pub mod diff;
+pub mod drive;
+pub mod gauge;
 pub mod inspect;
 pub mod prepare;
 mod probes;
 pub mod render;
 pub mod replay;
-pub mod study;
 pub mod verify;
 mod watch;
 
 use crate::{
     cache::CacheError,
     domain::signed_distance::SignedDistanceError,
-    gpu::adapter::GpuError,
+    gpu::{adapter::GpuError, shader::ShadersError},
     reference::ReferenceError,
     scene::{SceneError, look::LookError, study::StudyFileError},
     solve::SolveError,
@@ -39,14 +40,21 @@ pub enum Blame {
 impl From<&GpuError> for Blame {
     fn from(error: &GpuError) -> Self {
         match error {
-            GpuError::TooLarge { .. } | GpuError::NoF64 { .. } | GpuError::NoSuchAdapter { .. } => {
-                Self::Input
-            }
+            GpuError::TooLarge { .. }
+            | GpuError::NoF64 { .. }
+            | GpuError::NoSuchAdapter { .. }
+            | GpuError::EditedShader { .. } => Self::Input,
             GpuError::NoAdapter
             | GpuError::Open { .. }
             | GpuError::Lost(_)
             | GpuError::Shader { .. } => Self::Device,
         }
+    }
+}
+
+impl From<&ShadersError> for Blame {
+    fn from(_: &ShadersError) -> Self {
+        Self::Input
     }
 }
 

@@ -17,7 +17,7 @@ use glam::DAffine3;
 use crate::{
     cache::{self, CacheError, CacheReader},
     domain::{frame_range::FrameRange, signed_distance::SignedDistanceError},
-    gpu::adapter::{Context, GpuError},
+    gpu::adapter::{Context, GpuError, Needs},
     render::{
         Attributes, Image, RenderError, RenderScene, Renderer,
         image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
@@ -29,7 +29,10 @@ use crate::{
 };
 
 use self::folder::{Folder, Owner, Wanted};
-use super::Blame;
+use super::{
+    Blame,
+    device::{Gpu, shaders_note},
+};
 
 pub use self::{
     folder::FolderError,
@@ -50,8 +53,8 @@ pub struct Request {
     pub directory: PathBuf,
     /// Frames wanted; all that are cached where `None`.
     pub frames: Option<FrameRange>,
-    /// Index or part of the name of an adapter.
-    pub adapter: Option<String>,
+    /// What to render on.
+    pub gpu: Gpu,
     /// Whether frames that stand there already are made again, also those of another look or cache.
     pub overwrite: bool,
     /// Whether passes are timed, which runs them one by one.
@@ -179,11 +182,15 @@ pub fn render(
         cache.entry(frame)?;
     }
     let scene = baked_scene(&cache, &request.cache)?;
-    let context = Context::open(request.adapter.as_deref())?;
+    let context = request.gpu.open(Needs::default())?;
     let folder = enter(request, &cache, &frames)?;
     let image = &request.look.spec().image;
     tell(Event::Ready {
-        device: context.info.name.clone(),
+        device: format!(
+            "{}{}",
+            context.info.name,
+            shaders_note(request.gpu.shaders.edited())
+        ),
         size: [image.width, image.height],
         frames: frames.len(),
     });
@@ -218,7 +225,7 @@ fn told(error: RenderError, look: &Look) -> RenderJobError {
 
 /// Takes this process's place in the output folder.
 fn enter(request: &Request, cache: &CacheReader, frames: &[u32]) -> Result<Folder, RenderJobError> {
-    let first = attributes(cache, &request.look, cache.first_frame())?;
+    let first = attributes(cache, request, cache.first_frame())?;
     let mut names = Vec::new();
     for &frame in frames {
         names.extend(pictures(cache, &request.look, frame));
@@ -308,7 +315,7 @@ impl Job<'_> {
 
     fn frame(&mut self, frame: u32) -> Result<Done, RenderJobError> {
         let request = self.request;
-        let attributes = attributes(&self.cache, &request.look, frame)?;
+        let attributes = attributes(&self.cache, request, frame)?;
         let pictures = pictures(&self.cache, &request.look, frame);
         let stands = || {
             let is_there = |(name, format): &(String, FormatSpec)| {
@@ -376,15 +383,24 @@ fn render_scene(scene: &Scene, frame: u32) -> RenderScene {
     }
 }
 
-fn attributes(cache: &CacheReader, look: &Look, frame: u32) -> Result<Attributes, CacheError> {
+fn attributes(
+    cache: &CacheReader,
+    request: &Request,
+    frame: u32,
+) -> Result<Attributes, CacheError> {
     let manifest = cache.manifest();
     Ok(Attributes {
         frame,
         shot: manifest.shot.clone(),
-        software: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
+        software: format!(
+            "{} {}{}",
+            env!("CARGO_PKG_NAME"),
+            env!("CARGO_PKG_VERSION"),
+            shaders_note(request.gpu.shaders.edited())
+        ),
         scene_hash: manifest.scene_hash.clone(),
         cache_hash: cache.frame_hash(frame)?.to_owned(),
-        look_hash: look.hash(),
+        look_hash: request.look.hash(),
     })
 }
 
@@ -411,7 +427,7 @@ fn pictures(cache: &CacheReader, look: &Look, frame: u32) -> Vec<(String, Format
 }
 
 /// Name of the PNG of a frame of a cache.
-pub(super) fn picture_name(cache: &CacheReader, frame: u32) -> String {
+pub fn picture_name(cache: &CacheReader, frame: u32) -> String {
     let name = name(&cache.manifest().shot, frame, cache.last_frame());
     format!("{name}.{}", ending(FormatSpec::Png))
 }

@@ -24,6 +24,7 @@ mod cache {
 mod check;
 mod cli {
     mod pipeline;
+    mod shaders;
     #[cfg(target_os = "linux")]
     mod terminal;
 }
@@ -32,6 +33,7 @@ mod compare {
     mod renders;
 }
 mod domain {
+    mod circles;
     mod signed_distance;
 }
 mod experiment {
@@ -58,6 +60,7 @@ mod scene {
     mod edits;
     mod faults;
     mod fuzz_inputs;
+    mod imports;
     mod untrusted;
 }
 mod solve {
@@ -68,6 +71,7 @@ mod solve {
     mod independent;
     mod moving_solids;
     mod pbf;
+    mod plan;
     mod pressure;
 }
 mod stage {

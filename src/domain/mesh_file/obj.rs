@@ -34,7 +34,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     geometry.read()
 }
 
-/// What is handed on to tobj.
+/// The lines that are handed on to tobj.
 #[derive(Default)]
 struct Geometry {
     text: String,

@@ -5,27 +5,27 @@ use glam::DVec3;
 use super::{AIR, Cells, FLUID, SOLID, System};
 use crate::domain::bricks::{Bricks, CELLS, EDGE, table_dims};
 
-/// Where pressure is zero.
+/// Place where pressure is taken as zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Surface {
-    /// At the centre of the first cell of air.
+    /// The centre of the first cell of air.
     Voxel,
-    /// Where the surface crosses the way there.
+    /// The point where the surface crosses the line to that centre.
     GhostFluid,
 }
 
 /// A system's inputs, laid out on bricks.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Where the elements lie.
+    /// Layout of the elements.
     pub bricks: Bricks,
     /// Metres.
     pub cell_size: f64,
-    /// As in [`Cells`].
+    /// See [`Cells`].
     pub kind: Vec<u32>,
-    /// As in [`Cells`].
+    /// See [`Cells`].
     pub open: Vec<f32>,
-    /// As in [`Cells`], metres.
+    /// See [`Cells`]; metres.
     pub distance: Vec<f32>,
     /// Whether `distance` counts.
     pub surface: Surface,
@@ -85,7 +85,7 @@ impl Case {
         DVec3::from_array(self.cell(element).map(|c| f64::from(c) + 0.5)) * self.cell_size
     }
 
-    /// What the builder takes.
+    /// Input of the system builder.
     pub fn cells(&self) -> Cells<'_> {
         Cells {
             bricks: &self.bricks,
@@ -199,7 +199,7 @@ pub fn tank_rhs(case: &Case, system: &System) -> Vec<f64> {
         .collect()
 }
 
-/// In −1..1, from a hash of the row.
+/// Values in −1..1, each a hash of its row.
 pub fn white_noise(rows: usize) -> Vec<f64> {
     (1..=rows as u64)
         .map(|k| {

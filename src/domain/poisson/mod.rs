@@ -27,11 +27,11 @@ pub const NONE: u32 = u32::MAX;
 /// Rows of one task.
 const GRAIN: usize = 4096;
 
-/// What a system is built from, in f32 as the GPU has it or in f64; arrays are by element, `512 slot + local`, slot 0
+/// Input of a system, in f32 as the GPU has it or in f64; arrays are by element, `512 slot + local`, slot 0
 /// included.
 #[derive(Clone, Copy, Debug)]
 pub struct Cells<'a, T = f32> {
-    /// Where the elements lie.
+    /// Layout of the elements.
     pub bricks: &'a Bricks,
     /// [`AIR`], [`FLUID`] or [`SOLID`]; only wet bricks hold water.
     pub kind: &'a [u32],
@@ -97,7 +97,7 @@ impl<T: Copy + Into<f64>> Cells<'_, T> {
 pub struct System {
     /// Element of each row.
     pub cell: Vec<u32>,
-    /// What air adds to the diagonal: Σ f/θ.
+    /// Part of the diagonal due to air: Σ f/θ.
     pub dirichlet: Vec<f64>,
     /// The diagonal.
     pub diagonal: Vec<f64>,

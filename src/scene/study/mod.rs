@@ -16,7 +16,9 @@ use std::{
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Fault, Place, Reach, Scene, document::Document, error::SceneError, look::LookError};
+use super::{
+    Fault, Place, Reach, Scene, document::Document, error::SceneError, keys, look::LookError,
+};
 
 use comparison::SolverComparison;
 use stability::Stability;
@@ -31,6 +33,32 @@ pub enum Study {
     Sweep(Box<Sweep>),
     /// `kind = "stability"`.
     Stability(Box<Stability>),
+}
+
+/// What a run is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RunsOn {
+    /// The study's adapter, in f32.
+    Gpu,
+    /// The f64 reference.
+    Cpu,
+}
+
+impl RunsOn {
+    /// As studies name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gpu => "gpu",
+            Self::Cpu => "cpu",
+        }
+    }
+
+    /// What a word of a study names.
+    fn named(word: &str) -> Option<Self> {
+        [Self::Gpu, Self::Cpu]
+            .into_iter()
+            .find(|device| device.name() == word)
+    }
 }
 
 /// Why a study could not be loaded.
@@ -88,8 +116,9 @@ impl Study {
         base_dir: &Path,
         reach: Reach,
     ) -> Result<Self, StudyFileError> {
-        let (doc, root) = Document::parse(text, file, &[])?;
+        let (doc, mut root) = Document::parse(text, file, &[], keys::STUDY)?;
         let doc = doc.within(reach);
+        doc.settle(&mut root)?;
         let told = KindSpec::deserialize(toml::Deserializer::from(root.clone()))
             .map_err(|error| doc.translate(&error))?;
         match told.kind.get_ref().as_str() {
@@ -124,10 +153,9 @@ impl Study {
         match self {
             Self::SolverComparison(comparison) => comparison.scenes.iter().for_each(of),
             Self::Sweep(sweep) => {
-                let points = sweep.lines.iter().flat_map(|line| &line.points);
-                points
-                    .chain(&sweep.state)
-                    .for_each(|point| of(&point.scene));
+                let points = sweep.points();
+                let points = points.chain(&sweep.state);
+                points.for_each(|point| of(&point.scene));
             }
             Self::Stability(stability) => stability.for_each_scene(of),
         }

@@ -30,7 +30,7 @@ use toml::{Spanned, Value, de::DeTable};
 
 use super::{
     super::{Method, Scene, document::Document, error::SceneError, physics_hash, words::shown},
-    SceneFile, StudyFileError, load_with,
+    RunsOn, SceneFile, StudyFileError, load_with,
 };
 use fit::{check_coarser, check_converged, check_fit};
 
@@ -79,22 +79,10 @@ pub struct Line {
     pub coarser: Option<Point>,
 }
 
-/// What a run is on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum LineDevice {
-    /// The study's adapter, in f32.
-    Gpu,
-    /// The f64 reference.
-    Cpu,
-}
-
-impl LineDevice {
-    /// As studies name it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Gpu => "gpu",
-            Self::Cpu => "cpu",
-        }
+impl Sweep {
+    /// Settings of all methods, without what is coarser.
+    pub fn points(&self) -> impl Iterator<Item = &Point> {
+        self.lines.iter().flat_map(|line| &line.points)
     }
 }
 
@@ -108,7 +96,7 @@ pub struct Point {
     /// Output frames to run.
     pub frames: u32,
     /// What it runs on.
-    pub device: LineDevice,
+    pub device: RunsOn,
 }
 
 /// How errors are measured.
@@ -341,7 +329,7 @@ fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point,
         label: String::new(),
         frames: frames(doc, spec, &scene)?,
         scene,
-        device: LineDevice::Gpu,
+        device: RunsOn::Gpu,
     })
 }
 
@@ -378,19 +366,18 @@ fn device(
     spec: &SweepSpec,
     word: &str,
     at: Range<usize>,
-) -> Result<LineDevice, SceneError> {
+) -> Result<RunsOn, SceneError> {
     let fault = |problem: &str| Err(doc.fault_at(at.clone(), problem));
     let named = |wanted: &str| spec.errors.get_ref().iter().any(|e| e.get_ref() == wanted);
     let is_projection = ErrorMeasure::NAMED
         .iter()
         .any(|(name, error)| error.measure() == Measure::Projection && named(name));
-    match word {
-        "gpu" => Ok(LineDevice::Gpu),
-        "cpu" if is_projection => {
+    match RunsOn::named(word) {
+        Some(RunsOn::Cpu) if is_projection => {
             fault("the reference's projection is what these errors are measured against")
         }
-        "cpu" => Ok(LineDevice::Cpu),
-        other => fault(&format!("{other:?} is no device")),
+        Some(device) => Ok(device),
+        None => fault(&format!("{word:?} is no device")),
     }
 }
 
@@ -420,7 +407,7 @@ fn line(
     };
     let is_device = key.get_ref() == DEVICE;
     let own_device = match &method.device {
-        None => LineDevice::Gpu,
+        None => RunsOn::Gpu,
         Some(word) if is_device => {
             return Err(doc.fault_at(word.span(), "the key is the device itself"));
         }

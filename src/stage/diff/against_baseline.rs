@@ -9,56 +9,17 @@ use std::{
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{DiffError, Request, adapter_of, aggregates, bake_of, gauge, physics, scene_of};
+use super::{DiffError, Request, adapter_of, aggregates, bake_of, of_caches, physics, scene_of};
 use crate::{
     cache::{CacheError, CacheReader},
     compare::{
         baseline::{
-            Baseline, BaselineFault, BaselineFrame, Basis, FORMAT_VERSION, Lost, Measured,
-            default_tolerances, particles_hash,
+            Baseline, BaselineDiff, BaselineFrame, FORMAT_VERSION, Lost, Measured, particles_hash,
         },
-        spread,
+        limits::default_tolerances,
     },
-    domain::{
-        aggregates::Aggregates,
-        frame_range::{FrameRange, ranges},
-        tolerance::Limit,
-    },
+    domain::frame_range::{FrameRange, ranges},
 };
-
-/// What differs between a cache and a baseline.
-#[derive(Clone, Debug, Serialize)]
-pub struct BaselineDiff {
-    /// What baked the cache, and on what.
-    pub bake: String,
-    /// Whether the baseline knows the cache's adapter, so that hashes decide as well.
-    pub basis: Basis,
-    /// Whether hashes were to be ignored.
-    pub ignores_hashes: bool,
-    /// Adapters whose hashes the baseline holds.
-    pub known_adapters: Vec<String>,
-    /// The adapter that the baseline's aggregates are from.
-    pub aggregates_from: String,
-    /// The first key of the scenes that differs, with the baseline's value and then the cache's.
-    pub physics: Option<String>,
-    /// Frames that the cache has not, of those that were asked for.
-    pub only_baseline: Vec<u32>,
-    /// What was compared.
-    pub frames: Vec<FramePair>,
-    /// In the order of the frames.
-    pub faults: Vec<BaselineFault>,
-}
-
-/// One frame's aggregates.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FramePair {
-    /// Output frame.
-    pub frame: u32,
-    /// Of the cache and of the baseline.
-    pub aggregates: [Aggregates; 2],
-    /// What they may differ by, by name.
-    pub limits: BTreeMap<String, Limit>,
-}
 
 /// What became of a baseline that was written.
 #[derive(Clone, Debug, Serialize)]
@@ -117,15 +78,6 @@ pub(super) fn compare(
     let adapter = adapter_of(cache.manifest());
     let adapter = (!request.ignores_hashes).then_some(adapter.as_str());
     let (basis, faults) = baseline.compare(adapter, &measured);
-    let pair = |found: &Measured| {
-        let frame = found.frame.frame;
-        let expected = baseline.frames.iter().find(|f| f.frame == frame)?;
-        Some(FramePair {
-            frame,
-            aggregates: [found.frame.aggregates, expected.aggregates],
-            limits: baseline.limits(adapter, found),
-        })
-    };
     Ok(BaselineDiff {
         bake: bake_of(cache.manifest()),
         basis,
@@ -134,7 +86,7 @@ pub(super) fn compare(
         aggregates_from: baseline.aggregates_from.clone(),
         physics: physics(&request.b, &baseline.scene.join("\n"), cache.scene_toml())?,
         only_baseline,
-        frames: measured.iter().filter_map(pair).collect(),
+        frames: baseline.pairs(adapter, &measured),
         faults,
     })
 }
@@ -207,18 +159,17 @@ fn take_spread(
     others: &[PathBuf],
     frames: &[u32],
 ) -> Result<(), DiffError> {
-    let expected = measure(cache, frames)?;
-    let expected: Vec<BaselineFrame> = expected.into_iter().map(|m| m.frame).collect();
-    let mut bakes = Vec::new();
-    baseline.spread_from.clear();
-    for path in others {
-        let other = CacheReader::open(path)?;
-        let bake: Vec<BaselineFrame> = measure(&other, frames)?
+    let measured = |cache: &CacheReader| -> Result<Vec<BaselineFrame>, DiffError> {
+        Ok(measure(cache, frames)?
             .into_iter()
             .map(|m| m.frame)
-            .collect();
-        let adapter = adapter_of(other.manifest());
-        let changed = physics(cache.dir(), cache.scene_toml(), other.scene_toml())?;
+            .collect())
+    };
+    let expected = measured(cache)?;
+    let counts = |frames: &[BaselineFrame]| frames.first().map(|frame| frame.particles);
+    let bake = |path: &PathBuf| {
+        let other = CacheReader::open(path)?;
+        let bake = measured(&other)?;
         let refuse = |why: &str| {
             let path = path.display();
             Err(DiffError::usage(format!("--spread {path}: {why}")))
@@ -226,25 +177,18 @@ fn take_spread(
         if other.manifest().solver != cache.manifest().solver {
             return refuse("another solver is no rounding");
         }
-        let counts = |frames: &[BaselineFrame]| frames.first().map(|frame| frame.particles);
         if counts(&bake) != counts(&expected) {
             return refuse("another number of particles is no rounding");
         }
-        let from = match changed {
-            Some(key) => key,
-            None if adapter != adapter_of(cache.manifest()) => adapter,
-            None => return refuse("the same scene on the same adapter has no spread"),
-        };
-        baseline.spread_from.push(from);
-        bakes.push(bake);
-    }
-    let spreads = spread::of(&expected, &bakes);
-    let particles = expected.first().map_or(0, |frame| frame.particles);
-    let spacing = cache.manifest().particle_spacing;
-    baseline.tolerances = spread::tolerances(&spreads, spacing, particles);
-    for (frame, spread) in baseline.frames.iter_mut().zip(spreads) {
-        frame.spread = Some(spread);
-    }
+        let adapter = adapter_of(other.manifest());
+        match physics(cache.dir(), cache.scene_toml(), other.scene_toml())? {
+            Some(key) => Ok((key, bake)),
+            None if adapter != adapter_of(cache.manifest()) => Ok((adapter, bake)),
+            None => refuse("the same scene on the same adapter has no spread"),
+        }
+    };
+    let bakes: Vec<_> = others.iter().map(bake).collect::<Result<_, _>>()?;
+    baseline.take_spread(&expected, bakes, cache.manifest().particle_spacing);
     Ok(())
 }
 
@@ -258,7 +202,7 @@ fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
 fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffError> {
     cache.check_beside(frames)?;
     let scene = scene_of(cache)?;
-    let gauge = gauge(&scene, &[cache])?;
+    let gauge = of_caches(&scene, &[cache])?;
     let one = |&frame: &u32| {
         let particles = cache.read(frame)?;
         Ok(Measured {

@@ -3,52 +3,17 @@
 use std::collections::BTreeSet;
 
 use rayon::prelude::*;
-use serde::Serialize;
 
-use super::{DiffError, Request, aggregates, bake_of, gauge, physics, scene_of, streams};
+use super::{DiffError, Request, aggregates, bake_of, of_caches, physics, scene_of, streams};
 use crate::{
     cache::{CacheError, CacheReader},
     compare::{
+        caches::CacheDiff,
         frames::{self, FrameDiff},
         streams::StreamDiff,
     },
     domain::tolerance::Tolerance,
 };
-
-/// What differs between two caches.
-#[derive(Clone, Debug, Serialize)]
-pub struct CacheDiff {
-    /// What baked each, and on what.
-    pub bakes: [String; 2],
-    /// The first key of the scenes that differs, with b's value and then a's.
-    pub physics: Option<String>,
-    /// Frames that a alone has, of those that were asked for.
-    pub only_a: Vec<u32>,
-    /// Frames that b alone has.
-    pub only_b: Vec<u32>,
-    /// Frames of both.
-    pub frames: Vec<FrameDiff>,
-    /// Streams that a alone has: `grids`, `grid NAME`, `probe NAME`.
-    pub streams_only_a: Vec<String>,
-    /// Streams that b alone has.
-    pub streams_only_b: Vec<String>,
-    /// What differs beside the particles, by frame.
-    pub streams: Vec<StreamDiff>,
-    /// Whether those count: without a tolerance they do, and with one nothing in it names them.
-    pub streams_judged: bool,
-}
-
-impl CacheDiff {
-    pub(super) fn is_within(&self) -> bool {
-        let same_streams = self.streams.is_empty()
-            && self.streams_only_a.is_empty()
-            && self.streams_only_b.is_empty();
-        self.only_a.is_empty()
-            && self.only_b.is_empty()
-            && self.frames.iter().all(|frame| frame.faults.is_empty())
-            && (same_streams || !self.streams_judged)
-    }
-}
 
 /// A tolerance that judges nothing here would pass anything.
 fn check_tolerance(tolerance: &Tolerance, caches: [&CacheReader; 2]) -> Result<(), DiffError> {
@@ -95,7 +60,7 @@ pub(super) fn compare(
         cache.check_beside(&chosen)?;
     }
     let (scene_a, scene_b) = (scene_of(a)?, scene_of(b)?);
-    let gauge = gauge(&scene_b, &[b, a])?;
+    let gauge = of_caches(&scene_b, &[b, a])?;
     let frame = |&frame: &u32| {
         let (of_a, of_b) = (a.read(frame)?, b.read(frame)?);
         let side = |cache, particles| -> Result<_, CacheError> {

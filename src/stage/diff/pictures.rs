@@ -7,58 +7,16 @@ use std::{
 };
 
 use rayon::prelude::*;
-use serde::{Serialize, Serializer};
 
 use super::{DiffError, Images, Request};
 use crate::{
-    compare::pictures::{self, Encoding, Picture, PictureDiff, PictureFault, difference_image},
+    compare::pictures::{self, Encoding, PairDiff, Picture, PicturesDiff, difference_image},
     domain::{frame_range::FrameRange, tolerance::PictureLimits},
     render::{
         RenderError,
         image::{read_exr, read_png, write_rgb_png},
     },
 };
-
-/// What differs between two renders.
-#[derive(Clone, Debug, Serialize)]
-pub struct PicturesDiff {
-    /// Names that a alone has.
-    pub only_a: Vec<String>,
-    /// Names that b alone has.
-    pub only_b: Vec<String>,
-    /// By name.
-    pub pairs: Vec<PairDiff>,
-}
-
-/// Two pictures of one name.
-#[derive(Clone, Debug, Serialize)]
-pub struct PairDiff {
-    /// File name.
-    pub name: String,
-    /// Width and height of a and of b, pixels.
-    pub sizes: [[usize; 2]; 2],
-    /// `None` where the sizes differ.
-    pub diff: Option<PictureDiff>,
-    /// What is out of tolerance.
-    pub faults: Vec<PictureFault>,
-    /// Where its difference image went; written out, bytes that are no UTF-8 become U+FFFD.
-    #[serde(serialize_with = "as_text")]
-    pub image: Option<PathBuf>,
-}
-
-/// A path of any bytes: serde's own way refuses those that are no UTF-8.
-fn as_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
-    path.as_deref()
-        .map(Path::to_string_lossy)
-        .serialize(serializer)
-}
-
-impl PicturesDiff {
-    pub(super) fn is_within(&self) -> bool {
-        let is_within = |pair: &PairDiff| pair.diff.is_some() && pair.faults.is_empty();
-        self.only_a.is_empty() && self.only_b.is_empty() && self.pairs.iter().all(is_within)
-    }
-}
 
 fn encoding(path: &Path) -> Option<Encoding> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();

@@ -344,6 +344,10 @@ fn check_standing(
     for name in names(folder)? {
         let file = folder.join(&name);
         let is_replaced = wanted.names.contains(&name);
+        if is_replaced && file.is_dir() {
+            // No picture can take its name, whoever it belongs to.
+            return Err(at(&file)(io::ErrorKind::IsADirectory.into()));
+        }
         let Some(what) = stranger(&file, is_replaced, wanted) else {
             continue;
         };

@@ -262,6 +262,7 @@ fn manifest(grids: Option<GridRecord>) -> Manifest {
         format_version: Manifest::FORMAT_VERSION,
         program: "swell".to_owned(),
         program_version: "0.1.0".to_owned(),
+        shaders: None,
         shot: "ball".to_owned(),
         scene_hash: "5ce".to_owned(),
         solver: "flip".to_owned(),

@@ -101,6 +101,7 @@ fn standard_output_that_takes_nothing_is_exit_code_4() {
         "--help",
         "--version",
         "bake --help",
+        "keys",
         "inspect --adapters",
         "inspect small.toml",
         "inspect cache/small/pbf",
@@ -249,6 +250,10 @@ fn paths_need_not_be_utf_8() {
     let same: serde_json::Value = serde_json::from_str(&same).unwrap();
     assert!(same["a"].as_str().unwrap().contains(lossy), "{same}");
     assert_eq!(same["is_within"], true);
+    let mut from = cache.clone().into_os_string();
+    from.push(":1");
+    let words = "bake @ --from @ -o @ --device cpu --frames 2";
+    with_paths(&job, words, &[&scene, &from.into(), &path("branch")]);
     for words in ["verify @", "inspect @", "check @ --progress none"] {
         with_paths(&job, words, &[&cache]);
     }

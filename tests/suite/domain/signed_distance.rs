@@ -11,7 +11,8 @@ use parry3d_f64::{
 use rayon::prelude::*;
 use swell::domain::{
     bounds::Bounds,
-    mesh::{NoInside, TriangleMesh},
+    inside::NoInside,
+    mesh::TriangleMesh,
     signed_distance::{SignedDistance, SignedDistanceError},
 };
 

@@ -1,23 +1,22 @@
 //! `[budget]`: what holds, what breaks it, what is kept of a frame that could not be made, and which pass was at fault.
+mod not_a_number;
 mod replay;
 
 use std::{
-    fs,
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
 };
 
 use crate::support::job::Job;
 use swell::{
-    cache::{CacheReader, directory_hash, failed},
+    cache::CacheReader,
     domain::{budget::Watched, solver::StepReport},
     gpu::adapter::{Context, Spoil},
     scene::Scene,
     stage::{
         bake::{self, BakeError, Event, Request},
-        device::{Device, needs},
-        prepare::Start,
-        replay::{Failure, replay},
+        device::Device,
+        replay::Failure,
     },
 };
 use tempfile::TempDir;
@@ -34,6 +33,10 @@ fn load(name: &str, set: &[&str]) -> Scene {
 
 fn opened(context: &Context) -> Device {
     Device::Open(Box::new(context.clone()))
+}
+
+const fn spoil(pass: &'static str, from: &'static str, to: &'static str) -> Spoil {
+    Spoil { pass, from, to }
 }
 
 fn spoiled(context: &Context, spoil: Spoil) -> Device {
@@ -261,194 +264,6 @@ fn the_work_of_walls_is_that_of_the_reference() {
             "{single} {double}"
         );
     }
-}
-
-/// What is no number, in WGSL: a compiler knows none that is constant.
-macro_rules! nan {
-    ($seed:literal) => {
-        concat!("bitcast<f32>(0x7fc00000u | min(", $seed, ", 1u))")
-    };
-}
-
-const fn spoil(pass: &'static str, from: &'static str, to: &'static str) -> Spoil {
-    Spoil { pass, from, to }
-}
-
-/// Goes on with a sound cache on a device with a fault in one pass.
-fn is_caught(context: &Context, scene: &Scene, sound: &Path, spoil: Spoil) {
-    let opened = spoiled(context, spoil);
-    let mut broken = bake_copy(sound);
-    broken.go_on(&opened, scene, "1-4");
-    let Failure { breach, place } = broken.failure();
-    assert_eq!(
-        (breach.watched, breach.frame),
-        (Watched::NotFinite, 3),
-        "{breach}"
-    );
-    assert_eq!(
-        place.as_ref().map(|place| place.pass),
-        Some(spoil.pass),
-        "{breach}"
-    );
-    let said = broken.error.as_ref().unwrap().to_string();
-    assert!(
-        said.contains(&format!("first in {} of substep 1", spoil.pass)),
-        "{said}"
-    );
-    // The line that a replay gives.
-    let kept = failed::read(&broken.cache().join("failed")).unwrap();
-    let start = Start::of(scene).unwrap();
-    let again = replay(
-        &opened.open(needs(scene)).unwrap(),
-        scene,
-        &start,
-        kept.last_frame,
-        &kept.start,
-    )
-    .unwrap();
-    assert_eq!(again.as_ref(), Some(broken.failure()));
-    assert!(said.starts_with(&again.unwrap().to_string()), "{said}");
-    // Nothing else of the cache is other than it was.
-    failed::remove(&broken.cache()).unwrap();
-    assert_eq!(
-        directory_hash(&broken.cache()).unwrap(),
-        directory_hash(sound).unwrap()
-    );
-    assert_eq!(
-        CacheReader::open(&broken.cache()).unwrap().read(2).unwrap(),
-        kept.start
-    );
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let (path, to) = {
-            let entry = entry.unwrap();
-            (entry.path(), to.join(entry.file_name()))
-        };
-        if path.is_dir() {
-            copy(&path, &to);
-        } else {
-            fs::copy(&path, &to).unwrap();
-        }
-    }
-}
-
-fn bake_copy(sound: &Path) -> Baked {
-    let folder = TempDir::new().unwrap();
-    copy(sound, &folder.path().join("cache"));
-    Baked {
-        folder,
-        reports: Vec::new(),
-        removed: 0,
-        particles: 0,
-        error: None,
-    }
-}
-
-/// Hard case 34 with PBF.
-#[test]
-fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_pbf() {
-    let context = Context::open(None).unwrap();
-    let scene = load("34-not-a-number", &[SOLVERS[0]]);
-    let sound = bake(&opened(&context), &scene, "1-2");
-    for spoil in [
-        spoil(
-            "pbf/predict",
-            "vec4f(x, 0.0);",
-            concat!("vec4f(x + ", nan!("thread"), ", 0.0);"),
-        ),
-        spoil(
-            "pbf/reorder",
-            "start_position[thread] = x;",
-            concat!("start_position[thread] = x * ", nan!("thread"), ";"),
-        ),
-        spoil(
-            "pbf/compute_lambda",
-            "slot].w = -max(",
-            concat!("slot].w = ", nan!("slot"), " - max("),
-        ),
-        spoil(
-            "pbf/compute_delta",
-            "delta), current.w)",
-            concat!("delta) + ", nan!("i"), ", current.w)"),
-        ),
-        spoil(
-            "pbf/update_velocity",
-            "velocity[thread] = vec4f(v, 0.0);",
-            concat!("velocity[thread] = vec4f(v * ", nan!("thread"), ", 0.0);"),
-        ),
-        spoil(
-            "effects/viscosity_apply",
-            "+= viscosity_change[i]",
-            concat!("+= viscosity_change[i] * ", nan!("i")),
-        ),
-        spoil(
-            "pbf/measure_density",
-            "density[thread] = ",
-            concat!("density[thread] = ", nan!("thread"), " + "),
-        ),
-    ] {
-        is_caught(&context, &scene, &sound.cache(), spoil);
-    }
-    // Control: without a fault the frames are made, and there is nothing to find in them.
-    let mut whole = bake_copy(&sound.cache());
-    whole.go_on(&opened(&context), &scene, "1-4");
-    assert!(whole.error.is_none(), "{:?}", whole.error);
-}
-
-/// Hard case 34 with FLIP.
-#[test]
-fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_flip() {
-    let context = Context::open(None).unwrap();
-    let scene = load("34-not-a-number", &[SOLVERS[1]]);
-    let sound = bake(&opened(&context), &scene, "1-2");
-    for spoil in [
-        spoil(
-            "flip/cut_cells",
-            "face_open[element] = lower.x;",
-            concat!("face_open[element] = lower.x * ", nan!("element"), ";"),
-        ),
-        spoil(
-            "flip/spread_faces",
-            "let c = center_weights(f.z);",
-            concat!("let c = center_weights(f.z) * ", nan!("i"), ";"),
-        ),
-        spoil(
-            "flip/gather_centers",
-            "liquid_distance[element] = -kept",
-            concat!("liquid_distance[element] = ", nan!("element"), " - kept"),
-        ),
-        spoil(
-            "pressure/displace",
-            "-face.difference, face.is_open",
-            concat!(
-                "-face.difference * ",
-                nan!("face.element"),
-                ", face.is_open"
-            ),
-        ),
-        spoil(
-            "flip/grid_to_particle",
-            "carried[CARRIED * i + axis] = u;",
-            concat!("carried[CARRIED * i + axis] = u * ", nan!("i"), ";"),
-        ),
-        spoil(
-            "flip/advect",
-            "position[i] = vec4f(clamp(x, low, high), 1.0);",
-            concat!(
-                "position[i] = vec4f(clamp(x, low, high) * ",
-                nan!("i"),
-                ", 1.0);"
-            ),
-        ),
-    ] {
-        is_caught(&context, &scene, &sound.cache(), spoil);
-    }
-    let mut whole = bake_copy(&sound.cache());
-    whole.go_on(&opened(&context), &scene, "1-4");
-    assert!(whole.error.is_none(), "{:?}", whole.error);
 }
 
 /// Hard case 14: the lid meets the water in frame 20.

@@ -20,6 +20,7 @@ pub fn manifest() -> Manifest {
         format_version: Manifest::FORMAT_VERSION,
         program: "swell".to_owned(),
         program_version: "0.1.0".to_owned(),
+        shaders: None,
         shot: "tank".to_owned(),
         scene_hash: "5ce".to_owned(),
         solver: "pbf".to_owned(),

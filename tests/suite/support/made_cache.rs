@@ -131,6 +131,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         format_version: Manifest::FORMAT_VERSION,
         program: "swell".to_owned(),
         program_version: made.version.to_owned(),
+        shaders: None,
         shot: scene.shot.name.clone(),
         scene_hash: physics_hash(&scene),
         solver: "pbf".to_owned(),

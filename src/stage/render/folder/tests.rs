@@ -168,6 +168,27 @@ fn a_gate_that_was_taken_away_is_made_anew() {
     other.try_lock().unwrap();
 }
 
+/// Said before any frame is rendered, whether or not the folder is ours.
+#[test]
+fn a_folder_in_place_of_a_picture_is_refused_at_once() {
+    for overwrite in [false, true] {
+        let folder = tempfile::tempdir().unwrap();
+        let d = folder.path();
+        drop(enter("day", d, false).unwrap());
+        picture(&d.join("small.0003.png"), 3, |_| ());
+        fs::create_dir(d.join("small.0002.png")).unwrap();
+        match enter("day", d, overwrite) {
+            Err(FolderError::File { file, source }) => {
+                assert_eq!(file, d.join("small.0002.png"));
+                assert_eq!(source.kind(), io::ErrorKind::IsADirectory);
+            }
+            other => panic!("{other:?}"),
+        }
+        fs::remove_dir(d.join("small.0002.png")).unwrap();
+        enter("day", d, overwrite).unwrap();
+    }
+}
+
 /// Each thing that pictures of one folder have in common.
 #[test]
 fn a_picture_of_something_else_is_told_by_what_it_is() {

@@ -3,9 +3,10 @@
 use swell::{
     domain::budget::Watched,
     gpu::adapter::{Context, Needs},
+    stage::replay::Failure,
 };
 
-use super::{Failure, SOLVERS, bake, is_caught, load, opened, spoil};
+use super::{SOLVERS, bake, load, not_a_number::is_caught, opened, spoil};
 
 /// A solve's scalars and arrays have another layout in f64. Read as f32, their words are no numbers here and there, and no
 /// residual. And a solve that takes more than one batch of iterations runs the passes behind it more than once, empty.

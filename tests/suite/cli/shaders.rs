@@ -1,0 +1,176 @@
+//! `--shaders DIR`: an edited shader changes what it is said to change and is recorded; the shipped ones are no edit.
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+use swell::render::image::read_png_attributes;
+
+use crate::support::job::{Job, assert_has};
+
+/// A job with a copy of the shipped shaders in each of `folders`.
+fn job(folders: &[&str]) -> Job {
+    let job = Job::new();
+    for folder in folders {
+        copy(
+            &Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"),
+            &job.path(folder),
+        );
+    }
+    job
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+/// A word that changes nothing but the text.
+fn comment(job: &Job, folder: &str) {
+    job.edit(
+        &format!("{folder}/pbf/predict.wgsl"),
+        "// Explicit step",
+        "// An explicit step",
+    );
+}
+
+/// A substep that is too long for the particles.
+fn overshoot(job: &Job, folder: &str) {
+    job.edit(
+        &format!("{folder}/pbf/predict.wgsl"),
+        "let free = position[thread].xyz + params.time_step * v;",
+        "let free = position[thread].xyz + 1.01 * params.time_step * v;",
+    );
+}
+
+fn recorded(job: &Job, cache: &str) -> Option<String> {
+    let text = fs::read_to_string(job.path(cache).join("manifest.json")).unwrap();
+    let manifest: Value = serde_json::from_str(&text).unwrap();
+    manifest["shaders"].as_str().map(str::to_owned)
+}
+
+#[test]
+fn a_bake_by_edited_shaders_is_recorded_and_not_resumed_by_others() {
+    let job = job(&["same", "comment", "edit"]);
+    comment(&job, "comment");
+    overshoot(&job, "edit");
+    job.expect(0, "bake small.toml --frames 1-2 -o plain");
+    for folder in ["same", "comment", "edit"] {
+        let said = job.expect(
+            0,
+            &format!("bake small.toml --frames 1-2 -o by-{folder} --shaders {folder}"),
+        );
+        let is_flagged = said.contains("not the shipped ones");
+        assert_eq!(is_flagged, folder != "same", "{folder}: {said}");
+        let shown = job.expect(0, &format!("inspect by-{folder}"));
+        assert_eq!(
+            shown.contains("not the shipped ones"),
+            is_flagged,
+            "{shown}"
+        );
+    }
+    // The shipped text from a folder is the shipped program.
+    assert_eq!(job.hash("plain"), job.hash("by-same"));
+    assert_eq!(recorded(&job, "plain"), None);
+    let (comment, edit) = (recorded(&job, "by-comment"), recorded(&job, "by-edit"));
+    assert!(comment.is_some() && edit.is_some() && comment != edit);
+    // What differs is the record alone, and then the water.
+    assert_ne!(job.hash("plain"), job.hash("by-comment"));
+    assert_eq!(job.hash("plain/frames"), job.hash("by-comment/frames"));
+    assert_ne!(job.hash("plain/frames"), job.hash("by-edit/frames"));
+    // Resumed by the same shaders alone.
+    for (cache, shaders) in [
+        ("by-edit", ""),
+        ("by-edit", "--shaders comment"),
+        ("plain", "--shaders edit"),
+    ] {
+        let before = job.hash(cache);
+        let said = job.expect(
+            4,
+            &format!("bake small.toml --frames 1-3 -o {cache} --resume {shaders}"),
+        );
+        assert_has(&said, &["was baked with shaders = "]);
+        assert_eq!(job.hash(cache), before);
+    }
+    job.expect(
+        0,
+        "bake small.toml --frames 1-3 -o by-edit --resume --shaders edit",
+    );
+    job.expect(
+        0,
+        "bake small.toml --frames 1-3 -o plain --resume --shaders same",
+    );
+}
+
+#[test]
+fn a_check_says_whose_shaders_it_ran() {
+    let job = job(&["same", "edit"]);
+    overshoot(&job, "edit");
+    let same = job.json(0, "check small.toml --progress none --shaders same");
+    assert_eq!(same["shaders"], Value::Null);
+    let edited = job.json(1, "check small.toml --progress none --shaders edit");
+    assert_eq!(edited["shaders"].as_str().unwrap().len(), 64);
+    assert_eq!(edited["first_over"]["pass"], "pbf/predict");
+    let said = job.expect(1, "check small.toml --shaders edit");
+    assert_has(&said, &["not the shipped ones"]);
+}
+
+#[test]
+fn a_picture_by_edited_shaders_says_so_and_stays_apart() {
+    let job = job(&["same", "edit"]);
+    job.edit(
+        "edit/ssfr/shade.wgsl",
+        "let n = shading.index;",
+        "let n = 1.2 * shading.index;",
+    );
+    job.expect(0, "bake small.toml --frames 1-2 -o cache");
+    let render = "render cache --look look.toml --frames 2";
+    job.expect(0, &format!("{render} -o plain"));
+    job.expect(0, &format!("{render} -o same --shaders same"));
+    let said = job.expect(0, &format!("{render} -o edited --shaders edit"));
+    assert_has(&said, &["not the shipped ones"]);
+    let picture = |folder: &str| job.path(folder).join("small.0002.png");
+    let bytes = |folder: &str| fs::read(picture(folder)).unwrap();
+    assert!(bytes("plain") == bytes("same"));
+    assert!(bytes("plain") != bytes("edited"));
+    let software = |folder: &str| read_png_attributes(&picture(folder)).unwrap().software;
+    assert!(!software("plain").contains("shaders"));
+    assert_has(
+        &software("edited"),
+        &["with shaders ", "not the shipped ones"],
+    );
+    // Pictures of other shaders are pictures of another program.
+    let said = job.expect(4, &format!("{render} -o plain --shaders edit"));
+    assert_has(&said, &["version of the program"]);
+}
+
+#[test]
+fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
+    let job = job(&["torn", "broken"]);
+    fs::remove_file(job.path("torn/shared/walls.wgsl")).unwrap();
+    job.edit(
+        "broken/pbf/predict.wgsl",
+        "let x = confine(free);",
+        "let x = confined(free);",
+    );
+    for (shaders, words) in [
+        ("torn", &["torn", "lacks shared/walls.wgsl"][..]),
+        ("nowhere", &["cannot read nowhere"]),
+        ("broken", &["pbf/predict of --shaders", "confined"]),
+        ("torn --device cpu", &["--shaders run on a GPU"]),
+    ] {
+        let said = job.expect(
+            2,
+            &format!("bake small.toml --frames 1-1 -o cache --shaders {shaders}"),
+        );
+        assert_has(&said, words);
+        assert!(!job.path("cache").exists());
+    }
+}
