@@ -78,5 +78,6 @@ mod stage {
     mod branch;
     mod budget;
     mod device_cpu;
+    mod drive;
     mod far_origin;
 }
