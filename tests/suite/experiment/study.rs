@@ -14,6 +14,7 @@ use swell::{
         Stop,
         study::{Study, sweep::Sweep},
     },
+    stage::device::Gpu,
 };
 use tempfile::TempDir;
 
@@ -91,7 +92,7 @@ impl Job {
             name: "tiny-study".into(),
             study: Study::Sweep(Box::new(self.load(text).unwrap())),
             directory: self.folder.path().join("out"),
-            adapter: None,
+            gpu: Gpu::default(),
             command: "swell study s.toml".into(),
         };
         let mut points = Vec::new();
