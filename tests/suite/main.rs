@@ -61,6 +61,7 @@ mod scene {
     mod edits;
     mod faults;
     mod fuzz_inputs;
+    mod imports;
     mod untrusted;
 }
 mod solve {
@@ -71,6 +72,7 @@ mod solve {
     mod independent;
     mod moving_solids;
     mod pbf;
+    mod plan;
     mod pressure;
 }
 mod stage {

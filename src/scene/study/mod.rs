@@ -16,7 +16,9 @@ use std::{
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Fault, Place, Reach, Scene, document::Document, error::SceneError, look::LookError};
+use super::{
+    Fault, Place, Reach, Scene, document::Document, error::SceneError, keys, look::LookError,
+};
 
 use comparison::SolverComparison;
 use stability::Stability;
@@ -114,8 +116,9 @@ impl Study {
         base_dir: &Path,
         reach: Reach,
     ) -> Result<Self, StudyFileError> {
-        let (doc, root) = Document::parse(text, file, &[])?;
+        let (doc, mut root) = Document::parse(text, file, &[], keys::STUDY)?;
         let doc = doc.within(reach);
+        doc.settle(&mut root)?;
         let told = KindSpec::deserialize(toml::Deserializer::from(root.clone()))
             .map_err(|error| doc.translate(&error))?;
         match told.kind.get_ref().as_str() {
