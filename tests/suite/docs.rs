@@ -1,4 +1,4 @@
-//! What the documents say of the tree is true.
+//! What documents promise of the tree: paths that are there, files that can be read in one sitting.
 
 use std::{fs, path::Path};
 
@@ -38,4 +38,41 @@ fn every_path_that_a_document_names_is_there() {
     assert!(absent.is_empty(), "{absent:#?}");
     let said = "`src/lib.rs`, `src/no_such_room`, `shaders/ROOM/NAME.wgsl`";
     assert_eq!(missing(root, said), ["src/no_such_room"]);
+}
+
+/// Lines of a source file at most.
+const LONGEST: usize = 600;
+
+fn is_too_long(text: &str) -> bool {
+    text.lines().count() > LONGEST
+}
+
+fn sources(folder: &Path, ends: &[&str], visit: &mut dyn FnMut(&Path)) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let end = path.extension().and_then(|end| end.to_str());
+        if path.is_dir() {
+            sources(&path, ends, visit);
+        } else if end.is_some_and(|end| ends.contains(&end)) {
+            visit(&path);
+        }
+    }
+}
+
+#[test]
+fn no_source_file_is_too_long() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (mut seen, mut long) = (0, Vec::new());
+    for folder in ["src", "shaders", "tests/suite", "tools"] {
+        sources(&root.join(folder), &["rs", "wgsl", "py"], &mut |file| {
+            seen += 1;
+            if is_too_long(&fs::read_to_string(file).unwrap()) {
+                long.push(file.to_owned());
+            }
+        });
+    }
+    assert!(seen > 300, "{seen}");
+    assert!(long.is_empty(), "over {LONGEST} lines: {long:#?}");
+    assert!(!is_too_long(&"x\n".repeat(LONGEST)));
+    assert!(is_too_long(&"x\n".repeat(LONGEST + 1)));
 }
