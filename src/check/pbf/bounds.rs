@@ -3,27 +3,32 @@
 use glam::DVec3;
 
 use crate::{
-    compare::rounding::{self, Sums, U, WallError},
+    compare::rounding::{
+        DENSITY, GRADIENT_SQUARES, LAMBDA, OTHER_GRADIENTS, OWN_GRADIENT, Sums, U, WALL_DENSITY,
+        WALL_GRADIENT, WALL_PLACE,
+    },
     domain::pbf::CONTACT,
     reference::pbf::passes::{Inputs, Row},
 };
 
-/// What the bounds of a pass depend on.
-pub(super) struct Bounds<'a>(pub(super) Inputs<'a>);
+use super::rows::{DELTA, GRID, PUSHED, REACH, REPULSION};
 
-/// A bound on a position behind walls and solids.
-pub(super) struct Confined {
-    /// Metres.
-    pub(super) error: f64,
-    /// Of what the walls alone added to it, metres.
-    pub(super) push_error: f64,
+/// What the bounds of a pass depend on.
+pub(in crate::check) struct Bounds<'a>(pub(in crate::check) Inputs<'a>);
+
+/// Bounds on a position behind walls and solids.
+pub(in crate::check) struct Confined {
+    /// Magnitudes of its tolerance.
+    pub(in crate::check) magnitudes: [f64; 4],
+    /// [`PUSHED`]: of what the walls alone added to it, metres.
+    pub(in crate::check) push_error: f64,
     /// Whether they pushed, or may have by rounding alone.
-    pub(super) is_touched: bool,
+    pub(in crate::check) is_touched: bool,
 }
 
 impl Bounds<'_> {
     /// Sums over the neighbours of particle `i`, each term weighted.
-    pub(super) fn sums(&self, i: usize, weight: impl Fn(usize) -> f64) -> Sums {
+    pub(in crate::check) fn sums(&self, i: usize, weight: impl Fn(usize) -> f64) -> Sums {
         let h = self.0.model.calibration.support_radius;
         let mut sums = Sums::default();
         for j in self.0.neighbors.all(i) {
@@ -35,12 +40,13 @@ impl Bounds<'_> {
     }
 
     /// A neighbour's part in sums: 1, or a sample's weight.
-    pub(super) fn mass(&self, j: usize) -> f64 {
+    fn mass(&self, j: usize) -> f64 {
         j.checked_sub(self.0.particles())
             .map_or(1.0, |sample| self.0.model.sample_weights[sample])
     }
 
-    pub(super) fn walls(&self, x: DVec3) -> WallError {
+    /// [`WALL_DENSITY`] and, over h, [`WALL_GRADIENT`] at `x`.
+    fn walls(&self, x: DVec3) -> [f64; 2] {
         let h = self.0.model.calibration.support_radius;
         let walls = &self.0.substep.walls;
         let gaps = [(x - walls.min).to_array(), (walls.max - x).to_array()];
@@ -48,8 +54,10 @@ impl Bounds<'_> {
             .iter()
             .flatten()
             .filter(|&&gap| gap < h * 1.001)
-            .count();
-        WallError::of(faces, self.wall_place() / h)
+            .count() as f64;
+        let q = WALL_PLACE.of([self.wall_place() / h]);
+        let density = WALL_DENSITY.of([faces, q]);
+        [density, WALL_GRADIENT.of([faces, q, density]) / h]
     }
 
     /// By how much f32 misplaces a wall, metres.
@@ -59,33 +67,33 @@ impl Bounds<'_> {
         off(walls.min).max(off(walls.max))
     }
 
-    /// Of the relative density.
-    pub(super) fn density(&self, i: usize, density: f64) -> f64 {
+    /// [`DENSITY`].
+    pub(in crate::check) fn density(&self, i: usize, density: f64) -> f64 {
         let sums = self.sums(i, |j| self.mass(j));
-        self.0.model.calibration.density_scale * (sums.kernel() + 6.0 * U)
-            + self.walls(self.0.points[i]).density
-            + 2.0 * U * density
+        let [walls, _] = self.walls(self.0.points[i]);
+        let scale = self.0.model.calibration.density_scale;
+        DENSITY.of([scale, sums.kernel(), walls, density])
     }
 
-    /// Of λ.
+    /// [`LAMBDA`].
     pub(super) fn lambda(&self, i: usize, row: &Row, lambda: f64) -> f64 {
-        let calibration = &self.0.model.calibration;
-        let scale = calibration.gradient_scale;
+        let scale = self.0.model.calibration.gradient_scale;
         let sums = self.sums(i, |j| self.mass(j));
-        let walls = self.walls(self.0.points[i]).gradient / calibration.support_radius;
+        let [_, walls] = self.walls(self.0.points[i]);
         let own = row.own.length();
-        let own_error = scale * sums.gradient() + walls + 2.0 * U * own;
-        let squares = rounding::squares(own, own_error, scale * scale * sums.squares());
-        let density = self.density(i, row.density);
-        rounding::lambda(
-            lambda,
-            row.squares + self.0.model.regularization(),
-            density,
+        let own_error = OWN_GRADIENT.of([scale, sums.gradient(), walls, own]);
+        let others = OTHER_GRADIENTS.of([scale, sums.squares()]);
+        let squares = GRADIENT_SQUARES.of([own, own_error, others]);
+        let denominator = row.squares + self.0.model.regularization();
+        LAMBDA.of([
+            lambda.abs(),
+            denominator,
+            self.density(i, row.density),
             squares,
-        )
+        ])
     }
 
-    /// Of a correction before walls and solids, metres.
+    /// [`DELTA`]: of a correction before walls and solids, metres.
     pub(super) fn delta(&self, i: usize, lambda: &[f64]) -> f64 {
         let model = self.0.model;
         let calibration = &model.calibration;
@@ -94,12 +102,16 @@ impl Bounds<'_> {
             let other = lambda.get(j).copied().unwrap_or(0.0);
             self.mass(j) * (lambda[i].abs() + other.abs())
         };
-        // w⁴ of p¹² is at most 4.4 and errs by 12 · 10 u of it.
-        let repulsion = self.sums(i, |j| 140.0 * 4.4 * artificial * self.mass(j));
-        let walls = self.walls(self.0.points[i]).gradient / calibration.support_radius;
-        model.settings.relaxation
-            * (calibration.gradient_scale * (self.sums(i, weight).gradient() + U * repulsion.s2)
-                + lambda[i].abs() * walls)
+        let repulsion = self.sums(i, |j| REPULSION.of([artificial, self.mass(j)]));
+        let [_, walls] = self.walls(self.0.points[i]);
+        DELTA.of([
+            model.settings.relaxation,
+            calibration.gradient_scale,
+            self.sums(i, weight).gradient(),
+            repulsion.s2,
+            lambda[i].abs(),
+            walls,
+        ])
     }
 
     /// Of what walls and solids make of `x`, the position before they push, which errs by `error`. Solids bend the way: the
@@ -112,10 +124,9 @@ impl Bounds<'_> {
         let mut reach = error;
         let mut is_near = false;
         if let Some(grid) = &model.distance {
-            reach += U
-                * (7.0 * (x - grid.origin).abs().max_element()
-                    + grid.origin.abs().max_element()
-                    + 48.0 * grid.spacing);
+            let offset = (x - grid.origin).abs().max_element();
+            let origin = grid.origin.abs().max_element();
+            reach = REACH.of([error, GRID.of([offset, origin, grid.spacing])]);
             is_near = grid.sample(x) < contact + reach + 0.5 * grid.spacing;
         }
         if !is_near {
@@ -124,8 +135,8 @@ impl Bounds<'_> {
             let high = walls.max - contact - slack;
             let is_touched = x.cmplt(low).any() || x.cmpgt(high).any();
             return Confined {
-                error: error + if is_touched { place } else { 0.0 },
-                push_error: error + place,
+                magnitudes: [error, 0.0, if is_touched { place } else { 0.0 }, 0.0],
+                push_error: PUSHED.of([error, 0.0, place, 0.0]),
                 is_touched,
             };
         }
@@ -143,15 +154,19 @@ impl Bounds<'_> {
             moved += most;
             pushed += most_pushed;
         }
-        let rounding = place + U * x.length();
+        let magnitudes = match is_touched {
+            true => [error, moved, place, x.length()],
+            false => [error, 0.0, 0.0, 0.0],
+        };
         Confined {
-            error: if is_touched {
-                moved.max(error) + rounding
-            } else {
-                error
-            },
-            push_error: pushed.max(error) + rounding,
+            magnitudes,
+            push_error: PUSHED.of([error, pushed, place, x.length()]),
             is_touched,
         }
     }
+}
+
+/// Speed between a particle and its neighbour, of which samples have none.
+pub(in crate::check) fn relative_speed(velocity: &[DVec3], i: usize) -> impl Fn(usize) -> f64 + '_ {
+    move |j| velocity.get(j).map_or(0.0, |v| v.distance(velocity[i]))
 }

@@ -6,17 +6,22 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    compare::rounding::U,
+    check::{
+        engine::{Io, Outcome},
+        table::pair,
+    },
     reference::neighbors::{Crowd, Neighbors},
     solve::{
         SolveError,
-        params::Phase,
+        pbf::buffers,
         plan::{LIST_CAPACITY, Plan},
-        trace::Traced,
     },
 };
 
-use super::{Checker, NEIGHBORS, pair_of};
+use super::{
+    PbfState, State,
+    rows::{NEAR_H, NEIGHBORS},
+};
 
 /// Particles of a list block, as in shared/neighbor_list.wgsl.
 const STRIDE: usize = 128;
@@ -51,7 +56,7 @@ fn split(near: &[u32], particles: usize, members: &mut Vec<u32>) -> [u32; 2] {
     [(first + fluid) as u32, members.len() as u32]
 }
 
-impl Checker<'_> {
+impl PbfState {
     /// Who is nearer than h, in f64; `points` may stand in any order.
     pub(super) fn search(&self, points: &[DVec3]) -> Neighbors {
         self.search_within(points, self.model.calibration.support_radius)
@@ -59,7 +64,7 @@ impl Checker<'_> {
 
     /// The cells' order in f64 may differ from the device's where a particle stands on a face.
     fn search_within(&self, points: &[DVec3], radius: f64) -> Neighbors {
-        let n = self.n();
+        let n = self.particles();
         let ids: Vec<u32> = (0..points.len() as u32).collect();
         let mut order = self.model.cells.order(&points[..n], &ids);
         order.extend(n..points.len());
@@ -84,16 +89,16 @@ impl Checker<'_> {
     }
 
     /// Whom a pass visits from `points`: the list, or the cells about where there is none.
-    pub(super) fn visited(
+    pub(in crate::check) fn visited(
         &mut self,
-        traced: Traced<'_>,
+        io: &Io<'_>,
         points: &[DVec3],
     ) -> Result<Arc<Neighbors>, SolveError> {
         if let Some(all) = &self.lists.all {
             return Ok(Arc::clone(all));
         }
         if !self.is_searching() {
-            let (n, lists) = (self.n(), &self.lists.members);
+            let (n, lists) = (self.particles(), &self.lists.members);
             let all = Neighbors::listed(n, |i, members| split(&lists[i], n, members));
             let all = Arc::new(all);
             self.lists.all = Some(Arc::clone(&all));
@@ -101,7 +106,7 @@ impl Checker<'_> {
         }
         if self.lists.start.is_empty() {
             let count: usize = self.model.cells.dims.iter().product();
-            self.lists.start = traced.read("cell_start", count + 1)?;
+            self.lists.start = io.before(buffers::CELL_START, count + 1)?;
         }
         Ok(Arc::new(self.searched(points)))
     }
@@ -114,7 +119,7 @@ impl Checker<'_> {
     /// Whom a pass visits from `points` where some have no list: who was sorted into the cells about where a particle
     /// is now. Two that come near each other from cells farther apart do not see each other.
     pub(super) fn searched(&self, points: &[DVec3]) -> Neighbors {
-        let n = self.n();
+        let n = self.particles();
         let (cells, lists) = (&self.model.cells, &self.lists);
         let start = &lists.start;
         let solid_start = cells.starts(&self.model.samples);
@@ -142,69 +147,71 @@ impl Checker<'_> {
             split(&near, n, members)
         })
     }
+}
 
-    pub(super) fn build_neighbors(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
-        let n = self.n();
-        let phase = traced.uniform::<Phase>("phase")?;
-        let (points, _) = self.stored(&phase);
-        let (first, count) = (phase.first as usize, phase.count as usize);
-        let capacity = LIST_CAPACITY as usize;
-        let words = count.next_multiple_of(STRIDE) * capacity;
-        let list = traced.read::<u32>(traced.buffer("neighbor_list"), words)?;
-        let counts = traced.read::<u32>("neighbor_count", n)?;
-        let member = |local: usize, k: usize| {
-            let lane = local % STRIDE;
-            let base = local / STRIDE * STRIDE * (capacity / 4) + (lane >> 1) + ((lane & 1) << 6);
-            list[4 * (base + k / 4 * STRIDE) + k % 4]
-        };
-        // Words of four whose last holds its entries first.
-        let members = |local: usize| {
-            let held = counts[first + local] as usize;
-            let mut all: Vec<u32> = (0..held.next_multiple_of(4))
-                .map(|k| member(local, k))
-                .filter(|&j| (j as usize) < points.len())
-                .collect();
-            all.sort_unstable();
-            all
-        };
-        let h = self.model.calibration.support_radius;
-        let (inner, outer) = (h * h * (1.0 - 10.0 * U), h * h * (1.0 + 10.0 * U));
-        let near = self.search_within(&points, h * (1.0 + 10.0 * U));
-        let one = |local: usize| {
-            let i = first + local;
-            let r2 = |&j: &u32| points[i].distance_squared(points[j as usize]);
-            let near: Vec<u32> = near.all(i).collect();
-            let sure = near.iter().filter(|j| r2(j) < inner).count();
-            let possible = near.iter().filter(|j| r2(j) < outer).count();
-            let held = counts[i] as usize;
-            let all = if held <= capacity {
-                members(local)
-            } else {
-                Vec::new()
-            };
-            let wrong = if held > capacity {
-                sure.saturating_sub(held) + held.saturating_sub(possible)
-            } else {
-                let within = |j: &&u32| near.contains(j) && r2(j) < outer;
-                let twice = all.windows(2).filter(|pair| pair[0] == pair[1]).count();
-                let right = all.iter().filter(within).count() - twice;
-                let missed = (near.iter())
-                    .filter(|j| r2(j) < inner && all.binary_search(j).is_err())
-                    .count();
-                missed + all.len() - right + held.abs_diff(all.len())
-            };
-            (wrong, possible - sure, all)
-        };
-        let found: Vec<_> = (0..count).into_par_iter().map(one).collect();
-        let ties = found.iter().map(|(_, ties, _)| ties).sum();
-        let pairs: Vec<_> = (found.iter().enumerate())
-            .map(|(local, (wrong, ..))| pair_of(first + local, *wrong as f64, 0.0, 0.0))
+pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let n = state.particles();
+    let phase = io.window(&buffers::PHASES)?;
+    let (points, _) = state.stored(io, &phase)?;
+    let (first, count) = (phase.first as usize, phase.count as usize);
+    let capacity = LIST_CAPACITY as usize;
+    let words = count.next_multiple_of(STRIDE) * capacity;
+    let list = io.after(buffers::NEIGHBOR_LIST.retyped::<u32>(), words)?;
+    let counts = io.after(buffers::NEIGHBOR_COUNT, n)?;
+    let member = |local: usize, k: usize| {
+        let lane = local % STRIDE;
+        let base = local / STRIDE * STRIDE * (capacity / 4) + (lane >> 1) + ((lane & 1) << 6);
+        list[4 * (base + k / 4 * STRIDE) + k % 4]
+    };
+    // Words of four whose last holds its entries first.
+    let members = |local: usize| {
+        let held = counts[first + local] as usize;
+        let mut all: Vec<u32> = (0..held.next_multiple_of(4))
+            .map(|k| member(local, k))
+            .filter(|&j| (j as usize) < points.len())
             .collect();
-        self.table.add(&NEIGHBORS, &pairs, ties);
-        for (local, (_, _, all)) in found.into_iter().enumerate() {
-            self.lists.is_searched[first + local] = counts[first + local] > LIST_CAPACITY;
-            self.lists.members[first + local] = all;
-        }
-        Ok(())
+        all.sort_unstable();
+        all
+    };
+    let h = state.model.calibration.support_radius;
+    let shell = NEAR_H.of([]);
+    let (inner, outer) = (h * h * (1.0 - shell), h * h * (1.0 + shell));
+    let near = state.search_within(&points, h * (1.0 + shell));
+    let one = |local: usize| {
+        let i = first + local;
+        let r2 = |&j: &u32| points[i].distance_squared(points[j as usize]);
+        let near: Vec<u32> = near.all(i).collect();
+        let sure = near.iter().filter(|j| r2(j) < inner).count();
+        let possible = near.iter().filter(|j| r2(j) < outer).count();
+        let held = counts[i] as usize;
+        let all = if held <= capacity {
+            members(local)
+        } else {
+            Vec::new()
+        };
+        let wrong = if held > capacity {
+            sure.saturating_sub(held) + held.saturating_sub(possible)
+        } else {
+            let within = |j: &&u32| near.contains(j) && r2(j) < outer;
+            let twice = all.windows(2).filter(|pair| pair[0] == pair[1]).count();
+            let right = all.iter().filter(within).count() - twice;
+            let missed = (near.iter())
+                .filter(|j| r2(j) < inner && all.binary_search(j).is_err())
+                .count();
+            missed + all.len() - right + held.abs_diff(all.len())
+        };
+        (wrong, possible - sure, all)
+    };
+    let found: Vec<_> = (0..count).into_par_iter().map(one).collect();
+    let wrong =
+        |(local, one): (usize, &(usize, usize, _))| pair(first + local, one.0 as f64, 0.0, []);
+    io.table
+        .add(&NEIGHBORS, found.iter().enumerate().map(wrong));
+    io.table
+        .add_ties(&NEIGHBORS, found.iter().map(|one| one.1).sum());
+    for (local, (_, _, all)) in found.into_iter().enumerate() {
+        state.lists.is_searched[first + local] = counts[first + local] > LIST_CAPACITY;
+        state.lists.members[first + local] = all;
     }
+    Ok(())
 }

@@ -4,7 +4,8 @@
 use glam::DVec3;
 
 use crate::{
-    compare::{deviation::Deviation, rounding::U},
+    check::table::{Table, pair},
+    compare::deviation::Deviation,
     domain::boundary::Boundary,
     reference::{
         Timings,
@@ -13,10 +14,10 @@ use crate::{
     },
 };
 
-use super::{Checker, fields::*, pair_of};
-
-/// Of the RMS answer to one set of moves, which is a sample of what roundings do.
-const SAFETY: f64 = 4.0;
+use super::{
+    PbfState, State,
+    rows::{SHIFT, WHOLE_DELTA, WHOLE_DENSITY, WHOLE_LAMBDA},
+};
 
 /// Where the iteration starts, and where the GPU's ends.
 #[derive(Default)]
@@ -56,13 +57,13 @@ struct Outcome {
     lambda: Vec<f64>,
 }
 
-impl Checker<'_> {
-    pub(super) fn add_whole(&mut self, boundary: &Boundary) {
+impl PbfState {
+    pub(super) fn add_whole(&mut self, boundary: &Boundary, table: &mut Table) {
         let Some(start) = self.whole.start.take() else {
             return;
         };
-        let n = self.n();
-        let model = Model::new(self.scene, boundary);
+        let n = self.particles();
+        let model = Model::new(&self.scene, boundary);
         // The GPU rounds in each iteration. Moves of the start alone would not do: where the iteration converges it forgets
         // them, and what is left is what the last iterations rounded.
         let solved = |moves: &dyn Fn(u32, usize) -> DVec3| {
@@ -78,7 +79,7 @@ impl Checker<'_> {
             iterate_among(&model, substep, sorted, timings, &mut visit, &mut disturb);
             moved.points
         };
-        let shift = 2.0 * U * self.scene.domain.size().length();
+        let shift = SHIFT.of([self.scene.domain.size().length()]);
         let layer = |k: usize| (start.points[k] / self.scene.particle_spacing()).floor();
         let exact = solved(&|_, _| DVec3::ZERO);
         // Each particle on its own; and on a lattice, where all of a layer meet the same numbers, all of it alike, and in
@@ -97,17 +98,16 @@ impl Checker<'_> {
             (&WHOLE_DENSITY, &density),
             (&WHOLE_LAMBDA, &lambda),
         ];
-        for (field, off) in rows {
+        for (entry, off) in rows {
             let error = off(&found);
             let answer = off(&alone).rms.max(off(&alike).rms);
             let index = error.max_at.unwrap_or(0);
-            let pair = pair_of(index, error.rms, 0.0, SAFETY * answer);
-            self.table.add(field, &[pair], 0);
+            table.add(entry, [pair(index, error.rms, 0.0, [answer])]);
         }
     }
 
     fn outcome(&self, points: &[DVec3]) -> Outcome {
-        let n = self.n();
+        let n = self.particles();
         let neighbors = self.search(points);
         let inputs = self.inputs(points, &neighbors);
         let (mut lambda, mut density) = (vec![0.0; n], vec![0.0; n]);

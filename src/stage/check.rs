@@ -1,8 +1,4 @@
-//! `check`: a step on the GPU against the f64 reference, from the same inputs, pass by pass and as a whole.
-
-pub mod flip;
-pub mod pbf;
-mod sort;
+//! `check`: opens what a step starts from and the device, and has the room `check` hold the step against the reference.
 
 use std::{
     path::PathBuf,
@@ -10,11 +6,9 @@ use std::{
     time::Instant,
 };
 
-use glam::{DVec3, Vec4};
-
 use crate::{
     cache::{CacheError, CacheReader},
-    compare::check::Pair,
+    check::{flip, pbf},
     domain::{
         frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
         substep::Which,
@@ -30,7 +24,7 @@ use super::{
     prepare::Start,
 };
 
-pub use crate::compare::check::{Row, Table};
+pub use crate::check::{Checked, Row, Table};
 
 /// Where the inputs of the step come from.
 #[derive(Clone, Debug)]
@@ -50,15 +44,6 @@ pub struct Request {
     pub substep: Which,
     /// Index or part of the name of an adapter.
     pub gpu: Gpu,
-}
-
-/// A substep held against its twins.
-#[derive(Clone, Debug, Default)]
-pub struct Checked {
-    /// What was found; empty where there is no water.
-    pub table: Table,
-    /// Which substep of its frame it was, from 1; `None` where there is no water.
-    pub substep: Option<u32>,
 }
 
 /// The first row out of tolerance.
@@ -283,27 +268,5 @@ pub fn check_substep(
             pbf::check(context, scene, plan, boundaries, (frame, particles), which)
         }
         Method::Flip => flip::check(context, scene, plan, boundary, (frame, particles), which),
-    }
-}
-
-fn wide(value: &[f32; 4]) -> DVec3 {
-    Vec4::from_array(*value).as_dvec4().truncate()
-}
-
-fn pair(index: usize, value: DVec3, reference: DVec3, tolerance: f64) -> Pair<[f64; 3]> {
-    Pair {
-        index,
-        value: value.to_array(),
-        reference: reference.to_array(),
-        tolerance,
-    }
-}
-
-fn pair_of(index: usize, value: f64, reference: f64, tolerance: f64) -> Pair<f64> {
-    Pair {
-        index,
-        value,
-        reference,
-        tolerance,
     }
 }
