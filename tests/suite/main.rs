@@ -32,6 +32,7 @@ mod compare {
     mod diff;
     mod renders;
 }
+mod docs;
 mod domain {
     mod circles;
     mod signed_distance;
