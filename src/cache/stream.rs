@@ -94,11 +94,6 @@ pub(super) enum Layout {
 }
 
 impl Stream {
-    /// The line of [`STREAMS`] with this name.
-    pub fn of(name: &str) -> Option<&'static Self> {
-        STREAMS.iter().find(|stream| stream.name == name)
-    }
-
     /// The streams of a bake with this manifest.
     pub fn all(manifest: &Manifest) -> impl Iterator<Item = &'static Self> {
         STREAMS.iter().filter(|stream| stream.is_in(manifest))
@@ -171,13 +166,6 @@ mod tests {
         let names: BTreeSet<_> = STREAMS.iter().map(|stream| stream.name).collect();
         let folders: BTreeSet<_> = STREAMS.iter().map(|stream| stream.folder).collect();
         assert_eq!((names.len(), folders.len()), (STREAMS.len(), STREAMS.len()));
-        for stream in &STREAMS {
-            assert_eq!(
-                Stream::of(stream.name).map(|s| s.folder),
-                Some(stream.folder)
-            );
-        }
-        assert!(Stream::of("whitewater").is_none());
     }
 
     /// `diff` compares one stream of particles, with the tolerance's fields and the aggregates; a second one needs a place of its own there.

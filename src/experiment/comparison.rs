@@ -197,31 +197,29 @@ const MEASURED: &str = "Both solvers are measured alike, from the particles. Spa
     front steepness of Kjeldsen and Myrhaug 1979). In the air is what lies more than a cube from the continuous water. \
     Values that differ by less than 5 % are called alike. Times are wall clock, the whole frame, with writing beside it.";
 
+/// A course's median, with so many digits.
+fn middle(course: &Course, digits: usize, value: fn(&Row) -> Option<f64>) -> String {
+    let middle = median(course.rows.iter().filter_map(value).collect());
+    middle.map_or("none".into(), |value| format!("{value:.digits$}"))
+}
+
 fn run_table(caches: &[CacheReader; 2], courses: &[Course; 2]) -> Vec<Vec<String>> {
     type Cell = fn(&Manifest, &Course) -> String;
-    fn each(course: &Course, value: fn(&Row) -> f64) -> Option<f64> {
-        median(course.rows.iter().map(value).collect())
-    }
-    fn show(value: Option<f64>, digits: usize) -> String {
-        value.map_or("none".into(), |value| format!("{value:.digits$}"))
-    }
-    let rows: [(&str, Cell); 10] = [
+    let rows: [(&str, Cell); 11] = [
+        ("", |_, c| c.solver.clone()),
         ("particles at the start", |m, _| {
             m.start_particles.to_string()
         }),
         ("particle spacing, m", |m, _| m.particle_spacing.to_string()),
         ("frames measured", |_, c| c.rows.len().to_string()),
         ("time per frame, median, s", |_, c| {
-            show(
-                median(c.rows.iter().filter_map(|row| row.seconds).collect()),
-                3,
-            )
+            middle(c, 3, |row| row.seconds)
         }),
         ("substeps a frame, median", |_, c| {
-            show(each(c, |row| row.substeps.into()), 0)
+            middle(c, 0, |row| Some(row.substeps.into()))
         }),
         ("iterations a frame, median", |_, c| {
-            show(each(c, |row| row.iterations as f64), 0)
+            middle(c, 0, |row| Some(row.iterations as f64))
         }),
         ("projections that missed their tolerance", |_, c| {
             c.rows.iter().map(|row| row.missed).sum::<u32>().to_string()
@@ -236,18 +234,12 @@ fn run_table(caches: &[CacheReader; 2], courses: &[Course; 2]) -> Vec<Vec<String
             m.scene_hash.chars().take(16).collect()
         }),
     ];
-    let titles = [String::new()]
-        .into_iter()
-        .chain(courses.iter().map(|c| c.solver.clone()));
-    let mut table = vec![titles.collect()];
-    for (title, cell) in rows {
-        let cells = caches
-            .iter()
-            .zip(courses)
-            .map(|(cache, course)| cell(cache.manifest(), course));
-        table.push([title.to_owned()].into_iter().chain(cells).collect());
-    }
-    table
+    let of = |(title, cell): (&str, Cell)| {
+        let both = caches.iter().zip(courses);
+        let cells = both.map(|(cache, course)| cell(cache.manifest(), course));
+        [title.to_owned()].into_iter().chain(cells).collect()
+    };
+    rows.into_iter().map(of).collect()
 }
 
 fn pictures(

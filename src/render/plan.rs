@@ -4,8 +4,6 @@
 
 use std::collections::BTreeMap;
 
-use bytemuck::NoUninit;
-
 use super::{RenderError, buffers::FILLS, frame::Extent, uniform::Fill};
 use crate::gpu::{
     adapter::Context,
@@ -133,12 +131,12 @@ impl Plan {
     }
 
     /// A buffer that holds `count` values, of zeros.
-    pub(super) fn buffer<T>(&mut self, buffer: &Buf<T>, count: usize) {
+    pub(super) fn buffer<T: Element>(&mut self, buffer: &Buf<T>, count: usize) {
         self.buffers.push(buffer.sized(count));
     }
 
     /// A buffer of these values.
-    pub(super) fn values<T: NoUninit>(&mut self, buffer: &Buf<T>, values: &[T]) {
+    pub(super) fn values<T: Element>(&mut self, buffer: &Buf<T>, values: &[T]) {
         self.buffer(buffer, values.len());
         let bytes = bytemuck::cast_slice(values).to_vec();
         self.contents.push((buffer.name().to_owned(), bytes));

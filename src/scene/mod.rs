@@ -1,4 +1,4 @@
-//! Scene and look files, parsed into validated types, and the plan that follows from them.
+//! Scene and look files, parsed into validated types.
 
 pub mod budget;
 pub mod effects;
@@ -7,7 +7,6 @@ pub mod grids;
 pub mod keys;
 pub mod look;
 pub mod moving_solid;
-pub mod plan;
 pub mod probe;
 pub mod step;
 pub mod study;

@@ -250,33 +250,36 @@ pub fn summary(findings: &[Finding]) -> String {
     )
 }
 
-/// Every measured frame, SI units; empty where there is no value. The first row are titles.
+/// Name in the table and value; empty where there is none.
+type Column = (&'static str, fn(&Row) -> Option<f64>);
+
+const COLUMNS: [Column; 13] = [
+    ("frame", |row| Some(row.frame.into())),
+    ("time_s", |row| Some(row.time)),
+    ("bake_s", |row| row.seconds),
+    ("substeps", |row| Some(row.substeps.into())),
+    ("iterations", |row| Some(row.iterations as f64)),
+    ("missed", |row| Some(row.missed.into())),
+    ("crest_height_m", |row| Some(row.measures.crest_height)),
+    ("crest_slope_degrees", |row| row.measures.crest_slope),
+    ("front_m", |row| row.measures.front),
+    ("splash_height_m", |row| Some(row.measures.splash_height)),
+    ("splash_reach_m", |row| Some(row.measures.splash_reach)),
+    ("airborne", |row| Some(row.measures.airborne)),
+    ("wet_area_m2", |row| Some(row.measures.wet_area)),
+];
+
+/// Every measured frame, SI units. The first row are titles.
 pub fn table(courses: &[Course]) -> Vec<Vec<String>> {
-    let titles = "solver,frame,time_s,bake_s,substeps,iterations,missed,crest_height_m,crest_slope_degrees,front_m,\
-                  splash_height_m,splash_reach_m,airborne,wet_area_m2";
-    let optional = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
-    let row = |course: &Course, row: &Row| {
-        let m = &row.measures;
-        vec![
-            course.solver.clone(),
-            row.frame.to_string(),
-            row.time.to_string(),
-            optional(row.seconds),
-            row.substeps.to_string(),
-            row.iterations.to_string(),
-            row.missed.to_string(),
-            m.crest_height.to_string(),
-            optional(m.crest_slope),
-            optional(m.front),
-            m.splash_height.to_string(),
-            m.splash_reach.to_string(),
-            m.airborne.to_string(),
-            m.wet_area.to_string(),
-        ]
-    };
-    let mut table = vec![titles.split(',').map(str::to_owned).collect()];
+    let titles = COLUMNS.iter().map(|(name, _)| *name);
+    let titles = ["solver"].into_iter().chain(titles);
+    let mut table = vec![titles.map(str::to_owned).collect()];
     for course in courses {
-        table.extend(course.rows.iter().map(|of| row(course, of)));
+        table.extend(course.rows.iter().map(|row| {
+            let cell = |(_, value): &Column| value(row).map_or(String::new(), |v| v.to_string());
+            let cells = COLUMNS.iter().map(cell);
+            [course.solver.clone()].into_iter().chain(cells).collect()
+        }));
     }
     table
 }

@@ -310,7 +310,6 @@ impl Results<'_> {
         }
         let mut run = what_was_run(request);
         run.push(Part::Text(self.where_run()));
-        run.push(Part::Words(self.runs_table()));
         parts.push(Part::Folded("What was run".into(), run));
         let measured = [EVERYWHERE, MEASURED].map(|text| Part::Text(text.into()));
         parts.push(Part::Folded("How it was measured".into(), measured.into()));
@@ -357,33 +356,12 @@ impl Results<'_> {
         let gpu = self.devices.gpu.as_ref();
         let gpu = gpu.map_or(String::new(), |gpu| format!("GPU: {}. ", gpu.identity()));
         format!(
-            "{gpu}CPU: {}. By {} {}. Limits are those of the GPU's solvers.",
+            "{gpu}CPU: {}. By {} {}. Limits are those of the GPU's solvers. Particles, frames and seconds of each run stand in \
+             results.csv.",
             self.devices.cpu.identity(),
             env!("CARGO_PKG_NAME"),
             env!("CARGO_PKG_VERSION")
         )
-    }
-
-    fn runs_table(&self) -> Vec<Vec<String>> {
-        let titles = "case,solver,device,particles,frames,frames a second,s";
-        let mut table = vec![strings(titles.split(','))];
-        for (case, runs) in self.stability.cases.iter().zip(&self.runs) {
-            let Held::Runs(trials) = &case.held else {
-                continue;
-            };
-            for (trial, run) in trials.iter().zip(runs) {
-                table.push(vec![
-                    format!("{} {}", case.number, case.name),
-                    trial.scene.solver.method.name().to_owned(),
-                    trial.device.name().to_owned(),
-                    run.particles.to_string(),
-                    run.frames.to_string(),
-                    number(trial.scene.shot.frames_per_second),
-                    format!("{:.2}", run.seconds.iter().sum::<f64>()),
-                ]);
-            }
-        }
-        table
     }
 }
 

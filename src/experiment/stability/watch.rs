@@ -6,7 +6,7 @@ use crate::{
     domain::{
         bounds::Bounds,
         probe::{energies, volume},
-        solver::{Projection, StepReport},
+        solver::StepReport,
     },
     scene::{
         Scene,
@@ -63,60 +63,50 @@ impl<'a> Beside<'a> {
 /// A mark while a run is under way.
 pub(super) struct Watch<'a> {
     pub(super) mark: &'a Mark,
-    memory: Memory,
+    flight: Option<Flight>,
+    /// What a quantity remembers of the frames before, as [`remembered`] begins it.
+    memory: Vec<f64>,
     /// Seconds and numbers, one a frame that counts.
     pub(super) curve: Vec<[f64; 2]>,
     value: Option<f64>,
 }
 
-/// What a quantity remembers of the frames before.
-enum Memory {
-    Nothing,
-    Flight(Flight),
-    /// Lowest place so far, a particle.
-    Lowest(Vec<f64>),
-    /// Of the start, and the least so far.
-    Energy(f64, f64),
-    /// Sums a probe, and how many there are.
-    Means(Vec<f64>, f64),
-    /// At `since`, or of the start; `None` before.
-    Reference(Option<f64>),
-    /// Two sums.
-    Sums([f64; 2]),
+/// What a quantity remembers before the first frame.
+fn remembered(mark: &Mark, run: &View<'_>) -> Vec<f64> {
+    let (scene, start) = (run.scene, &run.start.particles);
+    let of_start = |number: f64| mark.since.is_none().then_some(number);
+    match mark.of {
+        // The lowest place so far, a particle.
+        Quantity::Rebound => start.position.iter().map(|p| f64::from(p[1])).collect(),
+        // The start's, and the least so far.
+        Quantity::EnergyGain | Quantity::EnergyRise => {
+            let mass = scene.water.rest_density * scene.particle_spacing().powi(3);
+            let (gravity, corner) = (scene.water.gravity, scene.domain.min);
+            let (kinetic, potential) = energies(start, mass, gravity, corner);
+            vec![kinetic + potential; 2]
+        }
+        // A sum a probe, and how many there are.
+        Quantity::MeanPressureError => vec![0.0; scene.pressure_points().len() + 1],
+        // What is held against the state at `since` is not known before.
+        Quantity::Sinking => {
+            let height = mean_height(&start.position) - scene.domain.min.y;
+            of_start(height).into_iter().collect()
+        }
+        Quantity::VolumeDrift | Quantity::FilledVolume => of_start(1.0).into_iter().collect(),
+        // Two sums.
+        Quantity::IterationsRatio | Quantity::GaugeConvergence => vec![0.0; 2],
+        _ => Vec::new(),
+    }
 }
 
 impl<'a> Watch<'a> {
     pub(super) fn new(mark: &'a Mark, run: &View<'_>) -> Self {
         let start = &run.start.particles;
-        let memory = match mark.of {
-            Quantity::BallisticError => {
-                Memory::Flight(Flight::new(&start.position, &start.velocity))
-            }
-            Quantity::Rebound => {
-                Memory::Lowest(start.position.iter().map(|p| f64::from(p[1])).collect())
-            }
-            Quantity::EnergyGain | Quantity::EnergyRise => {
-                let mass = run.scene.water.rest_density * run.scene.particle_spacing().powi(3);
-                let gravity = run.scene.water.gravity;
-                let (kinetic, potential) = energies(start, mass, gravity, run.scene.domain.min);
-                Memory::Energy(kinetic + potential, kinetic + potential)
-            }
-            Quantity::MeanPressureError => {
-                Memory::Means(vec![0.0; run.scene.pressure_points().len()], 0.0)
-            }
-            Quantity::Sinking => {
-                let start = mean_height(&start.position) - run.scene.domain.min.y;
-                Memory::Reference(mark.since.is_none().then_some(start))
-            }
-            Quantity::VolumeDrift | Quantity::FilledVolume => {
-                Memory::Reference(mark.since.is_none().then_some(1.0))
-            }
-            Quantity::IterationsRatio | Quantity::GaugeConvergence => Memory::Sums([0.0; 2]),
-            _ => Memory::Nothing,
-        };
+        let is_flight = mark.of == Quantity::BallisticError;
         Self {
             mark,
-            memory,
+            flight: is_flight.then(|| Flight::new(&start.position, &start.velocity)),
+            memory: remembered(mark, run),
             curve: Vec::new(),
             value: None,
         }
@@ -127,7 +117,8 @@ impl<'a> Watch<'a> {
         let from = self.mark.after.max(self.mark.since.unwrap_or(0.0));
         let counts = run.time() >= from * (1.0 - 1e-9);
         // What sums up the way from the start has to see all of it; means begin where the mark does.
-        if !counts && !matches!(self.memory, Memory::Flight(_) | Memory::Lowest(_)) {
+        let sees_all = self.flight.is_some() || self.mark.of == Quantity::Rebound;
+        if !counts && !sees_all {
             return;
         }
         let number = self.number(run, beside, report);
@@ -150,6 +141,7 @@ impl<'a> Watch<'a> {
         let spacing = scene.particle_spacing();
         let (start, now) = (&run.start.particles, &run.state);
         let projection = report.projection.unwrap_or_default();
+        let energy = report.kinetic_energy + report.potential_energy;
         match self.mark.of {
             Quantity::Escaped => outside(&now.position, &scene.domain) as f64,
             Quantity::Lost => lost(&start.id, &now.id) as f64,
@@ -164,13 +156,56 @@ impl<'a> Watch<'a> {
             }
             Quantity::LeastSpacing => least_spacing(&now.position, spacing),
             Quantity::Climb => (top(&now.position) - top(&start.position)) / spacing,
+            Quantity::Sinking => 1.0 - self.drift(mean_height(&now.position) - scene.domain.min.y),
+            Quantity::BallisticError => self.flight.as_mut().map_or(f64::NAN, |flight| {
+                let seconds = scene.shot.frame_seconds();
+                flight.advance(scene.water.gravity, seconds, report.substeps);
+                flight.error(&now.position)
+            }),
+            Quantity::Rebound => {
+                let mut most = 0.0f64;
+                let all = now.position.iter().zip(&start.position);
+                for (low, (p, from)) in self.memory.iter_mut().zip(all) {
+                    *low = low.min(f64::from(p[1]));
+                    let fallen = f64::from(from[1]) - *low;
+                    if fallen > 0.0 {
+                        most = most.max((f64::from(p[1]) - *low) / fallen);
+                    }
+                }
+                most
+            }
+            Quantity::VolumeDrift => {
+                let held = now.len() as f64 * spacing.powi(3);
+                (self.drift(volume(now, spacing, &scene.domain) / held) - 1.0).abs()
+            }
+            Quantity::FilledVolume => {
+                let filled = filled_volume(&now.position, spacing, &scene.domain);
+                (self.drift(filled.unwrap_or(f64::NAN)) - 1.0).abs()
+            }
+            Quantity::EnergyGain => energy / self.memory[0] - 1.0,
+            Quantity::EnergyRise => {
+                self.memory[1] = self.memory[1].min(energy);
+                (energy - self.memory[1]) / self.memory[0]
+            }
+            Quantity::PressureError => {
+                let pressures = run.pressures.iter().map(|p| p.unwrap_or(f64::NAN));
+                pressure_error(run, pressures)
+            }
+            Quantity::MeanPressureError => {
+                let now = run.pressures.iter().map(|p| p.unwrap_or(f64::NAN));
+                for (sum, p) in self.memory.iter_mut().zip(now.chain([1.0])) {
+                    *sum += p;
+                }
+                let (count, sums) = self.memory.split_last().unwrap_or((&f64::NAN, &[]));
+                pressure_error(run, sums.iter().map(|sum| sum / count))
+            }
             Quantity::Compression => report.density_error_mean,
             Quantity::LargestCompression => report.density_error_max,
-            Quantity::Residual
-            | Quantity::Missed
-            | Quantity::Pockets
-            | Quantity::Incompatible
-            | Quantity::Dropped => of_projection(self.mark.of, &projection),
+            Quantity::Residual => projection.residual,
+            Quantity::Missed => f64::from(projection.missed),
+            Quantity::Pockets => f64::from(projection.pockets),
+            Quantity::Incompatible => projection.incompatible,
+            Quantity::Dropped => projection.dropped as f64,
             Quantity::Iterations => report.iterations as f64,
             Quantity::Substeps => f64::from(report.substeps),
             Quantity::Capped => {
@@ -186,100 +221,44 @@ impl<'a> Watch<'a> {
                 Some(region) => (now.len() - outside(&now.position, &about(region, scene))) as f64,
                 None => f64::NAN,
             },
-            Quantity::PressureError => {
-                let pressures = run.pressures.iter().map(|p| p.unwrap_or(f64::NAN));
-                pressure_error(run, pressures)
-            }
             Quantity::Difference => self.difference(run, beside),
             Quantity::DisplacementError => displacement_error(run, beside),
+            Quantity::IterationsRatio => {
+                let theirs = beside.first().and_then(|other| other.view.report.as_ref());
+                let theirs = theirs.map_or(f64::NAN, |report| report.iterations as f64);
+                self.ratio([report.iterations as f64, theirs])
+            }
             Quantity::GaugeDifference => match beside {
                 [other, ..] => {
                     largest(gaps(run, &other.view, other.other.scale)) / run.resolution()
                 }
                 [] => f64::NAN,
             },
-            Quantity::Sinking
-            | Quantity::VolumeDrift
-            | Quantity::FilledVolume
-            | Quantity::BallisticError
-            | Quantity::Rebound
-            | Quantity::EnergyGain
-            | Quantity::EnergyRise
-            | Quantity::MeanPressureError
-            | Quantity::IterationsRatio
-            | Quantity::GaugeConvergence => self.remembered(run, beside, report),
-        }
-    }
-
-    /// Of quantities that depend on the frames before.
-    fn remembered(&mut self, run: &View<'_>, beside: &[Beside<'_>], report: &StepReport) -> f64 {
-        let now = &run.state;
-        match &mut self.memory {
-            Memory::Flight(flight) => {
-                let gravity = run.scene.water.gravity;
-                flight.advance(gravity, run.scene.shot.frame_seconds(), report.substeps);
-                flight.error(&now.position)
-            }
-            Memory::Lowest(lowest) => {
-                let mut most = 0.0f64;
-                let start = run.start.particles.position.iter();
-                for ((low, p), from) in lowest.iter_mut().zip(&now.position).zip(start) {
-                    *low = low.min(f64::from(p[1]));
-                    let fallen = f64::from(from[1]) - *low;
-                    if fallen > 0.0 {
-                        most = most.max((f64::from(p[1]) - *low) / fallen);
-                    }
-                }
-                most
-            }
-            Memory::Reference(reference) => {
-                let scene = run.scene;
-                let spacing = scene.particle_spacing();
-                let number = match self.mark.of {
-                    Quantity::Sinking => mean_height(&now.position) - scene.domain.min.y,
-                    Quantity::FilledVolume => {
-                        filled_volume(&now.position, spacing, &scene.domain).unwrap_or(f64::NAN)
-                    }
-                    _ => volume(now, spacing, &scene.domain) / (now.len() as f64 * spacing.powi(3)),
-                };
-                let ratio = number / *reference.get_or_insert(number);
-                match self.mark.of {
-                    Quantity::Sinking => 1.0 - ratio,
-                    _ => (ratio - 1.0).abs(),
-                }
-            }
-            Memory::Energy(first, least) => {
-                let energy = report.kinetic_energy + report.potential_energy;
-                *least = least.min(energy);
-                match self.mark.of {
-                    Quantity::EnergyRise => (energy - *least) / *first,
-                    _ => energy / *first - 1.0,
-                }
-            }
-            Memory::Means(sums, count) => {
-                *count += 1.0;
-                for (sum, p) in sums.iter_mut().zip(&run.pressures) {
-                    *sum += p.unwrap_or(f64::NAN);
-                }
-                pressure_error(run, sums.iter().map(|sum| sum / *count))
-            }
-            Memory::Sums(sums) => match (self.mark.of, beside) {
-                (Quantity::IterationsRatio, [other, ..]) => {
-                    let theirs = other.view.report.as_ref().map_or(0, |r| r.iterations);
-                    sums[0] += report.iterations as f64;
-                    sums[1] += theirs as f64;
-                    sums[0] / sums[1]
-                }
-                (Quantity::GaugeConvergence, [second, third, ..]) => {
+            Quantity::GaugeConvergence => match beside {
+                [second, third, ..] => {
                     let square = |gaps: Vec<f64>| gaps.iter().map(|gap| gap * gap).sum::<f64>();
-                    sums[0] += square(gaps(&second.view, &third.view, 1.0));
-                    sums[1] += square(gaps(run, &second.view, second.other.scale));
-                    (sums[0] / sums[1]).sqrt()
+                    let finer = square(gaps(&second.view, &third.view, 1.0));
+                    let coarser = square(gaps(run, &second.view, second.other.scale));
+                    self.ratio([finer, coarser]).sqrt()
                 }
                 _ => f64::NAN,
             },
-            Memory::Nothing => f64::NAN,
         }
+    }
+
+    /// A number over that of the reference, which it becomes where none is known yet.
+    fn drift(&mut self, number: f64) -> f64 {
+        if self.memory.is_empty() {
+            self.memory.push(number);
+        }
+        number / self.memory[0]
+    }
+
+    /// The ratio of two sums over the frames so far.
+    fn ratio(&mut self, numbers: [f64; 2]) -> f64 {
+        let sums = self.memory.iter_mut().zip(numbers);
+        sums.for_each(|(sum, number)| *sum += number);
+        self.memory[0] / self.memory[1]
     }
 
     fn difference(&self, run: &View<'_>, beside: &[Beside<'_>]) -> f64 {
@@ -330,16 +309,6 @@ fn lost(a: &[u32], b: &[u32]) -> usize {
     }
     let missing = |a: &[u32], b: &[u32]| a.iter().filter(|id| b.binary_search(id).is_err()).count();
     missing(a, b) + missing(b, a).max(usize::from(a.len() == b.len()))
-}
-
-fn of_projection(of: Quantity, projection: &Projection) -> f64 {
-    match of {
-        Quantity::Residual => projection.residual,
-        Quantity::Missed => f64::from(projection.missed),
-        Quantity::Pockets => f64::from(projection.pockets),
-        Quantity::Incompatible => projection.incompatible,
-        _ => projection.dropped as f64,
-    }
 }
 
 fn top(position: &[[f32; 3]]) -> f64 {

@@ -16,7 +16,14 @@ use crate::{
         poisson::{self, gradients::norm},
     },
     scene::{flip::Surface, study::sweep::Point},
-    solve::{SolveError, flip::Flip, pbf::device_limits},
+    solve::{
+        SolveError,
+        flip::{
+            Flip,
+            buffers::{CELL_KIND, FACE_OPEN, FACE_VELOCITY, LIQUID_DISTANCE, SOLID_FLUX},
+        },
+        plan::device_limits,
+    },
     stage::{device::Opened, drive::Drive, prepare::Start},
 };
 
@@ -264,7 +271,7 @@ impl<'a> Projections<'a> {
         // p is q times the same factor on both sides.
         let found = solver.solution(&system.cell)?;
         let off: Vec<f64> = found.iter().zip(&exact.q).map(|(q, q64)| q - q64).collect();
-        let velocity = solver.field::<f32>("face_velocity", 3 * stride)?;
+        let velocity = solver.field(FACE_VELOCITY, 3 * stride)?;
         let faces = system.gradient(cells, &exact.q);
         let (moved, after): (Vec<f64>, Vec<f64>) = faces
             .into_iter()
@@ -315,13 +322,13 @@ impl Grid {
     fn read(solver: &Flip, point: &Point) -> Result<Self, SolveError> {
         let stride = solver.plan().counts.bricks.slots * CELLS as usize;
         let has_distance = point.scene.solver.flip().surface == Surface::GhostFluid;
-        let distance = has_distance.then(|| solver.field("liquid_distance", stride));
+        let distance = has_distance.then(|| solver.field(LIQUID_DISTANCE, stride));
         Ok(Self {
-            kind: solver.field("cell_kind", stride)?,
-            open: solver.field("face_open", 3 * stride)?,
+            kind: solver.field(CELL_KIND, stride)?,
+            open: solver.field(FACE_OPEN, 3 * stride)?,
             distance: distance.transpose()?,
-            flux: solver.field("solid_flux", stride)?,
-            velocity: solver.field("face_velocity", 3 * stride)?,
+            flux: solver.field(SOLID_FLUX, stride)?,
+            velocity: solver.field(FACE_VELOCITY, 3 * stride)?,
         })
     }
 

@@ -116,12 +116,17 @@ impl Chart {
         }
     }
 
-    /// Points that have a place on the axes.
+    /// A point's y, where it has a place on the axes.
+    fn value(&self, dot: &Dot) -> Option<f64> {
+        let has_place = |value: &f64| !self.is_log || (*value > 0.0 && dot.at > 0.0);
+        dot.value.filter(has_place)
+    }
+
+    /// Points that have a place, with the number of their series and y.
     fn dots(&self) -> impl Iterator<Item = (usize, &Dot, f64)> {
         let series = self.series.iter().enumerate();
         let all = series.flat_map(|(k, series)| series.points.iter().map(move |dot| (k, dot)));
-        all.filter_map(|(k, dot)| Some((k, dot, dot.value?)))
-            .filter(|(_, _, value)| !self.is_log || *value > 0.0)
+        all.filter_map(|(k, dot)| Some((k, dot, self.value(dot)?)))
     }
 
     /// Where each series stands in the legend: left end and base line.
@@ -149,9 +154,8 @@ impl Chart {
         // A linear axis is as long as its series, gaps as well.
         let gaps = self.series.iter().flat_map(|series| &series.points);
         let gaps = gaps.filter(|_| !self.is_log).map(|dot| dot.at);
-        let costs = self
-            .dots()
-            .flat_map(|(_, dot, _)| [dot.at, bars(dot)[0], bars(dot)[1]]);
+        let costs = self.dots().flat_map(|(_, dot, _)| bars(dot));
+        let costs = costs.chain(self.dots().map(|(_, dot, _)| dot.at));
         let x = Axis::new(self.is_log, false, costs.chain(gaps), [left, width - right]);
         let values: Vec<f64> = self.dots().map(|(_, _, value)| value).collect();
         let most = values.iter().fold(0.0f64, |a, v| a.max(v.abs()));
@@ -254,15 +258,15 @@ impl Chart {
     fn write_series(&self, svg: &mut Svg, colour: &str, series: &Series, x: &Axis, y: &Axis) {
         let (mut path, mut pen) = (String::new(), 'M');
         for dot in &series.points {
-            match dot.value {
-                Some(value) if !self.is_log || value > 0.0 => {
+            match self.value(dot) {
+                Some(value) => {
                     path += &format!("{pen}{:.1} {:.1}", x.at(dot.at), y.at(value));
                     // A point of its own shows as a dot.
                     path += if pen == 'M' { "h0" } else { "" };
                     pen = 'L';
                 }
-                _ if self.is_log => {}
-                _ => pen = 'M',
+                None if self.is_log => {}
+                None => pen = 'M',
             }
         }
         svg.path(
@@ -271,7 +275,7 @@ impl Chart {
             " stroke-width=\"1.7\" stroke-linecap=\"round\"",
         );
         for dot in series.points.iter().filter(|_| self.is_log) {
-            let Some(value) = dot.value.filter(|value| *value > 0.0) else {
+            let Some(value) = self.value(dot) else {
                 continue;
             };
             let at = [x.at(dot.at), y.at(value)];
@@ -418,9 +422,13 @@ mod tests {
     }
 
     #[test]
-    fn an_error_of_nothing_has_no_place_on_a_logarithmic_axis() {
-        let svg = log_chart([1e-1, 0.0, 1e-3]).to_svg();
-        assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("n=1"));
+    fn an_error_or_a_cost_of_nothing_has_no_place_on_a_logarithmic_axis() {
+        let mut free = log_chart([1e-1, 1e-2, 1e-3]);
+        free.series[0].points[1].at = 0.0;
+        for chart in [log_chart([1e-1, 0.0, 1e-3]), free] {
+            let svg = chart.to_svg();
+            assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("n=1"));
+        }
     }
 
     /// One ring, about the dot that is the knee, whose label says so.

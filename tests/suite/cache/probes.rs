@@ -9,12 +9,12 @@ use swell::{
     domain::{boundary::Boundary, solver::Solver},
     scene::{
         Method, Scene, SceneError, physics_difference, physics_hash,
-        plan::{Capacity, Counts, Plan},
         probe::{Probe, ProbeKind},
     },
     solve::{
         flip::Flip,
-        pbf::{Pbf, device_limits},
+        pbf::Pbf,
+        plan::{Capacity, Counts, Plan, device_limits},
     },
     stage::prepare::Start,
 };
@@ -241,7 +241,7 @@ fn only_a_pressure_costs_the_device_anything() {
     for method in ["pbf", "flip"] {
         let plan = |probes: &str| -> Plan {
             let scene = parse(probes, &[&format!("solver.method={method}")]).unwrap();
-            swell::solve::plan(&scene, counts, device_limits(&context))
+            Plan::new(&scene, counts, device_limits(&context))
         };
         let bare = plan("");
         assert_eq!(plan(&others), bare);

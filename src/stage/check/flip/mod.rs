@@ -22,11 +22,12 @@ use crate::{
     },
     gpu::{adapter::Context, recording::Moment},
     reference::flip::{Cloud, Faces, Given, Model, Room, Sorted, Step, assign_cells, survey},
-    scene::{Scene, flip::Transfer, plan::Plan, step::Substep},
+    scene::{Scene, flip::Transfer, step::Substep},
     solve::{
         SolveError,
         flip::Flip,
         params::FlipParams,
+        plan::Plan,
         trace::{Begun, Span, TraceFrame, Traced},
     },
 };

@@ -8,8 +8,12 @@ use rayon::prelude::*;
 use crate::{
     compare::rounding::U,
     reference::neighbors::{Crowd, Neighbors},
-    scene::plan::{LIST_CAPACITY, Plan},
-    solve::{SolveError, params::Phase, trace::Traced},
+    solve::{
+        SolveError,
+        params::Phase,
+        plan::{LIST_CAPACITY, Plan},
+        trace::Traced,
+    },
 };
 
 use super::{Checker, NEIGHBORS, pair_of};

@@ -24,11 +24,12 @@ use crate::{
             passes::{self, Inputs, Momentum},
         },
     },
-    scene::{Iteration, Scene, Stop, plan::Plan},
+    scene::{Iteration, Scene, Stop},
     solve::{
         SolveError,
         params::{Counters, IterationControl, Phase},
         pbf::Pbf,
+        plan::Plan,
         trace::{Span, TraceFrame, Traced},
     },
 };
