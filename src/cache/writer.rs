@@ -28,7 +28,7 @@ const DEPTH: usize = 2;
 pub struct Asset {
     /// Path below `assets/`, with `/`.
     pub name: String,
-    /// Its content.
+    /// Content of the file.
     pub bytes: Vec<u8>,
 }
 

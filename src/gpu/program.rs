@@ -344,10 +344,10 @@ pub(super) fn checked<T>(
         .push_error_scope(wgpu::ErrorFilter::Validation);
     let made = make();
     match pollster::block_on(scope.pop()) {
-        Some(error) => Err(GpuError::Shader {
+        Some(error) => Err(context.shaders.blamed(GpuError::Shader {
             name: name.to_owned(),
             message: error.to_string(),
-        }),
+        })),
         None => Ok(made),
     }
 }
@@ -358,7 +358,7 @@ pub(super) fn checked<T>(
 /// [`GpuError::Shader`]; [`GpuError::NoF64`].
 pub(super) fn shader(context: &Context, name: &str, defines: &[&str]) -> Result<Shader, GpuError> {
     let source = source(context, name, defines)?;
-    let reflection = reflect(name, &source)?;
+    let reflection = reflect(name, &source).map_err(|error| context.shaders.blamed(error))?;
     if reflection.has_f64 && !context.has_f64 {
         return Err(GpuError::NoF64 {
             adapter: context.info.name.clone(),

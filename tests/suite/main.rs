@@ -32,6 +32,7 @@ mod compare {
     mod diff;
     mod renders;
 }
+mod docs;
 mod domain {
     mod circles;
     mod signed_distance;
@@ -78,5 +79,6 @@ mod stage {
     mod branch;
     mod budget;
     mod device_cpu;
+    mod drive;
     mod far_origin;
 }
