@@ -357,10 +357,3 @@ wanted_tuple!(A: 0, B: 1, C: 2);
 wanted_tuple!(A: 0, B: 1, C: 2, D: 3);
 wanted_tuple!(A: 0, B: 1, C: 2, D: 3, E: 4);
 wanted_tuple!(A: 0, B: 1, C: 2, D: 3, E: 4, F: 5);
-
-/// A storage buffer by its name alone.
-impl<T> From<&str> for Buf<T> {
-    fn from(name: &str) -> Self {
-        Self::named(name.to_owned())
-    }
-}

@@ -41,10 +41,10 @@ impl Traced<'_> {
     /// The device.
     pub fn read<T: bytemuck::Pod>(
         &self,
-        buffer: impl Into<Buf<T>>,
+        buffer: Buf<T>,
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.read(buffer.into(), count)?)
+        Ok(self.program.read(buffer, count)?)
     }
 
     /// What stands in a buffer of one struct, or in front of others.
@@ -128,7 +128,8 @@ impl Traced<'_> {
         let offset = found
             .and_then(|bind| bind.window)
             .map_or(0, |window| window.0) as usize;
-        let bytes: Vec<u8> = self.read(self.buffer(variable), offset + size_of::<T>())?;
+        let buffer: Buf<u8> = Buf::named(self.buffer(variable).to_owned());
+        let bytes = self.read(buffer, offset + size_of::<T>())?;
         Ok(bytemuck::pod_read_unaligned(&bytes[offset..]))
     }
 
