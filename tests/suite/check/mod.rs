@@ -78,10 +78,8 @@ fn case(method: Method) -> (Scene, Start) {
             max_iterations: 40,
         },
     });
-    scene.effects = Effects {
-        viscosity: Some(viscosity::Settings { xsph: 0.1 }),
-        vorticity_confinement: Some(vorticity_confinement::Settings { strength: 1.0 }),
-    };
+    scene.effects.viscosity = Some(viscosity::Settings { xsph: 0.1 });
+    scene.effects.vorticity_confinement = Some(vorticity_confinement::Settings { strength: 1.0 });
     scene.solver.pbf.as_mut().unwrap().cfl = CFL;
     let mut particles = lattice([-0.01, 0.2, -0.01], [8, 6, 7], [0.9 * D; 3]);
     jitter(&mut particles, 0.02 * D);
