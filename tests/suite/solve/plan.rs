@@ -195,7 +195,7 @@ fn faults(plan: &Plan, commands: &[Command]) -> BTreeSet<String> {
             };
             let (held, found) = (row.spec.element, &binding.element);
             // A shader may go through vectors a scalar at a time.
-            let is_part = held.scalar != Scalar::Mixed && held.bytes % found.stride == 0;
+            let is_part = held.scalar != Scalar::Mixed && held.bytes.is_multiple_of(found.stride);
             let is_same = (held.scalar, held.head) == (found.scalar, found.head)
                 && (held.bytes == found.stride || is_part);
             // It looks at the bits of whatever buffer, sixteen bytes at a time.
