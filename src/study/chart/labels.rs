@@ -20,10 +20,12 @@ pub(super) struct Room {
 }
 
 impl Room {
-    /// The place next to a point that no point and no earlier label takes: its left end and base line.
-    pub(super) fn place(&mut self, at: [f64; 2], letters: usize) -> Option<[f64; 2]> {
+    /// The place next to a point, `least` from it or farther, that no point and no earlier label takes: its left end and
+    /// base line.
+    pub(super) fn place(&mut self, at: [f64; 2], least: f64, letters: usize) -> Option<[f64; 2]> {
         let (width, height) = (LETTER[0] * letters as f64, LETTER[1]);
-        let candidates = [7.0, 15.0, 25.0].into_iter().flat_map(|r: f64| {
+        let candidates = [0.0, 8.0, 18.0].into_iter().flat_map(|more| {
+            let r = least + more;
             [
                 [r, -0.6 * r],
                 [-r - width, 0.6 * r + height],
@@ -110,7 +112,7 @@ mod tests {
             taken: vec![[96.0, 96.0, 104.0, 104.0]],
         };
         let placed = (0..40)
-            .filter(|_| room.place([100.0, 100.0], 3).is_some())
+            .filter(|_| room.place([100.0, 100.0], 7.0, 3).is_some())
             .count();
         assert!((6..40).contains(&placed), "{placed}");
         for (k, a) in room.taken.iter().enumerate() {
