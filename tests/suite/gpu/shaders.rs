@@ -394,7 +394,7 @@ const EFFECT_FILES: [&str; 5] = [
     "reference/flip/effects",
 ];
 
-/// Lines that name an effect outside its own files, comments and tests aside.
+/// Lines that name an effect outside its own files; comments, tests and what a key says in words aside.
 fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
     let own = EFFECT_FILES.map(|folder| format!("{folder}/{effect}.rs"));
     files
@@ -403,7 +403,9 @@ fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
         .flat_map(|(file, text)| {
             let code = text.split("#[cfg(test)]").next().unwrap_or("");
             code.lines()
-                .filter(|line| !line.trim_start().starts_with("//") && line.contains(effect))
+                .map(str::trim_start)
+                .filter(|line| !line.starts_with("//") && !line.starts_with(".about("))
+                .filter(|line| line.contains(effect))
                 .map(move |line| format!("{file}: {line}"))
         })
         .collect()
