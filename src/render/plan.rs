@@ -290,9 +290,9 @@ mod tests {
 
     #[test]
     fn what_is_planned_is_what_commands_use() {
-        const ALL: &str = "[output]\naovs = [\"Z\", \"forward\"]\n[basin]\nheight_m = 0.5\n\
+        const ALL: &str = "[output]\nformats = [\"exr\"]\naovs = [\"Z\", \"forward\"]\n[basin]\nheight_m = 0.5\n\
             [water]\nspray = { density_per_metre = 9.0, speed_m_per_s = 5.5 }\n";
-        let depth_alone = "[output]\naovs = [\"Z\"]\n";
+        let depth_alone = "[output]\nformats = [\"exr\"]\naovs = [\"Z\"]\n";
         let mut sizes = BTreeSet::new();
         for surface in ["curvature_flow", "narrow_range"] {
             for more in ["", depth_alone, ALL] {

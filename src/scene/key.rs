@@ -385,7 +385,7 @@ fn from_to(range: &Interval) -> String {
 /// A bound in few digits.
 fn brief(value: f64) -> String {
     match value.abs() {
-        size if size >= 1e6 => format!("{value:e}"),
+        size if size >= 1e6 || (size > 0.0 && size < 1e-3) => format!("{value:e}"),
         _ => shown(value),
     }
 }

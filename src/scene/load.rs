@@ -397,7 +397,7 @@ at = [5.0, 2.0]
         let mut written = BTreeSet::new();
         for (kind, overrides) in kinds.iter().zip(variants) {
             let text = of_solid.replace("\"KIND\"", kind);
-            let flip = ["solver.method=flip"];
+            let flip = ["solver.method=flip", "effects.viscosity.xsph=0.02"];
             let all: Vec<&str> = flip.iter().chain(overrides).copied().collect();
             let scene = parse(dir.path(), &text, &all).expect("valid");
             let toml = scene.to_toml(&|_, _| "a.obj".to_owned());

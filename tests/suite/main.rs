@@ -79,5 +79,6 @@ mod stage {
     mod branch;
     mod budget;
     mod device_cpu;
+    mod drive;
     mod far_origin;
 }

@@ -4,12 +4,15 @@ use crate::{
     check::{
         engine::{Io, NONE, Outcome, State, Twin, names, twin},
         flip::FlipState,
-        pbf::{PbfState, bounds::{Bounds, relative_speed}},
+        pbf::{
+            PbfState,
+            bounds::{Bounds, relative_speed},
+        },
         table::{entries, pair},
     },
     compare::rounding::{KERNEL, U},
-    reference::pbf::effects::viscosity::{viscosity_apply, viscosity_gather},
     gpu::buffer::Buf,
+    reference::pbf::effects::viscosity::{viscosity_apply, viscosity_gather},
     solve::pbf,
 };
 
@@ -28,7 +31,11 @@ entries! {
 
 pub(super) const PBF: &[Twin<PbfState>] = &[
     twin("effects/viscosity_gather", NONE, gather),
-    twin("effects/viscosity_apply", || names![pbf::buffers::VELOCITY], apply),
+    twin(
+        "effects/viscosity_apply",
+        || names![pbf::buffers::VELOCITY],
+        apply,
+    ),
 ];
 
 pub(super) const FLIP: &[Twin<FlipState>] = &[];
@@ -38,7 +45,10 @@ fn gather(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let n = state.particles();
-    let (points, velocity) = (state.moved(io)?, io.vectors_before(pbf::buffers::VELOCITY, n)?);
+    let (points, velocity) = (
+        state.moved(io)?,
+        io.vectors_before(pbf::buffers::VELOCITY, n)?,
+    );
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = viscosity_gather(inputs, settings.xsph, &velocity);

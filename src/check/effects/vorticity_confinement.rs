@@ -6,18 +6,21 @@ use crate::{
     check::{
         engine::{Io, NONE, Outcome, State, Twin, names, twin},
         flip::FlipState,
-        pbf::{PbfState, bounds::{Bounds, relative_speed}},
+        pbf::{
+            PbfState,
+            bounds::{Bounds, relative_speed},
+        },
         table::{each, entries, pair},
     },
     compare::{
         rounding::{GRADIENT, ROOT, U},
         tolerance::bounds,
     },
+    gpu::buffer::Buf,
     reference::{
         flip::{grid_confinement, grid_curl},
         pbf::effects::vorticity_confinement::{vorticity_curl, vorticity_force},
     },
-    gpu::buffer::Buf,
     solve::{flip, pbf},
 };
 
@@ -59,17 +62,28 @@ entries! {
 
 pub(super) const PBF: &[Twin<PbfState>] = &[
     twin("effects/vorticity_curl", NONE, curl),
-    twin("effects/vorticity_force", || names![pbf::buffers::VELOCITY], force),
+    twin(
+        "effects/vorticity_force",
+        || names![pbf::buffers::VELOCITY],
+        force,
+    ),
 ];
 
 pub(super) const FLIP: &[Twin<FlipState>] = &[
     twin("effects/grid_curl", NONE, curl_on_grid),
-    twin("effects/grid_confinement", || names![flip::buffers::FACE_VELOCITY], confine_on_grid),
+    twin(
+        "effects/grid_confinement",
+        || names![flip::buffers::FACE_VELOCITY],
+        confine_on_grid,
+    ),
 ];
 
 fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let (points, velocity) = (state.moved(io)?, io.vectors_before(pbf::buffers::VELOCITY, n)?);
+    let (points, velocity) = (
+        state.moved(io)?,
+        io.vectors_before(pbf::buffers::VELOCITY, n)?,
+    );
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = vorticity_curl(inputs, &velocity);
@@ -80,7 +94,8 @@ fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         let sums = Bounds(inputs).sums(i, relative_speed(&velocity, i));
         ROTATION.of([scale, sums.gradient()])
     });
-    io.table.each(&CURL, 0..n, |i| pair(i, vectors[i], twin[i], [errors[i]]));
+    io.table
+        .each(&CURL, 0..n, |i| pair(i, vectors[i], twin[i], [errors[i]]));
     io.table.each(&LENGTH, 0..n, |i| {
         let exact = twin[i].length();
         pair(i, found[i][3], exact, [errors[i], exact])
@@ -93,7 +108,10 @@ fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let n = state.particles();
-    let (points, velocity) = (state.moved(io)?, io.vectors_before(pbf::buffers::VELOCITY, n)?);
+    let (points, velocity) = (
+        state.moved(io)?,
+        io.vectors_before(pbf::buffers::VELOCITY, n)?,
+    );
     let vorticity = io.vectors_before(VORTICITY, n)?;
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
@@ -176,7 +194,15 @@ fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let step = state.step();
     let (model, room, strength) = (&state.model, state.room(), settings.strength);
     let twin = |omega: &[DVec3]| {
-        grid_confinement(model, &step, &elements.bricks, room, strength, omega, &before)
+        grid_confinement(
+            model,
+            &step,
+            &elements.bricks,
+            room,
+            strength,
+            omega,
+            &before,
+        )
     };
     let exact = twin(&omega);
     // Magnitudes err by 12 u and the slope's differences pass that on: what the twin answers when they do.

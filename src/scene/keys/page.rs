@@ -16,8 +16,8 @@ fn chapter(out: &mut String, file: File) {
     let (title, intro) = match file {
         File::Scene => (
             "Scene keys",
-            "A star marks a key that is no physics: a bake continues (`--resume`) where it has changed. Numbers of other keys \
-             may not change.",
+            "A bake continues (`--resume`) only with the values that it began with, except of keys with a star: those are no \
+             physics.",
         ),
         File::Look => (
             "Look keys",
@@ -41,7 +41,7 @@ fn section(out: &mut String, file: File, head: &str, about: &str, keys: &'static
     if !head.is_empty() {
         *out += &format!("\n### `{head}`\n");
         if !about.is_empty() {
-            *out += &format!("\n{about}.\n");
+            *out += &format!("\n{about}\n");
         }
     }
     let path = head.trim_matches(['[', ']']);
@@ -72,10 +72,10 @@ fn section(out: &mut String, file: File, head: &str, about: &str, keys: &'static
             _ => format!("[{dotted}]"),
         };
         let star = match (file, table.physics) {
-            (File::Scene, Physics::No) => "; no key of it is physics",
+            (File::Scene, Physics::No) => " No key of it is physics.",
             _ => "",
         };
-        let about = format!("{}{}{star}", table.about, optional(table));
+        let about = format!("{}.{}{star}", table.about, optional(table));
         section(out, file, &head, &about, table.below());
     }
 }
@@ -83,9 +83,9 @@ fn section(out: &mut String, file: File, head: &str, about: &str, keys: &'static
 /// That a table may be left out, where that means that there is none.
 fn optional(table: &Key) -> &'static str {
     match (&table.kind, &table.default) {
-        (Kind::Tables(_), _) => "; any number",
-        (_, Default::Absent) => "; none if left out",
-        (_, Default::Needed) => "; needed",
+        (Kind::Tables(_), _) => " Any number.",
+        (_, Default::Absent) => " None if left out.",
+        (_, Default::Needed) => " Needed.",
         _ => "",
     }
 }

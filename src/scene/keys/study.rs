@@ -33,13 +33,12 @@ pub(in super::super) const KEYS: &[Key] = &[
     KEY.only("kind", SWEEP),
     VALUES.only("kind", SWEEP),
     COARSER.only("kind", SWEEP),
-    Key::other(
-        "steps",
-        "a whole number of output frames from 1 to 1000000; or seconds",
-    )
-    .absent()
-    .only("kind", SWEEP)
-    .about("how long a run is"),
+    Key::whole("steps", 1..=1_000_000)
+        .absent()
+        .without(&["seconds"])
+        .only("kind", SWEEP)
+        .also("; or seconds")
+        .about("output frames of a run"),
     Key::other(
         "seconds",
         "seconds of the shot, a whole number of frames at every frame rate; or steps",
@@ -47,8 +46,8 @@ pub(in super::super) const KEYS: &[Key] = &[
     .absent()
     .only("kind", SWEEP)
     .about("how long a run is"),
-    Key::other("repeats", "a whole number from 1 to 100")
-        .absent()
+    Key::whole("repeats", 1..=100)
+        .default("1")
         .only("kind", SWEEP)
         .about("times are medians over so many runs"),
     Key::other(
@@ -59,8 +58,8 @@ pub(in super::super) const KEYS: &[Key] = &[
     )
     .only("kind", SWEEP)
     .about("what is measured"),
-    Key::other("convergence_point", "true or false")
-        .absent()
+    Key::flag("convergence_point")
+        .default("false")
         .only("kind", SWEEP)
         .about("whether that of the paper's Table 1 is looked for"),
     Key::tables("method", METHOD)

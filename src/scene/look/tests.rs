@@ -20,6 +20,8 @@ height = 36
 model = \"hosek_wilkie\"
 ";
 
+const POSE: &str = "position = [0.0, 3.0, 0.0]\ntarget = [10.0, 1.0, 0.0]\n";
+
 fn fault(text: &str) -> (usize, String, String) {
     match Look::parse(text, Path::new("a.toml")) {
         Err(LookError(SceneError::Fault(fault))) => match fault.place {
@@ -124,8 +126,8 @@ fn a_missing_table_is_named_itself_with_what_it_takes() {
             "from 0.001 to 1000, metres",
         ),
         (
-            "[image]",
-            "[[camera.keyframe]]\nframe = 1\ntarget = [0, 0, 0]\n[image]",
+            POSE,
+            "[[camera.keyframe]]\nframe = 1\ntarget = [0, 0, 0]\n",
             "camera.keyframe[0].position",
             "three numbers",
         ),
@@ -281,13 +283,16 @@ fn values_out_of_range_are_refused_with_what_is_allowed() {
 
 #[test]
 fn keyframes_must_ascend() {
-    let text = PLAIN.replace(
-        "position = [0.0, 3.0, 0.0]\ntarget = [10.0, 1.0, 0.0]\n",
-        "",
-    ) + "[[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\n\
-           [[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\n";
-    let (line, key, _) = fault(&text);
+    let poses =
+        "[[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\n".repeat(2);
+    let (line, key, _) = fault(&(PLAIN.replace(POSE, "") + &poses));
     assert_eq!((line, key.as_str()), (13, "camera.keyframe[1].frame"));
+    let (line, key, message) = fault(&(PLAIN.to_owned() + &poses));
+    assert_eq!((line, key.as_str()), (3, "camera.position"));
+    assert!(
+        message.contains("given together with keyframe"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -38,7 +38,7 @@ use super::{
     boundary::Movers,
     effects,
     params::Counters,
-    plan::{Counts, DeviceLimits, Plan, device_limits},
+    plan::{Counts, Plan},
     pressure::{self, PressureSolver},
     state::{check_finite, check_ids, slots_by_id, take_over, upload},
     trace::{Begun, Observe, Run, Span, TraceFrame, trace},
@@ -52,7 +52,6 @@ use record::{Commands, Recordings, groups, numbers};
 pub struct Flip {
     program: Program,
     plan: Plan,
-    limits: DeviceLimits,
     scene: Scene,
     movers: Option<Movers>,
     recordings: Recordings,
@@ -129,7 +128,6 @@ impl Flip {
             timer: is_timed.then(|| Timer::new(context)),
             bricks,
             program,
-            limits: device_limits(context),
             plan,
             scene: scene.clone(),
             movers: Movers::of(boundary, scene),
@@ -173,10 +171,10 @@ impl Flip {
     /// The device.
     pub fn field<T: bytemuck::Pod>(
         &self,
-        buffer: impl Into<Buf<T>>,
+        buffer: Buf<T>,
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.read(buffer.into(), count)?)
+        Ok(self.program.read(buffer, count)?)
     }
 
     fn survey(&mut self, run: &mut Run<'_>) -> Result<Survey, SolveError> {
@@ -219,7 +217,7 @@ impl Flip {
                 bricks: grown,
                 ..self.plan.counts
             };
-            self.plan = Plan::new(&self.scene, counts, self.limits);
+            self.plan = plan::plan(&self.scene, counts);
             let (buffers, passes) = (self.plan.buffer_specs(), self.plan.pass_specs());
             self.program.refit(&buffers, &passes)?;
             upload_constants(&self.program, &self.plan, &self.scene);

@@ -121,10 +121,10 @@ impl Pbf {
     /// The device.
     pub fn field<T: bytemuck::Pod>(
         &self,
-        buffer: impl Into<Buf<T>>,
+        buffer: Buf<T>,
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.read(buffer.into(), count)?)
+        Ok(self.program.read(buffer, count)?)
     }
 
     fn params(&self, time: f64, step: f64) -> Params {
@@ -362,12 +362,12 @@ impl TraceFrame for Pbf {
             let (time, step) = self.substep_of(count, number);
             let elapsed = f64::from(number - 1) * step;
             let begun = Begun { number, elapsed };
-            let told = &mut |traced: Traced<'_>| observe(begun, traced);
+            let mut tell = |traced: Traced<'_>| observe(begun, traced);
             self.prepare_substep(time, step);
-            trace(&[&self.substep], &self.program, told)?;
+            trace(&[&self.substep], &self.program, &mut tell)?;
             if number == last {
                 self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
-                trace(&[&self.measure], &self.program, told)?;
+                trace(&[&self.measure], &self.program, &mut tell)?;
             }
         }
         Ok(last)

@@ -20,17 +20,17 @@
 //! | `liquid_distance` | `f32` cells | metres, negative inside; with the ghost-fluid surface alone |
 //! | `density_excess` | `f32` cells | ρ/ρ_target − 1 as it is to be corrected; with the correction alone |
 //!
-//! What the room fills, of [`buffers`]: `face_velocity` in place; `pressure`, Pa, natural cell order, 0 where
+//! What the room fills, of [`planned`]: `face_velocity` in place; `pressure`, Pa, natural cell order, 0 where
 //! there is no water; `face_displacement`, planes in metres, 0 on faces that touch no water or are closed.
 //! Only cells of wet slots are FLUID. Cells of a brick that lie past the box are AIR, and their lower faces closed:
 //! one of those is the box's own wall. Only faces between water and water or water and air change.
 //!
 //! # Use
 //! ```text
-//! specs += pressure::buffers(..); passes += pressure::passes(..);      plan
+//! buffers += pressure::planned(..); passes += pressure::passes(..);    plan
 //! let mut pressure = PressureSolver::new(..);                          once, and again when slots grow
 //! pressure.set_topology(&program, &bricks, cell_size)                  each substep, after `bricks` is uploaded
-//! pressure.project(&program, Scale { .. }, timer)                       builds, solves, subtracts; waits once
+//! pressure.project(&program, Scale { .. }, timer)                      builds, solves, subtracts; waits once
 //! pressure.correct(&program, timer)                                    same system, density_excess -> face_displacement
 //! ```
 
@@ -119,7 +119,7 @@ pub struct Projected {
     pub dropped: u32,
 }
 
-/// The projection, bound to a program that holds [`buffers`] and [`passes`].
+/// The projection, bound to a program that holds [`planned`] buffers and [`passes`].
 pub struct PressureSolver {
     settings: Pressure,
     has_correction: bool,

@@ -169,7 +169,7 @@ pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Ta
             POCKET_RANGES.sized(cells / 2),
             BRICKS.sized(capacity),
             // A sum a workgroup, and room for those that a dispatch in two dimensions adds.
-            reals(SUMS, 4 * (capacity + 1024)),
+            reals(SUMS, capacity + 1024),
             match precision {
                 Precision::F32 | Precision::F32Refined => CONTROL.sized(1),
                 Precision::F64 => CONTROL_F64.sized(1),

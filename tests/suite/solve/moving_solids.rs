@@ -16,7 +16,11 @@ use swell::{
         moving_solid::MovingSolid,
     },
     solve::{
-        flip::{Flip, capacity},
+        flip::{
+            Flip,
+            buffers::{CLOSED_VELOCITY, FACE_OPEN, SOLID_FLUX},
+            capacity,
+        },
         plan::{Counts, Plan, device_limits},
     },
 };
@@ -127,9 +131,9 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
 
     let bricks = solver.bricks().clone();
     let stride = solver.plan().counts.bricks.slots * 512;
-    let open = solver.field::<f32>("face_open", 3 * stride).unwrap();
-    let flux = solver.field::<f32>("solid_flux", stride).unwrap();
-    let closed = solver.field::<f32>("closed_velocity", 3 * stride).unwrap();
+    let open = solver.field(FACE_OPEN, 3 * stride).unwrap();
+    let flux = solver.field(SOLID_FLUX, stride).unwrap();
+    let closed = solver.field(CLOSED_VELOCITY, 3 * stride).unwrap();
     let dims = bricks.table_dims.map(|n| n as usize);
     let element = |x: usize, y: usize, z: usize| {
         let slot = bricks.table[(z / 8 * dims[1] + y / 8) * dims[0] + x / 8] as usize;
@@ -198,7 +202,7 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
     let mut solver = self::solver(&context, &scene, &particles);
     solver.load(25, &particles).unwrap();
     solver.advance().unwrap();
-    let flux = solver.field::<f32>("solid_flux", stride).unwrap();
+    let flux = solver.field(SOLID_FLUX, stride).unwrap();
     assert!(flux.iter().all(|&f| f == 0.0));
 }
 

@@ -8,7 +8,7 @@ use swell::{
         signed_distance::SignedDistance,
         solver::{Solver, StepReport},
     },
-    gpu::adapter::Context,
+    gpu::{adapter::Context, buffer::Buf},
     scene::{
         Method, Scene,
         flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
@@ -122,11 +122,11 @@ pub struct Field {
 }
 
 impl Field {
-    pub fn new(solver: &Flip, name: &str, planes: usize) -> Self {
+    pub fn new(solver: &Flip, buffer: Buf<f32>, planes: usize) -> Self {
         let stride = solver.plan().counts.bricks.slots * CELLS as usize;
         Self {
             bricks: solver.bricks().clone(),
-            values: solver.field(name, planes * stride).unwrap(),
+            values: solver.field(buffer, planes * stride).unwrap(),
             stride,
         }
     }
