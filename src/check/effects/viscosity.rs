@@ -11,13 +11,9 @@ use crate::{
         table::{entries, pair},
     },
     compare::rounding::{KERNEL, U},
-    gpu::buffer::Buf,
     reference::pbf::effects::viscosity::{viscosity_apply, viscosity_gather},
-    solve::pbf,
+    solve::{effects::viscosity::CHANGE as VISCOSITY_CHANGE, pbf},
 };
-
-/// What the first pass leaves to the second.
-const VISCOSITY_CHANGE: Buf<[f32; 4]> = Buf::new("viscosity_change");
 
 entries! {
     "effects/viscosity_gather" {

@@ -16,16 +16,12 @@ use crate::{
         rounding::{GRADIENT, ROOT, U},
         tolerance::bounds,
     },
-    gpu::buffer::Buf,
     reference::{
         flip::{grid_confinement, grid_curl},
         pbf::effects::vorticity_confinement::{vorticity_curl, vorticity_force},
     },
-    solve::{flip, pbf},
+    solve::{effects::vorticity_confinement::VORTICITY, flip, pbf},
 };
-
-/// Vorticity and its length, of particles or of cells.
-const VORTICITY: Buf<[f32; 4]> = Buf::new("vorticity");
 
 bounds! {
     ROTATION = [scale: "twice the gradient's scale, for the two products of a cross product",
