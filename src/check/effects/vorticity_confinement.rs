@@ -69,13 +69,13 @@ pub(super) const FLIP: &[Twin<FlipState>] = &[
 
 fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let (points, velocity) = (state.moved(io)?, io.vectors_before(pbf::buffers::VELOCITY, n)?);
+    let (points, velocity) = (state.moved(io)?, io.before.vectors(pbf::buffers::VELOCITY, n)?);
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = vorticity_curl(inputs, &velocity);
     let scale = 2.0 * inputs.model.calibration.gradient_scale;
-    let found = io.after(VORTICITY, n)?;
-    let vectors = io.vectors(VORTICITY, n)?;
+    let found = io.after.get(VORTICITY, n)?;
+    let vectors = io.after.vectors(VORTICITY, n)?;
     let errors = each(0..n, |i| {
         let sums = Bounds(inputs).sums(i, relative_speed(&velocity, i));
         ROTATION.of([scale, sums.gradient()])
@@ -93,15 +93,15 @@ fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let n = state.particles();
-    let (points, velocity) = (state.moved(io)?, io.vectors_before(pbf::buffers::VELOCITY, n)?);
-    let vorticity = io.vectors_before(VORTICITY, n)?;
+    let (points, velocity) = (state.moved(io)?, io.before.vectors(pbf::buffers::VELOCITY, n)?);
+    let vorticity = io.before.vectors(VORTICITY, n)?;
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = vorticity_force(inputs, settings.strength, &vorticity, &velocity);
     let strength: Vec<f64> = vorticity.iter().map(|w| w.length()).collect();
     let scale = inputs.model.calibration.gradient_scale;
     let h = inputs.model.calibration.support_radius;
-    let found = io.vectors(pbf::buffers::VELOCITY, n)?;
+    let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
     io.table.each(&VELOCITY, 0..n, |i| {
         let bounds = Bounds(inputs);
         let other = |j: usize| strength.get(j).copied();
@@ -143,9 +143,9 @@ fn slope(bounds: &Bounds<'_>, strength: &[f64], i: usize) -> f64 {
 
 fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let velocity = elements.planes_before(io, flip::buffers::FACE_VELOCITY)?;
-    let found = io.after(VORTICITY, elements.cells)?;
-    let vectors = io.vectors(VORTICITY, elements.cells)?;
+    let velocity = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
+    let found = io.after.get(VORTICITY, elements.cells)?;
+    let vectors = io.after.vectors(VORTICITY, elements.cells)?;
     let twin = grid_curl(&state.model, &elements.bricks, state.room(), &velocity);
     let size = state.model.cell_size();
     let error = |e: usize| {
@@ -170,9 +170,9 @@ fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let elements = state.elements();
-    let omega = io.vectors(VORTICITY, elements.cells)?;
-    let before = elements.planes_before(io, flip::buffers::FACE_VELOCITY)?;
-    let found = elements.planes(io, flip::buffers::FACE_VELOCITY)?;
+    let omega = io.after.vectors(VORTICITY, elements.cells)?;
+    let before = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
+    let found = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
     let step = state.step();
     let (model, room, strength) = (&state.model, state.room(), settings.strength);
     let twin = |omega: &[DVec3]| {
