@@ -16,6 +16,7 @@
 //! - [`render`]: screen-space fluid rendering.
 //! - [`compare`]: by how much two sets of values, two caches or two pictures differ.
 //! - [`study`]: what frames measure, curves, and the page that shows them.
+//! - [`experiment`]: runs studies: points, resumable results, reports.
 //! - [`stage`]: wires the rooms into jobs; no terminal.
 //! - [`cli`]: arguments in, terminal out.
 
@@ -27,6 +28,7 @@ pub mod check;
 pub mod cli;
 pub mod compare;
 pub mod domain;
+pub mod experiment;
 pub mod gpu;
 #[cfg(feature = "mutants")]
 pub mod mutants;

@@ -52,6 +52,17 @@ where
     const SCALAR: Scalar = T::SCALAR;
 }
 
+/// What a buffer holds, for comparison with the shaders' variable of its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Held {
+    /// Of a value.
+    pub bytes: u32,
+    /// What a value is made of.
+    pub scalar: Scalar,
+    /// Bytes before the first value.
+    pub head: u32,
+}
+
 /// A struct that the shaders have too, under the same name.
 pub trait Mirror: Element {
     /// Name, size and members, for comparison with what naga makes of the shader's.
@@ -179,18 +190,25 @@ impl<T> Buf<T> {
         }
     }
 
+    /// Where value `index` begins, bytes.
+    pub(super) fn place(&self, index: usize) -> u64 {
+        self.offset + (index * size_of::<T>()) as u64
+    }
+}
+
+impl<T: Element> Buf<T> {
     /// One that holds `count` values.
     pub fn sized(&self, count: usize) -> BufferSpec {
         BufferSpec {
             name: self.name.clone().into_owned(),
             bytes: self.offset + (count * size_of::<T>()) as u64,
             is_uniform: self.is_uniform,
+            element: Held {
+                bytes: size_of::<T>() as u32,
+                scalar: T::SCALAR,
+                head: self.offset as u32,
+            },
         }
-    }
-
-    /// Where value `index` begins, bytes.
-    pub(super) fn place(&self, index: usize) -> u64 {
-        self.offset + (index * size_of::<T>()) as u64
     }
 }
 
@@ -236,15 +254,6 @@ impl<T> Windows<T> {
         self.variable
     }
 
-    /// A buffer of `count` windows.
-    pub fn sized(&self, count: usize) -> BufferSpec {
-        BufferSpec {
-            name: self.name.clone().into_owned(),
-            bytes: (count * STRIDE) as u64,
-            is_uniform: true,
-        }
-    }
-
     /// Binds the variable to window `index`.
     pub fn bind(&self, index: usize) -> super::recording::Bind {
         const { assert!(size_of::<T>() <= STRIDE) };
@@ -257,6 +266,20 @@ impl<T> Windows<T> {
 }
 
 impl<T: Element> Windows<T> {
+    /// A buffer of `count` windows.
+    pub fn sized(&self, count: usize) -> BufferSpec {
+        BufferSpec {
+            name: self.name.clone().into_owned(),
+            bytes: (count * STRIDE) as u64,
+            is_uniform: true,
+            element: Held {
+                bytes: size_of::<T>() as u32,
+                scalar: T::SCALAR,
+                head: 0,
+            },
+        }
+    }
+
     /// Bytes of a buffer that holds `values`, one a window.
     pub fn bytes(values: &[T]) -> Vec<u8> {
         let mut bytes = vec![0; values.len() * STRIDE];
@@ -283,7 +306,7 @@ pub trait Wanted {
     fn spans(&self) -> Vec<(&str, u64, usize)>;
 
     /// The values from the bytes of each, in the same order.
-    fn values<'a>(bytes: &mut dyn Iterator<Item = &'a [u8]>) -> Self::Values;
+    fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values;
 }
 
 impl<T: bytemuck::Pod> Wanted for First<T> {
@@ -294,7 +317,7 @@ impl<T: bytemuck::Pod> Wanted for First<T> {
         vec![(self.buffer.name(), self.buffer.offset, bytes)]
     }
 
-    fn values<'a>(bytes: &mut dyn Iterator<Item = &'a [u8]>) -> Vec<T> {
+    fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Vec<T> {
         bytemuck::pod_collect_to_vec(bytes.next().unwrap_or_default())
     }
 }
@@ -308,7 +331,7 @@ macro_rules! wanted_tuple {
                 [$(self.$place.spans()),+].concat()
             }
 
-            fn values<'a>(bytes: &mut dyn Iterator<Item = &'a [u8]>) -> Self::Values {
+            fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values {
                 ($($name::values(bytes),)+)
             }
         }

@@ -1,11 +1,6 @@
 //! `bake`: a scene to a particle cache.
 
-use std::{
-    fs,
-    path::PathBuf,
-    sync::atomic::{AtomicBool, Ordering},
-    time::Instant,
-};
+use std::{fs, path::PathBuf, sync::atomic::AtomicBool, time::Instant};
 
 use serde_json::{Value, json};
 
@@ -24,11 +19,11 @@ use crate::{
 use super::{
     Blame,
     branch::{Branch, BranchError, BranchPoint},
-    device::{Built, Device, Identity, Opened, SolverError, needs},
+    device::{Device, Identity, Opened, SolverError, needs},
+    drive::{Drive, End, Step},
     prepare::Start,
     probes,
     replay::{self, Failure, ReplayError},
-    watch::Watch,
 };
 
 /// What to bake, and where to.
@@ -201,7 +196,7 @@ pub fn bake(
         notes,
     } = beginning(request, last)?;
     let opened = request.device.open(needs(scene))?;
-    let Built { mut solver, bytes } = opened.build(scene, &start, request.time_passes)?;
+    let mut drive = Drive::unloaded(&opened, scene, &start, request.time_passes)?.with_pressures();
     let device = opened.identity();
     let (mut writer, mut clock, state) = open_cache(request, &device, &start, clock, &parent)?;
     let first = clock.frame + 1;
@@ -211,75 +206,59 @@ pub fn bake(
         removed: start.removed,
         boundary_samples: start.boundary.samples.len(),
         solver: scene.solver.method.name(),
-        bytes,
+        bytes: drive.bytes,
         first,
         last,
         parent,
         notes,
         warnings: scene.warnings(),
     });
-    solver.load(clock.frame, &state)?;
-    let mut watch = Watch::new(scene, &start.particles, clock.frame, &state);
-    let gauges = scene.pressure_points();
-    let mut broken = None;
-    let mut interrupted = false;
-    while clock.frame < last {
-        interrupted = stop.load(Ordering::Relaxed);
-        if interrupted {
-            break;
-        }
+    drive.load_watched(&start.particles, clock.frame, &state)?;
+    let ended = drive.run(last, stop, |step| {
         let begin = Instant::now();
-        let advanced = solver.advance().and_then(|(particles, mut report)| {
-            watch.look(&particles, &mut report)?;
-            let pressures = match gauges[..] {
-                [] => Vec::new(),
-                _ => solver.pressures(&gauges)?,
-            };
-            Ok((particles, report, pressures))
-        });
-        let (particles, report, pressures) = match advanced {
-            Ok(result) => result,
-            Err(error) => {
-                broken = Some(error);
-                break;
-            }
-        };
-        let seen = probes::look(scene, &particles, &pressures);
-        let seconds = begin.elapsed().as_secs_f64();
-        clock.frame += 1;
+        let seen = probes::look(scene, &step.particles, &step.pressures);
+        let seconds = step.seconds + begin.elapsed().as_secs_f64();
+        let Step {
+            frame,
+            particles,
+            report,
+            ..
+        } = step;
+        clock.frame = frame;
         clock.time = f64::from(clock.frame) / scene.shot.frames_per_second;
         clock.substeps = report.substeps;
         clock.steps += u64::from(report.substeps);
-        writer.submit(
-            clock,
-            particles,
-            seen,
-            to_json(&report),
-            json!({ "seconds": seconds }),
-        )?;
-        if clock.frame == first {
+        let extra = json!({ "seconds": seconds });
+        writer.submit(clock, particles, seen, to_json(&report), extra)?;
+        if frame == first {
             // Of an earlier bake, which broke off here.
             failed::remove(&request.directory)?;
         }
         tell(Event::Frame {
-            frame: clock.frame,
+            frame,
             report,
             seconds,
         });
-    }
+        Ok::<_, BakeError>(())
+    });
+    let (end, broken) = match ended {
+        Ok(end) => (end, None),
+        Err(BakeError::Solve(error)) => (End::Done, Some(error)),
+        Err(error) => return Err(error),
+    };
     // What was computed before a failure is kept.
     let summary = writer.finish()?;
-    let passes = solver.timings();
+    let passes = drive.timings();
     if let Some(error) = broken {
-        drop(solver);
-        return Err(end(request, &opened, &start, error));
+        drop(drive);
+        return Err(self::end(request, &opened, &start, error));
     }
     Ok(Outcome {
         last_frame: summary.last_frame,
         frames: summary.frames,
         bytes: summary.bytes,
         waited: summary.waiting.as_secs_f64(),
-        interrupted,
+        interrupted: end == End::Stopped,
         passes: if request.time_passes {
             passes
         } else {

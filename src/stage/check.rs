@@ -15,7 +15,7 @@ use crate::{
     },
     gpu::adapter::{Context, GpuError},
     scene::{Method, Scene, SceneError},
-    solve::{SolveError, pbf::device_limits},
+    solve::{SolveError, plan::device_limits},
 };
 
 use super::{

@@ -16,11 +16,7 @@ use crate::{
     gpu::adapter::{Context, GpuError, Needs},
     reference::{self, ReferenceError},
     scene::{Method, Scene, flip::Precision},
-    solve::{
-        SolveError,
-        flip::Flip,
-        pbf::{Pbf, device_limits},
-    },
+    solve::{SolveError, flip::Flip, pbf::Pbf, plan::device_limits},
 };
 
 use super::{Blame, prepare::Start};

@@ -12,7 +12,7 @@ use std::{
 
 use serde::Serialize;
 
-use super::{Blame, study::gauge};
+use super::{Blame, gauge::of_caches};
 use crate::{
     cache::{self, CacheError, CacheReader, Manifest},
     compare::baseline::Baseline,

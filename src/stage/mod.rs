@@ -5,12 +5,13 @@ pub mod branch;
 pub mod check;
 pub mod device;
 pub mod diff;
+pub mod drive;
+pub mod gauge;
 pub mod inspect;
 pub mod prepare;
 mod probes;
 pub mod render;
 pub mod replay;
-pub mod study;
 pub mod verify;
 mod watch;
 

@@ -51,12 +51,10 @@ pub(super) fn look(scene: &Scene, particles: &Particles, pressures: &[Option<f64
 pub(super) fn chart(shot: &str, record: &ProbeRecord, index: usize, entries: &[Entry]) -> Chart {
     let columns = || record.columns.iter().map(|column| column.rsplit_once('_'));
     let value = |entry: &Entry, column: usize| *entry.row(PROBES, index).get(column)?;
-    let series = columns().enumerate().map(|(column, parts)| Series {
-        name: parts.map_or_else(String::new, |(quantity, _)| quantity.to_owned()),
-        points: entries
-            .iter()
-            .map(|entry| (entry.clock.time, value(entry, column)))
-            .collect(),
+    let series = columns().enumerate().map(|(column, parts)| {
+        let points = entries.iter();
+        let points = points.map(|entry| (entry.clock.time, value(entry, column)));
+        Series::curve(parts.map_or("", |(quantity, _)| quantity), points)
     });
     let unit = columns().flatten().map(|(_, unit)| unit).next();
     let place = match &record.at[..] {
@@ -71,6 +69,6 @@ pub(super) fn chart(shot: &str, record: &ProbeRecord, index: usize, entries: &[E
             unit => unit.unwrap_or_default().to_owned(),
         },
         series: series.collect(),
-        marks: Vec::new(),
+        ..Chart::default()
     }
 }

@@ -427,7 +427,7 @@ fn pictures(cache: &CacheReader, look: &Look, frame: u32) -> Vec<(String, Format
 }
 
 /// Name of the PNG of a frame of a cache.
-pub(super) fn picture_name(cache: &CacheReader, frame: u32) -> String {
+pub fn picture_name(cache: &CacheReader, frame: u32) -> String {
     let name = name(&cache.manifest().shot, frame, cache.last_frame());
     format!("{name}.{}", ending(FormatSpec::Png))
 }

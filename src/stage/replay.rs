@@ -27,7 +27,8 @@ use crate::{
         SolveError,
         flip::Flip,
         params::FlipParams,
-        pbf::{Pbf, device_limits},
+        pbf::Pbf,
+        plan::device_limits,
         pressure::DONE,
         trace::{Begun, Span, TraceFrame, Traced},
     },
@@ -35,7 +36,8 @@ use crate::{
 
 use super::{
     Blame,
-    device::{Built, Device, Gpu, Opened, SolverError, needs},
+    device::{Device, Gpu, Opened, SolverError, needs},
+    drive::Drive,
     prepare::Start,
     watch::{Watch, volume_of},
 };
@@ -90,26 +92,19 @@ pub fn replay(
     last: u32,
     state: &Particles,
 ) -> Result<Option<Failure>, SolverError> {
-    let mut watch = Watch::new(scene, &start.particles, last, state);
-    let (energy, start_volume) = (watch.energy(), watch.start_volume());
-    let Built { mut solver, .. } = opened.build(scene, start, false)?;
-    solver.load(last, state)?;
-    let mut made = None;
-    let breach = match solver.advance() {
-        Ok((particles, mut report)) => match watch.look(&particles, &mut report) {
-            Ok(()) => return Ok(None),
-            Err(breach) => {
-                made = Some(report);
-                breach
-            }
-        },
+    let before = Watch::new(scene, &start.particles, last, state);
+    let mut drive = Drive::unloaded(opened, scene, start, false)?;
+    drive.load_watched(&start.particles, last, state)?;
+    let breach = match drive.advance() {
+        Ok(_) => return Ok(None),
         Err(error) => match error.breach() {
             Some(breach) => breach.clone(),
             None => return Err(error),
         },
     };
+    let made = drive.report().cloned();
     // Two solvers at once may be more than the device holds.
-    drop(solver);
+    drop(drive);
     let Opened::Gpu(context) = opened else {
         return Ok(Some(Failure {
             breach,
@@ -121,8 +116,8 @@ pub fn replay(
         state,
         breach: &breach,
         made,
-        energy,
-        start_volume,
+        energy: before.energy(),
+        start_volume: before.start_volume(),
         is_correcting: false,
         place: None,
     };

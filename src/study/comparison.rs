@@ -1,10 +1,8 @@
 //! Two solvers on one scene, measured frame by frame, and what follows for the claims that the paper
 //! draws from its Figures 2 (PBF) and 3 (PIC/FLIP).
 
-use std::fmt::Write as _;
-
 use super::{
-    chart::{Chart, Series},
+    chart::{Chart, Mark, Series},
     measure::Measures,
     median,
 };
@@ -252,38 +250,38 @@ pub fn summary(findings: &[Finding]) -> String {
     )
 }
 
-/// Every measured frame as CSV, SI units; empty where there is no value.
-pub fn to_csv(courses: &[Course]) -> String {
-    let mut out = "solver,frame,time_s,bake_s,substeps,iterations,missed,crest_height_m,\
-                   crest_slope_degrees,front_m,splash_height_m,splash_reach_m,airborne,wet_area_m2\n"
-        .to_owned();
-    let optional = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
-    for (course, row) in courses
-        .iter()
-        .flat_map(|c| c.rows.iter().map(move |r| (c, r)))
-    {
-        let m = &row.measures;
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-            course.solver,
-            row.frame,
-            row.time,
-            optional(row.seconds),
-            row.substeps,
-            row.iterations,
-            row.missed,
-            m.crest_height,
-            optional(m.crest_slope),
-            optional(m.front),
-            m.splash_height,
-            m.splash_reach,
-            m.airborne,
-            m.wet_area
-        );
+/// Name in the table and value; empty where there is none.
+type Column = (&'static str, fn(&Row) -> Option<f64>);
+
+const COLUMNS: [Column; 13] = [
+    ("frame", |row| Some(row.frame.into())),
+    ("time_s", |row| Some(row.time)),
+    ("bake_s", |row| row.seconds),
+    ("substeps", |row| Some(row.substeps.into())),
+    ("iterations", |row| Some(row.iterations as f64)),
+    ("missed", |row| Some(row.missed.into())),
+    ("crest_height_m", |row| Some(row.measures.crest_height)),
+    ("crest_slope_degrees", |row| row.measures.crest_slope),
+    ("front_m", |row| row.measures.front),
+    ("splash_height_m", |row| Some(row.measures.splash_height)),
+    ("splash_reach_m", |row| Some(row.measures.splash_reach)),
+    ("airborne", |row| Some(row.measures.airborne)),
+    ("wet_area_m2", |row| Some(row.measures.wet_area)),
+];
+
+/// Every measured frame, SI units. The first row are titles.
+pub fn table(courses: &[Course]) -> Vec<Vec<String>> {
+    let titles = COLUMNS.iter().map(|(name, _)| *name);
+    let titles = ["solver"].into_iter().chain(titles);
+    let mut table = vec![titles.map(str::to_owned).collect()];
+    for course in courses {
+        table.extend(course.rows.iter().map(|row| {
+            let cell = |(_, value): &Column| value(row).map_or(String::new(), |v| v.to_string());
+            let cells = COLUMNS.iter().map(cell);
+            [course.solver.clone()].into_iter().chain(cells).collect()
+        }));
     }
-    out
+    table
 }
 
 /// The curves of a page: each measure against simulated time.
@@ -310,29 +308,22 @@ pub fn charts(courses: &[Course], impact: Impact) -> Vec<Chart> {
         }),
         ("Time per frame", "s", |row| row.seconds),
     ];
-    let rows = courses.iter().flat_map(|course| &course.rows);
-    let at_impact = rows
-        .filter(|row| Some(row.frame) == impact.frame)
-        .map(|row| (row.time, "impact".to_owned()));
-    let marks: Vec<_> = at_impact.take(1).collect();
-    let series = |course: &Course, value: Value| Series {
-        name: course.solver.clone(),
-        points: course
-            .rows
-            .iter()
-            .map(|row| (row.time, value(row)))
-            .collect(),
+    let mut rows = courses.iter().flat_map(|course| &course.rows);
+    let at_impact = rows.find(|row| Some(row.frame) == impact.frame);
+    let mark = at_impact.map(|row| Mark::At(row.time, "impact".to_owned()));
+    let series = |course: &Course, value: Value| {
+        let points = course.rows.iter().map(|row| (row.time, value(row)));
+        Series::curve(&course.solver, points)
     };
-    measured
-        .into_iter()
-        .map(|(title, unit, value)| Chart {
-            title: title.into(),
-            x_label: "simulated time, s".into(),
-            y_label: unit.into(),
-            series: courses.iter().map(|course| series(course, value)).collect(),
-            marks: marks.clone(),
-        })
-        .collect()
+    let chart = |(title, unit, value): (&str, &str, Value)| Chart {
+        title: title.into(),
+        x_label: "simulated time, s".into(),
+        y_label: unit.into(),
+        series: courses.iter().map(|course| series(course, value)).collect(),
+        marks: mark.iter().cloned().collect(),
+        ..Chart::default()
+    };
+    measured.into_iter().map(chart).collect()
 }
 
 #[cfg(test)]
@@ -446,12 +437,10 @@ mod tests {
 
     #[test]
     fn the_table_has_a_line_a_frame_and_as_many_columns_as_titles() {
-        let csv = to_csv(&pair(1.0, 2.0));
-        let lines: Vec<&str> = csv.lines().collect();
-        assert_eq!(lines.len(), 21);
-        let columns = |line: &str| line.split(',').count();
-        assert!(lines.iter().all(|line| columns(line) == columns(lines[0])));
-        assert_eq!(lines[11], "flip,1,0.1,0.5,2,8,0,2,20,1,2,0,0.2,2");
+        let table = table(&pair(1.0, 2.0));
+        assert_eq!(table.len(), 21);
+        assert!(table.iter().all(|row| row.len() == table[0].len()));
+        assert_eq!(table[11].join(","), "flip,1,0.1,0.5,2,8,0,2,20,1,2,0,0.2,2");
     }
 
     #[test]
@@ -459,11 +448,11 @@ mod tests {
         let courses = pair(1.0, 2.0);
         let charts = charts(&courses, Impact { frame: Some(3) });
         assert_eq!(charts.len(), 7);
-        assert!(
-            charts
-                .iter()
-                .all(|c| c.series.len() == 2 && c.marks.len() == 1)
-        );
-        assert!((charts[0].marks[0].0 - 0.3).abs() < 1e-12);
+        for chart in &charts {
+            let [Mark::At(time, _)] = &chart.marks[..] else {
+                panic!("{:?}", chart.marks)
+            };
+            assert!(chart.series.len() == 2 && (time - 0.3).abs() < 1e-12);
+        }
     }
 }

@@ -1,9 +1,29 @@
 //! Where more time stops paying, and who is better for the same time.
 
 /// Part of the discretisation error below which a solver's error is of no account.
-const OF_NO_ACCOUNT: f64 = 0.1;
+pub const OF_NO_ACCOUNT: f64 = 0.1;
 
-use super::work_precision::{Line, Point};
+/// A method's points, in the order of its settings.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Line {
+    /// Of the method.
+    pub name: String,
+    /// What was measured.
+    pub points: Vec<Point>,
+}
+
+/// A setting: what it costs and how far off it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// The setting.
+    pub label: String,
+    /// Least, median and greatest of the repeats, in any one unit.
+    pub time: [f64; 3],
+    /// The cost that no machine changes, in any one unit.
+    pub work: f64,
+    /// 0 or more.
+    pub error: f64,
+}
 
 /// The points of a line that no other beats in both time and error, from the cheapest on.
 fn best(line: &Line) -> Vec<&Point> {
@@ -23,17 +43,34 @@ fn best(line: &Line) -> Vec<&Point> {
 }
 
 /// The cheapest setting whose error is below a tenth of the discretisation error; `None` where none is.
-pub fn first_of_no_account(line: &Line, discretisation: f64) -> Option<&Point> {
+fn first_of_no_account(line: &Line, discretisation: f64) -> Option<&Point> {
     let mut points = best(line).into_iter();
     points.find(|point| point.error <= OF_NO_ACCOUNT * discretisation)
 }
 
-/// The setting with the least error × time, which stands in for the knee where the discretisation error is not known. Up to
-/// it x times the time buys more than x times the accuracy, beyond it less. `None` for a line without points.
-pub fn knee(line: &Line) -> Option<&Point> {
-    best(line)
-        .into_iter()
-        .min_by(|a, b| (a.time[1] * a.error).total_cmp(&(b.time[1] * b.error)))
+/// Where more time stops paying.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Knee<'a> {
+    /// The setting.
+    pub point: &'a Point,
+    /// Whether its error is below a tenth of the discretisation error; otherwise it has the least error × time, up to
+    /// which x times the time buys more than x times the accuracy, and beyond it less.
+    pub is_enough: bool,
+}
+
+/// The knee of a line, beside the discretisation error where that is known; `None` for a line without points.
+pub fn knee(line: &Line, discretisation: Option<f64>) -> Option<Knee<'_>> {
+    let enough = discretisation.and_then(|error| first_of_no_account(line, error));
+    let product = |point: &&Point| point.time[1] * point.error;
+    let least = || {
+        best(line)
+            .into_iter()
+            .min_by(|a, b| product(a).total_cmp(&product(b)))
+    };
+    Some(Knee {
+        point: enough.or_else(least)?,
+        is_enough: enough.is_some(),
+    })
 }
 
 /// "x times the time buys y times the accuracy".
@@ -50,44 +87,34 @@ fn bargain(from: &Point, to: &Point) -> String {
 /// What the knee of a line is, in words, beside the discretisation error where that is known.
 pub fn words(line: &Line, discretisation: Option<f64>) -> String {
     let best = best(line);
-    let (Some(least), Some(first), Some(last)) = (knee(line), best.first(), best.last()) else {
+    let (Some(knee), Some(first), Some(last)) =
+        (knee(line, discretisation), best.first(), best.last())
+    else {
         return "nothing was measured".into();
     };
     if best.len() < 2 {
         return "one setting alone has no knee".into();
     }
-    let (knee, told) = match discretisation {
-        None => (
-            least,
-            format!(
-                "the discretisation error is not known here; by error × time the knee is {}",
-                least.label
-            ),
+    let Knee { point, is_enough } = knee;
+    let label = &point.label;
+    let mut said = vec![match discretisation {
+        None => format!(
+            "the discretisation error is not known here; by error × time the knee is {label}"
         ),
-        Some(error) => match first_of_no_account(line, error) {
-            Some(knee) => (
-                knee,
-                format!(
-                    "the knee is {}, the cheapest whose error ({:.2e}) is below a tenth of the discretisation error ({error:.2e})",
-                    knee.label, knee.error
-                ),
-            ),
-            None => (
-                least,
-                format!(
-                    "no setting comes below a tenth of the discretisation error ({error:.2e}); by error × time the knee is {}",
-                    least.label
-                ),
-            ),
-        },
-    };
-    let mut said = vec![told];
-    if knee.label != first.label {
-        said.push(bargain(first, knee));
+        Some(error) if is_enough => format!(
+            "the knee is {label}, the cheapest whose error ({:.2e}) is below a tenth of the discretisation error ({error:.2e})",
+            point.error
+        ),
+        Some(error) => format!(
+            "no setting comes below a tenth of the discretisation error ({error:.2e}); by error × time the knee is {label}"
+        ),
+    }];
+    if *label != first.label {
+        said.push(bargain(first, point));
     }
-    if knee.label != last.label {
-        said.push(bargain(knee, last));
-    } else if discretisation.is_none_or(|error| knee.error > OF_NO_ACCOUNT * error) {
+    if *label != last.label {
+        said.push(bargain(point, last));
+    } else if !is_enough {
         said.push("it is the best that was run, so that more may still pay".into());
     }
     said.join("; ")
@@ -104,45 +131,44 @@ fn at_time(line: &Line, time: f64) -> Option<f64> {
     Some(a.error * (b.error / a.error).powf(part))
 }
 
-/// Another line's error over this point's, at this point's time.
+/// A line against another at equal times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rivalry {
-    /// The setting of the line that is asked about.
-    pub label: String,
-    /// Of each other line: its error over the point's; above 1 the point is better. `None` where that line has no point on
-    /// both sides of the time.
-    pub ratios: Vec<Option<f64>>,
+    /// Name of the other line.
+    pub other: String,
+    /// Settings with a time at which both lines have points, and there the other's error over the setting's: above 1 the
+    /// setting is better.
+    pub ratios: Vec<(String, f64)>,
 }
 
-/// Compares each point of line `index` with every other line at the same time.
+/// Compares the points of line `index` with every other line at the same time.
 pub fn rivalry(lines: &[Line], index: usize) -> Vec<Rivalry> {
-    let compare = |point: &Point| Rivalry {
-        label: point.label.clone(),
-        ratios: (0..lines.len())
-            .filter(|&other| other != index)
-            .map(|other| Some(at_time(&lines[other], point.time[1])? / point.error))
-            .collect(),
+    let others = lines.iter().enumerate().filter(|(k, _)| *k != index);
+    let points = || lines[index].points.iter().filter(|p| p.error > 0.0);
+    let ratio = |other: &Line, point: &Point| {
+        let theirs = at_time(other, point.time[1])?;
+        Some((point.label.clone(), theirs / point.error))
     };
-    let points = lines[index].points.iter().filter(|p| p.error > 0.0);
-    points.map(compare).collect()
+    others
+        .map(|(_, other)| Rivalry {
+            other: other.name.clone(),
+            ratios: points().filter_map(|point| ratio(other, point)).collect(),
+        })
+        .collect()
 }
 
-/// Whether a line beats each other at equal time, in words: where it does not, the settings are named.
-pub fn rivalry_words(lines: &[Line], index: usize) -> String {
-    let table = rivalry(lines, index);
-    let others = (0..lines.len()).filter(|&other| other != index);
-    let said = others.enumerate().map(|(column, other)| {
-        let ratios: Vec<(&str, f64)> = table
-            .iter()
-            .filter_map(|row| Some((row.label.as_str(), row.ratios[column]?)))
-            .collect();
-        let lost: Vec<String> = ratios
-            .iter()
-            .filter(|(_, ratio)| *ratio <= 1.0)
-            .map(|(label, ratio)| format!("{label} ({ratio:.2})"))
-            .collect();
-        let name = &lines[other].name;
-        match (ratios.len(), lost.len()) {
+impl Rivalry {
+    /// Settings at which the line is not better, with the ratios.
+    pub fn lost(&self) -> Vec<String> {
+        let lost = self.ratios.iter().filter(|(_, ratio)| *ratio <= 1.0);
+        lost.map(|(label, ratio)| format!("{label} ({ratio:.2})"))
+            .collect()
+    }
+
+    /// Whether the line beats the other, in words: where it does not, the settings are named.
+    pub fn words(&self) -> String {
+        let (name, lost) = (&self.other, self.lost());
+        match (self.ratios.len(), lost.len()) {
             (all @ 0..2, _) => {
                 format!("{name}: {all} settings with times in common, too few for a verdict")
             }
@@ -155,8 +181,7 @@ pub fn rivalry_words(lines: &[Line], index: usize) -> String {
                 lost.join(", ")
             ),
         }
-    });
-    said.collect::<Vec<_>>().join("; ")
+    }
 }
 
 #[cfg(test)]
@@ -192,7 +217,8 @@ mod tests {
                 (16.0, 0.081),
             ],
         );
-        assert_eq!(knee(&bent).map(|p| p.label.as_str()), Some("s2"));
+        let label = |line| knee(line, None).map(|knee| knee.point.label.clone());
+        assert_eq!(label(&bent).as_deref(), Some("s2"));
         let said = words(&bent, None);
         assert!(
             said.contains("is not known here; by error × time the knee is s2"),
@@ -210,7 +236,7 @@ mod tests {
         let worse = line("a", &[(1.0, 1.6), (2.0, 0.4), (3.0, 0.5), (4.0, 0.1)]);
         assert_eq!(best(&worse).len(), 3);
         assert!(words(&worse, None).contains("more may still pay"));
-        assert_eq!(knee(&line("a", &[(1.0, 0.0)])), None);
+        assert_eq!(label(&line("a", &[(1.0, 0.0)])), None);
     }
 
     #[test]
@@ -252,14 +278,15 @@ mod tests {
         );
         // Error 1/t: at 2.5 it is 0.4, at 8 0.125.
         let lines = [slow, fast];
-        let found = rivalry(&lines, 1);
-        let ratio = |k: usize| found[k].ratios[0];
-        assert_eq!((ratio(0), ratio(3)), (None, None));
-        assert!(ratio(1).is_some_and(|r| (r - 2.0).abs() < 1e-12));
-        assert!(ratio(2).is_some_and(|r| (r - 2.0).abs() < 1e-12));
-        assert!(rivalry_words(&lines, 1).contains("less error than slow at all 2"));
+        let [found] = &rivalry(&lines, 1)[..] else {
+            panic!("one other line")
+        };
+        let labels: Vec<&str> = found.ratios.iter().map(|r| r.0.as_str()).collect();
+        assert_eq!(labels, ["s1", "s2"]);
+        assert!(found.ratios.iter().all(|(_, r)| (r - 2.0).abs() < 1e-12));
+        assert!(found.words().contains("less error than slow at all 2"));
         // The other way round it loses at every time.
-        let said = rivalry_words(&lines, 0);
+        let said = rivalry(&lines, 0)[0].words();
         assert!(said.contains("at 0 of 3 settings, not at s0"), "{said}");
     }
 }

@@ -106,27 +106,20 @@ impl Gauge {
     /// Depth of water at rest, metres: the median over its columns. Particles are `spacing` metres
     /// apart.
     pub fn depth(&self, position: &[[f32; 3]], spacing: f64) -> f64 {
-        let rest = self.rest_count(spacing);
-        let counts = self.counts(position);
-        let body = self.body(&counts, rest);
-        let elevation = self.elevation(&counts, &body, rest);
-        median(elevation.into_iter().flatten().collect()).unwrap_or(0.0)
+        let depths = self.water(position, spacing).elevation.into_iter();
+        median(depths.flatten().collect()).unwrap_or(0.0)
     }
 
     /// Elevation above the domain's floor along the wave's way, metres: the mean over each row across it, dry ground
     /// at 0. Particles are `spacing` metres apart.
     pub fn profile(&self, position: &[[f32; 3]], spacing: f64) -> Vec<f64> {
-        let rest = self.rest_count(spacing);
-        let counts = self.counts(position);
-        let body = self.body(&counts, rest);
-        let elevation = self.elevation(&counts, &body, rest);
+        let elevation = self.water(position, spacing).elevation;
         let [nx, _, nz] = self.dims;
-        (0..nx)
-            .map(|s| {
-                let across = (0..nz).map(|t| elevation[t * nx + s].unwrap_or(0.0));
-                across.sum::<f64>() / nz as f64
-            })
-            .collect()
+        let mean = |s: usize| {
+            let across = (0..nz).map(|t| elevation[t * nx + s].unwrap_or(0.0));
+            across.sum::<f64>() / nz as f64
+        };
+        (0..nx).map(mean).collect()
     }
 
     /// What a frame is compared by. Particles are `spacing` metres apart at `rest_density` kg/m³; gravity in m/s². No
@@ -174,10 +167,8 @@ impl Gauge {
         if position.is_empty() {
             return Measures::default();
         }
-        let rest = self.rest_count(spacing);
-        let counts = self.counts(position);
-        let body = self.body(&counts, rest);
-        let elevation = self.smoothed(&self.elevation(&counts, &body, rest));
+        let water = self.water(position, spacing);
+        let elevation = self.smoothed(&water.elevation);
         let rows: Vec<Row> = (0..self.dims[2])
             .filter_map(|t| self.row(&elevation, t))
             .collect();
@@ -188,7 +179,7 @@ impl Gauge {
         let height = |p: &[f32; 3]| f64::from(p[1]) - self.domain.min.y - self.still;
         let heights = position.iter().map(height).collect();
         let reaches = position.iter().map(|&p| self.distance(point(p))).collect();
-        let is_near = self.dilated(&body);
+        let is_near = self.dilated(&water.body);
         let far = |p: &&[f32; 3]| !is_near[self.index(self.cube(**p))];
         Measures {
             crest_height: median(rows.iter().map(|row| row.crest).collect()).unwrap_or(0.0),
@@ -197,13 +188,23 @@ impl Gauge {
             splash_height: percentile(heights, NEARLY_ALL).unwrap_or(0.0),
             splash_reach: percentile(reaches, NEARLY_ALL).unwrap_or(0.0),
             airborne: position.iter().filter(far).count() as f64 / position.len() as f64,
-            wet_area: self.wet_columns(&counts) as f64 * self.edge * self.edge,
-            volume: self.volume(&counts, &body, rest),
+            wet_area: self.wet_columns(&water.counts) as f64 * self.edge * self.edge,
+            volume: self.volume(&water),
         }
     }
 
-    fn rest_count(&self, spacing: f64) -> f64 {
-        (self.edge / spacing).powi(3)
+    fn water(&self, position: &[[f32; 3]], spacing: f64) -> Water {
+        let rest = (self.edge / spacing).powi(3);
+        let counts = self.counts(position);
+        let body = self.body(&counts, rest);
+        let tops = self.tops(&counts, &body, rest);
+        let column = |(top, fill): (usize, f64)| (top as f64 + fill) * self.edge;
+        Water {
+            elevation: tops.iter().map(|top| top.map(column)).collect(),
+            counts,
+            body,
+            tops,
+        }
     }
 
     fn index(&self, [s, y, t]: [usize; 3]) -> usize {
@@ -277,13 +278,6 @@ impl Gauge {
         })
     }
 
-    /// Depth of the continuous water in each column (way fastest), metres; `None` where it is dry.
-    fn elevation(&self, counts: &[u32], body: &[bool], rest: f64) -> Vec<Option<f64>> {
-        let column = |(top, fill): (usize, f64)| (top as f64 + fill) * self.edge;
-        let tops = self.tops(counts, body, rest);
-        tops.into_iter().map(|top| top.map(column)).collect()
-    }
-
     /// Top cube of the continuous water in each column (way fastest), and the fill of it and of the one
     /// above it, in cubes.
     fn tops(&self, counts: &[u32], body: &[bool], rest: f64) -> Vec<Option<(usize, f64)>> {
@@ -297,11 +291,11 @@ impl Gauge {
         (0..nx * nz).map(|k| column(k % nx, k / nx)).collect()
     }
 
-    fn volume(&self, counts: &[u32], body: &[bool], rest: f64) -> f64 {
-        let tops = self.tops(counts, body, rest).into_iter().flatten();
+    fn volume(&self, water: &Water) -> f64 {
+        let tops = water.tops.iter().flatten();
         let (columns, fills) = tops.fold((0, 0.0), |(n, sum), (_, fill)| (n + 1, sum + fill));
         // The cubes below the tops are full.
-        let full = body.iter().filter(|&&is_water| is_water).count() - columns;
+        let full = water.body.iter().filter(|&&is_water| is_water).count() - columns;
         (full as f64 + fills) * self.edge.powi(3)
     }
 
@@ -311,9 +305,8 @@ impl Gauge {
         let weight = |step: i64| if step == 0 { 2.0 } else { 1.0 };
         let at = |s: i64, t: i64| {
             let is_inside = (0..nx as i64).contains(&s) && (0..nz as i64).contains(&t);
-            is_inside
-                .then(|| elevation[t as usize * nx + s as usize])
-                .flatten()
+            let index = is_inside.then_some(t * nx as i64 + s)?;
+            elevation[index as usize]
         };
         let column = |k: usize| {
             elevation[k]?;
@@ -332,12 +325,7 @@ impl Gauge {
 
     fn row(&self, elevation: &[Option<f64>], t: usize) -> Option<Row> {
         let row = &elevation[t * self.dims[0]..][..self.dims[0]];
-        let above = |s: usize| {
-            row.get(s)
-                .copied()
-                .flatten()
-                .map(|depth| depth - self.still)
-        };
+        let above = |s: usize| Some((*row.get(s)?)? - self.still);
         let last = (0..row.len()).rev().find(|&s| row[s].is_some())?;
         let crest = (0..=last)
             .filter_map(above)
@@ -384,6 +372,17 @@ impl Gauge {
         let is_wet = |k: &usize| (0..ny).any(|y| counts[self.index([k % nx, y, k / nx])] > 0);
         (0..nx * nz).filter(is_wet).count()
     }
+}
+
+/// Particles in cubes.
+struct Water {
+    counts: Vec<u32>,
+    /// Whether each cube belongs to the continuous water.
+    body: Vec<bool>,
+    /// Of that in each column (way fastest) the top cube, and the fill of it and of the one above it, in cubes.
+    tops: Vec<Option<(usize, f64)>>,
+    /// Depth of the continuous water in each column, metres; `None` where it is dry.
+    elevation: Vec<Option<f64>>,
 }
 
 /// One row of columns along the wave's way.

@@ -1,9 +1,8 @@
 //! Studies: what baked frames measure, and the page that shows it.
 //!
-//! Pure functions from particles to numbers, and from numbers to text; `stage::study` reads the
-//! caches, draws the pictures and writes the files. A kind of study is one file: [`comparison`] sets
-//! two solvers side by side; [`stability`] measures what is hard on a solver; a sweep draws [`work_precision`], finds the [`knee`] and, for the paper's Table 1, the
-//! [`convergence_point`]. [`measure`], [`chart`] and [`page`] serve every kind.
+//! Pure functions from particles to numbers, and from numbers to text; `experiment` runs what is measured and writes the
+//! files. [`comparison`] sets two solvers side by side; [`stability`] measures what is hard on a solver; a sweep finds the
+//! [`knee`] and, for the paper's Table 1, the [`convergence_point`]. [`measure`], [`chart`] and [`page`] serve every kind.
 
 pub mod chart;
 pub mod comparison;
@@ -14,6 +13,5 @@ pub mod page;
 pub mod picture;
 pub mod raster;
 pub mod stability;
-pub mod work_precision;
 
 pub use crate::domain::statistics::{median, percentile};

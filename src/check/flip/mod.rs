@@ -20,10 +20,11 @@ use crate::{
         flip::{Given, Model, Room, Sorted, Step},
         poisson::iteration::Sum,
     },
-    scene::{Scene, plan::Plan},
+    scene::Scene,
     solve::{
         SolveError,
         flip::{Flip, buffers},
+        plan::Plan,
         pressure::buffers as solved,
         trace::{Begun, Span, TraceFrame},
     },

@@ -11,8 +11,11 @@ use crate::{
         table::pair,
     },
     reference::neighbors::{Crowd, Neighbors},
-    scene::plan::{LIST_CAPACITY, Plan},
-    solve::{SolveError, pbf::buffers},
+    solve::{
+        SolveError,
+        pbf::buffers,
+        plan::{LIST_CAPACITY, Plan},
+    },
 };
 
 use super::{

@@ -19,11 +19,12 @@ use crate::{
         neighbors::Neighbors,
         pbf::{Model, Substep, passes::Inputs},
     },
-    scene::{Scene, Stop, plan::Plan},
+    scene::{Scene, Stop},
     solve::{
         SolveError,
         params::{IterationControl, Phase},
         pbf::{Pbf, buffers},
+        plan::Plan,
         trace::{Span, TraceFrame},
     },
 };

@@ -16,7 +16,9 @@ use std::{
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Fault, Place, Reach, Scene, document::Document, error::SceneError, look::LookError};
+use super::{
+    Fault, Place, Reach, Scene, document::Document, error::SceneError, keys, look::LookError,
+};
 
 use comparison::SolverComparison;
 use stability::Stability;
@@ -33,6 +35,32 @@ pub enum Study {
     Stability(Box<Stability>),
 }
 
+/// What a run is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RunsOn {
+    /// The study's adapter, in f32.
+    Gpu,
+    /// The f64 reference.
+    Cpu,
+}
+
+impl RunsOn {
+    /// As studies name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gpu => "gpu",
+            Self::Cpu => "cpu",
+        }
+    }
+
+    /// What a word of a study names.
+    fn named(word: &str) -> Option<Self> {
+        [Self::Gpu, Self::Cpu]
+            .into_iter()
+            .find(|device| device.name() == word)
+    }
+}
+
 /// Why a study could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyFileError {
@@ -47,7 +75,7 @@ pub enum StudyFileError {
 /// What every kind says; the rest is read by the kind.
 #[derive(Deserialize)]
 struct KindSpec {
-    kind: Spanned<String>,
+    kind: String,
 }
 
 impl Study {
@@ -88,23 +116,21 @@ impl Study {
         base_dir: &Path,
         reach: Reach,
     ) -> Result<Self, StudyFileError> {
-        let (doc, root) = Document::parse(text, file, &[])?;
+        let (doc, mut root) = Document::parse(text, file, &[], keys::STUDY)?;
         let doc = doc.within(reach);
+        doc.settle(&mut root)?;
         let told = KindSpec::deserialize(toml::Deserializer::from(root.clone()))
             .map_err(|error| doc.translate(&error))?;
-        match told.kind.get_ref().as_str() {
+        match told.kind.as_str() {
             "solver_comparison" => {
                 let comparison = comparison::parse(&doc, root, base_dir)?;
                 Ok(Self::SolverComparison(Box::new(comparison)))
             }
             "sweep" => Ok(Self::Sweep(Box::new(sweep::parse(&doc, root, base_dir)?))),
-            "stability" => {
+            // The table of keys has no other.
+            _ => {
                 let stability = stability::parse(&doc, root, base_dir)?;
                 Ok(Self::Stability(Box::new(stability)))
-            }
-            other => {
-                let problem = format!("{other:?} is no kind of study");
-                Err(doc.fault_at(told.kind.span(), problem).into())
             }
         }
     }
@@ -124,10 +150,9 @@ impl Study {
         match self {
             Self::SolverComparison(comparison) => comparison.scenes.iter().for_each(of),
             Self::Sweep(sweep) => {
-                let points = sweep.lines.iter().flat_map(|line| &line.points);
-                points
-                    .chain(&sweep.state)
-                    .for_each(|point| of(&point.scene));
+                let points = sweep.points();
+                let points = points.chain(&sweep.state);
+                points.for_each(|point| of(&point.scene));
             }
             Self::Stability(stability) => stability.for_each_scene(of),
         }

@@ -30,7 +30,7 @@ use toml::{Spanned, Value, de::DeTable};
 
 use super::{
     super::{Method, Scene, document::Document, error::SceneError, physics_hash, words::shown},
-    SceneFile, StudyFileError, load_with,
+    RunsOn, SceneFile, StudyFileError, load_with,
 };
 use fit::{check_coarser, check_converged, check_fit};
 
@@ -79,22 +79,10 @@ pub struct Line {
     pub coarser: Option<Point>,
 }
 
-/// What a run is on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum LineDevice {
-    /// The study's adapter, in f32.
-    Gpu,
-    /// The f64 reference.
-    Cpu,
-}
-
-impl LineDevice {
-    /// As studies name it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Gpu => "gpu",
-            Self::Cpu => "cpu",
-        }
+impl Sweep {
+    /// Settings of all methods, without what is coarser.
+    pub fn points(&self) -> impl Iterator<Item = &Point> {
+        self.lines.iter().flat_map(|line| &line.points)
     }
 }
 
@@ -108,7 +96,7 @@ pub struct Point {
     /// Output frames to run.
     pub frames: u32,
     /// What it runs on.
-    pub device: LineDevice,
+    pub device: RunsOn,
 }
 
 /// How errors are measured.
@@ -212,11 +200,10 @@ struct SweepSpec {
     key: Option<Spanned<String>>,
     values: Option<Spanned<Vec<Spanned<Value>>>>,
     coarser: Option<Spanned<Vec<Spanned<String>>>>,
-    steps: Option<Spanned<i64>>,
+    steps: Option<u32>,
     seconds: Option<Spanned<f64>>,
-    repeats: Option<Spanned<i64>>,
+    repeats: u32,
     errors: Spanned<Vec<Spanned<String>>>,
-    #[serde(default)]
     convergence_point: bool,
     method: Spanned<Vec<Spanned<MethodSpec>>>,
 }
@@ -243,7 +230,6 @@ pub(super) fn parse(
     let spec = SweepSpec::deserialize(toml::Deserializer::from(root))
         .map_err(|error| doc.translate(&error))?;
     let errors = errors(doc, &spec.errors)?;
-    let repeats = whole(doc, &spec.repeats, 100)?.unwrap_or(1);
     let state = match errors[0].measure() {
         Measure::Projection => Some(state(doc, &spec, base_dir)?),
         Measure::Report | Measure::Finest | Measure::Converged => None,
@@ -278,7 +264,7 @@ pub(super) fn parse(
     Ok(Sweep {
         about: spec.about.unwrap_or_default(),
         lines,
-        repeats,
+        repeats: spec.repeats,
         errors,
         state,
         has_convergence_point: spec.convergence_point,
@@ -314,21 +300,6 @@ fn errors(
     Ok(errors)
 }
 
-fn whole(
-    doc: &Document<'_>,
-    spec: &Option<Spanned<i64>>,
-    most: u32,
-) -> Result<Option<u32>, SceneError> {
-    let Some(spec) = spec else {
-        return Ok(None);
-    };
-    let value = u32::try_from(*spec.get_ref()).ok();
-    match value.filter(|value| (1..=most).contains(value)) {
-        Some(value) => Ok(Some(value)),
-        None => Err(doc.fault_at(spec.span(), format!("{} is out of range", spec.get_ref()))),
-    }
-}
-
 /// What projections start from: the scene with what is set for all.
 fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point, SceneError> {
     let fixed: Vec<_> = spec.set.iter().collect();
@@ -341,7 +312,7 @@ fn state(doc: &Document<'_>, spec: &SweepSpec, base_dir: &Path) -> Result<Point,
         label: String::new(),
         frames: frames(doc, spec, &scene)?,
         scene,
-        device: LineDevice::Gpu,
+        device: RunsOn::Gpu,
     })
 }
 
@@ -378,19 +349,18 @@ fn device(
     spec: &SweepSpec,
     word: &str,
     at: Range<usize>,
-) -> Result<LineDevice, SceneError> {
+) -> Result<RunsOn, SceneError> {
     let fault = |problem: &str| Err(doc.fault_at(at.clone(), problem));
     let named = |wanted: &str| spec.errors.get_ref().iter().any(|e| e.get_ref() == wanted);
     let is_projection = ErrorMeasure::NAMED
         .iter()
         .any(|(name, error)| error.measure() == Measure::Projection && named(name));
-    match word {
-        "gpu" => Ok(LineDevice::Gpu),
-        "cpu" if is_projection => {
+    match RunsOn::named(word) {
+        Some(RunsOn::Cpu) if is_projection => {
             fault("the reference's projection is what these errors are measured against")
         }
-        "cpu" => Ok(LineDevice::Cpu),
-        other => fault(&format!("{other:?} is no device")),
+        Some(device) => Ok(device),
+        None => fault(&format!("{word:?} is no device")),
     }
 }
 
@@ -420,7 +390,7 @@ fn line(
     };
     let is_device = key.get_ref() == DEVICE;
     let own_device = match &method.device {
-        None => LineDevice::Gpu,
+        None => RunsOn::Gpu,
         Some(word) if is_device => {
             return Err(doc.fault_at(word.span(), "the key is the device itself"));
         }
@@ -517,12 +487,8 @@ fn tie_pic_blend(scene: &mut Scene, own_rate: f64) {
 fn frames(doc: &Document<'_>, spec: &SweepSpec, scene: &Scene) -> Result<u32, SceneError> {
     let rate = scene.shot.frames_per_second;
     let Some(seconds) = &spec.seconds else {
-        let steps = whole(doc, &spec.steps, 1_000_000)?;
-        return steps.ok_or_else(|| doc.missing(spec.scene.span(), "steps"));
+        return (spec.steps).ok_or_else(|| doc.missing(spec.scene.span(), "steps"));
     };
-    if let Some(steps) = &spec.steps {
-        return Err(doc.fault_at(steps.span(), "seconds stands there as well"));
-    }
     let frames = seconds.get_ref() * rate;
     let is_whole = (frames - frames.round()).abs() <= 1e-6 * frames;
     if !is_whole || !(1.0..=1e6).contains(&frames.round()) {

@@ -9,7 +9,7 @@ use std::{
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{DiffError, Request, adapter_of, aggregates, bake_of, gauge, physics, scene_of};
+use super::{DiffError, Request, adapter_of, aggregates, bake_of, of_caches, physics, scene_of};
 use crate::{
     cache::{CacheError, CacheReader},
     compare::{
@@ -202,7 +202,7 @@ fn write(file: &Path, baseline: &Baseline) -> Result<(), DiffError> {
 fn measure(cache: &CacheReader, frames: &[u32]) -> Result<Vec<Measured>, DiffError> {
     cache.check_beside(frames)?;
     let scene = scene_of(cache)?;
-    let gauge = gauge(&scene, &[cache])?;
+    let gauge = of_caches(&scene, &[cache])?;
     let one = |&frame: &u32| {
         let particles = cache.read(frame)?;
         Ok(Measured {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
-use super::{DiffError, Request, aggregates, bake_of, gauge, physics, scene_of, streams};
+use super::{DiffError, Request, aggregates, bake_of, of_caches, physics, scene_of, streams};
 use crate::{
     cache::{CacheError, CacheReader},
     compare::{
@@ -60,7 +60,7 @@ pub(super) fn compare(
         cache.check_beside(&chosen)?;
     }
     let (scene_a, scene_b) = (scene_of(a)?, scene_of(b)?);
-    let gauge = gauge(&scene_b, &[b, a])?;
+    let gauge = of_caches(&scene_b, &[b, a])?;
     let frame = |&frame: &u32| {
         let (of_a, of_b) = (a.read(frame)?, b.read(frame)?);
         let side = |cache, particles| -> Result<_, CacheError> {

@@ -13,9 +13,11 @@ use swell::{
         Effects, Iteration, Method, Scene, Stop, Wall, WaveMaker,
         effects::{viscosity, vorticity_confinement},
         flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
-        plan::DeviceLimits,
     },
-    solve::{SolveError, pbf::device_limits},
+    solve::{
+        SolveError,
+        plan::{DeviceLimits, device_limits},
+    },
     stage::{
         check::{Table, check_frame},
         prepare::Start,

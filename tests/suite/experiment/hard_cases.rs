@@ -6,15 +6,16 @@ use std::{
 };
 
 use swell::{
+    experiment::{
+        Devices,
+        stability::{Run, Verdict, refusal, run_trial},
+    },
     gpu::adapter::Context,
     scene::study::{
         Study,
         stability::{Bound, Case, Held, Mark, Quantity, Stability, Trial},
     },
-    stage::{
-        device::Opened,
-        study::stability::{Devices, Run, Verdict, refusal, run_trial},
-    },
+    stage::device::Opened,
 };
 
 static STUDY: LazyLock<Stability> = LazyLock::new(|| load("scenes/studies/hard-cases.toml"));
@@ -38,9 +39,7 @@ fn devices() -> Devices {
 }
 
 fn run(trial: &Trial) -> Run {
-    run_trial(&devices(), trial, &AtomicBool::new(false))
-        .unwrap()
-        .unwrap()
+    run_trial(&devices(), trial, &AtomicBool::new(false)).unwrap()
 }
 
 /// What does not come out as the study says: marks that are missed, known failures that hold, and what is not refused.

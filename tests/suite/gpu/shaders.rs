@@ -228,12 +228,11 @@ fn composition_faults_name_their_place() {
     assert!(fault.contains("test"), "{fault}");
 }
 
-/// Rooms that each room may import; `stage` and `cli` stand above them all.
-const MAY_IMPORT: [(&str, &[&str]); 11] = [
+/// Rooms that each room may import; `stage`, `experiment` and `cli` stand above them all.
+const MAY_IMPORT: [(&str, &[&str]); 12] = [
     ("domain", &[]),
     ("gpu", &[]),
-    // The plan's rows are gpu's own plain descriptions: a copy of them would have to be kept in step.
-    ("scene", &["domain", "gpu"]),
+    ("scene", &["domain"]),
     ("cache", &["domain"]),
     ("solve", &["gpu", "domain", "scene"]),
     ("reference", &["domain", "scene"]),
@@ -254,7 +253,20 @@ const MAY_IMPORT: [(&str, &[&str]); 11] = [
             "study",
         ],
     ),
-    ("cli", &["stage", "scene", "domain"]),
+    (
+        "experiment",
+        &[
+            "domain",
+            "gpu",
+            "scene",
+            "cache",
+            "solve",
+            "reference",
+            "study",
+            "stage",
+        ],
+    ),
+    ("cli", &["stage", "experiment", "scene", "domain"]),
 ];
 
 /// Crates that only some rooms name.
@@ -359,13 +371,17 @@ fn rooms_import_what_they_may() {
         1
     );
     assert_eq!(breaches("scene", "use wgpu::Device;").len(), 1);
+    assert_eq!(
+        breaches("scene", "use crate::gpu::program::PassSpec;").len(),
+        1
+    );
     assert!(breaches("solve", "use crate::{domain::mesh, gpu::adapter};\n").is_empty());
 }
 
-/// Files of an effect's own: its settings and plan, its f64 twins, and what holds the two
-/// against each other.
-const EFFECT_FILES: [&str; 5] = [
+/// Files of an effect's own: its settings, its passes, its f64 twins, and what holds the two against each other.
+const EFFECT_FILES: [&str; 6] = [
     "scene/effects",
+    "solve/effects",
     "reference/pbf/effects",
     "stage/check/pbf/effects",
     "reference/flip/effects",
@@ -408,7 +424,7 @@ fn an_effect_is_its_files_and_one_line() {
         let found = mentions(&files, effect);
         assert_eq!(found.len(), 1, "{effect}: {found:#?}");
         assert!(found[0].contains("$callback!("), "{found:?}");
-        for folder in &EFFECT_FILES[..3] {
+        for folder in &EFFECT_FILES[..4] {
             assert!(root.join(format!("{folder}/{effect}.rs")).exists());
         }
     }

@@ -8,9 +8,11 @@ use swell::{
     scene::{
         Scene, Wall, WaveMaker, effects,
         flip::{Preconditioner, Transfer},
+    },
+    solve::{
+        flip::{Flip, capacity},
         plan::Capacity,
     },
-    solve::flip::{Flip, capacity},
 };
 
 /// How far the water's volume is from that of its particles: mean over cells with water or walls all about them of

@@ -14,12 +14,10 @@ use swell::{
         Method, Scene,
         flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
         moving_solid::MovingSolid,
-        plan::{Counts, SOLID_GRIDS_BYTES},
     },
     solve::{
         flip::{Flip, capacity},
-        params::SolidGrids,
-        pbf::device_limits,
+        plan::{Counts, Plan, device_limits},
     },
 };
 
@@ -66,7 +64,7 @@ fn solver(context: &Context, scene: &Scene, particles: &Particles) -> Flip {
         bricks: capacity(scene, particles),
         ..boundary.counts()
     };
-    let plan = swell::solve::plan(scene, counts, device_limits(context));
+    let plan = Plan::new(scene, counts, device_limits(context));
     Flip::new(context, scene, plan, &boundary, false).unwrap()
 }
 
@@ -334,7 +332,6 @@ fn a_box_that_dips_into_a_tank_lifts_its_water_by_what_it_displaces() {
 
 #[test]
 fn scenes_without_moving_solids_have_nothing_for_them() {
-    assert_eq!(SOLID_GRIDS_BYTES, size_of::<SolidGrids>() as u64);
     let context = context();
     let mut scene = scene([8.0; 3]);
     let particles = water([0; 3], [4; 3], BOX);
@@ -344,7 +341,7 @@ fn scenes_without_moving_solids_have_nothing_for_them() {
             bricks: capacity(scene, &particles),
             ..boundary.counts()
         };
-        let plan = swell::solve::plan(scene, counts, device_limits(&context));
+        let plan = Plan::new(scene, counts, device_limits(&context));
         let is_moving = plan
             .passes
             .iter()

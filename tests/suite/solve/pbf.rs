@@ -8,11 +8,8 @@ use crate::support::*;
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, budget::Breach, particles::Particles, solver::Solver},
-    scene::{Iteration, Scene, Stop, effects, plan::*},
-    solve::{
-        SolveError,
-        pbf::{Pbf, device_limits},
-    },
+    scene::{Iteration, Scene, Stop, effects},
+    solve::{SolveError, pbf::Pbf, plan::*},
 };
 
 /// Compressed and jittered water that touches five walls.

@@ -12,11 +12,10 @@ use swell::{
     scene::{
         Method, Scene,
         flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
-        plan::{Capacity, Counts},
     },
     solve::{
         flip::{Flip, capacity},
-        pbf::device_limits,
+        plan::{Capacity, Counts, Plan, device_limits},
     },
 };
 
@@ -68,7 +67,7 @@ pub fn solver_with(
         bricks,
         ..boundary.counts()
     };
-    let plan = swell::solve::plan(scene, counts, device_limits(context));
+    let plan = Plan::new(scene, counts, device_limits(context));
     let mut solver = Flip::new(context, scene, plan, boundary, false).unwrap();
     solver.load(0, particles).unwrap();
     solver

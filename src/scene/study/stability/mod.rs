@@ -45,10 +45,12 @@ mod spec;
 
 use glam::DVec3;
 
-use super::super::{Method, Scene, error::SceneError};
+use super::{
+    super::{Method, Scene, error::SceneError},
+    RunsOn,
+};
 use crate::domain::bounds::Bounds;
 
-pub use super::sweep::LineDevice as CaseDevice;
 pub use quantity::{About, Over, Quantity};
 pub(super) use spec::parse;
 
@@ -117,7 +119,7 @@ pub struct Attempt {
     /// The solver.
     pub method: Method,
     /// What it runs on where it loads after all.
-    pub device: CaseDevice,
+    pub device: RunsOn,
     /// What loading it came to, in words where it failed.
     pub scene: Result<Box<Scene>, String>,
 }
@@ -126,7 +128,7 @@ pub struct Attempt {
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// What it runs on.
-    pub device: CaseDevice,
+    pub device: RunsOn,
     /// With every override laid over it.
     pub scene: Scene,
     /// Output frames to run.
@@ -141,7 +143,7 @@ pub struct Trial {
 #[derive(Clone, Debug)]
 pub struct Other {
     /// What it runs on.
-    pub device: CaseDevice,
+    pub device: RunsOn,
     /// Its scene.
     pub scene: Scene,
     /// Its lengths over those of the run.

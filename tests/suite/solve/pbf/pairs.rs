@@ -12,9 +12,9 @@ use swell::{
     },
     scene::{
         Iteration, Scene, Stop,
-        plan::LIST_CAPACITY,
         probe::{Probe, ProbeKind},
     },
+    solve::plan::LIST_CAPACITY,
 };
 
 use super::{Naive, ONE_ITERATION_TOLERANCE};

@@ -1,0 +1,130 @@
+//! Experiments: runs what a study asks for, measures it, and writes the page.
+//!
+//! The [`engine`] opens devices, runs points and keeps their results; a kind of study is a file or folder beside it: what is
+//! run, what is measured, what is drawn. [`sweep`] changes one setting at a time, [`stability`] runs scenes that are hard on a
+//! solver against their marks, [`comparison`] bakes and renders a scene with two solvers.
+//!
+//! A further kind is one file here that implements [`engine::Kind`], its parser in [`scene::study`](crate::scene::study), and
+//! a line in [`study`].
+
+mod comparison;
+mod engine;
+mod error;
+mod report;
+pub mod stability;
+mod sweep;
+
+use std::{path::PathBuf, sync::atomic::AtomicBool};
+
+use crate::{
+    gpu::adapter,
+    scene::study::Study,
+    stage::{bake, device::Gpu, render},
+};
+
+use engine::{Bench, Kind};
+
+pub use engine::{Devices, Run};
+pub use error::StudyError;
+
+/// What to study, and where to.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Of the study, as its page is titled.
+    pub name: String,
+    /// Validated study.
+    pub study: Study,
+    /// Caches, pictures, table and page go in here.
+    pub directory: PathBuf,
+    /// Adapter and shaders of what runs on a GPU.
+    pub gpu: Gpu,
+    /// As typed, for the page.
+    pub command: String,
+}
+
+/// What a study has to tell while it runs.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// A bake begins or goes on.
+    Solver(&'static str),
+    /// What a user has to know of a scene of the study.
+    Warning(String),
+    /// A bake tells.
+    Bake(Box<bake::Event>),
+    /// A render tells.
+    Render(render::Event),
+    /// A point of a sweep.
+    Point(PointEvent),
+}
+
+/// Where a sweep stands.
+#[derive(Clone, Debug)]
+pub struct PointEvent {
+    /// From 1.
+    pub number: usize,
+    /// Points of the study.
+    pub count: usize,
+    /// Method and setting.
+    pub name: String,
+    /// What became of it.
+    pub status: PointStatus,
+}
+
+/// What became of a point of a sweep.
+#[derive(Clone, Debug)]
+pub enum PointStatus {
+    /// It stands there from a run before.
+    Stands,
+    /// It was run: milliseconds a frame or a projection, and each error that is known already, with its name.
+    Done(f64, Vec<(&'static str, f64)>),
+    /// Its numbers failed.
+    Failed(String),
+}
+
+/// How a study ended.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// Its page; `None` where a signal ended it before.
+    pub page: Option<PathBuf>,
+    /// What was found, in words.
+    pub findings: Vec<String>,
+    /// Marks that are missed and not known to be; only of a study that has marks.
+    pub missed: Vec<String>,
+}
+
+/// Runs a study; `tell` hears of progress, and `stop` ends it after the current frame of a bake, a render or a point, which
+/// is then run anew. Results that stand in the directory already are kept.
+///
+/// # Errors
+/// [`StudyError`].
+pub fn study(
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Outcome, StudyError> {
+    // Also where no point needs it: a name that is none is not passed over.
+    if let Some(adapter) = &request.gpu.adapter {
+        adapter::check_request(adapter)?;
+    }
+    for warning in request.study.warnings() {
+        tell(Event::Warning(warning));
+    }
+    let kind: &dyn Kind = match &request.study {
+        Study::SolverComparison(comparison) => &**comparison,
+        Study::Sweep(sweep) => &**sweep,
+        Study::Stability(stability) => &**stability,
+    };
+    let mut bench = Bench {
+        request,
+        devices: &Devices::open(&request.gpu, kind.needs())?,
+        stop,
+        tell,
+        count: kind.count(),
+        number: 0,
+    };
+    match kind.run(&mut bench) {
+        Ok(report) => report.write(request),
+        Err(StudyError::Stopped) => Ok(Outcome::default()),
+        Err(error) => Err(error),
+    }
+}

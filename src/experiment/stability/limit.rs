@@ -1,0 +1,95 @@
+//! How far a setting goes before a mark is missed, by bisection.
+
+use crate::scene::study::stability::{Limit, Search, Trial};
+
+use super::{
+    super::{
+        PointStatus, StudyError,
+        engine::{Bench, Ledger},
+    },
+    Measured, Run, Verdict, point, report,
+};
+
+/// Where a limit was found.
+#[derive(Default)]
+pub(super) struct Found {
+    /// Farthest value that passes; `None` where not even the first does.
+    pub(super) passes: Option<f64>,
+    /// Nearest value that fails, and what it fails by; `None` where not even the last does.
+    pub(super) fails: Option<(f64, String)>,
+    /// Runs that it took.
+    pub(super) tries: usize,
+}
+
+/// Both ends first, and then the middle by ratio of a value that passes and one that fails, until they are near.
+pub(super) fn find(
+    bench: &mut Bench<'_>,
+    ledger: &mut Ledger<Vec<Measured>>,
+    limit: &Limit,
+    search: &Search,
+) -> Result<Found, StudyError> {
+    let title = format!("{}, {}", limit.name, search.method.name());
+    let mut found = Found::default();
+    let mut next = Some(limit.passes);
+    while let Some(value) = next {
+        let fault = match search.trial(value) {
+            // Beyond what a scene can say.
+            Err(error) => Some(error.to_string()),
+            Ok(trial) => {
+                let (run, _) = point(bench, ledger, &format!("{title} = {value}"), &trial)?;
+                missed(&run, &trial)
+            }
+        };
+        found.tries += 1;
+        match fault {
+            None => found.passes = Some(value),
+            Some(words) => found.fails = Some((value, words)),
+        }
+        next = following(limit, &found);
+    }
+    let name = format!("{title}: {}", found.words(&limit.unit));
+    bench.told(name, PointStatus::Done(0.0, Vec::new()));
+    Ok(found)
+}
+
+/// The first mark that a run misses, in words.
+fn missed(run: &Run, trial: &Trial) -> Option<String> {
+    if let Some(message) = &run.ended {
+        return Some(message.clone());
+    }
+    let verdicts = run.verdicts(trial);
+    let place = verdicts.iter().position(|v| *v == Verdict::Misses)?;
+    let mark = &trial.marks[place];
+    Some(format!(
+        "{} is {}, the mark {}",
+        mark.of.about().title,
+        run.measured[place].words(),
+        report::bound(mark.bound)
+    ))
+}
+
+/// The next value to try; `None` where the limit is found.
+fn following(limit: &Limit, found: &Found) -> Option<f64> {
+    match (found.passes, &found.fails) {
+        (Some(_), None) if found.tries == 1 => Some(limit.fails),
+        (Some(passes), Some((fails, _))) => {
+            let ratio = (fails / passes).max(passes / fails);
+            (ratio > limit.ratio).then(|| (passes * fails).sqrt())
+        }
+        _ => None,
+    }
+}
+
+impl Found {
+    /// In words.
+    pub(super) fn words(&self, unit: &str) -> String {
+        let told = |value: f64| format!("{} {unit}", report::number(value));
+        match (self.passes, &self.fails) {
+            (Some(passes), Some((fails, _))) => {
+                format!("passes at {}, fails at {}", told(passes), told(*fails))
+            }
+            (Some(passes), None) => format!("passes at {}, as far as was tried", told(passes)),
+            (None, _) => "fails at the first value".to_owned(),
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Scenes that are hard on a solver: each run, measured against its marks, and how far single settings go.
+
+mod limit;
+mod report;
+mod trial;
+mod verdict;
+mod view;
+mod watch;
+
+use crate::{
+    gpu::adapter::Needs,
+    scene::{
+        Scene,
+        study::{
+            RunsOn,
+            stability::{Bound, Held, Stability, Trial},
+        },
+    },
+};
+
+use super::{
+    PointStatus, StudyError,
+    engine::{Bench, Kind, Ledger, needs_of},
+    report::Report,
+};
+use report::Results;
+
+pub use trial::{refusal, run_trial};
+pub use verdict::{Measured, Run, Verdict};
+
+impl Kind for Stability {
+    fn needs(&self) -> Option<Needs> {
+        let mut runs = Vec::new();
+        for case in &self.cases {
+            match &case.held {
+                Held::Test(_) => {}
+                Held::Runs(trials) => runs.extend(trials.iter().flat_map(scenes)),
+                Held::Refusal { attempts, .. } => runs.extend(
+                    (attempts.iter()).filter_map(|a| Some((&**a.scene.as_ref().ok()?, a.device))),
+                ),
+            }
+        }
+        let of_limits = (!self.limits.is_empty()).then(Needs::default);
+        needs_of(runs.into_iter()).or(of_limits)
+    }
+
+    fn count(&self) -> usize {
+        let of_case = |held: &Held| match held {
+            Held::Test(_) => 0,
+            Held::Runs(trials) => trials.len(),
+            Held::Refusal { attempts, .. } => attempts.len(),
+        };
+        let cases = self.cases.iter().map(|case| of_case(&case.held));
+        let limits = self.limits.iter().map(|limit| limit.searches.len());
+        cases.chain(limits).sum()
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
+        let mut ledger = Ledger::open(&bench.request.directory)?;
+        let mut runs = Vec::new();
+        for case in &self.cases {
+            let title = format!("{} {}", case.number, case.name);
+            let mut of_case = Vec::new();
+            match &case.held {
+                Held::Test(_) => {}
+                Held::Runs(trials) => {
+                    for trial in trials {
+                        let method = trial.scene.solver.method.name();
+                        let name = format!("{title}, {method}, {}", trial.device.name());
+                        let (run, stood) = point(bench, &mut ledger, &name, trial)?;
+                        bench.told(name, run.status(trial, stood));
+                        of_case.push(run);
+                    }
+                }
+                Held::Refusal { attempts, .. } => {
+                    for attempt in attempts {
+                        let (method, device) = (attempt.method.name(), attempt.device.name());
+                        // Quick, and no line: it is tried every time.
+                        of_case.push(Run {
+                            ended: refusal(bench.devices, attempt)?,
+                            ..Run::default()
+                        });
+                        let name = format!("{title}, {method}, {device}");
+                        bench.told(name, PointStatus::Done(0.0, Vec::new()));
+                    }
+                }
+            }
+            runs.push(of_case);
+        }
+        let mut limits = Vec::new();
+        for limit in &self.limits {
+            for search in &limit.searches {
+                limits.push((
+                    limit,
+                    search,
+                    limit::find(bench, &mut ledger, limit, search)?,
+                ));
+            }
+        }
+        let results = Results {
+            stability: self,
+            devices: bench.devices,
+            runs,
+            limits,
+        };
+        Ok(results.draw(bench.request))
+    }
+}
+
+/// Scenes of a trial, its own first, each with what it runs on.
+fn scenes(trial: &Trial) -> impl Iterator<Item = (&Scene, RunsOn)> {
+    let others = trial
+        .others
+        .iter()
+        .map(|other| (&other.scene, other.device));
+    [(&trial.scene, trial.device)].into_iter().chain(others)
+}
+
+/// A trial's results, and whether they stood in the ledger.
+fn point(
+    bench: &Bench<'_>,
+    ledger: &mut Ledger<Vec<Measured>>,
+    name: &str,
+    trial: &Trial,
+) -> Result<(Run, bool), StudyError> {
+    let mut measured = String::new();
+    for other in &trial.others {
+        measured += &format!("{} {} ", other.scale, other.shift);
+    }
+    for mark in &trial.marks {
+        // The worst of the frames depends on the side that the mark is on, not on where it is.
+        let side = matches!(mark.bound, Bound::AtMost(_));
+        let (of, after, since, region) = (mark.of, mark.after, mark.since, &mark.region);
+        measured += &format!("{of:?} {side} {after} {since:?} {region:?} ");
+    }
+    let runs: Vec<_> = scenes(trial).collect();
+    let hash = bench.devices.hash(&runs, trial.frames, &measured);
+    let measure = || run_trial(bench.devices, trial, bench.stop);
+    bench.point(ledger, name, hash, measure)
+}

@@ -1,0 +1,102 @@
+//! Runs a case's trial, with what it is held against beside it.
+
+use std::{sync::atomic::AtomicBool, time::Instant};
+
+use crate::{
+    scene::study::{
+        RunsOn,
+        stability::{Attempt, Trial},
+    },
+    stage::{device::SolverError, drive::Drive},
+};
+
+use super::{
+    super::{Devices, StudyError, engine::until_done},
+    verdict::{Measured, Run},
+    view::View,
+    watch::{Beside, Watch},
+};
+
+/// Runs a trial to its last frame, or to where its numbers fail.
+///
+/// # Errors
+/// What is no fault of the numbers: the device, a file; [`StudyError::Stopped`] where `stop` came before the end.
+pub fn run_trial(devices: &Devices, trial: &Trial, stop: &AtomicBool) -> Result<Run, StudyError> {
+    let mut run = Run::default();
+    if let Err(error) = go(devices, trial, stop, &mut run) {
+        run.ended = Some(error.of_the_point()?);
+    }
+    Ok(run)
+}
+
+fn go(
+    devices: &Devices,
+    trial: &Trial,
+    stop: &AtomicBool,
+    run: &mut Run,
+) -> Result<(), StudyError> {
+    let mut view = View::new(&trial.scene)?;
+    let mut own = drive(devices, trial.device, &view)?;
+    run.particles = view.state.len();
+    let mut drives = Vec::new();
+    let mut beside = Vec::new();
+    for other in &trial.others {
+        let theirs = View::new(&other.scene)?;
+        drives.push(drive(devices, other.device, &theirs)?);
+        beside.push(Beside::new(theirs, other, &view));
+    }
+    let marks = trial.marks.iter();
+    let mut watches: Vec<_> = marks.map(|mark| Watch::new(mark, &view)).collect();
+    let mut seconds = 0.0;
+    let ended = until_done(&mut own, trial.frames, stop, |step| {
+        seconds += step.seconds;
+        let report = step.report.clone();
+        view.take(step);
+        let begin = Instant::now();
+        for (drive, other) in drives.iter_mut().zip(&mut beside) {
+            other.view.take(drive.advance()?);
+        }
+        seconds += begin.elapsed().as_secs_f64();
+        run.frames += 1;
+        for watch in &mut watches {
+            watch.look(&view, &beside, &report);
+        }
+        Ok(())
+    });
+    run.seconds.push(seconds);
+    let measured = watches.iter();
+    run.measured = measured
+        .map(|watch| Measured::new(watch.value(), &watch.curve, watch.mark))
+        .collect();
+    ended
+}
+
+/// A run at its start.
+fn drive<'a>(devices: &Devices, device: RunsOn, view: &View<'a>) -> Result<Drive<'a>, SolverError> {
+    let drive = Drive::new(devices.of(device), view.scene, &view.start, false)?;
+    Ok(drive.with_pressures())
+}
+
+/// Frames within which a scene that is to be refused is refused, where it loads.
+const FIRST_FRAMES: u32 = 2;
+
+/// In whose words a scene is refused; `None` where it is not.
+///
+/// # Errors
+/// What is no fault of the scene: the device, a file.
+pub fn refusal(devices: &Devices, attempt: &Attempt) -> Result<Option<String>, StudyError> {
+    let scene = match &attempt.scene {
+        Err(message) => return Ok(Some(message.clone())),
+        Ok(scene) => scene,
+    };
+    let begun = || {
+        let view = View::new(scene)?;
+        let mut drive = drive(devices, attempt.device, &view)?;
+        let mut frames = (0..FIRST_FRAMES).map(|_| drive.advance());
+        Ok::<_, StudyError>(frames.try_for_each(|step| step.map(|_| ()))?)
+    };
+    match begun() {
+        Ok(()) => Ok(None),
+        Err(error) => error.of_the_point().map(Some),
+    }
+}

@@ -1,0 +1,103 @@
+//! A run as its marks see it after each frame.
+
+use glam::DVec3;
+
+use crate::{
+    domain::{
+        bounds::Bounds, particles::Particles, probe::elevation,
+        signed_distance::SignedDistanceError, solver::StepReport,
+    },
+    scene::{Method, Scene, probe::ProbeKind},
+    stage::{drive::Step, prepare::Start},
+};
+
+/// A scene and where its run stands.
+pub(super) struct View<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) start: Start,
+    /// Frames that are done.
+    frame: u32,
+    pub(super) state: Particles,
+    /// Of the last frame; before the first there is none.
+    pub(super) report: Option<StepReport>,
+    /// At the probes of pressure, Pa.
+    pub(super) pressures: Vec<Option<f64>>,
+    /// At the probes of elevation, metres above the domain's floor.
+    pub(super) elevations: Vec<Option<f64>>,
+}
+
+impl<'a> View<'a> {
+    pub(super) fn new(scene: &'a Scene) -> Result<Self, SignedDistanceError> {
+        let start = Start::of(scene)?;
+        Ok(Self {
+            state: start.particles.clone(),
+            start,
+            scene,
+            frame: 0,
+            report: None,
+            pressures: Vec::new(),
+            elevations: Vec::new(),
+        })
+    }
+
+    /// Takes a frame over.
+    pub(super) fn take(&mut self, step: Step) {
+        let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
+        let probes = self.scene.probes.iter();
+        let levels = probes.filter_map(|probe| match probe.kind {
+            ProbeKind::Elevation { at } => Some(elevation(&step.particles, spacing, domain, at)),
+            _ => None,
+        });
+        self.elevations = levels.map(|level| Some(level? - domain.min.y)).collect();
+        self.pressures = step.pressures;
+        self.state = step.particles;
+        self.report = Some(step.report);
+        self.frame = step.frame;
+    }
+
+    /// Seconds of the shot that are over.
+    pub(super) fn time(&self) -> f64 {
+        f64::from(self.frame) * self.scene.shot.frame_seconds()
+    }
+
+    /// What lengths are told in: the particle spacing with PBF, the cell size with FLIP, metres.
+    pub(super) fn resolution(&self) -> f64 {
+        match self.scene.solver.method {
+            Method::Pbf => self.scene.particle_spacing(),
+            Method::Flip => self.scene.solver.flip().cell_size,
+        }
+    }
+
+    /// To how much a particle's displacement in a substep is held, metres.
+    pub(super) fn cap(&self) -> f64 {
+        match self.scene.solver.method {
+            Method::Pbf => {
+                let pbf = self.scene.solver.pbf();
+                crate::domain::pbf::CAP * pbf.cfl * pbf.particle_spacing
+            }
+            Method::Flip => {
+                let flip = self.scene.solver.flip();
+                crate::domain::flip::CAP * flip.cfl * flip.cell_size
+            }
+        }
+    }
+
+    /// The box's faces now, wave makers included, in the world.
+    pub(super) fn walls(&self) -> Bounds {
+        let (walls, origin) = (self.scene.walls(self.time()), self.scene.domain.min);
+        Bounds {
+            min: origin + walls.min,
+            max: origin + walls.max,
+        }
+    }
+
+    /// How deep a point lies in a solid where that stands now, metres; negative outside.
+    pub(super) fn depth_in_solid(&self, at: DVec3) -> f64 {
+        let boundary = &self.start.boundary;
+        let still = boundary.distance.iter().map(|solid| -solid.sample(at));
+        let movers = boundary.moving.iter().zip(&self.scene.moving_solids);
+        let moving =
+            movers.map(|(distance, solid)| -distance.sample(at - solid.displacement(self.time())));
+        still.chain(moving).fold(f64::NEG_INFINITY, f64::max)
+    }
+}

@@ -1,0 +1,376 @@
+//! One mark of a run: a number a frame, and what these come to.
+
+use glam::DVec3;
+
+use crate::{
+    domain::{
+        bounds::Bounds,
+        probe::{energies, volume},
+        solver::StepReport,
+    },
+    scene::{
+        Scene,
+        study::stability::{Mark, Other, Over, Quantity},
+    },
+    study::stability::{Flight, filled_volume, least_spacing, matched, outside, point},
+};
+
+use super::view::View;
+
+/// A run beside the one that is measured, and who is who.
+pub(super) struct Beside<'a> {
+    pub(super) view: View<'a>,
+    pub(super) other: &'a Other,
+    /// For each particle of the run its own; `None` where it has none there.
+    pub(super) partner: Vec<Option<usize>>,
+    /// Of the run that is measured.
+    origin: DVec3,
+}
+
+/// A place of the other run, about its own origin, where the run would have it, about its own.
+fn to_ours(p: DVec3, origin: DVec3, view: &View<'_>, other: &Other) -> DVec3 {
+    (p + view.scene.origin - other.shift) / other.scale - origin
+}
+
+impl<'a> Beside<'a> {
+    pub(super) fn new(view: View<'a>, other: &'a Other, ours: &View<'_>) -> Self {
+        let partner = matched(
+            &ours.state.position,
+            &view.state.position,
+            |p| to_ours(p, ours.scene.origin, &view, other),
+            ours.scene.particle_spacing(),
+        );
+        Self {
+            origin: ours.scene.origin,
+            view,
+            other,
+            partner,
+        }
+    }
+
+    /// Where a particle of the run would be if it went as here; its place at the start as well.
+    fn places(&self, k: usize) -> Option<(DVec3, DVec3)> {
+        let of = |p: &[f32; 3]| to_ours(point(p), self.origin, &self.view, self.other);
+        let partner = self.partner[k]?;
+        let start = &self.view.start.particles;
+        Some((
+            of(&self.view.state.position[partner]),
+            of(&start.position[partner]),
+        ))
+    }
+}
+
+/// A mark while a run is under way.
+pub(super) struct Watch<'a> {
+    pub(super) mark: &'a Mark,
+    flight: Option<Flight>,
+    /// What a quantity remembers of the frames before, as [`remembered`] begins it.
+    memory: Vec<f64>,
+    /// Seconds and numbers, one a frame that counts.
+    pub(super) curve: Vec<[f64; 2]>,
+    value: Option<f64>,
+}
+
+/// What a quantity remembers before the first frame.
+fn remembered(mark: &Mark, run: &View<'_>) -> Vec<f64> {
+    let (scene, start) = (run.scene, &run.start.particles);
+    let of_start = |number: f64| mark.since.is_none().then_some(number);
+    match mark.of {
+        // The lowest place so far, a particle.
+        Quantity::Rebound => start.position.iter().map(|p| f64::from(p[1])).collect(),
+        // The start's, and the least so far.
+        Quantity::EnergyGain | Quantity::EnergyRise => {
+            let mass = scene.water.rest_density * scene.particle_spacing().powi(3);
+            let (gravity, corner) = (scene.water.gravity, scene.domain.min);
+            let (kinetic, potential) = energies(start, mass, gravity, corner);
+            vec![kinetic + potential; 2]
+        }
+        // A sum a probe, and how many there are.
+        Quantity::MeanPressureError => vec![0.0; scene.pressure_points().len() + 1],
+        // What is held against the state at `since` is not known before.
+        Quantity::Sinking => {
+            let height = mean_height(&start.position) - scene.domain.min.y;
+            of_start(height).into_iter().collect()
+        }
+        Quantity::VolumeDrift | Quantity::FilledVolume => of_start(1.0).into_iter().collect(),
+        // Two sums.
+        Quantity::IterationsRatio | Quantity::GaugeConvergence => vec![0.0; 2],
+        _ => Vec::new(),
+    }
+}
+
+impl<'a> Watch<'a> {
+    pub(super) fn new(mark: &'a Mark, run: &View<'_>) -> Self {
+        let start = &run.start.particles;
+        let is_flight = mark.of == Quantity::BallisticError;
+        Self {
+            mark,
+            flight: is_flight.then(|| Flight::new(&start.position, &start.velocity)),
+            memory: remembered(mark, run),
+            curve: Vec::new(),
+            value: None,
+        }
+    }
+
+    /// After each frame.
+    pub(super) fn look(&mut self, run: &View<'_>, beside: &[Beside<'_>], report: &StepReport) {
+        let from = self.mark.after.max(self.mark.since.unwrap_or(0.0));
+        let counts = run.time() >= from * (1.0 - 1e-9);
+        // What sums up the way from the start has to see all of it; means begin where the mark does.
+        let sees_all = self.flight.is_some() || self.mark.of == Quantity::Rebound;
+        if !counts && !sees_all {
+            return;
+        }
+        let number = self.number(run, beside, report);
+        if counts {
+            self.curve.push([run.time(), number]);
+            self.value = Some(match (self.mark.of.about().over, self.value) {
+                (Over::Worst, Some(before)) => self.mark.bound.worse(before, number),
+                _ => number,
+            });
+        }
+    }
+
+    /// What the frames come to; `None` where none counted or it is no number.
+    pub(super) fn value(&self) -> Option<f64> {
+        self.value.filter(|value| value.is_finite())
+    }
+
+    fn number(&mut self, run: &View<'_>, beside: &[Beside<'_>], report: &StepReport) -> f64 {
+        let scene = run.scene;
+        let spacing = scene.particle_spacing();
+        let (start, now) = (&run.start.particles, &run.state);
+        let projection = report.projection.unwrap_or_default();
+        let energy = report.kinetic_energy + report.potential_energy;
+        match self.mark.of {
+            Quantity::Escaped => outside(&now.position, &scene.domain) as f64,
+            Quantity::Lost => lost(&start.id, &now.id) as f64,
+            Quantity::NotFinite => {
+                let values = now.position.iter().chain(&now.velocity).flatten();
+                values.filter(|value| !value.is_finite()).count() as f64
+            }
+            Quantity::Speed => report.max_speed,
+            Quantity::SpeedOverCap => {
+                let step = scene.shot.frame_seconds() / f64::from(report.substeps.max(1));
+                report.max_speed * step / run.cap()
+            }
+            Quantity::LeastSpacing => least_spacing(&now.position, spacing),
+            Quantity::Climb => (top(&now.position) - top(&start.position)) / spacing,
+            Quantity::Sinking => 1.0 - self.drift(mean_height(&now.position) - scene.domain.min.y),
+            Quantity::BallisticError => self.flight.as_mut().map_or(f64::NAN, |flight| {
+                let seconds = scene.shot.frame_seconds();
+                flight.advance(scene.water.gravity, seconds, report.substeps);
+                flight.error(&now.position)
+            }),
+            Quantity::Rebound => {
+                let mut most = 0.0f64;
+                let all = now.position.iter().zip(&start.position);
+                for (low, (p, from)) in self.memory.iter_mut().zip(all) {
+                    *low = low.min(f64::from(p[1]));
+                    let fallen = f64::from(from[1]) - *low;
+                    if fallen > 0.0 {
+                        most = most.max((f64::from(p[1]) - *low) / fallen);
+                    }
+                }
+                most
+            }
+            Quantity::VolumeDrift => {
+                let held = now.len() as f64 * spacing.powi(3);
+                (self.drift(volume(now, spacing, &scene.domain) / held) - 1.0).abs()
+            }
+            Quantity::FilledVolume => {
+                let filled = filled_volume(&now.position, spacing, &scene.domain);
+                (self.drift(filled.unwrap_or(f64::NAN)) - 1.0).abs()
+            }
+            Quantity::EnergyGain => energy / self.memory[0] - 1.0,
+            Quantity::EnergyRise => {
+                self.memory[1] = self.memory[1].min(energy);
+                (energy - self.memory[1]) / self.memory[0]
+            }
+            Quantity::PressureError => {
+                let pressures = run.pressures.iter().map(|p| p.unwrap_or(f64::NAN));
+                pressure_error(run, pressures)
+            }
+            Quantity::MeanPressureError => {
+                let now = run.pressures.iter().map(|p| p.unwrap_or(f64::NAN));
+                for (sum, p) in self.memory.iter_mut().zip(now.chain([1.0])) {
+                    *sum += p;
+                }
+                let (count, sums) = self.memory.split_last().unwrap_or((&f64::NAN, &[]));
+                pressure_error(run, sums.iter().map(|sum| sum / count))
+            }
+            Quantity::Compression => report.density_error_mean,
+            Quantity::LargestCompression => report.density_error_max,
+            Quantity::Residual => projection.residual,
+            Quantity::Missed => f64::from(projection.missed),
+            Quantity::Pockets => f64::from(projection.pockets),
+            Quantity::Incompatible => projection.incompatible,
+            Quantity::Dropped => projection.dropped as f64,
+            Quantity::Iterations => report.iterations as f64,
+            Quantity::Substeps => f64::from(report.substeps),
+            Quantity::Capped => {
+                let steps = now.len() as f64 * f64::from(report.substeps);
+                report.capped as f64 / steps.max(1.0)
+            }
+            Quantity::Behind => outside(&now.position, &run.walls()) as f64,
+            Quantity::InSolid => {
+                let depths = now.position.iter().map(|p| run.depth_in_solid(point(p)));
+                depths.fold(f64::NEG_INFINITY, f64::max).max(-1e3) / run.resolution()
+            }
+            Quantity::InRegion => match &self.mark.region {
+                Some(region) => (now.len() - outside(&now.position, &about(region, scene))) as f64,
+                None => f64::NAN,
+            },
+            Quantity::Difference => self.difference(run, beside),
+            Quantity::DisplacementError => displacement_error(run, beside),
+            Quantity::IterationsRatio => {
+                let theirs = beside.first().and_then(|other| other.view.report.as_ref());
+                let theirs = theirs.map_or(f64::NAN, |report| report.iterations as f64);
+                self.ratio([report.iterations as f64, theirs])
+            }
+            Quantity::GaugeDifference => match beside {
+                [other, ..] => {
+                    largest(gaps(run, &other.view, other.other.scale)) / run.resolution()
+                }
+                [] => f64::NAN,
+            },
+            Quantity::GaugeConvergence => match beside {
+                [second, third, ..] => {
+                    let square = |gaps: Vec<f64>| gaps.iter().map(|gap| gap * gap).sum::<f64>();
+                    let finer = square(gaps(&second.view, &third.view, 1.0));
+                    let coarser = square(gaps(run, &second.view, second.other.scale));
+                    self.ratio([finer, coarser]).sqrt()
+                }
+                _ => f64::NAN,
+            },
+        }
+    }
+
+    /// A number over that of the reference, which it becomes where none is known yet.
+    fn drift(&mut self, number: f64) -> f64 {
+        if self.memory.is_empty() {
+            self.memory.push(number);
+        }
+        number / self.memory[0]
+    }
+
+    /// The ratio of two sums over the frames so far.
+    fn ratio(&mut self, numbers: [f64; 2]) -> f64 {
+        let sums = self.memory.iter_mut().zip(numbers);
+        sums.for_each(|(sum, number)| *sum += number);
+        self.memory[0] / self.memory[1]
+    }
+
+    fn difference(&self, run: &View<'_>, beside: &[Beside<'_>]) -> f64 {
+        let [other, ..] = beside else {
+            return f64::NAN;
+        };
+        let (start, now) = (&run.start.particles, &run.state);
+        let is_meant = |k: &usize| {
+            let region = self.mark.region.as_ref();
+            let at = point(&start.position[*k]) + run.scene.origin;
+            region.is_none_or(|region| region.contains(at))
+        };
+        let gap = |k: usize| match other.places(k) {
+            Some((place, _)) => place.distance(point(&now.position[k])),
+            None => f64::NAN,
+        };
+        largest((0..now.len()).filter(is_meant).map(gap)) / run.resolution()
+    }
+}
+
+fn displacement_error(run: &View<'_>, beside: &[Beside<'_>]) -> f64 {
+    let [other, ..] = beside else {
+        return f64::NAN;
+    };
+    let (mut gaps, mut ways) = (0.0, 0.0);
+    for (k, p) in run.state.position.iter().enumerate() {
+        let Some((place, start)) = other.places(k) else {
+            return f64::NAN;
+        };
+        gaps += place.distance_squared(point(p));
+        ways += place.distance_squared(start);
+    }
+    (gaps / ways).sqrt()
+}
+
+/// A box of the world about the scene's origin.
+fn about(region: &Bounds, scene: &Scene) -> Bounds {
+    Bounds {
+        min: region.min - scene.origin,
+        max: region.max - scene.origin,
+    }
+}
+
+/// Ids that one of two ascending lists has and the other has not.
+fn lost(a: &[u32], b: &[u32]) -> usize {
+    if a == b {
+        return 0;
+    }
+    let missing = |a: &[u32], b: &[u32]| a.iter().filter(|id| b.binary_search(id).is_err()).count();
+    missing(a, b) + missing(b, a).max(usize::from(a.len() == b.len()))
+}
+
+fn top(position: &[[f32; 3]]) -> f64 {
+    position
+        .iter()
+        .map(|p| f64::from(p[1]))
+        .fold(f64::MIN, f64::max)
+}
+
+fn mean_height(position: &[[f32; 3]]) -> f64 {
+    position.iter().map(|p| f64::from(p[1])).sum::<f64>() / position.len() as f64
+}
+
+/// Largest; what is no number is larger than any.
+fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    let larger = |a: f64, b: f64| {
+        if a.is_nan() || b.is_nan() {
+            f64::NAN
+        } else {
+            a.max(b)
+        }
+    };
+    values.into_iter().fold(0.0, larger)
+}
+
+fn pressure_error(run: &View<'_>, pressures: impl Iterator<Item = f64>) -> f64 {
+    let scene = run.scene;
+    let surface = top(&run.start.particles.position) + 0.5 * scene.particle_spacing();
+    let weight = scene.water.rest_density * scene.water.gravity.length();
+    let points = scene.pressure_points();
+    let off = points.iter().zip(pressures);
+    largest(off.map(|(at, p)| (p / (weight * (surface - at.y)) - 1.0).abs()))
+}
+
+/// Of the probes of elevation, metres of the first run.
+fn gaps(a: &View<'_>, b: &View<'_>, scale: f64) -> Vec<f64> {
+    let pairs = a.elevations.iter().zip(&b.elevations);
+    let gap = |(a, b): (&Option<f64>, &Option<f64>)| match (a, b) {
+        (Some(a), Some(b)) => (a - b / scale).abs(),
+        (None, None) => 0.0,
+        _ => f64::NAN,
+    };
+    pairs.map(gap).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lost_and_doubled_particles_count() {
+        assert_eq!(lost(&[1, 2, 3], &[1, 2, 3]), 0);
+        assert_eq!(lost(&[1, 2, 3], &[1, 3]), 1);
+        assert_eq!(lost(&[1, 2, 3], &[1, 2, 3, 7]), 1);
+        assert_eq!(lost(&[1, 2, 3], &[1, 2, 9]), 2);
+        // 3 is lost, 2 doubled.
+        assert_eq!(lost(&[1, 2, 3], &[1, 2, 2]), 2);
+    }
+
+    #[test]
+    fn what_is_no_number_is_the_largest() {
+        assert_eq!(largest([1.0, 3.0, 2.0]), 3.0);
+        assert!(largest([1.0, f64::NAN, 2.0]).is_nan());
+    }
+}

@@ -1,0 +1,173 @@
+//! A point that is a run of frames.
+
+use glam::{DVec3, Vec3};
+
+use crate::{
+    domain::particles::Particles,
+    reference::{
+        neighbors::{Cells, Crowd, Neighbors},
+        pbf::constraint::distance_to_converged,
+    },
+    scene::{
+        Method, Scene,
+        flip::Preconditioner,
+        study::sweep::{Measure, Point, SAMPLES, Sweep},
+    },
+    stage::{
+        device::Opened,
+        drive::{Drive, Step},
+        prepare::Start,
+    },
+    study::measure::Gauge,
+};
+
+use super::{
+    super::{
+        StudyError,
+        engine::{Bench, until_done},
+    },
+    measured::{Measured, Run, Sample},
+};
+
+/// Compression at which constraints hold: Newton's next step would move particles by less than f32 tells apart.
+const CONVERGED: f64 = 1e-6;
+
+/// Runs a point as often as the sweep repeats, each time from the scene's start, after one frame that is not counted: it
+/// makes the device's programs ready. Samples are taken where there is a gauge; the distance to where the constraints hold
+/// is taken of the end alone, and its time is not the run's.
+pub(super) fn measure(
+    bench: &Bench<'_>,
+    point: &Point,
+    sweep: &Sweep,
+    gauge: Option<&Gauge>,
+) -> Result<Run, StudyError> {
+    let scene = &point.scene;
+    let start = Start::of(scene)?;
+    let opened = bench.devices.of(point.device);
+    let mut drive = Drive::new(opened, scene, &start, false)?;
+    drive.advance()?;
+    let mut run = Run {
+        particles: start.particles.len(),
+        frames: point.frames,
+        ..Run::default()
+    };
+    let mut end = Particles::default();
+    for repeat in 0..sweep.repeats {
+        drive.load(0, &start.particles)?;
+        let mut seconds = 0.0;
+        until_done(&mut drive, point.frames, bench.stop, |step| {
+            seconds += step.seconds;
+            // The same steps again: only their time is new.
+            if repeat == 0 {
+                run.measured.look(point, gauge, &step);
+            }
+            end = step.particles;
+            Ok(())
+        })?;
+        run.seconds.push(seconds);
+    }
+    let measured = &mut run.measured;
+    if sweep.errors[0].measure() == Measure::Converged {
+        let boundary = &start.boundary;
+        let distance = distance_to_converged(scene, boundary, point.frames, &end, CONVERGED)?;
+        measured.distance = Some(distance);
+    }
+    match (scene.solver.method, opened) {
+        (Method::Pbf, _) => measured.work = neighbor_visits(scene, &end, measured),
+        (Method::Flip, Opened::Gpu(_)) => {
+            measured.work *= products(scene.solver.flip().pressure.preconditioner);
+        }
+        // The reference's incomplete Cholesky reads in its two halves what one product does, as IPP.
+        (Method::Flip, Opened::Cpu) => measured.work *= products(Preconditioner::Ipp),
+    }
+    Ok(run)
+}
+
+impl Measured {
+    fn look(&mut self, point: &Point, gauge: Option<&Gauge>, step: &Step) {
+        let report = &step.report;
+        self.substeps += u64::from(report.substeps);
+        self.iterations += report.iterations;
+        self.density.push([
+            report.density_error_mean,
+            report.density_error_p99,
+            report.density_error_max,
+        ]);
+        if let Some(projection) = report.projection {
+            self.missed += projection.missed;
+            self.work += (report.iterations + projection.correction_iterations) as f64;
+        }
+        let is_sampled = || step.frame % (point.frames / SAMPLES) == 0;
+        if let Some(gauge) = gauge.filter(|_| is_sampled()) {
+            self.samples
+                .push(sample(&point.scene, gauge, &step.particles));
+        }
+    }
+}
+
+fn sample(scene: &Scene, gauge: &Gauge, particles: &Particles) -> Sample {
+    let spacing = scene.particle_spacing();
+    let measures = gauge.measure(&particles.position, spacing);
+    Sample {
+        crest: measures.crest_height,
+        front: measures.front,
+        energy: specific_energy(scene, particles),
+        profile: gauge.profile(&particles.position, spacing),
+    }
+}
+
+/// Energy per mass, m²/s²: ½ v² + g h over the domain's least corner, mean over the particles.
+fn specific_energy(scene: &Scene, particles: &Particles) -> f64 {
+    let gravity = scene.water.gravity;
+    let of = |(x, v): (&[f32; 3], &[f32; 3])| {
+        let [x, v] = [x, v].map(|p| Vec3::from_array(*p).as_dvec3());
+        0.5 * v.length_squared() - gravity.dot(x - scene.domain.min)
+    };
+    let all = particles.position.iter().zip(&particles.velocity);
+    all.map(of).sum::<f64>() / particles.len().max(1) as f64
+}
+
+/// Neighbour visits of a PBF run: particles × mean neighbours × passes over them, which are one of λ and one of
+/// corrections an iteration and the search of each substep. The mean is that of the end.
+fn neighbor_visits(scene: &Scene, end: &Particles, run: &Measured) -> f64 {
+    let pbf = scene.solver.pbf();
+    let radius = pbf.support_ratio * pbf.particle_spacing;
+    let place = |x: &[f32; 3]| Vec3::from_array(*x).as_dvec3() - scene.domain.min;
+    let positions: Vec<DVec3> = end.position.iter().map(place).collect();
+    let cells = Cells::new(scene.domain.size(), radius);
+    let order = cells.order(&positions, &end.id);
+    let points: Vec<DVec3> = order.iter().map(|&k| positions[k]).collect();
+    let crowd = Crowd {
+        cells,
+        points: &points,
+        particles: points.len(),
+    };
+    // Each pair from either side: particles × mean neighbours.
+    let pairs = Neighbors::search(&crowd, radius).pairs() as f64;
+    pairs * (2 * run.iterations + run.substeps) as f64
+}
+
+/// Products with the finest matrix that an iteration comes to: one of its own, and what its preconditioner reads of
+/// neighbours. Both halves of IPP make one; a V-cycle takes half a product each for the second colour, the residual, the
+/// corrected colour and the last, and an eighth as much on each coarser level.
+pub(super) fn products(preconditioner: Preconditioner) -> f64 {
+    match preconditioner {
+        Preconditioner::None | Preconditioner::Jacobi => 1.0,
+        Preconditioner::Ipp => 2.0,
+        Preconditioner::Multigrid => 1.0 + 2.0 * 8.0 / 7.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand, beside the iteration's own product: four half-products on each level, which has an eighth of the cells of the one before.
+    #[test]
+    fn a_v_cycle_s_products_are_counted_over_its_levels() {
+        let cycle: f64 = (0..20).map(|level| 4.0 * 0.5 / 8f64.powi(level)).sum();
+        assert!((products(Preconditioner::Multigrid) - 1.0 - cycle).abs() < 1e-12);
+        assert_eq!(products(Preconditioner::Ipp), 2.0);
+        assert_eq!(products(Preconditioner::Jacobi), 1.0);
+    }
+}

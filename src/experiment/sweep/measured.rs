@@ -1,0 +1,137 @@
+//! What a sweep measures of a point, and the errors that follow from it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::scene::study::sweep::ErrorMeasure;
+
+/// What a point of a sweep came to.
+pub(super) type Run = super::super::Run<Measured>;
+
+/// What is measured beside the time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Measured {
+    /// Summed over the frames.
+    pub(super) substeps: u64,
+    /// Summed over the frames.
+    pub(super) iterations: u64,
+    /// The cost that no machine changes, summed over the frames: neighbour visits or matrix-vector products.
+    pub(super) work: f64,
+    /// Pressure solves that ended above their tolerance.
+    pub(super) missed: u32,
+    /// Mean, 99th percentile and maximum of max(0, ρ/ρ0 − 1) at each frame's end.
+    pub(super) density: Vec<[f64; 3]>,
+    /// At equally spaced times, where the run is compared with the finest.
+    pub(super) samples: Vec<Sample>,
+    /// RMS over the particles of the way from the end to where their constraints hold, in spacings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) distance: Option<f64>,
+    /// Of a projection.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) projection: Option<ProjectionErrors>,
+}
+
+/// What a frame is compared by.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Sample {
+    /// Metres above the still level.
+    pub(super) crest: f64,
+    /// Metres along the wave's way.
+    pub(super) front: Option<f64>,
+    /// m²/s².
+    pub(super) energy: f64,
+    /// Elevation along the wave's way, metres.
+    pub(super) profile: Vec<f64>,
+}
+
+/// One projection against the exact solution of its system.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct ProjectionErrors {
+    /// ‖p − p64‖ / ‖p64‖.
+    pub(super) pressure: f64,
+    /// ‖u − u64‖ / ‖u64‖.
+    pub(super) velocity: f64,
+    /// Largest |∇·u| Δt.
+    pub(super) divergence: f64,
+    /// ‖b − Ap‖ / ‖b‖ as the device reports it.
+    pub(super) residual: f64,
+    /// Rows of the system.
+    pub(super) rows: usize,
+    /// ‖b − Ap64‖ / ‖b‖ of the exact solution.
+    pub(super) exact_residual: f64,
+    /// Whether that is by a sparse Cholesky factor, not by conjugate gradients.
+    pub(super) has_factor: bool,
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+/// An error of a run; against `finest` where the measure needs one. `None` where it cannot be told.
+pub(super) fn error(of: ErrorMeasure, run: &Measured, finest: Option<&Measured>) -> Option<f64> {
+    let density = |k: usize| mean(run.density.iter().map(move |frame| frame[k]));
+    let against = |difference: fn(&Sample, &Sample) -> Option<f64>| {
+        let pairs = run.samples.iter().zip(&finest?.samples);
+        mean(pairs.filter_map(|(sample, fine)| difference(sample, fine)))
+    };
+    match of {
+        ErrorMeasure::DensityMean => density(0),
+        ErrorMeasure::DensityP99 => density(1),
+        ErrorMeasure::DensityMax => density(2),
+        ErrorMeasure::Crest => against(|a, b| Some((a.crest - b.crest).abs())),
+        ErrorMeasure::Front => against(|a, b| Some((a.front? - b.front?).abs())),
+        ErrorMeasure::Energy => against(|a, b| Some((a.energy / b.energy - 1.0).abs())),
+        ErrorMeasure::Profile => against(|a, b| {
+            let pairs = a.profile.iter().zip(&b.profile);
+            mean(pairs.map(|(a, b)| (a - b).powi(2))).map(f64::sqrt)
+        }),
+        ErrorMeasure::Pressure => run.projection.map(|p| p.pressure),
+        ErrorMeasure::Velocity => run.projection.map(|p| p.velocity),
+        ErrorMeasure::Divergence => run.projection.map(|p| p.divergence),
+        ErrorMeasure::DistanceToConverged => run.distance,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_means_over_the_times_that_both_know() {
+        let sample = |front, crest, energy, level: f64| Sample {
+            front,
+            crest,
+            energy,
+            profile: vec![level; 4],
+        };
+        let run = Measured {
+            samples: vec![
+                sample(Some(1.0), 0.5, 9.0, 1.0),
+                sample(None, 0.7, 8.0, 1.5),
+            ],
+            density: vec![[0.01, 0.02, 0.3], [0.03, 0.04, 0.5]],
+            ..Measured::default()
+        };
+        let finest = Measured {
+            samples: vec![
+                sample(Some(1.5), 0.4, 10.0, 1.2),
+                sample(Some(2.0), 0.4, 10.0, 1.2),
+            ],
+            ..Measured::default()
+        };
+        let against = |of| error(of, &run, Some(&finest)).expect("measured");
+        assert!((against(ErrorMeasure::Front) - 0.5).abs() < 1e-12);
+        assert!((against(ErrorMeasure::Crest) - 0.2).abs() < 1e-12);
+        assert!((against(ErrorMeasure::Energy) - 0.15).abs() < 1e-12);
+        assert!((against(ErrorMeasure::Profile) - 0.25).abs() < 1e-12);
+        assert!((against(ErrorMeasure::DensityP99) - 0.03).abs() < 1e-12);
+        assert_eq!(error(ErrorMeasure::Crest, &run, None), None);
+        assert_eq!(error(ErrorMeasure::Pressure, &run, None), None);
+        // Against itself a run is off by nothing.
+        assert_eq!(error(ErrorMeasure::Crest, &run, Some(&run)), Some(0.0));
+    }
+}

@@ -1,0 +1,129 @@
+//! A scene run over and over with one setting changed at a time: errors against time.
+
+mod frames;
+mod measured;
+mod projection;
+mod report;
+mod words;
+
+use crate::{
+    gpu::adapter::Needs,
+    scene::study::sweep::{ErrorMeasure, Measure, Point, Sweep},
+    stage::{gauge, prepare::Start},
+    study::measure::Gauge,
+};
+
+use super::{
+    PointStatus, StudyError,
+    engine::{Bench, Kind, Ledger, needs_of},
+    report::Report,
+};
+use measured::{Run, error};
+use projection::Projections;
+
+impl Kind for Sweep {
+    fn needs(&self) -> Option<Needs> {
+        needs_of(self.points().map(|point| (&point.scene, point.device)))
+    }
+
+    fn count(&self) -> usize {
+        self.points().count() + self.lines.iter().flat_map(|line| &line.coarser).count()
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
+        let mut lab = Lab {
+            sweep: self,
+            gauge: gauge_of(self)?,
+            projections: self.state.as_ref().map(Projections::new),
+        };
+        let mut ledger = Ledger::open(&bench.request.directory)?;
+        let mut runs = Vec::new();
+        for line in &self.lines {
+            let mut of_line = Vec::new();
+            for point in line.points.iter().chain(&line.coarser) {
+                let coarser = line.coarser.as_ref();
+                let is_coarser = coarser.is_some_and(|coarser| std::ptr::eq(coarser, point));
+                let finest = line.points.last().filter(|_| is_coarser);
+                let name = match is_coarser {
+                    true => format!("{}, coarser: {}", line.name, point.label),
+                    false => format!("{}, {} = {}", line.name, line.key, point.label),
+                };
+                let hash = lab.hash(bench, point, finest);
+                let measure = || lab.measure(bench, point, finest);
+                let (run, stood) = bench.point(&mut ledger, &name, hash, measure)?;
+                bench.told(name, status(&self.errors, &run, stood));
+                of_line.push(run);
+            }
+            runs.push(of_line);
+        }
+        Ok(report::draw(self, bench, &runs))
+    }
+}
+
+fn status(errors: &[ErrorMeasure], run: &Run, stood: bool) -> PointStatus {
+    let known = |of: &ErrorMeasure| Some((of.name(), error(*of, &run.measured, None)?));
+    match &run.ended {
+        _ if stood => PointStatus::Stands,
+        Some(message) => PointStatus::Failed(message.clone()),
+        None => PointStatus::Done(
+            1e3 * run.per_frame()[1],
+            errors.iter().filter_map(known).collect(),
+        ),
+    }
+}
+
+/// What the points of a sweep share.
+struct Lab<'a> {
+    sweep: &'a Sweep,
+    /// One for all, so that runs of different resolution are measured alike.
+    gauge: Option<Gauge>,
+    projections: Option<Projections<'a>>,
+}
+
+impl Lab<'_> {
+    /// `finest` is what a coarser point's error is told beside.
+    fn measure(
+        &mut self,
+        bench: &Bench<'_>,
+        point: &Point,
+        finest: Option<&Point>,
+    ) -> Result<Run, StudyError> {
+        match (&mut self.projections, finest) {
+            (None, _) => frames::measure(bench, point, self.sweep, self.gauge.as_ref()),
+            (Some(projections), None) => projections.measure(bench, point, self.sweep.repeats),
+            (Some(projections), Some(finest)) => projections.coarser(bench, finest, point),
+        }
+    }
+
+    fn hash(&self, bench: &Bench<'_>, point: &Point, finest: Option<&Point>) -> String {
+        let points = [point].into_iter().chain(&self.sweep.state).chain(finest);
+        let runs: Vec<_> = points.map(|point| (&point.scene, point.device)).collect();
+        let repeats = self.sweep.repeats;
+        let measured = format!(
+            "{repeats} {:?} {:?}",
+            self.sweep.errors[0].measure(),
+            self.gauge
+        );
+        bench.devices.hash(&runs, point.frames, &measured)
+    }
+}
+
+/// Where runs are measured against the finest; its cubes are those of the coarsest lattice.
+fn gauge_of(sweep: &Sweep) -> Result<Option<Gauge>, StudyError> {
+    let Some(finest) = sweep.points().last() else {
+        return Ok(None);
+    };
+    if sweep.errors[0].measure() != Measure::Finest {
+        return Ok(None);
+    }
+    let spacings = sweep.points().map(|point| point.scene.particle_spacing());
+    let scene = &finest.scene;
+    let start = Start::of(scene)?.particles.position;
+    let coarsest = spacings.fold(0.0, f64::max);
+    Ok(Some(gauge::gauge(
+        scene,
+        coarsest,
+        &start,
+        scene.particle_spacing(),
+    )))
+}

@@ -1,0 +1,292 @@
+//! Sweeps run, resumed and measured.
+
+use std::fs;
+
+use swell::experiment::PointStatus;
+
+use super::{ITERATIONS, Job, SCENE, stands};
+
+/// The study's name, one sentence, the curve with its knee; method against method only for who opens it.
+fn reads_from_the_answer_on(page: &str) {
+    let place = |text: &str| page.find(text).unwrap_or_else(|| panic!("{text}: {page}"));
+    let order = [
+        "<h1>tiny-study</h1>",
+        "<p class=\"answer\">The knee is solver.pbf.iterations = ",
+        "<svg",
+        ">knee: ",
+        "<summary>3 more curves</summary>",
+        "Why &lt;this&gt; is run.",
+        "<h2>Knees</h2>",
+        "<summary>Method against method in equal time</summary>",
+        "<h2>Table</h2>",
+        "<summary>What was run</summary>",
+    ];
+    for pair in order.windows(2) {
+        assert!(place(pair[0]) < place(pair[1]), "{pair:?}");
+    }
+    // What would be wider than a narrow window: text that does not wrap, boxes that scroll or have a least width.
+    for wide in ["nowrap", "overflow-x", "min-width", "white-space:pre}"] {
+        assert!(!page.contains(wide), "{wide}");
+    }
+}
+
+#[test]
+fn a_sweep_runs_once_and_tells() {
+    let job = Job::new();
+    let (outcome, points) = job.run(ITERATIONS, false).unwrap();
+    assert_eq!((points.len(), stands(&points)), (4, 0));
+    // Which setting is the knee and who is better, times decide; that both are told, they do not.
+    let tells = |what: &str| outcome.findings.iter().any(|f| f.contains(what));
+    assert!(tells("knee") && tells("at equal time"), "{outcome:?}");
+    assert_eq!(
+        job.column("method"),
+        ["jacobi", "jacobi", "red_black", "red_black"]
+    );
+    assert_eq!(job.column("setting"), ["1", "4", "1", "4"]);
+    assert_eq!(job.column("particles"), ["216"; 4]);
+    assert_eq!(job.column("repeats"), ["2"; 4]);
+    // One step a frame of four, each of so many iterations.
+    assert_eq!(job.column("iterations"), ["4", "16", "4", "16"]);
+    // Lists and pairs: 9 passes over neighbours a frame to 3. The neighbours themselves differ little.
+    let work = job.numbers("work");
+    assert!((work[1] / work[0] - 3.0).abs() < 0.6, "{work:?}");
+    // A block of 6 layers that begins to fall over: more iterations leave less error.
+    let error = job.numbers("density_error_mean");
+    assert!(error[1] < error[0] && error[3] < error[2], "{error:?}");
+    // 4 steps are no 51.
+    assert_eq!(job.column("convergence_point_density"), [""; 4]);
+
+    let page = job.read("index.html");
+    assert_eq!(page.matches("<svg").count(), 4);
+    reads_from_the_answer_on(&page);
+    for text in [
+        "Why &lt;this&gt; is run.",
+        "swell study s.toml",
+        "not within the run",
+        "23.73",
+        "736",
+    ] {
+        assert_eq!(
+            page.contains(text),
+            text != "736" && text != "23.73",
+            "{text}"
+        );
+    }
+    for outside in ["src=\"", "href=", "<script"] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    let picture = fs::read(job.out("curves/density_error_mean-time.png")).unwrap();
+    let mut reader = png::Decoder::new(std::io::Cursor::new(&picture))
+        .read_info()
+        .unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    // Title, two labels, and numbers: above the plot, where nothing but text is drawn, there are dark pixels.
+    let row = 4 * reader.info().width as usize;
+    let dark = pixels[..50 * row]
+        .chunks_exact(4)
+        .filter(|p| p[0] < 100)
+        .count();
+    assert!(dark > 200, "{dark}");
+
+    // Again: nothing is run, and what is written is the same.
+    let lines = job.read("results.jsonl");
+    let written = (job.read("results.csv"), page);
+    let (_, points) = job.run(ITERATIONS, false).unwrap();
+    assert_eq!(stands(&points), 4);
+    assert_eq!(job.read("results.jsonl"), lines);
+    assert_eq!((job.read("results.csv"), job.read("index.html")), written);
+
+    // A line that is gone is run again, and it alone.
+    let (kept, _) = lines.trim_end().rsplit_once('\n').unwrap();
+    fs::write(job.out("results.jsonl"), format!("{kept}\n")).unwrap();
+    let (_, points) = job.run(ITERATIONS, false).unwrap();
+    assert_eq!(stands(&points), 3);
+
+    // Negative control: with another scene nothing stands; with one method's setting changed the other's points do.
+    let other = ITERATIONS.replace("iteration=jacobi", "iteration=chebyshev");
+    let (_, points) = job.run(&other, false).unwrap();
+    assert_eq!(stands(&points), 2);
+    fs::write(
+        job.folder.path().join("tiny.toml"),
+        SCENE.replace("0.6, 0.6, 0.6", "0.6, 0.5, 0.6"),
+    )
+    .unwrap();
+    let (_, points) = job.run(ITERATIONS, false).unwrap();
+    assert_eq!(stands(&points), 0);
+}
+
+#[test]
+fn a_signal_ends_it_and_a_failure_is_listed() {
+    let job = Job::new();
+    // 0.16 m/s after a frame: at a CFL number of 1e-4 that asks for hundreds of substeps.
+    let text = ITERATIONS
+        .replace("solver.pbf.iterations", "solver.pbf.cfl")
+        .replace("[1, 4]", "[1e-4, 1.0, 0.5]");
+    let (outcome, points) = job.run(&text, true).unwrap();
+    assert!(outcome.page.is_none() && points.is_empty());
+    assert!(!job.out("results.csv").exists());
+
+    let (outcome, points) = job.run(&text, false).unwrap();
+    assert!(outcome.page.is_some());
+    let failed = |p: &PointStatus| matches!(p, PointStatus::Failed(said) if said.contains("max_substeps is 32"));
+    assert_eq!(
+        points.iter().map(failed).collect::<Vec<_>>(),
+        [true, false, false, true, false, false]
+    );
+    assert_eq!(job.column("setting").len(), 6);
+    assert!(job.column("failed")[0].contains("asked for"));
+    assert_eq!(job.column("failed")[1], "");
+    let page = job.read("index.html");
+    assert!(page.contains("<h2>Failed</h2>"));
+    // In the list, in the table, and below each of the four curves.
+    assert!(
+        page.matches("solver.pbf.cfl = 1e-4: frame 1").count() >= 5,
+        "{page}"
+    );
+    // A failure stands as well as a result.
+    let (_, points) = job.run(&text, false).unwrap();
+    assert_eq!(stands(&points), 6);
+}
+
+/// The dam before it moves: 6 × 6 × 6 cells.
+#[test]
+fn projections_approach_the_exact_solution() {
+    let job = Job::new();
+    let text = r#"
+kind = "sweep"
+scene = "tiny.toml"
+set = ["solver.method=flip"]
+key = "solver.flip.pressure.tolerance"
+values = [1e-1, 1e-3, 1e-6]
+steps = 3
+errors = ["velocity_error", "pressure_error", "divergence"]
+[[method]]
+name = "ghost fluid"
+[[method]]
+name = "voxel"
+set = ["solver.flip.surface=voxel", "solver.flip.pressure.preconditioner=jacobi"]
+"#;
+    job.run(text, false).unwrap();
+    for error in ["velocity_error", "pressure_error", "divergence"] {
+        let found = job.numbers(error);
+        for line in [0, 3] {
+            // Two decades of tolerance and more buy at least one of error; 1e-6 is near what f32 velocities can hold.
+            assert!(found[line + 1] < 0.1 * found[line], "{error}: {found:?}");
+            assert!(
+                found[line + 2] < 0.1 * found[line + 1],
+                "{error}: {found:?}"
+            );
+            assert!(
+                found[line + 2] < 1e-5 && found[line] > 1e-4,
+                "{error}: {found:?}"
+            );
+        }
+    }
+    assert_eq!(job.column("missed"), ["0"; 6]);
+    let page = job.read("index.html");
+    assert!(
+        page.contains("(216 rows)") || page.contains("rows)"),
+        "{page}"
+    );
+}
+
+#[test]
+fn runs_are_held_against_their_finest() {
+    let job = Job::new();
+    let text = r#"
+kind = "sweep"
+scene = "tiny.toml"
+key = "shot.frames_per_second"
+values = [50, 100, 200]
+seconds = 0.2
+errors = ["profile_error", "energy_error"]
+[[method]]
+name = "flip"
+set = ["solver.method=flip", "shot.frames_per_second=50"]
+[[method]]
+name = "pbf"
+"#;
+    let sweep = job.load(text).unwrap();
+    let blend = |k: usize| sweep.lines[0].points[k].scene.solver.flip().pic_blend;
+    // As much a second at each rate: two frames of 100 keep what one of 50 keeps.
+    assert!((blend(0) - 0.05).abs() < 1e-12);
+    assert!(((1.0 - blend(1)).powi(2) - 0.95).abs() < 1e-12);
+    assert!(((1.0 - blend(2)).powi(4) - 0.95).abs() < 1e-12);
+    job.run(text, false).unwrap();
+    let energy = job.column("energy_error");
+    assert!(energy[2].is_empty() && energy[5].is_empty(), "{energy:?}");
+    let value = |k: usize| energy[k].parse::<f64>().unwrap();
+    for line in [0, 3] {
+        assert!(
+            value(line + 1) < value(line) && value(line) < 0.5,
+            "{energy:?}"
+        );
+    }
+    assert!(job.read("index.html").contains("α_ref"));
+}
+
+/// The same settings in f32 and f64: rounding is what differs, and the step's length is another matter.
+#[test]
+fn a_method_runs_on_the_cpu_and_another_is_held_against_it() {
+    let job = Job::new();
+    let text = r#"
+kind = "sweep"
+scene = "tiny.toml"
+key = "shot.frames_per_second"
+values = [50, 100]
+seconds = 0.2
+errors = ["profile_error", "energy_error"]
+[[method]]
+name = "f64"
+device = "cpu"
+[[method]]
+name = "f32"
+against = "f64"
+"#;
+    job.run(text, false).unwrap();
+    assert_eq!(job.column("device"), ["cpu", "cpu", "gpu", "gpu"]);
+    let energy = job.column("energy_error");
+    // The finest run is its own reference; runs against another method's have one each.
+    assert_eq!(energy[1], "");
+    let [coarse, _, first, second] = [0, 1, 2, 3].map(|k| energy[k].parse().unwrap_or(f64::NAN));
+    // 10 or 20 steps of f32, each rounded to 6e-8 and amplified by iterations on a crowded lattice: below 1e-5, and not
+    // 0. Half the steps are off by percents: negative control, for so would be f32 against the wrong run.
+    assert!(first > 0.0 && first < 1e-5, "{energy:?}");
+    assert!(second > 0.0 && second < 1e-5, "{energy:?}");
+    assert!(coarse > 1e-3, "{energy:?}");
+    let page = job.read("index.html");
+    assert!(page.contains("On CPU f64 reference ("), "{page}");
+    assert!(page.contains("f32 is held, value by value, against f64"));
+
+    // The device is in what a point depends on: on the GPU nothing of the CPU's stands.
+    let (_, points) = job.run(text, false).unwrap();
+    assert_eq!(stands(&points), 4);
+    let moved = text
+        .replace("device = \"cpu\"", "device = \"gpu\"")
+        .replace("name = \"f32\"", "name = \"f32\"\ndevice = \"cpu\"");
+    let (_, points) = job.run(&moved, false).unwrap();
+    assert_eq!(stands(&points), 4, "the same four, by another name");
+    let more = moved.replace("[50, 100]", "[50, 100, 200]");
+    let (_, points) = job.run(&more, false).unwrap();
+    assert_eq!(stands(&points), 4);
+}
+
+#[test]
+fn iterations_come_nearer_to_what_is_converged() {
+    let job = Job::new();
+    let text = ITERATIONS
+        .replace("[1, 4]", "[1, 4, 32]")
+        .replace("repeats = 2\n", "")
+        .replace(
+            "\"density_error_mean\", \"density_error_max\"",
+            "\"distance_to_converged\"",
+        );
+    job.run(&text, false).unwrap();
+    let distance = job.numbers("distance_to_converged");
+    for line in distance.chunks(3) {
+        // A block in free room: 32 iterations leave a hundredth of a spacing, one much more.
+        assert!(line[1] < line[0] && line[2] < line[1], "{distance:?}");
+        assert!(line[2] < 0.01 && line[2] > 0.0, "{distance:?}");
+    }
+}
