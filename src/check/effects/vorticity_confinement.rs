@@ -33,7 +33,7 @@ bounds! {
     GRID_CURL = [speed: "the largest about", size: "Δx"] 30.0 * U * speed / size, "differences of means of two faces over two cells";
     GROWN = [] 20.0 * U, "";
     TURNED = [force: "Δt ε Δx of the largest |ω| about"] 0.05 * force,
-        "nothing: where the answers are farther off than this, the direction is noise";
+        "a direction that is noise, as the answers are farther apart than that";
 }
 
 entries! {
