@@ -246,6 +246,7 @@ const MAY_IMPORT: [(&str, &[&str]); 13] = [
     (
         "stage",
         &[
+            "check",
             "domain",
             "gpu",
             "scene",
@@ -383,6 +384,10 @@ fn rooms_import_what_they_may() {
         1
     );
     assert!(breaches("solve", "use crate::{domain::mesh, gpu::adapter};\n").is_empty());
+    let both = "use crate::{reference::pbf, solve::pbf};\n";
+    assert!(breaches("check", both).is_empty());
+    assert_eq!(breaches("compare", both).len(), 2);
+    assert_eq!(breaches("render", "use crate::check::Table;").len(), 1);
 }
 
 /// Files of an effect's own: its settings, its passes, its f64 twins, and what holds the two against each other.
