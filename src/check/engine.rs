@@ -76,59 +76,55 @@ pub(super) trait State: Sized + 'static {
     const ELSEWHERE: &'static [(&'static str, &'static str)];
 }
 
-/// A dispatch that has run, what it read and what it left; and the table.
+/// A dispatch that has run: what it read and what it left; and the table.
 pub(super) struct Io<'a> {
-    traced: Traced<'a>,
-    kept: &'a BTreeMap<String, Vec<u32>>,
+    /// Name of the pass.
+    pub(super) pass: &'static str,
     /// The pass before.
     pub(super) last: &'static str,
+    /// Buffers as they stood before it ran.
+    pub(super) before: View<'a>,
+    /// Buffers as it left them.
+    pub(super) after: View<'a>,
     /// Where comparisons are added.
     pub(super) table: &'a mut Table,
 }
 
-impl Io<'_> {
-    /// Name of the pass.
-    pub(super) fn pass(&self) -> &'static str {
-        self.traced.pass
-    }
+/// The device's buffers at one time.
+pub(super) struct View<'a> {
+    traced: Traced<'a>,
+    /// Those that the pass writes and that were kept; `None` after it.
+    kept: Option<&'a BTreeMap<String, Vec<u32>>>,
+}
 
+impl View<'_> {
     /// Name of the buffer that a variable is bound to.
     pub(super) fn buffer<'b>(&'b self, variable: &'b str) -> &'b str {
         self.traced.buffer(variable)
     }
 
-    /// The first `count` values of a variable as the pass left them.
-    pub(super) fn after<T: Pod>(
-        &self,
-        variable: Buf<T>,
-        count: usize,
-    ) -> Result<Vec<T>, SolveError> {
-        match self.buffer(variable.name()) == variable.name() {
+    /// The first `count` values of a variable. Before the pass that is what was kept, and else what stands there now, which
+    /// must be of what the pass does not write.
+    pub(super) fn get<T: Pod>(&self, variable: Buf<T>, count: usize) -> Result<Vec<T>, SolveError> {
+        let name = variable.name();
+        if let Some(kept) = self.kept {
+            if let Some(words) = kept.get(name) {
+                let bytes: &[u8] = bytemuck::cast_slice(words);
+                return Ok(bytemuck::pod_collect_to_vec(
+                    &bytes[..count * size_of::<T>()],
+                ));
+            }
+            let is_written = self.traced.writes(self.buffer(name));
+            assert!(
+                !is_written,
+                "{} writes {name}: its twin has to keep it",
+                self.traced.pass
+            );
+        }
+        match self.buffer(name) == name {
             true => self.traced.read(variable, count),
             false => self.traced.bound(variable, count),
         }
-    }
-
-    /// The same as they stood before it ran: kept, where the twin says so, and else as they stand, which must be
-    /// of what the pass does not write.
-    pub(super) fn before<T: Pod>(
-        &self,
-        variable: Buf<T>,
-        count: usize,
-    ) -> Result<Vec<T>, SolveError> {
-        let Some(words) = self.kept.get(variable.name()) else {
-            assert!(
-                !self.traced.writes(self.buffer(variable.name())),
-                "{} writes {}: its twin has to keep it",
-                self.pass(),
-                variable.name()
-            );
-            return self.after(variable, count);
-        };
-        let bytes: &[u8] = bytemuck::cast_slice(words);
-        Ok(bytemuck::pod_collect_to_vec(
-            &bytes[..count * size_of::<T>()],
-        ))
     }
 
     /// Vectors, of which the fourth component is left out.
@@ -137,21 +133,12 @@ impl Io<'_> {
         variable: Buf<[f32; 4]>,
         count: usize,
     ) -> Result<Vec<DVec3>, SolveError> {
-        Ok(wide(&self.after(variable, count)?))
-    }
-
-    /// The same from before.
-    pub(super) fn vectors_before(
-        &self,
-        variable: Buf<[f32; 4]>,
-        count: usize,
-    ) -> Result<Vec<DVec3>, SolveError> {
-        Ok(wide(&self.before(variable, count)?))
+        Ok(wide(&self.get(variable, count)?))
     }
 
     /// Numbers in f64.
     pub(super) fn scalars(&self, variable: Buf<f32>, count: usize) -> Result<Vec<f64>, SolveError> {
-        let values = self.after(variable, count)?;
+        let values = self.get(variable, count)?;
         Ok(values.into_iter().map(f64::from).collect())
     }
 
@@ -162,50 +149,23 @@ impl Io<'_> {
         precision: Precision,
         count: usize,
     ) -> Result<Vec<f64>, SolveError> {
-        let buffer = Buf::named(self.buffer(variable.name()).to_owned());
-        self.traced.reals(&buffer, precision, count)
-    }
-
-    /// The same from before.
-    pub(super) fn reals_before(
-        &self,
-        variable: &Buf<Real>,
-        precision: Precision,
-        count: usize,
-    ) -> Result<Vec<f64>, SolveError> {
         match precision {
-            Precision::F64 => self.before(variable.retyped::<f64>(), count),
-            Precision::F32 | Precision::F32Refined => {
-                let values = self.before(variable.retyped::<f32>(), count)?;
-                Ok(values.into_iter().map(f64::from).collect())
-            }
+            Precision::F64 => self.get(variable.retyped::<f64>(), count),
+            Precision::F32 | Precision::F32Refined => self.scalars(variable.retyped(), count),
         }
     }
 
     /// The scalars of a projection.
     pub(super) fn control(&self, precision: Precision) -> Result<PressureControl64, SolveError> {
-        self.traced.pressure_control(precision)
-    }
-
-    /// The same from before.
-    pub(super) fn control_before(
-        &self,
-        precision: Precision,
-    ) -> Result<PressureControl64, SolveError> {
-        Ok(match precision {
-            Precision::F64 => self.one_before(pressure::CONTROL_F64)?,
-            Precision::F32 | Precision::F32Refined => self.one_before(pressure::CONTROL)?.into(),
-        })
+        match precision {
+            Precision::F64 => self.one(pressure::CONTROL_F64),
+            Precision::F32 | Precision::F32Refined => Ok(self.one(pressure::CONTROL)?.into()),
+        }
     }
 
     /// A struct that stands in front of a buffer.
     pub(super) fn one<T: Pod>(&self, variable: Buf<T>) -> Result<T, SolveError> {
-        Ok(self.after(variable, 1)?.remove(0))
-    }
-
-    /// The same from before.
-    pub(super) fn one_before<T: Pod>(&self, variable: Buf<T>) -> Result<T, SolveError> {
-        Ok(self.before(variable, 1)?.remove(0))
+        Ok(self.get(variable, 1)?.remove(0))
     }
 
     /// The window of a uniform that the dispatch is bound to.
@@ -272,9 +232,13 @@ impl<S: State> Engine<S> {
             return Ok(());
         }
         let io = &mut Io {
-            traced,
-            kept: &self.kept,
+            pass: traced.pass,
             last: self.last,
+            before: View {
+                traced,
+                kept: Some(&self.kept),
+            },
+            after: View { traced, kept: None },
             table: &mut self.table,
         };
         match (twin.is_due)(&mut self.state, io)? {

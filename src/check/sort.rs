@@ -56,9 +56,9 @@ pub(super) fn twins<S: State>() -> Twins<S> {
 }
 
 fn scan(io: &mut Io<'_>) -> Outcome {
-    let length = io.window(&LENGTH)?[0] as usize;
+    let length = io.before.window(&LENGTH)?[0] as usize;
     let (mut scanned, mut totals) = (Vec::with_capacity(length), Vec::new());
-    for block in io.before(VALUES, length)?.chunks(BLOCK) {
+    for block in io.before.get(VALUES, length)?.chunks(BLOCK) {
         let mut sum = 0u32;
         for value in block {
             scanned.push(sum);
@@ -67,30 +67,30 @@ fn scan(io: &mut Io<'_>) -> Outcome {
         totals.push(sum);
     }
     io.table
-        .add_exact(&SCAN, &io.after(VALUES, length)?, &scanned);
+        .add_exact(&SCAN, &io.after.get(VALUES, length)?, &scanned);
     io.table
-        .add_exact(&SCAN, &io.after(BLOCK_SUMS, totals.len())?, &totals);
+        .add_exact(&SCAN, &io.after.get(BLOCK_SUMS, totals.len())?, &totals);
     Ok(())
 }
 
 fn add(io: &mut Io<'_>) -> Outcome {
-    let length = io.window(&LENGTH)?[0] as usize;
-    let sums = io.before(BLOCK_SUMS, length.div_ceil(BLOCK))?;
-    let mut values = io.before(VALUES, length)?;
+    let length = io.before.window(&LENGTH)?[0] as usize;
+    let sums = io.before.get(BLOCK_SUMS, length.div_ceil(BLOCK))?;
+    let mut values = io.before.get(VALUES, length)?;
     for (k, value) in values.iter_mut().enumerate() {
         *value = value.wrapping_add(sums[k / BLOCK]);
     }
     io.table
-        .add_exact(&ADD, &io.after(VALUES, length)?, &values);
+        .add_exact(&ADD, &io.after.get(VALUES, length)?, &values);
     Ok(())
 }
 
 fn place(n: usize, io: &mut Io<'_>) -> Outcome {
-    let cell_of = io.before(buffers::CELL_OF, n)?;
-    let slot = io.before(buffers::SLOT_IN_CELL, n)?;
+    let cell_of = io.before.get(buffers::CELL_OF, n)?;
+    let slot = io.before.get(buffers::SLOT_IN_CELL, n)?;
     // `cell_start` as far as the keys reach.
     let cells = cell_of.iter().max().map_or(0, |&cell| cell as usize + 1);
-    let start = io.before(buffers::CELL_START, cells)?;
+    let start = io.before.get(buffers::CELL_START, cells)?;
     let mut placed = vec![u32::MAX; n];
     for i in 0..n {
         let place = start[cell_of[i] as usize] + slot[i];
@@ -99,17 +99,17 @@ fn place(n: usize, io: &mut Io<'_>) -> Outcome {
         }
     }
     io.table
-        .add_exact(&PLACE, &io.after(buffers::PLACED, n)?, &placed);
+        .add_exact(&PLACE, &io.after.get(buffers::PLACED, n)?, &placed);
     Ok(())
 }
 
 fn stabilize(n: usize, io: &mut Io<'_>) -> Outcome {
-    let cell_of = io.before(buffers::CELL_OF, n)?;
-    let id = io.before(buffers::ID, n)?;
-    let mut order = io.before(buffers::PLACED, n)?;
+    let cell_of = io.before.get(buffers::CELL_OF, n)?;
+    let id = io.before.get(buffers::ID, n)?;
+    let mut order = io.before.get(buffers::PLACED, n)?;
     order.sort_by_key(|&k| (cell_of[k as usize], id[k as usize]));
     io.table
-        .add_exact(&STABILIZE, &io.after(buffers::ORDER, n)?, &order);
+        .add_exact(&STABILIZE, &io.after.get(buffers::ORDER, n)?, &order);
     Ok(())
 }
 

@@ -40,9 +40,13 @@ pub struct Derivation {
 impl fmt::Display for Derivation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.tolerance)?;
-        match self.tie {
-            Some(tie) => write!(f, "; a tie within {tie}"),
-            None => Ok(()),
+        let Some(tie) = self.tie else {
+            return Ok(());
+        };
+        write!(f, "; a tie within {} of {}", tie.expression(), tie.reason)?;
+        match tie.magnitudes {
+            [] => Ok(()),
+            _ => write!(f, "; {}", tie.meanings()),
         }
     }
 }
@@ -326,7 +330,7 @@ mod tests {
         assert_eq!((row.worst.ratio, row.worst.index), (2.0, 7));
         assert_eq!(row.deviation.count, 1);
         let derivation = row.field.derivation.to_string();
-        assert_eq!(derivation, "most; most = what the test allows: a test");
+        assert_eq!(derivation, "most (a test); most = what the test allows");
     }
 
     #[test]

@@ -42,24 +42,34 @@ pub struct Magnitude {
     pub bound: Option<&'static Text>,
 }
 
-/// Expression, then what each name stands for, then the reason.
-impl fmt::Display for Text {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut text = match self.expression {
+impl Text {
+    /// The expression, as it is read in a table.
+    pub fn expression(&self) -> String {
+        match self.expression {
             "0.0" => "equal".into(),
             expression => plain(expression),
-        };
+        }
+    }
+
+    /// What each name in it stands for, one after the other.
+    pub fn meanings(&self) -> String {
         let mut told = Vec::new();
         tell(self.magnitudes, &mut told);
-        for (k, meaning) in told.iter().enumerate() {
-            text += if k == 0 { "; " } else { ", " };
-            text += meaning;
-        }
+        told.join(", ")
+    }
+}
+
+/// Expression, then the reason, then what each name stands for.
+impl fmt::Display for Text {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.expression())?;
         if !self.reason.is_empty() {
-            text += ": ";
-            text += self.reason;
+            write!(f, " ({})", self.reason)?;
         }
-        f.write_str(&text)
+        if !self.magnitudes.is_empty() {
+            write!(f, "; {}", self.meanings())?;
+        }
+        Ok(())
     }
 }
 
@@ -160,7 +170,7 @@ mod tests {
 
     bounds! {
         INNER = [n: "terms", size: "Σ|t|"] U * (n + 2.0) * size, "a sum";
-        OUTER = [scale: "", sum: "the sum's error " INNER, x: "|x|"] scale * sum + 0.5 * x.max(10.05), "two of them";
+        OUTER = [scale: "a part", sum: "the sum's error " INNER, x: "|x|"] scale * sum + 0.5 * x.max(10.05), "two of them";
         EQUAL = [] 0.0, "a copy";
     }
 
@@ -171,9 +181,9 @@ mod tests {
         assert_eq!(EQUAL.of([]), 0.0);
         assert_eq!(
             OUTER.text.to_string(),
-            "scale × sum + 0.5 × x.max(10.05); scale = , sum = the sum's error U × (n + 2) × size (a sum), n = terms, \
-             size = Σ|t|, x = |x|: two of them"
+            "scale × sum + 0.5 × x.max(10.05) (two of them); scale = a part, \
+             sum = the sum's error U × (n + 2) × size (a sum), n = terms, size = Σ|t|, x = |x|"
         );
-        assert_eq!(EQUAL.text.to_string(), "equal: a copy");
+        assert_eq!(EQUAL.text.to_string(), "equal (a copy)");
     }
 }

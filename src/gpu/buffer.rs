@@ -19,10 +19,12 @@ use super::{program::BufferSpec, reflect::Layout};
 /// Scalars of which a value is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scalar {
-    /// `f32` or `f64`.
-    Float,
+    /// `f32`.
+    F32,
+    /// `f64`.
+    F64,
     /// `u32`.
-    Uint,
+    U32,
     /// Several kinds, as in a struct, whose members [`Mirror::layout`] names.
     Mixed,
 }
@@ -34,15 +36,15 @@ pub trait Element: bytemuck::Pod {
 }
 
 impl Element for f32 {
-    const SCALAR: Scalar = Scalar::Float;
+    const SCALAR: Scalar = Scalar::F32;
 }
 
 impl Element for f64 {
-    const SCALAR: Scalar = Scalar::Float;
+    const SCALAR: Scalar = Scalar::F64;
 }
 
 impl Element for u32 {
-    const SCALAR: Scalar = Scalar::Uint;
+    const SCALAR: Scalar = Scalar::U32;
 }
 
 impl<T: Element, const N: usize> Element for [T; N]
@@ -97,15 +99,19 @@ macro_rules! mirror {
 
 pub(crate) use mirror;
 
-mirror!(
-    /// Workgroups of an indirect dispatch; zeros make it empty.
-    Workgroups {
-        /// Along each axis.
-        count: [u32; 3],
-        /// Unused.
-        padding: u32,
-    }
-);
+/// Workgroups of an indirect dispatch, a `vec4u` of the shaders; zeros make it empty.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Workgroups {
+    /// Along each axis.
+    pub count: [u32; 3],
+    /// Unused.
+    pub padding: u32,
+}
+
+impl Element for Workgroups {
+    const SCALAR: Scalar = Scalar::U32;
+}
 
 impl From<[u32; 3]> for Workgroups {
     fn from(count: [u32; 3]) -> Self {
@@ -170,6 +176,14 @@ impl<T> Buf<T> {
     /// Its name.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// One of another name that holds the same.
+    pub fn renamed(&self, name: &str) -> Self {
+        Self {
+            name: Cow::Owned(name.to_owned()),
+            ..*self
+        }
     }
 
     /// The same bytes as values of another type.
@@ -343,10 +357,3 @@ wanted_tuple!(A: 0, B: 1, C: 2);
 wanted_tuple!(A: 0, B: 1, C: 2, D: 3);
 wanted_tuple!(A: 0, B: 1, C: 2, D: 3, E: 4);
 wanted_tuple!(A: 0, B: 1, C: 2, D: 3, E: 4, F: 5);
-
-/// A storage buffer by its name alone.
-impl<T> From<&str> for Buf<T> {
-    fn from(name: &str) -> Self {
-        Self::named(name.to_owned())
-    }
-}

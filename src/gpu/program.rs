@@ -415,6 +415,14 @@ fn compile(
     spec: &PassSpec,
     shared: &[(&'static str, f64)],
 ) -> Result<Pass, GpuError> {
+    compile_own(context, spec, shared).map_err(|error| context.shaders.blamed(error))
+}
+
+fn compile_own(
+    context: &Context,
+    spec: &PassSpec,
+    shared: &[(&'static str, f64)],
+) -> Result<Pass, GpuError> {
     let shader = shader(context, spec.name, &spec.defines)?;
     let reflection = shader.reflection;
     let declared = |name: &str| reflection.overrides.iter().any(|constant| constant == name);

@@ -49,7 +49,7 @@ pub(super) enum Kind {
 }
 
 /// What holds where a key is left out.
-pub(super) enum Default {
+pub(super) enum LeftOut {
     /// It may not be.
     Needed,
     /// The same as if this had been written, in TOML.
@@ -78,7 +78,7 @@ pub(super) struct Key {
     pub(super) kind: Kind,
     /// In words; empty where there is none.
     pub(super) unit: &'static str,
-    pub(super) default: Default,
+    pub(super) default: LeftOut,
     pub(super) physics: Physics,
     /// What it is for, on the page.
     pub(super) about: &'static str,
@@ -99,7 +99,7 @@ impl Key {
             name,
             kind,
             unit: "",
-            default: Default::Needed,
+            default: LeftOut::Needed,
             physics: Physics::Yes,
             about: "",
             also: "",
@@ -193,17 +193,17 @@ impl Key {
     }
 
     pub(super) const fn default(mut self, toml: &'static str) -> Self {
-        self.default = Default::Value(toml);
+        self.default = LeftOut::Value(toml);
         self
     }
 
     pub(super) const fn computed(mut self, words: fn() -> String) -> Self {
-        self.default = Default::Computed(words);
+        self.default = LeftOut::Computed(words);
         self
     }
 
     pub(super) const fn absent(mut self) -> Self {
-        self.default = Default::Absent;
+        self.default = LeftOut::Absent;
         self
     }
 
@@ -300,7 +300,7 @@ impl Key {
     /// What its value may be, in words, and what holds where it is left out and no other key says it.
     pub(super) fn allowed(&self) -> String {
         match self.default {
-            Default::Computed(default) => format!("{}; {} if left out", self.values(), default()),
+            LeftOut::Computed(default) => format!("{}; {} if left out", self.values(), default()),
             _ => self.values(),
         }
     }
@@ -364,7 +364,7 @@ impl Kind {
 
 /// A table by what it cannot do without, else by all that it has.
 fn table_words(keys: &[Key]) -> String {
-    let needed = |key: &&Key| matches!(key.default, Default::Needed) && key.only.is_none();
+    let needed = |key: &&Key| matches!(key.default, LeftOut::Needed) && key.only.is_none();
     let names =
         |keys: &mut dyn Iterator<Item = &Key>| -> Vec<_> { keys.map(|key| key.name).collect() };
     let (all, needed) = (

@@ -10,7 +10,7 @@ use toml::{
 use super::{
     document::{Document, join, nearest, unknown_key},
     error::SceneError,
-    key::{ANY, Default, Key, Kind},
+    key::{ANY, Key, Kind, LeftOut},
     words::{is_file_stem, shown, shown_all},
 };
 
@@ -129,19 +129,19 @@ impl Table<'_, '_> {
             return Ok(());
         }
         match key.default {
-            Default::Needed => {
+            LeftOut::Needed => {
                 let path = join(self.path, key.name);
                 let message = format!("missing; allowed: {}", key.allowed());
                 Err(self.doc.fault(self.span.clone(), path, message))
             }
-            Default::Value(toml) => {
+            LeftOut::Value(toml) => {
                 let span = self.span.clone().unwrap_or_default();
                 let value = DeValue::parse(toml).expect("every default is TOML");
                 let name = Spanned::new(span.clone(), key.name.into());
                 values.insert(name, Spanned::new(span, value.into_inner()));
                 Ok(())
             }
-            Default::Computed(_) | Default::Absent => Ok(()),
+            LeftOut::Computed(_) | LeftOut::Absent => Ok(()),
         }
     }
 

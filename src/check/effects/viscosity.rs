@@ -11,13 +11,9 @@ use crate::{
         table::{entries, pair},
     },
     compare::rounding::{KERNEL, U},
-    gpu::buffer::Buf,
     reference::pbf::effects::viscosity::{viscosity_apply, viscosity_gather},
-    solve::pbf,
+    solve::{effects::viscosity::CHANGE as VISCOSITY_CHANGE, pbf},
 };
-
-/// What the first pass leaves to the second.
-const VISCOSITY_CHANGE: Buf<[f32; 4]> = Buf::new("viscosity_change");
 
 entries! {
     "effects/viscosity_gather" {
@@ -47,13 +43,13 @@ fn gather(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let (points, velocity) = (
         state.moved(io)?,
-        io.vectors_before(pbf::buffers::VELOCITY, n)?,
+        io.before.vectors(pbf::buffers::VELOCITY, n)?,
     );
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = viscosity_gather(inputs, settings.xsph, &velocity);
     let scale = settings.xsph * inputs.model.calibration.density_scale;
-    let found = io.vectors(VISCOSITY_CHANGE, n)?;
+    let found = io.after.vectors(VISCOSITY_CHANGE, n)?;
     io.table.each(&CHANGE, 0..n, |i| {
         let sums = Bounds(inputs).sums(i, relative_speed(&velocity, i));
         pair(i, found[i], twin[i], [scale, sums.kernel()])
@@ -63,9 +59,9 @@ fn gather(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
 
 fn apply(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let change = io.vectors_before(VISCOSITY_CHANGE, n)?;
-    let twin = viscosity_apply(&change, &io.vectors_before(pbf::buffers::VELOCITY, n)?);
-    let found = io.vectors(pbf::buffers::VELOCITY, n)?;
+    let change = io.before.vectors(VISCOSITY_CHANGE, n)?;
+    let twin = viscosity_apply(&change, &io.before.vectors(pbf::buffers::VELOCITY, n)?);
+    let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
     io.table.each(&VELOCITY, 0..n, |i| {
         pair(i, found[i], twin[i], [twin[i].length()])
     });

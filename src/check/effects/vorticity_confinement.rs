@@ -16,16 +16,12 @@ use crate::{
         rounding::{GRADIENT, ROOT, U},
         tolerance::bounds,
     },
-    gpu::buffer::Buf,
     reference::{
         flip::{grid_confinement, grid_curl},
         pbf::effects::vorticity_confinement::{vorticity_curl, vorticity_force},
     },
-    solve::{flip, pbf},
+    solve::{effects::vorticity_confinement::VORTICITY, flip, pbf},
 };
-
-/// Vorticity and its length, of particles or of cells.
-const VORTICITY: Buf<[f32; 4]> = Buf::new("vorticity");
 
 bounds! {
     ROTATION = [scale: "twice the gradient's scale, for the two products of a cross product",
@@ -36,7 +32,7 @@ bounds! {
     GRID_CURL = [speed: "the largest about", size: "Δx"] 30.0 * U * speed / size, "differences of means of two faces over two cells";
     GROWN = [] 20.0 * U, "";
     TURNED = [force: "Δt ε Δx of the largest |ω| about"] 0.05 * force,
-        "nothing: where the answers are farther off than this, the direction is noise";
+        "a direction that is noise, as the answers are farther apart than that";
 }
 
 entries! {
@@ -82,14 +78,14 @@ fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let (points, velocity) = (
         state.moved(io)?,
-        io.vectors_before(pbf::buffers::VELOCITY, n)?,
+        io.before.vectors(pbf::buffers::VELOCITY, n)?,
     );
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = vorticity_curl(inputs, &velocity);
     let scale = 2.0 * inputs.model.calibration.gradient_scale;
-    let found = io.after(VORTICITY, n)?;
-    let vectors = io.vectors(VORTICITY, n)?;
+    let found = io.after.get(VORTICITY, n)?;
+    let vectors = io.after.vectors(VORTICITY, n)?;
     let errors = each(0..n, |i| {
         let sums = Bounds(inputs).sums(i, relative_speed(&velocity, i));
         ROTATION.of([scale, sums.gradient()])
@@ -110,16 +106,16 @@ fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let (points, velocity) = (
         state.moved(io)?,
-        io.vectors_before(pbf::buffers::VELOCITY, n)?,
+        io.before.vectors(pbf::buffers::VELOCITY, n)?,
     );
-    let vorticity = io.vectors_before(VORTICITY, n)?;
+    let vorticity = io.before.vectors(VORTICITY, n)?;
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = vorticity_force(inputs, settings.strength, &vorticity, &velocity);
     let strength: Vec<f64> = vorticity.iter().map(|w| w.length()).collect();
     let scale = inputs.model.calibration.gradient_scale;
     let h = inputs.model.calibration.support_radius;
-    let found = io.vectors(pbf::buffers::VELOCITY, n)?;
+    let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
     io.table.each(&VELOCITY, 0..n, |i| {
         let bounds = Bounds(inputs);
         let other = |j: usize| strength.get(j).copied();
@@ -161,9 +157,9 @@ fn slope(bounds: &Bounds<'_>, strength: &[f64], i: usize) -> f64 {
 
 fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let velocity = elements.planes_before(io, flip::buffers::FACE_VELOCITY)?;
-    let found = io.after(VORTICITY, elements.cells)?;
-    let vectors = io.vectors(VORTICITY, elements.cells)?;
+    let velocity = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
+    let found = io.after.get(VORTICITY, elements.cells)?;
+    let vectors = io.after.vectors(VORTICITY, elements.cells)?;
     let twin = grid_curl(&state.model, &elements.bricks, state.room(), &velocity);
     let size = state.model.cell_size();
     let error = |e: usize| {
@@ -188,9 +184,9 @@ fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let elements = state.elements();
-    let omega = io.vectors(VORTICITY, elements.cells)?;
-    let before = elements.planes_before(io, flip::buffers::FACE_VELOCITY)?;
-    let found = elements.planes(io, flip::buffers::FACE_VELOCITY)?;
+    let omega = io.after.vectors(VORTICITY, elements.cells)?;
+    let before = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
+    let found = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
     let step = state.step();
     let (model, room, strength) = (&state.model, state.room(), settings.strength);
     let twin = |omega: &[DVec3]| {

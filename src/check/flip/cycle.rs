@@ -56,8 +56,8 @@ const fn of_level(
 }
 
 fn is_due(state: &mut FlipState, io: &Io<'_>) -> Result<bool, SolveError> {
-    let level = io.window(&solved::PHASES)?.level;
-    let is_turn = io.pass() == "pressure/coarsen" || state.is_turn(io)?;
+    let level = io.before.window(&solved::PHASES)?.level;
+    let is_turn = io.pass == "pressure/coarsen" || state.is_turn(io)?;
     Ok(is_turn && state.is_due(io, level))
 }
 
@@ -70,15 +70,15 @@ struct Cycle {
 
 impl Cycle {
     fn of(state: &FlipState, io: &Io<'_>) -> Result<Self, SolveError> {
-        let phase = io.window(&solved::PHASES)?;
-        let reals = |buffer, cells| io.reals(&buffer, state.precision(), cells);
+        let phase = io.before.window(&solved::PHASES)?;
+        let reals = |buffer, cells| io.after.reals(&buffer, state.precision(), cells);
         let level = |&[first, count, ..]: &[u32; 4]| first..first + count;
         let all = &phase.levels[..=phase.last_level as usize];
         let levels: Vec<Range<u32>> = all.iter().map(level).collect();
         let slots = levels[phase.last_level as usize].end as usize;
         let (cells, stride) = (slots * CELLS as usize, phase.stride as usize);
-        let planes = io.after(solved::COEFFICIENT, 2 * stride + cells)?;
-        let bricks = io.after(solved::BRICKS, slots)?;
+        let planes = io.after.get(solved::COEFFICIENT, 2 * stride + cells)?;
+        let bricks = io.after.get(solved::BRICKS, slots)?;
         let brick = |brick: &PressureBrick| Brick {
             faces: brick.faces,
             above: brick.above,
@@ -166,7 +166,7 @@ fn solve_coarse(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let cycle = Cycle::of(state, io)?;
     let (levels, unit) = (&cycle.levels, state.unit());
-    let kinds = io.after(solved::BLOCK, levels.bricks.len() * 64)?;
+    let kinds = io.after.get(solved::BLOCK, levels.bricks.len() * 64)?;
     let (mut shared, mut airs) = (Vec::new(), Vec::new());
     let mut full = vec![[true; 2]; kinds.len()];
     let mut is_child = vec![false; kinds.len()];

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::{
-    check::engine::{Io, names},
+    check::engine::{View, names},
     domain::bricks::{Bricks, CELLS},
     gpu::buffer::Buf,
     reference::flip::Faces,
@@ -13,7 +13,7 @@ use crate::{
     solve::{SolveError, flip::buffers},
 };
 
-/// What [`Elements::faces_before`] reads.
+/// What [`Elements::faces`] reads.
 pub(super) fn faces_kept() -> Vec<String> {
     names![
         buffers::FACE_VELOCITY,
@@ -55,51 +55,32 @@ impl Elements {
     }
 
     /// An array of cells.
-    pub(super) fn scalars(&self, io: &Io<'_>, buffer: Buf<f32>) -> Result<Vec<f64>, SolveError> {
-        io.scalars(buffer, self.cells)
+    pub(super) fn scalars(
+        &self,
+        view: &View<'_>,
+        buffer: Buf<f32>,
+    ) -> Result<Vec<f64>, SolveError> {
+        view.scalars(buffer, self.cells)
     }
 
     /// Three planes as one vector a cell.
     pub(in crate::check) fn planes(
         &self,
-        io: &Io<'_>,
+        view: &View<'_>,
         buffer: Buf<f32>,
     ) -> Result<Vec<DVec3>, SolveError> {
-        Ok(self.joined(&io.after(buffer, 2 * self.stride + self.cells)?))
-    }
-
-    /// The same from before the pass.
-    pub(in crate::check) fn planes_before(
-        &self,
-        io: &Io<'_>,
-        buffer: Buf<f32>,
-    ) -> Result<Vec<DVec3>, SolveError> {
-        Ok(self.joined(&io.before(buffer, 2 * self.stride + self.cells)?))
-    }
-
-    fn joined(&self, values: &[f32]) -> Vec<DVec3> {
-        let at = |k: usize| f64::from(values[k]);
-        (0..self.cells)
-            .map(|e| DVec3::new(at(e), at(self.stride + e), at(2 * self.stride + e)))
-            .collect()
+        let values = view.scalars(buffer, 2 * self.stride + self.cells)?;
+        let plane = |k: usize, e: usize| values[k * self.stride + e];
+        let vector = |e: usize| DVec3::new(plane(0, e), plane(1, e), plane(2, e));
+        Ok((0..self.cells).map(vector).collect())
     }
 
     /// Velocities, changes and layers at faces.
-    pub(super) fn faces(&self, io: &Io<'_>) -> Result<Faces, SolveError> {
+    pub(super) fn faces(&self, view: &View<'_>) -> Result<Faces, SolveError> {
         Ok(Faces {
-            velocity: self.planes(io, buffers::FACE_VELOCITY)?,
-            change: self.planes(io, buffers::FACE_CHANGE)?,
-            layer: io.after(buffers::FACE_LAYER, self.cells)?,
-            weight: Vec::new(),
-        })
-    }
-
-    /// The same from before the pass.
-    pub(super) fn faces_before(&self, io: &Io<'_>) -> Result<Faces, SolveError> {
-        Ok(Faces {
-            velocity: self.planes_before(io, buffers::FACE_VELOCITY)?,
-            change: self.planes_before(io, buffers::FACE_CHANGE)?,
-            layer: io.before(buffers::FACE_LAYER, self.cells)?,
+            velocity: self.planes(view, buffers::FACE_VELOCITY)?,
+            change: self.planes(view, buffers::FACE_CHANGE)?,
+            layer: view.get(buffers::FACE_LAYER, self.cells)?,
             weight: Vec::new(),
         })
     }

@@ -101,15 +101,15 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         .map(|k| state.shifted_room(0.0, DVec3::new(side(k, 0), side(k, 1), side(k, 2))))
         .collect();
     let room = Room {
-        kind: io.after(buffers::CELL_KIND, elements.cells)?,
-        open: elements.planes(io, buffers::FACE_OPEN)?,
-        solid_flux: elements.scalars(io, buffers::SOLID_FLUX)?,
+        kind: io.after.get(buffers::CELL_KIND, elements.cells)?,
+        open: elements.planes(&io.after, buffers::FACE_OPEN)?,
+        solid_flux: elements.scalars(&io.after, buffers::SOLID_FLUX)?,
         volume: match has_solids {
-            true => elements.scalars(io, buffers::OPEN_VOLUME)?,
+            true => elements.scalars(&io.after, buffers::OPEN_VOLUME)?,
             false => twin.volume.clone(),
         },
         closed_velocity: match has_moving {
-            true => elements.planes(io, buffers::CLOSED_VELOCITY)?,
+            true => elements.planes(&io.after, buffers::CLOSED_VELOCITY)?,
             false => twin.closed_velocity.clone(),
         },
     };
@@ -155,13 +155,13 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 /// After the last of the three axes.
 pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    if io.window(&buffers::AXES)?[0] < 2 {
+    if io.before.window(&buffers::AXES)?[0] < 2 {
         return Ok(());
     }
     let (elements, step) = (state.elements(), state.step());
     let (bricks, sorted) = (&elements.bricks, state.sorted());
     let twin = twin_gather_faces(&state.model, &step, bricks, sorted, state.room());
-    let found = elements.faces(io)?;
+    let found = elements.faces(&io.after)?;
     let place = state.place();
     let error = |e: usize| {
         let About { count, low, high } = state.about(e);
@@ -218,18 +218,18 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
     let active = elements.active();
     let errors = each(active.clone(), error);
     let error = |e: usize| errors[e - active.start];
-    let density = elements.scalars(io, buffers::DENSITY)?;
+    let density = elements.scalars(&io.after, buffers::DENSITY)?;
     io.table.each(&RELATIVE_DENSITY, active.clone(), |e| {
         pair(e, density[e], twin.density[e], [error(e)])
     });
     if settings.density_correction {
-        let excess = elements.scalars(io, buffers::DENSITY_EXCESS)?;
+        let excess = elements.scalars(&io.after, buffers::DENSITY_EXCESS)?;
         io.table.each(&EXCESS, active.clone(), |e| {
             pair(e, excess[e], twin.excess[e], [error(e)])
         });
     }
     if settings.surface == Surface::GhostFluid {
-        let distance = elements.scalars(io, buffers::LIQUID_DISTANCE)?;
+        let distance = elements.scalars(&io.after, buffers::LIQUID_DISTANCE)?;
         io.table.each(&DISTANCE, active.clone(), |e| {
             let exact = twin.distance[e];
             let moved = surface_moved(exact / size, error(e));
@@ -241,10 +241,10 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
 
 pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let mut twin = elements.faces_before(io)?;
+    let mut twin = elements.faces(&io.before)?;
     let before = twin.change.clone();
     twin_find_change(&state.model, &elements.bricks, state.room(), &mut twin);
-    let found = elements.faces(io)?;
+    let found = elements.faces(&io.after)?;
     let active = elements.active();
     io.table.each(&CHANGE, active.clone(), |e| {
         let size = twin.velocity[e].length() + before[e].length();
@@ -256,15 +256,15 @@ pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 pub(super) fn extrapolate(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let layer = io.window(&buffers::LAYERS)?[0];
+    let layer = io.before.window(&buffers::LAYERS)?[0];
     let (elements, step) = (state.elements(), state.step());
     if layer > step.layers as u32 {
         return Ok(());
     }
-    let before = elements.faces_before(io)?;
+    let before = elements.faces(&io.before)?;
     let mut twin = before.clone();
     twin_extrapolate(&step, &elements.bricks, layer, &mut twin);
-    let found = elements.faces(io)?;
+    let found = elements.faces(&io.after)?;
     let largest = |e: usize| {
         let sides = (0..7).map(|k| {
             let mut offset = [0; 3];

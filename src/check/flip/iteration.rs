@@ -82,7 +82,7 @@ const _: () = assert!(
 impl FlipState {
     /// Counts a run of a pass on a level; true for the first few.
     pub(super) fn is_due(&mut self, io: &Io<'_>, level: u32) -> bool {
-        let runs = self.runs.entry((io.pass(), level)).or_default();
+        let runs = self.runs.entry((io.pass, level)).or_default();
         *runs += 1;
         *runs <= PRODUCTS
     }
@@ -95,13 +95,13 @@ impl FlipState {
 
     /// Whether the dispatch was not empty.
     pub(super) fn is_turn(&self, io: &Io<'_>) -> Result<bool, SolveError> {
-        let state = self.control(io)?.state;
-        Ok(match io.pass() {
+        let state = io.before.control(self.precision())?.state;
+        Ok(match io.pass {
             // A solve among pockets begins with a verification.
             "pressure/verify" => state == VERIFYING || io.last == "pressure/center",
             "pressure/center" => {
                 let values = VALUES;
-                let buffer = io.buffer(values.name());
+                let buffer = io.before.buffer(values.name());
                 let is_verified = io.last == "pressure/verify" && buffer == solved::RESIDUAL.name();
                 let wanted = if is_verified { VERIFYING } else { ITERATING };
                 buffer == solved::RHS.name() || state == wanted
@@ -112,7 +112,7 @@ impl FlipState {
 
     /// What the bricks' sums of products of two arrays come to.
     pub(super) fn note_sum(&mut self, io: &Io<'_>, a: Buf<Real>, b: Buf<Real>) -> Outcome {
-        let [a, b] = [self.by_row(io, a)?, self.by_row(io, b)?];
+        let [a, b] = [self.by_row(&io.after, a)?, self.by_row(&io.after, b)?];
         self.sum = Some(products(&a, &b));
         Ok(())
     }
@@ -120,10 +120,10 @@ impl FlipState {
 
 fn precondition(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let unit = state.unit();
-    let r = state.by_row(io, solved::RESIDUAL)?;
-    let z = state.by_row(io, solved::CORRECTION)?;
+    let r = state.by_row(&io.after, solved::RESIDUAL)?;
+    let z = state.by_row(&io.after, solved::CORRECTION)?;
     if state.model.settings().pressure.preconditioner == Preconditioner::Jacobi {
-        let d = state.by_row(io, solved::INVERSE_DIAGONAL)?;
+        let d = state.by_row(&io.after, solved::INVERSE_DIAGONAL)?;
         state.add_rows(io.table, &PRECONDITIONED, |i| {
             (z[i], d[i] * r[i], [unit, (d[i] * r[i]).abs()])
         });
@@ -136,9 +136,9 @@ fn precondition(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 fn ipp_lower(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let unit = state.unit();
-    let r = state.by_row(io, solved::RESIDUAL)?;
-    let d = state.by_row(io, solved::INVERSE_DIAGONAL)?;
-    let half = state.by_row(io, solved::PRODUCT)?;
+    let r = state.by_row(&io.after, solved::RESIDUAL)?;
+    let d = state.by_row(&io.after, solved::INVERSE_DIAGONAL)?;
+    let half = state.by_row(&io.after, solved::PRODUCT)?;
     let twin = twin_ipp_lower(state.system(), &d, &r);
     state.add_rows(io.table, &IPP_LOWER, |i| {
         (half[i], twin[i].value, [unit, d[i], twin[i].size])
@@ -148,9 +148,9 @@ fn ipp_lower(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 fn ipp_upper(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let unit = state.unit();
-    let d = state.by_row(io, solved::INVERSE_DIAGONAL)?;
-    let half = state.by_row(io, solved::PRODUCT)?;
-    let z = state.by_row(io, solved::CORRECTION)?;
+    let d = state.by_row(&io.after, solved::INVERSE_DIAGONAL)?;
+    let half = state.by_row(&io.after, solved::PRODUCT)?;
+    let z = state.by_row(&io.after, solved::CORRECTION)?;
     let twin = twin_ipp_upper(state.system(), &d, &half);
     state.add_rows(io.table, &IPP_UPPER, |i| {
         (z[i], twin[i].value, [unit, twin[i].size])
@@ -159,10 +159,10 @@ fn ipp_upper(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 fn direction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let (unit, beta) = (state.unit(), state.control(io)?.beta);
-    let before = state.by_row_before(io, solved::DIRECTION)?;
-    let z = state.by_row(io, solved::CORRECTION)?;
-    let p = state.by_row(io, solved::DIRECTION)?;
+    let (unit, beta) = (state.unit(), io.before.control(state.precision())?.beta);
+    let before = state.by_row(&io.before, solved::DIRECTION)?;
+    let z = state.by_row(&io.after, solved::CORRECTION)?;
+    let p = state.by_row(&io.after, solved::DIRECTION)?;
     state.add_rows(io.table, &DIRECTED, |i| {
         let kept = beta * before[i];
         (p[i], z[i] + kept, [unit, z[i].abs() + kept.abs()])
@@ -171,10 +171,10 @@ fn direction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 fn advance(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let (unit, alpha) = (state.unit(), state.control(io)?.alpha);
-    let p = state.by_row(io, solved::DIRECTION)?;
-    let q = state.by_row(io, solved::PRODUCT)?;
-    let [before, terms] = [state.terms_before(io)?, state.terms(io)?];
+    let (unit, alpha) = (state.unit(), io.before.control(state.precision())?.alpha);
+    let p = state.by_row(&io.after, solved::DIRECTION)?;
+    let q = state.by_row(&io.after, solved::PRODUCT)?;
+    let [before, terms] = [state.terms(&io.before)?, state.terms(&io.after)?];
     let at = |terms: &[Vec<f64>], i: usize| terms.iter().map(|term| term[i]).sum::<f64>();
     state.add_rows(io.table, &ADVANCED_SOLUTION, |i| {
         let way = alpha * p[i];
@@ -187,8 +187,8 @@ fn advance(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         };
         (at(&terms, i), at(&before, i) + way, magnitudes)
     });
-    let old = state.by_row_before(io, solved::RESIDUAL)?;
-    let r = state.by_row(io, solved::RESIDUAL)?;
+    let old = state.by_row(&io.before, solved::RESIDUAL)?;
+    let r = state.by_row(&io.after, solved::RESIDUAL)?;
     state.add_rows(io.table, &ADVANCED_RESIDUAL, |i| {
         let way = alpha * q[i];
         (r[i], old[i] - way, [unit, old[i].abs() + way.abs()])
@@ -198,9 +198,9 @@ fn advance(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 fn verify(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let (terms, unit) = (state.terms(io)?, state.unit());
-    let b = state.by_row(io, solved::RHS)?;
-    let r = state.by_row(io, solved::RESIDUAL)?;
+    let (terms, unit) = (state.terms(&io.after)?, state.unit());
+    let b = state.by_row(&io.after, solved::RHS)?;
+    let r = state.by_row(&io.after, solved::RESIDUAL)?;
     let system = state.system();
     let twin = twin_verify(system, &b, &terms);
     let errors: Vec<_> = terms.iter().map(|term| differences(system, term)).collect();
@@ -214,8 +214,8 @@ fn verify(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 fn center(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let unit = state.unit();
-    let before = state.by_row_before(io, VALUES)?;
-    let found = state.by_row(io, VALUES)?;
+    let before = state.by_row(&io.before, VALUES)?;
+    let found = state.by_row(&io.after, VALUES)?;
     let pockets = state.system().pockets();
     let mut exact = before.clone();
     remove_means(&mut exact, &pockets);
@@ -238,8 +238,8 @@ fn center(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 /// A pocket's cells have its least element for a label, all else 0.
 fn count_pockets(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let wet = state.elements().wet();
-    let labels = io.after(solved::LABEL, wet.end)?;
-    let counted = io.one(solved::STATS)?.pockets;
+    let labels = io.after.get(solved::LABEL, wet.end)?;
+    let counted = io.after.one(solved::STATS)?.pockets;
     let system = state.system();
     let pockets = system.pockets();
     let mut expected = vec![0; wet.end];
@@ -260,8 +260,8 @@ fn count_pockets(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 /// The bricks' sums and what follows from them.
 fn reduce(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let phase = io.window(&solved::PHASES)?;
-    let before = state.control(io)?;
+    let phase = io.before.window(&solved::PHASES)?;
+    let before = io.before.control(state.precision())?;
     let step = STEPS[phase.step as usize];
     let wanted = match step {
         ReduceStep::Verified => VERIFYING,
@@ -271,8 +271,8 @@ fn reduce(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let Some(Sum { value, size }) = state.sum.take().filter(|_| is_turn) else {
         return Ok(());
     };
-    let after = io.control(state.precision())?;
-    let found = io.one(solved::STATS)?.pockets;
+    let after = io.after.control(state.precision())?;
+    let found = io.after.one(solved::STATS)?.pockets;
     let unit = state.unit();
     let slack = OF_SUM.of([unit, f64::from(phase.sum_count), size]);
     let target = f64::from(phase.tolerance_square) * before.rhs_square;

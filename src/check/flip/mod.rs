@@ -172,11 +172,11 @@ impl FlipState {
 /// From the pressure and the flux that the device has.
 fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let pressure = elements.scalars(io, solved::PRESSURE)?;
-    let flux = elements.scalars(io, buffers::SOLID_FLUX)?;
-    let kind = io.before(buffers::CELL_KIND, elements.cells)?;
+    let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
+    let flux = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
+    let kind = io.before.get(buffers::CELL_KIND, elements.cells)?;
     let wet = elements.wet();
-    let sums = io.after(buffers::BOUNDARY_WORK, wet.len() / 64)?;
+    let sums = io.after.get(buffers::BOUNDARY_WORK, wet.len() / 64)?;
     let term = |e: usize| match kind[e] {
         FLUID => -pressure[e] * flux[e],
         _ => 0.0,

@@ -31,9 +31,9 @@ fn of_faces(bricks: &Bricks, values: &[DVec3], element: u32, place: f64) -> f64 
 
 pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let faces = elements.faces_before(io)?;
+    let faces = elements.faces(&io.before)?;
     let shift = match state.model.settings().density_correction {
-        true => Some(elements.planes_before(io, solved::FACE_DISPLACEMENT)?),
+        true => Some(elements.planes(&io.before, solved::FACE_DISPLACEMENT)?),
         false => None,
     };
     let (bricks, step, sorted) = (&elements.bricks, state.step(), state.sorted());
@@ -107,7 +107,7 @@ fn given(state: &FlipState, io: &Io<'_>) -> Result<Given, SolveError> {
         true => 6,
         false => 3,
     };
-    let values = io.scalars(buffers::CARRIED, width * state.n)?;
+    let values = io.after.scalars(buffers::CARRIED, width * state.n)?;
     let at = |first: usize| -> Vec<DVec3> {
         let rows = values.chunks_exact(width);
         rows.map(|row| {
@@ -116,7 +116,7 @@ fn given(state: &FlipState, io: &Io<'_>) -> Result<Given, SolveError> {
         })
         .collect()
     };
-    let cloud = state.unsorted(io)?;
+    let cloud = state.unsorted(&io.after)?;
     Ok(Given {
         velocity: cloud.velocity,
         affine: cloud.affine,
@@ -130,7 +130,7 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let (n, elements) = (state.n, state.elements());
-    let faces = elements.planes_before(io, buffers::FACE_VELOCITY)?;
+    let faces = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
     let (step, start) = (state.step(), &state.sorted().cloud.position);
     let go = |start: &[DVec3]| {
         let (model, bricks) = (&state.model, &elements.bricks);
@@ -154,8 +154,8 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         let sides = answers.chunks(2);
         sides.map(|pair| of(&pair[0]).max(of(&pair[1]))).sum()
     };
-    let position = io.vectors(buffers::POSITION, n)?;
-    let velocity = io.vectors(buffers::VELOCITY, n)?;
+    let position = io.after.vectors(buffers::POSITION, n)?;
+    let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     io.table.each(&MOVED, 0..n, |i| {
         let x = twin.position[i];
         let moved = answer(&|moved| moved.position[i].distance(x));
@@ -171,13 +171,13 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         let came = among * (given.velocity[i].length() + solids);
         pair(i, velocity[i], v, [moved, v.length() + came])
     });
-    let before = io.one_before(buffers::COUNTERS)?;
-    let after = io.one(buffers::COUNTERS)?;
+    let before = io.before.one(buffers::COUNTERS)?;
+    let after = io.after.one(buffers::COUNTERS)?;
     let slowed = f64::from(after.capped) - f64::from(before.capped);
     let exact = twin.capped as f64;
     let slack = answer(&|moved| (moved.capped as f64 - exact).abs());
     io.table.add(&SLOWED, [pair(0, slowed, exact, [slack])]);
-    let ids = io.after(buffers::ID, n)?;
+    let ids = io.after.get(buffers::ID, n)?;
     io.table
         .add_exact(&MOVED_ID, &ids, &state.sorted().cloud.id);
     Ok(())

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     check::{
-        engine::{Io, NONE, Outcome, Twin, names, twin},
+        engine::{Io, NONE, Outcome, Twin, View, names, twin},
         table::{Entry, Table, pair},
     },
     compare::{
@@ -26,13 +26,13 @@ use crate::{
         SolveError,
         flip::buffers,
         pressure::{
-            CORRECTION_TOLERANCE, DONE, PressureControl64, blocked,
+            CORRECTION_TOLERANCE, DONE, blocked,
             buffers::{self as solved, Real},
         },
     },
 };
 
-use super::{FlipState, iteration::PRODUCTS, rows::*};
+use super::{Elements, FlipState, iteration::PRODUCTS, rows::*};
 
 /// Twins of what an iteration goes from and comes to.
 pub(super) const TWINS: &[Twin<FlipState>] = &[
@@ -102,17 +102,9 @@ impl FlipState {
         }
     }
 
-    /// The scalars of the solve before the pass.
-    pub(super) fn control(&self, io: &Io<'_>) -> Result<PressureControl64, SolveError> {
-        match io.pass() {
-            "pressure/reduce" => io.control_before(self.precision()),
-            _ => io.control(self.precision()),
-        }
-    }
-
     /// Whether the solve has ended before the pass.
     fn is_done(&mut self, io: &Io<'_>) -> Result<bool, SolveError> {
-        Ok(self.control(io)?.state == DONE)
+        Ok(io.before.control(self.precision())?.state == DONE)
     }
 
     fn rows_of(&self, values: &[f64]) -> Vec<f64> {
@@ -121,40 +113,22 @@ impl FlipState {
     }
 
     /// An array of the pressure's own, by row.
-    pub(super) fn by_row(&self, io: &Io<'_>, buffer: Buf<Real>) -> Result<Vec<f64>, SolveError> {
-        let values = io.reals(&buffer, self.precision(), self.elements().cells)?;
-        Ok(self.rows_of(&values))
-    }
-
-    /// The same from before the pass.
-    pub(super) fn by_row_before(
+    pub(super) fn by_row(
         &self,
-        io: &Io<'_>,
+        view: &View<'_>,
         buffer: Buf<Real>,
     ) -> Result<Vec<f64>, SolveError> {
-        let values = io.reals_before(&buffer, self.precision(), self.elements().cells)?;
+        let values = view.reals(&buffer, self.precision(), self.elements().cells)?;
         Ok(self.rows_of(&values))
     }
 
     /// The terms that the solution is the sum of, by row.
-    pub(super) fn terms(&self, io: &Io<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
-        let values = io.reals(&solved::SOLUTION, self.precision(), self.term_values())?;
-        Ok(self.terms_of(&values))
-    }
-
-    /// The same from before the pass.
-    pub(super) fn terms_before(&self, io: &Io<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
-        let values = io.reals_before(&solved::SOLUTION, self.precision(), self.term_values())?;
-        Ok(self.terms_of(&values))
-    }
-
-    fn term_values(&self) -> usize {
-        self.elements().stride * (self.precision().terms() - 1) + self.elements().cells
-    }
-
-    fn terms_of(&self, values: &[f64]) -> Vec<Vec<f64>> {
-        let term = |k: usize| self.rows_of(&values[k * self.elements().stride..]);
-        (0..self.precision().terms()).map(term).collect()
+    pub(super) fn terms(&self, view: &View<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
+        let Elements { cells, stride, .. } = *self.elements();
+        let (precision, terms) = (self.precision(), self.precision().terms());
+        let values = view.reals(&solved::SOLUTION, precision, stride * (terms - 1) + cells)?;
+        let term = |k: usize| self.rows_of(&values[k * stride..]);
+        Ok((0..terms).map(term).collect())
     }
 
     /// [`OF_DIFFERENCE`] of all terms, by element.
@@ -234,11 +208,11 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let centers = Centers {
         density: Vec::new(),
         excess: match settings.density_correction {
-            true => elements.scalars(io, buffers::DENSITY_EXCESS)?,
+            true => elements.scalars(&io.after, buffers::DENSITY_EXCESS)?,
             false => Vec::new(),
         },
         distance: match settings.surface {
-            Surface::GhostFluid => elements.scalars(io, buffers::LIQUID_DISTANCE)?,
+            Surface::GhostFluid => elements.scalars(&io.after, buffers::LIQUID_DISTANCE)?,
             Surface::Voxel => Vec::new(),
         },
     };
@@ -247,8 +221,10 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         Preconditioner::Jacobi | Preconditioner::Ipp
     );
     let system = Waters::new(&state.model, &elements.bricks, state.room(), &centers).system();
-    let coefficient = io.after(solved::COEFFICIENT, 2 * elements.stride + cells)?;
-    let block = io.after(solved::BLOCK, cells / 8)?;
+    let coefficient = io
+        .after
+        .get(solved::COEFFICIENT, 2 * elements.stride + cells)?;
+    let block = io.after.get(solved::BLOCK, cells / 8)?;
     let (stride, wet) = (elements.stride, elements.wet());
     let is_row = |e: usize| {
         let place = blocked(e as u32);
@@ -260,7 +236,7 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     }
     state.assembled = Some(Assembled { system, centers });
     let (system, unit) = (state.system(), state.unit());
-    let dirichlet = state.by_row(io, solved::DIRICHLET)?;
+    let dirichlet = state.by_row(&io.after, solved::DIRICHLET)?;
     state.add_rows(io.table, &DIRICHLET, |row| {
         let exact = system.dirichlet[row];
         (dirichlet[row], exact, [unit, exact])
@@ -278,7 +254,7 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     io.table
         .add_exact(&ROWS, &wet.map(is_row).collect::<Vec<_>>(), &expected);
     if has_diagonal {
-        let inverse = state.by_row(io, solved::INVERSE_DIAGONAL)?;
+        let inverse = state.by_row(&io.after, solved::INVERSE_DIAGONAL)?;
         state.add_rows(io.table, &INVERSE, |row| {
             let exact = 1.0 / system.diagonal[row];
             (inverse[row], exact, [unit, exact])
@@ -289,21 +265,23 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 fn divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     state.note_sum(io, solved::RHS, solved::RHS)?;
-    let velocity = state.elements().planes_before(io, buffers::FACE_VELOCITY)?;
+    let velocity = state
+        .elements()
+        .planes(&io.before, buffers::FACE_VELOCITY)?;
     let twin = state.waters().divergence(state.system(), &velocity);
     let flow = state.flow(&velocity);
-    let (rhs, unit) = (state.by_row(io, solved::RHS)?, state.unit());
+    let (rhs, unit) = (state.by_row(&io.after, solved::RHS)?, state.unit());
     state.add_rows(io.table, &RHS, |row| {
         (rhs[row], twin[row], [unit, flow[row]])
     });
-    let found = io.one(solved::STATS)?.divergence_before;
+    let found = io.after.one(solved::STATS)?.divergence_before;
     state.add_noted(io.table, &BEFORE, found, [&twin, &flow]);
     Ok(())
 }
 
 fn density_source(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     state.note_sum(io, solved::RHS, solved::RHS)?;
-    let rhs = state.by_row(io, solved::RHS)?;
+    let rhs = state.by_row(&io.after, solved::RHS)?;
     let centers = &state.assembled().centers;
     let twin = twin_density_source(&state.model, state.system(), centers);
     state.add_rows(io.table, &SOURCE, |row| {
@@ -319,11 +297,11 @@ fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     if state.products == PRODUCTS {
         return Ok(());
     }
-    let direction = state.by_row(io, solved::DIRECTION)?;
+    let direction = state.by_row(&io.after, solved::DIRECTION)?;
     if direction.iter().all(|&value| value == 0.0) {
         return Ok(());
     }
-    let product = state.by_row(io, solved::PRODUCT)?;
+    let product = state.by_row(&io.after, solved::PRODUCT)?;
     let (system, unit) = (state.system(), state.unit());
     let (twin, errors) = (system.apply(&direction), differences(system, &direction));
     state.add_rows(io.table, &PRODUCT, |row| {
@@ -335,16 +313,16 @@ fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 fn project(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
-    let terms = state.terms(io)?;
+    let terms = state.terms(&io.after)?;
     let (errors, x) = (state.difference_errors(&terms), sum(&terms));
     let waters = state.waters();
-    let mut twin = elements.planes_before(io, buffers::FACE_VELOCITY)?;
+    let mut twin = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
     waters.project(&waters.by_element(state.system(), &x), &mut twin);
-    let velocity = elements.planes(io, buffers::FACE_VELOCITY)?;
+    let velocity = elements.planes(&io.after, buffers::FACE_VELOCITY)?;
     io.table.each(&PROJECTED, elements.active(), |e| {
         pair(e, velocity[e], twin[e], [errors[e], twin[e].length()])
     });
-    let pressure = elements.scalars(io, solved::PRESSURE)?;
+    let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
     let scale = state.scene.water.rest_density * state.model.cell_size() / elements.substep.length;
     state.add_rows(io.table, &PRESSURE, |row| {
         let exact = scale * x[row];
@@ -356,7 +334,7 @@ fn project(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 /// The device's own system solved directly, against what its iterations came to.
 fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>) -> Outcome {
-    let mut b = state.by_row(io, solved::RHS)?;
+    let mut b = state.by_row(&io.after, solved::RHS)?;
     let system = state.system();
     let solver = match Solver::new(system, BUDGET) {
         Ok(solver) => solver,
@@ -393,24 +371,28 @@ fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>
 }
 
 fn measure_divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let velocity = state.elements().planes_before(io, buffers::FACE_VELOCITY)?;
+    let velocity = state
+        .elements()
+        .planes(&io.before, buffers::FACE_VELOCITY)?;
     let twin = state.waters().divergence(state.system(), &velocity);
-    let found = io.one(solved::STATS)?.divergence_after;
+    let found = io.after.one(solved::STATS)?.divergence_after;
     state.add_noted(io.table, &AFTER, found, [&twin, &state.flow(&velocity)]);
     Ok(())
 }
 
 fn displace(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let terms = state.terms(io)?;
+    let terms = state.terms(&io.after)?;
     let (errors, x) = (state.difference_errors(&terms), sum(&terms));
     let waters = state.waters();
     let twin = waters.displace(&waters.by_element(state.system(), &x));
-    let found = state.elements().planes(io, solved::FACE_DISPLACEMENT)?;
+    let found = state
+        .elements()
+        .planes(&io.after, solved::FACE_DISPLACEMENT)?;
     io.table
         .each(&DISPLACEMENT, state.elements().active(), |e| {
             pair(e, found[e], twin[e], [errors[e], twin[e].length()])
         });
-    let mut b = state.by_row(io, solved::RHS)?;
+    let mut b = state.by_row(&io.after, solved::RHS)?;
     remove_means(&mut b, &state.system().pockets());
     let [residual, allowed] = state.residual(&b, &x, CORRECTION_TOLERANCE);
     io.table

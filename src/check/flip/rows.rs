@@ -10,7 +10,7 @@ use crate::{
 bounds! {
     pub(super) PLACE = [cells: "cells along the domain's longest side"] U * cells, "";
     pub(super) CUT = [place: "" PLACE] 8.0 * place, "";
-    TURN = [grid: "" GRID] grid, "the solids' distance at which it turns; nor where nodes are as near";
+    TURN = [grid: "" GRID] grid, "the solids' distance at which it turns, and where nodes are as near";
     pub(super) OF_FACE = [place: "" PLACE, count: "particles about", weight: "what their hats add up to",
         range: "of their velocities", most: "their largest |v|"]
         (12.0 * place * count / weight).min(1.0) * range + U * (count + 20.0) * most, "along each axis";
@@ -27,7 +27,7 @@ bounds! {
     pub(super) OF_BLOCK = [unit: "U, or 2⁻⁵³ with f64", row: "|A| |z|", size: "the sum of magnitudes of b"]
         40.0 * unit * (row + size), "Higham 2002, theorem 9.3; the inverse has no negative entry, so that bounds take the same steps";
     pub(super) OF_RESTRICTION = [unit: "U, or 2⁻⁵³ with f64", size: "Σ|c z|"] 4.0 * unit * size, "products and 6 sums, halved";
-    PIVOT = [] 2e-5, "no pivot at all: a part of the block's diagonal";
+    PIVOT = [] 2e-5, "a pivot of 0, as a part of the block's diagonal";
     pub(super) OF_SUM = [unit: "U, or 2⁻⁵³ with f64", count: "sums of bricks", size: "Σ|terms|"]
         unit * (count / 256.0 + 60.0) * size, "8 cells a thread, 64 threads, and the bricks";
     pub(super) QUOTIENT = [sum: "" OF_SUM, value: "the sum", unit: "U, or 2⁻⁵³ with f64"] (sum / value).abs() + 4.0 * unit, "";

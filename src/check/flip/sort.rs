@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use crate::{
     check::{
-        engine::{Io, Outcome},
+        engine::{Io, Outcome, View},
         sort::{check_cells, check_slots},
         table::pair,
     },
@@ -21,40 +21,40 @@ impl FlipState {
     /// Particles of four arrays: position, velocity, id, slopes.
     fn cloud(
         &self,
-        io: &Io<'_>,
+        view: &View<'_>,
         [position, velocity]: [Buf<[f32; 4]>; 2],
         id: Buf<u32>,
         affine: Buf<f32>,
     ) -> Result<Cloud, SolveError> {
         let rows = match self.model.settings().transfer {
             Transfer::Flip => Vec::new(),
-            Transfer::Apic => io.after(affine.retyped::<[f32; 9]>(), self.n)?,
+            Transfer::Apic => view.get(affine.retyped::<[f32; 9]>(), self.n)?,
         };
         let matrix = |row: &[f32; 9]| DMat3::from_cols_array(&row.map(f64::from)).transpose();
         Ok(Cloud {
-            position: io.vectors(position, self.n)?,
-            velocity: io.vectors(velocity, self.n)?,
+            position: view.vectors(position, self.n)?,
+            velocity: view.vectors(velocity, self.n)?,
             affine: rows.iter().map(matrix).collect(),
-            id: io.after(id, self.n)?,
+            id: view.get(id, self.n)?,
         })
     }
 
     /// Particles as the pass left them.
-    pub(super) fn unsorted(&self, io: &Io<'_>) -> Result<Cloud, SolveError> {
+    pub(super) fn unsorted(&self, view: &View<'_>) -> Result<Cloud, SolveError> {
         let vectors = [buffers::POSITION, buffers::VELOCITY];
-        self.cloud(io, vectors, buffers::ID, buffers::AFFINE)
+        self.cloud(view, vectors, buffers::ID, buffers::AFFINE)
     }
 
-    fn sorted_now(&self, io: &Io<'_>) -> Result<Cloud, SolveError> {
+    fn sorted_now(&self, view: &View<'_>) -> Result<Cloud, SolveError> {
         let vectors = [buffers::SORTED_POSITION, buffers::SORTED_VELOCITY];
-        self.cloud(io, vectors, buffers::SORTED_ID, buffers::SORTED_AFFINE)
+        self.cloud(view, vectors, buffers::SORTED_ID, buffers::SORTED_AFFINE)
     }
 }
 
 pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let twin = twin_survey(&state.model, &state.unsorted(io)?);
-    let found = io.after(buffers::SURVEY_IS_WET, twin.is_wet.len())?;
-    let fastest = f64::from(io.one(buffers::SURVEY)?.speed_square);
+    let twin = twin_survey(&state.model, &state.unsorted(&io.after)?);
+    let found = io.after.get(buffers::SURVEY_IS_WET, twin.is_wet.len())?;
+    let fastest = f64::from(io.after.one(buffers::SURVEY)?.speed_square);
     let exact = twin.speed * twin.speed;
     io.table.add(&SPEED, [pair(0, fastest, exact, [exact])]);
     let is_wet: Vec<u32> = twin.is_wet.iter().map(|&wet| u32::from(wet)).collect();
@@ -79,26 +79,26 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 }
 
 pub(super) fn assign_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
-    let params = io.one(buffers::PARAMS)?;
+    let params = io.after.one(buffers::PARAMS)?;
     if let Some(elements) = &mut state.elements {
         elements.stride = params.stride as usize;
     }
     let (n, elements) = (state.n, state.elements());
-    let positions = io.vectors_before(buffers::POSITION, n)?;
-    let cell_of = io.after(buffers::CELL_OF, n)?;
+    let positions = io.before.vectors(buffers::POSITION, n)?;
+    let cell_of = io.after.get(buffers::CELL_OF, n)?;
     let twin = twin_cells(&state.model, &elements.bricks, &positions);
     let size = state.model.cell_size();
     check_cells(&CELL, &positions, size, &cell_of, &twin, io.table);
-    let slot = io.after(buffers::SLOT_IN_CELL, n)?;
-    let counts = io.after(buffers::CELL_START, elements.wet().end)?;
+    let slot = io.after.get(buffers::SLOT_IN_CELL, n)?;
+    let counts = io.after.get(buffers::CELL_START, elements.wet().end)?;
     check_slots([&COUNTS, &SLOTS], &cell_of, &slot, &counts, io.table);
     Ok(())
 }
 
 pub(super) fn reorder(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let n = state.n;
-    let (before, after) = (state.unsorted(io)?, state.sorted_now(io)?);
-    let order = io.before(buffers::ORDER, n)?;
+    let (before, after) = (state.unsorted(&io.after)?, state.sorted_now(&io.after)?);
+    let order = io.before.get(buffers::ORDER, n)?;
     let at = |i: usize| order[i] as usize;
     let copy = |found: &[DVec3], source: &[DVec3], i: usize| pair(i, found[i], source[at(i)], []);
     io.table.each(&POSITION, 0..n, |i| {
@@ -117,11 +117,13 @@ pub(super) fn reorder(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             });
         }
     }
-    let cell_of = io.before(buffers::CELL_OF, n)?;
+    let cell_of = io.before.get(buffers::CELL_OF, n)?;
     state.sorted = Some(Sorted {
         cell: (0..n).map(|i| cell_of[at(i)]).collect(),
         cloud: after,
-        start: io.before(buffers::CELL_START, state.elements().wet().end + 1)?,
+        start: io
+            .before
+            .get(buffers::CELL_START, state.elements().wet().end + 1)?,
     });
     Ok(())
 }

@@ -106,7 +106,7 @@ impl PbfState {
         }
         if self.lists.start.is_empty() {
             let count: usize = self.model.cells.dims.iter().product();
-            self.lists.start = io.before(buffers::CELL_START, count + 1)?;
+            self.lists.start = io.before.get(buffers::CELL_START, count + 1)?;
         }
         Ok(Arc::new(self.searched(points)))
     }
@@ -151,13 +151,15 @@ impl PbfState {
 
 pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let phase = io.window(&buffers::PHASES)?;
+    let phase = io.before.window(&buffers::PHASES)?;
     let (points, _) = state.stored(io, &phase)?;
     let (first, count) = (phase.first as usize, phase.count as usize);
     let capacity = LIST_CAPACITY as usize;
     let words = count.next_multiple_of(STRIDE) * capacity;
-    let list = io.after(buffers::NEIGHBOR_LIST.retyped::<u32>(), words)?;
-    let counts = io.after(buffers::NEIGHBOR_COUNT, n)?;
+    let list = io
+        .after
+        .get(buffers::NEIGHBOR_LIST.retyped::<u32>(), words)?;
+    let counts = io.after.get(buffers::NEIGHBOR_COUNT, n)?;
     let member = |local: usize, k: usize| {
         let lane = local % STRIDE;
         let base = local / STRIDE * STRIDE * (capacity / 4) + (lane >> 1) + ((lane & 1) << 6);

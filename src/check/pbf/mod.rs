@@ -182,7 +182,7 @@ impl PbfState {
     /// How the iteration until a density error stands before the pass; `None` where their number is given.
     fn control(&self, io: &Io<'_>) -> Result<Option<IterationControl>, SolveError> {
         match self.scene.solver.pbf().stop {
-            Stop::DensityError { .. } => Ok(Some(io.one_before(buffers::CONTROL)?)),
+            Stop::DensityError { .. } => Ok(Some(io.before.one(buffers::CONTROL)?)),
             _ => Ok(None),
         }
     }
@@ -190,7 +190,7 @@ impl PbfState {
     /// The positions that a phase reads, then the samples; and the λ beside them.
     fn stored(&self, io: &Io<'_>, phase: &Phase) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
         let n = self.particles();
-        let predicted = io.before(buffers::PREDICTED, 2 * n)?;
+        let predicted = io.before.get(buffers::PREDICTED, 2 * n)?;
         let half = |j: usize| predicted[j + [phase.read_even, phase.read_odd][j % 2] as usize];
         let read: Vec<[f32; 4]> = (0..n).map(half).collect();
         let mut points = wide(&read);
@@ -201,7 +201,7 @@ impl PbfState {
 
     /// Positions with the samples behind them, as effects see them.
     pub(super) fn moved(&self, io: &Io<'_>) -> Result<Vec<DVec3>, SolveError> {
-        let mut points = io.vectors_before(buffers::POSITION, self.particles())?;
+        let mut points = io.before.vectors(buffers::POSITION, self.particles())?;
         points.extend(&self.model.samples);
         Ok(points)
     }

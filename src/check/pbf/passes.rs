@@ -29,13 +29,13 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         state.substep.wall_velocity = Default::default();
     }
     let (x, v) = (
-        io.vectors_before(buffers::POSITION, n)?,
-        io.vectors_before(buffers::VELOCITY, n)?,
+        io.before.vectors(buffers::POSITION, n)?,
+        io.before.vectors(buffers::VELOCITY, n)?,
     );
-    let predicted = io.vectors(buffers::PREDICTED, 2 * n)?;
-    let velocity = io.vectors(buffers::VELOCITY, n)?;
+    let predicted = io.after.vectors(buffers::PREDICTED, 2 * n)?;
+    let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     let works = match state.scene.has_movers() {
-        true => io.after(buffers::WALL_WORK, 2 * n)?,
+        true => io.after.get(buffers::WALL_WORK, 2 * n)?,
         false => Vec::new(),
     };
     let none = Neighbors::listed(0, |_, _| [0; 2]);
@@ -83,36 +83,41 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
 pub(super) fn assign_cells(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let cells = &state.model.cells;
-    let points = &io.vectors_before(buffers::PREDICTED, 2 * n)?[n..];
+    let points = &io.before.vectors(buffers::PREDICTED, 2 * n)?[n..];
     let exact: Vec<u32> = points.iter().map(|&x| cells.index(x) as u32).collect();
-    let cell_of = io.after(buffers::CELL_OF, n)?;
+    let cell_of = io.after.get(buffers::CELL_OF, n)?;
     check_cells(&CELL, points, cells.edge, &cell_of, &exact, io.table);
-    let slot = io.after(buffers::SLOT_IN_CELL, n)?;
-    let counts = io.after(buffers::CELL_START, cells.dims.iter().product())?;
+    let slot = io.after.get(buffers::SLOT_IN_CELL, n)?;
+    let counts = io
+        .after
+        .get(buffers::CELL_START, cells.dims.iter().product())?;
     check_slots([&COUNTS, &SLOTS], &cell_of, &slot, &counts, io.table);
     Ok(())
 }
 
 pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let order = io.before(buffers::ORDER, n)?;
-    let predicted = io.vectors_before(buffers::PREDICTED, 2 * n)?;
-    let velocity = io.vectors_before(buffers::VELOCITY, n)?;
-    let ids = io.before(buffers::ID, n)?;
+    let order = io.before.get(buffers::ORDER, n)?;
+    let predicted = io.before.vectors(buffers::PREDICTED, 2 * n)?;
+    let velocity = io.before.vectors(buffers::VELOCITY, n)?;
+    let ids = io.before.get(buffers::ID, n)?;
     let at = |i: usize| order[i] as usize;
     for buffer in [buffers::PREDICTED, buffers::START_POSITION] {
-        let found = io.vectors(buffer, n)?;
+        let found = io.after.vectors(buffer, n)?;
         io.table.each(&REORDER_POSITION, 0..n, |i| {
             pair(i, found[i], predicted[n + at(i)], [])
         });
     }
-    let found = io.vectors(buffers::SORTED_VELOCITY, n)?;
+    let found = io.after.vectors(buffers::SORTED_VELOCITY, n)?;
     io.table.each(&REORDER_VELOCITY, 0..n, |i| {
         pair(i, found[i], velocity[at(i)], [])
     });
     let expected: Vec<u32> = (0..n).map(|i| ids[at(i)]).collect();
-    io.table
-        .add_exact(&REORDER_ID, &io.after(buffers::SORTED_ID, n)?, &expected);
+    io.table.add_exact(
+        &REORDER_ID,
+        &io.after.get(buffers::SORTED_ID, n)?,
+        &expected,
+    );
     Ok(())
 }
 
@@ -122,7 +127,7 @@ pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     }
     let n = state.particles();
-    let phase = io.window(&buffers::PHASES)?;
+    let phase = io.before.window(&buffers::PHASES)?;
     let (points, mut twin) = state.stored(io, &phase)?;
     let neighbors = state.visited(io, &points)?;
     if !state.whole.has_start() {
@@ -133,7 +138,7 @@ pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let mut dense = vec![0.0; n];
     passes::compute_lambda(inputs, Colour::All, &mut twin, &mut dense);
     let bounds = Bounds(inputs);
-    let after = io.after(buffers::PREDICTED, 2 * n)?;
+    let after = io.after.get(buffers::PREDICTED, 2 * n)?;
     let handled = handled(&phase);
     io.table.each(&OF_LAMBDA, 0..handled.len(), |k| {
         let i = handled[k];
@@ -142,7 +147,7 @@ pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         pair(i, after[stored][3], twin[i], [error])
     });
     if control.is_some() {
-        let density = io.after(buffers::DENSITY, n)?;
+        let density = io.after.get(buffers::DENSITY, n)?;
         io.table.each(&DENSITY_OF_LAMBDA, 0..handled.len(), |k| {
             let i = handled[k];
             pair(i, density[i], dense[i], [bounds.density(i, dense[i])])
@@ -156,11 +161,11 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     }
     let n = state.particles();
-    let phase = io.window(&buffers::PHASES)?;
+    let phase = io.before.window(&buffers::PHASES)?;
     let (points, lambda) = state.stored(io, &phase)?;
     let neighbors = state.visited(io, &points)?;
     let write = phase.write as usize;
-    let before = &io.vectors_before(buffers::PREDICTED, 2 * n)?[write..write + n];
+    let before = &io.before.vectors(buffers::PREDICTED, 2 * n)?[write..write + n];
     let factor = f64::from(phase.acceleration);
     let is_chebyshev = state.scene.solver.pbf().iteration == Iteration::Chebyshev;
     let momentum = is_chebyshev.then_some(Momentum { factor, before });
@@ -170,12 +175,12 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         Some(_) => passes::compute_delta(inputs, Colour::All, momentum, &lambda),
         None => plain.clone(),
     };
-    let after = io.after(buffers::PREDICTED, 2 * n)?;
-    let moved = io.vectors(buffers::PREDICTED, 2 * n)?;
+    let after = io.after.get(buffers::PREDICTED, 2 * n)?;
+    let moved = io.after.vectors(buffers::PREDICTED, 2 * n)?;
     let works = match state.scene.has_movers() {
         true => Some([
-            io.before(buffers::WALL_WORK, n)?,
-            io.after(buffers::WALL_WORK, n)?,
+            io.before.get(buffers::WALL_WORK, n)?,
+            io.after.get(buffers::WALL_WORK, n)?,
         ]),
         false => None,
     };
@@ -231,16 +236,16 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
 
 pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let phase = io.window(&buffers::PHASES)?;
+    let phase = io.before.window(&buffers::PHASES)?;
     let source = match state.control(io)? {
         Some(control) => n * (control.iterations % 2) as usize,
         None => phase.read_even as usize,
     };
-    let ends = io.vectors_before(buffers::PREDICTED, 2 * n)?[source..source + n].to_vec();
-    let starts = io.vectors_before(buffers::START_POSITION, n)?;
-    let velocities = io.vectors_before(buffers::SORTED_VELOCITY, n)?;
-    let position = io.vectors(buffers::POSITION, n)?;
-    let velocity = io.vectors(buffers::VELOCITY, n)?;
+    let ends = io.before.vectors(buffers::PREDICTED, 2 * n)?[source..source + n].to_vec();
+    let starts = io.before.vectors(buffers::START_POSITION, n)?;
+    let velocities = io.before.vectors(buffers::SORTED_VELOCITY, n)?;
+    let position = io.after.vectors(buffers::POSITION, n)?;
+    let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     let (model, substep) = (&state.model, &state.substep);
     let (cap, step) = (model.max_displacement(), substep.time_step);
     let one = |i: usize| {
@@ -264,14 +269,14 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let count = |which: usize| all.iter().filter(|one| one.2[which]).count() as f64;
     io.table.add(&UPDATE_POSITION, all.iter().map(|one| one.0));
     io.table.add(&UPDATE_VELOCITY, all.iter().map(|one| one.1));
-    let before = io.one_before(buffers::COUNTERS)?;
-    let after = io.one(buffers::COUNTERS)?;
+    let before = io.before.one(buffers::COUNTERS)?;
+    let after = io.after.one(buffers::COUNTERS)?;
     let counted = f64::from(after.capped) - f64::from(before.capped);
     io.table
         .add(&CAPPED, [pair(0, counted, count(0), [count(1)])]);
-    let ids = io.before(buffers::SORTED_ID, n)?;
+    let ids = io.before.get(buffers::SORTED_ID, n)?;
     io.table
-        .add_exact(&UPDATE_ID, &io.after(buffers::ID, n)?, &ids);
+        .add_exact(&UPDATE_ID, &io.after.get(buffers::ID, n)?, &ids);
     state.whole.end(ends);
     state.is_over = true;
     Ok(())
@@ -279,12 +284,12 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
 
 pub(super) fn measure_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let mut points = io.vectors_before(buffers::PREDICTED, n)?;
+    let mut points = io.before.vectors(buffers::PREDICTED, n)?;
     points.extend(&state.model.samples);
     let neighbors = state.search(&points);
     let inputs = state.inputs(&points, &neighbors);
     let twin = passes::measure_density(inputs);
-    let density = io.after(buffers::DENSITY, n)?;
+    let density = io.after.get(buffers::DENSITY, n)?;
     let bounds = Bounds(inputs);
     io.table.each(&MEASURED, 0..n, |i| {
         pair(i, density[i], twin[i], [bounds.density(i, twin[i])])

@@ -35,14 +35,14 @@ bounds! {
         factor * error + 4.0 * U * (factor - 1.0) * last, "";
     pub(super) CORRECTED = [error: "" MOMENTUM, x: "|x|"] error + U * x, "";
     pub(super) ACROSS = [error: "" STEP, last: "|the last step|"] 2.0 * error * last,
-        "Δx · the last step, whose sign decides whether a semi-iteration goes on; nor where two particles stand on one spot";
+        "Δx · the last step = 0, whose sign decides whether a semi-iteration goes on; and where two particles stand on one spot";
     pub(super) WORKED = [factor: "that of Chebyshev, or 1", error: "" STEP, push: "" PUSHED, x: "|x|"]
         (2.0 * factor - 1.0) * error + push + U * x, "a semi-iteration counts this step's part for that of the last one too";
 
     pub(super) NEAR_CAP = [cap: "the displacement cap"] 30.0 * U * cap, "";
     pub(super) UPDATED = [v: "|v|", way: "|x* − x*₀|/Δt", slowed: "|v| of a particle at the cap or beyond, else 0"]
         U * (v + 4.0 * way) + 20.0 * U * slowed, "";
-    pub(super) NEAR_H = [] 10.0 * U, "h² of r² = h²: r² errs by 5 u, h² by 3 u";
+    pub(super) NEAR_H = [] 10.0 * U, "r² / h² = 1, as r² errs by 5 u and h² by 3 u";
     pub(super) NEAR_TARGET = [n: "particles", sum: "the sum"] (n / 65536.0 + 10.0) * U * sum, "the threshold";
     pub(super) SHIFT = [diagonal: "the domain's"] 2.0 * U * diagonal, "";
 }

@@ -21,9 +21,9 @@ impl PbfState {
 pub(super) fn boundary_work(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let groups = n.div_ceil(64);
-    let work = io.before(buffers::WALL_WORK, 2 * n)?;
-    let before = io.before(buffers::BOUNDARY_WORK, groups)?;
-    let after = io.after(buffers::BOUNDARY_WORK, groups)?;
+    let work = io.before.get(buffers::WALL_WORK, 2 * n)?;
+    let before = io.before.get(buffers::BOUNDARY_WORK, groups)?;
+    let after = io.after.get(buffers::BOUNDARY_WORK, groups)?;
     io.table.each(&WORK, 0..groups, |group| {
         let terms = 64 * group..(64 * group + 64).min(n);
         let term = |i: usize| f64::from(work[i]) + f64::from(work[n + i]);

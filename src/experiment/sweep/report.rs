@@ -215,14 +215,14 @@ impl Results<'_> {
             .iter()
             .map(|(line, Knee { point, is_enough }, setting)| {
                 let why = match (is_enough, line.points.len()) {
-                    (true, _) => "the cheapest below a tenth of the discretisation error",
-                    (false, 1) => "the only one that was measured",
-                    (false, _) => "the least error × time",
+                    (true, _) => "the cheapest setting below a tenth of the discretisation error",
+                    (false, 1) => "the only setting that was measured",
+                    (false, _) => "the setting with the least error × time",
                 };
-                let (ms, of) = (point.time[1], self.cost_of());
+                let of = self.cost_of().trim_start_matches("of ");
+                let (ms, error) = (point.time[1], error.name());
                 format!(
-                    "{setting}, at {ms:.3} ms {of} and {} {:.2e}, {why}",
-                    error.name(),
+                    "{setting}: {ms:.2} ms {of}, {error} {:.2e}, {why}",
                     point.error
                 )
             });
@@ -301,7 +301,6 @@ impl Results<'_> {
         levels.sort_by(f64::total_cmp);
         // Lines of nearly one height are one.
         levels.dedup_by(|a, b| *a < 1.2 * *b);
-        let told = "a tenth of the discretisation error";
         let points = || self.sweep.points();
         let shots = unique(points().map(|point| point.scene.shot.name.as_str()));
         let keys = unique(self.sweep.lines.iter().map(|line| line.key.as_str()));
@@ -315,9 +314,13 @@ impl Results<'_> {
             y_label: error.title().to_owned(),
             is_log: true,
             series: lines.iter().enumerate().map(series).collect(),
-            marks: levels
-                .into_iter()
-                .map(|level| Mark::Level(level, told.to_owned()))
+            // One of several says what they are.
+            marks: (levels.iter().enumerate())
+                .map(|(k, level)| {
+                    let is_top = k + 1 == levels.len();
+                    let text = if is_top { DISCRETISATION } else { "" };
+                    Mark::Level(*level, text.to_owned())
+                })
                 .collect(),
             notes: notes.collect(),
         }
@@ -543,6 +546,8 @@ fn paper(scene: &Scene) -> Option<(f64, u32)> {
         Iteration::Chebyshev => None,
     }
 }
+
+const DISCRETISATION: &str = "a tenth of the discretisation error";
 
 const CONVERGENCE: &str = "The paper calls a run converged from the step on at which \"the relative error of the current \
     iteration and the 50 before is less than 0.5 %\", for good. It does not say what the error is, nor whether the 50 are what \

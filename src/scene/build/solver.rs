@@ -73,7 +73,7 @@ fn fit_flip(doc: &Document<'_>, flip: &Flip, domain: &Bounds) -> Result<Lattice>
 /// Default ω.
 pub(in super::super) const RELAXATION: f64 = 1.0;
 
-/// Default ω of the Chebyshev semi-iteration: 1 overshoots (table in solve/iteration.rs).
+/// Default ω of the Chebyshev semi-iteration: 1 overshoots (table in solve/pbf/iteration.rs).
 pub(in super::super) const CHEBYSHEV_RELAXATION: f64 = 0.7;
 
 impl From<PbfSpec> for Pbf {

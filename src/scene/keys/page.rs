@@ -1,7 +1,7 @@
 //! The reference page: every key with what it allows, its unit, its default and what it is for.
 
 use super::{
-    super::key::{Default, Key, Kind, Physics},
+    super::key::{Key, Kind, LeftOut, Physics},
     File,
 };
 
@@ -84,19 +84,19 @@ fn section(out: &mut String, file: File, head: &str, about: &str, keys: &'static
 fn optional(table: &Key) -> &'static str {
     match (&table.kind, &table.default) {
         (Kind::Tables(_), _) => " Any number.",
-        (_, Default::Absent) => " None if left out.",
-        (_, Default::Needed) => " Needed.",
+        (_, LeftOut::Absent) => " None if left out.",
+        (_, LeftOut::Needed) => " Needed.",
         _ => "",
     }
 }
 
 fn left_out(key: &Key) -> String {
     match key.default {
-        Default::Needed if key.only.is_some() => "needed there".to_owned(),
-        Default::Needed => "needed".to_owned(),
-        Default::Value(toml) => format!("`{toml}`"),
-        Default::Computed(words) => words(),
-        Default::Absent => "none".to_owned(),
+        LeftOut::Needed if key.only.is_some() => "needed there".to_owned(),
+        LeftOut::Needed => "needed".to_owned(),
+        LeftOut::Value(toml) => format!("`{toml}`"),
+        LeftOut::Computed(words) => words(),
+        LeftOut::Absent => "none".to_owned(),
     }
 }
 

@@ -74,7 +74,7 @@ fn what_is_left_out_is_the_default_of_the_table() {
     let mut compared = BTreeSet::new();
     for path in paths(SCENE) {
         let key = find(SCENE, &path).expect("a key");
-        let Default::Value(toml) = key.default else {
+        let LeftOut::Value(toml) = key.default else {
             continue;
         };
         let table: Table = toml::from_str(&format!("v = {toml}")).expect(toml);
@@ -101,7 +101,7 @@ fn what_is_left_out_is_the_default_of_the_table() {
 #[test]
 fn defaults_that_are_computed_are_what_their_words_say() {
     let says = |path: &str, number: &str| {
-        let Default::Computed(words) = find(SCENE, path).expect("a key").default else {
+        let LeftOut::Computed(words) = find(SCENE, path).expect("a key").default else {
             panic!("{path}");
         };
         assert!(words().contains(number), "{path}: {} for {number}", words());

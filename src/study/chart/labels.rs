@@ -13,17 +13,19 @@ fn overlap(a: &Area, b: &Area) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-/// Where labels may still go.
-pub(super) struct Room {
+/// Space of a chart that labels may still take.
+pub(super) struct FreeSpace {
     pub(super) within: Area,
     pub(super) taken: Vec<Area>,
 }
 
-impl Room {
-    /// The place next to a point that no point and no earlier label takes: its left end and base line.
-    pub(super) fn place(&mut self, at: [f64; 2], letters: usize) -> Option<[f64; 2]> {
+impl FreeSpace {
+    /// The place next to a point, `least` from it or farther, that no point and no earlier label takes: its left end and
+    /// base line.
+    pub(super) fn place(&mut self, at: [f64; 2], least: f64, letters: usize) -> Option<[f64; 2]> {
         let (width, height) = (LETTER[0] * letters as f64, LETTER[1]);
-        let candidates = [7.0, 15.0, 25.0].into_iter().flat_map(|r: f64| {
+        let candidates = [0.0, 8.0, 18.0].into_iter().flat_map(|more| {
+            let r = least + more;
             [
                 [r, -0.6 * r],
                 [-r - width, 0.6 * r + height],
@@ -105,12 +107,12 @@ mod tests {
 
     #[test]
     fn labels_do_not_overlap() {
-        let mut room = Room {
+        let mut room = FreeSpace {
             within: [0.0, 0.0, 200.0, 200.0],
             taken: vec![[96.0, 96.0, 104.0, 104.0]],
         };
         let placed = (0..40)
-            .filter(|_| room.place([100.0, 100.0], 3).is_some())
+            .filter(|_| room.place([100.0, 100.0], 7.0, 3).is_some())
             .count();
         assert!((6..40).contains(&placed), "{placed}");
         for (k, a) in room.taken.iter().enumerate() {

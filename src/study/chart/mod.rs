@@ -4,7 +4,7 @@ mod axis;
 mod labels;
 
 use axis::{Axis, number};
-use labels::{LETTER, Room, note_lines};
+use labels::{FreeSpace, LETTER, note_lines};
 
 use super::page::escaped;
 
@@ -37,7 +37,7 @@ pub struct Series {
 pub enum Mark {
     /// Upright, at this x.
     At(f64, String),
-    /// Level, at this y; left out where the curves are far from it.
+    /// Level, at this y; left out where the curves are far from it. What it says may be empty.
     Level(f64, String),
 }
 
@@ -74,6 +74,8 @@ const MARGIN: [f64; 3] = [70.0, 24.0, 50.0];
 const ROW: f64 = 16.0;
 /// Half the height of a bar's ends.
 const CAP: f64 = 4.5;
+/// Radius of the ring about a knee.
+const RING: f64 = 7.5;
 
 impl Series {
     /// A plain curve.
@@ -291,7 +293,7 @@ impl Chart {
             svg.circle(at, 3.0, &format!("fill=\"{colour}\""));
             if dot.is_knee {
                 let ring = format!("fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"");
-                svg.circle(at, 7.5, &ring);
+                svg.circle(at, RING, &ring);
             }
         }
     }
@@ -301,7 +303,7 @@ impl Chart {
             let ([px, py], r) = ([x.at(dot.at), y.at(value)], 4.0);
             [px - r, py - r, px + r, py + r]
         };
-        let mut room = Room {
+        let mut room = FreeSpace {
             within: [x.paper[0], y.paper[1], x.paper[1], y.paper[0]],
             taken: self.dots().map(area).collect(),
         };
@@ -309,14 +311,14 @@ impl Chart {
         labelled.sort_by_key(|(_, dot, _)| !dot.is_knee);
         for (index, dot, value) in labelled {
             let at = [x.at(dot.at), y.at(value)];
-            let (text, weight) = match dot.is_knee {
-                true => (format!("knee: {}", dot.label), " font-weight=\"bold\""),
-                false => (dot.label.clone(), ""),
+            let (text, least) = match dot.is_knee {
+                true => (format!("knee: {}", dot.label), RING + 5.0),
+                false => (dot.label.clone(), 7.0),
             };
             // A label without a free place is left to the table.
-            if let Some(place) = room.place(at, text.chars().count()) {
+            if let Some(place) = room.place(at, least, text.chars().count()) {
                 let fill = COLOURS[index % COLOURS.len()];
-                let more = format!("font-size=\"10\" fill=\"{fill}\"{weight}");
+                let more = format!("font-size=\"10\" fill=\"{fill}\"");
                 svg.text(place, &more, &text);
             }
         }

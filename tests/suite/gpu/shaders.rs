@@ -229,7 +229,7 @@ fn composition_faults_name_their_place() {
 }
 
 /// Rooms that each room may import; `stage`, `experiment` and `cli` stand above them all.
-const MAY_IMPORT: [(&str, &[&str]); 12] = [
+const MAY_IMPORT: [(&str, &[&str]); 13] = [
     ("domain", &[]),
     ("gpu", &[]),
     ("scene", &["domain"]),
@@ -240,8 +240,13 @@ const MAY_IMPORT: [(&str, &[&str]); 12] = [
     ("compare", &["domain"]),
     ("study", &["domain", "compare"]),
     (
+        "check",
+        &["domain", "gpu", "scene", "solve", "reference", "compare"],
+    ),
+    (
         "stage",
         &[
+            "check",
             "domain",
             "gpu",
             "scene",
@@ -251,6 +256,7 @@ const MAY_IMPORT: [(&str, &[&str]); 12] = [
             "render",
             "compare",
             "study",
+            "check",
         ],
     ),
     (
@@ -371,24 +377,29 @@ fn rooms_import_what_they_may() {
         1
     );
     assert_eq!(breaches("scene", "use wgpu::Device;").len(), 1);
+    assert_eq!(breaches("check", "use crate::stage::prepare;").len(), 1);
+    assert_eq!(breaches("solve", "use crate::check::Table;").len(), 1);
     assert_eq!(
         breaches("scene", "use crate::gpu::program::PassSpec;").len(),
         1
     );
     assert!(breaches("solve", "use crate::{domain::mesh, gpu::adapter};\n").is_empty());
+    let both = "use crate::{reference::pbf, solve::pbf};\n";
+    assert!(breaches("check", both).is_empty());
+    assert_eq!(breaches("compare", both).len(), 2);
+    assert_eq!(breaches("render", "use crate::check::Table;").len(), 1);
 }
 
 /// Files of an effect's own: its settings, its passes, its f64 twins, and what holds the two against each other.
-const EFFECT_FILES: [&str; 6] = [
+const EFFECT_FILES: [&str; 5] = [
     "scene/effects",
     "solve/effects",
+    "check/effects",
     "reference/pbf/effects",
-    "stage/check/pbf/effects",
     "reference/flip/effects",
-    "stage/check/flip/effects",
 ];
 
-/// Lines that name an effect outside its own files, comments and tests aside.
+/// Lines that name an effect outside its own files; comments, tests and what a key says in words aside.
 fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
     let own = EFFECT_FILES.map(|folder| format!("{folder}/{effect}.rs"));
     files
@@ -397,7 +408,9 @@ fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
         .flat_map(|(file, text)| {
             let code = text.split("#[cfg(test)]").next().unwrap_or("");
             code.lines()
-                .filter(|line| !line.trim_start().starts_with("//") && line.contains(effect))
+                .map(str::trim_start)
+                .filter(|line| !line.starts_with("//") && !line.starts_with(".about("))
+                .filter(|line| line.contains(effect))
                 .map(move |line| format!("{file}: {line}"))
         })
         .collect()
