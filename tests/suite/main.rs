@@ -61,7 +61,6 @@ mod scene {
     mod edits;
     mod faults;
     mod fuzz_inputs;
-    mod imports;
     mod untrusted;
 }
 mod solve {
