@@ -97,7 +97,7 @@ impl Measured {
             self.missed += projection.missed;
             self.work += (report.iterations + projection.correction_iterations) as f64;
         }
-        let is_sampled = || step.frame % (point.frames / SAMPLES) == 0;
+        let is_sampled = || step.frame.is_multiple_of(point.frames / SAMPLES);
         if let Some(gauge) = gauge.filter(|_| is_sampled()) {
             self.samples
                 .push(sample(&point.scene, gauge, &step.particles));
