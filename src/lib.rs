@@ -11,6 +11,7 @@
 //! - [`gpu`]: adapter, shader composition, passes recorded as data, scan and sort.
 //! - [`solve`]: the particle solvers on the GPU.
 //! - [`mod@reference`]: the same solvers on the CPU, in f64: what the GPU is held against.
+//! - [`check`]: a substep on the GPU against the same one in f64, pass by pass.
 //! - [`cache`]: frames, ledger, manifest on disk.
 //! - [`render`]: screen-space fluid rendering.
 //! - [`compare`]: by how much two sets of values, two caches or two pictures differ.
@@ -23,6 +24,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod cache;
+pub mod check;
 pub mod cli;
 pub mod compare;
 pub mod domain;

@@ -14,7 +14,7 @@ use swell::{
     gpu::adapter::Context,
     reference::flip::Flip as Reference,
     scene::Scene,
-    solve::{flip::Flip, pbf::device_limits},
+    solve::{flip::Flip, plan::device_limits},
     stage::prepare::Start,
 };
 

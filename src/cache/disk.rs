@@ -78,12 +78,24 @@ pub(super) fn create_directory(dir: &Path) -> Result<(), CacheError> {
     sync_parent(dir)
 }
 
+/// The writer's lock, held until it is dropped.
+#[derive(Debug)]
+pub(super) struct Lock(File);
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // Closing the file is not enough: a process that another thread just starts has a copy of it until it runs its
+        // own program, and would hold the lock for that moment.
+        let _ = self.0.unlock();
+    }
+}
+
 /// Takes the writer's lock. The file stays behind when the lock goes: removing it would let two
 /// writers hold locks on two files of one name.
 ///
 /// # Errors
 /// [`CacheError::Locked`], `Io`.
-pub(super) fn lock(dir: &Path) -> Result<File, CacheError> {
+pub(super) fn lock(dir: &Path) -> Result<Lock, CacheError> {
     let path = dir.join(LOCK);
     let mut file = File::options()
         .read(true)
@@ -103,7 +115,7 @@ pub(super) fn lock(dir: &Path) -> Result<File, CacheError> {
     if file.metadata().at(&path)?.len() == 0 {
         file.write_all(LOCK_TEXT).at(&path)?;
     }
-    Ok(file)
+    Ok(Lock(file))
 }
 
 /// Whether `dir` has a lock file of ours. An empty one counts: a kill may fall between its creation
@@ -247,6 +259,18 @@ mod tests {
         fs::write(d.join("a"), "1").unwrap();
         fs::create_dir(d.join("empty")).unwrap();
         assert_ne!(hash(), first);
+    }
+
+    /// As a process has it that another thread is starting.
+    #[test]
+    fn a_copy_of_the_lock_file_does_not_keep_the_lock() {
+        let dir = tempfile::tempdir().unwrap();
+        let held = lock(dir.path()).unwrap();
+        let copy = held.0.try_clone().unwrap();
+        assert!(matches!(lock(dir.path()), Err(CacheError::Locked { .. })));
+        drop(held);
+        lock(dir.path()).unwrap();
+        drop(copy);
     }
 
     #[test]

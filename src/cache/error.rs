@@ -3,16 +3,16 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What goes wrong with a cache. All but [`CacheError::Io`] mean that the cache is damaged or not the
+/// Errors of a cache. All but [`CacheError::Io`] mean that the cache is damaged or not the
 /// one that was meant.
 #[derive(Debug, thiserror::Error)]
 pub enum CacheError {
     /// The operating system refused.
     #[error("{}", path.display())]
     Io {
-        /// What was touched.
+        /// The file or folder.
         path: PathBuf,
-        /// Its words.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// No manifest.
@@ -57,9 +57,9 @@ pub enum CacheError {
         dir: PathBuf,
         /// Manifest field.
         field: String,
-        /// In the manifest.
+        /// Value in the manifest.
         cached: String,
-        /// In this run.
+        /// Value in this run.
         given: String,
     },
     /// Frames that stand there were not looked at by the probes that this run has.
@@ -71,9 +71,9 @@ pub enum CacheError {
     OtherProbes {
         /// The directory.
         dir: PathBuf,
-        /// In the manifest.
+        /// Value in the manifest.
         cached: String,
-        /// In this run.
+        /// Value in this run.
         given: String,
     },
     /// Frames that stand there follow from another frame than the one that this run is to begin from.
@@ -81,9 +81,9 @@ pub enum CacheError {
     OtherParent {
         /// The directory.
         dir: PathBuf,
-        /// In the manifest.
+        /// Value in the manifest.
         cached: String,
-        /// In this run.
+        /// Value in this run.
         given: String,
     },
     /// Written in a format that this program does not read.
@@ -107,7 +107,7 @@ pub enum CacheError {
     Damaged {
         /// The file.
         file: PathBuf,
-        /// What is off.
+        /// The fault.
         what: String,
     },
     /// A frame was asked for that was not baked.
@@ -122,7 +122,7 @@ pub enum CacheError {
         /// Last one there.
         last: u32,
     },
-    /// What a writer was given cannot stand in a cache: a bug of the caller.
+    /// A value that cannot be written to a cache: a bug of the caller.
     #[error("cannot be cached: {0}")]
     Unfit(String),
     /// The writer failed before and said so then.

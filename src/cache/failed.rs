@@ -35,7 +35,7 @@ pub struct Failed {
     pub start: Particles,
     /// The last good frame.
     pub last_frame: u32,
-    /// What was seen, for a machine: an object. On the disk it has `files` and `blake3` as well.
+    /// Report of the breach, for a machine: an object. On the disk it has `files` and `blake3` as well.
     pub report: Value,
 }
 
@@ -71,7 +71,7 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
     file(REPORT, text(fields).as_bytes())
 }
 
-/// As it stands in the file, in the order of the names.
+/// Text of the file, fields in the order of their names.
 fn text(fields: &Map<String, Value>) -> String {
     format!("{:#}\n", Value::Object(fields.clone()))
 }

@@ -18,7 +18,7 @@ use ply_rs_bw::ply::{
 use super::error::CacheError;
 use crate::domain::particles::Particles;
 
-/// What stands in every row, in this order, before the attributes; the first three are the position.
+/// Columns of every row, in this order, before the attributes; the first three are the position.
 const FIXED: [(&str, ScalarType); 7] = [
     ("x", ScalarType::Float),
     ("y", ScalarType::Float),
@@ -38,12 +38,12 @@ const ROWS_AT_ONCE: usize = 16_384;
 /// A header of ours has a few hundred bytes; a file without line ends is not read as one line.
 const HEADER_LIMIT: usize = 1 << 16;
 
-/// What a frame file says of itself in comments.
+/// Description of a frame file, written into it as comments.
 #[derive(Clone, Copy, Debug)]
 pub struct Stamp<'a> {
     /// `swell`.
     pub program: &'a str,
-    /// Its version.
+    /// Version of the program.
     pub program_version: &'a str,
     /// Shot name.
     pub shot: &'a str,
@@ -51,7 +51,7 @@ pub struct Stamp<'a> {
     pub frame: u32,
     /// Simulated, seconds.
     pub time: f64,
-    /// What is added to the particles' positions for the world's, metres. Reading takes it off again, and gives the same
+    /// Offset from the particles' positions to the world's, metres. Reading takes it off again, and gives the same
     /// bits as long as the sum is finer than the positions (see `scene::Scene::origin`).
     pub origin: DVec3,
 }
@@ -61,7 +61,7 @@ pub struct Stamp<'a> {
 pub struct Written {
     /// Length.
     pub bytes: u64,
-    /// Of the bytes.
+    /// BLAKE3 of the bytes.
     pub hash: blake3::Hash,
 }
 

@@ -15,13 +15,13 @@ use super::probes::ProbeValues;
 use super::record::FileRecord;
 use super::stream::{self, STREAMS, Stream};
 
-/// Its file.
+/// File name of the ledger.
 pub(super) const FILE: &str = "frames.jsonl";
 /// Stands between a line's contents and the 64 digits of its chained hash.
 const CHAIN_KEY: &[u8] = b",\"chain\":\"";
 const CHAIN_LEN: usize = CHAIN_KEY.len() + 64 + 2;
 
-/// Where a bake stands after a frame.
+/// Time and step counts of a bake after a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clock {
@@ -29,7 +29,7 @@ pub struct Clock {
     pub frame: u32,
     /// Simulated, seconds.
     pub time: f64,
-    /// In this frame.
+    /// Substeps in this frame.
     pub substeps: u32,
     /// Substeps since the start.
     pub steps: u64,
@@ -47,11 +47,11 @@ pub type Rows = BTreeMap<String, ProbeValues>;
 pub struct Entry {
     /// 0 is the start.
     pub frame: u32,
-    /// In the file of the particles.
+    /// Number of particles in the frame's file.
     pub particles: u64,
-    /// Of each stream with a file a frame that the manifest announces, and so of the particles at least.
+    /// Files of each stream with a file a frame that the manifest announces, and so of the particles at least.
     pub files: Files,
-    /// Of each stream with a row a frame that the manifest announces; absent where there is none.
+    /// Rows of each stream with a row a frame that the manifest announces; absent where there is none.
     #[serde(default)]
     pub rows: Rows,
     /// BLAKE3 of `manifest.json`, hex; the first frame alone has it, so that a changed manifest is told from a
@@ -60,7 +60,7 @@ pub struct Entry {
     pub manifest: Option<String>,
     /// After this frame.
     pub clock: Clock,
-    /// What the solver says of the frame. Nothing in it may differ between two bakes of one scene, so
+    /// The solver's report of the frame. Nothing in it may differ between two bakes of one scene, so
     /// no seconds.
     pub report: Value,
     /// BLAKE3 of the previous line's chained hash and this line's contents, hex; the manifest's hash
@@ -231,9 +231,9 @@ fn chained(previous: &Hash, contents: &[u8]) -> Hash {
 /// The ledger as found: whole lines, each checked.
 #[derive(Debug)]
 pub(super) struct Ledger {
-    /// In order, the start first; never empty.
+    /// Entries in order, the start first; never empty.
     pub(super) entries: Vec<Entry>,
-    /// Of the last whole line.
+    /// Chained hash of the last whole line.
     pub(super) chain: Hash,
     /// Length of the whole lines.
     pub(super) whole_bytes: u64,

@@ -13,7 +13,7 @@ use super::grids::GridRecord;
 use super::probes::ProbeRecord;
 use super::record::{FileRecord, is_file_stem, is_relative};
 
-/// Its file.
+/// File name of the manifest.
 pub(super) const FILE: &str = "manifest.json";
 /// The scene as baked.
 pub(super) const SCENE: &str = "scene.toml";
@@ -33,7 +33,7 @@ pub struct Manifest {
     pub format_version: u32,
     /// `swell`.
     pub program: String,
-    /// Its version.
+    /// Version of the program.
     pub program_version: String,
     /// BLAKE3 of the shaders that were read from a folder, hex; absent where they were the program's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -62,16 +62,16 @@ pub struct Manifest {
     /// Names of what each particle carries beside position, velocity and id; sorted by
     /// [`CacheWriter::create`](super::CacheWriter::create).
     pub attributes: Vec<String>,
-    /// What each frame has beside its particles; absent where the scene asks for no grids.
+    /// Grids of each frame; absent where the scene asks for no grids.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grids: Option<GridRecord>,
-    /// What is measured at each frame; absent where the scene has no probe.
+    /// Probes, which measure each frame; absent where the scene has no probe.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub probes: Vec<ProbeRecord>,
     /// The frame of another cache that this bake began from; absent where it began from its scene's start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<Parent>,
-    /// What its user was told of the scene before the bake, a sentence each; absent where there was nothing.
+    /// Warnings about the scene that were shown before the bake; absent where there were none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
     /// Particles at the start; filled in by `create`.
@@ -87,7 +87,7 @@ pub struct Manifest {
 pub struct Parent {
     /// Shot of that cache.
     pub shot: String,
-    /// Its solver.
+    /// Solver of that cache.
     pub solver: String,
     /// Hash of its physics, hex.
     pub scene_hash: String,
@@ -112,7 +112,7 @@ fn is_zero(origin: &[f64; 3]) -> bool {
     *origin == [0.0; 3]
 }
 
-/// What a resumed bake must have in common with the cache, the most telling first. The scene's hash
+/// Fields that a resumed bake must have in common with the cache, the most telling first. The scene's hash
 /// comes last: it differs where any of the fields above it that a scene sets does.
 const COMPARED: [&str; 15] = [
     "format_version",
@@ -144,7 +144,7 @@ impl Manifest {
         self.parent.as_ref().map_or(0, |parent| parent.frame)
     }
 
-    /// What the frame of this number says of itself, at `time` seconds.
+    /// Description for the file of this frame, at `time` seconds.
     pub(super) fn stamp(&self, frame: u32, time: f64) -> Stamp<'_> {
         Stamp {
             program: &self.program,
@@ -206,7 +206,7 @@ impl Manifest {
         self.files.iter().try_for_each(|record| record.check(dir))
     }
 
-    /// What is written must be read back, and no name may lead out of the cache.
+    /// Refuses what could not be read back, and names that lead out of the cache.
     pub(super) fn check(&self) -> Result<(), String> {
         if !is_file_stem(&self.shot) {
             return Err(format!("shot name `{}` is no file name", self.shot));

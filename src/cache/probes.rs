@@ -8,13 +8,13 @@ use super::record::is_file_stem;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeRecord {
-    /// Of its file, without ending.
+    /// Name of its file, without the ending.
     pub name: String,
     /// `elevation`, `pressure`, `energy` or `volume`.
     pub kind: String,
     /// World coordinates that it looks at, metres.
     pub at: Vec<f64>,
-    /// Of a row, behind frame and time; each ends with its unit.
+    /// Columns of a row, after frame and time; each name ends with its unit.
     pub columns: Vec<String>,
 }
 

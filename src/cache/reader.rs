@@ -27,16 +27,16 @@ pub struct CacheReader {
     ledger: Ledger,
 }
 
-/// What is off in one file.
+/// A fault in one file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// The file.
     pub file: PathBuf,
-    /// What is off.
+    /// The fault.
     pub what: String,
 }
 
-/// What a look at every checksum found.
+/// Result of checking every checksum.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VerifyReport {
     /// Baked frames in the ledger; the start is not counted.
@@ -45,7 +45,7 @@ pub struct VerifyReport {
     pub bytes: u64,
     /// Whether the cache has `failed/`, and all of it is sound.
     pub failed: bool,
-    /// In the order of the files; empty for a sound cache.
+    /// Faults in the order of the files; empty for a sound cache.
     pub problems: Vec<Problem>,
 }
 
@@ -92,7 +92,7 @@ impl CacheReader {
         Ok(reader)
     }
 
-    /// As [`Self::open`], the assets unseen.
+    /// [`Self::open`] without looking at the assets.
     fn open_without_assets(dir: &Path) -> Result<Self, CacheError> {
         let (manifest, seed) = Manifest::read(dir)?;
         let ledger = Ledger::read(dir, &manifest, &seed)?;
@@ -112,7 +112,7 @@ impl CacheReader {
         &self.dir
     }
 
-    /// What was baked, by what, on what.
+    /// The manifest: scene, program and device of the bake.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
@@ -319,7 +319,7 @@ impl CacheReader {
 }
 
 impl Problem {
-    /// What went wrong with a file; `file` where the error names none.
+    /// Builds the fault of a file from an error; `file` where the error names none.
     fn of(error: CacheError, file: &Path) -> Self {
         let (file, what) = match error {
             CacheError::Damaged { file, what } => (file, what),

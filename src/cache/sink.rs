@@ -20,7 +20,7 @@ use super::stream::{self, Layout, Stream};
 use super::tables;
 use crate::domain::particles::Particles;
 
-/// What one writer did.
+/// Counts of what one writer did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// Frames written by this writer.
@@ -41,7 +41,7 @@ pub(super) struct Sink {
     pub(super) manifest: Manifest,
     /// The manifest's hash.
     pub(super) seed: Hash,
-    /// Of the last line.
+    /// Chained hash of the last line.
     pub(super) chain: Hash,
     pub(super) ledger_bytes: u64,
 }

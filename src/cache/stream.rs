@@ -53,23 +53,23 @@ pub static STREAMS: [Stream; 3] = [
 /// One kind of file that a cache keeps of its frames.
 #[derive(Debug)]
 pub struct Stream {
-    /// In the ledger, and where a difference is told.
+    /// Name in the ledger and in reported differences.
     pub name: &'static str,
     /// Folder of its files, in the cache's.
     pub folder: &'static str,
     /// Ending of its files, without the dot.
     pub extension: &'static str,
-    /// What it holds.
+    /// Kind of its content.
     pub content: Content,
     /// How its files grow with the bake.
     pub(super) layout: Layout,
-    /// What a part of it is called before its name, where a difference is told.
+    /// Word before a part's name in reported differences.
     pub part: &'static str,
     /// Names of the parts that a bake with this manifest has of it; nothing where the bake has no such stream.
     parts: fn(&Manifest) -> Vec<&str>,
 }
 
-/// What a stream holds, and so by what two of them are compared.
+/// Kind of a stream's content, which decides how two of them are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// Particles, compared field by field and matched by their ids.
@@ -94,11 +94,6 @@ pub(super) enum Layout {
 }
 
 impl Stream {
-    /// The line of [`STREAMS`] with this name.
-    pub fn of(name: &str) -> Option<&'static Self> {
-        STREAMS.iter().find(|stream| stream.name == name)
-    }
-
     /// The streams of a bake with this manifest.
     pub fn all(manifest: &Manifest) -> impl Iterator<Item = &'static Self> {
         STREAMS.iter().filter(|stream| stream.is_in(manifest))
@@ -114,7 +109,7 @@ impl Stream {
         matches!(self.layout, Layout::FileAFrame(_))
     }
 
-    /// What `manifest` has of it and `other` has not: `grids`, `grid vel`, `probe gauge`.
+    /// Parts that `manifest` has and `other` does not: `grids`, `grid vel`, `probe gauge`.
     pub fn lone(&self, manifest: &Manifest, other: &Manifest) -> Vec<String> {
         if self.is_by_frame() && self.is_in(manifest) && !self.is_in(other) {
             return vec![self.name.to_owned()];
@@ -135,7 +130,7 @@ impl Stream {
         format!("{}/{table}.{}", self.folder, self.extension)
     }
 
-    /// Its tables, of a bake with this manifest; none of a stream with a file a frame.
+    /// Tables of a bake with this manifest; none of a stream with a file a frame.
     pub fn tables<'a>(&self, manifest: &'a Manifest) -> &'a [ProbeRecord] {
         match self.layout {
             Layout::FileAFrame(_) => &[],
@@ -171,13 +166,6 @@ mod tests {
         let names: BTreeSet<_> = STREAMS.iter().map(|stream| stream.name).collect();
         let folders: BTreeSet<_> = STREAMS.iter().map(|stream| stream.folder).collect();
         assert_eq!((names.len(), folders.len()), (STREAMS.len(), STREAMS.len()));
-        for stream in &STREAMS {
-            assert_eq!(
-                Stream::of(stream.name).map(|s| s.folder),
-                Some(stream.folder)
-            );
-        }
-        assert!(Stream::of("whitewater").is_none());
     }
 
     /// `diff` compares one stream of particles, with the tolerance's fields and the aggregates; a second one needs a place of its own there.

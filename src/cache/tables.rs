@@ -39,7 +39,7 @@ impl Table<'_> {
         dir.join(self.stream.table_file(&self.record.name))
     }
 
-    /// What the file holds after these frames.
+    /// Text of the file after these frames.
     fn text(&self, entries: &[Entry]) -> String {
         let header = format!("frame,time_s,{}\n", self.record.columns.join(","));
         let rows = entries
@@ -63,7 +63,7 @@ impl Table<'_> {
         row + "\n"
     }
 
-    /// What is off in the file, against the ledger.
+    /// Fault of the file, against the ledger.
     fn problem(&self, dir: &Path, entries: &[Entry]) -> Option<String> {
         let found = match std::fs::read(self.path(dir)) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {

@@ -28,7 +28,7 @@ const DEPTH: usize = 2;
 pub struct Asset {
     /// Path below `assets/`, with `/`.
     pub name: String,
-    /// Its content.
+    /// Content of the file.
     pub bytes: Vec<u8>,
 }
 
@@ -42,7 +42,7 @@ pub struct CacheWriter {
     sender: Option<SyncSender<Job>>,
     thread: Option<JoinHandle<Result<Summary, CacheError>>>,
     /// Held until the thread has ended: fields are dropped after `Drop::drop`.
-    _lock: File,
+    _lock: disk::Lock,
 }
 
 impl CacheWriter {
@@ -162,7 +162,7 @@ impl CacheWriter {
         sink: Sink,
         manifest: Manifest,
         last_frame: u32,
-        lock: File,
+        lock: disk::Lock,
     ) -> Result<Self, CacheError> {
         let (sender, jobs) = sync_channel(DEPTH);
         let dir = sink.dir.clone();

@@ -295,7 +295,7 @@ fn verdict(outcome: &Outcome) -> String {
                 .find(|row| row.field.pass == pass && row.field.name == field);
             let why = row.map_or_else(String::new, |row| {
                 let [error, tolerance] = [row.worst.error, row.worst.tolerance].map(short);
-                let derivation = row.field.derivation;
+                let derivation = &row.field.derivation;
                 format!("; off by {error} where {tolerance} is allowed: {derivation}")
             });
             format!(

@@ -5,6 +5,7 @@ mod check;
 mod diff;
 mod inspect;
 pub mod interrupt;
+mod keys;
 mod output;
 mod progress;
 mod render;
@@ -55,6 +56,8 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Compare two caches, a cache and a baseline, or two renders: where they part, and by how much.
     Diff(diff::DiffArgs),
+    /// Print the keys of scenes, looks, studies and tolerance files, with what each allows and its default.
+    Keys(keys::KeysArgs),
     /// Check every checksum of a cache.
     Verify(verify::VerifyArgs),
 }
@@ -133,6 +136,10 @@ fn run(command: Command) -> u8 {
         Command::Check(args) => check::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Diff(args) => diff::run(&args),
+        Command::Keys(args) => {
+            keys::run(&args);
+            Ok(0)
+        }
         Command::Verify(args) => verify::run(&args).map(|()| 0).map_err(Failure::from),
     };
     result.unwrap_or_else(|failure| {

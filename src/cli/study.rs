@@ -11,7 +11,7 @@ use crate::{
 };
 
 use super::{
-    Failure, OUT_OF_TOLERANCE, bake,
+    Failure, GpuArgs, OUT_OF_TOLERANCE, bake,
     interrupt::{self, Interrupt},
     output,
     progress::{Mode, Progress},
@@ -22,12 +22,11 @@ use super::{
 pub(super) struct StudyArgs {
     /// Study file (TOML).
     study: PathBuf,
-    /// Where caches, pictures, table and page go; studies/NAME where left out. What stands there is gone on with.
+    /// Where caches, pictures, table and page go; studies/NAME where left out. Existing results are resumed.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
-    #[arg(long, value_name = "NAME")]
-    adapter: Option<String>,
+    #[command(flatten)]
+    gpu: GpuArgs,
     /// Take meshes, tables and panoramas that lie outside of the folders of the scene and the look.
     #[arg(long)]
     allow_outside: bool,
@@ -49,7 +48,7 @@ pub(super) fn run(args: &StudyArgs) -> Result<u8, Failure> {
             directory.display()
         ),
         directory,
-        adapter: args.adapter.clone(),
+        gpu: args.gpu.read()?,
     };
     let interrupt = Interrupt::install_or_warn();
     let say = |text: &str, event| Progress::new(args.progress.lines(), 0).say(text, event);

@@ -81,14 +81,14 @@ pub enum Basis {
 pub struct BaselineFault {
     /// Output frame.
     pub frame: u32,
-    /// What is off.
+    /// The fault.
     pub fault: Fault,
 }
 
-/// What differs between a cache and a baseline.
+/// Differences between a cache and a baseline.
 #[derive(Clone, Debug, Serialize)]
 pub struct BaselineDiff {
-    /// What baked the cache, and on what.
+    /// Program and device that baked the cache.
     pub bake: String,
     /// Whether the baseline knows the cache's adapter, so that hashes decide as well.
     pub basis: Basis,
@@ -102,9 +102,9 @@ pub struct BaselineDiff {
     pub physics: Option<String>,
     /// Frames that the cache has not, of those that were asked for.
     pub only_baseline: Vec<u32>,
-    /// What was compared.
+    /// Frames that were compared.
     pub frames: Vec<FramePair>,
-    /// In the order of the frames.
+    /// Faults in the order of the frames.
     pub faults: Vec<BaselineFault>,
 }
 
@@ -113,9 +113,9 @@ pub struct BaselineDiff {
 pub struct FramePair {
     /// Output frame.
     pub frame: u32,
-    /// Of the cache and of the baseline.
+    /// Aggregates of the cache and of the baseline.
     pub aggregates: [Aggregates; 2],
-    /// What they may differ by, by name.
+    /// Limits of their differences, by name.
     pub limits: BTreeMap<String, Limit>,
 }
 
@@ -151,7 +151,7 @@ fn update(hasher: &mut blake3::Hasher, values: impl Iterator<Item = [u8; 4]>) {
     hasher.update(&bytes);
 }
 
-/// What a baseline that is written anew no longer has of the one before.
+/// Parts of the former baseline that a new one no longer has.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Lost {
     /// Adapters whose hashes were of another scene or of other frames.

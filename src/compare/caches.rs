@@ -4,10 +4,10 @@ use serde::Serialize;
 
 use super::{frames::FrameDiff, streams::StreamDiff};
 
-/// What differs between two caches.
+/// Differences between two caches.
 #[derive(Clone, Debug, Serialize)]
 pub struct CacheDiff {
-    /// What baked each, and on what.
+    /// Program and device that baked each.
     pub bakes: [String; 2],
     /// The first key of the scenes that differs, with b's value and then a's.
     pub physics: Option<String>,
@@ -21,7 +21,7 @@ pub struct CacheDiff {
     pub streams_only_a: Vec<String>,
     /// Streams that b alone has.
     pub streams_only_b: Vec<String>,
-    /// What differs beside the particles, by frame.
+    /// Differences in streams beside the particles, by frame.
     pub streams: Vec<StreamDiff>,
     /// Whether those count: without a tolerance they do, and with one nothing in it names them.
     pub streams_judged: bool,

@@ -43,6 +43,16 @@ impl Value for [f64; 3] {
     }
 }
 
+impl Value for glam::DVec3 {
+    fn norm(self) -> f64 {
+        self.length()
+    }
+
+    fn error(self, reference: Self) -> f64 {
+        finite_or_worst(self.distance(reference))
+    }
+}
+
 impl Value for [f32; 3] {
     fn norm(self) -> f64 {
         self.map(f64::from).norm()

@@ -12,7 +12,7 @@ use crate::domain::{
     tolerance::{FieldLimits, Limit, Tolerance},
 };
 
-/// What differs between two frames, and what of it is out of tolerance.
+/// Differences between two frames, and which are out of tolerance.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameDiff {
     /// Output frame.
@@ -25,9 +25,9 @@ pub struct FrameDiff {
     pub only_b: Missing,
     /// Position, velocity, and the attributes that both have.
     pub fields: Vec<FieldDiff>,
-    /// Of a and of b.
+    /// Aggregates of a and of b.
     pub aggregates: [Aggregates; 2],
-    /// In the order of the fields, then of the aggregates.
+    /// Faults in the order of the fields, then of the aggregates.
     pub faults: Vec<Fault>,
 }
 
@@ -45,7 +45,7 @@ pub struct Missing {
 pub struct FieldDiff {
     /// `position`, `velocity`, or an attribute's name.
     pub field: String,
-    /// In the field's unit.
+    /// Error in the field's unit.
     pub deviation: Deviation,
     /// The first particle, by id, of which not all bits are the same.
     pub first_different: Option<Parting>,
@@ -53,14 +53,14 @@ pub struct FieldDiff {
     pub worst: Option<Parting>,
 }
 
-/// Where two frames part.
+/// A particle in which two frames differ, with its values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Parting {
     /// Particle id.
     pub particle: u32,
-    /// Its value in a.
+    /// Value in a.
     pub a: Vec<f32>,
-    /// Its value in b.
+    /// Value in b.
     pub b: Vec<f32>,
 }
 
@@ -71,9 +71,9 @@ pub struct Fault {
     pub what: String,
     /// `bits`, `max`, `rms`, `p99`, or `difference` of an aggregate.
     pub measure: &'static str,
-    /// As found.
+    /// The value found.
     pub value: f64,
-    /// As allowed.
+    /// The value allowed.
     pub limit: f64,
     /// The first particle, by id, that is out; the worst one of rms and p99. None of an aggregate.
     pub parting: Option<Parting>,
@@ -174,7 +174,7 @@ struct Matches {
     only_b: Missing,
 }
 
-/// Of two ascending lists of ids.
+/// Matches two ascending lists of ids.
 fn matches(a: &[u32], b: &[u32]) -> Matches {
     let mut found = Matches {
         pairs: Vec::with_capacity(a.len().min(b.len())),
@@ -342,13 +342,13 @@ impl<const N: usize> Field<N> {
 pub struct AggregatePeak {
     /// One of [`Aggregates::NAMES`].
     pub name: &'static str,
-    /// Its unit.
+    /// Unit; empty where it has none.
     pub unit: &'static str,
     /// |a − b|, the largest of all frames; infinite where one side alone has a value.
     pub difference: f64,
-    /// The same over |b|.
+    /// Difference over |b|.
     pub relative: f64,
-    /// Where; the first frame where all are alike.
+    /// Frame of the difference; the first one where all are alike.
     pub frame: u32,
     /// Value there in a.
     pub a: Option<f64>,
@@ -356,7 +356,7 @@ pub struct AggregatePeak {
     pub b: Option<f64>,
 }
 
-/// By aggregate; empty where there is no frame.
+/// Largest difference of each aggregate; empty where there is no frame.
 pub fn aggregate_peaks(frames: &[(u32, [Aggregates; 2])]) -> Vec<AggregatePeak> {
     let names = Aggregates::NAMES.iter().enumerate();
     let peak = |(index, &(name, unit)): (usize, &(&'static str, &'static str))| {

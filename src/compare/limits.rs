@@ -72,7 +72,7 @@ pub struct StatedLimit {
     /// Multiples of the frame's spread. The three parts add up.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub spreads: f64,
-    /// In words.
+    /// The reason, in words.
     pub reason: String,
 }
 

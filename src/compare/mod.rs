@@ -5,7 +5,6 @@
 
 pub mod baseline;
 pub mod caches;
-pub mod check;
 pub mod deviation;
 pub mod frames;
 pub mod limits;
@@ -13,5 +12,6 @@ pub mod pictures;
 pub mod rounding;
 pub mod spread;
 pub mod streams;
+pub mod tolerance;
 
 pub use deviation::{Deviation, Value};

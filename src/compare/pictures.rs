@@ -61,14 +61,14 @@ pub struct PictureFault {
     pub limit: f64,
 }
 
-/// What differs between two renders.
+/// Differences between two renders.
 #[derive(Clone, Debug, Serialize)]
 pub struct PicturesDiff {
     /// Names that a alone has.
     pub only_a: Vec<String>,
     /// Names that b alone has.
     pub only_b: Vec<String>,
-    /// By name.
+    /// Pairs by name.
     pub pairs: Vec<PairDiff>,
 }
 
@@ -81,9 +81,9 @@ pub struct PairDiff {
     pub sizes: [[usize; 2]; 2],
     /// `None` where the sizes differ.
     pub diff: Option<PictureDiff>,
-    /// What is out of tolerance.
+    /// Measures that are out of tolerance.
     pub faults: Vec<PictureFault>,
-    /// Where its difference image went; written out, bytes that are no UTF-8 become U+FFFD.
+    /// File of the difference image; written out, bytes that are no UTF-8 become U+FFFD.
     #[serde(serialize_with = "as_text")]
     pub image: Option<PathBuf>,
 }

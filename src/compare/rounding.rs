@@ -9,6 +9,8 @@
 //! - r = r² / √r²: 9 u; s = 1 − q: 11 u; s²: 22 u s + u s²; d s²/r: 22 u s + 11 u s²;
 //! - a sum of n terms: n u of the sum of their magnitudes (Higham 2002, eq. 4.4).
 
+use super::tolerance::bounds;
+
 /// Unit roundoff of f32.
 pub const U: f64 = 1.0 / (1 << 24) as f64;
 
@@ -45,53 +47,56 @@ impl Sums {
         self.s2 += weight * s * s;
     }
 
-    /// Error of Σ w p³, with a few roundings more of what is multiplied on.
+    /// [`KERNEL`] of these sums.
     pub fn kernel(&self) -> f64 {
-        U * (30.0 * self.p2 + (self.count + 6.0) * self.p3)
+        KERNEL.of([self.count, self.p2, self.p3])
     }
 
-    /// Error of |Σ w d s²/r|, likewise.
+    /// [`GRADIENT`] of these sums.
     pub fn gradient(&self) -> f64 {
-        U * (22.0 * self.s1 + (self.count + 16.0) * self.s2)
+        GRADIENT.of([self.count, self.s1, self.s2])
     }
 
-    /// Error of Σ w s⁴ for weights 1, likewise: each term 44 u s³ + 2 u s⁴, and s³, s⁴ ≤ s².
+    /// [`SQUARES`] of these sums.
     pub fn squares(&self) -> f64 {
-        U * (self.count + 50.0) * self.s2
+        SQUARES.of([self.count, self.s2])
     }
 }
 
-/// Walls as half-spaces: what f32 makes of the part of the density and of the gradient that they add.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct WallError {
+bounds! {
+    /// Error of Σ w p³.
+    pub KERNEL = [n: "neighbours", p2: "Σ w p²", p3: "Σ w p³"] U * (30.0 * p2 + (n + 6.0) * p3),
+        "with a few roundings more of what is multiplied on";
+    /// Error of |Σ w d s²/r|.
+    pub GRADIENT = [n: "neighbours", s1: "Σ w s", s2: "Σ w s²"] U * (22.0 * s1 + (n + 16.0) * s2),
+        "with a few roundings more of what is multiplied on";
+    /// Error of Σ w s⁴ for weights 1.
+    pub SQUARES = [n: "neighbours", s2: "Σ w s²"] U * (n + 50.0) * s2,
+        "each term 44 u s³ + 2 u s⁴, and s³, s⁴ ≤ s²";
+    /// Error of a place's distance from a wall over h.
+    pub WALL_PLACE = [place: "by how much f32 misplaces a wall, over h"] place + 8.0 * U,
+        "a difference and a quotient";
+    /// Error of what walls, as half-spaces, add to the relative density.
+    pub WALL_DENSITY = [faces: "walls within h", q: "" WALL_PLACE] faces * (315.0 / 256.0 * q + 16.0 * U),
+        "the fraction's slope is at most 315/256, and its polynomial adds 16 u";
+    /// Error of what walls add to its gradient times h.
+    pub WALL_GRADIENT = [faces: "walls within h", q: "" WALL_PLACE, density: "" WALL_DENSITY]
+        faces * (405.0 / 128.0 * q + 20.0 * U + 1.5 * density),
+        "the slope of the fraction's slope is at most 405/128, and its polynomial adds 16 u";
     /// Error of the relative density.
-    pub density: f64,
-    /// Error of its gradient times h.
-    pub gradient: f64,
-}
-
-impl WallError {
-    /// Builds the errors for `faces` walls within reach, when a wall's place is rounded by `place` support radii. q errs by that and 8 u;
-    /// the fraction's slope is at most 315/256, that of the slope 405/128, and each polynomial adds 16 u.
-    pub fn of(faces: usize, place: f64) -> Self {
-        let faces = faces as f64;
-        let q = place + 8.0 * U;
-        let density = faces * (315.0 / 256.0 * q + 16.0 * U);
-        Self {
-            density,
-            gradient: faces * (405.0 / 128.0 * q + 20.0 * U + 1.5 * density),
-        }
-    }
-}
-
-/// Error of λ = −max(C, 0) / (Σ|∇C|² + ε) from those of the density and of the denominator.
-pub fn lambda(lambda: f64, denominator: f64, density_error: f64, square_error: f64) -> f64 {
-    (density_error + lambda.abs() * square_error) / denominator + 8.0 * U * lambda.abs()
-}
-
-/// Error of Σ|∇C|²: |own|² of a vector that errs by `own_error`, and the neighbours' part.
-pub fn squares(own: f64, own_error: f64, neighbors_error: f64) -> f64 {
-    2.0 * own * own_error + own_error * own_error + 6.0 * U * own * own + neighbors_error
+    pub DENSITY = [scale: "the kernel's scale", sums: "" KERNEL, walls: "" WALL_DENSITY, density: "the relative density"]
+        scale * (sums + 6.0 * U) + walls + 2.0 * U * density, "";
+    /// Error of |∇C| by the particle itself.
+    pub OWN_GRADIENT = [scale: "the gradient's scale", sums: "" GRADIENT, walls: "over h " WALL_GRADIENT, own: "|∇C| by itself"]
+        scale * sums + walls + 2.0 * U * own, "";
+    /// Error of Σ|∇C|² by the neighbours.
+    pub OTHER_GRADIENTS = [scale: "the gradient's scale", squares: "" SQUARES] scale * scale * squares, "";
+    /// Error of Σ|∇C|²: |own|² of a vector, and the neighbours' part.
+    pub GRADIENT_SQUARES = [own: "|∇C| by itself", error: "" OWN_GRADIENT, others: "" OTHER_GRADIENTS]
+        2.0 * own * error + error * error + 6.0 * U * own * own + others, "";
+    /// Error of λ = −max(C, 0) / (Σ|∇C|² + ε).
+    pub LAMBDA = [lambda: "|λ|", denominator: "Σ|∇C|² + ε", density: "" DENSITY, squares: "" GRADIENT_SQUARES]
+        (density + lambda * squares) / denominator + 8.0 * U * lambda, "";
 }
 
 #[cfg(test)]
@@ -103,6 +108,13 @@ mod tests {
     fn units_are_half_the_distance_from_1_to_the_next_number() {
         assert_eq!(U, f64::from(1.0f32.next_up() - 1.0) / 2.0);
         assert_eq!(U64, (1.0f64.next_up() - 1.0) / 2.0);
+    }
+
+    /// Bounds by walls that are misplaced by h.
+    fn walls(faces: f64) -> [f64; 2] {
+        let q = WALL_PLACE.of([1.0]);
+        let density = WALL_DENSITY.of([faces, q]);
+        [density, WALL_GRADIENT.of([faces, q, density])]
     }
 
     /// A wall's place that is off by far more than U counts by the steepest slope that there is: by differences over 1e-6
@@ -117,36 +129,35 @@ mod tests {
             });
             slopes.fold(0.0, f64::max)
         };
-        let bound = WallError::of(1, 1.0);
+        let [density, gradient] = walls(1.0);
         let spiky = |q: f64| 1.5 * (1.0 - q).powi(4) * (1.0 + 4.0 * q);
         for (found, steepest) in [
-            (bound.density, steepest(&half_space_fraction)),
-            (bound.gradient - 1.5 * bound.density, steepest(&spiky)),
+            (density, steepest(&half_space_fraction)),
+            (gradient - 1.5 * density, steepest(&spiky)),
         ] {
             // No less than the slope, but for what the differences err by.
             let part = found / steepest;
             assert!((1.0 - 1e-9..1.0 + 1e-5).contains(&part), "{part}");
         }
-        let three = WallError::of(3, 1.0);
-        assert!((three.density / bound.density - 3.0).abs() < 1e-12);
+        assert!((walls(3.0)[0] / density - 3.0).abs() < 1e-12);
     }
 
     /// λ and Σ|∇C|² with their inputs off to the worst side, by far more than U: the bounds are first-order, and these
     /// 1e-4 of second order and U beside them.
     #[test]
     fn bounds_are_met_by_the_worst_inputs() {
-        let (excess, denominator) = (0.05, 700.0);
+        let (excess, denominator) = (0.05f64, 700.0);
         let value = -excess / denominator;
         let [density_error, square_error] = [1e-5 * excess, 1e-5 * denominator];
         let worst = -(excess + density_error) / (denominator - square_error);
-        let bound = lambda(value, denominator, density_error, square_error);
+        let bound = LAMBDA.of([value.abs(), denominator, density_error, square_error]);
         let part = bound / (worst - value).abs();
         // 8 u |λ| of 2e-5 |λ| are 2.4e-2 of it.
         let rounded = 8.0 * U / 2e-5;
         assert!((part - 1.0 - rounded).abs() < 1e-4, "{part}");
         let (own, error) = (3.0, 1e-3);
         let grown = (own + error) * (own + error) - own * own;
-        let part = squares(own, error, 0.5 * grown) / (1.5 * grown);
+        let part = GRADIENT_SQUARES.of([own, error, 0.5 * grown]) / (1.5 * grown);
         assert!((part - 1.0).abs() < 1e-3, "{part}");
     }
 

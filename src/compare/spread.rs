@@ -122,7 +122,7 @@ pub fn tolerances(
         .collect()
 }
 
-/// To three digits, never less than it is.
+/// Rounds up to three digits.
 fn rounded_up(value: f64) -> f64 {
     if value == 0.0 {
         return 0.0;

@@ -8,7 +8,7 @@ use serde_json::Value as Json;
 use super::Value;
 use crate::domain::sparse_grid::{Leaf, SparseGrid, VOXELS};
 
-/// What differs in one stream of one frame.
+/// Differences in one stream of one frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StreamDiff {
     /// Output frame.
@@ -17,7 +17,7 @@ pub struct StreamDiff {
     pub stream: String,
     /// Path from the caches' folders, of a and of b.
     pub files: [String; 2],
-    /// Never empty.
+    /// Differences; never empty.
     pub differences: Vec<Difference>,
 }
 
@@ -29,9 +29,9 @@ pub enum Difference {
     Value {
         /// Column or key.
         key: String,
-        /// In a; null where it has none.
+        /// Value in a; null where it has none.
         a: Json,
-        /// In b.
+        /// Value in b.
         b: Json,
     },
     /// The values of a grid.

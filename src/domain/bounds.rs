@@ -39,6 +39,13 @@ impl Bounds {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
+    /// Cells of edge `edge` that cover it along each axis; one at least.
+    pub fn cells(&self, edge: f64) -> [u32; 3] {
+        (self.size() / edge)
+            .to_array()
+            .map(|cells| (cells.ceil() as u32).max(1))
+    }
+
     /// This box with each face moved outward by `margin` metres.
     pub fn grown(&self, margin: f64) -> Self {
         Self {

@@ -6,3 +6,14 @@ pub const CONTACT: f64 = 0.1;
 /// Displacement cap of a substep over the CFL displacement: what the projection speeds up beyond this is slowed
 /// and counted.
 pub const CAP: f64 = 2.0;
+
+/// Layers of faces that a velocity is carried outward where particles move by so many cells: √3 times as many
+/// along a diagonal, and what trilinear samples at both stages of the midpoint rule add.
+pub fn layers(displacement: f64) -> usize {
+    (3f64.sqrt() * displacement).ceil() as usize + 3
+}
+
+/// Cells stored along each axis: one beyond the domain's own, for its upper faces.
+pub fn stored_cells(cells: [u32; 3]) -> [u32; 3] {
+    cells.map(|n| n + 1)
+}

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Limits of a comparison; what is not named is shown and not judged.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,7 +16,8 @@ pub struct Tolerance {
 }
 
 /// Largest allowed errors of one field in any frame, in its unit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FieldLimits {
     /// Error of the worst particle.
     pub max: Option<f64>,
@@ -43,7 +44,8 @@ impl Limit {
 }
 
 /// Limits of one picture against another.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PictureLimits {
     /// Mean error over the pixels.
     pub mean: Option<f64>,

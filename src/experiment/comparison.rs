@@ -9,7 +9,11 @@ use crate::{
     domain::{frame_range::FrameRange, solver::StepReport},
     gpu::adapter::Needs,
     scene::{Scene, Solid, study::comparison::SolverComparison},
-    stage::{bake, device::Device, gauge, render},
+    stage::{
+        bake,
+        device::{Device, shaders_note},
+        gauge, render,
+    },
     study::{
         comparison::{self, Course, Finding, Impact, Row},
         measure::Gauge,
@@ -76,7 +80,7 @@ fn bake_and_render(
         frames: FrameRange::inclusive(1, last),
         resume: true,
         from: None,
-        device: Device::Gpu(request.adapter.clone().into()),
+        device: Device::Gpu(request.gpu.clone()),
         time_passes: false,
     };
     let mut tell = |event| (bench.tell)(Event::Bake(Box::new(event)));
@@ -88,7 +92,7 @@ fn bake_and_render(
         look: comparison.look.clone(),
         directory: picture_directory(request, scene),
         frames: Some(comparison.pictures.clone()),
-        gpu: request.adapter.clone().into(),
+        gpu: request.gpu.clone(),
         overwrite: false,
         time_passes: false,
     };
@@ -228,7 +232,8 @@ fn run_table(caches: &[CacheReader; 2], courses: &[Course; 2]) -> Vec<Vec<String
             format!("{} ({}, {})", m.device, m.driver, m.backend)
         }),
         ("program", |m, _| {
-            format!("{} {}", m.program, m.program_version)
+            let shaders = shaders_note(m.shaders.as_deref());
+            format!("{} {}{shaders}", m.program, m.program_version)
         }),
         ("scene's physics", |m, _| {
             m.scene_hash.chars().take(16).collect()

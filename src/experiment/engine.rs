@@ -12,10 +12,10 @@ use std::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
-    gpu::adapter::{Context, GpuError, Needs},
+    gpu::adapter::{GpuError, Needs},
     scene::{Method, Scene, physics_hash, study::RunsOn},
     stage::{
-        device::{Opened, needs},
+        device::{Gpu, Opened, needs},
         drive::{Drive, End, Step},
     },
     study::median,
@@ -62,9 +62,9 @@ pub struct Devices {
 
 impl Devices {
     /// Where the adapter has no f64 the points that ask for it fail, and the others do not.
-    pub(super) fn open(adapter: Option<&str>, needs: Option<Needs>) -> Result<Self, GpuError> {
-        let open = |needs| match Context::open_for(adapter, needs) {
-            Err(GpuError::NoF64 { .. }) => Context::open(adapter),
+    pub(super) fn open(gpu: &Gpu, needs: Option<Needs>) -> Result<Self, GpuError> {
+        let open = |needs| match gpu.open(needs) {
+            Err(GpuError::NoF64 { .. }) => gpu.open(Needs::default()),
             other => other,
         };
         let gpu = needs.map(open).transpose()?;

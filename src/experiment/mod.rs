@@ -19,7 +19,7 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use crate::{
     gpu::adapter,
     scene::study::Study,
-    stage::{bake, render},
+    stage::{bake, device::Gpu, render},
 };
 
 use engine::{Bench, Kind};
@@ -36,8 +36,8 @@ pub struct Request {
     pub study: Study,
     /// Caches, pictures, table and page go in here.
     pub directory: PathBuf,
-    /// Index or part of the name of an adapter.
-    pub adapter: Option<String>,
+    /// Adapter and shaders of what runs on a GPU.
+    pub gpu: Gpu,
     /// As typed, for the page.
     pub command: String,
 }
@@ -103,7 +103,7 @@ pub fn study(
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, StudyError> {
     // Also where no point needs it: a name that is none is not passed over.
-    if let Some(adapter) = &request.adapter {
+    if let Some(adapter) = &request.gpu.adapter {
         adapter::check_request(adapter)?;
     }
     for warning in request.study.warnings() {
@@ -116,7 +116,7 @@ pub fn study(
     };
     let mut bench = Bench {
         request,
-        devices: &Devices::open(request.adapter.as_deref(), kind.needs())?,
+        devices: &Devices::open(&request.gpu, kind.needs())?,
         stop,
         tell,
         count: kind.count(),

@@ -19,10 +19,12 @@ use super::{program::BufferSpec, reflect::Layout};
 /// Scalars of which a value is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scalar {
-    /// `f32` or `f64`.
-    Float,
+    /// `f32`.
+    F32,
+    /// `f64`.
+    F64,
     /// `u32`.
-    Uint,
+    U32,
     /// Several kinds, as in a struct, whose members [`Mirror::layout`] names.
     Mixed,
 }
@@ -34,15 +36,15 @@ pub trait Element: bytemuck::Pod {
 }
 
 impl Element for f32 {
-    const SCALAR: Scalar = Scalar::Float;
+    const SCALAR: Scalar = Scalar::F32;
 }
 
 impl Element for f64 {
-    const SCALAR: Scalar = Scalar::Float;
+    const SCALAR: Scalar = Scalar::F64;
 }
 
 impl Element for u32 {
-    const SCALAR: Scalar = Scalar::Uint;
+    const SCALAR: Scalar = Scalar::U32;
 }
 
 impl<T: Element, const N: usize> Element for [T; N]
@@ -50,6 +52,17 @@ where
     [T; N]: bytemuck::Pod,
 {
     const SCALAR: Scalar = T::SCALAR;
+}
+
+/// What a buffer holds, for comparison with the shaders' variable of its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Held {
+    /// Of a value.
+    pub bytes: u32,
+    /// What a value is made of.
+    pub scalar: Scalar,
+    /// Bytes before the first value.
+    pub head: u32,
 }
 
 /// A struct that the shaders have too, under the same name.
@@ -86,15 +99,19 @@ macro_rules! mirror {
 
 pub(crate) use mirror;
 
-mirror!(
-    /// Workgroups of an indirect dispatch; zeros make it empty.
-    Workgroups {
-        /// Along each axis.
-        count: [u32; 3],
-        /// Unused.
-        padding: u32,
-    }
-);
+/// Workgroups of an indirect dispatch, a `vec4u` of the shaders; zeros make it empty.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Workgroups {
+    /// Along each axis.
+    pub count: [u32; 3],
+    /// Unused.
+    pub padding: u32,
+}
+
+impl Element for Workgroups {
+    const SCALAR: Scalar = Scalar::U32;
+}
 
 impl From<[u32; 3]> for Workgroups {
     fn from(count: [u32; 3]) -> Self {
@@ -161,6 +178,14 @@ impl<T> Buf<T> {
         &self.name
     }
 
+    /// One of another name that holds the same.
+    pub fn renamed(&self, name: &str) -> Self {
+        Self {
+            name: Cow::Owned(name.to_owned()),
+            ..*self
+        }
+    }
+
     /// The same bytes as values of another type.
     pub fn retyped<U>(&self) -> Buf<U> {
         Buf {
@@ -179,18 +204,25 @@ impl<T> Buf<T> {
         }
     }
 
+    /// Where value `index` begins, bytes.
+    pub(super) fn place(&self, index: usize) -> u64 {
+        self.offset + (index * size_of::<T>()) as u64
+    }
+}
+
+impl<T: Element> Buf<T> {
     /// One that holds `count` values.
     pub fn sized(&self, count: usize) -> BufferSpec {
         BufferSpec {
             name: self.name.clone().into_owned(),
             bytes: self.offset + (count * size_of::<T>()) as u64,
             is_uniform: self.is_uniform,
+            element: Held {
+                bytes: size_of::<T>() as u32,
+                scalar: T::SCALAR,
+                head: self.offset as u32,
+            },
         }
-    }
-
-    /// Where value `index` begins, bytes.
-    pub(super) fn place(&self, index: usize) -> u64 {
-        self.offset + (index * size_of::<T>()) as u64
     }
 }
 
@@ -236,15 +268,6 @@ impl<T> Windows<T> {
         self.variable
     }
 
-    /// A buffer of `count` windows.
-    pub fn sized(&self, count: usize) -> BufferSpec {
-        BufferSpec {
-            name: self.name.clone().into_owned(),
-            bytes: (count * STRIDE) as u64,
-            is_uniform: true,
-        }
-    }
-
     /// Binds the variable to window `index`.
     pub fn bind(&self, index: usize) -> super::recording::Bind {
         const { assert!(size_of::<T>() <= STRIDE) };
@@ -257,6 +280,20 @@ impl<T> Windows<T> {
 }
 
 impl<T: Element> Windows<T> {
+    /// A buffer of `count` windows.
+    pub fn sized(&self, count: usize) -> BufferSpec {
+        BufferSpec {
+            name: self.name.clone().into_owned(),
+            bytes: (count * STRIDE) as u64,
+            is_uniform: true,
+            element: Held {
+                bytes: size_of::<T>() as u32,
+                scalar: T::SCALAR,
+                head: 0,
+            },
+        }
+    }
+
     /// Bytes of a buffer that holds `values`, one a window.
     pub fn bytes(values: &[T]) -> Vec<u8> {
         let mut bytes = vec![0; values.len() * STRIDE];
@@ -283,7 +320,7 @@ pub trait Wanted {
     fn spans(&self) -> Vec<(&str, u64, usize)>;
 
     /// The values from the bytes of each, in the same order.
-    fn values<'a>(bytes: &mut dyn Iterator<Item = &'a [u8]>) -> Self::Values;
+    fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values;
 }
 
 impl<T: bytemuck::Pod> Wanted for First<T> {
@@ -294,7 +331,7 @@ impl<T: bytemuck::Pod> Wanted for First<T> {
         vec![(self.buffer.name(), self.buffer.offset, bytes)]
     }
 
-    fn values<'a>(bytes: &mut dyn Iterator<Item = &'a [u8]>) -> Vec<T> {
+    fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Vec<T> {
         bytemuck::pod_collect_to_vec(bytes.next().unwrap_or_default())
     }
 }
@@ -308,7 +345,7 @@ macro_rules! wanted_tuple {
                 [$(self.$place.spans()),+].concat()
             }
 
-            fn values<'a>(bytes: &mut dyn Iterator<Item = &'a [u8]>) -> Self::Values {
+            fn values(bytes: &mut dyn Iterator<Item = &[u8]>) -> Self::Values {
                 ($($name::values(bytes),)+)
             }
         }
@@ -320,10 +357,3 @@ wanted_tuple!(A: 0, B: 1, C: 2);
 wanted_tuple!(A: 0, B: 1, C: 2, D: 3);
 wanted_tuple!(A: 0, B: 1, C: 2, D: 3, E: 4);
 wanted_tuple!(A: 0, B: 1, C: 2, D: 3, E: 4, F: 5);
-
-/// A storage buffer by its name alone.
-impl<T> From<&str> for Buf<T> {
-    fn from(name: &str) -> Self {
-        Self::named(name.to_owned())
-    }
-}

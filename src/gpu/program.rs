@@ -6,7 +6,7 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
 use super::{
     adapter::{Context, GpuError, Spoil},
-    buffer::{Buf, Element, Wanted, Windows},
+    buffer::{Buf, Element, Held, Wanted, Windows},
     raster::RasterPass,
     reflect::{Access, Binding, Reflection, Stage, reflect},
 };
@@ -20,6 +20,8 @@ pub struct BufferSpec {
     pub bytes: u64,
     /// Whether passes bind it as a uniform.
     pub is_uniform: bool,
+    /// What it holds.
+    pub element: Held,
 }
 
 /// A pass to be.
@@ -53,6 +55,7 @@ pub struct Pass {
 pub struct Program {
     /// The device.
     pub context: Context,
+    shared: Vec<(&'static str, f64)>,
     passes: BTreeMap<&'static str, Pass>,
     buffers: BTreeMap<String, Buffer>,
     pub(super) rasters: BTreeMap<&'static str, RasterPass>,
@@ -76,10 +79,7 @@ impl Program {
         check_sizes(context, buffers)?;
         let passes = passes
             .iter()
-            .map(|spec| match compile(context, spec, shared) {
-                Ok(pass) => Ok((spec.name, pass)),
-                Err(error) => Err(context.shaders.blamed(error)),
-            })
+            .map(|spec| Ok((spec.name, compile(context, spec, shared)?)))
             .collect::<Result<_, GpuError>>()?;
         let buffers = buffers
             .iter()
@@ -88,6 +88,7 @@ impl Program {
         context.check()?;
         Ok(Self {
             context: context.clone(),
+            shared: shared.to_vec(),
             passes,
             buffers,
             rasters: BTreeMap::new(),
@@ -96,15 +97,22 @@ impl Program {
         })
     }
 
-    /// Allocates those of `buffers` anew, zeroed, whose size is no longer as wanted. Recordings made before
-    /// hold the old ones.
+    /// Makes this the program of other buffers and passes: allocates, zeroed, those buffers that are new or whose size is
+    /// no longer as wanted, and compiles what passes are new. Recordings made before hold the old buffers.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`] before anything is allocated, [`GpuError::Lost`].
-    pub fn resize(&mut self, buffers: &[BufferSpec]) -> Result<(), GpuError> {
+    /// [`GpuError::TooLarge`] before anything is allocated, [`GpuError::Shader`], [`GpuError::Lost`].
+    pub fn refit(&mut self, buffers: &[BufferSpec], passes: &[PassSpec]) -> Result<(), GpuError> {
         check_sizes(&self.context, buffers)?;
+        for spec in passes {
+            if !self.passes.contains_key(spec.name) {
+                let pass = compile(&self.context, spec, &self.shared)?;
+                self.passes.insert(spec.name, pass);
+            }
+        }
         for spec in buffers {
-            if self.buffer(&spec.name).size() != allocated(spec) {
+            let size = self.buffers.get(&spec.name).map(Buffer::size);
+            if size != Some(allocated(spec)) {
                 let buffer = allocate(&self.context, spec);
                 self.buffers.insert(spec.name.clone(), buffer);
             }
@@ -336,10 +344,10 @@ pub(super) fn checked<T>(
         .push_error_scope(wgpu::ErrorFilter::Validation);
     let made = make();
     match pollster::block_on(scope.pop()) {
-        Some(error) => Err(GpuError::Shader {
+        Some(error) => Err(context.shaders.blamed(GpuError::Shader {
             name: name.to_owned(),
             message: error.to_string(),
-        }),
+        })),
         None => Ok(made),
     }
 }
@@ -350,7 +358,7 @@ pub(super) fn checked<T>(
 /// [`GpuError::Shader`]; [`GpuError::NoF64`].
 pub(super) fn shader(context: &Context, name: &str, defines: &[&str]) -> Result<Shader, GpuError> {
     let source = source(context, name, defines)?;
-    let reflection = reflect(name, &source)?;
+    let reflection = reflect(name, &source).map_err(|error| context.shaders.blamed(error))?;
     if reflection.has_f64 && !context.has_f64 {
         return Err(GpuError::NoF64 {
             adapter: context.info.name.clone(),
@@ -403,6 +411,14 @@ pub(super) fn shader(context: &Context, name: &str, defines: &[&str]) -> Result<
 }
 
 fn compile(
+    context: &Context,
+    spec: &PassSpec,
+    shared: &[(&'static str, f64)],
+) -> Result<Pass, GpuError> {
+    compile_own(context, spec, shared).map_err(|error| context.shaders.blamed(error))
+}
+
+fn compile_own(
     context: &Context,
     spec: &PassSpec,
     shared: &[(&'static str, f64)],

@@ -105,10 +105,10 @@ fn compile(context: &Context, spec: &RasterSpec) -> Result<RasterPass, GpuError>
     let has_fragment = match shader.reflection.stage {
         Stage::Raster { has_fragment } if has_fragment != spec.colours.is_empty() => has_fragment,
         stage => {
-            return Err(GpuError::Shader {
+            return Err(context.shaders.blamed(GpuError::Shader {
                 name: spec.name.to_owned(),
                 message: format!("{stage:?} does not draw {} colours", spec.colours.len()),
-            });
+            }));
         }
     };
     let targets: Vec<Option<wgpu::ColorTargetState>> = spec

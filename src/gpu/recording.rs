@@ -130,7 +130,8 @@ impl Command {
     }
 }
 
-pub(super) enum Step {
+/// A command with its bindings made on a device.
+pub(super) enum Recorded {
     Dispatch {
         pass: &'static str,
         binds: Vec<Bind>,
@@ -159,7 +160,7 @@ pub enum Moment {
 
 /// Commands with their bind groups, to be run many times.
 pub struct Recording {
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<Recorded>,
 }
 
 impl Recording {
@@ -175,7 +176,7 @@ impl Recording {
 
     /// Names of the passes that it runs, in order.
     pub fn passes(&self) -> impl Iterator<Item = &'static str> {
-        self.steps.iter().filter_map(Step::pass)
+        self.steps.iter().filter_map(Recorded::pass)
     }
 
     /// Submits all of it; returns without waiting unless `timer` measures.
@@ -221,7 +222,7 @@ impl Recording {
         mut observe: impl FnMut(Moment, &'static str, &[Bind]) -> Result<(), E>,
     ) -> Result<(), E> {
         for step in &self.steps {
-            if let Step::Dispatch { pass, binds, .. } = step {
+            if let Recorded::Dispatch { pass, binds, .. } = step {
                 observe(Moment::Before, pass, binds)?;
             }
             let mut encoder = program
@@ -231,7 +232,7 @@ impl Recording {
             encode(std::slice::from_ref(step), program, &mut encoder);
             program.context.queue.submit([encoder.finish()]);
             program.context.check()?;
-            if let Step::Dispatch { pass, binds, .. } = step {
+            if let Recorded::Dispatch { pass, binds, .. } = step {
                 observe(Moment::After, pass, binds)?;
             }
         }
@@ -239,18 +240,20 @@ impl Recording {
     }
 }
 
-pub(super) fn encode(steps: &[Step], program: &Program, encoder: &mut CommandEncoder) {
+pub(super) fn encode(steps: &[Recorded], program: &Program, encoder: &mut CommandEncoder) {
     let mut steps = steps.iter().peekable();
     while let Some(step) = steps.next() {
         match step {
-            Step::Draw(drawn) => drawn.encode(program, encoder, None),
-            Step::Clear(buffer) => encoder.clear_buffer(program.buffer(buffer), 0, None),
-            Step::ClearDepth(target) => raster::clear_depth(program, encoder, target),
-            Step::CopyTexture(copy) => raster::copy(program, encoder, copy),
-            Step::Dispatch { .. } => {
+            Recorded::Draw(drawn) => drawn.encode(program, encoder, None),
+            Recorded::Clear(buffer) => encoder.clear_buffer(program.buffer(buffer), 0, None),
+            Recorded::ClearDepth(target) => raster::clear_depth(program, encoder, target),
+            Recorded::CopyTexture(copy) => raster::copy(program, encoder, copy),
+            Recorded::Dispatch { .. } => {
                 let mut pass = encoder.begin_compute_pass(&Default::default());
                 dispatch(program, &mut pass, step);
-                while let Some(next) = steps.next_if(|next| matches!(next, Step::Dispatch { .. })) {
+                while let Some(next) =
+                    steps.next_if(|next| matches!(next, Recorded::Dispatch { .. }))
+                {
                     dispatch(program, &mut pass, next);
                 }
             }
@@ -258,7 +261,7 @@ pub(super) fn encode(steps: &[Step], program: &Program, encoder: &mut CommandEnc
     }
 }
 
-impl Step {
+impl Recorded {
     pub(super) fn pass(&self) -> Option<&'static str> {
         match self {
             Self::Dispatch { pass, .. } => Some(pass),
@@ -268,12 +271,12 @@ impl Step {
     }
 }
 
-fn record(program: &Program, command: &Command) -> Option<Step> {
+fn record(program: &Program, command: &Command) -> Option<Recorded> {
     match command {
-        Command::Draw(draw) => Some(Step::Draw(Drawn::new(program, draw))),
-        Command::Clear(buffer) => Some(Step::Clear(buffer.clone())),
-        Command::ClearDepth(target) => Some(Step::ClearDepth(target.clone())),
-        Command::CopyTexture(copy) => Some(Step::CopyTexture(copy.clone())),
+        Command::Draw(draw) => Some(Recorded::Draw(Drawn::new(program, draw))),
+        Command::Clear(buffer) => Some(Recorded::Clear(buffer.clone())),
+        Command::ClearDepth(target) => Some(Recorded::ClearDepth(target.clone())),
+        Command::CopyTexture(copy) => Some(Recorded::CopyTexture(copy.clone())),
         Command::Dispatch {
             pass: name,
             binds,
@@ -291,7 +294,7 @@ fn record(program: &Program, command: &Command) -> Option<Step> {
                 }
                 Groups::Indirect { buffer, offset } => Size::Indirect(buffer.clone(), *offset),
             };
-            Some(Step::Dispatch {
+            Some(Recorded::Dispatch {
                 pass: name,
                 binds: binds.clone(),
                 group: bind(program, name, &pass.layout, &pass.bindings, binds),
@@ -363,8 +366,8 @@ pub(super) fn bind(
     program.context.device.create_bind_group(&descriptor)
 }
 
-pub(super) fn dispatch(program: &Program, compute: &mut ComputePass<'_>, step: &Step) {
-    let Step::Dispatch {
+pub(super) fn dispatch(program: &Program, compute: &mut ComputePass<'_>, step: &Recorded) {
+    let Recorded::Dispatch {
         pass, group, size, ..
     } = step
     else {

@@ -68,8 +68,6 @@ pub struct ElementType {
     pub scalar: Scalar,
     /// Its name where it is a struct.
     pub name: Option<String>,
-    /// Bytes of a scalar; 0 of a mixed one.
-    pub scalar_bytes: u8,
     /// Bytes before the array.
     pub head: u32,
 }
@@ -133,16 +131,16 @@ fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
     let kind = inner.scalar();
     ElementType {
         stride: inner.size(module.to_ctx()),
-        scalar: match kind.map(|scalar| scalar.kind) {
-            Some(ScalarKind::Float) => Scalar::Float,
-            Some(ScalarKind::Uint) => Scalar::Uint,
+        scalar: match kind.map(|scalar| (scalar.kind, scalar.width)) {
+            Some((ScalarKind::Float, 4)) => Scalar::F32,
+            Some((ScalarKind::Float, 8)) => Scalar::F64,
+            Some((ScalarKind::Uint, 4)) => Scalar::U32,
             _ => Scalar::Mixed,
         },
         name: match inner {
             TypeInner::Struct { .. } => module.types[ty].name.clone(),
             _ => None,
         },
-        scalar_bytes: kind.map_or(0, |scalar| scalar.width),
         head: 0,
     }
 }

@@ -78,19 +78,23 @@ pub enum ShadersError {
 }
 
 impl Default for Shaders {
+    #[cfg(not(feature = "mutants"))]
     fn default() -> Self {
-        #[cfg(feature = "mutants")]
-        if let Some(shaders) = crate::mutants::shaders() {
-            return shaders;
-        }
-        Self {
-            files: None,
-            hash: None,
-        }
+        Self::SHIPPED
+    }
+
+    #[cfg(feature = "mutants")]
+    fn default() -> Self {
+        crate::mutants::shaders().unwrap_or(Self::SHIPPED)
     }
 }
 
 impl Shaders {
+    const SHIPPED: Self = Self {
+        files: None,
+        hash: None,
+    };
+
     /// Reads every WGSL file below `folder`. Files that nothing imports are allowed, so that a pass can be split.
     ///
     /// # Errors

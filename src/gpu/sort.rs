@@ -78,15 +78,6 @@ pub fn upload_lengths(program: &Program, data: &Buf<u32>, count: usize) {
     program.upload_windows(&lengths(data), &values);
 }
 
-/// A storage buffer.
-pub fn storage(name: &str, bytes: u64) -> BufferSpec {
-    BufferSpec {
-        name: name.to_owned(),
-        bytes,
-        is_uniform: false,
-    }
-}
-
 /// Names of the scan's passes.
 pub const SCAN_PASSES: [&str; 2] = ["sort/scan_blocks", "sort/add_block_sums"];
 

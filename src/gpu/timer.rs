@@ -7,7 +7,7 @@ use wgpu::{CommandEncoder, QuerySet};
 use super::{
     adapter::{Context, GpuError},
     program::Program,
-    recording::{Recording, Step, dispatch, encode},
+    recording::{Recorded, Recording, dispatch, encode},
 };
 
 /// Time per pass, summed over runs.
@@ -77,7 +77,7 @@ impl Timer {
 }
 
 fn run_alone(
-    step: &Step,
+    step: &Recorded,
     program: &Program,
     add: &mut impl FnMut(&'static str, f64),
 ) -> Result<(), GpuError> {
@@ -119,7 +119,7 @@ impl Queries {
 
     fn run(
         &self,
-        steps: &[Step],
+        steps: &[Recorded],
         program: &Program,
         add: &mut impl FnMut(&'static str, f64),
     ) -> Result<(), GpuError> {
@@ -155,14 +155,14 @@ impl Queries {
     /// Encodes a step; a pass writes its begin and end at the queries `first` and the one after. Whether it is one.
     fn encode(
         &self,
-        step: &Step,
+        step: &Recorded,
         program: &Program,
         encoder: &mut CommandEncoder,
         first: u32,
     ) -> bool {
         let (beginning, end) = (Some(first), Some(first + 1));
         match step {
-            Step::Dispatch { pass: name, .. } => {
+            Recorded::Dispatch { pass: name, .. } => {
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some(name),
                     timestamp_writes: Some(wgpu::ComputePassTimestampWrites {
@@ -173,7 +173,7 @@ impl Queries {
                 });
                 dispatch(program, &mut pass, step);
             }
-            Step::Draw(drawn) => {
+            Recorded::Draw(drawn) => {
                 let timestamps = wgpu::RenderPassTimestampWrites {
                     query_set: &self.set,
                     beginning_of_pass_write_index: beginning,
@@ -181,7 +181,7 @@ impl Queries {
                 };
                 drawn.encode(program, encoder, Some(timestamps));
             }
-            Step::Clear(_) | Step::ClearDepth(_) | Step::CopyTexture(_) => {
+            Recorded::Clear(_) | Recorded::ClearDepth(_) | Recorded::CopyTexture(_) => {
                 encode(std::slice::from_ref(step), program, encoder);
                 return false;
             }

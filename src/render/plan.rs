@@ -4,8 +4,6 @@
 
 use std::collections::BTreeMap;
 
-use bytemuck::NoUninit;
-
 use super::{RenderError, buffers::FILLS, frame::Extent, uniform::Fill};
 use crate::gpu::{
     adapter::Context,
@@ -133,12 +131,12 @@ impl Plan {
     }
 
     /// A buffer that holds `count` values, of zeros.
-    pub(super) fn buffer<T>(&mut self, buffer: &Buf<T>, count: usize) {
+    pub(super) fn buffer<T: Element>(&mut self, buffer: &Buf<T>, count: usize) {
         self.buffers.push(buffer.sized(count));
     }
 
     /// A buffer of these values.
-    pub(super) fn values<T: NoUninit>(&mut self, buffer: &Buf<T>, values: &[T]) {
+    pub(super) fn values<T: Element>(&mut self, buffer: &Buf<T>, values: &[T]) {
         self.buffer(buffer, values.len());
         let bytes = bytemuck::cast_slice(values).to_vec();
         self.contents.push((buffer.name().to_owned(), bytes));
@@ -292,9 +290,9 @@ mod tests {
 
     #[test]
     fn what_is_planned_is_what_commands_use() {
-        const ALL: &str = "[output]\naovs = [\"Z\", \"forward\"]\n[basin]\nheight_m = 0.5\n\
+        const ALL: &str = "[output]\nformats = [\"exr\"]\naovs = [\"Z\", \"forward\"]\n[basin]\nheight_m = 0.5\n\
             [water]\nspray = { density_per_metre = 9.0, speed_m_per_s = 5.5 }\n";
-        let depth_alone = "[output]\naovs = [\"Z\"]\n";
+        let depth_alone = "[output]\nformats = [\"exr\"]\naovs = [\"Z\"]\n";
         let mut sizes = BTreeSet::new();
         for surface in ["curvature_flow", "narrow_range"] {
             for more in ["", depth_alone, ALL] {

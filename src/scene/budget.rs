@@ -1,14 +1,8 @@
 //! `[budget]`: what a bake is held to, and the end of it where it is not kept.
 
-use std::fmt::{self, Write as _};
+use serde::{Deserialize, Deserializer};
 
-use serde::Deserialize;
-use toml::Spanned;
-
-use super::{
-    Method, Scene, Shot, Solver, document::Document, error::SceneError, ranges::BUDGET,
-    words::shown,
-};
+use super::{Method, Scene, Shot, Solver, document::Document, error::SceneError, words::shown};
 use crate::domain::{
     budget::{Breach, Watched},
     solver::StepReport,
@@ -36,13 +30,9 @@ pub struct Budget {
     pub energy: Option<f64>,
 }
 
-/// Defaults: a few times what the shipped scenes come to, of which docs/scene.md has the largest.
+/// Defaults that depend on the scene; the others stand in the table of keys.
 const SPEED: f64 = 4.0;
-const DENSITY_ERROR_MEAN: f64 = 0.5;
-const DENSITY_ERROR_P99: f64 = 5.0;
-const CAPPED: f64 = 0.01;
 const RESIDUAL: f64 = 1e-2;
-const DIVERGENCE: f64 = 0.1;
 /// What a wall that overtakes drops does on them without pressure is not in the work: 6 % of a frame in the small box of
 /// tests/hard_cases/24-leaving.toml, 0.1 % in the quickstart.
 const FLIP_ENERGY: f64 = 0.1;
@@ -56,43 +46,52 @@ const LEAST_SPEED: f64 = 10.0;
 /// Water with next to no energy: what moves a tenth of a spacing in a frame counts as the total.
 const LEAST_ENERGY_SPEED: f64 = 0.1;
 
-#[derive(Default, Deserialize)]
+/// The default of `budget.speed`, in words.
+pub(super) fn speed_words() -> String {
+    format!(
+        "{SPEED} (√(2 g × the domain's diagonal) + the fastest wall or moving solid), at least {LEAST_SPEED} spacings a frame"
+    )
+}
+
+/// The default of `budget.residual`, in words.
+pub(super) fn residual_words() -> String {
+    format!("{RESIDUAL}, or the tolerance where that is larger")
+}
+
+/// The default of `budget.energy`, in words.
+pub(super) fn energy_words() -> String {
+    format!("{PBF_ENERGY} with pbf, {FLIP_ENERGY} with flip")
+}
+
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct BudgetSpec {
-    speed: Option<Spanned<LimitSpec>>,
-    density_error_mean: Option<Spanned<LimitSpec>>,
-    density_error_p99: Option<Spanned<LimitSpec>>,
-    capped: Option<Spanned<LimitSpec>>,
-    residual: Option<Spanned<LimitSpec>>,
-    divergence: Option<Spanned<LimitSpec>>,
-    volume: Option<Spanned<LimitSpec>>,
-    energy: Option<Spanned<LimitSpec>>,
+    speed: Option<Limit>,
+    density_error_mean: Limit,
+    density_error_p99: Limit,
+    capped: Limit,
+    residual: Option<Limit>,
+    divergence: Limit,
+    volume: Limit,
+    energy: Option<Limit>,
 }
 
-#[derive(Clone, Copy, Deserialize)]
-#[serde(untagged)]
-enum LimitSpec {
-    Switch(bool),
-    Limit(f64),
-}
+/// A number, or `false` for none.
+#[derive(Clone, Copy)]
+struct Limit(Option<f64>);
 
-/// A number of the budget's range and of at least `least`, or `false`.
-fn limit(
-    doc: &Document<'_>,
-    value: &Option<Spanned<LimitSpec>>,
-    default: Option<f64>,
-    least: f64,
-) -> Result<Option<f64>, SceneError> {
-    let Some(value) = value else {
-        return Ok(default);
-    };
-    match *value.get_ref() {
-        LimitSpec::Switch(false) => Ok(None),
-        LimitSpec::Switch(true) => Err(doc.fault_at(value.span(), "true is no limit")),
-        LimitSpec::Limit(limit) if BUDGET.contains(&limit) && limit >= least => Ok(Some(limit)),
-        LimitSpec::Limit(limit) => {
-            Err(doc.fault_at(value.span(), format!("{} is out of range", shown(limit))))
+impl<'de> Deserialize<'de> for Limit {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(untagged)]
+        enum Written {
+            Off(#[expect(dead_code, reason = "only `false` is allowed")] bool),
+            Limit(f64),
         }
+        Ok(Self(match Written::deserialize(deserializer)? {
+            Written::Off(_) => None,
+            Written::Limit(limit) => Some(limit),
+        }))
     }
 }
 
@@ -118,38 +117,29 @@ pub(super) fn build(
         Method::Pbf => PBF_ENERGY,
         Method::Flip => FLIP_ENERGY,
     };
-    let plain = |value, default| limit(doc, value, default, 0.0);
+    let residual = match spec.residual {
+        Some(Limit(Some(limit))) if limit < tolerance => {
+            let problem = format!("{} is out of range", shown(limit));
+            return Err(doc.fault_of("budget.residual", problem));
+        }
+        Some(Limit(limit)) => limit,
+        None => Some(RESIDUAL.max(tolerance)),
+    };
     Ok(Budget {
-        speed: plain(&spec.speed, Some(speed))?,
-        density_error_mean: plain(&spec.density_error_mean, Some(DENSITY_ERROR_MEAN))?,
-        density_error_p99: plain(&spec.density_error_p99, Some(DENSITY_ERROR_P99))?,
-        capped: plain(&spec.capped, Some(CAPPED))?,
-        residual: limit(
-            doc,
-            &spec.residual,
-            Some(RESIDUAL.max(tolerance)),
-            tolerance,
-        )?,
-        divergence: plain(&spec.divergence, Some(DIVERGENCE))?,
-        volume: plain(&spec.volume, None)?,
-        energy: plain(&spec.energy, Some(energy))?,
+        speed: spec.speed.map_or(Some(speed), |limit| limit.0),
+        density_error_mean: spec.density_error_mean.0,
+        density_error_p99: spec.density_error_p99.0,
+        capped: spec.capped.0,
+        residual,
+        divergence: spec.divergence.0,
+        volume: spec.volume.0,
+        energy: spec.energy.map_or(Some(energy), |limit| limit.0),
     })
 }
 
 impl Budget {
-    /// As [`Scene::to_toml`] writes it.
-    pub(super) fn write(&self, out: &mut String) -> fmt::Result {
-        writeln!(out, "\n[budget]")?;
-        for (watched, limit) in self.rows() {
-            match limit {
-                Some(limit) => writeln!(out, "{} = {limit:?}", watched.name())?,
-                None => writeln!(out, "{} = false", watched.name())?,
-            }
-        }
-        Ok(())
-    }
-
-    fn rows(&self) -> [(Watched, Option<f64>); 8] {
+    /// Each limit with its name, in the order of the table of keys.
+    pub(super) fn rows(&self) -> [(Watched, Option<f64>); 8] {
         [
             (Watched::Speed, self.speed),
             (Watched::DensityErrorMean, self.density_error_mean),

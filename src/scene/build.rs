@@ -1,23 +1,21 @@
-//! From what is written to what is meant: ranges, defaults, files, and how the parts fit.
+//! From what is written to what is meant: files, and how the parts fit.
 
 mod solver;
 
-use std::{ops::Range, path::Path};
+use std::path::Path;
 
 use glam::DVec3;
-use toml::Spanned;
 
 use super::{
-    PlacedMesh, Placement, Scene, Shot, Swarm, Water, budget,
+    PlacedMesh, Placement, Scene, Swarm, Water, budget,
     document::Document,
     error::SceneError,
     grids,
-    moving_solid::{self, MAX_MOVING_SOLIDS},
+    moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
     origin, probe,
-    ranges::{self, Interval},
-    spec::{BoxSpec, ScaleSpec, SceneSpec, ShotSpec, SolidSpec, SwarmSpec, WaterSpec},
+    spec::{BoxSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
     wave_maker,
-    words::{shown, shown_all},
+    words::{chain, extent, shown, shown_all},
 };
 use crate::domain::{
     bounds::Bounds,
@@ -26,29 +24,30 @@ use crate::domain::{
     sampling,
 };
 
-/// Most particles of a scene: ids are 32 bits, and 2²⁷ particles of 200 bytes fill 25 GiB.
-pub(super) const MAX_PARTICLES: f64 = 134_217_728.0;
+pub(super) use solver::{CHEBYSHEV_RELAXATION, RELAXATION};
 
-/// Largest coordinate of a domain, metres.
-const MAX_COORDINATE: f64 = 1e6;
+/// Most particles of a scene: ids are 32 bits, and 2²⁷ particles of 200 bytes fill 25 GiB.
+const MAX_PARTICLES: f64 = 134_217_728.0;
+
+/// Least edge of the domain, metres: no smaller than the least spacing.
+const LEAST_EDGE: f64 = 1e-8;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
 /// The lattice on which the chosen solver's particles start.
 struct Lattice {
     spacing: f64,
-    /// Where the scene says how fine it is.
-    span: Range<usize>,
+    /// The key that says how fine it is.
+    key: &'static str,
     /// Metres that must stay between two walls.
     least_gap: f64,
 }
 
 /// Builds the scene.
 pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Result<Scene> {
-    let shot = shot(doc, &spec.shot)?;
+    let shot = spec.shot;
     let domain = domain(doc, &spec.domain)?;
-    let origin = origin::of(&domain);
-    let (solver, lattice) = solver::solver(doc, &spec.solver, &domain)?;
+    let (solver, lattice) = solver::solver(doc, spec.solver, &domain)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     check_particle_count(doc, &water, &domain, &lattice)?;
     let around = wave_maker::Surroundings {
@@ -58,39 +57,12 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         least_gap: lattice.least_gap,
         shot: &shot,
     };
-    let mut solids = Vec::new();
-    let mut moving_solids = Vec::new();
-    for solid in &spec.solid {
-        match (&solid.direction, &solid.motion) {
-            (None, None) => solids.push(static_solid(doc, solid, &around)?),
-            (Some(direction), Some(motion)) => {
-                moving_solid::check_method(doc, motion.span(), solver.method)?;
-                if moving_solids.len() == MAX_MOVING_SOLIDS {
-                    let problem = format!("at most {MAX_MOVING_SOLIDS} solids can move");
-                    return Err(doc.fault_plain(motion.span(), problem));
-                }
-                let placed = solid_mesh(doc, base_dir, solid)?;
-                moving_solids.push(moving_solid::build(
-                    doc, placed, direction, motion, &around,
-                )?);
-            }
-            (Some(direction), None) => {
-                return Err(doc.fault_at(direction.span(), "given without motion"));
-            }
-            (None, Some(motion)) => {
-                return Err(doc.fault_at(motion.span(), "given without direction"));
-            }
-        }
-    }
+    let (solids, moving_solids) = solids(doc, &spec.solid, &around, &solver)?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
-    if let Some((key, value, allowed)) = spec.effects.fault() {
-        return Err(doc.fault_of(&key, value, allowed));
-    }
-    let grids = spec
-        .grids
-        .as_ref()
-        .map(|table| grids::build(doc, table, &domain, &solver))
-        .transpose()?;
+    let grids = match &spec.grids {
+        Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
+        None => None,
+    };
     let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
     let motions = (wave_makers.iter().map(|maker| &maker.motion))
         .chain(moving_solids.iter().map(|solid| &solid.motion));
@@ -103,7 +75,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
     let scene = Scene {
         shot,
-        origin,
+        origin: origin::of(&domain),
         domain,
         water,
         solids,
@@ -118,100 +90,49 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     Ok(scene.into_local())
 }
 
-/// The value, if it is in the range; NaN never is.
-pub(super) fn number(doc: &Document<'_>, value: &Spanned<f64>, range: &Interval) -> Result<f64> {
-    let v = *value.get_ref();
-    if range.contains(&v) {
-        Ok(v)
-    } else {
-        Err(out_of_range(doc, value))
-    }
-}
-
-/// That a number is not what its key allows.
-pub(super) fn out_of_range(doc: &Document<'_>, value: &Spanned<f64>) -> SceneError {
-    let problem = format!("{} is out of range", shown(*value.get_ref()));
-    doc.fault_at(value.span(), problem)
-}
-
-fn number_or(
+/// Solids at rest, and those that move.
+fn solids(
     doc: &Document<'_>,
-    value: &Option<Spanned<f64>>,
-    default: f64,
-    range: &Interval,
-) -> Result<f64> {
-    value
-        .as_ref()
-        .map_or(Ok(default), |value| number(doc, value, range))
-}
-
-fn whole(doc: &Document<'_>, value: &Spanned<i64>, max: u32) -> Result<u32> {
-    let v = *value.get_ref();
-    u32::try_from(v)
-        .ok()
-        .filter(|v| (1..=max).contains(v))
-        .ok_or_else(|| doc.fault_at(value.span(), format!("{v} is out of range")))
-}
-
-pub(super) fn vector(doc: &Document<'_>, value: &Spanned<[f64; 3]>, limit: f64) -> Result<DVec3> {
-    let v = DVec3::from_array(*value.get_ref());
-    if v.is_finite() && v.abs().max_element() <= limit {
-        Ok(v)
-    } else {
-        Err(doc.fault_at(
-            value.span(),
-            format!("{} is out of range", shown_all(&v.to_array())),
-        ))
+    specs: &[MeshSpec],
+    around: &wave_maker::Surroundings<'_>,
+    solver: &super::Solver,
+) -> Result<(Vec<PlacedMesh>, Vec<MovingSolid>)> {
+    let (mut solids, mut moving) = (Vec::new(), Vec::new());
+    for (index, spec) in specs.iter().enumerate() {
+        let path = format!("solid[{index}]");
+        let (Some(direction), Some(motion)) = (spec.direction, &spec.motion) else {
+            solids.push(static_solid(doc, &path, spec, around)?);
+            continue;
+        };
+        let place = format!("{path}.motion");
+        moving_solid::check_method(doc, &place, solver.method)?;
+        if moving.len() == MAX_MOVING_SOLIDS {
+            let problem = format!("at most {MAX_MOVING_SOLIDS} solids can move");
+            return Err(doc.fault_of_plain(&place, problem));
+        }
+        let placed = placed_mesh(doc, around.base_dir, &path, "mesh", spec)?;
+        let direction = DVec3::from_array(direction);
+        moving.push(moving_solid::build(
+            doc, &path, placed, direction, motion, around,
+        )?);
     }
-}
-
-fn vector_or(
-    doc: &Document<'_>,
-    value: &Option<Spanned<[f64; 3]>>,
-    default: DVec3,
-    limit: f64,
-) -> Result<DVec3> {
-    value
-        .as_ref()
-        .map_or(Ok(default), |value| vector(doc, value, limit))
-}
-
-/// Whether a name can be a part of a file's.
-pub(super) fn is_file_stem(name: &str) -> bool {
-    (1..=100).contains(&name.len())
-        && name.starts_with(|c: char| c.is_ascii_alphanumeric())
-        && name
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.'))
-}
-
-fn shot(doc: &Document<'_>, spec: &ShotSpec) -> Result<Shot> {
-    let name = spec.name.get_ref();
-    if !is_file_stem(name) {
-        return Err(doc.fault_at(spec.name.span(), format!("{name:?} is no safe file name")));
-    }
-    Ok(Shot {
-        name: name.clone(),
-        frames: whole(doc, &spec.frames, 1_000_000)?,
-        frames_per_second: number(doc, &spec.frames_per_second, &ranges::FRAMES_PER_SECOND)?,
-    })
+    Ok((solids, moving))
 }
 
 /// The box of the whole scene.
 fn domain(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
-    let domain = bounds(doc, spec)?;
+    let domain = bounds(doc, "domain", spec)?;
     let size = domain.size();
-    if ranges::EDGE.contains(&size.min_element()) {
+    if size.min_element() >= LEAST_EDGE {
         return Ok(domain);
     }
     let problem = format!("its edges are {} m", shown_all(&size.to_array()));
-    Err(doc.fault_at(spec.max.span(), problem))
+    Err(doc.fault_of("domain.max", problem))
 }
 
 /// A box with positive edges.
-fn bounds(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
-    let min = vector(doc, &spec.min, MAX_COORDINATE)?;
-    let max = vector(doc, &spec.max, MAX_COORDINATE)?;
+fn bounds(doc: &Document<'_>, path: &str, spec: &BoxSpec) -> Result<Bounds> {
+    let [min, max] = [spec.min, spec.max].map(DVec3::from_array);
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         if min[axis] >= max[axis] {
             let problem = format!(
@@ -219,7 +140,7 @@ fn bounds(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
                 shown(max[axis]),
                 shown(min[axis])
             );
-            return Err(doc.fault_at(spec.max.span(), problem));
+            return Err(doc.fault_of(&format!("{path}.max"), problem));
         }
     }
     Ok(Bounds { min, max })
@@ -232,56 +153,55 @@ fn water(
     domain: &Bounds,
     lattice: &Lattice,
 ) -> Result<Water> {
-    let blocks = spec
-        .block
-        .iter()
-        .map(|block| water_block(doc, block, domain, lattice))
-        .collect::<Result<_>>()?;
-    let meshes = spec
-        .mesh
-        .iter()
-        .map(|mesh| {
-            let file = MeshSpec {
-                path: &mesh.file,
-                blake3: &mesh.blake3,
-                translate: &mesh.translate,
-                rotate_degrees: &mesh.rotate_degrees,
-                scale: &mesh.scale,
-            };
-            let placed = placed_mesh(doc, base_dir, &file)?;
-            let fits = placed.mesh.bounds().is_some_and(|b| fits(&b, domain));
-            if fits {
-                return Ok(placed);
-            }
-            let problem = format!(
-                "the water does not fit: it reaches over {}, the domain over {}",
-                extent(placed.mesh.bounds()),
-                extent(Some(*domain))
-            );
-            Err(doc.fault_at(mesh.file.span(), problem))
-        })
-        .collect::<Result<_>>()?;
-    Ok(Water {
-        rest_density: number_or(doc, &spec.rest_density, 1000.0, &ranges::REST_DENSITY)?,
-        gravity: vector_or(doc, &spec.gravity, DVec3::new(0.0, -9.81, 0.0), 1e4)?,
-        blocks,
-        meshes,
-        particles: spec
+    let mut water = Water {
+        rest_density: spec.rest_density,
+        gravity: DVec3::from_array(spec.gravity),
+        blocks: Vec::new(),
+        meshes: Vec::new(),
+        particles: Vec::new(),
+    };
+    for (index, block) in spec.block.iter().enumerate() {
+        let path = format!("water.block[{index}]");
+        water
+            .blocks
+            .push(water_block(doc, &path, block, domain, lattice)?);
+    }
+    for (index, mesh) in spec.mesh.iter().enumerate() {
+        let path = format!("water.mesh[{index}]");
+        water
+            .meshes
+            .push(water_mesh(doc, base_dir, &path, mesh, domain)?);
+    }
+    for (index, swarm) in spec.particles.iter().enumerate() {
+        let path = format!("water.particles[{index}].at");
+        water
             .particles
-            .iter()
-            .map(|swarm| self::swarm(doc, swarm, domain))
-            .collect::<Result<_>>()?,
-    })
+            .push(self::swarm(doc, &path, swarm, domain)?);
+    }
+    Ok(water)
 }
 
-fn swarm(doc: &Document<'_>, spec: &SwarmSpec, domain: &Bounds) -> Result<Swarm> {
-    let at: Vec<_> = spec
-        .at
-        .get_ref()
-        .iter()
-        .copied()
-        .map(DVec3::from_array)
-        .collect();
+fn water_mesh(
+    doc: &Document<'_>,
+    base_dir: &Path,
+    path: &str,
+    spec: &MeshSpec,
+    domain: &Bounds,
+) -> Result<PlacedMesh> {
+    let placed = placed_mesh(doc, base_dir, path, "file", spec)?;
+    if placed.mesh.bounds().is_some_and(|b| fits(&b, domain)) {
+        return Ok(placed);
+    }
+    let problem = format!(
+        "the water does not fit: it reaches over {}, the domain over {}",
+        extent(placed.mesh.bounds()),
+        extent(Some(*domain))
+    );
+    Err(doc.fault_of(&format!("{path}.file"), problem))
+}
+
+fn swarm(doc: &Document<'_>, path: &str, spec: &SwarmSpec, domain: &Bounds) -> Result<Swarm> {
+    let at: Vec<_> = spec.at.iter().copied().map(DVec3::from_array).collect();
     // NaN is in no box.
     if let Some(p) = at.iter().find(|p| !domain.contains(**p)) {
         let problem = format!(
@@ -289,40 +209,34 @@ fn swarm(doc: &Document<'_>, spec: &SwarmSpec, domain: &Bounds) -> Result<Swarm>
             shown_all(&p.to_array()),
             extent(Some(*domain))
         );
-        return Err(doc.fault_at(spec.at.span(), problem));
+        return Err(doc.fault_of(path, problem));
     }
     Ok(Swarm {
         at,
-        velocity: vector_or(doc, &spec.velocity, DVec3::ZERO, 1e4)?,
+        velocity: DVec3::from_array(spec.velocity),
     })
 }
 
 fn water_block(
     doc: &Document<'_>,
+    path: &str,
     spec: &BoxSpec,
     domain: &Bounds,
     lattice: &Lattice,
 ) -> Result<Bounds> {
-    let block = bounds(doc, spec)?;
+    let block = bounds(doc, path, spec)?;
     if !fits(&block, domain) {
-        let starts_inside = fits(
-            &Bounds {
-                min: block.min,
-                max: block.min,
-            },
-            domain,
-        );
-        let span = if starts_inside {
-            spec.max.span()
-        } else {
-            spec.min.span()
+        let corner = Bounds {
+            min: block.min,
+            max: block.min,
         };
+        let name = if fits(&corner, domain) { "max" } else { "min" };
         let problem = format!(
             "the water does not fit: the block reaches over {}, the domain over {}",
             extent(Some(block)),
             extent(Some(*domain))
         );
-        return Err(doc.fault_at(span, problem));
+        return Err(doc.fault_of(&format!("{path}.{name}"), problem));
     }
     if sampling::block_dims(&block, domain, lattice.spacing).contains(&0) {
         let size = block.size();
@@ -333,7 +247,7 @@ fn water_block(
             shown(size.z),
             shown(lattice.spacing)
         );
-        return Err(doc.fault_at(spec.max.span(), problem));
+        return Err(doc.fault_of(&format!("{path}.max"), problem));
     }
     Ok(block)
 }
@@ -342,16 +256,6 @@ fn water_block(
 fn fits(inner: &Bounds, domain: &Bounds) -> bool {
     let room = domain.grown(1e-9 * domain.size().max_element());
     room.contains(inner.min) && room.contains(inner.max)
-}
-
-pub(super) fn extent(bounds: Option<Bounds>) -> String {
-    bounds.map_or_else(
-        || "nothing".to_owned(),
-        |b| {
-            let [min, max] = [b.min, b.max].map(|corner| shown_all(&corner.to_array()));
-            format!("{min} to {max}")
-        },
-    )
 }
 
 fn check_particle_count(
@@ -385,38 +289,19 @@ fn check_particle_count(
             "the water would take about {count:.3e} particles {} m apart",
             shown(d)
         );
-        return Err(doc.fault_at(lattice.span.clone(), problem));
+        return Err(doc.fault_of(lattice.key, problem));
     }
     Ok(())
 }
 
-/// What `[[solid]]` and `[[water.mesh]]` have in common.
-struct MeshSpec<'a> {
-    path: &'a Spanned<String>,
-    blake3: &'a Option<Spanned<String>>,
-    translate: &'a Option<Spanned<[f64; 3]>>,
-    rotate_degrees: &'a Option<Spanned<[f64; 3]>>,
-    scale: &'a Option<Spanned<ScaleSpec>>,
-}
-
-fn solid_mesh(doc: &Document<'_>, base_dir: &Path, spec: &SolidSpec) -> Result<PlacedMesh> {
-    let file = MeshSpec {
-        path: &spec.mesh,
-        blake3: &spec.blake3,
-        translate: &spec.translate,
-        rotate_degrees: &spec.rotate_degrees,
-        scale: &spec.scale,
-    };
-    placed_mesh(doc, base_dir, &file)
-}
-
 fn static_solid(
     doc: &Document<'_>,
-    spec: &SolidSpec,
+    path: &str,
+    spec: &MeshSpec,
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<PlacedMesh> {
     let domain = around.domain;
-    let placed = solid_mesh(doc, around.base_dir, spec)?;
+    let placed = placed_mesh(doc, around.base_dir, path, "mesh", spec)?;
     let overlaps = placed
         .mesh
         .bounds()
@@ -429,27 +314,33 @@ fn static_solid(
         extent(placed.mesh.bounds()),
         extent(Some(*domain))
     );
-    Err(doc.fault_at(spec.mesh.span(), problem))
+    Err(doc.fault_of(&format!("{path}.mesh"), problem))
 }
 
-fn placed_mesh(doc: &Document<'_>, base_dir: &Path, spec: &MeshSpec<'_>) -> Result<PlacedMesh> {
-    let fail = |problem: String| doc.fault_at(spec.path.span(), problem);
-    let file = doc.find(base_dir, spec.path)?;
+/// A mesh of the table at `path`, whose file the key `name` names.
+fn placed_mesh(
+    doc: &Document<'_>,
+    base_dir: &Path,
+    path: &str,
+    name: &str,
+    spec: &MeshSpec,
+) -> Result<PlacedMesh> {
+    let key = format!("{path}.{name}");
+    let fail = |problem: String| doc.fault_of(&key, problem);
+    let file = doc.find(base_dir, &key, &spec.file)?;
     let bytes = MeshFormat::of(&file)
         .and_then(|format| Ok((format, mesh_file::read_bytes(&file)?)))
         .and_then(|(format, bytes)| Ok((TriangleMesh::from_bytes(&bytes, format, &file)?, bytes)));
     let (in_file, bytes) = bytes.map_err(|error| fail(chain(&error)))?;
     let file_hash = blake3::hash(&bytes).to_hex().to_string();
-    if let Some(expected) = spec.blake3
-        && *expected.get_ref() != file_hash
-    {
+    if spec.blake3.as_ref().is_some_and(|hash| *hash != file_hash) {
         let problem = format!("{} has BLAKE3 {file_hash}", file.display());
-        return Err(doc.fault_at(expected.span(), problem));
+        return Err(doc.fault_of(&format!("{path}.blake3"), problem));
     }
     let placement = Placement {
-        translate: vector_or(doc, spec.translate, DVec3::ZERO, 1e9)?,
-        rotate_degrees: vector_or(doc, spec.rotate_degrees, DVec3::ZERO, 1e6)?,
-        scale: scale(doc, spec.scale)?,
+        translate: DVec3::from_array(spec.translate),
+        rotate_degrees: DVec3::from_array(spec.rotate_degrees),
+        scale: spec.scale.into(),
     };
     let mesh = in_file.transformed(&placement.world_from_file());
     let holes = mesh
@@ -462,34 +353,4 @@ fn placed_mesh(doc: &Document<'_>, base_dir: &Path, spec: &MeshSpec<'_>) -> Resu
         mesh,
         holes,
     })
-}
-
-fn scale(doc: &Document<'_>, spec: &Option<Spanned<ScaleSpec>>) -> Result<DVec3> {
-    let Some(spec) = spec else {
-        return Ok(DVec3::ONE);
-    };
-    let scale = match *spec.get_ref() {
-        ScaleSpec::Uniform(s) => DVec3::splat(s),
-        ScaleSpec::PerAxis(s) => DVec3::from_array(s),
-    };
-    let size = scale.abs();
-    if size.min_element() >= 1e-6 && size.max_element() <= 1e6 {
-        Ok(scale)
-    } else {
-        Err(doc.fault_at(
-            spec.span(),
-            format!("{} is out of range", shown_all(&scale.to_array())),
-        ))
-    }
-}
-
-/// An error and its causes in one line.
-pub(super) fn chain(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text = format!("{text}: {cause}");
-        source = cause.source();
-    }
-    text
 }

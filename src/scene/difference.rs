@@ -4,16 +4,12 @@ use std::{collections::BTreeMap, iter};
 
 use toml::{Table, Value};
 
-use super::{Method, Scene, error::SceneError};
-
-/// Keys that change which frames there are or where they go, not what happens in them; `max_substeps`,
-/// as `[budget]`, only says when to give up.
-const NOT_PHYSICS: [&str; 4] = [
-    "shot.name",
-    "shot.frames",
-    "solver.pbf.max_substeps",
-    "solver.flip.max_substeps",
-];
+use super::{
+    Method, Scene,
+    error::SceneError,
+    key::{self, Physics},
+    keys,
+};
 
 /// Comes before every other difference: with it most of the others follow.
 const METHOD: &str = "solver.method";
@@ -24,14 +20,14 @@ const CANONICAL_FORM: &str = "swell scene physics 2";
 /// The first key (the method, then in alphabetical order) whose value differs between two scenes as
 /// [`Scene::to_toml`] wrote them, with both values; `None` where the physics is the same.
 ///
-/// `[grids]`, `[[probe]]`, `[budget]`, `shot.name`, `shot.frames` and a solver's `max_substeps` may differ, and so may the
-/// settings of a solver that is not chosen and the path of a mesh whose hash stands beside it in both.
+/// Keys that the table of keys calls no physics may differ, and so may the settings of a solver that is not chosen and the
+/// path of a mesh whose hash stands beside it in both.
 ///
 /// # Errors
 /// [`SceneError::NotToml`].
 pub fn physics_difference(old_toml: &str, new_toml: &str) -> Result<Option<String>, SceneError> {
-    let (mut old, mut new) = (flatten(old_toml)?, flatten(new_toml)?);
-    let paths: Vec<_> = old.keys().filter_map(|key| hashed_path(key)).collect();
+    let (mut old, mut new) = (flatten(&read(old_toml)?), flatten(&read(new_toml)?));
+    let paths: Vec<_> = old.keys().filter_map(|key| hash_beside(key)).collect();
     for (path, hash) in paths {
         if old.contains_key(&hash) && new.contains_key(&hash) {
             old.remove(&path);
@@ -57,40 +53,29 @@ pub fn physics_difference(old_toml: &str, new_toml: &str) -> Result<Option<Strin
 pub fn physics_hash(scene: &Scene) -> String {
     let mut hasher = blake3::Hasher::new();
     hasher.update(CANONICAL_FORM.as_bytes());
-    let written = scene.to_toml(&|_, hash| hash.to_owned());
-    // What we wrote is TOML (a test loads it back); hashing its text keeps this infallible.
-    match flatten(&written) {
-        Ok(values) => {
-            for (key, value) in values {
-                hasher.update(format!("\n{key} = {value}").as_bytes());
-            }
-        }
-        Err(_) => {
-            debug_assert!(false, "to_toml wrote no TOML");
-            hasher.update(written.as_bytes());
-        }
+    for (key, value) in flatten(&scene.written(&|_, hash| hash.to_owned())) {
+        hasher.update(format!("\n{key} = {value}").as_bytes());
     }
     hasher.finalize().to_hex().to_string()
 }
 
-/// For the key of a mesh's path the key of its hash.
-fn hashed_path(hash_key: &str) -> Option<(String, String)> {
-    let table = hash_key.strip_suffix(".blake3")?;
-    let name = if table.starts_with("water.") {
-        "file"
-    } else {
-        "mesh"
-    };
-    Some((format!("{table}.{name}"), hash_key.to_owned()))
+/// For the key of a file whose content counts the key itself, and that of its hash.
+fn hash_beside(path: &str) -> Option<(String, String)> {
+    let is_by_hash = key::find(keys::SCENE, path)?.physics == Physics::ByHash;
+    let (table, _) = path.rsplit_once('.')?;
+    is_by_hash.then(|| (path.to_owned(), format!("{table}.blake3")))
+}
+
+fn read(text: &str) -> Result<Table, SceneError> {
+    toml::from_str(text).map_err(|e| SceneError::NotToml {
+        reason: e.message().to_owned(),
+    })
 }
 
 /// Dotted keys and values of the physics, numbers written alike whether whole or not.
-fn flatten(text: &str) -> Result<BTreeMap<String, String>, SceneError> {
-    let table: Table = toml::from_str(text).map_err(|e| SceneError::NotToml {
-        reason: e.message().to_owned(),
-    })?;
+fn flatten(table: &Table) -> BTreeMap<String, String> {
     let mut values = BTreeMap::new();
-    for (key, value) in &table {
+    for (key, value) in table {
         flatten_value(key.clone(), value, &mut values);
     }
     let solver = table.get("solver").and_then(Value::as_table);
@@ -101,15 +86,12 @@ fn flatten(text: &str) -> Result<BTreeMap<String, String>, SceneError> {
             .filter(|(name, _)| method != Some(name));
         others.any(|(name, _)| key.starts_with(&format!("solver.{name}.")))
     };
-    // Grids follow from the particles; probes and budgets only look at them.
-    let is_output = |key: &str| {
-        NOT_PHYSICS.contains(&key)
-            || ["grids.", "probe[", "budget."]
-                .iter()
-                .any(|table| key.starts_with(table))
+    let is_physics = |path: &str| {
+        let along = key::along(keys::SCENE, path);
+        along.iter().all(|key| key.physics != Physics::No)
     };
-    values.retain(|key, _| !is_output(key) && !is_idle(key));
-    Ok(values)
+    values.retain(|key, _| is_physics(key) && !is_idle(key));
+    values
 }
 
 fn flatten_value(path: String, value: &Value, values: &mut BTreeMap<String, String>) {

@@ -1,30 +1,29 @@
 //! A TOML text with overrides laid over it, and the way back from a span to line and key.
 
 use std::{
-    borrow::Cow,
     ops::Range,
     path::{Path, PathBuf},
 };
 
 use toml::{
     Spanned,
-    de::{DeArray, DeTable, DeValue},
+    de::{DeTable, DeValue},
 };
 
 use super::{
     error::{Fault, Place, SceneError},
+    key::{self, Key},
+    overrides,
     reach::Reach,
-    words::{duplicate, plain_types, shown},
+    words::plain_types,
 };
 
-/// Bytes set aside for the spans of one override, beyond the end of the text.
-const OVERRIDE_SPAN: usize = 1 << 20;
-
-/// Where every key of a scene stands. Overrides have spans beyond the end of the text.
+/// Where every key of a file stands. Overrides have spans beyond the end of the text.
 pub(super) struct Document<'a> {
     file: PathBuf,
     text: &'a str,
     overrides: &'a [String],
+    keys: &'static [Key],
     entries: Vec<Entry>,
     reach: Reach,
 }
@@ -35,10 +34,8 @@ struct Entry {
     path: String,
 }
 
-type Value<'a> = Spanned<DeValue<'a>>;
-
 impl<'a> Document<'a> {
-    /// Parses `text`, lays `overrides` (`key=value`) over it, and indexes the result.
+    /// Parses `text`, a file with these `keys`, lays `overrides` (`key=value`) over it, and indexes the result.
     ///
     /// # Errors
     /// Broken TOML, or an override that names no place.
@@ -46,33 +43,77 @@ impl<'a> Document<'a> {
         text: &'a str,
         file: &Path,
         overrides: &'a [String],
+        keys: &'static [Key],
     ) -> Result<(Self, Spanned<DeTable<'a>>), SceneError> {
         let mut document = Self {
             file: file.to_owned(),
             text,
             overrides,
+            keys,
             entries: Vec::new(),
             reach: Reach::Folder,
         };
-        let mut root = DeTable::parse(text).map_err(|error| match duplicate(text, &error) {
-            Some(key) => {
-                let message = "a second key of this name in its table".to_owned();
-                document.fault(error.span(), key.to_owned(), message)
-            }
-            None => document.fault(error.span(), String::new(), error.message().to_owned()),
-        })?;
-        for (index, entry) in overrides.iter().enumerate() {
-            let mut spans = OverrideSpans {
-                start: text.len() + 1 + index * OVERRIDE_SPAN,
-                taken: 0,
-            };
-            lay_over(root.get_mut(), entry, &mut spans).map_err(|reason| SceneError::Override {
+        let mut root = DeTable::parse(text).map_err(|error| document.broken(&error))?;
+        overrides::lay_all(root.get_mut(), overrides, text.len()).map_err(|(entry, reason)| {
+            SceneError::Override {
                 text: entry.clone(),
                 reason,
-            })?;
-        }
+            }
+        })?;
         index_table(root.get_ref(), "", &mut document.entries);
         Ok((document, root))
+    }
+
+    /// What is wrong with a text that is no TOML.
+    fn broken(&self, error: &toml::de::Error) -> SceneError {
+        let span = error.span().unwrap_or_default();
+        let name = self.text.get(span.clone()).unwrap_or_default().trim();
+        if !error.message().starts_with("duplicate key") || name.is_empty() {
+            return self.fault(error.span(), String::new(), error.message().to_owned());
+        }
+        let (path, message) = match self.header_at(span.start) {
+            Some(header) => (header, "a second table of this name".to_owned()),
+            None => {
+                let table = self.table_around(&span);
+                let place = table_name(&table).unwrap_or_else(|| "the file".to_owned());
+                let message = format!("a second key of this name in {place}");
+                (join(&table, name), message)
+            }
+        };
+        self.fault(Some(span), path, message)
+    }
+
+    /// The dotted name in the header of a table, where `place` is on its line.
+    fn header_at(&self, place: usize) -> Option<String> {
+        let start = self.text.get(..place)?.rfind('\n').map_or(0, |at| at + 1);
+        let line = self.text.get(start..)?.lines().next()?.trim();
+        let (name, _) = line.strip_prefix('[')?.split_once(']')?;
+        let is_name = !name.contains(['=', '{', ',']);
+        is_name.then(|| name.trim_start_matches('[').trim().to_owned())
+    }
+
+    /// The table that a second key at a span stands in: the innermost in braces around it, else that of the last header
+    /// before. What can be read of the text tells.
+    fn table_around(&self, span: &Range<usize>) -> String {
+        let mut entries = Vec::new();
+        let (partial, _) = DeTable::parse_recoverable(self.text);
+        index_table(partial.get_ref(), "", &mut entries);
+        let begins = |entry: &Entry, with: &str| {
+            let rest = self.text.get(entry.value.start..);
+            rest.is_some_and(|rest| rest.starts_with(with))
+        };
+        let is_around =
+            |entry: &Entry| entry.value.start < span.start && span.end <= entry.value.end;
+        let is_before = |entry: &Entry| entry.value.start < span.start;
+        let inline = (entries.iter())
+            .filter(|entry| begins(entry, "{") && is_around(entry))
+            .min_by_key(|entry| entry.value.len());
+        let headed = (entries.iter())
+            .filter(|entry| begins(entry, "[") && is_before(entry))
+            .filter(|entry| self.header_at(entry.value.start).is_some())
+            .max_by_key(|entry| (entry.value.start, entry.path.len()));
+        let table = inline.or(headed);
+        table.map_or_else(String::new, |entry| entry.path.clone())
     }
 
     /// The same with paths that lead so far.
@@ -85,20 +126,21 @@ impl<'a> Document<'a> {
         self.reach
     }
 
-    /// The file that a value names, from `base_dir`.
+    /// The file that the key at `path` names, from `base_dir`.
     pub(super) fn find(
         &self,
         base_dir: &Path,
-        name: &Spanned<String>,
+        path: &str,
+        name: &str,
     ) -> Result<PathBuf, SceneError> {
-        let found = self.reach.find(base_dir, Path::new(name.get_ref()));
-        found.map_err(|problem| self.fault_at(name.span(), problem))
+        let found = self.reach.find(base_dir, Path::new(name));
+        found.map_err(|problem| self.fault_of(path, problem))
     }
 
     /// A fault at `span`, of the key that stands there, with what that key allows.
     pub(super) fn fault_at(&self, span: Range<usize>, problem: impl Into<String>) -> SceneError {
         let path = self.path_at(&span).unwrap_or_default();
-        let message = with_allowed(problem.into(), &path);
+        let message = self.with_allowed(problem.into(), &path);
         self.fault(Some(span), path, message)
     }
 
@@ -113,42 +155,63 @@ impl<'a> Document<'a> {
         self.text.get(span).unwrap_or_default()
     }
 
-    /// A fault of the value of the key at `path`, which allows what `allowed` says.
-    pub(super) fn fault_of(&self, path: &str, value: f64, allowed: &str) -> SceneError {
-        let span = self
-            .entries
-            .iter()
-            .find(|e| e.path == path)
-            .map(|e| e.value.clone());
-        let message = format!("{} is out of range; allowed: {allowed}", shown(value));
-        self.fault(span, path.to_owned(), message)
+    /// A fault of the key at `path`, with what it allows; it stands where the key does, or the table that lacks it.
+    pub(super) fn fault_of(&self, path: &str, problem: impl Into<String>) -> SceneError {
+        let message = self.with_allowed(problem.into(), path);
+        self.fault(self.span_of(path), path.to_owned(), message)
+    }
+
+    /// A fault of the key at `path` that says itself what is allowed.
+    pub(super) fn fault_of_plain(&self, path: &str, message: impl Into<String>) -> SceneError {
+        self.fault(self.span_of(path), path.to_owned(), message.into())
+    }
+
+    /// Where the key at `path` stands, for a fault that is found later.
+    pub(super) fn place_of(&self, path: &str) -> Fault {
+        self.fault_at_place(self.span_of(path), path.to_owned(), String::new())
+    }
+
+    fn span_of(&self, path: &str) -> Option<Range<usize>> {
+        let mut path = path;
+        loop {
+            if let Some(entry) = self.entries.iter().find(|entry| entry.path == path) {
+                return Some(entry.value.clone());
+            }
+            path = &path[..path.rfind(['.', '['])?];
+        }
     }
 
     /// A fault of the key `name` that is missing in the table at `span`.
     pub(super) fn missing(&self, span: Range<usize>, name: &str) -> SceneError {
         let path = self.path_of_missing(&span, name);
-        let message = with_allowed("missing".into(), &path);
+        let message = self.with_allowed("missing".into(), &path);
         self.fault(Some(span), path, message)
     }
 
-    fn fault(&self, span: Option<Range<usize>>, key: String, message: String) -> SceneError {
+    /// A fault of the key of this dotted name at a span, or of the whole file.
+    pub(super) fn fault(
+        &self,
+        span: Option<Range<usize>>,
+        key: String,
+        message: String,
+    ) -> SceneError {
+        SceneError::Fault(Box::new(self.fault_at_place(span, key, message)))
+    }
+
+    fn fault_at_place(&self, span: Option<Range<usize>>, key: String, message: String) -> Fault {
         let place = span.map_or(Place::Whole, |span| {
-            if let Some(text) = span
-                .start
-                .checked_sub(self.text.len() + 1)
-                .and_then(|beyond| self.overrides.get(beyond / OVERRIDE_SPAN))
-            {
+            if let Some(text) = overrides::at(self.overrides, span.start, self.text.len()) {
                 return Place::Override(text.clone());
             }
             let before = self.text.bytes().take(span.start);
             Place::Line(1 + before.filter(|b| *b == b'\n').count())
         });
-        SceneError::Fault(Box::new(Fault {
+        Fault {
             file: self.file.clone(),
             place,
             key,
             message,
-        }))
+        }
     }
 
     /// Turns serde's complaint into one that names the dotted key and what is allowed.
@@ -163,7 +226,8 @@ impl<'a> Document<'a> {
             let name = names.remove(0);
             let path = span.as_ref().and_then(|s| self.path_at(s));
             let path = path.unwrap_or_else(|| name.clone());
-            return self.fault(span, path, unknown_key(&name, &names));
+            let message = unknown_key(&path, &names);
+            return self.fault(span, path, message);
         }
         if let Some(name) = message
             .strip_prefix("missing field ")
@@ -172,7 +236,7 @@ impl<'a> Document<'a> {
             let path = span
                 .as_ref()
                 .map_or(name.clone(), |s| self.path_of_missing(s, &name));
-            let message = with_allowed("missing".into(), &path);
+            let message = self.with_allowed("missing".into(), &path);
             return self.fault(span.filter(|s| !s.is_empty()), path, message);
         }
         let path = span.as_ref().and_then(|s| self.path_at(s));
@@ -182,7 +246,7 @@ impl<'a> Document<'a> {
         } else {
             message
         };
-        let message = with_allowed(plain_types(problem), &path);
+        let message = self.with_allowed(plain_types(problem), &path);
         self.fault(span, path, message)
     }
 
@@ -208,30 +272,53 @@ impl<'a> Document<'a> {
         let tables = || self.entries.iter().filter(|e| e.value == *span);
         tables()
             .map(|e| join(&e.path, name))
-            .find(|path| super::allowed::of(path).is_some())
+            .find(|path| key::find(self.keys, path).is_some())
             .or_else(|| tables().next_back().map(|e| join(&e.path, name)))
             .unwrap_or_else(|| name.to_owned())
     }
-}
 
-/// "unknown key", the nearest of the allowed ones, and all of them.
-pub(super) fn unknown_key(name: &str, allowed: &[String]) -> String {
-    let nearest = allowed
-        .iter()
-        .min_by_key(|candidate| strsim::damerau_levenshtein(name, candidate));
-    match nearest {
-        Some(nearest) => format!(
-            "unknown key; the nearest is \"{nearest}\"; allowed here: {}",
-            allowed.join(", ")
-        ),
-        None => "unknown key; nothing is allowed here".to_owned(),
+    /// The keys that the file may have.
+    pub(super) fn keys(&self) -> &'static [Key] {
+        self.keys
+    }
+
+    /// The problem, and what the key at a path allows.
+    pub(super) fn with_allowed(&self, problem: String, path: &str) -> String {
+        match key::find(self.keys, path) {
+            Some(key) => format!("{problem}; allowed: {}", key.allowed()),
+            None => problem,
+        }
     }
 }
 
-fn with_allowed(problem: String, path: &str) -> String {
-    match super::allowed::of(path) {
-        Some(allowed) => format!("{problem}; allowed: {allowed}"),
-        None => problem,
+/// "unknown key", its table, the nearest of the allowed ones, and all of them.
+pub(super) fn unknown_key<S: AsRef<str>>(path: &str, allowed: &[S]) -> String {
+    let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
+    let place = table_name(table).map_or_else(String::new, |table| format!(" in {table}"));
+    match nearest(name, allowed) {
+        Some(nearest) => {
+            let all: Vec<_> = allowed.iter().map(AsRef::as_ref).collect();
+            format!(
+                "unknown key{place}; the nearest is \"{nearest}\"; allowed here: {}",
+                all.join(", ")
+            )
+        }
+        None => format!("unknown key{place}; nothing is allowed here"),
+    }
+}
+
+/// The word that is the least edits away.
+pub(super) fn nearest<'w, S: AsRef<str>>(word: &str, among: &'w [S]) -> Option<&'w str> {
+    let among = among.iter().map(AsRef::as_ref);
+    among.min_by_key(|candidate| strsim::damerau_levenshtein(word, candidate))
+}
+
+/// A table as a message names it; `None` for the file itself.
+fn table_name(table: &str) -> Option<String> {
+    match table {
+        "" => None,
+        table if table.contains('[') => Some(table.to_owned()),
+        table => Some(format!("[{table}]")),
     }
 }
 
@@ -244,7 +331,7 @@ fn quoted(text: &str) -> Vec<String> {
         .collect()
 }
 
-fn join(table: &str, name: &str) -> String {
+pub(super) fn join(table: &str, name: &str) -> String {
     if table.is_empty() {
         name.to_owned()
     } else {
@@ -259,7 +346,12 @@ fn index_table(table: &DeTable<'_>, path: &str, entries: &mut Vec<Entry>) {
     }
 }
 
-fn index_value(value: &Value<'_>, key: Range<usize>, path: String, entries: &mut Vec<Entry>) {
+fn index_value(
+    value: &Spanned<DeValue<'_>>,
+    key: Range<usize>,
+    path: String,
+    entries: &mut Vec<Entry>,
+) {
     match value.get_ref() {
         DeValue::Table(table) => index_table(table, &path, entries),
         DeValue::Array(array) => {
@@ -274,123 +366,4 @@ fn index_value(value: &Value<'_>, key: Range<usize>, path: String, entries: &mut
         value: value.span(),
         path,
     });
-}
-
-/// Spans of one override, a new one for each key and value that it lays down.
-struct OverrideSpans {
-    start: usize,
-    taken: usize,
-}
-
-impl OverrideSpans {
-    fn next(&mut self) -> Range<usize> {
-        let at = self.start + self.taken.min(OVERRIDE_SPAN - 1);
-        self.taken += 1;
-        at..at + 1
-    }
-}
-
-/// Lays `key=value` over the table. `a.b[2].c` and `a.b.2.c` both reach into arrays.
-fn lay_over<'a>(
-    root: &mut DeTable<'a>,
-    entry: &'a str,
-    spans: &mut OverrideSpans,
-) -> Result<(), String> {
-    const ALLOWED: &str = "allowed is key=value, as in solver.pbf.iterations=8";
-    let (key, value) = entry
-        .split_once('=')
-        .ok_or_else(|| format!("no \"=\"; {ALLOWED}"))?;
-    let segments: Vec<&str> = key
-        .split(['.', '['])
-        .map(|s| s.trim().trim_end_matches(']'))
-        .collect();
-    if segments.iter().any(|s| s.is_empty()) {
-        return Err(format!("\"{key}\" is no dotted key; {ALLOWED}"));
-    }
-    let value = respan(parse_value(value.trim())?, spans);
-    let (first, rest) = segments.split_first().ok_or(ALLOWED)?;
-    let mut slot = enter_table(root, first, spans);
-    for segment in rest {
-        slot = enter(slot, segment, spans)?;
-    }
-    *slot = value;
-    Ok(())
-}
-
-fn parse_value(text: &str) -> Result<Value<'_>, String> {
-    match DeValue::parse(text) {
-        Ok(value) => Ok(value),
-        Err(error) => {
-            let is_bare =
-                |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | '/' | '+' | ':');
-            if !text.is_empty() && text.chars().all(is_bare) {
-                Ok(Spanned::new(0..0, DeValue::String(Cow::Borrowed(text))))
-            } else {
-                Err(format!(
-                    "\"{text}\" is neither a TOML value ({}) nor a bare word",
-                    error.message()
-                ))
-            }
-        }
-    }
-}
-
-/// The same value with the override's spans throughout.
-fn respan<'a>(value: Value<'a>, spans: &mut OverrideSpans) -> Value<'a> {
-    let at = spans.next();
-    let inner = match value.into_inner() {
-        DeValue::Array(array) => {
-            let mut moved = DeArray::new();
-            for item in array.iter() {
-                moved.push(respan(item.clone(), spans));
-            }
-            DeValue::Array(moved)
-        }
-        DeValue::Table(table) => DeValue::Table(
-            table
-                .into_iter()
-                .map(|(key, item)| {
-                    let key = Spanned::new(spans.next(), key.into_inner());
-                    (key, respan(item, spans))
-                })
-                .collect(),
-        ),
-        other => other,
-    };
-    Spanned::new(at, inner)
-}
-
-/// The value that `segment` names; a table is made where there is none.
-fn enter<'t, 'a>(
-    slot: &'t mut Value<'a>,
-    segment: &'a str,
-    spans: &mut OverrideSpans,
-) -> Result<&'t mut Value<'a>, String> {
-    match slot.get_mut() {
-        DeValue::Table(table) => Ok(enter_table(table, segment, spans)),
-        DeValue::Array(array) => {
-            let len = array.len();
-            segment
-                .parse()
-                .ok()
-                .and_then(|index: usize| array.get_mut(index))
-                .ok_or_else(|| format!("\"{segment}\" is no index into an array of {len}"))
-        }
-        other => Err(format!(
-            "\"{segment}\" cannot be set within a value of type {}",
-            other.type_str()
-        )),
-    }
-}
-
-fn enter_table<'t, 'a>(
-    table: &'t mut DeTable<'a>,
-    segment: &'a str,
-    spans: &mut OverrideSpans,
-) -> &'t mut Value<'a> {
-    let key = Spanned::new(spans.next(), Cow::Borrowed(segment));
-    let at = spans.next();
-    table
-        .entry(key)
-        .or_insert_with(|| Spanned::new(at, DeValue::Table(DeTable::new())))
 }

@@ -1,5 +1,9 @@
 //! PIC/FLIP settings, validated.
 
+use serde::{Deserialize, Serialize};
+
+use super::key::read_by_name;
+
 /// Attributes that APIC declares: C of v(x) = v + C (x − x_p), 1/s, `affine_xy` = ∂v_x/∂y. A state without them
 /// starts from zeros.
 pub const AFFINE: [&str; 9] = [
@@ -15,7 +19,8 @@ pub const AFFINE: [&str; 9] = [
 ];
 
 /// PIC/FLIP settings (Zhu and Bridson 2005).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Flip {
     /// Δx, metres.
     pub cell_size: f64,
@@ -94,7 +99,8 @@ impl Surface {
 }
 
 /// The pressure solve.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Pressure {
     /// What precedes each conjugate-gradient iteration.
     pub preconditioner: Preconditioner,
@@ -174,3 +180,8 @@ impl Preconditioner {
         Self::NAMED[self as usize].0
     }
 }
+
+read_by_name!(Transfer);
+read_by_name!(Surface);
+read_by_name!(Precision);
+read_by_name!(Preconditioner);

@@ -1,11 +1,8 @@
 //! `[grids]`: which grids each frame gets beside its particles.
 
-use std::fmt::{self, Write as _};
+use serde::{Deserialize, Serialize};
 
-use serde::Deserialize;
-use toml::Spanned;
-
-use super::{Method, Solver, build::out_of_range, document::Document, error::SceneError};
+use super::{Method, Solver, document::Document, error::SceneError, words::shown};
 use crate::domain::{
     bounds::Bounds,
     sparse_grid::{EDGE, Precision},
@@ -13,7 +10,7 @@ use crate::domain::{
 };
 
 /// Grids of each frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Grids {
     /// A level set of the water's surface.
     pub surface: bool,
@@ -29,16 +26,16 @@ pub struct Grids {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GridsSpec {
-    surface: Option<Spanned<bool>>,
-    velocity: Option<bool>,
-    voxel_size: Option<Spanned<f64>>,
-    precision: Option<Spanned<String>>,
+    surface: bool,
+    velocity: bool,
+    voxel_size: Option<f64>,
+    precision: Precision,
 }
 
 /// Builds the table for the chosen solver.
 pub(super) fn build(
     doc: &Document<'_>,
-    spec: &Spanned<GridsSpec>,
+    spec: &GridsSpec,
     domain: &Bounds,
     solver: &Solver,
 ) -> Result<Grids, SceneError> {
@@ -49,50 +46,22 @@ pub(super) fn build(
         }
         Method::Flip => (solver.flip().particle_spacing(), solver.flip().cell_size),
     };
-    let table = spec.get_ref();
-    let grids = Grids {
-        surface: table.surface.as_ref().is_some_and(|v| *v.get_ref()),
-        velocity: table.velocity.unwrap_or(false),
-        voxel_size: match &table.voxel_size {
-            None => cell_size,
-            Some(size) => {
-                let size_in_spacings = |v: f64| Raster::VOXEL_RATIO.contains(&(v / spacing));
-                let size_fits = |v: f64| {
-                    let bricks = (domain.size() / (v * f64::from(EDGE))).ceil();
-                    bricks.element_product() <= MAX_BRICKS
-                };
-                let v = *size.get_ref();
-                if !(size_in_spacings(v) && size_fits(v)) {
-                    return Err(out_of_range(doc, size));
-                }
-                v
-            }
-        },
-        precision: match table.precision.as_ref() {
-            None => Precision::Half,
-            Some(name) => Precision::NAMED
-                .iter()
-                .find(|(known, _)| known == name.get_ref())
-                .map(|(_, precision)| *precision)
-                .ok_or_else(|| {
-                    doc.fault_at(name.span(), format!("{:?} is no precision", name.get_ref()))
-                })?,
-        },
-    };
-    if grids.surface || grids.velocity {
-        return Ok(grids);
+    if let Some(size) = spec.voxel_size {
+        let bricks = (domain.size() / (size * f64::from(EDGE))).ceil();
+        let fits = bricks.element_product() <= MAX_BRICKS;
+        if !(Raster::VOXEL_RATIO.contains(&(size / spacing)) && fits) {
+            let problem = format!("{} is out of range", shown(size));
+            return Err(doc.fault_of("grids.voxel_size", problem));
+        }
     }
-    let span = table.surface.as_ref().map_or(spec.span(), Spanned::span);
-    Err(doc.fault_at(span, "neither surface nor velocity is asked for"))
-}
-
-impl Grids {
-    /// As [`super::Scene::to_toml`] writes it.
-    pub(super) fn write(&self, out: &mut String) -> fmt::Result {
-        writeln!(out, "\n[grids]")?;
-        writeln!(out, "surface = {}", self.surface)?;
-        writeln!(out, "velocity = {}", self.velocity)?;
-        writeln!(out, "voxel_size = {:?}", self.voxel_size)?;
-        writeln!(out, "precision = {:?}", self.precision.name())
+    if !(spec.surface || spec.velocity) {
+        let problem = "neither surface nor velocity is asked for";
+        return Err(doc.fault_of("grids.surface", problem));
     }
+    Ok(Grids {
+        surface: spec.surface,
+        velocity: spec.velocity,
+        voxel_size: spec.voxel_size.unwrap_or(cell_size),
+        precision: spec.precision,
+    })
 }

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use serde::Deserialize as _;
 
-use super::{Reach, Scene, build, document::Document, error::SceneError, spec::SceneSpec};
+use super::{Reach, Scene, build, document::Document, error::SceneError, keys, spec::SceneSpec};
 
 impl Scene {
     /// Loads a scene file with overrides (`solver.pbf.iterations=8`: dotted keys, TOML values or
@@ -54,8 +54,9 @@ impl Scene {
         overrides: &[String],
         reach: Reach,
     ) -> Result<Self, SceneError> {
-        let (document, root) = Document::parse(text, file, overrides)?;
+        let (document, mut root) = Document::parse(text, file, overrides, keys::SCENE)?;
         let document = document.within(reach);
+        document.settle(&mut root)?;
         let spec = SceneSpec::deserialize(toml::Deserializer::from(root))
             .map_err(|error| document.translate(&error))?;
         build::scene(&document, base_dir, spec)
@@ -319,7 +320,7 @@ vorticity_confinement = { strength = 0.1 }
             ),
             (
                 "solver.pbf.iteratons=3",
-                "solver.pbf.iteratons: unknown key; the nearest is \"iterations\"",
+                "solver.pbf.iteratons: unknown key in [solver.pbf]; the nearest is \"iterations\"",
             ),
             (
                 "water.block=[{min=[0,0,0],max=[99,1,1]}]",
@@ -396,7 +397,7 @@ at = [5.0, 2.0]
         let mut written = BTreeSet::new();
         for (kind, overrides) in kinds.iter().zip(variants) {
             let text = of_solid.replace("\"KIND\"", kind);
-            let flip = ["solver.method=flip"];
+            let flip = ["solver.method=flip", "effects.viscosity.xsph=0.02"];
             let all: Vec<&str> = flip.iter().chain(overrides).copied().collect();
             let scene = parse(dir.path(), &text, &all).expect("valid");
             let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
@@ -404,8 +405,9 @@ at = [5.0, 2.0]
             collect_keys("", &table, &mut written);
         }
         // A motion's file is written as the points that were read from it.
-        let missing: Vec<_> = super::super::allowed::scene_keys()
-            .filter(|key| !key.ends_with("motion.file") && !written.contains(*key))
+        let missing: Vec<_> = keys::paths(keys::SCENE)
+            .into_iter()
+            .filter(|key| !key.ends_with("motion.file") && !written.contains(key))
             .collect();
         assert_eq!(missing, [] as [&str; 0]);
     }

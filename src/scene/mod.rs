@@ -1,26 +1,27 @@
-//! Scene and look files, parsed into validated types, and the plan that follows from them.
+//! Scene and look files, parsed into validated types.
 
 pub mod budget;
 pub mod effects;
 pub mod flip;
 pub mod grids;
+pub mod keys;
 pub mod look;
 pub mod moving_solid;
-pub mod plan;
 pub mod probe;
 pub mod step;
 pub mod study;
 pub mod tolerance;
 
-mod allowed;
 mod build;
 mod difference;
 mod document;
 mod error;
+mod key;
 mod load;
 mod origin;
-mod ranges;
+mod overrides;
 mod reach;
+mod settle;
 mod spec;
 mod wave_maker;
 mod words;
@@ -31,6 +32,8 @@ use std::path::PathBuf;
 use glam::{DAffine3, DQuat, DVec3};
 
 use crate::domain::{bounds::Bounds, holes::Holes, mesh::TriangleMesh, motion::Motion};
+
+use key::read_by_name;
 
 pub use budget::Budget;
 pub use difference::{physics_difference, physics_hash};
@@ -99,7 +102,8 @@ impl Scene {
 }
 
 /// Name and clock of a shot.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Shot {
     /// File-name safe.
     pub name: String,
@@ -387,3 +391,7 @@ impl Stop {
         }
     }
 }
+
+read_by_name!(Wall);
+read_by_name!(Method);
+read_by_name!(Iteration);

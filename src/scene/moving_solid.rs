@@ -1,17 +1,14 @@
 //! Solids that move: a mesh along a direction.
 
-use std::ops::Range;
-
 use glam::DVec3;
-use toml::Spanned;
 
 use super::{
     Method, PlacedMesh, Scene, Shot,
-    build::{extent, vector},
     document::Document,
     error::SceneError,
+    spec::MotionSpec,
     wave_maker,
-    words::shown,
+    words::{extent, shown},
 };
 use crate::domain::{bounds::Bounds, motion::Motion};
 
@@ -52,40 +49,36 @@ impl Scene {
     }
 }
 
-/// Refuses moving solids where the chosen solver has none.
-pub(super) fn check_method(doc: &Document<'_>, span: Range<usize>, method: Method) -> Result<()> {
+/// Refuses the moving solid whose motion stands at `place` where the chosen solver has none.
+pub(super) fn check_method(doc: &Document<'_>, place: &str, method: Method) -> Result<()> {
     match method {
         Method::Flip => Ok(()),
         Method::Pbf => {
             let problem = "solver pbf has no moving solids yet; choose solver.method = \"flip\"";
-            Err(doc.fault_plain(span, problem.to_owned()))
+            Err(doc.fault_of_plain(place, problem))
         }
     }
 }
 
-/// Builds one from its mesh and its keys.
+/// Builds the one at `path` from its mesh and its keys.
 pub(super) fn build(
     doc: &Document<'_>,
+    path: &str,
     placed: PlacedMesh,
-    direction: &Spanned<[f64; 3]>,
-    motion: &Spanned<super::spec::MotionSpec>,
+    direction: DVec3,
+    motion: &MotionSpec,
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<MovingSolid> {
-    let kind = &motion.get_ref().kind;
-    if kind.get_ref() == "solitary" {
-        let problem = "a solitary wave is made by a wall; a solid's motion is \"constant_velocity\", \
-                       \"sine\" or \"table\"";
-        return Err(doc.fault_plain(kind.span(), problem.to_owned()));
-    }
+    let place = format!("{path}.motion");
     let solid = MovingSolid {
         placed,
-        direction: vector(doc, direction, 1e6)?,
-        motion: wave_maker::motion(doc, around.base_dir, motion, around.gravity)?,
+        direction,
+        motion: wave_maker::motion(doc, &place, around.base_dir, motion, around.gravity)?,
     };
     if solid.direction.length() < LEAST_DIRECTION {
-        return Err(doc.fault_at(direction.span(), "no direction"));
+        return Err(doc.fault_of(&format!("{path}.direction"), "no direction"));
     }
-    check_way(doc, &solid, motion.span(), around.domain, around.shot)?;
+    check_way(doc, &solid, &place, around.domain, around.shot)?;
     Ok(solid)
 }
 
@@ -94,7 +87,7 @@ pub(super) fn build(
 fn check_way(
     doc: &Document<'_>,
     solid: &MovingSolid,
-    span: Range<usize>,
+    place: &str,
     domain: &Bounds,
     shot: &Shot,
 ) -> Result<()> {
@@ -108,7 +101,7 @@ fn check_way(
             shown(farthest),
             shown(size)
         );
-        return Err(doc.fault_at(span, problem));
+        return Err(doc.fault_of(place, problem));
     }
     let way = farthest * solid.direction.normalize();
     let swept = solid.placed.mesh.bounds().map(|b| Bounds {
@@ -123,5 +116,5 @@ fn check_way(
         extent(swept),
         extent(Some(*domain))
     );
-    Err(doc.fault_at(span, problem))
+    Err(doc.fault_of(place, problem))
 }

@@ -1,17 +1,9 @@
 //! `[[probe]]`: what is measured at each frame and written beside the particles.
 
-use std::fmt::{self, Write as _};
-
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
-use toml::Spanned;
 
-use super::{
-    Iteration, Method, Solver,
-    build::{extent, is_file_stem},
-    document::Document,
-    error::SceneError,
-};
+use super::{Iteration, Method, Solver, document::Document, error::SceneError, words::extent};
 use crate::domain::{bounds::Bounds, sparse_grid::EDGE, surface::MAX_BRICKS};
 
 /// A gauge that has a CSV of its own in the cache.
@@ -44,7 +36,7 @@ pub enum ProbeKind {
 
 impl ProbeKind {
     /// Names that scenes use.
-    const NAMES: [&str; 4] = ["elevation", "pressure", "energy", "volume"];
+    pub(super) const NAMES: [&str; 4] = ["elevation", "pressure", "energy", "volume"];
 
     /// As scenes name it.
     pub fn name(self) -> &'static str {
@@ -79,42 +71,41 @@ impl ProbeKind {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ProbeSpec {
-    kind: Spanned<String>,
-    name: Option<Spanned<String>>,
-    at: Option<Spanned<Vec<f64>>>,
+    kind: String,
+    name: Option<String>,
+    at: Option<Vec<f64>>,
 }
 
 /// Builds all of them. A probe without a name is called by its kind and its place among those of its kind.
 pub(super) fn build_all(
     doc: &Document<'_>,
-    specs: &[Spanned<ProbeSpec>],
+    specs: &[ProbeSpec],
     domain: &Bounds,
     solver: &Solver,
 ) -> Result<Vec<Probe>, SceneError> {
     let mut probes = Vec::<Probe>::new();
-    for table in specs {
-        let spec = table.get_ref();
-        let kind = kind(doc, table, domain)?;
-        if matches!(kind, ProbeKind::Pressure { .. }) {
-            check_pressure(doc, &spec.kind, solver)?;
-        }
-        if kind == ProbeKind::Volume {
-            check_volume(doc, &spec.kind, domain, solver)?;
+    for (index, spec) in specs.iter().enumerate() {
+        let path = format!("probe[{index}]");
+        let kind = kind(doc, &path, spec, domain)?;
+        let unfit = match kind {
+            ProbeKind::Pressure { .. } => why_no_pressure(solver),
+            ProbeKind::Volume => why_no_volume(domain, solver),
+            ProbeKind::Elevation { .. } | ProbeKind::Energy => None,
+        };
+        if let Some(problem) = unfit {
+            return Err(doc.fault_of(&format!("{path}.kind"), problem));
         }
         let alike = probes.iter().filter(|p| p.kind.name() == kind.name());
         let default = || format!("{}-{}", kind.name(), alike.count() + 1);
-        let name = spec.name.as_ref();
         let probe = Probe {
-            name: name.map_or_else(default, |name| name.get_ref().clone()),
+            name: spec.name.clone().unwrap_or_else(default),
             kind,
         };
-        let span = name.map_or(spec.kind.span(), Spanned::span);
-        if !is_file_stem(&probe.name) {
-            return Err(doc.fault_at(span, format!("{:?} is no safe file name", probe.name)));
-        }
         let is_alike = |known: &&Probe| known.name.eq_ignore_ascii_case(&probe.name);
         if let Some(known) = probes.iter().find(is_alike) {
-            return Err(doc.fault_at(span, second(&known.name, &probe.name)));
+            let problem = second(&known.name, &probe.name);
+            let key = if spec.name.is_some() { "name" } else { "kind" };
+            return Err(doc.fault_of(&format!("{path}.{key}"), problem));
         }
         probes.push(probe);
     }
@@ -132,75 +123,51 @@ fn second(known: &str, name: &str) -> String {
     problem
 }
 
+/// What the table at `path` measures, with its point in the domain.
 fn kind(
     doc: &Document<'_>,
-    table: &Spanned<ProbeSpec>,
+    path: &str,
+    spec: &ProbeSpec,
     domain: &Bounds,
 ) -> Result<ProbeKind, SceneError> {
-    let spec = table.get_ref();
-    let kind = match spec.kind.get_ref().as_str() {
+    let fault = |problem: String| doc.fault_of(&format!("{path}.at"), problem);
+    let given = spec.at.as_deref().unwrap_or_default();
+    let wrong = |count: usize| {
+        let problem = format!(
+            "{} numbers, and a probe of {} takes {count}",
+            given.len(),
+            spec.kind
+        );
+        fault(problem)
+    };
+    let (kind, is_within) = match spec.kind.as_str() {
         "elevation" => {
-            let [x, z] = point(doc, table)?;
-            let at = DVec2::new(x, z);
-            ProbeKind::Elevation { at }
+            let at = <[f64; 2]>::try_from(given).map_err(|_| wrong(2))?;
+            let at = DVec2::from_array(at);
+            let is_within = domain.contains(DVec3::new(at.x, domain.min.y, at.y));
+            (ProbeKind::Elevation { at }, is_within)
         }
         "pressure" => {
-            let at = DVec3::from_array(point(doc, table)?);
-            ProbeKind::Pressure { at }
+            let at = <[f64; 3]>::try_from(given).map_err(|_| wrong(3))?;
+            let at = DVec3::from_array(at);
+            (ProbeKind::Pressure { at }, domain.contains(at))
         }
-        "energy" => ProbeKind::Energy,
-        "volume" => ProbeKind::Volume,
-        other => return Err(doc.fault_at(spec.kind.span(), format!("{other:?} is no probe"))),
+        "energy" => (ProbeKind::Energy, true),
+        _ => (ProbeKind::Volume, true),
     };
-    let is_within = match kind {
-        ProbeKind::Elevation { at } => domain.contains(DVec3::new(at.x, domain.min.y, at.y)),
-        ProbeKind::Pressure { at } => domain.contains(at),
-        ProbeKind::Energy | ProbeKind::Volume => true,
-    };
-    match &spec.at {
-        Some(at) if !is_within => {
-            let all = extent(Some(*domain));
-            let problem = format!(
-                "{:?} is outside of the domain, which reaches over {all}",
-                at.get_ref()
-            );
-            Err(doc.fault_at(at.span(), problem))
-        }
-        Some(at) if kind.at(DVec3::ZERO).is_empty() => {
-            let problem = format!("a probe of {} has no place", kind.name());
-            Err(doc.fault_at(at.span(), problem))
-        }
-        _ => Ok(kind),
+    if is_within {
+        return Ok(kind);
     }
-}
-
-fn point<const N: usize>(
-    doc: &Document<'_>,
-    table: &Spanned<ProbeSpec>,
-) -> Result<[f64; N], SceneError> {
-    let spec = table.get_ref();
-    let Some(at) = &spec.at else {
-        return Err(doc.missing(table.span(), "at"));
-    };
-    let given = at.get_ref();
-    <[f64; N]>::try_from(given.as_slice()).map_err(|_| {
-        let problem = format!(
-            "{} numbers, and a probe of {} takes {N}",
-            given.len(),
-            spec.kind.get_ref()
-        );
-        doc.fault_at(at.span(), problem)
-    })
+    let all = extent(Some(*domain));
+    Err(fault(format!(
+        "{given:?} is outside of the domain, which reaches over {all}"
+    )))
 }
 
 /// PBF's pressure is the sum of its multipliers, which says all only where corrections are λ's and nothing else.
-fn check_pressure(
-    doc: &Document<'_>,
-    kind: &Spanned<String>,
-    solver: &Solver,
-) -> Result<(), SceneError> {
+fn why_no_pressure(solver: &Solver) -> Option<String> {
     if solver.method != Method::Pbf {
-        return Ok(());
+        return None;
     }
     let pbf = solver.pbf();
     let why = if pbf.iteration == Iteration::Chebyshev {
@@ -209,39 +176,20 @@ fn check_pressure(
     } else if pbf.artificial_pressure > 0.0 {
         "with solver.pbf.artificial_pressure above 0 particles are also held apart by a force that no pressure stands for"
     } else {
-        return Ok(());
+        return None;
     };
-    Err(doc.fault_at(kind.span(), why))
+    Some(why.to_owned())
 }
 
 /// The volume is that of a level set at voxels of one spacing, whose bricks have a table over the water.
-fn check_volume(
-    doc: &Document<'_>,
-    kind: &Spanned<String>,
-    domain: &Bounds,
-    solver: &Solver,
-) -> Result<(), SceneError> {
+fn why_no_volume(domain: &Bounds, solver: &Solver) -> Option<String> {
     let spacing = match solver.method {
         Method::Pbf => solver.pbf().particle_spacing,
         Method::Flip => solver.flip().particle_spacing(),
     };
     let bricks = (domain.size() / (spacing * f64::from(EDGE))).ceil();
-    if bricks.element_product() <= MAX_BRICKS {
-        return Ok(());
-    }
-    let problem =
-        format!("the domain has more than {MAX_BRICKS} bricks of {EDGE}³ particle spacings");
-    Err(doc.fault_at(kind.span(), problem))
-}
-
-/// As [`super::Scene::to_toml`] writes it.
-pub(super) fn write(out: &mut String, probe: &Probe, origin: DVec3) -> fmt::Result {
-    writeln!(out, "\n[[probe]]")?;
-    writeln!(out, "name = {:?}", probe.name)?;
-    writeln!(out, "kind = {:?}", probe.kind.name())?;
-    let at = probe.kind.at(origin);
-    if at.is_empty() {
-        return Ok(());
-    }
-    writeln!(out, "at = {at:?}")
+    let is_too_large = bricks.element_product() > MAX_BRICKS;
+    is_too_large.then(|| {
+        format!("the domain has more than {MAX_BRICKS} bricks of {EDGE}³ particle spacings")
+    })
 }

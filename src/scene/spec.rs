@@ -1,55 +1,47 @@
-//! The scene as it is written: types for serde, with spans for messages, and no logic.
+//! The scene as it is written, its numbers in range and its defaults laid down: types for serde, and no logic.
 
+use glam::DVec3;
 use serde::Deserialize;
-use toml::Spanned;
 
-use super::{Effects, budget::BudgetSpec, grids::GridsSpec, probe::ProbeSpec};
+use super::{
+    Effects, Iteration, Method, Shot, Wall, budget::BudgetSpec, flip::Flip, grids::GridsSpec,
+    probe::ProbeSpec,
+};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneSpec {
-    pub(super) shot: ShotSpec,
+    pub(super) shot: Shot,
     pub(super) domain: BoxSpec,
-    #[serde(default)]
     pub(super) water: WaterSpec,
     #[serde(default)]
-    pub(super) solid: Vec<SolidSpec>,
+    pub(super) solid: Vec<MeshSpec>,
     #[serde(default)]
     pub(super) wave_maker: Vec<WaveMakerSpec>,
     pub(super) solver: SolverSpec,
-    pub(super) grids: Option<Spanned<GridsSpec>>,
+    pub(super) grids: Option<GridsSpec>,
     #[serde(default)]
-    pub(super) probe: Vec<Spanned<ProbeSpec>>,
-    #[serde(default)]
+    pub(super) probe: Vec<ProbeSpec>,
     pub(super) budget: BudgetSpec,
-    #[serde(default)]
     pub(super) effects: Effects,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ShotSpec {
-    pub(super) name: Spanned<String>,
-    pub(super) frames: Spanned<i64>,
-    pub(super) frames_per_second: Spanned<f64>,
+pub(super) struct BoxSpec {
+    pub(super) min: [f64; 3],
+    pub(super) max: [f64; 3],
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct BoxSpec {
-    pub(super) min: Spanned<[f64; 3]>,
-    pub(super) max: Spanned<[f64; 3]>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub(super) struct WaterSpec {
-    pub(super) rest_density: Option<Spanned<f64>>,
-    pub(super) gravity: Option<Spanned<[f64; 3]>>,
+    pub(super) rest_density: f64,
+    pub(super) gravity: [f64; 3],
     #[serde(default)]
     pub(super) block: Vec<BoxSpec>,
     #[serde(default)]
-    pub(super) mesh: Vec<WaterMeshSpec>,
+    pub(super) mesh: Vec<MeshSpec>,
     #[serde(default)]
     pub(super) particles: Vec<SwarmSpec>,
 }
@@ -57,30 +49,22 @@ pub(super) struct WaterSpec {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SwarmSpec {
-    pub(super) at: Spanned<Vec<[f64; 3]>>,
-    pub(super) velocity: Option<Spanned<[f64; 3]>>,
+    pub(super) at: Vec<[f64; 3]>,
+    pub(super) velocity: [f64; 3],
 }
 
+/// A mesh of water or a solid; water says `file` and neither moves nor has a direction.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct WaterMeshSpec {
-    pub(super) file: Spanned<String>,
-    pub(super) blake3: Option<Spanned<String>>,
-    pub(super) translate: Option<Spanned<[f64; 3]>>,
-    pub(super) rotate_degrees: Option<Spanned<[f64; 3]>>,
-    pub(super) scale: Option<Spanned<ScaleSpec>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SolidSpec {
-    pub(super) mesh: Spanned<String>,
-    pub(super) blake3: Option<Spanned<String>>,
-    pub(super) translate: Option<Spanned<[f64; 3]>>,
-    pub(super) rotate_degrees: Option<Spanned<[f64; 3]>>,
-    pub(super) scale: Option<Spanned<ScaleSpec>>,
-    pub(super) direction: Option<Spanned<[f64; 3]>>,
-    pub(super) motion: Option<Spanned<MotionSpec>>,
+pub(super) struct MeshSpec {
+    #[serde(alias = "mesh")]
+    pub(super) file: String,
+    pub(super) blake3: Option<String>,
+    pub(super) translate: [f64; 3],
+    pub(super) rotate_degrees: [f64; 3],
+    pub(super) scale: ScaleSpec,
+    pub(super) direction: Option<[f64; 3]>,
+    pub(super) motion: Option<MotionSpec>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -90,73 +74,65 @@ pub(super) enum ScaleSpec {
     PerAxis([f64; 3]),
 }
 
+impl From<ScaleSpec> for DVec3 {
+    fn from(scale: ScaleSpec) -> Self {
+        match scale {
+            ScaleSpec::Uniform(scale) => Self::splat(scale),
+            ScaleSpec::PerAxis(scale) => Self::from_array(scale),
+        }
+    }
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct WaveMakerSpec {
-    pub(super) wall: Spanned<String>,
-    pub(super) motion: Spanned<MotionSpec>,
+    pub(super) wall: Wall,
+    pub(super) motion: MotionSpec,
 }
 
-/// One flat table for every kind: serde's tagged enums would lose the spans.
+/// A motion with the keys of its kind.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct MotionSpec {
-    pub(super) kind: Spanned<String>,
-    pub(super) velocity: Option<Spanned<f64>>,
-    pub(super) until: Option<Spanned<f64>>,
-    pub(super) stroke: Option<Spanned<f64>>,
-    pub(super) period: Option<Spanned<f64>>,
-    pub(super) ramp: Option<Spanned<f64>>,
-    pub(super) height: Option<Spanned<f64>>,
-    pub(super) depth: Option<Spanned<f64>>,
-    pub(super) file: Option<Spanned<String>>,
-    pub(super) points: Option<Spanned<Vec<[f64; 2]>>>,
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum MotionSpec {
+    ConstantVelocity {
+        velocity: f64,
+        until: Option<f64>,
+    },
+    Sine {
+        stroke: f64,
+        period: f64,
+        ramp: Option<f64>,
+    },
+    Solitary {
+        height: f64,
+        depth: f64,
+    },
+    Table {
+        file: Option<String>,
+        points: Option<Vec<[f64; 2]>>,
+    },
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SolverSpec {
-    pub(super) method: Spanned<String>,
+    pub(super) method: Method,
     pub(super) pbf: Option<PbfSpec>,
-    pub(super) flip: Option<FlipSpec>,
+    pub(super) flip: Option<Flip>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PbfSpec {
-    pub(super) particle_spacing: Spanned<f64>,
-    pub(super) support_ratio: Option<Spanned<f64>>,
-    pub(super) iteration: Option<Spanned<String>>,
-    pub(super) spectral_radius: Option<Spanned<f64>>,
-    pub(super) iterations: Option<Spanned<i64>>,
-    pub(super) density_error: Option<Spanned<f64>>,
-    pub(super) max_iterations: Option<Spanned<i64>>,
-    pub(super) cfl: Option<Spanned<f64>>,
-    pub(super) relaxation: Option<Spanned<f64>>,
-    pub(super) artificial_pressure: Option<Spanned<f64>>,
-    pub(super) max_substeps: Option<Spanned<i64>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct FlipSpec {
-    pub(super) cell_size: Spanned<f64>,
-    pub(super) particles_per_cell: Option<Spanned<i64>>,
-    pub(super) transfer: Option<Spanned<String>>,
-    pub(super) pic_blend: Option<Spanned<f64>>,
-    pub(super) cfl: Option<Spanned<f64>>,
-    pub(super) max_substeps: Option<Spanned<i64>>,
-    pub(super) surface: Option<Spanned<String>>,
-    pub(super) density_correction: Option<bool>,
-    #[serde(default)]
-    pub(super) pressure: PressureSpec,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct PressureSpec {
-    pub(super) preconditioner: Option<Spanned<String>>,
-    pub(super) precision: Option<Spanned<String>>,
-    pub(super) tolerance: Option<Spanned<f64>>,
-    pub(super) max_iterations: Option<Spanned<i64>>,
+    pub(super) particle_spacing: f64,
+    pub(super) support_ratio: f64,
+    pub(super) iteration: Iteration,
+    pub(super) spectral_radius: Option<f64>,
+    pub(super) iterations: Option<u32>,
+    pub(super) density_error: Option<f64>,
+    pub(super) max_iterations: Option<u32>,
+    pub(super) cfl: f64,
+    pub(super) relaxation: Option<f64>,
+    pub(super) artificial_pressure: f64,
+    pub(super) max_substeps: u32,
 }

@@ -136,8 +136,8 @@ impl Scene {
     /// many substeps: 1 − (1 − α)^(Δt / frame). At a fixed α halving Δt would double the dissipation. Effects take
     /// their part beside it.
     pub fn substep_pic_blend(&self, length: f64) -> f64 {
-        let effects = self.effects.flip_plans(0);
-        let kept: f64 = effects.iter().map(|effect| 1.0 - effect.blend).product();
+        let blends = self.effects.blends().into_iter();
+        let kept: f64 = blends.map(|blend| 1.0 - blend).product();
         let kept = (1.0 - self.solver.flip().pic_blend) * kept;
         1.0 - kept.powf(length / self.shot.frame_seconds())
     }

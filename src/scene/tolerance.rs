@@ -1,62 +1,109 @@
 //! Tolerance files: how far apart two caches or two pictures may be.
 
-use std::{collections::BTreeMap, fs, ops::RangeInclusive, path::Path};
+use std::{collections::BTreeMap, fs, path::Path};
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::{
-    document::{Document, unknown_key},
+    document::Document,
     error::SceneError,
-    words::shown,
+    key::{ANY, Interval, Key},
 };
 use crate::domain::{
     aggregates::Aggregates,
     tolerance::{FieldLimits, Limit, PictureLimits, Tolerance},
 };
 
-type Number = Option<Spanned<f64>>;
-
 /// What a difference may be; sums of them are finite.
-const LIMIT: RangeInclusive<f64> = 0.0..=1e300;
+const DIFFERENCE: Interval = 0.0..=1e300;
 
-/// What the perceptual score may be: pictures that have nothing in common have negative ones.
-const SCORE: RangeInclusive<f64> = -1e6..=100.0;
+const MAX: Key = Key::number("max", DIFFERENCE)
+    .absent()
+    .about("of the worst particle or pixel");
+const P99: Key = Key::number("p99", DIFFERENCE)
+    .absent()
+    .about("99th percentile");
+
+const FIELD: &[Key] = &[
+    MAX,
+    Key::number("rms", DIFFERENCE)
+        .absent()
+        .about("root mean square"),
+    P99,
+];
+
+const LIMIT: &[Key] = &[
+    Key::number("absolute", DIFFERENCE)
+        .absent()
+        .about("in the unit of the aggregate"),
+    Key::number("relative", DIFFERENCE)
+        .absent()
+        .about("of the reference's value; both add up"),
+];
+
+/// One for each aggregate.
+const AGGREGATES: [Key; 8] = {
+    let mut keys = [const { Key::inline("", LIMIT).absent().about("A limit") }; 8];
+    let mut at = 0;
+    while at < keys.len() {
+        keys[at].name = Aggregates::NAMES[at].0;
+        at += 1;
+    }
+    keys
+};
+
+/// Keys of a tolerance file.
+pub(super) const KEYS: &[Key] = &[
+    Key::table("position", FIELD).absent().about("Metres"),
+    Key::table("velocity", FIELD).absent().about("m/s"),
+    Key::table(
+        "attributes",
+        &[Key::table(ANY, FIELD)
+            .absent()
+            .about("In the attribute's unit")],
+    )
+    .absent()
+    .about("A table for each attribute"),
+    Key::table("aggregates", &AGGREGATES)
+        .absent()
+        .about("A limit for each aggregate"),
+    Key::table("pictures", PICTURES)
+        .absent()
+        .about("A pixel's error is its worst channel's; 1 is 255 in a PNG, linear white in an EXR"),
+];
+
+const PICTURES: &[Key] = &[
+    Key::number("mean", DIFFERENCE)
+        .absent()
+        .about("over the pixels"),
+    P99,
+    MAX,
+    // Pictures that have nothing in common have negative scores.
+    Key::number("perceptual", -1e6..=100.0)
+        .absent()
+        .also(", which is no visible difference")
+        .about("least SSIMULACRA 2 score; 90 is none to be seen"),
+];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ToleranceSpec {
-    position: Option<FieldSpec>,
-    velocity: Option<FieldSpec>,
+    position: Option<FieldLimits>,
+    velocity: Option<FieldLimits>,
     #[serde(default)]
-    attributes: BTreeMap<String, FieldSpec>,
+    attributes: BTreeMap<String, FieldLimits>,
     #[serde(default)]
     aggregates: BTreeMap<Spanned<String>, LimitSpec>,
-    pictures: Option<PictureSpec>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FieldSpec {
-    max: Number,
-    rms: Number,
-    p99: Number,
+    #[serde(default)]
+    pictures: PictureLimits,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LimitSpec {
-    absolute: Number,
-    relative: Number,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PictureSpec {
-    mean: Number,
-    p99: Number,
-    max: Number,
-    perceptual: Number,
+    absolute: Option<f64>,
+    relative: Option<f64>,
 }
 
 /// Loads a tolerance file.
@@ -76,13 +123,14 @@ pub fn load(path: &Path) -> Result<Tolerance, SceneError> {
 /// # Errors
 /// Those of [`load`].
 pub fn parse(text: &str, file: &Path) -> Result<Tolerance, SceneError> {
-    let (doc, root) = Document::parse(text, file, &[])?;
+    let (doc, mut root) = Document::parse(text, file, &[], KEYS)?;
+    doc.settle(&mut root)?;
     let spec = ToleranceSpec::deserialize(toml::Deserializer::from(root))
         .map_err(|error| doc.translate(&error))?;
     let tolerance = Tolerance {
-        fields: fields(&doc, &spec)?,
         aggregates: aggregates(&doc, &spec)?,
-        pictures: pictures(&doc, spec.pictures.as_ref())?,
+        pictures: spec.pictures,
+        fields: fields(spec),
     };
     if tolerance == Tolerance::default() {
         let problem = "it limits nothing; allowed: [position], [velocity], [attributes.NAME], [aggregates], [pictures]";
@@ -91,89 +139,33 @@ pub fn parse(text: &str, file: &Path) -> Result<Tolerance, SceneError> {
     Ok(tolerance)
 }
 
-fn fields(
-    doc: &Document<'_>,
-    spec: &ToleranceSpec,
-) -> Result<BTreeMap<String, FieldLimits>, SceneError> {
-    let own = [("position", &spec.position), ("velocity", &spec.velocity)];
-    let own = own
-        .into_iter()
-        .filter_map(|(name, spec)| Some((name.to_owned(), spec.as_ref()?)));
-    let attributes = spec.attributes.iter().map(|(name, s)| (name.clone(), s));
-    let mut fields = BTreeMap::new();
-    for (name, spec) in own.chain(attributes) {
-        let limits = FieldLimits {
-            max: from_zero(doc, &spec.max)?,
-            rms: from_zero(doc, &spec.rms)?,
-            p99: from_zero(doc, &spec.p99)?,
-        };
-        if limits != FieldLimits::default() {
-            fields.insert(name, limits);
-        }
-    }
-    Ok(fields)
+/// Limits by the name of their field, where there are any.
+fn fields(spec: ToleranceSpec) -> BTreeMap<String, FieldLimits> {
+    let own = [("position", spec.position), ("velocity", spec.velocity)];
+    let own = own.into_iter();
+    let own = own.filter_map(|(name, limits)| Some((name.to_owned(), limits?)));
+    let mut fields: BTreeMap<_, _> = own.chain(spec.attributes).collect();
+    fields.retain(|_, limits| *limits != FieldLimits::default());
+    fields
 }
 
 fn aggregates(
     doc: &Document<'_>,
     spec: &ToleranceSpec,
 ) -> Result<BTreeMap<String, Limit>, SceneError> {
-    let names = Aggregates::NAMES.map(|(name, _)| name.to_owned());
     let mut limits = BTreeMap::new();
     for (name, spec) in &spec.aggregates {
-        if !names.contains(name.get_ref()) {
-            return Err(doc.fault_plain(name.span(), unknown_key(name.get_ref(), &names)));
-        }
-        let (absolute, relative) = (
-            from_zero(doc, &spec.absolute)?,
-            from_zero(doc, &spec.relative)?,
-        );
-        if absolute.is_none() && relative.is_none() {
+        if spec.absolute.is_none() && spec.relative.is_none() {
             let message = "no limit; allowed: absolute, relative or both, which then add up";
             return Err(doc.fault_plain(name.span(), message.to_owned()));
         }
         let limit = Limit {
-            absolute: absolute.unwrap_or(0.0),
-            relative: relative.unwrap_or(0.0),
+            absolute: spec.absolute.unwrap_or(0.0),
+            relative: spec.relative.unwrap_or(0.0),
         };
         limits.insert(name.get_ref().clone(), limit);
     }
     Ok(limits)
-}
-
-fn pictures(doc: &Document<'_>, spec: Option<&PictureSpec>) -> Result<PictureLimits, SceneError> {
-    let Some(spec) = spec else {
-        return Ok(PictureLimits::default());
-    };
-    let perceptual = &spec.perceptual;
-    if let Some(score) = perceptual
-        && !SCORE.contains(score.get_ref())
-    {
-        let message = format!(
-            "{} is out of range; allowed: a score from -1e6 to 100, which is no visible difference",
-            shown(*score.get_ref())
-        );
-        return Err(doc.fault_plain(score.span(), message));
-    }
-    Ok(PictureLimits {
-        mean: from_zero(doc, &spec.mean)?,
-        p99: from_zero(doc, &spec.p99)?,
-        max: from_zero(doc, &spec.max)?,
-        perceptual: perceptual.as_ref().map(|score| *score.get_ref()),
-    })
-}
-
-fn from_zero(doc: &Document<'_>, number: &Number) -> Result<Option<f64>, SceneError> {
-    match number {
-        Some(number) if !LIMIT.contains(number.get_ref()) => {
-            let message = format!(
-                "{} is out of range; allowed: a number from 0 to 1e300",
-                shown(*number.get_ref())
-            );
-            Err(doc.fault_plain(number.span(), message))
-        }
-        other => Ok(other.as_ref().map(|number| *number.get_ref())),
-    }
 }
 
 #[cfg(test)]

@@ -1,23 +1,23 @@
-//! Wave-makers: which keys a motion takes, its table, and whether the walls stay apart.
+//! Wave-makers: how a motion is read, its table, and whether the walls stay apart.
 
 use std::{f64::consts::PI, fs::File, io::Read as _, path::Path};
 
 use glam::DVec3;
-use toml::Spanned;
 
 use super::{
-    Shot, Wall, WaveMaker,
-    build::{chain, number},
-    document::{Document, unknown_key},
+    Shot, WaveMaker,
+    document::Document,
     error::SceneError,
-    ranges::{Interval, LENGTH, PERIOD, SPEED, UNTIL},
     spec::{MotionSpec, WaveMakerSpec},
-    words::{shown, shown_all},
+    words::{chain, shown, shown_all},
 };
 use crate::domain::{bounds::Bounds, motion::Motion};
 
 /// Largest motion table read, bytes: ten hours at 60 points a second.
 const MAX_TABLE_BYTES: u64 = 64 << 20;
+
+/// Fastest that a motion may be, m/s: as fast as a velocity may be.
+const MAX_SPEED: f64 = 1e5;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
@@ -38,42 +38,61 @@ pub(super) fn build_all(
     around: &Surroundings<'_>,
 ) -> Result<Vec<WaveMaker>> {
     let mut makers = Vec::<WaveMaker>::new();
-    for spec in specs {
-        let wall = wall(doc, &spec.wall)?;
-        if makers.iter().any(|m| m.wall == wall) {
-            let problem = format!("a second wave maker on the wall {}", wall.name());
-            return Err(doc.fault_at(spec.wall.span(), problem));
+    for (index, spec) in specs.iter().enumerate() {
+        let path = format!("wave_maker[{index}]");
+        let place = format!("{path}.motion");
+        if makers.iter().any(|m| m.wall == spec.wall) {
+            let problem = format!("a second wave maker on the wall {}", spec.wall.name());
+            return Err(doc.fault_of(&format!("{path}.wall"), problem));
         }
-        let motion = motion(doc, around.base_dir, &spec.motion, around.gravity)?;
-        let size = around.domain.size()[wall.axis];
-        let room = size - around.least_gap;
-        let reach = motion.peak_displacement(around.shot.duration());
-        if reach > room {
-            let problem = format!(
-                "the wall {} crosses the whole domain: within the {} s of the shot it moves {} m of {} m",
-                wall.name(),
-                shown(around.shot.duration()),
-                shown(reach),
-                shown(size)
-            );
-            return Err(doc.fault_at(spec.motion.span(), problem));
-        }
-        let opposite = makers
-            .iter()
-            .find(|m| m.wall.axis == wall.axis && m.wall.is_max != wall.is_max);
-        if let Some(opposite) = opposite
-            && let Some(t) = meeting_time(&motion, &opposite.motion, room, around.shot.duration())
-        {
-            let problem = format!(
-                "the walls {} and {} collide {t:.3} s into the shot",
-                opposite.wall.name(),
-                wall.name()
-            );
-            return Err(doc.fault_at(spec.motion.span(), problem));
-        }
-        makers.push(WaveMaker { wall, motion });
+        let motion = motion(doc, &place, around.base_dir, &spec.motion, around.gravity)?;
+        let maker = WaveMaker {
+            wall: spec.wall,
+            motion,
+        };
+        check_room(doc, &place, &maker, &makers, around)?;
+        makers.push(maker);
     }
     Ok(makers)
+}
+
+/// That a wall crosses neither the domain nor the wall opposite.
+fn check_room(
+    doc: &Document<'_>,
+    place: &str,
+    maker: &WaveMaker,
+    others: &[WaveMaker],
+    around: &Surroundings<'_>,
+) -> Result<()> {
+    let wall = maker.wall;
+    let size = around.domain.size()[wall.axis];
+    let room = size - around.least_gap;
+    let duration = around.shot.duration();
+    let reach = maker.motion.peak_displacement(duration);
+    if reach > room {
+        let problem = format!(
+            "the wall {} crosses the whole domain: within the {} s of the shot it moves {} m of {} m",
+            wall.name(),
+            shown(duration),
+            shown(reach),
+            shown(size)
+        );
+        return Err(doc.fault_of(place, problem));
+    }
+    let opposite = others
+        .iter()
+        .find(|m| m.wall.axis == wall.axis && m.wall.is_max != wall.is_max);
+    if let Some(opposite) = opposite
+        && let Some(t) = meeting_time(&maker.motion, &opposite.motion, room, duration)
+    {
+        let problem = format!(
+            "the walls {} and {} collide {t:.3} s into the shot",
+            opposite.wall.name(),
+            wall.name()
+        );
+        return Err(doc.fault_of(place, problem));
+    }
+    Ok(())
 }
 
 /// When two motions together first use up `room`. Steps through the shot, and from each time no
@@ -88,111 +107,43 @@ fn meeting_time(a: &Motion, b: &Motion, room: f64, duration: f64) -> Option<f64>
     })
 }
 
-fn wall(doc: &Document<'_>, spec: &Spanned<String>) -> Result<Wall> {
-    Wall::NAMED
-        .iter()
-        .find(|(name, _)| name == spec.get_ref())
-        .map(|(_, wall)| *wall)
-        .ok_or_else(|| doc.fault_at(spec.span(), format!("{:?} is no wall", spec.get_ref())))
-}
-
-/// A motion's table with the keys that its kind takes.
-struct Keys<'a, 'b> {
-    doc: &'a Document<'b>,
-    motion: &'a Spanned<MotionSpec>,
-}
-
-impl Keys<'_, '_> {
-    fn needed(&self, value: &Option<Spanned<f64>>, name: &str, range: &Interval) -> Result<f64> {
-        match value {
-            Some(value) => number(self.doc, value, range),
-            None => Err(self.doc.missing(self.motion.span(), name)),
-        }
-    }
-
-    /// Refuses keys that stand there but mean nothing to this kind.
-    fn only(&self, allowed: &[&str]) -> Result<()> {
-        let m = self.motion.get_ref();
-        let given = [
-            ("velocity", m.velocity.as_ref().map(Spanned::span)),
-            ("until", m.until.as_ref().map(Spanned::span)),
-            ("stroke", m.stroke.as_ref().map(Spanned::span)),
-            ("period", m.period.as_ref().map(Spanned::span)),
-            ("ramp", m.ramp.as_ref().map(Spanned::span)),
-            ("height", m.height.as_ref().map(Spanned::span)),
-            ("depth", m.depth.as_ref().map(Spanned::span)),
-            ("file", m.file.as_ref().map(Spanned::span)),
-            ("points", m.points.as_ref().map(Spanned::span)),
-        ];
-        for (name, span) in given {
-            if let Some(span) = span
-                && !allowed.contains(&name)
-            {
-                let allowed: Vec<_> = allowed.iter().map(|&s| s.to_owned()).collect();
-                let problem = format!(
-                    "{} in a motion of kind {:?}",
-                    unknown_key(name, &allowed),
-                    m.kind.get_ref()
-                );
-                return Err(self.doc.fault_plain(span, problem));
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Builds a motion's table.
+/// The motion of the table at `path`.
 pub(super) fn motion(
     doc: &Document<'_>,
+    path: &str,
     base_dir: &Path,
-    spec: &Spanned<MotionSpec>,
+    spec: &MotionSpec,
     gravity: DVec3,
 ) -> Result<Motion> {
-    let keys = Keys { doc, motion: spec };
-    let m = spec.get_ref();
-    match m.kind.get_ref().as_str() {
-        "constant_velocity" => {
-            keys.only(&["velocity", "until"])?;
-            Ok(Motion::ConstantVelocity {
-                velocity: keys.needed(&m.velocity, "velocity", &SPEED)?,
-                until: match &m.until {
-                    Some(until) => Some(number(doc, until, &UNTIL)?),
-                    None => None,
-                },
-            })
+    match *spec {
+        MotionSpec::ConstantVelocity { velocity, until } => {
+            Ok(Motion::ConstantVelocity { velocity, until })
         }
-        "sine" => {
-            keys.only(&["stroke", "period", "ramp"])?;
-            let period = keys.needed(&m.period, "period", &PERIOD)?;
-            let stroke = keys.needed(&m.stroke, "stroke", &LENGTH)?;
+        MotionSpec::Sine {
+            stroke,
+            period,
+            ramp,
+        } => {
             check_speed(PI * stroke / period)
-                .map_err(|problem| doc.fault_plain(spec.span(), problem))?;
+                .map_err(|problem| doc.fault_of_plain(path, problem))?;
             Ok(Motion::Sine {
                 stroke,
                 period,
-                ramp: match &m.ramp {
-                    Some(ramp) if *ramp.get_ref() != 0.0 => number(doc, ramp, &PERIOD)?,
-                    Some(_) => 0.0,
-                    None => period,
-                },
+                ramp: ramp.unwrap_or(period),
             })
         }
-        "solitary" => {
-            keys.only(&["height", "depth"])?;
-            let depth = keys.needed(&m.depth, "depth", &LENGTH)?;
-            let height = keys.needed(&m.height, "height", &LENGTH)?;
-            if let Some(span) = m.height.as_ref().map(Spanned::span)
-                && height > depth
-            {
+        MotionSpec::Solitary { height, depth } => {
+            if height > depth {
                 let problem = format!(
                     "a wave of {} m on {} m of water",
                     shown(height),
                     shown(depth)
                 );
-                return Err(doc.fault_at(span, problem));
+                return Err(doc.fault_of(&format!("{path}.height"), problem));
             }
             if gravity.length() == 0.0 {
-                return Err(doc.fault_at(m.kind.span(), "a solitary wave needs gravity"));
+                let problem = "a solitary wave needs gravity";
+                return Err(doc.fault_of(&format!("{path}.kind"), problem));
             }
             Ok(Motion::Solitary {
                 height,
@@ -200,32 +151,25 @@ pub(super) fn motion(
                 gravity: gravity.length(),
             })
         }
-        "table" => {
-            keys.only(&["file", "points"])?;
-            table(doc, base_dir, spec)
+        MotionSpec::Table {
+            ref file,
+            ref points,
+        } => {
+            let file_key = format!("{path}.file");
+            let (points, key) = match file {
+                Some(file) => {
+                    let file = doc.find(base_dir, &file_key, file)?;
+                    let points = read_table(&file).map_err(|problem| {
+                        doc.fault_of(&file_key, format!("{}: {problem}", file.display()))
+                    })?;
+                    (points, file_key)
+                }
+                None => (points.clone().unwrap_or_default(), format!("{path}.points")),
+            };
+            check_points(&points).map_err(|problem| doc.fault_of(&key, problem))?;
+            Ok(Motion::Table { points })
         }
-        other => Err(doc.fault_at(m.kind.span(), format!("{other:?} is no kind of motion"))),
     }
-}
-
-fn table(doc: &Document<'_>, base_dir: &Path, spec: &Spanned<MotionSpec>) -> Result<Motion> {
-    let m = spec.get_ref();
-    let (points, span) = match (&m.points, &m.file) {
-        (Some(points), None) => (points.get_ref().clone(), points.span()),
-        (None, Some(file)) => {
-            let path = doc.find(base_dir, file)?;
-            let points = read_table(&path).map_err(|problem| {
-                doc.fault_at(file.span(), format!("{}: {problem}", path.display()))
-            })?;
-            (points, file.span())
-        }
-        (Some(points), Some(_)) => {
-            return Err(doc.fault_at(points.span(), "given together with file"));
-        }
-        (None, None) => return Err(doc.missing(spec.span(), "points")),
-    };
-    check_points(&points).map_err(|problem| doc.fault_at(span, problem))?;
-    Ok(Motion::Table { points })
 }
 
 fn check_points(points: &[[f64; 2]]) -> std::result::Result<(), String> {
@@ -261,13 +205,13 @@ fn check_points(points: &[[f64; 2]]) -> std::result::Result<(), String> {
 
 /// What a motion's keys together come to has the range that a velocity has.
 fn check_speed(speed: f64) -> std::result::Result<(), String> {
-    if speed <= *SPEED.end() {
+    if speed <= MAX_SPEED {
         return Ok(());
     }
     Err(format!(
         "it moves at {} m/s; allowed: up to {} m/s",
         shown(speed),
-        shown(*SPEED.end())
+        shown(MAX_SPEED)
     ))
 }
 

@@ -1,4 +1,6 @@
-//! Numbers and types in messages, as a user would write them.
+//! Numbers, types and boxes in messages, as a user would write them.
+
+use crate::domain::bounds::Bounds;
 
 /// A number in few digits: `1e308` has 309 when it is written out.
 pub(super) fn shown(value: f64) -> String {
@@ -49,13 +51,35 @@ pub(super) fn plain_types(message: &str) -> String {
     format!("{before}expected {word}{rest}")
 }
 
-/// The key that stands at a place twice, where that is what a TOML error is about: the parser does not name it.
-pub(super) fn duplicate<'a>(text: &'a str, error: &toml::de::Error) -> Option<&'a str> {
-    let key = text.get(error.span()?)?;
-    error
-        .message()
-        .starts_with("duplicate key")
-        .then(|| key.trim())
+/// Whether a name can be a part of a file's.
+pub(super) fn is_file_stem(name: &str) -> bool {
+    (1..=100).contains(&name.len())
+        && name.starts_with(|c: char| c.is_ascii_alphanumeric())
+        && name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.'))
+}
+
+/// A box by its corners.
+pub(super) fn extent(bounds: Option<Bounds>) -> String {
+    bounds.map_or_else(
+        || "nothing".to_owned(),
+        |b| {
+            let [min, max] = [b.min, b.max].map(|corner| shown_all(&corner.to_array()));
+            format!("{min} to {max}")
+        },
+    )
+}
+
+/// An error and its causes in one line.
+pub(super) fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text = format!("{text}: {cause}");
+        source = cause.source();
+    }
+    text
 }
 
 #[cfg(test)]

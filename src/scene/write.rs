@@ -1,13 +1,17 @@
 //! A scene as TOML again, every default written out.
 
-use std::{
-    fmt::{self, Write as _},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use serde::Serialize;
+use toml::{Table, Value};
 
-use super::{Iteration, Pbf, PlacedMesh, Scene, Stop, flip::Flip, probe};
+use super::{
+    Budget, Iteration, Pbf, PlacedMesh, Scene, Stop,
+    key::{Key, Kind},
+    keys,
+    probe::Probe,
+};
 use crate::domain::{bounds::Bounds, motion::Motion};
 
 /// Where a cache keeps its own copy of a mesh file: `assets/NAME-HASH.EXT`, so that two files of
@@ -53,172 +57,239 @@ impl Scene {
     /// found, relative to where the text is kept: [`asset_path`] for a cache.
     pub fn to_toml(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> String {
         let mut out = String::new();
-        // Writing to a String cannot fail.
-        let written = self.write(&mut out, mesh_path);
-        debug_assert!(written.is_ok());
+        write_tables(&mut out, keys::SCENE, "", &self.written(mesh_path));
         out
     }
 
-    fn write(&self, out: &mut String, mesh_path: &dyn Fn(&Path, &str) -> String) -> fmt::Result {
-        writeln!(out, "[shot]")?;
-        writeln!(out, "name = {}", text(&self.shot.name))?;
-        writeln!(out, "frames = {}", self.shot.frames)?;
-        writeln!(out, "frames_per_second = {:?}", self.shot.frames_per_second)?;
-        writeln!(out, "\n[domain]")?;
-        write_box(out, &self.domain.moved(self.origin))?;
-        writeln!(out, "\n[water]")?;
-        writeln!(out, "rest_density = {:?}", self.water.rest_density)?;
-        writeln!(out, "gravity = {}", vector(self.water.gravity))?;
-        for block in &self.water.blocks {
-            writeln!(out, "\n[[water.block]]")?;
-            write_box(out, &block.moved(self.origin))?;
-        }
-        for mesh in &self.water.meshes {
-            writeln!(out, "\n[[water.mesh]]")?;
-            write_mesh(out, "file", mesh, mesh_path)?;
-        }
-        for swarm in &self.water.particles {
-            writeln!(out, "\n[[water.particles]]")?;
-            let at: Vec<_> = swarm.at.iter().map(DVec3::to_array).collect();
-            writeln!(out, "at = {at:?}")?;
-            writeln!(out, "velocity = {}", vector(swarm.velocity))?;
-        }
-        for solid in &self.solids {
-            writeln!(out, "\n[[solid]]")?;
-            write_mesh(out, "mesh", solid, mesh_path)?;
-        }
-        for solid in &self.moving_solids {
-            writeln!(out, "\n[[solid]]")?;
-            write_mesh(out, "mesh", &solid.placed, mesh_path)?;
-            writeln!(out, "direction = {}", vector(solid.direction))?;
-            writeln!(out, "motion = {}", motion(&solid.motion))?;
-        }
-        for maker in &self.wave_makers {
-            writeln!(out, "\n[[wave_maker]]")?;
-            writeln!(out, "wall = {}", text(maker.wall.name()))?;
-            writeln!(out, "motion = {}", motion(&maker.motion))?;
-        }
-        self.write_solver(out)?;
+    /// Every key of the scene with its value.
+    pub(super) fn written(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> Table {
+        let mut scene = table([
+            ("shot", value(&self.shot)),
+            (
+                "domain",
+                Value::Table(corners(&self.domain.moved(self.origin))),
+            ),
+            ("water", Value::Table(self.written_water(mesh_path))),
+            ("solver", Value::Table(self.written_solver())),
+            ("budget", Value::Table(budget(&self.budget))),
+            ("effects", value(&self.effects)),
+        ]);
+        let placed = |solid: &PlacedMesh| mesh("mesh", solid, mesh_path);
+        let still = self.solids.iter().map(placed);
+        let moving = self.moving_solids.iter().map(|solid| {
+            let mut table = placed(&solid.placed);
+            table.insert("direction".to_owned(), vector(solid.direction));
+            table.insert("motion".to_owned(), motion(&solid.motion));
+            table
+        });
+        insert_tables(&mut scene, "solid", still.chain(moving));
+        let makers = self.wave_makers.iter();
+        let makers = makers.map(|maker| {
+            table([
+                ("wall", value(&maker.wall)),
+                ("motion", motion(&maker.motion)),
+            ])
+        });
+        insert_tables(&mut scene, "wave_maker", makers);
         if let Some(grids) = &self.grids {
-            grids.write(out)?;
+            scene.insert("grids".to_owned(), value(grids));
         }
-        for probe in &self.probes {
-            probe::write(out, probe, self.origin)?;
-        }
-        self.budget.write(out)?;
-        writeln!(out, "\n[effects]")?;
-        // An effect is a table of numbers, which toml can always write.
-        let effects = toml::Table::try_from(&self.effects).unwrap_or_default();
-        for (name, settings) in effects {
-            writeln!(out, "{name} = {settings}")?;
-        }
-        Ok(())
+        let probes = self.probes.iter().map(|it| probe(it, self.origin));
+        insert_tables(&mut scene, "probe", probes);
+        scene
     }
 
-    fn write_solver(&self, out: &mut String) -> fmt::Result {
-        writeln!(out, "\n[solver]")?;
-        writeln!(out, "method = {}", text(self.solver.method.name()))?;
-        if let Some(pbf) = &self.solver.pbf {
-            write_pbf(out, pbf)?;
+    fn written_water(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> Table {
+        let mut water = table([
+            ("rest_density", value(&self.water.rest_density)),
+            ("gravity", vector(self.water.gravity)),
+        ]);
+        let blocks = self.water.blocks.iter();
+        let blocks = blocks.map(|block| corners(&block.moved(self.origin)));
+        insert_tables(&mut water, "block", blocks);
+        let meshes = self.water.meshes.iter();
+        let meshes = meshes.map(|placed| mesh("file", placed, mesh_path));
+        insert_tables(&mut water, "mesh", meshes);
+        let swarms = self.water.particles.iter().map(|swarm| {
+            let at = swarm.at.iter().copied().map(vector).collect();
+            table([
+                ("at", Value::Array(at)),
+                ("velocity", vector(swarm.velocity)),
+            ])
+        });
+        insert_tables(&mut water, "particles", swarms);
+        water
+    }
+
+    fn written_solver(&self) -> Table {
+        let mut solver = table([("method", value(&self.solver.method))]);
+        if let Some(settings) = &self.solver.pbf {
+            solver.insert("pbf".to_owned(), Value::Table(pbf(settings)));
         }
-        if let Some(flip) = &self.solver.flip {
-            write_flip(out, flip)?;
+        if let Some(settings) = &self.solver.flip {
+            solver.insert("flip".to_owned(), value(settings));
         }
-        Ok(())
+        solver
     }
 }
 
-fn text(s: &str) -> String {
-    toml::Value::from(s).to_string()
+/// The tables below `path` in the order of their keys, each with its plain keys before its tables.
+fn write_tables(out: &mut String, keys: &[Key], path: &str, values: &Table) {
+    let is_table = |key: &&Key| matches!(key.kind, Kind::Table(_) | Kind::Tables(_));
+    for key in keys.iter().filter(|key| !is_table(key)) {
+        if let Some(value) = values.get(key.name) {
+            *out += &format!("{} = {}\n", key.name, inline(key, value));
+        }
+    }
+    for key in keys.iter().filter(is_table) {
+        let path = match path {
+            "" => key.name.to_owned(),
+            path => format!("{path}.{}", key.name),
+        };
+        let (items, head) = match values.get(key.name) {
+            None => continue,
+            Some(Value::Array(items)) => (items.as_slice(), format!("[[{path}]]")),
+            Some(item) => (std::slice::from_ref(item), format!("[{path}]")),
+        };
+        for table in items.iter().filter_map(Value::as_table) {
+            if !out.is_empty() {
+                out.push('\n');
+            }
+            *out += &format!("{head}\n");
+            write_tables(out, key.below(), &path, table);
+        }
+    }
 }
 
-/// `{:?}` is the shortest decimal that reads back as the same number, and valid TOML.
-fn vector(v: DVec3) -> String {
-    format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
+/// A value in one line. `{:?}` of a number is the shortest decimal that reads back as the same number, and valid TOML.
+fn inline(key: &Key, value: &Value) -> String {
+    match value {
+        Value::Float(number) => format!("{number:?}"),
+        Value::Array(items) => {
+            let items: Vec<_> = items.iter().map(|item| inline(key, item)).collect();
+            format!("[{}]", items.join(", "))
+        }
+        Value::Table(table) => {
+            let rows = key.below().iter().filter_map(|below| {
+                let value = table.get(below.name)?;
+                Some(format!("{} = {}", below.name, inline(below, value)))
+            });
+            format!("{{ {} }}", rows.collect::<Vec<_>>().join(", "))
+        }
+        other => other.to_string(),
+    }
 }
 
-fn write_box(out: &mut String, bounds: &Bounds) -> fmt::Result {
-    writeln!(out, "min = {}", vector(bounds.min))?;
-    writeln!(out, "max = {}", vector(bounds.max))
+/// A number, a name, or settings that have no other.
+fn value(of: &impl Serialize) -> Value {
+    Value::try_from(of).expect("numbers and names are TOML")
 }
 
-fn write_mesh(
-    out: &mut String,
-    key: &str,
-    mesh: &PlacedMesh,
-    mesh_path: &dyn Fn(&Path, &str) -> String,
-) -> fmt::Result {
-    let path = mesh_path(&mesh.file, &mesh.file_hash);
-    writeln!(out, "{key} = {}", text(&path))?;
-    writeln!(out, "blake3 = {}", text(&mesh.file_hash))?;
+fn vector(v: DVec3) -> Value {
+    value(&v.to_array())
+}
+
+fn table<const N: usize>(rows: [(&str, Value); N]) -> Table {
+    let rows = rows.into_iter();
+    rows.map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+fn insert_tables(into: &mut Table, key: &str, tables: impl Iterator<Item = Table>) {
+    let tables: Vec<_> = tables.map(Value::Table).collect();
+    if !tables.is_empty() {
+        into.insert(key.to_owned(), Value::Array(tables));
+    }
+}
+
+fn corners(bounds: &Bounds) -> Table {
+    table([("min", vector(bounds.min)), ("max", vector(bounds.max))])
+}
+
+fn mesh(key: &str, mesh: &PlacedMesh, mesh_path: &dyn Fn(&Path, &str) -> String) -> Table {
     let placement = &mesh.placement;
-    writeln!(out, "translate = {}", vector(placement.translate))?;
-    writeln!(out, "rotate_degrees = {}", vector(placement.rotate_degrees))?;
-    writeln!(out, "scale = {}", vector(placement.scale))
+    table([
+        (key, value(&mesh_path(&mesh.file, &mesh.file_hash))),
+        ("blake3", value(&mesh.file_hash)),
+        ("translate", vector(placement.translate)),
+        ("rotate_degrees", vector(placement.rotate_degrees)),
+        ("scale", vector(placement.scale)),
+    ])
 }
 
-fn write_pbf(out: &mut String, pbf: &Pbf) -> fmt::Result {
-    writeln!(out, "\n[solver.pbf]")?;
-    writeln!(out, "particle_spacing = {:?}", pbf.particle_spacing)?;
-    writeln!(out, "support_ratio = {:?}", pbf.support_ratio)?;
-    writeln!(out, "iteration = {}", text(pbf.iteration.name()))?;
+fn pbf(pbf: &Pbf) -> Table {
+    let mut rows = table([
+        ("particle_spacing", value(&pbf.particle_spacing)),
+        ("support_ratio", value(&pbf.support_ratio)),
+        ("iteration", value(&pbf.iteration)),
+        ("cfl", value(&pbf.cfl)),
+        ("relaxation", value(&pbf.relaxation)),
+        ("artificial_pressure", value(&pbf.artificial_pressure)),
+        ("max_substeps", value(&pbf.max_substeps)),
+    ]);
     if pbf.iteration == Iteration::Chebyshev {
-        writeln!(out, "spectral_radius = {:?}", pbf.spectral_radius)?;
+        rows.insert("spectral_radius".to_owned(), value(&pbf.spectral_radius));
     }
-    match pbf.stop {
-        Stop::Iterations(n) => writeln!(out, "iterations = {n}")?,
+    rows.extend(match pbf.stop {
+        Stop::Iterations(iterations) => table([("iterations", value(&iterations))]),
         Stop::DensityError {
             density_error,
             max_iterations,
-        } => {
-            writeln!(out, "density_error = {density_error:?}")?;
-            writeln!(out, "max_iterations = {max_iterations}")?;
-        }
-    }
-    writeln!(out, "cfl = {:?}", pbf.cfl)?;
-    writeln!(out, "relaxation = {:?}", pbf.relaxation)?;
-    writeln!(out, "artificial_pressure = {:?}", pbf.artificial_pressure)?;
-    writeln!(out, "max_substeps = {}", pbf.max_substeps)
+        } => table([
+            ("density_error", value(&density_error)),
+            ("max_iterations", value(&max_iterations)),
+        ]),
+    });
+    rows
 }
 
-fn write_flip(out: &mut String, flip: &Flip) -> fmt::Result {
-    writeln!(out, "\n[solver.flip]")?;
-    writeln!(out, "cell_size = {:?}", flip.cell_size)?;
-    writeln!(out, "particles_per_cell = {}", flip.particles_per_cell)?;
-    writeln!(out, "transfer = {}", text(flip.transfer.name()))?;
-    writeln!(out, "pic_blend = {:?}", flip.pic_blend)?;
-    writeln!(out, "cfl = {:?}", flip.cfl)?;
-    writeln!(out, "max_substeps = {}", flip.max_substeps)?;
-    writeln!(out, "surface = {}", text(flip.surface.name()))?;
-    writeln!(out, "density_correction = {}", flip.density_correction)?;
-    let pressure = &flip.pressure;
-    writeln!(out, "\n[solver.flip.pressure]")?;
-    let preconditioner = text(pressure.preconditioner.name());
-    writeln!(out, "preconditioner = {preconditioner}")?;
-    writeln!(out, "precision = {}", text(pressure.precision.name()))?;
-    writeln!(out, "tolerance = {:?}", pressure.tolerance)?;
-    writeln!(out, "max_iterations = {}", pressure.max_iterations)
-}
-
-fn motion(motion: &Motion) -> String {
-    match motion {
+fn motion(motion: &Motion) -> Value {
+    let (kind, rows) = match motion {
         Motion::ConstantVelocity { velocity, until } => {
-            let until = until.map_or(String::new(), |t| format!(", until = {t:?}"));
-            format!("{{ kind = \"constant_velocity\", velocity = {velocity:?}{until} }}")
+            let mut rows = table([("velocity", value(velocity))]);
+            if let Some(until) = until {
+                rows.insert("until".to_owned(), value(until));
+            }
+            ("constant_velocity", rows)
         }
         Motion::Sine {
             stroke,
             period,
             ramp,
-        } => format!(
-            "{{ kind = \"sine\", stroke = {stroke:?}, period = {period:?}, ramp = {ramp:?} }}"
-        ),
+        } => {
+            let rows = table([
+                ("stroke", value(stroke)),
+                ("period", value(period)),
+                ("ramp", value(ramp)),
+            ]);
+            ("sine", rows)
+        }
         // Its gravity is the water's.
         Motion::Solitary { height, depth, .. } => {
-            format!("{{ kind = \"solitary\", height = {height:?}, depth = {depth:?} }}")
+            let rows = table([("height", value(height)), ("depth", value(depth))]);
+            ("solitary", rows)
         }
-        Motion::Table { points } => {
-            format!("{{ kind = \"table\", points = {points:?} }}")
-        }
+        Motion::Table { points } => ("table", table([("points", value(points))])),
+    };
+    let mut all = table([("kind", value(&kind))]);
+    all.extend(rows);
+    Value::Table(all)
+}
+
+fn probe(probe: &Probe, origin: DVec3) -> Table {
+    let mut rows = table([
+        ("name", value(&probe.name)),
+        ("kind", value(&probe.kind.name())),
+    ]);
+    let at = probe.kind.at(origin);
+    if !at.is_empty() {
+        rows.insert("at".to_owned(), value(&at));
     }
+    rows
+}
+
+fn budget(budget: &Budget) -> Table {
+    let rows = budget.rows().into_iter();
+    let limit = |limit: Option<f64>| limit.map_or(Value::Boolean(false), Value::Float);
+    rows.map(|(watched, value)| (watched.name().to_owned(), limit(value)))
+        .collect()
 }

@@ -7,10 +7,7 @@ use glam::{DVec3, Vec3};
 use crate::{
     domain::{boundary::Boundary, signed_distance::SignedDistance, sph::Calibration},
     gpu::program::Program,
-    scene::{
-        Scene,
-        plan::{Counts, Plan},
-    },
+    scene::Scene,
 };
 
 use super::{
@@ -18,6 +15,7 @@ use super::{
     flip::buffers::SOLID_GRIDS,
     params::{SolidGrid, SolidGrids},
     pbf::buffers::{BOUNDARY_CELL_START, PREDICTED},
+    plan::{Counts, Plan},
 };
 
 impl Boundary {

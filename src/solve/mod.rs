@@ -2,9 +2,11 @@
 
 pub mod boundary;
 pub mod buffers;
+pub mod effects;
 pub mod flip;
 pub mod params;
 pub mod pbf;
+pub mod plan;
 pub mod pressure;
 mod state;
 pub mod trace;
@@ -12,31 +14,12 @@ pub mod trace;
 use crate::{
     domain::{bricks::Brick, budget::Breach},
     gpu::{adapter::GpuError, buffer::Mirror, reflect::Layout},
-    scene::{
-        Method, Scene,
-        plan::{Counts, DeviceLimits, Plan},
-    },
 };
 
 use params::{
     Counters, FlipParams, IterationControl, Params, Phase, SolidGrid, SolidGrids, SurveyHead,
 };
 use pressure::{PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats};
-
-/// What `scene`'s solver needs on a device with these limits.
-pub fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
-    let plan = Plan::new(scene, counts, limits);
-    match scene.solver.method {
-        Method::Pbf => plan,
-        Method::Flip => {
-            let flip = scene.solver.flip();
-            let (settings, has_correction) = (&flip.pressure, flip.density_correction);
-            let buffers = pressure::planned(settings, has_correction, counts.bricks.slots);
-            let passes = pressure::passes(settings, flip.surface, has_correction);
-            plan.with("pressure", buffers, passes)
-        }
-    }
-}
 
 /// Every struct that the host and the shaders share, by the name that it has in WGSL.
 pub fn mirrors() -> Vec<Layout> {

@@ -41,10 +41,10 @@ impl Traced<'_> {
     /// The device.
     pub fn read<T: bytemuck::Pod>(
         &self,
-        buffer: impl Into<Buf<T>>,
+        buffer: Buf<T>,
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.read(buffer.into(), count)?)
+        Ok(self.program.read(buffer, count)?)
     }
 
     /// What stands in a buffer of one struct, or in front of others.
@@ -64,7 +64,7 @@ impl Traced<'_> {
         variable: Buf<T>,
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
-        let buffer = Buf::named(self.buffer(variable.name()).to_owned());
+        let buffer = variable.renamed(self.buffer(variable.name()));
         Ok(self.program.read(buffer, count)?)
     }
 
@@ -128,7 +128,8 @@ impl Traced<'_> {
         let offset = found
             .and_then(|bind| bind.window)
             .map_or(0, |window| window.0) as usize;
-        let bytes: Vec<u8> = self.read(self.buffer(variable), offset + size_of::<T>())?;
+        let buffer: Buf<u8> = Buf::named(self.buffer(variable).to_owned());
+        let bytes = self.read(buffer, offset + size_of::<T>())?;
         Ok(bytemuck::pod_read_unaligned(&bytes[offset..]))
     }
 
@@ -165,13 +166,14 @@ impl Traced<'_> {
     /// The device.
     pub fn first_not_finite(&self) -> Result<Option<String>, SolveError> {
         for binding in self.written() {
-            let element = &binding.element;
-            if element.scalar != Scalar::Float {
+            let scalar = binding.element.scalar;
+            if !matches!(scalar, Scalar::F32 | Scalar::F64) {
                 continue;
             }
             let buffer = self.buffer(&binding.name);
-            let words = self.read::<u32>(buffer, self.length::<u32>(buffer))?;
-            if !are_finite(&words, element.scalar_bytes) {
+            let words: Buf<u32> = Buf::named(buffer.to_owned());
+            let words = self.read(words, self.length::<u32>(buffer))?;
+            if !are_finite(&words, scalar) {
                 return Ok(Some(buffer.to_owned()));
             }
         }
@@ -179,10 +181,10 @@ impl Traced<'_> {
     }
 }
 
-/// Whether floats of so many bytes are finite, by their exponents: the higher word of an f64 holds it.
-fn are_finite(words: &[u32], bytes: u8) -> bool {
-    let (width, exponent) = match bytes {
-        8 => (2, 0x7ff0_0000),
+/// Whether floats are finite, by their exponents: the higher word of an f64 holds it.
+fn are_finite(words: &[u32], float: Scalar) -> bool {
+    let (width, exponent) = match float {
+        Scalar::F64 => (2, 0x7ff0_0000),
         _ => (1, 0x7f80_0000),
     };
     let mut high = words.iter().skip(width - 1).step_by(width);
@@ -253,13 +255,13 @@ mod tests {
         let odd = f64::from_bits(0x3ff0_0000_7fc0_0000);
         assert!(are_finite(
             &[wide(1.0), wide(odd), wide(-f64::MAX)].concat(),
-            8
+            Scalar::F64
         ));
-        assert!(!are_finite(&wide(odd), 4));
+        assert!(!are_finite(&wide(odd), Scalar::F32));
         for value in [f64::NAN, f64::NEG_INFINITY] {
-            assert!(!are_finite(&[wide(1.0), wide(value)].concat(), 8));
-            assert!(!are_finite(&[(value as f32).to_bits()], 4));
+            assert!(!are_finite(&[wide(1.0), wide(value)].concat(), Scalar::F64));
+            assert!(!are_finite(&[(value as f32).to_bits()], Scalar::F32));
         }
-        assert!(are_finite(&[f32::MAX.to_bits(), 0], 4));
+        assert!(are_finite(&[f32::MAX.to_bits(), 0], Scalar::F32));
     }
 }

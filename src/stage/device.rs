@@ -16,11 +16,7 @@ use crate::{
     gpu::adapter::{Context, GpuError, Needs},
     reference::{self, ReferenceError},
     scene::{Method, Scene, flip::Precision},
-    solve::{
-        SolveError,
-        flip::Flip,
-        pbf::{Pbf, device_limits},
-    },
+    solve::{SolveError, flip::Flip, pbf::Pbf, plan::device_limits},
 };
 
 use super::{Blame, prepare::Start};
@@ -207,8 +203,8 @@ impl Opened {
         let method = scene.solver.method;
         let Self::Gpu(context) = self else {
             let solver: Box<dyn Solver<Error = SolverError>> = match method {
-                Method::Pbf => Box::new(Told(reference::pbf::Pbf::new(scene, boundary))),
-                Method::Flip => Box::new(Told(reference::flip::Flip::new(scene, boundary))),
+                Method::Pbf => Box::new(Unified(reference::pbf::Pbf::new(scene, boundary))),
+                Method::Flip => Box::new(Unified(reference::flip::Flip::new(scene, boundary))),
             };
             return Ok(Built {
                 solver,
@@ -218,17 +214,19 @@ impl Opened {
         let plan = start.plan(scene, device_limits(context));
         let bytes = Some(plan.bytes());
         let solver: Box<dyn Solver<Error = SolverError>> = match method {
-            Method::Pbf => Box::new(Told(Pbf::new(context, scene, plan, boundary, is_timed)?)),
-            Method::Flip => Box::new(Told(Flip::new(context, scene, plan, boundary, is_timed)?)),
+            Method::Pbf => Box::new(Unified(Pbf::new(context, scene, plan, boundary, is_timed)?)),
+            Method::Flip => Box::new(Unified(Flip::new(
+                context, scene, plan, boundary, is_timed,
+            )?)),
         };
         Ok(Built { solver, bytes })
     }
 }
 
-/// A solver that tells its errors as [`SolverError`]s.
-struct Told<S>(S);
+/// A solver whose errors are [`SolverError`]s.
+struct Unified<S>(S);
 
-impl<S: Solver> Solver for Told<S>
+impl<S: Solver> Solver for Unified<S>
 where
     SolverError: From<S::Error>,
 {

@@ -12,11 +12,8 @@ use crate::{
         adapter::{Context, GpuError, enumerate},
         program::check_sizes,
     },
-    scene::{
-        Scene,
-        plan::{DeviceLimits, LIST_BUDGET, Plan},
-    },
-    solve::pbf::device_limits,
+    scene::Scene,
+    solve::plan::{DeviceLimits, LIST_BUDGET, Plan, device_limits},
 };
 
 use super::{Blame, device::needs, prepare::Start, probes};
@@ -149,14 +146,9 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
     };
     let limits = context.as_ref().map_or(COMMON_LIMITS, device_limits);
     let plan = start.plan(scene, limits);
-    let buffers: Vec<_> = plan
-        .buffers
-        .iter()
-        .map(|buffer| buffer.spec.clone())
-        .collect();
     let misfit = context
         .as_ref()
-        .and_then(|context| check_sizes(context, &buffers).err())
+        .and_then(|context| check_sizes(context, &plan.buffer_specs()).err())
         .or(lacks);
     Ok(ScenePlan {
         plan,

@@ -10,11 +10,11 @@ use crate::{
         sampling::{boundary_samples, fill_water},
         signed_distance::{SignedDistance, SignedDistanceError},
     },
-    scene::{
-        Method, Scene,
+    scene::{Method, Scene},
+    solve::{
+        flip,
         plan::{Capacity, Counts, DeviceLimits, Plan},
     },
-    solve::{self, flip},
 };
 
 /// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
@@ -110,7 +110,7 @@ impl Start {
             bricks,
             ..self.boundary.counts()
         };
-        solve::plan(scene, counts, limits)
+        Plan::new(scene, counts, limits)
     }
 }
 

@@ -25,10 +25,10 @@ use crate::{
     scene::{self, Method, Scene, SceneError},
     solve::{
         SolveError,
-        flip::Flip,
-        params::FlipParams,
-        pbf::{Pbf, device_limits},
-        pressure::DONE,
+        flip::{Flip, buffers::*},
+        pbf::Pbf,
+        plan::device_limits,
+        pressure::{self, DONE},
         trace::{Begun, Span, TraceFrame, Traced},
     },
 };
@@ -176,7 +176,7 @@ impl Finder<'_> {
         }
         let found = match traced.first_not_finite()? {
             Some(buffer) => Some(buffer),
-            None => self.first_over(&traced)?.map(str::to_owned),
+            None => self.first_over(&traced)?,
         };
         let Some(buffer) = found else {
             return Ok(());
@@ -191,7 +191,7 @@ impl Finder<'_> {
     }
 
     /// The buffer, of those that the dispatch wrote, whose content is over the watched limit.
-    fn first_over(&self, traced: &Traced<'_>) -> Result<Option<&'static str>, SolveError> {
+    fn first_over(&self, traced: &Traced<'_>) -> Result<Option<String>, SolveError> {
         let limit = self.breach.limit;
         let n = self.state.len();
         match self.breach.watched {
@@ -199,12 +199,13 @@ impl Finder<'_> {
             Watched::Speed => self.too_fast(traced, limit),
             Watched::Substeps => self.too_fast(traced, self.most_speed()),
             Watched::Particles => {
-                let of_ids = ["id", "sorted_id"].into_iter();
-                for buffer in of_ids.filter(|buffer| traced.writes(buffer)) {
-                    let mut id: Vec<u32> = traced.read(buffer, n)?;
-                    id.sort_unstable();
-                    if id != self.state.id {
-                        return Ok(Some(buffer));
+                for buffer in [ID, SORTED_ID] {
+                    if traced.writes(buffer.name()) {
+                        let mut id = traced.read(buffer.clone(), n)?;
+                        id.sort_unstable();
+                        if id != self.state.id {
+                            return Ok(Some(buffer.name().to_owned()));
+                        }
                     }
                 }
                 Ok(None)
@@ -213,12 +214,9 @@ impl Finder<'_> {
                 let count = match self.scene.solver.method {
                     Method::Pbf => n,
                     // Beyond the water of this substep stands that of others.
-                    Method::Flip => {
-                        let params: Vec<FlipParams> = traced.read("params", 1)?;
-                        (params[0].wet_cells + CELLS) as usize
-                    }
+                    Method::Flip => (traced.one(PARAMS)?.wet_cells + CELLS) as usize,
                 };
-                let mut density: Vec<f32> = traced.read("density", count)?;
+                let mut density = traced.read(DENSITY, count)?;
                 if self.scene.solver.method == Method::Flip {
                     density.retain(|&density| density != 0.0);
                 }
@@ -228,44 +226,44 @@ impl Finder<'_> {
                     Watched::DensityErrorMean => report.density_error_mean,
                     _ => report.density_error_p99,
                 };
-                Ok((measured > limit).then_some("density"))
+                Ok((measured > limit).then(|| DENSITY.name().to_owned()))
             }
             Watched::Residual if traced.pass == "pressure/reduce" && !self.is_correcting => {
                 let precision = self.scene.solver.flip().pressure.precision;
                 let control = traced.pressure_control(precision)?;
                 let is_over = control.state == DONE && control.residual() > limit;
-                Ok(is_over.then_some("pressure_control"))
+                Ok(is_over.then(|| pressure::buffers::CONTROL.name().to_owned()))
             }
             Watched::Divergence if traced.pass == "pressure/measure_divergence" => {
                 let divergence = f64::from(traced.pressure_stats()?.divergence_after);
-                let params: Vec<FlipParams> = traced.read("params", 1)?;
+                let params = traced.one(PARAMS)?;
                 // The device's step is the rounded one.
-                let change = divergence * f64::from(params[0].time_step) * (1.0 + U);
-                Ok((change > limit).then_some("pressure_stats"))
+                let change = divergence * f64::from(params.time_step) * (1.0 + U);
+                Ok((change > limit).then(|| pressure::buffers::STATS.name().to_owned()))
             }
-            Watched::Volume if traced.writes("position") => {
+            Watched::Volume if traced.writes(POSITION.name()) => {
                 let moved = Particles {
                     position: self.positions(traced)?,
                     ..Particles::default()
                 };
                 let drift = |start: f64| (volume_of(self.scene, &moved) / start - 1.0).abs();
                 let is_over = self.start_volume.is_some_and(|start| drift(start) > limit);
-                Ok(is_over.then_some("position"))
+                Ok(is_over.then(|| POSITION.name().to_owned()))
             }
-            Watched::Energy if traced.writes("velocity") || traced.writes("position") => {
+            Watched::Energy if traced.writes(VELOCITY.name()) || traced.writes(POSITION.name()) => {
                 let energy = self.energy_of(traced)?;
                 let work = self
                     .made
                     .as_ref()
                     .map_or(0.0, |report| report.boundary_work);
                 let allowed = self.scene.allowed_energy(n, self.energy, work, limit);
-                Ok((energy > allowed).then_some("velocity"))
+                Ok((energy > allowed).then(|| VELOCITY.name().to_owned()))
             }
-            Watched::Capped if traced.writes("counters") => {
+            Watched::Capped if traced.writes(COUNTERS.name()) => {
                 let capped = f64::from(traced.counters()?.capped);
                 let substeps = self.made.as_ref().map_or(1, |report| report.substeps);
                 let most = limit * n as f64 * f64::from(substeps);
-                Ok((capped > most).then_some("counters"))
+                Ok((capped > most).then(|| COUNTERS.name().to_owned()))
             }
             _ => Ok(None),
         }
@@ -281,17 +279,13 @@ impl Finder<'_> {
         way * self.breach.limit * self.scene.shot.frames_per_second
     }
 
-    fn too_fast(
-        &self,
-        traced: &Traced<'_>,
-        limit: f64,
-    ) -> Result<Option<&'static str>, SolveError> {
-        for buffer in ["velocity", "sorted_velocity"] {
-            if traced.writes(buffer) {
-                let velocity: Vec<[f32; 4]> = traced.read(buffer, self.state.len())?;
+    fn too_fast(&self, traced: &Traced<'_>, limit: f64) -> Result<Option<String>, SolveError> {
+        for buffer in [VELOCITY, SORTED_VELOCITY] {
+            if traced.writes(buffer.name()) {
+                let velocity = traced.read(buffer.clone(), self.state.len())?;
                 let speed = |v: &[f32; 4]| vector(v).length();
                 if velocity.iter().any(|v| speed(v) > limit) {
-                    return Ok(Some(buffer));
+                    return Ok(Some(buffer.name().to_owned()));
                 }
             }
         }
@@ -300,14 +294,14 @@ impl Finder<'_> {
 
     /// World positions as they stand, metres.
     fn positions(&self, traced: &Traced<'_>) -> Result<Vec<[f32; 3]>, SolveError> {
-        let local: Vec<[f32; 4]> = traced.read("position", self.state.len())?;
+        let local = traced.read(POSITION, self.state.len())?;
         let world = |x: &[f32; 4]| (self.scene.domain.min + vector(x)).as_vec3().to_array();
         Ok(local.iter().map(world).collect())
     }
 
     /// Kinetic and potential energy of positions and velocities as they stand, joule: their order does not count.
     fn energy_of(&self, traced: &Traced<'_>) -> Result<f64, SolveError> {
-        let velocity: Vec<[f32; 4]> = traced.read("velocity", self.state.len())?;
+        let velocity = traced.read(VELOCITY, self.state.len())?;
         let state = Particles {
             position: self.positions(traced)?,
             velocity: velocity.iter().map(|v| [v[0], v[1], v[2]]).collect(),

@@ -32,6 +32,7 @@ mod compare {
     mod diff;
     mod renders;
 }
+mod docs;
 mod domain {
     mod circles;
     mod signed_distance;
@@ -60,6 +61,7 @@ mod scene {
     mod edits;
     mod faults;
     mod fuzz_inputs;
+    mod imports;
     mod untrusted;
 }
 mod solve {
@@ -70,6 +72,7 @@ mod solve {
     mod independent;
     mod moving_solids;
     mod pbf;
+    mod plan;
     mod pressure;
 }
 mod stage {

@@ -102,7 +102,7 @@ pub fn content_hash(grids: &Grids, precision: Precision) -> io::Result<blake3::H
 /// Bytes of [`header`].
 const HEADER: usize = 8 + 4 + 2 * 4 + 1 + 36;
 
-/// What stands before the file's metadata.
+/// Bytes before the file's metadata.
 fn header(body: &[u8]) -> Vec<u8> {
     let mut header = MAGIC.to_le_bytes().to_vec();
     put_u32(&mut header, FORMAT_VERSION);

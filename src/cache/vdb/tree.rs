@@ -31,7 +31,7 @@ mod inactive {
 /// A grid's leaves by the nodes above them; each map is in the order in which the file has them.
 pub(super) struct Tree<'a, T> {
     background: T,
-    /// By the first voxel of a 32³ node.
+    /// Nodes by the first voxel of a 32³ node.
     upper: BTreeMap<[i32; 3], BTreeMap<usize, Lower<'a, T>>>,
 }
 
@@ -120,7 +120,7 @@ impl<T: Value> Lower<'_, T> {
     }
 }
 
-/// Where a voxel lies in its node of `2^(above - below)` children an edge, x slowest.
+/// Offset of a voxel in its node of `2^(above - below)` children an edge, x slowest.
 fn offset(voxel: [i32; 3], below: u32, above: u32) -> usize {
     let edge_bits = above - below;
     voxel.iter().fold(0, |offset, x| {

@@ -4,7 +4,7 @@ use half::f16;
 
 /// A voxel's value.
 pub(super) trait Value: Copy + PartialEq + Send + Sync {
-    /// As OpenVDB names it in a tree's type.
+    /// OpenVDB's name in a tree's type.
     const NAME: &'static str;
     /// How transforms act on it: vectors as velocities.
     const VECTOR_TYPE: Option<&'static str>;
@@ -12,7 +12,7 @@ pub(super) trait Value: Copy + PartialEq + Send + Sync {
     /// Minus it.
     fn negative(self) -> Self;
 
-    /// Its components.
+    /// Components of the value.
     fn components(&self) -> &[f32];
 }
 

@@ -22,7 +22,7 @@ use crate::{
             Flip,
             buffers::{CELL_KIND, FACE_OPEN, FACE_VELOCITY, LIQUID_DISTANCE, SOLID_FLUX},
         },
-        pbf::device_limits,
+        plan::device_limits,
     },
     stage::{device::Opened, drive::Drive, prepare::Start},
 };

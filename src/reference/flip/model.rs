@@ -8,13 +8,12 @@ use crate::{
         boundary::Boundary,
         bounds::Bounds,
         bricks::{Bricks, EDGE, table_dims},
-        flip::{CAP, CONTACT},
+        flip::{CAP, CONTACT, layers, stored_cells},
         signed_distance::SignedDistance,
     },
     scene::{
         Scene,
         flip::{Flip, Surface},
-        plan::{grid_dims, layers, stored_cells},
         step::Substep,
     },
 };
@@ -65,7 +64,7 @@ impl Model {
         };
         let solids = boundary.distance.iter().chain(&boundary.moving);
         Self {
-            cells: grid_dims(&scene.domain, scene.solver.flip().cell_size),
+            cells: scene.domain.cells(scene.solver.flip().cell_size),
             solids: solids.map(local).collect(),
             at_rest: usize::from(boundary.distance.is_some()),
             scene: scene.clone(),

@@ -3,6 +3,8 @@
 
 mod cholesky;
 pub mod gradients;
+pub mod iteration;
+pub mod multigrid;
 
 use crate::{
     domain::poisson::{System, remove_means},

@@ -191,7 +191,7 @@ impl Renderer {
             return Ok(());
         }
         let capacity = room(particles);
-        self.program.resize(&[PARTICLES.sized(capacity)])?;
+        self.program.refit(&[PARTICLES.sized(capacity)], &[])?;
         self.capacity = capacity;
         self.sample = Recording::new(&self.program, &self.plan.sample);
         self.aovs = Recording::new(&self.program, &self.plan.aovs);

@@ -1,22 +1,21 @@
-//! Effects that a scene may name under `[effects]`: one word in a list, one file here, and one a reference solver.
+//! Effects that a scene may name under `[effects]`: one word in a list, and a file in each room.
 //!
-//! An effect's file here holds its settings, what they may be, and what it adds to the plan of each solver. Its
-//! passes bind buffers by name and run in order: of PBF after the velocity update, of FLIP on the grid
-//! before the projection. Their f64 twins stand in a file of the same name in `reference`.
+//! An effect's file here holds its settings and their keys. What it adds to each solver stands in a file of the
+//! same name in `solve::effects`, its f64 twins in `reference`, and what holds the two against each other in `check`.
 
-use crate::gpu::program::{BufferSpec, PassSpec};
+use super::key::Key;
 
-/// What an effect adds to the plan.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EffectPlan {
-    /// Key under `[effects]`.
-    pub name: &'static str,
-    /// In the order in which they run.
-    pub passes: Vec<PassSpec>,
-    /// Beyond what the solver has anyway.
-    pub buffers: Vec<BufferSpec>,
-    /// Part of the velocity that a frame takes from the grid for it; of FLIP alone.
-    pub blend: f64,
+/// What an effect's settings say of themselves.
+pub(super) trait Effect {
+    /// What it is, for the page of keys.
+    const ABOUT: &'static str;
+    /// Its keys, each with its range.
+    const KEYS: &'static [Key];
+
+    /// Part of the velocity that a frame of FLIP takes from the grid for it.
+    fn blend(&self) -> f64 {
+        0.0
+    }
 }
 
 /// Gives the list of effects, in the order in which they act, to a macro.
@@ -46,38 +45,18 @@ macro_rules! effects {
             /// Keys of all effects.
             pub const NAMES: &[&str] = &[$(stringify!($name)),+];
 
-            /// What the named effects add for `particles` particles.
-            pub fn plans(&self, particles: usize) -> Vec<EffectPlan> {
-                let mut plans = Vec::new();
-                $(
-                    if let Some(settings) = &self.$name {
-                        let (passes, buffers) = settings.plan(particles);
-                        plans.push(EffectPlan { name: stringify!($name), passes, buffers, blend: 0.0 });
-                    }
-                )+
-                plans
-            }
+            /// Each with its own keys.
+            pub(super) const KEYS: &[Key] = &[$(
+                Key::inline(stringify!($name), <$name::Settings as Effect>::KEYS)
+                    .absent()
+                    .about(<$name::Settings as Effect>::ABOUT)
+            ),+];
 
-            /// What the named effects add to FLIP with so many cells in its arrays.
-            pub fn flip_plans(&self, cells: usize) -> Vec<EffectPlan> {
-                let mut plans = Vec::new();
-                $(
-                    if let Some(settings) = &self.$name {
-                        let (passes, buffers, blend) = settings.flip_plan(cells);
-                        plans.push(EffectPlan { name: stringify!($name), passes, buffers, blend });
-                    }
-                )+
-                plans
-            }
-
-            /// The first setting that is out of its range: dotted key, its value, and what is allowed.
-            pub fn fault(&self) -> Option<(String, f64, &'static str)> {
-                $(
-                    if let Some((key, value, allowed)) = self.$name.as_ref().and_then($name::Settings::fault) {
-                        return Some((format!("effects.{}.{key}", stringify!($name)), value, allowed));
-                    }
-                )+
-                None
+            /// Part of the velocity that a frame of FLIP takes from the grid, of each of the named effects.
+            pub(super) fn blends(&self) -> Vec<f64> {
+                let mut blends = Vec::new();
+                $(blends.extend(self.$name.as_ref().map(Effect::blend));)+
+                blends
             }
         }
     };

@@ -2,10 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::gpu::{
-    program::{BufferSpec, PassSpec},
-    sort::storage,
-};
+use super::{super::key::Key, Effect};
 
 /// `viscosity = { xsph = 0.01 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,25 +13,18 @@ pub struct Settings {
     pub xsph: f64,
 }
 
-impl Settings {
-    /// A millionth is what a frame of 32-bit velocities hardly shows.
-    pub(super) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
-        (!(1e-6..=1.0).contains(&self.xsph)).then_some(("xsph", self.xsph, "a number from 1e-6 to 1"))
-    }
+impl Effect for Settings {
+    const ABOUT: &'static str = "XSPH viscosity (Schechter and Bridson 2012)";
 
-    pub(super) fn plan(&self, particles: usize) -> (Vec<PassSpec>, Vec<BufferSpec>) {
-        let gather = PassSpec {
-            name: "effects/viscosity_gather",
-            defines: Vec::new(),
-            constants: vec![("XSPH", self.xsph)],
-        };
-        let apply = PassSpec { name: "effects/viscosity_apply", defines: Vec::new(), constants: Vec::new() };
-        (vec![gather, apply], vec![storage("viscosity_change", 16 * particles as u64)])
-    }
+    const KEYS: &'static [Key] = &[
+        // A millionth is what a frame of 32-bit velocities hardly shows.
+        Key::number("xsph", 1e-6..=1.0)
+            .about("c, the part of the neighbours' mean relative velocity that a substep of PBF, or a frame of FLIP, takes over"),
+    ];
 
-    /// XSPH's mean of the neighbours' velocities is what the grid holds: c is a further part taken from it,
-    /// without a pass of its own.
-    pub(super) fn flip_plan(&self, _cells: usize) -> (Vec<PassSpec>, Vec<BufferSpec>, f64) {
-        (Vec::new(), Vec::new(), self.xsph)
+    /// XSPH's mean of the neighbours' velocities is what the grid holds: c is a further part taken from it, without a
+    /// pass of its own.
+    fn blend(&self) -> f64 {
+        self.xsph
     }
 }

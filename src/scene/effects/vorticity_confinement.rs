@@ -2,10 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::gpu::{
-    program::{BufferSpec, PassSpec},
-    sort::storage,
-};
+use super::{super::key::Key, Effect};
 
 /// `vorticity_confinement = { strength = 0.1 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,29 +12,13 @@ pub struct Settings {
     pub strength: f64,
 }
 
-impl Settings {
-    /// A millionth is what a frame of 32-bit velocities hardly shows.
-    pub(super) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
-        (!(1e-6..=100.0).contains(&self.strength)).then_some(("strength", self.strength, "a number from 1e-6 to 100"))
-    }
+impl Effect for Settings {
+    const ABOUT: &'static str =
+        "Vorticity confinement (Macklin and Müller 2013; on the grid Fedkiw et al. 2001)";
 
-    pub(super) fn plan(&self, particles: usize) -> (Vec<PassSpec>, Vec<BufferSpec>) {
-        let curl = PassSpec { name: "effects/vorticity_curl", defines: Vec::new(), constants: Vec::new() };
-        let force = PassSpec {
-            name: "effects/vorticity_force",
-            defines: Vec::new(),
-            constants: vec![("STRENGTH", self.strength)],
-        };
-        (vec![curl, force], vec![storage("vorticity", 16 * particles as u64)])
-    }
-
-    pub(super) fn flip_plan(&self, cells: usize) -> (Vec<PassSpec>, Vec<BufferSpec>, f64) {
-        let curl = PassSpec { name: "effects/grid_curl", defines: Vec::new(), constants: Vec::new() };
-        let force = PassSpec {
-            name: "effects/grid_confinement",
-            defines: Vec::new(),
-            constants: vec![("STRENGTH", self.strength)],
-        };
-        (vec![curl, force], vec![storage("vorticity", 16 * cells as u64)], 0.0)
-    }
+    const KEYS: &'static [Key] = &[
+        // A millionth is what a frame of 32-bit velocities hardly shows.
+        Key::number("strength", 1e-6..=100.0)
+            .about("ε, metres per second squared for each 1/s of vorticity and metre of support radius (PBF) or cell (FLIP)"),
+    ];
 }

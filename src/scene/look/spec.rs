@@ -1,4 +1,4 @@
-//! The look file as written: serde types, every default beside its field, no logic.
+//! The look file as written, its numbers in range and its defaults laid down: serde types, no logic.
 
 use std::path::PathBuf;
 
@@ -11,32 +11,24 @@ pub struct LookSpec {
     /// Where the picture is taken from.
     pub camera: CameraSpec,
     /// Size and sampling.
-    #[serde(default)]
     pub image: ImageSpec,
     /// How splats become a surface.
-    #[serde(default)]
     pub surface: SurfaceSpec,
     /// What the water is like inside.
-    #[serde(default)]
     pub water: WaterSpec,
     /// The sun.
-    #[serde(default)]
     pub sun: SunSpec,
     /// What the water mirrors.
     pub sky: SkySpec,
     /// The plane at the domain's floor, which runs to the horizon.
-    #[serde(default)]
     pub ground: GroundSpec,
     /// Quay walls just outside the domain's sides; none unless named.
     pub basin: Option<BasinSpec>,
     /// The scene's solids.
-    #[serde(default)]
     pub solids: SolidsSpec,
     /// From scene-linear light to a picture.
-    #[serde(default)]
     pub view: ViewSpec,
     /// What is written.
-    #[serde(default)]
     pub output: OutputSpec,
 }
 
@@ -47,14 +39,12 @@ pub struct CameraSpec {
     /// mm.
     pub focal_length_mm: f64,
     /// Width and height of the exposed film, mm; its shape must be the image's.
-    #[serde(default = "film_back")]
     pub film_back_mm: [f64; 2],
     /// World metres; with `target`, instead of keyframes.
     pub position: Option<[f64; 3]>,
     /// World metres.
     pub target: Option<[f64; 3]>,
     /// Direction that stands upright in the picture.
-    #[serde(default = "up")]
     pub up: [f64; 3],
     /// Poses at frames, in ascending order.
     #[serde(default, rename = "keyframe")]
@@ -75,17 +65,9 @@ pub struct KeyframeSpec {
     pub focal_length_mm: Option<f64>,
 }
 
-fn film_back() -> [f64; 2] {
-    [36.0, 20.25]
-}
-
-fn up() -> [f64; 3] {
-    [0.0, 1.0, 0.0]
-}
-
 /// Size and sampling of the picture.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct ImageSpec {
     /// Pixels.
     pub width: u32,
@@ -95,17 +77,6 @@ pub struct ImageSpec {
     pub samples: u32,
     /// Fraction of a frame for which the shutter is open, centred on the frame; 0 = no motion blur.
     pub shutter: f64,
-}
-
-impl Default for ImageSpec {
-    fn default() -> Self {
-        Self {
-            width: 640,
-            height: 360,
-            samples: 3,
-            shutter: 0.0,
-        }
-    }
 }
 
 /// The filter that turns splats into a surface.
@@ -120,7 +91,7 @@ pub enum FilterSpec {
 
 /// How splats become a surface.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct SurfaceSpec {
     /// Which filter.
     pub filter: FilterSpec,
@@ -132,18 +103,6 @@ pub struct SurfaceSpec {
     pub roughness: f64,
     /// Fine waves drawn into the normals; none unless named.
     pub ripple: Option<RippleSpec>,
-}
-
-impl Default for SurfaceSpec {
-    fn default() -> Self {
-        Self {
-            filter: FilterSpec::CurvatureFlow,
-            radius_m: None,
-            smoothing_width_m: None,
-            roughness: 0.08,
-            ripple: None,
-        }
-    }
 }
 
 /// Procedural ripples.
@@ -158,7 +117,7 @@ pub struct RippleSpec {
 
 /// What the water is like inside.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct WaterSpec {
     /// Refractive index.
     pub index: f64,
@@ -168,17 +127,6 @@ pub struct WaterSpec {
     pub scattering_per_metre: [f64; 3],
     /// White water where particles are thrown clear or fast; none unless named.
     pub spray: Option<SpraySpec>,
-}
-
-impl Default for WaterSpec {
-    fn default() -> Self {
-        Self {
-            index: 1.333,
-            absorption_per_metre: [0.34, 0.057, 0.0064],
-            scattering_per_metre: [0.0; 3],
-            spray: None,
-        }
-    }
 }
 
 /// Whitening of thrown and fast water.
@@ -193,7 +141,7 @@ pub struct SpraySpec {
 
 /// The sun.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct SunSpec {
     /// 0 = along +x, 90 = along +z.
     pub azimuth_degrees: f64,
@@ -203,16 +151,6 @@ pub struct SunSpec {
     pub intensity: f64,
 }
 
-impl Default for SunSpec {
-    fn default() -> Self {
-        Self {
-            azimuth_degrees: 60.0,
-            elevation_degrees: 40.0,
-            intensity: 1.0,
-        }
-    }
-}
-
 /// What the water mirrors.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
@@ -220,10 +158,8 @@ pub enum SkySpec {
     /// Hosek and Wilkie 2012.
     HosekWilkie {
         /// 1 (clear) to 10 (hazy).
-        #[serde(default = "turbidity")]
         turbidity: f64,
         /// Reflectance of the land around, red, green, blue.
-        #[serde(default = "albedo")]
         albedo: [f64; 3],
     },
     /// A latitude-longitude panorama, scene-linear.
@@ -231,29 +167,15 @@ pub enum SkySpec {
         /// EXR, relative to the look file.
         file: PathBuf,
         /// Turn about the vertical.
-        #[serde(default)]
         rotate_degrees: f64,
         /// Factor on its radiance.
-        #[serde(default = "one")]
         intensity: f64,
     },
 }
 
-fn turbidity() -> f64 {
-    3.0
-}
-
-fn albedo() -> [f64; 3] {
-    [0.15, 0.15, 0.15]
-}
-
-fn one() -> f64 {
-    1.0
-}
-
 /// The ground plane.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct GroundSpec {
     /// Reflectance, linear red, green, blue.
     pub colour: [f64; 3],
@@ -263,16 +185,6 @@ pub struct GroundSpec {
     pub haze_m: f64,
 }
 
-impl Default for GroundSpec {
-    fn default() -> Self {
-        Self {
-            colour: [0.30, 0.28, 0.25],
-            variation: 0.25,
-            haze_m: 500.0,
-        }
-    }
-}
-
 /// Quay walls along the domain's ±z sides.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -280,31 +192,17 @@ pub struct BasinSpec {
     /// Above the domain's floor, metres.
     pub height_m: f64,
     /// Metres.
-    #[serde(default = "thickness")]
     pub thickness_m: f64,
-}
-
-fn thickness() -> f64 {
-    0.6
 }
 
 /// How the scene's solids look.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct SolidsSpec {
     /// Reflectance, linear red, green, blue.
     pub colour: [f64; 3],
     /// Rows of windows on upright faces; none unless named.
     pub windows: Option<WindowsSpec>,
-}
-
-impl Default for SolidsSpec {
-    fn default() -> Self {
-        Self {
-            colour: [0.55, 0.52, 0.48],
-            windows: None,
-        }
-    }
 }
 
 /// Windows on upright faces.
@@ -316,13 +214,12 @@ pub struct WindowsSpec {
     /// Width from window to window, metres.
     pub bay_m: f64,
     /// Fraction of the windows that are lit from within.
-    #[serde(default)]
     pub lit: f64,
 }
 
 /// From scene-linear light to a picture.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct ViewSpec {
     /// Factor of 2 to this power on the light, in the PNG only.
     pub exposure_stops: f64,
@@ -336,12 +233,7 @@ pub struct ViewSpec {
 
 impl Default for ViewSpec {
     fn default() -> Self {
-        Self {
-            exposure_stops: 0.0,
-            transform: TransformSpec::Agx,
-            saturation: 1.0,
-            contrast: 1.0,
-        }
+        super::default_of(super::keys::VIEW)
     }
 }
 
@@ -384,7 +276,7 @@ pub enum AovSpec {
 
 /// What is written.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct OutputSpec {
     /// At least one.
     pub formats: Vec<FormatSpec>,
@@ -392,14 +284,4 @@ pub struct OutputSpec {
     pub aovs: Vec<AovSpec>,
     /// Whether the sky is in the picture, or left transparent.
     pub background: bool,
-}
-
-impl Default for OutputSpec {
-    fn default() -> Self {
-        Self {
-            formats: vec![FormatSpec::Png],
-            aovs: Vec::new(),
-            background: true,
-        }
-    }
 }

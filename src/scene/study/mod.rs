@@ -16,7 +16,9 @@ use std::{
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Fault, Place, Reach, Scene, document::Document, error::SceneError, look::LookError};
+use super::{
+    Fault, Place, Reach, Scene, document::Document, error::SceneError, keys, look::LookError,
+};
 
 use comparison::SolverComparison;
 use stability::Stability;
@@ -73,7 +75,7 @@ pub enum StudyFileError {
 /// What every kind says; the rest is read by the kind.
 #[derive(Deserialize)]
 struct KindSpec {
-    kind: Spanned<String>,
+    kind: String,
 }
 
 impl Study {
@@ -114,23 +116,21 @@ impl Study {
         base_dir: &Path,
         reach: Reach,
     ) -> Result<Self, StudyFileError> {
-        let (doc, root) = Document::parse(text, file, &[])?;
+        let (doc, mut root) = Document::parse(text, file, &[], keys::STUDY)?;
         let doc = doc.within(reach);
+        doc.settle(&mut root)?;
         let told = KindSpec::deserialize(toml::Deserializer::from(root.clone()))
             .map_err(|error| doc.translate(&error))?;
-        match told.kind.get_ref().as_str() {
+        match told.kind.as_str() {
             "solver_comparison" => {
                 let comparison = comparison::parse(&doc, root, base_dir)?;
                 Ok(Self::SolverComparison(Box::new(comparison)))
             }
             "sweep" => Ok(Self::Sweep(Box::new(sweep::parse(&doc, root, base_dir)?))),
-            "stability" => {
+            // The table of keys has no other.
+            _ => {
                 let stability = stability::parse(&doc, root, base_dir)?;
                 Ok(Self::Stability(Box::new(stability)))
-            }
-            other => {
-                let problem = format!("{other:?} is no kind of study");
-                Err(doc.fault_at(told.kind.span(), problem).into())
             }
         }
     }

@@ -200,11 +200,10 @@ struct SweepSpec {
     key: Option<Spanned<String>>,
     values: Option<Spanned<Vec<Spanned<Value>>>>,
     coarser: Option<Spanned<Vec<Spanned<String>>>>,
-    steps: Option<Spanned<i64>>,
+    steps: Option<u32>,
     seconds: Option<Spanned<f64>>,
-    repeats: Option<Spanned<i64>>,
+    repeats: u32,
     errors: Spanned<Vec<Spanned<String>>>,
-    #[serde(default)]
     convergence_point: bool,
     method: Spanned<Vec<Spanned<MethodSpec>>>,
 }
@@ -231,7 +230,6 @@ pub(super) fn parse(
     let spec = SweepSpec::deserialize(toml::Deserializer::from(root))
         .map_err(|error| doc.translate(&error))?;
     let errors = errors(doc, &spec.errors)?;
-    let repeats = whole(doc, &spec.repeats, 100)?.unwrap_or(1);
     let state = match errors[0].measure() {
         Measure::Projection => Some(state(doc, &spec, base_dir)?),
         Measure::Report | Measure::Finest | Measure::Converged => None,
@@ -266,7 +264,7 @@ pub(super) fn parse(
     Ok(Sweep {
         about: spec.about.unwrap_or_default(),
         lines,
-        repeats,
+        repeats: spec.repeats,
         errors,
         state,
         has_convergence_point: spec.convergence_point,
@@ -300,21 +298,6 @@ fn errors(
         return Err(doc.fault_at(spec.span(), "empty"));
     }
     Ok(errors)
-}
-
-fn whole(
-    doc: &Document<'_>,
-    spec: &Option<Spanned<i64>>,
-    most: u32,
-) -> Result<Option<u32>, SceneError> {
-    let Some(spec) = spec else {
-        return Ok(None);
-    };
-    let value = u32::try_from(*spec.get_ref()).ok();
-    match value.filter(|value| (1..=most).contains(value)) {
-        Some(value) => Ok(Some(value)),
-        None => Err(doc.fault_at(spec.span(), format!("{} is out of range", spec.get_ref()))),
-    }
 }
 
 /// What projections start from: the scene with what is set for all.
@@ -504,12 +487,8 @@ fn tie_pic_blend(scene: &mut Scene, own_rate: f64) {
 fn frames(doc: &Document<'_>, spec: &SweepSpec, scene: &Scene) -> Result<u32, SceneError> {
     let rate = scene.shot.frames_per_second;
     let Some(seconds) = &spec.seconds else {
-        let steps = whole(doc, &spec.steps, 1_000_000)?;
-        return steps.ok_or_else(|| doc.missing(spec.scene.span(), "steps"));
+        return (spec.steps).ok_or_else(|| doc.missing(spec.scene.span(), "steps"));
     };
-    if let Some(steps) = &spec.steps {
-        return Err(doc.fault_at(steps.span(), "seconds stands there as well"));
-    }
     let frames = seconds.get_ref() * rate;
     let is_whole = (frames - frames.round()).abs() <= 1e-6 * frames;
     if !is_whole || !(1.0..=1e6).contains(&frames.round()) {

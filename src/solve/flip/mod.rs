@@ -5,8 +5,9 @@
 //! No grid outlives its substep: the state is positions, velocities, ids, and with APIC the affine rows.
 
 pub mod buffers;
+mod capacity;
+pub(super) mod plan;
 mod record;
-mod room;
 mod step;
 
 use glam::DVec3;
@@ -16,6 +17,7 @@ use crate::{
         boundary::Boundary,
         bricks::{Bricks, CELLS},
         budget::Breach,
+        flip::layers,
         gauge::Gauge,
         particles::Particles,
         solver::{Projection, Solver, StepReport},
@@ -24,36 +26,32 @@ use crate::{
     gpu::{
         adapter::Context,
         buffer::Buf,
-        program::{BufferSpec, Program},
+        program::Program,
         recording::{Recording, Timer},
         sort,
     },
-    scene::{
-        Scene,
-        plan::{Counts, DeviceLimits, Plan, layers},
-        step::Substep,
-    },
+    scene::{Scene, step::Substep},
 };
 
 use super::{
     SolveError,
     boundary::Movers,
+    effects,
     params::Counters,
+    plan::{Counts, Plan},
     pressure::{self, PressureSolver},
     state::{check_finite, check_ids, slots_by_id, take_over, upload},
     trace::{Begun, Observe, Run, Span, TraceFrame, trace},
 };
 use buffers::*;
-use record::{Recordings, groups, numbers};
-use room::{bricks, capacity_of, no_water};
-
-pub use room::capacity;
+pub use capacity::capacity;
+use capacity::{bricks, capacity_of, no_water};
+use record::{Commands, Recordings, groups, numbers};
 
 /// FLIP on a device.
 pub struct Flip {
     program: Program,
     plan: Plan,
-    limits: DeviceLimits,
     scene: Scene,
     movers: Option<Movers>,
     recordings: Recordings,
@@ -73,9 +71,9 @@ struct Survey {
     is_wet: Vec<bool>,
 }
 
-/// What a frame's substeps did.
+/// What a frame's substeps did, added up.
 #[derive(Default)]
-struct Told {
+struct FrameTotals {
     substeps: u32,
     iterations: u64,
     projection: Projection,
@@ -85,7 +83,7 @@ struct Told {
     elapsed: f64,
 }
 
-impl Told {
+impl FrameTotals {
     fn add(&mut self, projected: &pressure::Projected) {
         let solved = &projected.solved;
         self.iterations += u64::from(solved.iterations);
@@ -112,11 +110,11 @@ impl Flip {
         boundary: &Boundary,
         is_timed: bool,
     ) -> Result<Self, SolveError> {
-        let passes: Vec<_> = plan.passes.iter().map(|pass| pass.spec.clone()).collect();
-        let program = Program::new(context, &specs(&plan), &passes, &[])?;
+        let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
+        let program = Program::new(context, &buffers, &passes, &[])?;
         boundary.upload_distance(&program, scene);
         upload_constants(&program, &plan, scene);
-        let bricks = bricks(&plan, &no_water(&plan), 0);
+        let bricks = bricks(plan.grid_dims, &no_water(plan.grid_dims), 0);
         // The first survey reads what does not depend on the substep.
         let frame = Substep {
             start: 0.0,
@@ -125,12 +123,11 @@ impl Flip {
         };
         program.upload(PARAMS, 0, &[step::params(scene, &plan, &bricks, &frame)]);
         Ok(Self {
-            recordings: Recordings::new(&program, &plan, scene),
+            recordings: recordings(&program, &plan, scene),
             pressure: pressure_solver(scene, &plan),
             timer: is_timed.then(|| Timer::new(context)),
             bricks,
             program,
-            limits: super::pbf::device_limits(context),
             plan,
             scene: scene.clone(),
             movers: Movers::of(boundary, scene),
@@ -174,15 +171,15 @@ impl Flip {
     /// The device.
     pub fn field<T: bytemuck::Pod>(
         &self,
-        buffer: impl Into<Buf<T>>,
+        buffer: Buf<T>,
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.read(buffer.into(), count)?)
+        Ok(self.program.read(buffer, count)?)
     }
 
     fn survey(&mut self, run: &mut Run<'_>) -> Result<Survey, SolveError> {
         run(&self.program, &[&self.recordings.survey])?;
-        let flags = SURVEY_IS_WET.first(no_water(&self.plan).len());
+        let flags = SURVEY_IS_WET.first(no_water(self.plan.grid_dims).len());
         let (head, is_wet) = self.program.download((SURVEY.first(1), flags))?;
         Ok(Survey {
             speed: f64::from(head[0].speed_square).sqrt(),
@@ -212,7 +209,7 @@ impl Flip {
     /// Lays out bricks about the water, and makes room for more where they do not fit.
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
         let layers = layers(substep.displacement);
-        self.bricks = bricks(&self.plan, is_wet, layers);
+        self.bricks = bricks(self.plan.grid_dims, is_wet, layers);
         let needed = capacity_of(&self.bricks);
         let grown = self.plan.counts.bricks.grown(needed);
         if grown != self.plan.counts.bricks {
@@ -220,10 +217,11 @@ impl Flip {
                 bricks: grown,
                 ..self.plan.counts
             };
-            self.plan = super::plan(&self.scene, counts, self.limits);
-            self.program.resize(&specs(&self.plan))?;
+            self.plan = plan::plan(&self.scene, counts);
+            let (buffers, passes) = (self.plan.buffer_specs(), self.plan.pass_specs());
+            self.program.refit(&buffers, &passes)?;
             upload_constants(&self.program, &self.plan, &self.scene);
-            self.recordings = Recordings::new(&self.program, &self.plan, &self.scene);
+            self.recordings = recordings(&self.program, &self.plan, &self.scene);
             self.pressure = pressure_solver(&self.scene, &self.plan);
         }
         let bricks = &self.bricks;
@@ -303,45 +301,45 @@ impl Flip {
         substep: &Substep,
         run: &mut Run<'_>,
     ) -> Result<pressure::Projected, SolveError> {
-        let step = pressure::Step {
+        let scale = pressure::Scale {
             time_step: substep.length,
             rest_density: self.scene.water.rest_density,
         };
         let cell_size = self.scene.solver.flip().cell_size;
         self.pressure
             .set_topology(&self.program, &self.bricks, cell_size);
-        self.pressure.project_by(&self.program, step, run)
+        self.pressure.project_by(&self.program, scale, run)
     }
 
     fn run_substep(
         &mut self,
         is_wet: &[bool],
         substep: &Substep,
-        told: &mut Told,
+        totals: &mut FrameTotals,
         run: &mut Run<'_>,
     ) -> Result<(), SolveError> {
         self.carry(is_wet, substep, run)?;
         let projected = self.project_by(substep, run)?;
-        told.add(&projected);
+        totals.add(&projected);
         self.scene.budget.check_projection(
             self.frame + 1,
-            told.substeps,
+            totals.substeps,
             projected.solved.residual,
             projected.divergence_after,
             substep.length,
         )?;
         if self.scene.solver.flip().density_correction {
             let corrected = self.pressure.correct_by(&self.program, run)?;
-            told.projection.correction_iterations += u64::from(corrected.iterations);
-            told.projection.missed += u32::from(corrected.is_missed);
+            totals.projection.correction_iterations += u64::from(corrected.iterations);
+            totals.projection.missed += u32::from(corrected.is_missed);
         }
         run(
             &self.program,
             &[&self.recordings.to_particles, &self.recordings.watch],
         )?;
-        let work = self.watched(told.substeps)?;
+        let work = self.watched(totals.substeps)?;
         let face = self.scene.solver.flip().cell_size.powi(2);
-        told.work += face * substep.length * work;
+        totals.work += face * substep.length * work;
         Ok(())
     }
 
@@ -367,31 +365,31 @@ impl Flip {
     /// What the next substep is, and whether it is the frame's last.
     fn look(
         &mut self,
-        told: &Told,
+        totals: &FrameTotals,
         run: &mut Run<'_>,
     ) -> Result<(Survey, Substep, bool), SolveError> {
         let length = self.scene.shot.frame_seconds();
-        let start = f64::from(self.frame) * length + told.elapsed;
+        let start = f64::from(self.frame) * length + totals.elapsed;
         let survey = self.survey(run)?;
         let (wanted, substep) =
-            self.choose(&survey, start, length - told.elapsed, told.substeps)?;
+            self.choose(&survey, start, length - totals.elapsed, totals.substeps)?;
         Ok((survey, substep, wanted <= 1.0))
     }
 
     /// The next substep; true where it was the frame's last.
-    fn go_on(&mut self, told: &mut Told, run: &mut Run<'_>) -> Result<bool, SolveError> {
-        let (survey, substep, is_last) = self.look(told, run)?;
-        told.substeps += 1;
-        self.run_substep(&survey.is_wet, &substep, told, run)?;
-        told.elapsed += substep.length;
+    fn go_on(&mut self, totals: &mut FrameTotals, run: &mut Run<'_>) -> Result<bool, SolveError> {
+        let (survey, substep, is_last) = self.look(totals, run)?;
+        totals.substeps += 1;
+        self.run_substep(&survey.is_wet, &substep, totals, run)?;
+        totals.elapsed += substep.length;
         Ok(is_last)
     }
 
     /// Substeps through one frame.
-    fn run_substeps(&mut self, run: &mut Run<'_>) -> Result<Told, SolveError> {
-        let mut told = Told::default();
-        while !self.go_on(&mut told, run)? {}
-        Ok(told)
+    fn run_substeps(&mut self, run: &mut Run<'_>) -> Result<FrameTotals, SolveError> {
+        let mut totals = FrameTotals::default();
+        while !self.go_on(&mut totals, run)? {}
+        Ok(totals)
     }
 
     fn upload_state(&self) {
@@ -470,15 +468,17 @@ impl Solver for Flip {
 
     fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
         self.program.upload(COUNTERS, 0, &[Counters::default()]);
-        let told = if self.state.is_empty() {
-            Told::default()
+        let totals = if self.state.is_empty() {
+            FrameTotals::default()
         } else {
             self.timed(Self::run_substeps)?
         };
         self.read_state()?;
-        check_finite(self.frame + 1, &self.state, None).map_err(|breach| match told.substeps {
-            0 => breach,
-            last => breach.in_substep(last),
+        check_finite(self.frame + 1, &self.state, None).map_err(|breach| {
+            match totals.substeps {
+                0 => breach,
+                last => breach.in_substep(last),
+            }
         })?;
         let density = if self.state.is_empty() {
             Vec::new()
@@ -492,11 +492,11 @@ impl Solver for Flip {
             self.upload_state();
         }
         let report = StepReport {
-            substeps: told.substeps,
-            iterations: told.iterations,
+            substeps: totals.substeps,
+            iterations: totals.iterations,
             capped: u64::from(capped),
-            boundary_work: told.work,
-            projection: Some(told.projection),
+            boundary_work: totals.work,
+            projection: Some(totals.projection),
             ..self
                 .scene
                 .report(&self.state, density.into_iter().map(f64::from))
@@ -530,24 +530,24 @@ impl TraceFrame for Flip {
         let plain: &mut Run<'_> =
             &mut |program, recordings| Ok(Recording::run_all(recordings, program, None)?);
         self.program.upload(COUNTERS, 0, &[Counters::default()]);
-        let mut told = Told::default();
+        let mut totals = FrameTotals::default();
         loop {
             let begun = Begun {
-                number: told.substeps + 1,
-                elapsed: told.elapsed,
+                number: totals.substeps + 1,
+                elapsed: totals.elapsed,
             };
             let is_traced = match span {
                 Span::From(first) => begun.number >= first,
                 Span::Only(Which::Number(number)) => begun.number == number,
                 // A look ahead: the substep's own finds the same.
-                Span::Only(Which::Last) => self.look(&told, plain)?.2,
+                Span::Only(Which::Last) => self.look(&totals, plain)?.2,
             };
             let is_last = if is_traced {
-                self.go_on(&mut told, &mut |program, recordings| {
+                self.go_on(&mut totals, &mut |program, recordings| {
                     trace(recordings, program, &mut |traced| observe(begun, traced))
                 })?
             } else {
-                self.go_on(&mut told, plain)?
+                self.go_on(&mut totals, plain)?
             };
             match span {
                 Span::Only(_) if is_traced => return Ok(begun.number),
@@ -555,21 +555,20 @@ impl TraceFrame for Flip {
                     return Err(SolveError::NoSubstep {
                         asked,
                         frame: self.frame,
-                        count: told.substeps,
+                        count: totals.substeps,
                     });
                 }
-                _ if is_last => return Ok(told.substeps),
+                _ if is_last => return Ok(totals.substeps),
                 _ => {}
             }
         }
     }
 }
 
-fn specs(plan: &Plan) -> Vec<BufferSpec> {
-    plan.buffers
-        .iter()
-        .map(|buffer| buffer.spec.clone())
-        .collect()
+/// The commands of a plan, bound to the buffers that the program has now.
+fn recordings(program: &Program, plan: &Plan, scene: &Scene) -> Recordings {
+    let effects = effects::of_flip(&scene.effects, CELLS as usize * plan.counts.bricks.slots);
+    Recordings::new(program, &Commands::new(plan, scene, &effects))
 }
 
 fn pressure_solver(scene: &Scene, plan: &Plan) -> PressureSolver {

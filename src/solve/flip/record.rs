@@ -1,16 +1,17 @@
 //! A substep's passes, recorded.
 
 use crate::{
-    domain::bricks::CELLS,
+    domain::{bricks::CELLS, flip::layers},
     gpu::{
         buffer::Workgroups,
-        program::{BufferSpec, Program},
+        program::Program,
         recording::{Bind, Command, Groups, Recording, spread},
         sort,
     },
-    scene::{
-        Scene,
-        plan::{Plan, layers},
+    scene::Scene,
+    solve::{
+        effects::Addition,
+        plan::{Plan, PlannedBuffer},
     },
 };
 
@@ -23,7 +24,7 @@ const WET: usize = 0;
 const ACTIVE: usize = 1;
 
 /// Those of the first extrapolated layer, one after the other.
-const FIRST_LAYER: usize = 2;
+pub(super) const FIRST_LAYER: usize = 2;
 
 /// Particles of a thread of `flip/survey`, its `RUN`.
 const SURVEY_RUN: usize = 16;
@@ -47,19 +48,45 @@ pub(super) struct Recordings {
 }
 
 impl Recordings {
-    pub(super) fn new(program: &Program, plan: &Plan, scene: &Scene) -> Self {
-        let layers = layers(scene.solver.flip().cfl);
-        let n = plan.counts.particles;
-        let survey = [
-            Command::clear(&SURVEY),
-            Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
-        ];
+    pub(super) fn new(program: &Program, commands: &Commands) -> Self {
         Self {
-            survey: Recording::new(program, &survey),
-            to_grid: Recording::new(program, &to_grid(plan)),
-            to_particles: Recording::new(program, &to_particles(plan, layers)),
-            watch: Recording::new(program, &watch(plan, scene)),
+            survey: Recording::new(program, &commands.survey),
+            to_grid: Recording::new(program, &commands.to_grid),
+            to_particles: Recording::new(program, &commands.to_particles),
+            watch: Recording::new(program, &commands.watch),
         }
+    }
+}
+
+/// Commands of the same parts.
+pub(super) struct Commands {
+    survey: Vec<Command>,
+    to_grid: Vec<Command>,
+    to_particles: Vec<Command>,
+    watch: Vec<Command>,
+}
+
+impl Commands {
+    /// For the counts and buffers of `plan`.
+    pub(super) fn new(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Self {
+        let n = plan.counts.particles;
+        Self {
+            survey: vec![
+                Command::clear(&SURVEY),
+                Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
+            ],
+            to_grid: to_grid(plan, effects),
+            to_particles: to_particles(plan, layers(scene.solver.flip().cfl)),
+            watch: watch(plan, scene),
+        }
+    }
+
+    pub(super) fn before_projection(&self) -> impl Iterator<Item = &Command> {
+        self.survey.iter().chain(&self.to_grid)
+    }
+
+    pub(super) fn after_projection(&self) -> impl Iterator<Item = &Command> {
+        self.to_particles.iter().chain(&self.watch)
     }
 }
 
@@ -98,7 +125,7 @@ fn along(pass: &'static str, size: usize, axis: usize) -> Command {
     bound(pass, size, vec![AXES.bind(axis)])
 }
 
-fn to_grid(plan: &Plan) -> Vec<Command> {
+fn to_grid(plan: &Plan, effects: &[(&'static str, Addition)]) -> Vec<Command> {
     let n = plan.counts.particles;
     let cells = plan.counts.bricks.wet * CELLS as usize;
     let mut commands = vec![
@@ -115,14 +142,14 @@ fn to_grid(plan: &Plan) -> Vec<Command> {
     }
     commands.push(along("flip/spread_centers", WET, 0));
     commands.push(over("flip/gather_centers", ACTIVE));
-    for effect in plan.effect_passes() {
-        commands.push(over(effect, ACTIVE));
+    for pass in effects.iter().flat_map(|(_, addition)| &addition.passes) {
+        commands.push(over(pass.name, ACTIVE));
     }
     commands
 }
 
 fn watch(plan: &Plan, scene: &Scene) -> Vec<Command> {
-    let look = |spec: &BufferSpec| Command::Dispatch {
+    let look = |PlannedBuffer { spec, .. }: &PlannedBuffer| Command::Dispatch {
         pass: "flip/find_not_finite",
         binds: vec![Bind {
             variable: "values",
@@ -131,7 +158,8 @@ fn watch(plan: &Plan, scene: &Scene) -> Vec<Command> {
         }],
         groups: Groups::Threads(spec.bytes.div_ceil(4 * WATCH_RUN)),
     };
-    let mut commands: Vec<Command> = plan.watched().map(look).collect();
+    let watched = plan.buffers.iter().filter(|buffer| buffer.is_watched);
+    let mut commands: Vec<Command> = watched.map(look).collect();
     if scene.has_movers() {
         commands.push(over("flip/boundary_work", WET));
     }

@@ -5,14 +5,10 @@ use glam::DVec3;
 use crate::{
     domain::{
         bricks::{Bricks, CELLS, table_dims},
-        flip::{CAP, CONTACT},
+        flip::{CAP, CONTACT, stored_cells},
     },
-    scene::{
-        Scene,
-        plan::{Plan, stored_cells},
-        step::Substep,
-    },
-    solve::params::FlipParams,
+    scene::{Scene, step::Substep},
+    solve::{params::FlipParams, plan::Plan},
 };
 
 pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep) -> FlipParams {

@@ -25,15 +25,12 @@ use std::mem::offset_of;
 
 use crate::{
     domain::pbf::chebyshev_factors,
-    gpu::{
-        program::Program,
-        recording::{Bind, Command, Groups},
-    },
-    scene::{
-        Iteration, Pbf, Stop,
+    gpu::recording::{Bind, Command, Groups},
+    scene::{Iteration, Pbf, Stop},
+    solve::{
+        params::{IterationControl, Phase},
         plan::{Chunk, Plan},
     },
-    solve::params::{IterationControl, Phase},
 };
 
 use super::buffers::{CONTROL, PHASES, list_of};
@@ -63,9 +60,9 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Tells the device the phases that commands refer to.
-    pub(super) fn upload_phases(&self, program: &Program) {
-        program.upload_windows(&PHASES, &self.phases);
+    /// The phases that commands refer to, by window.
+    pub(super) fn into_phases(self) -> Vec<Phase> {
+        self.phases
     }
 
     fn bind_phase(&mut self, phase: Phase) -> Bind {

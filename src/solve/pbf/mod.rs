@@ -2,6 +2,8 @@
 
 pub mod buffers;
 mod iteration;
+pub(super) mod plan;
+mod record;
 
 use glam::DVec3;
 
@@ -20,23 +22,22 @@ use crate::{
         adapter::Context,
         buffer::Buf,
         program::Program,
-        recording::{Command, Recording, Timer, spread},
+        recording::{Recording, Timer, spread},
         sort,
     },
-    scene::{
-        Scene, Stop,
-        plan::{DeviceLimits, LIST_BUDGET, Plan, SHARED_CONSTANTS},
-    },
+    scene::{Scene, Stop},
 };
 
 use super::{
-    SolveError,
+    SolveError, effects,
     params::{Counters, IterationControl, Params},
+    plan::Plan,
     state::{check_finite, check_ids, slots_by_id, take_over, upload},
     trace::{Begun, Observe, Span, TraceFrame, Traced, trace},
 };
 use buffers::*;
-use iteration::Builder;
+use plan::{SHARED_CONSTANTS, cell_count};
+use record::Commands;
 
 /// Far from everything, and still finite when squared.
 const NOBODY: [f32; 4] = [1e15, 1e15, 1e15, 0.0];
@@ -71,19 +72,15 @@ impl Pbf {
     ) -> Result<Self, SolveError> {
         let counts = plan.counts;
         let particles = counts.particles;
-        let buffers: Vec<_> = plan
-            .buffers
-            .iter()
-            .map(|buffer| buffer.spec.clone())
-            .collect();
-        let passes: Vec<_> = plan.passes.iter().map(|pass| pass.spec.clone()).collect();
+        let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
         let program = Program::new(context, &buffers, &passes, &SHARED_CONSTANTS)?;
         let pbf = scene.solver.pbf();
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
-        let mut builder = Builder::new(&plan);
-        let substep = Recording::new(&program, &substep_commands(&plan, scene, &mut builder));
-        let measure = Recording::new(&program, &measure_commands(&plan, &mut builder));
-        builder.upload_phases(&program);
+        let effects = effects::of_pbf(&scene.effects, particles);
+        let commands = Commands::new(&plan, scene, &effects);
+        let substep = Recording::new(&program, &commands.substep);
+        let measure = Recording::new(&program, &commands.measure);
+        program.upload_windows(&PHASES, &commands.phases);
         sort::upload_lengths(&program, &CELL_START, cell_count(&plan));
         program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
         let last = 2 * particles + counts.boundary_samples;
@@ -124,10 +121,10 @@ impl Pbf {
     /// The device.
     pub fn field<T: bytemuck::Pod>(
         &self,
-        buffer: impl Into<Buf<T>>,
+        buffer: Buf<T>,
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
-        Ok(self.program.read(buffer.into(), count)?)
+        Ok(self.program.read(buffer, count)?)
     }
 
     fn params(&self, time: f64, step: f64) -> Params {
@@ -365,70 +362,14 @@ impl TraceFrame for Pbf {
             let (time, step) = self.substep_of(count, number);
             let elapsed = f64::from(number - 1) * step;
             let begun = Begun { number, elapsed };
-            let told = &mut |traced: Traced<'_>| observe(begun, traced);
+            let mut tell = |traced: Traced<'_>| observe(begun, traced);
             self.prepare_substep(time, step);
-            trace(&[&self.substep], &self.program, told)?;
+            trace(&[&self.substep], &self.program, &mut tell)?;
             if number == last {
                 self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
-                trace(&[&self.measure], &self.program, told)?;
+                trace(&[&self.measure], &self.program, &mut tell)?;
             }
         }
         Ok(last)
     }
-}
-
-/// The limits of an open device that a plan depends on.
-pub fn device_limits(context: &Context) -> DeviceLimits {
-    DeviceLimits {
-        binding: context.limits.max_storage_buffer_binding_size,
-        buffer: context.limits.max_buffer_size,
-        list_budget: LIST_BUDGET,
-    }
-}
-
-fn cell_count(plan: &Plan) -> usize {
-    plan.grid_dims.iter().map(|&n| n as usize).product()
-}
-
-fn sort_commands(plan: &Plan) -> Vec<Command> {
-    let n = plan.counts.particles;
-    let mut commands = vec![
-        Command::clear(&CELL_START),
-        Command::over("pbf/assign_cells", n),
-    ];
-    commands.extend(sort::scan(&CELL_START, cell_count(plan)));
-    commands.extend(sort::SORT_PASSES.map(|pass| Command::over(pass, n)));
-    commands.push(Command::over("pbf/reorder", n));
-    commands
-}
-
-fn substep_commands(plan: &Plan, scene: &Scene, builder: &mut Builder<'_>) -> Vec<Command> {
-    let pbf = scene.solver.pbf();
-    let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
-    if !scene.pressure_points().is_empty() {
-        commands.push(Command::clear(&LAMBDA_SUM));
-    }
-    if scene.has_movers() {
-        commands.insert(0, Command::clear(&WALL_WORK));
-    }
-    commands.extend(sort_commands(plan));
-    if plan.has_lists {
-        builder.over_all("pbf/build_neighbors", &mut commands);
-    }
-    builder.iterations(pbf, &mut commands);
-    builder.finish(pbf, &mut commands);
-    if scene.has_movers() {
-        commands.push(Command::over("pbf/boundary_work", plan.counts.particles));
-    }
-    for effect in plan.effect_passes() {
-        builder.over_all(effect, &mut commands);
-    }
-    commands
-}
-
-fn measure_commands(plan: &Plan, builder: &mut Builder<'_>) -> Vec<Command> {
-    let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
-    commands.extend(sort_commands(plan));
-    builder.measure(&mut commands);
-    commands
 }

@@ -20,17 +20,17 @@
 //! | `liquid_distance` | `f32` cells | metres, negative inside; with the ghost-fluid surface alone |
 //! | `density_excess` | `f32` cells | ρ/ρ_target − 1 as it is to be corrected; with the correction alone |
 //!
-//! What the room fills, of [`buffers`]: `face_velocity` in place; `pressure`, Pa, natural cell order, 0 where
+//! What the room fills, of [`planned`]: `face_velocity` in place; `pressure`, Pa, natural cell order, 0 where
 //! there is no water; `face_displacement`, planes in metres, 0 on faces that touch no water or are closed.
 //! Only cells of wet slots are FLUID. Cells of a brick that lie past the box are AIR, and their lower faces closed:
 //! one of those is the box's own wall. Only faces between water and water or water and air change.
 //!
 //! # Use
 //! ```text
-//! specs += pressure::buffers(..); passes += pressure::passes(..);      plan
+//! buffers += pressure::planned(..); passes += pressure::passes(..);    plan
 //! let mut pressure = PressureSolver::new(..);                          once, and again when slots grow
 //! pressure.set_topology(&program, &bricks, cell_size)                  each substep, after `bricks` is uploaded
-//! pressure.project(&program, Step { .. }, timer)                       builds, solves, subtracts; waits once
+//! pressure.project(&program, Scale { .. }, timer)                      builds, solves, subtracts; waits once
 //! pressure.correct(&program, timer)                                    same system, density_excess -> face_displacement
 //! ```
 
@@ -61,6 +61,7 @@ pub use params::{
 };
 use plan::{PHASE_COUNT, Phase, SIZE_COUNT, Size};
 pub use plan::{passes, planned};
+pub(super) use stages::all_commands;
 use stages::{SINGLE, Shape, Stages};
 
 /// Levels of bricks that the multigrid uses at most: pass it to [`Bricks::new`] as depth.
@@ -81,9 +82,9 @@ pub const WANTS_POCKETS: u32 = 3;
 /// Iterations submitted at once at most: a device that is done skips the rest, but not for nothing.
 const MOST_AT_ONCE: u32 = 64;
 
-/// What a substep is.
+/// What q of a substep stands for: pressure is q ρ Δx / Δt.
 #[derive(Clone, Copy, Debug)]
-pub struct Step {
+pub struct Scale {
     /// Δt, seconds.
     pub time_step: f64,
     /// ρ, kg/m³.
@@ -118,12 +119,12 @@ pub struct Projected {
     pub dropped: u32,
 }
 
-/// The projection, bound to a program that holds [`buffers`] and [`passes`].
+/// The projection, bound to a program that holds [`planned`] buffers and [`passes`].
 pub struct PressureSolver {
     settings: Pressure,
     has_correction: bool,
     capacity: usize,
-    stages: BTreeMap<Shape, Stages>,
+    stages: BTreeMap<Shape, Stages<Recording>>,
     shape: Shape,
     phase: PressurePhase,
     sizes: [Workgroups; SIZE_COUNT],
@@ -222,10 +223,10 @@ impl PressureSolver {
     pub fn project(
         &mut self,
         program: &Program,
-        step: Step,
+        scale: Scale,
         mut timer: Option<&mut Timer>,
     ) -> Result<Projected, SolveError> {
-        self.project_by(program, step, &mut |program, recordings| {
+        self.project_by(program, scale, &mut |program, recordings| {
             Ok(Recording::run_all(
                 recordings,
                 program,
@@ -238,11 +239,11 @@ impl PressureSolver {
     pub(super) fn project_by(
         &mut self,
         program: &Program,
-        step: Step,
+        scale: Scale,
         run: &mut Run<'_>,
     ) -> Result<Projected, SolveError> {
-        let scale = step.rest_density * f64::from(self.phase.cell_size) / step.time_step;
-        self.phase.pressure_scale = scale as f32;
+        let pressure = scale.rest_density * f64::from(self.phase.cell_size) / scale.time_step;
+        self.phase.pressure_scale = pressure as f32;
         // Each substep looks for pockets anew.
         self.phase.has_pockets = 0;
         self.shape.has_pockets = false;
@@ -353,10 +354,10 @@ impl PressureSolver {
         }
     }
 
-    fn stages(&mut self, program: &Program) -> &Stages {
+    fn stages(&mut self, program: &Program) -> &Stages<Recording> {
         let (preconditioner, has_correction) = (self.settings.preconditioner, self.has_correction);
         self.stages.entry(self.shape).or_insert_with_key(|&shape| {
-            Stages::new(program, preconditioner, has_correction, shape)
+            Stages::new(preconditioner, has_correction, shape).bind(program)
         })
     }
 

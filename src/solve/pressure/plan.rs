@@ -4,16 +4,18 @@ use crate::{
     domain::bricks::CELLS,
     gpu::{
         buffer::Buf,
-        program::{BufferSpec, PassSpec},
+        program::PassSpec,
         recording::{Bind, Command, Groups},
     },
     scene::flip::{Precision, Preconditioner, Pressure, Surface},
+    solve::plan::{Table, in_order},
 };
 
 use super::{
     DONE, ITERATING, LEVELS, VERIFYING,
     buffers::*,
     params::{PressurePhase, ReduceStep},
+    stages::all_commands,
 };
 
 /// Places in `pressure_phases`.
@@ -28,14 +30,14 @@ pub(super) enum Phase {
 }
 
 /// Phases in all.
-pub(super) const PHASE_COUNT: usize = 2 * LEVELS + 7;
+pub(super) const PHASE_COUNT: usize = Phase::Center(true).index() + 1;
 
 impl Phase {
-    pub(super) fn index(self) -> usize {
+    pub(super) const fn index(self) -> usize {
         match self {
             Self::Level(level, colour) => 2 * level + colour,
             Self::Reduce(step) => 2 * LEVELS + step as usize,
-            Self::Center(is_noted) => 2 * LEVELS + 5 + usize::from(is_noted),
+            Self::Center(is_noted) => 2 * LEVELS + 5 + is_noted as usize,
         }
     }
 
@@ -73,10 +75,10 @@ pub(super) enum Size {
 }
 
 /// Sizes in all.
-pub(super) const SIZE_COUNT: usize = 2 * LEVELS + 3;
+pub(super) const SIZE_COUNT: usize = Size::Active.index() + 1;
 
 impl Size {
-    pub(super) fn index(self) -> usize {
+    pub(super) const fn index(self) -> usize {
         match self {
             Self::Full(level) => level,
             Self::Half(level) => LEVELS + level,
@@ -140,98 +142,72 @@ fn has_diagonal(settings: &Pressure) -> bool {
 }
 
 /// Buffers that the room adds to its inputs (module docs); `capacity` is in slots.
-pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Vec<BufferSpec> {
+pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Table {
     let cells = capacity * CELLS as usize;
     let precision = settings.precision;
     let reals = |buffer: Buf<Real>, count: usize| match precision {
         Precision::F32 | Precision::F32Refined => buffer.retyped::<f32>().sized(count),
         Precision::F64 => buffer.retyped::<f64>().sized(count),
     };
-    let mut specs = vec![
-        PRESSURE.sized(cells),
-        COEFFICIENT.sized(3 * cells),
-        reals(DIRICHLET, cells),
-        BLOCK.sized(cells / 8),
-        reals(RHS, cells),
-        reals(RESIDUAL, cells),
-        reals(CORRECTION, cells),
-        reals(DIRECTION, cells),
-        reals(PRODUCT, cells),
-        reals(SOLUTION, precision.terms() * cells),
-        LABEL.sized(cells),
-        POCKET_CELLS.sized(cells),
-        POCKET_RANGES.sized(cells / 2),
-        BRICKS.sized(capacity),
-        // A sum a workgroup, and room for those that a dispatch in two dimensions adds.
-        reals(SUMS, 4 * (capacity + 1024)),
-        match precision {
-            Precision::F32 | Precision::F32Refined => CONTROL.sized(1),
-            Precision::F64 => CONTROL_F64.sized(1),
-        },
-        STATS.sized(1),
-        SIZES.sized(SIZE_COUNT),
-        GROUPS.sized(3 * SIZE_COUNT),
-        PHASES.sized(PHASE_COUNT),
-    ];
+    let owner = "pressure";
+    let mut table = Table::default();
+    table.watch(owner, PRESSURE.sized(cells));
+    table.extend(
+        owner,
+        [
+            COEFFICIENT.sized(3 * cells),
+            reals(DIRICHLET, cells),
+            BLOCK.sized(cells / 8),
+            reals(RHS, cells),
+            reals(RESIDUAL, cells),
+            reals(CORRECTION, cells),
+            reals(DIRECTION, cells),
+            reals(PRODUCT, cells),
+            reals(SOLUTION, precision.terms() * cells),
+            LABEL.sized(cells),
+            POCKET_CELLS.sized(cells),
+            POCKET_RANGES.sized(cells / 2),
+            BRICKS.sized(capacity),
+            // A sum a workgroup, and room for those that a dispatch in two dimensions adds.
+            reals(SUMS, capacity + 1024),
+            match precision {
+                Precision::F32 | Precision::F32Refined => CONTROL.sized(1),
+                Precision::F64 => CONTROL_F64.sized(1),
+            },
+            STATS.sized(1),
+            SIZES.sized(SIZE_COUNT),
+            GROUPS.sized(3 * SIZE_COUNT),
+            PHASES.sized(PHASE_COUNT),
+        ],
+    );
     if has_diagonal(settings) {
-        specs.push(reals(INVERSE_DIAGONAL, cells));
+        table.add(owner, reals(INVERSE_DIAGONAL, cells));
     }
     if has_correction {
-        specs.push(FACE_DISPLACEMENT.sized(3 * cells));
+        table.watch(owner, FACE_DISPLACEMENT.sized(3 * cells));
     }
-    specs
+    table
 }
 
-/// Its passes.
+/// The passes that any solve runs by these settings, in the order in which they first run.
 pub fn passes(settings: &Pressure, surface: Surface, has_correction: bool) -> Vec<PassSpec> {
-    let mut names = vec![
-        "pressure/build_system",
-        "pressure/label_cells",
-        "pressure/merge_labels",
-        "pressure/count_pockets",
-        "pressure/center",
-        "pressure/divergence",
-        "pressure/direction",
-        "pressure/multiply",
-        "pressure/advance",
-        "pressure/reduce",
-        "pressure/verify",
-        "pressure/project",
-        "pressure/measure_divergence",
+    let commands = all_commands(settings.preconditioner, has_correction);
+    let names = in_order(&commands);
+    names.map(|name| pass(name, settings, surface)).collect()
+}
+
+/// A pass under the conditions that hold for the whole room; one that does not ask ignores them.
+fn pass(name: &'static str, settings: &Pressure, surface: Surface) -> PassSpec {
+    let conditions = [
+        ("GHOST_FLUID", surface == Surface::GhostFluid),
+        ("DIAGONAL", has_diagonal(settings)),
+        ("TWO_WORDS", settings.precision == Precision::F32Refined),
+        ("F64", settings.precision == Precision::F64),
     ];
-    names.extend_from_slice(match settings.preconditioner {
-        Preconditioner::None | Preconditioner::Jacobi => &["pressure/precondition"],
-        Preconditioner::Ipp => &["pressure/ipp_lower", "pressure/ipp_upper"],
-        Preconditioner::Multigrid => &[
-            "pressure/coarsen",
-            "pressure/smooth_first",
-            "pressure/smooth",
-            "pressure/smooth_corrected",
-            "pressure/restrict",
-            "pressure/solve_coarse",
-        ],
-    });
-    if has_correction {
-        names.extend(["pressure/density_source", "pressure/displace"]);
+    let holding = conditions.into_iter().filter(|(_, holds)| *holds);
+    PassSpec {
+        name,
+        defines: holding.map(|(define, _)| define).collect(),
+        constants: Vec::new(),
     }
-    let mut defines = Vec::new();
-    if surface == Surface::GhostFluid {
-        defines.push("GHOST_FLUID");
-    }
-    if has_diagonal(settings) {
-        defines.push("DIAGONAL");
-    }
-    match settings.precision {
-        Precision::F32 => {}
-        Precision::F32Refined => defines.push("TWO_WORDS"),
-        Precision::F64 => defines.push("F64"),
-    }
-    names
-        .into_iter()
-        .map(|name| PassSpec {
-            name,
-            defines: defines.clone(),
-            constants: Vec::new(),
-        })
-        .collect()
 }

@@ -9,9 +9,12 @@ use crate::{
     scene::flip::Preconditioner,
 };
 
-use super::buffers::{CORRECTION, RESIDUAL, RHS, Real, STATS};
-use super::params::ReduceStep;
-use super::plan::{Phase, Size, When, run, run_on};
+use super::{
+    LEVELS,
+    buffers::{CORRECTION, RESIDUAL, RHS, Real, STATS},
+    params::ReduceStep,
+    plan::{Phase, Size, When, run, run_on},
+};
 
 /// Bricks of a level that one workgroup can take on together with all coarser ones.
 pub(super) const SINGLE: u32 = 4;
@@ -30,44 +33,79 @@ pub(super) struct Shape {
     pub has_pockets: bool,
 }
 
-/// Bound command lists for one shape.
-pub(super) struct Stages {
+/// The stages of a solve for one shape: as commands, or bound to a program's buffers.
+pub(super) struct Stages<T> {
     /// System, bodies of water, right-hand side.
-    pub project: Recording,
+    pub project: T,
     /// The right-hand side alone.
-    pub correct: Option<Recording>,
+    pub correct: Option<T>,
     /// Means removed from the right-hand side, and the start.
-    pub begin: Recording,
-    pub iterate: Recording,
-    pub verify: Recording,
-    pub finish_project: Recording,
-    pub finish_correct: Option<Recording>,
+    pub begin: T,
+    pub iterate: T,
+    pub verify: T,
+    pub finish_project: T,
+    pub finish_correct: Option<T>,
 }
 
-impl Stages {
-    pub(super) fn new(
-        program: &Program,
-        preconditioner: Preconditioner,
-        has_correction: bool,
-        shape: Shape,
-    ) -> Self {
-        let record = |commands: &[Command]| Recording::new(program, commands);
+impl Stages<Vec<Command>> {
+    pub(super) fn new(preconditioner: Preconditioner, has_correction: bool, shape: Shape) -> Self {
         let finest = |pass, when| run(pass, Phase::Level(0, 0), when, Size::Full(0));
         let finish = |pass| run(pass, Phase::Level(0, 0), When::Done, Size::Active);
         Self {
-            project: record(&build(preconditioner, shape)),
-            correct: has_correction
-                .then(|| record(&[finest("pressure/density_source", When::Always)])),
-            begin: record(&begin(shape)),
-            iterate: record(&iteration(preconditioner, shape)),
-            verify: record(&verification(shape)),
-            finish_project: record(&[
+            project: build(preconditioner, shape),
+            correct: has_correction.then(|| vec![finest("pressure/density_source", When::Always)]),
+            begin: begin(shape),
+            iterate: iteration(preconditioner, shape),
+            verify: verification(shape),
+            finish_project: vec![
                 finish("pressure/project"),
                 finest("pressure/measure_divergence", When::Done),
-            ]),
-            finish_correct: has_correction.then(|| record(&[finish("pressure/displace")])),
+            ],
+            finish_correct: has_correction.then(|| vec![finish("pressure/displace")]),
         }
     }
+
+    pub(super) fn bind(&self, program: &Program) -> Stages<Recording> {
+        let record = |commands: &Vec<Command>| Recording::new(program, commands);
+        Stages {
+            project: record(&self.project),
+            correct: self.correct.as_ref().map(record),
+            begin: record(&self.begin),
+            iterate: record(&self.iterate),
+            verify: record(&self.verify),
+            finish_project: record(&self.finish_project),
+            finish_correct: self.finish_correct.as_ref().map(record),
+        }
+    }
+
+    /// In the order in which they run.
+    fn into_commands(self) -> impl Iterator<Item = Command> {
+        let project = [self.project, self.begin, self.iterate, self.verify];
+        let correct = [self.correct, self.finish_correct].into_iter().flatten();
+        let all = project.into_iter().chain([self.finish_project]);
+        all.chain(correct).flatten()
+    }
+}
+
+/// What solves of every shape run.
+pub(in crate::solve) fn all_commands(
+    preconditioner: Preconditioner,
+    has_correction: bool,
+) -> Vec<Command> {
+    let mut all = Vec::new();
+    for levels in (1..=LEVELS).rev() {
+        for dispatched in 1..levels.max(2) {
+            for has_pockets in [false, true] {
+                let shape = Shape {
+                    levels,
+                    dispatched,
+                    has_pockets,
+                };
+                all.extend(Stages::new(preconditioner, has_correction, shape).into_commands());
+            }
+        }
+    }
+    all
 }
 
 fn reduce(step: ReduceStep) -> Command {

@@ -13,13 +13,13 @@ fn overlap(a: &Area, b: &Area) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-/// Where labels may still go.
-pub(super) struct Room {
+/// Space of a chart that labels may still take.
+pub(super) struct FreeSpace {
     pub(super) within: Area,
     pub(super) taken: Vec<Area>,
 }
 
-impl Room {
+impl FreeSpace {
     /// The place next to a point, `least` from it or farther, that no point and no earlier label takes: its left end and
     /// base line.
     pub(super) fn place(&mut self, at: [f64; 2], least: f64, letters: usize) -> Option<[f64; 2]> {
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn labels_do_not_overlap() {
-        let mut room = Room {
+        let mut room = FreeSpace {
             within: [0.0, 0.0, 200.0, 200.0],
             taken: vec![[96.0, 96.0, 104.0, 104.0]],
         };

@@ -4,7 +4,7 @@ mod axis;
 mod labels;
 
 use axis::{Axis, number};
-use labels::{LETTER, Room, note_lines};
+use labels::{FreeSpace, LETTER, note_lines};
 
 use super::page::escaped;
 
@@ -303,7 +303,7 @@ impl Chart {
             let ([px, py], r) = ([x.at(dot.at), y.at(value)], 4.0);
             [px - r, py - r, px + r, py + r]
         };
-        let mut room = Room {
+        let mut room = FreeSpace {
             within: [x.paper[0], y.paper[1], x.paper[1], y.paper[0]],
             taken: self.dots().map(area).collect(),
         };

@@ -9,12 +9,12 @@ use swell::{
     domain::{boundary::Boundary, solver::Solver},
     scene::{
         Method, Scene, SceneError, physics_difference, physics_hash,
-        plan::{Capacity, Counts, Plan},
         probe::{Probe, ProbeKind},
     },
     solve::{
         flip::Flip,
-        pbf::{Pbf, device_limits},
+        pbf::Pbf,
+        plan::{Capacity, Counts, Plan, device_limits},
     },
     stage::prepare::Start,
 };
@@ -111,7 +111,7 @@ fn a_probe_that_cannot_be_is_told() {
             "kind = \"elevaton\"",
             &[],
             "probe[0].kind",
-            "\"elevaton\" is no probe; allowed: \"elevation\"",
+            "\"elevaton\" is no kind; the nearest is \"elevation\"; allowed: \"elevation\"",
         ),
         ("at = [0.0, 1.0]", &[], "probe[0].kind", "missing"),
         (
@@ -154,7 +154,7 @@ fn a_probe_that_cannot_be_is_told() {
             "kind = \"volume\"\nat = [0.0]",
             &[],
             "probe[0].at",
-            "a probe of volume has no place",
+            "does not go with kind = \"volume\"; allowed with it: name, kind",
         ),
         (
             "kind = \"energy\"\nname = \"../up\"",
@@ -241,7 +241,7 @@ fn only_a_pressure_costs_the_device_anything() {
     for method in ["pbf", "flip"] {
         let plan = |probes: &str| -> Plan {
             let scene = parse(probes, &[&format!("solver.method={method}")]).unwrap();
-            swell::solve::plan(&scene, counts, device_limits(&context))
+            Plan::new(&scene, counts, device_limits(&context))
         };
         let bare = plan("");
         assert_eq!(plan(&others), bare);

@@ -13,11 +13,7 @@ use swell::{
         Effects, Iteration, Method, PlacedMesh, Placement, Scene, Stop, Wall, WaveMaker,
         moving_solid::MovingSolid,
     },
-    solve::{
-        SolveError,
-        flip::Flip,
-        pbf::{Pbf, device_limits},
-    },
+    solve::{SolveError, flip::Flip, pbf::Pbf, plan::device_limits},
     stage::{
         check::{Checked, check_frame, check_substep},
         prepare::Start,

@@ -3,6 +3,7 @@ mod controls;
 mod frames;
 
 use swell::{
+    check::pbf,
     domain::{
         motion::Motion, particles::Particles, sampling::BoundarySample,
         signed_distance::SignedDistance, substep::Which,
@@ -12,11 +13,13 @@ use swell::{
         Effects, Iteration, Method, Scene, Stop, Wall, WaveMaker,
         effects::{viscosity, vorticity_confinement},
         flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
-        plan::DeviceLimits,
     },
-    solve::{SolveError, pbf::device_limits},
+    solve::{
+        SolveError,
+        plan::{DeviceLimits, device_limits},
+    },
     stage::{
-        check::{Table, check_frame, pbf},
+        check::{Table, check_frame},
         prepare::Start,
     },
 };
@@ -112,7 +115,7 @@ fn over(table: &Table) -> Vec<(&'static str, &'static str)> {
 }
 
 fn lines(table: &Table) -> String {
-    let line = |row: &swell::compare::check::Row| {
+    let line = |row: &swell::check::Row| {
         format!(
             "{} {}: {} values, {} ties, {} over, {:?}\n",
             row.field.pass, row.field.name, row.values, row.ties, row.over, row.worst
@@ -170,7 +173,7 @@ fn faults(context: &Context, checked: &Checked<'_>, controls: &[Control]) -> (Ta
 fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], elsewhere: &[&str]) {
     let checked = |context: &Context| check_frame(context, scene, start, 0, &start.particles);
     let (clean, mut faults) = faults(context, &checked, controls);
-    let covered = |row: &swell::compare::check::Row| {
+    let covered = |row: &swell::check::Row| {
         let field = row.field;
         let is_of =
             |control: &Control| control.pass == field.pass && control.fields.contains(&field.name);

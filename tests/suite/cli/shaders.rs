@@ -173,4 +173,15 @@ fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
         assert_has(&said, words);
         assert!(!job.path("cache").exists());
     }
+    job.expect(0, "bake small.toml --frames 1-1 -o cache");
+    job.edit(
+        "broken/ssfr/shade.wgsl",
+        "let n = shading.index;",
+        "let n = shading.no_such;",
+    );
+    let said = job.expect(
+        2,
+        "render cache --look look.toml -o pictures --shaders broken",
+    );
+    assert_has(&said, &["ssfr/shade of --shaders", "no_such"]);
 }

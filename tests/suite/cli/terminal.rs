@@ -101,6 +101,7 @@ fn standard_output_that_takes_nothing_is_exit_code_4() {
         "--help",
         "--version",
         "bake --help",
+        "keys",
         "inspect --adapters",
         "inspect small.toml",
         "inspect cache/small/pbf",

@@ -15,6 +15,7 @@ use std::{
 use swell::{
     experiment::{self, Event, Outcome, PointStatus, Request, StudyError},
     scene::study::{Study, sweep::Sweep},
+    stage::device::Gpu,
 };
 use tempfile::TempDir;
 
@@ -93,7 +94,7 @@ impl Job {
             name: "tiny-study".into(),
             study,
             directory: self.folder.path().join("out"),
-            adapter: None,
+            gpu: Gpu::default(),
             command: "swell study s.toml".into(),
         };
         let mut points = Vec::new();

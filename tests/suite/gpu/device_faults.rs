@@ -117,7 +117,7 @@ fn small_bindings_split_the_lists_and_give_the_same_bytes() {
     let request = request(&job, "pbf", "small", &small);
     let start = swell::stage::prepare::Start::of(&request.scene).unwrap();
     let chunks = |context: &Context| {
-        let plan = start.plan(&request.scene, swell::solve::pbf::device_limits(context));
+        let plan = start.plan(&request.scene, swell::solve::plan::device_limits(context));
         let lists = plan
             .buffers
             .iter()

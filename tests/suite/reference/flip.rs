@@ -16,7 +16,7 @@ use swell::{
         particles::Particles,
         solver::{Solver, StepReport},
     },
-    gpu::adapter::Context,
+    gpu::{adapter::Context, buffer::Buf},
     reference::{
         flip::{Flip as Reference, Trace, planes, survey},
         poisson::BUDGET,
@@ -25,7 +25,17 @@ use swell::{
         effects::viscosity,
         flip::{AFFINE, Surface, Transfer},
     },
-    solve::flip::{Flip, capacity},
+    solve::{
+        flip::{
+            Flip,
+            buffers::{
+                CELL_KIND, DENSITY, FACE_CHANGE, FACE_LAYER, FACE_OPEN, FACE_VELOCITY,
+                LIQUID_DISTANCE, SOLID_FLUX,
+            },
+            capacity,
+        },
+        pressure::buffers::{FACE_DISPLACEMENT, PRESSURE},
+    },
 };
 
 /// Both sides of a case after one substep.
@@ -79,15 +89,15 @@ fn pair(context: &Context, case: &Case) -> Pair {
 
 impl Pair {
     /// A field of the GPU by the elements of the reference, so many planes.
-    fn field(&self, name: &str, planes: usize) -> Vec<f64> {
-        let field = Field::new(&self.gpu, name, planes);
+    fn field(&self, buffer: Buf<f32>, planes: usize) -> Vec<f64> {
+        let field = Field::new(&self.gpu, buffer, planes);
         let length = CELLS as usize * (self.trace.bricks.active as usize + 1);
         let plane = |k: usize| field.values[k * field.stride..][..length].to_vec();
         (0..planes).flat_map(plane).map(f64::from).collect()
     }
 
-    fn bits(&self, name: &str) -> Vec<u32> {
-        let values = self.field(name, 1).into_iter();
+    fn bits(&self, buffer: Buf<u32>) -> Vec<u32> {
+        let values = self.field(buffer.retyped(), 1).into_iter();
         values.map(|value| (value as f32).to_bits()).collect()
     }
 }
@@ -132,25 +142,25 @@ fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     let mut rows = vec![
         row(
             "cell_kind",
-            off(&pair.bits("cell_kind"), &trace.room.kind),
+            off(&pair.bits(CELL_KIND), &trace.room.kind),
             0.0,
         ),
         row(
             "face_layer",
-            off(&pair.bits("face_layer"), &trace.faces.layer),
+            off(&pair.bits(FACE_LAYER), &trace.faces.layer),
             0.0,
         ),
         // Corners lie some 50 nodes of half a cell from the grid's own: their distances round by 50 u of those, and
         // an area changes by up to √3 of what its corners do.
         row(
             "face_open",
-            largest(&pair.field("face_open", 3), &planes(&trace.room.open)),
+            largest(&pair.field(FACE_OPEN, 3), &planes(&trace.room.open)),
             2.0 * 50.0 * U,
         ),
         // Six of those times up to 2.5 m/s of a wall or solid.
         row(
             "solid_flux",
-            largest(&pair.field("solid_flux", 1), &trace.room.solid_flux),
+            largest(&pair.field(SOLID_FLUX, 1), &trace.room.solid_flux),
             6.0 * 2.5 * 2.0 * 50.0 * U,
         ),
     ];
@@ -164,12 +174,12 @@ fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     let density = 8.0 * PLACE / room;
     rows.push(row(
         "density",
-        largest(&pair.field("density", 1), &trace.centers.density),
+        largest(&pair.field(DENSITY, 1), &trace.centers.density),
         density,
     ));
     if settings.surface == Surface::GhostFluid {
         // s − s²/2 = density: ds = d(density) / (1 − s), up to where a square root takes over.
-        let found = pair.field("liquid_distance", 1);
+        let found = pair.field(LIQUID_DISTANCE, 1);
         let over = found.iter().zip(&trace.centers.distance).map(|(a, b)| {
             let slope = (1.0 - (b / DX).abs()).max(0.0) + density.sqrt();
             (a - b).abs() / (DX * density / slope)
@@ -179,7 +189,7 @@ fn rows_to_grid(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     // velocity − change is the particles' own velocity throughout. Its weights are off by a place's rounding each, at
     // random, so that some 64 of them add up as 8; they weigh velocities that differ by up to 1 m/s, which APIC's
     // slopes double.
-    let [velocity, change] = ["face_velocity", "face_change"].map(|name| pair.field(name, 3));
+    let [velocity, change] = [FACE_VELOCITY, FACE_CHANGE].map(|buffer| pair.field(buffer, 3));
     let faces = &trace.faces;
     let own = planes(&faces.velocity)
         .into_iter()
@@ -210,7 +220,7 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     // ‖r‖ / √λ off in the Euclidean norm. Twice that: gradients and their differences round as well.
     let rows = (projected.system.cell.len() as f64).sqrt();
     let residual = reported.residual * reported.divergence_before * DX * rows;
-    let [found, change] = ["face_velocity", "face_change"].map(|name| pair.field(name, 3));
+    let [found, change] = [FACE_VELOCITY, FACE_CHANGE].map(|buffer| pair.field(buffer, 3));
     let own = planes(&trace.faces.velocity);
     let before = |v: &[f64], dv: &[f64]| -> Vec<f64> {
         let is_first = |k: usize| trace.faces.layer[k % n] >> (8 * (k / n)) & 0x7f == 1;
@@ -231,7 +241,7 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     let rounding = U * norm(&trace.pressure, &vec![0.0; n]);
     out.push(row(
         "pressure",
-        norm(&pair.field("pressure", 1), &trace.pressure),
+        norm(&pair.field(PRESSURE, 1), &trace.pressure),
         scale * STIFFNESS * left + rounding,
     ));
     let mut displaced = 0.0;
@@ -239,7 +249,7 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
         let source = trace.centers.excess.iter().map(|e| e * e).sum::<f64>();
         // To 1e-2, pressure::CORRECTION_TOLERANCE; and densities round, as above.
         let bound = STIFFNESS * DX * (1e-2 * source.sqrt() + 8.0 * PLACE * rows);
-        let found = pair.field("face_displacement", 3);
+        let found = pair.field(FACE_DISPLACEMENT, 3);
         let gap = norm(&found, &planes(displacement));
         out.push(row("face_displacement", gap, bound));
         displaced = largest(&found, &planes(displacement));

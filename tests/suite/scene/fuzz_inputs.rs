@@ -254,7 +254,7 @@ fn each_fault_of_a_study_names_file_line_key_and_what_is_allowed() {
         (
             "solver_comparison",
             "comparison",
-            "s.toml:1: kind: \"comparison\" is no kind of study; allowed: \"solver_comparison\"",
+            "s.toml:1: kind: \"comparison\" is no kind; the nearest is \"solver_comparison\"; allowed: \"solver_comparison\"",
         ),
         (
             "pictures",

@@ -8,17 +8,24 @@ use swell::{
     scene::{
         Scene, Wall, WaveMaker, effects,
         flip::{Preconditioner, Transfer},
+    },
+    solve::{
+        flip::{
+            Flip,
+            buffers::{CELL_KIND, DENSITY},
+            capacity,
+        },
         plan::Capacity,
     },
-    solve::flip::{Flip, capacity},
 };
 
 /// How far the water's volume is from that of its particles: mean over cells with water or walls all about them of
 /// the density, hats over what a full cell holds.
 fn relative_volume(solver: &Flip) -> f64 {
     let (kind, density) = (
-        Field::new(solver, "cell_kind", 1),
-        Field::new(solver, "density", 1),
+        // Read as the bits that they are.
+        Field::new(solver, CELL_KIND.retyped(), 1),
+        Field::new(solver, DENSITY, 1),
     );
     let cells = solver.plan().grid_dims.map(|n| n as i64);
     let is_filled = |x: i64, y: i64, z: i64| {

@@ -8,7 +8,10 @@ use swell::{
     domain::{particles::Particles, solver::Solver},
     scene::flip::AFFINE,
     scene::{Scene, flip::Transfer},
-    solve::flip::capacity,
+    solve::flip::{
+        buffers::{FACE_CHANGE, FACE_OPEN, FACE_VELOCITY},
+        capacity,
+    },
 };
 
 /// Water somewhere in a box, with velocities at random.
@@ -53,8 +56,8 @@ fn particle_to_grid_gap(spoil: f64) -> (f64, u32) {
     let (scene, particles) = scattered();
     let mut solver = solver(&context(), &scene, &particles);
     solver.advance().unwrap();
-    let after = Field::new(&solver, "face_velocity", 3);
-    let change = Field::new(&solver, "face_change", 3);
+    let after = Field::new(&solver, FACE_VELOCITY, 3);
+    let change = Field::new(&solver, FACE_CHANGE, 3);
     let (mut worst, mut faces) = (0.0f64, 0);
     for component in 0..3 {
         for z in 1..12 {
@@ -213,7 +216,7 @@ fn face_fractions_of_a_plane_are_exact() {
             capacity(&scene, &particles),
         );
         solver.advance().unwrap();
-        let open = Field::new(&solver, "face_open", 3);
+        let open = Field::new(&solver, FACE_OPEN, 3);
         let (mut worst, mut control, mut cut) = (0.0f64, 0.0f64, 0);
         for component in 0..3 {
             for k in 0..15 * 15 * 15 {

@@ -23,7 +23,7 @@ use swell::{
         pbf::{Model, Pbf as PbfReference, Sorted, Substep, effects as twins, local, passes},
     },
     scene::{Iteration, Method, Scene, Stop, Wall, WaveMaker, effects, step},
-    solve::params::{FlipParams, Params},
+    solve::{flip, pbf},
 };
 
 /// State and report after `frames` frames on the GPU and on the CPU.
@@ -81,7 +81,7 @@ fn passes_are_given_the_papers_constants() {
         let particles = lattice([0.0; 3], [4, 3, 5], [d; 3]);
         let mut solver = support::solver(&context, &scene, &particles, &boundary);
         solver.advance().unwrap();
-        let params = solver.field::<Params>("params", 1).unwrap()[0];
+        let params = solver.field(pbf::buffers::PARAMS, 1).unwrap()[0];
         let slope = paper
             .gradient(DVec3::new(1e-9 * paper.h, 0.0, 0.0))
             .length();
@@ -104,7 +104,7 @@ fn passes_are_given_the_papers_constants() {
         // Of a solid's samples: weights for the area of their faces, so that a sheet of them makes up for the lattice.
         let n = boundary.samples.len();
         let packed = solver
-            .field::<[f32; 4]>("predicted", 2 * particles.len() + n)
+            .field(pbf::buffers::PREDICTED, 2 * particles.len() + n)
             .unwrap();
         let weights = packed[2 * particles.len()..]
             .iter()
@@ -385,7 +385,7 @@ fn substeps_move_by_at_most_twice_the_cfl() {
         assert_eq!(trace.capped, particles.len() as u64);
         // On the GPU the same is the uniform's; PBF's is in `passes_are_given_the_papers_constants`.
         let gpu = rig::solver(&context(), &scene, &particles);
-        let params = gpu.field::<FlipParams>("params", 1).unwrap()[0];
+        let params = gpu.field(flip::buffers::PARAMS, 1).unwrap()[0];
         close(
             f64::from(params.max_displacement),
             2.0 * cfl * DX,

@@ -14,12 +14,14 @@ use swell::{
         Method, Scene,
         flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
         moving_solid::MovingSolid,
-        plan::{Counts, SOLID_GRIDS_BYTES},
     },
     solve::{
-        flip::{Flip, capacity},
-        params::SolidGrids,
-        pbf::device_limits,
+        flip::{
+            Flip,
+            buffers::{CLOSED_VELOCITY, FACE_OPEN, SOLID_FLUX},
+            capacity,
+        },
+        plan::{Counts, Plan, device_limits},
     },
 };
 
@@ -66,7 +68,7 @@ fn solver(context: &Context, scene: &Scene, particles: &Particles) -> Flip {
         bricks: capacity(scene, particles),
         ..boundary.counts()
     };
-    let plan = swell::solve::plan(scene, counts, device_limits(context));
+    let plan = Plan::new(scene, counts, device_limits(context));
     Flip::new(context, scene, plan, &boundary, false).unwrap()
 }
 
@@ -129,9 +131,9 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
 
     let bricks = solver.bricks().clone();
     let stride = solver.plan().counts.bricks.slots * 512;
-    let open = solver.field::<f32>("face_open", 3 * stride).unwrap();
-    let flux = solver.field::<f32>("solid_flux", stride).unwrap();
-    let closed = solver.field::<f32>("closed_velocity", 3 * stride).unwrap();
+    let open = solver.field(FACE_OPEN, 3 * stride).unwrap();
+    let flux = solver.field(SOLID_FLUX, stride).unwrap();
+    let closed = solver.field(CLOSED_VELOCITY, 3 * stride).unwrap();
     let dims = bricks.table_dims.map(|n| n as usize);
     let element = |x: usize, y: usize, z: usize| {
         let slot = bricks.table[(z / 8 * dims[1] + y / 8) * dims[0] + x / 8] as usize;
@@ -200,7 +202,7 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
     let mut solver = self::solver(&context, &scene, &particles);
     solver.load(25, &particles).unwrap();
     solver.advance().unwrap();
-    let flux = solver.field::<f32>("solid_flux", stride).unwrap();
+    let flux = solver.field(SOLID_FLUX, stride).unwrap();
     assert!(flux.iter().all(|&f| f == 0.0));
 }
 
@@ -334,7 +336,6 @@ fn a_box_that_dips_into_a_tank_lifts_its_water_by_what_it_displaces() {
 
 #[test]
 fn scenes_without_moving_solids_have_nothing_for_them() {
-    assert_eq!(SOLID_GRIDS_BYTES, size_of::<SolidGrids>() as u64);
     let context = context();
     let mut scene = scene([8.0; 3]);
     let particles = water([0; 3], [4; 3], BOX);
@@ -344,7 +345,7 @@ fn scenes_without_moving_solids_have_nothing_for_them() {
             bricks: capacity(scene, &particles),
             ..boundary.counts()
         };
-        let plan = swell::solve::plan(scene, counts, device_limits(&context));
+        let plan = Plan::new(scene, counts, device_limits(&context));
         let is_moving = plan
             .passes
             .iter()

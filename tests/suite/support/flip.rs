@@ -8,15 +8,14 @@ use swell::{
         signed_distance::SignedDistance,
         solver::{Solver, StepReport},
     },
-    gpu::adapter::Context,
+    gpu::{adapter::Context, buffer::Buf},
     scene::{
         Method, Scene,
         flip::{Flip as Settings, Precision, Preconditioner, Pressure, Surface, Transfer},
-        plan::{Capacity, Counts},
     },
     solve::{
         flip::{Flip, capacity},
-        pbf::device_limits,
+        plan::{Capacity, Counts, Plan, device_limits},
     },
 };
 
@@ -68,7 +67,7 @@ pub fn solver_with(
         bricks,
         ..boundary.counts()
     };
-    let plan = swell::solve::plan(scene, counts, device_limits(context));
+    let plan = Plan::new(scene, counts, device_limits(context));
     let mut solver = Flip::new(context, scene, plan, boundary, false).unwrap();
     solver.load(0, particles).unwrap();
     solver
@@ -123,11 +122,11 @@ pub struct Field {
 }
 
 impl Field {
-    pub fn new(solver: &Flip, name: &str, planes: usize) -> Self {
+    pub fn new(solver: &Flip, buffer: Buf<f32>, planes: usize) -> Self {
         let stride = solver.plan().counts.bricks.slots * CELLS as usize;
         Self {
             bricks: solver.bricks().clone(),
-            values: solver.field(name, planes * stride).unwrap(),
+            values: solver.field(buffer, planes * stride).unwrap(),
             stride,
         }
     }

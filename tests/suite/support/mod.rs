@@ -19,9 +19,9 @@ use swell::{
     gpu::adapter::Context,
     scene::{
         Budget, Effects, Iteration, Method, Pbf as Settings, PlacedMesh, Placement, Scene, Shot,
-        Solver as SolverSettings, Stop, Water, moving_solid::MovingSolid, plan::*,
+        Solver as SolverSettings, Stop, Water, moving_solid::MovingSolid,
     },
-    solve::pbf,
+    solve::{pbf, plan::*},
 };
 
 pub const D: f64 = 0.1;
@@ -115,7 +115,7 @@ pub fn plan(context: &Context, scene: &Scene, particles: usize, boundary: &Bound
         particles,
         ..boundary.counts()
     };
-    Plan::new(scene, counts, pbf::device_limits(context))
+    Plan::new(scene, counts, device_limits(context))
 }
 
 pub fn solver(

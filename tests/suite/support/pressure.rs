@@ -12,7 +12,7 @@ use swell::{
     solve::{
         flip::buffers::*,
         pressure::{
-            self, PressureSolver, Projected, Solved, Step, blocked,
+            self, PressureSolver, Projected, Scale, Solved, blocked,
             buffers::{Real, SOLUTION, read_reals},
         },
     },
@@ -44,7 +44,7 @@ impl Rig {
             CaseSurface::Voxel => Surface::Voxel,
             CaseSurface::GhostFluid => Surface::GhostFluid,
         };
-        let mut specs = pressure::planned(settings, true, capacity);
+        let mut specs = pressure::planned(settings, true, capacity).specs();
         specs.extend([
             BRICKS.sized(capacity),
             CELL_KIND.sized(cells),
@@ -111,11 +111,11 @@ impl Rig {
     }
 
     pub fn project(&mut self, timer: Option<&mut Timer>) -> Projected {
-        let step = Step {
+        let scale = Scale {
             time_step: 1.0,
             rest_density: 1.0 / self.case.cell_size,
         };
-        self.solver.project(&self.program, step, timer).unwrap()
+        self.solver.project(&self.program, scale, timer).unwrap()
     }
 
     pub fn solve(&mut self, b: &[f64]) -> Solved {

@@ -46,7 +46,9 @@ pub(super) fn apply(
     velocity: &[DVec3],
     timings: &mut Timings,
 ) -> Vec<DVec3> {
-    let vorticity = timings.time("effects/vorticity_curl", || vorticity_curl(inputs, velocity));
+    let vorticity = timings.time("effects/vorticity_curl", || {
+        vorticity_curl(inputs, velocity)
+    });
     timings.time("effects/vorticity_force", || {
         vorticity_force(inputs, settings.strength, &vorticity, velocity)
     })

@@ -8,22 +8,12 @@ use toml::{Spanned, de::DeTable};
 
 use super::{
     super::{
-        super::{
-            Method, Reach, Scene,
-            build::{number, vector},
-            document::Document,
-            error::SceneError,
-            ranges::{BOUND, RATIO, SCALE, SEARCHED, SECONDS},
-            words::shown,
-        },
+        super::{Method, Reach, Scene, document::Document, error::SceneError},
         RunsOn, SceneFile, StudyFileError, load_with,
     },
     Attempt, Bound, Case, Held, Limit, Mark, Other, Quantity, Search, Stability, Trial,
 };
 use crate::domain::bounds::Bounds;
-
-/// Largest coordinate of a region or a shift, metres.
-const FARTHEST: f64 = 1e9;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
@@ -65,18 +55,18 @@ struct OtherSpec {
     set: Vec<Spanned<String>>,
     device: Option<Spanned<String>>,
     scale: Option<Spanned<f64>>,
-    shift: Option<Spanned<[f64; 3]>>,
+    shift: Option<[f64; 3]>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MarkSpec {
     of: Spanned<String>,
-    at_most: Option<Spanned<f64>>,
-    at_least: Option<Spanned<f64>>,
-    after: Option<Spanned<f64>>,
+    at_most: Option<f64>,
+    at_least: Option<f64>,
+    after: Option<f64>,
     since: Option<Spanned<f64>>,
-    region: Option<Spanned<[[f64; 3]; 2]>>,
+    region: Option<[[f64; 3]; 2]>,
     solvers: Option<Vec<Spanned<String>>>,
     devices: Option<Vec<Spanned<String>>>,
     known_failure: Option<String>,
@@ -91,10 +81,10 @@ struct LimitSpec {
     scene: Spanned<String>,
     set: Vec<Spanned<String>>,
     solvers: Option<Vec<Spanned<String>>>,
-    passes: Spanned<f64>,
-    fails: Spanned<f64>,
-    ratio: Spanned<f64>,
-    seconds: Spanned<f64>,
+    passes: f64,
+    fails: f64,
+    ratio: f64,
+    seconds: f64,
     mark: Vec<Spanned<MarkSpec>>,
 }
 
@@ -229,10 +219,7 @@ fn other(
 ) -> Result<Other> {
     let set: Vec<_> = set.iter().copied().chain(&spec.set).collect();
     let scene = load(doc, file, &set, method)?;
-    let scale = match &spec.scale {
-        None => 1.0,
-        Some(scale) => number(doc, scale, &SCALE)?,
-    };
+    let scale = spec.scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
     // Runs go frame by frame; Froude's law has times as the root of lengths.
     let rate = beside.shot.frames_per_second / scale.sqrt();
     if (scene.shot.frames_per_second / rate - 1.0).abs() > 1e-9 {
@@ -253,10 +240,7 @@ fn other(
         },
         scene,
         scale,
-        shift: match &spec.shift {
-            Some(shift) => vector(doc, shift, FARTHEST)?,
-            None => DVec3::ZERO,
-        },
+        shift: spec.shift.map_or(DVec3::ZERO, DVec3::from_array),
     })
 }
 
@@ -312,40 +296,22 @@ fn mark(doc: &Document<'_>, spec: &Spanned<MarkSpec>, others: usize) -> Result<M
         return Err(doc.fault_at(since.span(), format!("{word:?} does not take since")));
     }
     let bound = match (&spec.at_most, &spec.at_least) {
-        (Some(most), None) => Bound::AtMost(number(doc, most, &BOUND)?),
-        (None, Some(least)) => Bound::AtLeast(number(doc, least, &BOUND)?),
+        (Some(most), None) => Bound::AtMost(*most),
+        (None, Some(least)) => Bound::AtLeast(*least),
         (Some(_), Some(_)) => return Err(fault(format!("{word:?} has at_most and at_least"))),
         (None, None) => return Err(doc.missing(at, "at_most")),
     };
     Ok(Mark {
         of,
         bound,
-        after: seconds(doc, &spec.after)?.unwrap_or(0.0),
-        since: seconds(doc, &spec.since)?,
-        region: match &spec.region {
-            Some(corners) => Some(region(doc, corners)?),
-            None => None,
-        },
+        after: spec.after.unwrap_or(0.0),
+        since: spec.since.as_ref().map(|since| *since.get_ref()),
+        region: spec.region.map(|corners| {
+            let [min, max] = corners.map(DVec3::from_array);
+            Bounds { min, max }
+        }),
         known_failure: spec.known_failure.clone(),
     })
-}
-
-fn seconds(doc: &Document<'_>, value: &Option<Spanned<f64>>) -> Result<Option<f64>> {
-    match value {
-        Some(value) => number(doc, value, &(0.0..=*SECONDS.end())).map(Some),
-        None => Ok(None),
-    }
-}
-
-fn region(doc: &Document<'_>, corners: &Spanned<[[f64; 3]; 2]>) -> Result<Bounds> {
-    let within = -FARTHEST..=FARTHEST;
-    let mut numbers = corners.get_ref().as_flattened().iter();
-    if let Some(&far) = numbers.find(|x| !within.contains(x)) {
-        let problem = format!("{} is out of range", shown(far));
-        return Err(doc.fault_at(corners.span(), problem));
-    }
-    let [min, max] = corners.get_ref().map(DVec3::from_array);
-    Ok(Bounds { min, max })
 }
 
 fn limit(doc: &Document<'_>, spec: &LimitSpec, base_dir: &Path) -> Result<Limit> {
@@ -355,11 +321,11 @@ fn limit(doc: &Document<'_>, spec: &LimitSpec, base_dir: &Path) -> Result<Limit>
             file: base_dir.join(spec.scene.get_ref()),
             reach: doc.reach(),
             set: spec.set.iter().map(|set| set.get_ref().clone()).collect(),
-            seconds: number(doc, &spec.seconds, &SECONDS)?,
+            seconds: spec.seconds,
             marks: marks(doc, &spec.mark, method, RunsOn::Gpu, 0)?,
         };
         // Where the bracket begins the scene has to be sound; further on it may become impossible.
-        template.trial(method, number(doc, &spec.passes, &SEARCHED)?)?;
+        template.trial(method, spec.passes)?;
         searches.push(Search { method, template });
     }
     Ok(Limit {
@@ -367,9 +333,9 @@ fn limit(doc: &Document<'_>, spec: &LimitSpec, base_dir: &Path) -> Result<Limit>
         note: spec.note.clone(),
         unit: spec.unit.clone().unwrap_or_default(),
         searches,
-        passes: number(doc, &spec.passes, &SEARCHED)?,
-        fails: number(doc, &spec.fails, &SEARCHED)?,
-        ratio: number(doc, &spec.ratio, &RATIO)?,
+        passes: spec.passes,
+        fails: spec.fails,
+        ratio: spec.ratio,
     })
 }
 

@@ -9,7 +9,10 @@ pub const KEY_FAULTS: &[Fault] = &[
         "frames = 240",
         "frame = 240",
         3,
-        &["shot.frame: unknown key", "nearest is \"frames\""],
+        &[
+            "shot.frame: unknown key in [shot]; the nearest is \"frames\"",
+            "name, frames, frames_per_second",
+        ],
     ),
     (
         "iterations = 4",
@@ -51,7 +54,10 @@ pub const KEY_FAULTS: &[Fault] = &[
         "[effects]",
         "[budget]\nvolume = \"much\"\n[effects]",
         33,
-        &["budget.volume: wrong type", "or false"],
+        &[
+            "budget.volume: invalid type: string \"much\", expected a number or false;",
+            "or false",
+        ],
     ),
     (
         "[effects]",
@@ -110,8 +116,8 @@ pub const KEY_FAULTS: &[Fault] = &[
         "[[probe]]\nkind = \"elevaton\"\n\n[effects]",
         33,
         &[
-            "probe[0].kind: \"elevaton\" is no probe",
-            "\"elevation\" or \"pressure\" with at",
+            "probe[0].kind: \"elevaton\" is no kind; the nearest is \"elevation\"",
+            "\"elevation\", \"pressure\", \"energy\" or \"volume\"",
         ],
     ),
     (
@@ -151,13 +157,17 @@ pub const KEY_FAULTS: &[Fault] = &[
         "stroke = 1.5",
         "strok = 1.5",
         24,
-        &["wave_maker[0].motion.strok: unknown key", "\"stroke\""],
+        &[
+            "wave_maker[0].motion.strok: unknown key in wave_maker[0].motion; the nearest is \"stroke\"",
+        ],
     ),
     (
         "stroke = 1.5",
         "stroke = 1.5, velocity = 1",
         24,
-        &["motion.velocity: unknown key", "kind \"sine\""],
+        &[
+            "motion.velocity: does not go with kind = \"sine\"; allowed with it: kind, stroke, period, ramp",
+        ],
     ),
     (
         "frames = 240\n",
@@ -187,7 +197,7 @@ pub const KEY_FAULTS: &[Fault] = &[
         "frames = 240",
         "frames = 240\nframes = 3",
         4,
-        &["frames: a second key of this name in its table"],
+        &["shot.frames: a second key of this name in [shot]"],
     ),
     ("frames = 240", "frames = = 3", 3, &["bad.toml:3"]),
     (
@@ -226,14 +236,17 @@ pub const KEY_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6]",
         8,
-        &["domain.max: invalid length 2", "three numbers from"],
+        &[
+            "domain.max: invalid type: an array of 2, expected an array of 3 numbers;",
+            "three numbers from",
+        ],
     ),
     (
         "scale = 2.0",
         "scale = \"big\"",
         20,
         &[
-            "solid[0].scale: wrong type",
+            "solid[0].scale: invalid type: string \"big\", expected a number or an array of 3;",
             "a number from 1e-6 to 1e6, or three",
         ],
     ),

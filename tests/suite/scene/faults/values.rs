@@ -118,13 +118,13 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "[shot]",
         "[shot]\n[shot]",
         2,
-        &["shot: a second key of this name in its table"],
+        &["shot: a second table of this name"],
     ),
     (
         "stroke = 1.5",
         "stroke = 1.5, stroke = 2",
         24,
-        &["stroke: a second key of this name in its table"],
+        &["wave_maker[0].motion.stroke: a second key of this name in wave_maker[0].motion"],
     ),
     (
         "frames = 240",
@@ -256,7 +256,10 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "\"-x\"",
         "\"left\"",
         23,
-        &["wave_maker[0].wall: \"left\" is no wall", "\"+z\""],
+        &[
+            "wave_maker[0].wall: \"left\" is no wall; the nearest is",
+            "\"+z\"",
+        ],
     ),
     (
         "stroke = 1.5",
@@ -323,7 +326,10 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
         "kind = \"wobble\"",
         24,
-        &["motion.kind: \"wobble\" is no kind of motion", "solitary"],
+        &[
+            "motion.kind: \"wobble\" is no kind; the nearest is",
+            "solitary",
+        ],
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
@@ -354,6 +360,32 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "kind = \"table\"",
         24,
         &["motion.points: missing"],
+    ),
+    (
+        "iterations = 4",
+        "max_iterations = 9",
+        30,
+        &["max_iterations: given without density_error"],
+    ),
+    (
+        "iterations = 4",
+        "spectral_radius = 0.9",
+        30,
+        &[
+            "spectral_radius: does not go with iteration = \"red_black\"; allowed with it: particle_spacing, ",
+        ],
+    ),
+    (
+        "scale = 2.0",
+        "direction = [1.0, 0.0, 0.0]",
+        20,
+        &["solid[0].direction: given without motion"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\", points = [[0, 0], [1, 2]], file = \"push.csv\"",
+        24,
+        &["motion.points: given together with file"],
     ),
     // Effects.
     (

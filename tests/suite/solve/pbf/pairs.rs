@@ -12,8 +12,11 @@ use swell::{
     },
     scene::{
         Iteration, Scene, Stop,
-        plan::LIST_CAPACITY,
         probe::{Probe, ProbeKind},
+    },
+    solve::{
+        pbf::buffers::{ID, LAMBDA_SUM},
+        plan::LIST_CAPACITY,
     },
 };
 
@@ -245,7 +248,7 @@ fn lambda_is_summed_over_the_corrections() {
 
     let mut gpu = solver(&context(), &scene, &particles, &Boundary::default());
     let (state, _) = gpu.advance().unwrap();
-    let (ids, found) = (gpu.field::<u32>("id", n), gpu.field::<f32>("lambda_sum", n));
+    let (ids, found) = (gpu.field(ID, n), gpu.field(LAMBDA_SUM, n));
     let mut of_gpu = vec![0.0; n];
     for (id, sum) in ids.unwrap().into_iter().zip(found.unwrap()) {
         of_gpu[id as usize] = f64::from(sum);

@@ -1,0 +1,224 @@
+//! Vorticity confinement, among particles and on the grid.
+
+use glam::DVec3;
+
+use crate::{
+    check::{
+        engine::{Io, NONE, Outcome, State, Twin, names, twin},
+        flip::FlipState,
+        pbf::{
+            PbfState,
+            bounds::{Bounds, relative_speed},
+        },
+        table::{each, entries, pair},
+    },
+    compare::{
+        rounding::{GRADIENT, ROOT, U},
+        tolerance::bounds,
+    },
+    reference::{
+        flip::{grid_confinement, grid_curl},
+        pbf::effects::vorticity_confinement::{vorticity_curl, vorticity_force},
+    },
+    solve::{effects::vorticity_confinement::VORTICITY, flip, pbf},
+};
+
+bounds! {
+    ROTATION = [scale: "twice the gradient's scale, for the two products of a cross product",
+        sums: "with w = |Δv| " GRADIENT] scale * sums, "";
+    SLOPE = [scale: "the gradient's scale", sums: "with w = |Δ|ω|| " GRADIENT, both: "Σ (|ω| + |ω'|) s²"]
+        scale * (sums + 12.0 * U * both), "";
+    NO_SLOPE = [error: "" SLOPE] 1.01 * error, "the least slope that gives a direction";
+    GRID_CURL = [speed: "the largest about", size: "Δx"] 30.0 * U * speed / size, "differences of means of two faces over two cells";
+    GROWN = [] 20.0 * U, "";
+    TURNED = [force: "Δt ε Δx of the largest |ω| about"] 0.05 * force,
+        "nothing: where the answers are farther off than this, the direction is noise";
+}
+
+entries! {
+    "effects/vorticity_curl" {
+        CURL = "vorticity", "1/s": [error: "" ROTATION] error, "";
+        LENGTH = "its length", "1/s": [error: "" ROTATION, w: "|ω|"] error + (ROOT + 3.0) * U * w, "a root takes 9 u";
+    }
+    "effects/vorticity_force" {
+        VELOCITY = "velocity", "m/s": [force: "Δt ε h |ω|", error: "" SLOPE, slope: "|∇|ω||, or ∞ where it gives no direction",
+            rounding: "1 where it gives one, else 0", v: "|v|"]
+            force * (2.0 * error / slope + 30.0 * U * rounding) + 2.0 * U * (v + force), "", tie NO_SLOPE;
+    }
+    "effects/grid_curl" {
+        GRID_VORTICITY = "vorticity", "1/s": [error: "" GRID_CURL] error, "";
+        GRID_LENGTH = "its length", "1/s": [error: "" GRID_CURL, w: "|ω|"] error + 12.0 * U * w, "";
+    }
+    "effects/grid_confinement" {
+        GRID_VELOCITY = "velocity at faces", "m/s": [moved: "what the twin answers when each |ω| grows or shrinks by the factor "
+            GROWN, push: "|the push| + Δt ε Δx of the largest |ω| about", v: "|v|"]
+            8.0 * moved + 60.0 * U * push + 2.0 * U * v, "", tie TURNED;
+    }
+}
+
+pub(super) const PBF: &[Twin<PbfState>] = &[
+    twin("effects/vorticity_curl", NONE, curl),
+    twin(
+        "effects/vorticity_force",
+        || names![pbf::buffers::VELOCITY],
+        force,
+    ),
+];
+
+pub(super) const FLIP: &[Twin<FlipState>] = &[
+    twin("effects/grid_curl", NONE, curl_on_grid),
+    twin(
+        "effects/grid_confinement",
+        || names![flip::buffers::FACE_VELOCITY],
+        confine_on_grid,
+    ),
+];
+
+fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let n = state.particles();
+    let (points, velocity) = (
+        state.moved(io)?,
+        io.vectors_before(pbf::buffers::VELOCITY, n)?,
+    );
+    let neighbors = state.visited(io, &points)?;
+    let inputs = state.inputs(&points, &neighbors);
+    let twin = vorticity_curl(inputs, &velocity);
+    let scale = 2.0 * inputs.model.calibration.gradient_scale;
+    let found = io.after(VORTICITY, n)?;
+    let vectors = io.vectors(VORTICITY, n)?;
+    let errors = each(0..n, |i| {
+        let sums = Bounds(inputs).sums(i, relative_speed(&velocity, i));
+        ROTATION.of([scale, sums.gradient()])
+    });
+    io.table
+        .each(&CURL, 0..n, |i| pair(i, vectors[i], twin[i], [errors[i]]));
+    io.table.each(&LENGTH, 0..n, |i| {
+        let exact = twin[i].length();
+        pair(i, found[i][3], exact, [errors[i], exact])
+    });
+    Ok(())
+}
+
+fn force(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let Some(settings) = state.scene.effects.vorticity_confinement.clone() else {
+        return Ok(());
+    };
+    let n = state.particles();
+    let (points, velocity) = (
+        state.moved(io)?,
+        io.vectors_before(pbf::buffers::VELOCITY, n)?,
+    );
+    let vorticity = io.vectors_before(VORTICITY, n)?;
+    let neighbors = state.visited(io, &points)?;
+    let inputs = state.inputs(&points, &neighbors);
+    let twin = vorticity_force(inputs, settings.strength, &vorticity, &velocity);
+    let strength: Vec<f64> = vorticity.iter().map(|w| w.length()).collect();
+    let scale = inputs.model.calibration.gradient_scale;
+    let h = inputs.model.calibration.support_radius;
+    let found = io.vectors(pbf::buffers::VELOCITY, n)?;
+    io.table.each(&VELOCITY, 0..n, |i| {
+        let bounds = Bounds(inputs);
+        let other = |j: usize| strength.get(j).copied();
+        let change = |j: usize| other(j).map_or(0.0, |w| (w - strength[i]).abs());
+        let both = |j: usize| other(j).map_or(0.0, |w| w + strength[i]);
+        let sums = bounds.sums(i, change).gradient();
+        let error = SLOPE.of([scale, sums, bounds.sums(i, both).s2]);
+        let slope = slope(&bounds, &strength, i);
+        // Below this the direction is noise, and none is taken.
+        let threshold = 1e-5 * strength[i] / h;
+        if (slope - threshold).abs() <= NO_SLOPE.of([error]) {
+            return None;
+        }
+        let force = inputs.substep.time_step * settings.strength * h * strength[i];
+        let (slope, rounding) = match slope < threshold {
+            true => (f64::INFINITY, 0.0),
+            false => (slope, 1.0),
+        };
+        let magnitudes = [force, error, slope, rounding, velocity[i].length()];
+        Some(pair(i, found[i], twin[i], magnitudes))
+    });
+    Ok(())
+}
+
+/// |∇|ω|| by differences, as `vorticity_force` takes it.
+fn slope(bounds: &Bounds<'_>, strength: &[f64], i: usize) -> f64 {
+    let inputs = bounds.0;
+    let calibration = &inputs.model.calibration;
+    let term = |&j: &u32| {
+        let d = inputs.points[i] - inputs.points[j as usize];
+        let r = d.length();
+        let s = (1.0 - r / calibration.support_radius).max(0.0);
+        let along = d * (calibration.gradient_scale * s * s / r.max(1e-15));
+        along * (strength[j as usize] - strength[i])
+    };
+    let sum: DVec3 = inputs.neighbors.fluid(i).iter().map(term).sum();
+    sum.length()
+}
+
+fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let elements = state.elements();
+    let velocity = elements.planes_before(io, flip::buffers::FACE_VELOCITY)?;
+    let found = io.after(VORTICITY, elements.cells)?;
+    let vectors = io.vectors(VORTICITY, elements.cells)?;
+    let twin = grid_curl(&state.model, &elements.bricks, state.room(), &velocity);
+    let size = state.model.cell_size();
+    let error = |e: usize| {
+        // Two cells off as well: twice the reach of one neighbourhood.
+        let about = |e: usize| elements.largest_about(e, |e| velocity[e].length());
+        GRID_CURL.of([elements.largest_about(e, about), size])
+    };
+    let errors = each(elements.active(), error);
+    let error = |e: usize| errors[e - elements.active().start];
+    io.table.each(&GRID_VORTICITY, elements.active(), |e| {
+        pair(e, vectors[e], twin[e], [error(e)])
+    });
+    io.table.each(&GRID_LENGTH, elements.active(), |e| {
+        let exact = twin[e].length();
+        pair(e, found[e][3], exact, [error(e), exact])
+    });
+    Ok(())
+}
+
+fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let Some(settings) = &state.scene.effects.vorticity_confinement else {
+        return Ok(());
+    };
+    let elements = state.elements();
+    let omega = io.vectors(VORTICITY, elements.cells)?;
+    let before = elements.planes_before(io, flip::buffers::FACE_VELOCITY)?;
+    let found = elements.planes(io, flip::buffers::FACE_VELOCITY)?;
+    let step = state.step();
+    let (model, room, strength) = (&state.model, state.room(), settings.strength);
+    let twin = |omega: &[DVec3]| {
+        grid_confinement(
+            model,
+            &step,
+            &elements.bricks,
+            room,
+            strength,
+            omega,
+            &before,
+        )
+    };
+    let exact = twin(&omega);
+    // Magnitudes err by 12 u and the slope's differences pass that on: what the twin answers when they do.
+    let grown = |sign: f64| -> Vec<DVec3> {
+        let by = |(e, w): (usize, &DVec3)| {
+            let hash = (e as u32 + 1).wrapping_mul(0x9e37_79b9) >> 31;
+            let side = if hash == 0 { sign } else { -sign };
+            *w * (1.0 + side * GROWN.of([]))
+        };
+        omega.iter().enumerate().map(by).collect()
+    };
+    let others = [1.0, -1.0].map(|sign| twin(&grown(sign)));
+    let scale = step.length * strength * model.cell_size();
+    io.table.each(&GRID_VELOCITY, elements.active(), |e| {
+        let force = scale * elements.largest_about(e, |e| omega[e].length());
+        let moved = others.iter().map(|other| other[e].distance(exact[e]));
+        let moved = moved.fold(0.0, f64::max);
+        let push = exact[e].distance(before[e]) + force;
+        let is_noise = moved > TURNED.of([force]) && moved > 0.0;
+        (!is_noise).then(|| pair(e, found[e], exact[e], [moved, push, exact[e].length()]))
+    });
+    Ok(())
+}

@@ -1,0 +1,297 @@
+//! Runs a table of twins along a traced substep: a twin says which pass it is of, what it reads, and what it makes of that;
+//! when and where the device's values are read is written here once.
+
+use std::collections::BTreeMap;
+
+use bytemuck::Pod;
+use glam::{DVec3, Vec4};
+
+use crate::{
+    gpu::{
+        buffer::{Buf, Windows},
+        recording::Moment,
+    },
+    scene::flip::Precision,
+    solve::{
+        SolveError,
+        pressure::{
+            PressureControl64,
+            buffers::{self as pressure, Real},
+        },
+        trace::Traced,
+    },
+};
+
+use super::{sort, table::Table};
+
+/// What comes of a comparison: the table holds what it found.
+pub(super) type Outcome = Result<(), SolveError>;
+
+/// What holds a pass against its twin; `S` is what a solver's twins know of the substep.
+pub(super) struct Twin<S> {
+    /// Name of the pass.
+    pub(super) pass: &'static str,
+    /// Names of variables of the pass that are wanted as they stood before it ran although it writes them: they are kept.
+    pub(super) keeps: fn() -> Vec<String>,
+    /// Whether this run of the pass is one that is compared.
+    pub(super) is_due: fn(&mut S, &Io<'_>) -> Result<bool, SolveError>,
+    /// Computes what the pass should have written, and adds that to the table beside what it did.
+    pub(super) compare: fn(&mut S, &mut Io<'_>) -> Outcome,
+}
+
+/// A [`Twin`] that compares every run.
+pub(super) const fn twin<S>(
+    pass: &'static str,
+    keeps: fn() -> Vec<String>,
+    compare: fn(&mut S, &mut Io<'_>) -> Outcome,
+) -> Twin<S> {
+    Twin {
+        pass,
+        keeps,
+        is_due: |_, _| Ok(true),
+        compare,
+    }
+}
+
+/// Nothing is kept.
+pub(super) const NONE: fn() -> Vec<String> = Vec::new;
+
+/// Names of buffers that are kept.
+macro_rules! names {
+    ($($buffer:expr),+ $(,)?) => {
+        vec![$($buffer.name().to_owned()),+]
+    };
+}
+pub(super) use names;
+
+/// What a solver's twins know of the substep from pass to pass.
+pub(super) trait State: Sized + 'static {
+    /// Twins of its passes.
+    fn twins() -> Vec<&'static [Twin<Self>]>;
+
+    /// Particles.
+    fn particles(&self) -> usize;
+
+    /// Passes without a row of their own, and where what they make is compared.
+    const ELSEWHERE: &'static [(&'static str, &'static str)];
+}
+
+/// A dispatch that has run, what it read and what it left; and the table.
+pub(super) struct Io<'a> {
+    traced: Traced<'a>,
+    kept: &'a BTreeMap<String, Vec<u32>>,
+    /// The pass before.
+    pub(super) last: &'static str,
+    /// Where comparisons are added.
+    pub(super) table: &'a mut Table,
+}
+
+impl Io<'_> {
+    /// Name of the pass.
+    pub(super) fn pass(&self) -> &'static str {
+        self.traced.pass
+    }
+
+    /// Name of the buffer that a variable is bound to.
+    pub(super) fn buffer<'b>(&'b self, variable: &'b str) -> &'b str {
+        self.traced.buffer(variable)
+    }
+
+    /// The first `count` values of a variable as the pass left them.
+    pub(super) fn after<T: Pod>(
+        &self,
+        variable: Buf<T>,
+        count: usize,
+    ) -> Result<Vec<T>, SolveError> {
+        match self.buffer(variable.name()) == variable.name() {
+            true => self.traced.read(variable, count),
+            false => self.traced.bound(variable, count),
+        }
+    }
+
+    /// The same as they stood before it ran: kept, where the twin says so, and else as they stand, which must be
+    /// of what the pass does not write.
+    pub(super) fn before<T: Pod>(
+        &self,
+        variable: Buf<T>,
+        count: usize,
+    ) -> Result<Vec<T>, SolveError> {
+        let Some(words) = self.kept.get(variable.name()) else {
+            assert!(
+                !self.traced.writes(self.buffer(variable.name())),
+                "{} writes {}: its twin has to keep it",
+                self.pass(),
+                variable.name()
+            );
+            return self.after(variable, count);
+        };
+        let bytes: &[u8] = bytemuck::cast_slice(words);
+        Ok(bytemuck::pod_collect_to_vec(
+            &bytes[..count * size_of::<T>()],
+        ))
+    }
+
+    /// Vectors, of which the fourth component is left out.
+    pub(super) fn vectors(
+        &self,
+        variable: Buf<[f32; 4]>,
+        count: usize,
+    ) -> Result<Vec<DVec3>, SolveError> {
+        Ok(wide(&self.after(variable, count)?))
+    }
+
+    /// The same from before.
+    pub(super) fn vectors_before(
+        &self,
+        variable: Buf<[f32; 4]>,
+        count: usize,
+    ) -> Result<Vec<DVec3>, SolveError> {
+        Ok(wide(&self.before(variable, count)?))
+    }
+
+    /// Numbers in f64.
+    pub(super) fn scalars(&self, variable: Buf<f32>, count: usize) -> Result<Vec<f64>, SolveError> {
+        let values = self.after(variable, count)?;
+        Ok(values.into_iter().map(f64::from).collect())
+    }
+
+    /// Values of the projection's own precision.
+    pub(super) fn reals(
+        &self,
+        variable: &Buf<Real>,
+        precision: Precision,
+        count: usize,
+    ) -> Result<Vec<f64>, SolveError> {
+        let buffer = Buf::named(self.buffer(variable.name()).to_owned());
+        self.traced.reals(&buffer, precision, count)
+    }
+
+    /// The same from before.
+    pub(super) fn reals_before(
+        &self,
+        variable: &Buf<Real>,
+        precision: Precision,
+        count: usize,
+    ) -> Result<Vec<f64>, SolveError> {
+        match precision {
+            Precision::F64 => self.before(variable.retyped::<f64>(), count),
+            Precision::F32 | Precision::F32Refined => {
+                let values = self.before(variable.retyped::<f32>(), count)?;
+                Ok(values.into_iter().map(f64::from).collect())
+            }
+        }
+    }
+
+    /// The scalars of a projection.
+    pub(super) fn control(&self, precision: Precision) -> Result<PressureControl64, SolveError> {
+        self.traced.pressure_control(precision)
+    }
+
+    /// The same from before.
+    pub(super) fn control_before(
+        &self,
+        precision: Precision,
+    ) -> Result<PressureControl64, SolveError> {
+        Ok(match precision {
+            Precision::F64 => self.one_before(pressure::CONTROL_F64)?,
+            Precision::F32 | Precision::F32Refined => self.one_before(pressure::CONTROL)?.into(),
+        })
+    }
+
+    /// A struct that stands in front of a buffer.
+    pub(super) fn one<T: Pod>(&self, variable: Buf<T>) -> Result<T, SolveError> {
+        Ok(self.after(variable, 1)?.remove(0))
+    }
+
+    /// The same from before.
+    pub(super) fn one_before<T: Pod>(&self, variable: Buf<T>) -> Result<T, SolveError> {
+        Ok(self.before(variable, 1)?.remove(0))
+    }
+
+    /// The window of a uniform that the dispatch is bound to.
+    pub(super) fn window<T: Pod>(&self, windows: &Windows<T>) -> Result<T, SolveError> {
+        self.traced.window(windows)
+    }
+}
+
+/// First three components, in f64.
+pub(super) fn wide(values: &[[f32; 4]]) -> Vec<DVec3> {
+    let wide = |value: &[f32; 4]| Vec4::from_array(*value).as_dvec4().truncate();
+    values.iter().map(wide).collect()
+}
+
+/// A table of twins at work.
+pub(super) struct Engine<S: State> {
+    pub(super) state: S,
+    pub(super) table: Table,
+    twins: Vec<&'static [Twin<S>]>,
+    sort: sort::Twins<S>,
+    ran: Vec<&'static str>,
+    kept: BTreeMap<String, Vec<u32>>,
+    last: &'static str,
+    now: &'static str,
+}
+
+impl<S: State> Engine<S> {
+    pub(super) fn new(state: S) -> Self {
+        Self {
+            state,
+            table: Table::default(),
+            twins: S::twins(),
+            sort: sort::twins(),
+            ran: Vec::new(),
+            kept: BTreeMap::new(),
+            last: "",
+            now: "",
+        }
+    }
+
+    /// Takes in a dispatch, before and after it runs.
+    pub(super) fn observe(&mut self, traced: Traced<'_>) -> Result<(), SolveError> {
+        if traced.moment == Moment::Before {
+            (self.last, self.now) = (self.now, traced.pass);
+            if !self.ran.contains(&traced.pass) {
+                self.ran.push(traced.pass);
+            }
+        }
+        let of_solver = self.twins.iter().copied().flatten();
+        let twin = (self.sort.iter().chain(of_solver)).find(|twin| twin.pass == traced.pass);
+        let Some(twin) = twin else {
+            return Ok(());
+        };
+        if traced.moment == Moment::Before {
+            self.kept.clear();
+            for variable in (twin.keeps)() {
+                let buffer = traced.buffer(&variable).to_owned();
+                if traced.writes(&buffer) {
+                    let words = traced.length::<u32>(&buffer);
+                    let words = traced.read(Buf::<u32>::named(buffer), words)?;
+                    self.kept.insert(variable, words);
+                }
+            }
+            return Ok(());
+        }
+        let io = &mut Io {
+            traced,
+            kept: &self.kept,
+            last: self.last,
+            table: &mut self.table,
+        };
+        match (twin.is_due)(&mut self.state, io)? {
+            true => (twin.compare)(&mut self.state, io),
+            false => Ok(()),
+        }
+    }
+
+    /// The table, with the passes that have no row.
+    pub(super) fn finish(mut self) -> Table {
+        for pass in self.ran {
+            if !self.table.has(pass) {
+                let known = S::ELSEWHERE.iter().find(|(name, _)| *name == pass);
+                let why = known.map_or("no f64 twin", |(_, why)| why);
+                self.table.unchecked.push((pass, why));
+            }
+        }
+        self.table
+    }
+}

@@ -1,0 +1,205 @@
+//! The multigrid's passes, from the values that the device had about each block.
+
+use std::ops::Range;
+
+use crate::{
+    check::{
+        engine::{Io, NONE, Outcome, Twin, twin},
+        table::{Entry, each, pair},
+    },
+    domain::bricks::CELLS,
+    reference::poisson::multigrid::{
+        About, Brick, Levels, MOST_AIR, Rounding, above_offset, place,
+    },
+    solve::{
+        SolveError,
+        pressure::{PressureBrick, PressurePhase, buffers as solved},
+    },
+};
+
+use super::{FlipState, rows::*};
+
+/// Twins of the multigrid's passes.
+pub(super) const TWINS: &[Twin<FlipState>] = &[
+    of_level("pressure/coarsen", coarsen),
+    of_level("pressure/smooth_first", |state, io| {
+        smooth(state, io, &SMOOTHED_FIRST, About::Nothing)
+    }),
+    Twin {
+        is_due: |state, io| {
+            // The last sweep of a cycle leaves the sums; a cycle has any number of them.
+            if state.is_turn(io)? && state.is_early() {
+                state.note_sum(io, solved::RESIDUAL, solved::CORRECTION)?;
+            }
+            is_due(state, io)
+        },
+        ..twin("pressure/smooth", NONE, |state, io| {
+            smooth(state, io, &SMOOTHED, About::Corrections)
+        })
+    },
+    of_level("pressure/smooth_corrected", |state, io| {
+        smooth(state, io, &SMOOTHED_CORRECTED, About::WithAbove)
+    }),
+    of_level("pressure/restrict", restrict),
+    of_level("pressure/solve_coarse", solve_coarse),
+];
+
+/// A twin of which the first few runs on each level are compared.
+const fn of_level(
+    pass: &'static str,
+    compare: fn(&mut FlipState, &mut Io<'_>) -> Outcome,
+) -> Twin<FlipState> {
+    Twin {
+        is_due,
+        ..twin(pass, NONE, compare)
+    }
+}
+
+fn is_due(state: &mut FlipState, io: &Io<'_>) -> Result<bool, SolveError> {
+    let level = io.window(&solved::PHASES)?.level;
+    let is_turn = io.pass() == "pressure/coarsen" || state.is_turn(io)?;
+    Ok(is_turn && state.is_due(io, level))
+}
+
+/// The levels as the pass left them.
+struct Cycle {
+    phase: PressurePhase,
+    levels: Levels,
+    rounding: Rounding,
+}
+
+impl Cycle {
+    fn of(state: &FlipState, io: &Io<'_>) -> Result<Self, SolveError> {
+        let phase = io.window(&solved::PHASES)?;
+        let reals = |buffer, cells| io.reals(&buffer, state.precision(), cells);
+        let level = |&[first, count, ..]: &[u32; 4]| first..first + count;
+        let all = &phase.levels[..=phase.last_level as usize];
+        let levels: Vec<Range<u32>> = all.iter().map(level).collect();
+        let slots = levels[phase.last_level as usize].end as usize;
+        let (cells, stride) = (slots * CELLS as usize, phase.stride as usize);
+        let planes = io.after(solved::COEFFICIENT, 2 * stride + cells)?;
+        let bricks = io.after(solved::BRICKS, slots)?;
+        let brick = |brick: &PressureBrick| Brick {
+            faces: brick.faces,
+            above: brick.above,
+        };
+        Ok(Self {
+            phase,
+            levels: Levels {
+                levels,
+                bricks: bricks.iter().map(brick).collect(),
+                coefficient: [0, 1, 2].map(|axis| planes[axis * stride..][..cells].to_vec()),
+                dirichlet: reals(solved::DIRICHLET, cells)?,
+                residual: reals(solved::RESIDUAL, cells)?,
+                correction: reals(solved::CORRECTION, cells)?,
+            },
+            rounding: Rounding {
+                unit: state.unit(),
+                block: OF_BLOCK.of,
+                restricted: OF_RESTRICTION.of,
+            },
+        })
+    }
+
+    fn level(&self) -> usize {
+        self.phase.level as usize
+    }
+
+    /// Blocks of the phase's colour with their slots.
+    fn blocks(&self) -> Vec<(u32, u32)> {
+        self.levels.coloured(self.level(), self.phase.colour)
+    }
+}
+
+fn smooth(state: &FlipState, io: &mut Io<'_>, entry: &'static Entry<1>, about: About) -> Outcome {
+    let cycle = Cycle::of(state, io)?;
+    let (levels, blocks) = (&cycle.levels, cycle.blocks());
+    let solved = each(0..blocks.len(), |k| {
+        let solved = levels.solved(cycle.level(), blocks[k], about, cycle.rounding, [0.0; 8]);
+        let pairs = solved.map(|cells| {
+            cells.map(|cell| {
+                let found = levels.correction[cell.place];
+                Some(pair(cell.place, found, cell.value, [cell.error]))
+            })
+        });
+        pairs.unwrap_or([None; 8])
+    });
+    io.table.add(entry, solved.into_iter().flatten());
+    Ok(())
+}
+
+fn restrict(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let cycle = Cycle::of(state, io)?;
+    let blocks = cycle.blocks().into_iter();
+    let above = |block| (cycle.levels).restricted(cycle.level(), block, cycle.rounding);
+    let pairs = blocks.flat_map(above).map(|cell| {
+        let found = cycle.levels.residual[cell.place];
+        pair(cell.place, found, cell.value, [cell.error])
+    });
+    io.table.add(&RESTRICTED, pairs);
+    Ok(())
+}
+
+/// All corrections that the pass leaves, and the residuals that it hands down.
+fn solve_coarse(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let cycle = Cycle::of(state, io)?;
+    let levels = &cycle.levels;
+    let Range { start, end } = levels.levels[cycle.level()];
+    let [corrections, residuals] =
+        [start, end].map(|slot| (CELLS * slot) as usize..levels.correction.len());
+    let Some([values, errors]) = levels.solve_coarse(cycle.level(), cycle.rounding) else {
+        io.table.leave_out(&COARSE_SOLVED, corrections.len());
+        io.table.leave_out(&COARSE_RESIDUAL, residuals.len());
+        return Ok(());
+    };
+    io.table.each(&COARSE_SOLVED, corrections, |at| {
+        let found = levels.correction[at];
+        pair(at, found, values.correction[at], [errors.correction[at]])
+    });
+    io.table.each(&COARSE_RESIDUAL, residuals, |at| {
+        let found = levels.residual[at];
+        pair(at, found, values.residual[at], [errors.residual[at]])
+    });
+    Ok(())
+}
+
+fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let cycle = Cycle::of(state, io)?;
+    let (levels, unit) = (&cycle.levels, state.unit());
+    let kinds = io.after(solved::BLOCK, levels.bricks.len() * 64)?;
+    let (mut shared, mut airs) = (Vec::new(), Vec::new());
+    let mut full = vec![[true; 2]; kinds.len()];
+    let mut is_child = vec![false; kinds.len()];
+    for slot in levels.levels[cycle.level() - 1].clone() {
+        for block in 0..64 {
+            let at = (levels.bricks[slot as usize].above + above_offset(block)) as usize;
+            for axis in 0..3 {
+                let lower = (0..8).filter(|c| c >> axis & 1 == 0);
+                let fine = &levels.coefficient[axis];
+                let faces = lower.map(|c| f64::from(fine[place(slot, block, c)]));
+                let exact = 0.25 * faces.sum::<f64>();
+                shared.push(pair(at, fine[at], exact, [exact]));
+            }
+            let air = (0..8).map(|c| levels.dirichlet[place(slot, block, c)]);
+            let exact = 0.5 * air.map(|air| air.min(MOST_AIR)).sum::<f64>();
+            airs.push(pair(at, levels.dirichlet[at], exact, [unit, exact]));
+            let kind = kinds[(64 * slot + block) as usize] & 3;
+            let coarse = at / 512 * 64 + at % 64;
+            full[coarse] = [full[coarse][0] && kind == 1, full[coarse][1] && kind == 0];
+            is_child[coarse] = true;
+        }
+    }
+    let children = || (0..kinds.len()).filter(|&k| is_child[k]);
+    let found: Vec<u32> = children().map(|k| kinds[k]).collect();
+    let expected: Vec<u32> = children()
+        .map(|k| match full[k] {
+            [_, true] => 0,
+            [true, _] => 1,
+            _ => 2,
+        })
+        .collect();
+    io.table.add(&COARSE_COEFFICIENT, shared);
+    io.table.add(&COARSE_AIR, airs);
+    io.table.add_exact(&COARSE_KIND, &found, &expected);
+    Ok(())
+}

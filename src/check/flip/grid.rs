@@ -1,0 +1,301 @@
+//! From the solids to velocities at faces: cuts, particle-to-grid, extrapolation.
+
+use glam::DVec3;
+
+use crate::{
+    check::{
+        engine::{Io, Outcome},
+        pbf::GRID,
+        table::{each, pair},
+    },
+    domain::{boundary::Boundary, signed_distance::SignedDistance},
+    reference::flip::{
+        Model, Room, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
+        find_change as twin_find_change, gather_centers as twin_gather_centers,
+        gather_faces as twin_gather_faces,
+    },
+    scene::flip::Surface,
+    solve::flip::buffers,
+};
+
+use super::{FlipState, elements::neighborhood, rows::*};
+
+/// Particles of the 27 cells about one, and the least and the greatest of their velocities.
+struct About {
+    count: f64,
+    low: DVec3,
+    high: DVec3,
+}
+
+impl FlipState {
+    fn about(&self, element: usize) -> About {
+        let (bricks, sorted) = (&self.elements().bricks, self.sorted());
+        let mut about = About {
+            count: 0.0,
+            low: DVec3::splat(f64::INFINITY),
+            high: DVec3::splat(f64::NEG_INFINITY),
+        };
+        for offset in neighborhood() {
+            for i in sorted.of(bricks.near(element as u32, offset)) {
+                let v = sorted.cloud.velocity[i];
+                let affine = sorted.cloud.affine.get(i);
+                // Faces are at most 1.5 cells off along each axis.
+                let reach = affine.map_or(0.0, |c| {
+                    let rows = [0, 1, 2].map(|k| c.row(k).abs().element_sum());
+                    2.0 * self.model.cell_size() * rows.into_iter().fold(0.0, f64::max)
+                });
+                about.count += 1.0;
+                about.low = about.low.min(v - reach);
+                about.high = about.high.max(v + reach);
+            }
+        }
+        about
+    }
+
+    /// What a solid's distance errs by on the device, metres.
+    pub(super) fn distance_error(&self) -> f64 {
+        let solids = self.boundary.distance.iter().chain(&self.boundary.moving);
+        let origin = self.scene.domain.min;
+        let extent = self.scene.domain.size().abs().max_element();
+        let of = |grid: &SignedDistance| {
+            let first = (grid.origin - origin).abs().max_element();
+            GRID.of([extent + first, first, grid.spacing])
+        };
+        solids.map(of).fold(0.0, f64::max)
+    }
+
+    /// The twin's room among solids whose distances are off by `shift` and whose nodes by `place`, metres.
+    fn shifted_room(&self, shift: f64, place: DVec3) -> Room {
+        let moved = |grid: &SignedDistance| SignedDistance {
+            origin: grid.origin + place,
+            values: grid.values.iter().map(|&v| v + shift as f32).collect(),
+            ..grid.clone()
+        };
+        let boundary = Boundary {
+            samples: Vec::new(),
+            distance: self.boundary.distance.as_ref().map(moved),
+            moving: self.boundary.moving.iter().map(moved).collect(),
+        };
+        let model = Model::new(&self.model.scene, &boundary);
+        let step = model.step(&self.elements().substep);
+        twin_cut_cells(&model, &step, &self.elements().bricks, self.sorted())
+    }
+}
+
+pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let has_moving = !state.boundary.moving.is_empty();
+    let has_solids = state.boundary.distance.is_some() || has_moving;
+    let (elements, step) = (state.elements(), state.step());
+    let twin = twin_cut_cells(&state.model, &step, &elements.bricks, state.sorted());
+    let error = state.distance_error();
+    let others: Vec<Room> = [-error, error]
+        .into_iter()
+        .filter(|_| has_solids)
+        .map(|shift| state.shifted_room(shift, DVec3::ZERO))
+        .collect();
+    // Which of nodes that are as near to a cell's centre is looked at tells whether a solid is near at all, and so whether
+    // its velocity stands at faces that it does not touch.
+    let side = |k: usize, axis: usize| if k >> axis & 1 == 0 { error } else { -error };
+    let rounded: Vec<Room> = (0..8)
+        .filter(|_| has_moving)
+        .map(|k| state.shifted_room(0.0, DVec3::new(side(k, 0), side(k, 1), side(k, 2))))
+        .collect();
+    let room = Room {
+        kind: io.after(buffers::CELL_KIND, elements.cells)?,
+        open: elements.planes(io, buffers::FACE_OPEN)?,
+        solid_flux: elements.scalars(io, buffers::SOLID_FLUX)?,
+        volume: match has_solids {
+            true => elements.scalars(io, buffers::OPEN_VOLUME)?,
+            false => twin.volume.clone(),
+        },
+        closed_velocity: match has_moving {
+            true => elements.planes(io, buffers::CLOSED_VELOCITY)?,
+            false => twin.closed_velocity.clone(),
+        },
+    };
+    let cut = CUT.of([state.place()]);
+    let wall = step.wall_velocity.map(|v| v.abs().max_element());
+    let solid = step.solids.iter().map(|s| s.velocity.length());
+    let speed = solid.fold(wall[0].max(wall[1]), f64::max);
+    let moved = |of: &dyn Fn(&Room) -> f64| others.iter().map(of).fold(0.0, f64::max);
+    io.table.each(&KIND, elements.active(), |e| {
+        let is_tie = others.iter().any(|other| other.kind[e] != twin.kind[e]);
+        (!is_tie).then(|| pair(e, room.kind[e], f64::from(twin.kind[e]), []))
+    });
+    io.table.each(&OPEN, elements.active(), |e| {
+        let moved = moved(&|other| other.open[e].distance(twin.open[e]));
+        pair(e, room.open[e], twin.open[e], [cut, moved])
+    });
+    io.table.each(&FLUX, elements.active(), |e| {
+        let moved = moved(&|other| (other.solid_flux[e] - twin.solid_flux[e]).abs());
+        pair(
+            e,
+            room.solid_flux[e],
+            twin.solid_flux[e],
+            [cut, speed, moved],
+        )
+    });
+    if has_solids {
+        io.table.each(&VOLUME, elements.active(), |e| {
+            let moved = moved(&|other| (other.volume[e] - twin.volume[e]).abs());
+            pair(e, room.volume[e], twin.volume[e], [cut, moved])
+        });
+    }
+    if has_moving {
+        io.table.each(&CLOSED, elements.active(), |e| {
+            let exact = twin.closed_velocity[e];
+            let mut answers = others.iter().chain(&rounded);
+            let is_tie = answers.any(|other| other.closed_velocity[e] != exact);
+            (!is_tie).then(|| pair(e, room.closed_velocity[e], exact, [exact.length()]))
+        });
+    }
+    state.room = Some(room);
+    Ok(())
+}
+
+/// After the last of the three axes.
+pub(super) fn gather_faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    if io.window(&buffers::AXES)?[0] < 2 {
+        return Ok(());
+    }
+    let (elements, step) = (state.elements(), state.step());
+    let (bricks, sorted) = (&elements.bricks, state.sorted());
+    let twin = twin_gather_faces(&state.model, &step, bricks, sorted, state.room());
+    let found = elements.faces(io)?;
+    let place = state.place();
+    let error = |e: usize| {
+        let About { count, low, high } = state.about(e);
+        if count == 0.0 {
+            return 0.0;
+        }
+        let (range, most) = (high - low, low.abs().max(high.abs()));
+        let along = |axis: usize| {
+            let weight = twin.weight[e][axis];
+            OF_FACE.of([place, count, weight, range[axis], most[axis]])
+        };
+        DVec3::from_array([0, 1, 2].map(along)).length()
+    };
+    let active = elements.active();
+    let errors = each(active.clone(), error);
+    let error = |e: usize| errors[e - active.start];
+    io.table.each(&OLD, active.clone(), |e| {
+        pair(e, found.change[e], twin.change[e], [error(e)])
+    });
+    io.table.each(&NEW, active.clone(), |e| {
+        let magnitudes = [
+            error(e),
+            step.velocity_step.length(),
+            twin.velocity[e].length(),
+        ];
+        pair(e, found.velocity[e], twin.velocity[e], magnitudes)
+    });
+    io.table
+        .add_exact(&KNOWN, &found.layer[active.clone()], &twin.layer[active]);
+    Ok(())
+}
+
+pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let settings = state.model.settings();
+    let (elements, step, room) = (state.elements(), state.step(), state.room());
+    let bricks = &elements.bricks;
+    let twin = twin_gather_centers(&state.model, &step, bricks, state.sorted(), room);
+    let share = 1.0 / f64::from(settings.particles_per_cell);
+    let (place, size) = (state.place(), state.model.cell_size());
+    let error = |e: usize| {
+        let count = state.about(e).count;
+        // Half of what the cells' open volumes leave: walls leave hats another part than cells.
+        let part = |step: i32| if step == 0 { 0.75 } else { 0.125 };
+        let open: f64 = neighborhood()
+            .map(|offset| {
+                let volume = room.volume[bricks.near(e as u32, offset) as usize];
+                offset.into_iter().map(part).product::<f64>() * volume
+            })
+            .sum();
+        let least = (0.5 * open).max(0.02);
+        let relative = (count * share / least).min(twin.density[e].max(1.0));
+        OF_CENTER.of([share, place, count, least, relative])
+    };
+    let active = elements.active();
+    let errors = each(active.clone(), error);
+    let error = |e: usize| errors[e - active.start];
+    let density = elements.scalars(io, buffers::DENSITY)?;
+    io.table.each(&RELATIVE_DENSITY, active.clone(), |e| {
+        pair(e, density[e], twin.density[e], [error(e)])
+    });
+    if settings.density_correction {
+        let excess = elements.scalars(io, buffers::DENSITY_EXCESS)?;
+        io.table.each(&EXCESS, active.clone(), |e| {
+            pair(e, excess[e], twin.excess[e], [error(e)])
+        });
+    }
+    if settings.surface == Surface::GhostFluid {
+        let distance = elements.scalars(io, buffers::LIQUID_DISTANCE)?;
+        io.table.each(&DISTANCE, active.clone(), |e| {
+            let exact = twin.distance[e];
+            let moved = surface_moved(exact / size, error(e));
+            pair(e, distance[e], exact, [moved, size])
+        });
+    }
+    Ok(())
+}
+
+pub(super) fn find_change(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let elements = state.elements();
+    let mut twin = elements.faces_before(io)?;
+    let before = twin.change.clone();
+    twin_find_change(&state.model, &elements.bricks, state.room(), &mut twin);
+    let found = elements.faces(io)?;
+    let active = elements.active();
+    io.table.each(&CHANGE, active.clone(), |e| {
+        let size = twin.velocity[e].length() + before[e].length();
+        pair(e, found.change[e], twin.change[e], [size])
+    });
+    io.table
+        .add_exact(&LAYER, &found.layer[active.clone()], &twin.layer[active]);
+    Ok(())
+}
+
+pub(super) fn extrapolate(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let layer = io.window(&buffers::LAYERS)?[0];
+    let (elements, step) = (state.elements(), state.step());
+    if layer > step.layers as u32 {
+        return Ok(());
+    }
+    let before = elements.faces_before(io)?;
+    let mut twin = before.clone();
+    twin_extrapolate(&step, &elements.bricks, layer, &mut twin);
+    let found = elements.faces(io)?;
+    let largest = |e: usize| {
+        let sides = (0..7).map(|k| {
+            let mut offset = [0; 3];
+            if k < 6 {
+                offset[k / 2] = k as i32 % 2 * 2 - 1;
+            }
+            let other = elements.bricks.near(e as u32, offset) as usize;
+            before.velocity[other].length() + before.change[other].length()
+        });
+        sides.fold(step.velocity_step.length(), f64::max)
+    };
+    let active = elements.active();
+    io.table.each(&SPREAD_VELOCITY, active.clone(), |e| {
+        pair(e, found.velocity[e], twin.velocity[e], [largest(e)])
+    });
+    io.table.each(&SPREAD_CHANGE, active.clone(), |e| {
+        pair(e, found.change[e], twin.change[e], [largest(e)])
+    });
+    io.table.add_exact(
+        &SPREAD_LAYER,
+        &found.layer[active.clone()],
+        &twin.layer[active],
+    );
+    Ok(())
+}
+
+/// By how much the distance of the surface, in cells, moves where the density does by `error`: the density as a function
+/// of it is s − s²/2, whose inverse is steep where the water is full.
+fn surface_moved(distance: f64, error: f64) -> f64 {
+    let s = distance.abs().min(1.0);
+    let slope = 1.0 - s;
+    let moved = |by: f64| (1.0 - (slope * slope + by).max(0.0).sqrt() - s).abs();
+    moved(2.0 * error).max(moved(-2.0 * error))
+}

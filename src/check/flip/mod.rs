@@ -1,0 +1,191 @@
+//! FLIP's passes against their f64 twins, each from the inputs that the GPU had.
+
+mod cycle;
+mod elements;
+mod grid;
+mod iteration;
+mod particles;
+mod pressure;
+mod rows;
+mod sort;
+
+use std::collections::BTreeMap;
+
+use crate::{
+    domain::{
+        boundary::Boundary, particles::Particles, poisson::FLUID, solver::Solver, substep::Which,
+    },
+    gpu::adapter::Context,
+    reference::{
+        flip::{Given, Model, Room, Sorted, Step},
+        poisson::iteration::Sum,
+    },
+    scene::Scene,
+    solve::{
+        SolveError,
+        flip::{Flip, buffers},
+        plan::Plan,
+        pressure::buffers as solved,
+        trace::{Begun, Span, TraceFrame},
+    },
+};
+
+use super::{
+    Checked, effects,
+    engine::{Engine, Io, NONE, Outcome, State, Twin, names, twin},
+    table::pair,
+};
+use elements::Elements;
+use pressure::Assembled;
+use rows::{PLACE, WORK};
+
+/// Twins of FLIP's own passes.
+const TWINS: &[Twin<FlipState>] = &[
+    twin("flip/survey", NONE, sort::survey),
+    twin("flip/assign_cells", NONE, sort::assign_cells),
+    twin("flip/reorder", NONE, sort::reorder),
+    twin("flip/cut_cells", NONE, grid::cut_cells),
+    twin("flip/gather_faces", NONE, grid::gather_faces),
+    twin("flip/gather_centers", NONE, grid::gather_centers),
+    twin("flip/find_change", elements::faces_kept, grid::find_change),
+    twin("flip/extrapolate", elements::faces_kept, grid::extrapolate),
+    twin("flip/grid_to_particle", NONE, particles::grid_to_particle),
+    twin(
+        "flip/advect",
+        || names![buffers::COUNTERS],
+        particles::advect,
+    ),
+    twin("flip/boundary_work", NONE, boundary_work),
+];
+
+/// Passes without a row of their own, and where what they make is compared.
+const BOTH_HALVES: &str = "the twin of flip/gather_faces and flip/gather_centers does both halves";
+const LABELLED: &str = "what they make is held against its twin after pressure/count_pockets";
+
+/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and holds it against the reference.
+///
+/// # Errors
+/// The device, the numbers of the solver, or a substep that the frame does not have.
+pub fn check(
+    context: &Context,
+    scene: &Scene,
+    plan: Plan,
+    boundary: &Boundary,
+    (frame, particles): (u32, &Particles),
+    which: Which,
+) -> Result<Checked, SolveError> {
+    let mut solver = Flip::new(context, scene, plan, boundary, false)?;
+    solver.load(frame, particles)?;
+    let mut engine = Engine::new(FlipState {
+        scene: scene.clone(),
+        boundary: boundary.clone(),
+        model: Model::new(scene, boundary),
+        n: particles.len(),
+        frame,
+        begun: Begun::default(),
+        elements: None,
+        sorted: None,
+        room: None,
+        assembled: None,
+        given: None,
+        runs: BTreeMap::new(),
+        products: 0,
+        sum: None,
+    });
+    let traced = solver.trace_frame(Span::Only(which), &mut |begun, traced| {
+        engine.state.begun = begun;
+        engine.observe(traced)
+    })?;
+    Ok(Checked {
+        table: engine.finish(),
+        substep: Some(traced),
+    })
+}
+
+/// What the twins know of the substep.
+pub(super) struct FlipState {
+    pub(super) scene: Scene,
+    boundary: Boundary,
+    pub(super) model: Model,
+    n: usize,
+    frame: u32,
+    begun: Begun,
+    elements: Option<Elements>,
+    sorted: Option<Sorted>,
+    room: Option<Room>,
+    assembled: Option<Assembled>,
+    given: Option<Given>,
+    /// How often each pass of an iteration was met on each level.
+    runs: BTreeMap<(&'static str, u32), usize>,
+    /// Runs of pressure/multiply that were compared.
+    products: usize,
+    /// What the bricks' sums of the latest pass that made any come to.
+    sum: Option<Sum>,
+}
+
+impl State for FlipState {
+    fn twins() -> Vec<&'static [Twin<Self>]> {
+        let own = [TWINS, pressure::TWINS, iteration::TWINS, cycle::TWINS];
+        [&own[..], &effects::flip()].concat()
+    }
+
+    fn particles(&self) -> usize {
+        self.n
+    }
+
+    const ELSEWHERE: &'static [(&'static str, &'static str)] = &[
+        (
+            "flip/find_not_finite",
+            "it counts what is not finite, which is nothing here",
+        ),
+        ("flip/spread_faces", BOTH_HALVES),
+        ("flip/spread_centers", BOTH_HALVES),
+        ("pressure/label_cells", LABELLED),
+        ("pressure/merge_labels", LABELLED),
+    ];
+}
+
+impl FlipState {
+    pub(super) fn elements(&self) -> &Elements {
+        self.elements.as_ref().expect("after flip/survey")
+    }
+
+    fn sorted(&self) -> &Sorted {
+        self.sorted.as_ref().expect("after flip/reorder")
+    }
+
+    pub(super) fn room(&self) -> &Room {
+        self.room.as_ref().expect("after flip/cut_cells")
+    }
+
+    pub(super) fn step(&self) -> Step<'_> {
+        self.model.step(&self.elements().substep)
+    }
+
+    /// [`PLACE`]: the rounding of a place in cells.
+    fn place(&self) -> f64 {
+        let cells = self.model.cells.into_iter().max().unwrap_or(1);
+        PLACE.of([f64::from(cells)])
+    }
+}
+
+/// From the pressure and the flux that the device has.
+fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let elements = state.elements();
+    let pressure = elements.scalars(io, solved::PRESSURE)?;
+    let flux = elements.scalars(io, buffers::SOLID_FLUX)?;
+    let kind = io.before(buffers::CELL_KIND, elements.cells)?;
+    let wet = elements.wet();
+    let sums = io.after(buffers::BOUNDARY_WORK, wet.len() / 64)?;
+    let term = |e: usize| match kind[e] {
+        FLUID => -pressure[e] * flux[e],
+        _ => 0.0,
+    };
+    io.table.each(&WORK, 0..sums.len(), |group| {
+        let first = wet.start + 64 * group;
+        let terms = (first..first + 64).map(term);
+        let sizes: f64 = terms.clone().map(f64::abs).sum();
+        pair(group, sums[group], terms.sum::<f64>(), [sizes])
+    });
+    Ok(())
+}

@@ -1,0 +1,184 @@
+//! The grid back to the particles.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::{
+    check::{
+        engine::{Io, Outcome},
+        table::pair,
+    },
+    domain::bricks::Bricks,
+    reference::flip::{
+        Given, Moved, advect as twin_advect, grid_to_particle as twin_grid_to_particle,
+    },
+    solve::{SolveError, flip::buffers, pressure::buffers as solved},
+};
+
+use super::{FlipState, elements::neighborhood, rows::*};
+
+/// [`OF_FACES`] about a cell, its length over the axes.
+fn of_faces(bricks: &Bricks, values: &[DVec3], element: u32, place: f64) -> f64 {
+    let (mut low, mut high) = (DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY));
+    for offset in neighborhood() {
+        let value = values[bricks.near(element, offset) as usize];
+        (low, high) = (low.min(value), high.max(value));
+    }
+    let (range, most) = (high - low, low.abs().max(high.abs()));
+    let error = |axis: usize| OF_FACES.of([place, range[axis], most[axis]]);
+    DVec3::from_array([0, 1, 2].map(error)).length()
+}
+
+pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let elements = state.elements();
+    let faces = elements.faces_before(io)?;
+    let shift = match state.model.settings().density_correction {
+        true => Some(elements.planes_before(io, solved::FACE_DISPLACEMENT)?),
+        false => None,
+    };
+    let (bricks, step, sorted) = (&elements.bricks, state.step(), state.sorted());
+    let twin = twin_grid_to_particle(
+        &state.model,
+        &step,
+        bricks,
+        sorted,
+        &faces,
+        shift.as_deref(),
+    );
+    let given = given(state, io)?;
+    let place = state.place();
+    let of_cell = |element: usize| {
+        let element = element as u32;
+        let own = sorted.of(element);
+        let mut errors = [0.0; 3];
+        if !own.is_empty() {
+            errors[0] = of_faces(bricks, &faces.velocity, element, place);
+            errors[1] = of_faces(bricks, &faces.change, element, place);
+            errors[2] = (shift.as_ref()).map_or(0.0, |of| of_faces(bricks, of, element, place));
+        }
+        own.map(move |i| (i, errors))
+    };
+    let errors: Vec<(usize, [f64; 3])> = (elements.wet().into_par_iter())
+        .flat_map_iter(of_cell)
+        .collect();
+    let all = || errors.iter().copied();
+    io.table.add(
+        &GIVEN,
+        all().map(|(i, [velocity, change, _])| {
+            let came = sorted.cloud.velocity[i].length();
+            pair(
+                i,
+                given.velocity[i],
+                twin.velocity[i],
+                [velocity, change, came],
+            )
+        }),
+    );
+    io.table.add(
+        &CARRIED,
+        all().map(|(i, [velocity, ..])| pair(i, given.carried[i], twin.carried[i], [velocity])),
+    );
+    if !given.affine.is_empty() {
+        let size = state.model.cell_size();
+        let rows = all().flat_map(|one| [0, 1, 2].map(|row| (one, row)));
+        io.table.add(
+            &GIVEN_AFFINE,
+            rows.map(|((i, [velocity, ..]), row)| {
+                let [found, exact] = [&given, &twin].map(|of| of.affine[i].row(row));
+                pair(i, found, exact, [velocity, size])
+            }),
+        );
+    }
+    if shift.is_some() {
+        io.table.add(
+            &SHIFT,
+            all().map(|(i, [.., error])| {
+                pair(i, given.displacement[i], twin.displacement[i], [error])
+            }),
+        );
+    }
+    state.given = Some(given);
+    Ok(())
+}
+
+/// What the device gave each particle.
+fn given(state: &FlipState, io: &Io<'_>) -> Result<Given, SolveError> {
+    let width = match state.model.settings().density_correction {
+        true => 6,
+        false => 3,
+    };
+    let values = io.scalars(buffers::CARRIED, width * state.n)?;
+    let at = |first: usize| -> Vec<DVec3> {
+        let rows = values.chunks_exact(width);
+        rows.map(|row| {
+            row.get(first..first + 3)
+                .map_or(DVec3::ZERO, DVec3::from_slice)
+        })
+        .collect()
+    };
+    let cloud = state.unsorted(io)?;
+    Ok(Given {
+        velocity: cloud.velocity,
+        affine: cloud.affine,
+        carried: at(0),
+        displacement: at(3),
+    })
+}
+
+pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let Some(given) = state.given.take() else {
+        return Ok(());
+    };
+    let (n, elements) = (state.n, state.elements());
+    let faces = elements.planes_before(io, buffers::FACE_VELOCITY)?;
+    let (step, start) = (state.step(), &state.sorted().cloud.position);
+    let go = |start: &[DVec3]| {
+        let (model, bricks) = (&state.model, &elements.bricks);
+        twin_advect(model, &step, bricks, start, &faces, &given)
+    };
+    let twin = go(start);
+    let fastest = faces.iter().map(|v| v.length()).fold(0.0, f64::max);
+    let grid = state.distance_error();
+    let reach = |x: &DVec3| START.of([x.length(), step.length, fastest, grid]);
+    let answers: Vec<Moved> = DVec3::AXES
+        .into_iter()
+        .flat_map(|axis| [axis, -axis])
+        .map(|side| {
+            go(&start
+                .iter()
+                .map(|x| *x + side * reach(x))
+                .collect::<Vec<_>>())
+        })
+        .collect();
+    let answer = |of: &dyn Fn(&Moved) -> f64| -> f64 {
+        let sides = answers.chunks(2);
+        sides.map(|pair| of(&pair[0]).max(of(&pair[1]))).sum()
+    };
+    let position = io.vectors(buffers::POSITION, n)?;
+    let velocity = io.vectors(buffers::VELOCITY, n)?;
+    io.table.each(&MOVED, 0..n, |i| {
+        let x = twin.position[i];
+        let moved = answer(&|moved| moved.position[i].distance(x));
+        pair(i, position[i], x, [moved, x.length()])
+    });
+    // What is left of a velocity that a solid stops has the rounding of the two that were subtracted.
+    let among = f64::from(u8::from(!step.solids.is_empty()));
+    let solids = step.solids.iter().map(|s| s.velocity.length());
+    let solids = solids.fold(0.0, f64::max);
+    io.table.each(&ADVECTED, 0..n, |i| {
+        let v = twin.velocity[i];
+        let moved = answer(&|moved| moved.velocity[i].distance(v));
+        let came = among * (given.velocity[i].length() + solids);
+        pair(i, velocity[i], v, [moved, v.length() + came])
+    });
+    let before = io.one_before(buffers::COUNTERS)?;
+    let after = io.one(buffers::COUNTERS)?;
+    let slowed = f64::from(after.capped) - f64::from(before.capped);
+    let exact = twin.capped as f64;
+    let slack = answer(&|moved| (moved.capped as f64 - exact).abs());
+    io.table.add(&SLOWED, [pair(0, slowed, exact, [slack])]);
+    let ids = io.after(buffers::ID, n)?;
+    io.table
+        .add_exact(&MOVED_ID, &ids, &state.sorted().cloud.id);
+    Ok(())
+}

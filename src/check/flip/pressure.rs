@@ -1,0 +1,419 @@
+//! The projection: its system, what goes in and what comes out, and the device's own system solved directly.
+
+use glam::DVec3;
+
+use crate::{
+    check::{
+        engine::{Io, NONE, Outcome, Twin, names, twin},
+        table::{Entry, Table, pair},
+    },
+    compare::{
+        deviation::relative,
+        rounding::{U, U64},
+    },
+    domain::poisson::{System, remove_means},
+    gpu::buffer::Buf,
+    reference::{
+        flip::{Centers, Waters, density_source as twin_density_source},
+        poisson::{
+            BUDGET, Solver,
+            gradients::norm,
+            iteration::{differences, least_eigenvalue, products},
+        },
+    },
+    scene::flip::{Precision, Preconditioner, Surface},
+    solve::{
+        SolveError,
+        flip::buffers,
+        pressure::{
+            CORRECTION_TOLERANCE, DONE, PressureControl64, blocked,
+            buffers::{self as solved, Real},
+        },
+    },
+};
+
+use super::{FlipState, iteration::PRODUCTS, rows::*};
+
+/// Twins of what an iteration goes from and comes to.
+pub(super) const TWINS: &[Twin<FlipState>] = &[
+    twin("pressure/build_system", NONE, build_system),
+    twin("pressure/divergence", NONE, divergence),
+    twin("pressure/density_source", NONE, density_source),
+    twin("pressure/multiply", NONE, multiply),
+    Twin {
+        is_due: FlipState::is_done,
+        ..twin(
+            "pressure/project",
+            || names![buffers::FACE_VELOCITY],
+            project,
+        )
+    },
+    Twin {
+        is_due: FlipState::is_done,
+        ..twin("pressure/measure_divergence", NONE, measure_divergence)
+    },
+    Twin {
+        is_due: FlipState::is_done,
+        ..twin("pressure/displace", NONE, displace)
+    },
+];
+
+/// The device's own system.
+pub(super) struct Assembled {
+    pub(super) system: System,
+    centers: Centers,
+}
+
+fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// The solution that is the sum of `terms`.
+fn sum(terms: &[Vec<f64>]) -> Vec<f64> {
+    let all = |row: usize| terms.iter().map(|term| term[row]).sum();
+    (0..terms[0].len()).map(all).collect()
+}
+
+impl FlipState {
+    fn assembled(&self) -> &Assembled {
+        self.assembled
+            .as_ref()
+            .expect("after pressure/build_system")
+    }
+
+    pub(super) fn system(&self) -> &System {
+        &self.assembled().system
+    }
+
+    fn waters(&self) -> Waters<'_> {
+        let centers = &self.assembled().centers;
+        Waters::new(&self.model, &self.elements().bricks, self.room(), centers)
+    }
+
+    pub(super) fn precision(&self) -> Precision {
+        self.model.settings().pressure.precision
+    }
+
+    /// Unit roundoff of what the projection computes in.
+    pub(super) fn unit(&self) -> f64 {
+        match self.precision() {
+            Precision::F32 | Precision::F32Refined => U,
+            Precision::F64 => U64,
+        }
+    }
+
+    /// The scalars of the solve before the pass.
+    pub(super) fn control(&self, io: &Io<'_>) -> Result<PressureControl64, SolveError> {
+        match io.pass() {
+            "pressure/reduce" => io.control_before(self.precision()),
+            _ => io.control(self.precision()),
+        }
+    }
+
+    /// Whether the solve has ended before the pass.
+    fn is_done(&mut self, io: &Io<'_>) -> Result<bool, SolveError> {
+        Ok(self.control(io)?.state == DONE)
+    }
+
+    fn rows_of(&self, values: &[f64]) -> Vec<f64> {
+        let rows = self.system().cell.iter();
+        rows.map(|&e| values[blocked(e)]).collect()
+    }
+
+    /// An array of the pressure's own, by row.
+    pub(super) fn by_row(&self, io: &Io<'_>, buffer: Buf<Real>) -> Result<Vec<f64>, SolveError> {
+        let values = io.reals(&buffer, self.precision(), self.elements().cells)?;
+        Ok(self.rows_of(&values))
+    }
+
+    /// The same from before the pass.
+    pub(super) fn by_row_before(
+        &self,
+        io: &Io<'_>,
+        buffer: Buf<Real>,
+    ) -> Result<Vec<f64>, SolveError> {
+        let values = io.reals_before(&buffer, self.precision(), self.elements().cells)?;
+        Ok(self.rows_of(&values))
+    }
+
+    /// The terms that the solution is the sum of, by row.
+    pub(super) fn terms(&self, io: &Io<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
+        let values = io.reals(&solved::SOLUTION, self.precision(), self.term_values())?;
+        Ok(self.terms_of(&values))
+    }
+
+    /// The same from before the pass.
+    pub(super) fn terms_before(&self, io: &Io<'_>) -> Result<Vec<Vec<f64>>, SolveError> {
+        let values = io.reals_before(&solved::SOLUTION, self.precision(), self.term_values())?;
+        Ok(self.terms_of(&values))
+    }
+
+    fn term_values(&self) -> usize {
+        self.elements().stride * (self.precision().terms() - 1) + self.elements().cells
+    }
+
+    fn terms_of(&self, values: &[f64]) -> Vec<Vec<f64>> {
+        let term = |k: usize| self.rows_of(&values[k * self.elements().stride..]);
+        (0..self.precision().terms()).map(term).collect()
+    }
+
+    /// [`OF_DIFFERENCE`] of all terms, by element.
+    fn difference_errors(&self, terms: &[Vec<f64>]) -> Vec<f64> {
+        let waters = self.waters();
+        let mut errors = vec![0.0; self.elements().cells];
+        for term in terms {
+            let differences = waters.displace(&waters.by_element(self.system(), term));
+            for (error, difference) in errors.iter_mut().zip(&differences) {
+                *error += OF_DIFFERENCE.of([self.unit(), difference.length()]);
+            }
+        }
+        errors
+    }
+
+    /// Σ |f u| and the solids' flux of each row.
+    fn flow(&self, velocity: &[DVec3]) -> Vec<f64> {
+        let (bricks, room) = (&self.elements().bricks, self.room());
+        let of_row = |&element: &u32| {
+            let through = |e: u32, axis: usize| {
+                let e = e as usize;
+                (room.open[e][axis] * velocity[e][axis]).abs()
+            };
+            let sum: f64 = (0..3)
+                .map(|axis| {
+                    let mut up = [0; 3];
+                    up[axis] = 1;
+                    through(element, axis) + through(bricks.near(element, up), axis)
+                })
+                .sum();
+            sum + room.solid_flux[element as usize].abs()
+        };
+        self.system().cell.iter().map(of_row).collect()
+    }
+
+    /// Adds a value a row.
+    pub(super) fn add_rows<const N: usize>(
+        &self,
+        table: &mut Table,
+        entry: &'static Entry<N>,
+        one: impl Fn(usize) -> (f64, f64, [f64; N]) + Send + Sync,
+    ) {
+        let cells = &self.system().cell;
+        table.each(entry, 0..cells.len(), |row| {
+            let (value, exact, magnitudes) = one(row);
+            pair(cells[row] as usize, value, exact, magnitudes)
+        });
+    }
+
+    /// Adds the largest divergence that the device noted, against `rows`.
+    fn add_noted(
+        &self,
+        table: &mut Table,
+        entry: &'static Entry<2>,
+        found: f32,
+        [rows, flow]: [&[f64]; 2],
+    ) {
+        let size = self.model.cell_size();
+        let largest = |of: &[f64]| of.iter().fold(0.0, |most: f64, v| most.max(v.abs())) / size;
+        let most = largest(rows);
+        table.add(entry, [pair(0, found, most, [largest(flow), most])]);
+    }
+
+    /// ‖b − A x‖ / ‖b‖, and [`ALLOWED`] where `asked` was asked for.
+    fn residual(&self, b: &[f64], x: &[f64], asked: f64) -> [f64; 2] {
+        let size = norm(b);
+        let residual = relative(norm(&minus(b, &self.system().apply(x))), size);
+        let spread = norm(&differences(self.system(), x));
+        [residual, ALLOWED.of([asked, self.unit(), spread, size])]
+    }
+}
+
+fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let settings = state.model.settings();
+    let elements = state.elements();
+    let cells = elements.cells;
+    let centers = Centers {
+        density: Vec::new(),
+        excess: match settings.density_correction {
+            true => elements.scalars(io, buffers::DENSITY_EXCESS)?,
+            false => Vec::new(),
+        },
+        distance: match settings.surface {
+            Surface::GhostFluid => elements.scalars(io, buffers::LIQUID_DISTANCE)?,
+            Surface::Voxel => Vec::new(),
+        },
+    };
+    let has_diagonal = matches!(
+        settings.pressure.preconditioner,
+        Preconditioner::Jacobi | Preconditioner::Ipp
+    );
+    let system = Waters::new(&state.model, &elements.bricks, state.room(), &centers).system();
+    let coefficient = io.after(solved::COEFFICIENT, 2 * elements.stride + cells)?;
+    let block = io.after(solved::BLOCK, cells / 8)?;
+    let (stride, wet) = (elements.stride, elements.wet());
+    let is_row = |e: usize| {
+        let place = blocked(e as u32);
+        block[place / 512 * 64 + place % 64] >> (8 + place % 512 / 64) & 1
+    };
+    let mut expected = vec![0; wet.len()];
+    for &element in &system.cell {
+        expected[element as usize - wet.start] = 1;
+    }
+    state.assembled = Some(Assembled { system, centers });
+    let (system, unit) = (state.system(), state.unit());
+    let dirichlet = state.by_row(io, solved::DIRICHLET)?;
+    state.add_rows(io.table, &DIRICHLET, |row| {
+        let exact = system.dirichlet[row];
+        (dirichlet[row], exact, [unit, exact])
+    });
+    io.table.each(&COEFFICIENT, 0..system.cell.len(), |row| {
+        let element = system.cell[row];
+        let found = |axis: usize| f64::from(coefficient[axis * stride + blocked(element)]);
+        let twin = |axis: usize| system.coefficient[row][2 * axis];
+        let [found, twin] = [
+            DVec3::new(found(0), found(1), found(2)),
+            DVec3::new(twin(0), twin(1), twin(2)),
+        ];
+        pair(element as usize, found, twin, [])
+    });
+    io.table
+        .add_exact(&ROWS, &wet.map(is_row).collect::<Vec<_>>(), &expected);
+    if has_diagonal {
+        let inverse = state.by_row(io, solved::INVERSE_DIAGONAL)?;
+        state.add_rows(io.table, &INVERSE, |row| {
+            let exact = 1.0 / system.diagonal[row];
+            (inverse[row], exact, [unit, exact])
+        });
+    }
+    Ok(())
+}
+
+fn divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    state.note_sum(io, solved::RHS, solved::RHS)?;
+    let velocity = state.elements().planes_before(io, buffers::FACE_VELOCITY)?;
+    let twin = state.waters().divergence(state.system(), &velocity);
+    let flow = state.flow(&velocity);
+    let (rhs, unit) = (state.by_row(io, solved::RHS)?, state.unit());
+    state.add_rows(io.table, &RHS, |row| {
+        (rhs[row], twin[row], [unit, flow[row]])
+    });
+    let found = io.one(solved::STATS)?.divergence_before;
+    state.add_noted(io.table, &BEFORE, found, [&twin, &flow]);
+    Ok(())
+}
+
+fn density_source(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    state.note_sum(io, solved::RHS, solved::RHS)?;
+    let rhs = state.by_row(io, solved::RHS)?;
+    let centers = &state.assembled().centers;
+    let twin = twin_density_source(&state.model, state.system(), centers);
+    state.add_rows(io.table, &SOURCE, |row| {
+        (rhs[row], twin[row], [twin[row].abs()])
+    });
+    Ok(())
+}
+
+fn multiply(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    if state.is_turn(io)? && state.is_due(io, 0) {
+        state.note_sum(io, solved::DIRECTION, solved::PRODUCT)?;
+    }
+    if state.products == PRODUCTS {
+        return Ok(());
+    }
+    let direction = state.by_row(io, solved::DIRECTION)?;
+    if direction.iter().all(|&value| value == 0.0) {
+        return Ok(());
+    }
+    let product = state.by_row(io, solved::PRODUCT)?;
+    let (system, unit) = (state.system(), state.unit());
+    let (twin, errors) = (system.apply(&direction), differences(system, &direction));
+    state.add_rows(io.table, &PRODUCT, |row| {
+        (product[row], twin[row], [unit, errors[row]])
+    });
+    state.products += 1;
+    Ok(())
+}
+
+fn project(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let elements = state.elements();
+    let terms = state.terms(io)?;
+    let (errors, x) = (state.difference_errors(&terms), sum(&terms));
+    let waters = state.waters();
+    let mut twin = elements.planes_before(io, buffers::FACE_VELOCITY)?;
+    waters.project(&waters.by_element(state.system(), &x), &mut twin);
+    let velocity = elements.planes(io, buffers::FACE_VELOCITY)?;
+    io.table.each(&PROJECTED, elements.active(), |e| {
+        pair(e, velocity[e], twin[e], [errors[e], twin[e].length()])
+    });
+    let pressure = elements.scalars(io, solved::PRESSURE)?;
+    let scale = state.scene.water.rest_density * state.model.cell_size() / elements.substep.length;
+    state.add_rows(io.table, &PRESSURE, |row| {
+        let exact = scale * x[row];
+        let found = pressure[state.system().cell[row] as usize];
+        (found, exact, [exact.abs()])
+    });
+    whole(state, x, &velocity, io)
+}
+
+/// The device's own system solved directly, against what its iterations came to.
+fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>) -> Outcome {
+    let mut b = state.by_row(io, solved::RHS)?;
+    let system = state.system();
+    let solver = match Solver::new(system, BUDGET) {
+        Ok(solver) => solver,
+        Err(_) => {
+            let why = "the direct factor of its system could not be made";
+            io.table.unchecked.push(("whole projection", why));
+            return Ok(());
+        }
+    };
+    remove_means(&mut b, solver.pockets());
+    remove_means(&mut x, solver.pockets());
+    let exact = solver.solve(&b).x;
+    let size = norm(&b);
+    let asked = state.model.settings().pressure.tolerance;
+    let [residual, allowed] = state.residual(&b, &x, asked);
+    let off = minus(&x, &exact);
+    let least = least_eigenvalue(&solver, b.len());
+    let energy = products(&off, &system.apply(&off)).value.max(0.0).sqrt();
+    let mut after = state.waters().divergence(system, velocity);
+    remove_means(&mut after, solver.pockets());
+    let (flow, spread) = (norm(&state.flow(velocity)), norm(&differences(system, &x)));
+    let far = FAR.of([allowed, size]);
+    let apart = relative(norm(&off), norm(&exact));
+    let left = relative(norm(&after), size);
+    io.table.add(&RESIDUAL, [pair(0, residual, 0.0, [allowed])]);
+    io.table
+        .add(&SOLUTION, [pair(0, apart, 0.0, [far, least, norm(&exact)])]);
+    io.table.add(&ENERGY, [pair(0, energy, 0.0, [far, least])]);
+    io.table.add(
+        &DIVERGENCE,
+        [pair(0, left, 0.0, [allowed, flow, spread, size])],
+    );
+    Ok(())
+}
+
+fn measure_divergence(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let velocity = state.elements().planes_before(io, buffers::FACE_VELOCITY)?;
+    let twin = state.waters().divergence(state.system(), &velocity);
+    let found = io.one(solved::STATS)?.divergence_after;
+    state.add_noted(io.table, &AFTER, found, [&twin, &state.flow(&velocity)]);
+    Ok(())
+}
+
+fn displace(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let terms = state.terms(io)?;
+    let (errors, x) = (state.difference_errors(&terms), sum(&terms));
+    let waters = state.waters();
+    let twin = waters.displace(&waters.by_element(state.system(), &x));
+    let found = state.elements().planes(io, solved::FACE_DISPLACEMENT)?;
+    io.table
+        .each(&DISPLACEMENT, state.elements().active(), |e| {
+            pair(e, found[e], twin[e], [errors[e], twin[e].length()])
+        });
+    let mut b = state.by_row(io, solved::RHS)?;
+    remove_means(&mut b, &state.system().pockets());
+    let [residual, allowed] = state.residual(&b, &x, CORRECTION_TOLERANCE);
+    io.table
+        .add(&CORRECTION, [pair(0, residual, 0.0, [allowed])]);
+    Ok(())
+}

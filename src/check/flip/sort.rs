@@ -1,0 +1,127 @@
+//! Which bricks have water, and particles in the order of their cells.
+
+use glam::{DMat3, DVec3};
+
+use crate::{
+    check::{
+        engine::{Io, Outcome},
+        sort::{check_cells, check_slots},
+        table::pair,
+    },
+    domain::bricks::CELLS,
+    gpu::buffer::Buf,
+    reference::flip::{Cloud, Sorted, assign_cells as twin_cells, survey as twin_survey},
+    scene::flip::Transfer,
+    solve::{SolveError, flip::buffers, trace::Begun},
+};
+
+use super::{Elements, FlipState, rows::*};
+
+impl FlipState {
+    /// Particles of four arrays: position, velocity, id, slopes.
+    fn cloud(
+        &self,
+        io: &Io<'_>,
+        [position, velocity]: [Buf<[f32; 4]>; 2],
+        id: Buf<u32>,
+        affine: Buf<f32>,
+    ) -> Result<Cloud, SolveError> {
+        let rows = match self.model.settings().transfer {
+            Transfer::Flip => Vec::new(),
+            Transfer::Apic => io.after(affine.retyped::<[f32; 9]>(), self.n)?,
+        };
+        let matrix = |row: &[f32; 9]| DMat3::from_cols_array(&row.map(f64::from)).transpose();
+        Ok(Cloud {
+            position: io.vectors(position, self.n)?,
+            velocity: io.vectors(velocity, self.n)?,
+            affine: rows.iter().map(matrix).collect(),
+            id: io.after(id, self.n)?,
+        })
+    }
+
+    /// Particles as the pass left them.
+    pub(super) fn unsorted(&self, io: &Io<'_>) -> Result<Cloud, SolveError> {
+        let vectors = [buffers::POSITION, buffers::VELOCITY];
+        self.cloud(io, vectors, buffers::ID, buffers::AFFINE)
+    }
+
+    fn sorted_now(&self, io: &Io<'_>) -> Result<Cloud, SolveError> {
+        let vectors = [buffers::SORTED_POSITION, buffers::SORTED_VELOCITY];
+        self.cloud(io, vectors, buffers::SORTED_ID, buffers::SORTED_AFFINE)
+    }
+}
+
+pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let twin = twin_survey(&state.model, &state.unsorted(io)?);
+    let found = io.after(buffers::SURVEY_IS_WET, twin.is_wet.len())?;
+    let fastest = f64::from(io.one(buffers::SURVEY)?.speed_square);
+    let exact = twin.speed * twin.speed;
+    io.table.add(&SPEED, [pair(0, fastest, exact, [exact])]);
+    let is_wet: Vec<u32> = twin.is_wet.iter().map(|&wet| u32::from(wet)).collect();
+    io.table.add_exact(&WET, &found, &is_wet);
+    // What the device found is what its substep follows.
+    let Begun { number, elapsed } = state.begun;
+    let length = state.scene.shot.frame_seconds();
+    let start = f64::from(state.frame) * length + elapsed;
+    let (frame, remaining, speed) = (state.frame + 1, length - elapsed, fastest.sqrt());
+    let chosen = (state.scene).flip_substep(frame, start, remaining, speed, number - 1)?;
+    let substep = chosen.1;
+    let flags: Vec<bool> = found.iter().map(|&flag| flag != 0).collect();
+    let layers = state.model.step(&substep).layers;
+    let bricks = state.model.bricks(&flags, layers);
+    state.elements = Some(Elements {
+        cells: (CELLS * (bricks.active + 1)) as usize,
+        stride: 0,
+        substep,
+        bricks,
+    });
+    Ok(())
+}
+
+pub(super) fn assign_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let params = io.one(buffers::PARAMS)?;
+    if let Some(elements) = &mut state.elements {
+        elements.stride = params.stride as usize;
+    }
+    let (n, elements) = (state.n, state.elements());
+    let positions = io.vectors_before(buffers::POSITION, n)?;
+    let cell_of = io.after(buffers::CELL_OF, n)?;
+    let twin = twin_cells(&state.model, &elements.bricks, &positions);
+    let size = state.model.cell_size();
+    check_cells(&CELL, &positions, size, &cell_of, &twin, io.table);
+    let slot = io.after(buffers::SLOT_IN_CELL, n)?;
+    let counts = io.after(buffers::CELL_START, elements.wet().end)?;
+    check_slots([&COUNTS, &SLOTS], &cell_of, &slot, &counts, io.table);
+    Ok(())
+}
+
+pub(super) fn reorder(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let n = state.n;
+    let (before, after) = (state.unsorted(io)?, state.sorted_now(io)?);
+    let order = io.before(buffers::ORDER, n)?;
+    let at = |i: usize| order[i] as usize;
+    let copy = |found: &[DVec3], source: &[DVec3], i: usize| pair(i, found[i], source[at(i)], []);
+    io.table.each(&POSITION, 0..n, |i| {
+        copy(&after.position, &before.position, i)
+    });
+    io.table.each(&VELOCITY, 0..n, |i| {
+        copy(&after.velocity, &before.velocity, i)
+    });
+    let ids: Vec<u32> = (0..n).map(|i| before.id[at(i)]).collect();
+    io.table.add_exact(&ID, &after.id, &ids);
+    if !after.affine.is_empty() {
+        for row in 0..3 {
+            let of = |cloud: &Cloud, i: usize| cloud.affine[i].row(row);
+            io.table.each(&AFFINE, 0..n, |i| {
+                pair(i, of(&after, i), of(&before, at(i)), [])
+            });
+        }
+    }
+    let cell_of = io.before(buffers::CELL_OF, n)?;
+    state.sorted = Some(Sorted {
+        cell: (0..n).map(|i| cell_of[at(i)]).collect(),
+        cloud: after,
+        start: io.before(buffers::CELL_START, state.elements().wet().end + 1)?,
+    });
+    Ok(())
+}

@@ -1,0 +1,172 @@
+//! Rounding bounds of one particle's values, from its neighbours and the walls as they are.
+
+use glam::DVec3;
+
+use crate::{
+    compare::rounding::{
+        DENSITY, GRADIENT_SQUARES, LAMBDA, OTHER_GRADIENTS, OWN_GRADIENT, Sums, U, WALL_DENSITY,
+        WALL_GRADIENT, WALL_PLACE,
+    },
+    domain::pbf::CONTACT,
+    reference::pbf::passes::{Inputs, Row},
+};
+
+use super::rows::{DELTA, GRID, PUSHED, REACH, REPULSION};
+
+/// What the bounds of a pass depend on.
+pub(in crate::check) struct Bounds<'a>(pub(in crate::check) Inputs<'a>);
+
+/// Bounds on a position behind walls and solids.
+pub(in crate::check) struct Confined {
+    /// Magnitudes of its tolerance.
+    pub(in crate::check) magnitudes: [f64; 4],
+    /// [`PUSHED`]: of what the walls alone added to it, metres.
+    pub(in crate::check) push_error: f64,
+    /// Whether they pushed, or may have by rounding alone.
+    pub(in crate::check) is_touched: bool,
+}
+
+impl Bounds<'_> {
+    /// Sums over the neighbours of particle `i`, each term weighted.
+    pub(in crate::check) fn sums(&self, i: usize, weight: impl Fn(usize) -> f64) -> Sums {
+        let h = self.0.model.calibration.support_radius;
+        let mut sums = Sums::default();
+        for j in self.0.neighbors.all(i) {
+            let j = j as usize;
+            let q = self.0.points[i].distance(self.0.points[j]) / h;
+            sums.add(q, weight(j));
+        }
+        sums
+    }
+
+    /// A neighbour's part in sums: 1, or a sample's weight.
+    fn mass(&self, j: usize) -> f64 {
+        j.checked_sub(self.0.particles())
+            .map_or(1.0, |sample| self.0.model.sample_weights[sample])
+    }
+
+    /// [`WALL_DENSITY`] and, over h, [`WALL_GRADIENT`] at `x`.
+    fn walls(&self, x: DVec3) -> [f64; 2] {
+        let h = self.0.model.calibration.support_radius;
+        let walls = &self.0.substep.walls;
+        let gaps = [(x - walls.min).to_array(), (walls.max - x).to_array()];
+        let faces = gaps
+            .iter()
+            .flatten()
+            .filter(|&&gap| gap < h * 1.001)
+            .count() as f64;
+        let q = WALL_PLACE.of([self.wall_place() / h]);
+        let density = WALL_DENSITY.of([faces, q]);
+        [density, WALL_GRADIENT.of([faces, q, density]) / h]
+    }
+
+    /// By how much f32 misplaces a wall, metres.
+    fn wall_place(&self) -> f64 {
+        let walls = &self.0.substep.walls;
+        let off = |x: DVec3| (x - x.as_vec3().as_dvec3()).abs().max_element();
+        off(walls.min).max(off(walls.max))
+    }
+
+    /// [`DENSITY`].
+    pub(in crate::check) fn density(&self, i: usize, density: f64) -> f64 {
+        let sums = self.sums(i, |j| self.mass(j));
+        let [walls, _] = self.walls(self.0.points[i]);
+        let scale = self.0.model.calibration.density_scale;
+        DENSITY.of([scale, sums.kernel(), walls, density])
+    }
+
+    /// [`LAMBDA`].
+    pub(super) fn lambda(&self, i: usize, row: &Row, lambda: f64) -> f64 {
+        let scale = self.0.model.calibration.gradient_scale;
+        let sums = self.sums(i, |j| self.mass(j));
+        let [_, walls] = self.walls(self.0.points[i]);
+        let own = row.own.length();
+        let own_error = OWN_GRADIENT.of([scale, sums.gradient(), walls, own]);
+        let others = OTHER_GRADIENTS.of([scale, sums.squares()]);
+        let squares = GRADIENT_SQUARES.of([own, own_error, others]);
+        let denominator = row.squares + self.0.model.regularization();
+        LAMBDA.of([
+            lambda.abs(),
+            denominator,
+            self.density(i, row.density),
+            squares,
+        ])
+    }
+
+    /// [`DELTA`]: of a correction before walls and solids, metres.
+    pub(super) fn delta(&self, i: usize, lambda: &[f64]) -> f64 {
+        let model = self.0.model;
+        let calibration = &model.calibration;
+        let artificial = model.settings.artificial_pressure / calibration.bulk_gradient_squares;
+        let weight = |j: usize| {
+            let other = lambda.get(j).copied().unwrap_or(0.0);
+            self.mass(j) * (lambda[i].abs() + other.abs())
+        };
+        let repulsion = self.sums(i, |j| REPULSION.of([artificial, self.mass(j)]));
+        let [_, walls] = self.walls(self.0.points[i]);
+        DELTA.of([
+            model.settings.relaxation,
+            calibration.gradient_scale,
+            self.sums(i, weight).gradient(),
+            repulsion.s2,
+            lambda[i].abs(),
+            walls,
+        ])
+    }
+
+    /// Of what walls and solids make of `x`, the position before they push, which errs by `error`. Solids bend the way: the
+    /// bound is what the twin answers when `x` moves by its error, and by that of its place in the distance grid, along each
+    /// axis. Where the push has taken it the answer is smaller: a curved solid turns a deep push by more.
+    pub(super) fn confine(&self, x: DVec3, error: f64) -> Confined {
+        let (model, walls) = (self.0.model, &self.0.substep.walls);
+        let contact = CONTACT * model.settings.particle_spacing;
+        let place = self.wall_place() + U * walls.max.abs().max_element();
+        let mut reach = error;
+        let mut is_near = false;
+        if let Some(grid) = &model.distance {
+            let offset = (x - grid.origin).abs().max_element();
+            let origin = grid.origin.abs().max_element();
+            reach = REACH.of([error, GRID.of([offset, origin, grid.spacing])]);
+            is_near = grid.sample(x) < contact + reach + 0.5 * grid.spacing;
+        }
+        if !is_near {
+            let slack = error + place;
+            let low = walls.min + contact + slack;
+            let high = walls.max - contact - slack;
+            let is_touched = x.cmplt(low).any() || x.cmpgt(high).any();
+            return Confined {
+                magnitudes: [error, 0.0, if is_touched { place } else { 0.0 }, 0.0],
+                push_error: PUSHED.of([error, 0.0, place, 0.0]),
+                is_touched,
+            };
+        }
+        let (centre, push) = model.confine_by(x, walls);
+        let (mut moved, mut pushed) = (0.0, 0.0);
+        let mut is_touched = centre != x;
+        for axis in DVec3::AXES {
+            let (mut most, mut most_pushed) = (0.0f64, 0.0f64);
+            for side in [axis * reach, -axis * reach] {
+                let (found, other) = model.confine_by(x + side, walls);
+                is_touched |= found != x + side;
+                most = most.max(found.distance(centre));
+                most_pushed = most_pushed.max(other.distance(push));
+            }
+            moved += most;
+            pushed += most_pushed;
+        }
+        let magnitudes = match is_touched {
+            true => [error, moved, place, x.length()],
+            false => [error, 0.0, 0.0, 0.0],
+        };
+        Confined {
+            magnitudes,
+            push_error: PUSHED.of([error, pushed, place, x.length()]),
+            is_touched,
+        }
+    }
+}
+
+/// Speed between a particle and its neighbour, of which samples have none.
+pub(in crate::check) fn relative_speed(velocity: &[DVec3], i: usize) -> impl Fn(usize) -> f64 + '_ {
+    move |j| velocity.get(j).map_or(0.0, |v| v.distance(velocity[i]))
+}

@@ -1,0 +1,217 @@
+//! Neighbour lists: the GPU's read back, and whom a pass visits.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::{
+    check::{
+        engine::{Io, Outcome},
+        table::pair,
+    },
+    reference::neighbors::{Crowd, Neighbors},
+    solve::{
+        SolveError,
+        pbf::buffers,
+        plan::{LIST_CAPACITY, Plan},
+    },
+};
+
+use super::{
+    PbfState, State,
+    rows::{NEAR_H, NEIGHBORS},
+};
+
+/// Particles of a list block, as in shared/neighbor_list.wgsl.
+const STRIDE: usize = 128;
+
+/// The lists of a substep, chunk by chunk.
+pub(super) struct Lists {
+    members: Vec<Vec<u32>>,
+    /// More neighbours than a list holds: searched for in each pass.
+    is_searched: Vec<bool>,
+    all: Option<Arc<Neighbors>>,
+    /// Where the device's cells begin.
+    start: Vec<u32>,
+}
+
+impl Lists {
+    pub(super) fn new(plan: &Plan) -> Self {
+        let n = plan.counts.particles;
+        Self {
+            members: vec![Vec::new(); n],
+            is_searched: vec![!plan.has_lists; n],
+            all: None,
+            start: Vec::new(),
+        }
+    }
+}
+
+/// Appends ascending neighbours, and gives the lengths after the particles and after the samples.
+fn split(near: &[u32], particles: usize, members: &mut Vec<u32>) -> [u32; 2] {
+    let first = members.len();
+    members.extend(near);
+    let fluid = near.partition_point(|&j| (j as usize) < particles);
+    [(first + fluid) as u32, members.len() as u32]
+}
+
+impl PbfState {
+    /// Who is nearer than h, in f64; `points` may stand in any order.
+    pub(super) fn search(&self, points: &[DVec3]) -> Neighbors {
+        self.search_within(points, self.model.calibration.support_radius)
+    }
+
+    /// The cells' order in f64 may differ from the device's where a particle stands on a face.
+    fn search_within(&self, points: &[DVec3], radius: f64) -> Neighbors {
+        let n = self.particles();
+        let ids: Vec<u32> = (0..points.len() as u32).collect();
+        let mut order = self.model.cells.order(&points[..n], &ids);
+        order.extend(n..points.len());
+        let sorted: Vec<DVec3> = order.iter().map(|&k| points[k]).collect();
+        let crowd = Crowd {
+            cells: self.model.cells,
+            points: &sorted,
+            particles: n,
+        };
+        let found = Neighbors::search(&crowd, radius);
+        let mut place = vec![0; n];
+        for (k, &slot) in order[..n].iter().enumerate() {
+            place[slot] = k;
+        }
+        Neighbors::listed(n, |i, members| {
+            let (fluid, solid) = found.of(place[i]);
+            [fluid, solid].map(|group| {
+                members.extend(group.iter().map(|&j| order[j as usize] as u32));
+                members.len() as u32
+            })
+        })
+    }
+
+    /// Whom a pass visits from `points`: the list, or the cells about where there is none.
+    pub(in crate::check) fn visited(
+        &mut self,
+        io: &Io<'_>,
+        points: &[DVec3],
+    ) -> Result<Arc<Neighbors>, SolveError> {
+        if let Some(all) = &self.lists.all {
+            return Ok(Arc::clone(all));
+        }
+        if !self.is_searching() {
+            let (n, lists) = (self.particles(), &self.lists.members);
+            let all = Neighbors::listed(n, |i, members| split(&lists[i], n, members));
+            let all = Arc::new(all);
+            self.lists.all = Some(Arc::clone(&all));
+            return Ok(all);
+        }
+        if self.lists.start.is_empty() {
+            let count: usize = self.model.cells.dims.iter().product();
+            self.lists.start = io.before(buffers::CELL_START, count + 1)?;
+        }
+        Ok(Arc::new(self.searched(points)))
+    }
+
+    /// Whether there are particles without a list.
+    pub(super) fn is_searching(&self) -> bool {
+        self.lists.is_searched.contains(&true)
+    }
+
+    /// Whom a pass visits from `points` where some have no list: who was sorted into the cells about where a particle
+    /// is now. Two that come near each other from cells farther apart do not see each other.
+    pub(super) fn searched(&self, points: &[DVec3]) -> Neighbors {
+        let n = self.particles();
+        let (cells, lists) = (&self.model.cells, &self.lists);
+        let start = &lists.start;
+        let solid_start = cells.starts(&self.model.samples);
+        let [nx, ny, nz] = cells.dims;
+        let h2 = self.model.calibration.support_radius.powi(2);
+        Neighbors::listed(n, |i, members| {
+            if !lists.is_searched[i] {
+                return split(&lists.members[i], n, members);
+            }
+            let mut near = Vec::new();
+            let [cx, cy, cz] = cells.coordinate(points[i]);
+            let (low, high) = (cx.saturating_sub(1), (cx + 1).min(nx - 1));
+            for z in cz.saturating_sub(1)..=(cz + 1).min(nz - 1) {
+                for y in cy.saturating_sub(1)..=(cy + 1).min(ny - 1) {
+                    let row = (z * ny + y) * nx;
+                    let (first, last) = (row + low, row + high + 1);
+                    let fluid = start[first] as usize..start[last] as usize;
+                    let solid = n + solid_start[first]..n + solid_start[last];
+                    let within = |&j: &usize| points[i].distance_squared(points[j]) < h2;
+                    let found = fluid.chain(solid).filter(|&j| j != i).filter(within);
+                    near.extend(found.map(|j| j as u32));
+                }
+            }
+            near.sort_unstable();
+            split(&near, n, members)
+        })
+    }
+}
+
+pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let n = state.particles();
+    let phase = io.window(&buffers::PHASES)?;
+    let (points, _) = state.stored(io, &phase)?;
+    let (first, count) = (phase.first as usize, phase.count as usize);
+    let capacity = LIST_CAPACITY as usize;
+    let words = count.next_multiple_of(STRIDE) * capacity;
+    let list = io.after(buffers::NEIGHBOR_LIST.retyped::<u32>(), words)?;
+    let counts = io.after(buffers::NEIGHBOR_COUNT, n)?;
+    let member = |local: usize, k: usize| {
+        let lane = local % STRIDE;
+        let base = local / STRIDE * STRIDE * (capacity / 4) + (lane >> 1) + ((lane & 1) << 6);
+        list[4 * (base + k / 4 * STRIDE) + k % 4]
+    };
+    // Words of four whose last holds its entries first.
+    let members = |local: usize| {
+        let held = counts[first + local] as usize;
+        let mut all: Vec<u32> = (0..held.next_multiple_of(4))
+            .map(|k| member(local, k))
+            .filter(|&j| (j as usize) < points.len())
+            .collect();
+        all.sort_unstable();
+        all
+    };
+    let h = state.model.calibration.support_radius;
+    let shell = NEAR_H.of([]);
+    let (inner, outer) = (h * h * (1.0 - shell), h * h * (1.0 + shell));
+    let near = state.search_within(&points, h * (1.0 + shell));
+    let one = |local: usize| {
+        let i = first + local;
+        let r2 = |&j: &u32| points[i].distance_squared(points[j as usize]);
+        let near: Vec<u32> = near.all(i).collect();
+        let sure = near.iter().filter(|j| r2(j) < inner).count();
+        let possible = near.iter().filter(|j| r2(j) < outer).count();
+        let held = counts[i] as usize;
+        let all = if held <= capacity {
+            members(local)
+        } else {
+            Vec::new()
+        };
+        let wrong = if held > capacity {
+            sure.saturating_sub(held) + held.saturating_sub(possible)
+        } else {
+            let within = |j: &&u32| near.contains(j) && r2(j) < outer;
+            let twice = all.windows(2).filter(|pair| pair[0] == pair[1]).count();
+            let right = all.iter().filter(within).count() - twice;
+            let missed = (near.iter())
+                .filter(|j| r2(j) < inner && all.binary_search(j).is_err())
+                .count();
+            missed + all.len() - right + held.abs_diff(all.len())
+        };
+        (wrong, possible - sure, all)
+    };
+    let found: Vec<_> = (0..count).into_par_iter().map(one).collect();
+    let wrong =
+        |(local, one): (usize, &(usize, usize, _))| pair(first + local, one.0 as f64, 0.0, []);
+    io.table
+        .add(&NEIGHBORS, found.iter().enumerate().map(wrong));
+    io.table
+        .add_ties(&NEIGHBORS, found.iter().map(|one| one.1).sum());
+    for (local, (_, _, all)) in found.into_iter().enumerate() {
+        state.lists.is_searched[first + local] = counts[first + local] > LIST_CAPACITY;
+        state.lists.members[first + local] = all;
+    }
+    Ok(())
+}

@@ -1,0 +1,208 @@
+//! PBF's passes against their f64 twins, each from the inputs that the GPU had.
+
+pub(super) mod bounds;
+mod lists;
+mod passes;
+mod rows;
+mod stop;
+mod whole;
+mod work;
+
+pub(super) use rows::GRID;
+
+use glam::DVec3;
+
+use crate::{
+    domain::{boundary::Boundary, particles::Particles, solver::Solver, substep::Which},
+    gpu::adapter::Context,
+    reference::{
+        neighbors::Neighbors,
+        pbf::{Model, Substep, passes::Inputs},
+    },
+    scene::{Scene, Stop},
+    solve::{
+        SolveError,
+        params::{IterationControl, Phase},
+        pbf::{Pbf, buffers},
+        plan::Plan,
+        trace::{Span, TraceFrame},
+    },
+};
+
+use super::{
+    Checked, effects,
+    engine::{Engine, Io, NONE, State, Twin, names, twin, wide},
+    table::{Table, pair},
+};
+use lists::Lists;
+use rows::{SAMPLES, WEIGHTS};
+use whole::Whole;
+
+/// Twins of PBF's own passes.
+const TWINS: &[Twin<PbfState>] = &[
+    twin("pbf/predict", || names![buffers::VELOCITY], passes::predict),
+    twin("pbf/assign_cells", NONE, passes::assign_cells),
+    twin(
+        "pbf/reorder",
+        || names![buffers::PREDICTED],
+        passes::reorder,
+    ),
+    twin("pbf/build_neighbors", NONE, lists::build_neighbors),
+    twin(
+        "pbf/compute_lambda",
+        || names![buffers::PREDICTED],
+        passes::compute_lambda,
+    ),
+    twin(
+        "pbf/compute_delta",
+        || names![buffers::PREDICTED, buffers::WALL_WORK],
+        passes::compute_delta,
+    ),
+    twin("pbf/sum_error", NONE, stop::sum_error),
+    twin(
+        "pbf/decide",
+        || names![buffers::CONTROL, buffers::COUNTERS],
+        stop::decide,
+    ),
+    twin(
+        "pbf/update_velocity",
+        || names![buffers::COUNTERS],
+        passes::update_velocity,
+    ),
+    twin("pbf/measure_density", NONE, passes::measure_density),
+    twin(
+        "pbf/boundary_work",
+        || names![buffers::BOUNDARY_WORK],
+        work::boundary_work,
+    ),
+];
+
+/// Traces a substep of the frame after `particles`, the state at the end of `frame`, and holds it against the reference.
+/// `boundary` is what the reference knows of the solids, `uploaded` what the device does: they differ in tests alone.
+///
+/// # Errors
+/// The device, the numbers of the solver, or a substep that the frame does not have.
+pub fn check(
+    context: &Context,
+    scene: &Scene,
+    plan: Plan,
+    [boundary, uploaded]: [&Boundary; 2],
+    (frame, particles): (u32, &Particles),
+    which: Which,
+) -> Result<Checked, SolveError> {
+    let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
+    solver.load(frame, particles)?;
+    let substeps = scene.pbf_substeps(frame, particles.max_speed())?;
+    let length = scene.shot.frame_seconds();
+    let time_step = length / f64::from(substeps);
+    let number = match which {
+        Which::Number(number) => number,
+        Which::Last => substeps,
+    };
+    let end = f64::from(frame) * length + f64::from(number) * time_step;
+    let mut engine = Engine::new(PbfState {
+        model: Model::new(scene, boundary),
+        substep: Substep::new(scene, end, time_step),
+        lists: Lists::new(&plan),
+        whole: Whole::default(),
+        is_over: false,
+        scene: scene.clone(),
+        plan,
+    });
+    engine.state.take_samples(&solver, &mut engine.table)?;
+    let span = Span::Only(which);
+    let traced = solver.trace_frame(span, &mut |_, traced| engine.observe(traced))?;
+    engine.state.add_whole(boundary, &mut engine.table);
+    Ok(Checked {
+        table: engine.finish(),
+        substep: Some(traced),
+    })
+}
+
+/// What the twins know of the substep.
+pub(super) struct PbfState {
+    pub(super) scene: Scene,
+    model: Model,
+    substep: Substep,
+    plan: Plan,
+    lists: Lists,
+    whole: Whole,
+    /// Whether the velocities have been updated: what follows measures the frame's end.
+    is_over: bool,
+}
+
+impl State for PbfState {
+    fn twins() -> Vec<&'static [Twin<Self>]> {
+        [&[TWINS][..], &effects::pbf()].concat()
+    }
+
+    fn particles(&self) -> usize {
+        self.plan.counts.particles
+    }
+
+    const ELSEWHERE: &'static [(&'static str, &'static str)] = &[];
+}
+
+impl PbfState {
+    pub(super) fn inputs<'b>(
+        &'b self,
+        points: &'b [DVec3],
+        neighbors: &'b Neighbors,
+    ) -> Inputs<'b> {
+        Inputs {
+            model: &self.model,
+            substep: &self.substep,
+            points,
+            neighbors,
+        }
+    }
+
+    /// Samples on solids as the device has them are inputs of its passes; here they are outputs of the upload.
+    fn take_samples(&mut self, solver: &Pbf, table: &mut Table) -> Result<(), SolveError> {
+        let (n, samples) = (self.particles(), self.plan.counts.boundary_samples);
+        if samples == 0 {
+            return Ok(());
+        }
+        let all = solver.field(buffers::PREDICTED, 2 * n + samples)?;
+        let (found, model) = (&all[2 * n..], &mut self.model);
+        let places = wide(found);
+        let weights: Vec<f64> = found.iter().map(|value| f64::from(value[3])).collect();
+        table.each(&SAMPLES, 0..samples, |k| {
+            let at = model.samples[k];
+            pair(k, places[k], at, [at.length()])
+        });
+        table.each(&WEIGHTS, 0..samples, |k| {
+            let expected = model.sample_weights[k];
+            pair(k, weights[k], expected, [expected])
+        });
+        (model.samples, model.sample_weights) = (places, weights);
+        Ok(())
+    }
+
+    /// How the iteration until a density error stands before the pass; `None` where their number is given.
+    fn control(&self, io: &Io<'_>) -> Result<Option<IterationControl>, SolveError> {
+        match self.scene.solver.pbf().stop {
+            Stop::DensityError { .. } => Ok(Some(io.one_before(buffers::CONTROL)?)),
+            _ => Ok(None),
+        }
+    }
+
+    /// The positions that a phase reads, then the samples; and the λ beside them.
+    fn stored(&self, io: &Io<'_>, phase: &Phase) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
+        let n = self.particles();
+        let predicted = io.before(buffers::PREDICTED, 2 * n)?;
+        let half = |j: usize| predicted[j + [phase.read_even, phase.read_odd][j % 2] as usize];
+        let read: Vec<[f32; 4]> = (0..n).map(half).collect();
+        let mut points = wide(&read);
+        points.extend(&self.model.samples);
+        let lambda = read.iter().map(|value| f64::from(value[3])).collect();
+        Ok((points, lambda))
+    }
+
+    /// Positions with the samples behind them, as effects see them.
+    pub(super) fn moved(&self, io: &Io<'_>) -> Result<Vec<DVec3>, SolveError> {
+        let mut points = io.vectors_before(buffers::POSITION, self.particles())?;
+        points.extend(&self.model.samples);
+        Ok(points)
+    }
+}

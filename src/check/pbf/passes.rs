@@ -1,0 +1,299 @@
+//! From the prediction to the velocity update.
+
+use glam::DVec3;
+
+use crate::{
+    check::{
+        engine::{Io, Outcome},
+        sort::{check_cells, check_slots},
+        table::{each, pair},
+    },
+    reference::{
+        neighbors::Neighbors,
+        pbf::{
+            Colour,
+            passes::{self, Momentum},
+        },
+    },
+    scene::Iteration,
+    solve::{params::Phase, pbf::buffers},
+};
+
+use super::{PbfState, State, bounds::Bounds, rows::*};
+
+pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let n = state.particles();
+    if state.is_over {
+        // A frame's measurement begins with a prediction of no length.
+        state.substep.time_step = 0.0;
+        state.substep.wall_velocity = Default::default();
+    }
+    let (x, v) = (
+        io.vectors_before(buffers::POSITION, n)?,
+        io.vectors_before(buffers::VELOCITY, n)?,
+    );
+    let predicted = io.vectors(buffers::PREDICTED, 2 * n)?;
+    let velocity = io.vectors(buffers::VELOCITY, n)?;
+    let works = match state.scene.has_movers() {
+        true => io.after(buffers::WALL_WORK, 2 * n)?,
+        false => Vec::new(),
+    };
+    let none = Neighbors::listed(0, |_, _| [0; 2]);
+    let bounds = Bounds(state.inputs(&[], &none));
+    let (model, step) = (&state.model, state.substep.time_step);
+    let one = |i: usize| {
+        let (x, v) = (x[i], v[i]);
+        let pushed = v + model.gravity * step;
+        let is_slowed = step * pushed.length() > 0.99 * model.max_displacement();
+        let speed = v.length() + model.gravity.length() * step;
+        let free = PUSH_FREE.of([if is_slowed { 16.0 } else { 0.0 }, speed]);
+        let error = WAY.of([x.length(), step, speed, free]);
+        let cap = (model.max_displacement() / (step * pushed.length()).max(1e-30)).min(1.0);
+        let confined = bounds.confine(x + step * cap * pushed, error);
+        let stopped = match confined.is_touched && step > 0.0 {
+            true => {
+                let position = PREDICT_POSITION.tolerance.of(confined.magnitudes);
+                STOPPED.of([error, position, x.length(), step])
+            }
+            false => 0.0,
+        };
+        let (at, then, work) = passes::predict_and_work(model, &state.substep, x, v);
+        let position = pair(i, predicted[n + i], at, confined.magnitudes);
+        let velocity = pair(i, velocity[i], then, [free, stopped, then.length()]);
+        let magnitudes = [
+            state.wall_speed(),
+            confined.push_error,
+            x.length(),
+            work.abs(),
+        ];
+        let work = (works.get(n + i)).map(|&found| pair(i, found, work, magnitudes));
+        (position, velocity, work)
+    };
+    let all = each(0..n, one);
+    io.table
+        .add(&PREDICT_POSITION, all.iter().map(|pairs| pairs.0));
+    io.table
+        .add(&PREDICT_VELOCITY, all.iter().map(|pairs| pairs.1));
+    if !works.is_empty() {
+        io.table.add(&PREDICT_WORK, all.iter().map(|pairs| pairs.2));
+    }
+    Ok(())
+}
+
+pub(super) fn assign_cells(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let n = state.particles();
+    let cells = &state.model.cells;
+    let points = &io.vectors_before(buffers::PREDICTED, 2 * n)?[n..];
+    let exact: Vec<u32> = points.iter().map(|&x| cells.index(x) as u32).collect();
+    let cell_of = io.after(buffers::CELL_OF, n)?;
+    check_cells(&CELL, points, cells.edge, &cell_of, &exact, io.table);
+    let slot = io.after(buffers::SLOT_IN_CELL, n)?;
+    let counts = io.after(buffers::CELL_START, cells.dims.iter().product())?;
+    check_slots([&COUNTS, &SLOTS], &cell_of, &slot, &counts, io.table);
+    Ok(())
+}
+
+pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let n = state.particles();
+    let order = io.before(buffers::ORDER, n)?;
+    let predicted = io.vectors_before(buffers::PREDICTED, 2 * n)?;
+    let velocity = io.vectors_before(buffers::VELOCITY, n)?;
+    let ids = io.before(buffers::ID, n)?;
+    let at = |i: usize| order[i] as usize;
+    for buffer in [buffers::PREDICTED, buffers::START_POSITION] {
+        let found = io.vectors(buffer, n)?;
+        io.table.each(&REORDER_POSITION, 0..n, |i| {
+            pair(i, found[i], predicted[n + at(i)], [])
+        });
+    }
+    let found = io.vectors(buffers::SORTED_VELOCITY, n)?;
+    io.table.each(&REORDER_VELOCITY, 0..n, |i| {
+        pair(i, found[i], velocity[at(i)], [])
+    });
+    let expected: Vec<u32> = (0..n).map(|i| ids[at(i)]).collect();
+    io.table
+        .add_exact(&REORDER_ID, &io.after(buffers::SORTED_ID, n)?, &expected);
+    Ok(())
+}
+
+pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let control = state.control(io)?;
+    if control.is_some_and(|control| control.is_done == 1) {
+        return Ok(());
+    }
+    let n = state.particles();
+    let phase = io.window(&buffers::PHASES)?;
+    let (points, mut twin) = state.stored(io, &phase)?;
+    let neighbors = state.visited(io, &points)?;
+    if !state.whole.has_start() {
+        let near = state.search(&points);
+        state.whole.start(&points, n, near);
+    }
+    let inputs = state.inputs(&points, &neighbors);
+    let mut dense = vec![0.0; n];
+    passes::compute_lambda(inputs, Colour::All, &mut twin, &mut dense);
+    let bounds = Bounds(inputs);
+    let after = io.after(buffers::PREDICTED, 2 * n)?;
+    let handled = handled(&phase);
+    io.table.each(&OF_LAMBDA, 0..handled.len(), |k| {
+        let i = handled[k];
+        let stored = i + [phase.read_even, phase.read_odd][i % 2] as usize;
+        let error = bounds.lambda(i, &passes::row(inputs, i), twin[i]);
+        pair(i, after[stored][3], twin[i], [error])
+    });
+    if control.is_some() {
+        let density = io.after(buffers::DENSITY, n)?;
+        io.table.each(&DENSITY_OF_LAMBDA, 0..handled.len(), |k| {
+            let i = handled[k];
+            pair(i, density[i], dense[i], [bounds.density(i, dense[i])])
+        });
+    }
+    Ok(())
+}
+
+pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    if (state.control(io)?).is_some_and(|control| control.is_done == 1) {
+        return Ok(());
+    }
+    let n = state.particles();
+    let phase = io.window(&buffers::PHASES)?;
+    let (points, lambda) = state.stored(io, &phase)?;
+    let neighbors = state.visited(io, &points)?;
+    let write = phase.write as usize;
+    let before = &io.vectors_before(buffers::PREDICTED, 2 * n)?[write..write + n];
+    let factor = f64::from(phase.acceleration);
+    let is_chebyshev = state.scene.solver.pbf().iteration == Iteration::Chebyshev;
+    let momentum = is_chebyshev.then_some(Momentum { factor, before });
+    let inputs = state.inputs(&points, &neighbors);
+    let plain = passes::compute_delta(inputs, Colour::All, None, &lambda);
+    let twin = match momentum {
+        Some(_) => passes::compute_delta(inputs, Colour::All, momentum, &lambda),
+        None => plain.clone(),
+    };
+    let after = io.after(buffers::PREDICTED, 2 * n)?;
+    let moved = io.vectors(buffers::PREDICTED, 2 * n)?;
+    let works = match state.scene.has_movers() {
+        true => Some([
+            io.before(buffers::WALL_WORK, n)?,
+            io.after(buffers::WALL_WORK, n)?,
+        ]),
+        false => None,
+    };
+    let bounds = Bounds(inputs);
+    let h = state.model.calibration.support_radius;
+    let one = |i: usize| {
+        // On one spot a hash decides where they part, by sines that WGSL leaves open.
+        let is_coincident = (neighbors.all(i))
+            .any(|j| points[i].distance_squared(points[j as usize]) < 2e-12 * h * h);
+        // The bound follows the correction from before walls and solids push, as they bend what it errs by.
+        let to = twin[i].free;
+        let step = STEP.of([bounds.delta(i, &lambda), (to - points[i]).length()]);
+        let last = match momentum {
+            Some(_) => points[i] - before[i],
+            None => DVec3::ZERO,
+        };
+        // Whether the semi-iteration goes on is decided before it adds to the step.
+        let along = (plain[i].free - points[i]).dot(last).abs();
+        let is_across = along <= ACROSS.of([step, last.length()]);
+        if is_coincident || (factor != 1.0 && is_across && last != DVec3::ZERO) {
+            return None;
+        }
+        let x = points[i].length();
+        let error = CORRECTED.of([MOMENTUM.of([factor, step, last.length()]), x]);
+        let confined = bounds.confine(to, error);
+        let moved = pair(i, moved[write + i], twin[i].position, confined.magnitudes);
+        let work = works.as_ref().map(|[before, after]| {
+            let [before, after] = [before, after].map(|work| f64::from(work[i]));
+            let added = twin[i].work;
+            let error = WORKED.of([factor, step, confined.push_error, x]);
+            let sums = before.abs() + after.abs();
+            let magnitudes = [state.wall_speed(), error, sums, added.abs()];
+            pair(i, after, before + added, magnitudes)
+        });
+        Some((moved, work))
+    };
+    let handled = handled(&phase);
+    let all = each(0..handled.len(), |k| one(handled[k]));
+    io.table.add(
+        &OF_DELTA,
+        all.iter().map(|pairs| pairs.map(|pairs| pairs.0)),
+    );
+    io.table.each(&CARRIED, 0..handled.len(), |k| {
+        let i = handled[k];
+        pair(i, after[write + i][3], lambda[i], [])
+    });
+    if works.is_some() {
+        let works = all.iter().map(|pairs| pairs.and_then(|pairs| pairs.1));
+        io.table.add(&DELTA_WORK, works);
+    }
+    Ok(())
+}
+
+pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let n = state.particles();
+    let phase = io.window(&buffers::PHASES)?;
+    let source = match state.control(io)? {
+        Some(control) => n * (control.iterations % 2) as usize,
+        None => phase.read_even as usize,
+    };
+    let ends = io.vectors_before(buffers::PREDICTED, 2 * n)?[source..source + n].to_vec();
+    let starts = io.vectors_before(buffers::START_POSITION, n)?;
+    let velocities = io.vectors_before(buffers::SORTED_VELOCITY, n)?;
+    let position = io.vectors(buffers::POSITION, n)?;
+    let velocity = io.vectors(buffers::VELOCITY, n)?;
+    let (model, substep) = (&state.model, &state.substep);
+    let (cap, step) = (model.max_displacement(), substep.time_step);
+    let one = |i: usize| {
+        let (end, start, v) = (ends[i], starts[i], velocities[i]);
+        let (x, then, is_capped) = passes::update_velocity(model, substep, end, start, v);
+        let way = (end - start).length() / step;
+        let whole = (v + (end - start) / step).length();
+        let is_near = (whole * step - cap).abs() <= NEAR_CAP.of([cap]);
+        let slowed = if is_capped || is_near { 1.0 } else { 0.0 };
+        let error = UPDATED.of([whole, way, slowed * whole]);
+        let position = pair(
+            i,
+            position[i],
+            x,
+            [slowed * x.length(), slowed * step, error],
+        );
+        let velocity = pair(i, velocity[i], then, [error]);
+        (position, velocity, [is_capped, is_near])
+    };
+    let all = each(0..n, one);
+    let count = |which: usize| all.iter().filter(|one| one.2[which]).count() as f64;
+    io.table.add(&UPDATE_POSITION, all.iter().map(|one| one.0));
+    io.table.add(&UPDATE_VELOCITY, all.iter().map(|one| one.1));
+    let before = io.one_before(buffers::COUNTERS)?;
+    let after = io.one(buffers::COUNTERS)?;
+    let counted = f64::from(after.capped) - f64::from(before.capped);
+    io.table
+        .add(&CAPPED, [pair(0, counted, count(0), [count(1)])]);
+    let ids = io.before(buffers::SORTED_ID, n)?;
+    io.table
+        .add_exact(&UPDATE_ID, &io.after(buffers::ID, n)?, &ids);
+    state.whole.end(ends);
+    state.is_over = true;
+    Ok(())
+}
+
+pub(super) fn measure_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    let n = state.particles();
+    let mut points = io.vectors_before(buffers::PREDICTED, n)?;
+    points.extend(&state.model.samples);
+    let neighbors = state.search(&points);
+    let inputs = state.inputs(&points, &neighbors);
+    let twin = passes::measure_density(inputs);
+    let density = io.after(buffers::DENSITY, n)?;
+    let bounds = Bounds(inputs);
+    io.table.each(&MEASURED, 0..n, |i| {
+        pair(i, density[i], twin[i], [bounds.density(i, twin[i])])
+    });
+    Ok(())
+}
+
+/// Particles that a dispatch handles.
+fn handled(phase: &Phase) -> Vec<usize> {
+    let particle = |thread| phase.first + thread * phase.stride + phase.colour;
+    (0..phase.count).map(|k| particle(k) as usize).collect()
+}

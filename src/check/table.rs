@@ -1,0 +1,346 @@
+//! What a check finds: each pass's outputs against its twin's, value by value.
+
+use std::{fmt, ops::Range};
+
+use rayon::prelude::*;
+use serde::{Serialize, Serializer};
+
+use crate::compare::{
+    deviation::{Deviation, Value, relative},
+    tolerance::{Bound, Text},
+};
+
+/// A line of a check: one field that one pass writes.
+#[derive(Debug, Serialize)]
+pub struct Field {
+    /// Pass name, or what is compared when several passes made it.
+    pub pass: &'static str,
+    /// What it writes.
+    pub name: &'static str,
+    /// Its unit; empty where it has none.
+    pub unit: &'static str,
+    /// Where the tolerance comes from.
+    pub derivation: Derivation,
+}
+
+impl PartialEq for Field {
+    fn eq(&self, other: &Self) -> bool {
+        (self.pass, self.name) == (other.pass, other.name)
+    }
+}
+
+/// How a field's tolerance is computed, as it prints itself.
+pub struct Derivation {
+    /// The tolerance.
+    pub tolerance: &'static Text,
+    /// Where rounding alone decides, so that a value is left out, and why.
+    pub tie: Option<&'static Text>,
+}
+
+impl fmt::Display for Derivation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.tolerance)?;
+        match self.tie {
+            Some(tie) => write!(f, "; a tie within {tie}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl fmt::Debug for Derivation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self}")
+    }
+}
+
+impl Serialize for Derivation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// A field and its tolerance: an expression of `N` magnitudes that each value hands in.
+pub struct Entry<const N: usize> {
+    /// What is compared.
+    pub field: Field,
+    /// By how much it may differ.
+    pub tolerance: &'static Bound<N>,
+}
+
+/// Declares entries, those of one pass together: `"pass" { NAME = "field", "unit": [magnitudes] tolerance, "reason"; }`;
+/// before the last `;` may stand `, tie BOUND`.
+macro_rules! entries {
+    ($($pass:literal {
+        $($name:ident = $field:literal, $unit:literal:
+            [$($magnitudes:tt)*] $value:expr, $reason:literal $(, tie $tie:ident)?;)+
+    })+) => {
+        $($(pub(super) static $name: $crate::check::table::Entry<
+            { $crate::compare::tolerance::count!($($magnitudes)*) }
+        > = {
+            static TOLERANCE: $crate::compare::tolerance::Bound<
+                { $crate::compare::tolerance::count!($($magnitudes)*) }
+            > = $crate::compare::tolerance::bound!([$($magnitudes)*] $value, $reason);
+            $crate::check::table::Entry {
+                field: $crate::check::table::Field {
+                    pass: $pass,
+                    name: $field,
+                    unit: $unit,
+                    derivation: $crate::check::table::Derivation {
+                        tolerance: &TOLERANCE.text,
+                        tie: $crate::compare::tolerance::optional!($(&$tie.text)?),
+                    },
+                },
+                tolerance: &TOLERANCE,
+            }
+        };)+)+
+    };
+}
+pub(super) use entries;
+
+/// A value, what its twin says, and the magnitudes that say by how much they may differ.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair<T, const N: usize> {
+    /// Of what: a particle's sorted index, a cell's element.
+    pub index: usize,
+    /// The GPU's.
+    pub value: T,
+    /// The twin's.
+    pub reference: T,
+    /// Of the tolerance.
+    pub magnitudes: [f64; N],
+}
+
+/// What `one` makes of each number of a range, on all cores and in their order.
+pub fn each<T: Send>(range: Range<usize>, one: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+    range.into_par_iter().map(one).collect()
+}
+
+/// A [`Pair`].
+pub fn pair<T, const N: usize>(
+    index: usize,
+    value: impl Into<T>,
+    reference: T,
+    magnitudes: [f64; N],
+) -> Pair<T, N> {
+    Pair {
+        index,
+        value: value.into(),
+        reference,
+        magnitudes,
+    }
+}
+
+/// The value that is furthest out, as a part of its own tolerance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Worst {
+    /// Error over tolerance; above 1 is a failure. JSON has no infinity: there it is null.
+    pub ratio: f64,
+    /// In the unit of the field.
+    pub error: f64,
+    /// In the unit of the field.
+    pub tolerance: f64,
+    /// Of what.
+    pub index: usize,
+}
+
+/// What all runs of a pass in a traced substep came to.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// What was compared.
+    #[serde(flatten)]
+    pub field: &'static Field,
+    /// Runs of the pass.
+    pub runs: usize,
+    /// Values compared in them.
+    pub values: usize,
+    /// Values left out: within rounding both outcomes are right.
+    pub ties: usize,
+    /// Values out of tolerance.
+    pub over: usize,
+    /// The furthest out.
+    pub worst: Worst,
+    /// Of the run that holds it.
+    pub deviation: Deviation,
+}
+
+impl Row {
+    /// Whether every value is within its tolerance.
+    pub fn is_within(&self) -> bool {
+        self.over == 0
+    }
+}
+
+/// The rows of a check, in the order in which their passes first ran.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Table {
+    /// One a field.
+    pub rows: Vec<Row>,
+    /// Passes that ran and have no twin, each with the reason.
+    pub unchecked: Vec<(&'static str, &'static str)>,
+}
+
+impl Table {
+    /// Adds a run of a pass; `None` is a value left out, as within rounding both outcomes are right. What is not a number
+    /// is out of tolerance.
+    pub fn add<T: Value, const N: usize, P: Into<Option<Pair<T, N>>>>(
+        &mut self,
+        entry: &'static Entry<N>,
+        pairs: impl IntoIterator<Item = P>,
+    ) {
+        let mut row = Row {
+            field: &entry.field,
+            runs: 1,
+            values: 0,
+            ties: 0,
+            over: 0,
+            worst: Worst::default(),
+            deviation: Deviation::default(),
+        };
+        let mut compared = Vec::new();
+        for pair in pairs {
+            let Some(pair) = pair.into() else {
+                row.ties += 1;
+                continue;
+            };
+            compared.push((pair.value, pair.reference));
+            let error = pair.value.error(pair.reference);
+            let tolerance = entry.tolerance.of(pair.magnitudes);
+            let ratio = match relative(error, tolerance) {
+                ratio if tolerance.is_nan() => ratio.max(f64::INFINITY),
+                ratio => ratio,
+            };
+            row.over += usize::from(ratio > 1.0);
+            if ratio > row.worst.ratio {
+                row.worst = Worst {
+                    ratio,
+                    error,
+                    tolerance,
+                    index: pair.index,
+                };
+            }
+        }
+        row.values = compared.len();
+        row.deviation = Deviation::of(compared);
+        self.merge(row);
+    }
+
+    /// Adds a run of a pass, value by value of a range on all cores.
+    pub fn each<T: Value + Send, const N: usize, P: Into<Option<Pair<T, N>>> + Send>(
+        &mut self,
+        entry: &'static Entry<N>,
+        range: Range<usize>,
+        one: impl Fn(usize) -> P + Send + Sync,
+    ) {
+        self.add(entry, each(range, one));
+    }
+
+    /// Counts values of a row that were not told apart one by one and are left out.
+    pub fn add_ties<const N: usize>(&mut self, entry: &'static Entry<N>, ties: usize) {
+        let known = self.rows.iter_mut().find(|row| *row.field == entry.field);
+        if let Some(row) = known {
+            row.ties += ties;
+        }
+    }
+
+    /// Adds a run of which rounding decides all `count` values.
+    pub fn leave_out<const N: usize>(&mut self, entry: &'static Entry<N>, count: usize) {
+        self.add(entry, vec![None::<Pair<f64, N>>; count]);
+    }
+
+    /// Adds a run whose outputs are whole numbers: those of `value` that are not `reference` are out of tolerance.
+    pub fn add_exact(&mut self, entry: &'static Entry<0>, value: &[u32], reference: &[u32]) {
+        let same = value.len() == reference.len();
+        let one = |(index, (&value, &reference)): (usize, (&u32, &u32))| {
+            let value = if same { f64::from(value) } else { f64::NAN };
+            pair(index, value, f64::from(reference), [])
+        };
+        self.add(entry, value.iter().zip(reference).enumerate().map(one));
+    }
+
+    /// Takes over the rows of another check, such as of another frame.
+    pub fn absorb(&mut self, other: Self) {
+        for row in other.rows {
+            self.merge(row);
+        }
+        for pass in other.unchecked {
+            if !self.unchecked.contains(&pass) {
+                self.unchecked.push(pass);
+            }
+        }
+    }
+
+    fn merge(&mut self, row: Row) {
+        let Some(known) = self.rows.iter_mut().find(|known| known.field == row.field) else {
+            self.rows.push(row);
+            return;
+        };
+        known.runs += row.runs;
+        known.values += row.values;
+        known.ties += row.ties;
+        known.over += row.over;
+        if row.worst.ratio > known.worst.ratio || known.deviation.count == 0 {
+            known.worst = row.worst;
+            known.deviation = row.deviation;
+        }
+    }
+
+    /// The first row out of tolerance.
+    pub fn first_over(&self) -> Option<&Row> {
+        self.rows.iter().find(|row| !row.is_within())
+    }
+
+    /// Whether a pass has a row.
+    pub fn has(&self, pass: &str) -> bool {
+        self.rows.iter().any(|row| row.field.pass == pass)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    entries! {
+        "a/pass" {
+            FIELD = "field", "m": [most: "what the test allows"] most, "a test";
+            WHOLE = "whole", "": [] 0.0, "a test";
+        }
+    }
+
+    fn one(index: usize, value: f64, tolerance: f64) -> Pair<f64, 1> {
+        pair(index, value, 1.0, [tolerance])
+    }
+
+    #[test]
+    fn the_worst_is_that_of_the_least_room() {
+        let mut table = Table::default();
+        // The larger error has the larger tolerance.
+        let pairs = [Some(one(3, 1.5, 1.0)), None, None, Some(one(4, 1.25, 0.3))];
+        table.add(&FIELD, pairs);
+        let row = &table.rows[0];
+        assert_eq!((row.worst.index, row.worst.error, row.over), (4, 0.25, 0));
+        assert_eq!((row.values, row.ties, row.deviation.max), (2, 2, 0.5));
+        assert!(table.first_over().is_none());
+        table.each(&FIELD, 7..8, |index| one(index, 1.5, 0.25));
+        let row = table.first_over().unwrap();
+        assert_eq!((row.runs, row.values, row.over), (2, 3, 1));
+        assert_eq!((row.worst.ratio, row.worst.index), (2.0, 7));
+        assert_eq!(row.deviation.count, 1);
+        let derivation = row.field.derivation.to_string();
+        assert_eq!(derivation, "most; most = what the test allows: a test");
+    }
+
+    #[test]
+    fn no_number_and_no_tolerance_are_out() {
+        for (value, tolerance) in [(f64::NAN, 1.0), (1.0 + 1e-9, 0.0), (1.1, f64::NAN)] {
+            let mut table = Table::default();
+            table.add(&FIELD, [one(0, value, tolerance)]);
+            assert!(table.first_over().is_some(), "{value} {tolerance}");
+        }
+        let mut table = Table::default();
+        table.add(&FIELD, [one(0, 1.0, 0.0)]);
+        table.add_exact(&WHOLE, &[1, 2], &[1, 2]);
+        assert!(table.first_over().is_none());
+        table.add_exact(&WHOLE, &[1, 2], &[1, 3]);
+        assert_eq!(table.rows[1].over, 1);
+    }
+}

@@ -1,0 +1,302 @@
+//! Twins of the passes of an iteration, row by row, and the magnitudes that their rounding is measured by.
+
+use crate::domain::poisson::{NONE, System};
+
+use super::{Solver, gradients::norm};
+
+/// Inverse iterations for the least eigenvalue.
+const EIGEN_STEPS: usize = 8;
+
+/// Times that the true residual may be found too large, as in pressure/reduce.
+const MOST_RESTARTS: u32 = 16;
+
+/// A value and the sum of the magnitudes of its terms.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sum {
+    /// Of the terms.
+    pub value: f64,
+    /// Of their magnitudes.
+    pub size: f64,
+}
+
+/// Σ a b.
+pub fn products(a: &[f64], b: &[f64]) -> Sum {
+    let terms = || a.iter().zip(b).map(|(a, b)| a * b);
+    Sum {
+        value: terms().sum(),
+        size: terms().map(f64::abs).sum(),
+    }
+}
+
+/// Σ c |x − x'| and what air takes, of each row.
+pub fn differences(system: &System, x: &[f64]) -> Vec<f64> {
+    (0..x.len())
+        .map(|i| {
+            let shared = system.neighbor[i].iter().zip(&system.coefficient[i]);
+            let inner: f64 = shared
+                .filter(|(j, _)| **j != NONE)
+                .map(|(&j, c)| c * (x[i] - x[j as usize]).abs())
+                .sum();
+            inner + system.dirichlet[i] * x[i].abs()
+        })
+        .collect()
+}
+
+/// Σ over the lower (`first` = 0) or the upper (1) neighbours of what row `i` shares with them times `value`.
+fn shared(system: &System, i: usize, first: usize, value: impl Fn(usize) -> f64) -> Sum {
+    let mut sum = Sum::default();
+    for k in (first..6).step_by(2) {
+        if system.neighbor[i][k] != NONE {
+            let term = system.coefficient[i][k] * value(system.neighbor[i][k] as usize);
+            sum.value += term;
+            sum.size += f64::abs(term);
+        }
+    }
+    sum
+}
+
+/// `pressure/ipp_lower`: y = d (r + L d r), of the inverse diagonal `d` and the residual `r`; the size is that of the sum
+/// before it is multiplied by d.
+pub fn ipp_lower(system: &System, d: &[f64], r: &[f64]) -> Vec<Sum> {
+    let of = |i: usize| {
+        let sum = shared(system, i, 0, |j| d[j] * r[j]);
+        Sum {
+            value: d[i] * (r[i] + sum.value),
+            size: r[i].abs() + sum.size,
+        }
+    };
+    (0..r.len()).map(of).collect()
+}
+
+/// `pressure/ipp_upper`: z = y + d U y.
+pub fn ipp_upper(system: &System, d: &[f64], y: &[f64]) -> Vec<Sum> {
+    let of = |i: usize| {
+        let sum = shared(system, i, 1, |j| y[j]);
+        Sum {
+            value: y[i] + d[i] * sum.value,
+            size: y[i].abs() + d[i] * sum.size,
+        }
+    };
+    (0..y.len()).map(of).collect()
+}
+
+/// `pressure/verify`: b − A x, x being the sum of `terms`; the size is that of b and of each image.
+pub fn verify(system: &System, b: &[f64], terms: &[Vec<f64>]) -> Vec<Sum> {
+    let images: Vec<_> = terms.iter().map(|term| system.apply(term)).collect();
+    let of = |i: usize| Sum {
+        value: images.iter().fold(b[i], |left, image| left - image[i]),
+        size: (images.iter()).fold(b[i].abs(), |size, image| size + image[i].abs()),
+    };
+    (0..b.len()).map(of).collect()
+}
+
+/// Where a solve stands; numbered as on the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SolveState {
+    /// It iterates.
+    Iterating,
+    /// Its residual is computed afresh.
+    Verifying,
+    /// It has ended.
+    Done,
+    /// It waits for the pockets to be listed.
+    WantsPockets,
+}
+
+/// What `pressure/reduce` decides from a sum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Decision {
+    /// Starts a solve from ‖b‖²; there may be pockets that are not listed yet.
+    Begin {
+        /// Whether there are.
+        wants_pockets: bool,
+    },
+    /// β, from residual · correction.
+    Direction,
+    /// α, from direction · its image.
+    Length,
+    /// Whether ‖r‖² of the recursion is small enough.
+    Check(Limits),
+    /// Whether that of the true residual is.
+    Verified(Limits),
+}
+
+/// When an iteration ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// ‖r‖² that is small enough.
+    pub target: f64,
+    /// Iterations at most.
+    pub iterations: u32,
+}
+
+/// What the decisions go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Where the solve stands.
+    pub state: SolveState,
+    /// So far.
+    pub iterations: u32,
+    /// Whether the next direction starts afresh.
+    pub is_first: bool,
+    /// Verifications.
+    pub restarts: u32,
+}
+
+impl Progress {
+    /// `pressure/reduce`: what follows from a sum.
+    #[must_use]
+    pub fn after(mut self, decision: Decision, sum: f64) -> Self {
+        match decision {
+            Decision::Begin { wants_pockets } => {
+                self = Self {
+                    state: match (wants_pockets, sum > 0.0) {
+                        (true, _) => SolveState::WantsPockets,
+                        (_, true) => SolveState::Iterating,
+                        _ => SolveState::Done,
+                    },
+                    iterations: 0,
+                    is_first: true,
+                    restarts: 0,
+                };
+            }
+            Decision::Direction => self.is_first = false,
+            Decision::Length => {}
+            Decision::Check(limits) => {
+                self.iterations += 1;
+                if sum <= limits.target || self.iterations >= limits.iterations {
+                    self.state = SolveState::Verifying;
+                }
+            }
+            Decision::Verified(limits) => {
+                self.restarts += 1;
+                self.is_first = true;
+                let is_over = self.iterations >= limits.iterations;
+                let is_last = sum <= limits.target || is_over || self.restarts > MOST_RESTARTS;
+                self.state = if is_last {
+                    SolveState::Done
+                } else {
+                    SolveState::Iterating
+                };
+            }
+        }
+        self
+    }
+}
+
+/// The least eigenvalue of a system of `rows` rows, by inverse iterations from a vector of hashed signs; what a few of
+/// them reach is at most a few percent above it.
+pub fn least_eigenvalue(solver: &Solver<'_>, rows: usize) -> f64 {
+    let sign = |k: usize| {
+        let hash = (k as u32 + 1).wrapping_mul(0x9e37_79b9) >> 31;
+        1.0 + f64::from(hash)
+    };
+    let mut y: Vec<f64> = (0..rows).map(sign).collect();
+    let mut eigenvalue = f64::INFINITY;
+    for _ in 0..EIGEN_STEPS {
+        let size = norm(&y);
+        for value in &mut y {
+            *value /= size;
+        }
+        y = solver.solve(&y).x;
+        eigenvalue = 1.0 / norm(&y);
+    }
+    eigenvalue
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        domain::poisson::cases::{Surface, tank, white_noise},
+        reference::poisson::BUDGET,
+    };
+
+    /// The two halves are (I + D U)(D + D L D) r: symmetric and positive, as a preconditioner has to be.
+    #[test]
+    fn the_two_halves_are_a_symmetric_preconditioner() {
+        let system = tank(8, Surface::GhostFluid, true).system();
+        let d: Vec<f64> = system.diagonal.iter().map(|d| 1.0 / d).collect();
+        let values = |sums: Vec<Sum>| sums.iter().map(|sum| sum.value).collect::<Vec<_>>();
+        let apply = |r: &[f64]| {
+            let half = values(ipp_lower(&system, &d, r));
+            values(ipp_upper(&system, &d, &half))
+        };
+        let a = white_noise(d.len());
+        let b: Vec<f64> = a.iter().rev().copied().collect();
+        let [ab, ba] = [products(&a, &apply(&b)), products(&b, &apply(&a))];
+        assert!(
+            (ab.value - ba.value).abs() < 1e-13 * ab.size,
+            "{ab:?} {ba:?}"
+        );
+        assert!(products(&a, &apply(&a)).value > 0.0);
+        // Negative control: the lower half alone is not symmetric.
+        let lower = |r: &[f64]| values(ipp_lower(&system, &d, r));
+        let [ab, ba] = [products(&a, &lower(&b)), products(&b, &lower(&a))];
+        assert!(
+            (ab.value - ba.value).abs() > 1e-6 * ab.size,
+            "{ab:?} {ba:?}"
+        );
+    }
+
+    #[test]
+    fn a_solve_goes_from_state_to_state() {
+        let limits = Limits {
+            target: 1.0,
+            iterations: 3,
+        };
+        let idle = Progress {
+            state: SolveState::Done,
+            iterations: 9,
+            is_first: false,
+            restarts: 9,
+        };
+        let begin = |wants_pockets, sum| idle.after(Decision::Begin { wants_pockets }, sum);
+        assert_eq!(begin(true, 4.0).state, SolveState::WantsPockets);
+        assert_eq!(begin(false, 0.0).state, SolveState::Done);
+        let begun = begin(false, 4.0);
+        assert_eq!(
+            (begun.state, begun.iterations, begun.restarts),
+            (SolveState::Iterating, 0, 0)
+        );
+        let checked = begun
+            .after(Decision::Direction, 4.0)
+            .after(Decision::Check(limits), 2.0);
+        assert_eq!(
+            (checked.state, checked.is_first),
+            (SolveState::Iterating, false)
+        );
+        let small = checked.after(Decision::Check(limits), 0.5);
+        assert_eq!(small.state, SolveState::Verifying);
+        // The recursion was too hopeful.
+        let again = small.after(Decision::Verified(limits), 2.0);
+        assert_eq!(
+            (again.state, again.is_first, again.restarts),
+            (SolveState::Iterating, true, 1)
+        );
+        assert_eq!(
+            small.after(Decision::Verified(limits), 1.0).state,
+            SolveState::Done
+        );
+        let last = again.after(Decision::Check(limits), 2.0);
+        assert_eq!(
+            last.after(Decision::Verified(limits), 2.0).state,
+            SolveState::Done
+        );
+    }
+
+    /// Against the Rayleigh quotient of what the inverse iterations end with: it is at least the least eigenvalue.
+    #[test]
+    fn the_least_eigenvalue_is_no_greater_than_any_quotient() {
+        let system = tank(8, Surface::GhostFluid, true).system();
+        let solver = Solver::new(&system, BUDGET).unwrap();
+        let least = least_eigenvalue(&solver, system.cell.len());
+        let smooth = vec![1.0; system.cell.len()];
+        let quotient = |x: &[f64]| products(x, &system.apply(x)).value / products(x, x).value;
+        let found = solver.solve(&smooth).x;
+        assert!(
+            least <= 1.001 * quotient(&found) && least > 0.9 * quotient(&solver.solve(&found).x)
+        );
+        assert!(quotient(&white_noise(smooth.len())) > 10.0 * least);
+    }
+}

@@ -1,0 +1,349 @@
+//! Twins of the multigrid's passes: the exact solution of each block of 2³ cells from the values about it.
+//!
+//! Cells are named by their places in the device's arrays: a brick has 8³ cells, 64 blocks; cell `c` of a block stands at
+//! `512 slot + 64 c + block`.
+
+use std::ops::Range;
+
+use crate::domain::bricks::CELLS;
+
+/// Least pivot of a block, as a part of its diagonal, that is not a closed pair's rounding; twice the shader's.
+const LEAST_PIVOT: f64 = 2e-5;
+
+/// Of what air adds to a diagonal, what a coarser level takes over at most, as in pressure/coarsen.
+pub const MOST_AIR: f64 = 4.0;
+
+/// Of the last level, as in pressure/solve_coarse.
+const SWEEPS: usize = 8;
+
+/// Where a brick's neighbours are.
+#[derive(Clone, Copy, Debug)]
+pub struct Brick {
+    /// Slots at the lower, then the upper faces.
+    pub faces: [u32; 6],
+    /// Element of the cell above block 0, on the next level.
+    pub above: u32,
+}
+
+/// Rows of all levels.
+#[derive(Clone, Debug)]
+pub struct Levels {
+    /// Slots of each level.
+    pub levels: Vec<Range<u32>>,
+    /// One a slot.
+    pub bricks: Vec<Brick>,
+    /// Of the lower faces.
+    pub coefficient: [Vec<f32>; 3],
+    /// What air adds to the diagonal.
+    pub dirichlet: Vec<f64>,
+    /// Right-hand sides.
+    pub residual: Vec<f64>,
+    /// Solutions.
+    pub correction: Vec<f64>,
+}
+
+/// How the device rounds.
+#[derive(Clone, Copy)]
+pub struct Rounding {
+    /// Unit roundoff of what the levels are computed in.
+    pub unit: f64,
+    /// Of a block's right-hand side, from the unit, |A| |z| and the sum of its own magnitudes.
+    pub block: fn([f64; 3]) -> f64,
+    /// Of a restricted residual, from the unit and the sum of magnitudes.
+    pub restricted: fn([f64; 2]) -> f64,
+}
+
+/// What a block sees about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum About {
+    /// Nothing.
+    Nothing,
+    /// The latest corrections.
+    Corrections,
+    /// The same with what the coarser level adds to them.
+    WithAbove,
+}
+
+/// A value that should stand at a place, and by how much it may be off.
+#[derive(Clone, Copy, Debug)]
+pub struct Expected {
+    /// Of the value.
+    pub place: usize,
+    /// In f64.
+    pub value: f64,
+    /// By rounding.
+    pub error: f64,
+}
+
+/// A block's eight rows: its own matrix, what stands on the right, and of that the sum of magnitudes.
+struct Block {
+    matrix: [[f64; 8]; 8],
+    rhs: [f64; 8],
+    size: [f64; 8],
+    /// What flows in from beyond the block.
+    inflow: [f64; 8],
+}
+
+/// Place of cell `c` of a block.
+pub fn place(slot: u32, block: u32, c: usize) -> usize {
+    (CELLS * slot + block) as usize + 64 * c
+}
+
+/// Place of the cell above a block, from that above block 0.
+pub fn above_offset(block: u32) -> u32 {
+    let at = [block & 3, block >> 2 & 3, block >> 4];
+    let half = at.map(|a| a >> 1);
+    let bit = at.map(|a| a & 1);
+    half[0] + 4 * half[1] + 16 * half[2] + 64 * bit[0] + 128 * bit[1] + 256 * bit[2]
+}
+
+impl Levels {
+    /// Blocks of a colour of a level, with their slots.
+    pub fn coloured(&self, level: usize, colour: u32) -> Vec<(u32, u32)> {
+        let is_of =
+            move |block: &u32| ((block & 1) + (block >> 2 & 1) + (block >> 4 & 1)) % 2 == colour;
+        (self.levels[level].clone())
+            .flat_map(|slot| (0..64).filter(is_of).map(move |block| (slot, block)))
+            .collect()
+    }
+
+    /// `pressure/smooth_first`, `pressure/smooth`, `pressure/smooth_corrected`: the corrections of a block of a level;
+    /// `None` where rounding decides whether it has a solution. The right-hand side itself is `rhs_error` off.
+    pub fn solved(
+        &self,
+        level: usize,
+        (slot, block): (u32, u32),
+        about: About,
+        rounding: Rounding,
+        rhs_error: [f64; 8],
+    ) -> Option<[Expected; 8]> {
+        let solution = (self.block(level, slot, block, about)).solution(rounding, rhs_error)?;
+        Some(std::array::from_fn(|c| Expected {
+            place: place(slot, block, c),
+            value: solution[c][0],
+            error: solution[c][1],
+        }))
+    }
+
+    /// `pressure/restrict`: residuals above a block of the first colour and above its neighbour along x: half of what has
+    /// flowed into the former since it was solved; nothing from the latter, which was solved last.
+    pub fn restricted(
+        &self,
+        level: usize,
+        (slot, block): (u32, u32),
+        rounding: Rounding,
+    ) -> [Expected; 2] {
+        let found = self.block(level, slot, block, About::Corrections);
+        let above = self.bricks[slot as usize].above;
+        let at = |block: u32| (above + above_offset(block)) as usize;
+        let sum: f64 = found.inflow.iter().sum();
+        // Residuals apart, that is what its size is made of.
+        let size: f64 = (0..8)
+            .map(|c| found.size[c] - self.residual[place(slot, block, c)].abs())
+            .sum();
+        [
+            Expected {
+                place: at(block),
+                value: 0.5 * sum,
+                error: (rounding.restricted)([rounding.unit, size]),
+            },
+            Expected {
+                place: at(block ^ 1),
+                value: 0.0,
+                error: 0.0,
+            },
+        ]
+    }
+
+    /// `pressure/solve_coarse`: from the residuals on level `first` down to the last one, symmetric sweeps there, and back
+    /// up. Corrections and residuals of the levels, and by how much the device's may be off; `None` where rounding decides
+    /// whether a block has a solution.
+    pub fn solve_coarse(&self, first: usize, rounding: Rounding) -> Option<[Self; 2]> {
+        let mut values = self.clone();
+        let own = (CELLS * self.levels[first].end) as usize;
+        values.residual[own..].fill(0.0);
+        values.correction.fill(0.0);
+        let mut errors = values.clone();
+        errors.residual.fill(0.0);
+        let mut cycle = Cycle {
+            values,
+            errors,
+            rounding,
+        };
+        cycle.run(first)?;
+        Some([cycle.values, cycle.errors])
+    }
+
+    /// The block beyond the face of a block; in slot 0 where there is none.
+    fn beside(&self, level: usize, slot: u32, block: u32, axis: usize, is_up: bool) -> (u32, u32) {
+        let step = 4u32.pow(axis as u32);
+        let at = block / step % 4;
+        match (is_up, at) {
+            (false, 1..) => (slot, block - step),
+            (true, ..3) => (slot, block + step),
+            _ => {
+                let far = self.bricks[slot as usize].faces[axis + 3 * usize::from(is_up)];
+                let far = if self.levels[level].contains(&far) {
+                    far
+                } else {
+                    0
+                };
+                let across = if is_up {
+                    block - 3 * step
+                } else {
+                    block + 3 * step
+                };
+                (far, across)
+            }
+        }
+    }
+
+    fn block(&self, level: usize, slot: u32, block: u32, about: About) -> Block {
+        let mut found = Block {
+            matrix: [[0.0; 8]; 8],
+            rhs: [0.0; 8],
+            size: [0.0; 8],
+            inflow: [0.0; 8],
+        };
+        for c in 0..8 {
+            let own = place(slot, block, c);
+            found.matrix[c][c] += self.dirichlet[own];
+            found.rhs[c] = self.residual[own];
+            found.size[c] = found.rhs[c].abs();
+            for k in 0..6 {
+                let (axis, is_up) = (k / 2, k % 2 == 1);
+                let other_c = c ^ 1 << axis;
+                let is_inner = (c >> axis & 1 == 1) != is_up;
+                let (there, other_block) = match is_inner {
+                    true => (slot, block),
+                    false => self.beside(level, slot, block, axis, is_up),
+                };
+                let other = place(there, other_block, other_c);
+                let owner = if is_up { other } else { own };
+                let shared = f64::from(self.coefficient[axis][owner]);
+                found.matrix[c][c] += shared;
+                if is_inner {
+                    found.matrix[c][other_c] -= shared;
+                } else if about != About::Nothing {
+                    let mut value = self.correction[other];
+                    let mut size = value.abs();
+                    if about == About::WithAbove {
+                        let brick = self.bricks[there as usize].above;
+                        let more = self.correction[(brick + above_offset(other_block)) as usize];
+                        value += more;
+                        size += more.abs();
+                    }
+                    found.inflow[c] += shared * value;
+                    found.size[c] += shared * size;
+                }
+            }
+            found.rhs[c] += found.inflow[c];
+        }
+        found
+    }
+}
+
+impl Block {
+    /// Solutions of its matrix; `None` where rounding decides whether it has one.
+    fn solve<const N: usize>(&self, mut rhs: [[f64; N]; 8]) -> Option<[[f64; N]; 8]> {
+        let mut a = self.matrix;
+        let is_row = |k: usize| self.matrix[k][k] != 0.0;
+        for k in (0..8).filter(|&k| is_row(k)) {
+            if a[k][k] < LEAST_PIVOT * self.matrix[k][k] {
+                return None;
+            }
+            let (pivots, known) = (a[k], rhs[k]);
+            for (row, rhs) in a.iter_mut().zip(&mut rhs).skip(k + 1) {
+                let factor = row[k] / pivots[k];
+                for (value, pivot) in row.iter_mut().zip(&pivots).skip(k) {
+                    *value -= factor * pivot;
+                }
+                for (value, known) in rhs.iter_mut().zip(&known) {
+                    *value -= factor * known;
+                }
+            }
+        }
+        for k in (0..8).rev() {
+            rhs[k] = std::array::from_fn(|n| {
+                let known: f64 = (k + 1..8).map(|j| a[k][j] * rhs[j][n]).sum();
+                match is_row(k) {
+                    true => (rhs[k][n] - known) / a[k][k],
+                    false => 0.0,
+                }
+            });
+        }
+        Some(rhs)
+    }
+
+    /// The solution and by how much it may be off: elimination solves a matrix and a right-hand side that are a few
+    /// roundings off (Higham 2002, theorem 9.3; its factors have no greater entries than an M-matrix itself), and the
+    /// inverse has no negative entry. The right-hand side itself is `rhs_error` off.
+    fn solution(&self, rounding: Rounding, rhs_error: [f64; 8]) -> Option<[[f64; 2]; 8]> {
+        let exact = self.solve(self.rhs.map(|b| [b]))?;
+        let off = std::array::from_fn(|c| {
+            let terms = self.matrix[c].iter().zip(&exact);
+            let row: f64 = terms.map(|(a, [z])| (a * z).abs()).sum();
+            [rhs_error[c] + (rounding.block)([rounding.unit, row, self.size[c]])]
+        });
+        let off = self.solve(off)?;
+        Some(std::array::from_fn(|c| [exact[c][0], off[c][0]]))
+    }
+}
+
+/// The levels' values, and by how much the device's may be off: what a block is given by others and its inverse have no
+/// negative entry, so that bounds take the same steps as values, and each step adds its own rounding.
+struct Cycle {
+    values: Levels,
+    errors: Levels,
+    rounding: Rounding,
+}
+
+impl Cycle {
+    fn smooth(&mut self, level: usize, colour: u32, about: About) -> Option<()> {
+        for (slot, block) in self.values.coloured(level, colour) {
+            let rhs_error = self.errors.block(level, slot, block, about).rhs;
+            let at = (slot, block);
+            let solved = (self.values).solved(level, at, about, self.rounding, rhs_error)?;
+            for Expected {
+                place,
+                value,
+                error,
+            } in solved
+            {
+                self.values.correction[place] = value;
+                self.errors.correction[place] = error;
+            }
+        }
+        Some(())
+    }
+
+    fn restrict(&mut self, level: usize) {
+        for at in self.values.coloured(level, 0) {
+            let found = self.values.restricted(level, at, self.rounding);
+            let carried = self.errors.restricted(level, at, self.rounding);
+            for (found, carried) in found.into_iter().zip(carried) {
+                self.values.residual[found.place] = found.value;
+                self.errors.residual[found.place] = carried.value + found.error;
+            }
+        }
+    }
+
+    fn run(&mut self, first: usize) -> Option<()> {
+        let last = self.values.levels.len() - 1;
+        for level in first..last {
+            self.smooth(level, 0, About::Nothing)?;
+            self.smooth(level, 1, About::Corrections)?;
+            self.restrict(level);
+        }
+        self.smooth(last, 0, About::Nothing)?;
+        for _ in 0..SWEEPS {
+            self.smooth(last, 1, About::Corrections)?;
+            self.smooth(last, 0, About::Corrections)?;
+        }
+        for level in (first..last).rev() {
+            self.smooth(level, 1, About::WithAbove)?;
+            self.smooth(level, 0, About::Corrections)?;
+        }
+        Some(())
+    }
+}

@@ -1,0 +1,460 @@
+//! Keys of a scene, in the order in which a cache's `scene.toml` has them.
+//!
+//! Each range is wider than any shot needs, and narrow enough that no product or quotient of what a scene may hold leaves
+//! what the solvers compute with.
+
+use super::super::{
+    Effects, Iteration, Method, Wall, budget,
+    build::{CHEBYSHEV_RELAXATION, RELAXATION},
+    flip::{self, Preconditioner, Surface, Transfer},
+    key::{Interval, Key, words},
+    probe::ProbeKind,
+};
+use crate::domain::sparse_grid;
+
+pub(in super::super) const KEYS: &[Key] = &[
+    Key::table("shot", SHOT)
+        .about("What the shot is called, how long it runs, how fine its clock is"),
+    Key::table("domain", DOMAIN).about("The box of the whole scene; its six walls are solid"),
+    Key::table("water", WATER)
+        .default("{}")
+        .about("The water and where it is at the start"),
+    Key::tables("solid", SOLID).about("What the water meets: meshes, at rest or in motion"),
+    Key::tables("wave_maker", WAVE_MAKER).about("Walls of the domain that move inward"),
+    Key::table("solver", SOLVER)
+        .about("Which solver, and the settings of each; both tables may stand"),
+    Key::table("grids", GRIDS)
+        .absent()
+        .not_physics()
+        .about("Each frame's water as OpenVDB grids beside its particles"),
+    Key::tables("probe", PROBE)
+        .not_physics()
+        .about("What is measured at each frame, a CSV each"),
+    Key::table("budget", BUDGET)
+        .default("{}")
+        .not_physics()
+        .about("What ends the bake where it is passed; `false` switches a limit off"),
+    Key::table("effects", Effects::KEYS)
+        .default("{}")
+        .about("Effects; what is not named here does not exist"),
+];
+
+/// Metres along an axis, from the world's origin.
+const COORDINATE: Interval = -1e6..=1e6;
+
+/// Metres. Below 10 nm matter is no fluid; 100 km is a tenth of the largest domain.
+const SPACING: Interval = 1e-8..=1e5;
+
+/// Largest displacement in a substep. With 10 000 substeps a frame, the most there are, 1e-5 is a tenth of one in a frame.
+const CFL: Interval = 1e-5..=5.0;
+
+/// m/s², and m/s of placed particles.
+const VECTOR: Interval = -1e4..=1e4;
+
+/// Iterations, or substeps in a frame.
+const MANY: std::ops::RangeInclusive<u32> = 1..=10_000;
+
+const SHOT: &[Key] = &[
+    Key::file_stem("name")
+        .not_physics()
+        .about("names the files"),
+    Key::whole("frames", 1..=1_000_000)
+        .not_physics()
+        .about("output frames; frame 1 is the first after the start"),
+    // From a frame in 100 s, with which a tide is baked in a thousand frames, to the rate of a high-speed camera.
+    Key::number("frames_per_second", 0.01..=1e5)
+        .unit("per second")
+        .about("output frames a second"),
+];
+
+const DOMAIN: &[Key] = &[
+    Key::vector("min", 3, COORDINATE)
+        .unit("metres")
+        .also(", each below max by 1e-8 at least")
+        .about("least corner"),
+    Key::vector("max", 3, COORDINATE)
+        .unit("metres")
+        .also(", each above min by 1e-8 at least")
+        .about("greatest corner"),
+];
+
+const WATER: &[Key] = &[
+    // Hydrogen gas has 0.09, osmium 22 590.
+    Key::number("rest_density", 0.01..=1e5)
+        .unit("kg/m³")
+        .default("1000.0")
+        .about("density at rest"),
+    Key::vector("gravity", 3, VECTOR)
+        .unit("m/s²")
+        .default("[0.0, -9.81, 0.0]")
+        .about("acceleration of all water"),
+    Key::tables("block", BLOCK).about("A box full of water"),
+    Key::tables("mesh", WATER_MESH).about("A mesh full of water"),
+    Key::tables("particles", PARTICLES).about("Single particles, one by one"),
+];
+
+const BLOCK: &[Key] = &[
+    Key::vector("min", 3, COORDINATE)
+        .unit("metres")
+        .also(", in the domain and below max")
+        .about("least corner"),
+    Key::vector("max", 3, COORDINATE)
+        .unit("metres")
+        .also(", in the domain and above min")
+        .about("greatest corner"),
+];
+
+const BLAKE3: Key = Key::text("blake3", "the BLAKE3 of the file in hex, or nothing")
+    .absent()
+    .about("the mesh is refused where its file has another; a cache's scene has it");
+const TRANSLATE: Key = Key::vector("translate", 3, -1e9..=1e9)
+    .unit("metres")
+    .default("[0.0, 0.0, 0.0]")
+    .about("where the file's origin goes, after scale and rotation");
+const ROTATE: Key = Key::vector("rotate_degrees", 3, -1e6..=1e6)
+    .unit("degrees about x, then y, then z")
+    .default("[0.0, 0.0, 0.0]")
+    .about("rotation, as \"XYZ Euler\" means in Blender and Houdini");
+const SCALE: Key = Key::scale("scale", 1e-6..=1e6)
+    .default("1.0")
+    .about("metres per unit of the file, for all axes or each");
+
+const WATER_MESH: &[Key] = &[
+    Key::text(
+        "file",
+        "a closed .obj, .ply or .stl within the domain, relative to the scene file",
+    )
+    .by_hash()
+    .about("the mesh; open ones are taken with a warning where an inside can be told"),
+    BLAKE3,
+    TRANSLATE,
+    ROTATE,
+    SCALE,
+];
+
+const PARTICLES: &[Key] = &[
+    Key::points("at", 3, "an array of [x, y, z], metres, in the domain")
+        .about("positions, taken as they are"),
+    Key::vector("velocity", 3, VECTOR)
+        .unit("m/s")
+        .default("[0.0, 0.0, 0.0]")
+        .about("of all of them"),
+];
+
+const SOLID: &[Key] = &[
+    Key::text(
+        "mesh",
+        "a closed .obj, .ply or .stl that reaches into the domain, relative to the scene file",
+    )
+    .by_hash()
+    .about("the mesh; open ones are taken with a warning where an inside can be told"),
+    BLAKE3,
+    TRANSLATE,
+    ROTATE,
+    SCALE,
+    Key::vector("direction", 3, -1e6..=1e6)
+        .absent()
+        .with("motion")
+        .also(", not all 0; their length does not count")
+        .about("where a solid moves; of the solver flip alone"),
+    Key::inline("motion", SOLID_MOTION)
+        .absent()
+        .with("direction")
+        .also(", that brings the solid into the domain and not ten domains away")
+        .about("How far along `direction` the solid has come"),
+];
+
+const WAVE_MAKER: &[Key] = &[
+    Key::choice("wall", &WALLS)
+        .also(", each once")
+        .about("which wall of the domain"),
+    Key::inline("motion", WALL_MOTION)
+        .also(", that leaves at least two particle spacings (PBF) or three cells (FLIP) between the walls")
+        .about("How far inward the wall has come"),
+];
+
+const WALLS: [&str; 6] = words(&Wall::NAMED);
+
+/// Metres: a stroke, a wave's height, the water's depth. The domain is the upper bound.
+const LENGTH: Interval = 1e-9..=1e6;
+
+/// Seconds: from a tenth of a millisecond, the ripples of ultrasound, to eleven days, a spring tide.
+const PERIOD: Interval = 1e-4..=1e6;
+
+// Sound has 1 500 m/s in water.
+const VELOCITY: Key = Key::number("velocity", 1e-9..=1e5)
+    .unit("m/s")
+    .only("kind", &["constant_velocity"])
+    .about("steady speed, inward or along direction");
+const UNTIL: Key = Key::number("until", 1e-6..=1e9)
+    .unit("seconds")
+    .absent()
+    .only("kind", &["constant_velocity"])
+    .about("when it stops");
+const STROKE: Key = Key::number("stroke", LENGTH)
+    .unit("metres")
+    .only("kind", &["sine"])
+    .about("from one end of the way to the other");
+const WAVE_PERIOD: Key = Key::number("period", PERIOD)
+    .unit("seconds")
+    .only("kind", &["sine"])
+    .about("there and back");
+const RAMP: Key = Key::number_or_zero("ramp", PERIOD)
+    .unit("seconds")
+    .computed(|| "one period".to_owned())
+    .only("kind", &["sine"])
+    .about("how long it takes to begin");
+const FILE: Key = Key::text(
+    "file",
+    "a CSV of time,displacement (seconds, metres), relative to the scene file",
+)
+.absent()
+.only("kind", &["table"])
+.about("displacements from a file; the written-out scene has them as points");
+const POINTS: Key = Key::points(
+    "points",
+    2,
+    "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0, all up to 1e9, no faster \
+     than 100000 m/s",
+)
+.only("kind", &["table"])
+.without(&["file"])
+.about("displacements in place");
+
+const SOLID_MOTION: &[Key] = &[
+    Key::choice("kind", &["constant_velocity", "sine", "table"])
+        .also("; a solitary wave is made by a wall")
+        .about("kind of motion"),
+    VELOCITY,
+    UNTIL,
+    STROKE,
+    WAVE_PERIOD,
+    RAMP,
+    FILE,
+    POINTS,
+];
+
+const WALL_MOTION: &[Key] = &[
+    Key::choice("kind", &["constant_velocity", "sine", "solitary", "table"])
+        .about("kind of motion; `solitary` is Goring 1978"),
+    VELOCITY,
+    UNTIL,
+    STROKE,
+    WAVE_PERIOD,
+    RAMP,
+    Key::number("height", LENGTH)
+        .unit("metres")
+        .only("kind", &["solitary"])
+        .also(", at most the depth")
+        .about("of the wave"),
+    Key::number("depth", LENGTH)
+        .unit("metres")
+        .only("kind", &["solitary"])
+        .about("of the water at rest"),
+    FILE,
+    POINTS,
+];
+
+const METHODS: [&str; 2] = words(&Method::NAMED);
+
+const SOLVER: &[Key] = &[
+    Key::choice("method", &METHODS)
+        .also(", with a table [solver.pbf] or [solver.flip]")
+        .about("the solver; `--solver` picks as well"),
+    Key::table("pbf", PBF)
+        .absent()
+        .about("Position-based fluids (Macklin and Müller 2013)"),
+    Key::table("flip", FLIP)
+        .absent()
+        .about("PIC/FLIP (Zhu and Bridson 2005)"),
+];
+
+const ITERATIONS: [&str; 3] = words(&Iteration::NAMED);
+
+const PBF: &[Key] = &[
+    Key::number("particle_spacing", SPACING)
+        .unit("metres")
+        .also(", with at most 65536 cells along an axis, 2147483647 cells and 134217728 particles")
+        .about("d, between neighbours at the start"),
+    Key::number("support_ratio", 1.5..=4.0)
+        .default("2.0")
+        .about("support radius over d"),
+    Key::choice("iteration", &ITERATIONS)
+        .default("\"red_black\"")
+        .about("how corrections see each other"),
+    // Above, Chebyshev's factors hardly change any more within 10 000 iterations.
+    Key::number("spectral_radius", 0.01..=0.9999)
+        .only("iteration", &["chebyshev"])
+        .default("0.98")
+        .about("ρ of the plain iteration; nearer to 1 reaches deeper"),
+    Key::whole("iterations", MANY)
+        .without(&["density_error", "max_iterations"])
+        .default("4")
+        .about("of each substep"),
+    // f32 tells densities 6e-8 apart.
+    Key::number("density_error", 1e-7..=0.99)
+        .absent()
+        .with("max_iterations")
+        .about("iterate until the mean of max(0, ρ/ρ0 − 1) is below it"),
+    Key::whole("max_iterations", MANY)
+        .absent()
+        .with("density_error")
+        .about("and at most so often"),
+    Key::number("cfl", CFL)
+        .default("1.0")
+        .about("largest displacement in a substep, in d; as many substeps as that asks"),
+    // A hundredth takes a hundred iterations for one.
+    Key::number("relaxation", 0.01..=1.5)
+        .computed(|| {
+            format!("{RELAXATION:?}, {CHEBYSHEV_RELAXATION:?} with iteration = \"chebyshev\"")
+        })
+        .about("ω, factor on each correction"),
+    Key::number("artificial_pressure", 0.0..=10.0)
+        .default("0.0")
+        .about("k of s_corr, with λ's natural scale as unit"),
+    Key::whole("max_substeps", MANY)
+        .not_physics()
+        .default("32")
+        .about("more in a frame are an error (exit 5), never silently fewer"),
+];
+
+const TRANSFERS: [&str; 2] = words(&Transfer::NAMED);
+const SURFACES: [&str; 2] = words(&Surface::NAMED);
+
+const FLIP: &[Key] = &[
+    Key::number("cell_size", SPACING)
+        .unit("metres")
+        .also(
+            ", with at least 3 and at most 65536 cells along each axis, 68719476736 cells and 134217728 particles",
+        )
+        .about("Δx"),
+    // Fewer than four in a cell do not tell its density.
+    Key::whole("particles_per_cell", 4..=64)
+        .default("8")
+        .about("in a full cell at rest, n on a lattice of spacing Δx / ∛n"),
+    Key::choice("transfer", &TRANSFERS)
+        .default("\"flip\"")
+        .about("`apic` (Jiang 2015) has affine rows as attributes of the frames"),
+    Key::number("pic_blend", 0.0..=1.0)
+        .default("0.05")
+        .about("α, the part of the velocity taken from the grid; a viscosity of α Δx² / (6 Δt); unused by apic"),
+    Key::number("cfl", CFL)
+        .default("3.0")
+        .about("largest displacement in a substep, in cells; as many substeps as that asks"),
+    Key::whole("max_substeps", MANY)
+        .not_physics()
+        .default("32")
+        .about("more in a frame are an error (exit 5), never silently fewer"),
+    Key::choice("surface", &SURFACES)
+        .default("\"ghost_fluid\"")
+        .about("where the pressure is zero: at the surface (Enright 2003), or in the middle of the first cell of air"),
+    Key::flag("density_correction")
+        .default("true")
+        .about("moves particles so that the volume stays (Kugelstadt 2019)"),
+    Key::table("pressure", PRESSURE)
+        .default("{}")
+        .about("The linear solve of the projection"),
+];
+
+const PRECONDITIONERS: [&str; 4] = words(&Preconditioner::NAMED);
+const PRECISIONS: [&str; 3] = words(&flip::Precision::NAMED);
+
+const PRESSURE: &[Key] = &[
+    Key::choice("preconditioner", &PRECONDITIONERS)
+        .default("\"multigrid\"")
+        .about("of the conjugate gradients; `ipp` is Ament 2010"),
+    Key::choice("precision", &PRECISIONS)
+        .default("\"f32_refined\"")
+        .also(", the last where the adapter has it")
+        .about("one word, iterative refinement, or 64-bit shader floats"),
+    // In f64 a residual is rounded at 2e-16 a term, and a row has seven.
+    Key::number("tolerance", 1e-14..=0.99)
+        .unit("of the right-hand side's norm")
+        .default("1e-5")
+        .about("true residual at which a solve stops"),
+    Key::whole("max_iterations", MANY)
+        .default("400")
+        .about("a solve that ends there is reported"),
+];
+
+const GRID_PRECISIONS: [&str; 2] = words(&sparse_grid::Precision::NAMED);
+
+const GRIDS: &[Key] = &[
+    Key::flag("surface")
+        .default("false")
+        .also("; one of surface and velocity true")
+        .about("level set \"surface\", metres, a band of three voxels to each side"),
+    Key::flag("velocity")
+        .default("false")
+        .about("staggered \"vel\", m/s, carried three voxels beyond the water"),
+    Key::other(
+        "voxel_size",
+        "a number from a quarter of the particle spacing to 8 of them, metres, with at most 268435456 leaves of 8³ voxels \
+         in the domain",
+    )
+    .computed(|| "flip's cell_size, or two particle spacings of pbf".to_owned())
+    .about("edge of a voxel"),
+    Key::choice("precision", &GRID_PRECISIONS)
+        .default("\"half\"")
+        .about("how values are kept"),
+];
+
+const PROBES: [&str; 4] = ProbeKind::NAMES;
+
+const PROBE: &[Key] = &[
+    Key::file_stem("name")
+        .also(", each name once, upper and lower case taken alike")
+        .computed(|| "the kind with a number".to_owned())
+        .about("of its CSV in the cache"),
+    Key::choice("kind", &PROBES)
+        .also(
+            "; with the solver pbf a pressure asks for iteration = \"red_black\" or \"jacobi\" and artificial_pressure = 0",
+        )
+        .about("elevation of the surface, m; pressure, Pa; energy of all water, J; its volume, m³"),
+    Key::other(
+        "at",
+        "[x, z] of an elevation or [x, y, z] of a pressure, metres, in the domain",
+    )
+    .only("kind", &["elevation", "pressure"])
+    .about("where"),
+];
+
+/// In its unit: wider than what f32 tells apart from nothing, and than anything that is computed.
+const LIMIT: Interval = 1e-12..=1e12;
+
+/// Defaults: a few times what the shipped scenes come to, of which docs/scene.md has the largest.
+const BUDGET: &[Key] = &[
+    Key::number_or_false("speed", LIMIT)
+        .unit("m/s")
+        .computed(budget::speed_words)
+        .about("of a particle at a frame's end"),
+    Key::number_or_false("density_error_mean", LIMIT)
+        .unit("of the rest density")
+        .default("0.5")
+        .about("mean of max(0, ρ/ρ0 − 1) at a frame's end"),
+    Key::number_or_false("density_error_p99", LIMIT)
+        .unit("of the rest density")
+        .default("5.0")
+        .about("its 99th percentile"),
+    Key::number_or_false("capped", LIMIT)
+        .unit("of all particles in all substeps")
+        .default("0.01")
+        .about("times that a particle was slowed to the displacement cap"),
+    Key::number_or_false("residual", LIMIT)
+        .unit("of the right-hand side's norm")
+        .also(", at least solver.flip.pressure.tolerance")
+        .computed(budget::residual_words)
+        .about("true residual of a projection"),
+    Key::number_or_false("divergence", LIMIT)
+        .unit("of a cell's volume in a substep")
+        .default("0.1")
+        .about("largest |∇·u| Δt after a projection"),
+    Key::number_or_false("volume", LIMIT)
+        .unit("of the volume at the start")
+        .default("false")
+        .about("how far the volume may be off; measured only where it is set"),
+    Key::number_or_false("energy", LIMIT)
+        .unit("of the total energy in a frame")
+        .computed(budget::energy_words)
+        .about("rise of kinetic and potential energy beyond the work of walls and solids"),
+];

@@ -1,0 +1,265 @@
+//! Keys of a study, of all its kinds.
+
+use super::super::key::{Interval, Key};
+
+pub(in super::super) const KEYS: &[Key] = &[
+    Key::choice("kind", &["solver_comparison", "sweep", "stability"]).about("what is compared"),
+    Key::text("scene", "a scene file, relative to the study file")
+        .only("kind", &["solver_comparison", "sweep"])
+        .about("what is simulated"),
+    Key::other("about", "an array of paragraphs for the page")
+        .absent()
+        .only("kind", &["sweep", "stability"])
+        .about("in the reader's words"),
+    // Of two solvers.
+    Key::text("look", "a look file that writes PNG, relative to the study file")
+        .only("kind", COMPARISON)
+        .about("how both are seen"),
+    Key::other("solvers", "two of \"pbf\" and \"flip\", each once")
+        .only("kind", COMPARISON)
+        .about("left and right"),
+    Key::other(
+        "frames",
+        "frames to measure, such as \"1-240\" or \"1-240x2\", within the shot; all of it if left out",
+    )
+    .absent()
+    .only("kind", COMPARISON)
+    .about("what the curves are drawn from"),
+    Key::other("pictures", "frames to render, such as \"60-240x60\", within the shot")
+        .only("kind", COMPARISON)
+        .about("pairs of pictures"),
+    // Of a sweep.
+    SET.only("kind", SWEEP),
+    KEY.only("kind", SWEEP),
+    VALUES.only("kind", SWEEP),
+    COARSER.only("kind", SWEEP),
+    Key::whole("steps", 1..=1_000_000)
+        .absent()
+        .without(&["seconds"])
+        .only("kind", SWEEP)
+        .also("; or seconds")
+        .about("output frames of a run"),
+    Key::other(
+        "seconds",
+        "seconds of the shot, a whole number of frames at every frame rate; or steps",
+    )
+    .absent()
+    .only("kind", SWEEP)
+    .about("how long a run is"),
+    Key::whole("repeats", 1..=100)
+        .default("1")
+        .only("kind", SWEEP)
+        .about("times are medians over so many runs"),
+    Key::other(
+        "errors",
+        "of \"density_error_mean\", \"density_error_p99\", \"density_error_max\", or of \"crest_error\", \
+         \"front_error\", \"energy_error\", \"profile_error\", or of \"pressure_error\", \"velocity_error\", \
+         \"divergence\", or \"distance_to_converged\"",
+    )
+    .only("kind", SWEEP)
+    .about("what is measured"),
+    Key::flag("convergence_point")
+        .default("false")
+        .only("kind", SWEEP)
+        .about("whether that of the paper's Table 1 is looked for"),
+    Key::tables("method", METHOD)
+        .only("kind", SWEEP)
+        .about("A line of the curves each"),
+    // Of stability.
+    Key::tables("case", CASE)
+        .only("kind", STABILITY)
+        .about("A small scene that is hard on a solver"),
+    Key::tables("limit", LIMIT)
+        .only("kind", STABILITY)
+        .about("How far a setting goes before a mark is missed"),
+];
+
+const COMPARISON: &[&str] = &["solver_comparison"];
+const SWEEP: &[&str] = &["sweep"];
+const STABILITY: &[&str] = &["stability"];
+
+const SET: Key = Key::other(
+    "set",
+    "an array of overrides of the scene, such as [\"solver.pbf.iterations=8\"]",
+)
+.absent()
+.about("laid over the scene, as `--set` does");
+
+const KEY: Key = Key::other(
+    "key",
+    "a key of the scene, such as \"solver.pbf.iterations\", or \"device\", here or for all methods",
+)
+.absent()
+.about("what changes from run to run");
+
+const VALUES: Key = Key::other(
+    "values",
+    "two or more values of the key, from coarse to fine, here or for all methods",
+)
+.absent()
+.about("of the key");
+
+const COARSER: Key = Key::other(
+    "coarser",
+    "an array of overrides of the scene that make the last value's run coarser, with errors against a finest run or of a \
+     projection",
+)
+.absent()
+.about("what that run is off by is the discretisation error");
+
+const METHOD: &[Key] = &[
+    Key::other("name", "what the line of the curves is called").about("for the legend"),
+    SET,
+    KEY,
+    VALUES,
+    COARSER,
+    Key::other(
+        "device",
+        "\"gpu\", or \"cpu\" for the f64 reference, which runs whole frames and no single projections",
+    )
+    .absent()
+    .about("what it runs on; the GPU if left out"),
+    Key::other(
+        "against",
+        "another method of the same key and values, with errors that are else against the finest run",
+    )
+    .absent()
+    .about("value by value against that method"),
+];
+
+const SOLVERS: Key = Key::other(
+    "solvers",
+    "an array of \"pbf\" and \"flip\"; both if left out",
+)
+.absent()
+.about("which solvers");
+
+const DEVICES: Key = Key::other(
+    "devices",
+    "an array of \"gpu\" and \"cpu\"; both if left out",
+)
+.absent()
+.about("which devices");
+
+const NOTE: Key = Key::other("note", "words")
+    .absent()
+    .about("further words, for the page");
+
+const CASE: &[Key] = &[
+    Key::other(
+        "number",
+        "a whole number; name and number together each once",
+    )
+    .about("several cases may have one"),
+    Key::other(
+        "name",
+        "words, other than those of a case of the same number",
+    )
+    .about("for the page"),
+    NOTE,
+    Key::other("scene", "a scene file, relative to the study file; or test")
+        .absent()
+        .about("what is simulated"),
+    Key::other(
+        "test",
+        "the command that runs a test that holds the case, in place of scene",
+    )
+    .absent()
+    .about("for what no scene can show"),
+    SET,
+    SOLVERS,
+    DEVICES,
+    Key::other("frames", "a whole number of frames within the shot")
+        .absent()
+        .about("to run; the whole shot if left out"),
+    Key::other(
+        "refused",
+        "an array of words that stand in the message of a refusal",
+    )
+    .absent()
+    .about("for a scene that has to be refused"),
+    Key::tables("against", AGAINST).about("Another run beside it, frame by frame"),
+    Key::tables("mark", MARKS).about(MARK),
+];
+
+const MARK: &str = "What is measured, and what it has to be";
+
+const AGAINST: &[Key] = &[
+    SET,
+    Key::other("device", "\"gpu\" or \"cpu\"")
+        .absent()
+        .about("the case's own if left out"),
+    Key::number("scale", 1e-6..=1e6)
+        .absent()
+        .also(": the lengths of the other run over those of the case")
+        .about("1 if left out"),
+    Key::vector("shift", 3, FAR)
+        .unit("metres")
+        .absent()
+        .about("its origin"),
+];
+
+/// Largest coordinate of a region or a shift, metres.
+const FAR: Interval = -1e9..=1e9;
+
+/// What a quantity is held to, in its unit.
+const BOUND: Interval = -1e12..=1e12;
+
+/// Seconds of a shot that do not count.
+const SKIPPED: Interval = 0.0..=1e8;
+
+const MARKS: &[Key] = &[
+    Key::other(
+        "of",
+        "a name of swell::scene::study::stability::Quantity, such as \"least_spacing\"",
+    )
+    .about("what is measured"),
+    Key::number("at_most", BOUND)
+        .absent()
+        .also("; one of at_most and at_least")
+        .about("what it has to be"),
+    Key::number("at_least", BOUND)
+        .absent()
+        .also("; one of at_most and at_least")
+        .about("what it has to be"),
+    Key::number("after", SKIPPED)
+        .unit("seconds")
+        .absent()
+        .about("time that does not count"),
+    Key::number("since", SKIPPED)
+        .unit("seconds")
+        .absent()
+        .about("against the state then, not that of the start"),
+    Key::corners("region", FAR)
+        .unit("metres")
+        .absent()
+        .about("only what starts in this box"),
+    SOLVERS,
+    DEVICES,
+    Key::other("known_failure", "words")
+        .absent()
+        .about("why it is missed; a known failure that passes is told as well"),
+];
+
+/// What a limit is searched between, in its unit.
+const SEARCHED: Interval = 1e-12..=1e12;
+
+const LIMIT: &[Key] = &[
+    Key::other("name", "words").about("for the page"),
+    NOTE,
+    Key::other("unit", "words").absent().about("of the setting"),
+    Key::other("scene", "a scene file, relative to the study file").about("what is simulated"),
+    Key::other(
+        "set",
+        "an array of overrides of the scene, such as [\"solver.pbf.iterations={}\"]",
+    )
+    .about("`{}` is the value, `{2*}` twice it, `{2/}` two over it"),
+    SOLVERS,
+    Key::number("passes", SEARCHED).about("from a value that passes"),
+    Key::number("fails", SEARCHED).about("to one that fails"),
+    // Each step halves the logarithm of what is left, 24 of them at most for 1e24 to 1.001.
+    Key::number("ratio", 1.001..=1e12).about("until the two are that near"),
+    // Some shots have 1e6 frames of 100 s.
+    Key::number("seconds", 1e-6..=1e8).about("of the shot"),
+    Key::tables("mark", MARKS).about(MARK),
+];

@@ -1,0 +1,306 @@
+//! The tables against what is read and written, and the page against the tables.
+
+use std::{collections::BTreeSet, path::Path};
+
+use toml::{Table, Value};
+
+use super::{super::key::*, super::*, *};
+
+/// Every table of a scene, each with as little as it may have.
+const LEAST: &str = r#"
+[shot]
+name = "least"
+frames = 10
+frames_per_second = 50
+[domain]
+min = [0, 0, 0]
+max = [4, 3, 12]
+[[water.mesh]]
+file = "cube.obj"
+[[water.particles]]
+at = [[2, 1, 1]]
+[[solid]]
+mesh = "cube.obj"
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "sine", stroke = 0.5, period = 2.0 }
+[solver]
+method = "pbf"
+[solver.pbf]
+particle_spacing = 0.1
+[solver.flip]
+cell_size = 0.2
+[grids]
+surface = true
+"#;
+
+const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
+    f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
+
+fn load(set: &[&str]) -> Scene {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
+    let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
+    Scene::parse(LEAST, Path::new("least.toml"), folder.path(), &set).expect("the least is enough")
+}
+
+/// The first value at a dotted path, in the first table of each array.
+fn value_at<'v>(table: &'v Table, path: &str) -> Option<&'v Value> {
+    let first = |value: &'v Value| match value {
+        Value::Array(items) if items.first().is_some_and(Value::is_table) => items.first(),
+        other => Some(other),
+    };
+    match path.split_once('.') {
+        None => table.get(path),
+        Some((name, rest)) => value_at(first(table.get(name)?)?.as_table()?, rest),
+    }
+}
+
+/// One number means the same whether it is written with a fraction or not, and a scale is one for all axes.
+fn plain(path: &str, value: &Value) -> Value {
+    match value {
+        Value::Integer(whole) => Value::Float(*whole as f64),
+        Value::Float(scale) if path.ends_with(".scale") => {
+            Value::Array(vec![Value::Float(*scale); 3])
+        }
+        other => other.clone(),
+    }
+}
+
+#[test]
+fn what_is_left_out_is_the_default_of_the_table() {
+    let chebyshev = load(&["solver.pbf.iteration=chebyshev"]).written(&|_, _| "a.obj".to_owned());
+    let written = load(&[]).written(&|_, _| "a.obj".to_owned());
+    let mut compared = BTreeSet::new();
+    for path in paths(SCENE) {
+        let key = find(SCENE, &path).expect("a key");
+        let LeftOut::Value(toml) = key.default else {
+            continue;
+        };
+        let table: Table = toml::from_str(&format!("v = {toml}")).expect(toml);
+        // What stands in the least scene, and tables.
+        if path == "grids.surface" || table["v"].is_table() {
+            continue;
+        }
+        let scene = if key.only.is_some() {
+            &chebyshev
+        } else {
+            &written
+        };
+        let found = value_at(scene, &path).unwrap_or_else(|| panic!("{path} is not written"));
+        assert_eq!(plain(&path, found), plain(&path, &table["v"]), "{path}");
+        compared.insert(path);
+    }
+    assert!(
+        compared.contains("solver.flip.pressure.tolerance") && compared.len() > 25,
+        "{compared:?}"
+    );
+}
+
+/// What depends on more than its key is said in words, with the numbers that hold.
+#[test]
+fn defaults_that_are_computed_are_what_their_words_say() {
+    let says = |path: &str, number: &str| {
+        let LeftOut::Computed(words) = find(SCENE, path).expect("a key").default else {
+            panic!("{path}");
+        };
+        assert!(words().contains(number), "{path}: {} for {number}", words());
+    };
+    for (set, path) in [
+        ("solver.pbf.iteration=red_black", "solver.pbf.relaxation"),
+        ("solver.pbf.iteration=chebyshev", "solver.pbf.relaxation"),
+        ("solver.method=pbf", "budget.energy"),
+        ("solver.method=flip", "budget.energy"),
+        ("solver.method=flip", "budget.residual"),
+    ] {
+        let written = load(&[set]).written(&|_, _| "a.obj".to_owned());
+        let value = value_at(&written, path).expect(path);
+        says(path, &value.to_string());
+    }
+}
+
+#[test]
+fn what_is_no_physics_is_said_once() {
+    let of = |physics: Physics| {
+        let mut paths = paths(SCENE);
+        paths.retain(|path| find(SCENE, path).expect("a key").physics == physics);
+        paths
+    };
+    let free = [
+        "shot.name",
+        "shot.frames",
+        "solver.pbf.max_substeps",
+        "solver.flip.max_substeps",
+        "grids",
+        "probe",
+        "budget",
+    ];
+    assert_eq!(of(Physics::No), free);
+    assert_eq!(of(Physics::ByHash), ["water.mesh.file", "solid.mesh"]);
+}
+
+#[test]
+fn allowed_words_follow_from_the_declaration() {
+    for (path, words) in [
+        ("solver.pbf.cfl", "a number from 1e-5 to 5"),
+        ("shot.frames", "a whole number from 1 to 1000000"),
+        ("domain", "a table with min and max"),
+        ("solver.pbf", "a table with at least particle_spacing"),
+        ("water.block[3]", "an array of tables [[block]]"),
+        ("water.gravity", "three numbers from -10000 to 10000, m/s²"),
+        (
+            "solid[1].scale",
+            "a number from 1e-6 to 1e6, or three of them; negative ones mirror",
+        ),
+        ("solver.flip.transfer", "\"flip\" or \"apic\""),
+        (
+            "wave_maker[0].motion.ramp",
+            "0 or a number from 1e-4 to 1e6, seconds, with kind = \"sine\"; one period if left out",
+        ),
+        (
+            "budget.speed",
+            "a number from 1e-12 to 1e12, m/s, or false; ",
+        ),
+        (
+            "solver.pbf.iterations",
+            "a whole number from 1 to 10000, not together with density_error or max_iterations",
+        ),
+    ] {
+        let key = find(SCENE, path).unwrap_or_else(|| panic!("{path}"));
+        assert!(
+            key.allowed().starts_with(words),
+            "{path}: {}",
+            key.allowed()
+        );
+    }
+    for path in ["solver.pbf.cfi", "solver.pbf.cfl.x", "cfl", ""] {
+        assert!(find(SCENE, path).is_none(), "{path}");
+    }
+    assert!(find(File::Tolerance.keys(), "attributes.any.max").is_some());
+}
+
+/// No two keys of a table have one name, every key says what it is for, and `only` looks at a key that is read before it.
+#[test]
+fn the_tables_are_whole() {
+    fn look(keys: &'static [Key], path: &str) {
+        for (place, key) in keys.iter().enumerate() {
+            let before = || keys[..place].iter();
+            assert!(
+                before().all(|other| other.name != key.name),
+                "{path}.{}",
+                key.name
+            );
+            assert!(!key.about.is_empty(), "{path}.{}", key.name);
+            if let Some((by, among)) = key.only {
+                let by = before()
+                    .find(|other| other.name == by)
+                    .expect("a key before it");
+                let Kind::Choice(words) = by.kind else {
+                    panic!("{path}.{}", by.name);
+                };
+                assert!(
+                    among.iter().all(|word| words.contains(word)),
+                    "{path}.{}",
+                    key.name
+                );
+            }
+            let beside = key.without.iter().chain(&key.with);
+            for other in beside {
+                assert!(
+                    keys.iter().any(|key| key.name == *other),
+                    "{path}.{}",
+                    key.name
+                );
+            }
+            look(key.below(), key.name);
+        }
+    }
+    for (name, file) in File::NAMED {
+        look(file.keys(), name);
+    }
+}
+
+/// Caches say by these hashes which scene they are of, and rendered pictures of which look.
+#[test]
+fn hashes_of_what_ships_are_those_of_the_caches_that_there_are() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    for (name, method, hash) in SHIPPED {
+        let set = [format!("solver.method={method}")];
+        let scene = Scene::load(&scenes.join(name).with_extension("toml"), &set).expect(name);
+        assert_eq!(physics_hash(&scene), hash, "{name} {method}");
+    }
+    for (name, hash) in [
+        (
+            "day",
+            "5902670e5453d87b94996af3d9c14cd1b1eadee27f2ddeb99b98433fc7c68f11",
+        ),
+        (
+            "dusk",
+            "26f870b4d42f6f6544249c5cd187a47e98120197133b0bf183788d8c27e44b2a",
+        ),
+    ] {
+        let look = look::Look::load(&scenes.join(format!("looks/{name}.toml"))).expect(name);
+        assert_eq!(look.hash(), hash, "{name}");
+    }
+}
+
+const SHIPPED: [(&str, &str, &str); 8] = [
+    (
+        "quickstart",
+        "pbf",
+        "a1f8f8dbb525d0f61e510f85af899569b4ef013c4b966965480da86b4ddcbd69",
+    ),
+    (
+        "quickstart",
+        "flip",
+        "e349157df7fbebae0c2a33f0ddd8e7c1e56c95c022fa7aee33764bec109d115c",
+    ),
+    (
+        "wave-city",
+        "pbf",
+        "b9b184cefbdc6213c8002173ab632a00d63212388f9973b6c1a6344c66220bf6",
+    ),
+    (
+        "wave-city",
+        "flip",
+        "4f0fc88fb7d0ed51115399499105f6b74e763e27cbcadc726772014944816d88",
+    ),
+    (
+        "dam-break",
+        "pbf",
+        "9f454f605a2560d6814a6cb58965096353a8d797d893f5180f4c908b149cf152",
+    ),
+    (
+        "dam-break",
+        "flip",
+        "ddd1c3ec08b60dc3a34f51adb580eb40eb34f66cdd22b315172365f58fcec592",
+    ),
+    (
+        "wave-tank",
+        "pbf",
+        "ef4337b5adca8c4e205d3c5e7a49a8c7fff8d5650888c8e18a211cecc67dac68",
+    ),
+    (
+        "wave-tank",
+        "flip",
+        "c98a10592a2688728a1767f5b69159b6a21b13c98256538c65b47e42d04cf6b9",
+    ),
+];
+
+/// The page is what `swell keys` prints: `target/release/swell keys > docs/keys.md`.
+#[test]
+fn the_page_of_keys_is_the_one_that_is_tracked() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/keys.md");
+    let tracked = std::fs::read_to_string(file).expect("docs/keys.md");
+    let now = page(&File::NAMED.map(|(_, file)| file));
+    let differs = tracked
+        .lines()
+        .zip(now.lines())
+        .find(|(old, new)| old != new);
+    assert_eq!(differs, None, "swell keys > docs/keys.md");
+    assert_eq!(tracked, now, "swell keys > docs/keys.md");
+    // Control: another default would stand there.
+    assert!(now.contains(
+        "| `tolerance` | a number from 1e-14 to 0.99, of the right-hand side's norm | `1e-5` |"
+    ));
+}

@@ -1,0 +1,284 @@
+//! Keys of a look.
+
+use super::super::key::{Interval, Key};
+
+pub(in super::super) const KEYS: &[Key] = &[
+    Key::table("camera", CAMERA)
+        .about("Where the picture is taken from: a pinhole camera, still or keyframed"),
+    Key::table("image", IMAGE)
+        .default("{}")
+        .about("Size and sampling"),
+    Key::table("surface", SURFACE)
+        .default("{}")
+        .about("How splats become a surface"),
+    Key::table("water", WATER)
+        .default("{}")
+        .about("What the water is like inside"),
+    Key::table("sun", SUN).default("{}").about("The sun"),
+    Key::table("sky", SKY).about("What the water mirrors"),
+    Key::table("ground", GROUND)
+        .default("{}")
+        .about("The plane at the domain's floor, which runs to the horizon"),
+    Key::table("basin", BASIN)
+        .absent()
+        .about("Quay walls just outside the domain's ±z sides"),
+    Key::table("solids", SOLIDS)
+        .default("{}")
+        .about("The scene's solids"),
+    Key::table("view", VIEW)
+        .default("{}")
+        .about("From scene-linear light to a picture"),
+    Key::table("output", OUTPUT)
+        .default("{}")
+        .about("What is written"),
+];
+
+/// Farther than this from the origin, f32 positions are coarser than a millimetre.
+const PLACE: Interval = -1e5..=1e5;
+
+/// A part of something, or a reflectance.
+const PART: Interval = 0.0..=1.0;
+
+const FOCAL_LENGTH: Interval = 1.0..=5000.0;
+
+/// Metres of a wall, a storey.
+const SIZE: Interval = 1e-3..=1e3;
+
+/// What a metre of water takes or gives.
+const PER_METRE: Interval = 0.0..=1e4;
+
+const DEGREES: Interval = -360.0..=360.0;
+
+const CAMERA: &[Key] = &[
+    Key::number("focal_length_mm", FOCAL_LENGTH)
+        .unit("mm")
+        .about("focal length"),
+    Key::vector("film_back_mm", 2, 1.0..=500.0)
+        .unit("mm")
+        .default("[36.0, 20.25]")
+        .also(", of the image's shape")
+        .about("width and height of the exposed film"),
+    Key::vector("position", 3, PLACE)
+        .unit("metres")
+        .absent()
+        .without(&["keyframe"])
+        .about("where it stands, with `target`"),
+    Key::vector("target", 3, PLACE)
+        .unit("metres")
+        .absent()
+        .without(&["keyframe"])
+        .about("what it looks at"),
+    Key::vector("up", 3, -1.0..=1.0)
+        .default("[0.0, 1.0, 0.0]")
+        .also(", neither zero nor along the line of sight")
+        .about("direction that stands upright in the picture"),
+    Key::tables("keyframe", KEYFRAME)
+        .about("Poses at frames, in ascending order, instead of position and target"),
+];
+
+const KEYFRAME: &[Key] = &[
+    Key::number("frame", -1e6..=1e6)
+        .also(", each after the one before")
+        .about("frame number; frame 1 is the first"),
+    Key::vector("position", 3, PLACE)
+        .unit("metres")
+        .about("where the camera stands"),
+    Key::vector("target", 3, PLACE)
+        .unit("metres")
+        .about("what it looks at"),
+    Key::number("focal_length_mm", FOCAL_LENGTH)
+        .unit("mm")
+        .computed(|| "the camera's own".to_owned())
+        .about("focal length"),
+];
+
+const IMAGE: &[Key] = &[
+    Key::whole("width", 1..=32768)
+        .unit("pixels")
+        .default("640")
+        .about("width"),
+    Key::whole("height", 1..=32768)
+        .unit("pixels")
+        .default("360")
+        .about("height"),
+    Key::whole("samples", 1..=1024)
+        .default("3")
+        .about("samples a pixel, spread over the pixel and over the shutter"),
+    Key::number("shutter", PART)
+        .unit("of a frame")
+        .default("0.0")
+        .about("how long the shutter is open, centred on the frame; 0 is no motion blur"),
+];
+
+const SURFACE: &[Key] = &[
+    Key::choice("filter", &["curvature_flow", "narrow_range"])
+        .default("\"curvature_flow\"")
+        .about(
+            "van der Laan 2009 with the world-space width of Bagar 2010, or Truong and Yuksel 2018",
+        ),
+    Key::number("radius_m", 1e-4..=100.0)
+        .unit("metres")
+        .computed(|| "0.87 particle spacings".to_owned())
+        .about("splat radius"),
+    Key::number("smoothing_width_m", 0.0..=100.0)
+        .unit("metres")
+        .computed(|| "1.6 particle spacings".to_owned())
+        .about("standard deviation of the smoothing, in the world"),
+    Key::number("roughness", 1e-3..=1.0).default("0.08").about(
+        "root mean square slope of the waves too small to be drawn, which widens the glitter",
+    ),
+    Key::table("ripple", RIPPLE)
+        .absent()
+        .about("Fine waves drawn into the normals"),
+];
+
+const RIPPLE: &[Key] = &[
+    Key::number("wavelength_m", 1e-3..=1000.0)
+        .unit("metres")
+        .about("longest wave"),
+    Key::number("slope", PART).about("root mean square slope"),
+];
+
+const WATER: &[Key] = &[
+    Key::number("index", 1.0..=3.0)
+        .default("1.333")
+        .about("refractive index"),
+    Key::vector("absorption_per_metre", 3, PER_METRE)
+        .unit("1/m")
+        .default("[0.34, 0.057, 0.0064]")
+        .about("red, green, blue"),
+    Key::vector("scattering_per_metre", 3, PER_METRE)
+        .unit("1/m")
+        .default("[0.0, 0.0, 0.0]")
+        .about("red, green, blue: what makes deep water turquoise, not black"),
+    Key::table("spray", SPRAY)
+        .absent()
+        .about("White water where particles are thrown clear or fast"),
+];
+
+const SPRAY: &[Key] = &[
+    Key::number("density_per_metre", PER_METRE)
+        .unit("1/m")
+        .about("optical density of fully aerated water"),
+    Key::number("speed_m_per_s", 1e-3..=1e4)
+        .unit("m/s")
+        .about("speed from which the surface begins to whiten"),
+];
+
+const SUN: &[Key] = &[
+    Key::number("azimuth_degrees", DEGREES)
+        .unit("degrees")
+        .default("60.0")
+        .about("0 is along +x, 90 along +z"),
+    Key::number("elevation_degrees", 0.5..=90.0)
+        .unit("degrees")
+        .default("40.0")
+        .about("above the horizon"),
+    Key::number("intensity", 0.0..=1000.0)
+        .default("1.0")
+        .about("factor on the sun that a clear sky of this turbidity lets through; 0 is none"),
+];
+
+const CLEAR: &[&str] = &["hosek_wilkie"];
+const PANORAMA: &[&str] = &["panorama"];
+
+const SKY: &[Key] = &[
+    Key::choice("model", &["hosek_wilkie", "panorama"])
+        .about("Hosek and Wilkie 2012, or a latitude-longitude picture"),
+    Key::number("turbidity", 1.0..=10.0)
+        .only("model", CLEAR)
+        .default("3.0")
+        .about("1 (clear) to 10 (hazy)"),
+    Key::vector("albedo", 3, PART)
+        .only("model", CLEAR)
+        .default("[0.15, 0.15, 0.15]")
+        .about("reflectance of the land around, red, green, blue"),
+    Key::text("file", "an EXR file, relative to the look file")
+        .only("model", PANORAMA)
+        .about("scene-linear picture"),
+    Key::number("rotate_degrees", DEGREES)
+        .unit("degrees")
+        .only("model", PANORAMA)
+        .default("0.0")
+        .about("turn about the vertical"),
+    Key::number("intensity", 0.0..=1e6)
+        .only("model", PANORAMA)
+        .default("1.0")
+        .about("factor on its radiance"),
+];
+
+const COLOUR: Key = Key::vector("colour", 3, PART).about("reflectance, linear red, green, blue");
+
+const GROUND: &[Key] = &[
+    COLOUR.default("[0.30, 0.28, 0.25]"),
+    Key::number("variation", PART)
+        .default("0.25")
+        .about("how uneven that is"),
+    Key::number("haze_m", 1.0..=1e7)
+        .unit("metres")
+        .default("500.0")
+        .about("distance after which air has taken 63 % of the contrast"),
+];
+
+const BASIN: &[Key] = &[
+    Key::number("height_m", SIZE)
+        .unit("metres")
+        .about("above the domain's floor"),
+    Key::number("thickness_m", SIZE)
+        .unit("metres")
+        .default("0.6")
+        .about("of the walls"),
+];
+
+const SOLIDS: &[Key] = &[
+    COLOUR.default("[0.55, 0.52, 0.48]"),
+    Key::table("windows", WINDOWS)
+        .absent()
+        .about("Rows of windows on upright faces"),
+];
+
+const WINDOWS: &[Key] = &[
+    Key::number("storey_m", SIZE)
+        .unit("metres")
+        .about("height of a storey"),
+    Key::number("bay_m", SIZE)
+        .unit("metres")
+        .about("width from window to window"),
+    Key::number("lit", PART)
+        .default("0.0")
+        .about("fraction of the windows that are lit from within"),
+];
+
+/// Of the PNG alone.
+pub(super) const VIEW: &[Key] = &[
+    Key::number("exposure_stops", -20.0..=20.0)
+        .unit("stops")
+        .default("0.0")
+        .about("factor of 2 to this power on the light, in the PNG only"),
+    Key::choice("transform", &["agx", "srgb"])
+        .default("\"agx\"")
+        .about("tone curve of the PNG: Sobotka's, which lets colours run to white, or none"),
+    Key::number("saturation", 0.0..=3.0)
+        .default("1.0")
+        .about("factor on the distance from grey after the tone curve"),
+    Key::number("contrast", 0.2..=3.0)
+        .default("1.0")
+        .about("power about middle grey after the tone curve"),
+];
+
+const OUTPUT: &[Key] = &[
+    Key::choices("formats", &["png", "exr"])
+        .default("[\"png\"]")
+        .also(", at least one")
+        .about("8 bits through the view, or scene-linear with AOVs"),
+    Key::choices("aovs", &["Z", "N", "P", "forward", "thickness"])
+        .default("[]")
+        .also(", with formats = [\"exr\"]")
+        .about(
+            "depth along the axis, m; normal; position, m; motion to the next frame, pixels, u to the right, v upward; water \
+             along the line of sight, m",
+        ),
+    Key::flag("background")
+        .default("true")
+        .about("whether the sky is in the picture, or left transparent"),
+];

@@ -1,0 +1,23 @@
+//! XSPH viscosity on the device.
+
+use crate::{gpu::buffer::Buf, scene::effects::viscosity::Settings};
+
+use super::{Addition, pass};
+
+/// What each particle's velocity changes by, and 0, in sorted order, m/s.
+pub const CHANGE: Buf<[f32; 4]> = Buf::new("viscosity_change");
+
+pub(super) fn pbf(settings: &Settings, particles: usize) -> Addition {
+    Addition {
+        passes: vec![
+            pass("effects/viscosity_gather", &[("XSPH", settings.xsph)]),
+            pass("effects/viscosity_apply", &[]),
+        ],
+        buffers: vec![CHANGE.sized(particles)],
+    }
+}
+
+/// Nothing of its own: the grid holds the mean of the neighbours' velocities already, and the blend takes more of it.
+pub(super) fn flip(_: &Settings, _cells: usize) -> Addition {
+    Addition::default()
+}

@@ -1,0 +1,34 @@
+//! Vorticity confinement on the device.
+
+use crate::{gpu::buffer::Buf, scene::effects::vorticity_confinement::Settings};
+
+use super::{Addition, pass};
+
+/// Curl of the velocity and its length: of each particle in sorted order (PBF), or of each cell (FLIP), 1/s.
+pub const VORTICITY: Buf<[f32; 4]> = Buf::new("vorticity");
+
+pub(super) fn pbf(settings: &Settings, particles: usize) -> Addition {
+    confinement(
+        ["effects/vorticity_curl", "effects/vorticity_force"],
+        settings,
+        particles,
+    )
+}
+
+pub(super) fn flip(settings: &Settings, cells: usize) -> Addition {
+    confinement(
+        ["effects/grid_curl", "effects/grid_confinement"],
+        settings,
+        cells,
+    )
+}
+
+fn confinement([curl, force]: [&'static str; 2], settings: &Settings, count: usize) -> Addition {
+    Addition {
+        passes: vec![
+            pass(curl, &[]),
+            pass(force, &[("STRENGTH", settings.strength)]),
+        ],
+        buffers: vec![VORTICITY.sized(count)],
+    }
+}

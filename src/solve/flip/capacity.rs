@@ -1,0 +1,45 @@
+//! Which bricks a state takes.
+
+use crate::{
+    domain::{
+        bricks::{Bricks, EDGE, table_dims},
+        flip::{layers, stored_cells},
+        particles::Particles,
+    },
+    scene::Scene,
+    solve::{plan::Capacity, pressure::LEVELS},
+};
+
+/// No flag set, one a brick of the domain.
+pub(super) fn no_water(grid_dims: [u32; 3]) -> Vec<bool> {
+    let dims = table_dims(stored_cells(grid_dims));
+    vec![false; dims.iter().map(|&n| n as usize).product()]
+}
+
+pub(super) fn bricks(grid_dims: [u32; 3], is_wet: &[bool], layers: usize) -> Bricks {
+    let reach = (layers as u32).div_ceil(EDGE);
+    Bricks::new(stored_cells(grid_dims), is_wet, reach, LEVELS)
+}
+
+pub(super) fn capacity_of(bricks: &Bricks) -> Capacity {
+    Capacity {
+        wet: bricks.wet as usize + 1,
+        slots: bricks.slots(),
+    }
+}
+
+/// Bricks that a state takes in a scene.
+pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
+    let grid_dims = scene.domain.cells(scene.solver.flip().cell_size);
+    let mut is_wet = no_water(grid_dims);
+    let dims = table_dims(stored_cells(grid_dims)).map(|n| n as usize);
+    let edge = f64::from(EDGE) * scene.solver.flip().cell_size;
+    for position in &particles.position {
+        let x = glam::Vec3::from_array(*position).as_dvec3() - scene.domain.min;
+        let at: [usize; 3] =
+            std::array::from_fn(|k| ((x[k] / edge).max(0.0) as usize).min(dims[k] - 1));
+        is_wet[(at[2] * dims[1] + at[1]) * dims[0] + at[0]] = true;
+    }
+    // As deep as layers of a first step reach that is not yet fast.
+    capacity_of(&bricks(grid_dims, &is_wet, layers(1.0)))
+}

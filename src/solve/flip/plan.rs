@@ -1,0 +1,164 @@
+//! What FLIP needs on the device.
+
+use crate::{
+    domain::{
+        bricks::{CELLS, table_dims},
+        flip::{layers, stored_cells},
+    },
+    gpu::{program::PassSpec, recording::Command, sort},
+    scene::{
+        Scene,
+        flip::{Surface, Transfer},
+    },
+    solve::{
+        effects,
+        plan::{Counts, Plan, Table, in_order},
+        pressure,
+    },
+};
+
+use super::{
+    buffers::*,
+    record::{Commands, FIRST_LAYER},
+};
+
+/// Faces about a cell that its particles reach, of one component.
+const FACES: usize = 18;
+
+/// Cell centres that they reach.
+const CENTERS: usize = 27;
+
+/// Lays out FLIP with its projection for `scene`.
+pub(in crate::solve) fn plan(scene: &Scene, counts: Counts) -> Plan {
+    let flip = scene.solver.flip();
+    let mut plan = Plan::bare(counts, scene.domain.cells(flip.cell_size));
+    let effects = effects::of_flip(&scene.effects, CELLS as usize * counts.bricks.slots);
+    let mut table = buffers(&plan, scene);
+    for (name, addition) in &effects {
+        table.extend(name, addition.buffers.clone());
+    }
+    let (settings, has_correction) = (&flip.pressure, flip.density_correction);
+    table.append(pressure::planned(
+        settings,
+        has_correction,
+        counts.bricks.slots,
+    ));
+    plan.declare(table);
+    let commands = Commands::new(&plan, scene, &effects);
+    let defines = conditions(&plan, scene);
+    let plain = |name| PassSpec {
+        name,
+        defines: defines.clone(),
+        constants: Vec::new(),
+    };
+    plan.add_passes(in_order(commands.before_projection()).map(&plain), &effects);
+    plan.add_passes(
+        pressure::passes(settings, flip.surface, has_correction),
+        &[],
+    );
+    plan.add_passes(in_order(commands.after_projection()).map(&plain), &[]);
+    plan
+}
+
+/// Every command of a substep, of projections of any shape among them.
+pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
+    let flip = scene.solver.flip();
+    let effects = effects::of_flip(&scene.effects, CELLS as usize * plan.counts.bricks.slots);
+    let commands = Commands::new(plan, scene, &effects);
+    let projection = pressure::all_commands(flip.pressure.preconditioner, flip.density_correction);
+    let before = commands.before_projection().cloned();
+    let after = commands.after_projection().cloned();
+    before.chain(projection).chain(after).collect()
+}
+
+/// Conditions that hold for the whole plan; a pass that does not ask ignores them.
+fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
+    let flip = scene.solver.flip();
+    let all = [
+        ("SOLIDS", plan.has_solids()),
+        ("MOVING_SOLIDS", plan.counts.moving_nodes > 0),
+        ("APIC", flip.transfer == Transfer::Apic),
+        ("GHOST_FLUID", flip.surface == Surface::GhostFluid),
+        ("CORRECTION", flip.density_correction),
+    ];
+    let holding = all.into_iter().filter(|(_, holds)| *holds);
+    holding.map(|(define, _)| define).collect()
+}
+
+fn buffers(plan: &Plan, scene: &Scene) -> Table {
+    let mut table = Table::default();
+    particles(plan, scene, &mut table);
+    bricks(plan, scene, &mut table);
+    if scene.has_movers() {
+        let cells = plan.counts.bricks.wet * CELLS as usize;
+        table.add("budget", BOUNDARY_WORK.sized(cells / 64));
+    }
+    table
+}
+
+fn particles(plan: &Plan, scene: &Scene, table: &mut Table) {
+    let flip = scene.solver.flip();
+    let n = plan.counts.particles;
+    let vectors = [POSITION, VELOCITY, SORTED_POSITION, SORTED_VELOCITY];
+    table.extend("flip", vectors.map(|buffer| buffer.sized(n)));
+    table.extend("flip", [ID.sized(n), SORTED_ID.sized(n)]);
+    let carried = if flip.density_correction { 6 } else { 3 };
+    table.watch("flip", CARRIED.sized(carried * n));
+    let slopes = flip.attributes().len();
+    if slopes > 0 {
+        table.watch("flip", AFFINE.sized(slopes * n));
+        table.add("flip", SORTED_AFFINE.sized(slopes * n));
+    }
+    let keys = [CELL_OF, SLOT_IN_CELL, PLACED, ORDER];
+    table.extend("sort", keys.map(|buffer| buffer.sized(n)));
+    table.add("sort", ELEMENT_COUNT.sized(1));
+    table.add("flip", COUNTERS.sized(1));
+}
+
+/// Whatever follows the bricks: its size changes while a scene runs.
+fn bricks(plan: &Plan, scene: &Scene, table: &mut Table) {
+    let flip = scene.solver.flip();
+    let slots = plan.counts.bricks.slots;
+    let wet = plan.counts.bricks.wet * CELLS as usize;
+    let all = slots * CELLS as usize;
+    let dims = table_dims(stored_cells(plan.grid_dims));
+    let bricks = dims.iter().map(|&n| n as usize).product();
+    table.add("flip", SURVEY_IS_WET.sized(bricks));
+    table.add("flip", BRICK_SLOT.sized(bricks));
+    table.add("flip", BRICKS.sized(slots));
+    table.add("sort", CELL_START.sized(wet + 1));
+    table.extend("sort", sort::scan_buffers(&CELL_START, wet));
+    table.add("flip", PARTIAL_MOMENTUM.sized(FACES * wet));
+    table.add("flip", PARTIAL_WEIGHT.sized(CENTERS * wet));
+    for planes in [FACE_VELOCITY, FACE_CHANGE, FACE_OPEN] {
+        table.watch("flip", planes.sized(3 * all));
+    }
+    table.extend(
+        "flip",
+        [FACE_LAYER, CELL_KIND].map(|cells| cells.sized(all)),
+    );
+    table.watch("flip", SOLID_FLUX.sized(all));
+    table.watch("flip", DENSITY.sized(all));
+    if flip.density_correction {
+        table.watch("flip", DENSITY_EXCESS.sized(all));
+    }
+    if flip.surface == Surface::GhostFluid {
+        table.watch("flip", LIQUID_DISTANCE.sized(all));
+    }
+    if plan.has_solids() {
+        table.watch("solids", OPEN_VOLUME.sized(all));
+        let nodes = plan.counts.solid_grid.iter().product::<usize>() + plan.counts.moving_nodes;
+        table.add("solids", SOLID_DISTANCE.sized(nodes));
+        if plan.counts.moving_nodes > 0 {
+            table.watch("solids", CLOSED_VELOCITY.sized(3 * all));
+            table.add("solids", SOLID_GRIDS.sized(1));
+        } else {
+            table.add("solids", SOLID_GRID.sized(1));
+        }
+    }
+    let layers = layers(flip.cfl);
+    table.add("flip", PARAMS.sized(1));
+    table.add("flip", AXES.sized(3));
+    table.add("flip", LAYERS.sized(layers));
+    table.add("flip", GROUPS.sized(FIRST_LAYER + layers));
+}

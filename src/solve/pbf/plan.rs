@@ -1,0 +1,172 @@
+//! What PBF needs on the device.
+
+use crate::{
+    domain::sph::Calibration,
+    gpu::{program::PassSpec, recording::Command, sort},
+    scene::{Iteration, Scene, Stop},
+    solve::{
+        effects,
+        plan::{Chunk, Counts, DeviceLimits, Plan, Table, in_order},
+    },
+};
+
+use super::{buffers::*, record::Commands};
+
+/// Constants for every pass that declares them.
+pub const SHARED_CONSTANTS: [(&str, f64); 1] = [("LIST_CAPACITY", LIST_CAPACITY as f64)];
+
+/// Neighbours that a list holds; a particle with more is searched for, and the report counts it. At rest
+/// h = 2d has 32; in the dam of `tools/bench pbf` no list of 48 overflowed.
+pub const LIST_CAPACITY: u32 = 48;
+
+/// Device memory that neighbour lists may take; a larger scene searches the cells in each pass instead.
+pub const LIST_BUDGET: u64 = 4 << 30;
+
+/// Particles of a list block: lists are chunked in these.
+const LIST_BLOCK: usize = 128;
+
+/// Fours of neighbours that a list holds.
+const LIST_FOURS: usize = LIST_CAPACITY as usize / 4;
+
+/// Lays out PBF for `scene`.
+pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
+    let pbf = scene.solver.pbf();
+    let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
+    let mut plan = Plan::bare(counts, scene.domain.cells(calibration.support_radius));
+    choose_lists(&mut plan, limits);
+    let effects = effects::of_pbf(&scene.effects, counts.particles);
+    let commands = Commands::new(&plan, scene, &effects);
+    let mut table = buffers(&plan, scene, commands.phases.len());
+    for (name, addition) in &effects {
+        table.extend(name, addition.buffers.clone());
+    }
+    let conditions = conditions(&plan);
+    plan.declare(table);
+    let specs = in_order(commands.substep.iter().chain(&commands.measure)).map(|name| {
+        let mut spec = own(name, scene);
+        spec.defines.extend_from_slice(&conditions);
+        spec
+    });
+    plan.add_passes(specs, &effects);
+    plan
+}
+
+/// Every command of a substep and of a frame's end.
+pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
+    let effects = effects::of_pbf(&scene.effects, plan.counts.particles);
+    let commands = Commands::new(plan, scene, &effects);
+    [commands.substep, commands.measure].concat()
+}
+
+fn choose_lists(plan: &mut Plan, limits: DeviceLimits) {
+    let particles = plan.counts.particles;
+    let block_bytes = list_of(0).sized(LIST_BLOCK * LIST_FOURS).bytes;
+    let total = particles.div_ceil(LIST_BLOCK) as u64 * block_bytes;
+    let blocks = limits.binding.min(limits.buffer) / block_bytes;
+    plan.has_lists = total <= limits.list_budget && blocks > 0;
+    let step = match plan.has_lists {
+        true => usize::try_from(blocks)
+            .unwrap_or(usize::MAX)
+            .saturating_mul(LIST_BLOCK),
+        false => particles.max(1),
+    };
+    plan.chunks = (0..particles)
+        .step_by(step)
+        .map(|first| Chunk {
+            first,
+            count: step.min(particles - first),
+        })
+        .collect();
+}
+
+/// Conditions that hold for the whole plan; a pass that does not ask ignores them.
+fn conditions(plan: &Plan) -> Vec<&'static str> {
+    let mut conditions = Vec::new();
+    if plan.has_solids() {
+        conditions.push("SOLIDS");
+    }
+    if plan.has_lists {
+        conditions.push("NEIGHBOR_LIST");
+    }
+    conditions
+}
+
+/// Conditions and constants of one pass.
+fn own(name: &'static str, scene: &Scene) -> PassSpec {
+    let pbf = scene.solver.pbf();
+    let is_adaptive = matches!(pbf.stop, Stop::DensityError { .. });
+    let all: &[(&str, bool)] = match name {
+        "pbf/predict" => &[("WALL_WORK", scene.has_movers())],
+        "pbf/compute_lambda" => &[("DENSITY", is_adaptive)],
+        "pbf/compute_delta" => &[
+            ("ARTIFICIAL_PRESSURE", pbf.artificial_pressure > 0.0),
+            ("CHEBYSHEV", pbf.iteration == Iteration::Chebyshev),
+            ("PRESSURE", !scene.pressure_points().is_empty()),
+            ("WALL_WORK", scene.has_movers()),
+        ],
+        "pbf/update_velocity" => &[("ADAPTIVE", is_adaptive)],
+        _ => &[],
+    };
+    let constants = match pbf.stop {
+        Stop::DensityError { density_error, .. } if name == "pbf/decide" => {
+            vec![("DENSITY_ERROR", density_error)]
+        }
+        _ => Vec::new(),
+    };
+    let holding = all.iter().filter(|(_, holds)| *holds);
+    PassSpec {
+        name,
+        defines: holding.map(|(define, _)| *define).collect(),
+        constants,
+    }
+}
+
+fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
+    let n = plan.counts.particles;
+    let cells = cell_count(plan);
+    let mut table = Table::default();
+    if plan.has_lists {
+        for (index, chunk) in plan.chunks.iter().enumerate() {
+            let fours = chunk.count.next_multiple_of(LIST_BLOCK) * LIST_FOURS;
+            table.add("lists", list_of(index).sized(fours));
+        }
+        table.add("lists", NEIGHBOR_COUNT.sized(n));
+    }
+    table.add("sort", CELL_START.sized(cells + 1));
+    table.extend("sort", sort::scan_buffers(&CELL_START, cells));
+    let keys = [CELL_OF, SLOT_IN_CELL, PLACED, ORDER];
+    table.extend("sort", keys.map(|buffer| buffer.sized(n)));
+    table.add("sort", ELEMENT_COUNT.sized(1));
+
+    table.add("pbf", PARAMS.sized(1));
+    table.add("pbf", PHASES.sized(phases));
+    let samples = plan.counts.boundary_samples;
+    table.add("pbf", PREDICTED.sized(2 * n + samples + 1));
+    let vectors = [POSITION, VELOCITY, START_POSITION, SORTED_VELOCITY];
+    table.extend("pbf", vectors.map(|buffer| buffer.sized(n)));
+    table.extend("pbf", [ID.sized(n), SORTED_ID.sized(n), DENSITY.sized(n)]);
+    table.add("pbf", COUNTERS.sized(1));
+    if let Stop::DensityError { .. } = scene.solver.pbf().stop {
+        table.add("pbf", CONTROL.sized(1));
+        table.add("pbf", ERROR_SUMS.sized(n.div_ceil(256)));
+    }
+    if !scene.pressure_points().is_empty() {
+        table.add("probes", LAMBDA_SUM.sized(n));
+    }
+    if scene.has_movers() {
+        table.add("budget", WALL_WORK.sized(2 * n));
+        table.add("budget", BOUNDARY_WORK.sized(n.div_ceil(64)));
+    }
+    if plan.has_solids() {
+        table.add("solids", SOLID_GRID.sized(1));
+        let nodes = plan.counts.solid_grid.iter().product();
+        table.add("solids", SOLID_DISTANCE.sized(nodes));
+        table.add("solids", BOUNDARY_CELL_START.sized(cells + 1));
+    }
+    table
+}
+
+/// Cells that particles are sorted by.
+pub(super) fn cell_count(plan: &Plan) -> usize {
+    plan.grid_dims.iter().map(|&n| n as usize).product()
+}

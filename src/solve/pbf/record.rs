@@ -1,0 +1,79 @@
+//! What a substep runs, and what a frame's end does, as commands.
+
+use crate::{
+    gpu::{recording::Command, sort},
+    scene::Scene,
+    solve::{effects::Addition, params::Phase, plan::Plan},
+};
+
+use super::{buffers::*, iteration::Builder, plan::cell_count};
+
+/// Commands of PBF, and the phases that they refer to.
+pub(super) struct Commands {
+    /// A substep.
+    pub(super) substep: Vec<Command>,
+    /// The frame's end: sorted at the last positions, density measured there.
+    pub(super) measure: Vec<Command>,
+    /// Contents of [`PHASES`].
+    pub(super) phases: Vec<Phase>,
+}
+
+impl Commands {
+    /// For the counts, chunks and lists of `plan`.
+    pub(super) fn new(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Self {
+        let mut builder = Builder::new(plan);
+        Self {
+            substep: substep(plan, scene, effects, &mut builder),
+            measure: measure(plan, &mut builder),
+            phases: builder.into_phases(),
+        }
+    }
+}
+
+fn sorting(plan: &Plan) -> Vec<Command> {
+    let n = plan.counts.particles;
+    let mut commands = vec![
+        Command::clear(&CELL_START),
+        Command::over("pbf/assign_cells", n),
+    ];
+    commands.extend(sort::scan(&CELL_START, cell_count(plan)));
+    commands.extend(sort::SORT_PASSES.map(|pass| Command::over(pass, n)));
+    commands.push(Command::over("pbf/reorder", n));
+    commands
+}
+
+fn substep(
+    plan: &Plan,
+    scene: &Scene,
+    effects: &[(&'static str, Addition)],
+    builder: &mut Builder<'_>,
+) -> Vec<Command> {
+    let pbf = scene.solver.pbf();
+    let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
+    if !scene.pressure_points().is_empty() {
+        commands.push(Command::clear(&LAMBDA_SUM));
+    }
+    if scene.has_movers() {
+        commands.insert(0, Command::clear(&WALL_WORK));
+    }
+    commands.extend(sorting(plan));
+    if plan.has_lists {
+        builder.over_all("pbf/build_neighbors", &mut commands);
+    }
+    builder.iterations(pbf, &mut commands);
+    builder.finish(pbf, &mut commands);
+    if scene.has_movers() {
+        commands.push(Command::over("pbf/boundary_work", plan.counts.particles));
+    }
+    for pass in effects.iter().flat_map(|(_, addition)| &addition.passes) {
+        builder.over_all(pass.name, &mut commands);
+    }
+    commands
+}
+
+fn measure(plan: &Plan, builder: &mut Builder<'_>) -> Vec<Command> {
+    let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
+    commands.extend(sorting(plan));
+    builder.measure(&mut commands);
+    commands
+}

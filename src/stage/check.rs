@@ -1,0 +1,272 @@
+//! `check`: opens what a step starts from and the device, and has the room `check` hold the step against the reference.
+
+use std::{
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
+
+use crate::{
+    cache::{CacheError, CacheReader},
+    check::{flip, pbf},
+    domain::{
+        frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
+        substep::Which,
+    },
+    gpu::adapter::{Context, GpuError},
+    scene::{Method, Scene, SceneError},
+    solve::{SolveError, plan::device_limits},
+};
+
+use super::{
+    Blame,
+    device::{Gpu, needs, shaders_note},
+    prepare::Start,
+};
+
+pub use crate::check::{Checked, Row, Table};
+
+/// Where the inputs of the step come from.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// A scene's start: frame 0.
+    Scene(Box<Scene>),
+    /// Frames of a cache; of its last one where none are asked for.
+    Cache(PathBuf, Option<FrameRange>),
+}
+
+/// What to check.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Inputs.
+    pub source: Source,
+    /// Which substep of the frame after each.
+    pub substep: Which,
+    /// Index or part of the name of an adapter.
+    pub gpu: Gpu,
+}
+
+/// The first row out of tolerance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FirstOver {
+    /// Frame that the step started from.
+    pub frame: u32,
+    /// Substep of the frame after it.
+    pub substep: Option<u32>,
+    /// Of the row.
+    pub pass: &'static str,
+    /// Of the row.
+    pub field: &'static str,
+}
+
+/// What a check has to tell while it runs.
+#[derive(Clone, Debug)]
+pub enum Event<'a> {
+    /// The device is open.
+    Ready {
+        /// Adapter and driver.
+        device: String,
+        /// Name of the solver.
+        solver: &'static str,
+        /// Particles at the start.
+        particles: usize,
+        /// Frames that will be checked.
+        frames: usize,
+        /// What a user has to know of the scene, a sentence each.
+        warnings: Vec<String>,
+    },
+    /// The step after a frame was checked.
+    Frame {
+        /// The frame that it started from.
+        frame: u32,
+        /// What was found, and in which substep.
+        checked: &'a Checked,
+        /// Wall clock for it.
+        seconds: f64,
+    },
+}
+
+/// What a check found.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// All frames in one: of each row the value that is furthest out.
+    pub table: Table,
+    /// The first row out of tolerance.
+    pub first_over: Option<FirstOver>,
+    /// Frames checked.
+    pub frames: Vec<u32>,
+    /// Of each, the substep of the frame after it that was checked.
+    pub substeps: Vec<Option<u32>>,
+    /// Hash of the shaders where they are not the shipped ones.
+    pub shaders: Option<String>,
+    /// Whether a signal ended it.
+    pub interrupted: bool,
+}
+
+/// Why a check could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckError {
+    /// The cache.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// Its scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The scene's solids.
+    #[error(transparent)]
+    Solid(#[from] SignedDistanceError),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The solver.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// A comparison of nothing is none that held.
+    #[error("nothing was compared: there is no water in it")]
+    NoWater,
+}
+
+impl From<&CheckError> for Blame {
+    fn from(error: &CheckError) -> Self {
+        match error {
+            CheckError::Cache(error) => error.into(),
+            CheckError::Scene(error) => error.into(),
+            CheckError::Solid(error) => error.into(),
+            CheckError::Gpu(error) => error.into(),
+            CheckError::Solve(error) => error.into(),
+            CheckError::NoWater => Self::Input,
+        }
+    }
+}
+
+/// Checks the step after each frame; `stop` ends it after the current one.
+///
+/// # Errors
+/// [`CheckError`]; a row out of tolerance is none, but in the outcome.
+pub fn check(
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event<'_>),
+) -> Result<Outcome, CheckError> {
+    let (scene, cache, frames) = open(&request.source)?;
+    let start = match &cache {
+        None => Start::of(&scene)?,
+        Some(cache) => Start::of_cache::<CheckError>(&scene, cache)?,
+    };
+    let context = request.gpu.open(needs(&scene))?;
+    let shaders = context.shaders.edited().map(str::to_owned);
+    let info = &context.info;
+    tell(Event::Ready {
+        device: format!(
+            "{} ({} {}){}",
+            info.name,
+            info.driver,
+            info.driver_info,
+            shaders_note(shaders.as_deref())
+        ),
+        solver: scene.solver.method.name(),
+        particles: start.particles.len(),
+        frames: frames.len(),
+        warnings: scene.warnings(),
+    });
+    let mut outcome = Outcome {
+        shaders,
+        ..Outcome::default()
+    };
+    for frame in frames {
+        outcome.interrupted = stop.load(Ordering::Relaxed);
+        if outcome.interrupted {
+            break;
+        }
+        let begin = Instant::now();
+        let particles = match &cache {
+            Some(cache) => cache.read(frame)?,
+            None => start.particles.clone(),
+        };
+        let which = request.substep;
+        let checked = check_substep(&context, &scene, &start, frame, &particles, which)?;
+        tell(Event::Frame {
+            frame,
+            checked: &checked,
+            seconds: begin.elapsed().as_secs_f64(),
+        });
+        let Checked { table, substep } = checked;
+        if let (None, Some(row)) = (outcome.first_over, table.first_over()) {
+            outcome.first_over = Some(FirstOver {
+                frame,
+                substep,
+                pass: row.field.pass,
+                field: row.field.name,
+            });
+        }
+        outcome.frames.push(frame);
+        outcome.substeps.push(substep);
+        outcome.table.absorb(table);
+    }
+    if outcome.table.rows.is_empty() && !outcome.interrupted {
+        return Err(CheckError::NoWater);
+    }
+    Ok(outcome)
+}
+
+fn open(source: &Source) -> Result<(Scene, Option<CacheReader>, Vec<u32>), CheckError> {
+    match source {
+        Source::Scene(scene) => Ok(((**scene).clone(), None, vec![0])),
+        Source::Cache(directory, frames) => {
+            let cache = CacheReader::open(directory)?;
+            let frames: Vec<u32> = match frames {
+                Some(frames) => frames.iter().collect(),
+                None => vec![cache.last_frame()],
+            };
+            for &frame in &frames {
+                cache.entry(frame)?;
+            }
+            // The cache's own copy: what was baked, wherever the cache has been moved to.
+            let file = directory.join("scene.toml");
+            let scene = Scene::parse(cache.scene_toml(), &file, directory, &[])?;
+            Ok((scene, Some(cache), frames))
+        }
+    }
+}
+
+/// The first substep of [`check_substep`].
+///
+/// # Errors
+/// Likewise.
+pub fn check_frame(
+    context: &Context,
+    scene: &Scene,
+    start: &Start,
+    frame: u32,
+    particles: &Particles,
+) -> Result<Table, SolveError> {
+    let first = Which::default();
+    Ok(check_substep(context, scene, start, frame, particles, first)?.table)
+}
+
+/// Checks a substep of the frame after `particles`, the state at the end of `frame`: those before it run at once. With PBF
+/// the measurement at a frame's end too, as if the frame ended there.
+///
+/// # Errors
+/// The device, the numbers of the solver, and a substep that the frame does not have.
+pub fn check_substep(
+    context: &Context,
+    scene: &Scene,
+    start: &Start,
+    frame: u32,
+    particles: &Particles,
+    which: Which,
+) -> Result<Checked, SolveError> {
+    if particles.is_empty() {
+        return Ok(Checked::default());
+    }
+    let plan = start.plan(scene, device_limits(context));
+    let boundary = &start.boundary;
+    match scene.solver.method {
+        Method::Pbf => {
+            let boundaries = [boundary; 2];
+            pbf::check(context, scene, plan, boundaries, (frame, particles), which)
+        }
+        Method::Flip => flip::check(context, scene, plan, boundary, (frame, particles), which),
+    }
+}

@@ -1,0 +1,78 @@
+//! What documents promise of the tree: paths that are there, files that can be read in one sitting.
+
+use std::{fs, path::Path};
+
+/// Paths between backticks that begin in one of the tree's folders. `NAME` and other words in capitals stand for any.
+fn paths(text: &str) -> impl Iterator<Item = &str> {
+    let quoted = text.split('`').skip(1).step_by(2);
+    let roots = ["src/", "shaders/", "scenes/", "tests/", "tools/", "docs/"];
+    quoted.filter(move |path| {
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "/._-".contains(c);
+        roots.iter().any(|root| path.starts_with(root))
+            && (path.chars().all(is_plain) || path.starts_with("docs/"))
+    })
+}
+
+fn missing(root: &Path, text: &str) -> Vec<String> {
+    let absent = paths(text).filter(|path| !root.join(path).exists());
+    absent.map(str::to_owned).collect()
+}
+
+#[test]
+fn every_path_that_a_document_names_is_there() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = vec![root.join("README.md")];
+    for entry in fs::read_dir(root.join("docs")).unwrap() {
+        files.push(entry.unwrap().path());
+    }
+    let (mut seen, mut absent) = (0, Vec::new());
+    for file in files.iter().filter(|file| !file.ends_with("mutants.md")) {
+        // A block of code has backticks of its own.
+        let text = fs::read_to_string(file).unwrap().replace("```", "");
+        seen += paths(&text).count();
+        for path in missing(root, &text) {
+            absent.push(format!("{}: {path}", file.display()));
+        }
+    }
+    assert!(seen > 40, "{seen}");
+    assert!(absent.is_empty(), "{absent:#?}");
+    let said = "`src/lib.rs`, `src/no_such_room`, `shaders/ROOM/NAME.wgsl`";
+    assert_eq!(missing(root, said), ["src/no_such_room"]);
+}
+
+/// Lines of a source file at most.
+const LONGEST: usize = 600;
+
+fn is_too_long(text: &str) -> bool {
+    text.lines().count() > LONGEST
+}
+
+fn sources(folder: &Path, ends: &[&str], visit: &mut dyn FnMut(&Path)) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let end = path.extension().and_then(|end| end.to_str());
+        if path.is_dir() {
+            sources(&path, ends, visit);
+        } else if end.is_some_and(|end| ends.contains(&end)) {
+            visit(&path);
+        }
+    }
+}
+
+#[test]
+fn no_source_file_is_too_long() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (mut seen, mut long) = (0, Vec::new());
+    for folder in ["src", "shaders", "tests/suite", "tools"] {
+        sources(&root.join(folder), &["rs", "wgsl", "py"], &mut |file| {
+            seen += 1;
+            if is_too_long(&fs::read_to_string(file).unwrap()) {
+                long.push(file.to_owned());
+            }
+        });
+    }
+    assert!(seen > 300, "{seen}");
+    assert!(long.is_empty(), "over {LONGEST} lines: {long:#?}");
+    assert!(!is_too_long(&"x\n".repeat(LONGEST)));
+    assert!(is_too_long(&"x\n".repeat(LONGEST + 1)));
+}

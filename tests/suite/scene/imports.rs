@@ -1,0 +1,119 @@
+//! Modules of a room import each other one way.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::Path,
+};
+
+/// Every path of a `use` tree.
+fn paths(tree: &str) -> Vec<String> {
+    let (Some(open), Some(close)) = (tree.find('{'), tree.rfind('}')) else {
+        return vec![tree.trim().to_owned()];
+    };
+    let (mut depth, mut items) = (0, vec![String::new()]);
+    for c in tree[open + 1..close].chars() {
+        match c {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            _ => {}
+        }
+        match (c, items.last_mut()) {
+            (',', _) if depth == 0 => items.push(String::new()),
+            (c, Some(item)) => item.push(c),
+            (_, None) => {}
+        }
+    }
+    let whole = |item: &String| paths(&format!("{}{}", &tree[..open], item.trim()));
+    items.iter().flat_map(whole).collect()
+}
+
+/// Modules that a file imports, which lies so many modules below its room; tests aside.
+fn imports(text: &str, depth: usize, modules: &BTreeSet<String>) -> BTreeSet<String> {
+    let code = text.split("\nmod tests {").next().unwrap_or("");
+    let up = "super::".repeat(depth);
+    let uses = code.split("use ").skip(1);
+    let trees = uses.filter_map(|rest| rest.split(';').next());
+    let named = trees.flat_map(paths).filter_map(|path| {
+        let rest = path.strip_prefix(&up)?;
+        rest.split("::").next().map(str::to_owned)
+    });
+    named.filter(|name| modules.contains(name)).collect()
+}
+
+/// Gathers what each module of a room imports, from the files below `folder`.
+fn gather(
+    folder: &Path,
+    module: Option<&str>,
+    depth: usize,
+    modules: &BTreeSet<String>,
+    found: &mut BTreeMap<String, BTreeSet<String>>,
+) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        let name = module.unwrap_or(&stem);
+        if path.is_dir() {
+            gather(&path, Some(name), depth + 1, modules, found);
+            continue;
+        }
+        let is_root = stem == "mod";
+        if module.is_none() && is_root {
+            continue;
+        }
+        let text = fs::read_to_string(&path).unwrap();
+        let below = if is_root { depth - 1 } else { depth };
+        let mut all = imports(&text, below, modules);
+        all.remove(name);
+        found.entry(name.to_owned()).or_default().extend(all);
+    }
+}
+
+/// A module that comes back to itself by what it imports, and the way.
+fn circle(of: &BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
+    fn walk(of: &BTreeMap<String, BTreeSet<String>>, way: &mut Vec<String>) -> Option<Vec<String>> {
+        let here = way.last()?.clone();
+        for next in of.get(&here).into_iter().flatten() {
+            if let Some(from) = way.iter().position(|module| module == next) {
+                return Some(way[from..].to_vec());
+            }
+            way.push(next.clone());
+            let found = walk(of, way);
+            if found.is_some() {
+                return found;
+            }
+            way.pop();
+        }
+        None
+    }
+    of.keys()
+        .find_map(|module| walk(of, &mut vec![module.clone()]))
+}
+
+#[test]
+fn modules_of_scene_import_each_other_one_way() {
+    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/scene");
+    let names = fs::read_dir(&room)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let mut modules: BTreeSet<_> = names
+        .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
+        .collect();
+    modules.remove("mod");
+    let mut found = BTreeMap::new();
+    gather(&room, None, 1, &modules, &mut found);
+    assert_eq!(circle(&found), None);
+    // Controls: the imports are seen, also through braces, and one back makes a circle.
+    assert!(found["build"].contains("document") && found["document"].contains("key"));
+    assert!(found["keys"].contains("look") && found["look"].contains("key"));
+    let nested = "use super::{\n    super::{Method, document::Document},\n    SceneFile,\n};";
+    assert_eq!(
+        imports(nested, 2, &modules),
+        BTreeSet::from(["document".to_owned()])
+    );
+    found
+        .get_mut("document")
+        .unwrap()
+        .insert("build".to_owned());
+    assert!(circle(&found).is_some_and(|way| way.len() == 2));
+}
