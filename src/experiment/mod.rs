@@ -1,10 +1,10 @@
 //! Experiments: runs what a study asks for, measures it, and writes the page.
 //!
-//! The [`engine`] opens devices, runs points and keeps their results; a kind of study is a file or folder beside it: what is
-//! run, what is measured, what is drawn. [`sweep`] changes one setting at a time, [`stability`] runs scenes that are hard on a
-//! solver against their marks, [`comparison`] bakes and renders a scene with two solvers.
+//! The `engine` opens devices, runs points and keeps their results; a kind of study is a file or folder beside it: what is
+//! run, what is measured, what is drawn. `sweep` changes one setting at a time, [`stability`] runs scenes that are hard on a
+//! solver against their marks, `comparison` bakes and renders a scene with two solvers.
 //!
-//! A further kind is one file here that implements [`engine::Kind`], its parser in [`scene::study`](crate::scene::study), and
+//! A further kind is one file here that implements `engine::Kind`, its parser in [`scene::study`](crate::scene::study), and
 //! a line in [`study`].
 
 mod comparison;

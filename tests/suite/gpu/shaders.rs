@@ -356,7 +356,8 @@ fn rooms_import_what_they_may() {
             .to_str()
             .unwrap()
             .trim_end_matches(".rs");
-        if room == "lib" {
+        // The map of all rooms, and what nothing that ships has.
+        if ["lib", "mutants"].contains(&room) {
             continue;
         }
         for breach in breaches(room, &fs::read_to_string(file).unwrap()) {
