@@ -17,9 +17,6 @@ pub const U: f64 = 1.0 / (1 << 24) as f64;
 /// Unit roundoff of f64.
 pub const U64: f64 = 1.0 / (1u64 << 53) as f64;
 
-/// Error of a square root, in u.
-pub const ROOT: f64 = 9.0;
-
 /// Magnitudes of the terms that a particle's neighbours add to its sums, each weighted: p = 1 − q² and s = 1 − q.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {

@@ -13,7 +13,7 @@ use crate::{
         table::{each, entries, pair},
     },
     compare::{
-        rounding::{GRADIENT, ROOT, U},
+        rounding::{GRADIENT, U},
         tolerance::bounds,
     },
     reference::{
@@ -38,7 +38,7 @@ bounds! {
 entries! {
     "effects/vorticity_curl" {
         CURL = "vorticity", "1/s": [error: "" ROTATION] error, "";
-        LENGTH = "its length", "1/s": [error: "" ROTATION, w: "|ω|"] error + (ROOT + 3.0) * U * w, "a root takes 9 u";
+        LENGTH = "its length", "1/s": [error: "" ROTATION, w: "|ω|"] error + 12.0 * U * w, "a root takes 9 u";
     }
     "effects/vorticity_force" {
         VELOCITY = "velocity", "m/s": [force: "Δt ε h |ω|", error: "" SLOPE, slope: "|∇|ω||, or ∞ where it gives no direction",

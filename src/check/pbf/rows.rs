@@ -114,13 +114,10 @@ entries! {
     "whole solve" {
         WHOLE_DELTA = "corrections, RMS error", "m": [answer: "the RMS by which the f64 solve's corrections answer when every \
             coordinate moves before each iteration, each particle on its own or each layer alike, by ± " SHIFT]
-            SAFETY * answer, "accumulated; one set of moves is a sample of what roundings do";
+            4.0 * answer, "accumulated; one set of moves is a sample of what roundings do";
         WHOLE_DENSITY = "relative density, RMS error", "": [answer: "the RMS by which the density after the f64 solve answers \
-            to the moves of the row above, ± " SHIFT] SAFETY * answer, "accumulated";
+            to the moves of the row above, ± " SHIFT] 4.0 * answer, "accumulated";
         WHOLE_LAMBDA = "lambda, RMS error", "m²": [answer: "the RMS by which λ after the f64 solve answers to the same moves, \
-            ± " SHIFT] SAFETY * answer, "accumulated";
+            ± " SHIFT] 4.0 * answer, "accumulated";
     }
 }
-
-/// Of the RMS answer to one set of moves.
-const SAFETY: f64 = 4.0;
