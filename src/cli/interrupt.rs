@@ -150,16 +150,26 @@ mod tests {
     #[test]
     fn the_first_signal_raises_and_the_second_ends() {
         use std::io::{BufRead, BufReader};
+        use std::os::unix::process::CommandExt;
         use std::process::{Command, Stdio};
 
+        // A shell starts what goes to the background with SIGINT ignored, and the child would not hear it.
+        let hear_all = || {
+            for signal in [libc::SIGINT, libc::SIGTERM] {
+                // SAFETY: `signal` may be called between fork and exec, and the default action holds no pointer.
+                unsafe { libc::signal(signal, libc::SIG_DFL) };
+            }
+            Ok(())
+        };
         for (first, second) in [("INT", "INT"), ("TERM", "INT")] {
-            let mut child = Command::new(std::env::current_exe().unwrap())
+            let mut command = Command::new(std::env::current_exe().unwrap());
+            command
                 .args(["--ignored", "--exact", "--nocapture"])
                 .arg("cli::interrupt::tests::child")
                 .stdout(Stdio::piped())
-                .stderr(Stdio::null())
-                .spawn()
-                .unwrap();
+                .stderr(Stdio::null());
+            // SAFETY: `hear_all` allocates nothing and takes no lock.
+            let mut child = unsafe { command.pre_exec(hear_all) }.spawn().unwrap();
             let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
             let pid = child.id().to_string();
             for (word, signal) in [("ready", first), ("raised", second)] {

@@ -256,7 +256,6 @@ const MAY_IMPORT: [(&str, &[&str]); 13] = [
             "render",
             "compare",
             "study",
-            "check",
         ],
     ),
     (
