@@ -128,7 +128,10 @@ fn is_unsized(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
 
 fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
     let inner = &module.types[ty].inner;
-    let kind = inner.scalar();
+    let kind = match inner {
+        TypeInner::Atomic(scalar) => Some(*scalar),
+        _ => inner.scalar(),
+    };
     ElementType {
         stride: inner.size(module.to_ctx()),
         scalar: match kind.map(|scalar| (scalar.kind, scalar.width)) {

@@ -44,6 +44,7 @@ impl<'a> Document<'a> {
 
 impl Table<'_, '_> {
     fn settle<'v>(&self, values: &mut DeTable<'v>) -> Result<()> {
+        self.check_deciders(values)?;
         self.check_names(values)?;
         for key in self.keys {
             if key.name == ANY {
@@ -56,6 +57,21 @@ impl Table<'_, '_> {
                 continue;
             }
             self.fill(values, key)?;
+            if let Some(value) = values.get_mut(key.name) {
+                self.settle_value(key.name, key, value)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Looks at values that decide which keys go with them, before those keys are called unknown.
+    fn check_deciders(&self, values: &mut DeTable<'_>) -> Result<()> {
+        let decides = |name: &str| {
+            self.keys
+                .iter()
+                .any(|key| key.only.is_some_and(|(by, _)| by == name))
+        };
+        for key in self.keys.iter().filter(|key| decides(key.name)) {
             if let Some(value) = values.get_mut(key.name) {
                 self.settle_value(key.name, key, value)?;
             }

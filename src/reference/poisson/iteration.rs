@@ -19,11 +19,20 @@ pub struct Sum {
     pub size: f64,
 }
 
-/// Σ a b.
+/// Σ a b, summed with what each addition rounds off kept beside it (Ogita, Rump and Oishi 2005, algorithm 4.4): the device
+/// may sum in f64 as well, and in a tree, which rounds less than one term after the other.
 pub fn products(a: &[f64], b: &[f64]) -> Sum {
     let terms = || a.iter().zip(b).map(|(a, b)| a * b);
+    let (value, rounded_off) = terms().fold((0.0, 0.0), |(sum, rounded_off), term| {
+        let next: f64 = sum + term;
+        let taken = next - sum;
+        (
+            next,
+            rounded_off + ((sum - (next - taken)) + (term - taken)),
+        )
+    });
     Sum {
-        value: terms().sum(),
+        value: value + rounded_off,
         size: terms().map(f64::abs).sum(),
     }
 }
@@ -211,6 +220,19 @@ mod tests {
         domain::poisson::cases::{Surface, tank, white_noise},
         reference::poisson::BUDGET,
     };
+
+    /// A large term that comes and goes between small ones, which a plain sum loses.
+    #[test]
+    fn a_sum_of_products_keeps_what_its_additions_round_off() {
+        let mut terms = vec![1.0];
+        for _ in 0..1000 {
+            terms.extend([1e16, 0.25, -1e16]);
+        }
+        let ones = vec![1.0; terms.len()];
+        assert_eq!(products(&terms, &ones).value, 251.0);
+        // Negative control.
+        assert_ne!(terms.iter().sum::<f64>(), 251.0);
+    }
 
     /// The two halves are (I + D U)(D + D L D) r: symmetric and positive, as a preconditioner has to be.
     #[test]

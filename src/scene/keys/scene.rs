@@ -259,7 +259,7 @@ const METHODS: [&str; 2] = words(&Method::NAMED);
 
 const SOLVER: &[Key] = &[
     Key::choice("method", &METHODS)
-        .also(", with a table [solver.pbf] or [solver.flip]")
+        .also(", with a table [solver.pbf] of at least particle_spacing or [solver.flip] of at least cell_size")
         .about("the solver; `--solver` picks as well"),
     Key::table("pbf", PBF)
         .absent()
