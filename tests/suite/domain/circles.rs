@@ -144,7 +144,8 @@ fn modules_of_a_room_import_each_other_one_way() {
         .get_mut("document")
         .unwrap()
         .insert("build".to_owned());
-    assert!(circle(&found).is_some_and(|way| way.len() == 2));
+    let way = circle(&found).unwrap();
+    assert!(["build", "document"].map(|name| way.iter().any(|module| module == name)) == [true; 2]);
     let of_cache = of_room("cache");
     assert!(of_cache["writer"].contains("sink") && of_cache["tables"].contains("ledger"));
 }
