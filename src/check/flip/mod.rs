@@ -47,6 +47,11 @@ const TWINS: &[Twin<FlipState>] = &[
     twin("flip/cut_cells", NONE, grid::cut_cells),
     twin("flip/gather_faces", NONE, grid::gather_faces),
     twin("flip/gather_centers", NONE, grid::gather_centers),
+    twin(
+        "flip/wall_friction",
+        elements::faces_kept,
+        grid::wall_friction,
+    ),
     twin("flip/find_change", elements::faces_kept, grid::find_change),
     twin("flip/extrapolate", elements::faces_kept, grid::extrapolate),
     twin("flip/grid_to_particle", NONE, particles::grid_to_particle),

@@ -84,6 +84,10 @@ entries! {
         DISTANCE = "distance of the surface", "m": [moved: "in cells, what it answers when s − s²/2 moves by " OF_CENTER,
             size: "Δx"] (moved + 24.0 * U) * size, "";
     }
+    "flip/wall_friction" {
+        FRICTION = "velocity slowed by walls", "m/s": [place: "" PLACE, moved: "what it is slowed by in Δt where a row is a whole cell nearer to each wall",
+            slowed: "Δt times the rate", v: "|v|"] (2.0 * place * moved + U * (16.0 * slowed + 4.0)) * v, "";
+    }
     "pressure/build_system" {
         DIRICHLET = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64", air: "Σ f / θ"] 24.0 * unit * air,
             "16 u of each quotient, 6 sums";

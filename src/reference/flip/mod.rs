@@ -15,6 +15,7 @@ mod solver;
 mod sort;
 mod to_grid;
 mod to_particles;
+mod wall_friction;
 
 pub use grid::planes;
 pub use model::{Model, Step};
@@ -25,3 +26,4 @@ pub use solver::{Flip, Projected, Trace};
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
 pub use to_grid::{Centers, Faces, Room, cut_cells, gather_centers, gather_faces};
 pub use to_particles::{Given, Moved, advect, extrapolate, find_change, grid_to_particle};
+pub use wall_friction::{friction_rates, wall_friction};

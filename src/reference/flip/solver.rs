@@ -7,6 +7,7 @@ use super::{
     density_source,
     effects::{self, Water},
     extrapolate, find_change, gather_centers, gather_faces, grid_to_particle, reorder, survey,
+    wall_friction,
 };
 use crate::{
     domain::{
@@ -175,6 +176,11 @@ impl Flip {
         let centers = timings.time("flip/gather_centers", || {
             gather_centers(model, &step, &bricks, &sorted, &room)
         });
+        if !model.scene.no_slip.is_empty() {
+            timings.time("flip/wall_friction", || {
+                wall_friction(model, &step, &bricks, &room, &mut faces);
+            });
+        }
         let water = Water {
             model,
             step: &step,

@@ -35,6 +35,9 @@ const WATCH_RUN: u64 = 16;
 /// Threads of a workgroup of passes over cells.
 const WORKGROUP: u32 = 64;
 
+/// The pass that slows water along no-slip walls.
+pub(super) const WALL_FRICTION: &str = "flip/wall_friction";
+
 /// A substep in its parts.
 pub(super) struct Recordings {
     /// Before the bricks are known.
@@ -75,7 +78,7 @@ impl Commands {
                 Command::clear(&SURVEY),
                 Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
             ],
-            to_grid: to_grid(plan, effects),
+            to_grid: to_grid(plan, scene, effects),
             to_particles: to_particles(plan, layers(scene.solver.flip().cfl)),
             watch: watch(plan, scene),
         }
@@ -125,7 +128,7 @@ fn along(pass: &'static str, size: usize, axis: usize) -> Command {
     bound(pass, size, vec![AXES.bind(axis)])
 }
 
-fn to_grid(plan: &Plan, effects: &[(&'static str, Addition)]) -> Vec<Command> {
+fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Vec<Command> {
     let n = plan.counts.particles;
     let cells = plan.counts.bricks.wet * CELLS as usize;
     let mut commands = vec![
@@ -142,6 +145,9 @@ fn to_grid(plan: &Plan, effects: &[(&'static str, Addition)]) -> Vec<Command> {
     }
     commands.push(along("flip/spread_centers", WET, 0));
     commands.push(over("flip/gather_centers", ACTIVE));
+    if !scene.no_slip.is_empty() {
+        commands.push(over(WALL_FRICTION, ACTIVE));
+    }
     for pass in effects.iter().flat_map(|(_, addition)| &addition.passes) {
         commands.push(over(pass.name, ACTIVE));
     }
