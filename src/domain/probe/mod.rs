@@ -16,7 +16,7 @@ pub use elevation::elevation;
 pub use fitted::fitted;
 pub use flux::flux;
 pub use front::{front, run_up};
-pub use volume::volume;
+pub use volume::{enclosed_volume, volume};
 
 /// R of the surface's kernel in particle spacings (Zhu and Bridson 2005).
 const SUPPORT: f64 = 2.0;
