@@ -11,6 +11,7 @@ pub mod frame_range;
 pub mod gauge;
 pub mod holes;
 pub mod inside;
+pub mod keep;
 pub mod mesh;
 pub mod mesh_file;
 pub mod motion;

@@ -27,6 +27,10 @@ pub(in super::super) const KEYS: &[Key] = &[
         .absent()
         .not_physics()
         .about("Each frame's water as OpenVDB grids beside its particles"),
+    Key::table("keep", KEEP)
+        .absent()
+        .not_physics()
+        .about("What of a bake stays on the disk; without this table, all"),
     Key::tables("probe", PROBE)
         .not_physics()
         .about("What is measured at each frame, a CSV each"),
@@ -401,6 +405,14 @@ const GRIDS: &[Key] = &[
         .default("\"half\"")
         .about("how values are kept"),
 ];
+
+const KEEP: &[Key] = &[Key::text(
+    "particles",
+    "\"all\", \"every N\" with N from 1 to 1000000, or \"none\"",
+)
+.about(
+    "frames whose particles stay; the first and the newest are always there, so that a bake can go on",
+)];
 
 const PROBES: [&str; 7] = ProbeKind::NAMES;
 
