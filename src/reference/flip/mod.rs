@@ -16,6 +16,7 @@ mod sort;
 mod to_grid;
 mod to_particles;
 mod wall_friction;
+mod water;
 
 pub use grid::planes;
 pub use model::{Model, Step};
@@ -24,6 +25,7 @@ pub use rotation::{grid_confinement, grid_curl};
 pub use solids::Solid;
 pub use solver::{Flip, Projected, Trace};
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
-pub use to_grid::{Centers, Faces, Room, cut_cells, gather_centers, gather_faces};
+pub use to_grid::{Faces, Room, cut_cells, gather_faces};
 pub use to_particles::{Given, Moved, advect, extrapolate, find_change, grid_to_particle};
 pub use wall_friction::{friction_rates, wall_friction};
+pub use water::{Centers, find_excess, find_water, gather_centers, is_near_half};

@@ -145,6 +145,10 @@ fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> 
     }
     commands.push(along("flip/spread_centers", WET, 0));
     commands.push(over("flip/gather_centers", ACTIVE));
+    commands.push(over("flip/find_water", ACTIVE));
+    if scene.solver.flip().density_correction {
+        commands.push(over("flip/find_excess", ACTIVE));
+    }
     if !scene.no_slip.is_empty() {
         commands.push(over(WALL_FRICTION, ACTIVE));
     }
