@@ -52,6 +52,7 @@ const TWINS: &[Twin<FlipState>] = &[
     twin("flip/find_change", elements::faces_kept, grid::find_change),
     twin("flip/extrapolate", elements::faces_kept, grid::extrapolate),
     twin("flip/grid_to_particle", NONE, particles::grid_to_particle),
+    twin("flip/push_apart", NONE, particles::push_apart),
     twin(
         "flip/advect",
         || names![buffers::COUNTERS],
