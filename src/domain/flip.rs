@@ -15,6 +15,9 @@ pub fn apart(spacing: f64) -> f64 {
     (APART * spacing).min(0.49)
 }
 
+/// κ of the law of the wall.
+pub const VON_KARMAN: f64 = 0.41;
+
 /// Displacement cap of a substep over the CFL displacement: what the projection speeds up beyond this is slowed
 /// and counted.
 pub const CAP: f64 = 2.0;

@@ -93,6 +93,10 @@ entries! {
         EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT] 4.0 * U * excess + cut * excess,
             "a difference, and the product with the open volume";
     }
+    "flip/wall_friction" {
+        FRICTION = "velocity slowed by walls", "m/s": [place: "" PLACE, moved: "what it is slowed by in Δt where a row is a whole cell nearer to each wall",
+            slowed: "Δt times the rate", v: "|v|"] (2.0 * place * moved + U * (16.0 * slowed + 4.0)) * v, "";
+    }
     "pressure/build_system" {
         DIRICHLET = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64", air: "Σ f / θ"] 24.0 * unit * air,
             "16 u of each quotient, 6 sums";

@@ -7,7 +7,7 @@ use super::{
     density_source,
     effects::{self, Water},
     extrapolate, find_change, find_excess, find_water, gather_centers, gather_faces,
-    grid_to_particle, push_apart, reorder, survey,
+    grid_to_particle, push_apart, reorder, survey, wall_friction,
 };
 use crate::{
     domain::{
@@ -187,6 +187,11 @@ impl Flip {
             excess,
             distance,
         };
+        if !model.scene.no_slip.is_empty() {
+            timings.time("flip/wall_friction", || {
+                wall_friction(model, &step, &bricks, &room, &mut faces);
+            });
+        }
         let water = Water {
             model,
             step: &step,

@@ -35,6 +35,9 @@ const WATCH_RUN: u64 = 16;
 /// Threads of a workgroup of passes over cells.
 const WORKGROUP: u32 = 64;
 
+/// The pass that slows water along no-slip walls.
+pub(super) const WALL_FRICTION: &str = "flip/wall_friction";
+
 /// A substep in its parts.
 pub(super) struct Recordings {
     /// Before the bricks are known.
@@ -145,6 +148,9 @@ fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> 
     commands.push(over("flip/find_water", ACTIVE));
     if scene.solver.flip().density_correction {
         commands.push(over("flip/find_excess", ACTIVE));
+    }
+    if !scene.no_slip.is_empty() {
+        commands.push(over(WALL_FRICTION, ACTIVE));
     }
     for pass in effects.iter().flat_map(|(_, addition)| &addition.passes) {
         commands.push(over(pass.name, ACTIVE));
