@@ -12,8 +12,8 @@ use super::{
     error::SceneError,
     grids,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
-    origin, probe,
-    spec::{BoxSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
+    origin, periodic, probe,
+    spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
     wave_maker,
     words::{chain, extent, shown, shown_all},
 };
@@ -48,7 +48,10 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let shot = spec.shot;
     let domain = domain(doc, &spec.domain)?;
     let (solver, lattice) = solver::solver(doc, spec.solver, &domain)?;
+    let periodic = periodic::read(doc, &spec.domain.periodic)?;
+    periodic::check_solver(doc, periodic, &domain, &solver)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
+    periodic::check_gravity(doc, periodic, water.gravity)?;
     check_particle_count(doc, &water, &domain, &lattice)?;
     let around = wave_maker::Surroundings {
         base_dir,
@@ -58,7 +61,12 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         shot: &shot,
     };
     let (solids, moving_solids) = solids(doc, &spec.solid, &around, &solver)?;
+    let moves = |spec: &MeshSpec| spec.motion.is_some();
+    let moving = (0..spec.solid.len()).filter(|&k| moves(&spec.solid[k]));
+    let moving: Vec<usize> = moving.collect();
+    periodic::check_solids(doc, periodic, &moving_solids, |k| moving[k])?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
+    periodic::check_makers(doc, periodic, &wave_makers)?;
     let grids = match &spec.grids {
         Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
         None => None,
@@ -77,6 +85,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         shot,
         origin: origin::of(&domain),
         domain,
+        periodic,
         water,
         solids,
         moving_solids,
@@ -120,8 +129,9 @@ fn solids(
 }
 
 /// The box of the whole scene.
-fn domain(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
-    let domain = bounds(doc, "domain", spec)?;
+fn domain(doc: &Document<'_>, spec: &DomainSpec) -> Result<Bounds> {
+    let DomainSpec { min, max, .. } = *spec;
+    let domain = bounds(doc, "domain", &BoxSpec { min, max })?;
     let size = domain.size();
     if size.min_element() >= LEAST_EDGE {
         return Ok(domain);

@@ -7,6 +7,7 @@ pub mod grids;
 pub mod keys;
 pub mod look;
 pub mod moving_solid;
+pub mod periodic;
 pub mod probe;
 pub mod step;
 pub mod study;
@@ -52,6 +53,8 @@ pub struct Scene {
     pub origin: DVec3,
     /// The box whose six walls are solid, metres.
     pub domain: Bounds,
+    /// Axes along which it has no walls but joins its own end.
+    pub periodic: [bool; 3],
     /// The water at the start.
     pub water: Water,
     /// Static solids.

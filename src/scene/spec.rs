@@ -5,14 +5,14 @@ use serde::Deserialize;
 
 use super::{
     Effects, Iteration, Method, Shot, Wall, budget::BudgetSpec, flip::Flip, grids::GridsSpec,
-    probe::ProbeSpec,
+    periodic::Axis, probe::ProbeSpec,
 };
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneSpec {
     pub(super) shot: Shot,
-    pub(super) domain: BoxSpec,
+    pub(super) domain: DomainSpec,
     pub(super) water: WaterSpec,
     #[serde(default)]
     pub(super) solid: Vec<MeshSpec>,
@@ -31,6 +31,15 @@ pub(super) struct SceneSpec {
 pub(super) struct BoxSpec {
     pub(super) min: [f64; 3],
     pub(super) max: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DomainSpec {
+    pub(super) min: [f64; 3],
+    pub(super) max: [f64; 3],
+    #[serde(default)]
+    pub(super) periodic: Vec<Axis>,
 }
 
 #[derive(Deserialize)]

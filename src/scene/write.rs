@@ -10,6 +10,7 @@ use super::{
     Budget, Iteration, Pbf, PlacedMesh, Scene, Stop,
     key::{Key, Kind},
     keys,
+    periodic::Axis,
     probe::Probe,
 };
 use crate::domain::{bounds::Bounds, motion::Motion};
@@ -65,10 +66,7 @@ impl Scene {
     pub(super) fn written(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> Table {
         let mut scene = table([
             ("shot", value(&self.shot)),
-            (
-                "domain",
-                Value::Table(corners(&self.domain.moved(self.origin))),
-            ),
+            ("domain", Value::Table(self.written_domain())),
             ("water", Value::Table(self.written_water(mesh_path))),
             ("solver", Value::Table(self.written_solver())),
             ("budget", Value::Table(budget(&self.budget))),
@@ -97,6 +95,14 @@ impl Scene {
         let probes = self.probes.iter().map(|it| probe(it, self.origin));
         insert_tables(&mut scene, "probe", probes);
         scene
+    }
+
+    fn written_domain(&self) -> Table {
+        let mut domain = corners(&self.domain.moved(self.origin));
+        if self.is_periodic() {
+            domain.insert("periodic".to_owned(), value(&Axis::of(self.periodic)));
+        }
+        domain
     }
 
     fn written_water(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> Table {

@@ -110,8 +110,8 @@ mirror!(
         contact_distance: f32,
         /// Of a substep.
         max_displacement: f32,
-        /// Unused.
-        padding: f32,
+        /// A bit an axis along which the domain joins its own end.
+        periodic: u32,
     }
 );
 

@@ -150,6 +150,8 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
                 .collect::<Vec<_>>())
         })
         .collect();
+    let period = state.model.period();
+    let apart = |x: DVec3, y: DVec3| period.shortest(x - y).length();
     let answer = |of: &dyn Fn(&Moved) -> f64| -> f64 {
         let sides = answers.chunks(2);
         sides.map(|pair| of(&pair[0]).max(of(&pair[1]))).sum()
@@ -158,8 +160,10 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     io.table.each(&MOVED, 0..n, |i| {
         let x = twin.position[i];
-        let moved = answer(&|moved| moved.position[i].distance(x));
-        pair(i, position[i], x, [moved, x.length()])
+        let moved = answer(&|moved| apart(moved.position[i], x));
+        // Rounding may take one of the two to the other end of a period.
+        let found = x + period.shortest(position[i] - x);
+        pair(i, found, x, [moved, x.length().max(period.0.length())])
     });
     // What is left of a velocity that a solid stops has the rounding of the two that were subtracted.
     let among = f64::from(u8::from(!step.solids.is_empty()));

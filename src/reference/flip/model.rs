@@ -9,6 +9,7 @@ use crate::{
         bounds::Bounds,
         bricks::{Bricks, EDGE, table_dims},
         flip::{CAP, CONTACT, layers, stored_cells},
+        period::Period,
         signed_distance::SignedDistance,
     },
     scene::{
@@ -91,6 +92,11 @@ impl Model {
         CAP * self.settings().cfl * self.cell_size()
     }
 
+    /// Lengths along the axes along which the domain joins its own end.
+    pub fn period(&self) -> Period {
+        self.scene.period()
+    }
+
     /// Whether the surface counts in the pressure.
     pub(super) fn has_ghost_fluid(&self) -> bool {
         self.settings().surface == Surface::GhostFluid
@@ -105,13 +111,13 @@ impl Model {
 
     /// One flag a brick, none set.
     pub(super) fn no_water(&self) -> Vec<bool> {
-        let dims = table_dims(stored_cells(self.cells));
+        let dims = table_dims(stored_cells(self.cells, self.scene.periodic));
         vec![false; dims.iter().map(|&n| n as usize).product()]
     }
 
     /// Place of a cell's brick among the flags.
     pub(super) fn brick_index(&self, cell: [u32; 3]) -> usize {
-        let dims = table_dims(stored_cells(self.cells));
+        let dims = table_dims(stored_cells(self.cells, self.scene.periodic));
         let [x, y, z] = cell.map(|c| c / EDGE);
         ((z * dims[1] + y) * dims[0] + x) as usize
     }
@@ -119,7 +125,9 @@ impl Model {
     /// Bricks with water, and those that `layers` of faces beyond it reach; their elements are those of the GPU.
     pub fn bricks(&self, is_wet: &[bool], layers: usize) -> Bricks {
         let reach = (layers as u32).div_ceil(EDGE);
-        Bricks::new(stored_cells(self.cells), is_wet, reach, 1)
+        let periodic = self.scene.periodic;
+        let cells = stored_cells(self.cells, periodic);
+        Bricks::periodic(cells, periodic, is_wet, reach, 1)
     }
 
     /// What `substep` knows.

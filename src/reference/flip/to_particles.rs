@@ -127,14 +127,15 @@ pub fn extrapolate(step: &Step<'_>, bricks: &Bricks, layer: u32, faces: &mut Fac
 /// the axes turned so that the component's own is first. Beyond the domain the cell's own row or column counts.
 fn stencil(model: &Model, bricks: &Bricks, element: u32, axis: usize) -> [usize; 18] {
     let cell = bricks.cell(element);
+    let goes_on = model.scene.periodic;
     std::array::from_fn(|k| {
         let mut offset = [0; 3];
         offset[axis] = (k % 2) as i32;
         for (turn, step) in [(1, k / 2 % 3), (2, k / 6)] {
             let across = (axis + turn) % 3;
             offset[across] = match step {
-                0 if cell[across] > 0 => -1,
-                2 if cell[across] + 1 < model.cells[across] => 1,
+                0 if cell[across] > 0 || goes_on[across] => -1,
+                2 if cell[across] + 1 < model.cells[across] || goes_on[across] => 1,
                 _ => 0,
             };
         }
@@ -244,7 +245,7 @@ fn velocity_at(
     otherwise: DVec3,
 ) -> DVec3 {
     let cells = DVec3::from_array(model.cells.map(f64::from));
-    let p = (x / model.cell_size()).clamp(DVec3::ZERO, cells);
+    let p = (model.period().wrap(x) / model.cell_size()).clamp(DVec3::ZERO, cells);
     let cell = p.min(cells - 1.0).floor();
     let f = p - cell;
     let at = cell.to_array().map(|c| c as i64);
@@ -265,7 +266,10 @@ fn velocity_at(
         } else {
             f[axis] - 0.5
         };
-        ([first.max(0), (first + 1).min(last)], t)
+        match model.scene.periodic[axis] {
+            true => ([first, first + 1], t),
+            false => ([first.max(0), (first + 1).min(last)], t),
+        }
     };
     let component = |own: usize| {
         let ways: [_; 3] = std::array::from_fn(|axis| {
@@ -315,7 +319,7 @@ pub fn advect(
         let [slowest, fastest] = step.wall_velocity;
         let v = DVec3::select(x.cmplt(low), v.max(slowest), v);
         let v = DVec3::select(x.cmpgt(high), v.min(fastest), v);
-        (x.clamp(low, high), v, is_capped)
+        (model.period().wrap(x.clamp(low, high)), v, is_capped)
     };
     let all: Vec<_> = (0..position.len())
         .into_par_iter()

@@ -114,7 +114,7 @@ impl Flip {
         let program = Program::new(context, &buffers, &passes, &[])?;
         boundary.upload_distance(&program, scene);
         upload_constants(&program, &plan, scene);
-        let bricks = bricks(plan.grid_dims, &no_water(plan.grid_dims), 0);
+        let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         // The first survey reads what does not depend on the substep.
         let frame = Substep {
             start: 0.0,
@@ -179,7 +179,7 @@ impl Flip {
 
     fn survey(&mut self, run: &mut Run<'_>) -> Result<Survey, SolveError> {
         run(&self.program, &[&self.recordings.survey])?;
-        let flags = SURVEY_IS_WET.first(no_water(self.plan.grid_dims).len());
+        let flags = SURVEY_IS_WET.first(no_water(&self.scene, self.plan.grid_dims).len());
         let (head, is_wet) = self.program.download((SURVEY.first(1), flags))?;
         Ok(Survey {
             speed: f64::from(head[0].speed_square).sqrt(),
@@ -209,7 +209,7 @@ impl Flip {
     /// Lays out bricks about the water, and makes room for more where they do not fit.
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
         let layers = layers(substep.displacement);
-        self.bricks = bricks(self.plan.grid_dims, is_wet, layers);
+        self.bricks = bricks(&self.scene, self.plan.grid_dims, is_wet, layers);
         let needed = capacity_of(&self.bricks);
         let grown = self.plan.counts.bricks.grown(needed);
         if grown != self.plan.counts.bricks {
