@@ -392,6 +392,39 @@ mod tests {
         assert!(found > 100);
     }
 
+    /// Three bricks, two and one; all cells are there, and so is each neighbour.
+    #[test]
+    fn periodic_bricks_join_their_own_ends() {
+        let (cells, dims) = ([24, 16, 8], [3, 2, 1]);
+        let periodic = [true, true, true];
+        let bricks = Bricks::periodic(cells, periodic, &[true; 6], 1, 8);
+        let image = |cell: [i64; 3]| -> [u32; 3] {
+            std::array::from_fn(|k| cell[k].rem_euclid(i64::from(cells[k])) as u32)
+        };
+        for element in (CELLS..CELLS * (bricks.active + 1)).step_by(7) {
+            let cell = bricks.cell(element).map(i64::from);
+            for offset in [[-1, 0, 0], [1, -1, 1], [8, 0, -8], [0, 1, 0], [-1, -1, -1]] {
+                let there: [i64; 3] = std::array::from_fn(|k| cell[k] + i64::from(offset[k]));
+                let near = bricks.near(element, offset);
+                assert_eq!(near, bricks.element(there));
+                assert_eq!(bricks.cell(near), image(there));
+            }
+        }
+        // Above three bricks are two, of which one is half empty: no joint; above two is one, above one still one.
+        let faces = |slot: u32| bricks.records[slot as usize].neighbors;
+        let above = bricks.levels[1].start;
+        assert_eq!(bricks.levels[1].count, 2);
+        assert_eq!((faces(above)[12], faces(above)[14]), (0, above + 1));
+        assert_eq!((faces(above)[10], faces(above)[16]), (above, above));
+        assert_eq!((faces(above)[4], faces(above)[22]), (0, 0));
+        // Within reach across the joint, and not without it.
+        let only = [true, false, false, false, false, false];
+        let reached = |periodic| Bricks::periodic(cells, periodic, &only, 1, 1).active;
+        assert_eq!(reached([true, false, false]), 6);
+        assert_eq!(reached([false; 3]), 4);
+        assert_eq!(volume(dims), 6);
+    }
+
     #[test]
     fn empty_height_adds_no_slot() {
         let low = Bricks::new([16, 8, 16], &[true, false, true, true], 1, 8);

@@ -12,12 +12,7 @@ use super::{
     moving_solid::MovingSolid,
     words::{shown, shown_all},
 };
-use crate::domain::{
-    bounds::Bounds,
-    bricks::EDGE,
-    mesh::TriangleMesh,
-    period::Period,
-};
+use crate::domain::{bounds::Bounds, bricks::EDGE, mesh::TriangleMesh, period::Period};
 
 /// The key that names the axes.
 const KEY: &str = "domain.periodic";
@@ -127,7 +122,11 @@ fn is_whole(count: f64, parts: f64) -> bool {
 }
 
 /// Refuses gravity along a periodic axis: no pressure could hold it, and no energy of place belongs to it.
-pub(super) fn check_gravity(doc: &Document<'_>, periodic: [bool; 3], gravity: DVec3) -> Result<(), SceneError> {
+pub(super) fn check_gravity(
+    doc: &Document<'_>,
+    periodic: [bool; 3],
+    gravity: DVec3,
+) -> Result<(), SceneError> {
     let along = Axis::of(periodic).into_iter();
     let Some(axis) = along.clone().find(|axis| gravity[*axis as usize] != 0.0) else {
         return Ok(());
@@ -166,9 +165,7 @@ pub(super) fn check_solids(
     index_of: impl Fn(usize) -> usize,
 ) -> Result<(), SceneError> {
     for axis in Axis::of(periodic) {
-        let moves = |solid: &MovingSolid| {
-            solid.direction.normalize()[axis as usize].abs() > ACROSS
-        };
+        let moves = |solid: &MovingSolid| solid.direction.normalize()[axis as usize].abs() > ACROSS;
         if let Some(found) = solids.iter().position(moves) {
             let problem = format!("the solid moves along {}, which {KEY} names", axis.name());
             let path = format!("solid[{}].direction", index_of(found));
@@ -184,10 +181,11 @@ impl Scene {
         self.periodic.contains(&true)
     }
 
-    /// Its lengths along those axes.
+    /// Its lengths along those axes, as 32 bits have them: the GPU and the reference repeat alike.
     pub fn period(&self) -> Period {
         let is = |axis: usize| f64::from(u8::from(self.periodic[axis]));
-        Period(self.domain.size() * DVec3::new(is(0), is(1), is(2)))
+        let size = self.domain.size() * DVec3::new(is(0), is(1), is(2));
+        Period(size.as_vec3().as_dvec3())
     }
 
     /// A mesh and, along periodic axes, those of its images that come nearer than `margin` metres to the domain.
@@ -203,7 +201,7 @@ impl Scene {
         }
         for k in (0..27).filter(|&k| k != 13) {
             let step = DVec3::from_array([k % 3, k / 3 % 3, k / 9].map(|n| f64::from(n) - 1.0));
-            // One image along an axis with walls: itself.
+            // Along an axis with walls there is none.
             if (0..3).any(|axis| !self.periodic[axis] && step[axis] != 0.0) {
                 continue;
             }

@@ -51,16 +51,16 @@ mirror!(
         max_displacement: f32,
         /// k times λ's natural scale, m².
         artificial_pressure: f32,
-        /// Unused.
-        padding: f32,
+        /// Length of the domain along x where it joins its own end; 0 with walls.
+        period_x: f32,
         /// Of the least faces, each along its axis, m/s.
         wall_velocity_min: [f32; 3],
-        /// Unused.
-        padding_min: f32,
+        /// The same along y.
+        period_y: f32,
         /// Of the greatest faces.
         wall_velocity_max: [f32; 3],
-        /// Unused.
-        padding_max: f32,
+        /// The same along z.
+        period_z: f32,
     }
 );
 

@@ -71,6 +71,7 @@ mod solve {
     mod independent;
     mod moving_solids;
     mod pbf;
+    mod periodic;
     mod plan;
     mod pressure;
 }

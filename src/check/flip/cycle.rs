@@ -179,7 +179,11 @@ fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
                 let fine = &levels.coefficient[axis];
                 let faces = lower.map(|c| f64::from(fine[place(slot, block, c)]));
                 let is_end = is_end(at, axis);
-                let exact = if is_end { 0.0 } else { 0.25 * faces.sum::<f64>() };
+                let exact = if is_end {
+                    0.0
+                } else {
+                    0.25 * faces.sum::<f64>()
+                };
                 shared.push(pair(at, fine[at], exact, [exact]));
             }
             let air = (0..8).map(|c| levels.dirichlet[place(slot, block, c)]);
@@ -187,7 +191,9 @@ fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             airs.push(pair(at, levels.dirichlet[at], exact, [unit, exact]));
             let kind = kinds[(64 * slot + block) as usize] & 3;
             let coarse = at / 512 * 64 + at % 64;
-            let is_full = full[coarse][0] && kind == 1 && !(0..3).any(|axis| is_end(at, axis));
+            let is_among =
+                !state.is_periodic() || levels.bricks[at / 512].faces.iter().all(|&face| face != 0);
+            let is_full = full[coarse][0] && kind == 1 && is_among;
             full[coarse] = [is_full, full[coarse][1] && kind == 0];
             is_child[coarse] = true;
         }

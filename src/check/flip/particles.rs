@@ -162,8 +162,14 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         let x = twin.position[i];
         let moved = answer(&|moved| apart(moved.position[i], x));
         // Rounding may take one of the two to the other end of a period.
-        let found = x + period.shortest(position[i] - x);
-        pair(i, found, x, [moved, x.length().max(period.0.length())])
+        let found = period.image_by_rounding(position[i], x);
+        let carried = f64::from(u8::from(period.is_at_joint(start[i], x)));
+        pair(
+            i,
+            found,
+            x,
+            [moved, x.length() + 4.0 * carried * period.0.length()],
+        )
     });
     // What is left of a velocity that a solid stops has the rounding of the two that were subtracted.
     let among = f64::from(u8::from(!step.solids.is_empty()));

@@ -198,7 +198,7 @@ entries! {
         GIVEN_AFFINE = "affine rows", "1/s": [velocity: "" OF_FACES, size: "Δx"] 2.0 * velocity / size, "";
     }
     "flip/advect" {
-        MOVED = "position", "m": [answer: "what the twin answers when its start moves along each axis by " START, x: "|x|"]
+        MOVED = "position", "m": [answer: "what the twin answers when its start moves along each axis by " START, x: "|x|, and where a period carried it that four times"]
             answer + U * x, "";
         ADVECTED = "velocity", "m/s": [answer: "what the twin answers when its start moves along each axis by " START,
             size: "|v|, with solids |v| that came in and theirs too"] answer + 8.0 * U * size, "";

@@ -33,7 +33,8 @@ impl Bounds<'_> {
         let mut sums = Sums::default();
         for j in self.0.neighbors.all(i) {
             let j = j as usize;
-            let q = self.0.points[i].distance(self.0.points[j]) / h;
+            let way = self.0.points[i] - self.0.points[j];
+            let q = self.0.model.period().shortest(way).length() / h;
             sums.add(q, weight(j));
         }
         sums

@@ -16,12 +16,7 @@ pub(super) fn no_water(scene: &Scene, grid_dims: [u32; 3]) -> Vec<bool> {
     vec![false; dims.iter().map(|&n| n as usize).product()]
 }
 
-pub(super) fn bricks(
-    scene: &Scene,
-    grid_dims: [u32; 3],
-    is_wet: &[bool],
-    layers: usize,
-) -> Bricks {
+pub(super) fn bricks(scene: &Scene, grid_dims: [u32; 3], is_wet: &[bool], layers: usize) -> Bricks {
     let reach = (layers as u32).div_ceil(EDGE);
     let cells = stored_cells(grid_dims, scene.periodic);
     Bricks::periodic(cells, scene.periodic, is_wet, reach, LEVELS)

@@ -39,6 +39,8 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
         particle_share: 1.0 / flip.particles_per_cell as f32,
         contact_distance: (CONTACT * flip.particle_spacing()) as f32,
         max_displacement: (CAP * flip.cfl * flip.cell_size) as f32,
-        periodic: (0..3).map(|axis| u32::from(scene.periodic[axis]) << axis).sum(),
+        periodic: (0..3)
+            .map(|axis| u32::from(scene.periodic[axis]) << axis)
+            .sum(),
     }
 }

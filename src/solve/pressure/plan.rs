@@ -204,12 +204,7 @@ pub fn passes(
 }
 
 /// A pass under the conditions that hold for the whole room; one that does not ask ignores them.
-fn pass(
-    name: &'static str,
-    settings: &Pressure,
-    surface: Surface,
-    is_periodic: bool,
-) -> PassSpec {
+fn pass(name: &'static str, settings: &Pressure, surface: Surface, is_periodic: bool) -> PassSpec {
     let conditions = [
         ("GHOST_FLUID", surface == Surface::GhostFluid),
         ("DIAGONAL", has_diagonal(settings)),
