@@ -144,11 +144,24 @@ fn pbf_is_within_tolerance_across_joints_and_fails_where_it_should() {
     };
     let searched: Vec<Control> = (PBF.iter())
         .filter(|control| control.pass != "pbf/build_neighbors")
-        .map(|&Control { spoil, pass, fields, follow }| Control { spoil, pass, fields, follow })
+        .map(
+            |&Control {
+                 spoil,
+                 pass,
+                 fields,
+                 follow,
+             }| Control {
+                spoil,
+                pass,
+                fields,
+                follow,
+            },
+        )
         .collect();
     let mut all = String::new();
     for (limits, controls) in [(limits, PBF), (none, &searched[..])] {
-        let checked = |context: &_| -> Result<Table, _> { pbf_table(context, &scene, &start, limits) };
+        let checked =
+            |context: &_| -> Result<Table, _> { pbf_table(context, &scene, &start, limits) };
         all += &faults(&context, &checked, controls).1;
     }
     assert!(all.is_empty(), "{all}");

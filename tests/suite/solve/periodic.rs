@@ -197,7 +197,12 @@ fn a_stream_keeps_its_speed_and_its_particles() {
         // Negative control: with walls the stream stops there.
         scene.periodic = [false; 3];
         let walled = run(&context, &scene, &particles, 4);
-        let off = apart(Period::default(), &walled, &shifted(&scene, &particles, 0.08 * stream), DVec3::ZERO);
+        let off = apart(
+            Period::default(),
+            &walled,
+            &shifted(&scene, &particles, 0.08 * stream),
+            DVec3::ZERO,
+        );
         assert!(off > 0.01, "{method:?}: {off}");
     }
 }
@@ -236,7 +241,9 @@ fn vortices_stand_still_in_a_periodic_box() {
         }
         let mut state = run(&context, &scene, &start, (seconds * 50.0) as u32);
         for x in &mut state.position {
-            *x = (DVec3::from_array(x.map(f64::from)) - way).as_vec3().to_array();
+            *x = (DVec3::from_array(x.map(f64::from)) - way)
+                .as_vec3()
+                .to_array();
         }
         rms(&state)
     };
@@ -282,7 +289,10 @@ fn a_full_box_at_rest_stays() {
         let mut scene = open_box(method, [true; 3]);
         scene.water.gravity = DVec3::ZERO;
         let particles = block([16, 16, 8]);
-        for after in [run(&context, &scene, &particles, 2), twin(&scene, &particles, 2)] {
+        for after in [
+            run(&context, &scene, &particles, 2),
+            twin(&scene, &particles, 2),
+        ] {
             let off = max_distance(&after, &particles);
             assert!(off < 1e-6, "{method:?}: {off}");
         }

@@ -9,7 +9,9 @@ pub const FLIP_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nperiodic = [\"z\"]",
         9,
-        &["domain.periodic: the period along z is 15 m: 75.000 cells of 0.2 m, and FLIP asks for a multiple of 8"],
+        &[
+            "domain.periodic: the period along z is 15 m: 75.000 cells of 0.2 m, and FLIP asks for a multiple of 8",
+        ],
     ),
     (
         "max = [25.0, 12.6, 15.0]",

@@ -39,7 +39,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nperiodic = [\"y\"]",
         9,
-        &["domain.periodic: gravity is 0, -9.81, 0 m/s\u00b2, and along y nothing holds the water up"],
+        &["domain.periodic: gravity is 0, -9.81, 0 m/s², and along y nothing holds the water up"],
     ),
     (
         "max = [25.0, 12.6, 15.0]",
@@ -57,7 +57,10 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 0.5]\nperiodic = [\"z\"]",
         9,
-        &["domain.periodic: the period along z is 0.5 m: 2.500 support radii of 0.2 m", "at least 3"],
+        &[
+            "domain.periodic: the period along z is 0.5 m: 2.500 support radii of 0.2 m",
+            "at least 3",
+        ],
     ),
     // Ranges.
     (
