@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::bounds::cells_over;
+
 /// Lengths of a box along the axes along which it joins its own end, metres; 0 along those with walls. Positions are
 /// relative to its least corner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,11 +47,11 @@ impl Period {
     /// Cells that cover a box of `size` metres along each axis, one at least: of edge `edge` along axes with walls, and
     /// along the others as many as fit without one's being shorter.
     pub fn cells(self, size: DVec3, edge: f64) -> [u32; 3] {
-        let count = (size / edge).to_array();
+        let (count, covering) = ((size / edge).to_array(), cells_over(size, edge).to_array());
         std::array::from_fn(|axis| match self.0[axis] > 0.0 {
             // Decimal fractions: 0.6 m are three cells of 0.2 m.
             true => ((count[axis] * (1.0 + 1e-9)).floor() as u32).max(1),
-            false => (count[axis].ceil() as u32).max(1),
+            false => covering[axis] as u32,
         })
     }
 

@@ -3,6 +3,7 @@
 use glam::{BVec3, DVec3};
 
 use super::solids::Solid;
+pub(super) use crate::domain::flip::ON_FACE;
 use crate::{
     domain::{
         boundary::Boundary,
@@ -18,9 +19,6 @@ use crate::{
         step::Substep,
     },
 };
-
-/// Nearer than this to a cell's face, in cells, counts as on it: the GPU's f32 positions round below it.
-pub(super) const ON_FACE: f64 = 1e-3;
 
 /// The scene, its grid and its solids; positions are relative to the domain's least corner.
 #[derive(Clone, Debug)]

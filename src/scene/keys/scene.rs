@@ -204,16 +204,19 @@ const UNTIL: Key = Key::number("until", 1e-6..=1e9)
 const STROKE: Key = Key::number("stroke", LENGTH)
     .unit("metres")
     .only("kind", &["sine"])
-    .about("from one end of the way to the other");
+    .about(
+        "the whole distance from one end of the way to the other, twice the amplitude: x(t) = stroke/2 (1 − cos(2π t / period)), \
+         times the ramp; the S of H/S in wave maker theory (Dean and Dalrymple 1991)",
+    );
 const WAVE_PERIOD: Key = Key::number("period", PERIOD)
     .unit("seconds")
     .only("kind", &["sine"])
-    .about("there and back");
+    .about("of one cycle, there and back");
 const RAMP: Key = Key::number_or_zero("ramp", PERIOD)
     .unit("seconds")
     .computed(|| "one period".to_owned())
     .only("kind", &["sine"])
-    .about("how long it takes to begin");
+    .about("how long the motion takes to reach its full stroke; 0: it begins with it");
 const FILE: Key = Key::text(
     "file",
     "a CSV of time,displacement (seconds, metres), relative to the scene file",
