@@ -7,8 +7,10 @@ use crate::{
     domain::{
         boundary::Boundary,
         bounds::Bounds,
+        flip as flip_domain,
         mesh::TriangleMesh,
         particles::Particles,
+        pbf,
         sampling::{BoundarySample, boundary_samples, fill_water},
         signed_distance::{SignedDistance, SignedDistanceError},
     },
@@ -164,9 +166,18 @@ fn samples(
     samples
 }
 
-/// Metres that a signed distance reaches beyond the solids.
+/// Metres that a signed distance reaches beyond the solids: where the domain joins its own end, as far as a particle may
+/// come beyond it in a substep as well.
 fn margin(scene: &Scene) -> f64 {
-    MARGIN * scene.particle_spacing()
+    let way = match scene.solver.method {
+        Method::Pbf => pbf::CAP * scene.solver.pbf().cfl * scene.particle_spacing(),
+        Method::Flip => {
+            let flip = scene.solver.flip();
+            flip_domain::CAP * flip.cfl * flip.cell_size
+        }
+    };
+    let beyond = if scene.is_periodic() { way } else { 0.0 };
+    MARGIN * scene.particle_spacing() + beyond
 }
 
 /// Of the union of meshes, as far as water can come to them.
