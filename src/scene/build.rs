@@ -10,7 +10,7 @@ use super::{
     PlacedMesh, Placement, Scene, Swarm, Water, budget,
     document::Document,
     error::SceneError,
-    grids,
+    grids, keep,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
     origin, periodic, probe,
     spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
@@ -71,6 +71,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
         None => None,
     };
+    let keep = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
     let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
     let motions = (wave_makers.iter().map(|maker| &maker.motion))
         .chain(moving_solids.iter().map(|solid| &solid.motion));
@@ -92,6 +93,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         wave_makers,
         solver,
         grids,
+        keep,
         probes,
         budget,
         effects: spec.effects,

@@ -11,6 +11,7 @@ use crate::{
         bricks::{Bricks, EDGE, table_dims},
         flip::{CAP, CONTACT, layers, stored_cells},
         period::Period,
+        shores::Shores,
         signed_distance::SignedDistance,
     },
     scene::{
@@ -29,6 +30,8 @@ pub struct Model {
     pub cells: [u32; 3],
     /// Distances to solids at the start: to those at rest, if there are any, as one; then to each that moves.
     pub(super) solids: Vec<SignedDistance>,
+    /// Where they cut cells.
+    shores: Shores,
     /// How many of them are at rest.
     at_rest: usize,
 }
@@ -65,6 +68,8 @@ impl Model {
         Self {
             cells: scene.domain.cells(scene.solver.flip().cell_size),
             solids: solids.map(local).collect(),
+            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size)
+                .joined(scene.periodic),
             at_rest: usize::from(boundary.distance.is_some()),
             scene: scene.clone(),
         }
@@ -120,12 +125,17 @@ impl Model {
         ((z * dims[1] + y) * dims[0] + x) as usize
     }
 
-    /// Bricks with water, and those that `layers` of faces beyond it reach; their elements are those of the GPU.
-    pub fn bricks(&self, is_wet: &[bool], layers: usize) -> Bricks {
-        let reach = (layers as u32).div_ceil(EDGE);
+    /// Bricks with particles, which `is_wet` tells, with what else is water beside walls and solids, and those that the
+    /// step's layers of faces beyond it reach; their elements are those of the GPU.
+    pub fn bricks(&self, is_wet: &[bool], step: &Step<'_>) -> Bricks {
         let periodic = self.scene.periodic;
         let cells = stored_cells(self.cells, periodic);
-        Bricks::periodic(cells, periodic, is_wet, reach, 1)
+        let reach = (step.layers as u32).div_ceil(EDGE);
+        let mut is_wet = is_wet.to_vec();
+        let moving = step.solids.iter().zip(&self.solids).skip(self.at_rest);
+        let ways = moving.map(|(now, start)| (now.origin - start.origin) / self.cell_size());
+        (self.shores).mark(&mut is_wet, table_dims(cells), &step.cut, ways);
+        Bricks::periodic(cells, periodic, &is_wet, reach, 1)
     }
 
     /// What `substep` knows.

@@ -70,6 +70,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
             }),
         },
         grids: None,
+        keep: None,
         probes: Vec::new(),
         budget: Budget::default(),
         effects: Effects::default(),
