@@ -222,7 +222,7 @@ impl Flip {
         };
         let moving = self.scene.moving_solids.iter();
         let ways = moving.map(|solid| solid.displacement(substep.start) / size);
-        let dims = table_dims(stored_cells(self.plan.grid_dims));
+        let dims = table_dims(stored_cells(self.plan.grid_dims, self.scene.periodic));
         let mut is_wet = is_wet.to_vec();
         self.shores.mark(&mut is_wet, dims, &cut, ways);
         is_wet

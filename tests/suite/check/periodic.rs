@@ -72,7 +72,14 @@ const FULL: &[Control] = &[control(
     "is_full",
     "pressure/coarsen",
     &["kind of block"],
-)];
+)
+.and(&[
+    "pressure/smooth_first",
+    "pressure/smooth",
+    "pressure/smooth_corrected",
+    "pressure/restrict",
+    "pressure/solve_coarse",
+])];
 
 /// Nothing but water.
 fn full() -> (Scene, Start) {

@@ -39,7 +39,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]",
         "max = [25.0, 12.6, 15.0]\nperiodic = [\"y\"]",
         9,
-        &["domain.periodic: gravity is 0, -9.81, 0 m/s², and along y nothing holds the water up"],
+        &["domain.periodic: gravity is [0, -9.81, 0] m/s², and along y nothing holds the water up"],
     ),
     (
         "max = [25.0, 12.6, 15.0]",
