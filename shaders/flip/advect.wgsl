@@ -10,6 +10,9 @@
 #ifdef SOLIDS
 #import "shared/flip_solid.wgsl"
 #endif
+#ifdef PERIODIC
+#import "shared/flip_periodic.wgsl"
+#endif
 
 @group(0) @binding(2) var<storage, read> face_velocity: array<f32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
@@ -48,15 +51,24 @@ fn component_at(component: u32, low: vec3i, high: vec3i, t: vec3f, otherwise: f3
 
 // The grid's velocity at x; `otherwise` where no brick is.
 fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
-    let p = clamp(x * params.inverse_cell_size, vec3f(0.0), vec3f(params.cells));
+#ifdef PERIODIC
+    let scaled = wrapped_place(x * params.inverse_cell_size, vec3f(params.cells));
+#else
+    let scaled = x * params.inverse_cell_size;
+#endif
+    let p = clamp(scaled, vec3f(0.0), vec3f(params.cells));
     let cell = vec3i(cell_of_place(p));
     let f = p - vec3f(cell);
     find_slots(cell);
     // Between centres; beyond the outermost ones the velocity is that of the outermost.
     let is_before = f < vec3f(0.5);
     let t = select(f - 0.5, f + 0.5, is_before);
-    let low = max(select(vec3i(0), vec3i(-1), is_before), -cell);
-    let high = min(select(vec3i(1), vec3i(0), is_before), vec3i(params.cells) - 1 - cell);
+    var low = max(select(vec3i(0), vec3i(-1), is_before), -cell);
+    var high = min(select(vec3i(1), vec3i(0), is_before), vec3i(params.cells) - 1 - cell);
+#ifdef PERIODIC
+    low = select(low, select(vec3i(0), vec3i(-1), is_before), is_periodic());
+    high = select(high, select(vec3i(1), vec3i(0), is_before), is_periodic());
+#endif
     let sampled = vec3f(
         component_at(0u, vec3i(0, low.yz), vec3i(1, high.yz), vec3f(f.x, t.yz), otherwise.x),
         component_at(1u, vec3i(low.x, 0, low.z), vec3i(high.x, 1, high.z), vec3f(t.x, f.y, t.z), otherwise.y),
@@ -153,7 +165,11 @@ fn main(
 #endif
     v = select(v, max(v, params.wall_velocity_min), x < low);
     v = select(v, min(v, params.wall_velocity_max), x > high);
-    position[i] = vec4f(clamp(x, low, high), 1.0);
+    x = clamp(x, low, high);
+#ifdef PERIODIC
+    x = wrapped_place(x, vec3f(params.cells) * params.cell_size);
+#endif
+    position[i] = vec4f(x, 1.0);
     velocity[i] = vec4f(v, 0.0);
     id[i] = sorted_id[i];
 }

@@ -35,12 +35,19 @@ fn main(
     let own = sorted_id[i];
     let apart = params.apart;
     var push = max(apart - 2.0 * (x - params.wall_min), vec3f(0.0)) - max(apart - 2.0 * (params.wall_max - x), vec3f(0.0));
+#ifdef PERIODIC
+    push = select(push, vec3f(0.0), is_periodic());
+    let size = params.wall_max - params.wall_min;
+#endif
     for (var k = 0u; k < 8u; k++) {
         let element = element_at(side * vec3i(vec3u(k & 1u, (k >> 1u) & 1u, k >> 2u)));
         let is_wet = element >= CELLS && element < params.wet_cells + CELLS;
         let end = select(0u, cell_start[element + 1u], is_wet);
         for (var j = select(0u, cell_start[element], is_wet); j < end; j++) {
-            let way = x - sorted_position[j].xyz;
+            var way = x - sorted_position[j].xyz;
+#ifdef PERIODIC
+            way = select(way, way - size * round(way / size), is_periodic());
+#endif
             let square = dot(way, way);
             for (var once = 0; once < select(0, 1, square < apart * apart && j != i); once++) {
                 let distance = sqrt(square);

@@ -1,13 +1,21 @@
 // Slots about a cell, straight from the table: for places that need not lie in a brick with water.
 #import "shared/flip_element.wgsl"
 #import "shared/flip_params.wgsl"
+#ifdef PERIODIC
+#import "shared/flip_periodic.wgsl"
+#endif
 
 @group(0) @binding(1) var<storage, read> brick_slot: array<u32>;
 
 fn slot_at(brick: vec3i) -> u32 {
     let dims = vec3i(params.table_dims);
-    let is_inside = all(brick >= vec3i(0)) && all(brick < dims);
-    let kept = clamp(brick, vec3i(0), dims - 1);
+#ifdef PERIODIC
+    let at = wrapped_cell(brick, dims);
+#else
+    let at = brick;
+#endif
+    let is_inside = all(at >= vec3i(0)) && all(at < dims);
+    let kept = clamp(at, vec3i(0), dims - 1);
     return select(0u, brick_slot[(kept.z * dims.y + kept.y) * dims.x + kept.x], is_inside);
 }
 

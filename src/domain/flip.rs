@@ -28,7 +28,8 @@ pub fn layers(displacement: f64) -> usize {
     (3f64.sqrt() * displacement).ceil() as usize + 3
 }
 
-/// Cells stored along each axis: one beyond the domain's own, for its upper faces.
-pub fn stored_cells(cells: [u32; 3]) -> [u32; 3] {
-    cells.map(|n| n + 1)
+/// Cells stored along each axis: one beyond the domain's own, for its upper faces; none where these are the lower faces
+/// of the first cells.
+pub fn stored_cells(cells: [u32; 3], periodic: [bool; 3]) -> [u32; 3] {
+    std::array::from_fn(|axis| cells[axis] + u32::from(!periodic[axis]))
 }

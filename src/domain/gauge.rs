@@ -56,6 +56,7 @@ impl Gauge<'_> {
 
     /// Kind and pressure of a cell; what is outside of the domain is solid.
     fn cell(&self, cell: [i64; 3]) -> (u32, f64) {
+        let cell = self.bricks.wrapped(cell);
         let is_inside = (0..3).all(|axis| (0..i64::from(self.cells[axis])).contains(&cell[axis]));
         if !is_inside {
             return (SOLID, 0.0);

@@ -8,6 +8,7 @@ pub mod keys;
 pub mod look;
 pub mod moving_solid;
 pub mod no_slip;
+pub mod periodic;
 pub mod probe;
 pub mod step;
 pub mod study;
@@ -56,6 +57,8 @@ pub struct Scene {
     pub domain: Bounds,
     /// Walls that hold water back, each once; along the others it slides freely.
     pub no_slip: Vec<Wall>,
+    /// Axes along which it has no walls but joins its own end.
+    pub periodic: [bool; 3],
     /// The water at the start.
     pub water: Water,
     /// Static solids.

@@ -10,6 +10,7 @@ use super::{
     Budget, Iteration, Pbf, PlacedMesh, Scene, Stop,
     key::{Key, Kind},
     keys,
+    periodic::Axis,
     probe::Probe,
 };
 use crate::domain::{bounds::Bounds, motion::Motion};
@@ -106,6 +107,9 @@ impl Scene {
         let mut domain = corners(&self.domain.moved(self.origin));
         if !self.no_slip.is_empty() {
             domain.insert("no_slip".to_owned(), value(&self.no_slip));
+        }
+        if self.is_periodic() {
+            domain.insert("periodic".to_owned(), value(&Axis::of(self.periodic)));
         }
         domain
     }

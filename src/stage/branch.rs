@@ -238,9 +238,10 @@ fn check_walls(
 ) -> Result<(), BranchError> {
     let walls = scene.walls(clock.time);
     let corner = scene.domain.min;
+    // Along periodic axes walls are far off, and the domain is what particles have to lie in.
     let room = Bounds {
-        min: corner + walls.min,
-        max: corner + walls.max,
+        min: (corner + walls.min).max(scene.domain.min),
+        max: (corner + walls.max).min(scene.domain.max),
     }
     .grown(0.5 * scene.particle_spacing());
     let is_beyond = |&k: &usize| {

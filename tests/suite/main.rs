@@ -73,6 +73,7 @@ mod solve {
     mod moving_solids;
     mod no_slip;
     mod pbf;
+    mod periodic;
     mod plan;
     mod pressure;
 }

@@ -161,6 +161,10 @@ impl FlipState {
         self.elements.as_ref().expect("after flip/survey")
     }
 
+    fn is_periodic(&self) -> bool {
+        self.scene.is_periodic()
+    }
+
     fn sorted(&self) -> &Sorted {
         self.sorted.as_ref().expect("after flip/reorder")
     }

@@ -135,6 +135,7 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let twin = twin_push_apart(&state.model, &step, &elements.bricks, sorted);
     let found = given(state, io)?;
     let (apart, extent) = (state.model.apart(), state.scene.domain.size().max_element());
+    let period = state.model.period().0.max_element();
     io.table.each(&PUSHED, 0..state.n, |i| {
         let about = neighborhood().map(|offset| {
             sorted
@@ -147,7 +148,7 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             i,
             found.displacement[i],
             exact,
-            [count, apart, extent, exact.length()],
+            [count, apart, period, extent, exact.length()],
         )
     });
     state.given = Some(found);
@@ -183,6 +184,8 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
                 .collect::<Vec<_>>())
         })
         .collect();
+    let period = state.model.period();
+    let apart = |x: DVec3, y: DVec3| period.shortest(x - y).length();
     let answer = |of: &dyn Fn(&Moved) -> f64| -> f64 {
         let sides = answers.chunks(2);
         sides.map(|pair| of(&pair[0]).max(of(&pair[1]))).sum()
@@ -191,8 +194,16 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     io.table.each(&MOVED, 0..n, |i| {
         let x = twin.position[i];
-        let moved = answer(&|moved| moved.position[i].distance(x));
-        pair(i, position[i], x, [moved, x.length()])
+        let moved = answer(&|moved| apart(moved.position[i], x));
+        // Rounding may take one of the two to the other end of a period.
+        let found = period.image_by_rounding(position[i], x);
+        let carried = f64::from(u8::from(period.is_at_joint(start[i], x)));
+        pair(
+            i,
+            found,
+            x,
+            [moved, x.length() + 4.0 * carried * period.0.length()],
+        )
     });
     // What is left of a velocity that a solid stops has the rounding of the two that were subtracted.
     let among = f64::from(u8::from(!step.solids.is_empty()));

@@ -136,14 +136,15 @@ pub fn extrapolate(step: &Step<'_>, bricks: &Bricks, layer: u32, faces: &mut Fac
 /// the axes turned so that the component's own is first. Beyond the domain the cell's own row or column counts.
 fn stencil(model: &Model, bricks: &Bricks, element: u32, axis: usize) -> [usize; 18] {
     let cell = bricks.cell(element);
+    let goes_on = model.scene.periodic;
     std::array::from_fn(|k| {
         let mut offset = [0; 3];
         offset[axis] = (k % 2) as i32;
         for (turn, step) in [(1, k / 2 % 3), (2, k / 6)] {
             let across = (axis + turn) % 3;
             offset[across] = match step {
-                0 if cell[across] > 0 => -1,
-                2 if cell[across] + 1 < model.cells[across] => 1,
+                0 if cell[across] > 0 || goes_on[across] => -1,
+                2 if cell[across] + 1 < model.cells[across] || goes_on[across] => 1,
                 _ => 0,
             };
         }
@@ -251,7 +252,7 @@ const LEAST_PART: f64 = 1e-3;
 /// is.
 fn velocity_at(model: &Model, bricks: &Bricks, faces: &Faces, x: DVec3, otherwise: DVec3) -> DVec3 {
     let cells = DVec3::from_array(model.cells.map(f64::from));
-    let p = (x / model.cell_size()).clamp(DVec3::ZERO, cells);
+    let p = (model.period().wrap(x) / model.cell_size()).clamp(DVec3::ZERO, cells);
     let cell = p.min(cells - 1.0).floor();
     let f = p - cell;
     let at = cell.to_array().map(|c| c as i64);
@@ -272,7 +273,10 @@ fn velocity_at(model: &Model, bricks: &Bricks, faces: &Faces, x: DVec3, otherwis
         } else {
             f[axis] - 0.5
         };
-        ([first.max(0), (first + 1).min(last)], t)
+        match model.scene.periodic[axis] {
+            true => ([first, first + 1], t),
+            false => ([first.max(0), (first + 1).min(last)], t),
+        }
     };
     let component = |own: usize| {
         let ways: [_; 3] = std::array::from_fn(|axis| {
@@ -315,18 +319,19 @@ const MOST: f64 = 0.25;
 /// them, metres; half of what each pair lacks, shared between the two (the weak springs of Ando and Tsuruno 2011, without
 /// their velocity). Shape (particles).
 pub fn push_apart(model: &Model, step: &Step<'_>, bricks: &Bricks, sorted: &Sorted) -> Vec<DVec3> {
-    let apart = model.apart();
+    let (apart, period) = (model.apart(), model.period());
     let one = |i: usize| {
         let (x, own) = (sorted.cloud.position[i], sorted.cloud.id[i]);
         let place = x / model.cell_size() - super::grid::corner(bricks, sorted.cell[i]);
         // The distance is below half a cell: whoever is nearer lies in one of eight.
         let side = place.to_array().map(|f| if f < 0.5 { -1 } else { 1 });
         let lacks = |way: DVec3| (apart - 2.0 * way).max(DVec3::ZERO);
-        let mut push = lacks(x - step.walls.min) - lacks(step.walls.max - x);
+        let of_walls = lacks(x - step.walls.min) - lacks(step.walls.max - x);
+        let mut push = DVec3::select(period.0.cmpgt(DVec3::ZERO), DVec3::ZERO, of_walls);
         for k in 0..8 {
             let offset = std::array::from_fn(|axis| side[axis] * (k >> axis & 1));
             for j in sorted.of(bricks.near(sorted.cell[i], offset)) {
-                let way = x - sorted.cloud.position[j];
+                let way = period.shortest(x - sorted.cloud.position[j]);
                 let distance = way.length();
                 if j != i && distance < apart {
                     let direction = match distance {
@@ -372,7 +377,7 @@ pub fn advect(
         let [slowest, fastest] = step.wall_velocity;
         let v = DVec3::select(x.cmplt(low), v.max(slowest), v);
         let v = DVec3::select(x.cmpgt(high), v.min(fastest), v);
-        (x.clamp(low, high), v, is_capped)
+        (model.period().wrap(x.clamp(low, high)), v, is_capped)
     };
     let all: Vec<_> = (0..position.len())
         .into_par_iter()

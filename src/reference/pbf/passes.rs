@@ -30,6 +30,13 @@ impl Inputs<'_> {
         self.points.len() - self.model.samples.len()
     }
 
+    /// From point `j` to point `i`, or to the image of it that is nearer, metres.
+    #[inline]
+    pub(super) fn between(&self, i: usize, j: usize) -> DVec3 {
+        let period = self.model.period();
+        period.shortest(self.points[i] - self.points[j])
+    }
+
     /// Of a sample as lists have it, in particles' worth of mass.
     pub(super) fn sample_weight(&self, j: u32) -> f64 {
         self.model.sample_weights[j as usize - self.particles()]
@@ -65,7 +72,8 @@ pub fn predict_and_work(
     } else {
         DVec3::ZERO
     };
-    (x, v + taken, substep.work_of_push(push))
+    let work = substep.work_of_push(push);
+    (model.period().wrap(x), v + taken, work)
 }
 
 /// Relative density ρ/ρ0 of each particle, shape (particles) (pbf/measure_density).
@@ -75,7 +83,7 @@ pub fn measure_density(inputs: Inputs<'_>) -> Vec<f64> {
     let one = |i: usize| {
         let x = inputs.points[i];
         let kernel = |&j: &u32| {
-            let q2 = x.distance_squared(inputs.points[j as usize]) * inverse_h2;
+            let q2 = inputs.between(i, j as usize).length_squared() * inverse_h2;
             (1.0 - q2).max(0.0).powi(3)
         };
         let (fluid, solid) = inputs.neighbors.of(i);
@@ -130,7 +138,7 @@ pub fn row(inputs: Inputs<'_>, i: usize) -> Row {
     let (mut kernel, mut gradient, mut squares) = (1.0, DVec3::ZERO, 0.0);
     // Poly6, and spiky's slope beside the difference over r.
     let pair = |j: u32| {
-        let d = x - inputs.points[j as usize];
+        let d = inputs.between(i, j as usize);
         let r2 = d.length_squared();
         let r = r2.sqrt();
         let p = (1.0 - r2 * inverse_h * inverse_h).max(0.0);
@@ -244,10 +252,9 @@ fn pair_corrections(inputs: Inputs<'_>, i: usize, lambda: &[f64]) -> DVec3 {
     } = inputs.model;
     let inverse_h = 1.0 / calibration.support_radius;
     let artificial = settings.artificial_pressure / calibration.bulk_gradient_squares;
-    let x = inputs.points[i];
     let mut coincident = None;
     let mut pair = |j: u32, scale: f64| {
-        let d = x - inputs.points[j as usize];
+        let d = inputs.between(i, j as usize);
         let r2 = d.length_squared();
         let r = r2.sqrt();
         let s = (1.0 - r * inverse_h).max(0.0);
@@ -289,7 +296,8 @@ pub fn update_velocity(
     let distance = v.length() * step;
     if distance > model.max_displacement() {
         let excess = v * (1.0 - model.max_displacement() / distance);
-        return (predicted - excess * step, v - excess, true);
+        let x = predicted - excess * step;
+        return (model.period().wrap(x), v - excess, true);
     }
-    (predicted, v, false)
+    (model.period().wrap(predicted), v, false)
 }

@@ -360,8 +360,10 @@ impl Solver for Pbf {
         );
         let pressure = |at: &DVec3| {
             let pressed = self.pressed.iter().map(|sum| scale * sum);
-            let particles = self.position.iter().copied().zip(pressed);
             let at = *at - self.scene.domain.min;
+            let period = self.model.period();
+            let nearest = self.position.iter().map(|x| at + period.shortest(*x - at));
+            let particles = nearest.zip(pressed);
             fitted(particles, at, calibration.support_radius)
         };
         Ok(points.iter().map(pressure).collect())

@@ -9,6 +9,7 @@ use super::super::{
     flip::{self, Preconditioner, Surface, Transfer},
     key::{Interval, Key, words},
     no_slip,
+    periodic::Axis,
     probe::{self, ProbeKind},
 };
 use crate::domain::sparse_grid;
@@ -16,7 +17,7 @@ use crate::domain::sparse_grid;
 pub(in super::super) const KEYS: &[Key] = &[
     Key::table("shot", SHOT)
         .about("What the shot is called, how long it runs, how fine its clock is"),
-    Key::table("domain", DOMAIN).about("The box of the whole scene; its six walls are solid"),
+    Key::table("domain", DOMAIN).about("The box of the whole scene; its walls are solid"),
     Key::table("water", WATER)
         .default("{}")
         .about("The water and where it is at the start"),
@@ -90,7 +91,16 @@ const DOMAIN: &[Key] = &[
         .without(&["walls"])
         .also(", each once; of the solver flip alone")
         .about("the no-slip walls, where not all six are"),
+    Key::choices("periodic", &AXES)
+        .absent()
+        .also(
+            ", each once, none along which gravity acts, a wave maker stands or a solid moves; along each the domain is a \
+             multiple of eight cells (FLIP), or of the particle spacing and at least three support radii (PBF)",
+        )
+        .about("axes along which the domain has no walls: water that leaves at one end comes in at the other"),
 ];
+
+const AXES: [&str; 3] = words(&Axis::NAMED);
 
 const WATER: &[Key] = &[
     // Hydrogen gas has 0.09, osmium 22 590.

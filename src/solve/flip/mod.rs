@@ -118,7 +118,7 @@ impl Flip {
         let program = Program::new(context, &buffers, &passes, &[])?;
         boundary.upload_distance(&program, scene);
         upload_constants(&program, &plan, scene);
-        let bricks = bricks(plan.grid_dims, &no_water(plan.grid_dims), 0);
+        let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         // The first survey reads what does not depend on the substep.
         let frame = Substep {
             start: 0.0,
@@ -135,7 +135,8 @@ impl Flip {
             plan,
             scene: scene.clone(),
             movers: Movers::of(boundary, scene),
-            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size),
+            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size)
+                .joined(scene.periodic),
             state: Particles::default(),
             frame: 0,
         })
@@ -184,7 +185,7 @@ impl Flip {
 
     fn survey(&mut self, run: &mut Run<'_>) -> Result<Survey, SolveError> {
         run(&self.program, &[&self.recordings.survey])?;
-        let flags = SURVEY_IS_WET.first(no_water(self.plan.grid_dims).len());
+        let flags = SURVEY_IS_WET.first(no_water(&self.scene, self.plan.grid_dims).len());
         let (head, is_wet) = self.program.download((SURVEY.first(1), flags))?;
         Ok(Survey {
             speed: f64::from(head[0].speed_square).sqrt(),
@@ -221,7 +222,7 @@ impl Flip {
         };
         let moving = self.scene.moving_solids.iter();
         let ways = moving.map(|solid| solid.displacement(substep.start) / size);
-        let dims = table_dims(stored_cells(self.plan.grid_dims));
+        let dims = table_dims(stored_cells(self.plan.grid_dims, self.scene.periodic));
         let mut is_wet = is_wet.to_vec();
         self.shores.mark(&mut is_wet, dims, &cut, ways);
         is_wet
@@ -231,7 +232,7 @@ impl Flip {
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
         let layers = layers(substep.displacement);
         let is_wet = self.with_shores(is_wet, substep);
-        self.bricks = bricks(self.plan.grid_dims, &is_wet, layers);
+        self.bricks = bricks(&self.scene, self.plan.grid_dims, &is_wet, layers);
         let needed = capacity_of(&self.bricks);
         let grown = self.plan.counts.bricks.grown(needed);
         if grown != self.plan.counts.bricks {

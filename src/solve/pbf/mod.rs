@@ -13,6 +13,7 @@ use crate::{
         budget::Breach,
         particles::Particles,
         pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
+        period::Period,
         probe::fitted,
         solver::{Solver, StepReport},
         sph::Calibration,
@@ -132,6 +133,7 @@ impl Pbf {
         let calibration = &self.calibration;
         let walls = self.scene.walls(time);
         let wall_velocity = self.scene.wall_velocity(time, step);
+        let Period(period) = self.scene.period();
         let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
         Params {
             velocity_step: (self.scene.water.gravity * step).as_vec3().to_array(),
@@ -153,11 +155,11 @@ impl Pbf {
             contact_distance: (CONTACT * pbf.particle_spacing) as f32,
             max_displacement: (CAP * pbf.cfl * pbf.particle_spacing) as f32,
             artificial_pressure: (pbf.artificial_pressure * natural_lambda) as f32,
-            padding: 0.0,
+            period_x: period.x as f32,
             wall_velocity_min: wall_velocity.min.as_vec3().to_array(),
-            padding_min: 0.0,
+            period_y: period.y as f32,
             wall_velocity_max: wall_velocity.max.as_vec3().to_array(),
-            padding_max: 0.0,
+            period_z: period.z as f32,
         }
     }
 
@@ -329,7 +331,11 @@ impl Solver for Pbf {
         let support = self.calibration.support_radius;
         let points = points.iter().map(local);
         Ok(points
-            .map(|at| fitted(self.pressed.iter().copied(), at, support))
+            .map(|at| {
+                let near = |x: DVec3| at + self.scene.period().shortest(x - at);
+                let pressed = self.pressed.iter().map(|&(x, p)| (near(x), p));
+                fitted(pressed, at, support)
+            })
             .collect())
     }
 
