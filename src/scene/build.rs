@@ -63,7 +63,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
         None => None,
     };
-    let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
+    let probes = probe::build_all(doc, &spec.probe, &domain, &shot, &solver)?;
     let motions = (wave_makers.iter().map(|maker| &maker.motion))
         .chain(moving_solids.iter().map(|solid| &solid.motion));
     let duration = shot.duration();

@@ -119,6 +119,11 @@ impl Shot {
         1.0 / self.frames_per_second
     }
 
+    /// When a frame ends, seconds from the start.
+    pub fn time(&self, frame: u32) -> f64 {
+        f64::from(frame) / self.frames_per_second
+    }
+
     /// Seconds from the start to the last frame.
     pub fn duration(&self) -> f64 {
         f64::from(self.frames) / self.frames_per_second

@@ -4,9 +4,9 @@ use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
 use super::{
-    Iteration, Method, Solver, Wall, document::Document, error::SceneError, words::extent,
+    Iteration, Method, Shot, Solver, Wall, document::Document, error::SceneError, words::extent,
 };
-use crate::domain::{bounds::Bounds, sparse_grid::EDGE, surface::MAX_BRICKS};
+use crate::domain::{bounds::Bounds, probe::Rate, sparse_grid::EDGE, surface::MAX_BRICKS};
 
 /// A gauge that has a CSV of its own in the cache.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +15,10 @@ pub struct Probe {
     pub name: String,
     /// What it measures.
     pub kind: ProbeKind,
+    /// How often.
+    pub rate: Rate,
+    /// Seconds up to each look over which the mean, the least and the greatest value are given too.
+    pub window: Option<f64>,
 }
 
 /// What a probe measures.
@@ -139,6 +143,9 @@ pub(super) struct ProbeSpec {
     at: Option<Vec<f64>>,
     axis: Option<Wall>,
     quantile: Option<f64>,
+    #[serde(default)]
+    rate_hz: Rate,
+    window: Option<f64>,
 }
 
 /// Builds all of them. A probe without a name is called by its kind and its place among those of its kind.
@@ -146,6 +153,7 @@ pub(super) fn build_all(
     doc: &Document<'_>,
     specs: &[ProbeSpec],
     domain: &Bounds,
+    shot: &Shot,
     solver: &Solver,
 ) -> Result<Vec<Probe>, SceneError> {
     let mut probes = Vec::<Probe>::new();
@@ -160,11 +168,16 @@ pub(super) fn build_all(
         if let Some(problem) = unfit {
             return Err(doc.fault_of(&format!("{path}.kind"), problem));
         }
+        if let Some(problem) = why_not_so_often(spec.rate_hz, shot, solver) {
+            return Err(doc.fault_of(&format!("{path}.rate_hz"), problem));
+        }
         let alike = probes.iter().filter(|p| p.kind.name() == kind.name());
         let default = || format!("{}-{}", kind.name(), alike.count() + 1);
         let probe = Probe {
             name: spec.name.clone().unwrap_or_else(default),
             kind,
+            rate: spec.rate_hz,
+            window: spec.window,
         };
         let is_alike = |known: &&Probe| known.name.eq_ignore_ascii_case(&probe.name);
         if let Some(known) = probes.iter().find(is_alike) {
@@ -257,6 +270,28 @@ fn kind(
         "{given:?} is outside of the domain, which reaches over {all}"
     )))
 }
+
+/// A look is at a substep's end, so there are at most as many as substeps.
+fn why_not_so_often(rate: Rate, shot: &Shot, solver: &Solver) -> Option<String> {
+    let Rate::Hertz(rate) = rate else {
+        return None;
+    };
+    let most = match solver.method {
+        Method::Pbf => solver.pbf().max_substeps,
+        Method::Flip => solver.flip().max_substeps,
+    };
+    let highest = shot.frames_per_second * f64::from(most);
+    let is_possible = LEAST_RATE <= rate && rate <= highest;
+    (!is_possible).then(|| {
+        format!(
+            "{rate} a second; from {LEAST_RATE} to {highest} are possible: shot.frames_per_second × solver.{}.max_substeps",
+            solver.method.name()
+        )
+    })
+}
+
+/// Hz: a look in a quarter of an hour.
+const LEAST_RATE: f64 = 1e-3;
 
 /// PBF's pressure is the sum of its multipliers, which says all only where corrections are λ's and nothing else.
 fn why_no_pressure(solver: &Solver) -> Option<String> {

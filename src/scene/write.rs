@@ -12,7 +12,7 @@ use super::{
     keys,
     probe::Probe,
 };
-use crate::domain::{bounds::Bounds, motion::Motion};
+use crate::domain::{bounds::Bounds, motion::Motion, probe::Rate};
 
 /// Where a cache keeps its own copy of a mesh file: `assets/NAME-HASH.EXT`, so that two files of
 /// one name stay apart.
@@ -289,6 +289,12 @@ fn probe(probe: &Probe, origin: DVec3) -> Table {
     }
     if let Some(quantile) = probe.kind.quantile() {
         rows.insert("quantile".to_owned(), value(&quantile));
+    }
+    if probe.rate != Rate::Frame {
+        rows.insert("rate_hz".to_owned(), value(&probe.rate));
+    }
+    if let Some(window) = probe.window {
+        rows.insert("window".to_owned(), value(&window));
     }
     rows
 }

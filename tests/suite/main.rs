@@ -18,6 +18,7 @@ mod cache {
     mod durability;
     mod faults;
     mod format;
+    mod probe_rates;
     mod probes;
     mod vdb;
 }

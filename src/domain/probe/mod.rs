@@ -6,6 +6,7 @@ mod elevation;
 mod fitted;
 mod flux;
 mod front;
+mod rate;
 mod volume;
 
 use glam::{DVec3, Vec3};
@@ -16,6 +17,7 @@ pub use elevation::elevation;
 pub use fitted::fitted;
 pub use flux::flux;
 pub use front::{front, run_up};
+pub use rate::Rate;
 pub use volume::{enclosed_volume, volume};
 
 /// R of the surface's kernel in particle spacings (Zhu and Bridson 2005).

@@ -427,6 +427,16 @@ const PROBE: &[Key] = &[
         .only("kind", &["front", "run_up"])
         .computed(probe::quantile_words)
         .about("part of the water, with run_up of the body of water, that lies behind or below"),
+    Key::other(
+        "rate_hz",
+        "\"substep\" or a number from 0.001 to shot.frames_per_second × the solver's max_substeps, Hz",
+    )
+    .computed(|| "each frame".to_owned())
+    .about("how often it looks: at the end of each substep, or of each in which a time k / rate_hz lies"),
+    Key::number("window", 1e-9..=1e6)
+        .unit("s")
+        .absent()
+        .about("time up to each look over which mean, least and greatest value are given as well"),
 ];
 
 /// In its unit: wider than what f32 tells apart from nothing, and than anything that is computed.

@@ -6,7 +6,7 @@ use crate::support::job::Job;
 use crate::support::{self, D, context, lattice};
 use glam::{DVec2, DVec3};
 use swell::{
-    domain::{boundary::Boundary, solver::Solver},
+    domain::{boundary::Boundary, probe::Rate, solver::Solver},
     scene::{
         Method, Scene, SceneError, physics_difference, physics_hash,
         probe::{Probe, ProbeKind},
@@ -323,6 +323,8 @@ fn probes_leave_the_water_as_it_is() {
         kind: ProbeKind::Pressure {
             at: DVec3::splat(0.2),
         },
+        rate: Rate::Frame,
+        window: None,
     });
     let mut solver = support::solver(&context, &scene, &particles, &Boundary::default());
     let mut state = particles;
