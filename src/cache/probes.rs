@@ -21,6 +21,9 @@ pub struct ProbeRecord {
     /// Part of the water that lies behind; only of kinds that have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quantile: Option<f64>,
+    /// A solid's number or a wall's name; only of forces.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solid: Option<String>,
     /// How often it looks, where not at each frame's end.
     #[serde(default, skip_serializing_if = "is_by_frame")]
     pub rate_hz: Rate,
@@ -124,6 +127,7 @@ impl ProbeRecord {
             }
             let settings = [
                 record.axis.as_ref().map(|axis| format!(" towards {axis}")),
+                record.solid.as_ref().map(|solid| format!(" on {solid}")),
                 record.quantile.map(|part| format!(" of quantile {part}")),
                 match record.rate_hz {
                     Rate::Frame => None,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::particles::Particles;
+use super::{particles::Particles, probe::Patch};
 
 /// Report of one output frame's steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,12 +62,14 @@ pub struct Projection {
 }
 
 /// What is looked at when a substep ends. A solver reads back what is named here, and nothing else.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wanted {
     /// Positions and velocities of all particles.
     pub particles: bool,
     /// Pressures at the scene's points of pressure.
     pub pressures: bool,
+    /// Pressures on these patches of surfaces, world coordinates; only of solvers with a pressure on cells.
+    pub patches: Vec<Patch>,
 }
 
 /// A substep of a frame.
@@ -88,6 +90,8 @@ pub struct Seen {
     pub particles: Particles,
     /// Pa; `None` where there was no water; empty where not wanted.
     pub pressures: Vec<Option<f64>>,
+    /// On the patches, Pa; 0 where they are dry.
+    pub patches: Vec<f64>,
 }
 
 /// Looks on while a frame is computed. It changes nothing.
@@ -101,8 +105,8 @@ pub trait Watch {
 
 impl Wanted {
     /// Whether there is anything.
-    pub fn is_any(self) -> bool {
-        self != Self::default()
+    pub fn is_any(&self) -> bool {
+        *self != Self::default()
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod budget;
 pub mod effects;
 pub mod flip;
+mod force;
 pub mod grids;
 pub mod keys;
 pub mod look;
@@ -143,6 +144,13 @@ pub struct Water {
     pub meshes: Vec<PlacedMesh>,
     /// Particles at places of their own.
     pub particles: Vec<Swarm>,
+}
+
+impl Water {
+    /// How pressure rises in water at rest: ρ g, Pa/m.
+    pub fn rise(&self) -> DVec3 {
+        self.rest_density * self.gravity
+    }
 }
 
 /// Particles that the scene places one by one; they are taken as they are, also where others stand.

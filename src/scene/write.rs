@@ -10,7 +10,7 @@ use super::{
     Budget, Iteration, Pbf, PlacedMesh, Scene, Stop,
     key::{Key, Kind},
     keys,
-    probe::Probe,
+    probe::{Probe, ProbeKind},
 };
 use crate::domain::{bounds::Bounds, motion::Motion, probe::Rate};
 
@@ -94,7 +94,7 @@ impl Scene {
         if let Some(grids) = &self.grids {
             scene.insert("grids".to_owned(), value(grids));
         }
-        let probes = self.probes.iter().map(|it| probe(it, self.origin));
+        let probes = self.probes.iter().map(|it| probe(it, self));
         insert_tables(&mut scene, "probe", probes);
         scene
     }
@@ -275,13 +275,18 @@ fn motion(motion: &Motion) -> Value {
     Value::Table(all)
 }
 
-fn probe(probe: &Probe, origin: DVec3) -> Table {
+fn probe(probe: &Probe, scene: &Scene) -> Table {
     let mut rows = table([
         ("name", value(&probe.name)),
         ("kind", value(&probe.kind.name())),
     ]);
-    let at = probe.kind.at(origin);
-    if !at.is_empty() {
+    let at = probe.kind.at(scene.origin);
+    if let ProbeKind::Force { on, .. } = probe.kind {
+        let name = on.name(scene);
+        let number = name.parse::<i64>().map(Value::Integer);
+        rows.insert("solid".to_owned(), number.unwrap_or(Value::String(name)));
+        rows.insert("about".to_owned(), value(&at));
+    } else if !at.is_empty() {
         rows.insert("at".to_owned(), value(&at));
     }
     if let Some(towards) = probe.kind.towards() {

@@ -11,7 +11,6 @@ use crate::{
     cache::ProbeValues,
     domain::{
         particles::Particles,
-        probe::Rate,
         solver::{Solver, StepReport},
     },
     scene::Scene,
@@ -20,7 +19,7 @@ use crate::{
 use super::{
     device::{Built, Opened, SolverError},
     prepare::Start,
-    probes::Recorder,
+    probes::{Recorder, is_recorded},
     watch::Watch,
 };
 
@@ -51,7 +50,8 @@ pub struct Step {
     pub report: StepReport,
     /// Pressures at the scene's [`pressure_points`](Scene::pressure_points), Pa; empty where none are read.
     pub pressures: Vec<Option<f64>>,
-    /// What probes with a rate of their own saw, by probe: of each look its time and its values.
+    /// What probes saw while the frame was computed, by probe: values, of one with a rate of its own each look's time and
+    /// its values.
     pub looks: ProbeValues,
     /// Wall clock of all that, seconds.
     pub seconds: f64,
@@ -130,10 +130,10 @@ impl<'a> Drive<'a> {
         self
     }
 
-    /// The same, and with looks at substeps for probes with a rate of their own.
+    /// The same, and with looks while a frame is computed for the probes that ask for them.
     pub(super) fn with_probes(mut self) -> Self {
         let mut probes = self.scene.probes.iter();
-        self.is_recorded = probes.any(|probe| probe.rate != Rate::Frame);
+        self.is_recorded = probes.any(is_recorded);
         self.with_pressures()
     }
 

@@ -4,7 +4,7 @@ use crate::{
     cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES},
     domain::{
         particles::Particles,
-        probe::{Rate, elevation, energies, flux, front, run_up, volume},
+        probe::{Patch, Rate, elevation, energies, flux, front, load, run_up, volume},
         solver::{Seen, Span, Wanted, Watch},
     },
     scene::{
@@ -24,6 +24,10 @@ pub(super) fn records(scene: &Scene) -> Vec<ProbeRecord> {
             at: probe.kind.at(scene.origin),
             axis: probe.kind.towards().map(|wall| wall.name().to_owned()),
             quantile: probe.kind.quantile(),
+            solid: match probe.kind {
+                ProbeKind::Force { on, .. } => Some(on.name(scene)),
+                _ => None,
+            },
             rate_hz: probe.rate,
             window: probe.window,
             columns: probe.kind.columns().iter().map(|&c| c.to_owned()).collect(),
@@ -41,12 +45,16 @@ pub(super) fn look(
     pressures: &[Option<f64>],
     looks: Option<ProbeValues>,
 ) -> ProbeValues {
-    let frame = |probe: &Probe| probe.rate == Rate::Frame || looks.is_none();
+    let frame = |probe: &Probe| !is_recorded(probe) || looks.is_none();
     let mut values = of_state(scene, particles, pressures, frame);
     match looks {
         Some(looks) => {
-            for (values, looks) in values.iter_mut().zip(looks) {
+            for ((values, looks), probe) in values.iter_mut().zip(looks).zip(&scene.probes) {
                 values.extend(looks);
+                if values.is_empty() && probe.rate == Rate::Frame {
+                    // No substep has run, since there is no water.
+                    values.resize(probe.kind.columns().len(), None);
+                }
             }
         }
         None => {
@@ -59,12 +67,19 @@ pub(super) fn look(
     values
 }
 
-/// What probes with a rate of their own see of a frame, while it is computed.
+/// Whether a probe looks while a frame is computed: it has a rate of its own, or what it looks at is gone afterwards.
+pub(super) fn is_recorded(probe: &Probe) -> bool {
+    probe.rate != Rate::Frame || matches!(probe.kind, ProbeKind::Force { .. })
+}
+
+/// What probes see of a frame while it is computed.
 pub(super) struct Recorder<'a> {
     scene: &'a Scene,
     /// When the frame ends, seconds.
     end: f64,
     values: ProbeValues,
+    /// Of the forces that are due, the probe's number and the surface, as they were asked for.
+    surfaces: Vec<(usize, Vec<Patch>)>,
 }
 
 impl<'a> Recorder<'a> {
@@ -74,6 +89,7 @@ impl<'a> Recorder<'a> {
             scene,
             end,
             values: vec![Vec::new(); scene.probes.len()],
+            surfaces: Vec::new(),
         }
     }
 
@@ -82,36 +98,74 @@ impl<'a> Recorder<'a> {
         self.values
     }
 
-    fn due(&self, substep: Span) -> impl Iterator<Item = &'a Probe> + use<'a> {
-        let probes = self.scene.probes.iter();
-        probes.filter(move |probe| probe.rate.is_due(substep.start, substep.end))
+    /// Probes that look at this substep's end, with their numbers.
+    fn due(&self, substep: Span) -> impl Iterator<Item = (usize, &'a Probe)> + use<'a> {
+        let probes = self.scene.probes.iter().enumerate();
+        probes.filter(move |(_, probe)| is_due(probe, substep))
+    }
+
+    fn take(&mut self, probe: usize, time: f64, found: impl IntoIterator<Item = Option<f64>>) {
+        if self.scene.probes[probe].rate != Rate::Frame {
+            self.values[probe].push(Some(time));
+        }
+        self.values[probe].extend(found);
+    }
+}
+
+fn is_due(probe: &Probe, substep: Span) -> bool {
+    match probe.rate {
+        Rate::Frame => substep.is_last && is_recorded(probe),
+        rate => rate.is_due(substep.start, substep.end),
     }
 }
 
 impl Watch for Recorder<'_> {
     fn wants(&mut self, substep: Span) -> Wanted {
-        let is_pressure = |probe: &&Probe| matches!(probe.kind, ProbeKind::Pressure { .. });
-        let due = || self.due(substep);
-        Wanted {
-            particles: due().any(|probe| !is_pressure(&probe)),
-            pressures: due().any(|probe| is_pressure(&probe)),
+        let mut wanted = Wanted::default();
+        self.surfaces.clear();
+        for (index, probe) in self.due(substep) {
+            match probe.kind {
+                ProbeKind::Pressure { .. } => wanted.pressures = true,
+                ProbeKind::Force { on, .. } => {
+                    // As the cells were cut on which the pressure stands.
+                    let patches = self.scene.patches(on, substep.start);
+                    wanted.patches.extend_from_slice(&patches);
+                    self.surfaces.push((index, patches));
+                }
+                _ => wanted.particles = true,
+            }
         }
+        wanted
     }
 
     fn look(&mut self, substep: Span, seen: Seen) {
-        let is_due = |probe: &Probe| probe.rate.is_due(substep.start, substep.end);
-        let found = of_state(self.scene, &seen.particles, &seen.pressures, is_due);
+        let is_force = |probe: &Probe| matches!(probe.kind, ProbeKind::Force { .. });
+        let is_seen = |probe: &Probe| is_due(probe, substep) && !is_force(probe);
+        let found = of_state(self.scene, &seen.particles, &seen.pressures, is_seen);
         // A frame's own time: substeps add up to it but for round-off.
         let time = if substep.is_last {
             self.end
         } else {
             substep.end
         };
-        for (values, found) in self.values.iter_mut().zip(found) {
+        for (probe, found) in found.into_iter().enumerate() {
             if !found.is_empty() {
-                values.push(Some(time));
-                values.extend(found);
+                self.take(probe, time, found);
             }
+        }
+        let mut pressures = &seen.patches[..];
+        for (probe, patches) in std::mem::take(&mut self.surfaces) {
+            let ProbeKind::Force { about, .. } = self.scene.probes[probe].kind else {
+                continue;
+            };
+            let (own, rest) = pressures.split_at(patches.len());
+            pressures = rest;
+            let sums = load(&patches, own, about);
+            self.take(
+                probe,
+                time,
+                sums.into_iter().flat_map(|sum| sum.to_array().map(Some)),
+            );
         }
     }
 }
@@ -158,6 +212,8 @@ fn of_state(
                 let rate = flux(particles, spacing, towards.axis, at);
                 vec![Some(if towards.is_max { rate } else { -rate })]
             }
+            // No substep has been made, as of pressures.
+            ProbeKind::Force { .. } => vec![None; probe.kind.columns().len()],
         })
         .collect()
 }

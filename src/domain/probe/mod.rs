@@ -5,6 +5,7 @@
 mod elevation;
 mod fitted;
 mod flux;
+mod force;
 mod front;
 mod rate;
 mod volume;
@@ -16,6 +17,7 @@ use super::particles::Particles;
 pub use elevation::elevation;
 pub use fitted::fitted;
 pub use flux::flux;
+pub use force::{Patch, load, patches};
 pub use front::{front, run_up};
 pub use rate::Rate;
 pub use volume::{enclosed_volume, volume};

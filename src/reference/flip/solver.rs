@@ -292,6 +292,19 @@ impl Flip {
         }
     }
 
+    /// The last substep's pressure; `None` before the first.
+    fn gauge(&self) -> Option<Gauge<'_>> {
+        let field = self.field.as_ref()?;
+        Some(Gauge {
+            bricks: &field.bricks,
+            cells: self.model.cells,
+            cell_size: self.model.cell_size(),
+            kind: &field.kind,
+            pressure: &field.pressure,
+            rise: self.model.scene.water.rise(),
+        })
+    }
+
     /// Shows a substep that just ran.
     fn show(&self, span: Span, cloud: &Cloud, watch: &mut dyn Watch) -> Result<(), ReferenceError> {
         let wanted = watch.wants(span);
@@ -307,6 +320,13 @@ impl Flip {
         }
         if wanted.pressures {
             seen.pressures = self.pressures(&self.model.scene.pressure_points())?;
+        }
+        if let Some(gauge) = self.gauge() {
+            let origin = self.model.scene.domain.min;
+            let patches = wanted.patches.iter();
+            seen.patches = patches
+                .map(|patch| gauge.on_face(patch.at - origin, patch.normal()))
+                .collect();
         }
         watch.look(span, seen);
         Ok(())
@@ -448,15 +468,8 @@ impl Solver for Flip {
     /// The projection's, between cell centres.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, ReferenceError> {
         // Without particles there is none.
-        let Some(field) = &self.field else {
+        let Some(gauge) = self.gauge() else {
             return Ok(vec![None; points.len()]);
-        };
-        let gauge = Gauge {
-            bricks: &field.bricks,
-            cells: self.model.cells,
-            cell_size: self.model.cell_size(),
-            kind: &field.kind,
-            pressure: &field.pressure,
         };
         let local = |at: &DVec3| *at - self.model.scene.domain.min;
         Ok(points.iter().map(|at| gauge.at(local(at))).collect())

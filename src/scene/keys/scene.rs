@@ -399,7 +399,7 @@ const GRIDS: &[Key] = &[
         .about("how values are kept"),
 ];
 
-const PROBES: [&str; 7] = ProbeKind::NAMES;
+const PROBES: [&str; 8] = ProbeKind::NAMES;
 
 const PROBE: &[Key] = &[
     Key::file_stem("name")
@@ -412,7 +412,7 @@ const PROBE: &[Key] = &[
         )
         .about(
             "elevation of the surface, m; pressure, Pa; energy of all water, J; its volume, m³; front along an axis, m; \
-             run_up, the highest water that hangs together with the body, m; flux through a plane, m³/s",
+             run_up, the highest water that hangs together with the body, m; flux through a plane, m³/s; force of the pressure on a solid or a wall, N, and its moment, N m; solver flip",
         ),
     Key::other(
         "at",
@@ -427,6 +427,17 @@ const PROBE: &[Key] = &[
         .only("kind", &["front", "run_up"])
         .computed(probe::quantile_words)
         .about("part of the water, with run_up of the body of water, that lies behind or below"),
+    Key::other(
+        "solid",
+        "the number of a [[solid]], from 0, or a wall of the domain: \"-x\", \"+x\", \"-y\", \"+y\", \"-z\" or \"+z\"",
+    )
+    .only("kind", &["force"])
+    .about("who bears the force"),
+    Key::vector("about", 3, COORDINATE)
+        .unit("m")
+        .only("kind", &["force"])
+        .computed(|| "the middle of the solid's or wall's box at the start".to_owned())
+        .about("where the moment is taken about"),
     Key::other(
         "rate_hz",
         "\"substep\" or a number from 0.001 to shot.frames_per_second × the solver's max_substeps, Hz",

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::domain::{
     gauge::Gauge,
+    probe::Patch,
     solver::{Seen, Span, Wanted, Watch},
 };
 
@@ -30,7 +31,7 @@ impl Flip {
             };
             let wanted = watch.wants(substep);
             if wanted.is_any() {
-                watch.look(substep, self.seen(wanted)?);
+                watch.look(substep, self.seen(&wanted)?);
             }
             if is_last {
                 return Ok(totals);
@@ -38,7 +39,7 @@ impl Flip {
         }
     }
 
-    fn seen(&self, wanted: Wanted) -> Result<Seen, SolveError> {
+    fn seen(&self, wanted: &Wanted) -> Result<Seen, SolveError> {
         let mut seen = Seen::default();
         if wanted.particles {
             seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
@@ -46,11 +47,25 @@ impl Flip {
         if wanted.pressures {
             seen.pressures = self.pressures_at(&self.scene.pressure_points())?;
         }
+        if !wanted.patches.is_empty() {
+            let on_face = |gauge: &Gauge<'_>, x, patch: &Patch| gauge.on_face(x, patch.normal());
+            seen.patches = self.gauged(&wanted.patches, |patch| patch.at, on_face)?;
+        }
         Ok(seen)
     }
 
     /// The projection's, between cell centres.
     pub(super) fn pressures_at(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
+        self.gauged(points, |at| *at, |gauge, x, _| gauge.at(x))
+    }
+
+    /// What `look` says of the last substep's pressure where each of these is, relative to the domain's least corner.
+    fn gauged<T, V>(
+        &self,
+        all: &[T],
+        place: impl Fn(&T) -> DVec3,
+        look: impl Fn(&Gauge<'_>, DVec3, &T) -> V,
+    ) -> Result<Vec<V>, SolveError> {
         let kind: Vec<u32> = self.field(CELL_KIND, self.elements())?;
         let pressure: Vec<f32> = self.field(pressure::buffers::PRESSURE, self.elements())?;
         let pressure: Vec<f64> = pressure.into_iter().map(f64::from).collect();
@@ -60,8 +75,12 @@ impl Flip {
             cell_size: self.scene.solver.flip().cell_size,
             kind: &kind,
             pressure: &pressure,
+            rise: self.scene.water.rise(),
         };
-        let local = |at: &DVec3| *at - self.scene.domain.min;
-        Ok(points.iter().map(|at| gauge.at(local(at))).collect())
+        let origin = self.scene.domain.min;
+        Ok(all
+            .iter()
+            .map(|one| look(&gauge, place(one) - origin, one))
+            .collect())
     }
 }

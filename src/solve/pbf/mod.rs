@@ -241,7 +241,7 @@ impl Pbf {
     }
 
     /// What is wanted of a substep of `step` seconds that just ran.
-    fn seen(&mut self, wanted: Wanted, step: f64) -> Result<Seen, SolveError> {
+    fn seen(&mut self, wanted: &Wanted, step: f64) -> Result<Seen, SolveError> {
         let mut seen = Seen::default();
         if wanted.particles {
             seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
@@ -316,7 +316,7 @@ impl Solver for Pbf {
             };
             let wanted = watch.wants(substep);
             if wanted.is_any() {
-                watch.look(substep, self.seen(wanted, step)?);
+                watch.look(substep, self.seen(&wanted, step)?);
             }
         }
         let (density, counters) = self.read_state(start + length)?;

@@ -123,7 +123,7 @@ fn tables(stream: &Stream, [a, b]: [Side<'_>; 2]) -> Vec<StreamDiff> {
         let settings = |table: &ProbeRecord| {
             json!({
                 "kind": table.kind, "at": table.at, "axis": table.axis, "quantile": table.quantile,
-                "rate_hz": table.rate_hz, "window": table.window,
+                "rate_hz": table.rate_hz, "window": table.window, "solid": table.solid,
             })
         };
         let [of_x, of_y] = [x, y].map(settings);
