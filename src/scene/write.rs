@@ -94,6 +94,12 @@ impl Scene {
         if let Some(grids) = &self.grids {
             scene.insert("grids".to_owned(), value(grids));
         }
+        if let Some(keep) = &self.keep {
+            scene.insert(
+                "keep".to_owned(),
+                Value::Table(table([("particles", value(keep))])),
+            );
+        }
         let probes = self.probes.iter().map(|it| probe(it, self));
         insert_tables(&mut scene, "probe", probes);
         scene

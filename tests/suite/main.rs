@@ -18,6 +18,8 @@ mod cache {
     mod durability;
     mod faults;
     mod format;
+    mod keep;
+    mod probe_forces;
     mod probe_rates;
     mod probes;
     mod vdb;

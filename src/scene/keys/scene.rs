@@ -27,9 +27,13 @@ pub(in super::super) const KEYS: &[Key] = &[
         .absent()
         .not_physics()
         .about("Each frame's water as OpenVDB grids beside its particles"),
+    Key::table("keep", KEEP)
+        .absent()
+        .not_physics()
+        .about("What of a bake stays on the disk; without this table, all"),
     Key::tables("probe", PROBE)
         .not_physics()
-        .about("What is measured at each frame, a CSV each"),
+        .about("What is measured, a CSV each"),
     Key::table("budget", BUDGET)
         .default("{}")
         .not_physics()
@@ -194,16 +198,19 @@ const UNTIL: Key = Key::number("until", 1e-6..=1e9)
 const STROKE: Key = Key::number("stroke", LENGTH)
     .unit("metres")
     .only("kind", &["sine"])
-    .about("from one end of the way to the other");
+    .about(
+        "the whole distance from one end of the way to the other, twice the amplitude: x(t) = stroke/2 (1 − cos(2π t / period)), \
+         times the ramp; the S of H/S in wave maker theory (Dean and Dalrymple 1991)",
+    );
 const WAVE_PERIOD: Key = Key::number("period", PERIOD)
     .unit("seconds")
     .only("kind", &["sine"])
-    .about("there and back");
+    .about("of one cycle, there and back");
 const RAMP: Key = Key::number_or_zero("ramp", PERIOD)
     .unit("seconds")
     .computed(|| "one period".to_owned())
     .only("kind", &["sine"])
-    .about("how long it takes to begin");
+    .about("how long the motion takes to reach its full stroke; 0: it begins with it");
 const FILE: Key = Key::text(
     "file",
     "a CSV of time,displacement (seconds, metres), relative to the scene file",
@@ -399,6 +406,14 @@ const GRIDS: &[Key] = &[
         .about("how values are kept"),
 ];
 
+const KEEP: &[Key] = &[Key::text(
+    "particles",
+    "\"all\", \"every N\" with N from 1 to 1000000, or \"none\"",
+)
+.about(
+    "frames whose particles stay; the first and the newest are always there, so that a bake can go on",
+)];
+
 const PROBES: [&str; 8] = ProbeKind::NAMES;
 
 const PROBE: &[Key] = &[
@@ -412,7 +427,8 @@ const PROBE: &[Key] = &[
         )
         .about(
             "elevation of the surface, m; pressure, Pa; energy of all water, J; its volume, m³; front along an axis, m; \
-             run_up, the highest water that hangs together with the body, m; flux through a plane, m³/s; force of the pressure on a solid or a wall, N, and its moment, N m; solver flip",
+             run_up, the highest water that hangs together with the body, m; flux through a plane, m³/s; force of the \
+             pressure on a solid or a wall, N, and its moment, N m, with the solver flip",
         ),
     Key::other(
         "at",

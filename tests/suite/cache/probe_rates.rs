@@ -13,20 +13,20 @@ frames_per_second = 30
 
 [domain]
 min = [-1.0, 0.5, 0.25]
-max = [1.0, 2.5, 0.65]
+max = [1.0, 2.5, 0.85]
 
 [[water.block]]
 min = [-1.0, 0.5, 0.25]
-max = [-0.2, 1.3, 0.65]
+max = [-0.2, 1.3, 0.85]
 
 [solver]
 method = "pbf"
 [solver.pbf]
 particle_spacing = 0.1
-cfl = 0.2
+cfl = 0.05
 [solver.flip]
 cell_size = 0.2
-cfl = 0.1
+cfl = 0.03
 "#;
 
 /// Each quantity once at frames and once at a rate of its own.

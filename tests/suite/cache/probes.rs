@@ -396,7 +396,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
     let bake = format!("bake tank.toml --solver {solver} -o");
     job.expect(0, &format!("{bake} whole"));
     let said = job.expect(0, "verify whole");
-    assert!(said.contains('9'), "{said}");
+    assert!(said.contains('6'), "{said}");
     let near = rows(&job, "whole/probes/elevation-1.csv");
     assert_eq!(near.len(), 7);
     // Before it falls, the water stands to y = 1.5 there; the far end is dry.

@@ -33,6 +33,7 @@ pub fn manifest() -> Manifest {
         rest_density: 1000.0,
         origin: [0.0; 3],
         grids: None,
+        keep: None,
         probes: probes(),
         parent: None,
         warnings: Vec::new(),
