@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::error::{AtPath, CacheError};
 use super::manifest::{self, Manifest};
-use super::probes::ProbeValues;
+use super::probes::{ProbeRecord, ProbeValues};
 use super::record::FileRecord;
 use super::stream::{self, STREAMS, Stream};
 
@@ -149,7 +149,7 @@ impl Entry {
         beside.filter_map(|stream| self.file(stream.name))
     }
 
-    /// The frame's row of a stream's table, by its index in the manifest; empty where there is none.
+    /// The frame's values of a stream's table, by its index in the manifest; empty where there are none.
     pub fn row(&self, stream: &str, table: usize) -> &[Option<f64>] {
         let row = self.rows.get(stream).and_then(|rows| rows.get(table));
         row.map_or(&[], Vec::as_slice)
@@ -181,12 +181,18 @@ pub(super) fn rows_misfit(manifest: &Manifest, rows: &Rows) -> Option<String> {
         let tables = stream.tables(manifest);
         expected += usize::from(!tables.is_empty());
         let found = rows.get(stream.name).map_or(&[][..], Vec::as_slice);
-        let widths = found.iter().map(Vec::len);
-        if !widths.eq(tables.iter().map(|table| table.columns.len())) {
-            let name = stream.name;
+        let name = stream.name;
+        if found.len() != tables.len() {
             return Some(format!(
                 "its {name} are not those that the manifest announces"
             ));
+        }
+        let misfit = |(table, values): (&ProbeRecord, &Vec<_>)| {
+            let what = table.misfit(values)?;
+            Some(format!("of {} in its {name}: {what}", table.name))
+        };
+        if let Some(misfit) = tables.iter().zip(found).find_map(misfit) {
+            return Some(misfit);
         }
         let mut values = found.iter().flatten().flatten();
         if let Some(value) = values.find(|value| !value.is_finite()) {

@@ -283,10 +283,13 @@ fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt:
     )?;
     for (index, probe) in manifest.probes.iter().enumerate() {
         for (k, column) in probe.columns.iter().enumerate() {
-            let value = |entry: &Entry| *entry.row(PROBES, index).get(k)?;
-            let least = entries.iter().filter_map(value).min_by(f64::total_cmp);
-            let greatest = entries.iter().filter_map(value).max_by(f64::total_cmp);
-            let last = entries.last().and_then(value);
+            let values = || {
+                let of = |entry| probe.looks(Entry::row(entry, PROBES, index), entry.clock.time);
+                entries.iter().flat_map(of).map(|look| look.values[k])
+            };
+            let least = values().flatten().min_by(f64::total_cmp);
+            let greatest = values().flatten().max_by(f64::total_cmp);
+            let last = values().last().flatten();
             let [least, greatest, last] = [least, greatest, last]
                 .map(|value| value.map_or("-".to_owned(), |v| format!("{v:.6}")));
             writeln!(

@@ -73,7 +73,17 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         None => None,
     };
     let keep = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
-    let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
+    let moves = |solid: &MeshSpec| solid.direction.is_some() && solid.motion.is_some();
+    let is_moving: Vec<bool> = spec.solid.iter().map(moves).collect();
+    let around = probe::Around {
+        domain: &domain,
+        shot: &shot,
+        solver: &solver,
+        solids: &solids,
+        moving: &moving_solids,
+        is_moving: &is_moving,
+    };
+    let probes = probe::build_all(doc, &spec.probe, &around)?;
     let motions = (wave_makers.iter().map(|maker| &maker.motion))
         .chain(moving_solids.iter().map(|solid| &solid.motion));
     let duration = shot.duration();

@@ -3,6 +3,7 @@
 pub mod budget;
 pub mod effects;
 pub mod flip;
+mod force;
 pub mod grids;
 pub mod keys;
 pub mod look;
@@ -128,6 +129,11 @@ impl Shot {
         1.0 / self.frames_per_second
     }
 
+    /// When a frame ends, seconds from the start.
+    pub fn time(&self, frame: u32) -> f64 {
+        f64::from(frame) / self.frames_per_second
+    }
+
     /// Seconds from the start to the last frame.
     pub fn duration(&self) -> f64 {
         f64::from(self.frames) / self.frames_per_second
@@ -147,6 +153,13 @@ pub struct Water {
     pub meshes: Vec<PlacedMesh>,
     /// Particles at places of their own.
     pub particles: Vec<Swarm>,
+}
+
+impl Water {
+    /// How pressure rises in water at rest: ρ g, Pa/m.
+    pub fn rise(&self) -> DVec3 {
+        self.rest_density * self.gravity
+    }
 }
 
 /// Particles that the scene places one by one; they are taken as they are, also where others stand.

@@ -196,7 +196,7 @@ pub fn bake(
         notes,
     } = beginning(request, last)?;
     let opened = request.device.open(needs(scene))?;
-    let mut drive = Drive::unloaded(&opened, scene, &start, request.time_passes)?.with_pressures();
+    let mut drive = Drive::unloaded(&opened, scene, &start, request.time_passes)?.with_probes();
     let device = opened.identity();
     let (mut writer, mut clock, state) = open_cache(request, &device, &start, clock, &parent)?;
     let first = clock.frame + 1;
@@ -216,7 +216,9 @@ pub fn bake(
     drive.load_watched(&start.particles, clock.frame, &state)?;
     let ended = drive.run(last, stop, |step| {
         let begin = Instant::now();
-        let seen = probes::look(scene, &step.particles, &step.pressures);
+        let time = scene.shot.time(step.frame);
+        let looks = Some(step.looks);
+        let seen = probes::look(scene, time, &step.particles, &step.pressures, looks);
         let seconds = step.seconds + begin.elapsed().as_secs_f64();
         let Step {
             frame,
@@ -225,7 +227,7 @@ pub fn bake(
             ..
         } = step;
         clock.frame = frame;
-        clock.time = f64::from(clock.frame) / scene.shot.frames_per_second;
+        clock.time = time;
         clock.substeps = report.substeps;
         clock.steps += u64::from(report.substeps);
         let extra = json!({ "seconds": seconds });
@@ -412,7 +414,7 @@ fn open_cache(
     check_first(request, clock.frame + 1)?;
     let assets = assets(scene)?;
     // No step has been made, so no pressure is known.
-    let seen = probes::look(scene, &start.particles, &[]);
+    let seen = probes::look(scene, clock.time, &start.particles, &[], None);
     let particles = &start.particles;
     let writer = CacheWriter::create(directory, manifest, &text, &assets, clock, particles, &seen)?;
     Ok((writer, clock, particles.clone()))

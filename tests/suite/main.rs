@@ -19,6 +19,8 @@ mod cache {
     mod faults;
     mod format;
     mod keep;
+    mod probe_forces;
+    mod probe_rates;
     mod probes;
     mod vdb;
 }

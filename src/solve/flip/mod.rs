@@ -9,6 +9,7 @@ mod capacity;
 pub(super) mod plan;
 mod record;
 mod step;
+mod watch;
 
 use glam::DVec3;
 
@@ -19,11 +20,10 @@ use crate::{
         bricks::{Bricks, CELLS, table_dims},
         budget::Breach,
         flip::{layers, stored_cells},
-        gauge::Gauge,
         particles::Particles,
         poisson::FLUID,
         shores::Shores,
-        solver::{Projection, Solver, StepReport},
+        solver::{Projection, Solver, StepReport, Watch},
         substep::Which,
     },
     gpu::{
@@ -408,13 +408,6 @@ impl Flip {
         Ok(is_last)
     }
 
-    /// Substeps through one frame.
-    fn run_substeps(&mut self, run: &mut Run<'_>) -> Result<FrameTotals, SolveError> {
-        let mut totals = FrameTotals::default();
-        while !self.go_on(&mut totals, run)? {}
-        Ok(totals)
-    }
-
     fn upload_state(&self) {
         upload(&self.program, &self.scene, &self.state);
         let names = self.scene.solver.flip().attributes();
@@ -491,12 +484,15 @@ impl Solver for Flip {
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
+    fn advance_watched(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<(Particles, StepReport), SolveError> {
         self.program.upload(COUNTERS, 0, &[Counters::default()]);
         let totals = if self.state.is_empty() {
             FrameTotals::default()
         } else {
-            self.timed(Self::run_substeps)?
+            self.timed(|flip, run| flip.run_substeps(watch, run))?
         };
         self.read_state()?;
         check_finite(self.frame + 1, &self.state, None).map_err(|breach| {
@@ -529,20 +525,8 @@ impl Solver for Flip {
         Ok((self.state.clone(), report))
     }
 
-    /// The projection's, between cell centres.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
-        let kind: Vec<u32> = self.field(CELL_KIND, self.elements())?;
-        let pressure: Vec<f32> = self.field(pressure::buffers::PRESSURE, self.elements())?;
-        let pressure: Vec<f64> = pressure.into_iter().map(f64::from).collect();
-        let gauge = Gauge {
-            bricks: &self.bricks,
-            cells: self.plan.grid_dims,
-            cell_size: self.scene.solver.flip().cell_size,
-            kind: &kind,
-            pressure: &pressure,
-        };
-        let local = |at: &DVec3| *at - self.scene.domain.min;
-        Ok(points.iter().map(|at| gauge.at(local(at))).collect())
+        self.pressures_at(points)
     }
 
     fn timings(&self) -> Vec<(&'static str, f64, u64)> {

@@ -15,7 +15,7 @@ use crate::{
         pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
         period::Period,
         probe::fitted,
-        solver::{Solver, StepReport},
+        solver::{Seen, Solver, Span as Substep, StepReport, Wanted, Watch},
         sph::Calibration,
         substep::Which,
     },
@@ -33,7 +33,7 @@ use super::{
     SolveError, effects,
     params::{Counters, IterationControl, Params},
     plan::Plan,
-    state::{check_finite, check_ids, slots_by_id, take_over, upload},
+    state::{check_finite, check_ids, look, slots_by_id, take_over, upload},
     trace::{Begun, Observe, Span, TraceFrame, Traced, trace},
 };
 use buffers::*;
@@ -242,6 +242,19 @@ impl Pbf {
             .collect())
     }
 
+    /// What is wanted of a substep of `step` seconds that just ran.
+    fn seen(&mut self, wanted: &Wanted, step: f64) -> Result<Seen, SolveError> {
+        let mut seen = Seen::default();
+        if wanted.particles {
+            seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
+        }
+        if wanted.pressures {
+            self.pressed = self.particle_pressures(step)?;
+            seen.pressures = self.pressures(&self.scene.pressure_points())?;
+        }
+        Ok(seen)
+    }
+
     /// Sorts at the frame's last positions, measures density there, and reads everything back.
     fn read_state(&mut self, time: f64) -> Result<(Vec<f64>, Counters), SolveError> {
         self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
@@ -287,7 +300,10 @@ impl Solver for Pbf {
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
+    fn advance_watched(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<(Particles, StepReport), SolveError> {
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
         let substeps = self.substeps()?;
@@ -295,6 +311,15 @@ impl Solver for Pbf {
         for k in 1..=substeps {
             let (time, step) = self.substep_of(substeps, k);
             self.run_substep(time, step)?;
+            let substep = Substep {
+                start: self.substep_of(substeps, k - 1).0,
+                end: time,
+                is_last: k == substeps,
+            };
+            let wanted = watch.wants(substep);
+            if wanted.is_any() {
+                watch.look(substep, self.seen(&wanted, step)?);
+            }
         }
         let (density, counters) = self.read_state(start + length)?;
         if !self.scene.pressure_points().is_empty() {
