@@ -357,7 +357,8 @@ fn a_cache_of_the_first_format_is_read_and_not_gone_on_with() {
     let refused = CacheWriter::resume(d, &manifest_of_all_streams()).unwrap_err();
     let said = refused.to_string();
     assert!(
-        said.contains("was baked with format_version = 1, and this run has 2; choose another -o"),
+        said.contains("was baked in cache format 1, and this program writes 2")
+            && said.contains(&format!("--from {}:FRAME and another -o", d.display())),
         "{said}"
     );
     assert_eq!(directory_hash(d).unwrap(), before);
