@@ -20,6 +20,7 @@ pub mod pbf;
 pub mod poisson;
 pub mod probe;
 pub mod sampling;
+pub mod shores;
 pub mod signed_distance;
 pub mod solver;
 pub mod sparse_grid;

@@ -290,6 +290,12 @@ fn probe(probe: &Probe, origin: DVec3) -> Table {
     if !at.is_empty() {
         rows.insert("at".to_owned(), value(&at));
     }
+    if let Some(towards) = probe.kind.towards() {
+        rows.insert("axis".to_owned(), value(&towards));
+    }
+    if let Some(quantile) = probe.kind.quantile() {
+        rows.insert("quantile".to_owned(), value(&quantile));
+    }
     rows
 }
 

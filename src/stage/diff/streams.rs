@@ -125,7 +125,12 @@ fn tables(stream: &Stream, [a, b]: [Side<'_>; 2]) -> Vec<StreamDiff> {
     let table = |(i, x): (usize, &crate::cache::ProbeRecord)| {
         let j = of_b.iter().position(|y| y.name == x.name)?;
         let y = &of_b[j];
-        let [of_x, of_y] = [x, y].map(|table| json!({ "kind": table.kind, "at": table.at }));
+        let settings = |table: &crate::cache::ProbeRecord| {
+            json!({
+                "kind": table.kind, "at": table.at, "axis": table.axis, "quantile": table.quantile,
+            })
+        };
+        let [of_x, of_y] = [x, y].map(settings);
         let mut differences = streams::keys("", &of_x, &of_y);
         let [of_a, of_b] = [(a, x, i), (b, y, j)].map(|(side, table, index)| Row {
             columns: &table.columns,

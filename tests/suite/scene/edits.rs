@@ -56,6 +56,19 @@ kind = "energy"
 
 [[probe]]
 kind = "volume"
+
+[[probe]]
+kind = "front"
+axis = "+x"
+quantile = 0.9
+
+[[probe]]
+kind = "run_up"
+
+[[probe]]
+kind = "flux"
+axis = "-x"
+at = [-0.3]
 "#;
 
 const MOVING: &str = r#"

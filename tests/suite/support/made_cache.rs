@@ -67,6 +67,7 @@ impl Made<'_> {
             kind: "energy".to_owned(),
             at: Vec::new(),
             columns: columns.iter().map(|&column| column.to_owned()).collect(),
+            ..ProbeRecord::default()
         };
         Self {
             grids: Some(GridRecord {
