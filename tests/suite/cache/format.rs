@@ -137,8 +137,7 @@ fn resume_names_the_field_that_differs() {
     let d = dir.path();
     let before = directory_hash(d).unwrap();
     type Change = fn(&mut Manifest);
-    let changes: [(&str, Change); 9] = [
-        ("format_version", |m| m.format_version += 1),
+    let changes: [(&str, Change); 8] = [
         ("program_version", |m| m.program_version.push('1')),
         ("scene_hash", |m| m.scene_hash.push('1')),
         ("solver", |m| m.solver = "flip".to_owned()),
@@ -164,6 +163,10 @@ fn resume_names_the_field_that_differs() {
             other => panic!("{name}: {other:?}"),
         }
     }
+    let mut given = manifest();
+    given.format_version += 1;
+    let refused = CacheWriter::resume(d, &given);
+    assert!(matches!(refused, Err(CacheError::OldFormat { .. })));
     assert_eq!(directory_hash(d).unwrap(), before);
     assert!(CacheWriter::resume(d, &manifest()).is_ok(), "control");
 }
