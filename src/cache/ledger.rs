@@ -236,6 +236,15 @@ impl Contents<'_> {
     }
 }
 
+/// What is wrong with a line, without the number that it has as a text of its own.
+fn in_line(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    match text.rsplit_once(" at line 1 column ") {
+        Some((what, column)) => format!("column {column}: {what}"),
+        None => text,
+    }
+}
+
 fn chained(previous: &Hash, contents: &[u8]) -> Hash {
     let mut hasher = blake3::Hasher::new();
     hasher.update(previous.as_bytes());
@@ -314,7 +323,7 @@ impl Ledger {
         let damaged =
             |what: &str| CacheError::damaged(dir.join(FILE), format!("line {number}: {what}"));
         let entry = Entry::parse(line, manifest.format_version)
-            .map_err(|error| damaged(&error.to_string()))?;
+            .map_err(|error| damaged(&in_line(&error)))?;
         let (contents, tail) = line.split_at(line.len().saturating_sub(CHAIN_LEN));
         if !tail.starts_with(CHAIN_KEY) {
             return Err(damaged("it does not end with its chained hash"));

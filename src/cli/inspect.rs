@@ -11,14 +11,20 @@ use clap::Args;
 
 use crate::{
     scene::{Method, Scene},
-    stage::inspect::{
-        Adapter, Entry, Manifest, PARTICLES, PROBES, ScenePlan, adapters, cache, plan, plot,
+    stage::{
+        inspect::{
+            Adapter, Entry, Manifest, PARTICLES, PROBES, ScenePlan, adapters, cache, plan, plot,
+        },
+        replay::is_failed,
     },
 };
 
 use super::{Failure, bake, check::Misplaced, is_cache, output, size};
 
 #[derive(Args, Debug)]
+#[command(
+    override_usage = "swell inspect [OPTIONS] <SCENE|LOOK|CACHE>\n       swell inspect --adapters"
+)]
 pub(super) struct InspectArgs {
     /// A scene file, a look file or a cache directory.
     #[arg(required_unless_present = "adapters")]
@@ -65,6 +71,17 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         }
     }
     match &args.subject {
+        Some(directory) if is_failed(directory) => {
+            let shown = directory.display();
+            let what = format!(
+                "{shown} is the frame that a bake broke off at, which no cache lists: `swell check {shown}` computes \
+                 it again"
+            );
+            return Err(Failure {
+                code: 2,
+                error: what.into(),
+            });
+        }
         Some(directory) if is_cache(directory) => {
             refuse_scene_options(args, directory)?;
             let (manifest, entries) = cache(directory)?;

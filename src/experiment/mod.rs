@@ -7,6 +7,7 @@
 //! A further kind is one file here that implements `engine::Kind`, its parser in [`scene::study`](crate::scene::study), and
 //! a line in [`study`].
 
+mod claim;
 mod comparison;
 mod engine;
 mod error;
@@ -122,6 +123,7 @@ pub fn study(
         count: kind.count(),
         number: 0,
     };
+    claim::take(&request.directory, &request.name)?;
     match kind.run(&mut bench) {
         Ok(report) => report.write(request),
         Err(StudyError::Stopped) => Ok(Outcome::default()),

@@ -147,6 +147,7 @@ impl Branch {
             scene_hash: manifest.scene_hash.clone(),
             frame: from.frame,
             blake3: cache.frame_hash(from.frame)?.to_owned(),
+            shaders: manifest.edited_shaders().map(str::to_owned),
         };
         let mut notes = Vec::new();
         if origin != scene.origin {

@@ -200,7 +200,8 @@ impl System {
         faces
     }
 
-    /// The matrix times `x`, by differences, so that a smooth `x` loses no digits.
+    /// The matrix times `x`, by differences, so that a smooth `x` loses no digits: the f64 twin of
+    /// `shaders/pressure/multiply.wgsl`.
     pub fn apply(&self, x: &[f64]) -> Vec<f64> {
         (0..x.len())
             .into_par_iter()

@@ -242,6 +242,24 @@ pub const KEY_FAULTS: &[Fault] = &[
         ],
     ),
     (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, \"high\", 15.0]",
+        8,
+        &[
+            "domain.max[1]: invalid type: string \"high\", expected a number;",
+            "three numbers from",
+        ],
+    ),
+    (
+        "[[water.block]]",
+        "[water.block]",
+        13,
+        &[
+            "water.block: invalid type: a table, expected an array of tables;",
+            "an array of tables [[water.block]]",
+        ],
+    ),
+    (
         "scale = 2.0",
         "scale = \"big\"",
         20,
