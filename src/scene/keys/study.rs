@@ -307,7 +307,7 @@ const BENCHMARK: &[Key] = &[
 const BENCHMARK_RUN: &[Key] = &[
     Key::other("solver", "\"pbf\" or \"flip\"").about("which solver"),
     Key::number("resolution", SEARCHED)
-        .about("cells, or pairs of spacings, of a length that the benchmark names"),
+        .about("cells, or spacings with PBF, of a length that the benchmark names"),
     SET,
     Key::other("device", "\"gpu\" or \"cpu\"")
         .absent()
