@@ -2,14 +2,13 @@
 // Batty et al. 2007, exact for the walls and for planes in meshes.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
-#import "shared/flip_neighborhood.wgsl"
+#import "shared/flip_cell.wgsl"
 #import "shared/flip_walls.wgsl"
 #ifdef SOLIDS
 #import "shared/flip_solid.wgsl"
 #import "shared/flip_cut.wgsl"
 #endif
 
-@group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read_write> cell_kind: array<u32>;
 @group(0) @binding(4) var<storage, read_write> face_open: array<f32>;
 @group(0) @binding(5) var<storage, read_write> solid_flux: array<f32>;
@@ -21,30 +20,9 @@
 @group(0) @binding(9) var<storage, read_write> closed_velocity: array<f32>;
 #endif
 
+// Which of the cells with room are water is found later, by the density at their centres.
 const AIR = 0u;
-const FLUID = 1u;
 const SOLID = 2u;
-
-fn particles_in(element: u32) -> u32 {
-    let is_wet = element < params.wet_cells + CELLS;
-    return select(0u, cell_start[element + 1u] - cell_start[element], is_wet);
-}
-
-// Particles beside a cell of which walls at rest leave less than half along an axis: in the cell inward of it. Such a cell
-// is water where that is: it may hold no particle of its own, and were it air, a wall would leak pressure all the way
-// down.
-fn water_beside(element: u32, cell: vec3f, extent: vec3f) -> u32 {
-    var count = 0u;
-    let is_low = !is_plane_open(cell);
-    let still = select(params.wall_velocity_max, params.wall_velocity_min, is_low) == vec3f(0.0);
-    let is_thin = (extent < vec3f(0.5)) & still;
-    for (var once = 0; once < select(0, 1, any(is_thin) && element < params.wet_cells + CELLS); once++) {
-        open_neighborhood(element);
-        let inward = select(vec3i(-1), vec3i(1), is_low);
-        count = particles_in(element_at(select(vec3i(0), inward, is_thin)));
-    }
-    return count;
-}
 
 @compute @workgroup_size(64)
 fn main(
@@ -117,8 +95,7 @@ fn main(
     open_volume[element] = volume;
 #endif
     let is_open = volume >= ON_FACE * ON_FACE || any(lower + upper > vec3f(0.0));
-    let fluid = particles_in(element) + water_beside(element, cell, extent);
-    cell_kind[element] = select(SOLID, select(AIR, FLUID, fluid > 0u), is_open);
+    cell_kind[element] = select(SOLID, AIR, is_open);
     face_open[element] = lower.x;
     face_open[params.stride + element] = lower.y;
     face_open[2u * params.stride + element] = lower.z;

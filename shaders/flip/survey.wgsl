@@ -47,13 +47,6 @@ fn main(
             atomicStore(&survey.is_wet[index], 1u);
             last = index;
         }
-        // The outermost cells may be too thin to hold particles, and are water all the same.
-        let outer = select(cell, cell + 1u, cell + 2u == params.cells);
-        if any((outer & vec3u(7u)) < (cell & vec3u(7u))) {
-            atomicStore(&survey.is_wet[table_index(vec3u(outer.x, cell.yz))], 1u);
-            atomicStore(&survey.is_wet[table_index(vec3u(cell.x, outer.y, cell.z))], 1u);
-            atomicStore(&survey.is_wet[table_index(vec3u(cell.xy, outer.z))], 1u);
-        }
     }
     if first < end {
         atomicMax(&survey.head.speed_square, bitcast<u32>(fastest));

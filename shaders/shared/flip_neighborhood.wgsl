@@ -1,7 +1,6 @@
 // A cell's 3³ neighbourhood by the links of its brick.
 #import "shared/flip_element.wgsl"
-
-@group(0) @binding(1) var<storage, read> bricks: array<Brick>;
+#import "shared/flip_cell.wgsl"
 
 fn open_neighborhood(element: u32) {
     let slot = element / CELLS;
@@ -19,11 +18,4 @@ fn open_neighborhood(element: u32) {
         bricks[slot].neighbors[side.y + side.z + 1u],
         bricks[slot].neighbors[side.x + side.y + side.z],
     );
-}
-
-// Cell coordinates from the domain's least corner.
-fn own_cell(element: u32) -> vec3u {
-    let slot = element / CELLS;
-    let brick = vec3u(bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
-    return 8u * brick + local_cell(element % CELLS);
 }

@@ -54,6 +54,14 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), CacheError> {
     write_whole(path, |file| file.write_all(bytes))
 }
 
+/// Removes a file, where there is one.
+pub(super) fn remove(path: &Path) -> Result<(), CacheError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        other => other.at(path),
+    }
+}
+
 /// Flushes the directory that holds `path`, without which a rename may not outlive a power cut.
 fn sync_parent(path: &Path) -> Result<(), CacheError> {
     match path.parent() {

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::domain::keep::Keep;
+
 /// Errors of a cache. All but [`CacheError::Io`] mean that the cache is damaged or not the
 /// one that was meant.
 #[derive(Debug, thiserror::Error)]
@@ -121,6 +123,24 @@ pub enum CacheError {
         first: u32,
         /// Last one there.
         last: u32,
+    },
+    /// A frame was asked for whose particles the bake did not keep.
+    #[error(
+        "{} has no particles of frame {frame}, as its scene has [keep] particles = \"{keep}\"; the nearest frames that \
+         have them are {before} and {after}",
+        dir.display()
+    )]
+    NotKept {
+        /// The directory.
+        dir: PathBuf,
+        /// Asked for.
+        frame: u32,
+        /// What the scene says.
+        keep: Keep,
+        /// The last one before it that has them.
+        before: u32,
+        /// The first one after it.
+        after: u32,
     },
     /// A value that cannot be written to a cache: a bug of the caller.
     #[error("cannot be cached: {0}")]

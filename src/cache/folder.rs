@@ -7,7 +7,7 @@ use super::disk;
 use super::error::{AtPath, CacheError};
 use super::ledger;
 use super::manifest::{self, Manifest};
-use super::stream::{STREAMS, Stream};
+use super::stream::{PARTICLES, STREAMS, Stream};
 
 /// The cache that a path lies in, or would lie in, links followed; also one whose creation has only begun.
 pub fn around(path: &Path) -> Option<PathBuf> {
@@ -116,8 +116,8 @@ pub(super) fn clear_unfinished(dir: &Path) -> Result<(), CacheError> {
     Ok(())
 }
 
-/// Removes from the folders of all streams temporary files, and files behind frame `last`: they were renamed, but a
-/// crash came before their line.
+/// Removes from the folders of all streams temporary files, files behind frame `last`, which were renamed but have no
+/// line, and particles that do not stay: what a crash leaves.
 pub(super) fn clear_leftovers(
     dir: &Path,
     manifest: &Manifest,
@@ -128,7 +128,9 @@ pub(super) fn clear_leftovers(
         for name in disk::names(&folder)? {
             let is_behind = frame_of(&name).is_some_and(|frame| {
                 let file = stream.frame_file(&manifest.shot, frame);
-                frame > last && stream.is_by_frame() && Path::new(&file).ends_with(&name)
+                let is_ours = stream.is_by_frame() && Path::new(&file).ends_with(&name);
+                let stays = stream.name != PARTICLES || manifest.has_particles(frame, last);
+                is_ours && (frame > last || !stays)
             });
             if is_behind || plain(&name).len() < name.len() {
                 let path = folder.join(&name);

@@ -49,7 +49,8 @@ pub struct Entry {
     pub frame: u32,
     /// Number of particles in the frame's file.
     pub particles: u64,
-    /// Files of each stream with a file a frame that the manifest announces, and so of the particles at least.
+    /// Files of each stream with a file a frame that the manifest announces, and so of the particles at least; also of
+    /// particles that the manifest does not keep.
     pub files: Files,
     /// Rows of each stream with a row a frame that the manifest announces; absent where there is none.
     #[serde(default)]
@@ -129,9 +130,17 @@ impl Entry {
         self.files.get(stream)
     }
 
-    /// The frame's files, the particles first.
-    pub fn all_files(&self) -> impl Iterator<Item = &FileRecord> {
-        STREAMS.iter().filter_map(|stream| self.file(stream.name))
+    /// The frame's files that stand in a cache with this manifest, whose newest frame is `newest`; the particles first.
+    pub(super) fn files_there(
+        &self,
+        manifest: &Manifest,
+        newest: u32,
+    ) -> impl Iterator<Item = &FileRecord> {
+        let has_particles = manifest.has_particles(self.frame, newest);
+        let there = STREAMS
+            .iter()
+            .filter(move |s| has_particles || s.name != stream::PARTICLES);
+        there.filter_map(|stream| self.file(stream.name))
     }
 
     /// The frame's files but that of the particles.
@@ -237,6 +246,8 @@ pub(super) struct Ledger {
     pub(super) chain: Hash,
     /// Length of the whole lines.
     pub(super) whole_bytes: u64,
+    /// Where each entry's line ends.
+    pub(super) ends: Vec<u64>,
     /// Bytes behind the last line end: what a crash left of a line, or a line being written now.
     pub(super) torn_bytes: u64,
 }
@@ -255,6 +266,7 @@ impl Ledger {
             entries: Vec::new(),
             chain: *seed,
             whole_bytes: 0,
+            ends: Vec::new(),
             torn_bytes: 0,
         };
         for piece in bytes.split_inclusive(|&b| b == b'\n') {
@@ -264,11 +276,31 @@ impl Ledger {
             };
             ledger.take(dir, manifest, line)?;
             ledger.whole_bytes += piece.len() as u64;
+            ledger.ends.push(ledger.whole_bytes);
         }
         if ledger.entries.is_empty() {
             return Err(CacheError::damaged(path, "it has no whole line"));
         }
         Ok(ledger)
+    }
+
+    /// Leaves out the entries behind the newest frame whose particles are there, as far as they do not have to be: a bake
+    /// can go on from there, and gives the same lines again.
+    pub(super) fn back_to_particles(&mut self, dir: &Path, manifest: &Manifest) {
+        while let [.., before, last] = &self.entries[..] {
+            let record = last.file(stream::PARTICLES);
+            let is_there = record.is_some_and(|record| dir.join(&record.file).exists());
+            let Ok(chain) = Hash::from_hex(&before.chain) else {
+                return;
+            };
+            if is_there || manifest.keeps(last.frame) {
+                return;
+            }
+            self.chain = chain;
+            self.entries.pop();
+            self.ends.pop();
+            self.whole_bytes = self.ends.last().copied().unwrap_or(0);
+        }
     }
 
     fn take(&mut self, dir: &Path, manifest: &Manifest, line: &[u8]) -> Result<(), CacheError> {

@@ -12,6 +12,7 @@ use super::frame::Stamp;
 use super::grids::GridRecord;
 use super::probes::ProbeRecord;
 use super::record::{FileRecord, is_file_stem, is_relative};
+use crate::domain::keep::Keep;
 
 /// File name of the manifest.
 pub(super) const FILE: &str = "manifest.json";
@@ -65,6 +66,9 @@ pub struct Manifest {
     /// Grids of each frame; absent where the scene asks for no grids.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grids: Option<GridRecord>,
+    /// Of which frames the particles stay; absent where those of all do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub keep: Option<Keep>,
     /// Probes, which measure each frame; absent where the scene has no probe.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub probes: Vec<ProbeRecord>,
@@ -114,7 +118,7 @@ fn is_zero(origin: &[f64; 3]) -> bool {
 
 /// Fields that a resumed bake must have in common with the cache, the most telling first. The scene's hash
 /// comes last: it differs where any of the fields above it that a scene sets does.
-const COMPARED: [&str; 15] = [
+const COMPARED: [&str; 16] = [
     "format_version",
     "program",
     "program_version",
@@ -129,6 +133,7 @@ const COMPARED: [&str; 15] = [
     "rest_density",
     "attributes",
     "grids",
+    "keep",
     "scene_hash",
 ];
 
@@ -142,6 +147,16 @@ impl Manifest {
     /// Number of the first frame: 0 is a scene's own start.
     pub fn first_frame(&self) -> u32 {
         self.parent.as_ref().map_or(0, |parent| parent.frame)
+    }
+
+    /// Whether a cache whose newest frame is `newest` has the particles of this one.
+    pub fn has_particles(&self, frame: u32, newest: u32) -> bool {
+        frame == newest || self.keeps(frame)
+    }
+
+    /// Whether this frame's particles stay when later frames are there.
+    pub(super) fn keeps(&self, frame: u32) -> bool {
+        frame == self.first_frame() || self.keep.is_none_or(|keep| keep.keeps(frame))
     }
 
     /// Description for the file of this frame, at `time` seconds.

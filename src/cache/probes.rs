@@ -5,15 +5,21 @@ use serde::{Deserialize, Serialize};
 use super::record::is_file_stem;
 
 /// A probe, as the manifest has it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeRecord {
     /// Name of its file, without the ending.
     pub name: String,
-    /// `elevation`, `pressure`, `energy` or `volume`.
+    /// As scenes name it: `elevation`, `pressure`, `energy`, …
     pub kind: String,
     /// World coordinates that it looks at, metres.
     pub at: Vec<f64>,
+    /// `-x` to `+z`: which way is ahead, or positive; only of kinds that have one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<String>,
+    /// Part of the water that lies behind; only of kinds that have one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quantile: Option<f64>,
     /// Columns of a row, after frame and time; each name ends with its unit.
     pub columns: Vec<String>,
 }
@@ -42,9 +48,20 @@ impl ProbeRecord {
 
     /// All of them in words.
     pub(super) fn list(records: &[Self]) -> String {
-        let words = |record: &Self| match &record.at[..] {
-            [] => record.name.clone(),
-            at => format!("{} ({} at {at:?})", record.name, record.kind),
+        let words = |record: &Self| {
+            let mut words = record.kind.clone();
+            if !record.at.is_empty() {
+                words += &format!(" at {:?}", record.at);
+            }
+            let settings = [
+                record.axis.as_ref().map(|axis| format!(" towards {axis}")),
+                record.quantile.map(|part| format!(" of quantile {part}")),
+            ];
+            words.extend(settings.into_iter().flatten());
+            match words == record.kind {
+                true => record.name.clone(),
+                false => format!("{} ({words})", record.name),
+            }
         };
         match records {
             [] => "no probes".to_owned(),

@@ -12,7 +12,7 @@ use super::frame;
 use super::ledger::{self, Entry, Ledger};
 use super::manifest::{self, Manifest};
 use super::record::FileRecord;
-use super::stream;
+use super::stream::{self, OF_PARTICLES};
 use super::tables;
 use super::vdb::{self, Grids};
 use crate::domain::particles::Particles;
@@ -43,6 +43,8 @@ pub struct VerifyReport {
     pub frames: u32,
     /// Length of the frames' files, the start's too, as the ledger has it.
     pub bytes: u64,
+    /// Frames with particles, the start among them; empty where all have them.
+    pub kept: Vec<u32>,
     /// Whether the cache has `failed/`, and all of it is sound.
     pub failed: bool,
     /// Faults in the order of the files; empty for a sound cache.
@@ -169,12 +171,50 @@ impl CacheReader {
             })
     }
 
+    /// Whether the frame is there, and its particles were kept.
+    pub fn has_particles(&self, frame: u32) -> bool {
+        self.entry(frame).is_ok() && self.manifest.has_particles(frame, self.last_frame())
+    }
+
+    /// The line of a frame whose particles were kept.
+    ///
+    /// # Errors
+    /// [`CacheError::NoFrame`], [`CacheError::NotKept`].
+    pub fn kept(&self, frame: u32) -> Result<&Entry, CacheError> {
+        let entry = self.entry(frame)?;
+        let has = |frame: &u32| self.has_particles(*frame);
+        match self.manifest.keep {
+            Some(keep) if !has(&frame) => Err(CacheError::NotKept {
+                dir: self.dir.clone(),
+                frame,
+                keep,
+                before: (self.first_frame()..frame).rfind(has).unwrap_or(frame),
+                after: (frame..=self.last_frame()).find(has).unwrap_or(frame),
+            }),
+            _ => Ok(entry),
+        }
+    }
+
     /// A frame's particles, once its length and its checksum are found right.
     ///
     /// # Errors
-    /// [`CacheError::NoFrame`], [`CacheError::Damaged`] (also for a missing file), [`CacheError::Io`].
+    /// Those of [`Self::kept`]; [`CacheError::Damaged`] (also for a missing file), [`CacheError::Io`].
     pub fn read(&self, frame: u32) -> Result<Particles, CacheError> {
-        read_frame(&self.dir, &self.manifest, self.entry(frame)?)
+        let found = read_frame(&self.dir, &self.manifest, self.kept(frame)?);
+        match found {
+            Err(error) => match self.gone_on(frame) {
+                Some(now) => now.kept(frame).and(Err(error)),
+                None => Err(error),
+            },
+            found => found,
+        }
+    }
+
+    /// The cache as it stands now, where this frame was its newest and a bake that goes on has let go of its particles.
+    fn gone_on(&self, frame: u32) -> Option<Self> {
+        let was_newest = frame == self.last_frame() && !self.manifest.keeps(frame);
+        let now = was_newest.then(|| Self::open(&self.dir).ok()).flatten()?;
+        (now.last_frame() > frame).then_some(now)
     }
 
     /// The grids in a frame's file, computed anew from its particles; `None` where the frame has none, or where its file
@@ -280,11 +320,17 @@ impl CacheReader {
                 ),
             });
         }
-        let frames: Vec<Problem> = entries
+        let newest = self.last_frame();
+        let there = |entry| Entry::files_there(entry, &self.manifest, newest);
+        let mut frames: Vec<Problem> = entries
             .par_iter()
-            .flat_map_iter(Entry::all_files)
+            .flat_map_iter(there)
             .filter_map(|record| self.problem(record))
             .collect();
+        if !frames.is_empty() && self.gone_on(newest).is_some() {
+            let file = OF_PARTICLES.frame_file(&self.manifest.shot, newest);
+            frames.retain(|problem| problem.file != self.dir.join(&file));
+        }
         problems.extend(frames);
         problems.extend(self.table_problems(entries));
         let failed = self.dir.join(failed::FAILED);
@@ -294,11 +340,13 @@ impl CacheReader {
         problems.extend(of_failed.map(|error| Problem::of(error, &self.dir)));
         VerifyReport {
             frames: self.last_frame() - self.first_frame(),
-            bytes: entries
-                .iter()
-                .flat_map(Entry::all_files)
-                .map(|f| f.bytes)
-                .sum(),
+            bytes: entries.iter().flat_map(there).map(|f| f.bytes).sum(),
+            kept: match self.manifest.keep {
+                Some(_) => (self.first_frame()..=newest)
+                    .filter(|&frame| self.has_particles(frame))
+                    .collect(),
+                None => Vec::new(),
+            },
             failed,
             problems,
         }

@@ -16,7 +16,7 @@ use super::ledger::{self, Clock, Contents, Files, Rows};
 use super::manifest::Manifest;
 use super::probes::ProbeValues;
 use super::record::FileRecord;
-use super::stream::{self, Layout, Stream};
+use super::stream::{self, Layout, OF_PARTICLES, Stream};
 use super::tables;
 use crate::domain::particles::Particles;
 
@@ -117,7 +117,20 @@ impl Sink {
         self.ledger_bytes += line.len() as u64;
         self.chain = chain;
         tables::append(&self.dir, &self.manifest, clock, rows)?;
+        self.let_go_before(clock.frame)?;
         Ok(files.values().map(|record| record.bytes).sum())
+    }
+
+    /// Removes the particles of the frame before `newest` where they do not stay: a bake now goes on from `newest`.
+    fn let_go_before(&self, newest: u32) -> Result<(), CacheError> {
+        let manifest = &self.manifest;
+        match newest.checked_sub(1) {
+            Some(before) if !manifest.keeps(before) => {
+                let file = OF_PARTICLES.frame_file(&manifest.shot, before);
+                disk::remove(&self.dir.join(file))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn note_timings(&self, frame: u32, timings: &Value) -> Result<(), CacheError> {

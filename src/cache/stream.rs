@@ -17,6 +17,9 @@ pub const GRIDS: &str = "grids";
 /// Name of the stream of what probes measure.
 pub const PROBES: &str = "probes";
 
+/// The line of the particles.
+pub(super) static OF_PARTICLES: &Stream = &STREAMS[0];
+
 /// The particles first: the other files of a frame follow from them.
 pub static STREAMS: [Stream; 3] = [
     Stream {

@@ -103,8 +103,9 @@ impl CacheWriter {
         Self::spawn(sink, manifest, clock.frame, lock)
     }
 
-    /// Goes on with the cache in `dir` after its last frame, which is handed back with its line. What
-    /// a crash left behind (half a line, temporary files, frames without a line) is cleared, once all
+    /// Goes on with the cache in `dir` after its last frame, which is handed back with its line. Where the particles of
+    /// that one do not stay and are gone, it goes on after the newest frame whose particles stay, and the lines behind it
+    /// are cut. What a crash left behind (half a line, temporary files, frames without a line) is cleared, once all
     /// else is found sound.
     ///
     /// # Errors
@@ -117,16 +118,22 @@ impl CacheWriter {
         let (manifest, seed) = Manifest::read(dir)?;
         manifest.expect(dir, given)?;
         let lock = disk::lock(dir)?;
+        let mut ledger = Ledger::read(dir, &manifest, &seed)?;
+        let found_bytes = ledger.whole_bytes + ledger.torn_bytes;
+        ledger.back_to_particles(dir, &manifest);
         let Ledger {
             mut entries,
             chain,
             whole_bytes,
-            torn_bytes,
-        } = Ledger::read(dir, &manifest, &seed)?;
+            ..
+        } = ledger;
         manifest.scene_record(dir)?;
         manifest.check_files(dir)?;
-        for record in entries.iter().flat_map(Entry::all_files) {
-            disk::check_length_on_disk(&dir.join(&record.file), record.bytes)?;
+        let newest = entries.last().map_or(0, |entry| entry.frame);
+        for entry in &entries {
+            for record in entry.files_there(&manifest, newest) {
+                disk::check_length_on_disk(&dir.join(&record.file), record.bytes)?;
+            }
         }
         let Some(last) = entries.pop() else {
             return Err(CacheError::damaged(dir.join(ledger::FILE), "it is empty"));
@@ -135,7 +142,7 @@ impl CacheWriter {
         last.files_beside()
             .try_for_each(|record| record.check(dir))?;
 
-        if torn_bytes > 0 {
+        if whole_bytes < found_bytes {
             let path = dir.join(ledger::FILE);
             let file = File::options().write(true).open(&path).at(&path)?;
             file.set_len(whole_bytes)

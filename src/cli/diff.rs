@@ -99,6 +99,9 @@ pub(super) fn run(args: &DiffArgs) -> Result<u8, Failure> {
     let is_within = outcome.is_within();
     let verdict = match (is_within, &request.tolerance, &outcome) {
         (false, ..) => "OUT OF TOLERANCE",
+        (true, None, Outcome::Caches(diff)) if !diff.without_particles.is_empty() => {
+            "the same in all that both keep"
+        }
         (true, None, Outcome::Caches(_) | Outcome::Pictures(_)) => "the same, bit for bit",
         _ => "within tolerance",
     };
@@ -124,6 +127,13 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
     show_lone(out, "frames", "B", &ranges(&diff.only_b))?;
     let numbers: Vec<u32> = diff.frames.iter().map(|frame| frame.frame).collect();
     writeln!(out, "compared frames {}", ranges(&numbers))?;
+    if !diff.without_particles.is_empty() {
+        writeln!(
+            out,
+            "particles not kept on both sides: frames {}, of which what stands beside them is compared",
+            ranges(&diff.without_particles)
+        )?;
+    }
     let lone = |frame: &&crate::stage::diff::FrameDiff| frame.only_a.count + frame.only_b.count > 0;
     for frame in diff.frames.iter().filter(lone).take(1) {
         writeln!(

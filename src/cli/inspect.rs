@@ -224,6 +224,12 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
         "{} a second, d = {} m",
         manifest.frames_per_second, manifest.particle_spacing
     )?;
+    if let Some(keep) = manifest.keep {
+        writeln!(
+            out,
+            "keeps particles: \"{keep}\", and the first and newest frame's"
+        )?;
+    }
     if manifest.origin != [0.0; 3] {
         writeln!(out, "solved about the origin {:?} m", manifest.origin)?;
     }
@@ -239,7 +245,13 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
         out,
         "\nframe  particles       bytes  substeps{columns}  density error  top speed  capped"
     )?;
+    let newest = entries.last().map_or(0, |entry| entry.frame);
     for entry in entries {
+        let bytes = entry.file(PARTICLES).map_or(0, |file| file.bytes);
+        let bytes = match manifest.has_particles(entry.frame, newest) {
+            true => size(bytes),
+            false => "-".to_owned(),
+        };
         let number = |key: &str| entry.report.get(key).and_then(serde_json::Value::as_f64);
         let percent =
             number("density_error_mean").map_or("-".into(), |x| format!("{:.3} %", 100.0 * x));
@@ -253,10 +265,7 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
         writeln!(
             out,
             "{:5}  {:9}  {:>10}  {:8}{columns}  {percent:>13}  {speed:>9}  {capped:>6}",
-            entry.clock.frame,
-            entry.particles,
-            size(entry.file(PARTICLES).map_or(0, |file| file.bytes)),
-            entry.clock.substeps
+            entry.clock.frame, entry.particles, bytes, entry.clock.substeps
         )?;
     }
     Ok(())

@@ -107,12 +107,20 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             device,
             size,
             frames,
+            left_out,
         } => {
             let progress = progress.get_or_init(|| Progress::new(mode, frames as u64));
             let [width, height] = size;
+            let others = match left_out {
+                0 => String::new(),
+                more => format!(" ({more} more were baked, and their particles not kept)"),
+            };
             progress.say(
-                &format!("on {device}\n{frames} frames of {width} × {height}"),
-                json!({ "event": "ready", "device": device, "width": width, "height": height, "frames": frames }),
+                &format!("on {device}\n{frames} frames of {width} × {height}{others}"),
+                json!({
+                    "event": "ready", "device": device, "width": width, "height": height, "frames": frames,
+                    "not_kept": left_out,
+                }),
             );
         }
         Event::Waiting { frames } => {

@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{output, size};
-use crate::stage::verify::{CacheError, VerifyReport, verify};
+use crate::{
+    domain::frame_range::ranges,
+    stage::verify::{CacheError, VerifyReport, verify},
+};
 
 /// Look at every checksum of a cache.
 #[derive(Args, Clone, Debug)]
@@ -33,8 +36,12 @@ fn show(report: &VerifyReport) -> String {
         } else {
             ""
         };
+        let kept = match &report.kept[..] {
+            [] => String::new(),
+            kept => format!("; particles of frames {}", ranges(kept)),
+        };
         return format!(
-            "ok: {} frame{plural}, {}{failed}\n",
+            "ok: {} frame{plural}, {}{failed}{kept}\n",
             report.frames,
             size(report.bytes)
         );
@@ -56,12 +63,17 @@ mod tests {
         let mut report = VerifyReport {
             frames: 72,
             bytes: 1_234_000_000,
+            kept: Vec::new(),
             failed: false,
             problems: vec![],
         };
         assert_eq!(show(&report), "ok: 72 frames, 1.2 GB\n");
         report.failed = true;
         let said = "ok: 72 frames, 1.2 GB, and the frame that failed\n";
+        assert_eq!(show(&report), said);
+        report.kept = vec![0, 10, 11];
+        let said =
+            "ok: 72 frames, 1.2 GB, and the frame that failed; particles of frames 0, 10-11\n";
         assert_eq!(show(&report), said);
         for name in ["a", "b"] {
             report.problems.push(Problem {

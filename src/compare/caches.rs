@@ -15,8 +15,10 @@ pub struct CacheDiff {
     pub only_a: Vec<u32>,
     /// Frames that b alone has.
     pub only_b: Vec<u32>,
-    /// Frames of both.
+    /// Frames of both whose particles both have kept.
     pub frames: Vec<FrameDiff>,
+    /// Frames of both that one of them has kept no particles of: there the streams beside them alone are compared.
+    pub without_particles: Vec<u32>,
     /// Streams that a alone has: `grids`, `grid NAME`, `probe NAME`.
     pub streams_only_a: Vec<String>,
     /// Streams that b alone has.

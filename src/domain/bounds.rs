@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::flip::ON_FACE;
+
 /// An axis-aligned box, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bounds {
@@ -39,11 +41,9 @@ impl Bounds {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
-    /// Cells of edge `edge` that cover it along each axis; one at least.
+    /// Cells of edge `edge` that cover it along each axis, as [`cells_over`] counts them.
     pub fn cells(&self, edge: f64) -> [u32; 3] {
-        (self.size() / edge)
-            .to_array()
-            .map(|cells| (cells.ceil() as u32).max(1))
+        cells_over(self.size(), edge).to_array().map(|n| n as u32)
     }
 
     /// This box with each face moved outward by `margin` metres.
@@ -53,6 +53,12 @@ impl Bounds {
             max: self.max + DVec3::splat(margin),
         }
     }
+}
+
+/// Cells of edge `edge` that cover a box of `size` metres along each axis, whole numbers; one at least. A last one of which
+/// the box would take less than [`ON_FACE`] is left out: 3 × 0.05 m are three cells of 0.05 m, though in f64 they are more.
+pub fn cells_over(size: DVec3, edge: f64) -> DVec3 {
+    (size / edge - ON_FACE).ceil().max(DVec3::ONE)
 }
 
 #[cfg(test)]
@@ -70,5 +76,38 @@ mod tests {
         assert!(!bounds.contains(DVec3::new(3.1, 4.5, -1.0)));
         assert!(bounds.grown(0.2).contains(DVec3::new(3.1, 4.5, -1.0)));
         assert!(Bounds::of_points([]).is_none());
+    }
+
+    /// Products of decimals, which f64 rounds up or down, along an axis that begins at 0 and along ones that do not.
+    #[test]
+    fn rounding_alone_makes_no_cell() {
+        let cells = |min: f64, max: f64, edge: f64| {
+            let bounds = Bounds {
+                min: DVec3::splat(min),
+                max: DVec3::splat(max),
+            };
+            bounds.cells(edge)[0]
+        };
+        assert!(3.0 * 0.05 / 0.05 > 3.0, "the case that this is about");
+        let mut over = 0;
+        for edge in [0.05, 0.1, 0.2, 0.3, 0.7, 1.0 / 3.0, 0.057_15 / 24.0] {
+            for count in (1..2000).chain([65_535, 65_536]) {
+                let length = f64::from(count) * edge;
+                for min in [0.0, -0.3, 0.1, 17.3, -2000.1] {
+                    over += u32::from((min + length - min) / edge > f64::from(count));
+                    let found = cells(min, min + length, edge);
+                    assert_eq!(found, count, "{count} of {edge} from {min}");
+                }
+                // As f32 has it, as other programs write it.
+                let narrow = f64::from(length as f32);
+                let found = cells(0.0, narrow, edge);
+                assert!(count > 8000 || found == count, "{count} of {edge} in f32");
+                // Negative control: a cell that is truly cut is one.
+                assert_eq!(cells(0.0, length + 2.0 * ON_FACE * edge, edge), count + 1);
+                assert_eq!(cells(0.0, length - 2.0 * ON_FACE * edge, edge), count);
+            }
+        }
+        assert!(over > 1000, "{over} of them were one more before");
+        assert_eq!(cells(0.0, 1e-6, 0.1), 1);
     }
 }

@@ -3,6 +3,9 @@
 /// Particles keep this part of their spacing from walls and solids; at rest the lattice stands at 0.5.
 pub const CONTACT: f64 = 0.1;
 
+/// Nearer than this to a cell's face, in cells, counts as on it: positions of thousands of cells in f32 round below it.
+pub const ON_FACE: f64 = 1e-3;
+
 /// Displacement cap of a substep over the CFL displacement: what the projection speeds up beyond this is slowed
 /// and counted.
 pub const CAP: f64 = 2.0;

@@ -3,6 +3,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::domain::bounds::cells_over;
+
 /// Particles whose neighbours one task lists.
 const BLOCK: usize = 512;
 
@@ -19,9 +21,7 @@ impl Cells {
     /// Cells that cover a box of `size` metres.
     pub fn new(size: DVec3, edge: f64) -> Self {
         Self {
-            dims: (size / edge)
-                .to_array()
-                .map(|cells| (cells.ceil() as usize).max(1)),
+            dims: cells_over(size, edge).to_array().map(|n| n as usize),
             edge,
         }
     }

@@ -10,7 +10,7 @@ use super::{
     PlacedMesh, Placement, Scene, Swarm, Water, budget,
     document::Document,
     error::SceneError,
-    grids,
+    grids, keep,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
     origin, probe,
     spec::{BoxSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
@@ -63,6 +63,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
         None => None,
     };
+    let keep = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
     let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
     let motions = (wave_makers.iter().map(|maker| &maker.motion))
         .chain(moving_solids.iter().map(|solid| &solid.motion));
@@ -83,6 +84,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         wave_makers,
         solver,
         grids,
+        keep,
         probes,
         budget,
         effects: spec.effects,

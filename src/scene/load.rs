@@ -376,6 +376,8 @@ motion = { kind = "KIND" }
 [grids]
 surface = true
 velocity = true
+[keep]
+particles = "every 10"
 [[probe]]
 kind = "elevation"
 at = [5.0, 2.0]

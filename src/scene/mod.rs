@@ -16,6 +16,7 @@ mod build;
 mod difference;
 mod document;
 mod error;
+mod keep;
 mod key;
 mod load;
 mod origin;
@@ -31,7 +32,7 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DQuat, DVec3};
 
-use crate::domain::{bounds::Bounds, holes::Holes, mesh::TriangleMesh, motion::Motion};
+use crate::domain::{bounds::Bounds, holes::Holes, keep::Keep, mesh::TriangleMesh, motion::Motion};
 
 use key::read_by_name;
 
@@ -64,6 +65,8 @@ pub struct Scene {
     pub solver: Solver,
     /// Grids that each frame gets beside its particles, where the scene asks for any.
     pub grids: Option<grids::Grids>,
+    /// Of which frames the particles stay on the disk; all where the scene does not say it.
+    pub keep: Option<Keep>,
     /// What is measured at each frame; most scenes have none.
     pub probes: Vec<probe::Probe>,
     /// What the bake is held to.

@@ -53,7 +53,11 @@ impl Scene {
             match &mut probe.kind {
                 ProbeKind::Elevation { at } => *at += DVec2::new(way.x, way.z),
                 ProbeKind::Pressure { at } => *at += way,
-                ProbeKind::Energy | ProbeKind::Volume => {}
+                ProbeKind::Flux { towards, at } => *at += way[towards.axis],
+                ProbeKind::Energy
+                | ProbeKind::Volume
+                | ProbeKind::Front { .. }
+                | ProbeKind::RunUp { .. } => {}
             }
         }
         self

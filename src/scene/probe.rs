@@ -3,7 +3,9 @@
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
-use super::{Iteration, Method, Solver, document::Document, error::SceneError, words::extent};
+use super::{
+    Iteration, Method, Solver, Wall, document::Document, error::SceneError, words::extent,
+};
 use crate::domain::{bounds::Bounds, sparse_grid::EDGE, surface::MAX_BRICKS};
 
 /// A gauge that has a CSV of its own in the cache.
@@ -32,11 +34,48 @@ pub enum ProbeKind {
     Energy,
     /// Volume of all water.
     Volume,
+    /// Place behind which a part of the water lies.
+    Front {
+        /// The wall that it heads for.
+        towards: Wall,
+        /// The part, above 0 and up to 1.
+        quantile: f64,
+    },
+    /// Height of the highest water that hangs together with the body.
+    RunUp {
+        /// Part of the body below it, above 0 and up to 1.
+        quantile: f64,
+    },
+    /// Volume a second that crosses a plane.
+    Flux {
+        /// The wall towards which it counts as positive.
+        towards: Wall,
+        /// Where the plane crosses the axis, metres.
+        at: f64,
+    },
+}
+
+/// Of a front where the scene does not say: spray ahead of a breaking wave is less than the rest.
+const FRONT_QUANTILE: f64 = 0.995;
+/// The same of a run-up, which leaves out what has come off the body anyway.
+const RUN_UP_QUANTILE: f64 = 1.0;
+
+/// Both in words.
+pub(super) fn quantile_words() -> String {
+    format!("{FRONT_QUANTILE} of a front, {RUN_UP_QUANTILE} of a run_up")
 }
 
 impl ProbeKind {
     /// Names that scenes use.
-    pub(super) const NAMES: [&str; 4] = ["elevation", "pressure", "energy", "volume"];
+    pub(super) const NAMES: [&str; 7] = [
+        "elevation",
+        "pressure",
+        "energy",
+        "volume",
+        "front",
+        "run_up",
+        "flux",
+    ];
 
     /// As scenes name it.
     pub fn name(self) -> &'static str {
@@ -45,6 +84,9 @@ impl ProbeKind {
             Self::Pressure { .. } => 1,
             Self::Energy => 2,
             Self::Volume => 3,
+            Self::Front { .. } => 4,
+            Self::RunUp { .. } => 5,
+            Self::Flux { .. } => 6,
         }]
     }
 
@@ -55,15 +97,36 @@ impl ProbeKind {
             Self::Pressure { .. } => &["pressure_Pa"],
             Self::Energy => &["kinetic_J", "potential_J", "total_J"],
             Self::Volume => &["volume_m3"],
+            Self::Front { .. } => &["front_m"],
+            Self::RunUp { .. } => &["run_up_m"],
+            Self::Flux { .. } => &["flux_m3/s"],
         }
     }
 
-    /// World coordinates of its point, metres: x and z, or x, y and z, or none. `origin` is the scene's.
+    /// World coordinates of its point, metres: x and z, or x, y and z, or that of a plane, or none. `origin` is the
+    /// scene's.
     pub fn at(self, origin: DVec3) -> Vec<f64> {
         match self {
             Self::Elevation { at } => (at + DVec2::new(origin.x, origin.z)).to_array().to_vec(),
             Self::Pressure { at } => (at + origin).to_array().to_vec(),
-            Self::Energy | Self::Volume => Vec::new(),
+            Self::Flux { towards, at } => vec![at + origin[towards.axis]],
+            Self::Energy | Self::Volume | Self::Front { .. } | Self::RunUp { .. } => Vec::new(),
+        }
+    }
+
+    /// The direction that counts as positive or ahead, where it has one.
+    pub fn towards(self) -> Option<Wall> {
+        match self {
+            Self::Front { towards, .. } | Self::Flux { towards, .. } => Some(towards),
+            _ => None,
+        }
+    }
+
+    /// The part of the water that it looks at, where it has one.
+    pub fn quantile(self) -> Option<f64> {
+        match self {
+            Self::Front { quantile, .. } | Self::RunUp { quantile } => Some(quantile),
+            _ => None,
         }
     }
 }
@@ -74,6 +137,8 @@ pub(super) struct ProbeSpec {
     kind: String,
     name: Option<String>,
     at: Option<Vec<f64>>,
+    axis: Option<Wall>,
+    quantile: Option<f64>,
 }
 
 /// Builds all of them. A probe without a name is called by its kind and its place among those of its kind.
@@ -90,7 +155,7 @@ pub(super) fn build_all(
         let unfit = match kind {
             ProbeKind::Pressure { .. } => why_no_pressure(solver),
             ProbeKind::Volume => why_no_volume(domain, solver),
-            ProbeKind::Elevation { .. } | ProbeKind::Energy => None,
+            _ => None,
         };
         if let Some(problem) = unfit {
             return Err(doc.fault_of(&format!("{path}.kind"), problem));
@@ -134,28 +199,57 @@ fn kind(
     let given = spec.at.as_deref().unwrap_or_default();
     let wrong = |count: usize| {
         let problem = format!(
-            "{} numbers, and a probe of {} takes {count}",
+            "{} {}, and a probe of {} takes {count}",
             given.len(),
+            if given.len() == 1 {
+                "number"
+            } else {
+                "numbers"
+            },
             spec.kind
         );
         fault(problem)
     };
-    let (kind, is_within) = match spec.kind.as_str() {
+    // The keys need it where a kind does.
+    let towards = || {
+        let missing = || doc.fault_of(&format!("{path}.axis"), "missing".to_owned());
+        spec.axis.ok_or_else(missing)
+    };
+    let (kind, point) = match spec.kind.as_str() {
         "elevation" => {
             let at = <[f64; 2]>::try_from(given).map_err(|_| wrong(2))?;
             let at = DVec2::from_array(at);
-            let is_within = domain.contains(DVec3::new(at.x, domain.min.y, at.y));
-            (ProbeKind::Elevation { at }, is_within)
+            let point = DVec3::new(at.x, domain.min.y, at.y);
+            (ProbeKind::Elevation { at }, point)
         }
         "pressure" => {
             let at = <[f64; 3]>::try_from(given).map_err(|_| wrong(3))?;
             let at = DVec3::from_array(at);
-            (ProbeKind::Pressure { at }, domain.contains(at))
+            (ProbeKind::Pressure { at }, at)
         }
-        "energy" => (ProbeKind::Energy, true),
-        _ => (ProbeKind::Volume, true),
+        "flux" => {
+            let [at] = <[f64; 1]>::try_from(given).map_err(|_| wrong(1))?;
+            let towards = towards()?;
+            let mut point = domain.min;
+            point[towards.axis] = at;
+            (ProbeKind::Flux { towards, at }, point)
+        }
+        other => {
+            let kind = match other {
+                "energy" => ProbeKind::Energy,
+                "front" => ProbeKind::Front {
+                    towards: towards()?,
+                    quantile: spec.quantile.unwrap_or(FRONT_QUANTILE),
+                },
+                "run_up" => ProbeKind::RunUp {
+                    quantile: spec.quantile.unwrap_or(RUN_UP_QUANTILE),
+                },
+                _ => ProbeKind::Volume,
+            };
+            (kind, domain.min)
+        }
     };
-    if is_within {
+    if domain.contains(point) {
         return Ok(kind);
     }
     let all = extent(Some(*domain));
@@ -181,7 +275,7 @@ fn why_no_pressure(solver: &Solver) -> Option<String> {
     Some(why.to_owned())
 }
 
-/// The volume is that of a level set at voxels of one spacing, whose bricks have a table over the water.
+/// The volume is counted on voxels of one spacing, whose bricks have a table over the water.
 fn why_no_volume(domain: &Bounds, solver: &Solver) -> Option<String> {
     let spacing = match solver.method {
         Method::Pbf => solver.pbf().particle_spacing,

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::{
     Effects, Iteration, Method, Shot, Wall, budget::BudgetSpec, flip::Flip, grids::GridsSpec,
-    probe::ProbeSpec,
+    keep::KeepSpec, probe::ProbeSpec,
 };
 
 #[derive(Deserialize)]
@@ -20,6 +20,7 @@ pub(super) struct SceneSpec {
     pub(super) wave_maker: Vec<WaveMakerSpec>,
     pub(super) solver: SolverSpec,
     pub(super) grids: Option<GridsSpec>,
+    pub(super) keep: Option<KeepSpec>,
     #[serde(default)]
     pub(super) probe: Vec<ProbeSpec>,
     pub(super) budget: BudgetSpec,

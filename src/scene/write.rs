@@ -94,6 +94,12 @@ impl Scene {
         if let Some(grids) = &self.grids {
             scene.insert("grids".to_owned(), value(grids));
         }
+        if let Some(keep) = &self.keep {
+            scene.insert(
+                "keep".to_owned(),
+                Value::Table(table([("particles", value(keep))])),
+            );
+        }
         let probes = self.probes.iter().map(|it| probe(it, self.origin));
         insert_tables(&mut scene, "probe", probes);
         scene
@@ -283,6 +289,12 @@ fn probe(probe: &Probe, origin: DVec3) -> Table {
     let at = probe.kind.at(origin);
     if !at.is_empty() {
         rows.insert("at".to_owned(), value(&at));
+    }
+    if let Some(towards) = probe.kind.towards() {
+        rows.insert("axis".to_owned(), value(&towards));
+    }
+    if let Some(quantile) = probe.kind.quantile() {
+        rows.insert("quantile".to_owned(), value(&quantile));
     }
     rows
 }

@@ -9,7 +9,7 @@ use crate::{
         Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, Parent, failed,
     },
     domain::{
-        budget::Breach, frame_range::FrameRange, particles::Particles,
+        budget::Breach, frame_range::FrameRange, keep::Keep, particles::Particles,
         signed_distance::SignedDistanceError, solver::StepReport,
     },
     gpu::adapter::GpuError,
@@ -389,6 +389,7 @@ fn open_cache(
         origin: scene.origin.to_array(),
         attributes: start.particles.attributes.keys().cloned().collect(),
         grids: scene.grids.map(|grids| grid_record(scene, &grids)),
+        keep: scene.keep.filter(|keep| *keep != Keep::All),
         probes: probes::records(scene),
         parent: parent.clone(),
         warnings: scene.warnings(),

@@ -219,7 +219,7 @@ fn open(source: &Source) -> Result<(Scene, Option<CacheReader>, Vec<u32>), Check
                 None => vec![cache.last_frame()],
             };
             for &frame in &frames {
-                cache.entry(frame)?;
+                cache.kept(frame)?;
             }
             // The cache's own copy: what was baked, wherever the cache has been moved to.
             let file = directory.join("scene.toml");

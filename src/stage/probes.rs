@@ -4,7 +4,7 @@ use crate::{
     cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES},
     domain::{
         particles::Particles,
-        probe::{elevation, energies, volume},
+        probe::{elevation, energies, flux, front, run_up, volume},
     },
     scene::{Scene, probe::ProbeKind},
     study::chart::{Chart, Series},
@@ -18,6 +18,8 @@ pub(super) fn records(scene: &Scene) -> Vec<ProbeRecord> {
             name: probe.name.clone(),
             kind: probe.kind.name().to_owned(),
             at: probe.kind.at(scene.origin),
+            axis: probe.kind.towards().map(|wall| wall.name().to_owned()),
+            quantile: probe.kind.quantile(),
             columns: probe.kind.columns().iter().map(|&c| c.to_owned()).collect(),
         })
         .collect()
@@ -43,6 +45,19 @@ pub(super) fn look(scene: &Scene, particles: &Particles, pressures: &[Option<f64
                 vec![Some(kinetic), Some(potential), Some(kinetic + potential)]
             }
             ProbeKind::Volume => vec![Some(volume(particles, spacing, &scene.domain))],
+            ProbeKind::Front { towards, quantile } => {
+                let sign = if towards.is_max { 1.0 } else { -1.0 };
+                let place = front(particles, spacing, towards.axis, sign, quantile);
+                vec![place.map(|place| scene.origin[towards.axis] + place)]
+            }
+            ProbeKind::RunUp { quantile } => {
+                let height = run_up(particles, spacing, quantile);
+                vec![height.map(|y| scene.origin.y + y)]
+            }
+            ProbeKind::Flux { towards, at } => {
+                let rate = flux(particles, spacing, towards.axis, at);
+                vec![Some(if towards.is_max { rate } else { -rate })]
+            }
         })
         .collect()
 }
@@ -64,10 +79,7 @@ pub(super) fn chart(shot: &str, record: &ProbeRecord, index: usize, entries: &[E
     Chart {
         title: format!("{shot}: {}{place}", record.name),
         x_label: "time, s".to_owned(),
-        y_label: match unit {
-            Some("m3") => "m³".to_owned(),
-            unit => unit.unwrap_or_default().to_owned(),
-        },
+        y_label: unit.unwrap_or_default().replace("m3", "m³"),
         series: series.collect(),
         ..Chart::default()
     }

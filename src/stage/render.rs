@@ -51,7 +51,7 @@ pub struct Request {
     pub look: Look,
     /// Where images go.
     pub directory: PathBuf,
-    /// Frames wanted; all that are cached where `None`.
+    /// Frames wanted; all whose particles are cached where `None`.
     pub frames: Option<FrameRange>,
     /// What to render on.
     pub gpu: Gpu,
@@ -72,6 +72,8 @@ pub enum Event {
         size: [u32; 2],
         /// Frames wanted.
         frames: usize,
+        /// Frames of the cache that are left out: their particles were not kept.
+        left_out: usize,
     },
     /// A frame is on the disk.
     Frame {
@@ -176,11 +178,18 @@ pub fn render(
     }
     let frames: Vec<u32> = match &request.frames {
         Some(frames) => frames.iter().collect(),
-        None => (cache.first_frame() + 1..=cache.last_frame()).collect(),
+        None => (cache.first_frame() + 1..=cache.last_frame())
+            .filter(|&frame| cache.has_particles(frame))
+            .collect(),
     };
     for &frame in &frames {
-        cache.entry(frame)?;
+        cache.kept(frame)?;
     }
+    let baked = cache.last_frame() - cache.first_frame();
+    let left_out = match &request.frames {
+        Some(_) => 0,
+        None => baked as usize - frames.len(),
+    };
     let scene = baked_scene(&cache, &request.cache)?;
     let context = request.gpu.open(Needs::default())?;
     let folder = enter(request, &cache, &frames)?;
@@ -193,6 +202,7 @@ pub fn render(
         ),
         size: [image.width, image.height],
         frames: frames.len(),
+        left_out,
     });
     let mut job = Job {
         request,

@@ -15,6 +15,7 @@ use crate::{
         bricks::CELLS,
         budget::{Breach, Watched},
         particles::Particles,
+        poisson::FLUID,
         signed_distance::SignedDistanceError,
         solver::StepReport,
     },
@@ -218,7 +219,8 @@ impl Finder<'_> {
                 };
                 let mut density = traced.read(DENSITY, count)?;
                 if self.scene.solver.method == Method::Flip {
-                    density.retain(|&density| density != 0.0);
+                    let mut kind = traced.read(CELL_KIND, count)?.into_iter();
+                    density.retain(|_| kind.next() == Some(FLUID));
                 }
                 let density = density.into_iter().map(f64::from);
                 let report = self.scene.report(&Particles::default(), density);
@@ -314,7 +316,7 @@ impl Finder<'_> {
 
 /// Whether a pass leaves the densities that a frame's report is of: in an iteration those of PBF are not yet what it leaves.
 fn is_measured(pass: &str) -> bool {
-    matches!(pass, "pbf/measure_density" | "flip/gather_centers")
+    matches!(pass, "pbf/measure_density" | "flip/find_water")
 }
 
 fn vector(v: &[f32; 4]) -> DVec3 {

@@ -18,6 +18,7 @@ mod cache {
     mod durability;
     mod faults;
     mod format;
+    mod keep;
     mod probes;
     mod vdb;
 }

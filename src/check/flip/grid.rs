@@ -11,8 +11,9 @@ use crate::{
     domain::{boundary::Boundary, signed_distance::SignedDistance},
     reference::flip::{
         Model, Room, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
-        find_change as twin_find_change, gather_centers as twin_gather_centers,
-        gather_faces as twin_gather_faces,
+        find_change as twin_find_change, find_excess as twin_find_excess,
+        find_water as twin_find_water, gather_centers as twin_gather_centers,
+        gather_faces as twin_gather_faces, is_near_half,
     },
     scene::flip::Surface,
     solve::flip::buffers,
@@ -78,7 +79,7 @@ impl FlipState {
         };
         let model = Model::new(&self.model.scene, &boundary);
         let step = model.step(&self.elements().substep);
-        twin_cut_cells(&model, &step, &self.elements().bricks, self.sorted())
+        twin_cut_cells(&model, &step, &self.elements().bricks)
     }
 }
 
@@ -86,7 +87,7 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let has_moving = !state.boundary.moving.is_empty();
     let has_solids = state.boundary.distance.is_some() || has_moving;
     let (elements, step) = (state.elements(), state.step());
-    let twin = twin_cut_cells(&state.model, &step, &elements.bricks, state.sorted());
+    let twin = twin_cut_cells(&state.model, &step, &elements.bricks);
     let error = state.distance_error();
     let others: Vec<Room> = [-error, error]
         .into_iter()
@@ -200,7 +201,7 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
     let bricks = &elements.bricks;
     let twin = twin_gather_centers(&state.model, &step, bricks, state.sorted(), room);
     let share = 1.0 / f64::from(settings.particles_per_cell);
-    let (place, size) = (state.place(), state.model.cell_size());
+    let place = state.place();
     let error = |e: usize| {
         let count = state.about(e).count;
         // Half of what the cells' open volumes leave: walls leave hats another part than cells.
@@ -212,7 +213,7 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
             })
             .sum();
         let least = (0.5 * open).max(0.02);
-        let relative = (count * share / least).min(twin.density[e].max(1.0));
+        let relative = (count * share / least).min(twin[e].max(1.0));
         OF_CENTER.of([share, place, count, least, relative])
     };
     let active = elements.active();
@@ -220,22 +221,60 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
     let error = |e: usize| errors[e - active.start];
     let density = elements.scalars(&io.after, buffers::DENSITY)?;
     io.table.each(&RELATIVE_DENSITY, active.clone(), |e| {
-        pair(e, density[e], twin.density[e], [error(e)])
+        pair(e, density[e], twin[e], [error(e)])
     });
-    if settings.density_correction {
-        let excess = elements.scalars(&io.after, buffers::DENSITY_EXCESS)?;
-        io.table.each(&EXCESS, active.clone(), |e| {
-            pair(e, excess[e], twin.excess[e], [error(e)])
-        });
-    }
-    if settings.surface == Surface::GhostFluid {
+    state.density = Some(density);
+    Ok(())
+}
+
+/// From the densities that the device has.
+pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let (elements, step, room) = (state.elements(), state.step(), state.room());
+    let (bricks, density) = (&elements.bricks, state.density());
+    let (twin, distances) = twin_find_water(&state.model, &step, bricks, room, density);
+    let cut = CUT.of([state.place()]);
+    let active = elements.active();
+    // A cell's own density, where nothing is averaged, decides the same on both sides.
+    let looked = each(active.clone(), |e| {
+        let about = neighborhood().map(|offset| density[bricks.near(e as u32, offset) as usize]);
+        let mean = OF_MEAN.of([about.fold(0.0, f64::max)]);
+        let is_tie = is_near_half(&step, bricks, room, e as u32, NEAR_HALF.of([cut, mean]));
+        (mean, is_tie)
+    });
+    let looked = |e: usize| looked[e - active.start];
+    let size = state.model.cell_size();
+    let moved = |e: usize| surface_moved(distances[e] / size, looked(e).0);
+    let is_tie = |e: usize| {
+        let level = (distances[e] / size).abs();
+        looked(e).1 || (level <= moved(e) && density[e] != 0.5)
+    };
+    let kind = io.after.get(buffers::CELL_KIND, elements.cells)?;
+    io.table.each(&WATER, active.clone(), |e| {
+        (!is_tie(e)).then(|| pair(e, kind[e], f64::from(twin[e]), []))
+    });
+    if state.model.settings().surface == Surface::GhostFluid {
         let distance = elements.scalars(&io.after, buffers::LIQUID_DISTANCE)?;
         io.table.each(&DISTANCE, active.clone(), |e| {
-            let exact = twin.distance[e];
-            let moved = surface_moved(exact / size, error(e));
-            pair(e, distance[e], exact, [moved, size])
+            (!looked(e).1).then(|| pair(e, distance[e], distances[e], [moved(e), size]))
         });
     }
+    let room = Room {
+        kind,
+        ..room.clone()
+    };
+    state.room = Some(room);
+    Ok(())
+}
+
+pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let (elements, density) = (state.elements(), state.density());
+    let twin = twin_find_excess(&elements.bricks, state.room(), density);
+    let excess = elements.scalars(&io.after, buffers::DENSITY_EXCESS)?;
+    let cut = CUT.of([state.place()]);
+    io.table.each(&EXCESS, elements.active(), |e| {
+        let size = (density[e] - 1.0).abs().min(1.0) + density[e];
+        pair(e, excess[e], twin[e], [size, cut])
+    });
     Ok(())
 }
 

@@ -47,6 +47,8 @@ const TWINS: &[Twin<FlipState>] = &[
     twin("flip/cut_cells", NONE, grid::cut_cells),
     twin("flip/gather_faces", NONE, grid::gather_faces),
     twin("flip/gather_centers", NONE, grid::gather_centers),
+    twin("flip/find_water", NONE, grid::find_water),
+    twin("flip/find_excess", NONE, grid::find_excess),
     twin("flip/find_change", elements::faces_kept, grid::find_change),
     twin("flip/extrapolate", elements::faces_kept, grid::extrapolate),
     twin("flip/grid_to_particle", NONE, particles::grid_to_particle),
@@ -86,6 +88,7 @@ pub fn check(
         elements: None,
         sorted: None,
         room: None,
+        density: None,
         assembled: None,
         given: None,
         runs: BTreeMap::new(),
@@ -113,6 +116,8 @@ pub(super) struct FlipState {
     elements: Option<Elements>,
     sorted: Option<Sorted>,
     room: Option<Room>,
+    /// Of cell centres, as the device has them.
+    density: Option<Vec<f64>>,
     assembled: Option<Assembled>,
     given: Option<Given>,
     /// How often each pass of an iteration was met on each level.
@@ -156,6 +161,10 @@ impl FlipState {
 
     pub(super) fn room(&self) -> &Room {
         self.room.as_ref().expect("after flip/cut_cells")
+    }
+
+    pub(super) fn density(&self) -> &[f64] {
+        self.density.as_ref().expect("after flip/gather_centers")
     }
 
     pub(super) fn step(&self) -> Step<'_> {

@@ -17,6 +17,9 @@ bounds! {
     pub(super) OF_CENTER = [share: "1 / particles of a full cell", place: "" PLACE, count: "particles about",
         least: "half of the open volume about, at least 0.02", part: "share × count / least, or the density where it is less"]
         share * place * 9.0 * count / least + part * (U * (count + 40.0) + 16.0 * place), "";
+    pub(super) OF_MEAN = [density: "the largest about"] 16.0 * U * density, "a mean over six faces";
+    pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
+        "a half, of the density or of what is open of a cell about";
     pub(super) OF_FACES = [place: "" PLACE, range: "of the faces' values about the cell", most: "the largest of them"]
         9.0 * place * range + 32.0 * U * most, "along each axis";
     pub(super) START = [x: "|x|", step: "Δt", fastest: "|v| at any face", grid: "with solids " GRID]
@@ -80,9 +83,15 @@ entries! {
     }
     "flip/gather_centers" {
         RELATIVE_DENSITY = "relative density", "": [center: "" OF_CENTER] center, "";
-        EXCESS = "density excess", "": [center: "" OF_CENTER] center, "";
-        DISTANCE = "distance of the surface", "m": [moved: "in cells, what it answers when s − s²/2 moves by " OF_CENTER,
-            size: "Δx"] (moved + 24.0 * U) * size, "";
+    }
+    "flip/find_water" {
+        WATER = "kind of cell", "": [] 0.0, "a whole number", tie NEAR_HALF;
+        DISTANCE = "distance of the surface", "m": [moved: "in cells, what it answers when s − s²/2 moves by " OF_MEAN,
+            size: "Δx"] (moved + 24.0 * U) * size, "", tie NEAR_HALF;
+    }
+    "flip/find_excess" {
+        EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT] 4.0 * U * excess + cut * excess,
+            "a difference, and the product with the open volume";
     }
     "pressure/build_system" {
         DIRICHLET = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64", air: "Σ f / θ"] 24.0 * unit * air,

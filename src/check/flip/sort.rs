@@ -67,8 +67,7 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let chosen = (state.scene).flip_substep(frame, start, remaining, speed, number - 1)?;
     let substep = chosen.1;
     let flags: Vec<bool> = found.iter().map(|&flag| flag != 0).collect();
-    let layers = state.model.step(&substep).layers;
-    let bricks = state.model.bricks(&flags, layers);
+    let bricks = (state.model).bricks(&flags, &state.model.step(&substep));
     state.elements = Some(Elements {
         cells: (CELLS * (bricks.active + 1)) as usize,
         stride: 0,

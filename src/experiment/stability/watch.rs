@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::{
     domain::{
         bounds::Bounds,
-        probe::{energies, volume},
+        probe::{enclosed_volume, energies},
         solver::StepReport,
     },
     scene::{
@@ -176,7 +176,7 @@ impl<'a> Watch<'a> {
             }
             Quantity::VolumeDrift => {
                 let held = now.len() as f64 * spacing.powi(3);
-                (self.drift(volume(now, spacing, &scene.domain) / held) - 1.0).abs()
+                (self.drift(enclosed_volume(now, spacing, &scene.domain) / held) - 1.0).abs()
             }
             Quantity::FilledVolume => {
                 let filled = filled_volume(&now.position, spacing, &scene.domain);

@@ -15,6 +15,7 @@ mod solver;
 mod sort;
 mod to_grid;
 mod to_particles;
+mod water;
 
 pub use grid::planes;
 pub use model::{Model, Step};
@@ -23,5 +24,6 @@ pub use rotation::{grid_confinement, grid_curl};
 pub use solids::Solid;
 pub use solver::{Flip, Projected, Trace};
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
-pub use to_grid::{Centers, Faces, Room, cut_cells, gather_centers, gather_faces};
+pub use to_grid::{Faces, Room, cut_cells, gather_faces};
 pub use to_particles::{Given, Moved, advect, extrapolate, find_change, grid_to_particle};
+pub use water::{Centers, find_excess, find_water, gather_centers, is_near_half};

@@ -3,12 +3,14 @@
 use glam::{BVec3, DVec3};
 
 use super::solids::Solid;
+pub(super) use crate::domain::flip::ON_FACE;
 use crate::{
     domain::{
         boundary::Boundary,
         bounds::Bounds,
         bricks::{Bricks, EDGE, table_dims},
         flip::{CAP, CONTACT, layers, stored_cells},
+        shores::Shores,
         signed_distance::SignedDistance,
     },
     scene::{
@@ -17,9 +19,6 @@ use crate::{
         step::Substep,
     },
 };
-
-/// Nearer than this to a cell's face, in cells, counts as on it: the GPU's f32 positions round below it.
-pub(super) const ON_FACE: f64 = 1e-3;
 
 /// The scene, its grid and its solids; positions are relative to the domain's least corner.
 #[derive(Clone, Debug)]
@@ -30,6 +29,8 @@ pub struct Model {
     pub cells: [u32; 3],
     /// Distances to solids at the start: to those at rest, if there are any, as one; then to each that moves.
     pub(super) solids: Vec<SignedDistance>,
+    /// Where they cut cells.
+    shores: Shores,
     /// How many of them are at rest.
     at_rest: usize,
 }
@@ -66,6 +67,7 @@ impl Model {
         Self {
             cells: scene.domain.cells(scene.solver.flip().cell_size),
             solids: solids.map(local).collect(),
+            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size),
             at_rest: usize::from(boundary.distance.is_some()),
             scene: scene.clone(),
         }
@@ -116,10 +118,16 @@ impl Model {
         ((z * dims[1] + y) * dims[0] + x) as usize
     }
 
-    /// Bricks with water, and those that `layers` of faces beyond it reach; their elements are those of the GPU.
-    pub fn bricks(&self, is_wet: &[bool], layers: usize) -> Bricks {
-        let reach = (layers as u32).div_ceil(EDGE);
-        Bricks::new(stored_cells(self.cells), is_wet, reach, 1)
+    /// Bricks with particles, which `is_wet` tells, with what else is water beside walls and solids, and those that the
+    /// step's layers of faces beyond it reach; their elements are those of the GPU.
+    pub fn bricks(&self, is_wet: &[bool], step: &Step<'_>) -> Bricks {
+        let cells = stored_cells(self.cells);
+        let reach = (step.layers as u32).div_ceil(EDGE);
+        let mut is_wet = is_wet.to_vec();
+        let moving = step.solids.iter().zip(&self.solids).skip(self.at_rest);
+        let ways = moving.map(|(now, start)| (now.origin - start.origin) / self.cell_size());
+        (self.shores).mark(&mut is_wet, table_dims(cells), &step.cut, ways);
+        Bricks::new(cells, &is_wet, reach, 1)
     }
 
     /// What `substep` knows.

@@ -6,16 +6,17 @@ use super::{
     Centers, Cloud, Faces, Model, Room, Sorted, Waters, advect, assign_cells, cut_cells,
     density_source,
     effects::{self, Water},
-    extrapolate, find_change, gather_centers, gather_faces, grid_to_particle, reorder, survey,
+    extrapolate, find_change, find_excess, find_water, gather_centers, gather_faces,
+    grid_to_particle, reorder, survey,
 };
 use crate::{
     domain::{
         boundary::Boundary,
-        bricks::{Bricks, CELLS},
+        bricks::Bricks,
         budget::Breach,
         gauge::Gauge,
         particles::Particles,
-        poisson::System,
+        poisson::{FLUID, System},
         solver::{Projection, Solver, StepReport},
     },
     reference::{
@@ -161,20 +162,31 @@ impl Flip {
         } = self;
         let step = model.step(substep);
         let (bricks, sorted) = timings.time("flip/reorder", || {
-            let bricks = model.bricks(is_wet, step.layers);
+            let bricks = model.bricks(is_wet, &step);
             let cell = assign_cells(model, &bricks, &cloud.position);
             let sorted = reorder(&bricks, cloud, &cell);
             (bricks, sorted)
         });
-        let room = timings.time("flip/cut_cells", || {
-            cut_cells(model, &step, &bricks, &sorted)
-        });
+        let mut room = timings.time("flip/cut_cells", || cut_cells(model, &step, &bricks));
         let mut faces = timings.time("flip/gather_faces", || {
             gather_faces(model, &step, &bricks, &sorted, &room)
         });
-        let centers = timings.time("flip/gather_centers", || {
+        let density = timings.time("flip/gather_centers", || {
             gather_centers(model, &step, &bricks, &sorted, &room)
         });
+        let (kind, distance) = timings.time("flip/find_water", || {
+            find_water(model, &step, &bricks, &room, &density)
+        });
+        room.kind = kind;
+        let excess = match model.settings().density_correction {
+            true => timings.time("flip/find_excess", || find_excess(&bricks, &room, &density)),
+            false => Vec::new(),
+        };
+        let centers = Centers {
+            density,
+            excess,
+            distance,
+        };
         let water = Water {
             model,
             step: &step,
@@ -268,10 +280,9 @@ impl Flip {
             *cloud = trace.after;
             if wanted <= 1.0 {
                 report.projection = Some(all);
-                let wet = CELLS as usize * (trace.bricks.wet as usize + 1);
-                let mut density = trace.centers.density;
-                density.truncate(wet);
-                density.retain(|&density| density != 0.0);
+                let of_cells = trace.centers.density.into_iter().zip(&trace.room.kind);
+                let in_water = of_cells.filter(|(_, kind)| **kind == FLUID);
+                let density = in_water.map(|(density, _)| density).collect();
                 self.field = Some(Field {
                     bricks: trace.bricks,
                     kind: trace.room.kind,

@@ -41,23 +41,14 @@ pub struct Sorted {
     pub start: Vec<u32>,
 }
 
-/// Speeds, and which bricks hold water.
+/// Speeds, and which bricks hold particles.
 pub fn survey(model: &Model, cloud: &Cloud) -> Survey {
     let mut is_wet = model.no_water();
     let (mut speed, mut not_finite) = (0.0f64, 0);
     for (&x, &v) in cloud.position.iter().zip(&cloud.velocity) {
         not_finite += u32::from(!x.is_finite() || !v.is_finite());
         speed = speed.max(v.length());
-        let cell = model.cell_of(x);
-        is_wet[model.brick_index(cell)] = true;
-        // The outermost cells may be too thin to hold particles, and are water all the same.
-        for axis in 0..3 {
-            if cell[axis] + 2 == model.cells[axis] {
-                let mut outer = cell;
-                outer[axis] += 1;
-                is_wet[model.brick_index(outer)] = true;
-            }
-        }
+        is_wet[model.brick_index(model.cell_of(x))] = true;
     }
     Survey {
         speed,

@@ -1,4 +1,4 @@
-//! Twins of the passes that bring particles and solids to the grid.
+//! Twins of the passes that bring solids to the grid, and particles' velocities to its faces.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -10,28 +10,18 @@ use super::{
     solids::{cut, face_sums},
 };
 use crate::domain::{
-    bricks::{Bricks, CELLS},
-    poisson::{AIR, FLUID, SOLID},
+    bricks::Bricks,
+    poisson::{AIR, SOLID},
 };
 
 /// What each hat has beyond itself, so that a face that no particle of its two cells touches takes the velocity of
 /// the particles nearby.
 const LEAST_WEIGHT: f64 = 2.4e-7;
 
-/// Of a cell's excess a substep corrects at most this much either way.
-const MOST_EXCESS: f64 = 0.5;
-
-/// Mean of a hat over the cell of its centre, and over the ones beside it.
-const OWN_SHARE: f64 = 0.75;
-const OTHER_SHARE: f64 = 0.125;
-
-/// A surface cell of water has its surface at least so far outside of its centre, in cells, and one of air inside.
-const LEAST_DISTANCE: f64 = 0.05;
-
 /// The room that there is for water.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Room {
-    /// [`AIR`], [`FLUID`] or [`SOLID`]. Shape (elements), as of every array here.
+    /// [`AIR`], [`FLUID`](crate::domain::poisson::FLUID) or [`SOLID`]. Shape (elements), as of every array here.
     pub kind: Vec<u32>,
     /// Open fractions of the lower faces, 0..1.
     pub open: Vec<DVec3>,
@@ -57,20 +47,9 @@ pub struct Faces {
     pub weight: Vec<DVec3>,
 }
 
-/// What cell centres know of the water about them.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Centers {
-    /// Over that of a full cell; 0 where there is no water. Shape (elements), as of every array here.
-    pub density: Vec<f64>,
-    /// What the density correction carries out of the cell.
-    pub excess: Vec<f64>,
-    /// Of the surface, metres; negative inside.
-    pub distance: Vec<f64>,
-}
-
 /// Hats of a place at the cells after, at and before its own along each axis: of the cell that sees it one step
 /// down, in itself, one step up. The middle entry of `face` is that of its cell's lower face.
-struct Hats {
+pub(super) struct Hats {
     face: [DVec3; 3],
     center: [DVec3; 3],
     /// Place in its cell.
@@ -103,20 +82,21 @@ impl Hats {
     }
 
     /// Weight at that cell's centre.
-    fn at_center(&self, offset: [i32; 3]) -> f64 {
+    pub(super) fn at_center(&self, offset: [i32; 3]) -> f64 {
         let [x, y, z] = offset.map(|step| (1 - step) as usize);
         self.center[x].x * self.center[y].y * self.center[z].z
     }
 }
 
-fn hats(model: &Model, bricks: &Bricks, sorted: &Sorted) -> Vec<Hats> {
+pub(super) fn hats(model: &Model, bricks: &Bricks, sorted: &Sorted) -> Vec<Hats> {
     (sorted.cloud.position.par_iter().zip(&sorted.cell))
         .map(|(&x, &element)| Hats::of(x / model.cell_size() - corner(bricks, element)))
         .collect()
 }
 
 /// What of each cell and of its lower faces is open, and what solids push through the rest (Batty et al. 2007).
-pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks, sorted: &Sorted) -> Room {
+/// Which cells with room are water is found later, by [`super::find_water`].
+pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
     #[derive(Clone, Default)]
     struct Cell {
         kind: u32,
@@ -167,14 +147,8 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks, sorted: &Sorte
                 + (of_walls[side] - open[side]) * velocity[side]
         });
         let is_open = volume >= ON_FACE * ON_FACE || (open[0] + open[1]).cmpgt(DVec3::ZERO).any();
-        let is_water = !sorted.of(element).is_empty()
-            || is_water_beside(step, bricks, sorted, element, cell, extent);
         Cell {
-            kind: match (is_open, is_water) {
-                (false, _) => SOLID,
-                (true, true) => FLUID,
-                (true, false) => AIR,
-            },
+            kind: if is_open { AIR } else { SOLID },
             open: open[0],
             flux: (high - low).element_sum(),
             volume,
@@ -193,31 +167,6 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks, sorted: &Sorte
         volume: cells.iter().map(|cell| cell.volume).collect(),
         closed_velocity: cells.iter().map(|cell| cell.closed_velocity).collect(),
     }
-}
-
-/// Whether a cell of which walls at rest leave less than half along an axis has water in the cell inward of it: it
-/// may hold no particle of its own, and were it air, a wall would leak pressure all the way down.
-fn is_water_beside(
-    step: &Step<'_>,
-    bricks: &Bricks,
-    sorted: &Sorted,
-    element: u32,
-    cell: DVec3,
-    extent: DVec3,
-) -> bool {
-    if element >= CELLS * (bricks.wet + 1) {
-        return false;
-    }
-    let is_plane_open = step.is_plane_open(cell);
-    let mut inward = [0; 3];
-    for axis in 0..3 {
-        let is_low = !is_plane_open.test(axis);
-        let wall = step.wall_velocity[usize::from(!is_low)][axis];
-        if extent[axis] < 0.5 && wall == 0.0 {
-            inward[axis] = if is_low { 1 } else { -1 };
-        }
-    }
-    inward != [0; 3] && !sorted.of(bricks.near(element, inward)).is_empty()
 }
 
 /// Particle-to-grid (Zhu and Bridson 2005; APIC: Jiang et al. 2015): what `flip/spread_faces` and
@@ -285,83 +234,4 @@ fn velocity_at_faces(
         model.cell_size() * affine.row(axis).dot(face - hats.place)
     };
     v + DVec3::new(slope(0), slope(1), slope(2))
-}
-
-/// Integral of the hat from minus infinity to `t`.
-fn hat_below(t: f64) -> f64 {
-    let s = 1.0 - t.abs().min(1.0);
-    if t < 0.0 {
-        0.5 * s * s
-    } else {
-        1.0 - 0.5 * s * s
-    }
-}
-
-/// Part of the hats about a cell's centre that walls and solids leave.
-fn room_of_hats(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> f64 {
-    let cell = corner(bricks, element);
-    let along_axis = |axis: usize| {
-        let center = cell[axis] + 0.5;
-        hat_below(step.cut.max[axis] - center) - hat_below(step.cut.min[axis] - center)
-    };
-    let of_walls = along_axis(0) * along_axis(1) * along_axis(2);
-    if step.solids.is_empty() {
-        return of_walls;
-    }
-    let share = |step: i32| if step == 0 { OWN_SHARE } else { OTHER_SHARE };
-    let of_cells: f64 = neighborhood()
-        .map(|offset| {
-            let part: f64 = offset.into_iter().map(share).product();
-            part * room.volume[bricks.near(element, offset) as usize]
-        })
-        .sum();
-    let beside = step.open_extent(cell - 1.0) + step.open_extent(cell + 1.0);
-    let whole = OWN_SHARE * step.open_extent(cell) + OTHER_SHARE * beside;
-    of_cells * of_walls / whole.element_product().max(1e-6)
-}
-
-/// Densities at cell centres, the excess that is corrected (Kugelstadt et al. 2019) and the distance of the surface:
-/// what `flip/spread_centers` and `flip/gather_centers` do between them.
-pub fn gather_centers(
-    model: &Model,
-    step: &Step<'_>,
-    bricks: &Bricks,
-    sorted: &Sorted,
-    room: &Room,
-) -> Centers {
-    let hats = hats(model, bricks, sorted);
-    let particle_share = 1.0 / f64::from(model.settings().particles_per_cell);
-    let cells = per_cell(bricks, |element| {
-        let (mut sum, mut touches_air) = (0.0, false);
-        for offset in neighborhood() {
-            let found = bricks.near(element, offset);
-            // Beyond the domain there is no cell and no air.
-            touches_air |= found >= CELLS && room.kind[found as usize] == AIR;
-            sum += (sorted.of(found))
-                .map(|i| hats[i].at_center(offset))
-                .sum::<f64>();
-        }
-        let space = room_of_hats(step, bricks, room, element).max(0.02);
-        let relative = sum * particle_share / space;
-        let e = element as usize;
-        let is_water = room.kind[e] == FLUID;
-        // Across a flat surface the hats' sum is 1/2 at it and falls as s − s²/2 with the distance s in cells.
-        let off = relative.clamp(0.0, 1.0) - 0.5;
-        let way = 1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt();
-        let inside = if off == 0.0 { 0.0 } else { way * off.signum() };
-        if is_water {
-            let least = if touches_air { 0.0 } else { -MOST_EXCESS };
-            let excess = (relative - 1.0).clamp(least, MOST_EXCESS) * room.volume[e];
-            let kept = inside.max(LEAST_DISTANCE);
-            (relative, excess, -kept * model.cell_size())
-        } else {
-            let kept = inside.min(-LEAST_DISTANCE);
-            (0.0, 0.0, -kept * model.cell_size())
-        }
-    });
-    Centers {
-        density: cells.iter().map(|cell| cell.0).collect(),
-        excess: cells.iter().map(|cell| cell.1).collect(),
-        distance: cells.iter().map(|cell| cell.2).collect(),
-    }
 }

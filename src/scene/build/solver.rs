@@ -10,7 +10,7 @@ use super::{
     },
     Lattice, Result,
 };
-use crate::domain::bounds::Bounds;
+use crate::domain::bounds::{Bounds, cells_over};
 
 /// Most cells of PBF's neighbour grid; their indices are 32 bits.
 const MAX_CELLS: f64 = 2_147_483_647.0;
@@ -139,7 +139,7 @@ fn check_grid(
     cell_size: f64,
     max_cells: f64,
 ) -> Result<()> {
-    let cells = (domain.size() / cell_size).ceil();
+    let cells = cells_over(domain.size(), cell_size);
     let all = cells.x * cells.y * cells.z;
     let axis = cells.max_element();
     if all > max_cells || axis > MAX_AXIS_CELLS {

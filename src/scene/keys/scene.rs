@@ -8,7 +8,7 @@ use super::super::{
     build::{CHEBYSHEV_RELAXATION, RELAXATION},
     flip::{self, Preconditioner, Surface, Transfer},
     key::{Interval, Key, words},
-    probe::ProbeKind,
+    probe::{self, ProbeKind},
 };
 use crate::domain::sparse_grid;
 
@@ -27,6 +27,10 @@ pub(in super::super) const KEYS: &[Key] = &[
         .absent()
         .not_physics()
         .about("Each frame's water as OpenVDB grids beside its particles"),
+    Key::table("keep", KEEP)
+        .absent()
+        .not_physics()
+        .about("What of a bake stays on the disk; without this table, all"),
     Key::tables("probe", PROBE)
         .not_physics()
         .about("What is measured at each frame, a CSV each"),
@@ -194,16 +198,19 @@ const UNTIL: Key = Key::number("until", 1e-6..=1e9)
 const STROKE: Key = Key::number("stroke", LENGTH)
     .unit("metres")
     .only("kind", &["sine"])
-    .about("from one end of the way to the other");
+    .about(
+        "the whole distance from one end of the way to the other, twice the amplitude: x(t) = stroke/2 (1 − cos(2π t / period)), \
+         times the ramp; the S of H/S in wave maker theory (Dean and Dalrymple 1991)",
+    );
 const WAVE_PERIOD: Key = Key::number("period", PERIOD)
     .unit("seconds")
     .only("kind", &["sine"])
-    .about("there and back");
+    .about("of one cycle, there and back");
 const RAMP: Key = Key::number_or_zero("ramp", PERIOD)
     .unit("seconds")
     .computed(|| "one period".to_owned())
     .only("kind", &["sine"])
-    .about("how long it takes to begin");
+    .about("how long the motion takes to reach its full stroke; 0: it begins with it");
 const FILE: Key = Key::text(
     "file",
     "a CSV of time,displacement (seconds, metres), relative to the scene file",
@@ -399,7 +406,15 @@ const GRIDS: &[Key] = &[
         .about("how values are kept"),
 ];
 
-const PROBES: [&str; 4] = ProbeKind::NAMES;
+const KEEP: &[Key] = &[Key::text(
+    "particles",
+    "\"all\", \"every N\" with N from 1 to 1000000, or \"none\"",
+)
+.about(
+    "frames whose particles stay; the first and the newest are always there, so that a bake can go on",
+)];
+
+const PROBES: [&str; 7] = ProbeKind::NAMES;
 
 const PROBE: &[Key] = &[
     Key::file_stem("name")
@@ -410,13 +425,23 @@ const PROBE: &[Key] = &[
         .also(
             "; with the solver pbf a pressure asks for iteration = \"red_black\" or \"jacobi\" and artificial_pressure = 0",
         )
-        .about("elevation of the surface, m; pressure, Pa; energy of all water, J; its volume, m³"),
+        .about(
+            "elevation of the surface, m; pressure, Pa; energy of all water, J; its volume, m³; front along an axis, m; \
+             run_up, the highest water that hangs together with the body, m; flux through a plane, m³/s",
+        ),
     Key::other(
         "at",
-        "[x, z] of an elevation or [x, y, z] of a pressure, metres, in the domain",
+        "[x, z] of an elevation, [x, y, z] of a pressure or [c] of a flux's plane along its axis, metres, in the domain",
     )
-    .only("kind", &["elevation", "pressure"])
+    .only("kind", &["elevation", "pressure", "flux"])
     .about("where"),
+    Key::choice("axis", &WALLS)
+        .only("kind", &["front", "flux"])
+        .about("which way a front is ahead, and a flux positive"),
+    Key::number("quantile", 1e-6..=1.0)
+        .only("kind", &["front", "run_up"])
+        .computed(probe::quantile_words)
+        .about("part of the water, with run_up of the body of water, that lies behind or below"),
 ];
 
 /// In its unit: wider than what f32 tells apart from nothing, and than anything that is computed.

@@ -79,10 +79,14 @@ fn load(
     file: &Path,
     solver: Method,
 ) -> Result<Scene, SceneError> {
-    Scene::load_within(file, &[solver.as_override()], doc.reach()).map_err(|error| match error {
+    let scene = Scene::load_within(file, &[solver.as_override()], doc.reach());
+    let mut scene = scene.map_err(|error| match error {
         SceneError::Read { source, .. } => super::unreadable(doc, &spec.scene, file, &source),
         other => other,
-    })
+    })?;
+    // Each frame is measured.
+    scene.keep = None;
+    Ok(scene)
 }
 
 fn solvers(doc: &Document<'_>, spec: &Spanned<Vec<String>>) -> Result<[Method; 2], SceneError> {

@@ -15,11 +15,14 @@ use glam::DVec3;
 use crate::{
     domain::{
         boundary::Boundary,
-        bricks::{Bricks, CELLS},
+        bounds::Bounds,
+        bricks::{Bricks, CELLS, table_dims},
         budget::Breach,
-        flip::layers,
+        flip::{layers, stored_cells},
         gauge::Gauge,
         particles::Particles,
+        poisson::FLUID,
+        shores::Shores,
         solver::{Projection, Solver, StepReport},
         substep::Which,
     },
@@ -54,6 +57,7 @@ pub struct Flip {
     plan: Plan,
     scene: Scene,
     movers: Option<Movers>,
+    shores: Shores,
     recordings: Recordings,
     pressure: PressureSolver,
     timer: Option<Timer>,
@@ -131,6 +135,7 @@ impl Flip {
             plan,
             scene: scene.clone(),
             movers: Movers::of(boundary, scene),
+            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size),
             state: Particles::default(),
             frame: 0,
         })
@@ -206,10 +211,27 @@ impl Flip {
         Ok(chosen)
     }
 
+    /// Which bricks are water, where `is_wet` are those that hold particles.
+    fn with_shores(&self, is_wet: &[bool], substep: &Substep) -> Vec<bool> {
+        let size = self.scene.solver.flip().cell_size;
+        let walls = self.scene.walls(substep.start);
+        let cut = Bounds {
+            min: walls.min / size,
+            max: walls.max / size,
+        };
+        let moving = self.scene.moving_solids.iter();
+        let ways = moving.map(|solid| solid.displacement(substep.start) / size);
+        let dims = table_dims(stored_cells(self.plan.grid_dims));
+        let mut is_wet = is_wet.to_vec();
+        self.shores.mark(&mut is_wet, dims, &cut, ways);
+        is_wet
+    }
+
     /// Lays out bricks about the water, and makes room for more where they do not fit.
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
         let layers = layers(substep.displacement);
-        self.bricks = bricks(self.plan.grid_dims, is_wet, layers);
+        let is_wet = self.with_shores(is_wet, substep);
+        self.bricks = bricks(self.plan.grid_dims, &is_wet, layers);
         let needed = capacity_of(&self.bricks);
         let grown = self.plan.counts.bricks.grown(needed);
         if grown != self.plan.counts.bricks {
@@ -443,9 +465,11 @@ impl Flip {
     /// Relative densities in cells of water, as the last substep found them.
     fn densities(&self) -> Result<Vec<f32>, SolveError> {
         let cells = (self.bricks.wet as usize + 1) * CELLS as usize;
-        let mut density = self.field(DENSITY, cells)?;
-        density.retain(|&value| value != 0.0);
-        Ok(density)
+        let wanted = (DENSITY.first(cells), CELL_KIND.first(cells));
+        let (density, kind) = self.program.download(wanted)?;
+        let of_cells = density.into_iter().zip(kind);
+        let in_water = of_cells.filter(|&(_, kind)| kind == FLUID);
+        Ok(in_water.map(|(density, _)| density).collect())
     }
 }
 

@@ -75,7 +75,7 @@ impl Commands {
                 Command::clear(&SURVEY),
                 Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
             ],
-            to_grid: to_grid(plan, effects),
+            to_grid: to_grid(plan, scene, effects),
             to_particles: to_particles(plan, layers(scene.solver.flip().cfl)),
             watch: watch(plan, scene),
         }
@@ -125,7 +125,7 @@ fn along(pass: &'static str, size: usize, axis: usize) -> Command {
     bound(pass, size, vec![AXES.bind(axis)])
 }
 
-fn to_grid(plan: &Plan, effects: &[(&'static str, Addition)]) -> Vec<Command> {
+fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Vec<Command> {
     let n = plan.counts.particles;
     let cells = plan.counts.bricks.wet * CELLS as usize;
     let mut commands = vec![
@@ -142,6 +142,10 @@ fn to_grid(plan: &Plan, effects: &[(&'static str, Addition)]) -> Vec<Command> {
     }
     commands.push(along("flip/spread_centers", WET, 0));
     commands.push(over("flip/gather_centers", ACTIVE));
+    commands.push(over("flip/find_water", ACTIVE));
+    if scene.solver.flip().density_correction {
+        commands.push(over("flip/find_excess", ACTIVE));
+    }
     for pass in effects.iter().flat_map(|(_, addition)| &addition.passes) {
         commands.push(over(pass.name, ACTIVE));
     }

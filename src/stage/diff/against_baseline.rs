@@ -111,7 +111,9 @@ pub fn write_baseline(
     };
     let frames: Vec<u32> = match frames {
         Some(frames) => frames.iter().collect(),
-        None => (cache.first_frame()..=cache.last_frame()).collect(),
+        None => (cache.first_frame()..=cache.last_frame())
+            .filter(|&frame| cache.has_particles(frame))
+            .collect(),
     };
     let measured = measure(&cache, &frames)?;
     let adapter = adapter_of(cache.manifest());

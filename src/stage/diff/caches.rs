@@ -12,7 +12,7 @@ use crate::{
         frames::{self, FrameDiff},
         streams::StreamDiff,
     },
-    domain::tolerance::Tolerance,
+    domain::{particles::Particles, tolerance::Tolerance},
 };
 
 /// A tolerance that judges nothing here would pass anything.
@@ -58,20 +58,19 @@ pub(super) fn compare(
     };
     for cache in [a, b] {
         cache.check_beside(&chosen)?;
+        if let Some(frames) = &request.frames {
+            frames
+                .iter()
+                .try_for_each(|frame| cache.kept(frame).map(|_| ()))?;
+        }
     }
+    let has_both = |frame: &u32| a.has_particles(*frame) && b.has_particles(*frame);
+    let (chosen, without_particles): (Vec<u32>, Vec<u32>) = chosen.into_iter().partition(has_both);
     let (scene_a, scene_b) = (scene_of(a)?, scene_of(b)?);
     let gauge = of_caches(&scene_b, &[b, a])?;
     let frame = |&frame: &u32| {
         let (of_a, of_b) = (a.read(frame)?, b.read(frame)?);
-        let side = |cache, particles| -> Result<_, CacheError> {
-            let entry = CacheReader::entry(cache, frame)?;
-            Ok(streams::Side {
-                cache,
-                entry,
-                particles,
-            })
-        };
-        let beside = streams::of_frame([side(a, &of_a)?, side(b, &of_b)?])?;
+        let beside = of_streams([a, b], frame, [Some(&of_a), Some(&of_b)])?;
         let [from, to] = [a, b].map(|cache| cache.manifest().origin.into());
         let of_a = of_a.about(from, to);
         let sums = [
@@ -85,16 +84,37 @@ pub(super) fn compare(
     };
     let found: Result<Vec<(FrameDiff, Vec<StreamDiff>)>, CacheError> =
         chosen.par_iter().map(frame).collect();
-    let (frames, beside): (_, Vec<_>) = found?.into_iter().unzip();
+    let (frames, mut beside): (_, Vec<_>) = found?.into_iter().unzip();
+    for &frame in &without_particles {
+        beside.push(of_streams([a, b], frame, [None; 2])?);
+    }
+    beside.sort_by_key(|diffs| diffs.first().map_or(0, |diff| diff.frame));
     Ok(CacheDiff {
         bakes: [a, b].map(|cache| bake_of(cache.manifest())),
         physics: physics(b.dir(), b.scene_toml(), a.scene_toml())?,
         only_a,
         only_b,
         frames,
+        without_particles,
         streams_only_a: streams::lone(a, b),
         streams_only_b: streams::lone(b, a),
         streams: beside.into_iter().flatten().collect(),
         streams_judged: tolerance.is_none(),
     })
+}
+
+/// What differs in a frame beside its particles.
+fn of_streams(
+    caches: [&CacheReader; 2],
+    frame: u32,
+    particles: [Option<&Particles>; 2],
+) -> Result<Vec<StreamDiff>, CacheError> {
+    let side = |k: usize| -> Result<_, CacheError> {
+        Ok(streams::Side {
+            cache: caches[k],
+            entry: caches[k].entry(frame)?,
+            particles: particles[k],
+        })
+    };
+    streams::of_frame([side(0)?, side(1)?])
 }

@@ -6,7 +6,7 @@ use serde_json::{Value as Json, json};
 use crate::{
     cache::{
         CacheError, CacheReader, Entry, GridRecord,
-        stream::{Content, STREAMS, Stream},
+        stream::{Content, PARTICLES, STREAMS, Stream},
         vdb,
     },
     compare::streams::{self, Difference, Row, StreamDiff},
@@ -18,7 +18,8 @@ use crate::{
 pub(super) struct Side<'a> {
     pub(super) cache: &'a CacheReader,
     pub(super) entry: &'a Entry,
-    pub(super) particles: &'a Particles,
+    /// `None` where one of the two caches has not kept them.
+    pub(super) particles: Option<&'a Particles>,
 }
 
 impl Side<'_> {
@@ -79,7 +80,11 @@ fn grids(stream: &Stream, sides: [Side<'_>; 2]) -> Result<Option<StreamDiff>, Ca
         a: file_a.bytes,
         b: file_b.bytes,
     }];
-    let [a, b] = sides.map(|side| side.cache.grids(side.entry, side.particles));
+    let of = |side: Side<'_>| match side.particles {
+        Some(particles) => side.cache.grids(side.entry, particles),
+        None => Ok(None),
+    };
+    let [a, b] = sides.map(of);
     let (Some(a), Some(b)) = (a?, b?) else {
         return diff(bytes);
     };
@@ -120,7 +125,12 @@ fn tables(stream: &Stream, [a, b]: [Side<'_>; 2]) -> Vec<StreamDiff> {
     let table = |(i, x): (usize, &crate::cache::ProbeRecord)| {
         let j = of_b.iter().position(|y| y.name == x.name)?;
         let y = &of_b[j];
-        let [of_x, of_y] = [x, y].map(|table| json!({ "kind": table.kind, "at": table.at }));
+        let settings = |table: &crate::cache::ProbeRecord| {
+            json!({
+                "kind": table.kind, "at": table.at, "axis": table.axis, "quantile": table.quantile,
+            })
+        };
+        let [of_x, of_y] = [x, y].map(settings);
         let mut differences = streams::keys("", &of_x, &of_y);
         let [of_a, of_b] = [(a, x, i), (b, y, j)].map(|(side, table, index)| Row {
             columns: &table.columns,
@@ -144,12 +154,20 @@ fn tables(stream: &Stream, [a, b]: [Side<'_>; 2]) -> Vec<StreamDiff> {
     of_a.iter().enumerate().filter_map(table).collect()
 }
 
-/// The clock, and what the solver reports.
+/// The clock, what the solver reports, and where the particles themselves are not compared the checksum of their file.
 fn ledger([a, b]: [Side<'_>; 2]) -> StreamDiff {
     let [x, y] = [a, b].map(|side| json!(side.entry.clock));
     let mut differences = streams::keys("clock", &x, &y);
     if !a.is_start() && !b.is_start() {
         differences.extend(streams::keys("report", &a.entry.report, &b.entry.report));
+    }
+    if a.particles.is_none() && has_same_stamps(a, b) {
+        let hash = |side: Side<'_>| json!(side.entry.file(PARTICLES).map(|file| &file.blake3));
+        differences.extend(streams::keys(
+            "particles",
+            &json!({ "blake3": hash(a) }),
+            &json!({ "blake3": hash(b) }),
+        ));
     }
     StreamDiff {
         frame: a.entry.frame,
@@ -157,4 +175,15 @@ fn ledger([a, b]: [Side<'_>; 2]) -> StreamDiff {
         files: [0, 1].map(|_| CacheReader::LEDGER.to_owned()),
         differences,
     }
+}
+
+/// Whether the same particles give the same file in both caches: it names program, shot and origin.
+fn has_same_stamps(a: Side<'_>, b: Side<'_>) -> bool {
+    let stamp = |side: Side<'_>| {
+        let manifest = side.cache.manifest();
+        let names =
+            [&manifest.program, &manifest.program_version, &manifest.shot].map(String::clone);
+        (names, manifest.origin)
+    };
+    stamp(a) == stamp(b)
 }

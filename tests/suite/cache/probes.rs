@@ -59,6 +59,15 @@ at = [-0.6, 0.8, 0.75]
 kind = "energy"
 [[probe]]
 kind = "volume"
+[[probe]]
+kind = "front"
+axis = "+x"
+[[probe]]
+kind = "run_up"
+[[probe]]
+kind = "flux"
+axis = "+x"
+at = [-0.2]
 "#;
 
 fn parse(probes: &str, set: &[&str]) -> Result<Scene, SceneError> {
@@ -87,7 +96,10 @@ fn scenes_say_what_is_measured() {
             "elevation-3",
             "pressure-1",
             "energy-1",
-            "volume-1"
+            "volume-1",
+            "front-1",
+            "run_up-1",
+            "flux-1"
         ]
     );
     let at = DVec2::new(0.0, 1.0);
@@ -155,6 +167,42 @@ fn a_probe_that_cannot_be_is_told() {
             &[],
             "probe[0].at",
             "does not go with kind = \"volume\"; allowed with it: name, kind",
+        ),
+        (
+            "kind = \"front\"",
+            &[],
+            "probe[0].axis",
+            "missing; allowed: \"-x\", \"+x\"",
+        ),
+        (
+            "kind = \"front\"\naxis = \"x\"",
+            &[],
+            "probe[0].axis",
+            "\"x\" is no axis",
+        ),
+        (
+            "kind = \"front\"\naxis = \"+x\"\nquantile = 0.0",
+            &[],
+            "probe[0].quantile",
+            "from 1e-6 to 1",
+        ),
+        (
+            "kind = \"run_up\"\naxis = \"+y\"",
+            &[],
+            "probe[0].axis",
+            "does not go with kind = \"run_up\"",
+        ),
+        (
+            "kind = \"flux\"\naxis = \"+x\"\nat = [0.0, 1.0]",
+            &[],
+            "probe[0].at",
+            "2 numbers, and a probe of flux takes 1",
+        ),
+        (
+            "kind = \"flux\"\naxis = \"-z\"\nat = [1.5]",
+            &[],
+            "probe[0].at",
+            "[1.5] is outside of the domain",
         ),
         (
             "kind = \"energy\"\nname = \"../up\"",
@@ -346,7 +394,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
     let bake = format!("bake tank.toml --solver {solver} -o");
     job.expect(0, &format!("{bake} whole"));
     let said = job.expect(0, "verify whole");
-    assert!(said.contains('6'), "{said}");
+    assert!(said.contains('9'), "{said}");
     let near = rows(&job, "whole/probes/elevation-1.csv");
     assert_eq!(near.len(), 7);
     // Before it falls, the water stands to y = 1.5 there; the far end is dry.
@@ -369,6 +417,26 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
             .iter()
             .all(|row| (row[2].unwrap() / 0.8 - 1.0).abs() < 0.06),
         "{volume:?}"
+    );
+    // 0.8 m long from −1 on, of which 0.5 % lie ahead of the front at the start; then it runs, through the plane where it
+    // began, of 1 m² at most, slower than what falls 1 m.
+    let front = rows(&job, "whole/probes/front-1.csv");
+    assert!(
+        (front[0][2].unwrap() - (0.995 * 0.8 - 1.0)).abs() < 1e-5,
+        "{front:?}"
+    );
+    assert!(
+        front.windows(2).all(|two| two[1][2] > two[0][2]),
+        "{front:?}"
+    );
+    let run_up = rows(&job, "whole/probes/run_up-1.csv");
+    assert!((run_up[0][2].unwrap() - 1.5).abs() < 1e-5, "{run_up:?}");
+    let flux = rows(&job, "whole/probes/flux-1.csv");
+    let fluxes: Vec<f64> = flux.iter().map(|row| row[2].unwrap()).collect();
+    assert_eq!(fluxes[0], 0.0);
+    assert!(
+        fluxes[1..].iter().all(|q| (0.0..4.5).contains(q)) && fluxes[6] > fluxes[1],
+        "{fluxes:?}"
     );
     let energy = rows(&job, "whole/probes/energy-1.csv");
     assert_eq!(energy[0][2], Some(0.0));
@@ -417,7 +485,7 @@ fn a_bake_leaves_a_file_a_probe(solver: &str) {
         svg.contains("kinetic") && svg.contains("tank: energy-1"),
         "{svg}"
     );
-    assert_eq!(fs::read_dir(job.path("plots")).unwrap().count(), 6);
+    assert_eq!(fs::read_dir(job.path("plots")).unwrap().count(), 9);
     assert_eq!(job.hash("stopped"), job.hash("whole"));
 
     // Negative control: who asks for nothing gets nothing, and the same water.

@@ -275,6 +275,7 @@ fn manifest(grids: Option<GridRecord>) -> Manifest {
         origin: [0.0; 3],
         attributes: Vec::new(),
         grids,
+        keep: None,
         probes: Vec::new(),
         parent: None,
         warnings: Vec::new(),

@@ -40,6 +40,9 @@ surface = true
 velocity = true
 voxel_size = 0.3
 
+[keep]
+particles = "every 2"
+
 [[probe]]
 kind = "elevation"
 at = [-0.5, 0.75]
@@ -53,6 +56,19 @@ kind = "energy"
 
 [[probe]]
 kind = "volume"
+
+[[probe]]
+kind = "front"
+axis = "+x"
+quantile = 0.9
+
+[[probe]]
+kind = "run_up"
+
+[[probe]]
+kind = "flux"
+axis = "-x"
+at = [-0.3]
 "#;
 
 const MOVING: &str = r#"
@@ -192,6 +208,8 @@ fn expected(key: &str, solver: &str) -> Option<String> {
         "shot = \"small\", and this run has".to_owned()
     } else if key.starts_with("grids.") {
         "baked with grids = ".to_owned()
+    } else if key.starts_with("keep.") {
+        "baked with keep = ".to_owned()
     } else if key.starts_with("probe[") {
         "go on with the same probes".to_owned()
     } else {

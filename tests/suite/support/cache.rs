@@ -33,6 +33,7 @@ pub fn manifest() -> Manifest {
         rest_density: 1000.0,
         origin: [0.0; 3],
         grids: None,
+        keep: None,
         probes: probes(),
         parent: None,
         warnings: Vec::new(),
@@ -48,6 +49,7 @@ pub fn probes() -> Vec<ProbeRecord> {
         kind: kind.to_owned(),
         at: at.to_vec(),
         columns: columns.iter().map(|&column| column.to_owned()).collect(),
+        ..ProbeRecord::default()
     };
     vec![
         probe("gauge", "elevation", &[0.5, 1.5], &["elevation_m"]),

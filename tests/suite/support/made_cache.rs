@@ -67,6 +67,7 @@ impl Made<'_> {
             kind: "energy".to_owned(),
             at: Vec::new(),
             columns: columns.iter().map(|&column| column.to_owned()).collect(),
+            ..ProbeRecord::default()
         };
         Self {
             grids: Some(GridRecord {
@@ -142,6 +143,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         particle_spacing: 0.1,
         rest_density: 1000.0,
         origin: [0.0; 3],
+        keep: None,
         grids: made.grids.clone(),
         probes: made.probes.clone(),
         attributes: Vec::new(),

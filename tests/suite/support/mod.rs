@@ -69,6 +69,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
             }),
         },
         grids: None,
+        keep: None,
         probes: Vec::new(),
         budget: Budget::default(),
         effects: Effects::default(),

@@ -117,7 +117,7 @@ pub const KEY_FAULTS: &[Fault] = &[
         33,
         &[
             "probe[0].kind: \"elevaton\" is no kind; the nearest is \"elevation\"",
-            "\"elevation\", \"pressure\", \"energy\" or \"volume\"",
+            "\"elevation\", \"pressure\", \"energy\", \"volume\", \"front\", \"run_up\" or \"flux\"",
         ],
     ),
     (

@@ -166,9 +166,9 @@ fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_flip() {
             concat!("let c = center_weights(f.z) * ", nan!("i"), ";"),
         ),
         spoil(
-            "flip/gather_centers",
-            "liquid_distance[element] = -kept",
-            concat!("liquid_distance[element] = ", nan!("element"), " - kept"),
+            "flip/find_water",
+            "liquid_distance[element] = -inside",
+            concat!("liquid_distance[element] = ", nan!("element"), " - inside"),
         ),
         spoil(
             "pressure/displace",

@@ -1,0 +1,19 @@
+// Cells whose centre lies within a wall or a solid.
+#import "shared/flip_params.wgsl"
+#import "shared/flip_walls.wgsl"
+
+#ifdef SOLIDS
+@group(0) @binding(9) var<storage, read> open_volume: array<f32>;
+#endif
+
+// A cell that is open by less has its centre in a wall or a solid; a wall through the centre is beside it.
+const HALF = 0.5 - ON_FACE;
+
+fn is_buried(element: u32, cell: vec3f) -> bool {
+    let extent = open_extent(cell);
+    var part = 1.0;
+#ifdef SOLIDS
+    part = open_volume[element] / max(extent.x * extent.y * extent.z, 1e-6);
+#endif
+    return any(extent < vec3f(HALF)) || part < HALF;
+}

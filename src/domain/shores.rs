@@ -1,0 +1,215 @@
+//! Bricks of water that hold no particle: walls and solids leave too little of their cells for one.
+//!
+//! Were such cells air, the water beside them would lose its pressure there.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+
+use super::{boundary::Boundary, bounds::Bounds, bricks::EDGE, signed_distance::SignedDistance};
+
+/// Nearer than this to a cell's face, in cells, a wall counts as on it.
+const ON_FACE: f64 = 1e-3;
+
+/// Where the solids of a scene cut cells. Lengths are in cells, from the domain's least corner.
+#[derive(Clone, Debug, Default)]
+pub struct Shores {
+    at_rest: Option<Surface>,
+    moving: Vec<Surface>,
+}
+
+/// A box of a brick's edge about each part of a solid's surface.
+#[derive(Clone, Debug)]
+struct Surface {
+    origin: DVec3,
+    boxes: Vec<DVec3>,
+}
+
+impl Surface {
+    fn of(grid: &SignedDistance, least: DVec3, cell_size: f64) -> Self {
+        let edge = f64::from(EDGE);
+        let mut boxes = BTreeSet::new();
+        // A cell that the surface crosses has a node within a cell's diagonal of it, and one node's spacing.
+        let reach = 3f64.sqrt() * (cell_size + grid.spacing);
+        let [nx, ny, _] = grid.dims;
+        for (k, &distance) in grid.values.iter().enumerate() {
+            if f64::from(distance).abs() <= reach {
+                let node = [k % nx, k / nx % ny, k / (nx * ny)].map(|n| n as f64);
+                let place = DVec3::from_array(node) * (grid.spacing / cell_size);
+                boxes.insert((place / edge).floor().to_array().map(|b| b as i64));
+            }
+        }
+        let corner = |b: [i64; 3]| edge * DVec3::from_array(b.map(|b| b as f64));
+        Self {
+            origin: (grid.origin - least) / cell_size,
+            boxes: boxes.into_iter().map(corner).collect(),
+        }
+    }
+
+    /// Bricks that it touches where it has come `way`.
+    fn bricks(&self, way: DVec3, dims: [u32; 3]) -> impl Iterator<Item = usize> {
+        let last = DVec3::from_array(dims.map(|n| f64::from(n) - 1.0));
+        self.boxes.iter().flat_map(move |corner| {
+            let low = (self.origin + way + corner) / f64::from(EDGE);
+            let from = low.floor().clamp(DVec3::ZERO, last);
+            let to = (low + 1.0).floor().clamp(DVec3::ZERO, last);
+            let is_within = (low + 1.0).cmpge(DVec3::ZERO).all() && low.cmple(last + 1.0).all();
+            (0..8usize).filter(move |_| is_within).map(move |k| {
+                let at = |axis: usize| {
+                    if k >> axis & 1 == 0 {
+                        from[axis]
+                    } else {
+                        to[axis]
+                    }
+                };
+                (at(2) as usize * dims[1] as usize + at(1) as usize) * dims[0] as usize
+                    + at(0) as usize
+            })
+        })
+    }
+}
+
+impl Shores {
+    /// Of a scene's solids; `least` is the domain's least corner, metres.
+    pub fn new(boundary: &Boundary, least: DVec3, cell_size: f64) -> Self {
+        let surface = |grid: &SignedDistance| Surface::of(grid, least, cell_size);
+        Self {
+            at_rest: boundary.distance.as_ref().map(surface),
+            moving: boundary.moving.iter().map(surface).collect(),
+        }
+    }
+
+    /// Marks what lies beside bricks that hold particles: bricks that solids cut, which have come `ways` since the start,
+    /// and layers of cells that the walls at `cut` cut, where these are the first or the last of a brick. `is_wet` is one
+    /// flag a brick, `dims` bricks along each axis, x fastest; lengths are in cells.
+    pub fn mark(
+        &self,
+        is_wet: &mut [bool],
+        dims: [u32; 3],
+        cut: &Bounds,
+        ways: impl Iterator<Item = DVec3>,
+    ) {
+        let at_rest = self.at_rest.iter().map(|surface| (surface, DVec3::ZERO));
+        let with_water = is_wet.to_vec();
+        for (surface, way) in at_rest.chain(self.moving.iter().zip(ways)) {
+            for brick in surface.bricks(way, dims) {
+                is_wet[brick] |= has_water_about(&with_water, dims, brick);
+            }
+        }
+        for axis in 0..3 {
+            let low = (cut.min[axis] + ON_FACE).floor();
+            let high = (cut.max[axis] - ON_FACE).ceil() - 1.0;
+            let edge = f64::from(EDGE);
+            if low >= 0.0 && cut.min[axis] - low > ON_FACE && (low + 1.0) % edge == 0.0 {
+                spread(is_wet, dims, axis, (low / edge) as u32, 1);
+            }
+            if high >= edge && high + 1.0 - cut.max[axis] > ON_FACE && high % edge == 0.0 {
+                spread(is_wet, dims, axis, (high / edge) as u32, -1);
+            }
+        }
+    }
+}
+
+/// Whether one of the 27 bricks about one is set.
+fn has_water_about(is_wet: &[bool], dims: [u32; 3], brick: usize) -> bool {
+    let n = dims.map(|n| n as usize);
+    let at = [brick % n[0], brick / n[0] % n[1], brick / (n[0] * n[1])];
+    let near = |axis: usize| at[axis].saturating_sub(1)..=(at[axis] + 1).min(n[axis] - 1);
+    near(2).any(|z| near(1).any(|y| near(0).any(|x| is_wet[(z * n[1] + y) * n[0] + x])))
+}
+
+/// Sets the bricks of layer `layer` along an axis whose neighbour `inward` is set.
+fn spread(is_wet: &mut [bool], dims: [u32; 3], axis: usize, layer: u32, inward: i64) {
+    let from = i64::from(layer) + inward;
+    if layer >= dims[axis] || !(0..i64::from(dims[axis])).contains(&from) {
+        return;
+    }
+    let stride: usize = dims[..axis].iter().map(|&n| n as usize).product();
+    for brick in 0..is_wet.len() {
+        if brick / stride % dims[axis] as usize == layer as usize {
+            let beside = (brick as i64 + inward * stride as i64) as usize;
+            is_wet[brick] |= is_wet[beside];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DIMS: [u32; 3] = [4, 3, 2];
+
+    fn index([x, y, z]: [usize; 3]) -> usize {
+        (z * 3 + y) * 4 + x
+    }
+
+    fn marked(shores: &Shores, wet: &[[usize; 3]], cut: Bounds, way: DVec3) -> Vec<usize> {
+        let mut is_wet = vec![false; 24];
+        for &brick in wet {
+            is_wet[index(brick)] = true;
+        }
+        shores.mark(&mut is_wet, DIMS, &cut, [way].into_iter());
+        (0..24).filter(|&k| is_wet[k]).collect()
+    }
+
+    fn cut(min: [f64; 3], max: [f64; 3]) -> Bounds {
+        Bounds {
+            min: DVec3::from_array(min),
+            max: DVec3::from_array(max),
+        }
+    }
+
+    fn sorted(bricks: &[[usize; 3]]) -> Vec<usize> {
+        let mut all: Vec<usize> = bricks.iter().map(|&brick| index(brick)).collect();
+        all.sort_unstable();
+        all
+    }
+
+    #[test]
+    fn walls_that_cut_the_outermost_layer_of_a_brick_make_it_water() {
+        let none = Shores::default();
+        let last = [32.0, 24.0, 16.0];
+        // A wall within the cell 7: the brick of it has no particles.
+        for (x, expected) in [
+            (7.6, vec![[0, 0, 0], [1, 0, 0]]),
+            (7.0, vec![[1, 0, 0]]),
+            (6.6, vec![[1, 0, 0]]),
+            (8.0, vec![[1, 0, 0]]),
+        ] {
+            let found = marked(&none, &[[1, 0, 0]], cut([x, 0.0, 0.0], last), DVec3::ZERO);
+            assert_eq!(found, sorted(&expected), "{x}");
+        }
+        // Two walls meet: the brick in the corner too.
+        let walls = cut([0.0; 3], [16.4, 8.3, 16.0]);
+        let found = marked(&none, &[[1, 0, 0], [3, 2, 1]], walls, DVec3::ZERO);
+        let corner = [[1, 0, 0], [2, 0, 0], [1, 1, 0], [2, 1, 0], [3, 2, 1]];
+        assert_eq!(found, sorted(&corner));
+    }
+
+    /// A floor at height 8.5 cells of a solid that moves: bricks below the water's and beside it, none farther off.
+    #[test]
+    fn bricks_that_a_solid_cuts_are_water_beside_water() {
+        let grid = SignedDistance {
+            origin: DVec3::new(-0.4, 0.45, -0.4),
+            spacing: 0.05,
+            dims: [81, 9, 41],
+            values: (0..81 * 9 * 41)
+                .map(|k| 0.05 * ((k / 81 % 9) as f32 - 8.0))
+                .collect(),
+        };
+        let boundary = Boundary {
+            moving: vec![grid],
+            ..Boundary::default()
+        };
+        let shores = Shores::new(&boundary, DVec3::ZERO, 0.1);
+        let all = cut([0.0; 3], [32.0, 24.0, 16.0]);
+        let wet = [[1, 1, 0]];
+        let found = marked(&shores, &wet, all, DVec3::ZERO);
+        assert!(found.contains(&index([1, 0, 0])), "{found:?}");
+        assert!(!found.contains(&index([3, 0, 0])), "{found:?}");
+        assert!(!found.contains(&index([1, 2, 0])), "{found:?}");
+        // Negative control: where it is gone nothing is marked.
+        let gone = marked(&shores, &wet, all, DVec3::new(0.0, -40.0, 0.0));
+        assert_eq!(gone, sorted(&wet));
+    }
+}

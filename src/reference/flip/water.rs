@@ -1,0 +1,210 @@
+//! Twins of the passes that find the water: densities at cell centres, and what follows from them.
+
+use rayon::prelude::*;
+
+use super::{
+    Model, Room, Sorted, Step,
+    grid::{along, corner, neighborhood, per_cell},
+    model::ON_FACE,
+    to_grid::hats,
+};
+use crate::domain::{
+    bricks::{Bricks, CELLS},
+    poisson::{AIR, FLUID, SOLID},
+};
+
+/// Of a cell's excess a substep corrects at most this much either way.
+const MOST_EXCESS: f64 = 0.5;
+
+/// Part of the hats below which a cell counts as that part full.
+const LEAST_ROOM: f64 = 0.02;
+
+/// Mean of a hat over the cell of its centre, and over the ones beside it.
+const OWN_SHARE: f64 = 0.75;
+const OTHER_SHARE: f64 = 0.125;
+
+/// A cell that is open by less has its centre in a wall or a solid; a wall through the centre is beside it.
+const HALF: f64 = 0.5 - ON_FACE;
+
+/// What cell centres know of the water about them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Centers {
+    /// Over that of a full cell, in cells of every kind. Shape (elements), as of every array here.
+    pub density: Vec<f64>,
+    /// What the density correction carries out of the cell.
+    pub excess: Vec<f64>,
+    /// Of the surface, metres; negative inside.
+    pub distance: Vec<f64>,
+}
+
+/// Integral of the hat from minus infinity to `t`.
+fn hat_below(t: f64) -> f64 {
+    let s = 1.0 - t.abs().min(1.0);
+    if t < 0.0 {
+        0.5 * s * s
+    } else {
+        1.0 - 0.5 * s * s
+    }
+}
+
+/// Part of the hats about a cell's centre that walls and solids leave.
+fn room_of_hats(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> f64 {
+    let cell = corner(bricks, element);
+    let along_axis = |axis: usize| {
+        let center = cell[axis] + 0.5;
+        hat_below(step.cut.max[axis] - center) - hat_below(step.cut.min[axis] - center)
+    };
+    let of_walls = along_axis(0) * along_axis(1) * along_axis(2);
+    if step.solids.is_empty() {
+        return of_walls;
+    }
+    let share = |step: i32| if step == 0 { OWN_SHARE } else { OTHER_SHARE };
+    let of_cells: f64 = neighborhood()
+        .map(|offset| {
+            let part: f64 = offset.into_iter().map(share).product();
+            part * room.volume[bricks.near(element, offset) as usize]
+        })
+        .sum();
+    let beside = step.open_extent(cell - 1.0) + step.open_extent(cell + 1.0);
+    let whole = OWN_SHARE * step.open_extent(cell) + OTHER_SHARE * beside;
+    of_cells * of_walls / whole.element_product().max(1e-6)
+}
+
+/// Densities at cell centres: what `flip/spread_centers` and `flip/gather_centers` do between them. Shape (elements).
+pub fn gather_centers(
+    model: &Model,
+    step: &Step<'_>,
+    bricks: &Bricks,
+    sorted: &Sorted,
+    room: &Room,
+) -> Vec<f64> {
+    let hats = hats(model, bricks, sorted);
+    let particle_share = 1.0 / f64::from(model.settings().particles_per_cell);
+    per_cell(bricks, |element| {
+        let given = neighborhood().map(|offset| {
+            (sorted.of(bricks.near(element, offset)))
+                .map(|i| hats[i].at_center(offset))
+                .sum::<f64>()
+        });
+        let sum: f64 = given.sum();
+        sum * particle_share / room_of_hats(step, bricks, room, element).max(LEAST_ROOM)
+    })
+}
+
+/// What walls leave of a cell along each axis, and what solids leave of that.
+fn open_parts(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> [f64; 4] {
+    let extent = step.open_extent(corner(bricks, element));
+    let part = match step.solids.is_empty() {
+        true => 1.0,
+        false => room.volume[element as usize] / extent.element_product().max(1e-6),
+    };
+    [extent.x, extent.y, extent.z, part]
+}
+
+/// Whether a cell's centre lies within a wall or a solid.
+fn is_buried(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> bool {
+    let parts = open_parts(step, bricks, room, element);
+    parts.into_iter().any(|part| part < HALF)
+}
+
+/// Whether rounding of `error` may decide where the centre of a cell, or of one of those about it, lies.
+pub fn is_near_half(
+    step: &Step<'_>,
+    bricks: &Bricks,
+    room: &Room,
+    element: u32,
+    error: f64,
+) -> bool {
+    neighborhood().any(|offset| {
+        let parts = open_parts(step, bricks, room, bricks.near(element, offset));
+        parts.into_iter().any(|part| (part - HALF).abs() < error)
+    })
+}
+
+/// Density before the walls and solids that a cell's centre lies in: in the cell inward of the walls, and where that is
+/// buried too, the mean over the faces that lead out of it, by how far they are open.
+fn density_before(
+    step: &Step<'_>,
+    bricks: &Bricks,
+    room: &Room,
+    density: &[f64],
+    element: u32,
+) -> f64 {
+    let cell = corner(bricks, element);
+    let (extent, is_plane_open) = (step.open_extent(cell), step.is_plane_open(cell));
+    let inward = [0, 1, 2].map(
+        |axis| match (extent[axis] < HALF, is_plane_open.test(axis)) {
+            (false, _) => 0,
+            (true, false) => 1,
+            (true, true) => -1,
+        },
+    );
+    let is_open = |other: u32| other >= CELLS && !is_buried(step, bricks, room, other);
+    let there = bricks.near(element, inward);
+    if inward != [0; 3] && is_open(there) {
+        return density[there as usize];
+    }
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (axis, side) in (0..3).flat_map(|axis| [(axis, -1), (axis, 1)]) {
+        let other = bricks.near(element, along(axis, side));
+        if is_open(other) {
+            let face = if side < 0 { element } else { other };
+            let weight = room.open[face as usize][axis];
+            sum += weight * density[other as usize];
+            weights += weight;
+        }
+    }
+    if weights > 0.0 {
+        sum / weights
+    } else {
+        density[element as usize]
+    }
+}
+
+/// Which cells are water, those at whose centre the density is at least half of the water's, and how far the surface is:
+/// kinds and metres. Shapes (elements).
+///
+/// Whether a cell has particles does not count. One whose centre lies within a wall or a solid is what the water before it is.
+pub fn find_water(
+    model: &Model,
+    step: &Step<'_>,
+    bricks: &Bricks,
+    room: &Room,
+    density: &[f64],
+) -> (Vec<u32>, Vec<f64>) {
+    let cells = per_cell(bricks, |element| {
+        let relative = if is_buried(step, bricks, room, element) {
+            density_before(step, bricks, room, density, element)
+        } else {
+            density[element as usize]
+        };
+        let is_water = relative >= 0.5 && element < CELLS * (bricks.wet + 1);
+        let kind = match room.kind[element as usize] {
+            SOLID => SOLID,
+            _ if is_water => FLUID,
+            _ => AIR,
+        };
+        // Across a flat surface the density is 1/2 at it, and falls as s − s²/2 with the distance s in cells.
+        let off = relative.clamp(0.0, 1.0) - 0.5;
+        let way = 1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt();
+        let inside = if off == 0.0 { 0.0 } else { way * off.signum() };
+        (kind, -inside * model.cell_size())
+    });
+    cells.into_par_iter().unzip()
+}
+
+/// What of the density is too much, or too little within the water, in parts of a cell (Kugelstadt et al. 2019): what the
+/// density correction takes away. Shape (elements).
+pub fn find_excess(bricks: &Bricks, room: &Room, density: &[f64]) -> Vec<f64> {
+    per_cell(bricks, |element| {
+        let e = element as usize;
+        if room.kind[e] != FLUID {
+            return 0.0;
+        }
+        // Beyond the domain there is no cell and no air.
+        let is_air = |other: u32| other >= CELLS && room.kind[other as usize] == AIR;
+        let touches_air = neighborhood().any(|offset| is_air(bricks.near(element, offset)));
+        let least = if touches_air { 0.0 } else { -MOST_EXCESS };
+        (density[e] - 1.0).clamp(least, MOST_EXCESS) * room.volume[e]
+    })
+}
