@@ -213,16 +213,6 @@ pub fn largest_mean(samples: &[(f64, f64)], window: f64) -> Option<f64> {
     most
 }
 
-/// The value below which a part of all values lies, from 0 to 1; of these values one. `None` of none.
-pub fn quantile(mut values: Vec<f64>, part: f64) -> Option<f64> {
-    let place = ((values.len() as f64 * part).ceil() as usize).max(1) - 1;
-    if values.is_empty() {
-        return None;
-    }
-    let place = place.min(values.len() - 1);
-    Some(*values.select_nth_unstable_by(place, f64::total_cmp).1)
-}
-
 /// Depth at x of water that ran out over a dry bed without friction, over a time t since its dam at 0 was gone (Ritter
 /// 1892): depth before it `depth` up to x = −t √(g h0), (2 √(g h0) − x/t)² / 9g from there to x = 2 t √(g h0).
 pub fn ritter(x: f64, t: f64, depth: f64, gravity: f64) -> f64 {
@@ -379,16 +369,6 @@ mod tests {
             (half.unwrap() - (7.0 * 0.01 + 3.0 * 0.005) / 0.015).abs() < 1e-9,
             "{half:?}"
         );
-    }
-
-    #[test]
-    fn a_quantile_leaves_single_drops_out() {
-        let mut values: Vec<f64> = (1..=1000).map(f64::from).collect();
-        values.reverse();
-        assert_eq!(quantile(values.clone(), 0.995), Some(995.0));
-        assert_eq!(quantile(values.clone(), 1.0), Some(1000.0));
-        assert_eq!(quantile(values, 0.0), Some(1.0));
-        assert_eq!(quantile(Vec::new(), 0.5), None);
     }
 
     /// Depth and flow at the dam in closed form, mass kept, and momentum of the profile's own: the shallow-water equations

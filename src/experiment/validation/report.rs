@@ -382,5 +382,5 @@ const MEASURED: &str = "Published numbers are those at 9.81 m/sÂ² and 1000 kg/mÂ
     those of pressure probes at the end of each frame. A wave's height and phase are those of one harmonic by least squares \
     over whole periods, without a trend. A crest is the parabola through what is above 0.8 of it, a celerity the straight line \
     through arrivals at all gauges. A front is where 99.5 % of the water is behind. Depths over a dry bed are the volumes of \
-    particles in bins of one cell. The resolution is cells with FLIP and particle spacings with PBF of the length that a \
+    particles in bins of a quarter of h0. The resolution is cells with FLIP and particle spacings with PBF of the length that a \
     benchmark names. The order is the slope of log error over log resolution by least squares.";

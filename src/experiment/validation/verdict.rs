@@ -87,3 +87,102 @@ impl<'a> Judged<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{experiment::validation::Measured, scene::study::Study};
+
+    fn benchmark(name: &str) -> Benchmark {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        let Ok(Study::Validation(study)) = Study::load(&folder.join("validation.toml")) else {
+            panic!("the study that ships");
+        };
+        let mut all = study.benchmarks.into_iter();
+        let found = all.find(|benchmark| benchmark.name == name);
+        let mut found = found.expect("a benchmark");
+        found
+            .gates
+            .iter_mut()
+            .for_each(|gate| gate.known_failure = None);
+        found
+    }
+
+    fn runs(numbers: &[f64], of: &str) -> Vec<Run> {
+        let run = |number: &f64| Run {
+            measured: Measured {
+                numbers: [(of.to_owned(), *number)].into(),
+                ..Measured::default()
+            },
+            ..Run::default()
+        };
+        numbers.iter().map(run).collect()
+    }
+
+    #[test]
+    fn an_error_that_falls_with_the_square_of_the_cells_passes_and_one_that_falls_with_them_does_not()
+     {
+        let benchmark = benchmark("solitary wave, order");
+        let c = 3.431;
+        let of = |errors: [f64; 3]| {
+            let runs = runs(&errors.map(|error| c * (1.0 - error)), "celerity");
+            let judged = judge(&benchmark, &runs);
+            assert_eq!((judged.len(), judged[0].error), (1, None));
+            (judged[0].verdict, judged[0].measured.expect("an order"))
+        };
+        let (verdict, order) = of([0.04, 0.01, 0.0025]);
+        assert_eq!(verdict, Verdict::Passes);
+        assert!((order - 2.0).abs() < 1e-9, "{order}");
+        let (verdict, order) = of([0.04, 0.02, 0.01]);
+        assert_eq!(verdict, Verdict::Misses);
+        assert!((order - 1.0).abs() < 1e-9, "{order}");
+    }
+
+    #[test]
+    fn a_gate_judges_its_solver_alone_and_a_run_that_ended_early_passes_none() {
+        let mut benchmark = benchmark("solitary wave over 20 depths");
+        benchmark.gates.retain(|gate| gate.of == "celerity");
+        // FLIP's gate is 2 %, PBF's 3 %: both runs are 2.5 % slow.
+        let mut runs = runs(&[3.431 * 0.975; 2], "celerity");
+        let verdicts = |benchmark: &Benchmark, runs: &[Run]| -> Vec<Verdict> {
+            judge(benchmark, runs)
+                .iter()
+                .map(|judged| judged.verdict)
+                .collect()
+        };
+        assert_eq!(
+            verdicts(&benchmark, &runs),
+            [Verdict::Misses, Verdict::Passes]
+        );
+        runs[1].ended = Some("too fast".to_owned());
+        benchmark.gates[0].known_failure = Some("because".to_owned());
+        assert_eq!(
+            verdicts(&benchmark, &runs),
+            [Verdict::KnownFailure, Verdict::Misses]
+        );
+        runs[0]
+            .measured
+            .numbers
+            .insert("celerity".to_owned(), 3.431);
+        assert_eq!(verdicts(&benchmark, &runs)[0], Verdict::PassesUnexpectedly);
+        // What is no number is missed.
+        runs[0].measured.numbers.clear();
+        benchmark.gates[0].known_failure = None;
+        assert_eq!(verdicts(&benchmark, &runs)[0], Verdict::Misses);
+    }
+
+    #[test]
+    fn resolutions_agree_or_they_do_not() {
+        let mut benchmark = benchmark("dam break of a column");
+        benchmark.gates.retain(|gate| gate.of == "front_time");
+        for (numbers, verdict) in [
+            ([2.50, 2.52, 2.54, 9.0], Verdict::Passes),
+            ([2.50, 2.52, 2.56, 2.5], Verdict::Misses),
+        ] {
+            let runs = runs(&numbers, "front_time");
+            assert_eq!(judge(&benchmark, &runs)[0].verdict, verdict, "{numbers:?}");
+        }
+    }
+}

@@ -455,3 +455,92 @@ impl Gate {
                 .is_none_or(|resolution| resolution == run.resolution)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::study::Study;
+
+    const TEXT: &str = "kind = \"validation\"
+[[benchmark]]
+name = \"wave\"
+measure = \"solitary_wave\"
+scene = \"../validation/solitary.toml\"
+depth = 1.0
+height = 0.2
+[[benchmark.run]]
+solver = \"flip\"
+resolution = 20
+[[benchmark.gate]]
+of = \"celerity\"
+published = 3.431
+source = \"Goring 1978\"
+within = 0.02
+[[benchmark.points]]
+of = \"elevation\"
+source = \"nobody\"
+at = [[0.0, 0.2]]
+";
+
+    fn read(text: &str) -> std::result::Result<Study, String> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        Study::parse(text, Path::new("s.toml"), &folder).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_line() {
+        assert!(read(TEXT).is_ok(), "{:?}", read(TEXT).err());
+        for (from, to, place, words) in [
+            ("\"solitary_wave\"", "\"solitary\"", "s.toml:4:", "solitary"),
+            ("height = 0.2\n", "", "s.toml:2:", "height"),
+            (
+                "height = 0.2",
+                "height = 0.2\nstroke = 1.0",
+                "s.toml:4:",
+                "takes no stroke",
+            ),
+            ("\"flip\"", "\"sph\"", "s.toml:9:", "no solver"),
+            ("resolution = 20\n", "", "s.toml:8:", "resolution"),
+            (
+                "\"celerity\"",
+                "\"period\"",
+                "s.toml:12:",
+                "is not measured here",
+            ),
+            ("within = 0.02", "", "s.toml:11:", "within"),
+            (
+                "within = 0.02",
+                "within = 0.02\nat_most = 4.0",
+                "s.toml:12:",
+                "more than one",
+            ),
+            (
+                "published = 3.431\n",
+                "",
+                "s.toml:12:",
+                "no published number",
+            ),
+            (
+                "within = 0.02",
+                "order_at_least = 1.5",
+                "s.toml:12:",
+                "1 runs",
+            ),
+            (
+                "within = 0.02",
+                "within = 0.02\nsolver = \"pbf\"",
+                "s.toml:12:",
+                "0 runs",
+            ),
+            ("\"elevation\"", "\"front\"", "s.toml:17:", "is no curve"),
+        ] {
+            let error = read(&TEXT.replacen(from, to, 1)).expect_err(to);
+            assert!(
+                error.contains(place) && error.contains(words),
+                "{to}: {error}"
+            );
+        }
+        let twice = format!("{TEXT}{}", TEXT.split_once('\n').expect("lines").1);
+        assert!(read(&twice).expect_err("two").contains("another benchmark"));
+    }
+}
