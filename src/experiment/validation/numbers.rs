@@ -109,10 +109,13 @@ fn regular_waves(record: &Record<'_>, out: &mut Measured) {
         "speed_ratio",
         Some(fastest / (PI * scale.stroke / scale.period)),
     );
-    let still = fits.first().map_or(0.0, |fit| fit.mean);
-    let first = level(record, 0).into_iter();
-    let curve = first.map(|(t, y)| (t / scale.period, (y - still) / scale.stroke));
-    out.draw("elevation", curve.collect());
+    // From a crest of the fit on, so that crests come at whole periods.
+    if let Some(fit) = fits.first() {
+        let at = |t: f64| t / scale.period - fit.phase / TAU;
+        let first = level(record, 0).into_iter();
+        let curve = first.map(|(t, y)| (at(t), (y - fit.mean) / scale.stroke));
+        out.draw("elevation", curve.collect());
+    }
 }
 
 fn solitary_wave(record: &Record<'_>, out: &mut Measured) {

@@ -64,7 +64,7 @@ impl Measure {
                 ("front_error", "front against the points, mean"),
                 (
                     "front_error_shifted",
-                    "the same with one shift of time fitted",
+                    "front against the points with one shift of T fitted, mean",
                 ),
                 ("front_shift", "that shift, of T"),
                 ("front_time", "T at which the front has come to 3 a"),
@@ -102,8 +102,14 @@ impl Measure {
                     "apart_1",
                     "P1 on the face and half a cell off it, apart by a part of it",
                 ),
-                ("apart_2", "P2, the same"),
-                ("apart_3", "P3, the same"),
+                (
+                    "apart_2",
+                    "P2 on the face and half a cell off it, apart by a part of it",
+                ),
+                (
+                    "apart_3",
+                    "P3 on the face and half a cell off it, apart by a part of it",
+                ),
                 (
                     "volume_error",
                     "volume, most that it is off that of the start",
@@ -121,7 +127,10 @@ impl Measure {
                     "pressure",
                     "p / (ρ g depth), mean of time and probes but the lowest",
                 ),
-                ("pressure_at_floor", "the same at the lowest probe"),
+                (
+                    "pressure_at_floor",
+                    "p / (ρ g depth) at the lowest probe, mean of time",
+                ),
                 ("speed", "largest speed, m/s"),
             ],
             Self::TaylorGreen => &[(
@@ -136,7 +145,11 @@ impl Measure {
         match self {
             Self::RegularWaves => &[(
                 "elevation",
-                ["elevation at the first gauge", "time, periods", "η / S"],
+                [
+                    "elevation at the first gauge",
+                    "time from a crest, periods",
+                    "η / S",
+                ],
             )],
             Self::SolitaryWave => &[(
                 "elevation",
