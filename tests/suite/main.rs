@@ -43,6 +43,7 @@ mod domain {
 mod experiment {
     mod hard_cases;
     mod study;
+    mod validation;
 }
 mod gpu {
     mod device_faults;

@@ -323,6 +323,7 @@ impl Results<'_> {
                 })
                 .collect(),
             notes: notes.collect(),
+            ..Chart::default()
         }
     }
 
