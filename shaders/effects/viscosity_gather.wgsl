@@ -18,7 +18,7 @@ fn visit(i: u32, j: u32) {
     if j >= fluid_count {
         return;
     }
-    let d = own_position - position[j].xyz;
+    let d = between(own_position, position[j].xyz);
     let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
     change += (velocity[j].xyz - own_velocity) * (p * p * p);
 }

@@ -16,7 +16,7 @@ fn visit(i: u32, j: u32) {
     if j >= fluid_count {
         return;
     }
-    let d = own_position - position[j].xyz;
+    let d = between(own_position, position[j].xyz);
     let r = length(d);
     let s = max(1.0 - r * inverse_h, 0.0);
     // ∇_j W points from j to i.

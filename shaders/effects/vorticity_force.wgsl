@@ -18,7 +18,7 @@ fn visit(i: u32, j: u32) {
     if j >= fluid_count {
         return;
     }
-    let d = own_position - position[j].xyz;
+    let d = between(own_position, position[j].xyz);
     let r = length(d);
     let s = max(1.0 - r * inverse_h, 0.0);
     slope -= d * ((vorticity[j].w - own_strength) * params.gradient_scale * s * s / max(r, 1e-15));

@@ -5,6 +5,9 @@
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_carried.wgsl"
+#ifdef PERIODIC
+#import "shared/flip_periodic.wgsl"
+#endif
 
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
@@ -155,8 +158,12 @@ fn main(
         open_neighborhood(element);
         let cell = own_cell(element);
         corner = vec3f(cell);
-        let to_before = select(vec3i(1), vec3i(0), cell == vec3u(0u));
-        let to_after = select(vec3i(1), vec3i(0), cell + 1u >= params.cells);
+        var to_before = select(vec3i(1), vec3i(0), cell == vec3u(0u));
+        var to_after = select(vec3i(1), vec3i(0), cell + 1u >= params.cells);
+#ifdef PERIODIC
+        to_before = select(to_before, vec3i(1), is_periodic());
+        to_after = select(to_after, vec3i(1), is_periodic());
+#endif
         let x = vec3i(1, 0, 0);
         let y = vec3i(0, 1, 0);
         let z = vec3i(0, 0, 1);

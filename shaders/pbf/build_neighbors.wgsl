@@ -50,14 +50,22 @@ fn main(
     word = list_base(i);
     four = vec4u(params.nobody);
     count = 0u;
+#ifdef PERIODIC
+    for (var k = 0; k < 27; k++) {
+        var cell: vec3i;
+        if cell_about(centre, k, &cell) {
+            let first = cell_index(cell);
+            let last = first + 1u;
+#else
     for (var z = low.z; z <= high.z; z++) {
         for (var y = low.y; y <= high.y; y++) {
             let row = (z * dims.y + y) * dims.x;
             let first = u32(row + low.x);
             let last = u32(row + high.x) + 1u;
+#endif
             let end = cell_start[last];
             for (var j = cell_start[first]; j < end; j++) {
-                let d = xi - predicted[j].xyz;
+                let d = between(xi, predicted[j].xyz);
                 if dot(d, d) < h2 && j != i {
                     append(j);
                 }
@@ -65,7 +73,7 @@ fn main(
 #ifdef SOLIDS
             let boundary_end = boundary_cell_start[last];
             for (var b = boundary_cell_start[first]; b < boundary_end; b++) {
-                let d = xi - predicted[2u * fluid_end + b].xyz;
+                let d = between(xi, predicted[2u * fluid_end + b].xyz);
                 if dot(d, d) < h2 {
                     append(fluid_end + b);
                 }

@@ -37,7 +37,7 @@ var<private> artificial_pressure: f32;
 
 fn visit(i: u32, j: u32) {
     let other = predicted[stored_index(j)];
-    let d = own_position - other.xyz;
+    let d = between(own_position, other.xyz);
     let r2 = dot(d, d);
     let inverse_r = inverseSqrt(max(r2, 1e-30));
     let s = max(1.0 - r2 * inverse_r * inverse_h, 0.0);

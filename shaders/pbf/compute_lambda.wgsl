@@ -19,7 +19,7 @@ var<private> gradient_squares: f32;
 
 fn visit(i: u32, j: u32) {
     let other = predicted[stored_index(j)];
-    let d = own_position - other.xyz;
+    let d = between(own_position, other.xyz);
     let r2 = dot(d, d);
     let p = max(1.0 - r2 * inverse_h * inverse_h, 0.0);
     let mass = weight(other.w);

@@ -14,7 +14,7 @@ var<private> kernel_sum: f32;
 
 fn visit(i: u32, j: u32) {
     let other = predicted[stored_index(j)];
-    let d = own_position - other.xyz;
+    let d = between(own_position, other.xyz);
     let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
     kernel_sum += weight(other.w) * p * p * p;
 }

@@ -36,6 +36,10 @@ fn main(
 #ifdef WALL_WORK
     wall_work[params.particle_count + thread] = work_of_push(wall_push);
 #endif
+#ifdef PERIODIC
+    predicted[params.particle_count + thread] = vec4f(wrapped_place(x), 0.0);
+#else
     predicted[params.particle_count + thread] = vec4f(x, 0.0);
+#endif
     velocity[thread] = vec4f(v + (x - free) * params.inverse_time_step, 0.0);
 }

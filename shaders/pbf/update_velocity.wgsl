@@ -43,6 +43,9 @@ fn main(
         x -= excess * params.time_step;
         atomicAdd(&counters.capped, 1u);
     }
+#ifdef PERIODIC
+    x = wrapped_place(x);
+#endif
     position[thread] = vec4f(x, 1.0);
     velocity[thread] = vec4f(v, 0.0);
     id[thread] = sorted_id[thread];

@@ -47,7 +47,13 @@ fn main(
             let t = select(256u, 128u, axis == 2u);
             let sum = (pressure_coefficient[first] + pressure_coefficient[first + s])
                 + (pressure_coefficient[first + t] + pressure_coefficient[first + s + t]);
-            pressure_coefficient[axis * phase.stride + coarse] = 0.25 * sum;
+            var shared_by_both = 0.25 * sum;
+#ifdef PERIODIC
+            // A level whose bricks do not join their own end has none beyond it: its ends are closed.
+            let is_end = at[axis] == 0u && ((c >> axis) & 1u) == 0u && pressure_bricks[slot].faces[axis] == 0u;
+            shared_by_both = select(shared_by_both, 0.0, is_end);
+#endif
+            pressure_coefficient[axis * phase.stride + coarse] = shared_by_both;
         }
         var air = real(0.0);
         for (var d = 0u; d < 8u; d++) {
@@ -56,5 +62,11 @@ fn main(
         pressure_dirichlet[coarse] = 0.5 * air;
         pressure_residual[coarse] = 0.0;
     }
+#ifdef PERIODIC
+    // At an end that the finer level goes on beyond, coefficients of 1 may stand below closed faces.
+    for (var side = 0u; side < 6u; side++) {
+        is_full = is_full && pressure_bricks[slot].faces[side] != 0u;
+    }
+#endif
     pressure_block[64u * slot + block] = select(select(2u, 1u, is_full), 0u, is_empty);
 }

@@ -32,7 +32,12 @@ struct FlipParams {
     particle_share: f32,
     contact_distance: f32,
     max_displacement: f32,
-    padding: f32,
+    // Particles that are nearer to each other are pushed apart.
+    apart: f32,
+    // A bit an axis along which the domain joins its own end.
+    periodic: u32,
+    padding: u32,
+    padding_more: vec2u,
 }
 @group(0) @binding(0) var<uniform> params: FlipParams;
 

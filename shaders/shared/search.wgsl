@@ -10,11 +10,19 @@ fn search_neighbors(xi: vec3f, i: u32) {
     let centre = cell_coordinate(xi);
     let low = max(centre - 1, vec3i(0));
     let high = min(centre + 1, dims - 1);
+#ifdef PERIODIC
+    for (var k = 0; k < 27; k++) {
+        var cell: vec3i;
+        if cell_about(centre, k, &cell) {
+            let first = cell_index(cell);
+            let last = first + 1u;
+#else
     for (var z = low.z; z <= high.z; z++) {
         for (var y = low.y; y <= high.y; y++) {
             let row = (z * dims.y + y) * dims.x;
             let first = u32(row + low.x);
             let last = u32(row + high.x) + 1u;
+#endif
             let end = cell_start[last];
             for (var j = cell_start[first]; j < end; j++) {
                 if j != i {

@@ -64,6 +64,20 @@ pub enum CacheError {
         /// Value in this run.
         given: String,
     },
+    /// A bake in an older format, which is read and not gone on with.
+    #[error(
+        "{} was baked in cache format {found}, and this program writes {newest}: begin from one of its frames with \
+         --from {}:FRAME and another -o, or bake it anew",
+        dir.display(), dir.display()
+    )]
+    OldFormat {
+        /// The directory.
+        dir: PathBuf,
+        /// Its format.
+        found: u32,
+        /// The format that this program writes.
+        newest: u32,
+    },
     /// Frames that stand there were not looked at by the probes that this run has.
     #[error(
         "{} was baked with {cached}, and this run has {given}: what a probe sees while a frame is computed cannot be \

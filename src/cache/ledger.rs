@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::error::{AtPath, CacheError};
 use super::manifest::{self, Manifest};
-use super::probes::ProbeValues;
+use super::probes::{ProbeRecord, ProbeValues};
 use super::record::FileRecord;
 use super::stream::{self, STREAMS, Stream};
 
@@ -149,7 +149,7 @@ impl Entry {
         beside.filter_map(|stream| self.file(stream.name))
     }
 
-    /// The frame's row of a stream's table, by its index in the manifest; empty where there is none.
+    /// The frame's values of a stream's table, by its index in the manifest; empty where there are none.
     pub fn row(&self, stream: &str, table: usize) -> &[Option<f64>] {
         let row = self.rows.get(stream).and_then(|rows| rows.get(table));
         row.map_or(&[], Vec::as_slice)
@@ -181,12 +181,18 @@ pub(super) fn rows_misfit(manifest: &Manifest, rows: &Rows) -> Option<String> {
         let tables = stream.tables(manifest);
         expected += usize::from(!tables.is_empty());
         let found = rows.get(stream.name).map_or(&[][..], Vec::as_slice);
-        let widths = found.iter().map(Vec::len);
-        if !widths.eq(tables.iter().map(|table| table.columns.len())) {
-            let name = stream.name;
+        let name = stream.name;
+        if found.len() != tables.len() {
             return Some(format!(
                 "its {name} are not those that the manifest announces"
             ));
+        }
+        let misfit = |(table, values): (&ProbeRecord, &Vec<_>)| {
+            let what = table.misfit(values)?;
+            Some(format!("of {} in its {name}: {what}", table.name))
+        };
+        if let Some(misfit) = tables.iter().zip(found).find_map(misfit) {
+            return Some(misfit);
         }
         let mut values = found.iter().flatten().flatten();
         if let Some(value) = values.find(|value| !value.is_finite()) {
@@ -227,6 +233,15 @@ impl Contents<'_> {
         line.extend_from_slice(chain.to_hex().as_bytes());
         line.extend_from_slice(b"\"}\n");
         Ok((line, chain))
+    }
+}
+
+/// What is wrong with a line, without the number that it has as a text of its own.
+fn in_line(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    match text.rsplit_once(" at line 1 column ") {
+        Some((what, column)) => format!("column {column}: {what}"),
+        None => text,
     }
 }
 
@@ -308,7 +323,7 @@ impl Ledger {
         let damaged =
             |what: &str| CacheError::damaged(dir.join(FILE), format!("line {number}: {what}"));
         let entry = Entry::parse(line, manifest.format_version)
-            .map_err(|error| damaged(&error.to_string()))?;
+            .map_err(|error| damaged(&in_line(&error)))?;
         let (contents, tail) = line.split_at(line.len().saturating_sub(CHAIN_LEN));
         if !tail.starts_with(CHAIN_KEY) {
             return Err(damaged("it does not end with its chained hash"));

@@ -99,6 +99,9 @@ pub struct Parent {
     pub frame: u32,
     /// BLAKE3 of the frame's file there, hex.
     pub blake3: String,
+    /// BLAKE3 of the shaders that it was baked with, hex; absent where they were the program's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shaders: Option<String>,
 }
 
 impl fmt::Display for Parent {
@@ -108,7 +111,11 @@ impl fmt::Display for Parent {
             f,
             "frame {} of {} {} ({hash})",
             self.frame, self.shot, self.solver
-        )
+        )?;
+        match &self.shaders {
+            Some(shaders) => write!(f, " with shaders {shaders}, not the shipped ones"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -118,8 +125,7 @@ fn is_zero(origin: &[f64; 3]) -> bool {
 
 /// Fields that a resumed bake must have in common with the cache, the most telling first. The scene's hash
 /// comes last: it differs where any of the fields above it that a scene sets does.
-const COMPARED: [&str; 16] = [
-    "format_version",
+const COMPARED: [&str; 15] = [
     "program",
     "program_version",
     "shaders",
@@ -147,6 +153,13 @@ impl Manifest {
     /// Number of the first frame: 0 is a scene's own start.
     pub fn first_frame(&self) -> u32 {
         self.parent.as_ref().map_or(0, |parent| parent.frame)
+    }
+
+    /// Hash of the edited shaders that made its frames or those that they began from, hex; `None` where only the program's
+    /// own did.
+    pub fn edited_shaders(&self) -> Option<&str> {
+        let of_parent = || self.parent.as_ref()?.shaders.as_deref();
+        self.shaders.as_deref().or_else(of_parent)
     }
 
     /// Whether a cache whose newest frame is `newest` has the particles of this one.
@@ -257,6 +270,13 @@ impl Manifest {
 
     /// Refuses to go on with a cache that this run would not have written.
     pub(super) fn expect(&self, dir: &Path, given: &Self) -> Result<(), CacheError> {
+        if self.format_version != given.format_version {
+            return Err(CacheError::OldFormat {
+                dir: dir.to_owned(),
+                found: self.format_version,
+                newest: given.format_version,
+            });
+        }
         let fields = |manifest: &Self| {
             let mut sorted = manifest.clone();
             sorted.attributes.sort_unstable();
@@ -286,9 +306,20 @@ impl Manifest {
             Some(&field) => Err(CacheError::OtherScene {
                 dir: dir.to_owned(),
                 field: field.to_owned(),
-                cached: cached[field].to_string(),
-                given: given_fields[field].to_string(),
+                cached: shown(field, &cached[field]),
+                given: shown(field, &given_fields[field]),
             }),
         }
+    }
+}
+
+/// A field's value in words.
+fn shown(field: &str, value: &Value) -> String {
+    match (field, value) {
+        ("shaders", Value::Null) => "the shipped ones".to_owned(),
+        ("shaders", Value::String(hash)) => format!("edited ones ({hash})"),
+        ("keep", Value::Null) => "\"all\"".to_owned(),
+        (_, Value::Null) => "none".to_owned(),
+        (_, value) => value.to_string(),
     }
 }

@@ -41,6 +41,7 @@ mod sink;
 pub mod stream;
 mod tables;
 pub mod vdb;
+mod window;
 mod writer;
 
 pub use disk::directory_hash;
@@ -49,7 +50,7 @@ pub use folder::around;
 pub use grids::GridRecord;
 pub use ledger::{Clock, Entry, Files, Rows};
 pub use manifest::{Manifest, Parent, exists};
-pub use probes::{ProbeRecord, ProbeValues};
+pub use probes::{Look, ProbeRecord, ProbeValues};
 pub use reader::{CacheReader, Problem, VerifyReport, survey};
 pub use record::FileRecord;
 pub use sink::Summary;

@@ -18,6 +18,7 @@ use super::probes::ProbeValues;
 use super::record::FileRecord;
 use super::stream::{self, Layout, OF_PARTICLES, Stream};
 use super::tables;
+use super::window::Window;
 use crate::domain::particles::Particles;
 
 /// Counts of what one writer did.
@@ -44,6 +45,8 @@ pub(super) struct Sink {
     /// Chained hash of the last line.
     pub(super) chain: Hash,
     pub(super) ledger_bytes: u64,
+    /// Of the tables' files.
+    pub(super) windows: Vec<Window>,
 }
 
 /// A frame to be written.
@@ -116,7 +119,7 @@ impl Sink {
         ledger::append(&self.dir.join(ledger::FILE), self.ledger_bytes, &line)?;
         self.ledger_bytes += line.len() as u64;
         self.chain = chain;
-        tables::append(&self.dir, &self.manifest, clock, rows)?;
+        tables::append(&self.dir, &self.manifest, &mut self.windows, clock, rows)?;
         self.let_go_before(clock.frame)?;
         Ok(files.values().map(|record| record.bytes).sum())
     }

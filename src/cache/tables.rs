@@ -1,4 +1,4 @@
-//! The files of streams with a row a frame, `probes/NAME.csv`: all that they hold stands in the ledger.
+//! The files of streams whose values stand in the ledger, `probes/NAME.csv`: a row a look, and all that they hold follows from it.
 //!
 //! So a row is never on the disk before its frame is, a bake that goes on writes the files anew, and a file that says
 //! something else is damaged.
@@ -13,6 +13,7 @@ use super::ledger::{Clock, Entry, Rows};
 use super::manifest::Manifest;
 use super::probes::ProbeRecord;
 use super::stream::{STREAMS, Stream};
+use super::window::Window;
 
 /// One file: a table of a stream.
 struct Table<'a> {
@@ -39,28 +40,38 @@ impl Table<'_> {
         dir.join(self.stream.table_file(&self.record.name))
     }
 
-    /// Text of the file after these frames.
-    fn text(&self, entries: &[Entry]) -> String {
-        let header = format!("frame,time_s,{}\n", self.record.columns.join(","));
+    /// Text of the file after these frames, and what of them later rows look back on.
+    fn text(&self, entries: &[Entry]) -> (String, Window) {
+        let mut window = Window::default();
+        let header = format!("frame,time_s,{}\n", self.record.file_columns().join(","));
         let rows = entries
             .iter()
-            .map(|entry| self.row(entry.clock, &entry.rows));
-        header + &rows.collect::<String>()
+            .map(|entry| self.rows(&mut window, entry.clock, &entry.rows));
+        (header + &rows.collect::<String>(), window)
     }
 
-    /// Numbers as the shortest decimals that read back as the same; nothing where there is none.
-    fn row(&self, clock: Clock, rows: &Rows) -> String {
+    /// A frame's rows, one a look. Numbers as the shortest decimals that read back as the same; nothing where there is none.
+    fn rows(&self, window: &mut Window, clock: Clock, rows: &Rows) -> String {
         let values = rows
             .get(self.stream.name)
             .and_then(|all| all.get(self.index));
-        let mut row = format!("{},{:?}", clock.frame, clock.time);
-        for value in values.into_iter().flatten() {
-            row.push(',');
-            if let Some(value) = value {
-                row += &format!("{value:?}");
+        let values = values.map_or(&[][..], Vec::as_slice);
+        let mut text = String::new();
+        for look in self.record.looks(values, clock.time) {
+            text += &format!("{},{:?}", clock.frame, look.time);
+            let seen = self.record.window.map(|length| window.take(length, look));
+            for (column, value) in look.values.iter().enumerate() {
+                let beside = seen.as_ref().map_or(&[][..], |seen| &seen[column][..]);
+                for value in [*value].iter().chain(beside) {
+                    text.push(',');
+                    if let Some(value) = value {
+                        text += &format!("{value:?}");
+                    }
+                }
             }
+            text.push('\n');
         }
-        row + "\n"
+        text
     }
 
     /// Fault of the file, against the ledger.
@@ -72,7 +83,7 @@ impl Table<'_> {
             Err(error) => return Some(format!("it cannot be read: {error}")),
             Ok(found) => found,
         };
-        let expected = self.text(entries).into_bytes();
+        let expected = self.text(entries).0.into_bytes();
         if found == expected {
             return None;
         }
@@ -85,29 +96,33 @@ impl Table<'_> {
     }
 }
 
-/// Writes every file anew from the ledger.
+/// Writes every file anew from the ledger; gives what rows to come look back on, by table.
 pub(super) fn write_all(
     dir: &Path,
     manifest: &Manifest,
     entries: &[Entry],
-) -> Result<(), CacheError> {
-    all(manifest).try_for_each(|table| {
-        let text = table.text(entries);
-        disk::write_bytes(&table.path(dir), text.as_bytes())
-    })
+) -> Result<Vec<Window>, CacheError> {
+    let write = |table: Table<'_>| {
+        let (text, window) = table.text(entries);
+        disk::write_bytes(&table.path(dir), text.as_bytes())?;
+        Ok(window)
+    };
+    all(manifest).map(write).collect()
 }
 
-/// Adds a frame's row to every file.
+/// Adds a frame's rows to every file; `windows` are those of [`write_all`], carried on.
 pub(super) fn append(
     dir: &Path,
     manifest: &Manifest,
+    windows: &mut [Window],
     clock: Clock,
     rows: &Rows,
 ) -> Result<(), CacheError> {
-    all(manifest).try_for_each(|table| {
+    all(manifest).zip(windows).try_for_each(|(table, window)| {
         let path = table.path(dir);
         let mut file = File::options().append(true).open(&path).at(&path)?;
-        file.write_all(table.row(clock, rows).as_bytes()).at(&path)
+        let text = table.rows(window, clock, rows);
+        file.write_all(text.as_bytes()).at(&path)
     })
 }
 

@@ -86,7 +86,7 @@ impl CacheWriter {
             disk::write_bytes(&path, &asset.bytes)?;
         }
         folder::make_streams(dir, &manifest)?;
-        tables::write_all(dir, &manifest, &[])?;
+        let windows = tables::write_all(dir, &manifest, &[])?;
         disk::write_bytes(&dir.join(ledger::FILE), b"")?;
 
         let seed = blake3::hash(&manifest_bytes);
@@ -96,6 +96,7 @@ impl CacheWriter {
             seed,
             chain: seed,
             ledger_bytes: 0,
+            windows,
         };
         sink.write(clock, start, &rows, &Value::Null)?;
         // Last, because it is what makes the directory a cache.
@@ -153,13 +154,14 @@ impl CacheWriter {
         folder::make_streams(dir, &manifest)?;
         folder::clear_leftovers(dir, &manifest, last.frame)?;
         entries.push(last.clone());
-        tables::write_all(dir, &manifest, &entries)?;
+        let windows = tables::write_all(dir, &manifest, &entries)?;
         let sink = Sink {
             dir: dir.to_owned(),
             manifest: manifest.clone(),
             seed,
             chain,
             ledger_bytes: whole_bytes,
+            windows,
         };
         let writer = Self::spawn(sink, manifest, last.frame, lock)?;
         Ok((writer, last, particles))

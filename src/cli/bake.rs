@@ -22,7 +22,7 @@ use crate::{
 };
 
 use super::{
-    Failure, GpuArgs,
+    Failure, GpuArgs, count,
     interrupt::{self, Interrupt},
     output,
     progress::{Mode, Progress},
@@ -168,11 +168,11 @@ pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
     };
     progress.say(
         &format!(
-            "{end} frame {} of {} in {} ({} frames, {} written now, waited {:.1} s for the disk)",
+            "{end} frame {} of {} in {} ({}, {} written now, waited {:.1} s for the disk)",
             outcome.last_frame,
             request.scene.shot.frames,
             request.directory.display(),
-            outcome.frames,
+            count(outcome.frames.into(), "frame"),
             size(outcome.bytes),
             outcome.waited
         ),

@@ -295,8 +295,15 @@ fn verdict(outcome: &Outcome) -> String {
                 .find(|row| row.field.pass == pass && row.field.name == field);
             let why = row.map_or_else(String::new, |row| {
                 let [error, tolerance] = [row.worst.error, row.worst.tolerance].map(short);
-                let derivation = &row.field.derivation;
-                format!("; off by {error} where {tolerance} is allowed: {derivation}")
+                let reason = match row.field.derivation.tolerance.why() {
+                    "" => String::new(),
+                    reason => format!(" ({reason})"),
+                };
+                let unit = row.field.unit;
+                let unit = if unit.is_empty() { "" } else { &format!(" {unit}") };
+                format!(
+                    "; off by {error}{unit} where {tolerance}{unit} is allowed{reason}; --json has the derivation"
+                )
             });
             format!(
                 "out of tolerance: {pass} first, its {field}, in substep {} after frame {frame}{why}",

@@ -11,14 +11,20 @@ use clap::Args;
 
 use crate::{
     scene::{Method, Scene},
-    stage::inspect::{
-        Adapter, Entry, Manifest, PARTICLES, PROBES, ScenePlan, adapters, cache, plan, plot,
+    stage::{
+        inspect::{
+            Adapter, Entry, Manifest, PARTICLES, PROBES, ScenePlan, adapters, cache, plan, plot,
+        },
+        replay::is_failed,
     },
 };
 
 use super::{Failure, bake, check::Misplaced, is_cache, output, size};
 
 #[derive(Args, Debug)]
+#[command(
+    override_usage = "swell inspect [OPTIONS] <SCENE|LOOK|CACHE>\n       swell inspect --adapters"
+)]
 pub(super) struct InspectArgs {
     /// A scene file, a look file or a cache directory.
     #[arg(required_unless_present = "adapters")]
@@ -65,6 +71,17 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         }
     }
     match &args.subject {
+        Some(directory) if is_failed(directory) => {
+            let shown = directory.display();
+            let what = format!(
+                "{shown} is the frame that a bake broke off at, which no cache lists: `swell check {shown}` computes \
+                 it again"
+            );
+            return Err(Failure {
+                code: 2,
+                error: what.into(),
+            });
+        }
         Some(directory) if is_cache(directory) => {
             refuse_scene_options(args, directory)?;
             let (manifest, entries) = cache(directory)?;
@@ -283,10 +300,13 @@ fn show_probes(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt:
     )?;
     for (index, probe) in manifest.probes.iter().enumerate() {
         for (k, column) in probe.columns.iter().enumerate() {
-            let value = |entry: &Entry| *entry.row(PROBES, index).get(k)?;
-            let least = entries.iter().filter_map(value).min_by(f64::total_cmp);
-            let greatest = entries.iter().filter_map(value).max_by(f64::total_cmp);
-            let last = entries.last().and_then(value);
+            let values = || {
+                let of = |entry| probe.looks(Entry::row(entry, PROBES, index), entry.clock.time);
+                entries.iter().flat_map(of).map(|look| look.values[k])
+            };
+            let least = values().flatten().min_by(f64::total_cmp);
+            let greatest = values().flatten().max_by(f64::total_cmp);
+            let last = values().last().flatten();
             let [least, greatest, last] = [least, greatest, last]
                 .map(|value| value.map_or("-".to_owned(), |v| format!("{v:.6}")));
             writeln!(

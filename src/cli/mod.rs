@@ -168,6 +168,14 @@ fn chain(error: &dyn Error) -> String {
     text
 }
 
+/// So many of a thing: `1 frame`, `2 frames`.
+fn count(many: u64, what: &str) -> String {
+    match many {
+        1 => format!("1 {what}"),
+        many => format!("{many} {what}s"),
+    }
+}
+
 /// Bytes in decimal units with one digit after the point.
 fn size(bytes: u64) -> String {
     let mut value = bytes as f64;

@@ -12,7 +12,7 @@ use crate::{
 };
 
 use super::{
-    Failure, GpuArgs, bake,
+    Failure, GpuArgs, bake, count,
     interrupt::{self, Interrupt},
     output,
     progress::{Mode, Progress},
@@ -78,13 +78,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
     let outcome = outcome?;
     progress.say(
         &format!(
-            "{} {} frames rendered, {} stood there already, in {}",
+            "{} {} rendered, {} stood there already, in {}",
             if outcome.interrupted {
                 "ended by a signal:"
             } else {
                 "done:"
             },
-            outcome.rendered,
+            count(outcome.rendered.into(), "frame"),
             outcome.skipped,
             request.directory.display()
         ),
@@ -116,7 +116,7 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
                 more => format!(" ({more} more were baked, and their particles not kept)"),
             };
             progress.say(
-                &format!("on {device}\n{frames} frames of {width} × {height}{others}"),
+                &format!("on {device}\n{} of {width} × {height}{others}", count(frames as u64, "frame")),
                 json!({
                     "event": "ready", "device": device, "width": width, "height": height, "frames": frames,
                     "not_kept": left_out,
@@ -126,7 +126,10 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
         Event::Waiting { frames } => {
             if let Some(progress) = progress.get() {
                 progress.say(
-                    &format!("waiting for {frames} frames that other processes render"),
+                    &format!(
+                        "waiting for {} that other processes render",
+                        count(frames as u64, "frame")
+                    ),
                     json!({ "event": "waiting", "frames": frames }),
                 );
             }

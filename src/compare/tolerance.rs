@@ -51,6 +51,21 @@ impl Text {
         }
     }
 
+    /// Why it is so: its own words, else those of the first bound that it is made of; empty where none has any.
+    pub fn why(&self) -> &'static str {
+        if !self.reason.is_empty() {
+            return self.reason;
+        }
+        let bounds = self
+            .magnitudes
+            .iter()
+            .filter_map(|magnitude| magnitude.bound);
+        bounds
+            .map(Self::why)
+            .find(|why| !why.is_empty())
+            .unwrap_or("")
+    }
+
     /// What each name in it stands for, one after the other.
     pub fn meanings(&self) -> String {
         let mut told = Vec::new();
@@ -166,12 +181,14 @@ pub(crate) use count;
 
 #[cfg(test)]
 mod tests {
+    use super::Text;
     use crate::compare::rounding::U;
 
     bounds! {
         INNER = [n: "terms", size: "Σ|t|"] U * (n + 2.0) * size, "a sum";
         OUTER = [scale: "a part", sum: "the sum's error " INNER, x: "|x|"] scale * sum + 0.5 * x.max(10.05), "two of them";
         EQUAL = [] 0.0, "a copy";
+        SILENT = [x: "|x|", sum: "" INNER] x + sum, "";
     }
 
     #[test]
@@ -185,5 +202,7 @@ mod tests {
              sum = the sum's error U × (n + 2) × size (a sum), n = terms, size = Σ|t|, x = |x|"
         );
         assert_eq!(EQUAL.text.to_string(), "equal (a copy)");
+        let why = [&OUTER.text, &SILENT.text].map(Text::why);
+        assert_eq!(why, ["two of them", "a sum"]);
     }
 }

@@ -4,6 +4,9 @@ use glam::DVec3;
 
 use super::flip::ON_FACE;
 
+/// Farther than any domain reaches, metres, and a power of two: where walls stand that are not there.
+pub const FAR: f64 = (1u64 << 40) as f64;
+
 /// An axis-aligned box, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bounds {

@@ -52,6 +52,8 @@ pub struct Level {
 pub struct Bricks {
     /// Cells of the finest level along each axis.
     pub cells: [u32; 3],
+    /// Axes along which the last brick's upper neighbour is the first one; their cells are a multiple of [`EDGE`].
+    pub periodic: [bool; 3],
     /// Bricks of the finest level along each axis.
     pub table_dims: [u32; 3],
     /// Slot of each brick of the finest level, x fastest; 0 where there is none.
@@ -78,9 +80,26 @@ impl Bricks {
     /// # Panics
     /// Where `is_wet` is not of the length of the table.
     pub fn new(cells: [u32; 3], is_wet: &[bool], reach: u32, depth: usize) -> Self {
+        Self::periodic(cells, [false; 3], is_wet, reach, depth)
+    }
+
+    /// The same where the domain joins its own end along the axes of `periodic`. A coarser level does so only where it
+    /// has half as many bricks as the one below; elsewhere its ends have no neighbour.
+    ///
+    /// # Panics
+    /// Where `is_wet` is not of the length of the table, or a periodic axis has cells that fill no whole bricks.
+    pub fn periodic(
+        cells: [u32; 3],
+        periodic: [bool; 3],
+        is_wet: &[bool],
+        reach: u32,
+        depth: usize,
+    ) -> Self {
         let dims = table_dims(cells);
         assert_eq!(is_wet.len(), volume(dims), "one flag a brick");
-        let near = dilate(is_wet, dims, reach);
+        let is_whole = |axis: usize| !periodic[axis] || cells[axis].is_multiple_of(EDGE);
+        assert!((0..3).all(is_whole), "whole bricks along a period");
+        let near = dilate(is_wet, dims, periodic, reach);
         let wet: Vec<usize> = (0..near.len()).filter(|&k| is_wet[k]).collect();
         let dry = (0..near.len()).filter(|&k| near[k] && !is_wet[k]);
         let mut records = vec![Brick::default()];
@@ -93,9 +112,11 @@ impl Bricks {
             });
         }
         let active = records.len() as u32 - 1;
-        connect(&mut records, 1..active as usize + 1, &table, dims);
+        let range = 1..active as usize + 1;
+        connect(&mut records, range, &table, dims, periodic);
         let mut bricks = Self {
             cells,
+            periodic,
             table_dims: dims,
             table,
             wet: wet.len() as u32,
@@ -125,6 +146,7 @@ impl Bricks {
     /// Element of a cell of the finest level; in slot 0 where no brick is.
     pub fn element(&self, cell: [i64; 3]) -> u32 {
         let edge = i64::from(EDGE);
+        let cell = self.wrapped(cell);
         let brick = cell.map(|c| c.div_euclid(edge));
         let dims = self.table_dims.map(i64::from);
         let is_inside = (0..3).all(|axis| (0..dims[axis]).contains(&brick[axis]));
@@ -135,6 +157,17 @@ impl Bricks {
         };
         let [x, y, z] = cell.map(|c| c.rem_euclid(edge) as u32);
         CELLS * slot + x + EDGE * (y + EDGE * z)
+    }
+
+    /// The cell of the domain that a cell beyond a periodic end is an image of.
+    pub fn wrapped(&self, cell: [i64; 3]) -> [i64; 3] {
+        std::array::from_fn(|axis| {
+            if self.periodic[axis] {
+                cell[axis].rem_euclid(i64::from(self.cells[axis]))
+            } else {
+                cell[axis]
+            }
+        })
     }
 
     /// Element of the cell `offset` away, at most eight cells along each axis; in slot 0 where there is none.
@@ -152,11 +185,14 @@ impl Bricks {
 
     /// Coarser levels over the wet bricks, until one brick holds all or `depth` levels stand.
     fn add_levels(&mut self, depth: usize) {
-        let mut dims = self.table_dims;
+        let (mut dims, mut periodic) = (self.table_dims, self.periodic);
         while self.levels.len() < depth && volume(dims) > 1 {
             let below = self.levels[self.levels.len() - 1];
             let range = below.start as usize..(below.start + below.count) as usize;
-            dims = dims.map(|n| n.div_ceil(2));
+            for axis in 0..3 {
+                periodic[axis] &= dims[axis].is_multiple_of(2);
+                dims[axis] = dims[axis].div_ceil(2);
+            }
             let level = self.levels.len() as u32;
             let mut table = vec![0; volume(dims)];
             for brick in &self.records[range.clone()] {
@@ -178,7 +214,13 @@ impl Bricks {
                 self.records[parent as usize].children[x + 2 * y + 4 * z] = slot as u32;
             }
             let end = self.records.len();
-            connect(&mut self.records, start as usize..end, &table, dims);
+            connect(
+                &mut self.records,
+                start as usize..end,
+                &table,
+                dims,
+                periodic,
+            );
             self.levels.push(Level {
                 start,
                 count: end as u32 - start,
@@ -212,13 +254,27 @@ fn parent_index(brick: &Brick, dims: [u32; 3]) -> usize {
 }
 
 /// Fills in the neighbours of the slots in `range`, whose level has `table`.
-fn connect(records: &mut [Brick], range: std::ops::Range<usize>, table: &[u32], dims: [u32; 3]) {
+fn connect(
+    records: &mut [Brick],
+    range: std::ops::Range<usize>,
+    table: &[u32],
+    dims: [u32; 3],
+    periodic: [bool; 3],
+) {
     records[range].par_iter_mut().for_each(|brick| {
         for (k, neighbor) in brick.neighbors.iter_mut().enumerate() {
             let step = [k % 3, k / 3 % 3, k / 9];
             // One to the left wraps round and is then too large.
             let at: [usize; 3] = std::array::from_fn(|axis| {
-                (brick.coordinate[axis] as usize + step[axis]).wrapping_sub(1)
+                let (at, count) = (
+                    brick.coordinate[axis] as usize + step[axis],
+                    dims[axis] as usize,
+                );
+                if periodic[axis] {
+                    (at + count - 1) % count
+                } else {
+                    at.wrapping_sub(1)
+                }
             });
             if (0..3).all(|axis| at[axis] < dims[axis] as usize) {
                 *neighbor = table[(at[2] * dims[1] as usize + at[1]) * dims[0] as usize + at[0]];
@@ -228,16 +284,21 @@ fn connect(records: &mut [Brick], range: std::ops::Range<usize>, table: &[u32], 
 }
 
 /// Flags within `reach` of a flag in the maximum norm: one axis after the other.
-fn dilate(flags: &[bool], dims: [u32; 3], reach: u32) -> Vec<bool> {
-    let [nx, ny, _] = dims.map(|n| n as usize);
-    let mut flags = flags.to_vec();
-    for (stride, length) in [(1, nx), (nx, ny), (nx * ny, dims[2] as usize)] {
+fn dilate(flags: &[bool], dims: [u32; 3], periodic: [bool; 3], reach: u32) -> Vec<bool> {
+    let [nx, ny, nz] = dims.map(|n| n as usize);
+    let (mut flags, reach) = (flags.to_vec(), reach as usize);
+    for (axis, (stride, length)) in [(1, nx), (nx, ny), (nx * ny, nz)].into_iter().enumerate() {
         let before = flags.clone();
         for (index, flag) in flags.iter_mut().enumerate() {
             let at = index / stride % length;
-            let first = at.saturating_sub(reach as usize);
-            let last = (at + reach as usize).min(length - 1);
-            *flag = (first..=last).any(|other| before[index + other * stride - at * stride]);
+            let is_set = |other: usize| before[index + other * stride - at * stride];
+            *flag = if periodic[axis] {
+                let first = at + length * reach - reach;
+                (first..=first + 2 * reach).any(|other| is_set(other % length))
+            } else {
+                let (first, last) = (at.saturating_sub(reach), (at + reach).min(length - 1));
+                (first..=last).any(is_set)
+            };
         }
     }
     flags
@@ -329,6 +390,39 @@ mod tests {
             }
         }
         assert!(found > 100);
+    }
+
+    /// Three bricks, two and one; all cells are there, and so is each neighbour.
+    #[test]
+    fn periodic_bricks_join_their_own_ends() {
+        let (cells, dims) = ([24, 16, 8], [3, 2, 1]);
+        let periodic = [true, true, true];
+        let bricks = Bricks::periodic(cells, periodic, &[true; 6], 1, 8);
+        let image = |cell: [i64; 3]| -> [u32; 3] {
+            std::array::from_fn(|k| cell[k].rem_euclid(i64::from(cells[k])) as u32)
+        };
+        for element in (CELLS..CELLS * (bricks.active + 1)).step_by(7) {
+            let cell = bricks.cell(element).map(i64::from);
+            for offset in [[-1, 0, 0], [1, -1, 1], [8, 0, -8], [0, 1, 0], [-1, -1, -1]] {
+                let there: [i64; 3] = std::array::from_fn(|k| cell[k] + i64::from(offset[k]));
+                let near = bricks.near(element, offset);
+                assert_eq!(near, bricks.element(there));
+                assert_eq!(bricks.cell(near), image(there));
+            }
+        }
+        // Above three bricks are two, of which one is half empty: no joint; above two is one, above one still one.
+        let faces = |slot: u32| bricks.records[slot as usize].neighbors;
+        let above = bricks.levels[1].start;
+        assert_eq!(bricks.levels[1].count, 2);
+        assert_eq!((faces(above)[12], faces(above)[14]), (0, above + 1));
+        assert_eq!((faces(above)[10], faces(above)[16]), (above, above));
+        assert_eq!((faces(above)[4], faces(above)[22]), (0, 0));
+        // Within reach across the joint, and not without it.
+        let only = [true, false, false, false, false, false];
+        let reached = |periodic| Bricks::periodic(cells, periodic, &only, 1, 1).active;
+        assert_eq!(reached([true, false, false]), 6);
+        assert_eq!(reached([false; 3]), 4);
+        assert_eq!(volume(dims), 6);
     }
 
     #[test]

@@ -6,6 +6,15 @@ pub const CONTACT: f64 = 0.1;
 /// Nearer than this to a cell's face, in cells, counts as on it: positions of thousands of cells in f32 round below it.
 pub const ON_FACE: f64 = 1e-3;
 
+/// Particles that are nearer to each other than this part of their spacing are pushed apart.
+const APART: f64 = 0.9;
+
+/// That distance in cells, where particles at rest are `spacing` cells apart; below half a cell, so that whoever is
+/// nearer lies in one of eight cells.
+pub fn apart(spacing: f64) -> f64 {
+    (APART * spacing).min(0.49)
+}
+
 /// κ of the law of the wall.
 pub const VON_KARMAN: f64 = 0.41;
 
@@ -19,7 +28,8 @@ pub fn layers(displacement: f64) -> usize {
     (3f64.sqrt() * displacement).ceil() as usize + 3
 }
 
-/// Cells stored along each axis: one beyond the domain's own, for its upper faces.
-pub fn stored_cells(cells: [u32; 3]) -> [u32; 3] {
-    cells.map(|n| n + 1)
+/// Cells stored along each axis: one beyond the domain's own, for its upper faces; none where these are the lower faces
+/// of the first cells.
+pub fn stored_cells(cells: [u32; 3], periodic: [bool; 3]) -> [u32; 3] {
+    std::array::from_fn(|axis| cells[axis] + u32::from(!periodic[axis]))
 }

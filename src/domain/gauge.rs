@@ -19,43 +19,100 @@ pub struct Gauge<'a> {
     pub kind: &'a [u32],
     /// Pressure of each element, Pa.
     pub pressure: &'a [f64],
+    /// How pressure rises in water at rest: ρ g, Pa/m.
+    pub rise: DVec3,
 }
+
+/// What is at a point.
+enum Found {
+    /// Its pressure, Pa.
+    Water(f64),
+    Air,
+    Solid,
+}
+
+/// How far beyond the domain a point may lie by rounding, in cells.
+const ON_FACE: f64 = 1e-6;
 
 impl Gauge<'_> {
     /// Trilinear between cell centres; `local` is relative to the domain's least corner, metres. `None` where the
-    /// point's cell holds no water. Air counts as 0 Pa; beyond a wall or in a solid the field goes on straight from the
-    /// point's cell and the one opposite, so that a linear pressure is met up to the wall.
+    /// point's cell holds no water. Air counts as 0 Pa. Beyond a wall or in a solid the field goes on from the cells of
+    /// water beside as in water at rest, ∂p/∂n = ρ g·n, which is what a still wall does to the pressure: so a pressure
+    /// that is linear along a wall and rises by ρ g is met up to it, and what stands half a cell off a wall along which
+    /// gravity points is what stands at it.
     pub fn at(&self, local: DVec3) -> Option<f64> {
+        match self.look(local) {
+            Found::Water(pressure) => Some(pressure),
+            Found::Air | Found::Solid => None,
+        }
+    }
+
+    /// Pressure on a surface whose unit `normal` points into the water, Pa; 0 where none is. It is that of the first cell
+    /// that is none of a solid's on the way out, half a cell to one and a half off, brought back as in water at rest.
+    pub fn on_face(&self, local: DVec3, normal: DVec3) -> f64 {
+        for half in 1..=3 {
+            let way = 0.5 * f64::from(half) * self.cell_size * normal;
+            match self.look(local + way) {
+                Found::Water(pressure) => return pressure - self.rise.dot(way),
+                Found::Air => return 0.0,
+                Found::Solid => {}
+            }
+        }
+        0.0
+    }
+
+    fn look(&self, local: DVec3) -> Found {
         let scaled = local / self.cell_size;
+        let room = DVec3::from_array(self.cells.map(f64::from));
+        if scaled.cmplt(DVec3::splat(-ON_FACE)).any() || scaled.cmpgt(room + ON_FACE).any() {
+            return Found::Solid;
+        }
         let own: [i64; 3] = std::array::from_fn(|axis| {
             let last = i64::from(self.cells[axis]) - 1;
             (scaled[axis].floor() as i64).clamp(0, last)
         });
-        let (FLUID, here) = self.cell(own) else {
-            return None;
-        };
+        match self.cell(own).0 {
+            FLUID => {}
+            AIR => return Found::Air,
+            _ => return Found::Solid,
+        }
         let first = (scaled - 0.5).floor();
         let part = scaled - 0.5 - first;
-        let mut sum = 0.0;
-        for corner in 0..8usize {
-            let bit: [usize; 3] = std::array::from_fn(|axis| corner >> axis & 1);
-            let cell: [i64; 3] = std::array::from_fn(|axis| first[axis] as i64 + bit[axis] as i64);
-            let weights = (0..3).map(|axis| [1.0 - part[axis], part[axis]][bit[axis]]);
-            let value = match self.cell(cell) {
-                (FLUID, p) => p,
-                (AIR, _) => 0.0,
-                _ => match self.cell(std::array::from_fn(|axis| 2 * own[axis] - cell[axis])) {
-                    (FLUID, opposite) => 2.0 * here - opposite,
-                    _ => here,
-                },
-            };
-            sum += weights.product::<f64>() * value;
+        let around: [(u32, f64); 8] = std::array::from_fn(|corner| {
+            let cell = |axis: usize| first[axis] as i64 + (corner >> axis & 1) as i64;
+            self.cell(std::array::from_fn(cell))
+        });
+        let weight = |corner: usize| -> f64 {
+            (0..3)
+                .map(|axis| [1.0 - part[axis], part[axis]][corner >> axis & 1])
+                .product()
+        };
+        let value = |corner: usize| match around[corner] {
+            (FLUID, p) => p,
+            (AIR, _) => 0.0,
+            _ => self.beyond(&around, corner),
+        };
+        Found::Water((0..8).map(|corner| weight(corner) * value(corner)).sum())
+    }
+
+    /// In a solid's cell among eight: from those of water that fewest steps along axes lead to, their mean.
+    fn beyond(&self, around: &[(u32, f64); 8], corner: usize) -> f64 {
+        let steps = |other: usize| (corner ^ other).count_ones();
+        let water = || (0..8).filter(|&other| around[other].0 == FLUID);
+        let nearest = water().map(steps).min();
+        let (mut sum, mut count) = (0.0, 0.0);
+        for other in water().filter(|&other| Some(steps(other)) == nearest) {
+            let bit = |of: usize, axis: usize| (of >> axis & 1) as f64;
+            let way = DVec3::from_array([0, 1, 2].map(|axis| bit(corner, axis) - bit(other, axis)));
+            sum += around[other].1 + self.rise.dot(self.cell_size * way);
+            count += 1.0;
         }
-        Some(sum)
+        sum / count
     }
 
     /// Kind and pressure of a cell; what is outside of the domain is solid.
     fn cell(&self, cell: [i64; 3]) -> (u32, f64) {
+        let cell = self.bricks.wrapped(cell);
         let is_inside = (0..3).all(|axis| (0..i64::from(self.cells[axis])).contains(&cell[axis]));
         if !is_inside {
             return (SOLID, 0.0);
@@ -74,8 +131,12 @@ impl Gauge<'_> {
 mod tests {
     use super::*;
 
-    /// A box of 8 × 8 × 8 cells with water below cell 6 and air above; the pressure is linear.
-    fn at(slope: DVec3, places: &[DVec3]) -> Vec<Option<f64>> {
+    /// A box of 8 × 8 × 8 cells with water below cell 6 and air above; `look` sees its gauge.
+    fn with_gauge<T>(
+        rise: DVec3,
+        field: impl Fn(DVec3) -> f64,
+        look: impl FnOnce(&Gauge<'_>) -> T,
+    ) -> T {
         let bricks = Bricks::new([8; 3], &[true], 0, 1);
         let cell_size = 0.25;
         let elements = bricks.slots() * CELLS as usize;
@@ -84,11 +145,7 @@ mod tests {
             let center = cell_size * (DVec3::from_array(bricks.cell(element).map(f64::from)) + 0.5);
             let is_water = center.y < 6.0 * cell_size;
             kind[element as usize] = if is_water { FLUID } else { AIR };
-            pressure[element as usize] = if is_water {
-                40.0 + slope.dot(center)
-            } else {
-                0.0
-            };
+            pressure[element as usize] = if is_water { field(center) } else { 0.0 };
         }
         let gauge = Gauge {
             bricks: &bricks,
@@ -96,8 +153,17 @@ mod tests {
             cell_size,
             kind: &kind,
             pressure: &pressure,
+            rise,
         };
-        places.iter().map(|&place| gauge.at(place)).collect()
+        look(&gauge)
+    }
+
+    /// A pressure that rises by `slope` as in water at rest.
+    fn at(slope: DVec3, places: &[DVec3]) -> Vec<Option<f64>> {
+        let field = |center| 40.0 + slope.dot(center);
+        with_gauge(slope, field, |gauge| {
+            places.iter().map(|&place| gauge.at(place)).collect()
+        })
     }
 
     /// A linear pressure comes back to rounding between centres and up to walls and corners.
@@ -117,6 +183,34 @@ mod tests {
                 "{place}: {found:?}"
             );
         }
+    }
+
+    /// cos(π x / 2 m), flat at the wall at x = 0, under gravity along y. Half a cell off the wall and at it the pressure is
+    /// the same; between centres it is off by what is bent there, (Δx)² p″ / 8, and at the wall by as much. On faces as at
+    /// points, with the way back along the normal.
+    #[test]
+    fn at_a_wall_stands_what_stands_half_a_cell_off() {
+        let (k, rise) = (0.5 * std::f64::consts::PI, DVec3::new(0.0, -20.0, 0.0));
+        let field = |x: DVec3| 100.0 * (k * x.x).cos() + rise.dot(x);
+        let bent = 100.0 * (0.25 * k).powi(2) / 8.0;
+        with_gauge(rise, field, |gauge| {
+            let wall = DVec3::new(0.0, 0.7, 1.0);
+            let off = DVec3::new(0.125, 0.7, 1.0);
+            let found = gauge.at(wall).unwrap();
+            assert!((found - gauge.at(off).unwrap()).abs() < 1e-12);
+            assert!((found - field(wall)).abs() < 1.01 * bent, "{found}");
+            assert!((gauge.on_face(wall, DVec3::X) - found).abs() < 1e-12);
+            // The floor's pressure is what weighs on it.
+            let floor = DVec3::new(0.6, 0.0, 1.0);
+            let found = gauge.on_face(floor, DVec3::Y);
+            assert!((found - field(floor)).abs() < 1.01 * bent, "{found}");
+            // Negative control: without gravity it is less.
+            let less = gauge.at(DVec3::new(0.6, 0.125, 1.0)).unwrap();
+            assert!((less - field(floor)).abs() > 2.0, "{less}");
+            // Air bears nothing on, and nothing stands beyond the box.
+            assert_eq!(gauge.on_face(DVec3::new(0.0, 1.7, 1.0), DVec3::X), 0.0);
+            assert_eq!(gauge.on_face(floor, -DVec3::Y), 0.0);
+        });
     }
 
     /// By hand: from 12 Pa at the last centre of water, 1.375 m up, to none at the centre of air a cell above.

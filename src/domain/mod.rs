@@ -17,6 +17,7 @@ pub mod mesh_file;
 pub mod motion;
 pub mod particles;
 pub mod pbf;
+pub mod period;
 pub mod poisson;
 pub mod probe;
 pub mod sampling;

@@ -16,6 +16,8 @@ const ON_FACE: f64 = 1e-3;
 pub struct Shores {
     at_rest: Option<Surface>,
     moving: Vec<Surface>,
+    /// Axes along which the last brick lies beside the first.
+    periodic: [bool; 3],
 }
 
 /// A box of a brick's edge about each part of a solid's surface.
@@ -76,7 +78,13 @@ impl Shores {
         Self {
             at_rest: boundary.distance.as_ref().map(surface),
             moving: boundary.moving.iter().map(surface).collect(),
+            periodic: [false; 3],
         }
+    }
+
+    /// The same in a domain that joins its own end along these axes.
+    pub fn joined(self, periodic: [bool; 3]) -> Self {
+        Self { periodic, ..self }
     }
 
     /// Marks what lies beside bricks that hold particles: bricks that solids cut, which have come `ways` since the start,
@@ -93,7 +101,7 @@ impl Shores {
         let with_water = is_wet.to_vec();
         for (surface, way) in at_rest.chain(self.moving.iter().zip(ways)) {
             for brick in surface.bricks(way, dims) {
-                is_wet[brick] |= has_water_about(&with_water, dims, brick);
+                is_wet[brick] |= has_water_about(&with_water, dims, self.periodic, brick);
             }
         }
         for axis in 0..3 {
@@ -111,10 +119,16 @@ impl Shores {
 }
 
 /// Whether one of the 27 bricks about one is set.
-fn has_water_about(is_wet: &[bool], dims: [u32; 3], brick: usize) -> bool {
+fn has_water_about(is_wet: &[bool], dims: [u32; 3], periodic: [bool; 3], brick: usize) -> bool {
     let n = dims.map(|n| n as usize);
     let at = [brick % n[0], brick / n[0] % n[1], brick / (n[0] * n[1])];
-    let near = |axis: usize| at[axis].saturating_sub(1)..=(at[axis] + 1).min(n[axis] - 1);
+    let near = |axis: usize| {
+        let (at, n) = (at[axis], n[axis]);
+        [at + n - 1, at + n, at + n + 1]
+            .into_iter()
+            .filter(move |k| periodic[axis] || (n..2 * n).contains(k))
+            .map(move |k| k % n)
+    };
     near(2).any(|z| near(1).any(|y| near(0).any(|x| is_wet[(z * n[1] + y) * n[0] + x])))
 }
 
@@ -208,6 +222,12 @@ mod tests {
         assert!(found.contains(&index([1, 0, 0])), "{found:?}");
         assert!(!found.contains(&index([3, 0, 0])), "{found:?}");
         assert!(!found.contains(&index([1, 2, 0])), "{found:?}");
+        // Where the ends are joined, the brick beside the last one is the first.
+        let across = shores.clone().joined([true, false, false]);
+        let found = marked(&across, &[[0, 1, 0]], all, DVec3::ZERO);
+        assert!(found.contains(&index([3, 0, 0])), "{found:?}");
+        let found = marked(&shores, &[[0, 1, 0]], all, DVec3::ZERO);
+        assert!(!found.contains(&index([3, 0, 0])), "{found:?}");
         // Negative control: where it is gone nothing is marked.
         let gone = marked(&shores, &wet, all, DVec3::new(0.0, -40.0, 0.0));
         assert_eq!(gone, sorted(&wet));

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::particles::Particles;
+use super::{particles::Particles, probe::Patch};
 
 /// Report of one output frame's steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,6 +61,66 @@ pub struct Projection {
     pub correction_iterations: u64,
 }
 
+/// What is looked at when a substep ends. A solver reads back what is named here, and nothing else.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wanted {
+    /// Positions and velocities of all particles.
+    pub particles: bool,
+    /// Pressures at the scene's points of pressure.
+    pub pressures: bool,
+    /// Pressures on these patches of surfaces, world coordinates; only of solvers with a pressure on cells.
+    pub patches: Vec<Patch>,
+}
+
+/// A substep of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Seconds from the shot's start.
+    pub start: f64,
+    /// Seconds from the shot's start; the next substep's start to the last bit, but for a frame's last.
+    pub end: f64,
+    /// Whether the frame ends with it.
+    pub is_last: bool,
+}
+
+/// The water when a substep ended.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    /// World positions and velocities in the order of the frame's; empty where not wanted.
+    pub particles: Particles,
+    /// Pa; `None` where there was no water; empty where not wanted.
+    pub pressures: Vec<Option<f64>>,
+    /// On the patches, Pa; 0 where they are dry.
+    pub patches: Vec<f64>,
+}
+
+/// Looks on while a frame is computed. It changes nothing.
+pub trait Watch {
+    /// What it wants to see of a substep; asked once, in order.
+    fn wants(&mut self, substep: Span) -> Wanted;
+
+    /// Shows it what it wanted of that substep; not called where that is nothing.
+    fn look(&mut self, substep: Span, seen: Seen);
+}
+
+impl Wanted {
+    /// Whether there is anything.
+    pub fn is_any(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
+/// Who looks at frames alone.
+pub struct Nobody;
+
+impl Watch for Nobody {
+    fn wants(&mut self, _: Span) -> Wanted {
+        Wanted::default()
+    }
+
+    fn look(&mut self, _: Span, _: Seen) {}
+}
+
 /// A solver that advances a particle state frame by frame.
 ///
 /// All that it needs for the next frame is in the state that it hands back.
@@ -78,9 +138,20 @@ pub trait Solver {
     ///
     /// # Errors
     /// The device fails, or the numbers do.
-    fn advance(&mut self) -> Result<(Particles, StepReport), Self::Error>;
+    fn advance(&mut self) -> Result<(Particles, StepReport), Self::Error> {
+        self.advance_watched(&mut Nobody)
+    }
 
-    /// Pressure at world points, metres, as the last substep of [`Solver::advance`] had it, Pa against the air's; `None`
+    /// The same, the same to the last bit, while `watch` looks on at the ends of substeps.
+    ///
+    /// # Errors
+    /// As [`Solver::advance`].
+    fn advance_watched(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<(Particles, StepReport), Self::Error>;
+
+    /// Pressure at world points, metres, as the last substep had it, Pa against the air's; `None`
     /// where there was no water. Told only of scenes with a probe of pressure: others keep nothing for it.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ use crate::{
     study::median,
 };
 
-use super::{Event, PointEvent, PointStatus, Request, StudyError, report::Report};
+use super::{Event, PointEvent, PointStatus, Request, StudyError, claim, report::Report};
 
 /// Changes whenever what a line of results holds does.
 const FORM: &str = "swell study 3";
@@ -223,26 +223,32 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
             source,
         };
         fs::create_dir_all(directory).map_err(fault)?;
-        let is_used = fs::read_dir(directory).map_err(fault)?.next().is_some();
+        let is_other = |entry: std::io::Result<fs::DirEntry>| {
+            entry.is_ok_and(|entry| entry.file_name() != claim::FILE)
+        };
+        let is_used = fs::read_dir(directory).map_err(fault)?.any(is_other);
         if is_used && !path.exists() {
             return Err(StudyError::File {
                 file: directory.to_owned(),
                 source: std::io::Error::other("it holds what is no study's: choose another -o"),
             });
         }
-        let text = match fs::read_to_string(&path) {
+        let text = match fs::read(&path) {
             Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
             Err(error) => return Err(fault(error)),
         };
-        let whole = text.rfind('\n').map_or(0, |end| end + 1);
+        let whole = text.iter().rposition(|&byte| byte == b'\n');
+        let whole = whole.map_or(0, |end| end + 1);
         let mut runs = BTreeMap::new();
-        for (index, line) in text[..whole].lines().enumerate() {
-            let line: Line<M> = serde_json::from_str(line).map_err(|error| StudyError::Ledger {
-                file: path.clone(),
-                line: index + 1,
-                what: error.to_string(),
-            })?;
+        let lines = text[..whole].split_inclusive(|&byte| byte == b'\n');
+        for (index, line) in lines.enumerate() {
+            let line: Line<M> =
+                serde_json::from_slice(line).map_err(|error| StudyError::Ledger {
+                    file: path.clone(),
+                    line: index + 1,
+                    what: in_line(&error),
+                })?;
             runs.insert(line.hash, line.run);
         }
         let file = OpenOptions::new()
@@ -271,6 +277,15 @@ impl<M: Serialize> Ledger<M> {
             source,
         })?;
         Ok(self.runs.entry(line.hash).or_insert(line.run))
+    }
+}
+
+/// What is wrong with a line, without the number that it has as a text of its own.
+fn in_line(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    match text.rsplit_once(" at line 1 column ") {
+        Some((what, _)) => what.to_owned(),
+        None => text,
     }
 }
 
@@ -308,5 +323,13 @@ mod tests {
         fs::write(&path, format!("{text}{{}}\n")).expect("written");
         let error = open().err().expect("spoiled").to_string();
         assert!(error.contains("results.jsonl:3: missing field"), "{error}");
+        assert!(!error.contains("line 1"), "{error}");
+        let bytes = [text.as_bytes(), b"{\"hash\":\"\xff\"}\n"].concat();
+        fs::write(&path, bytes).expect("written");
+        let error = open().err().expect("no UTF-8").to_string();
+        assert!(
+            error.contains("results.jsonl:3: invalid unicode"),
+            "{error}"
+        );
     }
 }

@@ -64,6 +64,19 @@ pub enum StudyError {
         /// What is off.
         what: String,
     },
+    /// Results of another study stand in the folder.
+    #[error(
+        "{} holds results of the study {found}, not of {name}; left untouched: choose another -o",
+        directory.display()
+    )]
+    OtherStudy {
+        /// The folder.
+        directory: PathBuf,
+        /// The study that it belongs to.
+        found: String,
+        /// The study that is run.
+        name: String,
+    },
     /// A picture that cannot stand in the page.
     #[error("{}", file.display())]
     Picture {
@@ -98,6 +111,7 @@ impl From<&StudyError> for Blame {
             StudyError::Solve(error) => error.into(),
             StudyError::Point(_) => Self::Input,
             StudyError::Stopped
+            | StudyError::OtherStudy { .. }
             | StudyError::File { .. }
             | StudyError::Picture { .. }
             | StudyError::Ledger { .. }

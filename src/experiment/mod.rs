@@ -2,17 +2,19 @@
 //!
 //! The `engine` opens devices, runs points and keeps their results; a kind of study is a file or folder beside it: what is
 //! run, what is measured, what is drawn. `sweep` changes one setting at a time, [`stability`] runs scenes that are hard on a
-//! solver against their marks, `comparison` bakes and renders a scene with two solvers.
+//! solver against their marks, [`validation`] against theory and experiments, `comparison` bakes and renders a scene with two solvers.
 //!
 //! A further kind is one file here that implements `engine::Kind`, its parser in [`scene::study`](crate::scene::study), and
 //! a line in [`study`].
 
+mod claim;
 mod comparison;
 mod engine;
 mod error;
 mod report;
 pub mod stability;
 mod sweep;
+pub mod validation;
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
@@ -113,6 +115,7 @@ pub fn study(
         Study::SolverComparison(comparison) => &**comparison,
         Study::Sweep(sweep) => &**sweep,
         Study::Stability(stability) => &**stability,
+        Study::Validation(validation) => &**validation,
     };
     let mut bench = Bench {
         request,
@@ -122,6 +125,7 @@ pub fn study(
         count: kind.count(),
         number: 0,
     };
+    claim::take(&request.directory, &request.name)?;
     match kind.run(&mut bench) {
         Ok(report) => report.write(request),
         Err(StudyError::Stopped) => Ok(Outcome::default()),

@@ -2,6 +2,7 @@
 
 pub mod adapter;
 pub mod buffer;
+mod edited;
 pub mod program;
 pub mod raster;
 pub mod recording;

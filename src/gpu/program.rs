@@ -7,8 +7,10 @@ use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 use super::{
     adapter::{Context, GpuError, Spoil},
     buffer::{Buf, Element, Held, Wanted, Windows},
+    edited,
     raster::RasterPass,
-    reflect::{Access, Binding, Reflection, Stage, reflect},
+    reflect::{Access, Binding, Reflection, Stage, reflect, reflect_at},
+    shader::Composed,
 };
 
 /// A buffer to be.
@@ -79,7 +81,7 @@ impl Program {
         check_sizes(context, buffers)?;
         let passes = passes
             .iter()
-            .map(|spec| Ok((spec.name, compile(context, spec, shared)?)))
+            .map(|spec| Ok((spec.name, compile(context, spec, shared, buffers)?)))
             .collect::<Result<_, GpuError>>()?;
         let buffers = buffers
             .iter()
@@ -106,7 +108,7 @@ impl Program {
         check_sizes(&self.context, buffers)?;
         for spec in passes {
             if !self.passes.contains_key(spec.name) {
-                let pass = compile(&self.context, spec, &self.shared)?;
+                let pass = compile(&self.context, spec, &self.shared, buffers)?;
                 self.passes.insert(spec.name, pass);
             }
         }
@@ -283,13 +285,13 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
 }
 
 /// WGSL of a pass, with the context's fault where it is one of this pass.
-fn source(context: &Context, name: &str, defines: &[&str]) -> Result<String, GpuError> {
-    let composed = context.shaders.compose(name, defines);
-    let source = composed.map_err(|error| context.shaders.blamed(error))?;
-    match context.spoil.filter(|spoil| spoil.pass == name) {
-        Some(spoil) => spoiled(&source, &spoil),
-        None => Ok(source),
+fn source(context: &Context, name: &str, defines: &[&str]) -> Result<Composed, GpuError> {
+    let composed = context.shaders.compose_with_places(name, defines);
+    let mut source = composed.map_err(|error| context.shaders.blamed(error))?;
+    if let Some(spoil) = context.spoil.filter(|spoil| spoil.pass == name) {
+        source.text = spoiled(&source.text, &spoil)?;
     }
+    Ok(source)
 }
 
 fn spoiled(source: &str, spoil: &Spoil) -> Result<String, GpuError> {
@@ -352,13 +354,27 @@ pub(super) fn checked<T>(
     }
 }
 
-/// Composes and reflects the shader of pass `name`.
+/// Composes and reflects the shader of pass `name`, of a program with these buffers.
 ///
 /// # Errors
 /// [`GpuError::Shader`]; [`GpuError::NoF64`].
-pub(super) fn shader(context: &Context, name: &str, defines: &[&str]) -> Result<Shader, GpuError> {
+pub(super) fn shader(
+    context: &Context,
+    name: &str,
+    defines: &[&str],
+    buffers: &[BufferSpec],
+) -> Result<Shader, GpuError> {
     let source = source(context, name, defines)?;
-    let reflection = reflect(name, &source).map_err(|error| context.shaders.blamed(error))?;
+    let blamed = |error| context.shaders.blamed(error);
+    let place = |line| source.place(line);
+    let reflection = reflect_at(name, &source.text, &place).map_err(blamed)?;
+    if let Some(shipped) = context.shaders.shipped_beside() {
+        let known = reflect(name, &shipped.compose(name, defines)?)?;
+        edited::check(&reflection, &known, buffers).map_err(|message| {
+            let name = name.to_owned();
+            blamed(GpuError::Shader { name, message })
+        })?;
+    }
     if reflection.has_f64 && !context.has_f64 {
         return Err(GpuError::NoF64 {
             adapter: context.info.name.clone(),
@@ -386,7 +402,7 @@ pub(super) fn shader(context: &Context, name: &str, defines: &[&str]) -> Result<
         });
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(name),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
+            source: wgpu::ShaderSource::Wgsl(source.text.into()),
         };
         let checks = wgpu::ShaderRuntimeChecks {
             force_loop_bounding: false,
@@ -414,16 +430,18 @@ fn compile(
     context: &Context,
     spec: &PassSpec,
     shared: &[(&'static str, f64)],
+    buffers: &[BufferSpec],
 ) -> Result<Pass, GpuError> {
-    compile_own(context, spec, shared).map_err(|error| context.shaders.blamed(error))
+    compile_own(context, spec, shared, buffers).map_err(|error| context.shaders.blamed(error))
 }
 
 fn compile_own(
     context: &Context,
     spec: &PassSpec,
     shared: &[(&'static str, f64)],
+    buffers: &[BufferSpec],
 ) -> Result<Pass, GpuError> {
-    let shader = shader(context, spec.name, &spec.defines)?;
+    let shader = shader(context, spec.name, &spec.defines, buffers)?;
     let reflection = shader.reflection;
     let declared = |name: &str| reflection.overrides.iter().any(|constant| constant == name);
     let mut constants = spec.constants.clone();

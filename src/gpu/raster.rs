@@ -101,7 +101,7 @@ impl Program {
 }
 
 fn compile(context: &Context, spec: &RasterSpec) -> Result<RasterPass, GpuError> {
-    let shader = shader(context, spec.name, &[])?;
+    let shader = shader(context, spec.name, &[], &[])?;
     let has_fragment = match shader.reflection.stage {
         Stage::Raster { has_fragment } if has_fragment != spec.colours.is_empty() => has_fragment,
         stage => {

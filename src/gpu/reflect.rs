@@ -2,6 +2,8 @@
 //!
 //! Bind groups are built from this, so no binding list is typed by hand.
 
+use std::error::Error as _;
+
 use naga::{
     AddressSpace, ImageClass, ImageDimension, ScalarKind, ShaderStage, StorageAccess, TypeInner,
 };
@@ -196,19 +198,52 @@ fn access(module: &naga::Module, variable: &naga::GlobalVariable) -> Option<Acce
 /// [`GpuError::Shader`] where it does not parse or validate, has other entry points, binds outside group 0, or binds
 /// anything but what [`Access`] lists.
 pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
+    reflect_at(name, wgsl, &|line| format!("line {line}"))
+}
+
+/// [`reflect`] of a text whose lines stand where `place` says: faults name places, of lines from 1.
+pub(super) fn reflect_at(
+    name: &str,
+    wgsl: &str,
+    place: &dyn Fn(usize) -> String,
+) -> Result<Reflection, GpuError> {
     let fault = |message: String| GpuError::Shader {
         name: name.to_owned(),
         message,
     };
-    let module =
-        naga::front::wgsl::parse_str(wgsl).map_err(|error| fault(error.emit_to_string(wgsl)))?;
+    let located = |message: String, labels: Vec<(naga::Span, String)>, notes: Vec<String>| {
+        let label = |(span, label): &(naga::Span, String)| {
+            let at = span.location(wgsl);
+            let line = at.line_number as usize;
+            let text = wgsl.lines().nth(line - 1).unwrap_or_default().trim();
+            format!("\n  {}: {label}: {text}", place(line))
+        };
+        let labels = labels
+            .iter()
+            .filter(|(span, _)| span.is_defined())
+            .map(label);
+        let notes = notes.iter().map(|note| format!("\n  {note}"));
+        fault(message + &labels.chain(notes).collect::<String>())
+    };
+    let module = naga::front::wgsl::parse_str(wgsl).map_err(|error| {
+        let labels = error.labels().map(|(span, label)| (span, label.to_owned()));
+        let notes = error.notes().map(str::to_owned).collect();
+        located(error.message().to_owned(), labels.collect(), notes)
+    })?;
     let mut validator = naga::valid::Validator::new(
         naga::valid::ValidationFlags::all(),
         naga::valid::Capabilities::default() | naga::valid::Capabilities::FLOAT64,
     );
-    validator
-        .validate(&module)
-        .map_err(|error| fault(error.emit_to_string(wgsl)))?;
+    validator.validate(&module).map_err(|error| {
+        let mut causes = Vec::new();
+        let mut next = error.as_inner().source();
+        while let Some(cause) = next {
+            causes.push(cause.to_string());
+            next = cause.source();
+        }
+        let labels = error.spans().cloned().collect();
+        located(error.as_inner().to_string(), labels, causes)
+    })?;
     let stage = stage(&module).ok_or_else(|| {
         let count = module.entry_points.len();
         fault(format!("{count} entry points, which are no pass"))

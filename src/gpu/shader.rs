@@ -53,6 +53,26 @@ pub struct Shaders {
     hash: Option<Arc<str>>,
 }
 
+/// WGSL of a pass, and where its lines stand.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Composed {
+    pub(super) text: String,
+    files: Vec<String>,
+    /// Of each line of the text the index of its file and its line there, from 1.
+    places: Vec<(usize, usize)>,
+}
+
+impl Composed {
+    /// Where a line of the text stands, from 1: `shared/walls.wgsl:12`.
+    pub(super) fn place(&self, line: usize) -> String {
+        let place = line.checked_sub(1).and_then(|index| self.places.get(index));
+        place.map_or_else(
+            || format!("line {line}"),
+            |&(file, line)| format!("{}:{line}", self.files[file]),
+        )
+    }
+}
+
 /// What is wrong with a folder of edited shaders.
 #[derive(Debug, thiserror::Error)]
 pub enum ShadersError {
@@ -134,9 +154,19 @@ impl Shaders {
     /// # Errors
     /// A file that does not exist, or a condition that does not close.
     pub fn compose(&self, name: &str, defines: &[&str]) -> Result<String, GpuError> {
-        let mut out = String::new();
+        self.compose_with_places(name, defines)
+            .map(|composed| composed.text)
+    }
+
+    /// [`Self::compose`], with the place of each line in its file.
+    pub(super) fn compose_with_places(
+        &self,
+        name: &str,
+        defines: &[&str],
+    ) -> Result<Composed, GpuError> {
+        let mut out = Composed::default();
         let mut seen = BTreeSet::new();
-        self.append(&format!("{name}.wgsl"), defines, &mut seen, &mut out)?;
+        self.append(&format!("{name}.wgsl"), None, defines, &mut seen, &mut out)?;
         Ok(out)
     }
 
@@ -150,6 +180,11 @@ impl Shaders {
         }
     }
 
+    /// The shipped ones, where these are edited.
+    pub(super) fn shipped_beside(&self) -> Option<Self> {
+        self.hash.is_some().then_some(Self::SHIPPED)
+    }
+
     fn source(&self, path: &str) -> Option<&str> {
         match &self.files {
             Some(files) => files.get(path).map(String::as_str),
@@ -159,9 +194,10 @@ impl Shaders {
     fn append(
         &self,
         path: &str,
+        importer: Option<&str>,
         defines: &[&str],
         seen: &mut BTreeSet<String>,
-        out: &mut String,
+        out: &mut Composed,
     ) -> Result<(), GpuError> {
         if !seen.insert(path.to_owned()) {
             return Ok(());
@@ -170,7 +206,15 @@ impl Shaders {
             name: path.to_owned(),
             message: format!("line {line}: {what}"),
         };
-        let text = self.source(path).ok_or_else(|| fault(0, "no such file"))?;
+        let text = self.source(path).ok_or_else(|| GpuError::Shader {
+            name: path.to_owned(),
+            message: match importer {
+                Some(place) => format!("no such file, and {place} imports it"),
+                None => "no such file".to_owned(),
+            },
+        })?;
+        let file = out.files.len();
+        out.files.push(path.to_owned());
         let mut open: Vec<(usize, bool)> = Vec::new();
         for (index, line) in text.lines().enumerate() {
             let mut words = line.split_whitespace();
@@ -178,7 +222,10 @@ impl Shaders {
             let argument = words.next().unwrap_or("").trim_matches('"');
             let live = open.iter().all(|&(_, on)| on);
             match directive {
-                "#import" if live => self.append(argument, defines, seen, out)?,
+                "#import" if live => {
+                    let place = format!("{path}:{}", index + 1);
+                    self.append(argument, Some(&place), defines, seen, out)?;
+                }
                 "#import" => {}
                 "#ifdef" => open.push((index + 1, defines.contains(&argument))),
                 "#ifndef" => open.push((index + 1, !defines.contains(&argument))),
@@ -191,8 +238,9 @@ impl Shaders {
                         .ok_or_else(|| fault(index + 1, "#endif without #ifdef"))?;
                 }
                 _ if live => {
-                    out.push_str(line);
-                    out.push('\n');
+                    out.text.push_str(line);
+                    out.text.push('\n');
+                    out.places.push((file, index + 1));
                 }
                 _ => {}
             }

@@ -1,36 +1,75 @@
 //! Cells, the order of particles in them, and who is within reach of whom.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::domain::bounds::cells_over;
+use crate::domain::period::Period;
 
 /// Particles whose neighbours one task lists.
 const BLOCK: usize = 512;
 
-/// Cells of one edge length over a box at the origin; x is fastest.
+/// Cells over a box at the origin; x is fastest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cells {
     /// Along x, y, z.
     pub dims: [usize; 3],
     /// Metres.
-    pub edge: f64,
+    pub edge: DVec3,
+    /// Of the box, where it joins its own end.
+    pub period: Period,
 }
 
 impl Cells {
     /// Cells that cover a box of `size` metres.
     pub fn new(size: DVec3, edge: f64) -> Self {
+        Self::periodic(size, edge, Period::default())
+    }
+
+    /// The same where the box joins its own end.
+    pub fn periodic(size: DVec3, edge: f64, period: Period) -> Self {
+        let dims = period.cells(size, edge);
         Self {
-            dims: cells_over(size, edge).to_array().map(|n| n as usize),
-            edge,
+            dims: dims.map(|n| n as usize),
+            edge: period.edges(dims, edge),
+            period,
         }
     }
 
-    /// The cell of a point; outside the box the nearest.
+    /// The cell of a point; outside the box the nearest, or that of its image.
     pub fn coordinate(&self, x: DVec3) -> [usize; 3] {
         let cell = (x / self.edge).floor().to_array();
-        // A cast saturates: what is below 0 becomes 0.
-        std::array::from_fn(|axis| (cell[axis] as usize).min(self.dims[axis] - 1))
+        std::array::from_fn(|axis| match self.joins(axis) {
+            true => cell[axis].rem_euclid(self.dims[axis] as f64) as usize,
+            // A cast saturates: what is below 0 becomes 0.
+            false => (cell[axis] as usize).min(self.dims[axis] - 1),
+        })
+    }
+
+    /// Whether the last cell along an axis lies beside the first.
+    fn joins(&self, axis: usize) -> bool {
+        self.period.0[axis] > 0.0
+    }
+
+    /// The cells about that of a point, it among them, as runs of their places.
+    pub fn runs(&self, x: DVec3) -> impl Iterator<Item = Range<usize>> + use<> {
+        let ([cx, cy, cz], [nx, ny, nz]) = (self.coordinate(x), self.dims);
+        let beside = |axis: usize, at: usize, count: usize| match self.joins(axis) {
+            true => [at + count - 1, at, at + 1].map(|k| k % count..k % count + 1),
+            // One run, and two that are empty.
+            false => [at.saturating_sub(1)..(at + 2).min(count), 0..0, 0..0],
+        };
+        let [along, rows, layers] = [(0, cx, nx), (1, cy, ny), (2, cz, nz)]
+            .map(|(axis, at, count)| beside(axis, at, count));
+        layers.into_iter().flatten().flat_map(move |z| {
+            let (rows, along) = (rows.clone(), along.clone());
+            rows.into_iter().flatten().flat_map(move |y| {
+                let row = (z * ny + y) * nx;
+                let found = along.clone().into_iter().filter(|run| !run.is_empty());
+                found.map(move |run| row + run.start..row + run.end)
+            })
+        })
     }
 
     /// Its place in x-fastest order.
@@ -100,18 +139,27 @@ impl Neighbors {
             (0, fluid, crowd.cells.starts(fluid)),
             (crowd.particles, solid, crowd.cells.starts(solid)),
         ];
-        let [nx, ny, nz] = crowd.cells.dims;
+        let period = crowd.cells.period;
         Self::listed(crowd.particles, |i, members| {
-            let [cx, cy, cz] = crowd.cells.coordinate(crowd.points[i]);
-            let (low, high) = (cx.saturating_sub(1), (cx + 1).min(nx - 1));
+            let x = crowd.points[i];
             groups.each_ref().map(|(first, points, starts)| {
-                for z in cz.saturating_sub(1)..=(cz + 1).min(nz - 1) {
-                    for y in cy.saturating_sub(1)..=(cy + 1).min(ny - 1) {
-                        let row = (z * ny + y) * nx;
-                        let run = starts[row + low]..starts[row + high + 1];
-                        let first = first + run.start;
-                        append_near(crowd.points[i], radius, &points[run], first, i, members);
+                let begin = members.len();
+                for cells in crowd.cells.runs(x) {
+                    let run = starts[cells.start]..starts[cells.end];
+                    let first = first + run.start;
+                    if period == Period::default() {
+                        append_near(x, radius, &points[run], first, i, members);
+                    } else {
+                        let near = |x: DVec3| period.shortest(x).length_squared() < radius * radius;
+                        let found = run
+                            .zip(first..)
+                            .filter(|(k, j)| *j != i && near(x - points[*k]));
+                        members.extend(found.map(|(_, j)| j as u32));
                     }
+                }
+                // Runs across a joint come before those that they follow.
+                if period != Period::default() {
+                    members[begin..].sort_unstable();
                 }
                 members.len() as u32
             })
@@ -123,7 +171,8 @@ impl Neighbors {
         let x = crowd.points;
         Self::listed(crowd.particles, |i, members| {
             [0..crowd.particles, crowd.particles..x.len()].map(|group| {
-                let near = |&j: &usize| j != i && x[i].distance_squared(x[j]) < radius * radius;
+                let r2 = |j: usize| crowd.cells.period.shortest(x[i] - x[j]).length_squared();
+                let near = |&j: &usize| j != i && r2(j) < radius * radius;
                 members.extend(group.filter(near).map(|j| j as u32));
                 members.len() as u32
             })
@@ -219,6 +268,41 @@ mod tests {
         (1..=count)
             .map(|k| size * DVec3::new(radical(k, 2), radical(k, 3), radical(k, 5)))
             .collect()
+    }
+
+    /// In a slab of three cells, and along x and z as well.
+    #[test]
+    fn search_goes_on_across_a_joint() {
+        let size = DVec3::new(2.3, 0.9, 0.63);
+        for axes in [DVec3::Z, DVec3::new(1.0, 0.0, 1.0), DVec3::ONE] {
+            let period = Period(size * axes);
+            let cells = Cells::periodic(size, 0.2, period);
+            let points = halton(900, size);
+            let id: Vec<u32> = (0..points.len() as u32).collect();
+            let order = cells.order(&points, &id).into_iter();
+            let points: Vec<DVec3> = order.map(|k| points[k]).collect();
+            let crowd = Crowd {
+                cells,
+                points: &points,
+                particles: points.len(),
+            };
+            let (fast, slow) = (
+                Neighbors::search(&crowd, 0.2),
+                Neighbors::naive(&crowd, 0.2),
+            );
+            for i in 0..points.len() {
+                assert_eq!(fast.of(i), slow.of(i), "particle {i}");
+            }
+            // With walls there, some are not found.
+            let walled = Crowd {
+                cells: Cells {
+                    period: Period::default(),
+                    ..cells
+                },
+                ..crowd
+            };
+            assert!(Neighbors::search(&walled, 0.2).pairs() < slow.pairs());
+        }
     }
 
     /// An even cloud, one that is packed into a corner, and one that reaches out of the box.

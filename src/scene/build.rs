@@ -12,7 +12,7 @@ use super::{
     error::SceneError,
     grids, keep,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
-    no_slip, origin, probe,
+    no_slip, origin, periodic, probe,
     spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
     wave_maker,
     words::{chain, extent, shown, shown_all},
@@ -48,8 +48,11 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let shot = spec.shot;
     let domain = domain(doc, &spec.domain)?;
     let (solver, lattice) = solver::solver(doc, spec.solver, &domain)?;
-    let no_slip = no_slip::build(doc, &spec.domain, solver.method)?;
+    let periodic = periodic::read(doc, &spec.domain.periodic)?;
+    periodic::check_solver(doc, periodic, &domain, &solver)?;
+    let no_slip = no_slip::build(doc, &spec.domain, solver.method, periodic)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
+    periodic::check_gravity(doc, periodic, water.gravity)?;
     check_particle_count(doc, &water, &domain, &lattice)?;
     let around = wave_maker::Surroundings {
         base_dir,
@@ -59,13 +62,28 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         shot: &shot,
     };
     let (solids, moving_solids) = solids(doc, &spec.solid, &around, &solver)?;
+    let moves = |spec: &MeshSpec| spec.motion.is_some();
+    let moving = (0..spec.solid.len()).filter(|&k| moves(&spec.solid[k]));
+    let moving: Vec<usize> = moving.collect();
+    periodic::check_solids(doc, periodic, &moving_solids, |k| moving[k])?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
+    periodic::check_makers(doc, periodic, &wave_makers)?;
     let grids = match &spec.grids {
         Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
         None => None,
     };
     let keep = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
-    let probes = probe::build_all(doc, &spec.probe, &domain, &solver)?;
+    let moves = |solid: &MeshSpec| solid.direction.is_some() && solid.motion.is_some();
+    let is_moving: Vec<bool> = spec.solid.iter().map(moves).collect();
+    let around = probe::Around {
+        domain: &domain,
+        shot: &shot,
+        solver: &solver,
+        solids: &solids,
+        moving: &moving_solids,
+        is_moving: &is_moving,
+    };
+    let probes = probe::build_all(doc, &spec.probe, &around)?;
     let motions = (wave_makers.iter().map(|maker| &maker.motion))
         .chain(moving_solids.iter().map(|solid| &solid.motion));
     let duration = shot.duration();
@@ -80,6 +98,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         origin: origin::of(&domain),
         domain,
         no_slip,
+        periodic,
         water,
         solids,
         moving_solids,

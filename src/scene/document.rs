@@ -12,7 +12,7 @@ use toml::{
 
 use super::{
     error::{Fault, Place, SceneError},
-    key::{self, Key},
+    key::{self, Key, Kind},
     overrides,
     reach::Reach,
     words::plain_types,
@@ -285,6 +285,13 @@ impl<'a> Document<'a> {
     /// The problem, and what the key at a path allows.
     pub(super) fn with_allowed(&self, problem: String, path: &str) -> String {
         match key::find(self.keys, path) {
+            Some(Key {
+                kind: Kind::Tables(_),
+                ..
+            }) => {
+                let name = without_indices(path);
+                format!("{problem}; allowed: an array of tables [[{name}]]")
+            }
             Some(key) => format!("{problem}; allowed: {}", key.allowed()),
             None => problem,
         }
@@ -320,6 +327,14 @@ fn table_name(table: &str) -> Option<String> {
         table if table.contains('[') => Some(table.to_owned()),
         table => Some(format!("[{table}]")),
     }
+}
+
+/// `water.block` of `water.block[3]`.
+fn without_indices(path: &str) -> String {
+    let parts = path
+        .split('.')
+        .map(|part| part.split('[').next().unwrap_or(part));
+    parts.collect::<Vec<_>>().join(".")
 }
 
 /// Words between backticks.

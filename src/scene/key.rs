@@ -300,13 +300,24 @@ impl Key {
     /// What its value may be, in words, and what holds where it is left out and no other key says it.
     pub(super) fn allowed(&self) -> String {
         match self.default {
-            LeftOut::Computed(default) => format!("{}; {} if left out", self.values(), default()),
-            _ => self.values(),
+            LeftOut::Computed(default) => {
+                format!("{}; {} if left out", self.values_here(), default())
+            }
+            _ => self.values_here(),
         }
     }
 
-    /// What its value may be, in words.
+    /// What its value may be, in words, and with which values of another key it goes.
     pub(super) fn values(&self) -> String {
+        self.words(self.only)
+    }
+
+    /// What its value may be, where the keys that it goes with stand.
+    fn values_here(&self) -> String {
+        self.words(None)
+    }
+
+    fn words(&self, only: Option<(&str, &[&str])>) -> String {
         let mut words = self.kind.words(self.name);
         if !self.unit.is_empty() {
             words += &format!(", {}", self.unit);
@@ -317,7 +328,7 @@ impl Key {
         if !self.without.is_empty() {
             words += &format!(", not together with {}", list(self.without, "or"));
         }
-        if let Some((key, among)) = self.only {
+        if let Some((key, among)) = only {
             words += &format!(", with {key} = {}", list(&quoted(among), "or"));
         }
         words += self.also;

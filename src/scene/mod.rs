@@ -3,11 +3,13 @@
 pub mod budget;
 pub mod effects;
 pub mod flip;
+mod force;
 pub mod grids;
 pub mod keys;
 pub mod look;
 pub mod moving_solid;
 pub mod no_slip;
+pub mod periodic;
 pub mod probe;
 pub mod step;
 pub mod study;
@@ -56,6 +58,8 @@ pub struct Scene {
     pub domain: Bounds,
     /// Walls that hold water back, each once; along the others it slides freely.
     pub no_slip: Vec<Wall>,
+    /// Axes along which it has no walls but joins its own end.
+    pub periodic: [bool; 3],
     /// The water at the start.
     pub water: Water,
     /// Static solids.
@@ -125,6 +129,11 @@ impl Shot {
         1.0 / self.frames_per_second
     }
 
+    /// When a frame ends, seconds from the start.
+    pub fn time(&self, frame: u32) -> f64 {
+        f64::from(frame) / self.frames_per_second
+    }
+
     /// Seconds from the start to the last frame.
     pub fn duration(&self) -> f64 {
         f64::from(self.frames) / self.frames_per_second
@@ -144,6 +153,13 @@ pub struct Water {
     pub meshes: Vec<PlacedMesh>,
     /// Particles at places of their own.
     pub particles: Vec<Swarm>,
+}
+
+impl Water {
+    /// How pressure rises in water at rest: ρ g, Pa/m.
+    pub fn rise(&self) -> DVec3 {
+        self.rest_density * self.gravity
+    }
 }
 
 /// Particles that the scene places one by one; they are taken as they are, also where others stand.

@@ -13,11 +13,12 @@ impl Scene {
     }
 }
 
-/// The walls that `domain.walls` or `domain.no_slip` names, in the order of [`Wall::NAMED`].
+/// The walls that `domain.walls` or `domain.no_slip` names, in the order of [`Wall::NAMED`]; a periodic axis has none.
 pub(super) fn build(
     doc: &Document<'_>,
     spec: &DomainSpec,
     method: Method,
+    periodic: [bool; 3],
 ) -> Result<Vec<Wall>, SceneError> {
     let is_all = spec.walls.as_deref() == Some(WALLS[1]);
     let all = Wall::NAMED.iter().map(|&(_, wall)| wall);
@@ -32,6 +33,15 @@ pub(super) fn build(
     if !is_all && walls.len() < spec.no_slip.len() {
         return Err(doc.fault_of(key, "a wall stands there twice"));
     }
+    let is_none = |wall: &Wall| periodic[wall.axis];
+    if let Some(wall) = walls.iter().find(|wall| !is_all && is_none(wall)) {
+        let problem = format!(
+            "there is no wall {}: domain.periodic joins both ends",
+            wall.name()
+        );
+        return Err(doc.fault_of_plain(key, problem));
+    }
+    let walls: Vec<Wall> = walls.into_iter().filter(|wall| !is_none(wall)).collect();
     if method == Method::Pbf && !walls.is_empty() {
         let problem = "solver pbf has free-slip walls alone; choose solver.method = \"flip\"";
         return Err(doc.fault_of_plain(key, problem));

@@ -52,7 +52,7 @@ impl Scene {
         for probe in &mut self.probes {
             match &mut probe.kind {
                 ProbeKind::Elevation { at } => *at += DVec2::new(way.x, way.z),
-                ProbeKind::Pressure { at } => *at += way,
+                ProbeKind::Pressure { at } | ProbeKind::Force { about: at, .. } => *at += way,
                 ProbeKind::Flux { towards, at } => *at += way[towards.axis],
                 ProbeKind::Energy
                 | ProbeKind::Volume

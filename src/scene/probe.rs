@@ -4,9 +4,10 @@ use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
 use super::{
-    Iteration, Method, Solver, Wall, document::Document, error::SceneError, words::extent,
+    Iteration, Method, PlacedMesh, Scene, Shot, Solver, Wall, document::Document,
+    error::SceneError, moving_solid::MovingSolid, words::extent,
 };
-use crate::domain::{bounds::Bounds, sparse_grid::EDGE, surface::MAX_BRICKS};
+use crate::domain::{bounds::Bounds, probe::Rate, sparse_grid::EDGE, surface::MAX_BRICKS};
 
 /// A gauge that has a CSV of its own in the cache.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +16,10 @@ pub struct Probe {
     pub name: String,
     /// What it measures.
     pub kind: ProbeKind,
+    /// How often.
+    pub rate: Rate,
+    /// Seconds up to each look over which the mean, the least and the greatest value are given too.
+    pub window: Option<f64>,
 }
 
 /// What a probe measures.
@@ -53,6 +58,43 @@ pub enum ProbeKind {
         /// Where the plane crosses the axis, metres.
         at: f64,
     },
+    /// Force of the pressure on a solid or a wall, and its moment.
+    Force {
+        /// Who bears it.
+        on: Bearer,
+        /// Where the moment is taken about, metres.
+        about: DVec3,
+    },
+}
+
+/// What bears a force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bearer {
+    /// A solid by its number in [`Scene::solids`].
+    Solid(usize),
+    /// A solid by its number in [`Scene::moving_solids`].
+    MovingSolid(usize),
+    /// A face of the domain, with its wave maker.
+    Wall(Wall),
+}
+
+impl Bearer {
+    /// As a scene names it whose solids at rest stand before those that move: a number, or a wall's name.
+    pub fn name(self, scene: &Scene) -> String {
+        match self {
+            Self::Solid(index) => index.to_string(),
+            Self::MovingSolid(index) => (scene.solids.len() + index).to_string(),
+            Self::Wall(wall) => wall.name().to_owned(),
+        }
+    }
+}
+
+/// A bearer as a scene names it.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged)]
+enum BearerSpec {
+    Number(usize),
+    Wall(Wall),
 }
 
 /// Of a front where the scene does not say: spray ahead of a breaking wave is less than the rest.
@@ -67,7 +109,7 @@ pub(super) fn quantile_words() -> String {
 
 impl ProbeKind {
     /// Names that scenes use.
-    pub(super) const NAMES: [&str; 7] = [
+    pub(super) const NAMES: [&str; 8] = [
         "elevation",
         "pressure",
         "energy",
@@ -75,6 +117,7 @@ impl ProbeKind {
         "front",
         "run_up",
         "flux",
+        "force",
     ];
 
     /// As scenes name it.
@@ -87,6 +130,7 @@ impl ProbeKind {
             Self::Front { .. } => 4,
             Self::RunUp { .. } => 5,
             Self::Flux { .. } => 6,
+            Self::Force { .. } => 7,
         }]
     }
 
@@ -100,15 +144,26 @@ impl ProbeKind {
             Self::Front { .. } => &["front_m"],
             Self::RunUp { .. } => &["run_up_m"],
             Self::Flux { .. } => &["flux_m3/s"],
+            Self::Force { .. } => &[
+                "force_x_N",
+                "force_y_N",
+                "force_z_N",
+                "moment_x_Nm",
+                "moment_y_Nm",
+                "moment_z_Nm",
+            ],
         }
     }
 
-    /// World coordinates of its point, metres: x and z, or x, y and z, or that of a plane, or none. `origin` is the
+    /// World coordinates of its point, metres: x and z, or x, y and z, or that of a plane, or none; of a force what its
+    /// moment is about. `origin` is the
     /// scene's.
     pub fn at(self, origin: DVec3) -> Vec<f64> {
         match self {
             Self::Elevation { at } => (at + DVec2::new(origin.x, origin.z)).to_array().to_vec(),
-            Self::Pressure { at } => (at + origin).to_array().to_vec(),
+            Self::Pressure { at } | Self::Force { about: at, .. } => {
+                (at + origin).to_array().to_vec()
+            }
             Self::Flux { towards, at } => vec![at + origin[towards.axis]],
             Self::Energy | Self::Volume | Self::Front { .. } | Self::RunUp { .. } => Vec::new(),
         }
@@ -139,32 +194,59 @@ pub(super) struct ProbeSpec {
     at: Option<Vec<f64>>,
     axis: Option<Wall>,
     quantile: Option<f64>,
+    #[serde(default)]
+    rate_hz: Rate,
+    window: Option<f64>,
+    solid: Option<BearerSpec>,
+    about: Option<[f64; 3]>,
+}
+
+/// What of a scene its probes are held against.
+pub(super) struct Around<'a> {
+    pub(super) domain: &'a Bounds,
+    pub(super) shot: &'a Shot,
+    pub(super) solver: &'a Solver,
+    pub(super) solids: &'a [PlacedMesh],
+    pub(super) moving: &'a [MovingSolid],
+    /// Of the scene's solids in its own order, whether each moves.
+    pub(super) is_moving: &'a [bool],
 }
 
 /// Builds all of them. A probe without a name is called by its kind and its place among those of its kind.
 pub(super) fn build_all(
     doc: &Document<'_>,
     specs: &[ProbeSpec],
-    domain: &Bounds,
-    solver: &Solver,
+    around: &Around<'_>,
 ) -> Result<Vec<Probe>, SceneError> {
+    let Around {
+        domain,
+        shot,
+        solver,
+        ..
+    } = *around;
     let mut probes = Vec::<Probe>::new();
     for (index, spec) in specs.iter().enumerate() {
         let path = format!("probe[{index}]");
-        let kind = kind(doc, &path, spec, domain)?;
+        let kind = kind(doc, &path, spec, around)?;
         let unfit = match kind {
             ProbeKind::Pressure { .. } => why_no_pressure(solver),
             ProbeKind::Volume => why_no_volume(domain, solver),
+            ProbeKind::Force { .. } => why_no_force(solver),
             _ => None,
         };
         if let Some(problem) = unfit {
             return Err(doc.fault_of(&format!("{path}.kind"), problem));
+        }
+        if let Some(problem) = why_not_so_often(spec.rate_hz, shot, solver) {
+            return Err(doc.fault_of(&format!("{path}.rate_hz"), problem));
         }
         let alike = probes.iter().filter(|p| p.kind.name() == kind.name());
         let default = || format!("{}-{}", kind.name(), alike.count() + 1);
         let probe = Probe {
             name: spec.name.clone().unwrap_or_else(default),
             kind,
+            rate: spec.rate_hz,
+            window: spec.window,
         };
         let is_alike = |known: &&Probe| known.name.eq_ignore_ascii_case(&probe.name);
         if let Some(known) = probes.iter().find(is_alike) {
@@ -193,8 +275,9 @@ fn kind(
     doc: &Document<'_>,
     path: &str,
     spec: &ProbeSpec,
-    domain: &Bounds,
+    around: &Around<'_>,
 ) -> Result<ProbeKind, SceneError> {
+    let domain = around.domain;
     let fault = |problem: String| doc.fault_of(&format!("{path}.at"), problem);
     let given = spec.at.as_deref().unwrap_or_default();
     let wrong = |count: usize| {
@@ -234,6 +317,7 @@ fn kind(
             point[towards.axis] = at;
             (ProbeKind::Flux { towards, at }, point)
         }
+        "force" => (force(doc, path, spec, around)?, domain.min),
         other => {
             let kind = match other {
                 "energy" => ProbeKind::Energy,
@@ -257,6 +341,81 @@ fn kind(
         "{given:?} is outside of the domain, which reaches over {all}"
     )))
 }
+
+/// Who bears a force, and what its moment is about: the middle of that at the start where the table does not say.
+fn force(
+    doc: &Document<'_>,
+    path: &str,
+    spec: &ProbeSpec,
+    around: &Around<'_>,
+) -> Result<ProbeKind, SceneError> {
+    let fault = |problem: &str| doc.fault_of(&format!("{path}.solid"), problem.to_owned());
+    let (on, bounds) = match spec.solid {
+        None => return Err(fault("missing")),
+        Some(BearerSpec::Wall(wall)) => {
+            let mut face = *around.domain;
+            if wall.is_max {
+                face.min[wall.axis] = face.max[wall.axis];
+            } else {
+                face.max[wall.axis] = face.min[wall.axis];
+            }
+            (Bearer::Wall(wall), Some(face))
+        }
+        Some(BearerSpec::Number(number)) => {
+            let Some((&moves, before)) = around
+                .is_moving
+                .get(..=number)
+                .and_then(<[bool]>::split_last)
+            else {
+                let count = around.is_moving.len();
+                return Err(fault(&format!(
+                    "{number}: the scene has {count} [[solid]], which count from 0"
+                )));
+            };
+            let index = before.iter().filter(|&&other| other == moves).count();
+            if moves {
+                let mesh = &around.moving[index].placed.mesh;
+                (Bearer::MovingSolid(index), mesh.bounds())
+            } else {
+                (Bearer::Solid(index), around.solids[index].mesh.bounds())
+            }
+        }
+    };
+    let middle = |bounds: Bounds| 0.5 * (bounds.min + bounds.max);
+    let about = spec.about.map(DVec3::from_array);
+    let about = about.or(bounds.map(middle)).unwrap_or_default();
+    Ok(ProbeKind::Force { on, about })
+}
+
+/// A pressure on particles is none on faces.
+fn why_no_force(solver: &Solver) -> Option<String> {
+    (solver.method == Method::Pbf).then(|| {
+        "solver pbf has no pressure on faces that a force could be summed from; choose solver.method = \"flip\""
+            .to_owned()
+    })
+}
+
+/// A look is at a substep's end, so there are at most as many as substeps.
+fn why_not_so_often(rate: Rate, shot: &Shot, solver: &Solver) -> Option<String> {
+    let Rate::Hertz(rate) = rate else {
+        return None;
+    };
+    let most = match solver.method {
+        Method::Pbf => solver.pbf().max_substeps,
+        Method::Flip => solver.flip().max_substeps,
+    };
+    let highest = shot.frames_per_second * f64::from(most);
+    let is_possible = LEAST_RATE <= rate && rate <= highest;
+    (!is_possible).then(|| {
+        format!(
+            "{rate} a second; from {LEAST_RATE} to {highest} are possible: shot.frames_per_second × solver.{}.max_substeps",
+            solver.method.name()
+        )
+    })
+}
+
+/// Hz: a look in a quarter of an hour.
+const LEAST_RATE: f64 = 1e-3;
 
 /// PBF's pressure is the sum of its multipliers, which says all only where corrections are λ's and nothing else.
 fn why_no_pressure(solver: &Solver) -> Option<String> {

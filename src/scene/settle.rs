@@ -46,6 +46,10 @@ impl Table<'_, '_> {
     fn settle<'v>(&self, values: &mut DeTable<'v>) -> Result<()> {
         self.check_deciders(values)?;
         self.check_names(values)?;
+        // Before a key is called missing that stands there under another table's rules.
+        for key in self.keys.iter().filter(|key| key.name != ANY) {
+            self.has_place(values, key)?;
+        }
         for key in self.keys {
             if key.name == ANY {
                 for (name, value) in values.iter_mut() {
@@ -189,9 +193,13 @@ impl Table<'_, '_> {
                 }
                 Ok(())
             }
-            (kind, value) => match kind.problem(key.name, value) {
-                Some(problem) => Err(self.fault(name, span, problem)),
-                None => Ok(()),
+            (kind, value) => match (kind.wrong_element(value), kind.problem(key.name, value)) {
+                (Some(wrong), _) => {
+                    let name = format!("{name}{}", wrong.index);
+                    Err(self.fault(&name, wrong.span, wrong.problem))
+                }
+                (None, Some(problem)) => Err(self.fault(name, span, problem)),
+                (None, None) => Ok(()),
             },
         }
     }
@@ -212,22 +220,69 @@ impl Key {
     }
 }
 
+/// An element of an array that is of another type than its neighbours have to be.
+struct WrongElement {
+    /// `[1]`, or `[1][2]`.
+    index: String,
+    span: Range<usize>,
+    problem: String,
+}
+
+/// The first item that is no number.
+fn no_number(items: &[Spanned<DeValue<'_>>]) -> Option<WrongElement> {
+    let (index, item) = (items.iter().enumerate()).find(|(_, i)| number(i.get_ref()).is_none())?;
+    Some(WrongElement::of(index, item, "a number"))
+}
+
+impl WrongElement {
+    fn of(index: usize, item: &Spanned<DeValue<'_>>, expected: &str) -> Self {
+        Self {
+            index: format!("[{index}]"),
+            span: item.span(),
+            problem: wrong_type(item.get_ref(), expected),
+        }
+    }
+}
+
+fn wrong_type(value: &DeValue<'_>, expected: &str) -> String {
+    let found = match value {
+        DeValue::String(text) => format!("string {text:?}"),
+        DeValue::Integer(whole) => format!("integer `{whole}`"),
+        DeValue::Float(number) => format!("number `{number}`"),
+        DeValue::Boolean(flag) => format!("boolean `{flag}`"),
+        DeValue::Array(items) => format!("an array of {}", items.len()),
+        DeValue::Datetime(date) => format!("date `{date}`"),
+        DeValue::Table(_) => "a table".to_owned(),
+    };
+    format!("invalid type: {found}, expected {expected}")
+}
+
 impl Kind {
+    /// The first element of a wrong type in an array that is as long as it has to be.
+    fn wrong_element(&self, value: &DeValue<'_>) -> Option<WrongElement> {
+        let items = value.as_array()?;
+        let first = |is_right: fn(&DeValue<'_>) -> bool, expected: &str| {
+            let mut items = items.iter().enumerate();
+            let (index, item) = items.find(|(_, item)| !is_right(item.get_ref()))?;
+            Some(WrongElement::of(index, item, expected))
+        };
+        match self {
+            Self::Vector(len, _) if items.len() == *len => no_number(items),
+            Self::Scale(_) if items.len() == 3 => no_number(items),
+            Self::Choices(_) => first(|item| item.is_str(), "a string"),
+            Self::Tables(_) => first(|item| item.is_table(), "a table"),
+            Self::Points(len, _) => wrong_point(items, *len),
+            Self::Corners(_) if items.len() == 2 => wrong_point(items, 3),
+            _ => None,
+        }
+    }
+
     /// What is wrong with a value.
     fn problem(&self, name: &str, value: &DeValue<'_>) -> Option<String> {
         let Some(expected) = self.expected(value) else {
             return self.misfit(name, value);
         };
-        let found = match value {
-            DeValue::String(text) => format!("string {text:?}"),
-            DeValue::Integer(whole) => format!("integer `{whole}`"),
-            DeValue::Float(number) => format!("number `{number}`"),
-            DeValue::Boolean(flag) => format!("boolean `{flag}`"),
-            DeValue::Array(items) => format!("an array of {}", items.len()),
-            DeValue::Datetime(date) => format!("date `{date}`"),
-            DeValue::Table(_) => "a table".to_owned(),
-        };
-        Some(format!("invalid type: {found}, expected {expected}"))
+        Some(wrong_type(value, &expected))
     }
 
     /// The type that a value of another one should have.
@@ -325,7 +380,8 @@ impl Kind {
             Self::Choice(words) => no_choice(name, words, value.as_str()?),
             Self::Choices(words) => {
                 let mut given = value.as_array()?.iter();
-                given.find_map(|word| no_choice(name, words, word.get_ref().as_str()?))
+                let one = name.strip_suffix('s').unwrap_or(name);
+                given.find_map(|word| no_choice(one, words, word.get_ref().as_str()?))
             }
             Self::FileStem => {
                 let given = value.as_str()?;
@@ -334,6 +390,26 @@ impl Kind {
             Self::Text(_) | Self::Points(..) | Self::Other(_) => None,
             Self::Flag | Self::Table(_) | Self::Inline(_) | Self::Tables(_) => None,
         }
+    }
+}
+
+/// The first item that is not so many numbers.
+fn wrong_point(items: &[Spanned<DeValue<'_>>], len: usize) -> Option<WrongElement> {
+    let is_point = |item: &Spanned<DeValue<'_>>| {
+        numbers(item.get_ref()).is_some_and(|given| given.len() == len)
+    };
+    let (index, item) = (items.iter().enumerate()).find(|(_, item)| !is_point(item))?;
+    let below = item.get_ref().as_array().filter(|below| below.len() == len);
+    match below.and_then(|below| no_number(below)) {
+        Some(wrong) => Some(WrongElement {
+            index: format!("[{index}]{}", wrong.index),
+            ..wrong
+        }),
+        None => Some(WrongElement::of(
+            index,
+            item,
+            &format!("an array of {len} numbers"),
+        )),
     }
 }
 

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::{
     Effects, Iteration, Method, Shot, Wall, budget::BudgetSpec, flip::Flip, grids::GridsSpec,
-    keep::KeepSpec, probe::ProbeSpec,
+    keep::KeepSpec, periodic::Axis, probe::ProbeSpec,
 };
 
 #[derive(Deserialize)]
@@ -42,6 +42,8 @@ pub(super) struct DomainSpec {
     pub(super) walls: Option<String>,
     #[serde(default)]
     pub(super) no_slip: Vec<Wall>,
+    #[serde(default)]
+    pub(super) periodic: Vec<Axis>,
 }
 
 #[derive(Deserialize)]

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::Scene;
 use crate::domain::{
-    bounds::Bounds,
+    bounds::{Bounds, FAR},
     budget::{Breach, Watched},
     particles::Particles,
     probe::energies,
@@ -24,9 +24,13 @@ pub struct Substep {
 }
 
 impl Scene {
-    /// The box's faces at `time`, wave makers included, relative to the domain's least corner, metres.
+    /// The box's faces at `time`, wave makers included, relative to the domain's least corner, metres; [`FAR`] off where
+    /// the domain joins its own end.
     pub fn walls(&self, time: f64) -> Bounds {
         let (mut min, mut max) = (DVec3::ZERO, self.domain.size());
+        for axis in (0..3).filter(|&axis| self.periodic[axis]) {
+            (min[axis], max[axis]) = (-FAR, FAR);
+        }
         for maker in &self.wave_makers {
             let inward = maker.motion.displacement(time);
             if maker.wall.is_max {

@@ -10,9 +10,10 @@ use super::{
     Budget, Iteration, Pbf, PlacedMesh, Scene, Stop,
     key::{Key, Kind},
     keys,
-    probe::Probe,
+    periodic::Axis,
+    probe::{Probe, ProbeKind},
 };
-use crate::domain::{bounds::Bounds, motion::Motion};
+use crate::domain::{bounds::Bounds, motion::Motion, probe::Rate};
 
 /// Where a cache keeps its own copy of a mesh file: `assets/NAME-HASH.EXT`, so that two files of
 /// one name stay apart.
@@ -97,7 +98,7 @@ impl Scene {
                 Value::Table(table([("particles", value(keep))])),
             );
         }
-        let probes = self.probes.iter().map(|it| probe(it, self.origin));
+        let probes = self.probes.iter().map(|it| probe(it, self));
         insert_tables(&mut scene, "probe", probes);
         scene
     }
@@ -106,6 +107,9 @@ impl Scene {
         let mut domain = corners(&self.domain.moved(self.origin));
         if !self.no_slip.is_empty() {
             domain.insert("no_slip".to_owned(), value(&self.no_slip));
+        }
+        if self.is_periodic() {
+            domain.insert("periodic".to_owned(), value(&Axis::of(self.periodic)));
         }
         domain
     }
@@ -286,13 +290,18 @@ fn motion(motion: &Motion) -> Value {
     Value::Table(all)
 }
 
-fn probe(probe: &Probe, origin: DVec3) -> Table {
+fn probe(probe: &Probe, scene: &Scene) -> Table {
     let mut rows = table([
         ("name", value(&probe.name)),
         ("kind", value(&probe.kind.name())),
     ]);
-    let at = probe.kind.at(origin);
-    if !at.is_empty() {
+    let at = probe.kind.at(scene.origin);
+    if let ProbeKind::Force { on, .. } = probe.kind {
+        let name = on.name(scene);
+        let number = name.parse::<i64>().map(Value::Integer);
+        rows.insert("solid".to_owned(), number.unwrap_or(Value::String(name)));
+        rows.insert("about".to_owned(), value(&at));
+    } else if !at.is_empty() {
         rows.insert("at".to_owned(), value(&at));
     }
     if let Some(towards) = probe.kind.towards() {
@@ -300,6 +309,12 @@ fn probe(probe: &Probe, origin: DVec3) -> Table {
     }
     if let Some(quantile) = probe.kind.quantile() {
         rows.insert("quantile".to_owned(), value(&quantile));
+    }
+    if probe.rate != Rate::Frame {
+        rows.insert("rate_hz".to_owned(), value(&probe.rate));
+    }
+    if let Some(window) = probe.window {
+        rows.insert("window".to_owned(), value(&window));
     }
     rows
 }

@@ -45,8 +45,10 @@ impl Boundary {
         let origin = scene.domain.min;
         let dims = plan.grid_dims.map(|n| n as usize);
         let spacing = scene.particle_spacing();
+        let support = calibration.support_radius;
+        let edges = scene.period().edges(plan.grid_dims, support);
         let cell = |p: DVec3| {
-            let c = ((p - origin) / calibration.support_radius)
+            let c = ((p - origin) / edges)
                 .floor()
                 .max(DVec3::ZERO)
                 .as_uvec3()

@@ -51,16 +51,16 @@ mirror!(
         max_displacement: f32,
         /// k times λ's natural scale, m².
         artificial_pressure: f32,
-        /// Unused.
-        padding: f32,
+        /// Length of the domain along x where it joins its own end; 0 with walls.
+        period_x: f32,
         /// Of the least faces, each along its axis, m/s.
         wall_velocity_min: [f32; 3],
-        /// Unused.
-        padding_min: f32,
+        /// The same along y.
+        period_y: f32,
         /// Of the greatest faces.
         wall_velocity_max: [f32; 3],
-        /// Unused.
-        padding_max: f32,
+        /// The same along z.
+        period_z: f32,
     }
 );
 
@@ -110,8 +110,14 @@ mirror!(
         contact_distance: f32,
         /// Of a substep.
         max_displacement: f32,
+        /// Particles that are nearer to each other are pushed apart.
+        apart: f32,
+        /// A bit an axis along which the domain joins its own end.
+        periodic: u32,
         /// Unused.
-        padding: f32,
+        padding: u32,
+        /// Unused.
+        padding_more: [u32; 2],
     }
 );
 

@@ -11,7 +11,10 @@ use crate::{
     scene::Scene,
 };
 
-use super::buffers::{ID, POSITION, VELOCITY};
+use super::{
+    SolveError,
+    buffers::{ID, POSITION, VELOCITY},
+};
 
 /// Positions go up relative to the domain's least corner.
 pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
@@ -49,6 +52,29 @@ pub(super) fn take_over(
         let [x, y, z, _] = velocity[k];
         state.velocity[slot] = [x, y, z];
     }
+}
+
+/// Positions and velocities as they stand on the device now, as a frame would have them; `state` is what the frame began
+/// with, and keeps its attributes to itself.
+pub(super) fn look(
+    program: &Program,
+    scene: &Scene,
+    state: &Particles,
+    frame: u32,
+) -> Result<Particles, SolveError> {
+    let n = state.len();
+    let wanted = (POSITION.first(n), VELOCITY.first(n), ID.first(n));
+    let (position, velocity, id) = program.download(wanted)?;
+    check_ids(frame, &state.id, &id)?;
+    let mut now = Particles {
+        position: vec![[0.0; 3]; n],
+        velocity: vec![[0.0; 3]; n],
+        id: state.id.clone(),
+        ..Particles::default()
+    };
+    let slot_of = slots_by_id(&state.id);
+    take_over(&mut now, scene, &slot_of, &id, &position, &velocity);
+    Ok(now)
 }
 
 /// Where a particle stands in a state, by id.

@@ -133,6 +133,14 @@ pub enum BakeError {
     /// Frames that a bake cannot compute.
     #[error("--frames {0}")]
     Frames(String),
+    /// A branch that begins at or after its last frame.
+    #[error("{asked}: nothing is left to bake after frame {frame}; raise shot.frames")]
+    NothingLeft {
+        /// The option that asks for it.
+        asked: String,
+        /// The frame to begin from.
+        frame: u32,
+    },
     /// A budget was broken; what the frame began with is kept.
     #[error(
         "{failure}; the last good frame is kept, and `swell check {}` computes this one again", .failed.display()
@@ -173,7 +181,9 @@ impl From<&BakeError> for Blame {
             BakeError::Branch(_) => Self::Input,
             BakeError::OtherPhysics { .. } => Self::Files,
             BakeError::Budget { .. } | BakeError::NotKept { .. } => Self::Numbers,
-            BakeError::Frames(_) | BakeError::Asset { .. } => Self::Input,
+            BakeError::Frames(_) | BakeError::NothingLeft { .. } | BakeError::Asset { .. } => {
+                Self::Input
+            }
         }
     }
 }
@@ -196,7 +206,7 @@ pub fn bake(
         notes,
     } = beginning(request, last)?;
     let opened = request.device.open(needs(scene))?;
-    let mut drive = Drive::unloaded(&opened, scene, &start, request.time_passes)?.with_pressures();
+    let mut drive = Drive::unloaded(&opened, scene, &start, request.time_passes)?.with_probes();
     let device = opened.identity();
     let (mut writer, mut clock, state) = open_cache(request, &device, &start, clock, &parent)?;
     let first = clock.frame + 1;
@@ -216,7 +226,9 @@ pub fn bake(
     drive.load_watched(&start.particles, clock.frame, &state)?;
     let ended = drive.run(last, stop, |step| {
         let begin = Instant::now();
-        let seen = probes::look(scene, &step.particles, &step.pressures);
+        let time = scene.shot.time(step.frame);
+        let looks = Some(step.looks);
+        let seen = probes::look(scene, time, &step.particles, &step.pressures, looks);
         let seconds = step.seconds + begin.elapsed().as_secs_f64();
         let Step {
             frame,
@@ -225,7 +237,7 @@ pub fn bake(
             ..
         } = step;
         clock.frame = frame;
-        clock.time = f64::from(clock.frame) / scene.shot.frames_per_second;
+        clock.time = time;
         clock.substeps = report.substeps;
         clock.steps += u64::from(report.substeps);
         let extra = json!({ "seconds": seconds });
@@ -319,7 +331,7 @@ fn beginning(request: &Request, last: u32) -> Result<Beginning, BakeError> {
     let stands = request.resume && crate::cache::exists(directory);
     let open = |from| Branch::open(from, scene);
     let branch = match request.from.as_ref().map(open).transpose()? {
-        Some(branch) if !stands => return branched(scene, last, branch),
+        Some(branch) if !stands => return branched(request, last, branch),
         other => other,
     };
     let start = if stands {
@@ -335,12 +347,18 @@ fn beginning(request: &Request, last: u32) -> Result<Beginning, BakeError> {
     })
 }
 
-fn branched(scene: &Scene, last: u32, mut branch: Branch) -> Result<Beginning, BakeError> {
+fn branched(request: &Request, last: u32, mut branch: Branch) -> Result<Beginning, BakeError> {
+    let scene = &request.scene;
     let frame = branch.clock.frame;
     if last <= frame {
-        return Err(BakeError::Frames(format!(
-            "1-{last}: nothing is left to bake after frame {frame}; raise shot.frames"
-        )));
+        return Err(BakeError::NothingLeft {
+            asked: match (&request.frames, &request.from) {
+                (Some(frames), _) => format!("--frames {frames}"),
+                (None, Some(from)) => format!("--from {from}"),
+                (None, None) => format!("a shot of {last} frames"),
+            },
+            frame,
+        });
     }
     let start = Start::with(scene, branch.particles.clone())?;
     branch.note_covered(scene, &start.boundary);
@@ -356,7 +374,8 @@ fn branched(scene: &Scene, last: u32, mut branch: Branch) -> Result<Beginning, B
 fn check_first(request: &Request, next: u32) -> Result<(), BakeError> {
     match &request.frames {
         Some(frames) if frames.first() > next => Err(BakeError::Frames(format!(
-            "{frames}: frame {next} has not been baked"
+            "{frames}: frame {next} has not been baked, and each frame needs the one before: --frames {next}-{}",
+            frames.last()
         ))),
         _ => Ok(()),
     }
@@ -412,7 +431,7 @@ fn open_cache(
     check_first(request, clock.frame + 1)?;
     let assets = assets(scene)?;
     // No step has been made, so no pressure is known.
-    let seen = probes::look(scene, &start.particles, &[]);
+    let seen = probes::look(scene, clock.time, &start.particles, &[], None);
     let particles = &start.particles;
     let writer = CacheWriter::create(directory, manifest, &text, &assets, clock, particles, &seen)?;
     Ok((writer, clock, particles.clone()))

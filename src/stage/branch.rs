@@ -147,6 +147,7 @@ impl Branch {
             scene_hash: manifest.scene_hash.clone(),
             frame: from.frame,
             blake3: cache.frame_hash(from.frame)?.to_owned(),
+            shaders: manifest.edited_shaders().map(str::to_owned),
         };
         let mut notes = Vec::new();
         if origin != scene.origin {
@@ -238,9 +239,10 @@ fn check_walls(
 ) -> Result<(), BranchError> {
     let walls = scene.walls(clock.time);
     let corner = scene.domain.min;
+    // Along periodic axes walls are far off, and the domain is what particles have to lie in.
     let room = Bounds {
-        min: corner + walls.min,
-        max: corner + walls.max,
+        min: (corner + walls.min).max(scene.domain.min),
+        max: (corner + walls.max).min(scene.domain.max),
     }
     .grown(0.5 * scene.particle_spacing());
     let is_beyond = |&k: &usize| {

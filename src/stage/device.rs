@@ -11,7 +11,7 @@ use crate::{
     domain::{
         budget::Breach,
         particles::Particles,
-        solver::{Solver, StepReport},
+        solver::{Solver, StepReport, Watch},
     },
     gpu::adapter::{Context, GpuError, Needs},
     reference::{self, ReferenceError},
@@ -236,8 +236,11 @@ where
         Ok(self.0.load(frame, particles)?)
     }
 
-    fn advance(&mut self) -> Result<(Particles, StepReport), SolverError> {
-        Ok(self.0.advance()?)
+    fn advance_watched(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<(Particles, StepReport), SolverError> {
+        Ok(self.0.advance_watched(watch)?)
     }
 
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolverError> {

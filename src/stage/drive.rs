@@ -8,6 +8,7 @@ use std::{
 use glam::DVec3;
 
 use crate::{
+    cache::ProbeValues,
     domain::{
         particles::Particles,
         solver::{Solver, StepReport},
@@ -18,6 +19,7 @@ use crate::{
 use super::{
     device::{Built, Opened, SolverError},
     prepare::Start,
+    probes::{Recorder, is_recorded},
     watch::Watch,
 };
 
@@ -31,6 +33,8 @@ pub struct Drive<'a> {
     watch: Option<Watch<'a>>,
     /// Where pressures are read after each frame.
     pressure_points: Vec<DVec3>,
+    /// Whether probes look at substeps.
+    is_recorded: bool,
     /// Of the last frame that the solver finished, also where that frame then broke a budget.
     report: Option<StepReport>,
 }
@@ -46,6 +50,9 @@ pub struct Step {
     pub report: StepReport,
     /// Pressures at the scene's [`pressure_points`](Scene::pressure_points), Pa; empty where none are read.
     pub pressures: Vec<Option<f64>>,
+    /// What probes saw while the frame was computed, by probe: values, of one with a rate of its own each look's time and
+    /// its values.
+    pub looks: ProbeValues,
     /// Wall clock of all that, seconds.
     pub seconds: f64,
 }
@@ -90,6 +97,7 @@ impl<'a> Drive<'a> {
             frame: 0,
             watch: None,
             pressure_points: Vec::new(),
+            is_recorded: false,
             report: None,
         })
     }
@@ -122,13 +130,24 @@ impl<'a> Drive<'a> {
         self
     }
 
+    /// The same, and with looks while a frame is computed for the probes that ask for them.
+    pub(super) fn with_probes(mut self) -> Self {
+        let mut probes = self.scene.probes.iter();
+        self.is_recorded = probes.any(is_recorded);
+        self.with_pressures()
+    }
+
     /// Computes the next frame.
     ///
     /// # Errors
     /// The device, the numbers, or a budget where frames are held against those.
     pub fn advance(&mut self) -> Result<Step, SolverError> {
         let begin = Instant::now();
-        let (particles, mut report) = self.solver.advance()?;
+        let mut recorder = Recorder::new(self.scene, self.scene.shot.time(self.frame + 1));
+        let (particles, mut report) = match self.is_recorded {
+            true => self.solver.advance_watched(&mut recorder)?,
+            false => self.solver.advance()?,
+        };
         let watched = match &mut self.watch {
             Some(watch) => watch.look(&particles, &mut report),
             None => Ok(()),
@@ -145,6 +164,7 @@ impl<'a> Drive<'a> {
             particles,
             report,
             pressures,
+            looks: recorder.into_values(),
             seconds: begin.elapsed().as_secs_f64(),
         })
     }

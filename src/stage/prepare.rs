@@ -1,13 +1,17 @@
 //! From a scene to what a solver starts from: particles, boundary, plan.
 
+use std::borrow::Cow;
+
 use crate::{
     cache::{CacheError, CacheReader},
     domain::{
         boundary::Boundary,
         bounds::Bounds,
+        flip as flip_domain,
         mesh::TriangleMesh,
         particles::Particles,
-        sampling::{boundary_samples, fill_water},
+        pbf,
+        sampling::{BoundarySample, boundary_samples, fill_water},
         signed_distance::{SignedDistance, SignedDistanceError},
     },
     scene::{Method, Scene},
@@ -44,7 +48,7 @@ impl Start {
         let movers = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
         let at_start = match scene.moving_solids[..] {
             [] => None,
-            _ => distance(scene, &meshes(scene).chain(movers).collect::<Vec<_>>())?,
+            _ => distance(scene, meshes(scene).chain(movers))?,
         };
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
         let fill = fill_water(
@@ -120,26 +124,74 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &TriangleMesh> {
 
 /// Solids as the solver meets them.
 fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
-    let sampled = |mesh| boundary_samples(mesh, &scene.domain, scene.particle_spacing());
+    let distance = distance(scene, meshes(scene))?;
+    let sampled = |mesh| samples(scene, mesh, distance.as_ref());
     Ok(Boundary {
         // FLIP meets solids by their distance alone.
         samples: match scene.solver.method {
             Method::Pbf => meshes(scene).flat_map(sampled).collect(),
             Method::Flip => Vec::new(),
         },
-        distance: distance(scene, &meshes(scene).collect::<Vec<_>>())?,
+        distance,
         moving: moving_distances(scene)?,
     })
 }
 
-/// Of the union of meshes, as far as water can come to them.
-fn distance(
+/// Samples on a mesh's surface, and on its images' along periodic axes: of two that are one there, the one at the least
+/// end.
+fn samples(
     scene: &Scene,
-    meshes: &[&TriangleMesh],
+    mesh: &TriangleMesh,
+    distance: Option<&SignedDistance>,
+) -> Vec<BoundarySample> {
+    let (images, spacing) = (
+        scene.with_images(mesh, margin(scene)),
+        scene.particle_spacing(),
+    );
+    let mut samples: Vec<_> = (images.iter())
+        .flat_map(|image| boundary_samples(image, &scene.domain, spacing))
+        .collect();
+    if !scene.is_periodic() {
+        return samples;
+    }
+    // Where a mesh ends at the domain's end, its image goes on: no surface.
+    let is_within = |sample: &BoundarySample| {
+        let before = sample.position + 0.5 * spacing * sample.normal;
+        distance.is_some_and(|distance| distance.sample(before) < 0.0)
+    };
+    let is_image = |sample: &BoundarySample| {
+        (0..3).any(|axis| scene.periodic[axis] && sample.position[axis] >= scene.domain.max[axis])
+    };
+    samples.retain(|sample| !is_image(sample) && !is_within(sample));
+    samples
+}
+
+/// Metres that a signed distance reaches beyond the solids: where the domain joins its own end, as far as a particle may
+/// come beyond it in a substep as well.
+fn margin(scene: &Scene) -> f64 {
+    let way = match scene.solver.method {
+        Method::Pbf => pbf::CAP * scene.solver.pbf().cfl * scene.particle_spacing(),
+        Method::Flip => {
+            let flip = scene.solver.flip();
+            flip_domain::CAP * flip.cfl * flip.cell_size
+        }
+    };
+    let beyond = if scene.is_periodic() { way } else { 0.0 };
+    MARGIN * scene.particle_spacing() + beyond
+}
+
+/// Of the union of meshes, as far as water can come to them.
+fn distance<'a>(
+    scene: &Scene,
+    meshes: impl Iterator<Item = &'a TriangleMesh>,
 ) -> Result<Option<SignedDistance>, SignedDistanceError> {
-    match solid_bounds(scene, meshes) {
+    let meshes: Vec<_> = meshes
+        .flat_map(|mesh| scene.with_images(mesh, margin(scene)))
+        .collect();
+    match solid_bounds(scene, &meshes) {
         Some(bounds) => {
-            SignedDistance::from_meshes(meshes.iter().copied(), &bounds, scene.particle_spacing())
+            let meshes = meshes.iter().map(AsRef::as_ref);
+            SignedDistance::from_meshes(meshes, &bounds, scene.particle_spacing())
         }
         None => Ok(None),
     }
@@ -153,14 +205,25 @@ fn moving_distances(scene: &Scene) -> Result<Vec<SignedDistance>, SignedDistance
         solids.filter_map(|solid| Some((&solid.placed.mesh, solid.placed.mesh.bounds()?)));
     bounded
         .map(|(mesh, bounds)| {
-            SignedDistance::from_mesh(mesh, &bounds.grown(MARGIN * spacing), spacing)
+            let mut bounds = bounds.grown(margin(scene));
+            if !scene.is_periodic() {
+                return SignedDistance::from_mesh(mesh, &bounds, spacing);
+            }
+            let reach = scene.domain.grown(margin(scene));
+            for axis in (0..3).filter(|&axis| scene.periodic[axis]) {
+                (bounds.min[axis], bounds.max[axis]) = (reach.min[axis], reach.max[axis]);
+            }
+            let images = scene.with_images(mesh, margin(scene));
+            let images = images.iter().map(AsRef::as_ref);
+            let distance = SignedDistance::from_meshes(images, &bounds, spacing)?;
+            Ok(distance.expect("the mesh itself is among its images"))
         })
         .collect()
 }
 
 /// Where meshes are, with room about them, as far as water can come.
-fn solid_bounds(scene: &Scene, meshes: &[&TriangleMesh]) -> Option<Bounds> {
-    let margin = MARGIN * scene.particle_spacing();
+fn solid_bounds(scene: &Scene, meshes: &[Cow<'_, TriangleMesh>]) -> Option<Bounds> {
+    let margin = margin(scene);
     let reach = scene.domain.grown(margin);
     let mut all: Option<Bounds> = None;
     for bounds in meshes.iter().filter_map(|mesh| mesh.bounds()) {

@@ -4,9 +4,13 @@ use crate::{
     cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES},
     domain::{
         particles::Particles,
-        probe::{elevation, energies, flux, front, run_up, volume},
+        probe::{Patch, Rate, elevation, energies, flux, front, load, run_up, volume},
+        solver::{Seen, Span, Wanted, Watch},
     },
-    scene::{Scene, probe::ProbeKind},
+    scene::{
+        Scene,
+        probe::{Probe, ProbeKind},
+    },
     study::chart::{Chart, Series},
 };
 
@@ -20,24 +24,174 @@ pub(super) fn records(scene: &Scene) -> Vec<ProbeRecord> {
             at: probe.kind.at(scene.origin),
             axis: probe.kind.towards().map(|wall| wall.name().to_owned()),
             quantile: probe.kind.quantile(),
+            solid: match probe.kind {
+                ProbeKind::Force { on, .. } => Some(on.name(scene)),
+                _ => None,
+            },
+            rate_hz: probe.rate,
+            window: probe.window,
             columns: probe.kind.columns().iter().map(|&c| c.to_owned()).collect(),
         })
         .collect()
 }
 
-/// Values of a frame, one list a probe. `pressures` are those at the scene's
-/// [`pressure_points`](Scene::pressure_points), Pa.
-pub(super) fn look(scene: &Scene, particles: &Particles, pressures: &[Option<f64>]) -> ProbeValues {
+/// Values of a frame that ends at `time` seconds, one list a probe. `pressures` are those at the scene's
+/// [`pressure_points`](Scene::pressure_points), Pa; `looks` are a [`Recorder`]'s, or none at the start, which all probes
+/// look at.
+pub(super) fn look(
+    scene: &Scene,
+    time: f64,
+    particles: &Particles,
+    pressures: &[Option<f64>],
+    looks: Option<ProbeValues>,
+) -> ProbeValues {
+    let frame = |probe: &Probe| !is_recorded(probe) || looks.is_none();
+    let mut values = of_state(scene, particles, pressures, frame);
+    match looks {
+        Some(looks) => {
+            for ((values, looks), probe) in values.iter_mut().zip(looks).zip(&scene.probes) {
+                values.extend(looks);
+                if values.is_empty() && probe.rate == Rate::Frame {
+                    // No substep has run, since there is no water.
+                    values.resize(probe.kind.columns().len(), None);
+                }
+            }
+        }
+        None => {
+            let own = scene.probes.iter().zip(&mut values);
+            for (_, values) in own.filter(|(probe, _)| probe.rate != Rate::Frame) {
+                values.insert(0, Some(time));
+            }
+        }
+    }
+    values
+}
+
+/// Whether a probe looks while a frame is computed: it has a rate of its own, or what it looks at is gone afterwards.
+pub(super) fn is_recorded(probe: &Probe) -> bool {
+    probe.rate != Rate::Frame || matches!(probe.kind, ProbeKind::Force { .. })
+}
+
+/// What probes see of a frame while it is computed.
+pub(super) struct Recorder<'a> {
+    scene: &'a Scene,
+    /// When the frame ends, seconds.
+    end: f64,
+    values: ProbeValues,
+    /// Of the forces that are due, the probe's number and the surface, as they were asked for.
+    surfaces: Vec<(usize, Vec<Patch>)>,
+}
+
+impl<'a> Recorder<'a> {
+    /// Of the frame that ends at `end` seconds.
+    pub(super) fn new(scene: &'a Scene, end: f64) -> Self {
+        Self {
+            scene,
+            end,
+            values: vec![Vec::new(); scene.probes.len()],
+            surfaces: Vec::new(),
+        }
+    }
+
+    /// By probe, each look its time and its values; nothing of probes that look at frames.
+    pub(super) fn into_values(self) -> ProbeValues {
+        self.values
+    }
+
+    /// Probes that look at this substep's end, with their numbers.
+    fn due(&self, substep: Span) -> impl Iterator<Item = (usize, &'a Probe)> + use<'a> {
+        let probes = self.scene.probes.iter().enumerate();
+        probes.filter(move |(_, probe)| is_due(probe, substep))
+    }
+
+    fn take(&mut self, probe: usize, time: f64, found: impl IntoIterator<Item = Option<f64>>) {
+        if self.scene.probes[probe].rate != Rate::Frame {
+            self.values[probe].push(Some(time));
+        }
+        self.values[probe].extend(found);
+    }
+}
+
+fn is_due(probe: &Probe, substep: Span) -> bool {
+    match probe.rate {
+        Rate::Frame => substep.is_last && is_recorded(probe),
+        rate => rate.is_due(substep.start, substep.end),
+    }
+}
+
+impl Watch for Recorder<'_> {
+    fn wants(&mut self, substep: Span) -> Wanted {
+        let mut wanted = Wanted::default();
+        self.surfaces.clear();
+        for (index, probe) in self.due(substep) {
+            match probe.kind {
+                ProbeKind::Pressure { .. } => wanted.pressures = true,
+                ProbeKind::Force { on, .. } => {
+                    // As the cells were cut on which the pressure stands.
+                    let patches = self.scene.patches(on, substep.start);
+                    wanted.patches.extend_from_slice(&patches);
+                    self.surfaces.push((index, patches));
+                }
+                _ => wanted.particles = true,
+            }
+        }
+        wanted
+    }
+
+    fn look(&mut self, substep: Span, seen: Seen) {
+        let is_force = |probe: &Probe| matches!(probe.kind, ProbeKind::Force { .. });
+        let is_seen = |probe: &Probe| is_due(probe, substep) && !is_force(probe);
+        let found = of_state(self.scene, &seen.particles, &seen.pressures, is_seen);
+        // A frame's own time: substeps add up to it but for round-off.
+        let time = if substep.is_last {
+            self.end
+        } else {
+            substep.end
+        };
+        for (probe, found) in found.into_iter().enumerate() {
+            if !found.is_empty() {
+                self.take(probe, time, found);
+            }
+        }
+        let mut pressures = &seen.patches[..];
+        for (probe, patches) in std::mem::take(&mut self.surfaces) {
+            let ProbeKind::Force { about, .. } = self.scene.probes[probe].kind else {
+                continue;
+            };
+            let (own, rest) = pressures.split_at(patches.len());
+            pressures = rest;
+            let sums = load(&patches, own, about);
+            self.take(
+                probe,
+                time,
+                sums.into_iter().flat_map(|sum| sum.to_array().map(Some)),
+            );
+        }
+    }
+}
+
+/// Values of a state by probe, of those that look at it; nothing of the others.
+fn of_state(
+    scene: &Scene,
+    particles: &Particles,
+    pressures: &[Option<f64>],
+    is_due: impl Fn(&Probe) -> bool,
+) -> ProbeValues {
     let spacing = scene.particle_spacing();
     let mut pressures = pressures.iter().copied();
     let probes = scene.probes.iter();
     probes
         .map(|probe| match probe.kind {
+            // The points are those of all probes of pressure.
+            ProbeKind::Pressure { .. } => {
+                let pressure = pressures.next().flatten();
+                Vec::from_iter(is_due(probe).then_some(pressure))
+            }
+            _ if !is_due(probe) => Vec::new(),
             ProbeKind::Elevation { at } => {
                 let height = elevation(particles, spacing, &scene.domain, at);
                 vec![height.map(|y| scene.origin.y + y)]
             }
-            ProbeKind::Pressure { .. } => vec![pressures.next().flatten()],
             ProbeKind::Energy => {
                 let mass = scene.water.rest_density * spacing.powi(3);
                 let gravity = scene.water.gravity;
@@ -58,6 +212,8 @@ pub(super) fn look(scene: &Scene, particles: &Particles, pressures: &[Option<f64
                 let rate = flux(particles, spacing, towards.axis, at);
                 vec![Some(if towards.is_max { rate } else { -rate })]
             }
+            // No substep has been made, as of pressures.
+            ProbeKind::Force { .. } => vec![None; probe.kind.columns().len()],
         })
         .collect()
 }
@@ -65,10 +221,15 @@ pub(super) fn look(scene: &Scene, particles: &Particles, pressures: &[Option<f64
 /// What the probe of `index` saw over time as a chart, one line a column.
 pub(super) fn chart(shot: &str, record: &ProbeRecord, index: usize, entries: &[Entry]) -> Chart {
     let columns = || record.columns.iter().map(|column| column.rsplit_once('_'));
-    let value = |entry: &Entry, column: usize| *entry.row(PROBES, index).get(column)?;
+    let looks = |entry: &'_ Entry| {
+        let looks = record.looks(entry.row(PROBES, index), entry.clock.time);
+        looks
+            .map(|look| (look.time, look.values.to_vec()))
+            .collect::<Vec<_>>()
+    };
+    let looks: Vec<_> = entries.iter().flat_map(looks).collect();
     let series = columns().enumerate().map(|(column, parts)| {
-        let points = entries.iter();
-        let points = points.map(|entry| (entry.clock.time, value(entry, column)));
+        let points = looks.iter().map(|(time, values)| (*time, values[column]));
         Series::curve(parts.map_or("", |(quantity, _)| quantity), points)
     });
     let unit = columns().flatten().map(|(_, unit)| unit).next();

@@ -15,7 +15,7 @@ use std::{
 use glam::DAffine3;
 
 use crate::{
-    cache::{self, CacheError, CacheReader},
+    cache::{self, CacheError, CacheReader, Manifest},
     domain::{frame_range::FrameRange, signed_distance::SignedDistanceError},
     gpu::adapter::{Context, GpuError, Needs},
     render::{
@@ -196,9 +196,10 @@ pub fn render(
     let image = &request.look.spec().image;
     tell(Event::Ready {
         device: format!(
-            "{}{}",
+            "{}{}{}",
             context.info.name,
-            shaders_note(request.gpu.shaders.edited())
+            shaders_note(request.gpu.shaders.edited()),
+            baked_note(cache.manifest())
         ),
         size: [image.width, image.height],
         frames: frames.len(),
@@ -403,15 +404,25 @@ fn attributes(
         frame,
         shot: manifest.shot.clone(),
         software: format!(
-            "{} {}{}",
+            "{} {}{}{}",
             env!("CARGO_PKG_NAME"),
             env!("CARGO_PKG_VERSION"),
-            shaders_note(request.gpu.shaders.edited())
+            shaders_note(request.gpu.shaders.edited()),
+            baked_note(manifest)
         ),
         scene_hash: manifest.scene_hash.clone(),
         cache_hash: cache.frame_hash(frame)?.to_owned(),
         look_hash: request.look.hash(),
     })
+}
+
+/// What is said of a cache behind a program: nothing where the program's own shaders baked it.
+fn baked_note(manifest: &Manifest) -> String {
+    let note = shaders_note(manifest.edited_shaders());
+    match note.is_empty() {
+        true => note,
+        false => format!(", of a cache baked{note}"),
+    }
 }
 
 /// `SHOT.0001`, with as many digits as the last cached frame needs, at least four.

@@ -56,6 +56,8 @@ pub struct Knee<'a> {
     /// Whether its error is below a tenth of the discretisation error; otherwise it has the least error × time, up to
     /// which x times the time buys more than x times the accuracy, and beyond it less.
     pub is_enough: bool,
+    /// Whether no setting that was run is better, so that more may still pay.
+    pub is_last: bool,
 }
 
 /// The knee of a line, beside the discretisation error where that is known; `None` for a line without points.
@@ -67,9 +69,13 @@ pub fn knee(line: &Line, discretisation: Option<f64>) -> Option<Knee<'_>> {
             .into_iter()
             .min_by(|a, b| product(a).total_cmp(&product(b)))
     };
+    let point = enough.or_else(least)?;
     Some(Knee {
-        point: enough.or_else(least)?,
+        point,
         is_enough: enough.is_some(),
+        is_last: best(line)
+            .last()
+            .is_some_and(|last| std::ptr::eq(*last, point)),
     })
 }
 
@@ -84,6 +90,12 @@ fn bargain(from: &Point, to: &Point) -> String {
     )
 }
 
+/// What is said of a knee at the end of what was run.
+pub const BEST_THAT_WAS_RUN: &str = "the best that was run, so that more may still pay";
+
+/// Settings that two lines have to have in common before either is called better.
+const LEAST_IN_COMMON: usize = 2;
+
 /// What the knee of a line is, in words, beside the discretisation error where that is known.
 pub fn words(line: &Line, discretisation: Option<f64>) -> String {
     let best = best(line);
@@ -95,7 +107,11 @@ pub fn words(line: &Line, discretisation: Option<f64>) -> String {
     if best.len() < 2 {
         return "one setting alone has no knee".into();
     }
-    let Knee { point, is_enough } = knee;
+    let Knee {
+        point,
+        is_enough,
+        is_last,
+    } = knee;
     let label = &point.label;
     let mut said = vec![match discretisation {
         None => format!(
@@ -112,10 +128,10 @@ pub fn words(line: &Line, discretisation: Option<f64>) -> String {
     if *label != first.label {
         said.push(bargain(first, point));
     }
-    if *label != last.label {
+    if !is_last {
         said.push(bargain(point, last));
     } else if !is_enough {
-        said.push("it is the best that was run, so that more may still pay".into());
+        said.push(format!("it is {BEST_THAT_WAS_RUN}"));
     }
     said.join("; ")
 }
@@ -130,6 +146,9 @@ fn at_time(line: &Line, time: f64) -> Option<f64> {
     let part = (time / a.time[1]).ln() / (b.time[1] / a.time[1]).ln();
     Some(a.error * (b.error / a.error).powf(part))
 }
+
+/// What is said of lines with hardly a time in common.
+pub const TOO_FEW: &str = "too few for a verdict";
 
 /// A line against another at equal times.
 #[derive(Clone, Debug, PartialEq)]
@@ -158,6 +177,11 @@ pub fn rivalry(lines: &[Line], index: usize) -> Vec<Rivalry> {
 }
 
 impl Rivalry {
+    /// Whether the lines have so many times in common that either may be called better.
+    pub fn has_verdict(&self) -> bool {
+        self.ratios.len() >= LEAST_IN_COMMON
+    }
+
     /// Settings at which the line is not better, with the ratios.
     pub fn lost(&self) -> Vec<String> {
         let lost = self.ratios.iter().filter(|(_, ratio)| *ratio <= 1.0);
@@ -168,10 +192,12 @@ impl Rivalry {
     /// Whether the line beats the other, in words: where it does not, the settings are named.
     pub fn words(&self) -> String {
         let (name, lost) = (&self.other, self.lost());
+        if !self.has_verdict() {
+            let all = self.ratios.len();
+            let settings = if all == 1 { "setting" } else { "settings" };
+            return format!("{name}: {all} {settings} with times in common, {TOO_FEW}");
+        }
         match (self.ratios.len(), lost.len()) {
-            (all @ 0..2, _) => {
-                format!("{name}: {all} settings with times in common, too few for a verdict")
-            }
             (all, 0) => {
                 format!("less error than {name} at all {all} settings that can be compared")
             }
@@ -236,6 +262,8 @@ mod tests {
         let worse = line("a", &[(1.0, 1.6), (2.0, 0.4), (3.0, 0.5), (4.0, 0.1)]);
         assert_eq!(best(&worse).len(), 3);
         assert!(words(&worse, None).contains("more may still pay"));
+        let is_last = |line| knee(line, None).is_some_and(|knee| knee.is_last);
+        assert!(is_last(&worse) && !is_last(&bent));
         assert_eq!(label(&line("a", &[(1.0, 0.0)])), None);
     }
 
@@ -286,7 +314,19 @@ mod tests {
         assert!(found.ratios.iter().all(|(_, r)| (r - 2.0).abs() < 1e-12));
         assert!(found.words().contains("less error than slow at all 2"));
         // The other way round it loses at every time.
-        let said = rivalry(&lines, 0)[0].words();
+        let loser = &rivalry(&lines, 0)[0];
+        let said = loser.words();
         assert!(said.contains("at 0 of 3 settings, not at s0"), "{said}");
+        assert!(loser.has_verdict() && found.has_verdict());
+        let one = Rivalry {
+            ratios: vec![("s1".into(), 2.0)],
+            ..loser.clone()
+        };
+        assert!(!one.has_verdict());
+        let said = one.words();
+        assert_eq!(
+            said,
+            "fast: 1 setting with times in common, too few for a verdict"
+        );
     }
 }

@@ -1,7 +1,8 @@
 //! Studies: what baked frames measure, and the page that shows it.
 //!
 //! Pure functions from particles to numbers, and from numbers to text; `experiment` runs what is measured and writes the
-//! files. [`comparison`] sets two solvers side by side; [`stability`] measures what is hard on a solver; a sweep finds the
+//! files. [`comparison`] sets two solvers side by side; [`stability`] measures what is hard on a solver, [`waves`] what theory and
+//! experiments know the answer to; a sweep finds the
 //! [`knee`] and, for the paper's Table 1, the [`convergence_point`]. [`measure`], [`chart`] and [`page`] serve every kind.
 
 pub mod chart;
@@ -13,5 +14,6 @@ pub mod page;
 pub mod picture;
 pub mod raster;
 pub mod stability;
+pub mod waves;
 
 pub use crate::domain::statistics::{median, percentile};

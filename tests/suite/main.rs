@@ -19,6 +19,8 @@ mod cache {
     mod faults;
     mod format;
     mod keep;
+    mod probe_forces;
+    mod probe_rates;
     mod probes;
     mod vdb;
 }
@@ -41,6 +43,7 @@ mod domain {
 mod experiment {
     mod hard_cases;
     mod study;
+    mod validation;
 }
 mod gpu {
     mod device_faults;
@@ -73,6 +76,7 @@ mod solve {
     mod moving_solids;
     mod no_slip;
     mod pbf;
+    mod periodic;
     mod plan;
     mod pressure;
 }

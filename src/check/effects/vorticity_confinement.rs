@@ -145,7 +145,8 @@ fn slope(bounds: &Bounds<'_>, strength: &[f64], i: usize) -> f64 {
     let inputs = bounds.0;
     let calibration = &inputs.model.calibration;
     let term = |&j: &u32| {
-        let d = inputs.points[i] - inputs.points[j as usize];
+        let period = inputs.model.period();
+        let d = period.shortest(inputs.points[i] - inputs.points[j as usize]);
         let r = d.length();
         let s = (1.0 - r / calibration.support_radius).max(0.0);
         let along = d * (calibration.gradient_scale * s * s / r.max(1e-15));

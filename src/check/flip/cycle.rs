@@ -166,6 +166,7 @@ fn solve_coarse(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let cycle = Cycle::of(state, io)?;
     let (levels, unit) = (&cycle.levels, state.unit());
+    let is_end = |at, axis| state.is_periodic() && levels.is_closed_end(at, axis);
     let kinds = io.after.get(solved::BLOCK, levels.bricks.len() * 64)?;
     let (mut shared, mut airs) = (Vec::new(), Vec::new());
     let mut full = vec![[true; 2]; kinds.len()];
@@ -177,7 +178,12 @@ fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
                 let lower = (0..8).filter(|c| c >> axis & 1 == 0);
                 let fine = &levels.coefficient[axis];
                 let faces = lower.map(|c| f64::from(fine[place(slot, block, c)]));
-                let exact = 0.25 * faces.sum::<f64>();
+                let is_end = is_end(at, axis);
+                let exact = if is_end {
+                    0.0
+                } else {
+                    0.25 * faces.sum::<f64>()
+                };
                 shared.push(pair(at, fine[at], exact, [exact]));
             }
             let air = (0..8).map(|c| levels.dirichlet[place(slot, block, c)]);
@@ -185,7 +191,10 @@ fn coarsen(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             airs.push(pair(at, levels.dirichlet[at], exact, [unit, exact]));
             let kind = kinds[(64 * slot + block) as usize] & 3;
             let coarse = at / 512 * 64 + at % 64;
-            full[coarse] = [full[coarse][0] && kind == 1, full[coarse][1] && kind == 0];
+            let is_among =
+                !state.is_periodic() || levels.bricks[at / 512].faces.iter().all(|&face| face != 0);
+            let is_full = full[coarse][0] && kind == 1 && is_among;
+            full[coarse] = [is_full, full[coarse][1] && kind == 0];
             is_child[coarse] = true;
         }
     }

@@ -57,6 +57,7 @@ const TWINS: &[Twin<FlipState>] = &[
     twin("flip/find_change", elements::faces_kept, grid::find_change),
     twin("flip/extrapolate", elements::faces_kept, grid::extrapolate),
     twin("flip/grid_to_particle", NONE, particles::grid_to_particle),
+    twin("flip/push_apart", NONE, particles::push_apart),
     twin(
         "flip/advect",
         || names![buffers::COUNTERS],
@@ -158,6 +159,10 @@ impl State for FlipState {
 impl FlipState {
     pub(super) fn elements(&self) -> &Elements {
         self.elements.as_ref().expect("after flip/survey")
+    }
+
+    fn is_periodic(&self) -> bool {
+        self.scene.is_periodic()
     }
 
     fn sorted(&self) -> &Sorted {

@@ -210,8 +210,14 @@ entries! {
         SHIFT = "displacement", "m": [displacement: "" OF_FACES] displacement, "";
         GIVEN_AFFINE = "affine rows", "1/s": [velocity: "" OF_FACES, size: "Δx"] 2.0 * velocity / size, "";
     }
+    "flip/push_apart" {
+        PUSHED = "displacement", "m": [count: "particles about", apart: "the distance that is kept", period: "the longest of a domain that joins its own end",
+            extent: "the domain's longest side", displacement: "its own value"]
+            U * (count * (8.0 * apart + 2.0 * period) + 2.0 * extent + 2.0 * displacement),
+            "a difference, a root, a quotient and a product for each; the walls' places; a sum";
+    }
     "flip/advect" {
-        MOVED = "position", "m": [answer: "what the twin answers when its start moves along each axis by " START, x: "|x|"]
+        MOVED = "position", "m": [answer: "what the twin answers when its start moves along each axis by " START, x: "|x|, and where a period carried it that four times"]
             answer + U * x, "";
         ADVECTED = "velocity", "m/s": [answer: "what the twin answers when its start moves along each axis by " START,
             size: "|v|, with solids |v| that came in and theirs too"] answer + 8.0 * U * size, "";

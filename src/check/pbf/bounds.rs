@@ -7,7 +7,7 @@ use crate::{
         DENSITY, GRADIENT_SQUARES, LAMBDA, OTHER_GRADIENTS, OWN_GRADIENT, Sums, U, WALL_DENSITY,
         WALL_GRADIENT, WALL_PLACE,
     },
-    domain::pbf::CONTACT,
+    domain::{bounds::FAR, pbf::CONTACT},
     reference::pbf::passes::{Inputs, Row},
 };
 
@@ -33,7 +33,8 @@ impl Bounds<'_> {
         let mut sums = Sums::default();
         for j in self.0.neighbors.all(i) {
             let j = j as usize;
-            let q = self.0.points[i].distance(self.0.points[j]) / h;
+            let way = self.0.points[i] - self.0.points[j];
+            let q = self.0.model.period().shortest(way).length() / h;
             sums.add(q, weight(j));
         }
         sums
@@ -120,7 +121,9 @@ impl Bounds<'_> {
     pub(super) fn confine(&self, x: DVec3, error: f64) -> Confined {
         let (model, walls) = (self.0.model, &self.0.substep.walls);
         let contact = CONTACT * model.settings.particle_spacing;
-        let place = self.wall_place() + U * walls.max.abs().max_element();
+        let there = walls.max.to_array().map(f64::abs).into_iter();
+        let farthest = there.filter(|&wall| wall < FAR).fold(0.0, f64::max);
+        let place = self.wall_place() + U * farthest;
         let mut reach = error;
         let mut is_near = false;
         if let Some(grid) = &model.distance {

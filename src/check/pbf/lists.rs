@@ -123,25 +123,23 @@ impl PbfState {
         let (cells, lists) = (&self.model.cells, &self.lists);
         let start = &lists.start;
         let solid_start = cells.starts(&self.model.samples);
-        let [nx, ny, nz] = cells.dims;
         let h2 = self.model.calibration.support_radius.powi(2);
         Neighbors::listed(n, |i, members| {
             if !lists.is_searched[i] {
                 return split(&lists.members[i], n, members);
             }
             let mut near = Vec::new();
-            let [cx, cy, cz] = cells.coordinate(points[i]);
-            let (low, high) = (cx.saturating_sub(1), (cx + 1).min(nx - 1));
-            for z in cz.saturating_sub(1)..=(cz + 1).min(nz - 1) {
-                for y in cy.saturating_sub(1)..=(cy + 1).min(ny - 1) {
-                    let row = (z * ny + y) * nx;
-                    let (first, last) = (row + low, row + high + 1);
-                    let fluid = start[first] as usize..start[last] as usize;
-                    let solid = n + solid_start[first]..n + solid_start[last];
-                    let within = |&j: &usize| points[i].distance_squared(points[j]) < h2;
-                    let found = fluid.chain(solid).filter(|&j| j != i).filter(within);
-                    near.extend(found.map(|j| j as u32));
-                }
+            for run in cells.runs(points[i]) {
+                let fluid = start[run.start] as usize..start[run.end] as usize;
+                let solid = n + solid_start[run.start]..n + solid_start[run.end];
+                let r2 = |j: usize| {
+                    cells
+                        .period
+                        .shortest(points[i] - points[j])
+                        .length_squared()
+                };
+                let found = fluid.chain(solid).filter(|&j| j != i && r2(j) < h2);
+                near.extend(found.map(|j| j as u32));
             }
             near.sort_unstable();
             split(&near, n, members)
@@ -181,7 +179,12 @@ pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let near = state.search_within(&points, h * (1.0 + shell));
     let one = |local: usize| {
         let i = first + local;
-        let r2 = |&j: &u32| points[i].distance_squared(points[j as usize]);
+        let period = state.model.period();
+        let r2 = |&j: &u32| {
+            period
+                .shortest(points[i] - points[j as usize])
+                .length_squared()
+        };
         let near: Vec<u32> = near.all(i).collect();
         let sure = near.iter().filter(|j| r2(j) < inner).count();
         let possible = near.iter().filter(|j| r2(j) < outer).count();

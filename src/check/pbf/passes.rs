@@ -58,7 +58,11 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             false => 0.0,
         };
         let (at, then, work) = passes::predict_and_work(model, &state.substep, x, v);
-        let position = pair(i, predicted[n + i], at, confined.magnitudes);
+        // Rounding may take one of the two to the other end of a period.
+        let found = (model.period()).image_by_rounding(predicted[n + i], at);
+        let [error, moved, place, pushed] = confined.magnitudes;
+        let magnitudes = [error, moved, place, pushed + state.carried(x, at)];
+        let position = pair(i, found, at, magnitudes);
         let velocity = pair(i, velocity[i], then, [free, stopped, then.length()]);
         let magnitudes = [
             state.wall_speed(),
@@ -86,7 +90,8 @@ pub(super) fn assign_cells(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let points = &io.before.vectors(buffers::PREDICTED, 2 * n)?[n..];
     let exact: Vec<u32> = points.iter().map(|&x| cells.index(x) as u32).collect();
     let cell_of = io.after.get(buffers::CELL_OF, n)?;
-    check_cells(&CELL, points, cells.edge, &cell_of, &exact, io.table);
+    let places: Vec<DVec3> = points.iter().map(|&x| x / cells.edge).collect();
+    check_cells(&CELL, &places, 1.0, &cell_of, &exact, io.table);
     let slot = io.after.get(buffers::SLOT_IN_CELL, n)?;
     let counts = io
         .after
@@ -185,11 +190,12 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         false => None,
     };
     let bounds = Bounds(inputs);
-    let h = state.model.calibration.support_radius;
+    let (h, period) = (state.model.calibration.support_radius, state.model.period());
     let one = |i: usize| {
         // On one spot a hash decides where they part, by sines that WGSL leaves open.
         let is_coincident = (neighbors.all(i))
-            .any(|j| points[i].distance_squared(points[j as usize]) < 2e-12 * h * h);
+            .map(|j| period.shortest(points[i] - points[j as usize]))
+            .any(|way| way.length_squared() < 2e-12 * h * h);
         // The bound follows the correction from before walls and solids push, as they bend what it errs by.
         let to = twin[i].free;
         let step = STEP.of([bounds.delta(i, &lambda), (to - points[i]).length()]);
@@ -258,9 +264,13 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
         let error = UPDATED.of([whole, way, slowed * whole]);
         let position = pair(
             i,
-            position[i],
+            model.period().image_by_rounding(position[i], x),
             x,
-            [slowed * x.length(), slowed * step, error],
+            [
+                slowed * x.length() + state.carried(end, x),
+                slowed * step,
+                error,
+            ],
         );
         let velocity = pair(i, velocity[i], then, [error]);
         (position, velocity, [is_capped, is_near])
@@ -295,6 +305,17 @@ pub(super) fn measure_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
         pair(i, density[i], twin[i], [bounds.density(i, twin[i])])
     });
     Ok(())
+}
+
+impl PbfState {
+    /// Four periods where one carried a particle from `before` to `after`, or rounding decides whether, metres.
+    fn carried(&self, before: DVec3, after: DVec3) -> f64 {
+        let period = self.model.period();
+        match period.is_at_joint(before, after) {
+            true => 4.0 * period.0.length(),
+            false => 0.0,
+        }
+    }
 }
 
 /// Particles that a dispatch handles.

@@ -55,7 +55,8 @@ entries! {
     "pbf/predict" {
         PREDICT_POSITION = "predicted position", "m": [error: "" WAY,
             moved: "near solids what the f64 twin answers when its input moves along each axis by " REACH,
-            place: "where a wall pushes, by how much f32 misplaces it", x: "where a solid pushes |x|"]
+            place: "where a wall pushes, by how much f32 misplaces it", x: "where a solid pushes |x|, and four periods where \
+            one carries it"]
             moved.max(error) + (place + U * x), "each velocity term 3 u; walls and solids bend the way";
         PREDICT_VELOCITY = "velocity", "m/s": [velocity: "" PUSH_FREE,
             stopped: "where walls or solids take part of the way " STOPPED, v: "|v|"]
@@ -102,8 +103,8 @@ entries! {
         DECISION = "done, iterations", "": [] 0.0, "and what is counted over the frame", tie NEAR_TARGET;
     }
     "pbf/update_velocity" {
-        UPDATE_POSITION = "position", "m": [x: "|x| of a particle at the cap or beyond, else 0",
-            step: "of such a particle Δt, else 0", velocity: "" UPDATED] U * x + step * velocity, "a copy where none is slowed";
+        UPDATE_POSITION = "position", "m": [x: "|x| of a particle at the cap or beyond, else 0, and four periods where one carries it",
+            step: "of such a particle Δt, else 0", velocity: "" UPDATED] U * x + step * velocity, "a copy where none is slowed or carried";
         UPDATE_VELOCITY = "velocity", "m/s": [velocity: "" UPDATED] velocity, "one sum and a quotient";
         CAPPED = "particles slowed", "": [near: "particles as near to the cap as " NEAR_CAP] near, "a count";
         UPDATE_ID = "id", "": [] 0.0, "a copy";

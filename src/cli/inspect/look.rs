@@ -8,7 +8,7 @@ use std::{
 
 use super::{InspectArgs, misplaced};
 use crate::{
-    cli::{Failure, bake, is_cache, size},
+    cli::{Failure, bake, count, is_cache, size},
     scene::look::Look,
     stage::render::{LookPlan, Subject, plan},
 };
@@ -58,8 +58,10 @@ fn show_plan(
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     writeln!(
         out,
-        "{name}: {} × {} pixels, {} samples",
-        image.width, image.height, image.samples
+        "{name}: {} × {} pixels, {}",
+        image.width,
+        image.height,
+        count(image.samples.into(), "sample")
     )?;
     match subject {
         Subject::Nothing => writeln!(out, "for no scene: --scene adds solids and particles")?,

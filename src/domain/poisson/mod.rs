@@ -200,7 +200,8 @@ impl System {
         faces
     }
 
-    /// The matrix times `x`, by differences, so that a smooth `x` loses no digits.
+    /// The matrix times `x`, by differences, so that a smooth `x` loses no digits: the f64 twin of
+    /// `shaders/pressure/multiply.wgsl`.
     pub fn apply(&self, x: &[f64]) -> Vec<f64> {
         (0..x.len())
             .into_par_iter()
@@ -246,13 +247,18 @@ impl System {
     }
 }
 
-/// Subtracts the mean of `values` over each pocket.
+/// Subtracts the mean of `values` over each pocket. Of values that are all alike nothing is left: the rounding of their
+/// mean would be a right-hand side without a solution.
 pub fn remove_means(values: &mut [f64], pockets: &[Vec<u32>]) {
     for pocket in pockets {
         let sum: f64 = pocket.iter().map(|&row| values[row as usize]).sum();
         let mean = sum / pocket.len() as f64;
+        let slack = pocket.len() as f64 * f64::EPSILON * mean.abs();
+        let is_alike = |&row: &u32| (values[row as usize] - mean).abs() <= slack;
+        let are_alike = pocket.iter().all(is_alike);
         for &row in pocket {
-            values[row as usize] -= mean;
+            let value = &mut values[row as usize];
+            *value = if are_alike { 0.0 } else { *value - mean };
         }
     }
 }

@@ -5,7 +5,9 @@
 mod elevation;
 mod fitted;
 mod flux;
+mod force;
 mod front;
+mod rate;
 mod volume;
 
 use glam::{DVec3, Vec3};
@@ -15,7 +17,9 @@ use super::particles::Particles;
 pub use elevation::elevation;
 pub use fitted::fitted;
 pub use flux::flux;
+pub use force::{Patch, load, patches};
 pub use front::{front, run_up};
+pub use rate::Rate;
 pub use volume::{enclosed_volume, volume};
 
 /// R of the surface's kernel in particle spacings (Zhu and Bridson 2005).

@@ -157,7 +157,7 @@ mod tests {
         f64::from((x ^ (x >> 13)) % 65_536) / 65_536.0
     }
 
-    /// Particles at these places, d = 0.1, in a domain of 4 × 4 × 4.
+    /// Particles at these places, d = 0.1, in a domain of 6 × 6 × 6.
     fn of(places: impl Iterator<Item = DVec3>) -> (f64, f64) {
         let position: Vec<_> = places.map(|x| x.as_vec3().to_array()).collect();
         let expected = position.len() as f64 * 1e-3;
@@ -167,7 +167,7 @@ mod tests {
         };
         let domain = Bounds {
             min: DVec3::ZERO,
-            max: DVec3::splat(4.0),
+            max: DVec3::splat(6.0),
         };
         (volume(&particles, 0.1, &domain) / expected, expected)
     }

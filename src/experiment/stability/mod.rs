@@ -25,6 +25,8 @@ use super::{
 };
 use report::Results;
 
+pub(super) use report::number;
+
 pub use trial::{refusal, run_trial};
 pub use verdict::{Measured, Run, Verdict};
 

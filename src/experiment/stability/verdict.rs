@@ -45,7 +45,7 @@ impl Verdict {
         }
     }
 
-    fn of(holds: bool, is_known: bool) -> Self {
+    pub(in super::super) fn of(holds: bool, is_known: bool) -> Self {
         match (holds, is_known) {
             (true, false) => Self::Passes,
             (false, false) => Self::Misses,

@@ -134,7 +134,7 @@ fn neighbor_visits(scene: &Scene, end: &Particles, run: &Measured) -> f64 {
     let radius = pbf.support_ratio * pbf.particle_spacing;
     let place = |x: &[f32; 3]| Vec3::from_array(*x).as_dvec3() - scene.domain.min;
     let positions: Vec<DVec3> = end.position.iter().map(place).collect();
-    let cells = Cells::new(scene.domain.size(), radius);
+    let cells = Cells::periodic(scene.domain.size(), radius, scene.period());
     let order = cells.order(&positions, &end.id);
     let points: Vec<DVec3> = order.iter().map(|&k| positions[k]).collect();
     let crowd = Crowd {

@@ -10,7 +10,7 @@ use crate::{
     study::{
         chart::{Chart, Dot, Mark, Series},
         convergence_point::{Reading, TABLE_1, convergence_point},
-        knee::{self, Knee, OF_NO_ACCOUNT},
+        knee::{self, BEST_THAT_WAS_RUN, Knee, OF_NO_ACCOUNT, TOO_FEW},
         page::Part,
     },
 };
@@ -21,6 +21,7 @@ use super::{
         engine::Bench,
         report::{Report, what_was_run},
     },
+    digits::{shortened, significant},
     measured::{self, Run},
 };
 
@@ -211,21 +212,20 @@ impl Results<'_> {
             });
             knees.truncate(1);
         }
-        let told = knees
-            .iter()
-            .map(|(line, Knee { point, is_enough }, setting)| {
-                let why = match (is_enough, line.points.len()) {
-                    (true, _) => "the cheapest setting below a tenth of the discretisation error",
-                    (false, 1) => "the only setting that was measured",
-                    (false, _) => "the setting with the least error × time",
-                };
-                let of = self.cost_of().trim_start_matches("of ");
-                let (ms, error) = (point.time[1], error.name());
-                format!(
-                    "{setting}: {ms:.2} ms {of}, {error} {:.2e}, {why}",
-                    point.error
-                )
-            });
+        let told = knees.iter().map(|(line, knee, setting)| {
+            let why = match (knee.is_enough, line.points.len(), knee.is_last) {
+                (true, ..) => {
+                    "the cheapest setting below a tenth of the discretisation error".to_owned()
+                }
+                (_, 1, _) => "the only setting that was measured".to_owned(),
+                (_, _, false) => LEAST_PRODUCT.to_owned(),
+                (_, _, true) => format!("{LEAST_PRODUCT}, {BEST_THAT_WAS_RUN}"),
+            };
+            let of = self.cost_of().trim_start_matches("of ");
+            let (ms, value) = (knee.point.time[1], knee.point.error);
+            let (ms, title) = (significant(ms), error.title());
+            format!("{setting}: {ms} ms {of}, {title}: {value:.1e}; {why}")
+        });
         match told.collect::<Vec<_>>().join("; ") {
             none if none.is_empty() => "Nothing was measured: no point came to its end.".to_owned(),
             told => format!("The knee is {told}."),
@@ -323,6 +323,7 @@ impl Results<'_> {
                 })
                 .collect(),
             notes: notes.collect(),
+            ..Chart::default()
         }
     }
 
@@ -422,7 +423,7 @@ impl Results<'_> {
         let mut knees: Vec<Vec<String>> = titled(&["error", "method", "knee"]);
         for (error, _, line, discretisation) in self.each() {
             let words = knee::words(&line, discretisation);
-            knees.push(vec![error.name().to_owned(), line.name, words]);
+            knees.push(vec![error.title().to_owned(), line.name, words]);
         }
         parts.push(Part::Words(knees));
         if !rivals.is_empty() {
@@ -437,13 +438,17 @@ impl Results<'_> {
             let mut pairs: Vec<Vec<String>> = titled(&titles);
             for (error, k, rivalry) in rivals {
                 let (all, lost) = (rivalry.ratios.len(), rivalry.lost());
+                let (won, lost) = match rivalry.has_verdict() {
+                    true => ((all - lost.len()).to_string(), lost.join(", ")),
+                    false => (TOO_FEW.to_owned(), String::new()),
+                };
                 pairs.push(vec![
-                    error.name().to_owned(),
+                    error.title().to_owned(),
                     self.sweep.lines[*k].name.clone(),
                     rivalry.other.clone(),
                     all.to_string(),
-                    (all - lost.len()).to_string(),
-                    lost.join(", "),
+                    won,
+                    lost,
                 ]);
             }
             let title = "Method against method in equal time";
@@ -460,7 +465,7 @@ impl Results<'_> {
             parts.push(Part::Text(CONVERGENCE.into()));
         }
         parts.push(Part::Heading("Table".into()));
-        parts.push(Part::Table(table.to_vec()));
+        parts.push(Part::Table(shortened(table)));
         let mut run = what_was_run(bench.request);
         run.push(Part::Text(format!(
             "{} By {} {}. {}",
@@ -516,6 +521,8 @@ impl Results<'_> {
         table
     }
 }
+
+const LEAST_PRODUCT: &str = "the setting with the least error × time";
 
 /// Each once, in the order in which they come.
 fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {

@@ -9,7 +9,8 @@ use crate::{
         boundary::Boundary,
         bounds::Bounds,
         bricks::{Bricks, EDGE, table_dims},
-        flip::{CAP, CONTACT, layers, stored_cells},
+        flip::{CAP, CONTACT, apart, layers, stored_cells},
+        period::Period,
         shores::Shores,
         signed_distance::SignedDistance,
     },
@@ -67,7 +68,8 @@ impl Model {
         Self {
             cells: scene.domain.cells(scene.solver.flip().cell_size),
             solids: solids.map(local).collect(),
-            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size),
+            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size)
+                .joined(scene.periodic),
             at_rest: usize::from(boundary.distance.is_some()),
             scene: scene.clone(),
         }
@@ -88,9 +90,20 @@ impl Model {
         CONTACT * self.settings().particle_spacing()
     }
 
+    /// Particles that are nearer to each other are pushed apart, metres.
+    pub fn apart(&self) -> f64 {
+        let size = self.cell_size();
+        size * apart(self.settings().particle_spacing() / size)
+    }
+
     /// Displacement cap of a substep, metres.
     pub(super) fn max_displacement(&self) -> f64 {
         CAP * self.settings().cfl * self.cell_size()
+    }
+
+    /// Lengths along the axes along which the domain joins its own end.
+    pub fn period(&self) -> Period {
+        self.scene.period()
     }
 
     /// Whether the surface counts in the pressure.
@@ -107,13 +120,13 @@ impl Model {
 
     /// One flag a brick, none set.
     pub(super) fn no_water(&self) -> Vec<bool> {
-        let dims = table_dims(stored_cells(self.cells));
+        let dims = table_dims(stored_cells(self.cells, self.scene.periodic));
         vec![false; dims.iter().map(|&n| n as usize).product()]
     }
 
     /// Place of a cell's brick among the flags.
     pub(super) fn brick_index(&self, cell: [u32; 3]) -> usize {
-        let dims = table_dims(stored_cells(self.cells));
+        let dims = table_dims(stored_cells(self.cells, self.scene.periodic));
         let [x, y, z] = cell.map(|c| c / EDGE);
         ((z * dims[1] + y) * dims[0] + x) as usize
     }
@@ -121,13 +134,14 @@ impl Model {
     /// Bricks with particles, which `is_wet` tells, with what else is water beside walls and solids, and those that the
     /// step's layers of faces beyond it reach; their elements are those of the GPU.
     pub fn bricks(&self, is_wet: &[bool], step: &Step<'_>) -> Bricks {
-        let cells = stored_cells(self.cells);
+        let periodic = self.scene.periodic;
+        let cells = stored_cells(self.cells, periodic);
         let reach = (step.layers as u32).div_ceil(EDGE);
         let mut is_wet = is_wet.to_vec();
         let moving = step.solids.iter().zip(&self.solids).skip(self.at_rest);
         let ways = moving.map(|(now, start)| (now.origin - start.origin) / self.cell_size());
         (self.shores).mark(&mut is_wet, table_dims(cells), &step.cut, ways);
-        Bricks::new(cells, &is_wet, reach, 1)
+        Bricks::periodic(cells, periodic, &is_wet, reach, 1)
     }
 
     /// What `substep` knows.

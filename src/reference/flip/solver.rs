@@ -7,7 +7,7 @@ use super::{
     density_source,
     effects::{self, Water},
     extrapolate, find_change, find_excess, find_water, gather_centers, gather_faces,
-    grid_to_particle, reorder, survey, wall_friction,
+    grid_to_particle, push_apart, reorder, survey, wall_friction,
 };
 use crate::{
     domain::{
@@ -17,7 +17,7 @@ use crate::{
         gauge::Gauge,
         particles::Particles,
         poisson::{FLUID, System},
-        solver::{Projection, Solver, StepReport},
+        solver::{Projection, Seen, Solver, Span, StepReport, Watch},
     },
     reference::{
         ReferenceError, Timings,
@@ -214,13 +214,21 @@ impl Flip {
                 extrapolate(&step, &bricks, layer, &mut faces);
             }
         });
-        let given = timings.time("flip/grid_to_particle", || {
+        let mut given = timings.time("flip/grid_to_particle", || {
             let displacement = displacement.as_deref();
             grid_to_particle(model, &step, &bricks, &sorted, &faces, displacement)
         });
+        if displacement.is_some() {
+            let pushed = timings.time("flip/push_apart", || {
+                push_apart(model, &step, &bricks, &sorted)
+            });
+            for (displacement, push) in given.displacement.iter_mut().zip(pushed) {
+                *displacement += push;
+            }
+        }
         let moved = timings.time("flip/advect", || {
             let position = &sorted.cloud.position;
-            advect(model, &step, &bricks, position, &faces.velocity, &given)
+            advect(model, &step, &bricks, position, &faces, &given)
         });
         let scale = model.scene.water.rest_density * model.cell_size() / step.length;
         let pressure = waters.by_element(&projected.system, &projected.solution.x);
@@ -244,7 +252,11 @@ impl Flip {
     }
 
     /// Substeps through one frame, from `cloud` on; what they did, and the densities that the last one found.
-    fn run_frame(&mut self, cloud: &mut Cloud) -> Result<(StepReport, Vec<f64>), ReferenceError> {
+    fn run_frame(
+        &mut self,
+        cloud: &mut Cloud,
+        watch: &mut dyn Watch,
+    ) -> Result<(StepReport, Vec<f64>), ReferenceError> {
         let frame = self.frame + 1;
         let length = self.model.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
@@ -281,32 +293,85 @@ impl Flip {
             report.iterations += u64::from(trace.projected.solution.iterations);
             report.capped += trace.capped;
             add(&mut all, &trace.projected);
+            let span = Span {
+                start: start + elapsed,
+                end: start + (elapsed + substep.length),
+                is_last: wanted <= 1.0,
+            };
             elapsed += substep.length;
             *cloud = trace.after;
-            if wanted <= 1.0 {
+            self.field = Some(Field {
+                bricks: trace.bricks,
+                kind: trace.room.kind,
+                pressure: trace.pressure,
+            });
+            self.show(span, cloud, watch)?;
+            if span.is_last {
                 report.projection = Some(all);
-                let of_cells = trace.centers.density.into_iter().zip(&trace.room.kind);
+                let kinds = self.field.iter().flat_map(|field| &field.kind);
+                let of_cells = trace.centers.density.into_iter().zip(kinds);
                 let in_water = of_cells.filter(|(_, kind)| **kind == FLUID);
                 let density = in_water.map(|(density, _)| density).collect();
-                self.field = Some(Field {
-                    bricks: trace.bricks,
-                    kind: trace.room.kind,
-                    pressure: trace.pressure,
-                });
                 return Ok((report, density));
             }
         }
     }
 
+    /// The last substep's pressure; `None` before the first.
+    fn gauge(&self) -> Option<Gauge<'_>> {
+        let field = self.field.as_ref()?;
+        Some(Gauge {
+            bricks: &field.bricks,
+            cells: self.model.cells,
+            cell_size: self.model.cell_size(),
+            kind: &field.kind,
+            pressure: &field.pressure,
+            rise: self.model.scene.water.rise(),
+        })
+    }
+
+    /// Shows a substep that just ran.
+    fn show(&self, span: Span, cloud: &Cloud, watch: &mut dyn Watch) -> Result<(), ReferenceError> {
+        let wanted = watch.wants(span);
+        if !wanted.is_any() {
+            return Ok(());
+        }
+        let mut seen = Seen::default();
+        if wanted.particles {
+            seen.particles.id.clone_from(&self.state.id);
+            seen.particles.position.clone_from(&self.state.position);
+            seen.particles.velocity.clone_from(&self.state.velocity);
+            self.round(cloud, &by_id(cloud), &mut seen.particles);
+        }
+        if wanted.pressures {
+            seen.pressures = self.pressures(&self.model.scene.pressure_points())?;
+        }
+        if let Some(gauge) = self.gauge() {
+            let origin = self.model.scene.domain.min;
+            let patches = wanted.patches.iter();
+            seen.patches = patches
+                .map(|patch| gauge.on_face(patch.at - origin, patch.normal()))
+                .collect();
+        }
+        watch.look(span, seen);
+        Ok(())
+    }
+
+    /// Positions and velocities into a state's order, as a frame has them.
+    fn round(&self, cloud: &Cloud, order: &[usize], state: &mut Particles) {
+        let origin = self.model.scene.domain.min;
+        for (slot, &k) in order.iter().enumerate() {
+            state.position[slot] = (origin + cloud.position[k]).as_vec3().to_array();
+            state.velocity[slot] = cloud.velocity[k].as_vec3().to_array();
+        }
+    }
+
     /// Rounds into the state, in its order.
     fn write(&mut self, cloud: &Cloud) {
-        let origin = self.model.scene.domain.min;
-        let mut order: Vec<usize> = (0..cloud.id.len()).collect();
-        order.sort_unstable_by_key(|&k| cloud.id[k]);
-        for (slot, &k) in order.iter().enumerate() {
-            self.state.position[slot] = (origin + cloud.position[k]).as_vec3().to_array();
-            self.state.velocity[slot] = cloud.velocity[k].as_vec3().to_array();
-        }
+        let order = by_id(cloud);
+        let mut state = std::mem::take(&mut self.state);
+        self.round(cloud, &order, &mut state);
+        self.state = state;
         if !cloud.affine.is_empty() {
             for (place, name) in AFFINE.into_iter().enumerate() {
                 let value = |&k: &usize| cloud.affine[k].row(place / 3)[place % 3] as f32;
@@ -390,7 +455,10 @@ impl Solver for Flip {
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<(Particles, StepReport), ReferenceError> {
+    fn advance_watched(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<(Particles, StepReport), ReferenceError> {
         let mut cloud = self.cloud();
         let (done, density) = if self.state.is_empty() {
             let report = self.model.scene.report(&self.state, [].into_iter());
@@ -403,7 +471,7 @@ impl Solver for Flip {
                 Vec::new(),
             )
         } else {
-            self.run_frame(&mut cloud)?
+            self.run_frame(&mut cloud, watch)?
         };
         self.write(&cloud);
         let frame = self.frame + 1;
@@ -425,15 +493,8 @@ impl Solver for Flip {
     /// The projection's, between cell centres.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, ReferenceError> {
         // Without particles there is none.
-        let Some(field) = &self.field else {
+        let Some(gauge) = self.gauge() else {
             return Ok(vec![None; points.len()]);
-        };
-        let gauge = Gauge {
-            bricks: &field.bricks,
-            cells: self.model.cells,
-            cell_size: self.model.cell_size(),
-            kind: &field.kind,
-            pressure: &field.pressure,
         };
         let local = |at: &DVec3| *at - self.model.scene.domain.min;
         Ok(points.iter().map(|at| gauge.at(local(at))).collect())
@@ -442,6 +503,13 @@ impl Solver for Flip {
     fn timings(&self) -> Vec<(&'static str, f64, u64)> {
         self.timings.rows()
     }
+}
+
+/// Places in the cloud in the order of the ids.
+fn by_id(cloud: &Cloud) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..cloud.id.len()).collect();
+    order.sort_unstable_by_key(|&k| cloud.id[k]);
+    order
 }
 
 fn widen(v: &[f32; 3]) -> DVec3 {

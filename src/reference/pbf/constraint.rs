@@ -245,7 +245,7 @@ impl<'a> Gradients<'a> {
     fn pair(&self, i: usize, j: usize) -> DVec3 {
         let calibration = &self.inputs.model.calibration;
         let h = calibration.support_radius;
-        let d = self.inputs.points[i] - self.inputs.points[j];
+        let d = self.inputs.between(i, j);
         if self.is_exact {
             let p = (1.0 - d.length_squared() / (h * h)).max(0.0);
             return d * (6.0 * calibration.density_scale * p * p / (h * h));

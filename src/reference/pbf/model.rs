@@ -7,6 +7,7 @@ use crate::{
         boundary::Boundary,
         bounds::Bounds,
         pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
+        period::Period,
         signed_distance::SignedDistance,
         sph::{Calibration, half_space_fraction},
     },
@@ -89,7 +90,8 @@ impl Model {
         let settings = scene.solver.pbf();
         let samples = &boundary.samples;
         let calibration = Calibration::new(settings.particle_spacing, settings.support_ratio);
-        let cells = Cells::new(scene.domain.size(), calibration.support_radius);
+        let (size, support) = (scene.domain.size(), calibration.support_radius);
+        let cells = Cells::periodic(size, support, scene.period());
         let origin = scene.domain.min;
         let local: Vec<DVec3> = samples.iter().map(|s| s.position - origin).collect();
         let id: Vec<u32> = (0..local.len() as u32).collect();
@@ -110,6 +112,12 @@ impl Model {
             gravity: scene.water.gravity,
             cells,
         }
+    }
+
+    /// Lengths along the axes along which the domain joins its own end.
+    #[inline]
+    pub fn period(&self) -> Period {
+        self.cells.period
     }
 
     /// Largest correction of one iteration, metres.

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{Colour, Model, Substep};
-use crate::reference::neighbors::Neighbors;
+use crate::reference::{hash::pair_direction, neighbors::Neighbors};
 
 /// Particles of a task; fewer are not worth the handing out.
 const GRAIN: usize = 256;
@@ -28,6 +28,13 @@ impl Inputs<'_> {
     /// How many of the points are particles.
     pub fn particles(&self) -> usize {
         self.points.len() - self.model.samples.len()
+    }
+
+    /// From point `j` to point `i`, or to the image of it that is nearer, metres.
+    #[inline]
+    pub(super) fn between(&self, i: usize, j: usize) -> DVec3 {
+        let period = self.model.period();
+        period.shortest(self.points[i] - self.points[j])
     }
 
     /// Of a sample as lists have it, in particles' worth of mass.
@@ -65,7 +72,8 @@ pub fn predict_and_work(
     } else {
         DVec3::ZERO
     };
-    (x, v + taken, substep.work_of_push(push))
+    let work = substep.work_of_push(push);
+    (model.period().wrap(x), v + taken, work)
 }
 
 /// Relative density ρ/ρ0 of each particle, shape (particles) (pbf/measure_density).
@@ -75,7 +83,7 @@ pub fn measure_density(inputs: Inputs<'_>) -> Vec<f64> {
     let one = |i: usize| {
         let x = inputs.points[i];
         let kernel = |&j: &u32| {
-            let q2 = x.distance_squared(inputs.points[j as usize]) * inverse_h2;
+            let q2 = inputs.between(i, j as usize).length_squared() * inverse_h2;
             (1.0 - q2).max(0.0).powi(3)
         };
         let (fluid, solid) = inputs.neighbors.of(i);
@@ -130,7 +138,7 @@ pub fn row(inputs: Inputs<'_>, i: usize) -> Row {
     let (mut kernel, mut gradient, mut squares) = (1.0, DVec3::ZERO, 0.0);
     // Poly6, and spiky's slope beside the difference over r.
     let pair = |j: u32| {
-        let d = x - inputs.points[j as usize];
+        let d = inputs.between(i, j as usize);
         let r2 = d.length_squared();
         let r = r2.sqrt();
         let p = (1.0 - r2 * inverse_h * inverse_h).max(0.0);
@@ -244,10 +252,9 @@ fn pair_corrections(inputs: Inputs<'_>, i: usize, lambda: &[f64]) -> DVec3 {
     } = inputs.model;
     let inverse_h = 1.0 / calibration.support_radius;
     let artificial = settings.artificial_pressure / calibration.bulk_gradient_squares;
-    let x = inputs.points[i];
     let mut coincident = None;
     let mut pair = |j: u32, scale: f64| {
-        let d = x - inputs.points[j as usize];
+        let d = inputs.between(i, j as usize);
         let r2 = d.length_squared();
         let r = r2.sqrt();
         let s = (1.0 - r * inverse_h).max(0.0);
@@ -289,24 +296,8 @@ pub fn update_velocity(
     let distance = v.length() * step;
     if distance > model.max_displacement() {
         let excess = v * (1.0 - model.max_displacement() / distance);
-        return (predicted - excess * step, v - excess, true);
+        let x = predicted - excess * step;
+        return (model.period().wrap(x), v - excess, true);
     }
-    (predicted, v, false)
-}
-
-/// PCG hash (Jarzynski and Olano 2020; shared/hash.wgsl).
-fn pcg(value: u32) -> u32 {
-    let state = value.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    (word >> 22) ^ word
-}
-
-/// A unit vector for a pair that stands on one spot: opposite for (a, b) and (b, a).
-fn pair_direction(a: u32, b: u32) -> DVec3 {
-    let seed = pcg(a.min(b) ^ pcg(a.max(b)));
-    let z = f64::from(seed & 0xffff) / 32767.5 - 1.0;
-    let angle = f64::from(seed >> 16) * (std::f64::consts::TAU / 65536.0);
-    let r = (1.0 - z * z).max(0.0).sqrt();
-    let sign = if a < b { 1.0 } else { -1.0 };
-    sign * DVec3::new(r * angle.cos(), r * angle.sin(), z)
+    (model.period().wrap(predicted), v, false)
 }

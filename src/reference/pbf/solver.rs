@@ -14,7 +14,7 @@ use crate::{
         particles::Particles,
         pbf::chebyshev_factors,
         probe::fitted,
-        solver::{Solver, StepReport},
+        solver::{Seen, Solver, Span, StepReport, Watch},
     },
     reference::{
         ReferenceError, Timings,
@@ -282,15 +282,42 @@ impl Pbf {
         (iterations, capped, work)
     }
 
-    /// Rounds into the state.
-    fn write(&mut self, position: &[DVec3], velocity: &[DVec3]) {
+    /// Shows a substep of `step` seconds that just ran.
+    fn show(
+        &mut self,
+        span: Span,
+        step: f64,
+        position: &[DVec3],
+        velocity: &[DVec3],
+        watch: &mut dyn Watch,
+    ) -> Result<(), ReferenceError> {
+        let wanted = watch.wants(span);
+        if !wanted.is_any() {
+            return Ok(());
+        }
+        let mut seen = Seen::default();
+        if wanted.particles {
+            seen.particles.id.clone_from(&self.state.id);
+            let [positions, velocities] = self.rounded(position, velocity);
+            (seen.particles.position, seen.particles.velocity) = (positions, velocities);
+        }
+        if wanted.pressures {
+            (self.position, self.step) = (position.to_vec(), step);
+            seen.pressures = self.pressures(&self.scene.pressure_points())?;
+        }
+        watch.look(span, seen);
+        Ok(())
+    }
+
+    /// World positions and velocities as a frame has them.
+    fn rounded(&self, position: &[DVec3], velocity: &[DVec3]) -> [Vec<[f32; 3]>; 2] {
         let origin = self.scene.domain.min;
-        for (slot, x) in self.state.position.iter_mut().zip(position) {
-            *slot = (origin + *x).as_vec3().to_array();
-        }
-        for (slot, v) in self.state.velocity.iter_mut().zip(velocity) {
-            *slot = v.as_vec3().to_array();
-        }
+        let place = |x: &DVec3| (origin + *x).as_vec3().to_array();
+        let speed = |v: &DVec3| v.as_vec3().to_array();
+        [
+            position.iter().map(place).collect(),
+            velocity.iter().map(speed).collect(),
+        ]
     }
 
     /// Relative densities of the state in its order.
@@ -315,7 +342,10 @@ impl Solver for Pbf {
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<(Particles, StepReport), ReferenceError> {
+    fn advance_watched(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<(Particles, StepReport), ReferenceError> {
         let frame = self.frame + 1;
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
@@ -332,8 +362,14 @@ impl Solver for Pbf {
             iterations += u64::from(some);
             capped += slowed;
             boundary_work += work;
+            let span = Span {
+                start: start + f64::from(k - 1) * step,
+                end: start + f64::from(k) * step,
+                is_last: k == substeps,
+            };
+            self.show(span, step, &position, &velocity, watch)?;
         }
-        self.write(&position, &velocity);
+        [self.state.position, self.state.velocity] = self.rounded(&position, &velocity);
         let density = self.density(start + length);
         if let Some((count, first)) = self.state.first_not_finite(Some(&density)) {
             return Err(Breach::not_finite(frame, count, Some(first)).into());
@@ -360,8 +396,10 @@ impl Solver for Pbf {
         );
         let pressure = |at: &DVec3| {
             let pressed = self.pressed.iter().map(|sum| scale * sum);
-            let particles = self.position.iter().copied().zip(pressed);
             let at = *at - self.scene.domain.min;
+            let period = self.model.period();
+            let nearest = self.position.iter().map(|x| at + period.shortest(*x - at));
+            let particles = nearest.zip(pressed);
             fitted(particles, at, calibration.support_radius)
         };
         Ok(points.iter().map(pressure).collect())

@@ -102,18 +102,27 @@ fn shared(system: &System, i: usize, first: usize, value: impl Fn(usize) -> f64)
         .sum()
 }
 
-/// One over the square roots of MIC(0)'s pivots. Lower neighbours stand in rows before.
+/// The same over the neighbours whose rows stand before row `i`, or after it. Without periods they are the lower and the
+/// upper ones.
+fn shared_in_order(system: &System, i: usize, is_after: bool, value: impl Fn(usize) -> f64) -> f64 {
+    (system.neighbor[i].iter().zip(&system.coefficient[i]))
+        .filter(|&(&j, _)| j != NONE && (j as usize > i) == is_after)
+        .map(|(&j, coefficient)| coefficient * value(j as usize))
+        .sum()
+}
+
+/// One over the square roots of MIC(0)'s pivots.
 fn pivots(system: &System) -> Vec<f64> {
     let mut pivots = vec![0.0; system.cell.len()];
     for i in 0..pivots.len() {
         let mut pivot = system.diagonal[i];
-        for k in [0, 2, 4] {
-            let Some(&p) = pivots.get(system.neighbor[i][k] as usize) else {
+        for (&j, &own) in system.neighbor[i].iter().zip(&system.coefficient[i]) {
+            let j = j as usize;
+            if j >= i {
                 continue;
-            };
-            let j = system.neighbor[i][k] as usize;
-            let own = system.coefficient[i][k];
-            let others = shared(system, j, 1, |_| 1.0) - own;
+            }
+            let p = pivots[j];
+            let others = shared_in_order(system, j, true, |_| 1.0) - own;
             pivot -= own * (own + MODIFIED * others) * p * p;
         }
         if pivot < LEAST_PIVOT * system.diagonal[i] {
@@ -140,10 +149,12 @@ fn correction(system: &System, precondition: Precondition, pivots: &[f64], r: &[
         Precondition::IncompleteCholesky => {
             let mut z = vec![0.0; r.len()];
             for i in 0..r.len() {
-                z[i] = pivots[i] * (r[i] + shared(system, i, 0, |j| pivots[j] * z[j]));
+                let before = shared_in_order(system, i, false, |j| pivots[j] * z[j]);
+                z[i] = pivots[i] * (r[i] + before);
             }
             for i in (0..r.len()).rev() {
-                z[i] = pivots[i] * (z[i] + pivots[i] * shared(system, i, 1, |j| z[j]));
+                let after = shared_in_order(system, i, true, |j| z[j]);
+                z[i] = pivots[i] * (z[i] + pivots[i] * after);
             }
             z
         }

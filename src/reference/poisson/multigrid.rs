@@ -174,6 +174,13 @@ impl Levels {
         Some([cycle.values, cycle.errors])
     }
 
+    /// Whether the lower face along `axis` of the cell at a place is one beyond which its level has no brick.
+    pub fn is_closed_end(&self, at: usize, axis: usize) -> bool {
+        let (slot, c, block) = (at / 512, at % 512 / 64, at % 64);
+        let is_first = block >> (2 * axis) & 3 == 0 && c >> axis & 1 == 0;
+        is_first && self.bricks[slot].faces[axis] == 0
+    }
+
     /// The block beyond the face of a block; in slot 0 where there is none.
     fn beside(&self, level: usize, slot: u32, block: u32, axis: usize, is_up: bool) -> (u32, u32) {
         let step = 4u32.pow(axis as u32);

@@ -9,6 +9,7 @@ use super::super::{
     flip::{self, Preconditioner, Surface, Transfer},
     key::{Interval, Key, words},
     no_slip,
+    periodic::Axis,
     probe::{self, ProbeKind},
 };
 use crate::domain::sparse_grid;
@@ -16,7 +17,7 @@ use crate::domain::sparse_grid;
 pub(in super::super) const KEYS: &[Key] = &[
     Key::table("shot", SHOT)
         .about("What the shot is called, how long it runs, how fine its clock is"),
-    Key::table("domain", DOMAIN).about("The box of the whole scene; its six walls are solid"),
+    Key::table("domain", DOMAIN).about("The box of the whole scene; its walls are solid"),
     Key::table("water", WATER)
         .default("{}")
         .about("The water and where it is at the start"),
@@ -34,7 +35,7 @@ pub(in super::super) const KEYS: &[Key] = &[
         .about("What of a bake stays on the disk; without this table, all"),
     Key::tables("probe", PROBE)
         .not_physics()
-        .about("What is measured at each frame, a CSV each"),
+        .about("What is measured, a CSV each"),
     Key::table("budget", BUDGET)
         .default("{}")
         .not_physics()
@@ -90,7 +91,16 @@ const DOMAIN: &[Key] = &[
         .without(&["walls"])
         .also(", each once; of the solver flip alone")
         .about("the no-slip walls, where not all six are"),
+    Key::choices("periodic", &AXES)
+        .absent()
+        .also(
+            ", each once, none along which gravity acts, a wave maker stands or a solid moves; along each the domain is a \
+             multiple of eight cells (FLIP), or of the particle spacing and at least three support radii (PBF)",
+        )
+        .about("axes along which the domain has no walls: water that leaves at one end comes in at the other"),
 ];
+
+const AXES: [&str; 3] = words(&Axis::NAMED);
 
 const WATER: &[Key] = &[
     // Hydrogen gas has 0.09, osmium 22 590.
@@ -424,7 +434,7 @@ const KEEP: &[Key] = &[Key::text(
     "frames whose particles stay; the first and the newest are always there, so that a bake can go on",
 )];
 
-const PROBES: [&str; 7] = ProbeKind::NAMES;
+const PROBES: [&str; 8] = ProbeKind::NAMES;
 
 const PROBE: &[Key] = &[
     Key::file_stem("name")
@@ -437,7 +447,8 @@ const PROBE: &[Key] = &[
         )
         .about(
             "elevation of the surface, m; pressure, Pa; energy of all water, J; its volume, m³; front along an axis, m; \
-             run_up, the highest water that hangs together with the body, m; flux through a plane, m³/s",
+             run_up, the highest water that hangs together with the body, m; flux through a plane, m³/s; force of the \
+             pressure on a solid or a wall, N, and its moment, N m, with the solver flip",
         ),
     Key::other(
         "at",
@@ -452,6 +463,27 @@ const PROBE: &[Key] = &[
         .only("kind", &["front", "run_up"])
         .computed(probe::quantile_words)
         .about("part of the water, with run_up of the body of water, that lies behind or below"),
+    Key::other(
+        "solid",
+        "the number of a [[solid]], from 0, or a wall of the domain: \"-x\", \"+x\", \"-y\", \"+y\", \"-z\" or \"+z\"",
+    )
+    .only("kind", &["force"])
+    .about("who bears the force"),
+    Key::vector("about", 3, COORDINATE)
+        .unit("m")
+        .only("kind", &["force"])
+        .computed(|| "the middle of the solid's or wall's box at the start".to_owned())
+        .about("where the moment is taken about"),
+    Key::other(
+        "rate_hz",
+        "\"substep\" or a number from 0.001 to shot.frames_per_second × the solver's max_substeps, Hz",
+    )
+    .computed(|| "each frame".to_owned())
+    .about("how often it looks: at the end of each substep, or of each in which a time k / rate_hz lies"),
+    Key::number("window", 1e-9..=1e6)
+        .unit("s")
+        .absent()
+        .about("time up to each look over which mean, least and greatest value are given as well"),
 ];
 
 /// In its unit: wider than what f32 tells apart from nothing, and than anything that is computed.

@@ -1,15 +1,18 @@
 //! Keys of a study, of all its kinds.
 
-use super::super::key::{Interval, Key};
+use super::super::{
+    key::{Interval, Key, words},
+    study::validation::Measure,
+};
 
 pub(in super::super) const KEYS: &[Key] = &[
-    Key::choice("kind", &["solver_comparison", "sweep", "stability"]).about("what is compared"),
+    Key::choice("kind", &["solver_comparison", "sweep", "stability", "validation"]).about("what is compared"),
     Key::text("scene", "a scene file, relative to the study file")
         .only("kind", &["solver_comparison", "sweep"])
         .about("what is simulated"),
     Key::other("about", "an array of paragraphs for the page")
         .absent()
-        .only("kind", &["sweep", "stability"])
+        .only("kind", &["sweep", "stability", "validation"])
         .about("in the reader's words"),
     // Of two solvers.
     Key::text("look", "a look file that writes PNG, relative to the study file")
@@ -72,11 +75,16 @@ pub(in super::super) const KEYS: &[Key] = &[
     Key::tables("limit", LIMIT)
         .only("kind", STABILITY)
         .about("How far a setting goes before a mark is missed"),
+    // Against theory and experiments.
+    Key::tables("benchmark", BENCHMARK)
+        .only("kind", VALIDATION)
+        .about("Something whose answer is known"),
 ];
 
 const COMPARISON: &[&str] = &["solver_comparison"];
 const SWEEP: &[&str] = &["sweep"];
 const STABILITY: &[&str] = &["stability"];
+const VALIDATION: &[&str] = &["validation"];
 
 const SET: Key = Key::other(
     "set",
@@ -262,4 +270,103 @@ const LIMIT: &[Key] = &[
     // Some shots have 1e6 frames of 100 s.
     Key::number("seconds", 1e-6..=1e8).about("of the shot"),
     Key::tables("mark", MARKS).about(MARK),
+];
+
+/// What a measure is told, metres, seconds, metres a second.
+const TOLD: Interval = 1e-6..=1e6;
+
+const fn told(name: &'static str, unit: &'static str) -> Key {
+    Key::number(name, TOLD)
+        .unit(unit)
+        .absent()
+        .also(", with the measures that take it")
+}
+
+const BENCHMARK: &[Key] = &[
+    Key::other("name", "words, other than those of another benchmark").about("for the page"),
+    NOTE,
+    Key::choice("measure", &words(&Measure::NAMED)).about("what is measured"),
+    Key::other("scene", "a scene file, relative to the study file").about("what is simulated"),
+    SET,
+    told("depth", "metres").about("of still water, or of a reservoir"),
+    told("length", "metres").about("of a column, a wave or a box, or where the dam is"),
+    told("height", "metres").about("of a crest above still water"),
+    told("stroke", "metres").about("of a piston, from end to end"),
+    told("period", "seconds").about("of a piston"),
+    told("speed", "m/s").about("of a vortex"),
+    Key::number("after", SKIPPED)
+        .unit("seconds")
+        .absent()
+        .also(", with the measures that take it")
+        .about("time that does not count"),
+    Key::tables("run", BENCHMARK_RUN).about("A run of it"),
+    Key::tables("gate", GATE).about("What a number has to be"),
+    Key::tables("points", POINTS).about("Data that a curve is held against"),
+];
+
+const BENCHMARK_RUN: &[Key] = &[
+    Key::other("solver", "\"pbf\" or \"flip\"").about("which solver"),
+    Key::number("resolution", SEARCHED)
+        .about("cells, or spacings with PBF, of a length that the benchmark names"),
+    SET,
+    Key::other("device", "\"gpu\" or \"cpu\"")
+        .absent()
+        .about("the GPU if left out"),
+];
+
+const ONE_OF: &str = "; one of within, off_by, at_most, at_least, order_at_least and agree_within";
+
+const GATE: &[Key] = &[
+    Key::other(
+        "of",
+        "a number of swell::scene::study::validation::Measure, such as \"height_ratio\"",
+    )
+    .about("what is judged"),
+    Key::number("published", BOUND)
+        .absent()
+        .about("what theory or an experiment has"),
+    Key::other("source", "words").about("whose word that is"),
+    Key::number("within", BOUND)
+        .absent()
+        .also(ONE_OF)
+        .about("of |measured / published − 1|"),
+    Key::number("off_by", BOUND)
+        .absent()
+        .also(ONE_OF)
+        .about("of |measured − published|"),
+    Key::number("at_most", BOUND)
+        .absent()
+        .also(ONE_OF)
+        .about("of the number"),
+    Key::number("at_least", BOUND)
+        .absent()
+        .also(ONE_OF)
+        .about("of the number"),
+    Key::number("order_at_least", BOUND)
+        .absent()
+        .also(ONE_OF)
+        .about("the power of the resolution with which the error falls"),
+    Key::number("agree_within", BOUND)
+        .absent()
+        .also(ONE_OF)
+        .about("largest less least of all resolutions, over their mean"),
+    Key::other("solver", "\"pbf\" or \"flip\"")
+        .absent()
+        .about("the only solver that is judged"),
+    Key::number("resolution", SEARCHED)
+        .absent()
+        .about("the only resolution that is judged"),
+    Key::other("known_failure", "words")
+        .absent()
+        .about("why it is missed; a known failure that passes is told as well"),
+];
+
+const POINTS: &[Key] = &[
+    Key::other(
+        "of",
+        "a curve of swell::scene::study::validation::Measure, such as \"front\"",
+    )
+    .about("what they stand beside"),
+    Key::other("source", "words").about("whose they are"),
+    Key::other("at", "an array of [x, y] in the curve's units").about("x rising"),
 ];

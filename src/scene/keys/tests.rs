@@ -132,6 +132,7 @@ fn what_is_no_physics_is_said_once() {
         "solver.pbf.max_substeps",
         "solver.flip.max_substeps",
         "grids",
+        "keep",
         "probe",
         "budget",
     ];
@@ -155,7 +156,7 @@ fn allowed_words_follow_from_the_declaration() {
         ("solver.flip.transfer", "\"flip\" or \"apic\""),
         (
             "wave_maker[0].motion.ramp",
-            "0 or a number from 1e-4 to 1e6, seconds, with kind = \"sine\"; one period if left out",
+            "0 or a number from 1e-4 to 1e6, seconds; one period if left out",
         ),
         (
             "budget.speed",

@@ -1,11 +1,12 @@
 //! Study files: what is to be compared, on which scene.
 //!
 //! One file a kind: [`comparison`] sets two solvers side by side, [`sweep`] runs a scene over and over, with one
-//! setting changed at a time, [`stability`] runs scenes that are hard on a solver.
+//! setting changed at a time, [`stability`] runs scenes that are hard on a solver, [`validation`] those whose answer is known.
 
 pub mod comparison;
 pub mod stability;
 pub mod sweep;
+pub mod validation;
 
 use std::{
     fs,
@@ -23,6 +24,7 @@ use super::{
 use comparison::SolverComparison;
 use stability::Stability;
 use sweep::Sweep;
+use validation::Validation;
 
 /// A validated study: every file that it names read.
 #[derive(Clone, Debug)]
@@ -33,6 +35,8 @@ pub enum Study {
     Sweep(Box<Sweep>),
     /// `kind = "stability"`.
     Stability(Box<Stability>),
+    /// `kind = "validation"`.
+    Validation(Box<Validation>),
 }
 
 /// What a run is on.
@@ -127,10 +131,14 @@ impl Study {
                 Ok(Self::SolverComparison(Box::new(comparison)))
             }
             "sweep" => Ok(Self::Sweep(Box::new(sweep::parse(&doc, root, base_dir)?))),
-            // The table of keys has no other.
-            _ => {
+            "stability" => {
                 let stability = stability::parse(&doc, root, base_dir)?;
                 Ok(Self::Stability(Box::new(stability)))
+            }
+            // The table of keys has no other.
+            _ => {
+                let validation = validation::parse(&doc, root, base_dir)?;
+                Ok(Self::Validation(Box::new(validation)))
             }
         }
     }
@@ -155,6 +163,10 @@ impl Study {
                 points.for_each(|point| of(&point.scene));
             }
             Self::Stability(stability) => stability.for_each_scene(of),
+            Self::Validation(validation) => {
+                let runs = validation.benchmarks.iter().flat_map(|b| &b.runs);
+                runs.for_each(|run| of(&run.scene));
+            }
         }
         warnings
     }
@@ -223,7 +235,7 @@ mod tests {
     #[test]
     fn the_studies_that_ship_fit_their_scenes() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
-        let (mut comparisons, mut sweeps, mut stabilities) = (0, 0, 0);
+        let (mut comparisons, mut sweeps, mut stabilities, mut validations) = (0, 0, 0, 0);
         for entry in fs::read_dir(folder).expect("studies") {
             let file = entry.expect("a study").path();
             match Study::load(&file).unwrap_or_else(|error| panic!("{error}")) {
@@ -248,8 +260,16 @@ mod tests {
                     }
                     stabilities += 1;
                 }
+                Study::Validation(validation) => {
+                    let mut benchmarks = validation.benchmarks.iter();
+                    assert!(benchmarks.all(|benchmark| !benchmark.gates.is_empty()));
+                    validations += 1;
+                }
             }
         }
-        assert_eq!((comparisons, sweeps, stabilities), (2, 9, 1));
+        assert_eq!(
+            (comparisons, sweeps, stabilities, validations),
+            (2, 9, 1, 2)
+        );
     }
 }

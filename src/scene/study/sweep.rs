@@ -487,7 +487,11 @@ fn tie_pic_blend(scene: &mut Scene, own_rate: f64) {
 fn frames(doc: &Document<'_>, spec: &SweepSpec, scene: &Scene) -> Result<u32, SceneError> {
     let rate = scene.shot.frames_per_second;
     let Some(seconds) = &spec.seconds else {
-        return (spec.steps).ok_or_else(|| doc.missing(spec.scene.span(), "steps"));
+        let missing = || {
+            let message = doc.with_allowed("missing".into(), "steps");
+            doc.fault(None, "steps".into(), message)
+        };
+        return spec.steps.ok_or_else(missing);
     };
     let frames = seconds.get_ref() * rate;
     let is_whole = (frames - frames.round()).abs() <= 1e-6 * frames;

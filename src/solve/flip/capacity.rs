@@ -11,14 +11,15 @@ use crate::{
 };
 
 /// No flag set, one a brick of the domain.
-pub(super) fn no_water(grid_dims: [u32; 3]) -> Vec<bool> {
-    let dims = table_dims(stored_cells(grid_dims));
+pub(super) fn no_water(scene: &Scene, grid_dims: [u32; 3]) -> Vec<bool> {
+    let dims = table_dims(stored_cells(grid_dims, scene.periodic));
     vec![false; dims.iter().map(|&n| n as usize).product()]
 }
 
-pub(super) fn bricks(grid_dims: [u32; 3], is_wet: &[bool], layers: usize) -> Bricks {
+pub(super) fn bricks(scene: &Scene, grid_dims: [u32; 3], is_wet: &[bool], layers: usize) -> Bricks {
     let reach = (layers as u32).div_ceil(EDGE);
-    Bricks::new(stored_cells(grid_dims), is_wet, reach, LEVELS)
+    let cells = stored_cells(grid_dims, scene.periodic);
+    Bricks::periodic(cells, scene.periodic, is_wet, reach, LEVELS)
 }
 
 pub(super) fn capacity_of(bricks: &Bricks) -> Capacity {
@@ -31,8 +32,8 @@ pub(super) fn capacity_of(bricks: &Bricks) -> Capacity {
 /// Bricks that a state takes in a scene.
 pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
     let grid_dims = scene.domain.cells(scene.solver.flip().cell_size);
-    let mut is_wet = no_water(grid_dims);
-    let dims = table_dims(stored_cells(grid_dims)).map(|n| n as usize);
+    let mut is_wet = no_water(scene, grid_dims);
+    let dims = table_dims(stored_cells(grid_dims, scene.periodic)).map(|n| n as usize);
     let edge = f64::from(EDGE) * scene.solver.flip().cell_size;
     for position in &particles.position {
         let x = glam::Vec3::from_array(*position).as_dvec3() - scene.domain.min;
@@ -41,5 +42,5 @@ pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
         is_wet[(at[2] * dims[1] + at[1]) * dims[0] + at[0]] = true;
     }
     // As deep as layers of a first step reach that is not yet fast.
-    capacity_of(&bricks(grid_dims, &is_wet, layers(1.0)))
+    capacity_of(&bricks(scene, grid_dims, &is_wet, layers(1.0)))
 }

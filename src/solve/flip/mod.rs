@@ -9,6 +9,7 @@ mod capacity;
 pub(super) mod plan;
 mod record;
 mod step;
+mod watch;
 
 use glam::DVec3;
 
@@ -19,11 +20,10 @@ use crate::{
         bricks::{Bricks, CELLS, table_dims},
         budget::Breach,
         flip::{layers, stored_cells},
-        gauge::Gauge,
         particles::Particles,
         poisson::FLUID,
         shores::Shores,
-        solver::{Projection, Solver, StepReport},
+        solver::{Projection, Solver, StepReport, Watch},
         substep::Which,
     },
     gpu::{
@@ -118,7 +118,7 @@ impl Flip {
         let program = Program::new(context, &buffers, &passes, &[])?;
         boundary.upload_distance(&program, scene);
         upload_constants(&program, &plan, scene);
-        let bricks = bricks(plan.grid_dims, &no_water(plan.grid_dims), 0);
+        let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         // The first survey reads what does not depend on the substep.
         let frame = Substep {
             start: 0.0,
@@ -135,7 +135,8 @@ impl Flip {
             plan,
             scene: scene.clone(),
             movers: Movers::of(boundary, scene),
-            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size),
+            shores: Shores::new(boundary, scene.domain.min, scene.solver.flip().cell_size)
+                .joined(scene.periodic),
             state: Particles::default(),
             frame: 0,
         })
@@ -184,7 +185,7 @@ impl Flip {
 
     fn survey(&mut self, run: &mut Run<'_>) -> Result<Survey, SolveError> {
         run(&self.program, &[&self.recordings.survey])?;
-        let flags = SURVEY_IS_WET.first(no_water(self.plan.grid_dims).len());
+        let flags = SURVEY_IS_WET.first(no_water(&self.scene, self.plan.grid_dims).len());
         let (head, is_wet) = self.program.download((SURVEY.first(1), flags))?;
         Ok(Survey {
             speed: f64::from(head[0].speed_square).sqrt(),
@@ -221,7 +222,7 @@ impl Flip {
         };
         let moving = self.scene.moving_solids.iter();
         let ways = moving.map(|solid| solid.displacement(substep.start) / size);
-        let dims = table_dims(stored_cells(self.plan.grid_dims));
+        let dims = table_dims(stored_cells(self.plan.grid_dims, self.scene.periodic));
         let mut is_wet = is_wet.to_vec();
         self.shores.mark(&mut is_wet, dims, &cut, ways);
         is_wet
@@ -231,7 +232,7 @@ impl Flip {
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
         let layers = layers(substep.displacement);
         let is_wet = self.with_shores(is_wet, substep);
-        self.bricks = bricks(self.plan.grid_dims, &is_wet, layers);
+        self.bricks = bricks(&self.scene, self.plan.grid_dims, &is_wet, layers);
         let needed = capacity_of(&self.bricks);
         let grown = self.plan.counts.bricks.grown(needed);
         if grown != self.plan.counts.bricks {
@@ -407,13 +408,6 @@ impl Flip {
         Ok(is_last)
     }
 
-    /// Substeps through one frame.
-    fn run_substeps(&mut self, run: &mut Run<'_>) -> Result<FrameTotals, SolveError> {
-        let mut totals = FrameTotals::default();
-        while !self.go_on(&mut totals, run)? {}
-        Ok(totals)
-    }
-
     fn upload_state(&self) {
         upload(&self.program, &self.scene, &self.state);
         let names = self.scene.solver.flip().attributes();
@@ -490,12 +484,15 @@ impl Solver for Flip {
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
+    fn advance_watched(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<(Particles, StepReport), SolveError> {
         self.program.upload(COUNTERS, 0, &[Counters::default()]);
         let totals = if self.state.is_empty() {
             FrameTotals::default()
         } else {
-            self.timed(Self::run_substeps)?
+            self.timed(|flip, run| flip.run_substeps(watch, run))?
         };
         self.read_state()?;
         check_finite(self.frame + 1, &self.state, None).map_err(|breach| {
@@ -528,20 +525,8 @@ impl Solver for Flip {
         Ok((self.state.clone(), report))
     }
 
-    /// The projection's, between cell centres.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
-        let kind: Vec<u32> = self.field(CELL_KIND, self.elements())?;
-        let pressure: Vec<f32> = self.field(pressure::buffers::PRESSURE, self.elements())?;
-        let pressure: Vec<f64> = pressure.into_iter().map(f64::from).collect();
-        let gauge = Gauge {
-            bricks: &self.bricks,
-            cells: self.plan.grid_dims,
-            cell_size: self.scene.solver.flip().cell_size,
-            kind: &kind,
-            pressure: &pressure,
-        };
-        let local = |at: &DVec3| *at - self.scene.domain.min;
-        Ok(points.iter().map(|at| gauge.at(local(at))).collect())
+        self.pressures_at(points)
     }
 
     fn timings(&self) -> Vec<(&'static str, f64, u64)> {

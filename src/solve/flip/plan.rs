@@ -56,7 +56,7 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts) -> Plan {
     };
     plan.add_passes(in_order(commands.before_projection()).map(&plain), &effects);
     plan.add_passes(
-        pressure::passes(settings, flip.surface, has_correction),
+        pressure::passes(settings, flip.surface, has_correction, scene.is_periodic()),
         &[],
     );
     plan.add_passes(in_order(commands.after_projection()).map(&plain), &[]);
@@ -83,6 +83,7 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
         ("APIC", flip.transfer == Transfer::Apic),
         ("GHOST_FLUID", flip.surface == Surface::GhostFluid),
         ("CORRECTION", flip.density_correction),
+        ("PERIODIC", scene.is_periodic()),
     ];
     let holding = all.into_iter().filter(|(_, holds)| *holds);
     holding.map(|(define, _)| define).collect()
@@ -124,7 +125,7 @@ fn bricks(plan: &Plan, scene: &Scene, table: &mut Table) {
     let slots = plan.counts.bricks.slots;
     let wet = plan.counts.bricks.wet * CELLS as usize;
     let all = slots * CELLS as usize;
-    let dims = table_dims(stored_cells(plan.grid_dims));
+    let dims = table_dims(stored_cells(plan.grid_dims, scene.periodic));
     let bricks = dims.iter().map(|&n| n as usize).product();
     table.add("flip", SURVEY_IS_WET.sized(bricks));
     table.add("flip", BRICK_SLOT.sized(bricks));

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::{
     domain::{
         bricks::{Bricks, CELLS, table_dims},
-        flip::{CAP, CONTACT, stored_cells},
+        flip::{CAP, CONTACT, apart, stored_cells},
     },
     scene::{Scene, step::Substep},
     solve::{params::FlipParams, plan::Plan},
@@ -34,11 +34,16 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
         cell_size: flip.cell_size as f32,
         cells: plan.grid_dims,
         inverse_cell_size: (1.0 / flip.cell_size) as f32,
-        table_dims: table_dims(stored_cells(plan.grid_dims)),
+        table_dims: table_dims(stored_cells(plan.grid_dims, scene.periodic)),
         pic_blend: scene.substep_pic_blend(step.length) as f32,
         particle_share: 1.0 / flip.particles_per_cell as f32,
         contact_distance: (CONTACT * flip.particle_spacing()) as f32,
         max_displacement: (CAP * flip.cfl * flip.cell_size) as f32,
-        padding: 0.0,
+        apart: (flip.cell_size * apart(flip.particle_spacing() / flip.cell_size)) as f32,
+        periodic: (0..3)
+            .map(|axis| u32::from(scene.periodic[axis]) << axis)
+            .sum(),
+        padding: 0,
+        padding_more: [0; 2],
     }
 }

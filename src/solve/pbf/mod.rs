@@ -13,8 +13,9 @@ use crate::{
         budget::Breach,
         particles::Particles,
         pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
+        period::Period,
         probe::fitted,
-        solver::{Solver, StepReport},
+        solver::{Seen, Solver, Span as Substep, StepReport, Wanted, Watch},
         sph::Calibration,
         substep::Which,
     },
@@ -32,7 +33,7 @@ use super::{
     SolveError, effects,
     params::{Counters, IterationControl, Params},
     plan::Plan,
-    state::{check_finite, check_ids, slots_by_id, take_over, upload},
+    state::{check_finite, check_ids, look, slots_by_id, take_over, upload},
     trace::{Begun, Observe, Span, TraceFrame, Traced, trace},
 };
 use buffers::*;
@@ -132,6 +133,7 @@ impl Pbf {
         let calibration = &self.calibration;
         let walls = self.scene.walls(time);
         let wall_velocity = self.scene.wall_velocity(time, step);
+        let Period(period) = self.scene.period();
         let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
         Params {
             velocity_step: (self.scene.water.gravity * step).as_vec3().to_array(),
@@ -153,11 +155,11 @@ impl Pbf {
             contact_distance: (CONTACT * pbf.particle_spacing) as f32,
             max_displacement: (CAP * pbf.cfl * pbf.particle_spacing) as f32,
             artificial_pressure: (pbf.artificial_pressure * natural_lambda) as f32,
-            padding: 0.0,
+            period_x: period.x as f32,
             wall_velocity_min: wall_velocity.min.as_vec3().to_array(),
-            padding_min: 0.0,
+            period_y: period.y as f32,
             wall_velocity_max: wall_velocity.max.as_vec3().to_array(),
-            padding_max: 0.0,
+            period_z: period.z as f32,
         }
     }
 
@@ -240,6 +242,19 @@ impl Pbf {
             .collect())
     }
 
+    /// What is wanted of a substep of `step` seconds that just ran.
+    fn seen(&mut self, wanted: &Wanted, step: f64) -> Result<Seen, SolveError> {
+        let mut seen = Seen::default();
+        if wanted.particles {
+            seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
+        }
+        if wanted.pressures {
+            self.pressed = self.particle_pressures(step)?;
+            seen.pressures = self.pressures(&self.scene.pressure_points())?;
+        }
+        Ok(seen)
+    }
+
     /// Sorts at the frame's last positions, measures density there, and reads everything back.
     fn read_state(&mut self, time: f64) -> Result<(Vec<f64>, Counters), SolveError> {
         self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);
@@ -285,7 +300,10 @@ impl Solver for Pbf {
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<(Particles, StepReport), SolveError> {
+    fn advance_watched(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<(Particles, StepReport), SolveError> {
         let length = self.scene.shot.frame_seconds();
         let start = f64::from(self.frame) * length;
         let substeps = self.substeps()?;
@@ -293,6 +311,15 @@ impl Solver for Pbf {
         for k in 1..=substeps {
             let (time, step) = self.substep_of(substeps, k);
             self.run_substep(time, step)?;
+            let substep = Substep {
+                start: self.substep_of(substeps, k - 1).0,
+                end: time,
+                is_last: k == substeps,
+            };
+            let wanted = watch.wants(substep);
+            if wanted.is_any() {
+                watch.look(substep, self.seen(&wanted, step)?);
+            }
         }
         let (density, counters) = self.read_state(start + length)?;
         if !self.scene.pressure_points().is_empty() {
@@ -329,7 +356,11 @@ impl Solver for Pbf {
         let support = self.calibration.support_radius;
         let points = points.iter().map(local);
         Ok(points
-            .map(|at| fitted(self.pressed.iter().copied(), at, support))
+            .map(|at| {
+                let near = |x: DVec3| at + self.scene.period().shortest(x - at);
+                let pressed = self.pressed.iter().map(|&(x, p)| (near(x), p));
+                fitted(pressed, at, support)
+            })
             .collect())
     }
 

@@ -32,7 +32,8 @@ const LIST_FOURS: usize = LIST_CAPACITY as usize / 4;
 pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
     let pbf = scene.solver.pbf();
     let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
-    let mut plan = Plan::bare(counts, scene.domain.cells(calibration.support_radius));
+    let (size, support) = (scene.domain.size(), calibration.support_radius);
+    let mut plan = Plan::bare(counts, scene.period().cells(size, support));
     choose_lists(&mut plan, limits);
     let effects = effects::of_pbf(&scene.effects, counts.particles);
     let commands = Commands::new(&plan, scene, &effects);
@@ -40,7 +41,7 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits
     for (name, addition) in &effects {
         table.extend(name, addition.buffers.clone());
     }
-    let conditions = conditions(&plan);
+    let conditions = conditions(&plan, scene);
     plan.declare(table);
     let specs = in_order(commands.substep.iter().chain(&commands.measure)).map(|name| {
         let mut spec = own(name, scene);
@@ -80,13 +81,16 @@ fn choose_lists(plan: &mut Plan, limits: DeviceLimits) {
 }
 
 /// Conditions that hold for the whole plan; a pass that does not ask ignores them.
-fn conditions(plan: &Plan) -> Vec<&'static str> {
+fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     let mut conditions = Vec::new();
     if plan.has_solids() {
         conditions.push("SOLIDS");
     }
     if plan.has_lists {
         conditions.push("NEIGHBOR_LIST");
+    }
+    if scene.is_periodic() {
+        conditions.push("PERIODIC");
     }
     conditions
 }

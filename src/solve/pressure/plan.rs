@@ -190,19 +190,27 @@ pub fn planned(settings: &Pressure, has_correction: bool, capacity: usize) -> Ta
 }
 
 /// The passes that any solve runs by these settings, in the order in which they first run.
-pub fn passes(settings: &Pressure, surface: Surface, has_correction: bool) -> Vec<PassSpec> {
+pub fn passes(
+    settings: &Pressure,
+    surface: Surface,
+    has_correction: bool,
+    is_periodic: bool,
+) -> Vec<PassSpec> {
     let commands = all_commands(settings.preconditioner, has_correction);
     let names = in_order(&commands);
-    names.map(|name| pass(name, settings, surface)).collect()
+    names
+        .map(|name| pass(name, settings, surface, is_periodic))
+        .collect()
 }
 
 /// A pass under the conditions that hold for the whole room; one that does not ask ignores them.
-fn pass(name: &'static str, settings: &Pressure, surface: Surface) -> PassSpec {
+fn pass(name: &'static str, settings: &Pressure, surface: Surface, is_periodic: bool) -> PassSpec {
     let conditions = [
         ("GHOST_FLUID", surface == Surface::GhostFluid),
         ("DIAGONAL", has_diagonal(settings)),
         ("TWO_WORDS", settings.precision == Precision::F32Refined),
         ("F64", settings.precision == Precision::F64),
+        ("PERIODIC", is_periodic),
     ];
     let holding = conditions.into_iter().filter(|(_, holds)| *holds);
     PassSpec {

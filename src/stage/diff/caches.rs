@@ -73,10 +73,16 @@ pub(super) fn compare(
         let beside = of_streams([a, b], frame, [Some(&of_a), Some(&of_b)])?;
         let [from, to] = [a, b].map(|cache| cache.manifest().origin.into());
         let of_a = of_a.about(from, to);
-        let sums = [
+        let mut sums = [
             aggregates(a, &scene_a, &gauge, frame, &of_a)?,
             aggregates(b, &scene_b, &gauge, frame, &of_b)?,
         ];
+        // A bake has no report of the frame that it began with, as a branch of the one that it is compared with.
+        if [a, b].iter().any(|cache| cache.first_frame() == frame) {
+            for sum in &mut sums {
+                sum.density_error = None;
+            }
+        }
         Ok((
             frames::compare(frame, [&of_a, &of_b], sums, tolerance),
             beside,

@@ -5,12 +5,12 @@ use serde_json::{Value as Json, json};
 
 use crate::{
     cache::{
-        CacheError, CacheReader, Entry, GridRecord,
+        CacheError, CacheReader, Entry, GridRecord, Look, ProbeRecord,
         stream::{Content, PARTICLES, STREAMS, Stream},
         vdb,
     },
     compare::streams::{self, Difference, Row, StreamDiff},
-    domain::particles::Particles,
+    domain::{particles::Particles, probe::Rate},
 };
 
 /// A frame of one of the two caches; its particles are as they were read.
@@ -122,21 +122,24 @@ fn settings(grids: &GridRecord, side: Side<'_>) -> Json {
 /// Rows of the tables that both have, by name.
 fn tables(stream: &Stream, [a, b]: [Side<'_>; 2]) -> Vec<StreamDiff> {
     let [of_a, of_b] = [a, b].map(|side| stream.tables(side.cache.manifest()));
-    let table = |(i, x): (usize, &crate::cache::ProbeRecord)| {
+    let table = |(i, x): (usize, &ProbeRecord)| {
         let j = of_b.iter().position(|y| y.name == x.name)?;
         let y = &of_b[j];
-        let settings = |table: &crate::cache::ProbeRecord| {
+        let settings = |table: &ProbeRecord| {
             json!({
                 "kind": table.kind, "at": table.at, "axis": table.axis, "quantile": table.quantile,
+                "rate_hz": table.rate_hz, "window": table.window, "solid": table.solid,
             })
         };
         let [of_x, of_y] = [x, y].map(settings);
         let mut differences = streams::keys("", &of_x, &of_y);
-        let [of_a, of_b] = [(a, x, i), (b, y, j)].map(|(side, table, index)| Row {
-            columns: &table.columns,
-            values: side.entry.row(stream.name, index),
+        let looks = [(a, x, i), (b, y, j)].map(|(side, table, index)| {
+            let values = side.entry.row(stream.name, index);
+            table
+                .looks(values, side.entry.clock.time)
+                .collect::<Vec<_>>()
         });
-        let mut rows = streams::rows(of_a, of_b);
+        let mut rows = looks_apart([x, y], &looks);
         rows.retain(|difference| match difference {
             Difference::Value { a: x, b: y, .. } => {
                 !(a.is_start() && x.is_null() || b.is_start() && y.is_null())
@@ -152,6 +155,44 @@ fn tables(stream: &Stream, [a, b]: [Side<'_>; 2]) -> Vec<StreamDiff> {
         })
     };
     of_a.iter().enumerate().filter_map(table).collect()
+}
+
+/// What the first look that differs differs in. Where a table has more than one a frame, it is named by its number in the
+/// frame, from 1, and its time and how many there are count as well.
+fn looks_apart(tables: [&ProbeRecord; 2], looks: &[Vec<Look<'_>>; 2]) -> Vec<Difference> {
+    let [a, b] = looks;
+    let is_many = tables.iter().any(|table| table.rate_hz != Rate::Frame);
+    let of_look = |(k, (x, y)): (usize, (&Look<'_>, &Look<'_>))| {
+        let mut found = streams::rows(
+            Row {
+                columns: &tables[0].columns,
+                values: x.values,
+            },
+            Row {
+                columns: &tables[1].columns,
+                values: y.values,
+            },
+        );
+        if is_many {
+            let [a, b] = [x, y].map(|look| json!({ "time_s": look.time }));
+            found.extend(streams::keys("", &a, &b));
+            for difference in &mut found {
+                if let Difference::Value { key, .. } = difference {
+                    *key = format!("{key} of look {}", k + 1);
+                }
+            }
+        }
+        (!found.is_empty()).then_some(found)
+    };
+    let mut found = a
+        .iter()
+        .zip(b)
+        .enumerate()
+        .find_map(of_look)
+        .unwrap_or_default();
+    let [count_a, count_b] = [a, b].map(|looks| json!({ "looks": looks.len() }));
+    found.extend(streams::keys("", &count_a, &count_b));
+    found
 }
 
 /// The clock, what the solver reports, and where the particles themselves are not compared the checksum of their file.

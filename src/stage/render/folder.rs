@@ -54,10 +54,22 @@ impl Owner {
             ("scene", self.scene_hash == other.scene_hash),
             ("cache", self.cache == other.cache),
             ("look", self.look_hash == other.look_hash),
-            ("version of the program", self.software == other.software),
+            (
+                "version of the program",
+                version_of(&self.software) == version_of(&other.software),
+            ),
+            ("set of shaders", self.software == other.software),
         ];
         rows.into_iter().find(|row| !row.1).map(|row| row.0)
     }
+}
+
+/// Program and version, without what is said of shaders behind them.
+fn version_of(software: &str) -> &str {
+    let shaders = software.find(" with shaders ");
+    let cache = software.find(", of a cache ");
+    let end = [shaders, cache].into_iter().flatten().min();
+    &software[..end.unwrap_or(software.len())]
 }
 
 /// What a process is going to do in a folder.

@@ -56,6 +56,8 @@ pub struct Chart {
     pub is_log: bool,
     /// In the order of the colours.
     pub series: Vec<Series>,
+    /// Data that the series are held against, each point a ring, in the colours after theirs; on linear axes alone.
+    pub dots: Vec<Series>,
     /// Lines across.
     pub marks: Vec<Mark>,
     /// What has no place on the axes, each in a line below.
@@ -76,6 +78,8 @@ const ROW: f64 = 16.0;
 const CAP: f64 = 4.5;
 /// Radius of the ring about a knee.
 const RING: f64 = 7.5;
+/// Radius of a ring that stands for a point of data.
+const DATA: f64 = 4.5;
 
 impl Series {
     /// A plain curve.
@@ -124,9 +128,14 @@ impl Chart {
         dot.value.filter(has_place)
     }
 
+    /// All that has a name and a colour.
+    fn named(&self) -> impl Iterator<Item = &Series> {
+        self.series.iter().chain(&self.dots)
+    }
+
     /// Points that have a place, with the number of their series and y.
     fn dots(&self) -> impl Iterator<Item = (usize, &Dot, f64)> {
-        let series = self.series.iter().enumerate();
+        let series = self.named().enumerate();
         let all = series.flat_map(|(k, series)| series.points.iter().map(move |dot| (k, dot)));
         all.filter_map(|(k, dot)| Some((k, dot, self.value(dot)?)))
     }
@@ -144,7 +153,7 @@ impl Chart {
             at[0] += width;
             place
         };
-        self.series.iter().map(place).collect()
+        self.named().map(place).collect()
     }
 
     /// A picture of its own, also within HTML.
@@ -154,7 +163,7 @@ impl Chart {
         let top = ROW + legend.last().map_or(2.0 * ROW, |place| place[1]);
         let bars = |dot: &Dot| dot.bar.unwrap_or([dot.at; 2]);
         // A linear axis is as long as its series, gaps as well.
-        let gaps = self.series.iter().flat_map(|series| &series.points);
+        let gaps = self.named().flat_map(|series| &series.points);
         let gaps = gaps.filter(|_| !self.is_log).map(|dot| dot.at);
         let costs = self.dots().flat_map(|(_, dot, _)| bars(dot));
         let costs = costs.chain(self.dots().map(|(_, dot, _)| dot.at));
@@ -182,6 +191,15 @@ impl Chart {
         for (index, series) in self.series.iter().enumerate() {
             self.write_series(&mut svg, COLOURS[index % COLOURS.len()], series, &x, &y);
         }
+        for (index, series) in self.dots.iter().enumerate() {
+            let colour = COLOURS[(self.series.len() + index) % COLOURS.len()];
+            for dot in &series.points {
+                if let Some(value) = self.value(dot) {
+                    let ring = format!("fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.7\"");
+                    svg.circle([x.at(dot.at), y.at(value)], DATA, &ring);
+                }
+            }
+        }
         self.write_labels(&mut svg, &x, &y);
         for (index, text) in notes.iter().enumerate() {
             let base = height + ROW * index as f64;
@@ -197,7 +215,7 @@ impl Chart {
         if !self.subtitle.is_empty() {
             svg.text([12.0, 18.0 + ROW], "fill=\"#666\"", &self.subtitle);
         }
-        for (index, (series, [at, base])) in self.series.iter().zip(legend).enumerate() {
+        for (index, (series, [at, base])) in self.named().zip(legend).enumerate() {
             let fill = format!("fill=\"{}\"", COLOURS[index % COLOURS.len()]);
             svg.circle([*at, base - 4.0], 4.0, &fill);
             svg.text([at + 8.0, *base], &fill, &series.name);

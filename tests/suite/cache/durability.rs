@@ -26,8 +26,9 @@ at = [-0.6, 0.7, 0.75]
 
 [[probe]]
 kind = "energy"
+"#;
 
-[effects]"#;
+const KEEP: &str = "[keep]\nparticles = \"every 10\"\n";
 
 fn number(variable: &str) -> Option<u64> {
     std::env::var(variable)
@@ -107,7 +108,7 @@ fn has_temporary(cache: &Path) -> bool {
 }
 
 impl Case {
-    fn new(solver: &'static str, is_watched: bool, seed: u64) -> Self {
+    fn new(solver: &'static str, more: &str, seed: u64) -> Self {
         let job = Job::new();
         for (from, to) in [
             ("frames = 8", format!("frames = {FRAMES}").as_str()),
@@ -116,9 +117,7 @@ impl Case {
         ] {
             job.edit("small.toml", from, to);
         }
-        if is_watched {
-            job.edit("small.toml", "[effects]", WATCHED);
-        }
+        job.edit("small.toml", "[effects]", &format!("{more}\n[effects]"));
         let mut case = Self {
             job,
             solver,
@@ -277,7 +276,7 @@ impl Case {
 }
 
 /// A quarter of all kills each.
-fn killed(name: &str, solver: &'static str, is_watched: bool) {
+fn killed(name: &str, solver: &'static str, more: &str) {
     static CASE: AtomicU32 = AtomicU32::new(0);
     let kills = number("SWELL_KILLS").unwrap_or(100).div_ceil(4) as u32;
     let clock = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
@@ -286,7 +285,7 @@ fn killed(name: &str, solver: &'static str, is_watched: bool) {
     let begin = Instant::now();
     let case = Case::new(
         solver,
-        is_watched,
+        more,
         seed ^ u64::from(CASE.fetch_add(1, Ordering::Relaxed)),
     );
     let (startup, frame) = (case.startup, case.frame);
@@ -312,20 +311,20 @@ fn killed(name: &str, solver: &'static str, is_watched: bool) {
 
 #[test]
 fn pbf_bakes_survive_kills() {
-    killed("pbf", "pbf", false);
+    killed("pbf", "pbf", "");
 }
 
 #[test]
 fn pbf_bakes_with_grids_and_probes_survive_kills() {
-    killed("pbf, grids and probes", "pbf", true);
+    killed("pbf, grids and probes", "pbf", WATCHED);
 }
 
 #[test]
 fn flip_bakes_survive_kills() {
-    killed("flip", "flip", false);
+    killed("flip, every 10th frame's particles", "flip", KEEP);
 }
 
 #[test]
 fn flip_bakes_with_grids_and_probes_survive_kills() {
-    killed("flip, grids and probes", "flip", true);
+    killed("flip, grids and probes", "flip", WATCHED);
 }

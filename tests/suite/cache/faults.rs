@@ -412,6 +412,7 @@ fn a_cache_that_begins_at_a_frame_is_numbered_from_there() {
         scene_hash: "5ce".to_owned(),
         frame: 120,
         blake3: "b3".to_owned(),
+        shaders: None,
     };
     let given = Manifest {
         parent: Some(parent),

@@ -1,6 +1,7 @@
 //! `check` passes on what the device computes, and each of its rows fails where that pass is spoiled.
 mod controls;
 mod frames;
+mod periodic;
 
 use swell::{
     check::pbf,
@@ -327,16 +328,24 @@ fn pbf_lists_in_chunks_and_none() {
     {
         let plan = start.plan(&scene, limits);
         assert_eq!((plan.chunks.len(), plan.has_lists), (chunks, has_lists));
-        let checked = |context: &Context| {
-            let boundaries = [&start.boundary; 2];
-            let state = (0, &start.particles);
-            let plan = plan.clone();
-            let first = Which::default();
-            Ok(pbf::check(context, &scene, plan, boundaries, state, first)?.table)
-        };
+        let checked = |context: &Context| pbf_table(context, &scene, &start, limits);
         all += &faults(&context, &checked, controls).1;
     }
     assert!(all.is_empty(), "{all}");
+}
+
+/// The check of PBF on a device with these limits.
+fn pbf_table(
+    context: &Context,
+    scene: &Scene,
+    start: &Start,
+    limits: DeviceLimits,
+) -> Result<Table, SolveError> {
+    let boundaries = [&start.boundary; 2];
+    let state = (0, &start.particles);
+    let plan = start.plan(scene, limits);
+    let first = Which::default();
+    Ok(pbf::check(context, scene, plan, boundaries, state, first)?.table)
 }
 
 /// The other precisions of the projection; in f64 with the tolerances of its own roundoff: a product that is off by 1e-9

@@ -437,7 +437,7 @@ fn a_new_look_leaves_the_cache_as_it_is() {
     );
     fs::write(job.path("day/small.0001.png"), &first[..first.len() / 2]).unwrap();
     let said = job.expect(0, "render cache --look look.toml -o day");
-    assert!(said.contains("1 frames rendered, 3 stood there"), "{said}");
+    assert!(said.contains("1 frame rendered, 3 stood there"), "{said}");
     assert_eq!(png("day", 1), first);
     job.expect(4, "render cache --look wide.toml -o day");
     assert_eq!(png("day", 1), first);

@@ -86,17 +86,20 @@ fn a_bake_by_edited_shaders_is_recorded_and_not_resumed_by_others() {
     assert_eq!(job.hash("plain/frames"), job.hash("by-comment/frames"));
     assert_ne!(job.hash("plain/frames"), job.hash("by-edit/frames"));
     // Resumed by the same shaders alone.
-    for (cache, shaders) in [
-        ("by-edit", ""),
-        ("by-edit", "--shaders comment"),
-        ("plain", "--shaders edit"),
+    for (cache, shaders, words) in [
+        ("by-edit", "", 2),
+        ("by-edit", "--shaders comment", 1),
+        ("plain", "--shaders edit", 2),
     ] {
         let before = job.hash(cache);
         let said = job.expect(
             4,
             &format!("bake small.toml --frames 1-3 -o {cache} --resume {shaders}"),
         );
-        assert_has(&said, &["was baked with shaders = "]);
+        assert_has(
+            &said,
+            &["was baked with shaders = ", "the shipped ones"][..words],
+        );
         assert_eq!(job.hash(cache), before);
     }
     job.expect(
@@ -146,9 +149,8 @@ fn a_picture_by_edited_shaders_says_so_and_stays_apart() {
         &software("edited"),
         &["with shaders ", "not the shipped ones"],
     );
-    // Pictures of other shaders are pictures of another program.
     let said = job.expect(4, &format!("{render} -o plain --shaders edit"));
-    assert_has(&said, &["version of the program"]);
+    assert_has(&said, &["another set of shaders"]);
 }
 
 #[test]
@@ -163,7 +165,14 @@ fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
     for (shaders, words) in [
         ("torn", &["torn", "lacks shared/walls.wgsl"][..]),
         ("nowhere", &["cannot read nowhere"]),
-        ("broken", &["pbf/predict of --shaders", "confined"]),
+        (
+            "broken",
+            &[
+                "pbf/predict of --shaders",
+                "pbf/predict.wgsl:35",
+                "confined",
+            ],
+        ),
         ("torn --device cpu", &["--shaders run on a GPU"]),
     ] {
         let said = job.expect(
@@ -184,4 +193,91 @@ fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
         "render cache --look look.toml -o pictures --shaders broken",
     );
     assert_has(&said, &["ssfr/shade of --shaders", "no_such"]);
+}
+
+/// What a pass binds and how it is laid out is the program's: an edit of that is refused before anything is written.
+#[test]
+fn an_edit_that_the_program_cannot_bind_or_compose_is_refused_with_its_place() {
+    let job = job(&["name", "layout", "shared", "import"]);
+    for (from, to) in [
+        ("> velocity:", "> velocities:"),
+        ("velocity[thread]", "velocities[thread]"),
+    ] {
+        job.edit("name/pbf/predict.wgsl", from, to);
+    }
+    job.edit(
+        "layout/shared/pbf_params.wgsl",
+        "    time_step: f32,",
+        "    more: vec4f,\n    time_step: f32,",
+    );
+    job.edit(
+        "shared/shared/confine.wgsl",
+        "fn confine(",
+        "fn confine_not(a: f32) -> f32 { return b; }\nfn confine(",
+    );
+    job.edit(
+        "import/pbf/predict.wgsl",
+        "shared/confine.wgsl",
+        "shared/confined.wgsl",
+    );
+    let line = |folder: &str, file: &str, words: &str| {
+        let text = fs::read_to_string(job.path(folder).join(file)).unwrap();
+        let line = text.lines().position(|line| line.contains(words)).unwrap();
+        format!("{file}:{}", line + 1)
+    };
+    let confine = line("shared", "shared/confine.wgsl", "return b;");
+    let import = line("import", "pbf/predict.wgsl", "confined");
+    for (shaders, words) in [
+        (
+            "name",
+            &[
+                "pbf/predict of --shaders",
+                "`velocities` is no buffer of the program",
+            ][..],
+        ),
+        ("layout", &["`params` is", "and the program has"]),
+        ("shared", &[&confine, "`b`"]),
+        (
+            "import",
+            &["shared/confined.wgsl of --shaders: no such file", &import],
+        ),
+    ] {
+        let said = job.expect(
+            2,
+            &format!("bake small.toml --frames 1-1 -o cache --shaders {shaders}"),
+        );
+        assert_has(&said, words);
+        assert!(!job.path("cache").exists());
+    }
+}
+
+/// A branch of such a cache by the shipped shaders says whose frames it began from, and so do pictures of both.
+#[test]
+fn what_follows_from_frames_of_edited_shaders_says_so() {
+    let job = job(&["edit"]);
+    overshoot(&job, "edit");
+    job.expect(0, "bake small.toml --frames 1-2 -o plain");
+    job.expect(0, "bake small.toml --frames 1-2 -o edited --shaders edit");
+    let hash = recorded(&job, "edited").unwrap();
+    for (from, is_edited) in [("plain", false), ("edited", true)] {
+        let branch = format!("from-{from}");
+        let said = job.expect(
+            0,
+            &format!("bake small.toml --frames 1-3 --from {from}:2 -o {branch}"),
+        );
+        assert_eq!(said.contains(&hash), is_edited, "{said}");
+        let said = job.expect(0, &format!("inspect {branch}"));
+        assert_eq!(said.contains(&hash), is_edited, "{said}");
+        for cache in [from, &branch] {
+            let pictures = format!("pictures-{cache}");
+            let said = job.expect(
+                0,
+                &format!("render {cache} --look look.toml --frames 2 -o {pictures}"),
+            );
+            assert_eq!(said.contains(&hash), is_edited, "{said}");
+            let picture = job.path(&pictures).join("small.0002.png");
+            let software = read_png_attributes(&picture).unwrap().software;
+            assert_eq!(software.contains(&hash), is_edited, "{software}");
+        }
+    }
 }

@@ -232,7 +232,7 @@ fn a_folder_in_use_is_shared_by_one_look_alone() {
         let said = job.expect(4, &words);
         assert_has(&said, &["busy is in use", "--overwrite"]);
     }
-    assert!(job.expect(0, &last).contains("1 frames rendered"));
+    assert!(job.expect(0, &last).contains("1 frame rendered"));
     assert!(exists(".swell/work"), "the first is still at work");
     // The frame that it has is waited for, and rendered here once its process is dead.
     let second = spawn(&job, render);

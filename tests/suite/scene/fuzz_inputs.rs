@@ -85,7 +85,7 @@ fn a_missing_table_and_a_missing_file_are_named() {
         .expect_err("no domain")
         .to_string();
     assert!(
-        message.contains("domain: missing; allowed: a table with min and max"),
+        message.contains("domain: missing; allowed: a table with at least min and max"),
         "{message}"
     );
     let error = Scene::load(&dir.path().join("none.toml"), &[]).expect_err("no file");

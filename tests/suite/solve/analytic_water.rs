@@ -6,7 +6,12 @@ use crate::support::flip::*;
 use crate::support::{self, D, context, lattice};
 use glam::{DVec2, DVec3, Vec3};
 use swell::{
-    domain::{boundary::Boundary, particles::Particles, probe::elevation, solver::Solver},
+    domain::{
+        boundary::Boundary,
+        particles::Particles,
+        probe::{Rate, elevation},
+        solver::Solver,
+    },
     gpu::adapter::Context,
     scene::{
         Method, Scene, Stop, effects,
@@ -36,6 +41,8 @@ fn ask_for_pressure(scene: &mut Scene) {
     scene.probes.push(Probe {
         name: "p".to_owned(),
         kind: ProbeKind::Pressure { at: DVec3::ZERO },
+        rate: Rate::Frame,
+        window: None,
     });
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 use swell::{
-    domain::{bounds::Bounds, motion::Motion},
+    domain::{bounds::Bounds, motion::Motion, probe::Rate},
     gpu::{
         buffer::Scalar,
         recording::{Command, Groups},
@@ -98,6 +98,8 @@ fn cases() -> Vec<Case> {
     probed.probes.push(Probe {
         name: "p".to_owned(),
         kind: ProbeKind::Pressure { at: DVec3::ONE },
+        rate: Rate::Frame,
+        window: None,
     });
     let mut all = vec![
         Case::new(pbf(|_| {})),

@@ -54,7 +54,7 @@ impl Rig {
             LIQUID_DISTANCE.sized(cells),
             DENSITY_EXCESS.sized(cells),
         ]);
-        let passes = pressure::passes(settings, surface, true);
+        let passes = pressure::passes(settings, surface, true, false);
         let program = Program::new(context, &specs, &passes, &[]).unwrap();
         let mut rig = Self {
             solver: PressureSolver::new(settings, true, capacity),

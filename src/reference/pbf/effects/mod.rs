@@ -45,7 +45,7 @@ fn fluid_sums<'a>(
 /// ∇_j W as calibrated, 1/m; it points from j to i.
 fn slope(inputs: Inputs<'_>, i: usize, j: usize) -> DVec3 {
     let calibration = &inputs.model.calibration;
-    let d = inputs.points[i] - inputs.points[j];
+    let d = inputs.between(i, j);
     let r = d.length();
     let s = (1.0 - r / calibration.support_radius).max(0.0);
     d * (calibration.gradient_scale * s * s / r.max(1e-15))

@@ -11,7 +11,7 @@ pub fn viscosity_gather(inputs: Inputs<'_>, xsph: f64, velocity: &[DVec3]) -> Ve
     let calibration = &inputs.model.calibration;
     let inverse_h = 1.0 / calibration.support_radius;
     fluid_sums(inputs, |i, j| {
-        let q2 = inputs.points[i].distance_squared(inputs.points[j]) * inverse_h * inverse_h;
+        let q2 = inputs.between(i, j).length_squared() * inverse_h * inverse_h;
         (velocity[j] - velocity[i]) * (1.0 - q2).max(0.0).powi(3)
     })
     .map(|sum| xsph * calibration.density_scale * sum)

@@ -193,13 +193,19 @@ fn a_folder_in_place_of_a_picture_is_refused_at_once() {
 #[test]
 fn a_picture_of_something_else_is_told_by_what_it_is() {
     type Edit = fn(&mut Attributes);
-    let edits: [(&str, Edit); 5] = [
+    let edits: [(&str, Edit); 7] = [
         ("of another shot", |a| a.shot.push('x')),
         ("of another scene", |a| a.scene_hash.push('x')),
         ("of another cache", |a| a.cache_hash.push('x')),
         ("of another look", |a| a.look_hash.push('x')),
         ("of another version of the program", |a| {
             a.software.push('x');
+        }),
+        ("of another set of shaders", |a| {
+            a.software += " with shaders 5e4, not the shipped ones";
+        }),
+        ("of another set of shaders", |a| {
+            a.software += ", of a cache baked with shaders 5e4, not the shipped ones";
         }),
     ];
     for (says, edit) in edits {

@@ -31,6 +31,20 @@ fn devices_and_references_that_do_not_fit_are_refused() {
         let said = job.load(&ITERATIONS.replace(from, to)).unwrap_err();
         assert!(said.contains(expected), "{said}");
     }
+    // A key of another kind is at fault, and not one that is missing.
+    let other = ITERATIONS.replace("kind = \"sweep\"", "kind = \"solver_comparison\"");
+    let said = job.load(&other).unwrap_err();
+    let words = "does not go with kind = \"solver_comparison\"; allowed with it: kind, scene";
+    assert!(said.contains("s.toml:") && said.contains(words), "{said}");
+    let said = job
+        .load(&ITERATIONS.replace("steps = 4\n", ""))
+        .unwrap_err();
+    let words =
+        "steps: missing; allowed: a whole number from 1 to 1000000, not together with seconds; or";
+    assert!(
+        said.contains(words) && !said.contains("scene.steps"),
+        "{said}"
+    );
     let finest = ITERATIONS.replace("steps = 4", "steps = 10").replace(
         "\"density_error_mean\", \"density_error_max\"",
         "\"crest_error\"",

@@ -4,6 +4,33 @@ use super::Fault;
 
 /// The same with `solver.method=flip` laid over.
 pub const FLIP_FAULTS: &[Fault] = &[
+    // Periodic axes.
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nperiodic = [\"z\"]",
+        9,
+        &[
+            "domain.periodic: the period along z is 15 m: 75.000 cells of 0.2 m, and FLIP asks for a multiple of 8",
+        ],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 16.0]\nperiodic = [\"z\"]",
+        9,
+        &[],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0",
+        "max = [25.0, 12.6, 16.0]\nperiodic = [\"z\"]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0\ndirection = [1.0, 0.0, 0.5]\nmotion = { kind = \"sine\", stroke = 0.5, period = 3.0 }",
+        22,
+        &["solid[0].direction: the solid moves along z, which domain.periodic names"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0",
+        "max = [25.0, 12.6, 16.0]\nperiodic = [\"z\"]\n\n[water]\nrest_density = 1000.0\ngravity = [0.0, -9.81, 0.0]\n[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [13.4, 1.0, 15.0]\n\n[[solid]]\nmesh = \"cube.obj\"\ntranslate = [18.0, 0.0, 7.0]\nscale = 2.0\ndirection = [1.0, 0.0, 0.0]\nmotion = { kind = \"sine\", stroke = 0.5, period = 3.0 }",
+        22,
+        &[],
+    ),
     (
         "cell_size = 0.2",
         "cell_size = 0",
@@ -140,6 +167,12 @@ pub const FLIP_FAULTS: &[Fault] = &[
         "max = [25.0, 12.6, 15.0]\nno_slip = [\"-y\", \"+x\", \"-y\"]",
         9,
         &["domain.no_slip: a wall stands there twice", "each once"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 16.0]\nperiodic = [\"z\"]\nno_slip = [\"-y\", \"+z\"]",
+        10,
+        &["domain.no_slip: there is no wall +z: domain.periodic joins both ends"],
     ),
     (
         "max = [25.0, 12.6, 15.0]",

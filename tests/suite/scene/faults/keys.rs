@@ -117,7 +117,7 @@ pub const KEY_FAULTS: &[Fault] = &[
         33,
         &[
             "probe[0].kind: \"elevaton\" is no kind; the nearest is \"elevation\"",
-            "\"elevation\", \"pressure\", \"energy\", \"volume\", \"front\", \"run_up\" or \"flux\"",
+            "\"elevation\", \"pressure\", \"energy\", \"volume\", \"front\", \"run_up\", \"flux\" or \"force\"",
         ],
     ),
     (
@@ -239,6 +239,24 @@ pub const KEY_FAULTS: &[Fault] = &[
         &[
             "domain.max: invalid type: an array of 2, expected an array of 3 numbers;",
             "three numbers from",
+        ],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, \"high\", 15.0]",
+        8,
+        &[
+            "domain.max[1]: invalid type: string \"high\", expected a number;",
+            "three numbers from",
+        ],
+    ),
+    (
+        "[[water.block]]",
+        "[water.block]",
+        13,
+        &[
+            "water.block: invalid type: a table, expected an array of tables;",
+            "an array of tables [[water.block]]",
         ],
     ),
     (

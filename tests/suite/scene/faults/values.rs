@@ -20,6 +20,64 @@ pub const VALUE_FAULTS: &[Fault] = &[
         9,
         &["domain.no_slip: solver pbf has free-slip walls alone"],
     ),
+    // Periodic axes.
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nperiodic = [\"z\"]",
+        9,
+        &[],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nperiodic = []",
+        9,
+        &[],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nperiodic = [\"w\"]",
+        9,
+        &["domain.periodic: \"w\" is no periodic"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nperiodic = \"z\"",
+        9,
+        &["domain.periodic: invalid type: string \"z\", expected an array of strings"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nperiodic = [\"z\", \"x\", \"z\"]",
+        9,
+        &["domain.periodic: \"z\" stands there twice"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nperiodic = [\"y\"]",
+        9,
+        &["domain.periodic: gravity is [0, -9.81, 0] m/s², and along y nothing holds the water up"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nperiodic = [\"x\"]",
+        24,
+        &["wave_maker[0].wall: there is no wall -x: domain.periodic joins"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.05]\nperiodic = [\"z\"]",
+        9,
+        &["domain.periodic: the period along z is 15.05 m: 150.500 particle spacings of 0.1 m"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 0.5]\nperiodic = [\"z\"]",
+        9,
+        &[
+            "domain.periodic: the period along z is 0.5 m: 2.500 support radii of 0.2 m",
+            "at least 3",
+        ],
+    ),
     // Ranges.
     (
         "= 0.1\n",

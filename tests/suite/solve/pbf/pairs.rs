@@ -3,7 +3,11 @@
 use glam::DVec3;
 use swell::{
     domain::{
-        boundary::Boundary, particles::Particles, probe::fitted, solver::Solver, sph::Calibration,
+        boundary::Boundary,
+        particles::Particles,
+        probe::{Rate, fitted},
+        solver::Solver,
+        sph::Calibration,
     },
     gpu::adapter::{Context, Spoil},
     reference::{
@@ -208,6 +212,8 @@ fn pressed(iterations: u32) -> (Scene, Particles) {
     scene.probes.push(Probe {
         name: "p".to_owned(),
         kind: ProbeKind::Pressure { at: DVec3::ONE },
+        rate: Rate::Frame,
+        window: None,
     });
     let mut particles = lattice([0.7; 3], [6; 3], [0.95 * D; 3]);
     jitter(&mut particles, 0.01 * D);

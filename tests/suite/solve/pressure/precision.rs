@@ -146,6 +146,7 @@ fn a_precision_takes_its_own_bytes_and_features() {
             &in_precision(Precision::F64, 1e-5),
             SceneSurface::GhostFluid,
             true,
+            false,
         ),
         &[],
     );

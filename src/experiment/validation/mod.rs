@@ -1,0 +1,128 @@
+//! Benchmarks whose answer is known: each run, measured, and held against theory and experiments.
+
+mod numbers;
+mod record;
+mod report;
+mod start;
+mod verdict;
+
+use std::{collections::BTreeMap, sync::atomic::AtomicBool};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    gpu::adapter::Needs,
+    scene::study::validation::{Benchmark, Trial, Validation},
+    stage::{drive::Drive, prepare::Start},
+};
+
+use super::{
+    Devices, PointStatus, StudyError,
+    engine::{Bench, Kind, Ledger, needs_of, until_done},
+    report::Report,
+};
+use record::Record;
+
+pub use verdict::{Judged, judge};
+
+/// What a run came to.
+pub type Run = super::Run<Measured>;
+
+/// What a benchmark's measure gives of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// By the names of [`Measure::numbers`](crate::scene::study::validation::Measure::numbers); one that cannot be had is left out.
+    pub numbers: BTreeMap<String, f64>,
+    /// By the names of [`Measure::curves`](crate::scene::study::validation::Measure::curves).
+    pub curves: BTreeMap<String, Vec<(f64, f64)>>,
+}
+
+impl Kind for Validation {
+    fn needs(&self) -> Option<Needs> {
+        let runs = self.benchmarks.iter().flat_map(|benchmark| &benchmark.runs);
+        needs_of(runs.map(|run| (&run.scene, run.device)))
+    }
+
+    fn count(&self) -> usize {
+        self.benchmarks
+            .iter()
+            .map(|benchmark| benchmark.runs.len())
+            .sum()
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
+        let mut ledger = Ledger::open(&bench.request.directory)?;
+        let mut results = Vec::new();
+        for benchmark in &self.benchmarks {
+            let mut runs = Vec::new();
+            for trial in &benchmark.runs {
+                let name = format!("{}, {}", benchmark.name, trial.name());
+                let measured = format!(
+                    "{:?} {:?} {:?}",
+                    benchmark.measure, benchmark.scale, benchmark.points
+                );
+                let scenes = [(&trial.scene, trial.device)];
+                let hash = bench
+                    .devices
+                    .hash(&scenes, trial.scene.shot.frames, &measured);
+                let measure = || run_benchmark(bench.devices, benchmark, trial, bench.stop);
+                let (run, stood) = bench.point(&mut ledger, &name, hash, measure)?;
+                bench.told(name, status(&run, stood));
+                runs.push(run);
+            }
+            let judged = judge(benchmark, &runs);
+            results.push((benchmark, runs, judged));
+        }
+        Ok(report::draw(self, bench, &results))
+    }
+}
+
+fn status(run: &Run, stood: bool) -> PointStatus {
+    match &run.ended {
+        Some(message) => PointStatus::Failed(message.clone()),
+        None if stood => PointStatus::Stands,
+        None => PointStatus::Done(1e3 * run.per_frame()[1], Vec::new()),
+    }
+}
+
+/// Runs one of a benchmark's runs over its whole shot, or to where its numbers fail.
+///
+/// # Errors
+/// What is no fault of the numbers: the device, a file; [`StudyError::Stopped`] where `stop` came before the end.
+pub fn run_benchmark(
+    devices: &Devices,
+    benchmark: &Benchmark,
+    trial: &Trial,
+    stop: &AtomicBool,
+) -> Result<Run, StudyError> {
+    let mut run = Run::default();
+    if let Err(error) = go(devices, benchmark, trial, stop, &mut run) {
+        run.ended = Some(error.of_the_point()?);
+    }
+    Ok(run)
+}
+
+fn go(
+    devices: &Devices,
+    benchmark: &Benchmark,
+    trial: &Trial,
+    stop: &AtomicBool,
+    run: &mut Run,
+) -> Result<(), StudyError> {
+    let scene = &trial.scene;
+    let mut start = Start::of(scene)?;
+    start::prepare(benchmark, scene, &mut start.particles);
+    run.particles = start.particles.len();
+    let mut drive = Drive::new(devices.of(trial.device), scene, &start, false)?.with_pressures();
+    let mut record = Record::new(benchmark, scene, &start.particles);
+    let mut seconds = 0.0;
+    let ended = until_done(&mut drive, scene.shot.frames, stop, |step| {
+        seconds += step.seconds;
+        run.frames += 1;
+        record.look(&step);
+        Ok(())
+    });
+    run.seconds.push(seconds);
+    run.measured = numbers::of(&record);
+    ended
+}

@@ -1,0 +1,335 @@
+//! From a run's frames to the numbers and curves of its benchmark.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::{
+    scene::{Method, Scene, study::validation::Measure},
+    study::waves,
+};
+
+use super::{
+    Measured,
+    record::{Record, Row},
+};
+
+/// m/s²: of the published numbers, whatever the scene has.
+const GRAVITY: f64 = 9.81;
+
+/// kg/m³, the same.
+const DENSITY: f64 = 1000.0;
+
+/// Seconds over which the pressures of SPHERIC benchmark 2 are averaged.
+const WINDOW: f64 = 0.01;
+
+/// Part of a crest from which on a parabola is laid through it.
+const CREST: f64 = 0.8;
+
+/// Largest shift of T that is tried on a dam break's front.
+const SHIFT: f64 = 1.0;
+
+/// T from which to which water that ran out over a dry bed is looked at.
+const DRY_BED: [f64; 2] = [4.0, 8.0];
+
+/// Points that a curve keeps.
+const CURVE: usize = 400;
+
+type Curve = Vec<(f64, f64)>;
+
+pub(super) fn of(record: &Record<'_>) -> Measured {
+    let mut out = Measured::default();
+    match record.benchmark.measure {
+        Measure::RegularWaves => regular_waves(record, &mut out),
+        Measure::SolitaryWave => solitary_wave(record, &mut out),
+        Measure::DamBreak => dam_break(record, &mut out),
+        Measure::DryBed => dry_bed(record, &mut out),
+        Measure::BlockImpact => block_impact(record, &mut out),
+        Measure::StandingWave => standing_wave(record, &mut out),
+        Measure::Hydrostatic => hydrostatic(record, &mut out),
+        Measure::TaylorGreen => taylor_green(record, &mut out),
+    }
+    out.numbers.retain(|_, value| value.is_finite());
+    for curve in out.curves.values_mut() {
+        curve.retain(|(x, y)| x.is_finite() && y.is_finite());
+        let every = curve.len().div_ceil(CURVE).max(1);
+        *curve = std::mem::take(curve).into_iter().step_by(every).collect();
+    }
+    out
+}
+
+impl Measured {
+    fn put(&mut self, name: &str, value: Option<f64>) {
+        if let Some(value) = value {
+            self.numbers.insert(name.to_owned(), value);
+        }
+    }
+
+    fn draw(&mut self, name: &str, curve: Curve) {
+        self.curves.insert(name.to_owned(), curve);
+    }
+}
+
+/// A number of each frame over its time, seconds; frames without it are left out.
+fn over_time(rows: &[Row], of: impl Fn(&Row) -> Option<f64>) -> Curve {
+    rows.iter()
+        .filter_map(|row| Some((row.time, of(row)?)))
+        .collect()
+}
+
+/// A gauge's level over time, metres.
+fn level(record: &Record<'_>, gauge: usize) -> Curve {
+    over_time(&record.rows, |row| *row.levels.get(gauge)?)
+}
+
+fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values
+        .into_iter()
+        .fold((0.0, 0), |(sum, n), v| (sum + v, n + 1));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+fn regular_waves(record: &Record<'_>, out: &mut Measured) {
+    let scale = record.benchmark.scale;
+    let omega = TAU / scale.period;
+    let gauges = record.gauges();
+    let fitted = |gauge: usize| {
+        let samples = level(record, gauge);
+        let window = waves::whole_periods(&samples, scale.period, scale.after);
+        waves::harmonic(window, omega)
+    };
+    let fits: Option<Vec<_>> = (0..gauges.len()).map(fitted).collect();
+    let fits = fits.unwrap_or_default();
+    let heights = fits.iter().map(|fit| 2.0 * fit.amplitude / scale.stroke);
+    out.put("height_ratio", mean(heights));
+    if let ([first, .., last], [from, .., to]) = (&fits[..], &gauges[..]) {
+        let length = waves::wave_length(first.phase, last.phase, to.x - from.x);
+        out.put("wave_length", Some(length));
+    }
+    let fastest = record.rows.iter().map(|row| row.speed).fold(0.0, f64::max);
+    out.put(
+        "speed_ratio",
+        Some(fastest / (PI * scale.stroke / scale.period)),
+    );
+    // From a crest of the fit on, so that crests come at whole periods.
+    if let Some(fit) = fits.first() {
+        let at = |t: f64| t / scale.period - fit.phase / TAU;
+        let first = level(record, 0).into_iter();
+        let curve = first.map(|(t, y)| (at(t), (y - fit.mean) / scale.stroke));
+        out.draw("elevation", curve.collect());
+    }
+}
+
+fn solitary_wave(record: &Record<'_>, out: &mut Measured) {
+    let scale = record.benchmark.scale;
+    let gauges = record.gauges();
+    let above = |gauge: usize| -> Curve {
+        let samples = level(record, gauge).into_iter();
+        samples.map(|(t, y)| (t, y - scale.depth)).collect()
+    };
+    let crests: Option<Vec<_>> = (0..gauges.len())
+        .map(|gauge| waves::crest(&above(gauge), CREST))
+        .collect();
+    let crests = crests.unwrap_or_default();
+    // By a straight line through the arrivals at all gauges.
+    let arrivals = crests.iter().zip(&gauges).map(|((t, _), at)| (*t, at.x));
+    out.put("celerity", waves::slope(&arrivals.collect::<Vec<_>>()));
+    out.put("height", mean(crests.iter().map(|(_, y)| y / scale.depth)));
+    if let Some((at, _)) = crests.last() {
+        let unit = (scale.depth / GRAVITY).sqrt();
+        let curve = above(gauges.len() - 1).into_iter();
+        let curve = curve.map(|(t, y)| ((t - at) / unit, y / scale.depth));
+        out.draw("elevation", curve.filter(|(t, _)| t.abs() < 12.0).collect());
+    }
+}
+
+fn dam_break(record: &Record<'_>, out: &mut Measured) {
+    let benchmark = record.benchmark;
+    let a = benchmark.scale.length;
+    let front = over_time(&record.rows, |row| row.of_water.first().map(|x| x / a));
+    let unit = (GRAVITY / a).sqrt();
+    let front: Curve = front
+        .into_iter()
+        .map(|(t, z)| (2f64.sqrt() * unit * t, z))
+        .collect();
+    let column = level(record, 0).into_iter();
+    let column: Curve = column.map(|(t, h)| (unit * t, h / (2.0 * a))).collect();
+    for points in &benchmark.points {
+        match points.of.as_str() {
+            "front" => {
+                out.put("front_error", waves::mean_error(&front, &points.at, 0.0));
+                let shifted = waves::fitted_shift(&front, &points.at, SHIFT);
+                out.put("front_shift", shifted.map(|(shift, _)| shift));
+                out.put("front_error_shifted", shifted.map(|(_, error)| error));
+            }
+            _ => out.put("column_error", waves::mean_error(&column, &points.at, 0.0)),
+        }
+    }
+    out.put("front_time", waves::reaches(&front, 3.0));
+    out.draw("front", front);
+    out.draw("column", column);
+}
+
+fn dry_bed(record: &Record<'_>, out: &mut Measured) {
+    let scale = record.benchmark.scale;
+    let celerity = (GRAVITY * scale.depth).sqrt();
+    let time = |row: &Row| row.time * celerity / scale.depth;
+    let [from, until] = DRY_BED;
+    let looked_at = |row: &&Row| (from - 1e-9..=until + 1e-9).contains(&time(row));
+    let rows: Vec<&Row> = record.rows.iter().filter(looked_at).collect();
+    let Some(bins) = rows.first().map(|row| row.of_water.len()) else {
+        return;
+    };
+    let width = record.scene.domain.size().x / bins as f64;
+    let middle = |bin: usize| (bin as f64 + 0.5) * width - scale.length;
+    // The dam stands between two bins, whose mean is the depth there to second order.
+    let dam = (scale.length / width).round() as usize;
+    let depths = rows
+        .iter()
+        .map(|row| 0.5 * (row.of_water[dam - 1] + row.of_water[dam]));
+    out.put(
+        "depth_at_dam",
+        mean(depths).map(|depth| depth / scale.depth),
+    );
+    let beyond = |row: &&Row| (row.time, width * row.of_water[dam..].iter().sum::<f64>());
+    let flow = waves::slope(&rows.iter().map(beyond).collect::<Vec<_>>());
+    out.put(
+        "flow_at_dam",
+        flow.map(|flow| flow / (scale.depth * celerity)),
+    );
+    let off = |row: &&Row| {
+        let of_bin = |(bin, depth): (usize, &f64)| {
+            let exact = waves::ritter(middle(bin), row.time, scale.depth, GRAVITY);
+            // Towards the tip the solution is that of water without friction alone.
+            (exact > 0.1 * scale.depth).then(|| (depth - exact).abs() / scale.depth)
+        };
+        let all = row.of_water.iter().enumerate().filter_map(of_bin);
+        all.fold(0.0, f64::max)
+    };
+    out.put("profile_error", mean(rows.iter().map(off)));
+    let middle_row = rows.iter().min_by(|a, b| {
+        let far = |row: &Row| (time(row) - 0.5 * (from + until)).abs();
+        far(a).total_cmp(&far(b))
+    });
+    if let Some(row) = middle_row {
+        let x = |bin: usize| middle(bin) / (row.time * celerity);
+        let depths = row.of_water.iter().enumerate();
+        let profile = depths.map(|(bin, depth)| (x(bin), depth / scale.depth));
+        out.draw(
+            "profile",
+            profile.filter(|(x, _)| (-1.5..2.2).contains(x)).collect(),
+        );
+    }
+}
+
+fn block_impact(record: &Record<'_>, out: &mut Measured) {
+    // H1 to H4, and P1 to P4, in the order of the scene's probes.
+    let levels: Vec<Curve> = (0..4).map(|gauge| level(record, gauge)).collect();
+    let highest = levels[1].iter().map(|(_, y)| *y).fold(0.0, f64::max);
+    out.put("arrival", levels[1].first().map(|(t, _)| *t));
+    out.put("height_2", Some(highest));
+    for (name, time) in [
+        ("height_4_1s", 1.0),
+        ("height_4_2s", 2.0),
+        ("height_4_4s", 4.0),
+    ] {
+        out.put(name, waves::value_at(&levels[3], time));
+    }
+    let pressure = |probe: usize| {
+        // Dry is no pressure.
+        over_time(&record.rows, |row| {
+            Some(row.pressures.get(probe)?.unwrap_or(0.0))
+        })
+    };
+    for probe in 0..4 {
+        let name = format!("peak_{}", probe + 1);
+        out.put(&name, waves::largest_mean(&pressure(probe), WINDOW));
+    }
+    // Half a cell off the face, P1 to P4 once more.
+    for probe in 0..3 {
+        let on = waves::largest_mean(&pressure(probe), WINDOW);
+        let off = waves::largest_mean(&pressure(probe + 4), WINDOW);
+        let apart = on.zip(off).map(|(on, off)| (off / on - 1.0).abs());
+        out.put(&format!("apart_{}", probe + 1), apart);
+    }
+    let volumes = || record.rows.iter().filter_map(|row| row.of_water.first());
+    let first = volumes().next().copied().unwrap_or(f64::NAN);
+    let off = volumes().map(|volume| (volume / first - 1.0).abs());
+    out.put("volume_error", Some(off.fold(0.0, f64::max)));
+    let wet = |row: &&Row| row.pressures.iter().take(4).flatten().any(|p| *p > 0.0);
+    out.put("onset", record.rows.iter().find(wet).map(|row| row.time));
+    out.draw("height_2", levels[1].clone());
+    out.draw("height_4", levels[3].clone());
+    out.draw("pressure_1", pressure(0));
+}
+
+fn standing_wave(record: &Record<'_>, out: &mut Measured) {
+    let amplitude = over_time(&record.rows, |row| row.of_water.first().copied());
+    let start = amplitude.first().map_or(f64::NAN, |(_, a)| *a);
+    out.put("period", waves::period(&amplitude, 0.1 * start.abs()));
+    let k = TAU / record.benchmark.scale.length;
+    let period = TAU / (GRAVITY * k * (k * record.benchmark.scale.depth).tanh()).sqrt();
+    let third = amplitude
+        .iter()
+        .filter(|(t, _)| (2.6..3.4).contains(&(t / period)));
+    let most = third.map(|(_, a)| *a).fold(f64::NAN, f64::max);
+    out.put("amplitude_left", Some(most / start));
+    out.draw(
+        "amplitude",
+        amplitude.into_iter().map(|(t, a)| (t, a / start)).collect(),
+    );
+}
+
+fn hydrostatic(record: &Record<'_>, out: &mut Measured) {
+    let scale = record.benchmark.scale;
+    let floor = record.scene.domain.min.y;
+    let points = record.scene.pressure_points();
+    let counted = || record.rows.iter().filter(|row| row.time > scale.after);
+    let of_probe = |probe: usize| {
+        let all: Option<Vec<f64>> = counted().map(|row| *row.pressures.get(probe)?).collect();
+        let depth = scale.depth - (points[probe].y - floor);
+        Some((depth, mean(all?)? / (DENSITY * GRAVITY * depth)))
+    };
+    let ratios: Option<Curve> = (0..points.len()).map(of_probe).collect();
+    let mut ratios = ratios.unwrap_or_default();
+    ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some(((_, lowest), others)) = ratios.split_last() {
+        out.put("pressure", mean(others.iter().map(|(_, ratio)| *ratio)));
+        out.put("pressure_at_floor", Some(*lowest));
+    }
+    out.put(
+        "speed",
+        Some(counted().map(|row| row.speed).fold(0.0, f64::max)),
+    );
+    out.draw("pressure", ratios);
+}
+
+fn taylor_green(record: &Record<'_>, out: &mut Measured) {
+    let scale = record.benchmark.scale;
+    let energy = over_time(&record.rows, |row| row.of_water.first().copied());
+    // A turn is that of the vortex' middle, whose vorticity is 2 k U.
+    let k = PI / scale.length;
+    let turn = TAU / (k * scale.speed);
+    if let (Some((_, first)), Some((end, last))) = (energy.first(), energy.last()) {
+        let viscosity = numerical_viscosity(record.scene, record.substeps, *end);
+        // Of a Taylor–Green vortex energy falls as e^(−4 ν k² t).
+        let decay = -(last / first).ln();
+        out.put(
+            "viscosity_ratio",
+            Some(decay / (4.0 * viscosity * k * k * end)),
+        );
+        let first = *first;
+        let curve = energy.iter().map(|(t, e)| (t / turn, e / first));
+        out.draw("energy", curve.collect());
+    }
+}
+
+/// α Δx² / (6 Δt), m²/s (Zhu and Bridson 2005): what PIC's part does to a flow.
+fn numerical_viscosity(scene: &Scene, substeps: u32, seconds: f64) -> f64 {
+    match scene.solver.method {
+        Method::Pbf => f64::NAN,
+        Method::Flip => {
+            let flip = scene.solver.flip();
+            let step = seconds / f64::from(substeps.max(1));
+            flip.pic_blend * flip.cell_size.powi(2) / (6.0 * step)
+        }
+    }
+}

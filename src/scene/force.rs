@@ -1,0 +1,53 @@
+//! Surfaces that bear a probe's force.
+
+use glam::DVec3;
+
+use super::{Scene, Wall, probe::Bearer};
+use crate::domain::{
+    mesh::TriangleMesh,
+    probe::{Patch, patches},
+};
+
+impl Scene {
+    /// Where `bearer` meets the water at `time`, in patches no longer than a cell, metres about the scene's origin. What
+    /// faces a wall of the domain less than half a cell away bears nothing: no water comes between.
+    pub fn patches(&self, bearer: Bearer, time: f64) -> Vec<Patch> {
+        let edge = self.solver.flip().cell_size;
+        let (mesh, way) = match bearer {
+            Bearer::Solid(index) => (&self.solids[index].mesh, DVec3::ZERO),
+            Bearer::MovingSolid(index) => {
+                let solid = &self.moving_solids[index];
+                (&solid.placed.mesh, solid.displacement(time))
+            }
+            Bearer::Wall(wall) => return patches(&self.face(wall, time), edge),
+        };
+        let meets_water = |patch: &Patch| {
+            let outside = patch.at + 0.5 * edge * patch.normal();
+            self.domain.contains(outside)
+        };
+        let all = patches(mesh, edge)
+            .into_iter()
+            .map(|patch| patch.moved(way));
+        all.filter(meets_water).collect()
+    }
+
+    /// A wall of the domain where it stands at `time`, counter-clockwise from within.
+    fn face(&self, wall: Wall, time: f64) -> TriangleMesh {
+        let walls = self.walls(time);
+        let at = if wall.is_max { walls.max } else { walls.min }[wall.axis];
+        let (u, v) = ((wall.axis + 1) % 3, (wall.axis + 2) % 3);
+        let corner = |end_u: usize, end_v: usize| {
+            let ends = [DVec3::ZERO, self.domain.size()];
+            let mut corner = DVec3::ZERO;
+            corner[wall.axis] = at;
+            (corner[u], corner[v]) = (ends[end_u][u], ends[end_v][v]);
+            self.domain.min + corner
+        };
+        let inward = [[0, 1, 2], [0, 2, 3]];
+        let turned = [[0, 2, 1], [0, 3, 2]];
+        TriangleMesh {
+            vertices: vec![corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)],
+            triangles: if wall.is_max { turned } else { inward }.to_vec(),
+        }
+    }
+}

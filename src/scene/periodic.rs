@@ -1,0 +1,216 @@
+//! Axes along which the domain joins its own end, and what does not go with them.
+
+use std::borrow::Cow;
+
+use glam::{DAffine3, DVec3};
+
+use super::{
+    Method, Scene, Solver, WaveMaker,
+    document::Document,
+    error::SceneError,
+    key::read_by_name,
+    moving_solid::MovingSolid,
+    words::{shown, shown_all},
+};
+use crate::domain::{bounds::Bounds, bricks::EDGE, mesh::TriangleMesh, period::Period};
+
+/// The key that names the axes.
+const KEY: &str = "domain.periodic";
+
+/// Cells of PBF's neighbour search along a period: with fewer a particle would meet another and its image.
+const LEAST_CELLS: f64 = 3.0;
+
+/// Of a spacing or cell, how far a period may be off a whole number of them: the rounding of decimal fractions.
+const ROUNDING: f64 = 1e-6;
+
+/// Sine of the angle to a periodic axis below which a solid counts as moving across it.
+const ACROSS: f64 = 1e-9;
+
+/// An axis of the domain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// The first.
+    X,
+    /// Upward.
+    Y,
+    /// The last.
+    Z,
+}
+
+impl Axis {
+    /// With the names that scenes use.
+    pub const NAMED: [(&'static str, Self); 3] = [("x", Self::X), ("y", Self::Y), ("z", Self::Z)];
+
+    /// As scenes name it.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
+    }
+
+    /// Those that are set.
+    pub(super) fn of(periodic: [bool; 3]) -> Vec<Self> {
+        let named = Self::NAMED.iter().zip(periodic);
+        named
+            .filter_map(|((_, axis), is)| is.then_some(*axis))
+            .collect()
+    }
+}
+
+read_by_name!(Axis);
+
+/// One flag an axis.
+pub(super) fn read(doc: &Document<'_>, axes: &[Axis]) -> Result<[bool; 3], SceneError> {
+    let mut periodic = [false; 3];
+    for axis in axes {
+        if std::mem::replace(&mut periodic[*axis as usize], true) {
+            let problem = format!("{:?} stands there twice", axis.name());
+            return Err(doc.fault_of(KEY, problem));
+        }
+    }
+    Ok(periodic)
+}
+
+/// Refuses a solver whose cells or lattice the periods do not hold a whole number of.
+pub(super) fn check_solver(
+    doc: &Document<'_>,
+    periodic: [bool; 3],
+    domain: &Bounds,
+    solver: &Solver,
+) -> Result<(), SceneError> {
+    for axis in Axis::of(periodic) {
+        let length = domain.size()[axis as usize];
+        let refuse = |problem: String| {
+            let period = format!("the period along {} is {} m", axis.name(), shown(length));
+            Err(doc.fault_of_plain(KEY, format!("{period}: {problem}")))
+        };
+        match solver.method {
+            Method::Flip => {
+                let (size, edge) = (solver.flip().cell_size, f64::from(EDGE));
+                if !is_whole(length / size / edge, edge) {
+                    return refuse(format!(
+                        "{:.3} cells of {} m, and FLIP asks for a multiple of {EDGE} of them",
+                        length / size,
+                        shown(size)
+                    ));
+                }
+            }
+            Method::Pbf => {
+                let spacing = solver.pbf().particle_spacing;
+                if !is_whole(length / spacing, 1.0) {
+                    return refuse(format!(
+                        "{:.3} particle spacings of {} m, and PBF asks for a whole number",
+                        length / spacing,
+                        shown(spacing)
+                    ));
+                }
+                let support = spacing * solver.pbf().support_ratio;
+                if length / support < LEAST_CELLS * (1.0 - ROUNDING) {
+                    return refuse(format!(
+                        "{:.3} support radii of {} m, and PBF asks for at least {LEAST_CELLS}",
+                        length / support,
+                        shown(support)
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether there are so many, one at least, up to the rounding of a part in `parts`.
+fn is_whole(count: f64, parts: f64) -> bool {
+    count.round() >= 1.0 && (count - count.round()).abs() * parts < ROUNDING
+}
+
+/// Refuses gravity along a periodic axis: no pressure could hold it, and no energy of place belongs to it.
+pub(super) fn check_gravity(
+    doc: &Document<'_>,
+    periodic: [bool; 3],
+    gravity: DVec3,
+) -> Result<(), SceneError> {
+    let along = Axis::of(periodic).into_iter();
+    let Some(axis) = along.clone().find(|axis| gravity[*axis as usize] != 0.0) else {
+        return Ok(());
+    };
+    let problem = format!(
+        "gravity is {} m/s², and along {} nothing holds the water up: it would fall for ever",
+        shown_all(&gravity.to_array()),
+        axis.name()
+    );
+    Err(doc.fault_of_plain(KEY, problem))
+}
+
+/// Refuses walls that move where there are none.
+pub(super) fn check_makers(
+    doc: &Document<'_>,
+    periodic: [bool; 3],
+    makers: &[WaveMaker],
+) -> Result<(), SceneError> {
+    let Some(index) = makers.iter().position(|maker| periodic[maker.wall.axis]) else {
+        return Ok(());
+    };
+    let wall = makers[index].wall;
+    let problem = format!(
+        "there is no wall {}: {KEY} joins the domain's ends along {}",
+        wall.name(),
+        Axis::NAMED[wall.axis].0
+    );
+    Err(doc.fault_of_plain(&format!("wave_maker[{index}].wall"), problem))
+}
+
+/// Refuses solids that move along a periodic axis: they would have to come in again at the other end.
+pub(super) fn check_solids(
+    doc: &Document<'_>,
+    periodic: [bool; 3],
+    solids: &[MovingSolid],
+    index_of: impl Fn(usize) -> usize,
+) -> Result<(), SceneError> {
+    for axis in Axis::of(periodic) {
+        let moves = |solid: &MovingSolid| solid.direction.normalize()[axis as usize].abs() > ACROSS;
+        if let Some(found) = solids.iter().position(moves) {
+            let problem = format!("the solid moves along {}, which {KEY} names", axis.name());
+            let path = format!("solid[{}].direction", index_of(found));
+            return Err(doc.fault_of_plain(&path, problem));
+        }
+    }
+    Ok(())
+}
+
+impl Scene {
+    /// Whether the domain joins its own end along any axis.
+    pub fn is_periodic(&self) -> bool {
+        self.periodic.contains(&true)
+    }
+
+    /// Its lengths along those axes, as 32 bits have them: the GPU and the reference repeat alike.
+    pub fn period(&self) -> Period {
+        let is = |axis: usize| f64::from(u8::from(self.periodic[axis]));
+        let size = self.domain.size() * DVec3::new(is(0), is(1), is(2));
+        Period(size.as_vec3().as_dvec3())
+    }
+
+    /// A mesh and, along periodic axes, those of its images that come nearer than `margin` metres to the domain.
+    pub fn with_images<'a>(
+        &self,
+        mesh: &'a TriangleMesh,
+        margin: f64,
+    ) -> Vec<Cow<'a, TriangleMesh>> {
+        let (Period(period), near) = (self.period(), self.domain.grown(margin));
+        let mut images = vec![Cow::Borrowed(mesh)];
+        if !self.is_periodic() {
+            return images;
+        }
+        for k in (0..27).filter(|&k| k != 13) {
+            let step = DVec3::from_array([k % 3, k / 3 % 3, k / 9].map(|n| f64::from(n) - 1.0));
+            // Along an axis with walls there is none.
+            if (0..3).any(|axis| !self.periodic[axis] && step[axis] != 0.0) {
+                continue;
+            }
+            let image = mesh.transformed(&DAffine3::from_translation(step * period));
+            let comes_near = |b: Bounds| b.min.cmplt(near.max).all() && b.max.cmpgt(near.min).all();
+            if image.bounds().is_some_and(comes_near) {
+                images.push(Cow::Owned(image));
+            }
+        }
+        images
+    }
+}

@@ -1,0 +1,183 @@
+//! What a benchmark measures: its numbers, its curves, and what it has to be told.
+
+/// What is measured of a benchmark's runs, and what its scene starts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// Waves of a piston, at the scene's elevation probes.
+    RegularWaves,
+    /// One solitary wave, at the scene's elevation probes.
+    SolitaryWave,
+    /// A column that collapses along x: front, and height at the wall.
+    DamBreak,
+    /// A long reservoir that empties over a dry bed along x: the profile about the dam.
+    DryBed,
+    /// A dam that breaks onto a block: the scene's probes of elevation and pressure.
+    BlockImpact,
+    /// A wave between two walls along x, which starts at rest from its highest.
+    StandingWave,
+    /// Water at rest: the scene's probes of pressure.
+    Hydrostatic,
+    /// A vortex in a closed box, full of water and without gravity, in the plane of x and y.
+    TaylorGreen,
+}
+
+impl Measure {
+    /// As studies name them.
+    pub(in super::super::super) const NAMED: [(&'static str, Self); 8] = [
+        ("regular_waves", Self::RegularWaves),
+        ("solitary_wave", Self::SolitaryWave),
+        ("dam_break", Self::DamBreak),
+        ("dry_bed", Self::DryBed),
+        ("block_impact", Self::BlockImpact),
+        ("standing_wave", Self::StandingWave),
+        ("hydrostatic", Self::Hydrostatic),
+        ("taylor_green", Self::TaylorGreen),
+    ];
+
+    /// What it has to be told.
+    pub(super) fn needs(self) -> &'static [&'static str] {
+        match self {
+            Self::RegularWaves => &["stroke", "period", "after"],
+            Self::SolitaryWave => &["depth", "height"],
+            Self::DamBreak => &["length"],
+            Self::DryBed => &["depth", "length"],
+            Self::BlockImpact => &[],
+            Self::StandingWave => &["depth", "length", "height"],
+            Self::Hydrostatic => &["depth", "after"],
+            Self::TaylorGreen => &["length", "speed"],
+        }
+    }
+
+    /// Numbers that it gives, as gates name them, each with its title and unit. `{curve}` is one that points stand beside.
+    pub fn numbers(self) -> &'static [(&'static str, &'static str)] {
+        match self {
+            Self::RegularWaves => &[
+                ("height_ratio", "wave height over stroke, H/S"),
+                ("wave_length", "wave length, m"),
+                ("speed_ratio", "largest speed anywhere over the paddle's"),
+            ],
+            Self::SolitaryWave => &[
+                ("height", "height of the crest over the depth, H/d"),
+                ("celerity", "celerity, m/s"),
+            ],
+            Self::DamBreak => &[
+                ("front_error", "front against the points, mean"),
+                (
+                    "front_error_shifted",
+                    "front against the points with one shift of T fitted, mean",
+                ),
+                ("front_shift", "that shift, of T"),
+                ("front_time", "T at which the front has come to 3 a"),
+                (
+                    "column_error",
+                    "column at the wall against the points, mean",
+                ),
+            ],
+            Self::DryBed => &[
+                (
+                    "depth_at_dam",
+                    "depth at the dam over h0, mean of T from 4 to 8",
+                ),
+                (
+                    "flow_at_dam",
+                    "flow at the dam over h0 √(g h0), mean of T from 4 to 8",
+                ),
+                (
+                    "profile_error",
+                    "profile, largest |h − Ritter's| over h0 where h > 0.1 h0, mean of T from 4 to 8",
+                ),
+            ],
+            Self::BlockImpact => &[
+                ("arrival", "water reaches H2, s"),
+                ("height_2", "highest at H2, m"),
+                ("height_4_1s", "H4 at 1 s, m"),
+                ("height_4_2s", "H4 at 2 s, m"),
+                ("height_4_4s", "H4 at 4 s, m"),
+                ("peak_1", "P1, largest mean of 10 ms, Pa"),
+                ("peak_2", "P2, largest mean of 10 ms, Pa"),
+                ("peak_3", "P3, largest mean of 10 ms, Pa"),
+                ("peak_4", "P4, largest mean of 10 ms, Pa"),
+                ("onset", "the block feels the water, s"),
+                (
+                    "apart_1",
+                    "P1 on the face and half a cell off it, apart by a part of it",
+                ),
+                (
+                    "apart_2",
+                    "P2 on the face and half a cell off it, apart by a part of it",
+                ),
+                (
+                    "apart_3",
+                    "P3 on the face and half a cell off it, apart by a part of it",
+                ),
+                (
+                    "volume_error",
+                    "volume, most that it is off that of the start",
+                ),
+            ],
+            Self::StandingWave => &[
+                ("period", "period, s"),
+                (
+                    "amplitude_left",
+                    "part of the amplitude that is left after three periods",
+                ),
+            ],
+            Self::Hydrostatic => &[
+                (
+                    "pressure",
+                    "p / (ρ g depth), mean of time and probes but the lowest",
+                ),
+                (
+                    "pressure_at_floor",
+                    "p / (ρ g depth) at the lowest probe, mean of time",
+                ),
+                ("speed", "largest speed, m/s"),
+            ],
+            Self::TaylorGreen => &[(
+                "viscosity_ratio",
+                "decay of the energy over that of the numerical viscosity α Δx² / (6 Δt)",
+            )],
+        }
+    }
+
+    /// Curves that it gives, as points name them, each with its title and what its axes say.
+    pub fn curves(self) -> &'static [(&'static str, [&'static str; 3])] {
+        match self {
+            Self::RegularWaves => &[(
+                "elevation",
+                [
+                    "elevation at the first gauge",
+                    "time from a crest, periods",
+                    "η / S",
+                ],
+            )],
+            Self::SolitaryWave => &[(
+                "elevation",
+                [
+                    "elevation at the last gauge",
+                    "time from the crest, √(d/g)",
+                    "η / d",
+                ],
+            )],
+            Self::DamBreak => &[
+                ("front", ["front", "T = t √(2g/a)", "Z = x / a"]),
+                (
+                    "column",
+                    ["column at the wall", "τ = t √(g/a)", "H = h / 2a"],
+                ),
+            ],
+            Self::DryBed => &[("profile", ["profile at T = 6", "x / (t √(g h0))", "h / h0"])],
+            Self::BlockImpact => &[
+                ("height_2", ["H2", "time, s", "height, m"]),
+                ("height_4", ["H4", "time, s", "height, m"]),
+                ("pressure_1", ["P1", "time, s", "Pa"]),
+            ],
+            Self::StandingWave => &[(
+                "amplitude",
+                ["amplitude of the first mode", "time, s", "of the start's"],
+            )],
+            Self::Hydrostatic => &[("pressure", ["pressure", "depth, m", "p / (ρ g depth)"])],
+            Self::TaylorGreen => &[("energy", ["energy", "time, turns", "of the start's"])],
+        }
+    }
+}

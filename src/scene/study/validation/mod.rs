@@ -1,0 +1,546 @@
+//! `kind = "validation"`: benchmarks whose answer is known from theory or from an experiment, and how far from it a solver is.
+//!
+//! ```toml
+//! kind = "validation"
+//!
+//! [[benchmark]]
+//! name = "piston, kh = 1"
+//! measure = "regular_waves"                   # what is measured: a name of Measure
+//! scene = "../validation/piston.toml"
+//! set = ["shot.frames=400"]                   # laid over the scene of every run, as --set does
+//! stroke = 0.1                                # what the measure is told: metres, seconds
+//! period = 2.3
+//! after = 6.0
+//!
+//! [[benchmark.run]]
+//! solver = "flip"
+//! resolution = 20                             # cells a depth, a width, a wave length: for the order, and to name the run
+//! set = ["solver.flip.cell_size=0.05"]
+//! device = "gpu"                              # where left out
+//!
+//! [[benchmark.gate]]
+//! of = "height_ratio"                         # a number of the measure
+//! published = 0.982
+//! source = "linear theory (Dean and Dalrymple 1991)"
+//! within = 0.05                               # or off_by, at_most, at_least, order_at_least, agree_within
+//! solver = "flip"                             # runs that it judges; all where left out
+//! resolution = 20
+//! known_failure = "why it is missed"
+//!
+//! [[benchmark.points]]                        # data that a curve of the measure is drawn and held against
+//! of = "front"
+//! source = "Martin and Moyce 1952"
+//! at = [[0.84, 1.22], [1.43, 1.67]]
+//! ```
+
+mod measure;
+
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::{Spanned, de::DeTable};
+
+use super::{
+    super::{Method, Scene, document::Document, error::SceneError},
+    RunsOn, SceneFile, StudyFileError, load_with,
+};
+
+pub use measure::Measure;
+
+type Result<T> = std::result::Result<T, SceneError>;
+
+/// A validated study against theory and experiments.
+#[derive(Clone, Debug)]
+pub struct Validation {
+    /// In the reader's words, for the page; paragraphs.
+    pub about: Vec<String>,
+    /// In the order of the file.
+    pub benchmarks: Vec<Benchmark>,
+}
+
+/// Something whose answer is known.
+#[derive(Clone, Debug)]
+pub struct Benchmark {
+    /// In words; no two have one name.
+    pub name: String,
+    /// Further words, for the page.
+    pub note: Option<String>,
+    /// What is measured.
+    pub measure: Measure,
+    /// What the measure is told.
+    pub scale: Scale,
+    /// In the order of the file.
+    pub runs: Vec<Trial>,
+    /// In the order of the file.
+    pub gates: Vec<Gate>,
+    /// Data beside curves.
+    pub points: Vec<Points>,
+}
+
+/// A run of a benchmark.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// What it runs on.
+    pub device: RunsOn,
+    /// Cells a length that the benchmark chooses.
+    pub resolution: f64,
+    /// With every override laid over it.
+    pub scene: Scene,
+}
+
+impl Trial {
+    /// Solver and resolution, for a legend or a line.
+    pub fn name(&self) -> String {
+        format!("{}, {}", self.scene.solver.method.name(), self.resolution)
+    }
+}
+
+/// What a measure is told; 0 where it is not told.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scale {
+    /// Of still water, metres.
+    pub depth: f64,
+    /// Of a column, a wave or a box, or where the dam is, metres.
+    pub length: f64,
+    /// Of a crest above still water, metres.
+    pub height: f64,
+    /// Of a piston, from end to end, metres.
+    pub stroke: f64,
+    /// Of a piston, seconds.
+    pub period: f64,
+    /// Of a vortex, m/s.
+    pub speed: f64,
+    /// Seconds of the shot that do not count.
+    pub after: f64,
+}
+
+/// What a number has to be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gate {
+    /// A number of the measure.
+    pub of: String,
+    /// What is known of it, and whose word that is.
+    pub published: Option<f64>,
+    /// Of the published number, or of the gate.
+    pub source: String,
+    /// How far from it.
+    pub bound: Bound,
+    /// The only solver that it judges.
+    pub method: Option<Method>,
+    /// The only resolution that it judges.
+    pub resolution: Option<f64>,
+    /// Why it is missed.
+    pub known_failure: Option<String>,
+}
+
+/// How a number is judged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bound {
+    /// |measured / published − 1| is at most this.
+    Within(f64),
+    /// |measured − published| is at most this, in the number's unit.
+    OffBy(f64),
+    /// Not more.
+    AtMost(f64),
+    /// Not less.
+    AtLeast(f64),
+    /// Error against the published number falls with the resolution by at least this power, over all resolutions.
+    OrderAtLeast(f64),
+    /// Numbers of all resolutions, largest less least over their mean, differ by at most this.
+    AgreeWithin(f64),
+}
+
+impl Bound {
+    /// Whether it judges several runs at once.
+    pub fn is_of_all(self) -> bool {
+        matches!(self, Self::OrderAtLeast(_) | Self::AgreeWithin(_))
+    }
+}
+
+/// Data that a curve is held against.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Points {
+    /// A curve of the measure.
+    pub of: String,
+    /// Whose.
+    pub source: String,
+    /// In the curve's units.
+    pub at: Vec<[f64; 2]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ValidationSpec {
+    #[serde(rename = "kind")]
+    _kind: String,
+    about: Option<Vec<String>>,
+    benchmark: Vec<Spanned<BenchmarkSpec>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BenchmarkSpec {
+    name: Spanned<String>,
+    note: Option<String>,
+    measure: Spanned<String>,
+    scene: Spanned<String>,
+    #[serde(default)]
+    set: Vec<Spanned<String>>,
+    depth: Option<f64>,
+    length: Option<f64>,
+    height: Option<f64>,
+    stroke: Option<f64>,
+    period: Option<f64>,
+    speed: Option<f64>,
+    after: Option<f64>,
+    #[serde(default)]
+    run: Vec<Spanned<RunSpec>>,
+    #[serde(default)]
+    gate: Vec<Spanned<GateSpec>>,
+    #[serde(default)]
+    points: Vec<PointsSpec>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RunSpec {
+    solver: Spanned<String>,
+    resolution: f64,
+    #[serde(default)]
+    set: Vec<Spanned<String>>,
+    device: Option<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GateSpec {
+    of: Spanned<String>,
+    published: Option<f64>,
+    source: String,
+    within: Option<f64>,
+    off_by: Option<f64>,
+    at_most: Option<f64>,
+    at_least: Option<f64>,
+    order_at_least: Option<f64>,
+    agree_within: Option<f64>,
+    solver: Option<Spanned<String>>,
+    resolution: Option<Spanned<f64>>,
+    known_failure: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PointsSpec {
+    of: Spanned<String>,
+    source: String,
+    at: Vec<[f64; 2]>,
+}
+
+/// The rest of a document of this kind; files are relative to `base_dir`.
+pub(super) fn parse(
+    doc: &Document<'_>,
+    root: Spanned<DeTable<'_>>,
+    base_dir: &Path,
+) -> std::result::Result<Validation, StudyFileError> {
+    let spec = ValidationSpec::deserialize(toml::Deserializer::from(root))
+        .map_err(|error| doc.translate(&error))?;
+    let mut benchmarks: Vec<Benchmark> = Vec::new();
+    for spec in &spec.benchmark {
+        let read = benchmark(doc, spec, base_dir)?;
+        if benchmarks.iter().any(|other| other.name == read.name) {
+            let problem = format!("{:?} is the name of another benchmark", read.name);
+            return Err(doc.fault_at(spec.get_ref().name.span(), problem).into());
+        }
+        benchmarks.push(read);
+    }
+    Ok(Validation {
+        about: spec.about.unwrap_or_default(),
+        benchmarks,
+    })
+}
+
+fn benchmark(
+    doc: &Document<'_>,
+    spec: &Spanned<BenchmarkSpec>,
+    base_dir: &Path,
+) -> Result<Benchmark> {
+    let at = spec.span();
+    let spec = spec.get_ref();
+    let word = spec.measure.get_ref();
+    let named = Measure::NAMED.iter().find(|(name, _)| name == word);
+    let measure = named.map(|(_, measure)| *measure);
+    let measure = measure.ok_or_else(|| {
+        doc.fault_at(
+            spec.measure.span(),
+            format!("{word:?} is nothing that is measured"),
+        )
+    })?;
+    let scale = scale(doc, spec, measure, at.clone())?;
+    let file = SceneFile::new(&spec.scene, base_dir);
+    let run = |run: &Spanned<RunSpec>| trial(doc, &file, &spec.set, run.get_ref());
+    let runs = spec.run.iter().map(run).collect::<Result<Vec<_>>>()?;
+    if runs.is_empty() {
+        return Err(doc.missing(at, "run"));
+    }
+    let gate = |gate: &Spanned<GateSpec>| self::gate(doc, gate, measure, &runs);
+    let gates = spec.gate.iter().map(gate).collect::<Result<_>>()?;
+    let points = |points: &PointsSpec| {
+        let word = points.of.get_ref();
+        if !measure.curves().iter().any(|(name, _)| name == word) {
+            let names: Vec<_> = measure.curves().iter().map(|(name, _)| *name).collect();
+            let problem = format!(
+                "{word:?} is no curve of {}, which has {names:?}",
+                spec.measure.get_ref()
+            );
+            return Err(doc.fault_at(points.of.span(), problem));
+        }
+        Ok(Points {
+            of: word.clone(),
+            source: points.source.clone(),
+            at: points.at.clone(),
+        })
+    };
+    Ok(Benchmark {
+        name: spec.name.get_ref().clone(),
+        note: spec.note.clone(),
+        measure,
+        scale,
+        points: spec.points.iter().map(points).collect::<Result<_>>()?,
+        runs,
+        gates,
+    })
+}
+
+fn scale(
+    doc: &Document<'_>,
+    spec: &BenchmarkSpec,
+    measure: Measure,
+    at: std::ops::Range<usize>,
+) -> Result<Scale> {
+    let given = [
+        ("depth", spec.depth),
+        ("length", spec.length),
+        ("height", spec.height),
+        ("stroke", spec.stroke),
+        ("period", spec.period),
+        ("speed", spec.speed),
+        ("after", spec.after),
+    ];
+    for (name, value) in given {
+        let is_needed = measure.needs().contains(&name);
+        match value {
+            None if is_needed => return Err(doc.missing(at, name)),
+            Some(_) if !is_needed => {
+                let word = spec.measure.get_ref();
+                let problem = format!("{word:?} takes no {name}");
+                return Err(doc.fault_at(spec.measure.span(), problem));
+            }
+            _ => {}
+        }
+    }
+    let [depth, length, height, stroke, period, speed, after] =
+        given.map(|(_, value)| value.unwrap_or(0.0));
+    Ok(Scale {
+        depth,
+        length,
+        height,
+        stroke,
+        period,
+        speed,
+        after,
+    })
+}
+
+fn trial(
+    doc: &Document<'_>,
+    file: &SceneFile<'_>,
+    set: &[Spanned<String>],
+    spec: &RunSpec,
+) -> Result<Trial> {
+    let method = method(doc, &spec.solver)?;
+    let sets = set.iter().chain(&spec.set);
+    let sets = sets.map(|set| (set.get_ref().clone(), set.span()));
+    let scene = load_with(doc, file, sets.chain([(method.as_override(), 0..0)]))?;
+    let device = match &spec.device {
+        None => RunsOn::Gpu,
+        Some(word) => RunsOn::named(word.get_ref()).ok_or_else(|| {
+            doc.fault_at(word.span(), format!("{:?} is no device", word.get_ref()))
+        })?,
+    };
+    Ok(Trial {
+        device,
+        resolution: spec.resolution,
+        scene,
+    })
+}
+
+fn method(doc: &Document<'_>, word: &Spanned<String>) -> Result<Method> {
+    let named = Method::NAMED
+        .iter()
+        .find(|(name, _)| name == word.get_ref());
+    let fault = || doc.fault_at(word.span(), format!("{:?} is no solver", word.get_ref()));
+    named.map(|(_, method)| *method).ok_or_else(fault)
+}
+
+fn gate(
+    doc: &Document<'_>,
+    spec: &Spanned<GateSpec>,
+    measure: Measure,
+    runs: &[Trial],
+) -> Result<Gate> {
+    let at = spec.span();
+    let spec = spec.get_ref();
+    let fault = |problem: String| doc.fault_at(spec.of.span(), problem);
+    let word = spec.of.get_ref();
+    if !measure.numbers().iter().any(|(name, _)| name == word) {
+        let names: Vec<_> = measure.numbers().iter().map(|(name, _)| *name).collect();
+        return Err(fault(format!(
+            "{word:?} is not measured here; {names:?} are"
+        )));
+    }
+    let bounds = [
+        spec.within.map(Bound::Within),
+        spec.off_by.map(Bound::OffBy),
+        spec.at_most.map(Bound::AtMost),
+        spec.at_least.map(Bound::AtLeast),
+        spec.order_at_least.map(Bound::OrderAtLeast),
+        spec.agree_within.map(Bound::AgreeWithin),
+    ];
+    let mut bounds = bounds.into_iter().flatten();
+    let bound = bounds.next().ok_or_else(|| doc.missing(at, "within"))?;
+    if bounds.next().is_some() {
+        let problem =
+            "more than one of within, off_by, at_most, at_least, order_at_least and agree_within";
+        return Err(fault(problem.to_owned()));
+    }
+    if matches!(
+        bound,
+        Bound::Within(_) | Bound::OffBy(_) | Bound::OrderAtLeast(_)
+    ) && spec.published.is_none()
+    {
+        return Err(fault(format!(
+            "{word:?} is held against no published number"
+        )));
+    }
+    let method = spec
+        .solver
+        .as_ref()
+        .map(|word| method(doc, word))
+        .transpose()?;
+    let gate = Gate {
+        of: word.clone(),
+        published: spec.published,
+        source: spec.source.clone(),
+        bound,
+        method,
+        resolution: spec.resolution.as_ref().map(|r| *r.get_ref()),
+        known_failure: spec.known_failure.clone(),
+    };
+    let judged = runs.iter().filter(|run| gate.judges(run)).count();
+    if judged < if bound.is_of_all() { 2 } else { 1 } {
+        return Err(fault(format!(
+            "{judged} runs are of its solver and resolution"
+        )));
+    }
+    Ok(gate)
+}
+
+impl Gate {
+    /// Whether a run is one of those that it judges.
+    pub fn judges(&self, run: &Trial) -> bool {
+        self.method
+            .is_none_or(|method| method == run.scene.solver.method)
+            && self
+                .resolution
+                .is_none_or(|resolution| resolution == run.resolution)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::study::Study;
+
+    const TEXT: &str = "kind = \"validation\"
+[[benchmark]]
+name = \"wave\"
+measure = \"solitary_wave\"
+scene = \"../validation/solitary.toml\"
+depth = 1.0
+height = 0.2
+[[benchmark.run]]
+solver = \"flip\"
+resolution = 20
+[[benchmark.gate]]
+of = \"celerity\"
+published = 3.431
+source = \"Goring 1978\"
+within = 0.02
+[[benchmark.points]]
+of = \"elevation\"
+source = \"nobody\"
+at = [[0.0, 0.2]]
+";
+
+    fn read(text: &str) -> std::result::Result<Study, String> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        Study::parse(text, Path::new("s.toml"), &folder).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_line() {
+        assert!(read(TEXT).is_ok(), "{:?}", read(TEXT).err());
+        for (from, to, place, words) in [
+            ("\"solitary_wave\"", "\"solitary\"", "s.toml:4:", "solitary"),
+            ("height = 0.2\n", "", "s.toml:2:", "height"),
+            (
+                "height = 0.2",
+                "height = 0.2\nstroke = 1.0",
+                "s.toml:4:",
+                "takes no stroke",
+            ),
+            ("\"flip\"", "\"sph\"", "s.toml:9:", "no solver"),
+            ("resolution = 20\n", "", "s.toml:8:", "resolution"),
+            (
+                "\"celerity\"",
+                "\"period\"",
+                "s.toml:12:",
+                "is not measured here",
+            ),
+            ("within = 0.02", "", "s.toml:11:", "within"),
+            (
+                "within = 0.02",
+                "within = 0.02\nat_most = 4.0",
+                "s.toml:12:",
+                "more than one",
+            ),
+            (
+                "published = 3.431\n",
+                "",
+                "s.toml:12:",
+                "no published number",
+            ),
+            (
+                "within = 0.02",
+                "order_at_least = 1.5",
+                "s.toml:12:",
+                "1 runs",
+            ),
+            (
+                "within = 0.02",
+                "within = 0.02\nsolver = \"pbf\"",
+                "s.toml:12:",
+                "0 runs",
+            ),
+            ("\"elevation\"", "\"front\"", "s.toml:17:", "is no curve"),
+        ] {
+            let error = read(&TEXT.replacen(from, to, 1)).expect_err(to);
+            assert!(
+                error.contains(place) && error.contains(words),
+                "{to}: {error}"
+            );
+        }
+        let twice = format!("{TEXT}{}", TEXT.split_once('\n').expect("lines").1);
+        assert!(read(&twice).expect_err("two").contains("another benchmark"));
+    }
+}

@@ -1,0 +1,86 @@
+//! What probes see of a substep.
+
+use glam::DVec3;
+
+use super::{
+    super::{SolveError, pressure, state::look, trace::Run},
+    CELL_KIND, Flip, FrameTotals,
+};
+use crate::domain::{
+    gauge::Gauge,
+    probe::Patch,
+    solver::{Seen, Span, Wanted, Watch},
+};
+
+impl Flip {
+    /// Substeps through one frame.
+    pub(super) fn run_substeps(
+        &mut self,
+        watch: &mut dyn Watch,
+        run: &mut Run<'_>,
+    ) -> Result<FrameTotals, SolveError> {
+        let begin = f64::from(self.frame) * self.scene.shot.frame_seconds();
+        let mut totals = FrameTotals::default();
+        loop {
+            let start = begin + totals.elapsed;
+            let is_last = self.go_on(&mut totals, run)?;
+            let substep = Span {
+                start,
+                end: begin + totals.elapsed,
+                is_last,
+            };
+            let wanted = watch.wants(substep);
+            if wanted.is_any() {
+                watch.look(substep, self.seen(&wanted)?);
+            }
+            if is_last {
+                return Ok(totals);
+            }
+        }
+    }
+
+    fn seen(&self, wanted: &Wanted) -> Result<Seen, SolveError> {
+        let mut seen = Seen::default();
+        if wanted.particles {
+            seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
+        }
+        if wanted.pressures {
+            seen.pressures = self.pressures_at(&self.scene.pressure_points())?;
+        }
+        if !wanted.patches.is_empty() {
+            let on_face = |gauge: &Gauge<'_>, x, patch: &Patch| gauge.on_face(x, patch.normal());
+            seen.patches = self.gauged(&wanted.patches, |patch| patch.at, on_face)?;
+        }
+        Ok(seen)
+    }
+
+    /// The projection's, between cell centres.
+    pub(super) fn pressures_at(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
+        self.gauged(points, |at| *at, |gauge, x, _| gauge.at(x))
+    }
+
+    /// What `look` says of the last substep's pressure where each of these is, relative to the domain's least corner.
+    fn gauged<T, V>(
+        &self,
+        all: &[T],
+        place: impl Fn(&T) -> DVec3,
+        look: impl Fn(&Gauge<'_>, DVec3, &T) -> V,
+    ) -> Result<Vec<V>, SolveError> {
+        let kind: Vec<u32> = self.field(CELL_KIND, self.elements())?;
+        let pressure: Vec<f32> = self.field(pressure::buffers::PRESSURE, self.elements())?;
+        let pressure: Vec<f64> = pressure.into_iter().map(f64::from).collect();
+        let gauge = Gauge {
+            bricks: &self.bricks,
+            cells: self.plan.grid_dims,
+            cell_size: self.scene.solver.flip().cell_size,
+            kind: &kind,
+            pressure: &pressure,
+            rise: self.scene.water.rise(),
+        };
+        let origin = self.scene.domain.min;
+        Ok(all
+            .iter()
+            .map(|one| look(&gauge, place(one) - origin, one))
+            .collect())
+    }
+}

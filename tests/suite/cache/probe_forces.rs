@@ -1,0 +1,217 @@
+//! Force and moment of the water on solids and walls, against water at rest.
+
+use std::{fs, path::Path};
+
+use crate::support::job::Job;
+use swell::scene::Scene;
+
+/// The cube from 0 to 1.
+const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
+    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n";
+
+/// 1.1 m deep. The first solid hangs in the water and moves by a millionth of a cell, so that it counts as one that moves;
+/// the second stands on the floor.
+const SCENE: &str = r#"
+[shot]
+name = "tank"
+frames = 4
+frames_per_second = 100
+
+[domain]
+min = [0.0, 0.0, 0.0]
+max = [1.6, 1.6, 1.2]
+
+[[water.block]]
+min = [0.0, 0.0, 0.0]
+max = [1.6, 1.1, 1.2]
+
+[[solid]]
+mesh = "cube.obj"
+translate = [0.4, 0.3, 0.4]
+scale = 0.4
+direction = [0.0, 1.0, 0.0]
+motion = { kind = "constant_velocity", velocity = 1e-6 }
+
+[[solid]]
+mesh = "cube.obj"
+translate = [1.1, 0.0, 0.4]
+scale = 0.3
+
+[solver]
+method = "flip"
+[solver.flip]
+cell_size = 0.1
+[solver.pbf]
+particle_spacing = 0.05
+"#;
+
+const PROBES: &str = r#"
+[[probe]]
+name = "hung"
+kind = "force"
+solid = 0
+[[probe]]
+name = "standing"
+kind = "force"
+solid = 1
+rate_hz = "substep"
+[[probe]]
+name = "wall"
+kind = "force"
+solid = "-x"
+about = [0.0, 0.0, 0.0]
+[[probe]]
+name = "floor"
+kind = "force"
+solid = "-y"
+"#;
+
+/// ρ g, N/m³.
+const WEIGHT: f64 = 9810.0;
+
+/// Δx² / H² of a wall. Between the topmost cell's centre and the air's above it the pressure falls straight to none, where
+/// in truth there is none from the surface halfway on: Δx² / 16 too much of H² / 2. It ends there with a step of Δx / 4, which
+/// patches up to a cell high may count half a patch too far: Δx² / 8.
+const TOLERANCE: f64 = 2.0 * (1.0 / 16.0 + 1.0 / 8.0) * (0.1 / 1.1) * (0.1 / 1.1);
+
+fn water_at_rest_bears(device: &str) {
+    let scene = format!("{SCENE}{PROBES}");
+    let job = Job::of(&[("tank.toml", &scene), ("cube.obj", CUBE)]);
+    let bake = format!("bake tank.toml {device} -o");
+    job.expect(0, &format!("{bake} whole"));
+    let rows = |name: &str| -> Vec<Vec<Option<f64>>> {
+        let text =
+            fs::read_to_string(job.path("whole/probes").join(format!("{name}.csv"))).unwrap();
+        let number = |field: &str| (!field.is_empty()).then(|| field.parse().unwrap());
+        let rows = text.lines().skip(1);
+        rows.map(|line| line.split(',').map(number).collect())
+            .collect()
+    };
+    let depth = 1.1;
+    // What is displaced; what stands above, as no water comes under it; ½ ρ g H² B; all of the floor.
+    let lift = WEIGHT * 0.4f64.powi(3);
+    let load = -WEIGHT * (depth - 0.3) * 0.3 * 0.3;
+    let push = -0.5 * WEIGHT * depth * depth * 1.2;
+    let weight = -WEIGHT * depth * 1.6 * 1.2;
+    let expected = [
+        ("hung", [0.0, lift, 0.0], [0.0, 0.0, 0.0]),
+        ("standing", [0.0, load, 0.0], [0.0, 0.0, 0.0]),
+        // At the half of the width, a third of the depth up: z × −x is −y, and −(y × −x) is z.
+        (
+            "wall",
+            [push, 0.0, 0.0],
+            [0.0, 0.6 * push, -depth / 3.0 * push],
+        ),
+        ("floor", [0.0, weight, 0.0], [0.0, 0.0, 0.0]),
+    ];
+    for (name, force, moment) in expected {
+        let rows = rows(name);
+        assert!(rows[0][2..].iter().all(Option::is_none), "{name}: {rows:?}");
+        assert!(rows.len() >= 5, "{name}: {rows:?}");
+        // Pressures on all faces of a body add to what is left of them.
+        let scale = match name {
+            "hung" => WEIGHT * depth * 0.16,
+            "standing" => WEIGHT * depth * 0.09,
+            _ => force.iter().fold(0.0, |most: f64, f| most.max(f.abs())),
+        };
+        for row in &rows[1..] {
+            let found: Vec<f64> = row[2..].iter().map(|value| value.unwrap()).collect();
+            for axis in 0..3 {
+                let (off, lever) = (found[axis] - force[axis], found[3 + axis] - moment[axis]);
+                assert!(off.abs() < TOLERANCE * scale, "{name}: {found:?} {force:?}");
+                assert!(
+                    lever.abs() < TOLERANCE * scale,
+                    "{name}: {found:?} {moment:?}"
+                );
+            }
+        }
+        println!(
+            "{device} {name}: {:?} of {force:?} {moment:?}",
+            rows[rows.len() - 1]
+        );
+        // Negative control: gravity 1 % off is seen.
+        let found = rows[4][3].unwrap() - 1.01 * force[1];
+        assert!(
+            name == "wall" || found.abs() > TOLERANCE * scale,
+            "{name}: {found}"
+        );
+    }
+    // The written-out scene has the solids in another order, and goes on all the same.
+    job.expect(0, &format!("{bake} stopped --frames 1-2"));
+    job.expect(0, &format!("{bake} stopped --resume"));
+    assert_eq!(job.hash("stopped"), job.hash("whole"));
+    job.expect(0, "inspect whole --plot plots");
+}
+
+#[test]
+fn water_at_rest_bears_on_solids_and_walls() {
+    water_at_rest_bears("");
+}
+
+#[test]
+fn water_at_rest_bears_on_solids_and_walls_in_the_reference() {
+    water_at_rest_bears("--device cpu");
+}
+
+#[test]
+fn a_force_that_cannot_be_is_told() {
+    let job = Job::of(&[("cube.obj", CUBE)]);
+    let parse = |line: &str, set: &[&str]| {
+        let text = format!("{SCENE}\n[[probe]]\nkind = \"force\"\n{line}\n");
+        let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
+        Scene::parse(&text, Path::new("a.toml"), &job.path(""), &set)
+    };
+    let cases: &[(&str, &[&str], &str, &str)] = &[
+        ("", &[], "probe[0].solid", "missing"),
+        (
+            "solid = 2",
+            &[],
+            "probe[0].solid",
+            "2: the scene has 2 [[solid]]",
+        ),
+        (
+            "solid = \"left\"",
+            &[],
+            "probe[0].solid",
+            "the number of a [[solid]]",
+        ),
+        (
+            "solid = -1",
+            &[],
+            "probe[0].solid",
+            "the number of a [[solid]]",
+        ),
+        (
+            "solid = 0\nat = [1.0, 1.0]",
+            &[],
+            "probe[0].at",
+            "does not go with kind = \"force\"",
+        ),
+        (
+            "solid = 0\nabout = [1.0]",
+            &[],
+            "probe[0].about",
+            "three numbers",
+        ),
+    ];
+    for (line, set, key, words) in cases {
+        let error = parse(line, set).unwrap_err().to_string();
+        assert!(
+            error.contains(key) && error.contains(words),
+            "{line}: {error}"
+        );
+    }
+    // PBF has none, and says so.
+    let still = SCENE.split("[[solid]]").next().unwrap();
+    let rest = &SCENE[SCENE.find("[solver]").unwrap()..];
+    let text = format!("{still}{rest}\n[[probe]]\nkind = \"force\"\nsolid = \"-x\"\n");
+    let parse = |set: &[String]| Scene::parse(&text, Path::new("a.toml"), &job.path(""), set);
+    let error = parse(&["solver.method=pbf".to_owned()])
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("probe[0].kind") && error.contains("solver.method = \"flip\""),
+        "{error}"
+    );
+    assert!(parse(&[]).is_ok());
+}

@@ -1,0 +1,183 @@
+//! Coarse runs of the benchmarks whose answer is known, by the study's own engine, and what a wrong world comes to.
+use std::{
+    f64::consts::TAU,
+    fs,
+    path::{Path, PathBuf},
+    sync::{LazyLock, atomic::AtomicBool},
+};
+
+use swell::{
+    domain::motion::{Motion, piston_height_ratio, wave_number},
+    experiment::{
+        Devices,
+        stability::Verdict,
+        validation::{judge, run_benchmark},
+    },
+    gpu::adapter::{Context, Spoil},
+    scene::study::{
+        Study,
+        validation::{Benchmark, Measure, Validation},
+    },
+    stage::device::Opened,
+};
+
+fn studies() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies")
+}
+
+static COARSE: LazyLock<String> =
+    LazyLock::new(|| fs::read_to_string(studies().join("validation-coarse.toml")).unwrap());
+
+fn parsed(text: &str) -> Validation {
+    let folder = studies();
+    match Study::parse(text, &folder.join("validation-coarse.toml"), &folder).unwrap() {
+        Study::Validation(validation) => *validation,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Gates of a benchmark that its runs miss on `context`.
+fn missed(context: &Context, benchmark: &Benchmark) -> Vec<String> {
+    let devices = Devices {
+        gpu: Some(Opened::Gpu(Box::new(context.clone()))),
+        cpu: Opened::Cpu,
+    };
+    let run = |trial| run_benchmark(&devices, benchmark, trial, &AtomicBool::new(false)).unwrap();
+    let runs: Vec<_> = benchmark.runs.iter().map(run).collect();
+    for run in &runs {
+        println!(
+            "{}: {:?} {:?}",
+            benchmark.name, run.ended, run.measured.numbers
+        );
+    }
+    let mut missed = Vec::new();
+    for judged in judge(benchmark, &runs) {
+        if !matches!(judged.verdict, Verdict::Passes | Verdict::KnownFailure) {
+            let (of, is) = (&judged.gate.of, judged.measured);
+            missed.push(format!("{of} is {is:?}: {:?}", judged.verdict));
+        }
+    }
+    missed
+}
+
+fn benchmark(text: &str, name: &str) -> Benchmark {
+    let mut all = parsed(text).benchmarks.into_iter();
+    all.find(|benchmark| benchmark.name == name).unwrap()
+}
+
+fn hold(name: &str) {
+    let missed = missed(&crate::support::context(), &benchmark(&COARSE, name));
+    assert!(missed.is_empty(), "{name}: {}", missed.join("\n"));
+}
+
+macro_rules! benchmarks {
+    ($($test:ident: $name:literal,)*) => {
+        $(#[test]
+        fn $test() {
+            hold($name);
+        })*
+
+        #[test]
+        fn every_benchmark_has_its_test() {
+            let listed = [$($name),*];
+            for benchmark in &parsed(&COARSE).benchmarks {
+                assert!(listed.contains(&benchmark.name.as_str()), "{}", benchmark.name);
+            }
+        }
+    };
+}
+
+benchmarks! {
+    a_piston_makes_the_waves_of_linear_theory: "piston, kh = 1",
+    a_solitary_wave_keeps_its_height_and_celerity: "solitary wave",
+    a_column_collapses_as_in_the_experiment: "dam break of a column",
+    a_dry_bed_is_run_over_as_ritter_has_it: "dam break on a dry bed",
+    a_dam_breaks_onto_a_block: "dam break onto a block",
+    a_standing_wave_has_its_period: "standing wave",
+    a_column_at_rest_weighs_what_it_weighs: "column at rest",
+    a_vortex_turns_on: "Taylor–Green vortex",
+}
+
+/// A benchmark's text with one passage replaced.
+fn spoiled(from: &str, to: &str) -> String {
+    assert!(COARSE.contains(from), "{from}");
+    COARSE.replace(from, to)
+}
+
+/// Negative control: a hundredth more gravity, or less, is a hundredth more pressure, or less.
+#[test]
+fn gravity_that_is_off_by_a_hundredth_fails_a_benchmark() {
+    let context = crate::support::context();
+    for gravity in [-9.81 * 1.01, -9.81 * 0.99] {
+        let set = format!("    \"shot.frames=45\",\n    \"water.gravity=[0.0, {gravity:?}, 0.0]\"");
+        let text = spoiled("    \"shot.frames=45\"", &set);
+        let missed = missed(&context, &benchmark(&text, "column at rest"));
+        assert_eq!(missed.len(), 2, "{gravity}: {missed:?}");
+    }
+}
+
+/// Negative control: a paddle that goes a twentieth less far than the study says.
+#[test]
+fn a_stroke_that_is_off_by_a_twentieth_fails_a_benchmark() {
+    let mut piston = benchmark(&COARSE, "piston, kh = 1");
+    let maker = &mut piston.runs[0].scene.wave_makers[0].motion;
+    match maker {
+        Motion::Sine { stroke, .. } => *stroke *= 0.95,
+        other => panic!("{other:?}"),
+    }
+    let missed = missed(&crate::support::context(), &piston);
+    assert!(missed[0].starts_with("height_ratio"), "{missed:?}");
+}
+
+/// Negative control: the air always a whole cell from the centre of the last cell of water.
+#[test]
+fn a_ghost_fluid_in_the_wrong_place_fails_a_benchmark() {
+    let mut context = crate::support::context();
+    context.spoil = Some(Spoil {
+        pass: "pressure/build_system",
+        from: "return 1.0 / clamp(theta, LEAST_THETA, 1.0);",
+        to: "return 1.0;",
+    });
+    let missed = missed(&context, &benchmark(&COARSE, "column at rest"));
+    assert!(!missed.is_empty());
+}
+
+/// Numbers that theory sets are those of its formulas at 9.81 m/s², in both studies.
+#[test]
+fn published_numbers_are_those_of_theory() {
+    let text = fs::read_to_string(studies().join("validation.toml")).unwrap();
+    let mut held = 0;
+    for benchmark in [parsed(&text), parsed(&COARSE)]
+        .iter()
+        .flat_map(|v| &v.benchmarks)
+    {
+        let scale = benchmark.scale;
+        let theory = |of: &str| {
+            let k = |period: f64, depth| wave_number(TAU / period, depth, 9.81);
+            Some(match (benchmark.measure, of) {
+                // Pistons stand in water one metre deep.
+                (Measure::RegularWaves, "height_ratio") => {
+                    piston_height_ratio(k(scale.period, 1.0), 1.0)
+                }
+                (Measure::RegularWaves, "wave_length") => TAU / k(scale.period, 1.0),
+                (Measure::SolitaryWave, "celerity") => (9.81 * (scale.depth + scale.height)).sqrt(),
+                (Measure::SolitaryWave, "height") => scale.height / scale.depth,
+                (Measure::DryBed, "depth_at_dam") => 4.0 / 9.0,
+                (Measure::DryBed, "flow_at_dam") => 8.0 / 27.0,
+                (Measure::StandingWave, "period") => {
+                    let k = TAU / scale.length;
+                    TAU / (9.81 * k * (k * scale.depth).tanh()).sqrt()
+                }
+                _ => return None,
+            })
+        };
+        for gate in &benchmark.gates {
+            if let Some((theory, published)) = theory(&gate.of).zip(gate.published) {
+                let off = (published / theory - 1.0).abs();
+                assert!(off < 2e-4, "{}: {published} {theory}", benchmark.name);
+                held += 1;
+            }
+        }
+    }
+    assert!(held > 20, "{held}");
+}
