@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     Faces, Model, Room, Sorted, Step,
-    grid::{along, per_cell},
+    grid::{along, neighborhood, per_cell},
     solids,
 };
 use crate::domain::{
@@ -52,7 +52,8 @@ fn is_known(tags: u32, axis: usize) -> bool {
     tags >> (8 * axis) & KNOWN != 0
 }
 
-/// After the projection: which faces it gave a velocity (layer 1), and what of that is change.
+/// After the projection: which faces have a velocity (layer 1), and what of that is change. Those of drops have one that no
+/// water is near: their change is gravity's.
 pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Faces) {
     let tags = per_cell(bricks, |element| {
         let e = element as usize;
@@ -60,13 +61,20 @@ pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Face
         if (bricks.cell(element).iter().zip(&model.cells)).any(|(cell, cells)| cell > cells) {
             return NO_NEED;
         }
+        let is_water_about = |axis: usize| {
+            let mut about = neighborhood().filter(|offset| offset[axis] < 1);
+            about.any(|offset| room.kind[bricks.near(element, offset) as usize] == FLUID)
+        };
         let found = |axis: usize| {
             let before = bricks.near(element, along(axis, -1));
             let kind = room.kind[before as usize];
             let is_closed = room.open[e][axis] == 0.0;
             // A closed face between solids has no velocity of its own; slot 0 is what lies beyond the domain.
             let is_buried = own == SOLID && (kind == SOLID || before < CELLS);
-            own == FLUID || kind == FLUID || (is_closed && !is_buried)
+            own == FLUID
+                || kind == FLUID
+                || (is_closed && !is_buried)
+                || (is_known(faces.layer[e], axis) && !is_water_about(axis))
         };
         let layers = (0..3).map(|axis| u32::from(found(axis)) << (8 * axis));
         faces.layer[e] | layers.sum::<u32>()
