@@ -4,16 +4,16 @@
 #import "shared/thread.wgsl"
 #import "shared/counters.wgsl"
 #import "shared/flip_params.wgsl"
-#import "shared/flip_element.wgsl"
+#import "shared/flip_slots.wgsl"
 #import "shared/flip_carried.wgsl"
 #import "shared/finite.wgsl"
 #ifdef SOLIDS
 #import "shared/flip_solid.wgsl"
 #endif
 
-@group(0) @binding(1) var<storage, read> brick_slot: array<u32>;
 @group(0) @binding(2) var<storage, read> face_velocity: array<f32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
+@group(0) @binding(12) var<storage, read> face_layer: array<u32>;
 @group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
 @group(0) @binding(5) var<storage, read> carried: array<f32>;
 @group(0) @binding(6) var<storage, read_write> position: array<vec4f>;
@@ -22,45 +22,28 @@
 // Of particles slowed, and of what is not finite, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
 
-fn slot_at(brick: vec3i) -> u32 {
-    let dims = vec3i(params.table_dims);
-    let is_inside = all(brick >= vec3i(0)) && all(brick < dims);
-    let kept = clamp(brick, vec3i(0), dims - 1);
-    return select(0u, brick_slot[(kept.z * dims.y + kept.y) * dims.x + kept.x], is_inside);
-}
+// Where the faces that have a velocity have less of the weight, they say nothing.
+const LEAST_PART = 1e-3;
 
-// Slots about a cell, straight from the table: a place on the way has no brick of its own yet.
-fn find_slots(cell: vec3i) {
-    own_local = cell & vec3i(7);
-    let brick = cell >> vec3u(3u);
-    let side = brick + select(vec3i(1), vec3i(-1), own_local < vec3i(4));
-    slots_near = vec4u(
-        slot_at(brick),
-        slot_at(vec3i(side.x, brick.yz)),
-        slot_at(vec3i(brick.x, side.y, brick.z)),
-        slot_at(vec3i(side.xy, brick.z)),
-    );
-    slots_far = vec4u(
-        slot_at(vec3i(brick.xy, side.z)),
-        slot_at(vec3i(side.x, brick.y, side.z)),
-        slot_at(vec3i(brick.x, side.yz)),
-        slot_at(side),
-    );
-}
-
-fn component_at(plane: u32, low: vec3i, high: vec3i, t: vec3f) -> f32 {
+// Among the eight faces about a place, those that have a velocity, alone: where a drop flies there are others.
+fn component_at(component: u32, low: vec3i, high: vec3i, t: vec3f, otherwise: f32) -> f32 {
+    let plane = component * params.stride;
     var sum = 0.0;
+    var weights = 0.0;
     for (var z = 0; z < 2; z++) {
         for (var y = 0; y < 2; y++) {
             for (var x = 0; x < 2; x++) {
                 let is_high = vec3i(x, y, z) == vec3i(1);
                 let weight = select(1.0 - t, t, is_high);
                 let face = element_at(select(low, high, is_high));
-                sum += weight.x * weight.y * weight.z * face_velocity[plane + face];
+                let is_there = ((face_layer[face] >> (8u * component)) & 0xffu) != 0u;
+                let part = select(0.0, weight.x * weight.y * weight.z, is_there);
+                sum += part * face_velocity[plane + face];
+                weights += part;
             }
         }
     }
-    return sum;
+    return select(otherwise, sum / weights, weights > LEAST_PART);
 }
 
 // The grid's velocity at x; `otherwise` where no brick is.
@@ -75,9 +58,9 @@ fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
     let low = max(select(vec3i(0), vec3i(-1), is_before), -cell);
     let high = min(select(vec3i(1), vec3i(0), is_before), vec3i(params.cells) - 1 - cell);
     let sampled = vec3f(
-        component_at(0u, vec3i(0, low.yz), vec3i(1, high.yz), vec3f(f.x, t.yz)),
-        component_at(params.stride, vec3i(low.x, 0, low.z), vec3i(high.x, 1, high.z), vec3f(t.x, f.y, t.z)),
-        component_at(2u * params.stride, vec3i(low.xy, 0), vec3i(high.xy, 1), vec3f(t.xy, f.z)),
+        component_at(0u, vec3i(0, low.yz), vec3i(1, high.yz), vec3f(f.x, t.yz), otherwise.x),
+        component_at(1u, vec3i(low.x, 0, low.z), vec3i(high.x, 1, high.z), vec3f(t.x, f.y, t.z), otherwise.y),
+        component_at(2u, vec3i(low.xy, 0), vec3i(high.xy, 1), vec3f(t.xy, f.z), otherwise.z),
     );
     return select(sampled, otherwise, slots_near.x == 0u);
 }

@@ -32,7 +32,8 @@ struct FlipParams {
     particle_share: f32,
     contact_distance: f32,
     max_displacement: f32,
-    padding: f32,
+    // Particles that are nearer to each other are pushed apart.
+    apart: f32,
 }
 @group(0) @binding(0) var<uniform> params: FlipParams;
 

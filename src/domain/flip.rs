@@ -6,6 +6,18 @@ pub const CONTACT: f64 = 0.1;
 /// Nearer than this to a cell's face, in cells, counts as on it: positions of thousands of cells in f32 round below it.
 pub const ON_FACE: f64 = 1e-3;
 
+/// Particles that are nearer to each other than this part of their spacing are pushed apart.
+const APART: f64 = 0.9;
+
+/// That distance in cells, where particles at rest are `spacing` cells apart; below half a cell, so that whoever is
+/// nearer lies in one of eight cells.
+pub fn apart(spacing: f64) -> f64 {
+    (APART * spacing).min(0.49)
+}
+
+/// κ of the law of the wall.
+pub const VON_KARMAN: f64 = 0.41;
+
 /// Displacement cap of a substep over the CFL displacement: what the projection speeds up beyond this is slowed
 /// and counted.
 pub const CAP: f64 = 2.0;

@@ -4,6 +4,7 @@
 //! function that carries the name of a GPU pass is its twin: the same inputs, the same outputs.
 
 pub mod flip;
+mod hash;
 pub mod neighbors;
 pub mod pbf;
 pub mod poisson;

@@ -12,8 +12,8 @@ use super::{
     error::SceneError,
     grids, keep,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
-    origin, probe,
-    spec::{BoxSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
+    no_slip, origin, probe,
+    spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
     wave_maker,
     words::{chain, extent, shown, shown_all},
 };
@@ -48,6 +48,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let shot = spec.shot;
     let domain = domain(doc, &spec.domain)?;
     let (solver, lattice) = solver::solver(doc, spec.solver, &domain)?;
+    let no_slip = no_slip::build(doc, &spec.domain, solver.method)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     check_particle_count(doc, &water, &domain, &lattice)?;
     let around = wave_maker::Surroundings {
@@ -88,6 +89,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         shot,
         origin: origin::of(&domain),
         domain,
+        no_slip,
         water,
         solids,
         moving_solids,
@@ -132,8 +134,9 @@ fn solids(
 }
 
 /// The box of the whole scene.
-fn domain(doc: &Document<'_>, spec: &BoxSpec) -> Result<Bounds> {
-    let domain = bounds(doc, "domain", spec)?;
+fn domain(doc: &Document<'_>, spec: &DomainSpec) -> Result<Bounds> {
+    let DomainSpec { min, max, .. } = *spec;
+    let domain = bounds(doc, "domain", &BoxSpec { min, max })?;
     let size = domain.size();
     if size.min_element() >= LEAST_EDGE {
         return Ok(domain);

@@ -8,6 +8,7 @@ pub mod grids;
 pub mod keys;
 pub mod look;
 pub mod moving_solid;
+pub mod no_slip;
 pub mod probe;
 pub mod step;
 pub mod study;
@@ -54,6 +55,8 @@ pub struct Scene {
     pub origin: DVec3,
     /// The box whose six walls are solid, metres.
     pub domain: Bounds,
+    /// Walls that hold water back, each once; along the others it slides freely.
+    pub no_slip: Vec<Wall>,
     /// The water at the start.
     pub water: Water,
     /// Static solids.

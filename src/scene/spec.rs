@@ -12,7 +12,7 @@ use super::{
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneSpec {
     pub(super) shot: Shot,
-    pub(super) domain: BoxSpec,
+    pub(super) domain: DomainSpec,
     pub(super) water: WaterSpec,
     #[serde(default)]
     pub(super) solid: Vec<MeshSpec>,
@@ -32,6 +32,16 @@ pub(super) struct SceneSpec {
 pub(super) struct BoxSpec {
     pub(super) min: [f64; 3],
     pub(super) max: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DomainSpec {
+    pub(super) min: [f64; 3],
+    pub(super) max: [f64; 3],
+    pub(super) walls: Option<String>,
+    #[serde(default)]
+    pub(super) no_slip: Vec<Wall>,
 }
 
 #[derive(Deserialize)]

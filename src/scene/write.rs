@@ -65,10 +65,7 @@ impl Scene {
     pub(super) fn written(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> Table {
         let mut scene = table([
             ("shot", value(&self.shot)),
-            (
-                "domain",
-                Value::Table(corners(&self.domain.moved(self.origin))),
-            ),
+            ("domain", Value::Table(self.written_domain())),
             ("water", Value::Table(self.written_water(mesh_path))),
             ("solver", Value::Table(self.written_solver())),
             ("budget", Value::Table(budget(&self.budget))),
@@ -103,6 +100,14 @@ impl Scene {
         let probes = self.probes.iter().map(|it| probe(it, self));
         insert_tables(&mut scene, "probe", probes);
         scene
+    }
+
+    fn written_domain(&self) -> Table {
+        let mut domain = corners(&self.domain.moved(self.origin));
+        if !self.no_slip.is_empty() {
+            domain.insert("no_slip".to_owned(), value(&self.no_slip));
+        }
+        domain
     }
 
     fn written_water(&self, mesh_path: &dyn Fn(&Path, &str) -> String) -> Table {

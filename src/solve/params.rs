@@ -110,8 +110,8 @@ mirror!(
         contact_distance: f32,
         /// Of a substep.
         max_displacement: f32,
-        /// Unused.
-        padding: f32,
+        /// Particles that are nearer to each other are pushed apart.
+        apart: f32,
     }
 );
 

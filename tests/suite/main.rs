@@ -73,6 +73,7 @@ mod solve {
     mod flip_passes;
     mod independent;
     mod moving_solids;
+    mod no_slip;
     mod pbf;
     mod plan;
     mod pressure;

@@ -8,12 +8,12 @@ use crate::{
         pbf::GRID,
         table::{each, pair},
     },
-    domain::{boundary::Boundary, signed_distance::SignedDistance},
+    domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance},
     reference::flip::{
         Model, Room, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
         find_change as twin_find_change, find_excess as twin_find_excess,
-        find_water as twin_find_water, gather_centers as twin_gather_centers,
-        gather_faces as twin_gather_faces, is_near_half,
+        find_water as twin_find_water, friction_rates, gather_centers as twin_gather_centers,
+        gather_faces as twin_gather_faces, is_near_half, wall_friction as twin_wall_friction,
     },
     scene::flip::Surface,
     solve::flip::buffers,
@@ -274,6 +274,28 @@ pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     io.table.each(&EXCESS, elements.active(), |e| {
         let size = (density[e] - 1.0).abs().min(1.0) + density[e];
         pair(e, excess[e], twin[e], [size, cut])
+    });
+    Ok(())
+}
+
+pub(super) fn wall_friction(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let (elements, step) = (state.elements(), state.step());
+    let (bricks, room) = (&elements.bricks, state.room());
+    let before = elements.faces(&io.before)?;
+    let rates = friction_rates(&state.model, &step, bricks, room, &before);
+    let mut twin = before.clone();
+    twin_wall_friction(&state.model, &step, bricks, room, &mut twin);
+    let found = elements.faces(&io.after)?;
+    let place = state.place();
+    // Of each of four walls two components, neither faster than the fastest about.
+    let at_most = |e: usize| {
+        let speed = elements.largest_about(e, |e| before.change[e].length());
+        4.0 * 2f64.sqrt() * VON_KARMAN * VON_KARMAN * speed / state.model.cell_size()
+    };
+    io.table.each(&FRICTION, elements.active(), |e| {
+        let (moved, slowed) = (step.length * at_most(e), step.length * rates[e].length());
+        let magnitudes = [place, moved, slowed, before.velocity[e].length()];
+        pair(e, found.velocity[e], twin.velocity[e], magnitudes)
     });
     Ok(())
 }

@@ -49,9 +49,15 @@ const TWINS: &[Twin<FlipState>] = &[
     twin("flip/gather_centers", NONE, grid::gather_centers),
     twin("flip/find_water", NONE, grid::find_water),
     twin("flip/find_excess", NONE, grid::find_excess),
+    twin(
+        "flip/wall_friction",
+        elements::faces_kept,
+        grid::wall_friction,
+    ),
     twin("flip/find_change", elements::faces_kept, grid::find_change),
     twin("flip/extrapolate", elements::faces_kept, grid::extrapolate),
     twin("flip/grid_to_particle", NONE, particles::grid_to_particle),
+    twin("flip/push_apart", NONE, particles::push_apart),
     twin(
         "flip/advect",
         || names![buffers::COUNTERS],

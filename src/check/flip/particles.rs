@@ -11,6 +11,7 @@ use crate::{
     domain::bricks::Bricks,
     reference::flip::{
         Given, Moved, advect as twin_advect, grid_to_particle as twin_grid_to_particle,
+        push_apart as twin_push_apart,
     },
     solve::{SolveError, flip::buffers, pressure::buffers as solved},
 };
@@ -125,19 +126,51 @@ fn given(state: &FlipState, io: &Io<'_>) -> Result<Given, SolveError> {
     })
 }
 
+/// Of the particles as they were sorted; `displacement` is what it adds to.
+pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let Some(before) = state.given.take() else {
+        return Ok(());
+    };
+    let (elements, sorted, step) = (state.elements(), state.sorted(), state.step());
+    let twin = twin_push_apart(&state.model, &step, &elements.bricks, sorted);
+    let found = given(state, io)?;
+    let (apart, extent) = (state.model.apart(), state.scene.domain.size().max_element());
+    io.table.each(&PUSHED, 0..state.n, |i| {
+        let about = neighborhood().map(|offset| {
+            sorted
+                .of(elements.bricks.near(sorted.cell[i], offset))
+                .len()
+        });
+        let count = about.sum::<usize>() as f64;
+        let exact = before.displacement[i] + twin[i];
+        pair(
+            i,
+            found.displacement[i],
+            exact,
+            [count, apart, extent, exact.length()],
+        )
+    });
+    state.given = Some(found);
+    Ok(())
+}
+
 pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let Some(given) = state.given.take() else {
         return Ok(());
     };
     let (n, elements) = (state.n, state.elements());
-    let faces = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
+    let faces = elements.faces(&io.before)?;
     let (step, start) = (state.step(), &state.sorted().cloud.position);
     let go = |start: &[DVec3]| {
         let (model, bricks) = (&state.model, &elements.bricks);
         twin_advect(model, &step, bricks, start, &faces, &given)
     };
     let twin = go(start);
-    let fastest = faces.iter().map(|v| v.length()).fold(0.0, f64::max);
+    let fastest = faces
+        .velocity
+        .iter()
+        .map(|v| v.length())
+        .fold(0.0, f64::max);
     let grid = state.distance_error();
     let reach = |x: &DVec3| START.of([x.length(), step.length, fastest, grid]);
     let answers: Vec<Moved> = DVec3::AXES

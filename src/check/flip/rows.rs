@@ -93,6 +93,10 @@ entries! {
         EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT] 4.0 * U * excess + cut * excess,
             "a difference, and the product with the open volume";
     }
+    "flip/wall_friction" {
+        FRICTION = "velocity slowed by walls", "m/s": [place: "" PLACE, moved: "what it is slowed by in Δt where a row is a whole cell nearer to each wall",
+            slowed: "Δt times the rate", v: "|v|"] (2.0 * place * moved + U * (16.0 * slowed + 4.0)) * v, "";
+    }
     "pressure/build_system" {
         DIRICHLET = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64", air: "Σ f / θ"] 24.0 * unit * air,
             "16 u of each quotient, 6 sums";
@@ -205,6 +209,11 @@ entries! {
         CARRIED = "velocity of the grid", "m/s": [velocity: "" OF_FACES] velocity, "";
         SHIFT = "displacement", "m": [displacement: "" OF_FACES] displacement, "";
         GIVEN_AFFINE = "affine rows", "1/s": [velocity: "" OF_FACES, size: "Δx"] 2.0 * velocity / size, "";
+    }
+    "flip/push_apart" {
+        PUSHED = "displacement", "m": [count: "particles about", apart: "the distance that is kept", extent: "the domain's longest side",
+            displacement: "its own value"] U * (count * 8.0 * apart + 2.0 * extent + 2.0 * displacement),
+            "a difference, a root, a quotient and a product for each; the walls' places; a sum";
     }
     "flip/advect" {
         MOVED = "position", "m": [answer: "what the twin answers when its start moves along each axis by " START, x: "|x|"]

@@ -15,6 +15,7 @@ mod solver;
 mod sort;
 mod to_grid;
 mod to_particles;
+mod wall_friction;
 mod water;
 
 pub use grid::planes;
@@ -25,5 +26,8 @@ pub use solids::Solid;
 pub use solver::{Flip, Projected, Trace};
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
 pub use to_grid::{Faces, Room, cut_cells, gather_faces};
-pub use to_particles::{Given, Moved, advect, extrapolate, find_change, grid_to_particle};
+pub use to_particles::{
+    Given, Moved, advect, extrapolate, find_change, grid_to_particle, push_apart,
+};
+pub use wall_friction::{friction_rates, wall_friction};
 pub use water::{Centers, find_excess, find_water, gather_centers, is_near_half};

@@ -7,7 +7,7 @@ use super::{
     density_source,
     effects::{self, Water},
     extrapolate, find_change, find_excess, find_water, gather_centers, gather_faces,
-    grid_to_particle, reorder, survey,
+    grid_to_particle, push_apart, reorder, survey, wall_friction,
 };
 use crate::{
     domain::{
@@ -187,6 +187,11 @@ impl Flip {
             excess,
             distance,
         };
+        if !model.scene.no_slip.is_empty() {
+            timings.time("flip/wall_friction", || {
+                wall_friction(model, &step, &bricks, &room, &mut faces);
+            });
+        }
         let water = Water {
             model,
             step: &step,
@@ -209,13 +214,21 @@ impl Flip {
                 extrapolate(&step, &bricks, layer, &mut faces);
             }
         });
-        let given = timings.time("flip/grid_to_particle", || {
+        let mut given = timings.time("flip/grid_to_particle", || {
             let displacement = displacement.as_deref();
             grid_to_particle(model, &step, &bricks, &sorted, &faces, displacement)
         });
+        if displacement.is_some() {
+            let pushed = timings.time("flip/push_apart", || {
+                push_apart(model, &step, &bricks, &sorted)
+            });
+            for (displacement, push) in given.displacement.iter_mut().zip(pushed) {
+                *displacement += push;
+            }
+        }
         let moved = timings.time("flip/advect", || {
             let position = &sorted.cloud.position;
-            advect(model, &step, &bricks, position, &faces.velocity, &given)
+            advect(model, &step, &bricks, position, &faces, &given)
         });
         let scale = model.scene.water.rest_density * model.cell_size() / step.length;
         let pressure = waters.by_element(&projected.system, &projected.solution.x);

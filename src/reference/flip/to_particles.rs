@@ -5,17 +5,23 @@ use rayon::prelude::*;
 
 use super::{
     Faces, Model, Room, Sorted, Step,
-    grid::{along, neighborhood, per_cell},
+    grid::{along, per_cell},
     solids,
 };
-use crate::domain::{
-    bricks::{Bricks, CELLS},
-    poisson::{FLUID, SOLID},
+use crate::{
+    domain::{
+        bricks::{Bricks, CELLS},
+        poisson::{FLUID, SOLID},
+    },
+    reference::hash::pair_direction,
 };
 
 /// Bits of a component's layer, and whether particles gave it a velocity.
 const LAYER: u32 = 0x7f;
 const KNOWN: u32 = 0x80;
+
+/// In place of a layer: a closed face has its velocity, and gives it to none.
+const CLOSED: u32 = 0x7f;
 
 /// Beyond the stored layer of the upper walls: no face is ever asked for.
 const NO_NEED: u32 = 0x7f_7f7f;
@@ -52,8 +58,7 @@ fn is_known(tags: u32, axis: usize) -> bool {
     tags >> (8 * axis) & KNOWN != 0
 }
 
-/// After the projection: which faces have a velocity (layer 1), and what of that is change. Those of drops have one that no
-/// water is near: their change is gravity's.
+/// After the projection: which faces it gave a velocity (layer 1), and what of that is change.
 pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Faces) {
     let tags = per_cell(bricks, |element| {
         let e = element as usize;
@@ -61,22 +66,18 @@ pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Face
         if (bricks.cell(element).iter().zip(&model.cells)).any(|(cell, cells)| cell > cells) {
             return NO_NEED;
         }
-        let is_water_about = |axis: usize| {
-            let mut about = neighborhood().filter(|offset| offset[axis] < 1);
-            about.any(|offset| room.kind[bricks.near(element, offset) as usize] == FLUID)
-        };
         let found = |axis: usize| {
             let before = bricks.near(element, along(axis, -1));
             let kind = room.kind[before as usize];
             let is_closed = room.open[e][axis] == 0.0;
             // A closed face between solids has no velocity of its own; slot 0 is what lies beyond the domain.
             let is_buried = own == SOLID && (kind == SOLID || before < CELLS);
-            own == FLUID
-                || kind == FLUID
-                || (is_closed && !is_buried)
-                || (is_known(faces.layer[e], axis) && !is_water_about(axis))
+            match is_closed && !is_buried {
+                true => CLOSED,
+                false => u32::from(own == FLUID || kind == FLUID),
+            }
         };
-        let layers = (0..3).map(|axis| u32::from(found(axis)) << (8 * axis));
+        let layers = (0..3).map(|axis| found(axis) << (8 * axis));
         faces.layer[e] | layers.sum::<u32>()
     });
     faces.layer = tags;
@@ -243,14 +244,12 @@ pub fn grid_to_particle(
     }
 }
 
-/// The grid's velocity at `x`, m/s; `otherwise` where no brick is.
-fn velocity_at(
-    model: &Model,
-    bricks: &Bricks,
-    velocity: &[DVec3],
-    x: DVec3,
-    otherwise: DVec3,
-) -> DVec3 {
+/// Where the faces that have a velocity have less of the weight, they say nothing.
+const LEAST_PART: f64 = 1e-3;
+
+/// The grid's velocity at `x`, m/s, by those of the faces about it that have one; `otherwise` where none has or no brick
+/// is.
+fn velocity_at(model: &Model, bricks: &Bricks, faces: &Faces, x: DVec3, otherwise: DVec3) -> DVec3 {
     let cells = DVec3::from_array(model.cells.map(f64::from));
     let p = (x / model.cell_size()).clamp(DVec3::ZERO, cells);
     let cell = p.min(cells - 1.0).floor();
@@ -290,11 +289,61 @@ fn velocity_at(
                 if high[axis] == 1 { t } else { 1.0 - t }
             };
             let there = std::array::from_fn(|axis| ways[axis].0[high[axis]]);
-            weight(0) * weight(1) * weight(2) * velocity[bricks.element(there) as usize][own]
+            let face = bricks.element(there) as usize;
+            let is_there = faces.layer[face] >> (8 * own) & 0xff != 0;
+            let part = weight(0) * weight(1) * weight(2) * f64::from(u8::from(is_there));
+            (part, part * faces.velocity[face][own])
         };
-        (0..8).map(corner).sum()
+        let add = |a: (f64, f64), b: (f64, f64)| (a.0 + b.0, a.1 + b.1);
+        let (weights, sum) = (0..8).map(corner).fold((0.0, 0.0), add);
+        if weights > LEAST_PART {
+            sum / weights
+        } else {
+            otherwise[own]
+        }
     };
     DVec3::new(component(0), component(1), component(2))
+}
+
+/// Of what a pair of particles lacks to the distance that is kept, each is moved by so much.
+const SHARE: f64 = 0.25;
+
+/// Of that distance, a particle is moved by at most so much.
+const MOST: f64 = 0.25;
+
+/// Displacements that move particles apart which have come nearer to each other, or to a wall, than water at rest has
+/// them, metres; half of what each pair lacks, shared between the two (the weak springs of Ando and Tsuruno 2011, without
+/// their velocity). Shape (particles).
+pub fn push_apart(model: &Model, step: &Step<'_>, bricks: &Bricks, sorted: &Sorted) -> Vec<DVec3> {
+    let apart = model.apart();
+    let one = |i: usize| {
+        let (x, own) = (sorted.cloud.position[i], sorted.cloud.id[i]);
+        let place = x / model.cell_size() - super::grid::corner(bricks, sorted.cell[i]);
+        // The distance is below half a cell: whoever is nearer lies in one of eight.
+        let side = place.to_array().map(|f| if f < 0.5 { -1 } else { 1 });
+        let lacks = |way: DVec3| (apart - 2.0 * way).max(DVec3::ZERO);
+        let mut push = lacks(x - step.walls.min) - lacks(step.walls.max - x);
+        for k in 0..8 {
+            let offset = std::array::from_fn(|axis| side[axis] * (k >> axis & 1));
+            for j in sorted.of(bricks.near(sorted.cell[i], offset)) {
+                let way = x - sorted.cloud.position[j];
+                let distance = way.length();
+                if j != i && distance < apart {
+                    let direction = match distance {
+                        0.0 => pair_direction(own, sorted.cloud.id[j]),
+                        distance => way / distance,
+                    };
+                    push += (apart - distance) * direction;
+                }
+            }
+        }
+        (SHARE * push).clamp_length_max(MOST * apart)
+    };
+    (0..sorted.cell.len())
+        .into_par_iter()
+        .with_min_len(256)
+        .map(one)
+        .collect()
 }
 
 /// Moves particles by the midpoint rule and by the density correction's displacement, keeps them out of solids and
@@ -304,7 +353,7 @@ pub fn advect(
     step: &Step<'_>,
     bricks: &Bricks,
     position: &[DVec3],
-    velocity: &[DVec3],
+    faces: &Faces,
     given: &Given,
 ) -> Moved {
     let contact = model.contact_distance();
@@ -312,7 +361,7 @@ pub fn advect(
     let one = |i: usize| {
         let (start, here) = (position[i], given.carried[i]);
         let middle = start + 0.5 * step.length * here;
-        let between = velocity_at(model, bricks, velocity, middle, here);
+        let between = velocity_at(model, bricks, faces, middle, here);
         let mut way = step.length * between + given.displacement[i];
         let distance = way.length();
         let is_capped = distance > model.max_displacement();

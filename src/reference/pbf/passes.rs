@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{Colour, Model, Substep};
-use crate::reference::neighbors::Neighbors;
+use crate::reference::{hash::pair_direction, neighbors::Neighbors};
 
 /// Particles of a task; fewer are not worth the handing out.
 const GRAIN: usize = 256;
@@ -292,21 +292,4 @@ pub fn update_velocity(
         return (predicted - excess * step, v - excess, true);
     }
     (predicted, v, false)
-}
-
-/// PCG hash (Jarzynski and Olano 2020; shared/hash.wgsl).
-fn pcg(value: u32) -> u32 {
-    let state = value.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    (word >> 22) ^ word
-}
-
-/// A unit vector for a pair that stands on one spot: opposite for (a, b) and (b, a).
-fn pair_direction(a: u32, b: u32) -> DVec3 {
-    let seed = pcg(a.min(b) ^ pcg(a.max(b)));
-    let z = f64::from(seed & 0xffff) / 32767.5 - 1.0;
-    let angle = f64::from(seed >> 16) * (std::f64::consts::TAU / 65536.0);
-    let r = (1.0 - z * z).max(0.0).sqrt();
-    let sign = if a < b { 1.0 } else { -1.0 };
-    sign * DVec3::new(r * angle.cos(), r * angle.sin(), z)
 }

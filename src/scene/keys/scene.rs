@@ -8,6 +8,7 @@ use super::super::{
     build::{CHEBYSHEV_RELAXATION, RELAXATION},
     flip::{self, Preconditioner, Surface, Transfer},
     key::{Interval, Key, words},
+    no_slip,
     probe::{self, ProbeKind},
 };
 use crate::domain::sparse_grid;
@@ -80,6 +81,15 @@ const DOMAIN: &[Key] = &[
         .unit("metres")
         .also(", each above min by 1e-8 at least")
         .about("greatest corner"),
+    Key::choice("walls", &no_slip::WALLS)
+        .computed(|| "free_slip, but for those of no_slip".to_owned())
+        .also(", the last of the solver flip alone")
+        .about("how water meets all six walls: free-slip ones it slides along, no-slip ones slow what is within a cell"),
+    Key::choices("no_slip", &WALLS)
+        .absent()
+        .without(&["walls"])
+        .also(", each once; of the solver flip alone")
+        .about("the no-slip walls, where not all six are"),
 ];
 
 const WATER: &[Key] = &[

@@ -144,7 +144,7 @@ fn allowed_words_follow_from_the_declaration() {
     for (path, words) in [
         ("solver.pbf.cfl", "a number from 1e-5 to 5"),
         ("shot.frames", "a whole number from 1 to 1000000"),
-        ("domain", "a table with min and max"),
+        ("domain", "a table with at least min and max"),
         ("solver.pbf", "a table with at least particle_spacing"),
         ("water.block[3]", "an array of tables [[block]]"),
         ("water.gravity", "three numbers from -10000 to 10000, m/s²"),

@@ -34,7 +34,8 @@ pub const SORTED_POSITION: Buf<[f32; 4]> = Buf::new("sorted_position");
 pub const AFFINE: Buf<f32> = Buf::new("affine");
 /// The same in sorted order.
 pub const SORTED_AFFINE: Buf<f32> = Buf::new("sorted_affine");
-/// Velocity that moves each particle, and its displacement by the density correction: three or six floats.
+/// Velocity that moves each particle, and its displacement by the density correction and by
+/// what pushes it apart from others: three or six floats.
 pub const CARRIED: Buf<f32> = Buf::new("carried");
 
 /// Sums over a cell's particles for the 18 faces that they reach, in planes of cells with water.

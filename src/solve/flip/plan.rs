@@ -19,7 +19,7 @@ use crate::{
 
 use super::{
     buffers::*,
-    record::{Commands, FIRST_LAYER},
+    record::{Commands, FIRST_LAYER, WALL_FRICTION},
 };
 
 /// Faces about a cell that its particles reach, of one component.
@@ -49,7 +49,10 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts) -> Plan {
     let plain = |name| PassSpec {
         name,
         defines: defines.clone(),
-        constants: Vec::new(),
+        constants: match name {
+            WALL_FRICTION => vec![("NO_SLIP", f64::from(scene.no_slip_bits()))],
+            _ => Vec::new(),
+        },
     };
     plan.add_passes(in_order(commands.before_projection()).map(&plain), &effects);
     plan.add_passes(

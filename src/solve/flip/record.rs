@@ -35,6 +35,9 @@ const WATCH_RUN: u64 = 16;
 /// Threads of a workgroup of passes over cells.
 const WORKGROUP: u32 = 64;
 
+/// The pass that slows water along no-slip walls.
+pub(super) const WALL_FRICTION: &str = "flip/wall_friction";
+
 /// A substep in its parts.
 pub(super) struct Recordings {
     /// Before the bricks are known.
@@ -76,7 +79,7 @@ impl Commands {
                 Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
             ],
             to_grid: to_grid(plan, scene, effects),
-            to_particles: to_particles(plan, layers(scene.solver.flip().cfl)),
+            to_particles: to_particles(plan, scene),
             watch: watch(plan, scene),
         }
     }
@@ -146,6 +149,9 @@ fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> 
     if scene.solver.flip().density_correction {
         commands.push(over("flip/find_excess", ACTIVE));
     }
+    if !scene.no_slip.is_empty() {
+        commands.push(over(WALL_FRICTION, ACTIVE));
+    }
     for pass in effects.iter().flat_map(|(_, addition)| &addition.passes) {
         commands.push(over(pass.name, ACTIVE));
     }
@@ -170,13 +176,17 @@ fn watch(plan: &Plan, scene: &Scene) -> Vec<Command> {
     commands
 }
 
-fn to_particles(plan: &Plan, layers: usize) -> Vec<Command> {
+fn to_particles(plan: &Plan, scene: &Scene) -> Vec<Command> {
+    let flip = scene.solver.flip();
     let mut commands = vec![over("flip/find_change", ACTIVE)];
-    for k in 0..layers.saturating_sub(1) {
+    for k in 0..layers(flip.cfl).saturating_sub(1) {
         let binds = vec![LAYERS.bind(k)];
         commands.push(bound("flip/extrapolate", FIRST_LAYER + k, binds));
     }
     commands.push(over("flip/grid_to_particle", WET));
+    if flip.density_correction {
+        commands.push(Command::over("flip/push_apart", plan.counts.particles));
+    }
     commands.push(Command::over("flip/advect", plan.counts.particles));
     commands
 }

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::{
     domain::{
         bricks::{Bricks, CELLS, table_dims},
-        flip::{CAP, CONTACT, stored_cells},
+        flip::{CAP, CONTACT, apart, stored_cells},
     },
     scene::{Scene, step::Substep},
     solve::{params::FlipParams, plan::Plan},
@@ -39,6 +39,6 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
         particle_share: 1.0 / flip.particles_per_cell as f32,
         contact_distance: (CONTACT * flip.particle_spacing()) as f32,
         max_displacement: (CAP * flip.cfl * flip.cell_size) as f32,
-        padding: 0.0,
+        apart: (flip.cell_size * apart(flip.particle_spacing() / flip.cell_size)) as f32,
     }
 }

@@ -136,6 +136,8 @@ fn cases() -> Vec<Case> {
         flip.surface = Surface::Voxel;
         flip.density_correction = false;
     };
+    let mut no_slip = grid(|_| {});
+    no_slip.no_slip.push(Wall::NAMED[2].1);
     let mut moving = grid(|_| {});
     let bounds = Bounds {
         min: DVec3::splat(0.2),
@@ -152,6 +154,7 @@ fn cases() -> Vec<Case> {
         Case::new(grid(plain)),
         Case::new(grid(|flip| flip.transfer = Transfer::Apic)).with_solids(),
         Case::new(with_effects(with_wave_maker(grid(|_| {})))),
+        Case::new(no_slip),
         moving,
     ]);
     all

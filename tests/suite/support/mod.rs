@@ -43,6 +43,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
             min: DVec3::ZERO,
             max: DVec3::from_array(size),
         },
+        no_slip: Vec::new(),
         water: Water {
             rest_density: 1000.0,
             gravity: DVec3::new(0.0, -9.81, 0.0),

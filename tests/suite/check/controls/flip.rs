@@ -201,6 +201,13 @@ pub const FLIP: &[Control] = &[
         &["velocity"],
     ),
     control(
+        "flip/push_apart",
+        "(apart - distance) * direction",
+        "(apart - distance) * 1.01 * direction",
+        "flip/push_apart",
+        &["displacement"],
+    ),
+    control(
         "flip/advect",
         "+ 0.5 * params.time_step * here",
         "- 0.5 * params.time_step * here",

@@ -7,7 +7,7 @@ use swell::{
         signed_distance::SignedDistance,
     },
     scene::{
-        Scene,
+        Scene, Wall,
         flip::{AFFINE, Flip, Preconditioner, Surface, Transfer},
     },
     stage::prepare::Start,
@@ -77,6 +77,15 @@ fn moving_solid(scene: &mut Scene, start: &mut Start) {
         id: (0..kept.len() as u32).collect(),
         ..Particles::default()
     };
+}
+
+/// All six walls, of which two cut cells of water.
+fn no_slip(scene: &mut Scene, start: &mut Start) {
+    scene.domain.max = DVec3::new(1.31, 6.4, 1.13);
+    scene.no_slip = Wall::NAMED.iter().map(|named| named.1).collect();
+    start.boundary = Boundary::default();
+    start.particles = lattice([0.0; 3], [13, 6, 11], [D; 3]);
+    stir(&mut start.particles);
 }
 
 /// A box of two bricks, full to its ceiling.
@@ -193,6 +202,33 @@ pub const VARIANTS: &[Variant] = &[
                 "v = -solid_velocity + stopped",
                 "flip/advect",
                 &["velocity"],
+            ),
+        ],
+    },
+    Variant {
+        name: "no-slip walls",
+        change: no_slip,
+        controls: &[
+            control(
+                "flip/wall_friction",
+                "VON_KARMAN = 0.41",
+                "VON_KARMAN = 0.42",
+                "flip/wall_friction",
+                &["velocity slowed by walls"],
+            ),
+            control(
+                "flip/wall_friction",
+                "- (k >> 1u) * unit(own)",
+                "+ (k >> 1u) * unit(own)",
+                "flip/wall_friction",
+                &["velocity slowed by walls"],
+            ),
+            control(
+                "flip/wall_friction",
+                "1.5 - (place - params.cut_min)",
+                "1.4 - (place - params.cut_min)",
+                "flip/wall_friction",
+                &["velocity slowed by walls"],
             ),
         ],
     },

@@ -123,6 +123,30 @@ pub const FLIP_FAULTS: &[Fault] = &[
         39,
         &["pressure.max_iterations: 0 is out of range"],
     ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nwalls = \"noslip\"",
+        9,
+        &["domain.walls: \"noslip\" is no walls; the nearest is \"no_slip\""],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nno_slip = [\"-y\", \"floor\"]",
+        9,
+        &["domain.no_slip: \"floor\" is no no_slip"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nno_slip = [\"-y\", \"+x\", \"-y\"]",
+        9,
+        &["domain.no_slip: a wall stands there twice", "each once"],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nwalls = \"free_slip\"\nno_slip = [\"-y\"]",
+        10,
+        &["domain.no_slip: given together with walls"],
+    ),
     // 0.5 m are left: five particle spacings, but fewer than three cells.
     (
         "stroke = 1.5",

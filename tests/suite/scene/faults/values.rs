@@ -4,6 +4,22 @@ use super::Fault;
 
 /// Values, with the scene as it stands: PBF.
 pub const VALUE_FAULTS: &[Fault] = &[
+    // No-slip walls are FLIP's.
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nwalls = \"no_slip\"",
+        9,
+        &[
+            "domain.walls: solver pbf has free-slip walls alone",
+            "solver.method = \"flip\"",
+        ],
+    ),
+    (
+        "max = [25.0, 12.6, 15.0]",
+        "max = [25.0, 12.6, 15.0]\nno_slip = [\"-y\"]",
+        9,
+        &["domain.no_slip: solver pbf has free-slip walls alone"],
+    ),
     // Ranges.
     (
         "= 0.1\n",

@@ -1,0 +1,57 @@
+// Particles that have come nearer to each other, or to a wall, than water at rest has them are moved apart: half of what each
+// pair lacks, shared between the two (the weak springs of Ando and Tsuruno 2011, without their velocity). The density
+// correction knows cells alone: within one, particles may gather at the surface, at walls, or on one spot.
+#import "shared/thread.wgsl"
+#import "shared/flip_slots.wgsl"
+#import "shared/flip_carried.wgsl"
+#import "shared/hash.wgsl"
+
+@group(0) @binding(2) var<storage, read> cell_start: array<u32>;
+@group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
+@group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
+@group(0) @binding(5) var<storage, read_write> carried: array<f32>;
+
+// Of what a pair lacks, for each of the two.
+const SHARE = 0.25;
+// Of the distance that is kept, at most so much in a substep.
+const MOST = 0.25;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let i = thread_index(workgroup, workgroups, local, 64u);
+    if i >= params.particle_count {
+        return;
+    }
+    let x = sorted_position[i].xyz;
+    let p = clamp(x * params.inverse_cell_size, vec3f(0.0), vec3f(params.cells));
+    let cell = vec3i(cell_of_place(p));
+    find_slots(cell);
+    // The distance is below half a cell: whoever is nearer lies in one of eight.
+    let side = select(vec3i(1), vec3i(-1), p - vec3f(cell) < vec3f(0.5));
+    let own = sorted_id[i];
+    let apart = params.apart;
+    var push = max(apart - 2.0 * (x - params.wall_min), vec3f(0.0)) - max(apart - 2.0 * (params.wall_max - x), vec3f(0.0));
+    for (var k = 0u; k < 8u; k++) {
+        let element = element_at(side * vec3i(vec3u(k & 1u, (k >> 1u) & 1u, k >> 2u)));
+        let is_wet = element >= CELLS && element < params.wet_cells + CELLS;
+        let end = select(0u, cell_start[element + 1u], is_wet);
+        for (var j = select(0u, cell_start[element], is_wet); j < end; j++) {
+            let way = x - sorted_position[j].xyz;
+            let square = dot(way, way);
+            for (var once = 0; once < select(0, 1, square < apart * apart && j != i); once++) {
+                let distance = sqrt(square);
+                let direction = select(way / max(distance, 1e-20), pair_direction(own, sorted_id[j]), square == 0.0);
+                push += (apart - distance) * direction;
+            }
+        }
+    }
+    push *= SHARE;
+    push *= min(1.0, MOST * apart / max(length(push), 1e-20));
+    carried[CARRIED * i + 3u] += push.x;
+    carried[CARRIED * i + 4u] += push.y;
+    carried[CARRIED * i + 5u] += push.z;
+}

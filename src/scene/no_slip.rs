@@ -1,0 +1,40 @@
+//! Walls that hold water back.
+
+use super::{Method, Scene, Wall, document::Document, error::SceneError, spec::DomainSpec};
+
+/// The words of `domain.walls`: how water meets all six walls.
+pub(super) const WALLS: [&str; 2] = ["free_slip", "no_slip"];
+
+impl Scene {
+    /// A bit a no-slip wall: of the least faces along x, y and z, then of the greatest.
+    pub fn no_slip_bits(&self) -> u32 {
+        let bit = |wall: &Wall| 1 << (wall.axis + 3 * usize::from(wall.is_max));
+        self.no_slip.iter().map(bit).sum()
+    }
+}
+
+/// The walls that `domain.walls` or `domain.no_slip` names, in the order of [`Wall::NAMED`].
+pub(super) fn build(
+    doc: &Document<'_>,
+    spec: &DomainSpec,
+    method: Method,
+) -> Result<Vec<Wall>, SceneError> {
+    let is_all = spec.walls.as_deref() == Some(WALLS[1]);
+    let all = Wall::NAMED.iter().map(|&(_, wall)| wall);
+    let walls: Vec<Wall> = all
+        .filter(|wall| is_all || spec.no_slip.contains(wall))
+        .collect();
+    let key = if is_all {
+        "domain.walls"
+    } else {
+        "domain.no_slip"
+    };
+    if !is_all && walls.len() < spec.no_slip.len() {
+        return Err(doc.fault_of(key, "a wall stands there twice"));
+    }
+    if method == Method::Pbf && !walls.is_empty() {
+        let problem = "solver pbf has free-slip walls alone; choose solver.method = \"flip\"";
+        return Err(doc.fault_of_plain(key, problem));
+    }
+    Ok(walls)
+}
