@@ -44,7 +44,7 @@ impl Window {
             Some(seen().map(|(span, value)| span * value).sum::<f64>() / total)
         } else {
             // The first look of all.
-            seen().map(|(_, value)| value).last()
+            seen().map(|(_, value)| value).next_back()
         };
         let values = || seen().map(|(_, value)| value);
         [

@@ -202,11 +202,11 @@ fn of_state(
             ProbeKind::Front { towards, quantile } => {
                 let sign = if towards.is_max { 1.0 } else { -1.0 };
                 let place = front(particles, spacing, towards.axis, sign, quantile);
-                vec![place.map(|place| scene.origin[towards.axis] + place)]
+                vec![place.map(|place| within(scene, towards.axis, place))]
             }
             ProbeKind::RunUp { quantile } => {
                 let height = run_up(particles, spacing, quantile);
-                vec![height.map(|y| scene.origin.y + y)]
+                vec![height.map(|y| within(scene, 1, y))]
             }
             ProbeKind::Flux { towards, at } => {
                 let rate = flux(particles, spacing, towards.axis, at);
@@ -216,6 +216,13 @@ fn of_state(
             ProbeKind::Force { .. } => vec![None; probe.kind.columns().len()],
         })
         .collect()
+}
+
+/// World coordinate of a place up to which water reaches: the half spacing beyond its last particle ends at the domain's
+/// walls.
+fn within(scene: &Scene, axis: usize, place: f64) -> f64 {
+    let (min, max) = (scene.domain.min[axis], scene.domain.max[axis]);
+    scene.origin[axis] + place.clamp(min, max)
 }
 
 /// What the probe of `index` saw over time as a chart, one line a column.

@@ -511,3 +511,38 @@ fn a_pbf_bake_leaves_a_file_a_probe() {
 fn a_flip_bake_leaves_a_file_a_probe() {
     a_bake_leaves_a_file_a_probe("flip");
 }
+
+/// A column falls, runs up the far wall and breaks over. What is spray, film and torn sheet counts: what is missing is 2.4 %
+/// of disorder, and what the solver presses together: with FLIP its density error, up to 3 % at the time of the splash, with PBF
+/// up to 3.5 % in layers at the surface, which it takes for less dense than they are. The level set's volume went down to 0.89.
+fn a_splash_keeps_its_volume(solver: &str) {
+    let scene = "[shot]\nname = \"splash\"\nframes = 40\nframes_per_second = 40\n\
+        [domain]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 2.0, 0.6]\n\
+        [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [0.7, 1.0, 0.6]\n\
+        [solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.05\n[solver.flip]\ncell_size = 0.1\n\
+        [[probe]]\nkind = \"volume\"\n";
+    let job = Job::of(&[("splash.toml", scene)]);
+    job.expect(0, &format!("bake splash.toml --solver {solver} -o out"));
+    let parts: Vec<f64> = rows(&job, "out/probes/volume-1.csv")
+        .iter()
+        .map(|row| row[2].unwrap() / 0.42)
+        .collect();
+    println!("{solver}: {parts:.3?}");
+    assert!((parts[0] - 1.0).abs() < 1e-5);
+    assert!(
+        parts
+            .iter()
+            .all(|part| (1.0 - 0.024 - 0.035..1.00001).contains(part)),
+        "{parts:?}"
+    );
+}
+
+#[test]
+fn a_splash_of_pbf_keeps_its_volume() {
+    a_splash_keeps_its_volume("pbf");
+}
+
+#[test]
+fn a_splash_of_flip_keeps_its_volume() {
+    a_splash_keeps_its_volume("flip");
+}
