@@ -305,6 +305,9 @@ pub(super) fn warned(warning: &str) -> (String, Value) {
 /// Mean density error above which the water is plainly wrong; splashes stay below 0.1.
 const DENSE: f64 = 0.15;
 
+/// Density error of a cell above which water has leaked or run together there; FLIP's splashes stay below 0.6.
+const CROWDED: f64 = 1.0;
+
 /// Mean divergence of a pocket against the largest anywhere, above which it is not rounding.
 const INCOMPATIBLE: f64 = 1e-3;
 
@@ -326,6 +329,18 @@ fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
     let Some(projection) = &report.projection else {
         return warnings;
     };
+    if report.density_error_max > CROWDED {
+        warnings.push((
+            format!(
+                "warning: frame {frame}: a cell holds {:.1} times the water that it has room for",
+                1.0 + report.density_error_max
+            ),
+            json!({
+                "event": "warning", "what": "crowded cell", "frame": frame,
+                "density_error_max": report.density_error_max,
+            }),
+        ));
+    }
     if projection.missed > 0 {
         warnings.push((
             format!(
@@ -394,6 +409,13 @@ mod tests {
             "{text}"
         );
         assert!(warnings(1, &report(Some(good))).is_empty());
+        let crowded = StepReport {
+            density_error_max: 1.4,
+            ..report(Some(good))
+        };
+        let told = warnings(5, &crowded);
+        assert_eq!(told.len(), 1);
+        assert!(told[0].0.contains("frame 5: a cell holds 2.4 times"));
         let missed = Projection { missed: 2, ..good };
         let warnings = warnings(7, &report(Some(missed)));
         assert!(warnings[0].0.contains("frame 7: 2 pressure solves missed"));

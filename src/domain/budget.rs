@@ -16,10 +16,14 @@ pub enum Watched {
     Substeps,
     /// Largest speed of a particle at a frame's end, m/s.
     Speed,
+    /// Largest speed at a frame's end, m/s, against the state before it and what gravity and walls can add.
+    SpeedJump,
     /// Mean of max(0, ρ/ρ0 − 1) at a frame's end.
     DensityErrorMean,
     /// 99th percentile of max(0, ρ/ρ0 − 1) at a frame's end.
     DensityErrorP99,
+    /// Its largest.
+    DensityErrorMax,
     /// Times that a particle was slowed to the displacement cap, over particles and substeps.
     Capped,
     /// Relative true residual of a projection.
@@ -34,7 +38,7 @@ pub enum Watched {
 
 impl Watched {
     /// Each quantity, its name in reports, and its words in a message.
-    const NAMED: [(Self, &'static str, &'static str); 11] = [
+    const NAMED: [(Self, &'static str, &'static str); 13] = [
         (Self::NotFinite, "not_finite", "values that are not finite"),
         (
             Self::Particles,
@@ -43,6 +47,7 @@ impl Watched {
         ),
         (Self::Substeps, "max_substeps", "substeps asked for"),
         (Self::Speed, "speed", "the largest speed, m/s,"),
+        (Self::SpeedJump, "speed_jump", "the largest speed, m/s,"),
         (
             Self::DensityErrorMean,
             "density_error_mean",
@@ -52,6 +57,11 @@ impl Watched {
             Self::DensityErrorP99,
             "density_error_p99",
             "the density error's 99th percentile",
+        ),
+        (
+            Self::DensityErrorMax,
+            "density_error_max",
+            "the largest density error",
         ),
         (
             Self::Capped,
@@ -178,6 +188,10 @@ impl fmt::Display for Breach {
         match watched {
             Watched::NotFinite | Watched::Particles => write!(f, ": {measured} {words}")?,
             Watched::Substeps => write!(f, ": {measured} {words}, and {name} is {limit}")?,
+            Watched::SpeedJump => write!(
+                f,
+                ": {words} is {measured}, and budget.{name} allows {limit}"
+            )?,
             // The limit as the scene says it, and the value in full where a few digits would read as the limit.
             _ if Short(self.measured).to_string() == Short(self.limit).to_string() => {
                 let [measured, limit] = [self.measured, self.limit];

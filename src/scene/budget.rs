@@ -13,10 +13,14 @@ use crate::domain::{
 pub struct Budget {
     /// Largest speed of a particle at a frame's end, m/s.
     pub speed: Option<f64>,
+    /// How many times as fast as before the frame, gravity and walls in it counted, its fastest particle may be.
+    pub speed_jump: Option<f64>,
     /// Mean of max(0, ρ/ρ0 − 1) at a frame's end.
     pub density_error_mean: Option<f64>,
     /// Its 99th percentile.
     pub density_error_p99: Option<f64>,
+    /// Its largest.
+    pub density_error_max: Option<f64>,
     /// Times that a particle was slowed to the displacement cap, over particles and substeps.
     pub capped: Option<f64>,
     /// Relative true residual of a projection; of FLIP alone, as the next one.
@@ -40,6 +44,12 @@ const FLIP_ENERGY: f64 = 0.1;
 /// with Chebyshev's.
 const PBF_ENERGY: f64 = 0.25;
 
+/// FLIP's. Splashes of the shipped scenes come to 0.6, water that leaked along a wall to 24.
+const DENSITY_ERROR_MAX: f64 = 4.0;
+
+/// FLIP's. A dam that breaks, and a wave that meets a wall, come to 2; what a leak throws out of still water to 20 and more.
+const SPEED_JUMP: f64 = 8.0;
+
 /// Where gravity and walls give no speed to go by: so many spacings a frame.
 const LEAST_SPEED: f64 = 10.0;
 
@@ -51,6 +61,16 @@ pub(super) fn speed_words() -> String {
     format!(
         "{SPEED} (√(2 g × the domain's diagonal) + the fastest wall or moving solid), at least {LEAST_SPEED} spacings a frame"
     )
+}
+
+/// The default of `budget.speed_jump`, in words.
+pub(super) fn speed_jump_words() -> String {
+    format!("false with pbf, {SPEED_JUMP:?} with flip")
+}
+
+/// The default of `budget.density_error_max`, in words.
+pub(super) fn density_error_max_words() -> String {
+    format!("false with pbf, {DENSITY_ERROR_MAX:?} with flip")
 }
 
 /// The default of `budget.residual`, in words.
@@ -67,8 +87,10 @@ pub(super) fn energy_words() -> String {
 #[serde(deny_unknown_fields)]
 pub(super) struct BudgetSpec {
     speed: Option<Limit>,
+    speed_jump: Option<Limit>,
     density_error_mean: Limit,
     density_error_p99: Limit,
+    density_error_max: Option<Limit>,
     capped: Limit,
     residual: Option<Limit>,
     divergence: Limit,
@@ -117,6 +139,7 @@ pub(super) fn build(
         Method::Pbf => PBF_ENERGY,
         Method::Flip => FLIP_ENERGY,
     };
+    let of_flip = |limit: f64| (solver.method == Method::Flip).then_some(limit);
     let residual = match spec.residual {
         Some(Limit(Some(limit))) if limit < tolerance => {
             let problem = format!("{} is out of range", shown(limit));
@@ -127,8 +150,11 @@ pub(super) fn build(
     };
     Ok(Budget {
         speed: spec.speed.map_or(Some(speed), |limit| limit.0),
+        speed_jump: spec.speed_jump.map_or(of_flip(SPEED_JUMP), |limit| limit.0),
         density_error_mean: spec.density_error_mean.0,
         density_error_p99: spec.density_error_p99.0,
+        density_error_max: (spec.density_error_max)
+            .map_or(of_flip(DENSITY_ERROR_MAX), |limit| limit.0),
         capped: spec.capped.0,
         residual,
         divergence: spec.divergence.0,
@@ -137,13 +163,26 @@ pub(super) fn build(
     })
 }
 
+/// What a frame began with.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Before {
+    /// What [`Scene::total_energy`] gives, joule.
+    pub energy: f64,
+    /// Largest, m/s.
+    pub speed: f64,
+    /// Of the bake's start, m³, where it is watched.
+    pub start_volume: Option<f64>,
+}
+
 impl Budget {
     /// Each limit with its name, in the order of the table of keys.
-    pub(super) fn rows(&self) -> [(Watched, Option<f64>); 8] {
+    pub(super) fn rows(&self) -> [(Watched, Option<f64>); 10] {
         [
             (Watched::Speed, self.speed),
+            (Watched::SpeedJump, self.speed_jump),
             (Watched::DensityErrorMean, self.density_error_mean),
             (Watched::DensityErrorP99, self.density_error_p99),
+            (Watched::DensityErrorMax, self.density_error_max),
             (Watched::Capped, self.capped),
             (Watched::Residual, self.residual),
             (Watched::Divergence, self.divergence),
@@ -172,8 +211,7 @@ impl Budget {
             .map_err(|breach| breach.in_substep(substep))
     }
 
-    /// Holds a frame of so many particles to what its report says. `energy` is what [`Scene::total_energy`] gave for the
-    /// frame before, joule; `start_volume` that of the bake's start, m³.
+    /// Holds a frame of so many particles to what its report says, and to what stood before it.
     ///
     /// # Errors
     /// The first breach.
@@ -183,11 +221,32 @@ impl Budget {
         frame: u32,
         particles: usize,
         report: &StepReport,
-        energy: f64,
-        start_volume: Option<f64>,
+        before: &Before,
     ) -> Result<(), Breach> {
+        let &Before {
+            energy,
+            speed,
+            start_volume,
+        } = before;
         let check = |watched, measured, limit| Breach::check(frame, watched, measured, limit);
         check(Watched::Speed, report.max_speed, self.speed)?;
+        if let Some(times) = self.speed_jump {
+            let reached = scene.reached_speed(frame, speed);
+            check(Watched::SpeedJump, report.max_speed, Some(times * reached)).map_err(
+                |breach| {
+                    let detail = format!(
+                        "{} times {}, to which gravity and walls bring {}",
+                        shown(times),
+                        shown(reached),
+                        shown(speed)
+                    );
+                    Breach {
+                        detail: Some(detail),
+                        ..breach
+                    }
+                },
+            )?;
+        }
         check(
             Watched::DensityErrorMean,
             report.density_error_mean,
@@ -197,6 +256,11 @@ impl Budget {
             Watched::DensityErrorP99,
             report.density_error_p99,
             self.density_error_p99,
+        )?;
+        check(
+            Watched::DensityErrorMax,
+            report.density_error_max,
+            self.density_error_max,
         )?;
         let runs = particles.max(1) as f64 * f64::from(report.substeps.max(1));
         check(Watched::Capped, report.capped as f64 / runs, self.capped)?;
@@ -215,6 +279,16 @@ impl Budget {
 }
 
 impl Scene {
+    /// What gravity and moving walls or solids bring a particle of `speed` to in frame `frame`, m/s; a tenth of a spacing a
+    /// frame at least.
+    pub fn reached_speed(&self, frame: u32, speed: f64) -> f64 {
+        let length = self.shot.frame_seconds();
+        let start = f64::from(frame.saturating_sub(1)) * length;
+        let push = self.peak_boundary_speed(start, start + length);
+        let least = LEAST_ENERGY_SPEED * self.particle_spacing() / length;
+        (speed + push + self.water.gravity.length() * length).max(least)
+    }
+
     /// Kinetic and potential energy of a state of so many particles, the latter against the domain's lowest place,
     /// joule.
     pub fn total_energy(&self, particles: usize, report: &StepReport) -> f64 {
@@ -283,7 +357,12 @@ mod tests {
         let look = |limit: f64| {
             let mut held = Budget::default();
             budget(&mut held, limit);
-            held.check_frame(&scene, 3, 10, report, 100.0, Some(2.0))
+            let before = Before {
+                energy: 100.0,
+                speed: 3.0,
+                start_volume: Some(2.0),
+            };
+            held.check_frame(&scene, 3, 10, report, &before)
         };
         assert_eq!(look(expected * (1.0 + 1e-6)), Ok(()));
         let breach = look(expected * (1.0 - 1e-6)).unwrap_err();
@@ -302,6 +381,7 @@ mod tests {
             max_speed: 7.0,
             density_error_mean: 0.02,
             density_error_p99: 0.3,
+            density_error_max: 0.9,
             ..scene.report(&Default::default(), [].into_iter())
         }
     }
@@ -314,8 +394,28 @@ mod tests {
         measured(|b, limit| b.capped = Some(limit), &report, 3.0 / 40.0);
         measured(|b, limit| b.volume = Some(limit), &report, 0.05);
         measured(|b, limit| b.speed = Some(limit), &report, 7.0);
+        // 3 m/s, and 0.2 m/s of gravity in a fiftieth of a second; the wall stands by then. The limit counts in times.
+        let jump = |times: f64| {
+            let held = Budget {
+                speed_jump: Some(times),
+                ..Budget::default()
+            };
+            let before = Before {
+                speed: 3.0,
+                ..Before::default()
+            };
+            held.check_frame(&scene("flip"), 3, 0, &report, &before)
+        };
+        assert_eq!(jump(7.0 / 3.2 * (1.0 + 1e-6)), Ok(()));
+        let breach = jump(7.0 / 3.2 * (1.0 - 1e-6)).unwrap_err();
+        assert_eq!(breach.watched, Watched::SpeedJump);
+        assert!(
+            breach.to_string().contains("budget.speed_jump allows"),
+            "{breach}"
+        );
         measured(|b, limit| b.density_error_mean = Some(limit), &report, 0.02);
         measured(|b, limit| b.density_error_p99 = Some(limit), &report, 0.3);
+        measured(|b, limit| b.density_error_max = Some(limit), &report, 0.9);
         measured(|b, limit| b.energy = Some(limit), &report, 30.0 / 121.25);
         let against = StepReport {
             boundary_work: -20.0,
@@ -352,6 +452,8 @@ mod tests {
             // Ten spacings a frame are 50 m/s, and less.
             assert!((speed - expected).abs() < 1e-9 && speed > 50.0, "{speed}");
             assert_eq!(budget.energy, Some(energy));
+            assert_eq!(budget.speed_jump, (method == "flip").then_some(8.0));
+            assert_eq!(budget.density_error_max, (method == "flip").then_some(4.0));
             assert_eq!((budget.capped, budget.volume), (Some(0.01), None));
         }
     }

@@ -197,7 +197,7 @@ impl Finder<'_> {
         let n = self.state.len();
         match self.breach.watched {
             Watched::NotFinite => Ok(None),
-            Watched::Speed => self.too_fast(traced, limit),
+            Watched::Speed | Watched::SpeedJump => self.too_fast(traced, limit),
             Watched::Substeps => self.too_fast(traced, self.most_speed()),
             Watched::Particles => {
                 for buffer in [ID, SORTED_ID] {
@@ -211,7 +211,9 @@ impl Finder<'_> {
                 }
                 Ok(None)
             }
-            Watched::DensityErrorMean | Watched::DensityErrorP99 if is_measured(traced.pass) => {
+            Watched::DensityErrorMean | Watched::DensityErrorP99 | Watched::DensityErrorMax
+                if is_measured(traced.pass) =>
+            {
                 let count = match self.scene.solver.method {
                     Method::Pbf => n,
                     // Beyond the water of this substep stands that of others.
@@ -226,6 +228,7 @@ impl Finder<'_> {
                 let report = self.scene.report(&Particles::default(), density);
                 let measured = match self.breach.watched {
                     Watched::DensityErrorMean => report.density_error_mean,
+                    Watched::DensityErrorMax => report.density_error_max,
                     _ => report.density_error_p99,
                 };
                 Ok((measured > limit).then(|| DENSITY.name().to_owned()))

@@ -9,7 +9,7 @@ use crate::{
         probe::volume,
         solver::StepReport,
     },
-    scene::Scene,
+    scene::{Scene, budget::Before},
 };
 
 /// Roundings of a coordinate by which a particle may lie beyond a face of the domain.
@@ -20,10 +20,8 @@ pub(super) struct Watch<'a> {
     scene: &'a Scene,
     /// Of the frame that comes next.
     frame: u32,
-    /// Of the state before it, joule.
-    energy: f64,
-    /// m³, where it is watched.
-    start_volume: Option<f64>,
+    /// Of the state before it.
+    before: Before,
     /// Of all frames.
     id: Vec<u32>,
 }
@@ -35,20 +33,23 @@ impl<'a> Watch<'a> {
         Self {
             scene,
             frame: last + 1,
-            energy: scene.total_energy(state.len(), &report),
-            start_volume: scene.budget.volume.map(|_| volume_of(scene, start)),
+            before: Before {
+                energy: scene.total_energy(state.len(), &report),
+                speed: state.max_speed(),
+                start_volume: scene.budget.volume.map(|_| volume_of(scene, start)),
+            },
             id: state.id.clone(),
         }
     }
 
     /// Joule, of the state before the frame that comes next.
     pub(super) fn energy(&self) -> f64 {
-        self.energy
+        self.before.energy
     }
 
     /// m³, where a budget watches it.
     pub(super) fn start_volume(&self) -> Option<f64> {
-        self.start_volume
+        self.before.start_volume
     }
 
     /// Looks at the frame that came next, and notes in its report what was measured for this.
@@ -67,8 +68,9 @@ impl<'a> Watch<'a> {
         self.count(particles)?;
         report.volume = scene.budget.volume.map(|_| volume_of(scene, particles));
         let budget = &scene.budget;
-        budget.check_frame(scene, self.frame, n, report, self.energy, self.start_volume)?;
-        self.energy = scene.total_energy(n, report);
+        budget.check_frame(scene, self.frame, n, report, &self.before)?;
+        self.before.energy = scene.total_energy(n, report);
+        self.before.speed = report.max_speed;
         self.frame += 1;
         Ok(())
     }

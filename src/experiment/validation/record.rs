@@ -125,8 +125,13 @@ impl<'a> Record<'a> {
                 let area = domain.size().x / bins * domain.size().z;
                 let mut depths = vec![0.0; bins as usize];
                 for x in along() {
-                    let bin = (x / domain.size().x * bins).clamp(0.0, bins - 1.0);
-                    depths[bin as usize] += volume / area;
+                    // Shared by the two bins about it, so that a row of particles does not go over at once.
+                    let place = (x / domain.size().x * bins - 0.5).clamp(0.0, bins - 1.0);
+                    let (bin, part) = (place as usize, place.fract());
+                    depths[bin] += (1.0 - part) * volume / area;
+                    if let Some(next) = depths.get_mut(bin + 1) {
+                        *next += part * volume / area;
+                    }
                 }
                 depths
             }

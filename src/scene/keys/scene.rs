@@ -495,6 +495,10 @@ const BUDGET: &[Key] = &[
         .unit("m/s")
         .computed(budget::speed_words)
         .about("of a particle at a frame's end"),
+    Key::number_or_false("speed_jump", LIMIT)
+        .unit("times")
+        .computed(budget::speed_jump_words)
+        .about("of a frame's fastest particle over the fastest before it with what gravity, walls and moving solids add"),
     Key::number_or_false("density_error_mean", LIMIT)
         .unit("of the rest density")
         .default("0.5")
@@ -503,6 +507,10 @@ const BUDGET: &[Key] = &[
         .unit("of the rest density")
         .default("5.0")
         .about("its 99th percentile"),
+    Key::number_or_false("density_error_max", LIMIT)
+        .unit("of the rest density")
+        .computed(budget::density_error_max_words)
+        .about("its largest"),
     Key::number_or_false("capped", LIMIT)
         .unit("of all particles in all substeps")
         .default("0.01")

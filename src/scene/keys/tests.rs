@@ -111,6 +111,8 @@ fn defaults_that_are_computed_are_what_their_words_say() {
         ("solver.pbf.iteration=chebyshev", "solver.pbf.relaxation"),
         ("solver.method=pbf", "budget.energy"),
         ("solver.method=flip", "budget.energy"),
+        ("solver.method=flip", "budget.speed_jump"),
+        ("solver.method=flip", "budget.density_error_max"),
         ("solver.method=flip", "budget.residual"),
     ] {
         let written = load(&[set]).written(&|_, _| "a.obj".to_owned());

@@ -111,8 +111,10 @@ fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
     let gpu = opened(&Context::open(None).unwrap());
     let both = [
         ("speed=0.01", Watched::Speed),
+        ("speed_jump=1e-3", Watched::SpeedJump),
         ("density_error_mean=1e-6", Watched::DensityErrorMean),
         ("density_error_p99=1e-6", Watched::DensityErrorP99),
+        ("density_error_max=1e-6", Watched::DensityErrorMax),
         ("volume=1e-5", Watched::Volume),
     ];
     let of_flip = [
