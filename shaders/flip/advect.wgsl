@@ -16,7 +16,6 @@
 
 @group(0) @binding(2) var<storage, read> face_velocity: array<f32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
-@group(0) @binding(12) var<storage, read> face_layer: array<u32>;
 @group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
 @group(0) @binding(5) var<storage, read> carried: array<f32>;
 @group(0) @binding(6) var<storage, read_write> position: array<vec4f>;
@@ -25,28 +24,19 @@
 // Of particles slowed, and of what is not finite, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
 
-// Where the faces that have a velocity have less of the weight, they say nothing.
-const LEAST_PART = 1e-3;
-
-// Among the eight faces about a place, those that have a velocity, alone: where a drop flies there are others.
-fn component_at(component: u32, low: vec3i, high: vec3i, t: vec3f, otherwise: f32) -> f32 {
-    let plane = component * params.stride;
+fn component_at(plane: u32, low: vec3i, high: vec3i, t: vec3f) -> f32 {
     var sum = 0.0;
-    var weights = 0.0;
     for (var z = 0; z < 2; z++) {
         for (var y = 0; y < 2; y++) {
             for (var x = 0; x < 2; x++) {
                 let is_high = vec3i(x, y, z) == vec3i(1);
                 let weight = select(1.0 - t, t, is_high);
                 let face = element_at(select(low, high, is_high));
-                let is_there = ((face_layer[face] >> (8u * component)) & 0xffu) != 0u;
-                let part = select(0.0, weight.x * weight.y * weight.z, is_there);
-                sum += part * face_velocity[plane + face];
-                weights += part;
+                sum += weight.x * weight.y * weight.z * face_velocity[plane + face];
             }
         }
     }
-    return select(otherwise, sum / weights, weights > LEAST_PART);
+    return sum;
 }
 
 // The grid's velocity at x; `otherwise` where no brick is.
@@ -70,9 +60,9 @@ fn velocity_at(x: vec3f, otherwise: vec3f) -> vec3f {
     high = select(high, select(vec3i(1), vec3i(0), is_before), is_periodic());
 #endif
     let sampled = vec3f(
-        component_at(0u, vec3i(0, low.yz), vec3i(1, high.yz), vec3f(f.x, t.yz), otherwise.x),
-        component_at(1u, vec3i(low.x, 0, low.z), vec3i(high.x, 1, high.z), vec3f(t.x, f.y, t.z), otherwise.y),
-        component_at(2u, vec3i(low.xy, 0), vec3i(high.xy, 1), vec3f(t.xy, f.z), otherwise.z),
+        component_at(0u, vec3i(0, low.yz), vec3i(1, high.yz), vec3f(f.x, t.yz)),
+        component_at(params.stride, vec3i(low.x, 0, low.z), vec3i(high.x, 1, high.z), vec3f(t.x, f.y, t.z)),
+        component_at(2u * params.stride, vec3i(low.xy, 0), vec3i(high.xy, 1), vec3f(t.xy, f.z)),
     );
     return select(sampled, otherwise, slots_near.x == 0u);
 }
@@ -100,7 +90,9 @@ fn main(
     let start = sorted_position[i].xyz;
     let first = CARRIED * i;
     let here = vec3f(carried[first], carried[first + 1u], carried[first + 2u]);
-    let between = velocity_at(start + 0.5 * params.time_step * here, here);
+    // A drop goes on as it flies: on its way there are no faces of its own, and those about it may be other water's.
+    let is_drop = velocity[i].w > 0.0;
+    let between = select(velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop);
     var way = params.time_step * between;
 #ifdef CORRECTION
     way += vec3f(carried[first + 3u], carried[first + 4u], carried[first + 5u]);

@@ -15,9 +15,6 @@ const SOLID = 2u;
 // Beyond the stored layer of the upper walls: never asked for.
 const NO_NEED = 0x7f7f7fu;
 
-// In place of a layer: a closed face has its velocity, and gives it to none.
-const CLOSED = 0x7fu;
-
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -42,10 +39,9 @@ fn main(
         let is_closed = face_open[face] == 0.0;
         // A closed face between solids has no velocity of its own; slot 0 is what lies beyond the domain.
         let is_buried = own == SOLID && (kind == SOLID || other < CELLS);
-        let is_found = own == FLUID || kind == FLUID;
+        let is_found = own == FLUID || kind == FLUID || (is_closed && !is_buried);
         face_change[face] = face_velocity[face] - face_change[face];
-        let layer = select(u32(is_found), CLOSED, is_closed && !is_buried);
-        tags |= layer << (8u * component);
+        tags |= u32(is_found) << (8u * component);
     }
     face_layer[element] = select(tags, NO_NEED, any(own_cell > params.cells));
 }

@@ -12,7 +12,7 @@
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
-// Four floats a particle.
+// Four floats a particle; the fourth is 1 where it is a drop, far from all water that has a pressure.
 @group(0) @binding(5) var<storage, read_write> velocity: array<f32>;
 #ifdef APIC
 @group(0) @binding(6) var<storage, read_write> affine: array<f32>;
@@ -20,6 +20,7 @@
 @group(0) @binding(6) var<storage, read> face_change: array<f32>;
 @group(0) @binding(9) var<storage, read> sorted_velocity: array<f32>;
 #endif
+@group(0) @binding(12) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(10) var<storage, read_write> carried: array<f32>;
 #ifdef CORRECTION
 @group(0) @binding(11) var<storage, read> face_displacement: array<f32>;
@@ -105,6 +106,17 @@ fn read_component(axis: u32, steps: Steps) -> Component {
     return read;
 }
 
+const FLUID = 1u;
+
+// Whether none of the 27 cells about one is water.
+fn is_dry() -> bool {
+    var water = 0u;
+    for (var k = 0; k < 27; k++) {
+        water += u32(cell_kind[element_at(vec3i(k % 3, k / 3 % 3, k / 9) - 1)] == FLUID);
+    }
+    return water == 0u;
+}
+
 fn center_hats(f: f32) -> vec3f {
     return vec3f(max(0.5 - f, 0.0), 1.0 - abs(f - 0.5), max(f - 0.5, 0.0));
 }
@@ -153,9 +165,13 @@ fn main(
     var of_y: Component;
     var of_z: Component;
     var corner = vec3f(0.0);
+    var drop = 0.0;
     // Entered only by cells with particles.
     for (var once = 0; once < select(0, 1, end > first); once++) {
         open_neighborhood(element);
+        for (var once = 0; once < select(0, 1, cell_kind[element] != FLUID); once++) {
+            drop = select(0.0, 1.0, is_dry());
+        }
         let cell = own_cell(element);
         corner = vec3f(cell);
         var to_before = select(vec3i(1), vec3i(0), cell == vec3u(0u));
@@ -176,5 +192,6 @@ fn main(
         give(i, 0u, f, of_x);
         give(i, 1u, f.yzx, of_y);
         give(i, 2u, f.zxy, of_z);
+        velocity[4u * i + 3u] = drop;
     }
 }

@@ -37,7 +37,7 @@ fn main(
     var push = max(apart - 2.0 * (x - params.wall_min), vec3f(0.0)) - max(apart - 2.0 * (params.wall_max - x), vec3f(0.0));
 #ifdef PERIODIC
     push = select(push, vec3f(0.0), is_periodic());
-    let size = params.wall_max - params.wall_min;
+    let size = vec3f(params.cells) * params.cell_size;
 #endif
     for (var k = 0u; k < 8u; k++) {
         let element = element_at(side * vec3i(vec3u(k & 1u, (k >> 1u) & 1u, k >> 2u)));

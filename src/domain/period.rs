@@ -77,8 +77,8 @@ mod tests {
         let x = DVec3::new(-0.25, -7.0, 1.25);
         assert_eq!(period.wrap(x), DVec3::new(1.75, -7.0, 0.25));
         assert_eq!(period.wrap(period.wrap(x)), period.wrap(x));
-        let there = DVec3::new(1.75, 3.0, 0.125) - DVec3::new(0.25, 1.0, 0.375);
-        assert_eq!(period.shortest(there), DVec3::new(-0.5, 2.0, -0.25));
+        let there = DVec3::new(1.75, 3.0, 0.125) - DVec3::new(0.25, 1.0, 0.25);
+        assert_eq!(period.shortest(there), DVec3::new(-0.5, 2.0, -0.125));
         // The other end is near; a place beyond it is where it should not be.
         let (low, high) = (DVec3::new(1e-9, 1.0, 0.1), DVec3::new(2.0, 1.0, 0.1));
         let off = |found| period.image_by_rounding(found, high).distance(high);

@@ -381,6 +381,16 @@ particles = "every 10"
 [[probe]]
 kind = "elevation"
 at = [5.0, 2.0]
+rate_hz = 60.0
+window = 0.1
+[[probe]]
+kind = "front"
+axis = "+x"
+quantile = 0.99
+[[probe]]
+kind = "force"
+solid = "-y"
+about = [1.0, 0.0, 0.0]
 "#;
         let of_solid = FULL.replace("[solver]\n", &format!("{more}[solver]\n"));
         let kinds = [
@@ -399,17 +409,40 @@ at = [5.0, 2.0]
         let mut written = BTreeSet::new();
         for (kind, overrides) in kinds.iter().zip(variants) {
             let text = of_solid.replace("\"KIND\"", kind);
-            let flip = ["solver.method=flip", "effects.viscosity.xsph=0.02"];
+            let flip = [
+                "solver.method=flip",
+                "effects.viscosity.xsph=0.02",
+                "domain.no_slip=[\"-y\"]",
+            ];
             let all: Vec<&str> = flip.iter().chain(overrides).copied().collect();
             let scene = parse(dir.path(), &text, &all).expect("valid");
             let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
             let table: toml::Table = toml::from_str(&toml).expect("TOML");
             collect_keys("", &table, &mut written);
         }
-        // A motion's file is written as the points that were read from it.
+        // Walls stand in the way of all three axes there.
+        let slab = r#"
+[shot]
+name = "slab"
+frames = 1
+frames_per_second = 30
+[domain]
+min = [0, 0, 0]
+max = [4, 4, 2]
+periodic = ["z"]
+[solver]
+method = "flip"
+[solver.flip]
+cell_size = 0.25
+"#;
+        let scene = parse(dir.path(), slab, &[]).expect("valid");
+        let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
+        collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
+        // A motion's file is written as the points that were read from it, walls as those that are no-slip.
         let missing: Vec<_> = keys::paths(keys::SCENE)
             .into_iter()
-            .filter(|key| !key.ends_with("motion.file") && !written.contains(key))
+            .filter(|key| !key.ends_with("motion.file") && key != "domain.walls")
+            .filter(|key| !written.contains(key))
             .collect();
         assert_eq!(missing, [] as [&str; 0]);
     }

@@ -1,5 +1,6 @@
 //! Scene and look files, parsed into validated types.
 
+pub mod axis;
 pub mod budget;
 pub mod effects;
 pub mod flip;
@@ -7,6 +8,7 @@ mod force;
 pub mod grids;
 pub mod keys;
 pub mod look;
+mod motion_spec;
 pub mod moving_solid;
 pub mod no_slip;
 pub mod periodic;

@@ -6,7 +6,7 @@ use super::{
     Method, PlacedMesh, Scene, Shot,
     document::Document,
     error::SceneError,
-    spec::MotionSpec,
+    motion_spec::MotionSpec,
     wave_maker,
     words::{extent, shown},
 };

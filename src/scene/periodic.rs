@@ -6,9 +6,9 @@ use glam::{DAffine3, DVec3};
 
 use super::{
     Method, Scene, Solver, WaveMaker,
+    axis::Axis,
     document::Document,
     error::SceneError,
-    key::read_by_name,
     moving_solid::MovingSolid,
     words::{shown, shown_all},
 };
@@ -25,37 +25,6 @@ const ROUNDING: f64 = 1e-6;
 
 /// Sine of the angle to a periodic axis below which a solid counts as moving across it.
 const ACROSS: f64 = 1e-9;
-
-/// An axis of the domain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Axis {
-    /// The first.
-    X,
-    /// Upward.
-    Y,
-    /// The last.
-    Z,
-}
-
-impl Axis {
-    /// With the names that scenes use.
-    pub const NAMED: [(&'static str, Self); 3] = [("x", Self::X), ("y", Self::Y), ("z", Self::Z)];
-
-    /// As scenes name it.
-    pub fn name(self) -> &'static str {
-        Self::NAMED[self as usize].0
-    }
-
-    /// Those that are set.
-    pub(super) fn of(periodic: [bool; 3]) -> Vec<Self> {
-        let named = Self::NAMED.iter().zip(periodic);
-        named
-            .filter_map(|((_, axis), is)| is.then_some(*axis))
-            .collect()
-    }
-}
-
-read_by_name!(Axis);
 
 /// One flag an axis.
 pub(super) fn read(doc: &Document<'_>, axes: &[Axis]) -> Result<[bool; 3], SceneError> {

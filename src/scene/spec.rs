@@ -4,8 +4,8 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use super::{
-    Effects, Iteration, Method, Shot, Wall, budget::BudgetSpec, flip::Flip, grids::GridsSpec,
-    keep::KeepSpec, periodic::Axis, probe::ProbeSpec,
+    Effects, Iteration, Method, Shot, Wall, axis::Axis, budget::BudgetSpec, flip::Flip,
+    grids::GridsSpec, keep::KeepSpec, motion_spec::MotionSpec, probe::ProbeSpec,
 };
 
 #[derive(Deserialize)]
@@ -101,29 +101,6 @@ impl From<ScaleSpec> for DVec3 {
 pub(super) struct WaveMakerSpec {
     pub(super) wall: Wall,
     pub(super) motion: MotionSpec,
-}
-
-/// A motion with the keys of its kind.
-#[derive(Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum MotionSpec {
-    ConstantVelocity {
-        velocity: f64,
-        until: Option<f64>,
-    },
-    Sine {
-        stroke: f64,
-        period: f64,
-        ramp: Option<f64>,
-    },
-    Solitary {
-        height: f64,
-        depth: f64,
-    },
-    Table {
-        file: Option<String>,
-        points: Option<Vec<[f64; 2]>>,
-    },
 }
 
 #[derive(Deserialize)]

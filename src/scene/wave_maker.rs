@@ -8,7 +8,8 @@ use super::{
     Shot, WaveMaker,
     document::Document,
     error::SceneError,
-    spec::{MotionSpec, WaveMakerSpec},
+    motion_spec::MotionSpec,
+    spec::WaveMakerSpec,
     words::{chain, shown, shown_all},
 };
 use crate::domain::{bounds::Bounds, motion::Motion};

@@ -8,9 +8,9 @@ use toml::{Table, Value};
 
 use super::{
     Budget, Iteration, Pbf, PlacedMesh, Scene, Stop,
+    axis::Axis,
     key::{Key, Kind},
     keys,
-    periodic::Axis,
     probe::{Probe, ProbeKind},
 };
 use crate::domain::{bounds::Bounds, motion::Motion, probe::Rate};

@@ -44,9 +44,10 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         bricks,
         sorted,
         &faces,
+        &state.room().kind,
         shift.as_deref(),
     );
-    let given = given(state, io)?;
+    let given = given(state, io, twin.is_drop.clone())?;
     let place = state.place();
     let of_cell = |element: usize| {
         let element = element as u32;
@@ -102,8 +103,8 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
     Ok(())
 }
 
-/// What the device gave each particle.
-fn given(state: &FlipState, io: &Io<'_>) -> Result<Given, SolveError> {
+/// What the device gave each particle; which of them are drops follows from its kinds of cells.
+fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<Given, SolveError> {
     let width = match state.model.settings().density_correction {
         true => 6,
         false => 3,
@@ -123,6 +124,7 @@ fn given(state: &FlipState, io: &Io<'_>) -> Result<Given, SolveError> {
         affine: cloud.affine,
         carried: at(0),
         displacement: at(3),
+        is_drop,
     })
 }
 
@@ -133,7 +135,7 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     };
     let (elements, sorted, step) = (state.elements(), state.sorted(), state.step());
     let twin = twin_push_apart(&state.model, &step, &elements.bricks, sorted);
-    let found = given(state, io)?;
+    let found = given(state, io, before.is_drop.clone())?;
     let (apart, extent) = (state.model.apart(), state.scene.domain.size().max_element());
     let period = state.model.period().0.max_element();
     io.table.each(&PUSHED, 0..state.n, |i| {
@@ -160,18 +162,14 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let (n, elements) = (state.n, state.elements());
-    let faces = elements.faces(&io.before)?;
+    let faces = elements.planes(&io.before, buffers::FACE_VELOCITY)?;
     let (step, start) = (state.step(), &state.sorted().cloud.position);
     let go = |start: &[DVec3]| {
         let (model, bricks) = (&state.model, &elements.bricks);
         twin_advect(model, &step, bricks, start, &faces, &given)
     };
     let twin = go(start);
-    let fastest = faces
-        .velocity
-        .iter()
-        .map(|v| v.length())
-        .fold(0.0, f64::max);
+    let fastest = faces.iter().map(|v| v.length()).fold(0.0, f64::max);
     let grid = state.distance_error();
     let reach = |x: &DVec3| START.of([x.length(), step.length, fastest, grid]);
     let answers: Vec<Moved> = DVec3::AXES

@@ -309,12 +309,12 @@ fn taylor_green(record: &Record<'_>, out: &mut Measured) {
     let k = PI / scale.length;
     let turn = TAU / (k * scale.speed);
     if let (Some((_, first)), Some((end, last))) = (energy.first(), energy.last()) {
-        let viscosity = numerical_viscosity(record.scene, record.substeps, *end);
+        let diffusion = numerical_diffusion(record.scene, record.substeps, *end);
         // Of a Taylor–Green vortex energy falls as e^(−4 ν k² t).
         let decay = -(last / first).ln();
         out.put(
-            "viscosity_ratio",
-            Some(decay / (4.0 * viscosity * k * k * end)),
+            "dissipation_ratio",
+            Some(decay / (4.0 * diffusion * k * k * end)),
         );
         let first = *first;
         let curve = energy.iter().map(|(t, e)| (t / turn, e / first));
@@ -323,7 +323,7 @@ fn taylor_green(record: &Record<'_>, out: &mut Measured) {
 }
 
 /// α Δx² / (6 Δt), m²/s (Zhu and Bridson 2005): what PIC's part does to a flow.
-fn numerical_viscosity(scene: &Scene, substeps: u32, seconds: f64) -> f64 {
+fn numerical_diffusion(scene: &Scene, substeps: u32, seconds: f64) -> f64 {
     match scene.solver.method {
         Method::Pbf => f64::NAN,
         Method::Flip => {

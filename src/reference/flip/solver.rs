@@ -216,7 +216,15 @@ impl Flip {
         });
         let mut given = timings.time("flip/grid_to_particle", || {
             let displacement = displacement.as_deref();
-            grid_to_particle(model, &step, &bricks, &sorted, &faces, displacement)
+            grid_to_particle(
+                model,
+                &step,
+                &bricks,
+                &sorted,
+                &faces,
+                &room.kind,
+                displacement,
+            )
         });
         if displacement.is_some() {
             let pushed = timings.time("flip/push_apart", || {
@@ -228,7 +236,7 @@ impl Flip {
         }
         let moved = timings.time("flip/advect", || {
             let position = &sorted.cloud.position;
-            advect(model, &step, &bricks, position, &faces, &given)
+            advect(model, &step, &bricks, position, &faces.velocity, &given)
         });
         let scale = model.scene.water.rest_density * model.cell_size() / step.length;
         let pressure = waters.by_element(&projected.system, &projected.solution.x);

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     Faces, Model, Room, Sorted, Step,
-    grid::{along, per_cell},
+    grid::{along, neighborhood, per_cell},
     solids,
 };
 use crate::{
@@ -20,9 +20,6 @@ use crate::{
 const LAYER: u32 = 0x7f;
 const KNOWN: u32 = 0x80;
 
-/// In place of a layer: a closed face has its velocity, and gives it to none.
-const CLOSED: u32 = 0x7f;
-
 /// Beyond the stored layer of the upper walls: no face is ever asked for.
 const NO_NEED: u32 = 0x7f_7f7f;
 
@@ -35,6 +32,8 @@ pub struct Given {
     pub affine: Vec<DMat3>,
     /// The grid's velocity where it is, m/s. Shape (particles).
     pub carried: Vec<DVec3>,
+    /// Whether it is a drop: none of the 27 cells about its own is water. Shape (particles).
+    pub is_drop: Vec<bool>,
     /// The density correction's displacement there, metres. Shape (particles).
     pub displacement: Vec<DVec3>,
 }
@@ -72,12 +71,9 @@ pub fn find_change(model: &Model, bricks: &Bricks, room: &Room, faces: &mut Face
             let is_closed = room.open[e][axis] == 0.0;
             // A closed face between solids has no velocity of its own; slot 0 is what lies beyond the domain.
             let is_buried = own == SOLID && (kind == SOLID || before < CELLS);
-            match is_closed && !is_buried {
-                true => CLOSED,
-                false => u32::from(own == FLUID || kind == FLUID),
-            }
+            own == FLUID || kind == FLUID || (is_closed && !is_buried)
         };
-        let layers = (0..3).map(|axis| found(axis) << (8 * axis));
+        let layers = (0..3).map(|axis| u32::from(found(axis)) << (8 * axis));
         faces.layer[e] | layers.sum::<u32>()
     });
     faces.layer = tags;
@@ -184,6 +180,7 @@ pub fn grid_to_particle(
     bricks: &Bricks,
     sorted: &Sorted,
     faces: &Faces,
+    kind: &[u32],
     displacement: Option<&[DVec3]>,
 ) -> Given {
     let is_apic = !sorted.cloud.affine.is_empty();
@@ -196,10 +193,12 @@ pub fn grid_to_particle(
         let (velocity, change) = (values(&faces.velocity), values(&faces.change));
         let shift = displacement.map(values);
         let cell = super::grid::corner(bricks, element);
+        let is_water = |offset| kind[bricks.near(element, offset) as usize] == FLUID;
+        let is_drop = !neighborhood().any(is_water);
         let of_particle = move |i: usize| {
             let place = sorted.cloud.position[i] / size - cell;
             let v = sorted.cloud.velocity[i];
-            let mut given = (DVec3::ZERO, DMat3::ZERO, DVec3::ZERO, DVec3::ZERO);
+            let mut given = (DVec3::ZERO, DMat3::ZERO, DVec3::ZERO, DVec3::ZERO, is_drop);
             let mut rows = [DVec3::ZERO; 3];
             for axis in 0..3 {
                 let [f, g, h] = [0, 1, 2].map(|turn| place[(axis + turn) % 3]);
@@ -242,15 +241,18 @@ pub fn grid_to_particle(
             .collect(),
         carried: all.iter().map(|given| given.2).collect(),
         displacement: all.iter().map(|given| given.3).collect(),
+        is_drop: all.iter().map(|given| given.4).collect(),
     }
 }
 
-/// Where the faces that have a velocity have less of the weight, they say nothing.
-const LEAST_PART: f64 = 1e-3;
-
-/// The grid's velocity at `x`, m/s, by those of the faces about it that have one; `otherwise` where none has or no brick
-/// is.
-fn velocity_at(model: &Model, bricks: &Bricks, faces: &Faces, x: DVec3, otherwise: DVec3) -> DVec3 {
+/// The grid's velocity at `x`, m/s; `otherwise` where no brick is.
+fn velocity_at(
+    model: &Model,
+    bricks: &Bricks,
+    velocity: &[DVec3],
+    x: DVec3,
+    otherwise: DVec3,
+) -> DVec3 {
     let cells = DVec3::from_array(model.cells.map(f64::from));
     let p = (model.period().wrap(x) / model.cell_size()).clamp(DVec3::ZERO, cells);
     let cell = p.min(cells - 1.0).floor();
@@ -293,18 +295,9 @@ fn velocity_at(model: &Model, bricks: &Bricks, faces: &Faces, x: DVec3, otherwis
                 if high[axis] == 1 { t } else { 1.0 - t }
             };
             let there = std::array::from_fn(|axis| ways[axis].0[high[axis]]);
-            let face = bricks.element(there) as usize;
-            let is_there = faces.layer[face] >> (8 * own) & 0xff != 0;
-            let part = weight(0) * weight(1) * weight(2) * f64::from(u8::from(is_there));
-            (part, part * faces.velocity[face][own])
+            weight(0) * weight(1) * weight(2) * velocity[bricks.element(there) as usize][own]
         };
-        let add = |a: (f64, f64), b: (f64, f64)| (a.0 + b.0, a.1 + b.1);
-        let (weights, sum) = (0..8).map(corner).fold((0.0, 0.0), add);
-        if weights > LEAST_PART {
-            sum / weights
-        } else {
-            otherwise[own]
-        }
+        (0..8).map(corner).sum()
     };
     DVec3::new(component(0), component(1), component(2))
 }
@@ -358,7 +351,7 @@ pub fn advect(
     step: &Step<'_>,
     bricks: &Bricks,
     position: &[DVec3],
-    faces: &Faces,
+    velocity: &[DVec3],
     given: &Given,
 ) -> Moved {
     let contact = model.contact_distance();
@@ -366,7 +359,11 @@ pub fn advect(
     let one = |i: usize| {
         let (start, here) = (position[i], given.carried[i]);
         let middle = start + 0.5 * step.length * here;
-        let between = velocity_at(model, bricks, faces, middle, here);
+        // A drop goes on as it flies: the faces on its way may be other water's.
+        let between = match given.is_drop[i] {
+            true => here,
+            false => velocity_at(model, bricks, velocity, middle, here),
+        };
         let mut way = step.length * between + given.displacement[i];
         let distance = way.length();
         let is_capped = distance > model.max_displacement();

@@ -4,12 +4,13 @@
 //! what the solvers compute with.
 
 use super::super::{
-    Effects, Iteration, Method, Wall, budget,
+    Effects, Iteration, Method, Wall,
+    axis::Axis,
+    budget,
     build::{CHEBYSHEV_RELAXATION, RELAXATION},
     flip::{self, Preconditioner, Surface, Transfer},
     key::{Interval, Key, words},
     no_slip,
-    periodic::Axis,
     probe::{self, ProbeKind},
 };
 use crate::domain::sparse_grid;

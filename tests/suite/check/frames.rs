@@ -95,7 +95,7 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
         file: "sphere.obj".into(),
         file_hash: String::new(),
         placement: Placement::default(),
-        mesh: sphere(DVec3::new(0.63, 0.31, 0.57), 0.26),
+        mesh: sphere(SPHERE.0, SPHERE.1),
         holes: Default::default(),
     };
     match speed {
@@ -115,6 +115,9 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
     }
     (scene, start)
 }
+
+/// Centre and radius.
+const SPHERE: (DVec3, f64) = (DVec3::new(0.63, 0.31, 0.57), 0.26);
 
 /// Frames that the sphere's tank is followed over.
 const FRAMES: u32 = 12;
@@ -169,8 +172,13 @@ fn a_sphere_in_a_tank_of_flip_is_within_tolerance() {
         let (scene, start) = tank(Method::Flip, speed);
         let plan = start.plan(&scene, device_limits(&context));
         let solver = Flip::new(&context, &scene, plan, &start.boundary, false).unwrap();
-        let (faults, state) = follow(&context, &scene, &start, solver);
+        let (faults, mut state) = follow(&context, &scene, &start, solver);
         assert!(faults.is_empty(), "{faults}");
+        // Particles hardly touch it by themselves: one is put into it.
+        let time = f64::from(FRAMES) * scene.shot.frame_seconds();
+        let way = speed * time * DVec3::new(0.6, 0.0, 0.8);
+        let within = SPHERE.0 + way + 0.5 * SPHERE.1 * DVec3::Y;
+        state.position[0] = within.as_vec3().to_array();
         push_is_seen(&context, &scene, &start, &state, "flip/advect", "position");
     }
 }
@@ -252,23 +260,14 @@ fn far_walls_are_within_tolerance_and_fail_where_they_should() {
         "pbf/compute_delta",
         &["work of walls"],
     );
-    let of_flip = [
-        control(
-            "flip/survey",
-            "cell + 2u == params.cells",
-            "cell + 3u == params.cells",
-            "flip/survey",
-            &["bricks with water"],
-        ),
-        control(
-            "flip/cut_cells",
-            "select(vec3i(-1), vec3i(1), is_low)",
-            "select(vec3i(1), vec3i(-1), is_low)",
-            "flip/cut_cells",
-            &["kind of cell"],
-        )
-        .and(SYSTEM),
-    ];
+    let of_flip = [control(
+        "flip/find_water",
+        "select(vec3i(-1), vec3i(1), !is_plane_open(cell))",
+        "select(vec3i(1), vec3i(-1), !is_plane_open(cell))",
+        "flip/find_water",
+        &["distance of the surface"],
+    )
+    .and(SYSTEM)];
     let chebyshev = |scene: &mut Scene| {
         let settings = scene.solver.pbf.as_mut().unwrap();
         (settings.iteration, settings.relaxation) = (Iteration::Chebyshev, 0.7);

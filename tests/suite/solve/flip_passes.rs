@@ -66,7 +66,8 @@ fn particle_to_grid_gap(spoil: f64) -> (f64, u32) {
                 for x in (1..14).filter(|x| (x + y + z) % 3 == 0) {
                     let cell = [x, y, z];
                     let (momentum, sum, count) = naive_face(&particles, component, cell, spoil);
-                    if sum < 0.5 {
+                    // Within the water: beyond it the velocity's change is carried on from other faces.
+                    if sum < 4.5 {
                         continue;
                     }
                     let old = after.at(component, cell) - change.at(component, cell);

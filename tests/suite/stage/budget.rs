@@ -268,7 +268,8 @@ fn the_work_of_walls_is_that_of_the_reference() {
     }
 }
 
-/// Hard case 14: the lid meets the water in frame 20.
+/// Hard case 14: the lid meets the water in frame 20; from frame 15 on it leaves less than half a cell of air, which FLIP cannot
+/// tell from water.
 #[test]
 fn a_lid_on_sealed_water_is_reported_as_incompatible() {
     let gpu = opened(&Context::open(None).unwrap());
@@ -277,7 +278,7 @@ fn a_lid_on_sealed_water_is_reported_as_incompatible() {
         let pressed = whole(device, &scene);
         assert!(pressed.error.is_none(), "{:?}", pressed.error);
         let squeezed = |report: &StepReport| report.projection.unwrap().incompatible;
-        let (before, after) = pressed.reports.split_at(18);
+        let (before, after) = pressed.reports.split_at(14);
         assert!(before.iter().all(|report| squeezed(report) == 0.0));
         // 0.5 m/s on 0.6 m.
         let most = after.iter().map(squeezed).fold(0.0, f64::max);
@@ -285,9 +286,9 @@ fn a_lid_on_sealed_water_is_reported_as_incompatible() {
     }
     // Until then the water keeps its volume to one part in a hundred.
     let open = load("14-sealed", &["budget.volume=0.01"]);
-    let open = bake(&gpu, &open, "1-18");
+    let open = bake(&gpu, &open, "1-14");
     assert!(open.error.is_none(), "{:?}", open.error);
-    assert_eq!(open.reports.len(), 18);
+    assert_eq!(open.reports.len(), 14);
     // PBF has no pressure to be incompatible: what is squeezed is too dense, and so is told.
     let scene = load("14-sealed", &[SOLVERS[0], "budget.density_error_mean=0.1"]);
     let pressed = whole(&gpu, &scene);
@@ -373,7 +374,7 @@ fn nothing_leaves_the_domain_and_a_ledger_that_does_not_close_ends_the_bake() {
             SOLVERS[1],
             spoil(
                 "flip/advect",
-                "position[i] = vec4f(clamp(x, low, high), 1.0);",
+                "position[i] = vec4f(x, 1.0);",
                 "position[i] = vec4f(x + 10.0, 1.0);",
             ),
             spoil(

@@ -125,10 +125,6 @@ pub fn of_cells(places: &[DVec3], size: DVec3, dx: f64) -> Vec<f64> {
     let mut densities = Vec::new();
     for k in 0..cells.x * cells.y * cells.z {
         let cell = IVec3::new(k % cells.x, k / cells.x % cells.y, k / (cells.x * cells.y));
-        let is_own = |x: &&DVec3| (**x / dx).floor().as_ivec3() == cell;
-        if !places.iter().any(|x| is_own(&x)) {
-            continue;
-        }
         let center = cell.as_dvec3() + 0.5;
         let hats = |x: &DVec3| {
             (1.0 - (*x / dx - center).abs())
@@ -141,7 +137,11 @@ pub fn of_cells(places: &[DVec3], size: DVec3, dx: f64) -> Vec<f64> {
             let walls = [cell[axis] == 0, cell[axis] + 1 == cells[axis]];
             1.0 - 0.125 * walls.into_iter().filter(|&is_beside| is_beside).count() as f64
         };
-        densities.push(sum / 8.0 / (room(0) * room(1) * room(2)));
+        let density = sum / 8.0 / (room(0) * room(1) * room(2));
+        // Less than half full at its centre it is air.
+        if density >= 0.5 {
+            densities.push(density);
+        }
     }
     densities
 }

@@ -134,8 +134,8 @@ impl Measure {
                 ("speed", "largest speed, m/s"),
             ],
             Self::TaylorGreen => &[(
-                "viscosity_ratio",
-                "decay of the energy over that of the numerical viscosity α Δx² / (6 Δt)",
+                "dissipation_ratio",
+                "decay of the energy over that of the numerical diffusion α Δx² / (6 Δt)",
             )],
         }
     }

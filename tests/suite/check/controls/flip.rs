@@ -226,7 +226,10 @@ pub const FLIP: &[Control] = &[
         "sort/stabilize",
         "flip/gather_faces",
         "flip/gather_centers",
+        "flip/find_water",
+        "flip/find_excess",
         "flip/grid_to_particle",
+        "flip/push_apart",
         "flip/advect",
     ]),
     control(
@@ -241,7 +244,10 @@ pub const FLIP: &[Control] = &[
         "sort/stabilize",
         "flip/gather_faces",
         "flip/gather_centers",
+        "flip/find_water",
+        "flip/find_excess",
         "flip/grid_to_particle",
+        "flip/push_apart",
         "flip/advect",
     ]),
     control(
@@ -253,8 +259,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/cut_cells",
-        "select(SOLID, select(AIR",
-        "select(AIR, select(AIR",
+        "select(SOLID, AIR, is_open)",
+        "select(AIR, AIR, is_open)",
         "flip/cut_cells",
         &["kind of cell"],
     ),
