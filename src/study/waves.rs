@@ -105,7 +105,7 @@ pub fn crest(samples: &[(f64, f64)], part: f64) -> Option<(f64, f64)> {
     }
     let [level, slope, bend] = solved(normal)?;
     let x = -0.5 * slope / bend;
-    (bend < 0.0 && x.abs() <= 1.0).then(|| (from + x * width, level + 0.5 * slope * x))
+    (bend < 0.0 && x.abs() <= 1.0).then_some((from + x * width, level + 0.5 * slope * x))
 }
 
 /// Slope of the straight line that fits points best by least squares; `None` of fewer than two, or of one x.
