@@ -305,7 +305,7 @@ pub(super) fn warned(warning: &str) -> (String, Value) {
 /// Mean density error above which the water is plainly wrong; splashes stay below 0.1.
 const DENSE: f64 = 0.15;
 
-/// Density error of a cell above which water has leaked or run together there; FLIP's splashes stay below 0.6.
+/// Density error of a cell above which water has leaked or run together there; FLIP's splashes stay below 0.9.
 const CROWDED: f64 = 1.0;
 
 /// Mean divergence of a pocket against the largest anywhere, above which it is not rounding.

@@ -44,7 +44,7 @@ const FLIP_ENERGY: f64 = 0.1;
 /// with Chebyshev's.
 const PBF_ENERGY: f64 = 0.25;
 
-/// FLIP's. Splashes of the shipped scenes come to 0.6, water that leaked along a wall to 24.
+/// FLIP's. Splashes of the shipped scenes come to 0.9, water that leaked along a wall to 24.
 const DENSITY_ERROR_MAX: f64 = 4.0;
 
 /// FLIP's. A dam that breaks, and a wave that meets a wall, come to 2; what a leak throws out of still water to 20 and more.

@@ -80,7 +80,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         shot: &shot,
         solver: &solver,
         solids: &solids,
-        moving: &moving_solids,
+        moving: moving_solids.iter().map(|solid| &solid.placed).collect(),
         is_moving: &is_moving,
     };
     let probes = probe::build_all(doc, &spec.probe, &around)?;

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::{
     Iteration, Method, PlacedMesh, Scene, Shot, Solver, Wall, document::Document,
-    error::SceneError, moving_solid::MovingSolid, words::extent,
+    error::SceneError, words::extent,
 };
 use crate::domain::{bounds::Bounds, probe::Rate, sparse_grid::EDGE, surface::MAX_BRICKS};
 
@@ -207,7 +207,8 @@ pub(super) struct Around<'a> {
     pub(super) shot: &'a Shot,
     pub(super) solver: &'a Solver,
     pub(super) solids: &'a [PlacedMesh],
-    pub(super) moving: &'a [MovingSolid],
+    /// Those that move, as they are placed at the start.
+    pub(super) moving: Vec<&'a PlacedMesh>,
     /// Of the scene's solids in its own order, whether each moves.
     pub(super) is_moving: &'a [bool],
 }
@@ -374,7 +375,7 @@ fn force(
             };
             let index = before.iter().filter(|&&other| other == moves).count();
             if moves {
-                let mesh = &around.moving[index].placed.mesh;
+                let mesh = &around.moving[index].mesh;
                 (Bearer::MovingSolid(index), mesh.bounds())
             } else {
                 (Bearer::Solid(index), around.solids[index].mesh.bounds())
