@@ -8,6 +8,7 @@ mod force;
 pub mod grids;
 pub mod keys;
 pub mod look;
+pub mod measure;
 mod motion_spec;
 pub mod moving_solid;
 pub mod no_slip;

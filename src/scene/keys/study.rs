@@ -2,7 +2,7 @@
 
 use super::super::{
     key::{Interval, Key, words},
-    study::validation::Measure,
+    measure::Measure,
 };
 
 pub(in super::super) const KEYS: &[Key] = &[

@@ -33,8 +33,6 @@
 //! at = [[0.84, 1.22], [1.43, 1.67]]
 //! ```
 
-mod measure;
-
 use std::path::Path;
 
 use serde::Deserialize;
@@ -45,7 +43,7 @@ use super::{
     RunsOn, SceneFile, StudyFileError, load_with,
 };
 
-pub use measure::Measure;
+pub use crate::scene::measure::Measure;
 
 type Result<T> = std::result::Result<T, SceneError>;
 

@@ -23,7 +23,7 @@ pub enum Measure {
 
 impl Measure {
     /// As studies name them.
-    pub(in super::super::super) const NAMED: [(&'static str, Self); 8] = [
+    pub(super) const NAMED: [(&'static str, Self); 8] = [
         ("regular_waves", Self::RegularWaves),
         ("solitary_wave", Self::SolitaryWave),
         ("dam_break", Self::DamBreak),
