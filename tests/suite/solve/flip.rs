@@ -410,12 +410,22 @@ fn water_stays_out_of_solids() {
         &solid,
         capacity(&scene, &particles),
     );
+    let mut before = f64::INFINITY;
     for frame in 0..40 {
         let (state, report) = solver.advance().unwrap();
         // The trilinear distance of a plane is the plane's; positions round.
         assert!(depth(&state) > 0.0, "frame {frame}: {}", depth(&state));
-        // What starts inside is thrown out: a few drops at over 12 m/s, which nothing slows but gravity.
-        assert!(report.max_speed < 25.0, "frame {frame}: {report:?}");
+        // The water slides into the corner of two walls, at 4.5 m/s at the most, and shoots up from there: particles at the
+        // walls' edge reach 12 m/s, as jets of waves at walls do (flip-through, Cooker and Peregrine 1990). Nothing is
+        // faster than three times the fall from the ceiling.
+        let fall = (2.0 * 9.81 * 16.0 * DX).sqrt();
+        assert!(report.max_speed < 3.0 * fall, "frame {frame}: {report:?}");
+        // What starts inside is lifted out by the density correction, within ten frames. No jet is for nothing from then on.
+        let energy = report.kinetic_energy + report.potential_energy;
+        if frame >= 10 {
+            assert!(energy < before, "frame {frame}: {before} {report:?}");
+        }
+        before = energy;
     }
 }
 
