@@ -20,6 +20,11 @@ const AIR = 0u;
 const FLUID = 1u;
 const SOLID = 2u;
 
+// Least distance of the surface from the centre of a cell of water, in cells. The pressure there is by it alone, and every
+// way to the air from there has to know of the same one: with a least θ of each way in its place, water whose surface passes
+// a centre was pushed sideways by up to half of gravity.
+const LEAST_DEPTH = 0.02;
+
 // Density before the walls and solids that a cell's centre lies in: in the cell inward of the walls, and where that is
 // buried too, the mean over the faces that lead out of it, by how far they are open.
 fn density_before(element: u32, cell: vec3f) -> f32 {
@@ -69,6 +74,7 @@ fn main(
     // Across a flat surface the density is 1/2 at it, and falls as s - s²/2 with the distance s in cells.
     let off = clamp(relative, 0.0, 1.0) - 0.5;
     let inside = sign(off) * (1.0 - sqrt(max(1.0 - 2.0 * abs(off), 0.0)));
-    liquid_distance[element] = -inside * params.cell_size;
+    let depth = select(inside, max(inside, LEAST_DEPTH), is_water);
+    liquid_distance[element] = -depth * params.cell_size;
 #endif
 }

@@ -84,7 +84,15 @@ impl Measure {
                 ),
                 (
                     "profile_error",
-                    "profile, largest |h − Ritter's| over h0 where h > 0.1 h0, mean of T from 4 to 8",
+                    "profile, mean |h − Ritter's| over h0 from the still water to h = 0.1 h0, mean of T from 4 to 8",
+                ),
+                (
+                    "profile_worst",
+                    "the largest of it, beside the kink where the still water begins",
+                ),
+                (
+                    "profile_worst_falls",
+                    "that of T from 7 to 8 over that of T from 4 to 5",
                 ),
             ],
             Self::BlockImpact => &[
@@ -135,7 +143,7 @@ impl Measure {
             ],
             Self::TaylorGreen => &[(
                 "dissipation_ratio",
-                "decay of the energy over that of the numerical diffusion α Δx² / (6 Δt)",
+                "decay of the energy over that of PIC and of the projection, α Δx² / (6 Δt) + U² Δt / 8",
             )],
         }
     }

@@ -11,7 +11,7 @@ use crate::{
     domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance},
     reference::flip::{
         Model, Room, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
-        find_change as twin_find_change, find_excess as twin_find_excess,
+        find_change as twin_find_change, find_depth, find_excess as twin_find_excess,
         find_water as twin_find_water, friction_rates, gather_centers as twin_gather_centers,
         gather_faces as twin_gather_faces, is_near_half, wall_friction as twin_wall_friction,
     },
@@ -231,7 +231,8 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
 pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, step, room) = (state.elements(), state.step(), state.room());
     let (bricks, density) = (&elements.bricks, state.density());
-    let (twin, distances) = twin_find_water(&state.model, &step, bricks, room, density);
+    let depth = find_depth(&step, bricks, room, density);
+    let (twin, distances) = twin_find_water(&state.model, bricks, room, &depth);
     let cut = CUT.of([state.place()]);
     let active = elements.active();
     // A cell's own density, where nothing is averaged, decides the same on both sides.
@@ -243,11 +244,8 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     });
     let looked = |e: usize| looked[e - active.start];
     let size = state.model.cell_size();
-    let moved = |e: usize| surface_moved(distances[e] / size, looked(e).0);
-    let is_tie = |e: usize| {
-        let level = (distances[e] / size).abs();
-        looked(e).1 || (level <= moved(e) && density[e] != 0.5)
-    };
+    let moved = |e: usize| surface_moved(depth[e], looked(e).0);
+    let is_tie = |e: usize| looked(e).1 || (depth[e].abs() <= moved(e) && density[e] != 0.5);
     let kind = io.after.get(buffers::CELL_KIND, elements.cells)?;
     io.table.each(&WATER, active.clone(), |e| {
         (!is_tie(e)).then(|| pair(e, kind[e], f64::from(twin[e]), []))
@@ -255,7 +253,7 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     if state.model.settings().surface == Surface::GhostFluid {
         let distance = elements.scalars(&io.after, buffers::LIQUID_DISTANCE)?;
         io.table.each(&DISTANCE, active.clone(), |e| {
-            (!looked(e).1).then(|| pair(e, distance[e], distances[e], [moved(e), size]))
+            (!is_tie(e)).then(|| pair(e, distance[e], distances[e], [moved(e), size]))
         });
     }
     let room = Room {

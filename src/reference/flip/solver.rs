@@ -6,7 +6,7 @@ use super::{
     Centers, Cloud, Faces, Model, Room, Sorted, Waters, advect, assign_cells, cut_cells,
     density_source,
     effects::{self, Water},
-    extrapolate, find_change, find_excess, find_water, gather_centers, gather_faces,
+    extrapolate, find_change, find_depth, find_excess, find_water, gather_centers, gather_faces,
     grid_to_particle, push_apart, reorder, survey, wall_friction,
 };
 use crate::{
@@ -175,7 +175,12 @@ impl Flip {
             gather_centers(model, &step, &bricks, &sorted, &room)
         });
         let (kind, distance) = timings.time("flip/find_water", || {
-            find_water(model, &step, &bricks, &room, &density)
+            find_water(
+                model,
+                &bricks,
+                &room,
+                &find_depth(&step, &bricks, &room, &density),
+            )
         });
         room.kind = kind;
         let excess = match model.settings().density_correction {

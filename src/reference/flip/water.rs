@@ -26,6 +26,10 @@ const OTHER_SHARE: f64 = 0.125;
 /// A cell that is open by less has its centre in a wall or a solid; a wall through the centre is beside it.
 const HALF: f64 = 0.5 - ON_FACE;
 
+/// Least distance of the surface from the centre of a cell of water, in cells: every way to the air from there knows of the
+/// same one, as the pressure there does.
+const LEAST_DEPTH: f64 = 0.02;
+
 /// What cell centres know of the water about them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Centers {
@@ -161,34 +165,44 @@ fn density_before(
     }
 }
 
-/// Which cells are water, those at whose centre the density is at least half of the water's, and how far the surface is:
-/// kinds and metres. Shapes (elements).
-///
-/// Whether a cell has particles does not count. One whose centre lies within a wall or a solid is what the water before it is.
-pub fn find_water(
-    model: &Model,
-    step: &Step<'_>,
-    bricks: &Bricks,
-    room: &Room,
-    density: &[f64],
-) -> (Vec<u32>, Vec<f64>) {
-    let cells = per_cell(bricks, |element| {
+/// How deep below the surface cell centres are, in cells, up to one either way; that of the water before it where a centre
+/// lies within a wall or a solid. Shapes (elements).
+pub fn find_depth(step: &Step<'_>, bricks: &Bricks, room: &Room, density: &[f64]) -> Vec<f64> {
+    per_cell(bricks, |element| {
         let relative = if is_buried(step, bricks, room, element) {
             density_before(step, bricks, room, density, element)
         } else {
             density[element as usize]
         };
-        let is_water = relative >= 0.5 && element < CELLS * (bricks.wet + 1);
+        // Across a flat surface the density is 1/2 at it, and falls as s − s²/2 with the distance s in cells.
+        let off = relative.clamp(0.0, 1.0) - 0.5;
+        let way = 1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt();
+        if off == 0.0 { 0.0 } else { way * off.signum() }
+    })
+}
+
+/// Which cells are water, those whose centre is not above the surface, and how far the surface is: kinds and metres. Shapes
+/// (elements). Whether a cell has particles does not count.
+pub fn find_water(
+    model: &Model,
+    bricks: &Bricks,
+    room: &Room,
+    depth: &[f64],
+) -> (Vec<u32>, Vec<f64>) {
+    let cells = per_cell(bricks, |element| {
+        let depth = depth[element as usize];
+        let is_water = depth >= 0.0 && element < CELLS * (bricks.wet + 1);
         let kind = match room.kind[element as usize] {
             SOLID => SOLID,
             _ if is_water => FLUID,
             _ => AIR,
         };
-        // Across a flat surface the density is 1/2 at it, and falls as s − s²/2 with the distance s in cells.
-        let off = relative.clamp(0.0, 1.0) - 0.5;
-        let way = 1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt();
-        let inside = if off == 0.0 { 0.0 } else { way * off.signum() };
-        (kind, -inside * model.cell_size())
+        let kept = if is_water {
+            depth.max(LEAST_DEPTH)
+        } else {
+            depth
+        };
+        (kind, -kept * model.cell_size())
     });
     cells.into_par_iter().unzip()
 }

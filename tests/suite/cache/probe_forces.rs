@@ -60,11 +60,21 @@ name = "wall"
 kind = "force"
 solid = "-x"
 about = [0.0, 0.0, 0.0]
+"#;
+
+/// All of it meets water where nothing stands on it.
+const FLOOR: &str = r#"
 [[probe]]
 name = "floor"
 kind = "force"
 solid = "-y"
 "#;
+
+/// The tank without its solids.
+fn bare() -> String {
+    let still = SCENE.split("[[solid]]").next().unwrap();
+    format!("{still}{}", &SCENE[SCENE.find("[solver]").unwrap()..])
+}
 
 /// ρ g, N/m³.
 const WEIGHT: f64 = 9810.0;
@@ -76,22 +86,30 @@ const TOLERANCE: f64 = 2.0 * (1.0 / 16.0 + 1.0 / 8.0) * (0.1 / 1.1) * (0.1 / 1.1
 
 fn water_at_rest_bears(device: &str) {
     let scene = format!("{SCENE}{PROBES}");
-    let job = Job::of(&[("tank.toml", &scene), ("cube.obj", CUBE)]);
+    let empty = format!("{}{FLOOR}", bare());
+    let job = Job::of(&[
+        ("tank.toml", &scene),
+        ("empty.toml", &empty),
+        ("cube.obj", CUBE),
+    ]);
     let bake = format!("bake tank.toml {device} -o");
     job.expect(0, &format!("{bake} whole"));
+    job.expect(0, &format!("bake empty.toml {device} -o empty"));
     let rows = |name: &str| -> Vec<Vec<Option<f64>>> {
-        let text =
-            fs::read_to_string(job.path("whole/probes").join(format!("{name}.csv"))).unwrap();
+        let cache = if name == "floor" { "empty" } else { "whole" };
+        let file = job.path(cache).join(format!("probes/{name}.csv"));
+        let text = fs::read_to_string(file).unwrap();
         let number = |field: &str| (!field.is_empty()).then(|| field.parse().unwrap());
         let rows = text.lines().skip(1);
         rows.map(|line| line.split(',').map(number).collect())
             .collect()
     };
     let depth = 1.1;
-    // What is displaced; what stands above, as no water comes under it; ½ ρ g H² B.
+    // What is displaced; what stands above, as no water comes under it; ½ ρ g H² B; all that stands on the floor.
     let lift = WEIGHT * 0.4f64.powi(3);
     let load = -WEIGHT * (depth - 0.3) * 0.3 * 0.3;
     let push = -0.5 * WEIGHT * depth * depth * 1.2;
+    let weight = -WEIGHT * depth * 1.6 * 1.2;
     let expected = [
         ("hung", [0.0, lift, 0.0], [0.0, 0.0, 0.0]),
         ("standing", [0.0, load, 0.0], [0.0, 0.0, 0.0]),
@@ -101,6 +119,7 @@ fn water_at_rest_bears(device: &str) {
             [push, 0.0, 0.0],
             [0.0, 0.6 * push, -depth / 3.0 * push],
         ),
+        ("floor", [0.0, weight, 0.0], [0.0, 0.0, 0.0]),
     ];
     for (name, force, moment) in expected {
         let rows = rows(name);
@@ -200,9 +219,7 @@ fn a_force_that_cannot_be_is_told() {
         );
     }
     // PBF has none, and says so.
-    let still = SCENE.split("[[solid]]").next().unwrap();
-    let rest = &SCENE[SCENE.find("[solver]").unwrap()..];
-    let text = format!("{still}{rest}\n[[probe]]\nkind = \"force\"\nsolid = \"-x\"\n");
+    let text = format!("{}\n[[probe]]\nkind = \"force\"\nsolid = \"-x\"\n", bare());
     let parse = |set: &[String]| Scene::parse(&text, Path::new("a.toml"), &job.path(""), set);
     let error = parse(&["solver.method=pbf".to_owned()])
         .unwrap_err()

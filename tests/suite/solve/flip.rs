@@ -5,6 +5,7 @@ use crate::support::{context, jitter, lattice};
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, motion::Motion, particles::Particles, solver::Solver},
+    gpu::adapter::{Context, Spoil},
     scene::{
         Scene, Wall, WaveMaker, effects,
         flip::{Preconditioner, Transfer},
@@ -347,6 +348,45 @@ fn still_water_in_a_domain_of_any_size() {
             "{part}: {height} {settled}"
         );
     }
+}
+
+/// Largest acceleration over g s of water at rest whose surface rises by s = 0.02 along the tank, and passes the centres of
+/// cells somewhere on its way: over ten such levels.
+fn push_of_a_gentle_slope(context: &Context) -> f64 {
+    const SLOPE: f64 = 0.02;
+    let mut scene = scene([32.0, 12.0, 3.0]);
+    scene.shot.frames_per_second = 50.0;
+    (0..10)
+        .map(|level| {
+            let mut particles = block([0, 0, 0], [32, 8, 3]);
+            for x in &mut particles.position {
+                // Of 8 cells, half a cell more in the middle.
+                let height = 8.5 + 0.002 * f64::from(level) + SLOPE * (f64::from(x[0]) / DX - 16.0);
+                x[1] *= (height / 8.0) as f32;
+            }
+            let (_, report) = run(context, &scene, &particles, 1);
+            report.max_speed * 50.0 / (9.81 * SLOPE)
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Water is pushed along its surface by g s, and by less the deeper it is.
+#[test]
+fn a_surface_that_passes_centres_of_cells_pushes_by_its_slope() {
+    let context = context();
+    let push = push_of_a_gentle_slope(&context);
+    println!("{push}");
+    // Densities of particles know a slope of a fiftieth to within itself.
+    assert!(push < 2.0, "{push}");
+    // Negative control: where each way to the air has a least part of its own.
+    let mut spoiled = context;
+    spoiled.spoil = Some(Spoil {
+        pass: "flip/find_water",
+        from: "max(inside, LEAST_DEPTH)",
+        to: "inside",
+    });
+    let push = push_of_a_gentle_slope(&spoiled);
+    assert!(push > 2.0, "{push}");
 }
 
 #[test]

@@ -110,8 +110,15 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/find_water",
-        "-inside * params.cell_size",
-        "inside * params.cell_size",
+        "-depth * params.cell_size",
+        "depth * params.cell_size",
+        "flip/find_water",
+        &["distance of the surface"],
+    ),
+    control(
+        "flip/find_water",
+        "LEAST_DEPTH = 0.02",
+        "LEAST_DEPTH = 0.5",
         "flip/find_water",
         &["distance of the surface"],
     ),

@@ -167,7 +167,7 @@ fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_flip() {
         ),
         spoil(
             "flip/find_water",
-            "liquid_distance[element] = -inside",
+            "liquid_distance[element] = -depth",
             concat!("liquid_distance[element] = ", nan!("element"), " - inside"),
         ),
         spoil(
