@@ -1,10 +1,36 @@
 //! Numbers of the FLIP model that the GPU solver and its reference share.
 
+use glam::DVec3;
+
+use super::bounds::Bounds;
+
 /// Particles keep this part of their spacing from walls and solids; at rest the lattice stands at 0.5.
 pub const CONTACT: f64 = 0.1;
 
 /// Nearer than this to a cell's face, in cells, counts as on it: positions of thousands of cells in f32 round below it.
 pub const ON_FACE: f64 = 1e-3;
+
+/// A cell that is open by less has its centre in a wall or a solid; a wall through the centre is beside it.
+pub const HALF: f64 = 0.5 - ON_FACE;
+
+/// Open part along each axis of the cell whose least corner is `cell`, of what walls at `cut` leave; all in cells.
+pub fn open_extent(cell: DVec3, cut: &Bounds) -> DVec3 {
+    let length = (cell + 1.0).min(cut.max) - cell.max(cut.min);
+    DVec3::from_array(length.to_array().map(|length| {
+        if length > 1.0 - ON_FACE {
+            1.0
+        } else if length < ON_FACE {
+            0.0
+        } else {
+            length
+        }
+    }))
+}
+
+/// Part of a cell that solids leave of what walls do, from its open `volume`.
+pub fn part_of_solids(extent: DVec3, volume: f64) -> f64 {
+    volume / extent.element_product().max(1e-6)
+}
 
 /// Particles that are nearer to each other than this part of their spacing are pushed apart.
 const APART: f64 = 0.9;

@@ -54,7 +54,10 @@ impl Measure {
             Self::RegularWaves => &[
                 ("height_ratio", "wave height over stroke, H/S"),
                 ("wave_length", "wave length, m"),
-                ("speed_ratio", "largest speed anywhere over the paddle's"),
+                (
+                    "speed_ratio",
+                    "largest speed up to the last gauge over the paddle's",
+                ),
             ],
             Self::SolitaryWave => &[
                 ("height", "height of the crest over the depth, H/d"),
@@ -97,7 +100,7 @@ impl Measure {
             ],
             Self::BlockImpact => &[
                 ("arrival", "water reaches H2, s"),
-                ("height_2", "highest at H2, m"),
+                ("height_2", "H2, largest mean of 50 ms, m"),
                 ("height_4_1s", "H4 at 1 s, m"),
                 ("height_4_2s", "H4 at 2 s, m"),
                 ("height_4_4s", "H4 at 4 s, m"),

@@ -1,6 +1,6 @@
 //! What a benchmark keeps of each frame.
 
-use glam::DVec2;
+use glam::{DVec2, Vec3};
 
 use crate::{
     domain::{
@@ -113,6 +113,14 @@ impl<'a> Record<'a> {
         };
         let volume = self.scene.particle_spacing().powi(3);
         match self.benchmark.measure {
+            // The largest speed between the paddle and the last gauge: at the far wall waves double as they turn.
+            Measure::RegularWaves => {
+                let last = self.gauges().iter().map(|at| at.x).fold(0.0, f64::max);
+                let speed = |v: &[f32; 3]| Vec3::from_array(*v).as_dvec3().length();
+                let both = along().zip(&particles.velocity);
+                let seen = both.filter(|(x, _)| *x <= last);
+                vec![seen.map(|(_, v)| speed(v)).fold(0.0, f64::max)]
+            }
             // The front.
             Measure::DamBreak => {
                 let spacing = self.scene.particle_spacing();

@@ -30,4 +30,6 @@ pub use to_particles::{
     Given, Moved, advect, extrapolate, find_change, grid_to_particle, push_apart,
 };
 pub use wall_friction::{friction_rates, wall_friction};
-pub use water::{Centers, find_depth, find_excess, find_water, gather_centers, is_near_half};
+pub use water::{
+    Centers, find_buried, find_depth, find_excess, find_water, gather_centers, is_near_half,
+};

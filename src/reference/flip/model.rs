@@ -4,6 +4,7 @@ use glam::{BVec3, DVec3};
 
 use super::solids::Solid;
 pub(super) use crate::domain::flip::ON_FACE;
+use crate::domain::flip::open_extent;
 use crate::{
     domain::{
         boundary::Boundary,
@@ -189,16 +190,7 @@ impl Model {
 impl Step<'_> {
     /// Open part of a cell's extent along each axis.
     pub(super) fn open_extent(&self, cell: DVec3) -> DVec3 {
-        let length = (cell + 1.0).min(self.cut.max) - cell.max(self.cut.min);
-        DVec3::from_array(length.to_array().map(|length| {
-            if length > 1.0 - ON_FACE {
-                1.0
-            } else if length < ON_FACE {
-                0.0
-            } else {
-                length
-            }
-        }))
+        open_extent(cell, &self.cut)
     }
 
     /// Whether the planes of a cell's lower faces lie in the open.

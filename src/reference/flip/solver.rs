@@ -6,8 +6,8 @@ use super::{
     Centers, Cloud, Faces, Model, Room, Sorted, Waters, advect, assign_cells, cut_cells,
     density_source,
     effects::{self, Water},
-    extrapolate, find_change, find_depth, find_excess, find_water, gather_centers, gather_faces,
-    grid_to_particle, push_apart, reorder, survey, wall_friction,
+    extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
+    gather_faces, grid_to_particle, push_apart, reorder, survey, wall_friction,
 };
 use crate::{
     domain::{
@@ -45,6 +45,8 @@ pub struct Flip {
 struct Field {
     bricks: Bricks,
     kind: Vec<u32>,
+    /// Whether their centre lies within a wall or a solid.
+    is_buried: Vec<bool>,
     /// Pa, by element.
     pressure: Vec<f64>,
 }
@@ -313,7 +315,9 @@ impl Flip {
             };
             elapsed += substep.length;
             *cloud = trace.after;
+            let step = self.model.step(&substep);
             self.field = Some(Field {
+                is_buried: find_buried(&step, &trace.bricks, &trace.room),
                 bricks: trace.bricks,
                 kind: trace.room.kind,
                 pressure: trace.pressure,
@@ -338,6 +342,7 @@ impl Flip {
             cells: self.model.cells,
             cell_size: self.model.cell_size(),
             kind: &field.kind,
+            is_buried: &field.is_buried,
             pressure: &field.pressure,
             rise: self.model.scene.water.rise(),
         })

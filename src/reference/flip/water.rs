@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use super::{
     Model, Room, Sorted, Step,
     grid::{along, corner, neighborhood, per_cell},
-    model::ON_FACE,
     to_grid::hats,
 };
 use crate::domain::{
     bricks::{Bricks, CELLS},
+    flip::{HALF, part_of_solids},
     poisson::{AIR, FLUID, SOLID},
 };
 
@@ -22,9 +22,6 @@ const LEAST_ROOM: f64 = 0.02;
 /// Mean of a hat over the cell of its centre, and over the ones beside it.
 const OWN_SHARE: f64 = 0.75;
 const OTHER_SHARE: f64 = 0.125;
-
-/// A cell that is open by less has its centre in a wall or a solid; a wall through the centre is beside it.
-const HALF: f64 = 0.5 - ON_FACE;
 
 /// Least distance of the surface from the centre of a cell of water, in cells: every way to the air from there knows of the
 /// same one, as the pressure there does.
@@ -100,7 +97,7 @@ fn open_parts(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> [f
     let extent = step.open_extent(corner(bricks, element));
     let part = match step.solids.is_empty() {
         true => 1.0,
-        false => room.volume[element as usize] / extent.element_product().max(1e-6),
+        false => part_of_solids(extent, room.volume[element as usize]),
     };
     [extent.x, extent.y, extent.z, part]
 }
@@ -109,6 +106,11 @@ fn open_parts(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> [f
 fn is_buried(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> bool {
     let parts = open_parts(step, bricks, room, element);
     parts.into_iter().any(|part| part < HALF)
+}
+
+/// Which cells have their centre within a wall or a solid. Shape (elements).
+pub fn find_buried(step: &Step<'_>, bricks: &Bricks, room: &Room) -> Vec<bool> {
+    per_cell(bricks, |element| is_buried(step, bricks, room, element))
 }
 
 /// Whether rounding of `error` may decide where the centre of a cell, or of one of those about it, lies.

@@ -65,6 +65,8 @@ pub struct Flip {
     frame: u32,
     /// Of the last substep.
     bricks: Bricks,
+    /// The walls that cut its cells, in cells.
+    cut: Bounds,
 }
 
 /// What `flip/survey` found.
@@ -131,6 +133,7 @@ impl Flip {
             pressure: pressure_solver(scene, &plan),
             timer: is_timed.then(|| Timer::new(context)),
             bricks,
+            cut: step::cut(scene, &frame),
             program,
             plan,
             scene: scene.clone(),
@@ -250,6 +253,7 @@ impl Flip {
         let bricks = &self.bricks;
         let params = step::params(&self.scene, &self.plan, bricks, substep);
         let groups = groups(&self.program, params.wet_cells, params.active_cells, layers);
+        self.cut = step::cut(&self.scene, substep);
         self.program.upload(PARAMS, 0, &[params]);
         self.program.upload(BRICKS, 0, &bricks.records);
         self.program.upload(BRICK_SLOT, 0, &bricks.table);

@@ -1,9 +1,8 @@
 //! What a substep's passes know.
 
-use glam::DVec3;
-
 use crate::{
     domain::{
+        bounds::Bounds,
         bricks::{Bricks, CELLS, table_dims},
         flip::{CAP, CONTACT, apart, stored_cells},
     },
@@ -11,20 +10,28 @@ use crate::{
     solve::{params::FlipParams, plan::Plan},
 };
 
+/// The walls that cut a substep's cells, in cells.
+pub(super) fn cut(scene: &Scene, step: &Substep) -> Bounds {
+    let (walls, size) = (scene.walls(step.start), scene.solver.flip().cell_size);
+    Bounds {
+        min: walls.min / size,
+        max: walls.max / size,
+    }
+}
+
 pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep) -> FlipParams {
     let flip = scene.solver.flip();
-    let before = scene.walls(step.start);
     let after = scene.walls(step.start + step.length);
-    let cut = |wall: DVec3| (wall / flip.cell_size).as_vec3().to_array();
+    let cut = cut(scene, step);
     let speed = scene.wall_velocity(step.start + step.length, step.length);
     FlipParams {
         wall_min: after.min.as_vec3().to_array(),
         particle_count: plan.counts.particles as u32,
         wall_max: after.max.as_vec3().to_array(),
         wet_cells: bricks.wet * CELLS,
-        cut_min: cut(before.min),
+        cut_min: cut.min.as_vec3().to_array(),
         active_cells: bricks.active * CELLS,
-        cut_max: cut(before.max),
+        cut_max: cut.max.as_vec3().to_array(),
         stride: plan.counts.bricks.slots as u32 * CELLS,
         wall_velocity_min: speed.min.as_vec3().to_array(),
         partial_stride: plan.counts.bricks.wet as u32 * CELLS,

@@ -4,9 +4,11 @@ use glam::DVec3;
 
 use super::{
     super::{SolveError, pressure, state::look, trace::Run},
-    CELL_KIND, Flip, FrameTotals,
+    CELL_KIND, Flip, FrameTotals, OPEN_VOLUME,
 };
 use crate::domain::{
+    bricks::CELLS,
+    flip::{HALF, open_extent, part_of_solids},
     gauge::Gauge,
     probe::Patch,
     solver::{Seen, Span, Wanted, Watch},
@@ -74,6 +76,7 @@ impl Flip {
             cells: self.plan.grid_dims,
             cell_size: self.scene.solver.flip().cell_size,
             kind: &kind,
+            is_buried: &self.find_buried()?,
             pressure: &pressure,
             rise: self.scene.water.rise(),
         };
@@ -82,5 +85,23 @@ impl Flip {
             .iter()
             .map(|one| look(&gauge, place(one) - origin, one))
             .collect())
+    }
+
+    /// Whether each element's centre lies within a wall or a solid, of the last substep.
+    fn find_buried(&self) -> Result<Vec<bool>, SolveError> {
+        let volume: Option<Vec<f32>> = match self.plan.has_solids() {
+            true => Some(self.field(OPEN_VOLUME, self.elements())?),
+            false => None,
+        };
+        let of_element = |element: u32| {
+            let cell = DVec3::from_array(self.bricks.cell(element).map(f64::from));
+            let extent = open_extent(cell, &self.cut);
+            let volume = volume.as_ref().map(|all| f64::from(all[element as usize]));
+            let part = volume.map_or(1.0, |volume| part_of_solids(extent, volume));
+            extent.min_element() < HALF || part < HALF
+        };
+        let beyond = std::iter::repeat_n(false, CELLS as usize);
+        let of_slots = (CELLS..self.elements() as u32).map(of_element);
+        Ok(beyond.chain(of_slots).collect())
     }
 }
