@@ -126,6 +126,18 @@ pub fn order(errors: &[(f64, f64)]) -> Option<f64> {
         .filter(|order| order.is_finite())
 }
 
+/// The order of convergence of (resolution, number) without the limit: from how much two steps of one ratio change the
+/// number (Roache 1998). `None` unless there are three, in a row of one ratio, that
+/// change to one side.
+pub fn order_of_changes(numbers: &[(f64, f64)]) -> Option<f64> {
+    let [(r0, a), (r1, b), (r2, c)] = *numbers else {
+        return None;
+    };
+    let ratio = r1 / r0;
+    let order = ((b - a) / (c - b)).ln() / ratio.ln();
+    ((r2 / r1 - ratio).abs() < 1e-9 * ratio && order.is_finite()).then_some(order)
+}
+
 /// Mean period of a signal from where it goes through 0 between swings of at least `least` to either side, seconds; `None`
 /// where it does so less than twice.
 pub fn period(samples: &[(f64, f64)], least: f64) -> Option<f64> {
@@ -301,6 +313,13 @@ mod tests {
         assert!(order(&[(10.0, 0.1), (20.0, 0.1)]).unwrap().abs() < 1e-12);
         assert_eq!(order(&errors[..1]), None);
         assert_eq!(slope(&[(1.0, 1.0), (1.0, 2.0)]), None);
+        // Of numbers whose limit is not told.
+        let numbers = errors.map(|(r, error)| (r, 5.0 + error));
+        assert!((order_of_changes(&numbers).unwrap() - 1.7).abs() < 1e-9);
+        let [a, b, _] = numbers;
+        assert_eq!(order_of_changes(&[a, b]), None);
+        assert_eq!(order_of_changes(&[a, b, (30.0, 5.0)]), None);
+        assert_eq!(order_of_changes(&[a, b, (40.0, a.1)]), None);
     }
 
     #[test]

@@ -51,11 +51,13 @@ pub fn judge<'a>(benchmark: &'a Benchmark, runs: &[Run]) -> Vec<Judged<'a>> {
 /// Order of the error, or spread of the numbers, of (resolution, number).
 fn over_all(gate: &Gate, numbers: &[(f64, f64)]) -> Option<f64> {
     match gate.bound {
-        Bound::OrderAtLeast(_) => {
-            let published = gate.published?;
-            let error = |(r, n): &(f64, f64)| (*r, n / published - 1.0);
-            waves::order(&numbers.iter().map(error).collect::<Vec<_>>())
-        }
+        Bound::OrderAtLeast(_) => match gate.published {
+            Some(published) => {
+                let error = |(r, n): &(f64, f64)| (*r, n / published - 1.0);
+                waves::order(&numbers.iter().map(error).collect::<Vec<_>>())
+            }
+            None => waves::order_of_changes(numbers),
+        },
         _ => {
             let values = || numbers.iter().map(|(_, n)| *n);
             let mean = values().sum::<f64>() / numbers.len() as f64;
@@ -135,9 +137,22 @@ mod tests {
         let (verdict, order) = of([0.04, 0.01, 0.0025]);
         assert_eq!(verdict, Verdict::Passes);
         assert!((order - 2.0).abs() < 1e-9, "{order}");
+        // Whatever they come to.
+        let (verdict, order) = of([0.06, 0.03, 0.0225]);
+        assert_eq!(verdict, Verdict::Passes);
+        assert!((order - 2.0).abs() < 1e-9, "{order}");
         let (verdict, order) = of([0.04, 0.02, 0.01]);
         assert_eq!(verdict, Verdict::Misses);
         assert!((order - 1.0).abs() < 1e-9, "{order}");
+        // With a published number, of what they are off it.
+        let mut benchmark = benchmark.clone();
+        benchmark.gates[0].published = Some(c);
+        let runs = runs(
+            &[0.06, 0.03, 0.0225].map(|error| c * (1.0 - error)),
+            "celerity",
+        );
+        let judged = judge(&benchmark, &runs);
+        assert_eq!(judged[0].verdict, Verdict::Misses);
     }
 
     #[test]

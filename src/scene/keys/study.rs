@@ -345,7 +345,7 @@ const GATE: &[Key] = &[
     Key::number("order_at_least", BOUND)
         .absent()
         .also(ONE_OF)
-        .about("the power of the resolution with which the error falls"),
+        .about("the power of the resolution with which the error falls; without published, of three runs in a row of one ratio, with which their changes do"),
     Key::number("agree_within", BOUND)
         .absent()
         .also(ONE_OF)

@@ -411,11 +411,7 @@ fn gate(
             "more than one of within, off_by, at_most, at_least, order_at_least and agree_within";
         return Err(fault(problem.to_owned()));
     }
-    if matches!(
-        bound,
-        Bound::Within(_) | Bound::OffBy(_) | Bound::OrderAtLeast(_)
-    ) && spec.published.is_none()
-    {
+    if matches!(bound, Bound::Within(_) | Bound::OffBy(_)) && spec.published.is_none() {
         return Err(fault(format!(
             "{word:?} is held against no published number"
         )));
@@ -435,7 +431,12 @@ fn gate(
         known_failure: spec.known_failure.clone(),
     };
     let judged = runs.iter().filter(|run| gate.judges(run)).count();
-    if judged < if bound.is_of_all() { 2 } else { 1 } {
+    let least = match bound {
+        Bound::OrderAtLeast(_) if spec.published.is_none() => 3,
+        _ if bound.is_of_all() => 2,
+        _ => 1,
+    };
+    if judged < least {
         return Err(fault(format!(
             "{judged} runs are of its solver and resolution"
         )));
