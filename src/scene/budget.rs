@@ -235,10 +235,8 @@ impl Budget {
             check(Watched::SpeedJump, report.max_speed, Some(times * reached)).map_err(
                 |breach| {
                     let detail = format!(
-                        "{} times {}, to which gravity and walls bring {}",
-                        shown(times),
-                        shown(reached),
-                        shown(speed)
+                        "{} times {reached:.4} m/s, which gravity and walls can bring {speed:.4} m/s of the fastest before to",
+                        shown(times)
                     );
                     Breach {
                         detail: Some(detail),

@@ -77,6 +77,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let is_moving: Vec<bool> = spec.solid.iter().map(moves).collect();
     let around = probe::Around {
         domain: &domain,
+        periodic,
         shot: &shot,
         solver: &solver,
         solids: &solids,

@@ -204,6 +204,7 @@ pub(super) struct ProbeSpec {
 /// What of a scene its probes are held against.
 pub(super) struct Around<'a> {
     pub(super) domain: &'a Bounds,
+    pub(super) periodic: [bool; 3],
     pub(super) shot: &'a Shot,
     pub(super) solver: &'a Solver,
     pub(super) solids: &'a [PlacedMesh],
@@ -353,6 +354,12 @@ fn force(
     let fault = |problem: &str| doc.fault_of(&format!("{path}.solid"), problem.to_owned());
     let (on, bounds) = match spec.solid {
         None => return Err(fault("missing")),
+        Some(BearerSpec::Wall(wall)) if around.periodic[wall.axis] => {
+            return Err(fault(&format!(
+                "there is no wall {}: domain.periodic joins both ends",
+                wall.name()
+            )));
+        }
         Some(BearerSpec::Wall(wall)) => {
             let mut face = *around.domain;
             if wall.is_max {

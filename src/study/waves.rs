@@ -76,7 +76,8 @@ pub fn wave_length(first: f64, second: f64, apart: f64) -> f64 {
 }
 
 /// A crest, from the parabola that fits samples (seconds, elevation) above `part` of the largest best: its time and height.
-/// `None` where they are fewer than three or bend upwards.
+/// `None` where they are fewer than three or bend upwards, or where the signal begins or ends as high, so that a part of the
+/// crest is not in it.
 pub fn crest(samples: &[(f64, f64)], part: f64) -> Option<(f64, f64)> {
     let most = samples
         .iter()
@@ -88,7 +89,8 @@ pub fn crest(samples: &[(f64, f64)], part: f64) -> Option<(f64, f64)> {
     let before = samples[..middle].iter().rev().take_while(is_high).count();
     let after = samples[middle..].iter().take_while(is_high).count();
     let high = &samples[middle - before..middle + after];
-    if high.len() < 3 {
+    let is_whole = before < middle && middle + after < samples.len();
+    if high.len() < 3 || !is_whole {
         return None;
     }
     let from = samples[middle].0;
@@ -303,6 +305,9 @@ mod tests {
         let (time, _) = crest(&sampled(0.0, 10.0, 0.05, two), 0.8).unwrap();
         assert!((time - 2.03).abs() < 0.01, "{time}");
         assert_eq!(crest(&sampled(0.0, 1.0, 0.1, |t| t * t), 0.8), None);
+        // Cut off a little after its highest, or before.
+        assert_eq!(crest(&sampled(0.0, 2.1, 0.05, sech), 0.8), None);
+        assert_eq!(crest(&sampled(1.95, 5.0, 0.05, sech), 0.8), None);
     }
 
     #[test]

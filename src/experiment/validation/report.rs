@@ -33,7 +33,12 @@ pub(super) fn draw(validation: &Validation, bench: &Bench<'_>, results: &[Result
     let names = |verdict: Verdict| -> Vec<String> {
         let own = all().filter(|(_, judged)| judged.verdict == verdict);
         own.map(|(benchmark, judged)| {
-            format!("{}, {}, {}", benchmark.name, of_run(judged), judged.gate.of)
+            format!(
+                "{}, {}, {}",
+                benchmark.name,
+                of_run(judged),
+                quantity(judged.gate)
+            )
         })
         .collect()
     };
@@ -160,7 +165,9 @@ fn verdicts(results: &[Result<'_>]) -> Part {
                 of_run(judged),
                 title(benchmark, &gate.of).to_owned(),
                 measured(judged, run),
-                gate.published.map_or(String::new(), number),
+                gate.published
+                    .filter(|_| !gate.bound.is_of_all())
+                    .map_or(String::new(), number),
                 judged
                     .error
                     .map_or(String::new(), |error| format!("{:+.1} %", 100.0 * error)),
@@ -300,6 +307,15 @@ fn chart(
     (!chart.series.is_empty()).then(|| chart.to_svg())
 }
 
+/// What a gate judges: a number, or what its runs together say of it.
+fn quantity(gate: &Gate) -> String {
+    match gate.bound {
+        Bound::OrderAtLeast(_) => format!("order of {}", gate.of),
+        Bound::AgreeWithin(_) => format!("spread of {}", gate.of),
+        _ => gate.of.clone(),
+    }
+}
+
 /// A line for each gate of each run, and for each number that no gate judges.
 fn table(results: &[Result<'_>]) -> Vec<Vec<String>> {
     let titles = "benchmark,solver,resolution,device,quantity,measured,published,error,gate,verdict,source,known_failure,particles,frames,seconds,ended";
@@ -336,9 +352,9 @@ fn table(results: &[Result<'_>]) -> Vec<Vec<String>> {
                 head,
             );
             row.extend([
-                gate.of.clone(),
+                quantity(gate),
                 exact(judged.measured),
-                exact(gate.published),
+                exact(gate.published.filter(|_| !gate.bound.is_of_all())),
                 exact(judged.error),
                 bound(gate),
                 judged.verdict.words().to_owned(),
@@ -353,6 +369,7 @@ fn table(results: &[Result<'_>]) -> Vec<Vec<String>> {
                 let is_judged = benchmark
                     .gates
                     .iter()
+                    .filter(|gate| !gate.bound.is_of_all())
                     .any(|gate| gate.of == *name && gate.judges(trial));
                 if !is_judged {
                     let mut row = head(trial);

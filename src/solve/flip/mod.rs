@@ -233,6 +233,7 @@ impl Flip {
 
     /// Lays out bricks about the water, and makes room for more where they do not fit.
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
+        let planned = layers(self.scene.solver.flip().cfl);
         let layers = layers(substep.displacement);
         let is_wet = self.with_shores(is_wet, substep);
         self.bricks = bricks(&self.scene, self.plan.grid_dims, &is_wet, layers);
@@ -252,7 +253,13 @@ impl Flip {
         }
         let bricks = &self.bricks;
         let params = step::params(&self.scene, &self.plan, bricks, substep);
-        let groups = groups(&self.program, params.wet_cells, params.active_cells, layers);
+        let groups = groups(
+            &self.program,
+            params.wet_cells,
+            params.active_cells,
+            layers,
+            planned,
+        );
         self.cut = step::cut(&self.scene, substep);
         self.program.upload(PARAMS, 0, &[params]);
         self.program.upload(BRICKS, 0, &bricks.records);

@@ -93,17 +93,20 @@ impl Commands {
     }
 }
 
-/// Contents of `groups`: empty from the layer on that the substep does not need.
+/// Contents of `groups`, of so many layers of `planned`: empty from the first on that the substep does not need, also
+/// where the substep before needed it.
 pub(super) fn groups(
     program: &Program,
     wet_cells: u32,
     active_cells: u32,
     layers: usize,
+    planned: usize,
 ) -> Vec<Workgroups> {
     let of = |cells: u32| spread(&program.context, WORKGROUP, u64::from(cells)).into();
     let mut all = vec![of(wet_cells), of(active_cells)];
     // Layer 1 is what the projection found.
     all.resize(FIRST_LAYER + layers.saturating_sub(1), of(active_cells));
+    all.resize(all.len().max(FIRST_LAYER + planned), Workgroups::default());
     all
 }
 

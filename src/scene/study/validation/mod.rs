@@ -153,6 +153,18 @@ impl Bound {
     pub fn is_of_all(self) -> bool {
         matches!(self, Self::OrderAtLeast(_) | Self::AgreeWithin(_))
     }
+
+    /// The number that it names.
+    fn limit(self) -> f64 {
+        match self {
+            Self::Within(limit)
+            | Self::OffBy(limit)
+            | Self::AtMost(limit)
+            | Self::AtLeast(limit)
+            | Self::OrderAtLeast(limit)
+            | Self::AgreeWithin(limit) => limit,
+        }
+    }
 }
 
 /// Data that a curve is held against.
@@ -436,6 +448,28 @@ fn gate(
         _ if bound.is_of_all() => 2,
         _ => 1,
     };
+    if spec
+        .known_failure
+        .as_ref()
+        .is_some_and(|why| why.trim().is_empty())
+    {
+        return Err(fault("known_failure gives no reason".to_owned()));
+    }
+    if matches!(
+        bound,
+        Bound::Within(_) | Bound::OffBy(_) | Bound::AgreeWithin(_)
+    ) && bound.limit() < 0.0
+    {
+        return Err(fault(format!(
+            "a bound of {} holds for nothing",
+            bound.limit()
+        )));
+    }
+    if matches!(bound, Bound::Within(_)) && spec.published == Some(0.0) {
+        return Err(fault(
+            "a part of 0 is 0: off_by goes with published = 0".to_owned(),
+        ));
+    }
     if judged < least {
         return Err(fault(format!(
             "{judged} runs are of its solver and resolution"
