@@ -2,8 +2,6 @@
 
 use glam::DVec3;
 
-use super::bounds::Bounds;
-
 /// Particles keep this part of their spacing from walls and solids; at rest the lattice stands at 0.5.
 pub const CONTACT: f64 = 0.1;
 
@@ -13,9 +11,9 @@ pub const ON_FACE: f64 = 1e-3;
 /// A cell that is open by less has its centre in a wall or a solid; a wall through the centre is beside it.
 pub const HALF: f64 = 0.5 - ON_FACE;
 
-/// Open part along each axis of the cell whose least corner is `cell`, of what walls at `cut` leave; all in cells.
-pub fn open_extent(cell: DVec3, cut: &Bounds) -> DVec3 {
-    let length = (cell + 1.0).min(cut.max) - cell.max(cut.min);
+/// Open part along each axis of the cell whose least corner is `cell`, of what walls at `low` and `high` leave; all in cells.
+pub fn open_extent(cell: DVec3, [low, high]: [DVec3; 2]) -> DVec3 {
+    let length = (cell + 1.0).min(high) - cell.max(low);
     DVec3::from_array(length.to_array().map(|length| {
         if length > 1.0 - ON_FACE {
             1.0

@@ -190,7 +190,7 @@ impl Model {
 impl Step<'_> {
     /// Open part of a cell's extent along each axis.
     pub(super) fn open_extent(&self, cell: DVec3) -> DVec3 {
-        open_extent(cell, &self.cut)
+        open_extent(cell, [self.cut.min, self.cut.max])
     }
 
     /// Whether the planes of a cell's lower faces lie in the open.

@@ -95,7 +95,7 @@ impl Flip {
         };
         let of_element = |element: u32| {
             let cell = DVec3::from_array(self.bricks.cell(element).map(f64::from));
-            let extent = open_extent(cell, &self.cut);
+            let extent = open_extent(cell, [self.cut.min, self.cut.max]);
             let volume = volume.as_ref().map(|all| f64::from(all[element as usize]));
             let part = volume.map_or(1.0, |volume| part_of_solids(extent, volume));
             extent.min_element() < HALF || part < HALF
