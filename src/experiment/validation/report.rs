@@ -163,7 +163,11 @@ fn verdicts(results: &[Result<'_>]) -> Part {
                     String::new()
                 },
                 of_run(judged),
-                title(benchmark, &gate.of).to_owned(),
+                match gate.bound {
+                    Bound::OrderAtLeast(_) => format!("order of: {}", title(benchmark, &gate.of)),
+                    Bound::AgreeWithin(_) => format!("spread of: {}", title(benchmark, &gate.of)),
+                    _ => title(benchmark, &gate.of).to_owned(),
+                },
                 measured(judged, run),
                 gate.published
                     .filter(|_| !gate.bound.is_of_all())
