@@ -209,7 +209,7 @@ fn dry_bed(record: &Record<'_>, out: &mut Measured) {
         let bins = row.of_water.iter().enumerate();
         bins.filter_map(of_bin).collect()
     };
-    let mean_gap = rows.iter().filter_map(|row| mean(gaps(row).into_iter()));
+    let mean_gap = rows.iter().filter_map(|row| mean(gaps(row)));
     out.put("profile_error", mean(mean_gap));
     let largest = |row: &&Row| gaps(row).into_iter().fold(0.0, f64::max);
     let worst: Vec<f64> = rows.iter().map(largest).collect();
