@@ -15,7 +15,7 @@ pub struct Gauge<'a> {
     pub cells: [u32; 3],
     /// Metres.
     pub cell_size: f64,
-    /// [`AIR`], [`FLUID`] or [`SOLID`], by element.
+    /// [`AIR`], [`FLUID`] or [`SOLID`](super::poisson::SOLID), by element.
     pub kind: &'a [u32],
     /// Whether an element's centre lies within a wall or a solid. What the projection has there turns the water within a
     /// thin part of a cell (a wave that hits a face had 19 kPa in a sliver, 10 kPa half a cell off), so that it is taken
