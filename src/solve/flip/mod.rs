@@ -218,11 +218,7 @@ impl Flip {
     /// Which bricks are water, where `is_wet` are those that hold particles.
     fn with_shores(&self, is_wet: &[bool], substep: &Substep) -> Vec<bool> {
         let size = self.scene.solver.flip().cell_size;
-        let walls = self.scene.walls(substep.start);
-        let cut = Bounds {
-            min: walls.min / size,
-            max: walls.max / size,
-        };
+        let cut = step::cut(&self.scene, substep);
         let moving = self.scene.moving_solids.iter();
         let ways = moving.map(|solid| solid.displacement(substep.start) / size);
         let dims = table_dims(stored_cells(self.plan.grid_dims, self.scene.periodic));
@@ -233,7 +229,6 @@ impl Flip {
 
     /// Lays out bricks about the water, and makes room for more where they do not fit.
     fn lay_out(&mut self, is_wet: &[bool], substep: &Substep) -> Result<(), SolveError> {
-        let planned = layers(self.scene.solver.flip().cfl);
         let layers = layers(substep.displacement);
         let is_wet = self.with_shores(is_wet, substep);
         self.bricks = bricks(&self.scene, self.plan.grid_dims, &is_wet, layers);
@@ -253,13 +248,7 @@ impl Flip {
         }
         let bricks = &self.bricks;
         let params = step::params(&self.scene, &self.plan, bricks, substep);
-        let groups = groups(
-            &self.program,
-            params.wet_cells,
-            params.active_cells,
-            layers,
-            planned,
-        );
+        let groups = groups(&self.program, &self.scene, &params, layers);
         self.cut = step::cut(&self.scene, substep);
         self.program.upload(PARAMS, 0, &[params]);
         self.program.upload(BRICKS, 0, &bricks.records);

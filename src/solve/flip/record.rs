@@ -11,6 +11,7 @@ use crate::{
     scene::Scene,
     solve::{
         effects::Addition,
+        params::FlipParams,
         plan::{Plan, PlannedBuffer},
     },
 };
@@ -93,20 +94,22 @@ impl Commands {
     }
 }
 
-/// Contents of `groups`, of so many layers of `planned`: empty from the first on that the substep does not need, also
-/// where the substep before needed it.
+/// Contents of `groups`: empty from the layer on that the substep does not need, also where the substep before needed it.
 pub(super) fn groups(
     program: &Program,
-    wet_cells: u32,
-    active_cells: u32,
-    layers: usize,
-    planned: usize,
+    scene: &Scene,
+    params: &FlipParams,
+    needed: usize,
 ) -> Vec<Workgroups> {
     let of = |cells: u32| spread(&program.context, WORKGROUP, u64::from(cells)).into();
-    let mut all = vec![of(wet_cells), of(active_cells)];
+    let mut all = vec![of(params.wet_cells), of(params.active_cells)];
     // Layer 1 is what the projection found.
-    all.resize(FIRST_LAYER + layers.saturating_sub(1), of(active_cells));
-    all.resize(all.len().max(FIRST_LAYER + planned), Workgroups::default());
+    all.resize(
+        FIRST_LAYER + needed.saturating_sub(1),
+        of(params.active_cells),
+    );
+    let planned = FIRST_LAYER + layers(scene.solver.flip().cfl);
+    all.resize(all.len().max(planned), Workgroups::default());
     all
 }
 
