@@ -58,10 +58,15 @@ impl Measure {
                     "speed_ratio",
                     "largest speed up to the last gauge over the paddle's",
                 ),
+                (
+                    "speed_anywhere",
+                    "largest speed in the flume over the paddle's; waves double where the far wall turns them",
+                ),
             ],
             Self::SolitaryWave => &[
                 ("height", "height of the crest over the depth, H/d"),
                 ("celerity", "celerity, m/s"),
+                ("crests", "part of the gauges that saw a whole crest"),
             ],
             Self::DamBreak => &[
                 ("front_error", "front against the points, mean"),

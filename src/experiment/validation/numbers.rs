@@ -107,12 +107,12 @@ fn regular_waves(record: &Record<'_>, out: &mut Measured) {
         let length = waves::wave_length(first.phase, last.phase, to.x - from.x);
         out.put("wave_length", Some(length));
     }
-    let speeds = record.rows.iter().flat_map(|row| &row.of_water);
-    let fastest = speeds.copied().fold(0.0, f64::max);
-    out.put(
-        "speed_ratio",
-        Some(fastest / (PI * scale.stroke / scale.period)),
-    );
+    let paddle = PI * scale.stroke / scale.period;
+    let ratio = |speeds: &mut dyn Iterator<Item = f64>| Some(speeds.fold(0.0, f64::max) / paddle);
+    let rows = || record.rows.iter();
+    let up_to_gauge = ratio(&mut rows().flat_map(|row| row.of_water.iter().copied()));
+    out.put("speed_ratio", up_to_gauge);
+    out.put("speed_anywhere", ratio(&mut rows().map(|row| row.speed)));
     // From a crest of the fit on, so that crests come at whole periods.
     if let Some(fit) = fits.first() {
         let at = |t: f64| t / scale.period - fit.phase / TAU;
@@ -129,9 +129,12 @@ fn solitary_wave(record: &Record<'_>, out: &mut Measured) {
         let samples = level(record, gauge).into_iter();
         samples.map(|(t, y)| (t, y - scale.depth)).collect()
     };
-    let crests: Option<Vec<_>> = (0..gauges.len())
+    let found: Vec<_> = (0..gauges.len())
         .map(|gauge| waves::crest(&above(gauge), CREST))
         .collect();
+    let whole = found.iter().flatten().count() as f64;
+    out.put("crests", Some(whole / gauges.len() as f64));
+    let crests: Option<Vec<_>> = found.into_iter().collect();
     let crests = crests.unwrap_or_default();
     // By a straight line through the arrivals at all gauges.
     let arrivals = crests.iter().zip(&gauges).map(|((t, _), at)| (*t, at.x));

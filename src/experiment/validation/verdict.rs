@@ -80,12 +80,14 @@ impl<'a> Judged<'a> {
             Bound::AtMost(most) | Bound::AgreeWithin(most) => measured <= most,
             Bound::AtLeast(least) | Bound::OrderAtLeast(least) => measured >= least,
         });
+        // What gives no number may have failed in any way, of which nothing is known.
+        let is_known = gate.known_failure.is_some() && measured.is_some();
         Self {
             gate,
             run,
             measured,
             error,
-            verdict: Verdict::of(holds, gate.known_failure.is_some()),
+            verdict: Verdict::of(holds, is_known),
         }
     }
 }
@@ -95,7 +97,10 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::{experiment::validation::Measured, scene::study::Study};
+    use crate::{
+        experiment::validation::Measured,
+        scene::{Method, study::Study},
+    };
 
     fn benchmark(name: &str) -> Benchmark {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
@@ -159,6 +164,12 @@ mod tests {
     fn a_gate_judges_its_solver_alone_and_a_run_that_ended_early_passes_none() {
         let mut benchmark = benchmark("solitary wave over 20 depths");
         benchmark.gates.retain(|gate| gate.of == "celerity");
+        let of_pbf = Gate {
+            method: Some(Method::Pbf),
+            bound: Bound::Within(0.03),
+            ..benchmark.gates[0].clone()
+        };
+        benchmark.gates.push(of_pbf);
         // FLIP's gate is 2 %, PBF's 3 %: both runs are 2.5 % slow.
         let mut runs = runs(&[3.431 * 0.975; 2], "celerity");
         let verdicts = |benchmark: &Benchmark, runs: &[Run]| -> Vec<Verdict> {
@@ -182,8 +193,9 @@ mod tests {
             .numbers
             .insert("celerity".to_owned(), 3.431);
         assert_eq!(verdicts(&benchmark, &runs)[0], Verdict::PassesUnexpectedly);
-        // What is no number is missed.
+        // What is no number is missed, whatever is known.
         runs[0].measured.numbers.clear();
+        assert_eq!(verdicts(&benchmark, &runs)[0], Verdict::Misses);
         benchmark.gates[0].known_failure = None;
         assert_eq!(verdicts(&benchmark, &runs)[0], Verdict::Misses);
     }
