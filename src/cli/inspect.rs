@@ -186,14 +186,14 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
         None => writeln!(out, "planned for common limits: no adapter here")?,
     }
     writeln!(out, "\npass                          for")?;
-    for pass in &plan.passes {
+    for pass in plan.parts().flat_map(|part| &part.passes) {
         writeln!(out, "{:28}  {}", pass.spec.name, pass.owner)?;
     }
     writeln!(
         out,
         "\nbuffer                        for                      bytes"
     )?;
-    for buffer in &plan.buffers {
+    for buffer in plan.parts().flat_map(|part| &part.buffers) {
         writeln!(
             out,
             "{:28}  {:22} {:>12}",

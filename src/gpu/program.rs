@@ -142,6 +142,21 @@ impl Program {
             .unwrap_or_else(|| panic!("buffer `{name}` is not in the program"))
     }
 
+    /// Whether it has a buffer of that name.
+    pub fn has(&self, name: &str) -> bool {
+        self.buffers.contains_key(name)
+    }
+
+    /// Copies the first `count` values of another program's buffer on the same device into one of this, before whatever is
+    /// submitted next.
+    pub fn copy<T>(&self, to: &Buf<T>, from: &Self, source: &Buf<T>, count: usize) {
+        let bytes = (count * size_of::<T>()) as u64;
+        let (source, to) = (from.buffer(source.name()), self.buffer(to.name()));
+        let mut encoder = (self.context.device).create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(source, 0, to, 0, bytes);
+        self.context.queue.submit([encoder.finish()]);
+    }
+
     /// Names of the passes and of the buffers, sorted.
     pub fn names(&self) -> (Vec<&str>, Vec<&str>) {
         (

@@ -27,6 +27,7 @@ mod key;
 mod load;
 mod origin;
 mod overrides;
+mod projection;
 mod reach;
 mod settle;
 mod spec;
@@ -361,6 +362,8 @@ pub struct Pbf {
     pub relaxation: f64,
     /// k of the artificial pressure s_corr, with λ's natural scale as unit; 0 leaves it out.
     pub artificial_pressure: f64,
+    /// Whether velocities are made free of divergence on a grid before particles move (Raveendran et al. 2011).
+    pub grid_projection: bool,
     /// Most substeps in a frame; a scene that needs more is stopped, never stepped more coarsely.
     pub max_substeps: u32,
 }

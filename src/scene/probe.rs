@@ -431,6 +431,9 @@ fn why_no_pressure(solver: &Solver) -> Option<String> {
         return None;
     }
     let pbf = solver.pbf();
+    if pbf.grid_projection {
+        return None;
+    }
     let why = if pbf.iteration == Iteration::Chebyshev {
         "with solver.pbf.iteration = \"chebyshev\" a part of each correction goes on from the one before, which no \
          pressure stands for"

@@ -124,5 +124,6 @@ pub(super) struct PbfSpec {
     pub(super) cfl: f64,
     pub(super) relaxation: Option<f64>,
     pub(super) artificial_pressure: f64,
+    pub(super) grid_projection: bool,
     pub(super) max_substeps: u32,
 }

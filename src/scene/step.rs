@@ -23,6 +23,18 @@ pub struct Substep {
     pub displacement: f64,
 }
 
+/// Displacement, in cells, that faces around the water are filled for where particles ask for none beyond their own cells.
+const WITHIN_CELLS: f64 = 1.0;
+
+/// The substep of a projection whose velocities alone are asked for; times in seconds.
+pub fn projected_substep(start: f64, length: f64) -> Substep {
+    Substep {
+        start,
+        length,
+        displacement: WITHIN_CELLS,
+    }
+}
+
 impl Scene {
     /// The box's faces at `time`, wave makers included, relative to the domain's least corner, metres; [`FAR`] off where
     /// the domain joins its own end.

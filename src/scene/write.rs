@@ -239,6 +239,7 @@ fn pbf(pbf: &Pbf) -> Table {
         ("cfl", value(&pbf.cfl)),
         ("relaxation", value(&pbf.relaxation)),
         ("artificial_pressure", value(&pbf.artificial_pressure)),
+        ("grid_projection", value(&pbf.grid_projection)),
         ("max_substeps", value(&pbf.max_substeps)),
     ]);
     if pbf.iteration == Iteration::Chebyshev {

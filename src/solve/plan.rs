@@ -47,7 +47,7 @@ pub struct Counts {
     pub solid_grid: [usize; 3],
     /// Nodes of the moving solids' signed distances, all together.
     pub moving_nodes: usize,
-    /// Bricks that sparse grids hold; of FLIP alone.
+    /// Bricks that sparse grids hold; of FLIP, or of PBF's projection.
     pub bricks: Capacity,
 }
 
@@ -159,6 +159,10 @@ pub struct Plan {
     pub chunks: Vec<Chunk>,
     /// Whether neighbours are listed once a substep; of PBF alone.
     pub has_lists: bool,
+    /// Whether FLIP moves particles; not where PBF takes its velocities alone.
+    pub moves: bool,
+    /// Of the grid on which PBF's velocities are projected, where they are.
+    pub projection: Option<Box<Plan>>,
     /// Every buffer.
     pub buffers: Vec<PlannedBuffer>,
     /// Every pass.
@@ -170,7 +174,7 @@ impl Plan {
     pub fn new(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Self {
         match scene.solver.method {
             Method::Pbf => pbf::plan::plan(scene, counts, limits),
-            Method::Flip => flip::plan::plan(scene, counts),
+            Method::Flip => flip::plan::plan(scene, counts, true),
         }
     }
 
@@ -189,6 +193,8 @@ impl Plan {
             grid_dims,
             chunks: Vec::new(),
             has_lists: false,
+            moves: true,
+            projection: None,
             buffers: Vec::new(),
             passes: Vec::new(),
         }
@@ -196,14 +202,20 @@ impl Plan {
 
     /// Bytes in all, and those of the neighbour lists.
     pub fn bytes(&self) -> (u64, u64) {
-        let sum = |lists_only: bool| {
+        let sum = |lists_only: bool| -> u64 {
             self.buffers
                 .iter()
                 .filter(|buffer| !lists_only || buffer.owner == "lists")
                 .map(|buffer| buffer.spec.bytes)
                 .sum()
         };
-        (sum(false), sum(true))
+        let of_projection = self.projection.as_ref().map_or(0, |plan| plan.bytes().0);
+        (sum(false) + of_projection, sum(true))
+    }
+
+    /// Itself, and the plan of its projection.
+    pub fn parts(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(self.projection.as_deref())
     }
 
     /// Whether solids stand in the scene, moving or not.

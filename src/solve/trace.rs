@@ -155,6 +155,11 @@ impl Traced<'_> {
             .any(|binding| self.buffer(&binding.name) == buffer)
     }
 
+    /// Whether the program that runs it has a buffer of that name.
+    pub fn has(&self, buffer: &str) -> bool {
+        self.program.has(buffer)
+    }
+
     /// How many values of `T` a buffer holds.
     pub fn length<T>(&self, buffer: &str) -> usize {
         self.program.buffer(buffer).size() as usize / size_of::<T>()

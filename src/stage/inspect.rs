@@ -148,7 +148,10 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
     let plan = start.plan(scene, limits);
     let misfit = context
         .as_ref()
-        .and_then(|context| check_sizes(context, &plan.buffer_specs()).err())
+        .and_then(|context| {
+            let mut parts = plan.parts();
+            parts.find_map(|part| check_sizes(context, &part.buffer_specs()).err())
+        })
         .or(lacks);
     Ok(ScenePlan {
         plan,

@@ -105,9 +105,10 @@ impl Start {
 
     /// What the scene needs on a device with these limits.
     pub fn plan(&self, scene: &Scene, limits: DeviceLimits) -> Plan {
-        let bricks = match scene.solver.method {
-            Method::Pbf => Capacity::default(),
-            Method::Flip => flip::capacity(scene, &self.particles),
+        let bricks = match (scene.solver.method, scene.of_projection()) {
+            (Method::Pbf, None) => Capacity::default(),
+            (Method::Pbf, Some(grid)) => flip::capacity(&grid, &self.particles),
+            (Method::Flip, _) => flip::capacity(scene, &self.particles),
         };
         let counts = Counts {
             particles: self.particles.len(),

@@ -20,7 +20,7 @@ use crate::{
         flip::{Given, Model, Room, Sorted, Step},
         poisson::iteration::Sum,
     },
-    scene::Scene,
+    scene::{Scene, step::Substep},
     solve::{
         SolveError,
         flip::{Flip, buffers},
@@ -84,23 +84,7 @@ pub fn check(
 ) -> Result<Checked, SolveError> {
     let mut solver = Flip::new(context, scene, plan, boundary, false)?;
     solver.load(frame, particles)?;
-    let mut engine = Engine::new(FlipState {
-        scene: scene.clone(),
-        boundary: boundary.clone(),
-        model: Model::new(scene, boundary),
-        n: particles.len(),
-        frame,
-        begun: Begun::default(),
-        elements: None,
-        sorted: None,
-        room: None,
-        density: None,
-        assembled: None,
-        given: None,
-        runs: BTreeMap::new(),
-        products: 0,
-        sum: None,
-    });
+    let mut engine = Engine::new(FlipState::new(scene, boundary, (frame, particles.len())));
     let traced = solver.trace_frame(Span::Only(which), &mut |begun, traced| {
         engine.state.begun = begun;
         engine.observe(traced)
@@ -112,13 +96,15 @@ pub fn check(
 }
 
 /// What the twins know of the substep.
-pub(super) struct FlipState {
+pub(in crate::check) struct FlipState {
     pub(super) scene: Scene,
     boundary: Boundary,
     pub(super) model: Model,
     n: usize,
     frame: u32,
-    begun: Begun,
+    pub(super) begun: Begun,
+    /// The substep, where it does not follow from the survey: that of a projection alone.
+    pub(super) given_substep: Option<Substep>,
     elements: Option<Elements>,
     sorted: Option<Sorted>,
     room: Option<Room>,
@@ -157,6 +143,28 @@ impl State for FlipState {
 }
 
 impl FlipState {
+    /// Of so many particles at the end of a frame.
+    pub(super) fn new(scene: &Scene, boundary: &Boundary, (frame, n): (u32, usize)) -> Self {
+        Self {
+            scene: scene.clone(),
+            boundary: boundary.clone(),
+            model: Model::new(scene, boundary),
+            n,
+            frame,
+            begun: Begun::default(),
+            given_substep: None,
+            elements: None,
+            sorted: None,
+            room: None,
+            density: None,
+            assembled: None,
+            given: None,
+            runs: BTreeMap::new(),
+            products: 0,
+            sum: None,
+        }
+    }
+
     pub(super) fn elements(&self) -> &Elements {
         self.elements.as_ref().expect("after flip/survey")
     }

@@ -64,8 +64,15 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let length = state.scene.shot.frame_seconds();
     let start = f64::from(state.frame) * length + elapsed;
     let (frame, remaining, speed) = (state.frame + 1, length - elapsed, fastest.sqrt());
-    let chosen = (state.scene).flip_substep(frame, start, remaining, speed, number - 1)?;
-    let substep = chosen.1;
+    let substep = match state.given_substep {
+        Some(substep) => substep,
+        None => {
+            (state
+                .scene
+                .flip_substep(frame, start, remaining, speed, number - 1)?)
+            .1
+        }
+    };
     let flags: Vec<bool> = found.iter().map(|&flag| flag != 0).collect();
     let bricks = (state.model).bricks(&flags, &state.model.step(&substep));
     state.elements = Some(Elements {

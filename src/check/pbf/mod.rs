@@ -19,9 +19,10 @@ use crate::{
         neighbors::Neighbors,
         pbf::{Model, Substep, passes::Inputs},
     },
-    scene::{Scene, Stop},
+    scene::{Scene, Stop, step::projected_substep},
     solve::{
         SolveError,
+        flip::buffers::BRICKS,
         params::{IterationControl, Phase},
         pbf::{Pbf, buffers},
         plan::Plan,
@@ -32,6 +33,7 @@ use crate::{
 use super::{
     Checked, effects,
     engine::{Engine, Io, NONE, State, Twin, names, twin, wide},
+    flip::FlipState,
     table::{Table, pair},
 };
 use lists::Lists;
@@ -110,11 +112,20 @@ pub fn check(
         plan,
     });
     engine.state.take_samples(&solver, &mut engine.table)?;
-    let span = Span::Only(which);
-    let traced = solver.trace_frame(span, &mut |_, traced| engine.observe(traced))?;
+    let mut of_grid = scene.of_projection().map(|grid| {
+        let mut state = FlipState::new(&grid, boundary, (frame, particles.len()));
+        state.given_substep = Some(projected_substep(end - time_step, time_step));
+        Engine::new(state)
+    });
+    let traced = solver.trace_frame(Span::Only(which), &mut |_, traced| match &mut of_grid {
+        Some(of_grid) if traced.has(BRICKS.name()) => of_grid.observe(traced),
+        _ => engine.observe(traced),
+    })?;
     engine.state.add_whole(boundary, &mut engine.table);
+    let mut table = of_grid.map_or_else(Table::default, Engine::finish);
+    table.absorb(engine.finish());
     Ok(Checked {
-        table: engine.finish(),
+        table,
         substep: Some(traced),
     })
 }

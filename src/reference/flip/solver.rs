@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{
-    Centers, Cloud, Faces, Model, Room, Sorted, Waters, advect, assign_cells, cut_cells,
+    Centers, Cloud, Faces, Given, Model, Room, Sorted, Waters, advect, assign_cells, cut_cells,
     density_source,
     effects::{self, Water},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
@@ -87,6 +87,8 @@ pub struct Trace {
     pub pressure: Vec<f64>,
     /// Displacements of the density correction at the lower faces, metres, where there is one.
     pub displacement: Option<Vec<DVec3>>,
+    /// What the grid gave the particles, in the order of `sorted`, before they moved.
+    pub given: Given,
     /// Particles as they then are, in the order of `sorted`.
     pub after: Cloud,
     /// Particles that were slowed to the displacement cap.
@@ -252,10 +254,11 @@ impl Flip {
             after: Cloud {
                 position: moved.position,
                 velocity: moved.velocity,
-                affine: given.affine,
+                affine: given.affine.clone(),
                 id: sorted.cloud.id.clone(),
             },
             capped: moved.capped,
+            given,
             bricks,
             sorted,
             room,
@@ -264,6 +267,58 @@ impl Flip {
             projected,
             displacement,
         })
+    }
+
+    /// A substep whose pressure the gauge then reads; its numbers are the frame and, from 1, its own in it.
+    fn judged_substep(
+        &mut self,
+        (frame, number): (u32, u32),
+        cloud: &Cloud,
+        is_wet: &[bool],
+        substep: &Substep,
+    ) -> Result<Trace, ReferenceError> {
+        let trace = self.substep(cloud, is_wet, substep)?;
+        let [_, divergence] = trace.projected.divergence;
+        self.model.scene.budget.check_projection(
+            frame,
+            number,
+            trace.projected.solution.residual,
+            divergence,
+            substep.length,
+        )?;
+        let step = self.model.step(substep);
+        self.field = Some(Field {
+            is_buried: find_buried(&step, &trace.bricks, &trace.room),
+            bricks: trace.bricks.clone(),
+            kind: trace.room.kind.clone(),
+            pressure: trace.pressure.clone(),
+        });
+        Ok(trace)
+    }
+
+    /// What the projection makes of the velocities of particles in the order of their ids over a substep, m/s, and what
+    /// moving walls did in it, joule; positions stay. The substep's numbers are the frame and, from 1, its own in it.
+    ///
+    /// # Errors
+    /// What is not finite, a projection over the budget, and a pressure system without a factor.
+    pub fn project_velocities(
+        &mut self,
+        (frame, number): (u32, u32),
+        cloud: &Cloud,
+        substep: &Substep,
+        all: &mut Projection,
+    ) -> Result<(Vec<DVec3>, f64), ReferenceError> {
+        let surveyed = survey(&self.model, cloud);
+        if surveyed.not_finite > 0 {
+            let breach = Breach::not_finite(frame, surveyed.not_finite as u64, None);
+            return Err(breach.in_substep(number).into());
+        }
+        let trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
+        add(all, &trace.projected);
+        let work = self.model.boundary_work(&trace, substep.length);
+        let order = by_id(&trace.sorted.cloud);
+        let given = order.iter().map(|&k| trace.given.velocity[k]);
+        Ok((given.collect(), work))
     }
 
     /// Substeps through one frame, from `cloud` on; what they did, and the densities that the last one found.
@@ -294,16 +349,9 @@ impl Flip {
                 surveyed.speed,
                 report.substeps,
             )?;
-            let trace = self.substep(cloud, &surveyed.is_wet, &substep)?;
             report.substeps += 1;
-            let [_, divergence] = trace.projected.divergence;
-            self.model.scene.budget.check_projection(
-                frame,
-                report.substeps,
-                trace.projected.solution.residual,
-                divergence,
-                substep.length,
-            )?;
+            let number = (frame, report.substeps);
+            let trace = self.judged_substep(number, cloud, &surveyed.is_wet, &substep)?;
             report.boundary_work += self.model.boundary_work(&trace, substep.length);
             report.iterations += u64::from(trace.projected.solution.iterations);
             report.capped += trace.capped;
@@ -314,19 +362,13 @@ impl Flip {
                 is_last: wanted <= 1.0,
             };
             elapsed += substep.length;
+            let density = trace.centers.density;
             *cloud = trace.after;
-            let step = self.model.step(&substep);
-            self.field = Some(Field {
-                is_buried: find_buried(&step, &trace.bricks, &trace.room),
-                bricks: trace.bricks,
-                kind: trace.room.kind,
-                pressure: trace.pressure,
-            });
             self.show(span, cloud, watch)?;
             if span.is_last {
                 report.projection = Some(all);
                 let kinds = self.field.iter().flat_map(|field| &field.kind);
-                let of_cells = trace.centers.density.into_iter().zip(kinds);
+                let of_cells = density.into_iter().zip(kinds);
                 let in_water = of_cells.filter(|(_, kind)| **kind == FLUID);
                 let density = in_water.map(|(density, _)| density).collect();
                 return Ok((report, density));

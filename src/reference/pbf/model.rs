@@ -109,7 +109,7 @@ impl Model {
             }),
             calibration,
             settings: settings.clone(),
-            gravity: scene.water.gravity,
+            gravity: scene.predicted_gravity(),
             cells,
         }
     }

@@ -14,19 +14,22 @@ use crate::{
         particles::Particles,
         pbf::chebyshev_factors,
         probe::fitted,
-        solver::{Seen, Solver, Span, StepReport, Watch},
+        solver::{Projection, Seen, Solver, Span, StepReport, Watch},
     },
     reference::{
         ReferenceError, Timings,
+        flip::{Cloud, Flip},
         neighbors::{Crowd, Neighbors},
     },
-    scene::{Iteration, Scene, Stop},
+    scene::{Iteration, Scene, Stop, step::projected_substep},
 };
 
 /// PBF in f64. Frames are rounded to f32 as they are written, and the next one starts from what was written.
 pub struct Pbf {
     scene: Scene,
     model: Model,
+    /// What projects velocities, where anything does.
+    grid: Option<Flip>,
     state: Particles,
     frame: u32,
     timings: Timings,
@@ -229,6 +232,7 @@ impl Pbf {
     pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
         Self {
             model: Model::new(scene, boundary),
+            grid: scene.of_projection().map(|grid| Flip::new(&grid, boundary)),
             scene: scene.clone(),
             state: Particles::default(),
             frame: 0,
@@ -237,6 +241,32 @@ impl Pbf {
             pressed: Vec::new(),
             step: 0.0,
         }
+    }
+
+    /// Velocities as the projection makes them for the substep from `start` on, the `number`-th of its frame, where there is
+    /// one; what moving walls did in it, joule.
+    fn project(
+        &mut self,
+        (number, start): (u32, f64),
+        step: f64,
+        position: &[DVec3],
+        velocity: &mut Vec<DVec3>,
+        all: &mut Projection,
+    ) -> Result<f64, ReferenceError> {
+        let Some(grid) = self.grid.as_mut().filter(|_| !position.is_empty()) else {
+            return Ok(0.0);
+        };
+        let cloud = Cloud {
+            position: position.to_vec(),
+            velocity: std::mem::take(velocity),
+            affine: Vec::new(),
+            id: self.state.id.clone(),
+        };
+        let numbers = (self.frame + 1, number);
+        let substep = projected_substep(start, step);
+        let (projected, work) = grid.project_velocities(numbers, &cloud, &substep, all)?;
+        *velocity = projected;
+        Ok(work)
     }
 
     /// One substep of particles in the order of their ids; returns iterations, capped particles and what moving walls
@@ -356,14 +386,17 @@ impl Solver for Pbf {
         let mut position = local(&self.scene, &self.state);
         let mut velocity: Vec<DVec3> = self.state.velocity.iter().map(widen).collect();
         let (mut iterations, mut capped, mut boundary_work) = (0, 0, 0.0);
+        let mut all = Projection::default();
         for k in 1..=substeps {
+            let begin = start + f64::from(k - 1) * step;
+            boundary_work += self.project((k, begin), step, &position, &mut velocity, &mut all)?;
             let substep = Substep::new(&self.scene, start + f64::from(k) * step, step);
             let (some, slowed, work) = self.step(&substep, &mut position, &mut velocity);
             iterations += u64::from(some);
             capped += slowed;
             boundary_work += work;
             let span = Span {
-                start: start + f64::from(k - 1) * step,
+                start: begin,
                 end: start + f64::from(k) * step,
                 is_last: k == substeps,
             };
@@ -381,6 +414,7 @@ impl Solver for Pbf {
             iterations,
             capped,
             boundary_work,
+            projection: self.grid.as_ref().map(|_| all),
             ..self.scene.report(&self.state, density.into_iter())
         };
         Ok((self.state.clone(), report))
@@ -388,6 +422,9 @@ impl Solver for Pbf {
 
     /// As [`pressure_scale`](crate::domain::sph::Calibration::pressure_scale) has it from Σ λ.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, ReferenceError> {
+        if let Some(grid) = &self.grid {
+            return grid.pressures(points);
+        }
         let calibration = &self.model.calibration;
         let scale = calibration.pressure_scale(
             self.scene.water.rest_density,

@@ -5,6 +5,7 @@ use super::{
         Iteration, Method, Pbf, Solver, Stop,
         document::Document,
         flip::Flip,
+        projection::PROJECTION_CELL,
         spec::{PbfSpec, SolverSpec},
         words::shown,
     },
@@ -56,6 +57,11 @@ fn fit_pbf(doc: &Document<'_>, pbf: &Pbf, domain: &Bounds) -> Result<Lattice> {
     };
     let support_radius = pbf.particle_spacing * pbf.support_ratio;
     check_grid(doc, domain, &lattice, support_radius, MAX_CELLS)?;
+    if pbf.grid_projection {
+        let cell_size = PROJECTION_CELL * pbf.particle_spacing;
+        check_interior(doc, &lattice, cell_size, domain)?;
+        check_grid(doc, domain, &lattice, cell_size, MAX_FLIP_CELLS)?;
+    }
     Ok(lattice)
 }
 
@@ -98,6 +104,7 @@ impl From<PbfSpec> for Pbf {
             cfl: spec.cfl,
             relaxation: spec.relaxation.unwrap_or(relaxation),
             artificial_pressure: spec.artificial_pressure,
+            grid_projection: spec.grid_projection,
             max_substeps: spec.max_substeps,
         }
     }

@@ -340,6 +340,10 @@ const PBF: &[Key] = &[
     Key::number("artificial_pressure", 0.0..=10.0)
         .default("0.0")
         .about("k of s_corr, with λ's natural scale as unit"),
+    Key::flag("grid_projection")
+        .default("false")
+        .about("velocities are made free of divergence on a grid of cells of 2 d before particles move (Raveendran 2011), \
+            so that iterations correct what is left; at least 3 such cells along each axis"),
     Key::whole("max_substeps", MANY)
         .not_physics()
         .default("32")

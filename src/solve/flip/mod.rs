@@ -9,6 +9,7 @@ mod capacity;
 pub(super) mod plan;
 mod record;
 mod step;
+mod velocities;
 mod watch;
 
 use glam::DVec3;
@@ -79,12 +80,12 @@ struct Survey {
 
 /// What a frame's substeps did, added up.
 #[derive(Default)]
-struct FrameTotals {
+pub(super) struct FrameTotals {
     substeps: u32,
     iterations: u64,
-    projection: Projection,
+    pub(super) projection: Projection,
     /// Joule.
-    work: f64,
+    pub(super) work: f64,
     /// Of the frame, seconds.
     elapsed: f64,
 }
@@ -239,7 +240,7 @@ impl Flip {
                 bricks: grown,
                 ..self.plan.counts
             };
-            self.plan = plan::plan(&self.scene, counts);
+            self.plan = plan::plan(&self.scene, counts, self.plan.moves);
             let (buffers, passes) = (self.plan.buffer_specs(), self.plan.pass_specs());
             self.program.refit(&buffers, &passes)?;
             upload_constants(&self.program, &self.plan, &self.scene);

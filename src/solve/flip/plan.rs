@@ -28,10 +28,11 @@ const FACES: usize = 18;
 /// Cell centres that they reach.
 const CENTERS: usize = 27;
 
-/// Lays out FLIP with its projection for `scene`.
-pub(in crate::solve) fn plan(scene: &Scene, counts: Counts) -> Plan {
+/// Lays out FLIP with its projection for `scene`; `moves` says whether it moves particles.
+pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan {
     let flip = scene.solver.flip();
     let mut plan = Plan::bare(counts, scene.domain.cells(flip.cell_size));
+    plan.moves = moves;
     let effects = effects::of_flip(&scene.effects, CELLS as usize * counts.bricks.slots);
     let mut table = buffers(&plan, scene);
     for (name, addition) in &effects {

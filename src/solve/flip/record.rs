@@ -193,6 +193,8 @@ fn to_particles(plan: &Plan, scene: &Scene) -> Vec<Command> {
     if flip.density_correction {
         commands.push(Command::over("flip/push_apart", plan.counts.particles));
     }
-    commands.push(Command::over("flip/advect", plan.counts.particles));
+    if plan.moves {
+        commands.push(Command::over("flip/advect", plan.counts.particles));
+    }
     commands
 }

@@ -3,6 +3,7 @@
 pub mod buffers;
 mod iteration;
 pub(super) mod plan;
+mod projection;
 mod record;
 
 use glam::DVec3;
@@ -34,10 +35,11 @@ use super::{
     params::{Counters, IterationControl, Params},
     plan::Plan,
     state::{check_finite, check_ids, look, slots_by_id, take_over, upload},
-    trace::{Begun, Observe, Span, TraceFrame, Traced, trace},
+    trace::{Begun, Observe, Run, Span, TraceFrame, Traced, trace},
 };
 use buffers::*;
 use plan::{SHARED_CONSTANTS, cell_count};
+use projection::Grid;
 use record::Commands;
 
 /// Far from everything, and still finite when squared.
@@ -51,6 +53,7 @@ pub struct Pbf {
     calibration: Calibration,
     substep: Recording,
     measure: Recording,
+    grid: Option<Grid>,
     timer: Option<Timer>,
     state: Particles,
     frame: u32,
@@ -88,6 +91,7 @@ impl Pbf {
         program.upload(PREDICTED, last, &[NOBODY]);
         boundary.upload(&program, scene, &plan, &calibration);
         Ok(Self {
+            grid: Grid::of(context, scene, &plan, boundary)?,
             timer: is_timed.then(|| Timer::new(context)),
             program,
             plan,
@@ -108,7 +112,12 @@ impl Pbf {
 
     /// Names of the passes that a substep and a frame's measurement run, in order.
     pub fn recorded_passes(&self) -> Vec<&'static str> {
-        self.substep.passes().chain(self.measure.passes()).collect()
+        let of_grid = self
+            .grid
+            .iter()
+            .flat_map(|grid| grid.flip().recorded_passes());
+        let own = self.substep.passes().chain(self.measure.passes());
+        of_grid.chain(own).collect()
     }
 
     /// Names of the passes and buffers that exist on the device, sorted.
@@ -136,7 +145,7 @@ impl Pbf {
         let Period(period) = self.scene.period();
         let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
         Params {
-            velocity_step: (self.scene.water.gravity * step).as_vec3().to_array(),
+            velocity_step: (self.scene.predicted_gravity() * step).as_vec3().to_array(),
             particle_count: self.plan.counts.particles as u32,
             grid_dims: self.plan.grid_dims,
             max_correction: (MAX_CORRECTION * pbf.particle_spacing) as f32,
@@ -164,7 +173,10 @@ impl Pbf {
     }
 
     /// Zeroes what adds up over a frame.
-    fn begin_frame(&self) {
+    fn begin_frame(&mut self) {
+        if let Some(grid) = &mut self.grid {
+            grid.begin_frame(self.frame);
+        }
         self.program.upload(COUNTERS, 0, &[Counters::default()]);
         if self.scene.has_movers() {
             let groups = self.plan.counts.particles.div_ceil(64);
@@ -183,15 +195,32 @@ impl Pbf {
         Ok(self.scene.particle_mass() / step * sum)
     }
 
-    fn prepare_substep(&self, time: f64, step: f64) {
+    /// Ready for the recording of the substep that ends at `time`.
+    fn prepare_substep(
+        &mut self,
+        time: f64,
+        step: f64,
+        run: &mut Run<'_>,
+    ) -> Result<(), SolveError> {
+        if let Some(grid) = &mut self.grid
+            && !self.state.is_empty()
+        {
+            grid.project(&self.program, (time - step, step), run)?;
+        }
         self.program.upload(PARAMS, 0, &[self.params(time, step)]);
         if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {
             self.program.upload(CONTROL, 0, &[self.control()]);
         }
+        Ok(())
     }
 
     fn run_substep(&mut self, time: f64, step: f64) -> Result<(), SolveError> {
-        self.prepare_substep(time, step);
+        let mut timer = self.timer.take();
+        let run: &mut Run<'_> =
+            &mut |program, recordings| Ok(Recording::run_all(recordings, program, timer.as_mut())?);
+        let prepared = self.prepare_substep(time, step, run);
+        self.timer = timer;
+        prepared?;
         Ok(self.substep.run(&self.program, self.timer.as_mut())?)
     }
 
@@ -249,7 +278,9 @@ impl Pbf {
             seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
         }
         if wanted.pressures {
-            self.pressed = self.particle_pressures(step)?;
+            if self.grid.is_none() {
+                self.pressed = self.particle_pressures(step)?;
+            }
             seen.pressures = self.pressures(&self.scene.pressure_points())?;
         }
         Ok(seen)
@@ -297,7 +328,10 @@ impl Solver for Pbf {
         self.state = particles.clone();
         self.frame = frame;
         upload(&self.program, &self.scene, &self.state);
-        Ok(())
+        match &mut self.grid {
+            Some(grid) => grid.load(frame, particles),
+            None => Ok(()),
+        }
     }
 
     fn advance_watched(
@@ -322,7 +356,7 @@ impl Solver for Pbf {
             }
         }
         let (density, counters) = self.read_state(start + length)?;
-        if !self.scene.pressure_points().is_empty() {
+        if self.scene.reads_multipliers() {
             self.pressed = self.particle_pressures(length / f64::from(substeps))?;
         }
         self.frame += 1;
@@ -339,19 +373,25 @@ impl Solver for Pbf {
             Stop::Iterations(count) => u64::from(count) * u64::from(substeps),
             Stop::DensityError { .. } => u64::from(counters.iterations),
         };
+        let grid = self.grid.as_ref().map(Grid::done);
+        let work = self.boundary_work(length / f64::from(substeps))?;
         let report = StepReport {
             substeps,
             iterations,
             capped: u64::from(counters.capped),
             searched: u64::from(counters.searched),
-            boundary_work: self.boundary_work(length / f64::from(substeps))?,
+            boundary_work: work + grid.as_ref().map_or(0.0, |grid| grid.1),
+            projection: grid.map(|grid| grid.0),
             ..self.scene.report(&self.state, density.into_iter())
         };
         Ok((self.state.clone(), report))
     }
 
-    /// Of the particles about a point, by the plane that fits them best.
+    /// Of the particles about a point, by the plane that fits them best; with a projection, its own.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, SolveError> {
+        if let Some(grid) = &self.grid {
+            return grid.pressures(points);
+        }
         let local = |at: &DVec3| *at - self.scene.domain.min;
         let support = self.calibration.support_radius;
         let points = points.iter().map(local);
@@ -394,7 +434,9 @@ impl TraceFrame for Pbf {
             let elapsed = f64::from(number - 1) * step;
             let begun = Begun { number, elapsed };
             let mut tell = |traced: Traced<'_>| observe(begun, traced);
-            self.prepare_substep(time, step);
+            self.prepare_substep(time, step, &mut |program, recordings| {
+                trace(recordings, program, &mut tell)
+            })?;
             trace(&[&self.substep], &self.program, &mut tell)?;
             if number == last {
                 self.program.upload(PARAMS, 0, &[self.params(time, 0.0)]);

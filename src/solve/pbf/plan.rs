@@ -5,7 +5,7 @@ use crate::{
     gpu::{program::PassSpec, recording::Command, sort},
     scene::{Iteration, Scene, Stop},
     solve::{
-        effects,
+        effects, flip,
         plan::{Chunk, Counts, DeviceLimits, Plan, Table, in_order},
     },
 };
@@ -34,6 +34,8 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits
     let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
     let (size, support) = (scene.domain.size(), calibration.support_radius);
     let mut plan = Plan::bare(counts, scene.period().cells(size, support));
+    plan.projection =
+        (scene.of_projection()).map(|grid| Box::new(flip::plan::plan(&grid, counts, false)));
     choose_lists(&mut plan, limits);
     let effects = effects::of_pbf(&scene.effects, counts.particles);
     let commands = Commands::new(&plan, scene, &effects);
@@ -105,7 +107,7 @@ fn own(name: &'static str, scene: &Scene) -> PassSpec {
         "pbf/compute_delta" => &[
             ("ARTIFICIAL_PRESSURE", pbf.artificial_pressure > 0.0),
             ("CHEBYSHEV", pbf.iteration == Iteration::Chebyshev),
-            ("PRESSURE", !scene.pressure_points().is_empty()),
+            ("PRESSURE", scene.reads_multipliers()),
             ("WALL_WORK", scene.has_movers()),
         ],
         "pbf/update_velocity" => &[("ADAPTIVE", is_adaptive)],
@@ -154,7 +156,7 @@ fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
         table.add("pbf", CONTROL.sized(1));
         table.add("pbf", ERROR_SUMS.sized(n.div_ceil(256)));
     }
-    if !scene.pressure_points().is_empty() {
+    if scene.reads_multipliers() {
         table.add("probes", LAMBDA_SUM.sized(n));
     }
     if scene.has_movers() {

@@ -50,7 +50,7 @@ fn substep(
 ) -> Vec<Command> {
     let pbf = scene.solver.pbf();
     let mut commands = vec![Command::over("pbf/predict", plan.counts.particles)];
-    if !scene.pressure_points().is_empty() {
+    if scene.reads_multipliers() {
         commands.push(Command::clear(&LAMBDA_SUM));
     }
     if scene.has_movers() {

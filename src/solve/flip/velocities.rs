@@ -1,0 +1,51 @@
+//! FLIP's velocities for a solver that moves the particles itself.
+
+use super::{
+    super::{SolveError, trace::Run},
+    Flip, FrameTotals,
+    buffers::*,
+};
+use crate::{
+    domain::budget::Breach, gpu::program::Program, scene::step::projected_substep,
+    solve::params::Counters,
+};
+
+impl Flip {
+    /// Zeroes what is counted over the frame after `frame`.
+    pub(in crate::solve) fn begin_frame(&mut self, frame: u32) {
+        self.frame = frame;
+        self.program.upload(COUNTERS, 0, &[Counters::default()]);
+    }
+
+    /// Takes positions, velocities and ids, in storage order, from a program; makes the velocities those that the projection
+    /// gives over the `length` seconds from `start` on; and hands them back, sorted.
+    ///
+    /// # Errors
+    /// The device, what is not finite, and a projection over the budget.
+    pub(in crate::solve) fn project_velocities(
+        &mut self,
+        program: &Program,
+        (start, length): (f64, f64),
+        totals: &mut FrameTotals,
+        run: &mut Run<'_>,
+    ) -> Result<(), SolveError> {
+        let n = self.state.len();
+        let own = &self.program;
+        own.copy(&POSITION, program, &POSITION, n);
+        own.copy(&VELOCITY, program, &VELOCITY, n);
+        own.copy(&ID, program, &ID, n);
+        let survey = self.survey(run)?;
+        totals.substeps += 1;
+        if survey.not_finite > 0 {
+            let breach = Breach::not_finite(self.frame + 1, survey.not_finite.into(), None);
+            return Err(breach.in_substep(totals.substeps).into());
+        }
+        let substep = projected_substep(start, length);
+        self.run_substep(&survey.is_wet, &substep, totals, run)?;
+        let own = &self.program;
+        program.copy(&POSITION, own, &SORTED_POSITION, n);
+        program.copy(&VELOCITY, own, &VELOCITY, n);
+        program.copy(&ID, own, &SORTED_ID, n);
+        Ok(())
+    }
+}
