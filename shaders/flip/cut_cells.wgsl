@@ -99,16 +99,17 @@ fn main(
     face_open[element] = lower.x;
     face_open[params.stride + element] = lower.y;
     face_open[2u * params.stride + element] = lower.z;
+    // What of a face lies beyond a wall that stands across it is nobody's.
 #ifdef MOVING_SOLIDS
-    let pushed_high = (1.0 - upper_of_walls) * wall_velocity(cell + 1.0) + (upper_of_walls - upper) * upper_velocity;
-    let pushed_low = (1.0 - lower_of_walls) * wall_velocity(cell) + (lower_of_walls - lower) * lower_velocity;
+    let pushed_high = (across - upper_of_walls) * wall_velocity(cell + 1.0) + (upper_of_walls - upper) * upper_velocity;
+    let pushed_low = (across - lower_of_walls) * wall_velocity(cell) + (lower_of_walls - lower) * lower_velocity;
     let pushed = pushed_high - pushed_low;
     let closing = select(wall_velocity(cell), lower_velocity, is_plane_open(cell));
     closed_velocity[element] = closing.x;
     closed_velocity[params.stride + element] = closing.y;
     closed_velocity[2u * params.stride + element] = closing.z;
 #else
-    let pushed = (1.0 - upper) * wall_velocity(cell + 1.0) - (1.0 - lower) * wall_velocity(cell);
+    let pushed = (across - upper) * wall_velocity(cell + 1.0) - (across - lower) * wall_velocity(cell);
 #endif
     solid_flux[element] = pushed.x + pushed.y + pushed.z;
 }

@@ -63,6 +63,11 @@ const TWINS: &[Twin<FlipState>] = &[
         || names![buffers::COUNTERS],
         particles::advect,
     ),
+    twin(
+        "flip/aim",
+        || names![buffers::SORTED_POSITION],
+        particles::aim,
+    ),
     twin("flip/boundary_work", NONE, boundary_work),
 ];
 

@@ -10,8 +10,8 @@ use crate::{
     },
     domain::bricks::Bricks,
     reference::flip::{
-        Given, Moved, advect as twin_advect, grid_to_particle as twin_grid_to_particle,
-        push_apart as twin_push_apart,
+        Given, Moved, advect as twin_advect, aim as twin_aim,
+        grid_to_particle as twin_grid_to_particle, push_apart as twin_push_apart,
     },
     solve::{SolveError, flip::buffers, pressure::buffers as solved},
 };
@@ -100,6 +100,20 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         );
     }
     state.given = Some(given);
+    Ok(())
+}
+
+/// From what the device gave the particles.
+pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let given = state.given.as_ref().expect("after flip/grid_to_particle");
+    let before = io.before.vectors(buffers::SORTED_POSITION, state.n)?;
+    let after = io.after.vectors(buffers::SORTED_POSITION, state.n)?;
+    let step = state.step();
+    let twin = twin_aim(&step, &before, given);
+    io.table.each(&AIMED, 0..state.n, |i| {
+        let way = step.length * (given.carried[i].length() + given.velocity[i].length());
+        pair(i, after[i], twin[i], [before[i].length(), way])
+    });
     Ok(())
 }
 

@@ -216,6 +216,9 @@ entries! {
             U * (count * (8.0 * apart + 2.0 * period) + 2.0 * extent + 2.0 * displacement),
             "a difference, a root, a quotient and a product for each; the walls' places; a sum";
     }
+    "flip/aim" {
+        AIMED = "position", "m": [x: "|x|", way: "Δt (|u| + |v|)"] U * (x + 4.0 * way), "a difference, a product and a sum";
+    }
     "flip/advect" {
         MOVED = "position", "m": [answer: "what the twin answers when its start moves along each axis by " START, x: "|x|, and where a period carried it that four times"]
             answer + U * x, "";

@@ -27,7 +27,7 @@ pub use solver::{Flip, Projected, Trace};
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
 pub use to_grid::{Faces, Room, cut_cells, gather_faces};
 pub use to_particles::{
-    Given, Moved, advect, extrapolate, find_change, grid_to_particle, push_apart,
+    Given, Moved, advect, aim, extrapolate, find_change, grid_to_particle, push_apart,
 };
 pub use wall_friction::{friction_rates, wall_friction};
 pub use water::{

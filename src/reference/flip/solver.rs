@@ -3,8 +3,8 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{
-    Centers, Cloud, Faces, Given, Model, Room, Sorted, Waters, advect, assign_cells, cut_cells,
-    density_source,
+    Centers, Cloud, Faces, Given, Model, Room, Sorted, Waters, advect, aim, assign_cells,
+    cut_cells, density_source,
     effects::{self, Water},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
     gather_faces, grid_to_particle, push_apart, reorder, survey, wall_friction,
@@ -296,18 +296,18 @@ impl Flip {
         Ok(trace)
     }
 
-    /// What the projection makes of the velocities of particles in the order of their ids over a substep, m/s, and what
-    /// moving walls did in it, joule; positions stay. The substep's numbers are the frame and, from 1, its own in it.
+    /// Makes the velocities of particles in the order of their ids those of the projection over a substep, m/s, and aims the
+    /// particles with them; returns what moving walls did, joule. The substep's numbers are the frame and, from 1, its own.
     ///
     /// # Errors
     /// What is not finite, a projection over the budget, and a pressure system without a factor.
     pub fn project_velocities(
         &mut self,
         (frame, number): (u32, u32),
-        cloud: &Cloud,
+        cloud: &mut Cloud,
         substep: &Substep,
         all: &mut Projection,
-    ) -> Result<(Vec<DVec3>, f64), ReferenceError> {
+    ) -> Result<f64, ReferenceError> {
         let surveyed = survey(&self.model, cloud);
         if surveyed.not_finite > 0 {
             let breach = Breach::not_finite(frame, surveyed.not_finite as u64, None);
@@ -317,8 +317,15 @@ impl Flip {
         add(all, &trace.projected);
         let work = self.model.boundary_work(&trace, substep.length);
         let order = by_id(&trace.sorted.cloud);
-        let given = order.iter().map(|&k| trace.given.velocity[k]);
-        Ok((given.collect(), work))
+        let aimed = aim(
+            &self.model.step(substep),
+            &trace.sorted.cloud.position,
+            &trace.given,
+        );
+        for (slot, &k) in order.iter().enumerate() {
+            (cloud.position[slot], cloud.velocity[slot]) = (aimed[k], trace.given.velocity[k]);
+        }
+        Ok(work)
     }
 
     /// Substeps through one frame, from `cloud` on; what they did, and the densities that the last one found.

@@ -143,7 +143,7 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
             open = open.map(|open| DVec3::select(open.cmplt(on_face), DVec3::ZERO, open));
         }
         let [low, high] = [0, 1].map(|side| {
-            (1.0 - of_walls[side]) * step.closing_velocity(planes[side])
+            (across - of_walls[side]) * step.closing_velocity(planes[side])
                 + (of_walls[side] - open[side]) * velocity[side]
         });
         let is_open = volume >= ON_FACE * ON_FACE || (open[0] + open[1]).cmpgt(DVec3::ZERO).any();

@@ -245,6 +245,16 @@ pub fn grid_to_particle(
     }
 }
 
+/// Where each particle has to start from so that its own new velocity takes it to where the grid's takes it from its
+/// place; drops where they are (flip/aim). Metres. Shape (particles), in sorted order.
+pub fn aim(step: &Step<'_>, position: &[DVec3], given: &Given) -> Vec<DVec3> {
+    let one = |(i, &x): (usize, &DVec3)| match given.is_drop[i] {
+        true => x,
+        false => x + step.length * (given.carried[i] - given.velocity[i]),
+    };
+    position.iter().enumerate().map(one).collect()
+}
+
 /// The grid's velocity at `x`, m/s; `otherwise` where no brick is.
 fn velocity_at(
     model: &Model,

@@ -243,29 +243,29 @@ impl Pbf {
         }
     }
 
-    /// Velocities as the projection makes them for the substep from `start` on, the `number`-th of its frame, where there is
-    /// one; what moving walls did in it, joule.
+    /// Velocities as the projection makes them for the substep from `start` on, the `number`-th of its frame, and particles
+    /// aimed with them, where there is one; what moving walls did in it, joule.
     fn project(
         &mut self,
         (number, start): (u32, f64),
         step: f64,
-        position: &[DVec3],
+        position: &mut Vec<DVec3>,
         velocity: &mut Vec<DVec3>,
         all: &mut Projection,
     ) -> Result<f64, ReferenceError> {
         let Some(grid) = self.grid.as_mut().filter(|_| !position.is_empty()) else {
             return Ok(0.0);
         };
-        let cloud = Cloud {
-            position: position.to_vec(),
+        let mut cloud = Cloud {
+            position: std::mem::take(position),
             velocity: std::mem::take(velocity),
             affine: Vec::new(),
             id: self.state.id.clone(),
         };
         let numbers = (self.frame + 1, number);
         let substep = projected_substep(start, step);
-        let (projected, work) = grid.project_velocities(numbers, &cloud, &substep, all)?;
-        *velocity = projected;
+        let work = grid.project_velocities(numbers, &mut cloud, &substep, all)?;
+        (*position, *velocity) = (cloud.position, cloud.velocity);
         Ok(work)
     }
 
@@ -389,7 +389,8 @@ impl Solver for Pbf {
         let mut all = Projection::default();
         for k in 1..=substeps {
             let begin = start + f64::from(k - 1) * step;
-            boundary_work += self.project((k, begin), step, &position, &mut velocity, &mut all)?;
+            boundary_work +=
+                self.project((k, begin), step, &mut position, &mut velocity, &mut all)?;
             let substep = Substep::new(&self.scene, start + f64::from(k) * step, step);
             let (some, slowed, work) = self.step(&substep, &mut position, &mut velocity);
             iterations += u64::from(some);

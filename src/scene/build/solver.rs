@@ -59,7 +59,6 @@ fn fit_pbf(doc: &Document<'_>, pbf: &Pbf, domain: &Bounds) -> Result<Lattice> {
     check_grid(doc, domain, &lattice, support_radius, MAX_CELLS)?;
     if pbf.grid_projection {
         let cell_size = PROJECTION_CELL * pbf.particle_spacing;
-        check_interior(doc, &lattice, cell_size, domain)?;
         check_grid(doc, domain, &lattice, cell_size, MAX_FLIP_CELLS)?;
     }
     Ok(lattice)

@@ -343,7 +343,7 @@ const PBF: &[Key] = &[
     Key::flag("grid_projection")
         .default("false")
         .about("velocities are made free of divergence on a grid of cells of 2 d before particles move (Raveendran 2011), \
-            so that iterations correct what is left; at least 3 such cells along each axis"),
+            so that iterations correct what is left"),
     Key::whole("max_substeps", MANY)
         .not_physics()
         .default("32")

@@ -193,8 +193,11 @@ fn to_particles(plan: &Plan, scene: &Scene) -> Vec<Command> {
     if flip.density_correction {
         commands.push(Command::over("flip/push_apart", plan.counts.particles));
     }
-    if plan.moves {
-        commands.push(Command::over("flip/advect", plan.counts.particles));
-    }
+    let last = if plan.moves {
+        "flip/advect"
+    } else {
+        "flip/aim"
+    };
+    commands.push(Command::over(last, plan.counts.particles));
     commands
 }
