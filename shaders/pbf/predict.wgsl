@@ -16,6 +16,20 @@
 // Of what is not finite, which clamping would hide.
 @group(0) @binding(12) var<storage, read_write> counters: Counters;
 
+#ifdef PROJECTED
+// After confine(free).
+fn stopped(v: vec3f, free: vec3f) -> vec3f {
+    var left = v;
+    var y = free;
+#ifdef SOLIDS
+    left -= solid_push * (min(dot(left, solid_push), 0.0) / max(dot(solid_push, solid_push), 1e-30));
+    y += solid_push;
+#endif
+    left = select(left, max(left, params.wall_velocity_min), y < params.wall_min + params.contact_distance);
+    return select(left, min(left, params.wall_velocity_max), y > params.wall_max - params.contact_distance);
+}
+
+#endif
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -41,5 +55,12 @@ fn main(
 #else
     predicted[params.particle_count + thread] = vec4f(x, 0.0);
 #endif
-    velocity[thread] = vec4f(v + (x - free) * params.inverse_time_step, 0.0);
+    let taken = (x - free) * params.inverse_time_step;
+#ifdef PROJECTED
+    // The grid's flow took water here, not its own velocity, which loses what it has into walls and solids and no more.
+    let is_drop = velocity[thread].w > 0.0;
+    velocity[thread] = vec4f(select(stopped(v, free), v + taken, is_drop), velocity[thread].w);
+#else
+    velocity[thread] = vec4f(v + taken, 0.0);
+#endif
 }

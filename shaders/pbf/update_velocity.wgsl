@@ -35,7 +35,14 @@ fn main(
     let source = thread + phase.read_even;
 #endif
     var x = predicted[source].xyz;
-    var v = sorted_velocity[thread].xyz + (x - start_position[thread].xyz) * params.inverse_time_step;
+    let came = sorted_velocity[thread];
+    var v = (x - start_position[thread].xyz) * params.inverse_time_step;
+#ifdef PROJECTED
+    // Water goes with the grid's flow and not with its own velocity: what it is corrected by in each step would add up
+    // in a velocity that never moves it. Drops fly with theirs.
+    v *= came.w;
+#endif
+    v += came.xyz;
     let distance = length(v) * params.time_step;
     if distance > params.max_displacement {
         let excess = v * (1.0 - params.max_displacement / distance);

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     check::{
-        engine::{Io, Outcome},
+        engine::{Io, Outcome, wide},
         sort::{check_cells, check_slots},
         table::{each, pair},
     },
@@ -28,10 +28,10 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         state.substep.time_step = 0.0;
         state.substep.wall_velocity = Default::default();
     }
-    let (x, v) = (
-        io.before.vectors(buffers::POSITION, n)?,
-        io.before.vectors(buffers::VELOCITY, n)?,
-    );
+    let x = io.before.vectors(buffers::POSITION, n)?;
+    let came: Vec<[f32; 4]> = io.before.get(buffers::VELOCITY, n)?;
+    let v = wide(&came);
+    let goes_along = |i: usize| state.model.settings.grid_projection && came[i][3] == 0.0;
     let predicted = io.after.vectors(buffers::PREDICTED, 2 * n)?;
     let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     let works = match state.scene.has_movers() {
@@ -57,13 +57,37 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             }
             false => 0.0,
         };
-        let (at, then, work) = passes::predict_and_work(model, &state.substep, x, v);
+        let predict = match goes_along(i) {
+            true => passes::predict_along,
+            false => passes::predict_and_work,
+        };
+        let (at, then, work) = predict(model, &state.substep, x, v);
         // Rounding may take one of the two to the other end of a period.
         let found = (model.period()).image_by_rounding(predicted[n + i], at);
         let [error, moved, place, pushed] = confined.magnitudes;
+        // What is stopped at once where it touches has another velocity a rounding beside it.
+        let answer = |(axis, side): (usize, f64)| {
+            let (_, other, _) = predict(
+                model,
+                &state.substep,
+                x + side * error * DVec3::AXES[axis],
+                v,
+            );
+            (other - then).length()
+        };
+        let sides = (0..3).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]);
+        let jump = match goes_along(i) {
+            true => sides.map(answer).fold(0.0, f64::max),
+            false => 0.0,
+        };
         let magnitudes = [error, moved, place, pushed + state.carried(x, at)];
         let position = pair(i, found, at, magnitudes);
-        let velocity = pair(i, velocity[i], then, [free, stopped, then.length()]);
+        let velocity = pair(
+            i,
+            velocity[i],
+            then,
+            [free, stopped.max(jump), then.length()],
+        );
         let magnitudes = [
             state.wall_speed(),
             confined.push_error,
@@ -249,13 +273,18 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     };
     let ends = io.before.vectors(buffers::PREDICTED, 2 * n)?[source..source + n].to_vec();
     let starts = io.before.vectors(buffers::START_POSITION, n)?;
-    let velocities = io.before.vectors(buffers::SORTED_VELOCITY, n)?;
+    let came: Vec<[f32; 4]> = io.before.get(buffers::SORTED_VELOCITY, n)?;
+    let velocities = wide(&came);
     let position = io.after.vectors(buffers::POSITION, n)?;
     let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     let (model, substep) = (&state.model, &state.substep);
     let (cap, step) = (model.max_displacement(), substep.time_step);
     let one = |i: usize| {
-        let (end, start, v) = (ends[i], starts[i], velocities[i]);
+        let (end, v) = (ends[i], velocities[i]);
+        let start = match model.settings.grid_projection && came[i][3] == 0.0 {
+            true => end,
+            false => starts[i],
+        };
         let (x, then, is_capped) = passes::update_velocity(model, substep, end, start, v);
         let way = (end - start).length() / step;
         let whole = (v + (end - start) / step).length();

@@ -297,7 +297,7 @@ impl Flip {
     }
 
     /// Makes the velocities of particles in the order of their ids those of the projection over a substep, m/s, and aims the
-    /// particles with them; returns what moving walls did, joule. The substep's numbers are the frame and, from 1, its own.
+    /// particles with them; returns which of them are drops, and what moving walls did, joule. The substep's numbers are the frame and, from 1, its own.
     ///
     /// # Errors
     /// What is not finite, a projection over the budget, and a pressure system without a factor.
@@ -307,7 +307,7 @@ impl Flip {
         cloud: &mut Cloud,
         substep: &Substep,
         all: &mut Projection,
-    ) -> Result<f64, ReferenceError> {
+    ) -> Result<(Vec<bool>, f64), ReferenceError> {
         let surveyed = survey(&self.model, cloud);
         if surveyed.not_finite > 0 {
             let breach = Breach::not_finite(frame, surveyed.not_finite as u64, None);
@@ -325,7 +325,8 @@ impl Flip {
         for (slot, &k) in order.iter().enumerate() {
             (cloud.position[slot], cloud.velocity[slot]) = (aimed[k], trace.given.velocity[k]);
         }
-        Ok(work)
+        let is_drop = order.iter().map(|&k| trace.given.is_drop[k]);
+        Ok((is_drop.collect(), work))
     }
 
     /// Substeps through one frame, from `cloud` on; what they did, and the densities that the last one found.

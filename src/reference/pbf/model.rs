@@ -142,14 +142,8 @@ impl Model {
 
     /// The same, and what the walls added to the position.
     pub fn confine_by(&self, x: DVec3, walls: &Bounds) -> (DVec3, DVec3) {
-        let contact = CONTACT * self.settings.particle_spacing;
-        let mut x = x;
-        if let Some(distance) = &self.distance {
-            let d = distance.sample(x);
-            if d < contact {
-                x += distance.gradient(x).normalize_or_zero() * (contact - d);
-            }
-        }
+        let contact = self.contact_distance();
+        let x = x + self.solid_push(x);
         let kept = DVec3::from_array(std::array::from_fn(|axis| {
             let (low, high) = (walls.min[axis] + contact, walls.max[axis] - contact);
             if x[axis] < low {
@@ -161,6 +155,22 @@ impl Model {
             }
         }));
         (kept, kept - x)
+    }
+
+    /// Least distance from walls and solids, metres.
+    pub(super) fn contact_distance(&self) -> f64 {
+        CONTACT * self.settings.particle_spacing
+    }
+
+    /// What solids add to a position, metres.
+    pub(super) fn solid_push(&self, x: DVec3) -> DVec3 {
+        let (Some(distance), contact) = (&self.distance, self.contact_distance()) else {
+            return DVec3::ZERO;
+        };
+        match distance.sample(x) {
+            d if d < contact => distance.gradient(x).normalize_or_zero() * (contact - d),
+            _ => DVec3::ZERO,
+        }
     }
 
     /// The derivative of the relative density that the walls give at `x`, 1/m; the gradient of

@@ -76,6 +76,28 @@ pub fn predict_and_work(
     (model.period().wrap(x), v + taken, work)
 }
 
+/// As [`predict_and_work`], of water that a grid's flow moves: its own velocity did not take it where it is, and loses what
+/// it has into walls and solids and no more (pbf/predict).
+pub fn predict_along(
+    model: &Model,
+    substep: &Substep,
+    position: DVec3,
+    velocity: DVec3,
+) -> (DVec3, DVec3, f64) {
+    let (x, _, work) = predict_and_work(model, substep, position, velocity);
+    let step = substep.time_step;
+    let v = velocity * (model.max_displacement() / (step * velocity.length()).max(1e-30)).min(1.0);
+    let free = position + step * v;
+    let push = model.solid_push(free);
+    let v = v - push * (v.dot(push).min(0.0) / push.length_squared().max(1e-30));
+    let y = free + push;
+    let contact = model.contact_distance();
+    let walls = (substep.walls.min + contact, substep.walls.max - contact);
+    let v = DVec3::select(y.cmplt(walls.0), v.max(substep.wall_velocity.min), v);
+    let v = DVec3::select(y.cmpgt(walls.1), v.min(substep.wall_velocity.max), v);
+    (x, v, work)
+}
+
 /// Relative density ρ/ρ0 of each particle, shape (particles) (pbf/measure_density).
 pub fn measure_density(inputs: Inputs<'_>) -> Vec<f64> {
     let model = inputs.model;

@@ -30,6 +30,8 @@ pub struct Pbf {
     model: Model,
     /// What projects velocities, where anything does.
     grid: Option<Flip>,
+    /// Which particles it found to be drops, whose corrections are motion; the others' shift them alone. Empty without it.
+    is_drop: Vec<bool>,
     state: Particles,
     frame: u32,
     timings: Timings,
@@ -232,6 +234,7 @@ impl Pbf {
     pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
         Self {
             model: Model::new(scene, boundary),
+            is_drop: Vec::new(),
             grid: scene.of_projection().map(|grid| Flip::new(&grid, boundary)),
             scene: scene.clone(),
             state: Particles::default(),
@@ -264,7 +267,8 @@ impl Pbf {
         };
         let numbers = (self.frame + 1, number);
         let substep = projected_substep(start, step);
-        let work = grid.project_velocities(numbers, &mut cloud, &substep, all)?;
+        let (is_drop, work) = grid.project_velocities(numbers, &mut cloud, &substep, all)?;
+        self.is_drop = is_drop;
         (*position, *velocity) = (cloud.position, cloud.velocity);
         Ok(work)
     }
@@ -277,10 +281,14 @@ impl Pbf {
         position: &mut Vec<DVec3>,
         velocity: &mut Vec<DVec3>,
     ) -> (u32, u64, f64) {
-        let (model, timings) = (&self.model, &mut self.timings);
+        let (model, timings, is_drop) = (&self.model, &mut self.timings, &self.is_drop);
         let by_prediction: Vec<_> = timings.time("pbf/predict", || {
             (position.par_iter().zip(velocity.par_iter()))
-                .map(|(&x, &v)| passes::predict_and_work(model, substep, x, v))
+                .enumerate()
+                .map(|(slot, (&x, &v))| match is_drop.get(slot) {
+                    Some(false) => passes::predict_along(model, substep, x, v),
+                    _ => passes::predict_and_work(model, substep, x, v),
+                })
                 .collect()
         });
         let predicted: Vec<DVec3> = by_prediction.iter().map(|p| p.0).collect();
@@ -293,7 +301,11 @@ impl Pbf {
         let (mut moved, capped) = timings.time("pbf/update_velocity", || {
             let updated: Vec<_> = (sorted.order.par_iter().zip(sorted.particles()))
                 .map(|(&slot, &x)| {
-                    passes::update_velocity(model, substep, x, predicted[slot], pushed[slot])
+                    let start = match is_drop.get(slot) {
+                        Some(false) => x,
+                        _ => predicted[slot],
+                    };
+                    passes::update_velocity(model, substep, x, start, pushed[slot])
                 })
                 .collect();
             for (point, &(x, ..)) in sorted.points.iter_mut().zip(&updated) {

@@ -102,7 +102,10 @@ fn own(name: &'static str, scene: &Scene) -> PassSpec {
     let pbf = scene.solver.pbf();
     let is_adaptive = matches!(pbf.stop, Stop::DensityError { .. });
     let all: &[(&str, bool)] = match name {
-        "pbf/predict" => &[("WALL_WORK", scene.has_movers())],
+        "pbf/predict" => &[
+            ("WALL_WORK", scene.has_movers()),
+            ("PROJECTED", pbf.grid_projection),
+        ],
         "pbf/compute_lambda" => &[("DENSITY", is_adaptive)],
         "pbf/compute_delta" => &[
             ("ARTIFICIAL_PRESSURE", pbf.artificial_pressure > 0.0),
@@ -110,7 +113,10 @@ fn own(name: &'static str, scene: &Scene) -> PassSpec {
             ("PRESSURE", scene.reads_multipliers()),
             ("WALL_WORK", scene.has_movers()),
         ],
-        "pbf/update_velocity" => &[("ADAPTIVE", is_adaptive)],
+        "pbf/update_velocity" => &[
+            ("ADAPTIVE", is_adaptive),
+            ("PROJECTED", pbf.grid_projection),
+        ],
         _ => &[],
     };
     let constants = match pbf.stop {
