@@ -72,6 +72,9 @@ fn read(text: &str) -> Result<Table, SceneError> {
     })
 }
 
+/// Keys that caches may be older than, each with the value by which nothing differs from before there was one.
+const YOUNGER: [(&str, &str); 1] = [("solver.pbf.grid_projection", "false")];
+
 /// Dotted keys and values of the physics, numbers written alike whether whole or not.
 fn flatten(table: &Table) -> BTreeMap<String, String> {
     let mut values = BTreeMap::new();
@@ -90,7 +93,8 @@ fn flatten(table: &Table) -> BTreeMap<String, String> {
         let along = key::along(keys::SCENE, path);
         along.iter().all(|key| key.physics != Physics::No)
     };
-    values.retain(|key, _| is_physics(key) && !is_idle(key));
+    let is_as_before = |key: &str, value: &str| YOUNGER.contains(&(key, value));
+    values.retain(|key, value| is_physics(key) && !is_idle(key) && !is_as_before(key, value));
     values
 }
 

@@ -9,9 +9,10 @@ use super::{
 /// Edge of a cell, in particle spacings: eight particles fill it, as FLIP's do.
 pub(super) const PROJECTION_CELL: f64 = 2.0;
 
-/// Part of the grid's velocity that particles take in a second, 1/s: a viscosity of r Δx² / 6 (Zhu and Bridson 2005).
-/// Without it what the grid does not see of a splash, particles against each other, hardly calms down.
-const PIC_RATE: f64 = 1.2;
+/// Rate r at which particles take on the grid's velocity, over √(g / Δx): a viscosity of r Δx² / 6 (Zhu and Bridson 2005),
+/// the same at any scale and length of a step. Without it what the grid does not see of a splash, particles against each
+/// other, hardly calms down.
+const PIC_RATE: f64 = 0.17;
 
 /// What the projection stops at, and after.
 const PRESSURE: Pressure = Pressure {
@@ -29,11 +30,13 @@ impl Scene {
             return None;
         }
         let pbf = self.solver.pbf();
+        let cell_size = PROJECTION_CELL * pbf.particle_spacing;
+        let rate = PIC_RATE * (self.water.gravity.length() / cell_size).sqrt();
         let flip = Flip {
-            cell_size: PROJECTION_CELL * pbf.particle_spacing,
+            cell_size,
             particles_per_cell: 8,
             transfer: Transfer::Flip,
-            pic_blend: -(-PIC_RATE * self.shot.frame_seconds()).exp_m1(),
+            pic_blend: -(-rate * self.shot.frame_seconds()).exp_m1(),
             cfl: 1.0,
             max_substeps: pbf.max_substeps,
             surface: Surface::GhostFluid,

@@ -79,6 +79,7 @@ mod solve {
     mod periodic;
     mod plan;
     mod pressure;
+    mod projected;
 }
 mod stage {
     mod branch;

@@ -9,6 +9,7 @@ mod capacity;
 pub(super) mod plan;
 mod record;
 mod step;
+mod totals;
 mod velocities;
 mod watch;
 
@@ -24,7 +25,7 @@ use crate::{
         particles::Particles,
         poisson::FLUID,
         shores::Shores,
-        solver::{Projection, Solver, StepReport, Watch},
+        solver::{Solver, StepReport, Watch},
         substep::Which,
     },
     gpu::{
@@ -51,6 +52,7 @@ use buffers::*;
 pub use capacity::capacity;
 use capacity::{bricks, capacity_of, no_water};
 use record::{Commands, Recordings, groups, numbers};
+pub(super) use totals::FrameTotals;
 
 /// FLIP on a device.
 pub struct Flip {
@@ -76,33 +78,6 @@ struct Survey {
     speed: f64,
     not_finite: u32,
     is_wet: Vec<bool>,
-}
-
-/// What a frame's substeps did, added up.
-#[derive(Default)]
-pub(super) struct FrameTotals {
-    substeps: u32,
-    iterations: u64,
-    pub(super) projection: Projection,
-    /// Joule.
-    pub(super) work: f64,
-    /// Of the frame, seconds.
-    elapsed: f64,
-}
-
-impl FrameTotals {
-    fn add(&mut self, projected: &pressure::Projected) {
-        let solved = &projected.solved;
-        self.iterations += u64::from(solved.iterations);
-        let all = &mut self.projection;
-        all.residual = all.residual.max(solved.residual);
-        all.divergence_before = all.divergence_before.max(projected.divergence_before);
-        all.divergence_after = all.divergence_after.max(projected.divergence_after);
-        all.missed += u32::from(solved.is_missed);
-        all.pockets = all.pockets.max(projected.pockets);
-        all.incompatible = all.incompatible.max(projected.incompatible);
-        all.dropped += u64::from(projected.dropped);
-    }
 }
 
 impl Flip {

@@ -68,7 +68,7 @@ impl Grid {
 
     /// What the frame's projections did, and what moving walls did in them, joule.
     pub(super) fn done(&self) -> (Projection, f64) {
-        (self.totals.projection.clone(), self.totals.work)
+        (self.totals.projection, self.totals.work)
     }
 
     pub(super) fn flip(&self) -> &Flip {

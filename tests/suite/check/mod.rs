@@ -213,6 +213,40 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
 }
 
 #[test]
+fn pbf_with_a_projection_is_within_tolerance_and_fails_where_it_should() {
+    let (mut scene, start) = case(Method::Pbf);
+    scene.solver.pbf.as_mut().unwrap().grid_projection = true;
+    let controls = [
+        control(
+            "flip/aim",
+            "params.time_step * beside",
+            "params.time_step * beside * 1.001",
+            "flip/aim",
+            &["position"],
+        ),
+        control(
+            "pbf/predict",
+            "select(stopped(v, free), v + taken, is_drop)",
+            "select(v, v + taken, is_drop)",
+            "pbf/predict",
+            &["velocity"],
+        ),
+        control(
+            "pbf/update_velocity",
+            "v *= came.w;",
+            "v *= 1.0 - came.w;",
+            "pbf/update_velocity",
+            &["velocity"],
+        ),
+    ];
+    let others: Vec<&str> = (PBF.iter().chain(FLIP))
+        .map(|control| control.pass)
+        .chain(["upload of solids"])
+        .collect();
+    hold(&context(), &scene, &start, &controls, &others);
+}
+
+#[test]
 fn pbf_until_a_density_error() {
     let (mut scene, start) = case(Method::Pbf);
     let settings = scene.solver.pbf.as_mut().unwrap();

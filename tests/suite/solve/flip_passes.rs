@@ -5,11 +5,11 @@ use crate::support::flip::*;
 use crate::support::{context, jitter, lattice, noise};
 use glam::DVec3;
 use swell::{
-    domain::{particles::Particles, solver::Solver},
+    domain::{bricks::CELLS, motion::Motion, particles::Particles, solver::Solver},
     scene::flip::AFFINE,
-    scene::{Scene, flip::Transfer},
+    scene::{Scene, Wall, WaveMaker, flip::Transfer},
     solve::flip::{
-        buffers::{FACE_CHANGE, FACE_OPEN, FACE_VELOCITY},
+        buffers::{FACE_CHANGE, FACE_OPEN, FACE_VELOCITY, SOLID_FLUX},
         capacity,
     },
 };
@@ -95,6 +95,35 @@ fn particle_to_grid_matches_the_naive_twin() {
     // Negative control: hats wider by 1 % are seen.
     let (worst, _) = particle_to_grid_gap(1.01);
     assert!(worst > 1.0, "{worst}");
+}
+
+/// What a wall at 0.2 m/s pushes into a box so many cells wide, over its open area, m/s.
+fn pushed_by(width: f64) -> f64 {
+    let mut scene = scene([8.0, 8.0, width]);
+    scene.wave_makers.push(WaveMaker {
+        wall: Wall::NAMED[0].1,
+        motion: Motion::ConstantVelocity {
+            velocity: 0.2,
+            until: None,
+        },
+    });
+    let particles = block([1, 0, 0], [6, 5, 3]);
+    let mut solver = solver(&context(), &scene, &particles);
+    solver.advance().unwrap();
+    let elements = CELLS as usize * (solver.bricks().active as usize + 1);
+    let flux: Vec<f32> = solver.field(SOLID_FLUX, elements).unwrap();
+    let sum: f64 = flux.into_iter().map(f64::from).sum();
+    -sum / (8.0 * width)
+}
+
+/// A side wall that stands across the cells closes a part of their faces, which the wave maker does not push through.
+#[test]
+fn a_wave_maker_pushes_the_open_part_of_cells_that_a_side_wall_cuts() {
+    for width in [3.0, 3.25, 3.5, 3.9] {
+        let speed = pushed_by(width);
+        // Sums of a few dozen faces of 0.2 m/s.
+        assert!((speed - 0.2).abs() < 1e-5, "{width} cells: {speed} m/s");
+    }
 }
 
 /// A of u = A x about the block's middle, without divergence. FLIP's means at the block's faces are off along

@@ -67,6 +67,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
                 cfl: 1.0,
                 relaxation: 1.0,
                 artificial_pressure: 0.0,
+                grid_projection: false,
                 max_substeps: 32,
             }),
         },

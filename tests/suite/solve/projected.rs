@@ -1,0 +1,268 @@
+//! PBF whose velocities a grid makes free of divergence: what water at rest, waves and walls do with it, on the GPU and in
+//! f64, and that without it they do not.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+use swell::{
+    domain::{
+        boundary::Boundary,
+        motion::Motion,
+        particles::Particles,
+        solver::{Solver, StepReport},
+    },
+    reference,
+    scene::{Scene, Wall, WaveMaker},
+    solve::{pbf, plan::Plan},
+    study::waves,
+};
+
+use crate::support::*;
+
+const GRAVITY: f64 = 9.81;
+
+fn projected(size: [f64; 3], frames_per_second: f64) -> Scene {
+    let mut scene = scene(size);
+    scene.shot.frames_per_second = frames_per_second;
+    scene.solver.pbf.as_mut().unwrap().grid_projection = true;
+    scene
+}
+
+fn without(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    scene.solver.pbf.as_mut().unwrap().grid_projection = false;
+    scene
+}
+
+fn on_gpu(scene: &Scene, particles: &Particles) -> pbf::Pbf {
+    solver(&context(), scene, particles, &Boundary::default())
+}
+
+fn in_f64(scene: &Scene, particles: &Particles) -> reference::pbf::Pbf {
+    let mut solver = reference::pbf::Pbf::new(scene, &Boundary::default());
+    solver.load(0, particles).unwrap();
+    solver
+}
+
+/// A tank 8 × 8 particles wide at 60 frames a second, so many layers deep.
+fn tank(layers: usize) -> (Scene, Particles) {
+    let scene = projected([0.8, layers as f64 * D + 1.0, 0.8], 60.0);
+    (scene, lattice([0.0; 3], [8, layers, 8], [D; 3]))
+}
+
+/// Fastest particle of the frames behind `settled`, m/s, largest mean compression, and pressures over ρ g depth.
+fn at_rest<S: Solver>(
+    mut solver: S,
+    layers: usize,
+    frames: u32,
+    settled: u32,
+) -> (f64, f64, Vec<f64>)
+where
+    S::Error: std::fmt::Debug,
+{
+    let (mut speed, mut compression) = (0.0f64, 0.0f64);
+    for frame in 1..=frames {
+        let (_, report) = solver.advance().unwrap();
+        compression = compression.max(report.density_error_mean);
+        if frame > settled {
+            speed = speed.max(report.max_speed);
+        }
+    }
+    let depth = layers as f64 * D;
+    let points: Vec<DVec3> = [0.0, 0.2, 0.4, 0.6, 0.8]
+        .map(|part| DVec3::new(0.4, part * depth, 0.4))
+        .to_vec();
+    let pressures = solver.pressures(&points).unwrap();
+    let ratio = |(at, p): (&DVec3, &Option<f64>)| {
+        p.expect("water there") / (1000.0 * GRAVITY * (depth - at.y))
+    };
+    let ratios = points.iter().zip(&pressures).map(ratio).collect();
+    (speed, compression, ratios)
+}
+
+/// Largest speed of water at rest after a second, m/s; the first frames even out what the lattice lacks at walls.
+const STILL: f64 = 0.02;
+
+/// Of ρ g depth; the surface's least depth of 0.02 cells alone is 0.4 % of the uppermost probe's of 10 layers.
+const PRESSURE: f64 = 0.02;
+
+fn assert_still((speed, compression, ratios): (f64, f64, Vec<f64>), name: &str) {
+    assert!(speed < STILL, "{name}: {speed} m/s");
+    assert!(compression < 0.005, "{name}: {compression}");
+    assert_eq!(ratios.len(), 5);
+    for ratio in ratios {
+        assert!((ratio - 1.0).abs() < PRESSURE, "{name}: {ratio}");
+    }
+}
+
+#[test]
+fn tanks_of_any_depth_stand_still_and_weigh_what_water_weighs() {
+    for layers in [10, 20, 40, 80] {
+        let (scene, particles) = tank(layers);
+        let solver = on_gpu(&scene, &particles);
+        assert_still(at_rest(solver, layers, 72, 60), &format!("{layers} layers"));
+    }
+    let (scene, particles) = tank(20);
+    assert_still(at_rest(in_f64(&scene, &particles), 20, 66, 60), "f64");
+    // Negative control: iterations alone reach a layer each.
+    let mut alone = on_gpu(&without(&scene), &particles);
+    let speeds = (1..=66).map(|_| alone.advance().unwrap().1.max_speed);
+    let late = speeds.skip(60).fold(0.0, f64::max);
+    assert!(late > 10.0 * STILL, "{late} m/s");
+}
+
+/// Water 20 layers deep with the velocities of a standing wave of half a length in the box, ω² = g k tanh kh.
+fn wave() -> (Scene, Particles, f64) {
+    let (length, depth) = (4.0, 2.0);
+    let scene = projected([length, 3.0, 0.4], 60.0);
+    let mut particles = lattice([0.0; 3], [40, 20, 4], [D; 3]);
+    let k = PI / length;
+    for (x, v) in particles.position.iter().zip(&mut particles.velocity) {
+        let (kx, ky) = (k * f64::from(x[0]), k * f64::from(x[1]));
+        let scale = 0.3 / (k * depth).sinh();
+        *v = [
+            (scale * kx.sin() * ky.cosh()) as f32,
+            (-scale * kx.cos() * ky.sinh()) as f32,
+            0.0,
+        ];
+    }
+    let period = TAU / (GRAVITY * k * (k * depth).tanh()).sqrt();
+    (scene, particles, period)
+}
+
+/// The period over theory's, and the third period's swing over the first's: of the first mode of where the water is.
+fn swing(scene: &Scene, particles: &Particles, period: f64) -> (Option<f64>, f64) {
+    let mut solver = on_gpu(scene, particles);
+    let k = PI / scene.domain.max.x;
+    let frames = (3.2 * period * 60.0).ceil() as u32;
+    let mode = |state: &Particles| {
+        let terms = state.position.iter().map(|x| (k * f64::from(x[0])).cos());
+        terms.sum::<f64>() / state.len() as f64
+    };
+    let samples: Vec<(f64, f64)> = (1..=frames)
+        .map(|frame| (f64::from(frame) / 60.0, mode(&solver.advance().unwrap().0)))
+        .collect();
+    let largest = |from: f64| {
+        let within = samples
+            .iter()
+            .filter(|(t, _)| (from..from + 1.0).contains(&(t / period)));
+        within.map(|(_, a)| a.abs()).fold(0.0, f64::max)
+    };
+    let (first, third) = (largest(0.0), largest(2.2));
+    let found = waves::period(&samples, 0.2 * first).map(|found| found / period);
+    (found, third / first)
+}
+
+#[test]
+fn a_standing_wave_keeps_its_height_and_its_period() {
+    let (scene, particles, period) = wave();
+    let (found, left) = swing(&scene, &particles, period);
+    let found = found.expect("a wave that swings");
+    assert!((found - 1.0).abs() < 0.02, "{found} of the period");
+    assert!(left > 0.6, "{left} left after three periods");
+    // Negative control.
+    let (_, left) = swing(&without(&scene), &particles, period);
+    assert!(left < 0.5, "{left}");
+}
+
+/// Water that a wall pushes into a heap, with drops.
+fn pushed() -> (Scene, Particles) {
+    let mut scene = projected([2.4, 2.0, 0.6], 60.0);
+    scene.wave_makers.push(WaveMaker {
+        wall: Wall::NAMED[0].1,
+        motion: Motion::ConstantVelocity {
+            velocity: 1.5,
+            until: Some(0.4),
+        },
+    });
+    let mut particles = lattice([0.0; 3], [24, 6, 6], [D; 3]);
+    let drops = lattice([1.0, 1.2, 0.2], [2, 2, 2], [1.5 * D; 3]);
+    particles.position.extend(drops.position);
+    particles.velocity.extend(drops.velocity);
+    particles.id = (0..particles.position.len() as u32).collect();
+    (scene, particles)
+}
+
+#[test]
+fn frames_are_the_same_bytes_from_any_frame() {
+    let (scene, particles) = pushed();
+    let mut first = on_gpu(&scene, &particles);
+    let states: Vec<Particles> = (0..24).map(|_| first.advance().unwrap().0).collect();
+    for frame in [1, 11, 23] {
+        let mut resumed = on_gpu(&scene, &particles);
+        resumed.load(frame, &states[frame as usize - 1]).unwrap();
+        let last = (frame..24).map(|_| resumed.advance().unwrap().0).last();
+        assert!(last.as_ref() == Some(&states[23]), "from frame {frame}");
+    }
+    // Negative control: one bit of one velocity is enough to part.
+    let mut spoiled = states[10].clone();
+    spoiled.velocity[100][0] = f32::from_bits(spoiled.velocity[100][0].to_bits() ^ 1 << 12);
+    let mut resumed = on_gpu(&scene, &particles);
+    resumed.load(11, &spoiled).unwrap();
+    let last = (11..24).map(|_| resumed.advance().unwrap().0).last();
+    assert!(last.as_ref() != Some(&states[23]));
+}
+
+/// What moving walls give and what the water has: of a frame's report, joule.
+fn energy(report: &StepReport) -> f64 {
+    report.kinetic_energy + report.potential_energy
+}
+
+#[test]
+fn gpu_and_f64_push_alike_and_the_wall_pays_for_it() {
+    let (scene, particles) = pushed();
+    let (mut gpu, mut cpu) = (on_gpu(&scene, &particles), in_f64(&scene, &particles));
+    let (mut work, mut gap) = (0.0, 0.0f64);
+    let mut start = None;
+    let mut end = 0.0;
+    for _ in 0..4 {
+        let (found, report) = gpu.advance().unwrap();
+        let (exact, of_reference) = cpu.advance().unwrap();
+        gap = gap.max(max_distance(&found, &exact));
+        start = start.or(Some(energy(&report)));
+        if end > 0.0 {
+            work += report.boundary_work;
+        }
+        end = energy(&report);
+        let projection = report.projection.expect("a projection");
+        let of_reference = of_reference.projection.expect("a projection");
+        assert!(projection.divergence_before > 0.1, "{projection:?}");
+        assert!(projection.residual <= 1e-5, "{projection:?}");
+        assert_eq!(projection.pockets, of_reference.pockets);
+    }
+    // Four frames of f32, whose projection stops at 1e-5: the wall's 1.5 m/s and gravity leave some 1e-5 d a frame.
+    assert!(gap < 1e-3 * D, "{gap} m");
+    let gained = end - start.unwrap();
+    assert!(work > 0.0 && gained > 0.0);
+    // Within what inelastic corrections take.
+    assert!((gained / work - 1.0).abs() < 0.1, "{gained} J of {work} J");
+}
+
+#[test]
+fn a_scene_that_does_not_name_it_has_none_of_it() {
+    let context = context();
+    let (scene, particles) = tank(10);
+    let plan =
+        |scene: &Scene| -> Plan { plan(&context, scene, particles.len(), &Boundary::default()) };
+    let (with, bare) = (plan(&scene), plan(&without(&scene)));
+    assert!(bare.projection.is_none());
+    assert!(with.projection.is_some());
+    assert_eq!(
+        bare.bytes().0,
+        Plan {
+            projection: None,
+            ..with.clone()
+        }
+        .bytes()
+        .0
+    );
+    let passes = |plan: &Plan| plan.parts().map(|part| part.passes.len()).sum::<usize>();
+    assert!(passes(&with) > passes(&bare) + 20);
+    let ran = on_gpu(&without(&scene), &particles).recorded_passes();
+    assert!(ran.iter().all(|pass| !pass.starts_with("flip/")), "{ran:?}");
+    let ran = on_gpu(&scene, &particles).recorded_passes();
+    assert!(
+        ran.contains(&"flip/aim") && !ran.contains(&"flip/advect"),
+        "{ran:?}"
+    );
+}
