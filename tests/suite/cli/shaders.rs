@@ -169,7 +169,7 @@ fn a_folder_that_is_not_whole_or_does_not_compile_is_refused_with_its_place() {
             "broken",
             &[
                 "pbf/predict of --shaders",
-                "pbf/predict.wgsl:35",
+                "pbf/predict.wgsl:49",
                 "confined",
             ],
         ),
