@@ -10,6 +10,7 @@ use super::{
     document::Document,
     error::SceneError,
     moving_solid::MovingSolid,
+    projection::PROJECTION_CELL,
     words::{shown, shown_all},
 };
 use crate::domain::{bounds::Bounds, bricks::EDGE, mesh::TriangleMesh, period::Period};
@@ -69,6 +70,15 @@ pub(super) fn check_solver(
                         "{:.3} particle spacings of {} m, and PBF asks for a whole number",
                         length / spacing,
                         shown(spacing)
+                    ));
+                }
+                let (cell, edge) = (PROJECTION_CELL * spacing, f64::from(EDGE));
+                if solver.pbf().grid_projection && !is_whole(length / cell / edge, edge) {
+                    return refuse(format!(
+                        "{:.3} particle spacings of {} m, and PBF with grid_projection asks for a multiple of {}",
+                        length / spacing,
+                        shown(spacing),
+                        PROJECTION_CELL * edge
                     ));
                 }
                 let support = spacing * solver.pbf().support_ratio;

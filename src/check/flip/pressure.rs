@@ -352,6 +352,12 @@ fn whole(state: &FlipState, mut x: Vec<f64>, velocity: &[DVec3], io: &mut Io<'_>
     let [residual, allowed] = state.residual(&b, &x, asked);
     let off = minus(&x, &exact);
     let least = least_eigenvalue(&solver, b.len());
+    // Without a number too, as of no rows at all.
+    if least.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+        let why = "nothing to solve: drops alone, or water that no air touches in one cell";
+        io.table.unchecked.push(("whole projection", why));
+        return Ok(());
+    }
     let energy = products(&off, &system.apply(&off)).value.max(0.0).sqrt();
     let mut after = state.waters().divergence(system, velocity);
     remove_means(&mut after, solver.pockets());

@@ -86,7 +86,7 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             i,
             velocity[i],
             then,
-            [free, stopped.max(jump), then.length()],
+            [free, stopped.max(jump), v.length().max(then.length())],
         );
         let magnitudes = [
             state.wall_speed(),

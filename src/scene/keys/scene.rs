@@ -343,7 +343,7 @@ const PBF: &[Key] = &[
     Key::flag("grid_projection")
         .default("false")
         .about("velocities are made free of divergence on a grid of cells of 2 d before particles move (Raveendran 2011), \
-            so that iterations correct what is left"),
+            so that iterations correct what is left; a period is then a multiple of 16 d"),
     Key::whole("max_substeps", MANY)
         .not_physics()
         .default("32")
@@ -448,7 +448,7 @@ const PROBE: &[Key] = &[
         .about("of its CSV in the cache"),
     Key::choice("kind", &PROBES)
         .also(
-            "; with the solver pbf a pressure asks for iteration = \"red_black\" or \"jacobi\" and artificial_pressure = 0",
+            "; with the solver pbf a pressure asks for grid_projection, or for iteration = \"red_black\" or \"jacobi\" and artificial_pressure = 0",
         )
         .about(
             "elevation of the surface, m; pressure, Pa; energy of all water, J; its volume, m³; front along an axis, m; \

@@ -266,3 +266,25 @@ fn a_scene_that_does_not_name_it_has_none_of_it() {
         "{ran:?}"
     );
 }
+
+/// Bricks of eight cells of two spacings join a period's ends.
+#[test]
+fn a_period_is_whole_bricks_of_the_projection() {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/dam-break.toml");
+    let load = |width: f64, key: bool| {
+        let block = format!("[{{ min = [0.0, 0.0, 0.0], max = [0.5, 0.5, {width}] }}]");
+        let sets = [
+            format!("domain.max=[2.0, 2.0, {width}]"),
+            format!("water.block={block}"),
+            "domain.periodic=[\"z\"]".to_owned(),
+            "solver.pbf.particle_spacing=0.1".to_owned(),
+            format!("solver.pbf.grid_projection={key}"),
+        ];
+        Scene::load(&file, &sets)
+    };
+    for (width, key) in [(1.6, true), (3.2, true), (0.7, false)] {
+        load(width, key).unwrap_or_else(|error| panic!("{width}: {error}"));
+    }
+    let said = load(0.7, true).expect_err("seven spacings").to_string();
+    assert!(said.contains("asks for a multiple of 16"), "{said}");
+}
