@@ -14,11 +14,11 @@
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
 // Four floats a particle; the fourth is 1 where it is a drop, far from all water that has a pressure.
 @group(0) @binding(5) var<storage, read_write> velocity: array<f32>;
+@group(0) @binding(9) var<storage, read> sorted_velocity: array<f32>;
 #ifdef APIC
 @group(0) @binding(6) var<storage, read_write> affine: array<f32>;
 #else
 @group(0) @binding(6) var<storage, read> face_change: array<f32>;
-@group(0) @binding(9) var<storage, read> sorted_velocity: array<f32>;
 #endif
 @group(0) @binding(12) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(10) var<storage, read_write> carried: array<f32>;
@@ -121,13 +121,15 @@ fn center_hats(f: f32) -> vec3f {
     return vec3f(max(0.5 - f, 0.0), 1.0 - abs(f - 0.5), max(f - 0.5, 0.0));
 }
 
-// `f` is the place in the cell, along a, b and c.
-fn give(i: u32, axis: u32, f: vec3f, faces: Component) {
+// `f` is the place in the cell, along a, b and c. A drop falls freely: about it nothing is projected, and closed faces, which
+// have the wall's velocity, would stop it a cell away from the wall, or hold it under a ceiling.
+fn give(i: u32, axis: u32, f: vec3f, faces: Component, is_drop: bool) {
     let a = vec2f(1.0 - f.x, f.x);
     let b = center_hats(f.y);
     let c = center_hats(f.z);
-    let u = value_at(faces.speeds, a, b, c);
     let k = 4u * i + axis;
+    let falling = sorted_velocity[k] + params.velocity_step[axis];
+    let u = select(value_at(faces.speeds, a, b, c), falling, is_drop);
     carried[CARRIED * i + axis] = u;
 #ifdef APIC
     velocity[k] = u;
@@ -141,10 +143,14 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component) {
     affine[row + (axis + 2u) % 3u] = scale * value_at(faces.speeds, a, b, of_c);
 #else
     let advanced = sorted_velocity[k] + value_at(faces.change, a, b, c);
-    velocity[k] = advanced + params.pic_blend * (u - advanced);
+    velocity[k] = select(advanced + params.pic_blend * (u - advanced), falling, is_drop);
 #endif
 #ifdef CORRECTION
     carried[CARRIED * i + 3u + axis] = value_at(faces.shift, a, b, c);
+#else
+#ifdef PUSHED
+    carried[CARRIED * i + 3u + axis] = 0.0;
+#endif
 #endif
 }
 
@@ -189,9 +195,9 @@ fn main(
     }
     for (var i = first; i < end; i++) {
         let f = sorted_position[i].xyz * params.inverse_cell_size - corner;
-        give(i, 0u, f, of_x);
-        give(i, 1u, f.yzx, of_y);
-        give(i, 2u, f.zxy, of_z);
+        give(i, 0u, f, of_x, drop > 0.0);
+        give(i, 1u, f.yzx, of_y, drop > 0.0);
+        give(i, 2u, f.zxy, of_z, drop > 0.0);
         velocity[4u * i + 3u] = drop;
     }
 }

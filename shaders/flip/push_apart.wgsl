@@ -10,6 +10,8 @@
 @group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
 @group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
 @group(0) @binding(5) var<storage, read_write> carried: array<f32>;
+// The fourth is 1 where it is a drop.
+@group(0) @binding(6) var<storage, read> velocity: array<vec4f>;
 
 // Of what a pair lacks, for each of the two.
 const SHARE = 0.25;
@@ -35,6 +37,8 @@ fn main(
     let own = sorted_id[i];
     let apart = params.apart;
     var push = max(apart - 2.0 * (x - params.wall_min), vec3f(0.0)) - max(apart - 2.0 * (params.wall_max - x), vec3f(0.0));
+    // A drop lies at a wall as near as it may: lifted off it, it would fall again in each step.
+    push = select(push, vec3f(0.0), velocity[i].w > 0.0);
 #ifdef PERIODIC
     push = select(push, vec3f(0.0), is_periodic());
     let size = vec3f(params.cells) * params.cell_size;

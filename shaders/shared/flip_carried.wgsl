@@ -1,5 +1,5 @@
-// Floats a particle of `carried`: the grid's velocity at it, and the density correction's displacement.
-#ifdef CORRECTION
+// Floats a particle of `carried`: the grid's velocity at it, and where particles are pushed, what they are displaced by.
+#ifdef PUSHED
 const CARRIED = 6u;
 #else
 const CARRIED = 3u;

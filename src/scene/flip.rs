@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::key::read_by_name;
+use crate::domain::flip::apart;
 
 /// Attributes that APIC declares: C of v(x) = v + C (x − x_p), 1/s, `affine_xy` = ∂v_x/∂y. A state without them
 /// starts from zeros.
@@ -48,6 +49,12 @@ impl Flip {
     /// Distance between neighbours of the lattice at the start, metres.
     pub fn particle_spacing(&self) -> f64 {
         self.cell_size / f64::from(self.particles_per_cell).cbrt()
+    }
+
+    /// Particles that are nearer to each other are pushed apart, metres.
+    pub fn apart(&self) -> f64 {
+        let spacing = self.particle_spacing() / self.cell_size;
+        self.cell_size * apart(spacing, self.density_correction)
     }
 
     /// Attributes of a frame beyond positions, velocities and ids.

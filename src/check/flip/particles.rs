@@ -112,17 +112,16 @@ pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let twin = twin_aim(&step, &before, given);
     io.table.each(&AIMED, 0..state.n, |i| {
         let way = step.length * (given.carried[i].length() + given.velocity[i].length());
-        pair(i, after[i], twin[i], [before[i].length(), way])
+        let pushed = given.displacement[i].length();
+        pair(i, after[i], twin[i], [before[i].length(), way, pushed])
     });
     Ok(())
 }
 
 /// What the device gave each particle; which of them are drops follows from its kinds of cells.
 fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<Given, SolveError> {
-    let width = match state.model.settings().density_correction {
-        true => 6,
-        false => 3,
-    };
+    let is_pushed = state.model.settings().density_correction || state.given_substep.is_some();
+    let width = if is_pushed { 6 } else { 3 };
     let values = io.after.scalars(buffers::CARRIED, width * state.n)?;
     let at = |first: usize| -> Vec<DVec3> {
         let rows = values.chunks_exact(width);
@@ -148,9 +147,18 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         return Ok(());
     };
     let (elements, sorted, step) = (state.elements(), state.sorted(), state.step());
-    let twin = twin_push_apart(&state.model, &step, &elements.bricks, sorted);
+    let twin = twin_push_apart(
+        &state.model,
+        &step,
+        &elements.bricks,
+        sorted,
+        &before.is_drop,
+    );
     let found = given(state, io, before.is_drop.clone())?;
-    let (apart, extent) = (state.model.apart(), state.scene.domain.size().max_element());
+    let (apart, extent) = (
+        state.model.settings().apart(),
+        state.scene.domain.size().max_element(),
+    );
     let period = state.model.period().0.max_element();
     io.table.each(&PUSHED, 0..state.n, |i| {
         let about = neighborhood().map(|offset| {

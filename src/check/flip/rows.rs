@@ -217,7 +217,8 @@ entries! {
             "a difference, a root, a quotient and a product for each; the walls' places; a sum";
     }
     "flip/aim" {
-        AIMED = "position", "m": [x: "|x|", way: "Δt (|u| + |v|)"] U * (x + 4.0 * way), "a difference, a product and a sum";
+        AIMED = "position", "m": [x: "|x|", way: "Δt (|u| + |v|)", pushed: "what it is pushed by"]
+            U * (2.0 * x + 4.0 * way + pushed), "a difference, a product and two sums";
     }
     "flip/advect" {
         MOVED = "position", "m": [answer: "what the twin answers when its start moves along each axis by " START, x: "|x|, and where a period carried it that four times"]

@@ -10,7 +10,7 @@ use crate::{
         boundary::Boundary,
         bounds::Bounds,
         bricks::{Bricks, EDGE, table_dims},
-        flip::{CAP, CONTACT, apart, layers, stored_cells},
+        flip::{CAP, CONTACT, layers, stored_cells},
         period::Period,
         shores::Shores,
         signed_distance::SignedDistance,
@@ -89,12 +89,6 @@ impl Model {
     /// Least distance of a particle from walls and solids, metres.
     pub(super) fn contact_distance(&self) -> f64 {
         CONTACT * self.settings().particle_spacing()
-    }
-
-    /// Particles that are nearer to each other are pushed apart, metres.
-    pub fn apart(&self) -> f64 {
-        let size = self.cell_size();
-        size * apart(self.settings().particle_spacing() / size)
     }
 
     /// Displacement cap of a substep, metres.

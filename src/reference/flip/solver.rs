@@ -237,7 +237,7 @@ impl Flip {
         });
         if displacement.is_some() {
             let pushed = timings.time("flip/push_apart", || {
-                push_apart(model, &step, &bricks, &sorted)
+                push_apart(model, &step, &bricks, &sorted, &given.is_drop)
             });
             for (displacement, push) in given.displacement.iter_mut().zip(pushed) {
                 *displacement += push;
@@ -313,15 +313,15 @@ impl Flip {
             let breach = Breach::not_finite(frame, surveyed.not_finite as u64, None);
             return Err(breach.in_substep(number).into());
         }
-        let trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
+        let mut trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
         add(all, &trace.projected);
         let work = self.model.boundary_work(&trace, substep.length);
         let order = by_id(&trace.sorted.cloud);
-        let aimed = aim(
-            &self.model.step(substep),
-            &trace.sorted.cloud.position,
-            &trace.given,
-        );
+        let step = self.model.step(substep);
+        let is_drop = &trace.given.is_drop;
+        let pushed = push_apart(&self.model, &step, &trace.bricks, &trace.sorted, is_drop);
+        trace.given.displacement = pushed;
+        let aimed = aim(&step, &trace.sorted.cloud.position, &trace.given);
         for (slot, &k) in order.iter().enumerate() {
             (cloud.position[slot], cloud.velocity[slot]) = (aimed[k], trace.given.velocity[k]);
         }

@@ -173,7 +173,7 @@ fn weighted(values: &[f64; 18], a: [f64; 2], b: [f64; 3], c: [f64; 3]) -> f64 {
 }
 
 /// Velocities from the grid: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its slope (APIC, Jiang et
-/// al. 2015); and the displacements of the density correction, where there is one.
+/// al. 2015), of drops v + g Δt; and the displacements of the density correction, where there is one.
 pub fn grid_to_particle(
     model: &Model,
     step: &Step<'_>,
@@ -203,9 +203,14 @@ pub fn grid_to_particle(
             for axis in 0..3 {
                 let [f, g, h] = [0, 1, 2].map(|turn| place[(axis + turn) % 3]);
                 let (a, b, c) = ([1.0 - f, f], center_hats(g), center_hats(h));
-                let u = weighted(&velocity[axis], a, b, c);
+                // A drop falls freely: about it nothing is projected, and closed faces have the wall's velocity.
+                let falling = v[axis] + step.velocity_step[axis];
                 let advanced = v[axis] + weighted(&change[axis], a, b, c);
-                given.0[axis] = if is_apic {
+                let u = match is_drop {
+                    true => falling,
+                    false => weighted(&velocity[axis], a, b, c),
+                };
+                given.0[axis] = if is_drop || is_apic {
                     u
                 } else {
                     advanced + step.pic_blend * (u - advanced)
@@ -246,11 +251,14 @@ pub fn grid_to_particle(
 }
 
 /// Where each particle has to start from so that its own new velocity takes it to where the grid's takes it from its
-/// place; drops where they are (flip/aim). Metres. Shape (particles), in sorted order.
+/// place; drops where they are; and each with its displacement (flip/aim). Metres. Shape (particles), in sorted order.
 pub fn aim(step: &Step<'_>, position: &[DVec3], given: &Given) -> Vec<DVec3> {
-    let one = |(i, &x): (usize, &DVec3)| match given.is_drop[i] {
-        true => x,
-        false => x + step.length * (given.carried[i] - given.velocity[i]),
+    let one = |(i, &x): (usize, &DVec3)| {
+        let beside = match given.is_drop[i] {
+            true => DVec3::ZERO,
+            false => given.carried[i] - given.velocity[i],
+        };
+        x + step.length * beside + given.displacement[i]
     };
     position.iter().enumerate().map(one).collect()
 }
@@ -320,9 +328,15 @@ const MOST: f64 = 0.25;
 
 /// Displacements that move particles apart which have come nearer to each other, or to a wall, than water at rest has
 /// them, metres; half of what each pair lacks, shared between the two (the weak springs of Ando and Tsuruno 2011, without
-/// their velocity). Shape (particles).
-pub fn push_apart(model: &Model, step: &Step<'_>, bricks: &Bricks, sorted: &Sorted) -> Vec<DVec3> {
-    let (apart, period) = (model.apart(), model.period());
+/// their velocity); drops lie at walls as near as they may. Shape (particles).
+pub fn push_apart(
+    model: &Model,
+    step: &Step<'_>,
+    bricks: &Bricks,
+    sorted: &Sorted,
+    is_drop: &[bool],
+) -> Vec<DVec3> {
+    let (apart, period) = (model.settings().apart(), model.period());
     let one = |i: usize| {
         let (x, own) = (sorted.cloud.position[i], sorted.cloud.id[i]);
         let place = x / model.cell_size() - super::grid::corner(bricks, sorted.cell[i]);
@@ -330,6 +344,7 @@ pub fn push_apart(model: &Model, step: &Step<'_>, bricks: &Bricks, sorted: &Sort
         let side = place.to_array().map(|f| if f < 0.5 { -1 } else { 1 });
         let lacks = |way: DVec3| (apart - 2.0 * way).max(DVec3::ZERO);
         let of_walls = lacks(x - step.walls.min) - lacks(step.walls.max - x);
+        let of_walls = if is_drop[i] { DVec3::ZERO } else { of_walls };
         let mut push = DVec3::select(period.0.cmpgt(DVec3::ZERO), DVec3::ZERO, of_walls);
         for k in 0..8 {
             let offset = std::array::from_fn(|axis| side[axis] * (k >> axis & 1));

@@ -75,6 +75,12 @@ pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
     before.chain(projection).chain(after).collect()
 }
 
+/// Whether particles that are too near to each other are pushed apart: with the density correction, which knows cells alone,
+/// and for a solver whose own corrections know compression alone.
+pub(super) fn pushes(plan: &Plan, scene: &Scene) -> bool {
+    scene.solver.flip().density_correction || !plan.moves
+}
+
 /// Conditions that hold for the whole plan; a pass that does not ask ignores them.
 fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     let flip = scene.solver.flip();
@@ -84,6 +90,7 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
         ("APIC", flip.transfer == Transfer::Apic),
         ("GHOST_FLUID", flip.surface == Surface::GhostFluid),
         ("CORRECTION", flip.density_correction),
+        ("PUSHED", pushes(plan, scene)),
         ("PERIODIC", scene.is_periodic()),
     ];
     let holding = all.into_iter().filter(|(_, holds)| *holds);
@@ -107,7 +114,7 @@ fn particles(plan: &Plan, scene: &Scene, table: &mut Table) {
     let vectors = [POSITION, VELOCITY, SORTED_POSITION, SORTED_VELOCITY];
     table.extend("flip", vectors.map(|buffer| buffer.sized(n)));
     table.extend("flip", [ID.sized(n), SORTED_ID.sized(n)]);
-    let carried = if flip.density_correction { 6 } else { 3 };
+    let carried = if pushes(plan, scene) { 6 } else { 3 };
     table.watch("flip", CARRIED.sized(carried * n));
     let slopes = flip.attributes().len();
     if slopes > 0 {

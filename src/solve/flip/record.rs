@@ -16,7 +16,7 @@ use crate::{
     },
 };
 
-use super::buffers::*;
+use super::{buffers::*, plan::pushes};
 
 /// Where in [`GROUPS`] those over cells of water stand.
 const WET: usize = 0;
@@ -190,7 +190,7 @@ fn to_particles(plan: &Plan, scene: &Scene) -> Vec<Command> {
         commands.push(bound("flip/extrapolate", FIRST_LAYER + k, binds));
     }
     commands.push(over("flip/grid_to_particle", WET));
-    if flip.density_correction {
+    if pushes(plan, scene) {
         commands.push(Command::over("flip/push_apart", plan.counts.particles));
     }
     let last = if plan.moves {

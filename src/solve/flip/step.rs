@@ -4,7 +4,7 @@ use crate::{
     domain::{
         bounds::Bounds,
         bricks::{Bricks, CELLS, table_dims},
-        flip::{CAP, CONTACT, apart, stored_cells},
+        flip::{CAP, CONTACT, stored_cells},
     },
     scene::{Scene, step::Substep},
     solve::{params::FlipParams, plan::Plan},
@@ -46,7 +46,7 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
         particle_share: 1.0 / flip.particles_per_cell as f32,
         contact_distance: (CONTACT * flip.particle_spacing()) as f32,
         max_displacement: (CAP * flip.cfl * flip.cell_size) as f32,
-        apart: (flip.cell_size * apart(flip.particle_spacing() / flip.cell_size)) as f32,
+        apart: flip.apart() as f32,
         periodic: (0..3)
             .map(|axis| u32::from(scene.periodic[axis]) << axis)
             .sum(),
