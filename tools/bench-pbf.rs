@@ -1,8 +1,8 @@
 //! Time per pass and per particle-step, and bytes per particle, of PBF in a collapsing dam.
 //!
-//! `tools/bench pbf [--device cpu] [--adapter NAME] [--frames N] [COUNT ...]`; `cpu` is the f64 reference; counts are 60 000, 250 000 and 1 000 000 where left
-//! out. A step is all in: sort, neighbour lists, 4 red/black iterations, and the frame's share of measuring
-//! density and reading the state back. h = 2d, no effects, no solids. The first two frames warm up; medians of
+//! `tools/bench pbf [--device cpu] [--adapter NAME] [--frames N] [--alone] [COUNT ...]`; `cpu` is the f64 reference; counts are
+//! 60 000, 250 000 and 1 000 000 where left out. A step is all in: projection on the grid (`--alone`: without), sort, neighbour lists,
+//! 4 red/black iterations, and the frame's share of measuring density and reading the state back. h = 2d, no effects, no solids. The first two frames warm up; medians of
 //! the rest.
 #![allow(missing_docs, reason = "a program")]
 
@@ -22,6 +22,7 @@ const WARM_UP: usize = 2;
 struct Options {
     device: Device,
     frames: usize,
+    has_projection: bool,
     counts: Vec<usize>,
 }
 
@@ -29,6 +30,7 @@ fn options() -> Result<Options, String> {
     let mut options = Options {
         device: Device::Gpu(None.into()),
         frames: 8,
+        has_projection: true,
         counts: Vec::new(),
     };
     let mut words = std::env::args().skip(1);
@@ -44,6 +46,7 @@ fn options() -> Result<Options, String> {
             "--frames" => {
                 options.frames = value()?.parse().map_err(|_| "--frames wants a number")?
             }
+            "--alone" => options.has_projection = false,
             // Cargo's own.
             "--bench" => {}
             _ => options.counts.push(
@@ -60,14 +63,15 @@ fn options() -> Result<Options, String> {
 
 /// A dam of about `count` particles, twice as long as wide and high, with as much room before it, already under
 /// way, so that a frame takes the substeps of a shot.
-fn dam(count: usize) -> Result<(Scene, Start), Box<dyn std::error::Error>> {
+fn dam(count: usize, has_projection: bool) -> Result<(Scene, Start), Box<dyn std::error::Error>> {
     let edge = (count as f64 / 2.0).cbrt().round() * 0.1;
     let text = format!(
         "[shot]\nname = \"bench\"\nframes = 1\nframes_per_second = 30\n\
          [domain]\nmin = [0.0, 0.0, 0.0]\nmax = [{}, {}, {edge}]\n\
          [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [{}, {edge}, {edge}]\n\
          [solver]\nmethod = \"pbf\"\n\
-         [solver.pbf]\nparticle_spacing = 0.1\niterations = 4\ncfl = 0.5\nmax_substeps = 64\n",
+         [solver.pbf]\nparticle_spacing = 0.1\niterations = 4\ncfl = 0.5\nmax_substeps = 64\n\
+         grid_projection = {has_projection}\n",
         4.0 * edge,
         2.0 * edge,
         2.0 * edge
@@ -88,7 +92,7 @@ fn measure(
     options: &Options,
     count: usize,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let (scene, start) = dam(count)?;
+    let (scene, start) = dam(count, options.has_projection)?;
     let particles = &start.particles;
     let n = particles.len() as f64;
     let mut built = opened.build(&scene, &start, false)?;

@@ -11,7 +11,7 @@ use crate::{
     scene::{
         Method, Scene,
         flip::Preconditioner,
-        study::sweep::{Measure, Point, SAMPLES, Sweep},
+        study::sweep::{ErrorMeasure, Measure, Point, SAMPLES, Sweep},
     },
     stage::{
         device::Opened,
@@ -45,6 +45,11 @@ pub(super) fn measure(
     let start = Start::of(scene)?;
     let opened = bench.devices.of(point.device);
     let mut drive = Drive::new(opened, scene, &start, false)?;
+    let mut weights = Vec::new();
+    if sweep.errors.contains(&ErrorMeasure::Weight) {
+        drive = drive.with_pressures();
+        weights = still_pressures(scene, &start.particles);
+    }
     drive.advance()?;
     let mut run = Run {
         particles: start.particles.len(),
@@ -60,6 +65,7 @@ pub(super) fn measure(
             // The same steps again: only their time is new.
             if repeat == 0 {
                 run.measured.look(point, gauge, &step);
+                run.measured.weigh(&weights, &step);
             }
             end = step.particles;
             Ok(())
@@ -93,6 +99,7 @@ impl Measured {
             report.density_error_p99,
             report.density_error_max,
         ]);
+        self.speed.push(report.max_speed);
         if let Some(projection) = report.projection {
             self.missed += projection.missed;
             self.work += (report.iterations + projection.correction_iterations) as f64;
@@ -103,6 +110,33 @@ impl Measured {
                 .push(sample(&point.scene, gauge, &step.particles));
         }
     }
+
+    /// `weights` are those of the water over each probe of pressure, Pa; empty where they are not asked for.
+    fn weigh(&mut self, weights: &[f64], step: &Step) {
+        let off = |(p, weight): (&Option<f64>, &f64)| Some((p.as_ref()? / weight - 1.0).abs());
+        let all: Option<Vec<f64>> = step.pressures.iter().zip(weights).map(off).collect();
+        if !weights.is_empty() {
+            let mean = |all: Vec<f64>| all.iter().sum::<f64>() / all.len() as f64;
+            self.weight.push(all.map(mean));
+        }
+    }
+}
+
+/// ρ g depth at the scene's probes of pressure, Pa, under the highest particle's upper end of the start.
+fn still_pressures(scene: &Scene, start: &Particles) -> Vec<f64> {
+    let gravity = scene.water.gravity;
+    let up = -gravity.normalize_or_zero();
+    let height = |x: &[f32; 3]| up.dot(Vec3::from_array(*x).as_dvec3());
+    let highest = start
+        .position
+        .iter()
+        .map(height)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let level = highest + 0.5 * scene.particle_spacing();
+    let points = scene.pressure_points().into_iter();
+    points
+        .map(|at| scene.water.rest_density * gravity.length() * (level - up.dot(at)))
+        .collect()
 }
 
 fn sample(scene: &Scene, gauge: &Gauge, particles: &Particles) -> Sample {

@@ -20,6 +20,12 @@ pub(super) struct Measured {
     pub(super) missed: u32,
     /// Mean, 99th percentile and maximum of max(0, ρ/ρ0 − 1) at each frame's end.
     pub(super) density: Vec<[f64; 3]>,
+    /// Of each frame: the fastest particle, m/s.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) speed: Vec<f64>,
+    /// Of each frame, where it is asked for: mean of |p / (ρ g depth) − 1| over the probes that read one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) weight: Vec<Option<f64>>,
     /// At equally spaced times, where the run is compared with the finest.
     pub(super) samples: Vec<Sample>,
     /// RMS over the particles of the way from the end to where their constraints hold, in spacings.
@@ -78,7 +84,18 @@ pub(super) fn error(of: ErrorMeasure, run: &Measured, finest: Option<&Measured>)
         let pairs = run.samples.iter().zip(&finest?.samples);
         mean(pairs.filter_map(|(sample, fine)| difference(sample, fine)))
     };
+    let late = |frames: usize| frames.div_ceil(2);
     match of {
+        ErrorMeasure::TopSpeed => {
+            let speeds = run.speed[late(run.speed.len())..].iter().copied();
+            speeds.reduce(f64::max)
+        }
+        // A probe that reads nothing in some frame has no mean.
+        ErrorMeasure::Weight => {
+            let weights = &run.weight[late(run.weight.len())..];
+            let all: Option<Vec<f64>> = weights.iter().copied().collect();
+            mean(all?.into_iter())
+        }
         ErrorMeasure::DensityMean => density(0),
         ErrorMeasure::DensityP99 => density(1),
         ErrorMeasure::DensityMax => density(2),
@@ -114,6 +131,8 @@ mod tests {
                 sample(None, 0.7, 8.0, 1.5),
             ],
             density: vec![[0.01, 0.02, 0.3], [0.03, 0.04, 0.5]],
+            speed: vec![9.0, 5.0, 1.0, 2.0],
+            weight: vec![Some(0.9), None, Some(0.1), Some(0.3)],
             ..Measured::default()
         };
         let finest = Measured {
@@ -129,6 +148,10 @@ mod tests {
         assert!((against(ErrorMeasure::Energy) - 0.15).abs() < 1e-12);
         assert!((against(ErrorMeasure::Profile) - 0.25).abs() < 1e-12);
         assert!((against(ErrorMeasure::DensityP99) - 0.03).abs() < 1e-12);
+        assert_eq!(error(ErrorMeasure::TopSpeed, &run, None), Some(2.0));
+        let weight = error(ErrorMeasure::Weight, &run, None).expect("measured");
+        assert!((weight - 0.2).abs() < 1e-12);
+        assert_eq!(error(ErrorMeasure::Weight, &finest, None), None);
         assert_eq!(error(ErrorMeasure::Crest, &run, None), None);
         assert_eq!(error(ErrorMeasure::Pressure, &run, None), None);
         // Against itself a run is off by nothing.

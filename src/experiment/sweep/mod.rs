@@ -100,10 +100,12 @@ impl Lab<'_> {
         let points = [point].into_iter().chain(&self.sweep.state).chain(finest);
         let runs: Vec<_> = points.map(|point| (&point.scene, point.device)).collect();
         let repeats = self.sweep.repeats;
+        let is_weighed = self.sweep.errors.contains(&ErrorMeasure::Weight);
         let measured = format!(
-            "{repeats} {:?} {:?}",
+            "{repeats} {:?} {:?} {:?}",
             self.sweep.errors[0].measure(),
-            self.gauge
+            self.gauge,
+            is_weighed.then(|| point.scene.pressure_points()),
         );
         bench.devices.hash(&runs, point.frames, &measured)
     }

@@ -10,7 +10,9 @@ impl Results<'_> {
         let mut texts = vec![KNEE.to_owned(), EQUAL_TIME.to_owned(), WORK.to_owned()];
         texts.push(match self.sweep.errors[0].measure() {
             Measure::Report => "A density error is max(0, ρ/ρ0 − 1) at a frame's end, over the particles (with FLIP over the \
-                cells of water); its mean, 99th percentile or maximum is averaged over all frames."
+                cells of water); its mean, 99th percentile or maximum is averaged over all frames. A largest speed is that of any particle in the \
+                run's second half; a pressure's error is |p / (ρ g depth) − 1| at the scene's probes, with the depth under the \
+                level of the start, averaged over those frames."
                 .to_owned(),
             Measure::Finest => format!(
                 "Errors are differences from the same method's finest run, the last of its values, at {SAMPLES} equally \

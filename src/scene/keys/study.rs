@@ -32,7 +32,7 @@ pub(in super::super) const KEYS: &[Key] = &[
         .only("kind", COMPARISON)
         .about("pairs of pictures"),
     // Of a sweep.
-    SET.only("kind", SWEEP),
+    SET.only("kind", &["solver_comparison", "sweep"]),
     KEY.only("kind", SWEEP),
     VALUES.only("kind", SWEEP),
     COARSER.only("kind", SWEEP),
@@ -55,7 +55,7 @@ pub(in super::super) const KEYS: &[Key] = &[
         .about("times are medians over so many runs"),
     Key::other(
         "errors",
-        "of \"density_error_mean\", \"density_error_p99\", \"density_error_max\", or of \"crest_error\", \
+        "of \"density_error_mean\", \"density_error_p99\", \"density_error_max\", \"top_speed\", \"weight_error\", or of \"crest_error\", \
          \"front_error\", \"energy_error\", \"profile_error\", or of \"pressure_error\", \"velocity_error\", \
          \"divergence\", or \"distance_to_converged\"",
     )

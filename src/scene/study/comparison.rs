@@ -12,7 +12,7 @@ use super::{
         error::SceneError,
         look::{FormatSpec, Look},
     },
-    StudyFileError,
+    SceneFile, StudyFileError, load_with,
 };
 use crate::domain::frame_range::FrameRange;
 
@@ -35,6 +35,8 @@ struct ComparisonSpec {
     #[serde(rename = "kind")]
     _kind: String,
     scene: Spanned<String>,
+    #[serde(default)]
+    set: Vec<Spanned<String>>,
     look: Spanned<String>,
     solvers: Spanned<Vec<String>>,
     frames: Option<Spanned<String>>,
@@ -50,7 +52,7 @@ pub(super) fn parse(
     let spec = ComparisonSpec::deserialize(toml::Deserializer::from(root))
         .map_err(|error| doc.translate(&error))?;
     let [left, right] = solvers(doc, &spec.solvers)?;
-    let file = base_dir.join(spec.scene.get_ref());
+    let file = SceneFile::new(&spec.scene, base_dir);
     let scenes = [
         load(doc, &spec, &file, left)?,
         load(doc, &spec, &file, right)?,
@@ -76,14 +78,15 @@ pub(super) fn parse(
 fn load(
     doc: &Document<'_>,
     spec: &ComparisonSpec,
-    file: &Path,
+    file: &SceneFile<'_>,
     solver: Method,
 ) -> Result<Scene, SceneError> {
-    let scene = Scene::load_within(file, &[solver.as_override()], doc.reach());
-    let mut scene = scene.map_err(|error| match error {
-        SceneError::Read { source, .. } => super::unreadable(doc, &spec.scene, file, &source),
-        other => other,
-    })?;
+    let sets = spec
+        .set
+        .iter()
+        .map(|set| (set.get_ref().clone(), set.span()));
+    let chosen = (solver.as_override(), spec.solvers.span());
+    let mut scene = load_with(doc, file, sets.chain([chosen]))?;
     // Each frame is measured.
     scene.keep = None;
     Ok(scene)

@@ -32,7 +32,7 @@ use super::{
     super::{Method, Scene, document::Document, error::SceneError, physics_hash, words::shown},
     RunsOn, SceneFile, StudyFileError, load_with,
 };
-use fit::{check_coarser, check_converged, check_fit};
+use fit::{check_coarser, check_converged, check_fit, check_weighed};
 
 /// The key that changes the length of a frame.
 pub const FRAME_RATE: &str = "shot.frames_per_second";
@@ -102,7 +102,7 @@ pub struct Point {
 /// How errors are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// From each frame's report, averaged over the frames.
+    /// From each frame's report or pressures, averaged over the frames or those of the second half.
     Report,
     /// At the same times against the finest run of the same line, the last of its values, or another line's run.
     Finest,
@@ -121,6 +121,10 @@ pub enum ErrorMeasure {
     DensityP99,
     /// Its maximum.
     DensityMax,
+    /// Largest speed of a particle in the run's second half.
+    TopSpeed,
+    /// |p / (ρ g depth) − 1| at the scene's probes of pressure, depth under the level of the start, in the run's second half.
+    Weight,
     /// Height of the crest against the finest run.
     Crest,
     /// Place of the front against the finest run.
@@ -141,10 +145,12 @@ pub enum ErrorMeasure {
 
 impl ErrorMeasure {
     /// With the names that studies use.
-    pub const NAMED: [(&'static str, Self); 11] = [
+    pub const NAMED: [(&'static str, Self); 13] = [
         ("density_error_mean", Self::DensityMean),
         ("density_error_p99", Self::DensityP99),
         ("density_error_max", Self::DensityMax),
+        ("top_speed", Self::TopSpeed),
+        ("weight_error", Self::Weight),
         ("crest_error", Self::Crest),
         ("front_error", Self::Front),
         ("energy_error", Self::Energy),
@@ -163,7 +169,11 @@ impl ErrorMeasure {
     /// What it takes to measure it.
     pub fn measure(self) -> Measure {
         match self {
-            Self::DensityMean | Self::DensityP99 | Self::DensityMax => Measure::Report,
+            Self::DensityMean
+            | Self::DensityP99
+            | Self::DensityMax
+            | Self::TopSpeed
+            | Self::Weight => Measure::Report,
             Self::Crest | Self::Front | Self::Energy | Self::Profile => Measure::Finest,
             Self::Pressure | Self::Velocity | Self::Divergence => Measure::Projection,
             Self::DistanceToConverged => Measure::Converged,
@@ -176,6 +186,8 @@ impl ErrorMeasure {
             Self::DensityMean => "density error, mean",
             Self::DensityP99 => "density error, 99th percentile",
             Self::DensityMax => "density error, maximum",
+            Self::TopSpeed => "largest speed in the second half, m/s",
+            Self::Weight => "pressure against ρ g depth, relative",
             Self::Crest => "height of the crest against the finest run, m",
             Self::Front => "place of the front against the finest run, m",
             Self::Energy => "energy against the finest run, relative",
@@ -242,6 +254,9 @@ pub(super) fn parse(
             return Err(doc.fault_at(method.get_ref().name.span(), problem).into());
         }
         check_fit(doc, &spec, &line, errors[0], state.as_ref())?;
+        if errors.contains(&ErrorMeasure::Weight) {
+            check_weighed(doc, &spec, &line)?;
+        }
         if errors[0].measure() == Measure::Converged {
             check_converged(doc, &spec, &line)?;
         }

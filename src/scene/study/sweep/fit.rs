@@ -56,6 +56,28 @@ pub(super) fn check_fit(
     Ok(())
 }
 
+/// Whether there are pressures that can be held against the water's weight.
+pub(super) fn check_weighed(
+    doc: &Document<'_>,
+    spec: &SweepSpec,
+    line: &Line,
+) -> Result<(), SceneError> {
+    let is_weighed = |point: &Point| {
+        let has_weight = point.scene.water.gravity != glam::DVec3::ZERO;
+        has_weight && !point.scene.pressure_points().is_empty()
+    };
+    match line.points.iter().find(|point| !is_weighed(point)) {
+        None => Ok(()),
+        Some(point) => {
+            let problem = format!(
+                "weight_error is measured at the scene's probes of pressure under its gravity, and {:?} with {} has none of one",
+                line.name, point.label
+            );
+            Err(doc.fault_at(spec.errors.span(), problem))
+        }
+    }
+}
+
 /// Whether the distance to where the constraints hold can be measured, and in minutes.
 pub(super) fn check_converged(
     doc: &Document<'_>,
