@@ -75,6 +75,21 @@ fn read(text: &str) -> Result<Table, SceneError> {
 /// Keys that caches may be older than, each with the value by which nothing differs from before there was one.
 const YOUNGER: [(&str, &str); 1] = [("solver.pbf.grid_projection", "false")];
 
+/// What a scene of a cache has to be given that is older than some keys, as overrides.
+pub(super) fn younger(text: &str) -> Result<Vec<String>, SceneError> {
+    let root = read(text)?;
+    let is_absent = |key: &str| {
+        let (tables, name) = key.rsplit_once('.').unwrap_or(("", key));
+        let mut tables = tables.split('.');
+        let table = tables.try_fold(&root, |table, name| table.get(name)?.as_table());
+        table.is_some_and(|table| !table.contains_key(name))
+    };
+    let absent = YOUNGER.iter().filter(|(key, _)| is_absent(key));
+    Ok(absent
+        .map(|(key, value)| format!("{key}={value}"))
+        .collect())
+}
+
 /// Dotted keys and values of the physics, numbers written alike whether whole or not.
 fn flatten(table: &Table) -> BTreeMap<String, String> {
     let mut values = BTreeMap::new();

@@ -72,21 +72,21 @@ pub(super) fn check_solver(
                         shown(spacing)
                     ));
                 }
-                let (cell, edge) = (PROJECTION_CELL * spacing, f64::from(EDGE));
-                if solver.pbf().grid_projection && !is_whole(length / cell / edge, edge) {
-                    return refuse(format!(
-                        "{:.3} particle spacings of {} m, and PBF with grid_projection asks for a multiple of {}",
-                        length / spacing,
-                        shown(spacing),
-                        PROJECTION_CELL * edge
-                    ));
-                }
                 let support = spacing * solver.pbf().support_ratio;
                 if length / support < LEAST_CELLS * (1.0 - ROUNDING) {
                     return refuse(format!(
                         "{:.3} support radii of {} m, and PBF asks for at least {LEAST_CELLS}",
                         length / support,
                         shown(support)
+                    ));
+                }
+                let (cell, edge) = (PROJECTION_CELL * spacing, f64::from(EDGE));
+                if solver.pbf().grid_projection && !is_whole(length / cell / edge, edge) {
+                    return refuse(format!(
+                        "{:.3} particle spacings of {} m, and PBF with grid_projection asks for a multiple of {} (without, for a whole number)",
+                        length / spacing,
+                        shown(spacing),
+                        PROJECTION_CELL * edge
                     ));
                 }
             }

@@ -223,7 +223,7 @@ fn open(source: &Source) -> Result<(Scene, Option<CacheReader>, Vec<u32>), Check
             }
             // The cache's own copy: what was baked, wherever the cache has been moved to.
             let file = directory.join("scene.toml");
-            let scene = Scene::parse(cache.scene_toml(), &file, directory, &[])?;
+            let scene = Scene::recorded(cache.scene_toml(), &file, directory)?;
             Ok((scene, Some(cache), frames))
         }
     }

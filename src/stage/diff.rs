@@ -265,7 +265,7 @@ fn physics(file: &Path, old: &str, new: &str) -> Result<Option<String>, DiffErro
 /// The cache's own copy of its scene.
 fn scene_of(cache: &CacheReader) -> Result<Scene, DiffError> {
     let file = cache.dir().join("scene.toml");
-    Scene::parse(cache.scene_toml(), &file, cache.dir(), &[]).map_err(|source| DiffError::Scene {
+    Scene::recorded(cache.scene_toml(), &file, cache.dir()).map_err(|source| DiffError::Scene {
         file: cache.dir().to_owned(),
         source,
     })

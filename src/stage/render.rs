@@ -222,7 +222,7 @@ pub fn render(
 /// The cache's own copy of its scene: what was baked, wherever the cache has been moved to.
 fn baked_scene(cache: &CacheReader, directory: &Path) -> Result<Scene, SceneError> {
     let file = directory.join("scene.toml");
-    Scene::parse(cache.scene_toml(), &file, directory, &[])
+    Scene::recorded(cache.scene_toml(), &file, directory)
 }
 
 /// A renderer's fault; that of a panorama at its place in the look.

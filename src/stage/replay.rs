@@ -440,7 +440,7 @@ pub fn replay_failed(directory: &Path, gpu: &Gpu) -> Result<Replayed, ReplayErro
     // Mesh files stand in the cache, whose folder this one is in.
     let cached = CacheReader::open(&directory.join(".."))?;
     let file = directory.join("scene.toml");
-    let scene = Scene::parse(&scene_toml, &file, cached.dir(), &[])?;
+    let scene = Scene::recorded(&scene_toml, &file, cached.dir())?;
     let start = Start::of_cache::<ReplayError>(&scene, &cached)?;
     if let Some(adapter) = &gpu.adapter {
         check_request(adapter)?;

@@ -341,9 +341,10 @@ const PBF: &[Key] = &[
         .default("0.0")
         .about("k of s_corr, with λ's natural scale as unit"),
     Key::flag("grid_projection")
-        .default("false")
+        .default("true")
         .about("velocities are made free of divergence on a grid of cells of 2 d before particles move (Raveendran 2011), \
-            so that iterations correct what is left; a period is then a multiple of 16 d"),
+            so that iterations correct what is left; a period is then a multiple of 16 d. `false`: the iterations alone, as \
+            in the paper by Macklin and Müller (2013)"),
     Key::whole("max_substeps", MANY)
         .not_physics()
         .default("32")

@@ -251,7 +251,7 @@ const SHIPPED: [(&str, &str, &str); 8] = [
     (
         "quickstart",
         "pbf",
-        "a1f8f8dbb525d0f61e510f85af899569b4ef013c4b966965480da86b4ddcbd69",
+        "c5a3f9b0f4e1c31de5245b6be31e23d3ac99b201b2b87f713e26dd060af335ab",
     ),
     (
         "quickstart",
@@ -261,7 +261,7 @@ const SHIPPED: [(&str, &str, &str); 8] = [
     (
         "wave-city",
         "pbf",
-        "b9b184cefbdc6213c8002173ab632a00d63212388f9973b6c1a6344c66220bf6",
+        "248169e5402c5bb9998cba435f90943ee6ae71e13848c6487ed0e714a8f9f5a0",
     ),
     (
         "wave-city",
@@ -271,7 +271,7 @@ const SHIPPED: [(&str, &str, &str); 8] = [
     (
         "dam-break",
         "pbf",
-        "9f454f605a2560d6814a6cb58965096353a8d797d893f5180f4c908b149cf152",
+        "61cd2653ff85c0efef883fb5e93d267860f0820ed18fa2591760c6534b4dace9",
     ),
     (
         "dam-break",
@@ -281,7 +281,7 @@ const SHIPPED: [(&str, &str, &str); 8] = [
     (
         "wave-tank",
         "pbf",
-        "ef4337b5adca8c4e205d3c5e7a49a8c7fff8d5650888c8e18a211cecc67dac68",
+        "0578104bd4b7d7385aa6a26ddc9175b021d0c5dfaf596bb36b63efc2e446b39d",
     ),
     (
         "wave-tank",

@@ -150,6 +150,12 @@ fn a_ledger_that_cannot_grow_is_cut_back_and_goes_on() {
         "max = [-0.8, 0.7, 0.45]",
     );
     job.edit("small.toml", "frames = 8", "frames = 30");
+    // Short lines and a short manifest.
+    job.edit(
+        "small.toml",
+        "particle_spacing = 0.1",
+        "particle_spacing = 0.1\ngrid_projection = false",
+    );
     job.expect(0, &format!("{BAKE} -o whole"));
     let lines = ledger(&job.path("whole"));
     let longest = files(&job.path("whole"))

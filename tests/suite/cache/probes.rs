@@ -247,13 +247,19 @@ fn a_probe_that_cannot_be_is_told() {
         ),
         (
             pressure,
-            &["solver.pbf.iteration=chebyshev"],
+            &[
+                "solver.pbf.iteration=chebyshev",
+                "solver.pbf.grid_projection=false",
+            ],
             "probe[0].kind",
             "goes on from the one before",
         ),
         (
             pressure,
-            &["solver.pbf.artificial_pressure=0.1"],
+            &[
+                "solver.pbf.artificial_pressure=0.1",
+                "solver.pbf.grid_projection=false",
+            ],
             "probe[0].kind",
             "held apart by a force",
         ),
@@ -286,15 +292,23 @@ fn only_a_pressure_costs_the_device_anything() {
         .filter(|p| !p.contains("pressure"))
         .collect::<Vec<_>>()
         .join("[[probe]]");
-    for method in ["pbf", "flip"] {
+    let grids = [("flip", true), ("pbf", true), ("pbf", false)];
+    for (method, has_grid) in grids {
         let plan = |probes: &str| -> Plan {
-            let scene = parse(probes, &[&format!("solver.method={method}")]).unwrap();
-            Plan::new(&scene, counts, device_limits(&context))
+            let sets = [
+                &*format!("solver.method={method}"),
+                &*format!("solver.pbf.grid_projection={has_grid}"),
+            ];
+            Plan::new(
+                &parse(probes, &sets).unwrap(),
+                counts,
+                device_limits(&context),
+            )
         };
         let bare = plan("");
         assert_eq!(plan(&others), bare);
         let asked = plan(PROBES);
-        if method == "flip" {
+        if has_grid {
             assert_eq!(asked, bare);
             continue;
         }

@@ -102,7 +102,13 @@ fn few_workgroups_a_dimension_give_the_same_bytes() {
 fn small_bindings_split_the_lists_and_give_the_same_bytes() {
     let whole = Context::open(None).unwrap();
     let job = Job::new();
-    run(&request(&job, "pbf", "whole", &whole)).unwrap();
+    // Of PBF's own passes: the projection's grid is no list, and has buffers that are larger.
+    let alone = |cache: &str, context: &Context| {
+        let mut request = request(&job, "pbf", cache, context);
+        request.scene.solver.pbf.as_mut().unwrap().grid_projection = false;
+        request
+    };
+    run(&alone("whole", &whole)).unwrap();
     let particles = CacheReader::open(&job.path("whole"))
         .unwrap()
         .read(0)
@@ -114,7 +120,7 @@ fn small_bindings_split_the_lists_and_give_the_same_bytes() {
         limits.max_storage_buffer_binding_size = binding;
     })
     .unwrap();
-    let request = request(&job, "pbf", "small", &small);
+    let request = alone("small", &small);
     let start = swell::stage::prepare::Start::of(&request.scene).unwrap();
     let chunks = |context: &Context| {
         let plan = start.plan(&request.scene, swell::solve::plan::device_limits(context));

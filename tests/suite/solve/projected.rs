@@ -11,8 +11,9 @@ use swell::{
         particles::Particles,
         solver::{Solver, StepReport},
     },
+    gpu::adapter::{Context, Spoil},
     reference,
-    scene::{Scene, Wall, WaveMaker},
+    scene::{Iteration, Scene, Wall, WaveMaker},
     solve::{pbf, plan::Plan},
     study::waves,
 };
@@ -287,4 +288,103 @@ fn a_period_is_whole_bricks_of_the_projection() {
     }
     let said = load(0.7, true).expect_err("seven spacings").to_string();
     assert!(said.contains("asks for a multiple of 16"), "{said}");
+}
+
+/// A column that falls, all lengths times `factor` and all times times its root; each frame's state over `factor`.
+fn falling_column(factor: f64, iteration: Iteration, gravity: f64) -> Vec<Particles> {
+    let mut scene = projected(
+        [2.4 * factor, 2.0 * factor, 0.8 * factor],
+        60.0 / factor.sqrt(),
+    );
+    let pbf = scene.solver.pbf.as_mut().unwrap();
+    (pbf.particle_spacing, pbf.iteration) = (D * factor, iteration);
+    scene.water.gravity.y = -gravity;
+    let mut solver = on_gpu(&scene, &lattice([0.0; 3], [8, 16, 8], [D * factor; 3]));
+    let one = |_| {
+        let mut state = solver.advance().unwrap().0;
+        for x in state.position.iter_mut().flatten() {
+            *x = (f64::from(*x) / factor) as f32;
+        }
+        state
+    };
+    (0..10).map(one).collect()
+}
+
+/// By Froude's law; what f32 rounds differently must not grow. Without a projection it does, a hundred times faster.
+#[test]
+fn similar_scenes_stay_similar_at_any_scale() {
+    for iteration in [Iteration::Jacobi, Iteration::RedBlack] {
+        let own = falling_column(1.0, iteration, GRAVITY);
+        let gap = |other: Vec<Particles>| {
+            let pairs = own.iter().zip(&other);
+            pairs.map(|(a, b)| max_distance(a, b)).fold(0.0, f64::max)
+        };
+        for factor in [0.01, 100.0] {
+            let gap = gap(falling_column(factor, iteration, GRAVITY));
+            assert!(gap < 1e-3 * D, "{iteration:?} at {factor}: {gap} m");
+        }
+        // Negative control.
+        let gap = gap(falling_column(100.0, iteration, 1.01 * GRAVITY));
+        assert!(gap > 1e-3 * D, "{gap} m");
+    }
+}
+
+/// Velocities of single particles that the grid does not see, neighbours against each other, fall with the rate at which
+/// particles take on the grid's: 0.17 √(g / Δx).
+#[test]
+fn what_the_grid_does_not_see_calms_down_at_the_rate_that_is_documented() {
+    let noise = 0.05;
+    let left = |gravity: f64| {
+        let (mut scene, mut particles) = tank(8);
+        scene.water.gravity.y = -gravity;
+        let places = particles.position.iter();
+        let parity = |x: &[f32; 3]| x.iter().map(|x| (f64::from(*x) / D) as u32).sum::<u32>() % 2;
+        particles.velocity = places
+            .map(|x| [if parity(x) == 0 { noise } else { -noise }, 0.0, 0.0])
+            .collect();
+        let mut solver = on_gpu(&scene, &particles);
+        let last = (0..30).map(|_| solver.advance().unwrap().0).last().unwrap();
+        let pairs = last.velocity.iter().zip(&particles.velocity);
+        let along: f64 = pairs.map(|(v, start)| f64::from(v[0] * start[0])).sum();
+        along / (f64::from(noise).powi(2) * particles.len() as f64)
+    };
+    let expected = |gravity: f64| (-0.17 * (gravity / (2.0 * D)).sqrt() * 0.5).exp();
+    for gravity in [GRAVITY, 4.0 * GRAVITY] {
+        let (left, expected) = (left(gravity), expected(gravity));
+        // A particle at a wall has fewer against it; those of the surface settle.
+        assert!((left / expected - 1.0).abs() < 0.03, "{left} of {expected}");
+    }
+    // Negative control: the two rates are told apart.
+    assert!(expected(4.0 * GRAVITY) < 0.6 * expected(GRAVITY));
+}
+
+/// Two particles on one spot of the surface, where nothing is compressed.
+#[test]
+fn particles_on_one_spot_part_also_at_the_surface() {
+    let (scene, mut particles) = tank(6);
+    // In the middle of the uppermost layer.
+    let top = (8 * 6) * 4 + 8 * 5 + 4;
+    assert!(particles.position[top][1] > 0.5);
+    particles.position.push(particles.position[top]);
+    particles.velocity.push([0.0; 3]);
+    particles.id.push(particles.id.len() as u32);
+    let last = particles.len() - 1;
+    let apart = |context: &Context| {
+        let mut solver = solver(context, &scene, &particles, &Boundary::default());
+        let state = (0..30).map(|_| solver.advance().unwrap().0).last().unwrap();
+        let [a, b] = [top, last].map(|k| glam::Vec3::from_array(state.position[k]).as_dvec3());
+        (a - b).length()
+    };
+    let context = context();
+    let distance = apart(&context);
+    assert!(distance > 0.4 * D, "{distance} m");
+    // Negative control: without the push.
+    let mut spoiled = context;
+    spoiled.spoil = Some(Spoil {
+        pass: "flip/push_apart",
+        from: "const SHARE = 0.25;",
+        to: "const SHARE = 0.0;",
+    });
+    let distance = apart(&spoiled);
+    assert!(distance < 0.4 * D, "{distance} m");
 }

@@ -192,9 +192,10 @@ fn too_many_slowed_particles_end_a_bake() {
 fn energy_rises_by_the_work_of_the_walls_alone() {
     let context = Context::open(None).unwrap();
     let gpu = opened(&context);
-    for (method, lost, grown) in [
+    for (method, projection, lost, grown) in [
         (
             SOLVERS[0],
+            "solver.pbf.grid_projection=false",
             Spoil {
                 pass: "pbf/boundary_work",
                 from: "+= sum;",
@@ -208,6 +209,7 @@ fn energy_rises_by_the_work_of_the_walls_alone() {
         ),
         (
             SOLVERS[1],
+            "solver.pbf.grid_projection=true",
             Spoil {
                 pass: "flip/boundary_work",
                 from: "boundary_work[thread / 64u] = sum;",
@@ -221,7 +223,7 @@ fn energy_rises_by_the_work_of_the_walls_alone() {
         ),
     ] {
         // A piston: its work is most of the energy.
-        let scene = load("24-leaving", &[method]);
+        let scene = load("24-leaving", &[method, projection]);
         let fine = bake(&gpu, &scene, "1-9");
         assert!(fine.error.is_none(), "{:?}", fine.error);
         let total = |report: &StepReport| report.kinetic_energy + report.potential_energy;

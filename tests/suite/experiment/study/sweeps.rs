@@ -281,6 +281,10 @@ fn iterations_come_nearer_to_what_is_converged() {
         .replace(
             "\"density_error_mean\", \"density_error_max\"",
             "\"distance_to_converged\"",
+        )
+        .replace(
+            "steps = 4",
+            "set = [\"solver.pbf.grid_projection=false\"]\nsteps = 4",
         );
     job.run(&text, false).unwrap();
     let distance = job.numbers("distance_to_converged");

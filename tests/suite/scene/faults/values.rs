@@ -23,7 +23,7 @@ pub const VALUE_FAULTS: &[Fault] = &[
     // Periodic axes.
     (
         "max = [25.0, 12.6, 15.0]",
-        "max = [25.0, 12.6, 15.0]\nperiodic = [\"z\"]",
+        "max = [25.0, 12.6, 16.0]\nperiodic = [\"z\"]",
         9,
         &[],
     ),
@@ -53,13 +53,13 @@ pub const VALUE_FAULTS: &[Fault] = &[
     ),
     (
         "max = [25.0, 12.6, 15.0]",
-        "max = [25.0, 12.6, 15.0]\nperiodic = [\"y\"]",
+        "max = [25.0, 12.8, 15.0]\nperiodic = [\"y\"]",
         9,
         &["domain.periodic: gravity is [0, -9.81, 0] m/s², and along y nothing holds the water up"],
     ),
     (
         "max = [25.0, 12.6, 15.0]",
-        "max = [25.0, 12.6, 15.0]\nperiodic = [\"x\"]",
+        "max = [25.6, 12.6, 15.0]\nperiodic = [\"x\"]",
         24,
         &["wave_maker[0].wall: there is no wall -x: domain.periodic joins"],
     ),
