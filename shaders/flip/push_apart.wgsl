@@ -36,7 +36,9 @@ fn main(
     let side = select(vec3i(1), vec3i(-1), p - vec3f(cell) < vec3f(0.5));
     let own = sorted_id[i];
     let apart = params.apart;
-    var push = max(apart - 2.0 * (x - params.wall_min), vec3f(0.0)) - max(apart - 2.0 * (params.wall_max - x), vec3f(0.0));
+    let of_walls = params.apart_from_walls;
+    var push = max(of_walls - 2.0 * (x - params.wall_min), vec3f(0.0))
+        - max(of_walls - 2.0 * (params.wall_max - x), vec3f(0.0));
     // A drop lies at a wall as near as it may: lifted off it, it would fall again in each step.
     push = select(push, vec3f(0.0), velocity[i].w > 0.0);
 #ifdef PERIODIC

@@ -36,8 +36,9 @@ struct FlipParams {
     apart: f32,
     // A bit an axis along which the domain joins its own end.
     periodic: u32,
-    padding: u32,
-    padding_more: vec2u,
+    // Water is pushed off walls that are nearer than half of this.
+    apart_from_walls: f32,
+    padding: vec2u,
 }
 @group(0) @binding(0) var<uniform> params: FlipParams;
 

@@ -6,7 +6,11 @@ use std::{
     fs::{self, File, OpenOptions},
     io::Write,
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        OnceLock,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::SystemTime,
 };
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -98,11 +102,24 @@ impl Devices {
                 scene.budget, scene.probes
             )
         };
-        let study = format!("{FORM} {} {frames} {measured}", env!("CARGO_PKG_VERSION"));
+        let study = format!("{FORM} {} {frames} {measured}", program());
         let text: Vec<String> = [study].into_iter().chain(runs.iter().map(of)).collect();
         let hash = blake3::hash(text.join("\n").as_bytes());
         hash.to_hex().to_string()
     }
+}
+
+/// BLAKE3 of the program that runs, since another build may compute otherwise; where its file cannot be read, what no other
+/// run has.
+fn program() -> &'static str {
+    static PROGRAM: OnceLock<String> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let bytes = std::env::current_exe().and_then(fs::read);
+        match bytes {
+            Ok(bytes) => blake3::hash(&bytes).to_hex().to_string(),
+            Err(_) => format!("{:?}", SystemTime::now()),
+        }
+    })
 }
 
 /// What a point came to; `M` is what its kind of study measures.

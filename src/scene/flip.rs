@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::key::read_by_name;
-use crate::domain::flip::apart;
+use crate::domain::flip::{APART, LEAST_APART, apart};
 
 /// Attributes that APIC declares: C of v(x) = v + C (x − x_p), 1/s, `affine_xy` = ∂v_x/∂y. A state without them
 /// starts from zeros.
@@ -53,8 +53,17 @@ impl Flip {
 
     /// Particles that are nearer to each other are pushed apart, metres.
     pub fn apart(&self) -> f64 {
-        let spacing = self.particle_spacing() / self.cell_size;
-        self.cell_size * apart(spacing, self.density_correction)
+        let part = if self.density_correction {
+            APART
+        } else {
+            LEAST_APART
+        };
+        self.cell_size * apart(part * self.particle_spacing() / self.cell_size)
+    }
+
+    /// Particles that are nearer to a wall than half of it are pushed off, metres.
+    pub fn apart_from_walls(&self) -> f64 {
+        self.cell_size * apart(APART * self.particle_spacing() / self.cell_size)
     }
 
     /// Attributes of a frame beyond positions, velocities and ids.

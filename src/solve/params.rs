@@ -114,10 +114,10 @@ mirror!(
         apart: f32,
         /// A bit an axis along which the domain joins its own end.
         periodic: u32,
+        /// Water is pushed off walls that are nearer than half of this.
+        apart_from_walls: f32,
         /// Unused.
-        padding: u32,
-        /// Unused.
-        padding_more: [u32; 2],
+        padding: [u32; 2],
     }
 );
 

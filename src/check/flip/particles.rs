@@ -156,7 +156,7 @@ pub(super) fn push_apart(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     );
     let found = given(state, io, before.is_drop.clone())?;
     let (apart, extent) = (
-        state.model.settings().apart(),
+        state.model.settings().apart_from_walls(),
         state.scene.domain.size().max_element(),
     );
     let period = state.model.period().0.max_element();

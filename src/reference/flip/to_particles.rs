@@ -337,12 +337,13 @@ pub fn push_apart(
     is_drop: &[bool],
 ) -> Vec<DVec3> {
     let (apart, period) = (model.settings().apart(), model.period());
+    let from_walls = model.settings().apart_from_walls();
     let one = |i: usize| {
         let (x, own) = (sorted.cloud.position[i], sorted.cloud.id[i]);
         let place = x / model.cell_size() - super::grid::corner(bricks, sorted.cell[i]);
         // The distance is below half a cell: whoever is nearer lies in one of eight.
         let side = place.to_array().map(|f| if f < 0.5 { -1 } else { 1 });
-        let lacks = |way: DVec3| (apart - 2.0 * way).max(DVec3::ZERO);
+        let lacks = |way: DVec3| (from_walls - 2.0 * way).max(DVec3::ZERO);
         let of_walls = lacks(x - step.walls.min) - lacks(step.walls.max - x);
         let of_walls = if is_drop[i] { DVec3::ZERO } else { of_walls };
         let mut push = DVec3::select(period.0.cmpgt(DVec3::ZERO), DVec3::ZERO, of_walls);

@@ -50,7 +50,7 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
         periodic: (0..3)
             .map(|axis| u32::from(scene.periodic[axis]) << axis)
             .sum(),
-        padding: 0,
-        padding_more: [0; 2],
+        apart_from_walls: flip.apart_from_walls() as f32,
+        padding: [0; 2],
     }
 }

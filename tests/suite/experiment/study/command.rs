@@ -50,6 +50,25 @@ fn the_command_tells_each_point() {
     assert_eq!(events[3]["status"], "stands there");
     assert_eq!(events[3]["count"], 4);
 
+    // Another build of the program runs every point again.
+    let program = fs::read(env!("CARGO_BIN_EXE_swell")).unwrap();
+    for (name, more, status) in [
+        ("copy", &b""[..], "stands there"),
+        ("other", &b"\0"[..], "done"),
+    ] {
+        let path = job.folder.path().join(name);
+        fs::copy(env!("CARGO_BIN_EXE_swell"), &path).unwrap();
+        fs::write(&path, [&program[..], more].concat()).unwrap();
+        let output = Command::new(&path)
+            .current_dir(job.folder.path())
+            .args(["study", "s.toml", "-o", "out", "--progress", "json"])
+            .output()
+            .unwrap();
+        let lines = String::from_utf8(output.stdout).unwrap();
+        let first: serde_json::Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
+        assert_eq!(first["status"], status, "{name}: {first}");
+    }
+
     // While another writes there, and where anything else lies, a study does not begin.
     let results = fs::File::open(job.folder.path().join("out/results.jsonl")).unwrap();
     results.lock().unwrap();
