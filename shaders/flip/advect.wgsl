@@ -77,6 +77,12 @@ fn stopped(v: vec3f, push: vec3f) -> vec3f {
 }
 #endif
 
+// Without what of a velocity leads into the walls that x lies at or beyond.
+fn at_walls(v: vec3f, x: vec3f) -> vec3f {
+    let left = select(v, max(v, params.wall_velocity_min), x < params.wall_min + params.contact_distance);
+    return select(left, min(left, params.wall_velocity_max), x > params.wall_max - params.contact_distance);
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -127,6 +133,7 @@ fn main(
             v = solid_velocity + stopped(v - solid_velocity, solid_push);
         }
     }
+    let free = x;
     // Where a solid and a wall meet, each would push into the other.
     let rounds = select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high)));
     for (var k = 0u; k < rounds; k++) {
@@ -147,16 +154,18 @@ fn main(
         x = leave_solids(x + way / f32(steps));
         v = stopped(v, solid_push);
     }
+    let free = x;
     // Where a solid and a wall meet, each would push into the other. How often is decided once: x lies exactly on
     // the wall after a push along it, and next to it after any other.
     let rounds = select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high)));
     for (var k = 0u; k < rounds; k++) {
         x = leave_solids(clamp(x, low, high));
     }
+#else
+    let free = x;
 #endif
 #endif
-    v = select(v, max(v, params.wall_velocity_min), x < low);
-    v = select(v, min(v, params.wall_velocity_max), x > high);
+    v = at_walls(at_walls(v, free), x);
     x = clamp(x, low, high);
 #ifdef PERIODIC
     x = wrapped_place(x, vec3f(params.cells) * params.cell_size);

@@ -35,15 +35,19 @@ pub fn physics_difference(old_toml: &str, new_toml: &str) -> Result<Option<Strin
         }
     }
     let keys: std::collections::BTreeSet<_> = old.keys().chain(new.keys()).collect();
-    let show = |value: Option<&String>| value.map_or("absent".to_owned(), Clone::clone);
+    let show = |key: &str, value: Option<&String>| {
+        let as_before = YOUNGER.iter().find(|(younger, _)| *younger == key);
+        let absent = as_before.map_or("absent", |(_, value)| value);
+        value.map_or(absent.to_owned(), Clone::clone)
+    };
     let method = METHOD.to_owned();
     let mut keys = iter::once(&method).chain(keys);
     let difference = keys.find(|key| old.get(*key) != new.get(*key));
     Ok(difference.map(|key| {
         format!(
             "{key} was {}, is now {}",
-            show(old.get(key)),
-            show(new.get(key))
+            show(key, old.get(key)),
+            show(key, new.get(key))
         )
     }))
 }

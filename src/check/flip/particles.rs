@@ -64,21 +64,20 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         .flat_map_iter(of_cell)
         .collect();
     let all = || errors.iter().copied();
+    let fallen = step.velocity_step.length();
+    let came = |i: usize| sorted.cloud.velocity[i].length() + fallen;
     io.table.add(
         &GIVEN,
         all().map(|(i, [velocity, change, _])| {
-            let came = sorted.cloud.velocity[i].length();
-            pair(
-                i,
-                given.velocity[i],
-                twin.velocity[i],
-                [velocity, change, came],
-            )
+            let magnitudes = [velocity, change, came(i)];
+            pair(i, given.velocity[i], twin.velocity[i], magnitudes)
         }),
     );
     io.table.add(
         &CARRIED,
-        all().map(|(i, [velocity, ..])| pair(i, given.carried[i], twin.carried[i], [velocity])),
+        all().map(|(i, [velocity, ..])| {
+            pair(i, given.carried[i], twin.carried[i], [velocity, came(i)])
+        }),
     );
     if !given.affine.is_empty() {
         let size = state.model.cell_size();

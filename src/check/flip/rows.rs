@@ -204,9 +204,9 @@ entries! {
         SPREAD_LAYER = "layers", "": [] 0.0, "whole numbers";
     }
     "flip/grid_to_particle" {
-        GIVEN = "velocity", "m/s": [velocity: "" OF_FACES, change: "the same of the changes", came: "|v| that came in"]
-            velocity + change + 4.0 * U * came, "";
-        CARRIED = "velocity of the grid", "m/s": [velocity: "" OF_FACES] velocity, "";
+        GIVEN = "velocity", "m/s": [velocity: "" OF_FACES, change: "the same of the changes", came: "|v| that came in and |g| Δt"]
+            velocity + change + 4.0 * U * came, "a drop's is their sum";
+        CARRIED = "velocity of the grid", "m/s": [velocity: "" OF_FACES, came: "|v| that came in and |g| Δt"] velocity + 4.0 * U * came, "the same";
         SHIFT = "displacement", "m": [displacement: "" OF_FACES] displacement, "";
         GIVEN_AFFINE = "affine rows", "1/s": [velocity: "" OF_FACES, size: "Δx"] 2.0 * velocity / size, "";
     }

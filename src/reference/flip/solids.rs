@@ -153,6 +153,14 @@ fn stopped(v: DVec3, push: DVec3) -> DVec3 {
     v - push * (v.dot(push).min(0.0) / push.length_squared().max(1e-30))
 }
 
+/// Without what of a velocity leads into the walls that `x` lies at or beyond, which are moved in by the contact distance.
+pub(super) fn at_walls(model: &Model, step: &super::Step<'_>, v: DVec3, x: DVec3) -> DVec3 {
+    let contact = model.contact_distance();
+    let [slowest, fastest] = step.wall_velocity;
+    let v = DVec3::select(x.cmplt(step.walls.min + contact), v.max(slowest), v);
+    DVec3::select(x.cmpgt(step.walls.max - contact), v.min(fastest), v)
+}
+
 /// Each halves, or better, how deep one that lies between a wall and a solid 45° off is in either.
 const CORNER_ROUNDS: usize = 4;
 
@@ -184,6 +192,7 @@ pub(super) fn go(
             v = solid.velocity + stopped(v - solid.velocity, x - next);
         }
     }
+    let v = at_walls(model, step, v, x);
     let (low, high) = (step.walls.min + contact, step.walls.max - contact);
     if x != x.clamp(low, high) {
         // Where a solid and a wall meet, each would push into the other.

@@ -397,9 +397,7 @@ pub fn advect(
             way *= model.max_displacement() / distance;
         }
         let (x, v) = solids::go(model, step, start, way, given.velocity[i]);
-        let [slowest, fastest] = step.wall_velocity;
-        let v = DVec3::select(x.cmplt(low), v.max(slowest), v);
-        let v = DVec3::select(x.cmpgt(high), v.min(fastest), v);
+        let v = solids::at_walls(model, step, v, x);
         (model.period().wrap(x.clamp(low, high)), v, is_capped)
     };
     let all: Vec<_> = (0..position.len())

@@ -280,7 +280,7 @@ fn the_scene_of_a_cache_that_is_older_than_a_key_is_read_as_it_was_baked() {
     let difference = physics_difference(&older, &written).expect("TOML");
     assert_eq!(
         difference.as_deref(),
-        Some("solver.pbf.grid_projection was absent, is now true")
+        Some("solver.pbf.grid_projection was false, is now true")
     );
     // Controls: a cache that has the key, and a scene of today that leaves it out.
     assert_eq!(

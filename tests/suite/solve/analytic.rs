@@ -9,6 +9,7 @@ use swell::{
     domain::{particles::Particles, solver::Solver},
     gpu::adapter::{Context, Spoil},
     scene::{Iteration, Method, Scene, Stop, flip::Transfer},
+    solve::flip::capacity,
 };
 
 /// `f` of every particle, mean.
@@ -91,6 +92,34 @@ fn drops_fall_from_a_ceiling_as_from_anywhere() {
         let off = fallen(&spoiled, scene);
         assert!(off > 0.1, "{off} m");
     }
+}
+
+/// Where a solid is near as well: what leads into the floor is taken from the velocity, or gravity would add to it for ever.
+#[test]
+fn a_drop_beside_a_solid_lies_still_on_the_floor() {
+    let mut scene = scene([16.0; 3]);
+    scene.shot.frames_per_second = 50.0;
+    let wall = half_space(DVec3::X, 0.4);
+    let drop = lattice([0.4, 0.3, 0.8], [1; 3], [D / 2.0; 3]);
+    let falls = |context: &Context| {
+        let most = capacity(&scene, &drop);
+        let mut solver = solver_with(context, &scene, &drop, &wall, most);
+        let states = (0..40).map(|_| solver.advance().unwrap().0);
+        velocity(&states.last().unwrap(), 0).length()
+    };
+    let context = context();
+    // A step's fall.
+    let speed = falls(&context);
+    assert!(speed < 9.81 / 50.0, "{speed} m/s");
+    // Negative control: after the rounds that keep it out of both, no wall knows of it.
+    let mut spoiled = context;
+    spoiled.spoil = Some(Spoil {
+        pass: "flip/advect",
+        from: "at_walls(at_walls(v, free), x)",
+        to: "at_walls(v, x)",
+    });
+    let speed = falls(&spoiled);
+    assert!(speed > 4.0, "{speed} m/s");
 }
 
 /// Water that nothing touches falls as one, every particle along its own parabola.

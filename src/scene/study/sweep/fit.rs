@@ -62,15 +62,24 @@ pub(super) fn check_weighed(
     spec: &SweepSpec,
     line: &Line,
 ) -> Result<(), SceneError> {
-    let is_weighed = |point: &Point| {
+    let lacking = |point: &Point| {
         let has_weight = point.scene.water.gravity != glam::DVec3::ZERO;
-        has_weight && !point.scene.pressure_points().is_empty()
+        let has_probes = !point.scene.pressure_points().is_empty();
+        match (has_probes, has_weight) {
+            (false, _) => Some("its scene has no probe of pressure"),
+            (true, false) => Some("its scene has no gravity"),
+            (true, true) => None,
+        }
     };
-    match line.points.iter().find(|point| !is_weighed(point)) {
+    let found = line
+        .points
+        .iter()
+        .find_map(|point| Some((point, lacking(point)?)));
+    match found {
         None => Ok(()),
-        Some(point) => {
+        Some((point, why)) => {
             let problem = format!(
-                "weight_error is measured at the scene's probes of pressure under its gravity, and {:?} with {} has none of one",
+                "weight_error cannot be measured of {:?} with {}: {why}",
                 line.name, point.label
             );
             Err(doc.fault_at(spec.errors.span(), problem))

@@ -23,6 +23,11 @@ fn devices_and_references_that_do_not_fit_are_refused() {
         ),
         (
             "\"density_error_mean\", \"density_error_max\"",
+            "\"weight_error\"",
+            "weight_error cannot be measured of \"jacobi\" with 1: its scene has no probe of pressure",
+        ),
+        (
+            "\"density_error_mean\", \"density_error_max\"",
             "\"distance_to_converged\", \"density_error_max\"",
             "errors[1]: \"density_error_max\" is not measured in the same run",
         ),

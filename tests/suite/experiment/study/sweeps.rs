@@ -272,6 +272,36 @@ against = "f64"
     assert_eq!(stands(&points), 4);
 }
 
+/// A tank that stands still under its own weight with a projection, and not without.
+#[test]
+fn water_at_rest_is_told_from_water_that_simmers() {
+    let job = Job::new();
+    let text = ITERATIONS
+        .replace("steps = 4", "steps = 40")
+        .replace("repeats = 2\n", "")
+        .replace("convergence_point = true\n", "")
+        .replace(
+            "\"density_error_mean\", \"density_error_max\"",
+            "\"top_speed\", \"weight_error\"",
+        )
+        .replace(
+            "key = ",
+            "set = [\"shot.frames=40\", \"domain.max=[0.6, 1.0, 0.6]\", \
+             \"probe=[{ kind = \\\"pressure\\\", at = [0.3, 0.25, 0.3] }]\"]\nkey = ",
+        )
+        .replace(
+            "name = \"red_black\"",
+            "name = \"alone\"\nset = [\"solver.pbf.grid_projection=false\"]",
+        );
+    job.run(&text, false).unwrap();
+    let (speed, weight) = (job.numbers("top_speed"), job.numbers("weight_error"));
+    let (projected, alone) = (&speed[..2], &speed[2..]);
+    assert!(projected.iter().all(|&speed| speed < 0.02), "{speed:?}");
+    assert!(alone.iter().all(|&speed| speed > 0.05), "{speed:?}");
+    assert!(weight[..2].iter().all(|&off| off < 0.03), "{weight:?}");
+    assert!(weight[2..].iter().any(|&off| off > 0.03), "{weight:?}");
+}
+
 #[test]
 fn iterations_come_nearer_to_what_is_converged() {
     let job = Job::new();
