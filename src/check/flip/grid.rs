@@ -244,7 +244,7 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     });
     let looked = |e: usize| looked[e - active.start];
     let size = state.model.cell_size();
-    let moved = |e: usize| surface_moved(depth[e], looked(e).0);
+    let moved = |e: usize| surface_moved(depth[e], OF_HALF.of([looked(e).0]));
     let is_tie = |e: usize| looked(e).1 || (depth[e].abs() <= moved(e) && density[e] != 0.5);
     let kind = io.after.get(buffers::CELL_KIND, elements.cells)?;
     io.table.each(&WATER, active.clone(), |e| {
@@ -357,4 +357,34 @@ fn surface_moved(distance: f64, error: f64) -> f64 {
     let slope = 1.0 - s;
     let moved = |by: f64| (1.0 - (slope * slope + by).max(0.0).sqrt() - s).abs();
     moved(2.0 * error).max(moved(-2.0 * error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{OF_HALF, surface_moved};
+    use crate::compare::rounding::U;
+
+    /// `flip/find_water`'s own steps, in f32.
+    fn device(density: f32) -> f64 {
+        let off = density - 0.5;
+        f64::from(off.signum() * (1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt()))
+    }
+
+    fn exact(density: f32) -> f64 {
+        let off = f64::from(density) - 0.5;
+        off.signum() * (1.0 - (1.0 - 2.0 * off.abs()).sqrt())
+    }
+
+    #[test]
+    fn the_surfaces_distance_is_within_its_bound_where_there_is_next_to_no_water() {
+        let mut is_needed = false;
+        for density in (1..2000).map(|i| 1.1f32.powi(-i / 8) / (1.0 + i as f32 / 3e3)) {
+            let (found, expected) = (device(density), exact(density));
+            let within =
+                |error: f64| (found - expected).abs() <= surface_moved(expected, error) + 24.0 * U;
+            assert!(within(OF_HALF.of([0.0])), "{density}: {found} {expected}");
+            is_needed |= !within(16.0 * U * f64::from(density));
+        }
+        assert!(is_needed, "a bound by the density alone holds as well");
+    }
 }

@@ -18,6 +18,7 @@ bounds! {
         least: "half of the open volume about, at least 0.02", part: "share × count / least, or the density where it is less"]
         share * place * 9.0 * count / least + part * (U * (count + 40.0) + 16.0 * place), "";
     pub(super) OF_MEAN = [density: "the largest about"] 16.0 * U * density, "a mean over six faces";
+    pub(super) OF_HALF = [mean: "" OF_MEAN] mean + 0.25 * U, "a density's difference from a half, which is half of 1 at most";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
         "a half, of the density or of what is open of a cell about";
     pub(super) OF_FACES = [place: "" PLACE, range: "of the faces' values about the cell", most: "the largest of them"]
@@ -86,7 +87,7 @@ entries! {
     }
     "flip/find_water" {
         WATER = "kind of cell", "": [] 0.0, "a whole number", tie NEAR_HALF;
-        DISTANCE = "distance of the surface", "m": [moved: "in cells, what it answers when s − s²/2 moves by " OF_MEAN,
+        DISTANCE = "distance of the surface", "m": [moved: "in cells, what it answers when s − s²/2 moves by " OF_HALF,
             size: "Δx"] (moved + 24.0 * U) * size, "", tie NEAR_HALF;
     }
     "flip/find_excess" {
