@@ -9,6 +9,7 @@ use glam::DVec3;
 use super::{
     PlacedMesh, Placement, Scene, Swarm, Water, budget,
     document::Document,
+    effects,
     error::SceneError,
     grids, keep,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
@@ -68,6 +69,12 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     periodic::check_solids(doc, periodic, &moving_solids, |k| moving[k])?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
     periodic::check_makers(doc, periodic, &wave_makers)?;
+    let around = effects::Surroundings {
+        domain: &domain,
+        periodic,
+        wave_makers: &wave_makers,
+    };
+    spec.effects.check(doc, &around)?;
     let grids = match &spec.grids {
         Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
         None => None,

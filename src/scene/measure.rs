@@ -55,6 +55,10 @@ impl Measure {
                 ("height_ratio", "wave height over stroke, H/S"),
                 ("wave_length", "wave length, m"),
                 (
+                    "reflection",
+                    "part of the wave's height that runs back past the gauges",
+                ),
+                (
                     "speed_ratio",
                     "largest speed up to the last gauge over the paddle's",
                 ),

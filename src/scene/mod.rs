@@ -275,6 +275,11 @@ impl Wall {
         Self { axis, is_max }
     }
 
+    /// One of six: of the least faces along x, y and z, then of the greatest.
+    pub fn bit(&self) -> u32 {
+        1 << (self.axis + 3 * usize::from(self.is_max))
+    }
+
     /// As scenes name it.
     pub fn name(self) -> &'static str {
         Self::NAMED[2 * self.axis + usize::from(self.is_max)].0

@@ -8,8 +8,7 @@ pub(super) const WALLS: [&str; 2] = ["free_slip", "no_slip"];
 impl Scene {
     /// A bit a no-slip wall: of the least faces along x, y and z, then of the greatest.
     pub fn no_slip_bits(&self) -> u32 {
-        let bit = |wall: &Wall| 1 << (wall.axis + 3 * usize::from(wall.is_max));
-        self.no_slip.iter().map(bit).sum()
+        self.no_slip.iter().map(Wall::bit).sum()
     }
 }
 

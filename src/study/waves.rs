@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use glam::DVec2;
+
 /// One harmonic of a signal, a + c cos(ωt) + s sin(ωt) = a + A cos(ωt − φ).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
@@ -73,6 +75,48 @@ pub fn whole_periods(samples: &[(f64, f64)], period: f64, after: f64) -> &[(f64,
 /// `apart` their distance, less than a wave length.
 pub fn wave_length(first: f64, second: f64, apart: f64) -> f64 {
     TAU * apart / (second - first).rem_euclid(TAU)
+}
+
+/// k of a wave of angular frequency `omega` (rad/s) over water `depth` deep (metres) under `gravity` (m/s²), 1/m: the root of
+/// ω² = g k tanh kh, by Newton's method.
+pub fn wave_number(omega: f64, depth: f64, gravity: f64) -> f64 {
+    let deep = omega * omega * depth / gravity;
+    // Above the root, from where the convex k h tanh kh is reached without passing it.
+    let start = deep.max(deep.sqrt()) + 1.0;
+    let better = |kh: f64, _| {
+        let tanh = kh.tanh();
+        kh - (kh * tanh - deep) / (tanh + kh * (1.0 - tanh * tanh))
+    };
+    (0..60).fold(start, better) / depth
+}
+
+/// How much of a wave of number `k` (1/m) is turned back, K = |reflected| / |incident|: of gauges' places along x (metres) and
+/// the wave's harmonic there, by least squares (Mansard and Funke 1980; of two gauges Goda and Suzuki 1976). `None` where
+/// gauges stand half a wave length apart, which cannot tell the two.
+pub fn reflection(gauges: &[(f64, Harmonic)], k: f64) -> Option<f64> {
+    // Complex numbers as vectors: a wave that comes has A exp(i(kx + δ)), one that runs back A exp(i(δ − kx)).
+    let count = gauges.len() as f64;
+    let turns = |times: f64| {
+        gauges
+            .iter()
+            .map(move |(x, _)| DVec2::from_angle(times * k * x))
+    };
+    let signal = || {
+        gauges
+            .iter()
+            .map(|(_, of)| of.amplitude * DVec2::from_angle(of.phase))
+    };
+    let twice: DVec2 = turns(2.0).sum();
+    let mixed = count * count - twice.length_squared();
+    if mixed < 0.02 * count * count {
+        return None;
+    }
+    let of_incident: DVec2 = turns(-1.0).zip(signal()).map(|(e, c)| e.rotate(c)).sum();
+    let of_reflected: DVec2 = turns(1.0).zip(signal()).map(|(e, c)| e.rotate(c)).sum();
+    let back = DVec2::new(twice.x, -twice.y);
+    let incident = count * of_incident - back.rotate(of_reflected);
+    let reflected = count * of_reflected - twice.rotate(of_incident);
+    Some(reflected.length() / incident.length())
 }
 
 /// A crest, from the parabola that fits samples (seconds, elevation) above `part` of the largest best: its time and height.
@@ -289,6 +333,43 @@ mod tests {
         assert!((wave_length(a, b, 3.0) - length).abs() < 1e-9);
         // Negative control: gauges in turn, which is a wave that runs back.
         assert!((wave_length(b, a, 2.0) - length).abs() > 1.0);
+    }
+
+    #[test]
+    fn the_wave_number_is_that_of_the_tables() {
+        for kh in [0.05f64, 0.5, 1.0, 3.0, 20.0] {
+            let omega = (9.81 * kh / 2.0 * kh.tanh()).sqrt();
+            assert!(
+                (wave_number(omega, 2.0, 9.81) - kh / 2.0).abs() < 1e-12 * kh,
+                "{kh}"
+            );
+        }
+    }
+
+    #[test]
+    fn gauges_tell_what_comes_from_what_runs_back() {
+        let (k, omega) = (1.1, 2.0);
+        let found = |places: &[f64], part: f64| {
+            let at = |&x: &f64| {
+                let wave =
+                    |t: f64| (omega * t - k * x).cos() + part * (omega * t + k * x - 0.4).cos();
+                (
+                    x,
+                    harmonic(&sampled(0.0, TAU / omega * 3.0 - 0.05, 0.05, wave), omega).unwrap(),
+                )
+            };
+            reflection(&places.iter().map(at).collect::<Vec<_>>(), k)
+        };
+        for part in [0.0, 0.05, 0.7] {
+            for places in [&[3.0, 4.0][..], &[3.0, 4.0, 5.3]] {
+                let is = found(places, part).unwrap();
+                assert!((is - part).abs() < 1e-9, "{places:?}: {is}, {part}");
+            }
+        }
+        // Half a wave length apart both waves look alike.
+        assert_eq!(found(&[3.0, 3.0 + TAU / k / 2.0], 0.05), None);
+        // Negative control: more runs back than comes.
+        assert!(found(&[3.0, 4.0], 20.0).unwrap() > 19.9);
     }
 
     #[test]

@@ -68,6 +68,7 @@ mod scene {
     mod untrusted;
 }
 mod solve {
+    mod absorbing;
     mod analytic;
     mod analytic_water;
     mod flip;

@@ -107,6 +107,17 @@ fn regular_waves(record: &Record<'_>, out: &mut Measured) {
         let length = waves::wave_length(first.phase, last.phase, to.x - from.x);
         out.put("wave_length", Some(length));
     }
+    if let Some(depth) = mean(fits.iter().map(|fit| fit.mean)) {
+        let at: Vec<_> = gauges
+            .iter()
+            .map(|at| at.x)
+            .zip(fits.iter().copied())
+            .collect();
+        out.put(
+            "reflection",
+            waves::reflection(&at, waves::wave_number(omega, depth, GRAVITY)),
+        );
+    }
     let paddle = PI * scale.stroke / scale.period;
     let ratio = |speeds: &mut dyn Iterator<Item = f64>| Some(speeds.fold(0.0, f64::max) / paddle);
     let rows = || record.rows.iter();

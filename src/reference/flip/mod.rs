@@ -5,7 +5,7 @@
 //! pass's name is its twin; where the GPU splits a pass for speed, one twin does both halves. [`Flip`] runs whole
 //! frames.
 
-mod effects;
+pub mod effects;
 mod grid;
 mod model;
 mod pressure;

@@ -206,6 +206,7 @@ impl Flip {
             step: &step,
             bricks: &bricks,
             room: &room,
+            old: &faces.change,
         };
         effects::apply(&model.scene.effects, water, &mut faces.velocity, timings);
         let waters = Waters::new(model, &bricks, &room, &centers);

@@ -46,6 +46,8 @@ pub struct Model {
     pub settings: scene::Pbf,
     /// m/s².
     pub gravity: DVec3,
+    /// Edges of the domain, metres.
+    pub size: DVec3,
     /// Cells of edge h over the domain.
     pub cells: Cells,
     /// Samples on solids, sorted by cell.
@@ -98,6 +100,7 @@ impl Model {
         let order = cells.order(&local, &id);
         let area = settings.particle_spacing * settings.particle_spacing;
         Self {
+            size,
             sample_weights: order
                 .iter()
                 .map(|&k| calibration.sample_weight * samples[k].area / area)

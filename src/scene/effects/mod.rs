@@ -3,7 +3,15 @@
 //! An effect's file here holds its settings and their keys. What it adds to each solver stands in a file of the
 //! same name in `solve::effects`, its f64 twins in `reference`, and what holds the two against each other in `check`.
 
-use super::key::Key;
+use super::{WaveMaker, document::Document, error::SceneError, key::Key};
+use crate::domain::bounds::Bounds;
+
+/// What of a scene an effect has to fit into.
+pub(super) struct Surroundings<'a> {
+    pub(super) domain: &'a Bounds,
+    pub(super) periodic: [bool; 3],
+    pub(super) wave_makers: &'a [WaveMaker],
+}
 
 /// What an effect's settings say of themselves.
 pub(super) trait Effect {
@@ -11,6 +19,11 @@ pub(super) trait Effect {
     const ABOUT: &'static str;
     /// Its keys, each with its range.
     const KEYS: &'static [Key];
+
+    /// Refuses settings that do not fit into the scene.
+    fn check(&self, _: &Document<'_>, _: &Surroundings<'_>) -> Result<(), SceneError> {
+        Ok(())
+    }
 
     /// Part of the velocity that a frame of FLIP takes from the grid for it.
     fn blend(&self) -> f64 {
@@ -21,7 +34,7 @@ pub(super) trait Effect {
 /// Gives the list of effects, in the order in which they act, to a macro.
 macro_rules! with_effects {
     ($callback:ident) => {
-        $callback!(viscosity, vorticity_confinement);
+        $callback!(viscosity, vorticity_confinement, absorbing_zone);
     };
 }
 pub(crate) use with_effects;
@@ -51,6 +64,12 @@ macro_rules! effects {
                     .absent()
                     .about(<$name::Settings as Effect>::ABOUT)
             ),+];
+
+            /// Refuses settings that do not fit into the scene.
+            pub(super) fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
+                $(self.$name.iter().try_for_each(|settings| settings.check(doc, around))?;)+
+                Ok(())
+            }
 
             /// Part of the velocity that a frame of FLIP takes from the grid, of each of the named effects.
             pub(super) fn blends(&self) -> Vec<f64> {

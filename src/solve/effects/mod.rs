@@ -5,7 +5,7 @@
 
 use crate::{
     gpu::program::{BufferSpec, PassSpec},
-    scene::effects::{Effects, with_effects},
+    scene::{Scene, effects::with_effects},
 };
 
 /// What an effect adds to a solver.
@@ -30,17 +30,17 @@ macro_rules! additions {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
 
-        /// What the named effects add to PBF with so many particles, by key.
-        pub(super) fn of_pbf(named: &Effects, particles: usize) -> Vec<(&'static str, Addition)> {
+        /// What a scene's effects add to PBF with so many particles, by key.
+        pub(super) fn of_pbf(scene: &Scene, particles: usize) -> Vec<(&'static str, Addition)> {
             let mut all = Vec::new();
-            $(all.extend(named.$name.iter().map(|settings| (stringify!($name), $name::pbf(settings, particles))));)+
+            $(all.extend(scene.effects.$name.iter().map(|settings| (stringify!($name), $name::pbf(settings, scene, particles))));)+
             all
         }
 
         /// What they add to FLIP with so many cells in its arrays.
-        pub(super) fn of_flip(named: &Effects, cells: usize) -> Vec<(&'static str, Addition)> {
+        pub(super) fn of_flip(scene: &Scene, cells: usize) -> Vec<(&'static str, Addition)> {
             let mut all = Vec::new();
-            $(all.extend(named.$name.iter().map(|settings| (stringify!($name), $name::flip(settings, cells))));)+
+            $(all.extend(scene.effects.$name.iter().map(|settings| (stringify!($name), $name::flip(settings, scene, cells))));)+
             all
         }
     };

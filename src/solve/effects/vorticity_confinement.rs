@@ -1,13 +1,13 @@
 //! Vorticity confinement on the device.
 
-use crate::{gpu::buffer::Buf, scene::effects::vorticity_confinement::Settings};
+use crate::{gpu::buffer::Buf, scene::{Scene, effects::vorticity_confinement::Settings}};
 
 use super::{Addition, pass};
 
 /// Curl of the velocity and its length: of each particle in sorted order (PBF), or of each cell (FLIP), 1/s.
 pub const VORTICITY: Buf<[f32; 4]> = Buf::new("vorticity");
 
-pub(super) fn pbf(settings: &Settings, particles: usize) -> Addition {
+pub(super) fn pbf(settings: &Settings, _: &Scene, particles: usize) -> Addition {
     confinement(
         ["effects/vorticity_curl", "effects/vorticity_force"],
         settings,
@@ -15,7 +15,7 @@ pub(super) fn pbf(settings: &Settings, particles: usize) -> Addition {
     )
 }
 
-pub(super) fn flip(settings: &Settings, cells: usize) -> Addition {
+pub(super) fn flip(settings: &Settings, _: &Scene, cells: usize) -> Addition {
     confinement(
         ["effects/grid_curl", "effects/grid_confinement"],
         settings,

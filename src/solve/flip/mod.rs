@@ -552,7 +552,7 @@ impl TraceFrame for Flip {
 
 /// The commands of a plan, bound to the buffers that the program has now.
 fn recordings(program: &Program, plan: &Plan, scene: &Scene) -> Recordings {
-    let effects = effects::of_flip(&scene.effects, CELLS as usize * plan.counts.bricks.slots);
+    let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
     Recordings::new(program, &Commands::new(plan, scene, &effects))
 }
 

@@ -33,7 +33,7 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan
     let flip = scene.solver.flip();
     let mut plan = Plan::bare(counts, scene.domain.cells(flip.cell_size));
     plan.moves = moves;
-    let effects = effects::of_flip(&scene.effects, CELLS as usize * counts.bricks.slots);
+    let effects = effects::of_flip(scene, CELLS as usize * counts.bricks.slots);
     let mut table = buffers(&plan, scene);
     for (name, addition) in &effects {
         table.extend(name, addition.buffers.clone());
@@ -67,7 +67,7 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan
 /// Every command of a substep, of projections of any shape among them.
 pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
     let flip = scene.solver.flip();
-    let effects = effects::of_flip(&scene.effects, CELLS as usize * plan.counts.bricks.slots);
+    let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
     let commands = Commands::new(plan, scene, &effects);
     let projection = pressure::all_commands(flip.pressure.preconditioner, flip.density_correction);
     let before = commands.before_projection().cloned();

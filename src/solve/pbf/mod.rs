@@ -80,7 +80,7 @@ impl Pbf {
         let program = Program::new(context, &buffers, &passes, &SHARED_CONSTANTS)?;
         let pbf = scene.solver.pbf();
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
-        let effects = effects::of_pbf(&scene.effects, particles);
+        let effects = effects::of_pbf(scene, particles);
         let commands = Commands::new(&plan, scene, &effects);
         let substep = Recording::new(&program, &commands.substep);
         let measure = Recording::new(&program, &commands.measure);

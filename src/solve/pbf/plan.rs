@@ -37,7 +37,7 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits
     plan.projection =
         (scene.of_projection()).map(|grid| Box::new(flip::plan::plan(&grid, counts, false)));
     choose_lists(&mut plan, limits);
-    let effects = effects::of_pbf(&scene.effects, counts.particles);
+    let effects = effects::of_pbf(scene, counts.particles);
     let commands = Commands::new(&plan, scene, &effects);
     let mut table = buffers(&plan, scene, commands.phases.len());
     for (name, addition) in &effects {
@@ -56,7 +56,7 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits
 
 /// Every command of a substep and of a frame's end.
 pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
-    let effects = effects::of_pbf(&scene.effects, plan.counts.particles);
+    let effects = effects::of_pbf(scene, plan.counts.particles);
     let commands = Commands::new(plan, scene, &effects);
     [commands.substep, commands.measure].concat()
 }

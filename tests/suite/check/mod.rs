@@ -12,7 +12,7 @@ use swell::{
     gpu::adapter::{Context, Needs, Spoil},
     scene::{
         Effects, Iteration, Method, Scene, Stop, Wall, WaveMaker,
-        effects::{viscosity, vorticity_confinement},
+        effects::{absorbing_zone, viscosity, vorticity_confinement},
         flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
     },
     solve::{
@@ -81,6 +81,12 @@ fn case(method: Method) -> (Scene, Start) {
     });
     scene.effects.viscosity = Some(viscosity::Settings { xsph: 0.1 });
     scene.effects.vorticity_confinement = Some(vorticity_confinement::Settings { strength: 1.0 });
+    // From both ends, and longer than the water is.
+    scene.effects.absorbing_zone = Some(absorbing_zone::Settings {
+        walls: vec![Wall::NAMED[0].1, Wall::NAMED[5].1],
+        length: 1.3,
+        period: 0.3,
+    });
     scene.solver.pbf.as_mut().unwrap().cfl = CFL;
     let mut particles = lattice([-0.01, 0.2, -0.01], [8, 6, 7], [0.9 * D; 3]);
     jitter(&mut particles, 0.02 * D);

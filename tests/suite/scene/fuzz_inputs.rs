@@ -136,6 +136,8 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("budget.energy", "{}", true),
     ("effects.viscosity.xsph", "{}", true),
     ("effects.vorticity_confinement.strength", "{}", true),
+    ("effects.absorbing_zone.length", "{}", false),
+    ("effects.absorbing_zone.period", "{}", true),
 ];
 
 /// The good scene with all that [`NUMBERS`] changes in it.
@@ -145,7 +147,9 @@ fn numbered() -> String {
     let more = "[[water.particles]]\nat = [[20.0, 3.0, 3.0]]\nvelocity = [1.0, 0.0, 0.0]\n[[solid]]\nmesh = \"cube.obj\"\n\
         translate = [15.0, 3.0, 3.0]\ndirection = [1.0, 0.0, 0.0]\n\
         motion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n";
+    let zone = "absorbing_zone = { walls = [\"-z\"], length = 1.0, period = 1.0 }\n";
     SCENE
+        .replace("[effects]\n", &format!("[effects]\n{zone}"))
         .replace("[solver]\n", &format!("{makers}{more}[solver]\n"))
         .replace("particle_spacing = 0.1\niterations = 4\n", "particle_spacing = 0.1\niteration = \"chebyshev\"\ndensity_error = 0.01\nmax_iterations = 9\n")
 }

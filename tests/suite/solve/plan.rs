@@ -13,7 +13,7 @@ use swell::{
     },
     scene::{
         Iteration, Method, Scene, Stop, Wall, WaveMaker,
-        effects::{viscosity, vorticity_confinement},
+        effects::{absorbing_zone, viscosity, vorticity_confinement},
         flip::{Precision, Preconditioner, Surface, Transfer},
         probe::{Probe, ProbeKind},
     },
@@ -62,6 +62,11 @@ impl Case {
 fn with_effects(mut scene: Scene) -> Scene {
     scene.effects.viscosity = Some(viscosity::Settings { xsph: 0.01 });
     scene.effects.vorticity_confinement = Some(vorticity_confinement::Settings { strength: 0.1 });
+    scene.effects.absorbing_zone = Some(absorbing_zone::Settings {
+        walls: vec![Wall::NAMED[1].1],
+        length: 0.5,
+        period: 1.0,
+    });
     scene
 }
 

@@ -20,11 +20,13 @@ pub(super) struct Water<'a> {
     pub(super) bricks: &'a Bricks,
     /// What of the cells is water.
     pub(super) room: &'a Room,
+    /// Velocities at faces before gravity, m/s.
+    pub(super) old: &'a [DVec3],
 }
 
 macro_rules! twins {
     ($($name:ident),+ $(,)?) => {
-        $(mod $name;)+
+        $(pub mod $name;)+
 
         /// Runs the effects that a scene names on the velocities at the faces, m/s.
         pub(super) fn apply(

@@ -22,6 +22,7 @@ pub(super) fn apply(
         step,
         bricks,
         room,
+        ..
     } = water;
     let vorticity = timings.time("effects/grid_curl", || {
         grid_curl(model, bricks, room, velocity)

@@ -144,6 +144,13 @@ pub const FLIP: &[Control] = &[
         &["velocity at faces"],
     ),
     control(
+        "effects/absorb_faces",
+        "part * face_change[face]",
+        "1.001 * part * face_change[face]",
+        "effects/absorb_faces",
+        &["velocity at faces"],
+    ),
+    control(
         "pressure/divergence",
         "pressure_rhs[own + 64u * c] = -b.lo[c]",
         "pressure_rhs[own + 64u * c] = b.lo[c]",

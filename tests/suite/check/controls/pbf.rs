@@ -60,6 +60,13 @@ pub const PBF: &[Control] = &[
     )
     .and(&UNSORTED),
     control(
+        "effects/absorb_particles",
+        "let kept = 1.0 -",
+        "let kept = 1.0001 -",
+        "effects/absorb_particles",
+        &["velocity"],
+    ),
+    control(
         "pbf/assign_cells",
         "atomicAdd(&cell_start[cell], 1u)",
         "atomicAdd(&cell_start[cell], 1u) * 2u",

@@ -175,6 +175,11 @@ pub fn effects() -> Case {
     case.scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.1 });
     case.scene.effects.vorticity_confinement =
         Some(effects::vorticity_confinement::Settings { strength: 0.5 });
+    case.scene.effects.absorbing_zone = Some(effects::absorbing_zone::Settings {
+        walls: vec![Wall::NAMED[1].1],
+        length: 0.6,
+        period: 0.5,
+    });
     Case {
         name: "effects",
         ..case

@@ -468,4 +468,34 @@ pub const VALUE_FAULTS: &[Fault] = &[
         33,
         &["effects.viscosity.xsph: -1 is out of range; allowed: a number from 1e-6 to 1"],
     ),
+    (
+        "viscosity = { xsph = 0.01 }",
+        "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [], length = 3.0, period = 2.0 }",
+        34,
+        &["effects.absorbing_zone.walls: names no wall"],
+    ),
+    (
+        "viscosity = { xsph = 0.01 }",
+        "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"-x\"], length = 3.0, period = 2.0 }",
+        34,
+        &["effects.absorbing_zone.walls: the wall -x is a wave maker's"],
+    ),
+    (
+        "viscosity = { xsph = 0.01 }",
+        "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"+x\", \"+x\"], length = 3.0, period = 2.0 }",
+        34,
+        &["effects.absorbing_zone.walls: \"+x\" stands there twice"],
+    ),
+    (
+        "viscosity = { xsph = 0.01 }",
+        "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"+x\"], length = 26.0, period = 2.0 }",
+        34,
+        &["effects.absorbing_zone.length: before the wall +x lie 25 m, and the zone is 26 m long"],
+    ),
+    (
+        "viscosity = { xsph = 0.01 }",
+        "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"right\"], length = 3.0, period = 2.0 }",
+        34,
+        &["effects.absorbing_zone.walls: \"right\" is no wall; the nearest is \"-x\""],
+    ),
 ];

@@ -1,0 +1,24 @@
+// Particles in an absorbing zone lose a part of their velocity. At rest in the water they have none, so that gravity, which
+// the next step adds, and the pressure that holds it are left alone.
+#import "shared/thread.wgsl"
+#import "shared/phase.wgsl"
+#import "shared/pbf_params.wgsl"
+#import "shared/absorbing_zone.wgsl"
+
+@group(0) @binding(10) var<storage, read> position: array<vec4f>;
+@group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= phase.count {
+        return;
+    }
+    let i = phase_particle(thread);
+    let kept = 1.0 - absorbed(position[i].xyz, params.time_step);
+    velocity[i] = vec4f(kept * velocity[i].xyz, velocity[i].w);
+}

@@ -1,0 +1,171 @@
+//! Absorbing zones: what they take of a flow, and what they leave alone.
+
+use glam::DVec3;
+use swell::{
+    domain::{boundary::Boundary, particles::Particles, solver::Solver},
+    gpu::adapter::Context,
+    reference,
+    scene::{Method, Scene, Wall, effects::absorbing_zone::Settings},
+    solve::plan::Plan,
+};
+
+use crate::support::{self, context, flip as of_flip, plan};
+
+const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
+
+/// Below, along y.
+const FLOOR: Wall = Wall {
+    axis: 1,
+    is_max: false,
+};
+
+const RIGHT: Wall = Wall {
+    axis: 0,
+    is_max: true,
+};
+
+fn zone(walls: &[Wall], length: f64, period: f64) -> Option<Settings> {
+    Some(Settings {
+        walls: walls.to_vec(),
+        length,
+        period,
+    })
+}
+
+/// 16 × 8 × 8 cells of FLIP, twice as many spacings of PBF, and the water of its lower half.
+fn half_full(method: Method) -> (Scene, Particles) {
+    let mut scene = of_flip::scene([16.0, 8.0, 8.0]);
+    let pbf = scene.solver.pbf.as_mut().unwrap();
+    pbf.particle_spacing = of_flip::DX / 2.0;
+    pbf.grid_projection = true;
+    scene.solver.method = method;
+    scene.shot.frames_per_second = 50.0;
+    (scene, of_flip::block([0; 3], [16, 4, 8]))
+}
+
+fn on_gpu(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> Particles {
+    match scene.solver.method {
+        Method::Flip => of_flip::run(context, scene, particles, frames).0,
+        Method::Pbf => support::run(context, scene, particles, frames).0,
+    }
+}
+
+fn on_cpu(scene: &Scene, particles: &Particles, frames: u32) -> Particles {
+    let none = Boundary::default();
+    let advance = |solver: &mut dyn Solver<Error = reference::ReferenceError>| {
+        solver.load(0, particles).unwrap();
+        let states = (0..frames).map(|_| solver.advance().unwrap().0);
+        states.last().unwrap()
+    };
+    match scene.solver.method {
+        Method::Flip => advance(&mut reference::flip::Flip::new(scene, &none)),
+        Method::Pbf => advance(&mut reference::pbf::Pbf::new(scene, &none)),
+    }
+}
+
+/// Mean of a velocity's component over each layer of cells.
+fn layers(state: &Particles, axis: usize) -> [f64; 4] {
+    let mut sums = [(0.0, 0.0); 4];
+    for (x, v) in state.position.iter().zip(&state.velocity) {
+        let layer = ((f64::from(x[1]) / of_flip::DX) as usize).min(3);
+        sums[layer].0 += f64::from(v[axis]);
+        sums[layer].1 += 1.0;
+    }
+    sums.map(|(sum, count)| sum / count)
+}
+
+/// Of a flow along x in a box without ends there, nothing but the zone takes anything: a layer of particles at y is left with
+/// the part Π 1 / (1 + r(y) Δt) of its velocity. With FLIP a layer of cells is the mean over two of them, and α is 0, which
+/// would carry a layer's velocity to the next at α Δx² / (6 Δt); what a particle loses is its faces', in a field whose second
+/// difference is up to 0.01 m/s. With PBF each particle has its own place's.
+#[test]
+fn a_flow_dies_out_as_the_zone_says() {
+    let context = context();
+    for method in METHODS {
+        let (mut scene, mut particles) = half_full(method);
+        scene.periodic = [true, false, true];
+        scene.water.gravity = DVec3::ZERO;
+        of_flip::flip(&mut scene).pic_blend = 0.0;
+        particles.velocity.fill([0.5, 0.0, 0.0]);
+        scene.effects.absorbing_zone = zone(&[FLOOR], 0.4, 8.0);
+        let (frames, step) = (25, 0.02f64);
+        let rate = 5.0 * std::f64::consts::PI / 8.0;
+        let expected = [0, 1, 2, 3].map(|layer| {
+            // Two layers of particles in a layer of cells.
+            let at = |y: f64| (1.0 + rate * step * (1.0 - y / 0.4).powi(2)).powi(-frames);
+            let y = 0.1 * f64::from(layer);
+            0.5 * 0.5 * (at(y + 0.025) + at(y + 0.075))
+        });
+        let states = [
+            on_gpu(&context, &scene, &particles, frames as u32),
+            on_cpu(&scene, &particles, frames as u32),
+        ];
+        for state in &states {
+            let found = layers(state, 0);
+            println!("{method:?}: {found:?}, expected {expected:?}");
+            for (found, expected) in found.into_iter().zip(expected) {
+                assert!((found - expected).abs() < 0.01, "{found} {expected}");
+            }
+        }
+        // Negative control: of half the period, at twice the rate.
+        scene.effects.absorbing_zone = zone(&[FLOOR], 0.4, 4.0);
+        let other = layers(&on_gpu(&context, &scene, &particles, frames as u32), 0);
+        assert!((other[0] - expected[0]).abs() > 0.05, "{other:?}");
+        // And without the zone all of it stays.
+        scene.effects.absorbing_zone = None;
+        let plain = layers(&on_gpu(&context, &scene, &particles, frames as u32), 0);
+        assert!(plain.iter().all(|v| (v - 0.5).abs() < 1e-5), "{plain:?}");
+    }
+}
+
+/// A zone takes of what moves. Had it taken of what gravity adds in a step as well, more before the wall than elsewhere, the
+/// water would begin to turn.
+#[test]
+fn water_at_rest_in_a_zone_stays_at_rest() {
+    let context = context();
+    for method in METHODS {
+        let (mut scene, particles) = half_full(method);
+        let top = |scene: &Scene| {
+            let state = on_gpu(&context, scene, &particles, 50);
+            let speeds = state
+                .velocity
+                .iter()
+                .map(|v| DVec3::from_array(v.map(f64::from)).length());
+            speeds.fold(0.0, f64::max)
+        };
+        let plain = top(&scene);
+        scene.effects.absorbing_zone = zone(&[RIGHT], 0.8, 0.5);
+        let absorbed = top(&scene);
+        println!("{method:?}: {plain:.2e} m/s without, {absorbed:.2e} m/s with");
+        // A hundredth of what gravity adds in a step, 0.2 m/s.
+        assert!(absorbed < plain + 2e-3, "{absorbed} {plain}");
+    }
+}
+
+/// One pass where a scene names it, and no buffer and no byte.
+#[test]
+fn a_scene_that_names_no_zone_pays_for_none() {
+    let context = context();
+    for method in METHODS {
+        let (mut scene, particles) = half_full(method);
+        let plan = |scene: &Scene| -> Plan {
+            plan(&context, scene, particles.len(), &Boundary::default())
+        };
+        let names = |plan: &Plan| -> Vec<&'static str> {
+            plan.passes.iter().map(|pass| pass.spec.name).collect()
+        };
+        let bare = plan(&scene);
+        scene.effects.absorbing_zone = zone(&[RIGHT, FLOOR], 0.3, 1.0);
+        let with = plan(&scene);
+        assert_eq!(with.bytes(), bare.bytes());
+        let added: Vec<_> = names(&with)
+            .into_iter()
+            .filter(|name| !names(&bare).contains(name))
+            .collect();
+        let expected = match method {
+            Method::Flip => "effects/absorb_faces",
+            Method::Pbf => "effects/absorb_particles",
+        };
+        assert_eq!(added, [expected]);
+    }
+}
