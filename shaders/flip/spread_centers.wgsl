@@ -1,4 +1,6 @@
-// What the particles of each cell give to the density at the 3 x 3 x 3 cell centres about it, in particles.
+// What the particles of each cell give to the density at the 3 x 3 x 3 cell centres about it, in particles. Before a wall the
+// water goes on as its mirror image: hats that a wall cuts would see less of particles that keep off it, and the density
+// correction would thin the water until they do.
 #import "shared/thread.wgsl"
 #import "shared/bricks.wgsl"
 #import "shared/flip_params.wgsl"
@@ -16,6 +18,18 @@ fn store(plane: u32, element: u32, weight: vec3f) {
     }
 }
 
+fn hat(t: vec3f) -> vec3f {
+    return max(1.0 - abs(t), vec3f(0.0));
+}
+
+// Hats as center_weights has them, with the place's images in the walls at `low` and `high` where a centre lies in the open.
+fn mirrored_weights(f: f32, low: f32, high: f32) -> vec3f {
+    let centers = vec3f(-0.5, 0.5, 1.5);
+    let images = hat(2.0 * low - f - centers) + hat(2.0 * high - f - centers);
+    let is_open = (centers >= vec3f(low)) & (centers <= vec3f(high));
+    return center_weights(f) + select(vec3f(0.0), images, is_open);
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -31,6 +45,8 @@ fn main(
     let brick = vec3u(bricks[slot].coordinate[0], bricks[slot].coordinate[1], bricks[slot].coordinate[2]);
     let corner = vec3f(8u * brick + local_cell(element % CELLS));
     let scale = params.inverse_cell_size;
+    let low = params.cut_min - corner;
+    let high = params.cut_max - corner;
     let first = cell_start[element];
     let end = cell_start[element + 1u];
     var before = mat3x3f();
@@ -38,8 +54,8 @@ fn main(
     var after = mat3x3f();
     for (var i = first; i < end; i++) {
         let f = sorted_position[i].xyz * scale - corner;
-        let layer = outer(center_weights(f.x), center_weights(f.y));
-        let z = center_weights(f.z);
+        let layer = outer(mirrored_weights(f.x, low.x, high.x), mirrored_weights(f.y, low.y, high.y));
+        let z = mirrored_weights(f.z, low.z, high.z);
         before += layer * z.x;
         own += layer * z.y;
         after += layer * z.z;

@@ -77,19 +77,6 @@ pub fn wave_length(first: f64, second: f64, apart: f64) -> f64 {
     TAU * apart / (second - first).rem_euclid(TAU)
 }
 
-/// k of a wave of angular frequency `omega` (rad/s) over water `depth` deep (metres) under `gravity` (m/s²), 1/m: the root of
-/// ω² = g k tanh kh, by Newton's method.
-pub fn wave_number(omega: f64, depth: f64, gravity: f64) -> f64 {
-    let deep = omega * omega * depth / gravity;
-    // Above the root, from where the convex k h tanh kh is reached without passing it.
-    let start = deep.max(deep.sqrt()) + 1.0;
-    let better = |kh: f64, _| {
-        let tanh = kh.tanh();
-        kh - (kh * tanh - deep) / (tanh + kh * (1.0 - tanh * tanh))
-    };
-    (0..60).fold(start, better) / depth
-}
-
 /// How much of a wave of number `k` (1/m) is turned back, K = |reflected| / |incident|: of gauges' places along x (metres) and
 /// the wave's harmonic there, by least squares (Mansard and Funke 1980; of two gauges Goda and Suzuki 1976). `None` where
 /// gauges stand half a wave length apart, which cannot tell the two.
@@ -333,17 +320,6 @@ mod tests {
         assert!((wave_length(a, b, 3.0) - length).abs() < 1e-9);
         // Negative control: gauges in turn, which is a wave that runs back.
         assert!((wave_length(b, a, 2.0) - length).abs() > 1.0);
-    }
-
-    #[test]
-    fn the_wave_number_is_that_of_the_tables() {
-        for kh in [0.05f64, 0.5, 1.0, 3.0, 20.0] {
-            let omega = (9.81 * kh / 2.0 * kh.tanh()).sqrt();
-            assert!(
-                (wave_number(omega, 2.0, 9.81) - kh / 2.0).abs() < 1e-12 * kh,
-                "{kh}"
-            );
-        }
     }
 
     #[test]

@@ -81,6 +81,7 @@ mod solve {
     mod plan;
     mod pressure;
     mod projected;
+    mod walls;
 }
 mod stage {
     mod branch;

@@ -16,7 +16,8 @@ bounds! {
         (12.0 * place * count / weight).min(1.0) * range + U * (count + 20.0) * most, "along each axis";
     pub(super) OF_CENTER = [share: "1 / particles of a full cell", place: "" PLACE, count: "particles about",
         least: "half of the open volume about, at least 0.02", part: "share × count / least, or the density where it is less"]
-        share * place * 9.0 * count / least + part * (U * (count + 40.0) + 16.0 * place), "";
+        share * place * 48.0 * count / least + part * (U * (count + 40.0) + 16.0 * place),
+        "along three axes a place and twice a wall's, times two weights of 2 at most, as images double them";
     pub(super) OF_MEAN = [density: "the largest about"] 16.0 * U * density, "a mean over six faces";
     pub(super) OF_HALF = [mean: "" OF_MEAN] mean + 0.25 * U, "a density's difference from a half, which is half of 1 at most";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,

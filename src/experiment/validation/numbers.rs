@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::{
+    domain::motion::wave_number,
     scene::{Method, Scene, study::validation::Measure},
     study::waves,
 };
@@ -115,7 +116,7 @@ fn regular_waves(record: &Record<'_>, out: &mut Measured) {
             .collect();
         out.put(
             "reflection",
-            waves::reflection(&at, waves::wave_number(omega, depth, GRAVITY)),
+            waves::reflection(&at, wave_number(omega, depth, GRAVITY)),
         );
     }
     let paddle = PI * scale.stroke / scale.period;

@@ -81,10 +81,17 @@ impl Hats {
         )
     }
 
-    /// Weight at that cell's centre.
-    pub(super) fn at_center(&self, offset: [i32; 3]) -> f64 {
-        let [x, y, z] = offset.map(|step| (1 - step) as usize);
-        self.center[x].x * self.center[y].y * self.center[z].z
+    /// Hats at the centres of the cells before, of its own and after along each axis, with the place's images in the walls at
+    /// `low` and `high` (from its cell's corner, in cells) where a centre lies in the open.
+    pub(super) fn mirrored(&self, low: DVec3, high: DVec3) -> [DVec3; 3] {
+        let images = [-0.5, 0.5, 1.5].map(|center| {
+            let hat = |x: DVec3| (1.0 - (x - center).abs()).max(DVec3::ZERO);
+            let images = hat(2.0 * low - self.place) + hat(2.0 * high - self.place);
+            let center = DVec3::splat(center);
+            let is_open = center.cmpge(low) & center.cmple(high);
+            DVec3::select(is_open, images, DVec3::ZERO)
+        });
+        std::array::from_fn(|k| self.center[k] + images[k])
     }
 }
 

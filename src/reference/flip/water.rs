@@ -1,5 +1,6 @@
 //! Twins of the passes that find the water: densities at cell centres, and what follows from them.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
@@ -48,12 +49,17 @@ fn hat_below(t: f64) -> f64 {
     }
 }
 
-/// Part of the hats about a cell's centre that walls and solids leave.
+/// Part of the hats about a cell's centre that solids leave, and walls where the centre lies behind one.
 fn room_of_hats(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> f64 {
     let cell = corner(bricks, element);
     let along_axis = |axis: usize| {
         let center = cell[axis] + 0.5;
-        hat_below(step.cut.max[axis] - center) - hat_below(step.cut.min[axis] - center)
+        let (low, high) = (step.cut.min[axis], step.cut.max[axis]);
+        match (low..=high).contains(&center) {
+            // Mirrored at walls, hats see all of the water.
+            true => 1.0,
+            false => hat_below(high - center) - hat_below(low - center),
+        }
     };
     let of_walls = along_axis(0) * along_axis(1) * along_axis(2);
     if step.solids.is_empty() {
@@ -71,7 +77,13 @@ fn room_of_hats(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> 
     of_cells * of_walls / whole.element_product().max(1e-6)
 }
 
-/// Densities at cell centres: what `flip/spread_centers` and `flip/gather_centers` do between them. Shape (elements).
+/// Weight at the centre of the cell from which the place's own lies `offset` away.
+fn at_center(weights: &[DVec3; 3], offset: [i32; 3]) -> f64 {
+    let [x, y, z] = offset.map(|step| (1 - step) as usize);
+    weights[x].x * weights[y].y * weights[z].z
+}
+
+/// Densities at cell centres, with the water's mirror image before walls: what `flip/spread_centers` and `flip/gather_centers` do between them. Shape (elements).
 pub fn gather_centers(
     model: &Model,
     step: &Step<'_>,
@@ -80,11 +92,17 @@ pub fn gather_centers(
     room: &Room,
 ) -> Vec<f64> {
     let hats = hats(model, bricks, sorted);
+    let weights: Vec<[DVec3; 3]> = (hats.par_iter().zip(&sorted.cell))
+        .map(|(hats, &element)| {
+            let cell = corner(bricks, element);
+            hats.mirrored(step.cut.min - cell, step.cut.max - cell)
+        })
+        .collect();
     let particle_share = 1.0 / f64::from(model.settings().particles_per_cell);
     per_cell(bricks, |element| {
         let given = neighborhood().map(|offset| {
             (sorted.of(bricks.near(element, offset)))
-                .map(|i| hats[i].at_center(offset))
+                .map(|i| at_center(&weights[i], offset))
                 .sum::<f64>()
         });
         let sum: f64 = given.sum();

@@ -89,6 +89,7 @@ macro_rules! benchmarks {
 
 benchmarks! {
     a_piston_makes_the_waves_of_linear_theory: "piston, kh = 1",
+    a_zone_absorbs_the_waves_of_a_piston: "absorbing zone, kh = 2",
     a_solitary_wave_keeps_its_height_and_celerity: "solitary wave",
     a_column_collapses_as_in_the_experiment: "dam break of a column",
     a_dry_bed_is_run_over_as_ritter_has_it: "dam break on a dry bed",
@@ -114,6 +115,15 @@ fn gravity_that_is_off_by_a_hundredth_fails_a_benchmark() {
         let missed = missed(&context, &benchmark(&text, "column at rest"));
         assert_eq!(missed.len(), 2, "{gravity}: {missed:?}");
     }
+}
+
+/// Negative control: a wall in place of the zone turns nearly all of a wave back.
+#[test]
+fn a_flume_without_its_zone_fails_a_benchmark() {
+    let mut zone = benchmark(&COARSE, "absorbing zone, kh = 2");
+    zone.runs[0].scene.effects = Default::default();
+    let missed = missed(&crate::support::context(), &zone);
+    assert!(missed[0].starts_with("reflection"), "{missed:?}");
 }
 
 /// Negative control: a paddle that goes a twentieth less far than the study says.

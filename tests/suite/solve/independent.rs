@@ -514,7 +514,7 @@ fn errors(densities: &[f64]) -> [f64; 3] {
 
 /// What a cache's ledger says of a frame is what its particles come to, by sums of this file's own, on either device. f32
 /// sums of 34 terms err by 42 ε (tests/pbf.rs), walls by 5e-7. FLIP's hats have 2.4e-7 more each, of 72 that count in a sum
-/// of 8, over the 0.67 of it that corners leave: 3.2e-6, and f32 some 10 ε.
+/// of 8: 2.2e-6, and f32 some 10 ε.
 #[test]
 fn ledgers_say_what_their_frames_come_to() {
     let job = Job::of(&[("dam.toml", DAM)]);

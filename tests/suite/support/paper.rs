@@ -119,25 +119,24 @@ impl Paper {
     }
 }
 
-/// Densities of cells of water by hats over what of them lies in the box: at the end of the frame before.
+/// Densities of cells of water by hats, at the end of the frame before. The water's image behind a wall gives back what of a
+/// hat lies there: between the wall and the centre beside it the hat stays at one.
 pub fn of_cells(places: &[DVec3], size: DVec3, dx: f64) -> Vec<f64> {
     let cells = (size / dx).round().as_ivec3();
     let mut densities = Vec::new();
     for k in 0..cells.x * cells.y * cells.z {
         let cell = IVec3::new(k % cells.x, k / cells.x % cells.y, k / (cells.x * cells.y));
-        let center = cell.as_dvec3() + 0.5;
-        let hats = |x: &DVec3| {
-            (1.0 - (*x / dx - center).abs())
-                .max(DVec3::ZERO)
-                .element_product()
+        let along = |x: &DVec3, axis: usize| {
+            let off = x[axis] / dx - f64::from(cell[axis]) - 0.5;
+            let is_first = cell[axis] == 0 && off < 0.0;
+            let is_last = cell[axis] + 1 == cells[axis] && off > 0.0;
+            match is_first || is_last {
+                true => 1.0,
+                false => (1.0 - off.abs()).max(0.0),
+            }
         };
-        let sum: f64 = places.iter().map(hats).sum();
-        // A wall half a cell from the centre takes ∫ (1 − t) from a half to 1.
-        let room = |axis: usize| {
-            let walls = [cell[axis] == 0, cell[axis] + 1 == cells[axis]];
-            1.0 - 0.125 * walls.into_iter().filter(|&is_beside| is_beside).count() as f64
-        };
-        let density = sum / 8.0 / (room(0) * room(1) * room(2));
+        let hats = |x: &DVec3| along(x, 0) * along(x, 1) * along(x, 2);
+        let density = places.iter().map(hats).sum::<f64>() / 8.0;
         // Less than half full at its centre it is air.
         if density >= 0.5 {
             densities.push(density);

@@ -1,0 +1,95 @@
+//! What walls do to the density on FLIP's grid.
+
+use crate::support::{
+    flip::{self as rig, DX},
+    jitter,
+};
+use glam::DVec3;
+use swell::{
+    domain::{boundary::Boundary, motion::Motion, particles::Particles, solver::Solver},
+    reference::flip::{Flip, Trace, survey},
+    scene::{Scene, Wall, WaveMaker, step},
+};
+
+/// One substep in f64 that begins at `start`, seconds.
+fn traced(scene: &Scene, particles: &Particles, start: f64) -> Trace {
+    let mut reference = Flip::new(scene, &Boundary::default());
+    reference.load(0, particles).unwrap();
+    let cloud = reference.cloud();
+    let found = survey(reference.model(), &cloud);
+    let step = step::Substep {
+        start,
+        length: 1e-3,
+        displacement: 1.0,
+    };
+    reference.substep(&cloud, &found.is_wet, &step).unwrap()
+}
+
+/// Density of all cells that a box has, in cells.
+fn held(trace: &Trace, cells: [i64; 3]) -> f64 {
+    let along = |axis: usize| 0..cells[axis];
+    let all = along(0).flat_map(|x| along(1).flat_map(move |y| along(2).map(move |z| [x, y, z])));
+    let density = &trace.centers.density;
+    all.map(|cell| density[trace.bricks.element(cell) as usize])
+        .sum()
+}
+
+/// Hats add up to one wherever a particle is, with what falls behind a wall given back by its image: cells hold as much as
+/// there are particles, however those stand. (Each of 27 hats has 2.4e-7 of a weight beyond its own.) Else a density
+/// correction thins all water by what walls hide.
+#[test]
+fn cells_hold_what_their_particles_are_also_at_walls() {
+    let cells = [8, 10, 8];
+    let (scene, mut particles) = rig::tank([8, 10, 8], 6);
+    jitter(&mut particles, 0.02);
+    // And none nearer to a wall than 0.225 cells, which is where water is pushed to.
+    let size = scene.domain.size();
+    for x in &mut particles.position {
+        let kept =
+            DVec3::from_array(x.map(f64::from)).clamp(DVec3::splat(0.225 * DX), size - 0.225 * DX);
+        *x = kept.as_vec3().to_array();
+    }
+    let count = particles.len() as f64 / 8.0;
+    let error = |trace: &Trace| (held(trace, cells) / count - 1.0).abs();
+    let found = traced(&scene, &particles, 0.0);
+    assert!(error(&found) < 27.0 * 2.4e-7 * 1.5, "{}", error(&found));
+    // Negative control: a particle more.
+    let mut more = particles.clone();
+    more.position.push([0.4, 0.3, 0.4]);
+    more.velocity.push([0.0; 3]);
+    more.id.push(particles.len() as u32);
+    assert!(error(&traced(&scene, &more, 0.0)) > 1e-4);
+}
+
+/// A lattice that goes up to a wall is water of density 1 before it, whatever part of a cell the wall cuts off, in cells
+/// whose centres lie before the wall. Particles stand a quarter of a cell apart from it and half a cell from each other; the
+/// lattice's hats add up to one at any place (they are linear between whole cells, of which the lattice is a half).
+#[test]
+fn water_before_a_wall_that_cuts_cells_has_its_density() {
+    for part in [0.1, 0.25, 0.4, 0.5] {
+        let (mut scene, mut particles) = rig::tank([8, 8, 8], 6);
+        scene.wave_makers = vec![WaveMaker {
+            wall: Wall::NAMED[0].1,
+            motion: Motion::ConstantVelocity {
+                velocity: part * DX,
+                until: Some(1.0),
+            },
+        }];
+        for x in &mut particles.position {
+            x[0] += (part * DX) as f32;
+        }
+        particles
+            .position
+            .iter_mut()
+            .for_each(|x| x[0] = x[0].min(0.8));
+        let trace = traced(&scene, &particles, 1.0);
+        let density = |x: i64| trace.centers.density[trace.bricks.element([x, 2, 4]) as usize];
+        for x in 0..4 {
+            assert!(
+                (density(x) - 1.0).abs() < 2e-5,
+                "{part}, {x}: {}",
+                density(x)
+            );
+        }
+    }
+}
