@@ -61,7 +61,11 @@ fn particles(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let neighbors = state.visited(io, &points)?;
     let inputs = state.inputs(&points, &neighbors);
     let twin = absorb_particles(&settings, inputs, &velocity);
-    let part = part(&settings, state.scene.domain.size(), inputs.substep.time_step);
+    let part = part(
+        &settings,
+        state.scene.domain.size(),
+        inputs.substep.time_step,
+    );
     let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
     io.table.each(&VELOCITY, 0..n, |i| {
         pair(i, found[i], twin[i], [part, velocity[i].length()])
@@ -87,7 +91,12 @@ fn faces(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     );
     let part = part(settings, state.scene.domain.size(), step.length);
     io.table.each(&FACES, elements.active(), |e| {
-        pair(e, found[e], twin[e], [part, old[e].length(), before[e].length()])
+        pair(
+            e,
+            found[e],
+            twin[e],
+            [part, old[e].length(), before[e].length()],
+        )
     });
     Ok(())
 }

@@ -4,7 +4,13 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    super::{Wall, document::Document, error::SceneError, key::{Key, words}, words::shown},
+    super::{
+        Wall,
+        document::Document,
+        error::SceneError,
+        key::{Key, words},
+        words::shown,
+    },
     Effect, Surroundings,
 };
 

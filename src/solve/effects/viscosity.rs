@@ -1,6 +1,9 @@
 //! XSPH viscosity on the device.
 
-use crate::{gpu::buffer::Buf, scene::{Scene, effects::viscosity::Settings}};
+use crate::{
+    gpu::buffer::Buf,
+    scene::{Scene, effects::viscosity::Settings},
+};
 
 use super::{Addition, pass};
 

@@ -1,6 +1,9 @@
 //! Vorticity confinement on the device.
 
-use crate::{gpu::buffer::Buf, scene::{Scene, effects::vorticity_confinement::Settings}};
+use crate::{
+    gpu::buffer::Buf,
+    scene::{Scene, effects::vorticity_confinement::Settings},
+};
 
 use super::{Addition, pass};
 

@@ -45,6 +45,13 @@ pub(super) fn apply(
 ) {
     let step = (water.model, water.step);
     *velocity = timings.time("effects/absorb_faces", || {
-        absorb_faces(settings, step, water.bricks, water.room, water.old, velocity)
+        absorb_faces(
+            settings,
+            step,
+            water.bricks,
+            water.room,
+            water.old,
+            velocity,
+        )
     });
 }
