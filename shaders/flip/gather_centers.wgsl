@@ -1,5 +1,5 @@
 // The water's density at cell centres over what a full cell has there, 1 in still water, 0.5 on its surface, from what the cells
-// about gave: mirrored at walls, solids left out of it, and behind a wall the wall as well.
+// about gave: with a density correction mirrored at walls. Solids are left out of it, and walls where nothing is mirrored.
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
@@ -56,12 +56,16 @@ fn main(
             }
         }
     }
-    // What the walls leave of the hats behind them, exactly; meshes take their part of it cell by cell.
+    // What the walls leave of the hats, exactly; meshes take their part of it cell by cell.
     let cell = vec3f(own_cell(element));
     let center = cell + 0.5;
     let along = hat_below(params.cut_max - center) - hat_below(params.cut_min - center);
+#ifdef CORRECTION
     let is_open = (center >= params.cut_min) & (center <= params.cut_max);
     let parts = select(along, vec3f(1.0), is_open);
+#else
+    let parts = along;
+#endif
     let of_walls = parts.x * parts.y * parts.z;
 #ifdef SOLIDS
     let cells = OWN_SHARE * open_extent(cell) + OTHER_SHARE * (open_extent(cell - 1.0) + open_extent(cell + 1.0));

@@ -1,6 +1,7 @@
-// What the particles of each cell give to the density at the 3 x 3 x 3 cell centres about it, in particles. Before a wall the
-// water goes on as its mirror image: hats that a wall cuts would see less of particles that keep off it, and the density
-// correction would thin the water until they do.
+// What the particles of each cell give to the density at the 3 x 3 x 3 cell centres about it, in particles. Where a density
+// correction goes by it, the water goes on behind a wall as its mirror image: hats that a wall cuts see less of particles
+// that keep off it, and the correction would thin the water. PBF's projection has none: it only asks which cells are water,
+// and with images a film of one particle on the floor would be, which flies up where it runs into a house.
 #import "shared/thread.wgsl"
 #import "shared/bricks.wgsl"
 #import "shared/flip_params.wgsl"
@@ -18,6 +19,7 @@ fn store(plane: u32, element: u32, weight: vec3f) {
     }
 }
 
+#ifdef CORRECTION
 fn hat(t: vec3f) -> vec3f {
     return max(1.0 - abs(t), vec3f(0.0));
 }
@@ -29,6 +31,11 @@ fn mirrored_weights(f: f32, low: f32, high: f32) -> vec3f {
     let is_open = (centers >= vec3f(low)) & (centers <= vec3f(high));
     return center_weights(f) + select(vec3f(0.0), images, is_open);
 }
+#else
+fn mirrored_weights(f: f32, low: f32, high: f32) -> vec3f {
+    return center_weights(f);
+}
+#endif
 
 @compute @workgroup_size(64)
 fn main(

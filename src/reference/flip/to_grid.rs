@@ -51,7 +51,7 @@ pub struct Faces {
 /// down, in itself, one step up. The middle entry of `face` is that of its cell's lower face.
 pub(super) struct Hats {
     face: [DVec3; 3],
-    center: [DVec3; 3],
+    pub(super) center: [DVec3; 3],
     /// Place in its cell.
     place: DVec3,
 }

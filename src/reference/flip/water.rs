@@ -49,14 +49,20 @@ fn hat_below(t: f64) -> f64 {
     }
 }
 
-/// Part of the hats about a cell's centre that solids leave, and walls where the centre lies behind one.
-fn room_of_hats(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> f64 {
+/// Part of the hats about a cell's centre that solids leave, and walls where nothing is mirrored in them: behind them, or at all.
+fn room_of_hats(
+    is_mirrored: bool,
+    step: &Step<'_>,
+    bricks: &Bricks,
+    room: &Room,
+    element: u32,
+) -> f64 {
     let cell = corner(bricks, element);
     let along_axis = |axis: usize| {
         let center = cell[axis] + 0.5;
         let (low, high) = (step.cut.min[axis], step.cut.max[axis]);
-        match (low..=high).contains(&center) {
-            // Mirrored at walls, hats see all of the water.
+        match is_mirrored && (low..=high).contains(&center) {
+            // Hats see all of the water.
             true => 1.0,
             false => hat_below(high - center) - hat_below(low - center),
         }
@@ -83,7 +89,7 @@ fn at_center(weights: &[DVec3; 3], offset: [i32; 3]) -> f64 {
     weights[x].x * weights[y].y * weights[z].z
 }
 
-/// Densities at cell centres, with the water's mirror image before walls: what `flip/spread_centers` and `flip/gather_centers` do between them. Shape (elements).
+/// Densities at cell centres, where a density correction goes by them with the water's mirror image behind walls: what `flip/spread_centers` and `flip/gather_centers` do between them. Shape (elements).
 pub fn gather_centers(
     model: &Model,
     step: &Step<'_>,
@@ -92,10 +98,14 @@ pub fn gather_centers(
     room: &Room,
 ) -> Vec<f64> {
     let hats = hats(model, bricks, sorted);
+    let is_mirrored = model.settings().density_correction;
     let weights: Vec<[DVec3; 3]> = (hats.par_iter().zip(&sorted.cell))
         .map(|(hats, &element)| {
             let cell = corner(bricks, element);
-            hats.mirrored(step.cut.min - cell, step.cut.max - cell)
+            match is_mirrored {
+                true => hats.mirrored(step.cut.min - cell, step.cut.max - cell),
+                false => hats.center,
+            }
         })
         .collect();
     let particle_share = 1.0 / f64::from(model.settings().particles_per_cell);
@@ -106,7 +116,8 @@ pub fn gather_centers(
                 .sum::<f64>()
         });
         let sum: f64 = given.sum();
-        sum * particle_share / room_of_hats(step, bricks, room, element).max(LEAST_ROOM)
+        sum * particle_share
+            / room_of_hats(is_mirrored, step, bricks, room, element).max(LEAST_ROOM)
     })
 }
 
