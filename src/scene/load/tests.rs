@@ -392,6 +392,8 @@ periodic = ["z"]
 method = "flip"
 [solver.flip]
 cell_size = 0.25
+[effects]
+absorbing_zone = { walls = ["+x"], length = 1.0, period = 2.0 }
 "#;
     let scene = parse(dir.path(), slab, &[]).expect("valid");
     let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
