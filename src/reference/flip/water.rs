@@ -89,7 +89,8 @@ fn at_center(weights: &[DVec3; 3], offset: [i32; 3]) -> f64 {
     weights[x].x * weights[y].y * weights[z].z
 }
 
-/// Densities at cell centres, where a density correction goes by them with the water's mirror image behind walls: what `flip/spread_centers` and `flip/gather_centers` do between them. Shape (elements).
+/// Densities at cell centres: what `flip/spread_centers` and `flip/gather_centers` do between them. Where a density correction
+/// goes by them, particles count with their mirror images in walls. Shape (elements).
 pub fn gather_centers(
     model: &Model,
     step: &Step<'_>,
