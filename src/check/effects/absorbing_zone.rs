@@ -18,9 +18,10 @@ use crate::{
 };
 
 bounds! {
-    // r Δt changes by 2 r Δt of the way's own change, and the part by no more.
+    // r Δt w² changes by 2 r Δt w of the way w's own change. Of the part x / (1 + x) that is 2 √(r Δt) √x / (1 + x)², whose
+    // greatest value is 0.65 √(r Δt), at x = 1/3; and no more than 2 r Δt.
     PART = [most: "r Δt at the wall", ratio: "the domain's longest side over the zone's length"]
-        U * most * (2.0 * (6.0 * ratio + 4.0) + 8.0), "of the part that is taken, by where a place is";
+        U * ((2.0 * most).min(0.65 * most.sqrt()) * (6.0 * ratio + 4.0) + 8.0 * most.min(1.0)), "of the part that is taken, by where a place is";
 }
 
 entries! {
@@ -50,22 +51,15 @@ fn part(settings: &Settings, size: DVec3, step: f64) -> f64 {
 }
 
 fn particles(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
-    let Some(settings) = state.scene.effects.absorbing_zone.clone() else {
+    let Some(settings) = &state.scene.effects.absorbing_zone else {
         return Ok(());
     };
     let n = state.particles();
-    let (points, velocity) = (
-        state.moved(io)?,
-        io.before.vectors(pbf::buffers::VELOCITY, n)?,
-    );
-    let neighbors = state.visited(io, &points)?;
-    let inputs = state.inputs(&points, &neighbors);
-    let twin = absorb_particles(&settings, inputs, &velocity);
-    let part = part(
-        &settings,
-        state.scene.domain.size(),
-        inputs.substep.time_step,
-    );
+    let places = io.before.vectors(pbf::buffers::POSITION, n)?;
+    let velocity = io.before.vectors(pbf::buffers::VELOCITY, n)?;
+    let (size, step) = (state.scene.domain.size(), state.substep.time_step);
+    let twin = absorb_particles(settings, (size, step), &places, &velocity);
+    let part = part(settings, size, step);
     let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
     io.table.each(&VELOCITY, 0..n, |i| {
         pair(i, found[i], twin[i], [part, velocity[i].length()])

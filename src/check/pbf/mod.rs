@@ -134,7 +134,7 @@ pub fn check(
 pub(super) struct PbfState {
     pub(super) scene: Scene,
     model: Model,
-    substep: Substep,
+    pub(super) substep: Substep,
     plan: Plan,
     lists: Lists,
     whole: Whole,

@@ -11,6 +11,8 @@ pub(super) struct Surroundings<'a> {
     pub(super) domain: &'a Bounds,
     pub(super) periodic: [bool; 3],
     pub(super) wave_makers: &'a [WaveMaker],
+    /// Two particle spacings, metres: shorter than that, nothing lies in a zone.
+    pub(super) least_length: f64,
 }
 
 /// What an effect's settings say of themselves.

@@ -6,10 +6,15 @@ use rayon::prelude::*;
 use super::Inputs;
 use crate::{reference::Timings, scene::effects::absorbing_zone::Settings};
 
-/// The velocities after the zone's absorption, m/s (effects/absorb_particles).
-pub fn absorb_particles(settings: &Settings, inputs: Inputs<'_>, velocity: &[DVec3]) -> Vec<DVec3> {
-    let (size, step) = (inputs.model.size, inputs.substep.time_step);
-    (velocity.par_iter().zip(inputs.points))
+/// The velocities of particles at `places` after the zone's absorption in a step of so many seconds, in a domain of `size`; m/s
+/// and metres, shapes (particles) (effects/absorb_particles).
+pub fn absorb_particles(
+    settings: &Settings,
+    (size, step): (DVec3, f64),
+    places: &[DVec3],
+    velocity: &[DVec3],
+) -> Vec<DVec3> {
+    (velocity.par_iter().zip(places))
         .map(|(&v, &x)| v * (1.0 - settings.absorbed(size, x, step)))
         .collect()
 }
@@ -21,6 +26,7 @@ pub(super) fn apply(
     timings: &mut Timings,
 ) -> Vec<DVec3> {
     timings.time("effects/absorb_particles", || {
-        absorb_particles(settings, inputs, velocity)
+        let step = inputs.substep.time_step;
+        absorb_particles(settings, (inputs.model.size, step), inputs.points, velocity)
     })
 }

@@ -472,19 +472,25 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "viscosity = { xsph = 0.01 }",
         "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [], length = 3.0, period = 2.0 }",
         34,
-        &["effects.absorbing_zone.walls: names no wall"],
+        &["effects.absorbing_zone.walls: names no wall; allowed: "],
     ),
     (
         "viscosity = { xsph = 0.01 }",
         "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"-x\"], length = 3.0, period = 2.0 }",
         34,
-        &["effects.absorbing_zone.walls: the wall -x is a wave maker's"],
+        &["effects.absorbing_zone.walls: the wall -x is a wave maker's; allowed: "],
     ),
     (
         "viscosity = { xsph = 0.01 }",
         "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"+x\", \"+x\"], length = 3.0, period = 2.0 }",
         34,
-        &["effects.absorbing_zone.walls: \"+x\" stands there twice"],
+        &["effects.absorbing_zone.walls: \"+x\" stands there twice; allowed: "],
+    ),
+    (
+        "viscosity = { xsph = 0.01 }",
+        "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [\"+x\"], length = 0.001, period = 2.0 }",
+        34,
+        &["effects.absorbing_zone.length: a zone of 0.001 m is shorter than two particle spacings"],
     ),
     (
         "viscosity = { xsph = 0.01 }",
