@@ -1,5 +1,6 @@
 // Particles in an absorbing zone lose a part of their velocity. At rest in the water they have none, so that gravity, which
-// the next step adds, and the pressure that holds it are left alone.
+// the next step adds, and the pressure that holds it are left alone. Drops, which a projection on a grid tells from water, fall as
+// they do elsewhere.
 #import "shared/thread.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/pbf_params.wgsl"
@@ -19,6 +20,7 @@ fn main(
         return;
     }
     let i = phase_particle(thread);
-    let kept = 1.0 - absorbed(position[i].xyz, params.time_step);
+    let is_drop = velocity[i].w > 0.0;
+    let kept = 1.0 - select(absorbed(position[i].xyz, params.time_step), 0.0, is_drop);
     velocity[i] = vec4f(kept * velocity[i].xyz, velocity[i].w);
 }

@@ -54,6 +54,6 @@ fn main(
     x = wrapped_place(x);
 #endif
     position[thread] = vec4f(x, 1.0);
-    velocity[thread] = vec4f(v, 0.0);
+    velocity[thread] = vec4f(v, came.w);
     id[thread] = sorted_id[thread];
 }

@@ -4,13 +4,17 @@
 //! start and never negative, so that no water is ever behind the wall.
 
 mod linear_theory;
+mod sea;
 mod solitary;
+mod spectrum;
 mod table;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 pub use linear_theory::{piston_height_ratio, wave_number};
+pub use sea::{Asked, Phases, Sea};
 use solitary::Goring;
+pub use spectrum::Spectrum;
 use table::Segment;
 
 /// Displacement of a wave-maker over time.
@@ -41,6 +45,8 @@ pub enum Motion {
         /// m/s², positive.
         gravity: f64,
     },
+    /// A sea or a packet of waves, by a spectrum.
+    Sea(Sea),
     /// Through given points by a monotone cubic (Fritsch and Carlson 1980), at rest before the
     /// first and after the last; it never leaves the range of the two points around it.
     Table {
@@ -89,6 +95,7 @@ impl Motion {
                 depth,
                 gravity,
             } => Goring::new(height, depth, gravity).state(t),
+            Self::Sea(ref sea) => sea.state(t),
             Self::Table { ref points } => table::state(points, t),
         }
     }
@@ -133,6 +140,7 @@ impl Motion {
                 let peak = goring.crest_time();
                 goring.state(peak.clamp(t0, t1)).1
             }
+            Self::Sea(ref sea) => sea.peak_speed(t0, t1),
             Self::Table { ref points } => points
                 .windows(2)
                 .enumerate()
@@ -158,6 +166,7 @@ impl Motion {
                     stroke * smooth_ramp(t, ramp).0
                 }
             }
+            Self::Sea(ref sea) => sea.peak_displacement(t),
             Self::Table { ref points } => points
                 .iter()
                 .filter(|p| p[0] <= t)
@@ -221,6 +230,33 @@ mod tests {
             Motion::Table {
                 points: vec![[0.0, 0.0], [0.5, 0.2], [0.9, 2.0], [2.0, 2.0], [5.0, 0.5]],
             },
+            Motion::Sea(Sea::new(Asked {
+                spectrum: Spectrum::Tma,
+                peak_period: 1.5,
+                peak_enhancement: 3.3,
+                shortest_period: 0.5,
+                depth: 0.6,
+                gravity: 9.81,
+                ramp: 2.0,
+                phases: Phases::Random {
+                    significant_height: 0.1,
+                    seed: 5,
+                },
+            })),
+            Motion::Sea(Sea::new(Asked {
+                spectrum: Spectrum::Tma,
+                peak_period: 1.5,
+                peak_enhancement: 3.3,
+                shortest_period: 0.5,
+                depth: 0.6,
+                gravity: 9.81,
+                ramp: 2.0,
+                phases: Phases::Focused {
+                    height: 0.1,
+                    at: 2.0,
+                    time: 7.0,
+                },
+            })),
         ]
     }
 
@@ -244,13 +280,16 @@ mod tests {
     fn motions_start_from_zero_and_never_leave_the_domain() {
         for motion in motions() {
             assert_eq!(motion.displacement(0.0), 0.0, "{motion:?}");
+            let mut seen = 0.0f64;
             for i in 0..2000 {
                 let t = 0.005 * f64::from(i);
                 let x = motion.displacement(t);
-                assert!(
-                    x >= 0.0 && x <= motion.peak_displacement(t) + 1e-15,
-                    "{motion:?} {t}"
-                );
+                assert!(x >= 0.0, "{motion:?} {t}");
+                seen = seen.max(x);
+                if i % 100 == 0 {
+                    let bound = motion.peak_displacement(t);
+                    assert!(seen <= bound + 1e-15, "{motion:?} {t}");
+                }
             }
         }
     }

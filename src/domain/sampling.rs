@@ -265,7 +265,7 @@ fn looks_out(domain: &Bounds, p: DVec3, normal: DVec3, tolerance: f64) -> bool {
 fn candidate([a, b, c]: &[DVec3; 3], triangle: u64, index: u64) -> DVec3 {
     const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     let coordinate = |axis: u64| {
-        let shift = hash(2 * triangle + axis) as f64 / u64::MAX as f64;
+        let shift = uniform(2 * triangle + axis);
         (shift + R2[axis as usize] * (index + 1) as f64).fract()
     };
     let (mut u, mut v) = (coordinate(0), coordinate(1));
@@ -274,6 +274,11 @@ fn candidate([a, b, c]: &[DVec3; 3], triangle: u64, index: u64) -> DVec3 {
         (u, v) = (1.0 - u, 1.0 - v);
     }
     *a + (*b - *a) * u + (*c - *a) * v
+}
+
+/// A number from 0 to 1 by chance, the same for the same `seed`.
+pub(super) fn uniform(seed: u64) -> f64 {
+    hash(seed) as f64 / u64::MAX as f64
 }
 
 /// SplitMix64's finaliser (Steele et al. 2014).

@@ -60,6 +60,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         domain: &domain,
         gravity: water.gravity,
         least_gap: lattice.least_gap,
+        spacing: lattice.spacing,
         shot: &shot,
     };
     let (solids, moving_solids) = solids(doc, &spec.solid, &around, &solver)?;

@@ -5,6 +5,8 @@
 pub enum Measure {
     /// Waves of a piston, at the scene's elevation probes.
     RegularWaves,
+    /// A sea or a packet of a wall that moves by a spectrum, at the scene's elevation probes.
+    IrregularWaves,
     /// One solitary wave, at the scene's elevation probes.
     SolitaryWave,
     /// A column that collapses along x: front, and height at the wall.
@@ -23,8 +25,9 @@ pub enum Measure {
 
 impl Measure {
     /// As studies name them.
-    pub(super) const NAMED: [(&'static str, Self); 8] = [
+    pub(super) const NAMED: [(&'static str, Self); 9] = [
         ("regular_waves", Self::RegularWaves),
+        ("irregular_waves", Self::IrregularWaves),
         ("solitary_wave", Self::SolitaryWave),
         ("dam_break", Self::DamBreak),
         ("dry_bed", Self::DryBed),
@@ -38,6 +41,7 @@ impl Measure {
     pub(super) fn needs(self) -> &'static [&'static str] {
         match self {
             Self::RegularWaves => &["stroke", "period", "after"],
+            Self::IrregularWaves => &["after"],
             Self::SolitaryWave => &["depth", "height"],
             Self::DamBreak => &["length"],
             Self::DryBed => &["depth", "length"],
@@ -66,6 +70,21 @@ impl Measure {
                     "speed_anywhere",
                     "largest speed in the flume over the paddle's; waves double where the far wall turns them",
                 ),
+            ],
+            Self::IrregularWaves => &[
+                (
+                    "variance_ratio",
+                    "root of the elevation's variance over linear theory's of the same waves in the same time",
+                ),
+                (
+                    "elevation_error",
+                    "elevation, root mean square of what it is off linear theory's over that of theory's, worst gauge",
+                ),
+                (
+                    "crest",
+                    "highest crest at the last gauge over linear theory's",
+                ),
+                ("crest_time", "how far off in time it is, s"),
             ],
             Self::SolitaryWave => &[
                 ("height", "height of the crest over the depth, H/d"),
@@ -170,6 +189,10 @@ impl Measure {
                     "time from a crest, periods",
                     "η / S",
                 ],
+            )],
+            Self::IrregularWaves => &[(
+                "elevation",
+                ["elevation at the last gauge", "time, s", "η, m"],
             )],
             Self::SolitaryWave => &[(
                 "elevation",

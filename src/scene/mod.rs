@@ -29,6 +29,7 @@ mod origin;
 mod overrides;
 mod projection;
 mod reach;
+mod seas;
 mod settle;
 mod spec;
 mod wave_maker;

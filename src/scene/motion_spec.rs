@@ -2,6 +2,11 @@
 
 use serde::Deserialize;
 
+use super::key::read_by_name;
+use crate::domain::motion::Spectrum;
+
+read_by_name!(Spectrum);
+
 /// A motion with the keys of its kind.
 #[derive(Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
@@ -18,6 +23,27 @@ pub(super) enum MotionSpec {
     Solitary {
         height: f64,
         depth: f64,
+    },
+    Sea {
+        significant_height: f64,
+        seed: u32,
+        spectrum: Spectrum,
+        peak_enhancement: Option<f64>,
+        peak_period: f64,
+        shortest_period: Option<f64>,
+        depth: f64,
+        ramp: Option<f64>,
+    },
+    Focused {
+        height: f64,
+        at: f64,
+        time: f64,
+        spectrum: Spectrum,
+        peak_enhancement: Option<f64>,
+        peak_period: f64,
+        shortest_period: Option<f64>,
+        depth: f64,
+        ramp: Option<f64>,
     },
     Table {
         file: Option<String>,

@@ -9,10 +9,14 @@ use super::{
     document::Document,
     error::SceneError,
     motion_spec::MotionSpec,
+    seas,
     spec::WaveMakerSpec,
     words::{chain, shown, shown_all},
 };
-use crate::domain::{bounds::Bounds, motion::Motion};
+use crate::domain::{
+    bounds::Bounds,
+    motion::{Motion, Phases},
+};
 
 /// Largest motion table read, bytes: ten hours at 60 points a second.
 const MAX_TABLE_BYTES: u64 = 64 << 20;
@@ -29,6 +33,8 @@ pub(super) struct Surroundings<'a> {
     pub(super) gravity: DVec3,
     /// Between two walls, or a wall and the opposite face, metres.
     pub(super) least_gap: f64,
+    /// Of particles, metres.
+    pub(super) spacing: f64,
     pub(super) shot: &'a Shot,
 }
 
@@ -47,6 +53,9 @@ pub(super) fn build_all(
             return Err(doc.fault_of(&format!("{path}.wall"), problem));
         }
         let motion = motion(doc, &place, around.base_dir, &spec.motion, around.gravity)?;
+        if let Motion::Sea(sea) = &motion {
+            seas::check(doc, &place, sea, spec.wall, around)?;
+        }
         let maker = WaveMaker {
             wall: spec.wall,
             motion,
@@ -152,6 +161,42 @@ pub(super) fn motion(
                 gravity: gravity.length(),
             })
         }
+        MotionSpec::Sea {
+            significant_height,
+            seed,
+            spectrum,
+            peak_enhancement,
+            peak_period,
+            shortest_period,
+            depth,
+            ramp,
+        } => {
+            let water = [peak_period, depth, gravity.length()];
+            let phases = Phases::Random {
+                significant_height,
+                seed,
+            };
+            let left_out = [shortest_period, ramp];
+            let shape = seas::shape(doc, path, spectrum, peak_enhancement)?;
+            seas::build(doc, path, seas::asked(shape, water, left_out, phases))
+        }
+        MotionSpec::Focused {
+            height,
+            at,
+            time,
+            spectrum,
+            peak_enhancement,
+            peak_period,
+            shortest_period,
+            depth,
+            ramp,
+        } => {
+            let water = [peak_period, depth, gravity.length()];
+            let phases = Phases::Focused { height, at, time };
+            let left_out = [shortest_period, ramp];
+            let shape = seas::shape(doc, path, spectrum, peak_enhancement)?;
+            seas::build(doc, path, seas::asked(shape, water, left_out, phases))
+        }
         MotionSpec::Table {
             ref file,
             ref points,
@@ -205,7 +250,7 @@ fn check_points(points: &[[f64; 2]]) -> std::result::Result<(), String> {
 }
 
 /// What a motion's keys together come to has the range that a velocity has.
-fn check_speed(speed: f64) -> std::result::Result<(), String> {
+pub(super) fn check_speed(speed: f64) -> std::result::Result<(), String> {
     if speed <= MAX_SPEED {
         return Ok(());
     }

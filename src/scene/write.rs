@@ -13,7 +13,11 @@ use super::{
     keys,
     probe::{Probe, ProbeKind},
 };
-use crate::domain::{bounds::Bounds, motion::Motion, probe::Rate};
+use crate::domain::{
+    bounds::Bounds,
+    motion::{Asked, Motion, Phases, Spectrum},
+    probe::Rate,
+};
 
 /// Where a cache keeps its own copy of a mesh file: `assets/NAME-HASH.EXT`, so that two files of
 /// one name stay apart.
@@ -284,11 +288,51 @@ fn motion(motion: &Motion) -> Value {
             let rows = table([("height", value(height)), ("depth", value(depth))]);
             ("solitary", rows)
         }
+        Motion::Sea(sea) => waves(sea.asked()),
         Motion::Table { points } => ("table", table([("points", value(points))])),
     };
     let mut all = table([("kind", value(&kind))]);
     all.extend(rows);
     Value::Table(all)
+}
+
+/// Its gravity is the water's.
+fn waves(asked: &Asked) -> (&'static str, Table) {
+    let mut rows = table([
+        ("depth", value(&asked.depth)),
+        ("spectrum", value(&asked.spectrum)),
+        ("peak_period", value(&asked.peak_period)),
+        ("shortest_period", value(&asked.shortest_period)),
+        ("ramp", value(&asked.ramp)),
+    ]);
+    if asked.spectrum != Spectrum::PiersonMoskowitz {
+        rows.insert(
+            "peak_enhancement".to_owned(),
+            value(&asked.peak_enhancement),
+        );
+    }
+    let (kind, of_kind) = match &asked.phases {
+        Phases::Random {
+            significant_height,
+            seed,
+        } => (
+            "sea",
+            table([
+                ("significant_height", value(significant_height)),
+                ("seed", value(seed)),
+            ]),
+        ),
+        Phases::Focused { height, at, time } => (
+            "focused",
+            table([
+                ("height", value(height)),
+                ("at", value(at)),
+                ("time", value(time)),
+            ]),
+        ),
+    };
+    rows.extend(of_kind);
+    (kind, rows)
 }
 
 fn probe(probe: &Probe, scene: &Scene) -> Table {

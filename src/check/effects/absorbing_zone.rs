@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     check::{
-        engine::{Io, Outcome, State, Twin, names, twin},
+        engine::{Io, Outcome, State, Twin, names, twin, wide},
         flip::FlipState,
         pbf::PbfState,
         table::{entries, pair},
@@ -56,9 +56,11 @@ fn particles(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     };
     let n = state.particles();
     let places = io.before.vectors(pbf::buffers::POSITION, n)?;
-    let velocity = io.before.vectors(pbf::buffers::VELOCITY, n)?;
+    let before = io.before.get(pbf::buffers::VELOCITY, n)?;
+    let velocity = wide(&before);
+    let is_drop: Vec<bool> = before.iter().map(|v| v[3] > 0.0).collect();
     let (size, step) = (state.scene.domain.size(), state.substep.time_step);
-    let twin = absorb_particles(settings, (size, step), &places, &velocity);
+    let twin = absorb_particles(settings, (size, step), &places, &is_drop, &velocity);
     let part = part(settings, size, step);
     let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
     io.table.each(&VELOCITY, 0..n, |i| {

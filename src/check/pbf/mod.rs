@@ -165,6 +165,7 @@ impl PbfState {
             substep: &self.substep,
             points,
             neighbors,
+            is_drop: &[],
         }
     }
 

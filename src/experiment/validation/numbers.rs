@@ -2,8 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
+use glam::DVec2;
+
 use crate::{
-    domain::motion::wave_number,
+    domain::motion::{Motion, wave_number},
     scene::{Method, Scene, study::validation::Measure},
     study::waves,
 };
@@ -43,6 +45,7 @@ pub(super) fn of(record: &Record<'_>) -> Measured {
     let mut out = Measured::default();
     match record.benchmark.measure {
         Measure::RegularWaves => regular_waves(record, &mut out),
+        Measure::IrregularWaves => irregular_waves(record, &mut out),
         Measure::SolitaryWave => solitary_wave(record, &mut out),
         Measure::DamBreak => dam_break(record, &mut out),
         Measure::DryBed => dry_bed(record, &mut out),
@@ -131,6 +134,54 @@ fn regular_waves(record: &Record<'_>, out: &mut Measured) {
         let first = level(record, 0).into_iter();
         let curve = first.map(|(t, y)| (at(t), (y - fit.mean) / scale.stroke));
         out.draw("elevation", curve.collect());
+    }
+}
+
+/// Against linear theory for the same wall's way, wave by wave: from `after` on, about the mean level, which is higher than the
+/// still water's by what the wall has come in.
+fn irregular_waves(record: &Record<'_>, out: &mut Measured) {
+    let makers = record.scene.wave_makers.iter();
+    let mut seas = makers.filter_map(|maker| match &maker.motion {
+        Motion::Sea(sea) => Some(sea),
+        _ => None,
+    });
+    let Some(sea) = seas.next() else {
+        return;
+    };
+    // Per gauge (seconds, elevation, theory's).
+    let gauge = |(gauge, at): (usize, &DVec2)| -> Option<Vec<[f64; 3]>> {
+        let mut samples = level(record, gauge);
+        samples.retain(|sample| sample.0 >= record.benchmark.scale.after);
+        let still = mean(samples.iter().map(|sample| sample.1))?;
+        let theory = samples.iter().map(|sample| sea.elevation(at.x, sample.0));
+        let theory: Vec<f64> = theory.collect();
+        let offset = mean(theory.iter().copied())?;
+        let both = samples.iter().zip(theory);
+        Some(
+            both.map(|(&(t, y), of)| [t, y - still, of - offset])
+                .collect(),
+        )
+    };
+    let gauges: Option<Vec<_>> = record.gauges().iter().enumerate().map(gauge).collect();
+    let gauges = gauges.unwrap_or_default();
+    let square = |of: &dyn Fn(&[f64; 3]) -> f64, samples: &[[f64; 3]]| -> f64 {
+        samples.iter().map(|sample| of(sample).powi(2)).sum()
+    };
+    let ratios = gauges
+        .iter()
+        .map(|samples| (square(&|s| s[1], samples) / square(&|s| s[2], samples)).sqrt());
+    out.put("variance_ratio", mean(ratios));
+    let errors = gauges
+        .iter()
+        .map(|samples| (square(&|s| s[1] - s[2], samples) / square(&|s| s[2], samples)).sqrt());
+    out.put("elevation_error", errors.reduce(f64::max));
+    if let Some(last) = gauges.last() {
+        let crest = |k: usize| last.iter().max_by(|a, b| a[k].total_cmp(&b[k]));
+        if let (Some(found), Some(theory)) = (crest(1), crest(2)) {
+            out.put("crest", Some(found[1] / theory[2]));
+            out.put("crest_time", Some((found[0] - theory[0]).abs()));
+        }
+        out.draw("elevation", last.iter().map(|s| (s[0], s[1])).collect());
     }
 }
 

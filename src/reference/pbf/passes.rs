@@ -22,6 +22,8 @@ pub struct Inputs<'a> {
     pub points: &'a [DVec3],
     /// Who was near whom when they were listed.
     pub neighbors: &'a Neighbors,
+    /// Which particles fly free of the water, where a projection on a grid told them apart; empty without it.
+    pub is_drop: &'a [bool],
 }
 
 impl Inputs<'_> {

@@ -86,6 +86,7 @@ impl Sorted {
             substep,
             points: &self.points,
             neighbors: &self.neighbors,
+            is_drop: &[],
         }
     }
 
@@ -315,7 +316,12 @@ impl Pbf {
             let capped = capped.count() as u64;
             (updated.into_iter().map(|(_, v, _)| v).collect(), capped)
         });
-        let inputs = sorted.inputs(model, substep);
+        let drops = sorted.order.iter().filter_map(|&slot| is_drop.get(slot));
+        let drops: Vec<bool> = drops.copied().collect();
+        let inputs = Inputs {
+            is_drop: &drops,
+            ..sorted.inputs(model, substep)
+        };
         effects::apply(&self.scene.effects, inputs, &mut moved, timings);
         *position = sorted.unsorted(sorted.particles());
         *velocity = sorted.unsorted(&moved);

@@ -5,6 +5,7 @@
 //! as a cache has it (`super::write`), what a resume compares (`super::difference`), and the reference page
 //! ([`page`], which `swell keys` prints).
 
+mod motion;
 mod page;
 mod scene;
 mod study;

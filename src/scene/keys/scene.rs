@@ -13,6 +13,7 @@ use super::super::{
     no_slip,
     probe::{self, ProbeKind},
 };
+use super::motion::{SOLID_MOTION, WALL_MOTION};
 use crate::domain::sparse_grid;
 
 pub(in super::super) const KEYS: &[Key] = &[
@@ -96,7 +97,7 @@ const DOMAIN: &[Key] = &[
         .absent()
         .also(
             ", each once, none along which gravity acts, a wave maker stands or a solid moves; along each the domain is a \
-             multiple of eight cells (FLIP), or of the particle spacing and at least three support radii (PBF)",
+             multiple of eight cells (FLIP), of 16 particle spacings (PBF), or without grid_projection of one and at least three support radii",
         )
         .about("axes along which the domain has no walls: water that leaves at one end comes in at the other"),
 ];
@@ -199,89 +200,6 @@ const WAVE_MAKER: &[Key] = &[
 ];
 
 const WALLS: [&str; 6] = words(&Wall::NAMED);
-
-/// Metres: a stroke, a wave's height, the water's depth. The domain is the upper bound.
-const LENGTH: Interval = 1e-9..=1e6;
-
-/// Seconds: from a tenth of a millisecond, the ripples of ultrasound, to eleven days, a spring tide.
-const PERIOD: Interval = 1e-4..=1e6;
-
-// Sound has 1 500 m/s in water.
-const VELOCITY: Key = Key::number("velocity", 1e-9..=1e5)
-    .unit("m/s")
-    .only("kind", &["constant_velocity"])
-    .about("steady speed, inward or along direction");
-const UNTIL: Key = Key::number("until", 1e-6..=1e9)
-    .unit("seconds")
-    .absent()
-    .only("kind", &["constant_velocity"])
-    .about("when it stops");
-const STROKE: Key = Key::number("stroke", LENGTH)
-    .unit("metres")
-    .only("kind", &["sine"])
-    .about(
-        "the whole distance from one end of the way to the other, twice the amplitude: x(t) = stroke/2 (1 − cos(2π t / period)), \
-         times the ramp; the S of H/S in wave maker theory (Dean and Dalrymple 1991)",
-    );
-const WAVE_PERIOD: Key = Key::number("period", PERIOD)
-    .unit("seconds")
-    .only("kind", &["sine"])
-    .about("of one cycle, there and back");
-const RAMP: Key = Key::number_or_zero("ramp", PERIOD)
-    .unit("seconds")
-    .computed(|| "one period".to_owned())
-    .only("kind", &["sine"])
-    .about("how long the motion takes to reach its full stroke; 0: it begins with it");
-const FILE: Key = Key::text(
-    "file",
-    "a CSV of time,displacement (seconds, metres), relative to the scene file",
-)
-.absent()
-.only("kind", &["table"])
-.about("displacements from a file; the written-out scene has them as points");
-const POINTS: Key = Key::points(
-    "points",
-    2,
-    "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0, all up to 1e9, no faster \
-     than 100000 m/s",
-)
-.only("kind", &["table"])
-.without(&["file"])
-.about("displacements in place");
-
-const SOLID_MOTION: &[Key] = &[
-    Key::choice("kind", &["constant_velocity", "sine", "table"])
-        .also("; a solitary wave is made by a wall")
-        .about("kind of motion"),
-    VELOCITY,
-    UNTIL,
-    STROKE,
-    WAVE_PERIOD,
-    RAMP,
-    FILE,
-    POINTS,
-];
-
-const WALL_MOTION: &[Key] = &[
-    Key::choice("kind", &["constant_velocity", "sine", "solitary", "table"])
-        .about("kind of motion; `solitary` is Goring 1978"),
-    VELOCITY,
-    UNTIL,
-    STROKE,
-    WAVE_PERIOD,
-    RAMP,
-    Key::number("height", LENGTH)
-        .unit("metres")
-        .only("kind", &["solitary"])
-        .also(", at most the depth")
-        .about("of the wave"),
-    Key::number("depth", LENGTH)
-        .unit("metres")
-        .only("kind", &["solitary"])
-        .about("of the water at rest"),
-    FILE,
-    POINTS,
-];
 
 const METHODS: [&str; 2] = words(&Method::NAMED);
 

@@ -34,6 +34,8 @@ cell_size = 0.2
 surface = true
 "#;
 
+const SEA: &str = "wave_maker.0.motion={ kind = \"sea\", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }";
+
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
 
@@ -71,6 +73,7 @@ fn plain(path: &str, value: &Value) -> Value {
 fn what_is_left_out_is_the_default_of_the_table() {
     let chebyshev = load(&["solver.pbf.iteration=chebyshev"]).written(&|_, _| "a.obj".to_owned());
     let written = load(&[]).written(&|_, _| "a.obj".to_owned());
+    let sea = load(&[SEA]).written(&|_, _| "a.obj".to_owned());
     let mut compared = BTreeSet::new();
     for path in paths(SCENE) {
         let key = find(SCENE, &path).expect("a key");
@@ -82,10 +85,10 @@ fn what_is_left_out_is_the_default_of_the_table() {
         if path == "grids.surface" || table["v"].is_table() {
             continue;
         }
-        let scene = if key.only.is_some() {
-            &chebyshev
-        } else {
-            &written
+        let scene = match key.only {
+            Some(("kind", _)) => &sea,
+            Some(_) => &chebyshev,
+            None => &written,
         };
         let found = value_at(scene, &path).unwrap_or_else(|| panic!("{path} is not written"));
         assert_eq!(plain(&path, found), plain(&path, &table["v"]), "{path}");
@@ -109,6 +112,7 @@ fn defaults_that_are_computed_are_what_their_words_say() {
     for (set, path) in [
         ("solver.pbf.iteration=red_black", "solver.pbf.relaxation"),
         ("solver.pbf.iteration=chebyshev", "solver.pbf.relaxation"),
+        (SEA, "wave_maker.motion.peak_enhancement"),
         ("solver.method=pbf", "budget.energy"),
         ("solver.method=flip", "budget.energy"),
         ("solver.method=flip", "budget.speed_jump"),
@@ -158,7 +162,7 @@ fn allowed_words_follow_from_the_declaration() {
         ("solver.flip.transfer", "\"flip\" or \"apic\""),
         (
             "wave_maker[0].motion.ramp",
-            "0 or a number from 1e-4 to 1e6, seconds; one period if left out",
+            "0 or a number from 1e-4 to 1e6, seconds; one period, or two of the peak's, if left out",
         ),
         (
             "budget.speed",

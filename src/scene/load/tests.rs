@@ -392,6 +392,12 @@ periodic = ["z"]
 method = "flip"
 [solver.flip]
 cell_size = 0.25
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "sea", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0, seed = 3 }
+[[wave_maker]]
+wall = "-y"
+motion = { kind = "focused", height = 0.1, at = 1.0, time = 9.0, spectrum = "tma", peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }
 [effects]
 absorbing_zone = { walls = ["+x"], length = 1.0, period = 2.0 }
 "#;

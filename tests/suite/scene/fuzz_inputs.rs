@@ -136,6 +136,11 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("budget.energy", "{}", true),
     ("effects.viscosity.xsph", "{}", true),
     ("effects.vorticity_confinement.strength", "{}", true),
+    ("wave_maker[3].motion.significant_height", "{}", false),
+    ("wave_maker[3].motion.peak_period", "{}", false),
+    ("wave_maker[3].motion.peak_enhancement", "{}", true),
+    ("wave_maker[3].motion.shortest_period", "{}", false),
+    ("wave_maker[3].motion.depth", "{}", false),
     ("effects.absorbing_zone.length", "{}", false),
     ("effects.absorbing_zone.period", "{}", true),
 ];
@@ -143,7 +148,8 @@ const NUMBERS: &[(&str, &str, bool)] = &[
 /// The good scene with all that [`NUMBERS`] changes in it.
 fn numbered() -> String {
     let makers = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
-        [[wave_maker]]\nwall = \"+z\"\nmotion = { kind = \"solitary\", height = 0.1, depth = 1.0 }\n";
+        [[wave_maker]]\nwall = \"+z\"\nmotion = { kind = \"solitary\", height = 0.1, depth = 1.0 }\n\
+        [[wave_maker]]\nwall = \"+y\"\nmotion = { kind = \"sea\", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }\n";
     let more = "[[water.particles]]\nat = [[20.0, 3.0, 3.0]]\nvelocity = [1.0, 0.0, 0.0]\n[[solid]]\nmesh = \"cube.obj\"\n\
         translate = [15.0, 3.0, 3.0]\ndirection = [1.0, 0.0, 0.0]\n\
         motion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n";

@@ -142,6 +142,46 @@ fn water_at_rest_in_a_zone_stays_at_rest() {
     }
 }
 
+/// A drop that flies over a zone falls as it does elsewhere: after n steps of g Δt, in f32. Where no grid tells PBF's drops from
+/// water they lose what water loses, which is the control.
+#[test]
+fn drops_over_a_zone_fall_freely() {
+    let context = context();
+    let (frames, step) = (5, 0.02);
+    for method in METHODS {
+        let (mut scene, mut particles) = half_full(method);
+        for x in [0.4, 1.45] {
+            particles.id.push(particles.id.len() as u32);
+            particles.position.push([x, 0.74, 0.4]);
+            particles.velocity.push([0.0; 3]);
+        }
+        scene.effects.absorbing_zone = zone(&[RIGHT], 0.8, 0.5);
+        let falls = |state: &Particles| -> Vec<f32> {
+            let last = particles.len() - 2;
+            let ids = last as u32..=last as u32 + 1;
+            let slots = ids.map(|id| state.id.iter().position(|other| *other == id).unwrap());
+            slots.map(|slot| state.velocity[slot][1]).collect()
+        };
+        let free = -9.81 * step * frames as f32;
+        for state in [
+            on_gpu(&context, &scene, &particles, frames),
+            on_cpu(&scene, &particles, frames),
+        ] {
+            let found = falls(&state);
+            println!("{method:?}: {found:?}, expected {free}");
+            assert!(
+                found.iter().all(|v| (v / free - 1.0).abs() < 1e-4),
+                "{found:?}"
+            );
+        }
+        if method == Method::Pbf {
+            scene.solver.pbf.as_mut().unwrap().grid_projection = false;
+            let found = falls(&on_gpu(&context, &scene, &particles, frames));
+            assert!(found[1] > 0.5 * free, "{found:?}");
+        }
+    }
+}
+
 /// One pass where a scene names it, and no buffer and no byte.
 #[test]
 fn a_scene_that_names_no_zone_pays_for_none() {

@@ -7,15 +7,19 @@ use super::Inputs;
 use crate::{reference::Timings, scene::effects::absorbing_zone::Settings};
 
 /// The velocities of particles at `places` after the zone's absorption in a step of so many seconds, in a domain of `size`; m/s
-/// and metres, shapes (particles) (effects/absorb_particles).
+/// and metres, shapes (particles). Drops lose nothing; `is_drop` is empty where nobody tells them (effects/absorb_particles).
 pub fn absorb_particles(
     settings: &Settings,
     (size, step): (DVec3, f64),
     places: &[DVec3],
+    is_drop: &[bool],
     velocity: &[DVec3],
 ) -> Vec<DVec3> {
-    (velocity.par_iter().zip(places))
-        .map(|(&v, &x)| v * (1.0 - settings.absorbed(size, x, step)))
+    (velocity.par_iter().zip(places).enumerate())
+        .map(|(i, (&v, &x))| match is_drop.get(i) {
+            Some(true) => v,
+            _ => v * (1.0 - settings.absorbed(size, x, step)),
+        })
         .collect()
 }
 
@@ -27,6 +31,12 @@ pub(super) fn apply(
 ) -> Vec<DVec3> {
     timings.time("effects/absorb_particles", || {
         let step = inputs.substep.time_step;
-        absorb_particles(settings, (inputs.model.size, step), inputs.points, velocity)
+        absorb_particles(
+            settings,
+            (inputs.model.size, step),
+            inputs.points,
+            inputs.is_drop,
+            velocity,
+        )
     })
 }

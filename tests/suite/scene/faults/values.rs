@@ -407,6 +407,64 @@ pub const VALUE_FAULTS: &[Fault] = &[
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"sea\", significant_height = 1.5, peak_period = 3.0, depth = 1.0",
+        24,
+        &["motion.significant_height: waves of 1.5 m on 1 m of water; allowed: "],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"sea\", significant_height = 0.5, peak_period = 1.4, depth = 1.0",
+        24,
+        &[
+            "motion.significant_height: waves of 1.4 s on 1 m of water break before they are 0.5 m high (Miche 1944)",
+        ],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, shortest_period = 2.9",
+        24,
+        &["motion.shortest_period: 2.9 s is 0.966"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, shortest_period = 0.5",
+        24,
+        &[
+            "motion.shortest_period: waves of 0.5 s are 0.390 m long, 3.9 particle spacings; allowed: ",
+        ],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, ramp = 0",
+        24,
+        &["motion.ramp: "],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, spectrum = \"pierson_moskowitz\", peak_enhancement = 2.0",
+        24,
+        &["motion.peak_enhancement: Pierson and Moskowitz's peak is not raised; allowed: "],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0, spectrum = \"jonswop\"",
+        24,
+        &["motion.spectrum: \"jonswop\" is no spectrum; the nearest is \"jonswap\""],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"focused\", height = 0.1, at = 30.0, time = 60.0, peak_period = 3.0, depth = 1.0",
+        24,
+        &["motion.at: 30 m from a face that is 25 m from the other"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"focused\", height = 0.1, at = 8.0, time = 9.0, peak_period = 3.0, depth = 1.0",
+        24,
+        &["motion.time: its slowest waves, of 0.784 m/s"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
         "kind = \"solitary\", height = 2, depth = 1",
         24,
         &["motion.height: a wave of 2 m on 1 m"],

@@ -1,0 +1,141 @@
+//! Keys of motions: of walls that make waves, and of solids.
+
+use super::super::key::{Interval, Key, words};
+use crate::domain::motion::Spectrum;
+
+/// Metres: a stroke, a wave's height, the water's depth. The domain is the upper bound.
+const LENGTH: Interval = 1e-9..=1e6;
+
+/// Seconds: from a tenth of a millisecond, the ripples of ultrasound, to eleven days, a spring tide.
+const PERIOD: Interval = 1e-4..=1e6;
+
+// Sound has 1 500 m/s in water.
+const VELOCITY: Key = Key::number("velocity", 1e-9..=1e5)
+    .unit("m/s")
+    .only("kind", &["constant_velocity"])
+    .about("steady speed, inward or along direction");
+const UNTIL: Key = Key::number("until", 1e-6..=1e9)
+    .unit("seconds")
+    .absent()
+    .only("kind", &["constant_velocity"])
+    .about("when it stops");
+const STROKE: Key = Key::number("stroke", LENGTH)
+    .unit("metres")
+    .only("kind", &["sine"])
+    .about(
+        "the whole distance from one end of the way to the other, twice the amplitude: x(t) = stroke/2 (1 − cos(2π t / period)), \
+         times the ramp; the S of H/S in wave maker theory (Dean and Dalrymple 1991)",
+    );
+const WAVE_PERIOD: Key = Key::number("period", PERIOD)
+    .unit("seconds")
+    .only("kind", &["sine"])
+    .about("of one cycle, there and back");
+const RAMP: Key = Key::number_or_zero("ramp", PERIOD)
+    .unit("seconds")
+    .computed(|| "one period".to_owned())
+    .only("kind", &["sine"])
+    .about("how long the motion takes to reach its full stroke; 0: it begins with it");
+const FILE: Key = Key::text(
+    "file",
+    "a CSV of time,displacement (seconds, metres), relative to the scene file",
+)
+.absent()
+.only("kind", &["table"])
+.about("displacements from a file; the written-out scene has them as points");
+const POINTS: Key = Key::points(
+    "points",
+    2,
+    "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0, all up to 1e9, no faster \
+     than 100000 m/s",
+)
+.only("kind", &["table"])
+.without(&["file"])
+.about("displacements in place");
+
+pub(super) const SOLID_MOTION: &[Key] = &[
+    Key::choice("kind", &["constant_velocity", "sine", "table"])
+        .also("; solitary waves, seas and packets are made by a wall")
+        .about("kind of motion"),
+    VELOCITY,
+    UNTIL,
+    STROKE,
+    WAVE_PERIOD,
+    RAMP,
+    FILE,
+    POINTS,
+];
+
+/// Motions by a spectrum.
+const SEAS: &[&str] = &["sea", "focused"];
+
+const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
+
+pub(super) const WALL_MOTION: &[Key] = &[
+    Key::choice(
+        "kind",
+        &["constant_velocity", "sine", "solitary", "sea", "focused", "table"],
+    )
+    .about("kind of motion; `solitary` is Goring 1978, `sea` and `focused` follow a spectrum by linear theory"),
+    VELOCITY,
+    UNTIL,
+    STROKE,
+    WAVE_PERIOD,
+    Key::number_or_zero("ramp", PERIOD)
+        .unit("seconds")
+        .computed(|| "one period, or two of the peak's,".to_owned())
+        .only("kind", &["sine", "sea", "focused"])
+        .about(
+            "how long the motion takes to reach its full size; 0, of a sine alone: it begins with it",
+        ),
+    Key::number("height", LENGTH)
+        .unit("metres")
+        .only("kind", &["solitary", "focused"])
+        .also(", at most the depth")
+        .about("of a solitary wave, whose crest leaves the wall (6 d/K + H/K)/c after the start, K = √(3H/4d), c = √(g (d + H)); of a packet's crest by linear theory"),
+    Key::number("depth", LENGTH)
+        .unit("metres")
+        .only("kind", &["solitary", "sea", "focused"])
+        .about("of the water at rest"),
+    Key::choice("spectrum", &SPECTRA)
+        .default("\"jonswap\"")
+        .only("kind", SEAS)
+        .about(
+            "how the energy is spread: JONSWAP (Hasselmann et al. 1973), Pierson and Moskowitz 1964, TMA (Bouws et al. 1985)",
+        ),
+    Key::number("peak_enhancement", 1.0..=20.0)
+        .computed(|| "3.3".to_owned())
+        .only("kind", SEAS)
+        .also(", not with spectrum = \"pierson_moskowitz\"")
+        .about("γ, how much higher the peak is than Pierson and Moskowitz's"),
+    Key::number("peak_period", PERIOD)
+        .unit("seconds")
+        .only("kind", SEAS)
+        .about("of the waves with the most energy; the sea comes again after 200 of them"),
+    Key::number("shortest_period", PERIOD)
+        .unit("seconds")
+        .computed(|| "a third of the peak's".to_owned())
+        .only("kind", SEAS)
+        .also(", a tenth to nine tenths of the peak's, of waves that are at least 10 particle spacings long")
+        .about("of the shortest waves that are made; what is left out is given to the others"),
+    Key::number("significant_height", LENGTH)
+        .unit("metres")
+        .only("kind", &["sea"])
+        .also(", at most the depth and no steeper at the peak than waves can be")
+        .about("four times the root of the elevation's variance"),
+    Key::whole("seed", 0..=u32::MAX)
+        .default("0")
+        .only("kind", &["sea"])
+        .about("another number makes another sea of the same spectrum"),
+    Key::number("at", LENGTH)
+        .unit("metres")
+        .only("kind", &["focused"])
+        .also(", inside of the domain")
+        .about("where the packet's crests meet, from the domain's face"),
+    Key::number("time", PERIOD)
+        .unit("seconds")
+        .only("kind", &["focused"])
+        .also(", late enough for its slowest waves to be there")
+        .about("when they meet"),
+    FILE,
+    POINTS,
+];

@@ -1,0 +1,160 @@
+//! Seas and packets of waves: how their motion is read, and whether the water can carry them.
+
+use std::f64::consts::TAU;
+
+use super::{
+    Wall,
+    document::Document,
+    error::SceneError,
+    wave_maker::{Surroundings, check_speed},
+    words::shown,
+};
+use crate::domain::motion::{Asked, Motion, Phases, Sea, Spectrum, wave_number};
+
+/// Shortest of the waves over the peak's period, where a scene does not say it. What is left out has 1.5 % of the energy of
+/// Pierson and Moskowitz's spectrum.
+const SHORTEST: f64 = 1.0 / 3.0;
+
+/// What it may be.
+const SHORTEST_RANGE: std::ops::RangeInclusive<f64> = 0.1..=0.9;
+
+/// γ where a scene does not say it: the mean of the waves off Sylt by which it was found (Hasselmann et al. 1973).
+const PEAK_ENHANCEMENT: f64 = 3.3;
+
+/// Peak periods until a motion's full size, where a scene does not say it.
+const RAMP: f64 = 2.0;
+
+/// Least length of a wave, in particle spacings: five cells of FLIP, below which little of one is left after its own length.
+const LEAST_WAVE: f64 = 10.0;
+
+/// Steepest that a wave of one height can be, H / (λ tanh kh) (Miche 1944).
+const STEEPEST: f64 = 0.142;
+
+type Result<T> = std::result::Result<T, SceneError>;
+
+/// The motion of the table at `path`, of a sea or a packet.
+pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Motion> {
+    let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
+    if asked.gravity == 0.0 {
+        return refuse("kind", "waves need gravity".to_owned());
+    }
+    if !SHORTEST_RANGE.contains(&(asked.shortest_period / asked.peak_period)) {
+        let problem = format!(
+            "{} s is {} of the peak's {} s",
+            shown(asked.shortest_period),
+            shown(asked.shortest_period / asked.peak_period),
+            shown(asked.peak_period)
+        );
+        return refuse("shortest_period", problem);
+    }
+    if asked.ramp == 0.0 {
+        return refuse(
+            "ramp",
+            "a spectrum's motion has none that is at rest".to_owned(),
+        );
+    }
+    let (key, height) = match asked.phases {
+        Phases::Random {
+            significant_height, ..
+        } => ("significant_height", significant_height),
+        Phases::Focused { height, .. } => ("height", height),
+    };
+    if height > asked.depth {
+        let (height, depth) = (shown(height), shown(asked.depth));
+        return refuse(key, format!("waves of {height} m on {depth} m of water"));
+    }
+    let number = wave_number(TAU / asked.peak_period, asked.depth, asked.gravity);
+    let most = STEEPEST * TAU / number * (number * asked.depth).tanh();
+    if key == "significant_height" && height > most {
+        let problem = format!(
+            "waves of {} s on {} m of water break before they are {} m high (Miche 1944)",
+            shown(asked.peak_period),
+            shown(asked.depth),
+            shown(height)
+        );
+        return refuse(key, problem);
+    }
+    let sea = Sea::new(asked);
+    let whole = sea.asked().ramp + sea.asked().peak_period;
+    let motion = Motion::Sea(sea);
+    check_speed(motion.peak_speed(0.0, whole))
+        .map_err(|problem| doc.fault_of_plain(path, problem))?;
+    Ok(motion)
+}
+
+/// The form of a spectrum and its γ, which Pierson and Moskowitz's has none of.
+pub(super) fn shape(
+    doc: &Document<'_>,
+    path: &str,
+    spectrum: Spectrum,
+    peak_enhancement: Option<f64>,
+) -> Result<(Spectrum, f64)> {
+    match (spectrum, peak_enhancement) {
+        (Spectrum::PiersonMoskowitz, Some(_)) => {
+            let problem = "Pierson and Moskowitz's peak is not raised";
+            Err(doc.fault_of(&format!("{path}.peak_enhancement"), problem))
+        }
+        (Spectrum::PiersonMoskowitz, None) => Ok((spectrum, 1.0)),
+        (_, given) => Ok((spectrum, given.unwrap_or(PEAK_ENHANCEMENT))),
+    }
+}
+
+/// What a table asks for, with what it leaves out.
+pub(super) fn asked(
+    (spectrum, peak_enhancement): (Spectrum, f64),
+    [peak_period, depth, gravity]: [f64; 3],
+    [shortest_period, ramp]: [Option<f64>; 2],
+    phases: Phases,
+) -> Asked {
+    Asked {
+        spectrum,
+        peak_enhancement,
+        peak_period,
+        shortest_period: shortest_period.unwrap_or(SHORTEST * peak_period),
+        depth,
+        gravity,
+        ramp: ramp.unwrap_or(RAMP * peak_period),
+        phases,
+    }
+}
+
+/// That the shortest waves can be told from particles, and that a packet meets in the domain and has the time to.
+pub(super) fn check(
+    doc: &Document<'_>,
+    path: &str,
+    sea: &Sea,
+    wall: Wall,
+    around: &Surroundings<'_>,
+) -> Result<()> {
+    let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
+    let length = sea.least_wave_length();
+    if length < LEAST_WAVE * around.spacing {
+        let problem = format!(
+            "waves of {} s are {length:.3} m long, {:.1} particle spacings",
+            shown(sea.asked().shortest_period),
+            length / around.spacing
+        );
+        return refuse("shortest_period", problem);
+    }
+    let Phases::Focused { at, time, .. } = sea.asked().phases else {
+        return Ok(());
+    };
+    let size = around.domain.size()[wall.axis];
+    if at >= size {
+        let problem = format!(
+            "{} m from a face that is {} m from the other",
+            shown(at),
+            shown(size)
+        );
+        return refuse("at", problem);
+    }
+    let least = sea.asked().ramp + at / sea.least_group_speed();
+    if time < least {
+        let problem = format!(
+            "its slowest waves, of {:.3} m/s, are there after {least:.3} s if they leave when the ramp is over",
+            sea.least_group_speed()
+        );
+        return refuse("time", problem);
+    }
+    Ok(())
+}
