@@ -86,9 +86,9 @@ mod tests {
     /// With x² = ω² h/g, Thompson and Vincent 1983 have φ = x²/2 to x = 1 and 1 − (2 − x)²/2 to x = 2, within 4 % of the exact φ.
     #[test]
     fn shallow_water_takes_from_the_long_waves_what_is_published() {
-        let (depth, gravity) = (1.0, 9.81);
+        let (depth, gravity) = (1.0f64, 9.81);
         for x in [0.1f64, 0.3, 0.6, 1.0, 1.4, 1.8] {
-            let frequency = x / (depth / gravity as f64).sqrt() / std::f64::consts::TAU;
+            let frequency = x / (depth / gravity).sqrt() / std::f64::consts::TAU;
             let of = |s: Spectrum| s.density(frequency, frequency, 3.3, (depth, gravity));
             let found = of(Spectrum::Tma) / of(Spectrum::Jonswap);
             let known = if x <= 1.0 {
