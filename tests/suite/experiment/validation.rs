@@ -238,3 +238,34 @@ fn published_numbers_are_those_of_theory() {
     }
     assert!(held > 20, "{held}");
 }
+
+/// The points beside a sea's curve are linear theory's for the wall's way that its scene has, about their mean over the time that is
+/// measured, which is below a millimetre.
+#[test]
+fn points_of_seas_are_those_of_linear_theory() {
+    let text = fs::read_to_string(studies().join("validation.toml")).unwrap();
+    let mut held = 0;
+    for benchmark in [parsed(&text), parsed(&COARSE)]
+        .iter()
+        .flat_map(|v| &v.benchmarks)
+        .filter(|benchmark| benchmark.measure == Measure::IrregularWaves)
+    {
+        let scene = &benchmark.runs[0].scene;
+        let Motion::Sea(sea) = &scene.wave_makers[0].motion else {
+            panic!("{:?}", scene.wave_makers)
+        };
+        let gauge = match scene.probes.last().unwrap().kind {
+            ProbeKind::Elevation { at } => at.x,
+            ref other => panic!("{other:?}"),
+        };
+        for &[t, elevation] in &benchmark.points[0].at {
+            let theory = sea.elevation(gauge, t);
+            assert!(
+                (theory - elevation).abs() < 1e-3,
+                "{t}: {theory} {elevation}"
+            );
+            held += 1;
+        }
+    }
+    assert!(held > 100, "{held}");
+}
