@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::key::read_by_name;
+use super::{key::read_by_name, words::shown};
 use crate::domain::motion::Spectrum;
 
 read_by_name!(Spectrum);
@@ -49,4 +49,19 @@ pub(super) enum MotionSpec {
         file: Option<String>,
         points: Option<Vec<[f64; 2]>>,
     },
+}
+
+/// Fastest that a motion may be, m/s: as fast as a velocity may be.
+const MAX_SPEED: f64 = 1e5;
+
+/// What a motion's keys together come to has the range that a velocity has.
+pub(super) fn check_speed(speed: f64) -> Result<(), String> {
+    if speed <= MAX_SPEED {
+        return Ok(());
+    }
+    Err(format!(
+        "it moves at {} m/s; allowed: up to {} m/s",
+        shown(speed),
+        shown(MAX_SPEED)
+    ))
 }

@@ -2,13 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{
-    Wall,
-    document::Document,
-    error::SceneError,
-    wave_maker::{Surroundings, check_speed},
-    words::shown,
-};
+use super::{document::Document, error::SceneError, motion_spec::check_speed, words::shown};
 use crate::domain::motion::{Asked, Motion, Phases, Sea, Spectrum, wave_number};
 
 /// Shortest of the waves over the peak's period, where a scene does not say it. What is left out has 1.5 % of the energy of
@@ -118,28 +112,27 @@ pub(super) fn asked(
     }
 }
 
-/// That the shortest waves can be told from particles, and that a packet meets in the domain and has the time to.
+/// That the shortest waves can be told from particles, so many metres apart, and that a packet meets in the domain, whose far face is
+/// `size` metres off, and has the time to.
 pub(super) fn check(
     doc: &Document<'_>,
     path: &str,
     sea: &Sea,
-    wall: Wall,
-    around: &Surroundings<'_>,
+    (size, spacing): (f64, f64),
 ) -> Result<()> {
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
     let length = sea.least_wave_length();
-    if length < LEAST_WAVE * around.spacing {
+    if length < LEAST_WAVE * spacing {
         let problem = format!(
             "waves of {} s are {length:.3} m long, {:.1} particle spacings",
             shown(sea.asked().shortest_period),
-            length / around.spacing
+            length / spacing
         );
         return refuse("shortest_period", problem);
     }
     let Phases::Focused { at, time, .. } = sea.asked().phases else {
         return Ok(());
     };
-    let size = around.domain.size()[wall.axis];
     if at >= size {
         let problem = format!(
             "{} m from a face that is {} m from the other",

@@ -8,7 +8,7 @@ use super::{
     Shot, WaveMaker,
     document::Document,
     error::SceneError,
-    motion_spec::MotionSpec,
+    motion_spec::{MotionSpec, check_speed},
     seas,
     spec::WaveMakerSpec,
     words::{chain, shown, shown_all},
@@ -20,9 +20,6 @@ use crate::domain::{
 
 /// Largest motion table read, bytes: ten hours at 60 points a second.
 const MAX_TABLE_BYTES: u64 = 64 << 20;
-
-/// Fastest that a motion may be, m/s: as fast as a velocity may be.
-const MAX_SPEED: f64 = 1e5;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
@@ -54,7 +51,8 @@ pub(super) fn build_all(
         }
         let motion = motion(doc, &place, around.base_dir, &spec.motion, around.gravity)?;
         if let Motion::Sea(sea) = &motion {
-            seas::check(doc, &place, sea, spec.wall, around)?;
+            let size = around.domain.size()[spec.wall.axis];
+            seas::check(doc, &place, sea, (size, around.spacing))?;
         }
         let maker = WaveMaker {
             wall: spec.wall,
@@ -247,18 +245,6 @@ fn check_points(points: &[[f64; 2]]) -> std::result::Result<(), String> {
             .map_err(|problem| format!("up to point {}, {problem}", i + 1))?;
     }
     Ok(())
-}
-
-/// What a motion's keys together come to has the range that a velocity has.
-pub(super) fn check_speed(speed: f64) -> std::result::Result<(), String> {
-    if speed <= MAX_SPEED {
-        return Ok(());
-    }
-    Err(format!(
-        "it moves at {} m/s; allowed: up to {} m/s",
-        shown(speed),
-        shown(MAX_SPEED)
-    ))
 }
 
 /// `time,displacement` a line; empty lines, those that start with `#`, and one line of titles are

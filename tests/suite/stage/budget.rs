@@ -203,7 +203,7 @@ fn energy_rises_by_the_work_of_the_walls_alone() {
             },
             Spoil {
                 pass: "pbf/update_velocity",
-                from: "velocity[thread] = vec4f(v, 0.0);",
+                from: "velocity[thread] = vec4f(v, came.w);",
                 to: "velocity[thread] = vec4f(1.3 * v, 0.0);",
             },
         ),

@@ -126,7 +126,7 @@ fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_pbf() {
         ),
         spoil(
             "pbf/update_velocity",
-            "velocity[thread] = vec4f(v, 0.0);",
+            "velocity[thread] = vec4f(v, came.w);",
             concat!("velocity[thread] = vec4f(v * ", nan!("thread"), ", 0.0);"),
         ),
         spoil(
