@@ -150,6 +150,14 @@ impl Manifest {
     /// The oldest format that it reads. A bake in an older one than [`Self::FORMAT_VERSION`] is not gone on with.
     pub const OLDEST_FORMAT: u32 = 1;
 
+    /// In the place of a solver: a stream of whitewater.
+    pub const WHITEWATER: &str = "whitewater";
+
+    /// Whether it is no bake's, but that of a stream of whitewater that was made from one.
+    pub fn is_whitewater(&self) -> bool {
+        self.solver == Self::WHITEWATER
+    }
+
     /// Number of the first frame: 0 is a scene's own start.
     pub fn first_frame(&self) -> u32 {
         self.parent.as_ref().map_or(0, |parent| parent.frame)

@@ -13,6 +13,7 @@ pub mod flip;
 pub mod pbf;
 mod sort;
 pub mod table;
+pub mod whitewater;
 
 pub use table::{Row, Table};
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use clap::{
-    Args, ValueEnum,
+    Args,
     builder::{OsStringValueParser, TypedValueParser as _},
 };
 use serde_json::{Value, json};
@@ -17,12 +17,11 @@ use crate::{
     stage::{
         bake::{Event, Request, bake},
         branch::BranchPoint,
-        device::Device,
     },
 };
 
 use super::{
-    Failure, GpuArgs, count,
+    DeviceArgs, Failure, count,
     interrupt::{self, Interrupt},
     output,
     progress::{Mode, Progress},
@@ -56,40 +55,14 @@ pub(super) struct BakeArgs {
     /// Take meshes and tables that lie outside of the scene's folder.
     #[arg(long)]
     allow_outside: bool,
-    /// Device to solve on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
-    #[arg(long, value_enum, default_value_t, value_name = "DEVICE")]
-    device: DeviceKind,
     #[command(flatten)]
-    gpu: GpuArgs,
+    device: DeviceArgs,
     /// Time each pass and print a table; passes then run one by one.
     #[arg(long)]
     time_passes: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
     progress: Mode,
-}
-
-#[derive(ValueEnum, Clone, Copy, Debug, Default)]
-enum DeviceKind {
-    #[default]
-    Gpu,
-    Cpu,
-}
-
-impl BakeArgs {
-    fn device(&self) -> Result<Device, Failure> {
-        let GpuArgs { adapter, shaders } = &self.gpu;
-        let fault = match (self.device, adapter, shaders) {
-            (DeviceKind::Gpu, ..) => return Ok(Device::Gpu(self.gpu.read()?)),
-            (DeviceKind::Cpu, None, None) => return Ok(Device::Cpu),
-            (DeviceKind::Cpu, Some(name), _) => format!("--adapter {name} names a GPU"),
-            (DeviceKind::Cpu, None, Some(_)) => "--shaders run on a GPU".to_owned(),
-        };
-        Err(Failure {
-            code: 2,
-            error: format!("{fault}, and --device is cpu").into(),
-        })
-    }
 }
 
 /// A solver by its name.
@@ -138,7 +111,7 @@ fn load_lengthened(args: &BakeArgs) -> Result<Scene, SceneError> {
 }
 
 pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
-    let device = args.device()?;
+    let device = args.device.read()?;
     let scene = load_lengthened(args)?;
     let method = scene.solver.method.name();
     let default = || PathBuf::from("cache").join(&scene.shot.name).join(method);

@@ -7,7 +7,7 @@ use crate::scene::keys::{File, page};
 
 #[derive(Args, Debug)]
 pub(super) struct KeysArgs {
-    /// Only the keys of this file: scene, look, study or tolerance.
+    /// Only the keys of this file: scene, look, study, tolerance or whitewater.
     #[arg(value_parser = PossibleValuesParser::new(File::NAMED.map(|(name, _)| name)))]
     file: Option<String>,
 }

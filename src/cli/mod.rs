@@ -11,6 +11,7 @@ mod progress;
 mod render;
 mod study;
 pub mod verify;
+mod whitewater;
 
 use std::{
     error::Error,
@@ -19,11 +20,11 @@ use std::{
     process::ExitCode,
 };
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::stage::{
     Blame,
-    device::{Gpu, Shaders},
+    device::{Device, Gpu, Shaders},
 };
 
 /// Exit code where something is out of tolerance.
@@ -50,13 +51,15 @@ enum Command {
     Render(render::RenderArgs),
     /// Bake, render and measure what a study compares, and write one page about it.
     Study(study::StudyArgs),
+    /// Make spray, foam and bubbles from a finished bake, as a stream beside it.
+    Whitewater(whitewater::WhitewaterArgs),
     /// Hold a step on the GPU against the f64 reference, pass by pass.
     Check(check::CheckArgs),
     /// Show a scene's plan, a look's plan, a cache's frames, or this machine's adapters.
     Inspect(inspect::InspectArgs),
     /// Compare two caches, a cache and a baseline, or two renders: where they part, and by how much.
     Diff(diff::DiffArgs),
-    /// Print the keys of scenes, looks, studies and tolerance files, with what each allows and its default.
+    /// Print the keys of scenes, looks, studies, tolerance and whitewater files, with what each allows and its default.
     Keys(keys::KeysArgs),
     /// Check every checksum of a cache.
     Verify(verify::VerifyArgs),
@@ -109,6 +112,39 @@ impl GpuArgs {
     }
 }
 
+/// Device of a command that needs no adapter.
+#[derive(Args, Debug)]
+struct DeviceArgs {
+    /// Device to compute on: an adapter, or the CPU with the f64 reference, which needs no driver and is slower.
+    #[arg(long, value_enum, default_value_t, value_name = "DEVICE")]
+    device: DeviceKind,
+    #[command(flatten)]
+    gpu: GpuArgs,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, Default)]
+enum DeviceKind {
+    #[default]
+    Gpu,
+    Cpu,
+}
+
+impl DeviceArgs {
+    fn read(&self) -> Result<Device, Failure> {
+        let GpuArgs { adapter, shaders } = &self.gpu;
+        let fault = match (self.device, adapter, shaders) {
+            (DeviceKind::Gpu, ..) => return Ok(Device::Gpu(self.gpu.read()?)),
+            (DeviceKind::Cpu, None, None) => return Ok(Device::Cpu),
+            (DeviceKind::Cpu, Some(name), _) => format!("--adapter {name} names a GPU"),
+            (DeviceKind::Cpu, None, Some(_)) => "--shaders run on a GPU".to_owned(),
+        };
+        Err(Failure {
+            code: 2,
+            error: format!("{fault}, and --device is cpu").into(),
+        })
+    }
+}
+
 /// Parses the command line, runs the command, prints what went wrong with all its causes.
 pub fn main() -> ExitCode {
     let code = match Cli::try_parse() {
@@ -140,6 +176,7 @@ fn run(command: Command) -> u8 {
             keys::run(&args);
             Ok(0)
         }
+        Command::Whitewater(args) => whitewater::run(&args),
         Command::Verify(args) => verify::run(&args).map(|()| 0).map_err(Failure::from),
     };
     result.unwrap_or_else(|failure| {

@@ -31,3 +31,4 @@ pub mod substep;
 pub mod surface;
 pub mod tolerance;
 mod voxels;
+pub mod whitewater;

@@ -2,6 +2,7 @@
 
 use super::uniform::{
     Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Shading, Thickness, Tile, Triangle,
+    Whitewater, WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
 
@@ -33,6 +34,12 @@ pub(super) const THICKNESS_PARAMS: Buf<Thickness> = Buf::uniform("thickness_para
 pub(super) const THICKNESS: Buf<u32> = Buf::new("thickness");
 /// Aerated water before the surface, as thickness.
 pub(super) const SPRAY: Buf<u32> = Buf::new("spray");
+/// Spray, foam and bubbles of a frame.
+pub(super) const WHITEWATER: Buf<Whitewater> = Buf::new("whitewater");
+/// How they are drawn.
+pub(super) const WHITEWATER_PARAMS: Buf<WhitewaterParams> = Buf::uniform("whitewater_params");
+/// Workgroups of a dispatch of a thread for each.
+pub(super) const WHITEWATER_GROUPS: Buf<Workgroups> = Buf::new("whitewater_groups");
 /// Whose sphere is the nearest, of each pixel.
 pub(super) const OWNER: Buf<u32> = Buf::new("owner");
 

@@ -27,11 +27,7 @@ pub(super) fn shading(
         absorption: colour(spec.water.absorption_per_metre),
         sun_path: (1.0 / sun_cosine) as f32,
         scattering: colour(spec.water.scattering_per_metre),
-        spray_density: spec
-            .water
-            .spray
-            .as_ref()
-            .map_or(0.0, |spray| spray.density_per_metre as f32),
+        spray_density: spray_density(look) as f32,
         ground_colour: colour(spec.ground.colour),
         ground_variation: spec.ground.variation as f32,
         solid_colour: colour(spec.solids.colour),
@@ -46,6 +42,18 @@ pub(super) fn shading(
         irradiance: sky.irradiance,
         shadow_from_world,
     }
+}
+
+/// Optical density, 1/m, of what stands in the sums of spray: of the look's own, else of its whitewater.
+pub(super) fn spray_density(look: &Look) -> f64 {
+    let own = look
+        .spec()
+        .water
+        .spray
+        .as_ref()
+        .map(|s| s.density_per_metre);
+    let white = look.spec().whitewater.as_ref().map(|w| w.density_per_metre);
+    own.or(white).unwrap_or(0.0)
 }
 
 /// Plans the textures and samplers that light comes from, but for the shadow map itself.

@@ -129,6 +129,26 @@ mirror!(
 );
 
 mirror!(
+    /// `Whitewater` of ssfr/splat_whitewater.wgsl.
+    Whitewater {
+        position: [f32; 3],
+        radius: f32,
+        velocity: [f32; 3],
+        pad: f32,
+    }
+);
+
+mirror!(
+    /// `WhitewaterParams` of ssfr/splat_whitewater.wgsl.
+    WhitewaterParams {
+        count: u32,
+        size: f32,
+        density: f32,
+        fading: f32,
+    }
+);
+
+mirror!(
     /// `Tile` of ssfr/solid.wgsl.
     Tile {
         corner: [f32; 2],
@@ -158,6 +178,8 @@ pub fn mirrors() -> Vec<Layout> {
         Fill::layout(),
         Triangle::layout(),
         Thickness::layout(),
+        Whitewater::layout(),
+        WhitewaterParams::layout(),
         Tile::layout(),
         Band::layout(),
     ]

@@ -314,10 +314,25 @@ pub(super) fn unknown_key<S: AsRef<str>>(path: &str, allowed: &[S]) -> String {
     }
 }
 
-/// The word that is the least edits away.
+/// Words that others use, and ours of the same meaning or the nearest to it.
+const OTHER_WORDS: [(&str, &str); 3] = [
+    ("amplitude", "stroke"),
+    ("frequency", "period"),
+    ("fps", "frames_per_second"),
+];
+
+/// The word that means the same, else the one that is the least edits away.
 pub(super) fn nearest<'w, S: AsRef<str>>(word: &str, among: &'w [S]) -> Option<&'w str> {
-    let among = among.iter().map(AsRef::as_ref);
-    among.min_by_key(|candidate| strsim::damerau_levenshtein(word, candidate))
+    let mut among = among.iter().map(AsRef::as_ref);
+    let meant = OTHER_WORDS.iter().find(|(other, _)| *other == word);
+    if let Some((_, ours)) = meant
+        && let Some(found) = among.clone().find(|candidate| candidate == ours)
+    {
+        return Some(found);
+    }
+    among
+        .by_ref()
+        .min_by_key(|candidate| strsim::damerau_levenshtein(word, candidate))
 }
 
 /// A table as a message names it; `None` for the file itself.

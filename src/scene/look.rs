@@ -16,7 +16,7 @@ pub(super) use keys::KEYS;
 pub use spec::{
     AovSpec, BasinSpec, CameraSpec, FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LookSpec,
     OutputSpec, RippleSpec, SkySpec, SpraySpec, SunSpec, SurfaceSpec, TransformSpec, ViewSpec,
-    WaterSpec, WindowsSpec,
+    WaterSpec, WhitewaterLook, WindowsSpec,
 };
 
 /// Why a look cannot be used.
@@ -145,7 +145,9 @@ fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
     }
-    hasher.update(format!("{canonical:?}").as_bytes());
+    // A look without whitewater has the hash that it had before there was any.
+    let text = format!("{canonical:?}").replace("whitewater: None, ", "");
+    hasher.update(text.as_bytes());
     if let Some(bytes) = panorama {
         hasher.update(blake3::hash(bytes).as_bytes());
     }

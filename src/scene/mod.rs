@@ -33,6 +33,7 @@ mod seas;
 mod settle;
 mod spec;
 mod wave_maker;
+pub mod whitewater;
 mod words;
 mod write;
 

@@ -252,9 +252,11 @@ pub(super) fn build_all(
         };
         let is_alike = |known: &&Probe| known.name.eq_ignore_ascii_case(&probe.name);
         if let Some(known) = probes.iter().find(is_alike) {
-            let problem = second(&known.name, &probe.name);
-            let key = if spec.name.is_some() { "name" } else { "kind" };
-            return Err(doc.fault_of(&format!("{path}.{key}"), problem));
+            let mut problem = second(&known.name, &probe.name);
+            if spec.name.is_none() {
+                problem += ", which it has by its kind and place: give it another";
+            }
+            return Err(doc.fault_of(&format!("{path}.name"), problem));
         }
         probes.push(probe);
     }

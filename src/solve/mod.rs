@@ -10,6 +10,7 @@ pub mod plan;
 pub mod pressure;
 mod state;
 pub mod trace;
+pub mod whitewater;
 
 use crate::{
     domain::{bricks::Brick, budget::Breach},

@@ -7,13 +7,13 @@ use std::{
 };
 
 use crate::{
-    cache::{CacheError, CacheReader},
+    cache::{CacheError, CacheReader, Manifest},
     check::{flip, pbf},
     domain::{
         frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
         substep::Which,
     },
-    gpu::adapter::{Context, GpuError},
+    gpu::adapter::{Context, GpuError, Needs},
     scene::{Method, Scene, SceneError},
     solve::{SolveError, plan::device_limits},
 };
@@ -22,6 +22,7 @@ use super::{
     Blame,
     device::{Gpu, needs, shaders_note},
     prepare::Start,
+    whitewater::{Stream, WhitewaterError},
 };
 
 pub use crate::check::{Checked, Row, Table};
@@ -121,6 +122,9 @@ pub enum CheckError {
     /// The solver.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// A stream of whitewater and the water that it was made from.
+    #[error(transparent)]
+    Whitewater(#[from] WhitewaterError),
     /// A comparison of nothing is none that held.
     #[error("nothing was compared: there is no water in it")]
     NoWater,
@@ -134,6 +138,7 @@ impl From<&CheckError> for Blame {
             CheckError::Solid(error) => error.into(),
             CheckError::Gpu(error) => error.into(),
             CheckError::Solve(error) => error.into(),
+            CheckError::Whitewater(error) => error.into(),
             CheckError::NoWater => Self::Input,
         }
     }
@@ -148,12 +153,8 @@ pub fn check(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event<'_>),
 ) -> Result<Outcome, CheckError> {
-    let (scene, cache, frames) = open(&request.source)?;
-    let start = match &cache {
-        None => Start::of(&scene)?,
-        Some(cache) => Start::of_cache::<CheckError>(&scene, cache)?,
-    };
-    let context = request.gpu.open(needs(&scene))?;
+    let (subject, frames) = open(&request.source)?;
+    let context = request.gpu.open(subject.needs())?;
     let shaders = context.shaders.edited().map(str::to_owned);
     let info = &context.info;
     tell(Event::Ready {
@@ -164,10 +165,10 @@ pub fn check(
             info.driver_info,
             shaders_note(shaders.as_deref())
         ),
-        solver: scene.solver.method.name(),
-        particles: start.particles.len(),
+        solver: subject.name(),
+        particles: subject.particles(),
         frames: frames.len(),
-        warnings: scene.warnings(),
+        warnings: subject.warnings(),
     });
     let mut outcome = Outcome {
         shaders,
@@ -179,12 +180,7 @@ pub fn check(
             break;
         }
         let begin = Instant::now();
-        let particles = match &cache {
-            Some(cache) => cache.read(frame)?,
-            None => start.particles.clone(),
-        };
-        let which = request.substep;
-        let checked = check_substep(&context, &scene, &start, frame, &particles, which)?;
+        let checked = subject.check(&context, frame, request.substep)?;
         tell(Event::Frame {
             frame,
             checked: &checked,
@@ -209,9 +205,83 @@ pub fn check(
     Ok(outcome)
 }
 
-fn open(source: &Source) -> Result<(Scene, Option<CacheReader>, Vec<u32>), CheckError> {
+/// What is checked.
+enum Subject {
+    /// A solver's step: of a scene's start, or from frames of a cache.
+    Step {
+        scene: Box<Scene>,
+        start: Start,
+        cache: Option<CacheReader>,
+    },
+    /// Frames of a stream of whitewater.
+    Whitewater(Box<Stream>),
+}
+
+impl Subject {
+    fn needs(&self) -> Needs {
+        match self {
+            Self::Step { scene, .. } => needs(scene),
+            Self::Whitewater(_) => Needs::default(),
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Step { scene, .. } => scene.solver.method.name(),
+            Self::Whitewater(_) => Manifest::WHITEWATER,
+        }
+    }
+
+    fn particles(&self) -> usize {
+        match self {
+            Self::Step { start, .. } => start.particles.len(),
+            Self::Whitewater(stream) => stream.water(),
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        match self {
+            Self::Step { scene, .. } => scene.warnings(),
+            Self::Whitewater(_) => Vec::new(),
+        }
+    }
+
+    fn check(&self, context: &Context, frame: u32, which: Which) -> Result<Checked, CheckError> {
+        match self {
+            Self::Step {
+                scene,
+                start,
+                cache,
+            } => {
+                let particles = match cache {
+                    Some(cache) => cache.read(frame)?,
+                    None => start.particles.clone(),
+                };
+                Ok(check_substep(
+                    context, scene, start, frame, &particles, which,
+                )?)
+            }
+            Self::Whitewater(stream) => Ok(Checked {
+                table: stream.check(context, frame)?,
+                // A frame of whitewater is one step.
+                substep: Some(1),
+            }),
+        }
+    }
+}
+
+fn open(source: &Source) -> Result<(Subject, Vec<u32>), CheckError> {
     match source {
-        Source::Scene(scene) => Ok(((**scene).clone(), None, vec![0])),
+        Source::Scene(scene) => {
+            let start = Start::of(scene)?;
+            let scene = scene.clone();
+            let subject = Subject::Step {
+                scene,
+                start,
+                cache: None,
+            };
+            Ok((subject, vec![0]))
+        }
         Source::Cache(directory, frames) => {
             let cache = CacheReader::open(directory)?;
             let frames: Vec<u32> = match frames {
@@ -221,10 +291,18 @@ fn open(source: &Source) -> Result<(Scene, Option<CacheReader>, Vec<u32>), Check
             for &frame in &frames {
                 cache.kept(frame)?;
             }
-            // The cache's own copy: what was baked, wherever the cache has been moved to.
-            let file = directory.join("scene.toml");
-            let scene = Scene::recorded(cache.scene_toml(), &file, directory)?;
-            Ok((scene, Some(cache), frames))
+            if cache.manifest().is_whitewater() {
+                let stream = Stream::open(directory, cache, &frames)?;
+                return Ok((Subject::Whitewater(Box::new(stream)), frames));
+            }
+            let scene = super::baked_scene(&cache, directory)?;
+            let start = Start::of_cache::<CheckError>(&scene, &cache)?;
+            let subject = Subject::Step {
+                scene: Box::new(scene),
+                start,
+                cache: Some(cache),
+            };
+            Ok((subject, frames))
         }
     }
 }

@@ -14,15 +14,24 @@ pub mod render;
 pub mod replay;
 pub mod verify;
 mod watch;
+pub mod whitewater;
+
+use std::path::Path;
 
 use crate::{
-    cache::CacheError,
+    cache::{CacheError, CacheReader},
     domain::signed_distance::SignedDistanceError,
     gpu::{adapter::GpuError, shader::ShadersError},
     reference::ReferenceError,
-    scene::{SceneError, look::LookError, study::StudyFileError},
+    scene::{Scene, SceneError, look::LookError, study::StudyFileError},
     solve::SolveError,
 };
+
+/// The cache's own copy of its scene: what was baked, wherever the cache has been moved to.
+fn baked_scene(cache: &CacheReader, directory: &Path) -> Result<Scene, SceneError> {
+    let file = directory.join("scene.toml");
+    Scene::recorded(cache.scene_toml(), &file, directory)
+}
 
 /// Where the fault of an error lies; what a caller does about it depends on this alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

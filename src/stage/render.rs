@@ -4,6 +4,7 @@
 
 mod folder;
 mod plan;
+mod whitewater;
 
 use std::{
     collections::BTreeMap,
@@ -16,7 +17,7 @@ use glam::DAffine3;
 
 use crate::{
     cache::{self, CacheError, CacheReader, Manifest},
-    domain::{frame_range::FrameRange, signed_distance::SignedDistanceError},
+    domain::{frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError},
     gpu::adapter::{Context, GpuError, Needs},
     render::{
         Attributes, Image, RenderError, RenderScene, Renderer,
@@ -29,6 +30,7 @@ use crate::{
 };
 
 use self::folder::{Folder, Owner, Wanted};
+use self::whitewater::Whitewater;
 use super::{
     Blame,
     device::{Gpu, shaders_note},
@@ -37,6 +39,7 @@ use super::{
 pub use self::{
     folder::FolderError,
     plan::{LookPlan, Subject, plan},
+    whitewater::StreamError,
 };
 
 /// Between two looks at frames that other processes render.
@@ -128,6 +131,12 @@ pub enum RenderJobError {
     /// The output folder.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// A stream of whitewater is no water.
+    #[error("{} is a stream of whitewater: render the cache that it was made from, with a look that has [whitewater]", .0.display())]
+    IsWhitewater(PathBuf),
+    /// The stream that the look draws.
+    #[error(transparent)]
+    Whitewater(#[from] StreamError),
     /// The output would go into a cache.
     #[error("{} is in the cache {}: choose another -o", directory.display(), cache.display())]
     IntoCache {
@@ -148,7 +157,9 @@ impl From<&RenderJobError> for Blame {
             RenderJobError::Gpu(error) => error.into(),
             RenderJobError::Render(RenderError::Gpu(error)) => error.into(),
             RenderJobError::Render(RenderError::Panorama(_) | RenderError::Scene(_))
+            | RenderJobError::IsWhitewater(_)
             | RenderJobError::IntoCache { .. } => Self::Input,
+            RenderJobError::Whitewater(_) => Self::Files,
             RenderJobError::Render(
                 RenderError::NotFinite { .. }
                 | RenderError::Write { .. }
@@ -190,7 +201,19 @@ pub fn render(
         Some(_) => 0,
         None => baked as usize - frames.len(),
     };
-    let scene = baked_scene(&cache, &request.cache)?;
+    if cache.manifest().is_whitewater() {
+        return Err(RenderJobError::IsWhitewater(request.cache.clone()));
+    }
+    let whitewater = match &request.look.spec().whitewater {
+        Some(look) => Some(Whitewater::open(
+            &request.cache,
+            &look.stream,
+            &cache,
+            &frames,
+        )?),
+        None => None,
+    };
+    let scene = super::baked_scene(&cache, &request.cache)?;
     let context = request.gpu.open(Needs::default())?;
     let folder = enter(request, &cache, &frames)?;
     let image = &request.look.spec().image;
@@ -209,6 +232,7 @@ pub fn render(
         request,
         folder,
         cache,
+        whitewater,
         scene,
         context,
         kept: None,
@@ -217,12 +241,6 @@ pub fn render(
     let mut outcome = job.run(frames, stop, tell)?;
     outcome.passes = job.times.into_values().collect();
     Ok(outcome)
-}
-
-/// The cache's own copy of its scene: what was baked, wherever the cache has been moved to.
-fn baked_scene(cache: &CacheReader, directory: &Path) -> Result<Scene, SceneError> {
-    let file = directory.join("scene.toml");
-    Scene::recorded(cache.scene_toml(), &file, directory)
 }
 
 /// A renderer's fault; that of a panorama at its place in the look.
@@ -269,6 +287,8 @@ struct Job<'a> {
     request: &'a Request,
     folder: Folder,
     cache: CacheReader,
+    /// Of the stream that the look draws.
+    whitewater: Option<Whitewater>,
     scene: Scene,
     context: Context,
     /// Of the frame before, where it can draw another.
@@ -326,7 +346,10 @@ impl Job<'_> {
 
     fn frame(&mut self, frame: u32) -> Result<Done, RenderJobError> {
         let request = self.request;
-        let attributes = attributes(&self.cache, request, frame)?;
+        let mut attributes = attributes(&self.cache, request, frame)?;
+        if let Some(stream) = &self.whitewater {
+            attributes.cache_hash += &format!(" {}", stream.frame_hash(frame)?);
+        }
         let pictures = pictures(&self.cache, &request.look, frame);
         let stands = || {
             let is_there = |(name, format): &(String, FormatSpec)| {
@@ -364,7 +387,12 @@ impl Job<'_> {
         if self.request.time_passes {
             renderer.time_passes();
         }
-        let picture = renderer.render(frame, &self.cache.read(frame)?)?;
+        let water = self.cache.read(frame)?;
+        let white = match &self.whitewater {
+            Some(stream) => stream.read(frame)?,
+            None => Particles::default(),
+        };
+        let picture = renderer.render_with(frame, &water, &white)?;
         for (name, seconds, runs) in renderer.times() {
             let total = self.times.entry(name).or_insert((name, 0.0, 0));
             total.1 += seconds;

@@ -82,6 +82,7 @@ mod solve {
     mod pressure;
     mod projected;
     mod walls;
+    mod whitewater;
 }
 mod stage {
     mod branch;
@@ -89,4 +90,5 @@ mod stage {
     mod device_cpu;
     mod drive;
     mod far_origin;
+    mod whitewater;
 }

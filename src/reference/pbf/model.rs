@@ -161,7 +161,7 @@ impl Model {
     }
 
     /// Least distance from walls and solids, metres.
-    pub(super) fn contact_distance(&self) -> f64 {
+    pub(in crate::reference) fn contact_distance(&self) -> f64 {
         CONTACT * self.settings.particle_spacing
     }
 

@@ -4,6 +4,7 @@ mod aovs;
 mod build;
 mod shade;
 mod splats;
+mod whitewater;
 
 use bytemuck::Pod;
 use rayon::prelude::*;
@@ -22,6 +23,7 @@ use crate::gpu::{
 };
 use crate::scene::look::Look;
 use build::room;
+use whitewater::Whitewater;
 
 /// Renders frames of one scene with one look.
 pub struct Renderer {
@@ -35,6 +37,8 @@ pub struct Renderer {
     aovs: Recording,
     /// Particles that there is room for.
     capacity: usize,
+    /// `None` where the look draws none.
+    whitewater: Option<Whitewater>,
     timer: Option<Timer>,
 }
 
@@ -76,6 +80,7 @@ impl Renderer {
             plan,
             program,
             capacity: room(0),
+            whitewater: Whitewater::of(look, scene),
             timer: None,
         };
         context.wait()?;
@@ -103,7 +108,26 @@ impl Renderer {
     /// [`RenderError::NotFinite`] for a damaged particle, [`RenderError::Gpu`] when the device is lost or the
     /// particles are more than it binds.
     pub fn render(&mut self, frame: u32, particles: &Particles) -> Result<Image, RenderError> {
+        self.render_with(frame, particles, &Particles::default())
+    }
+
+    /// As [`Renderer::render`], with whitewater, which is drawn where the look names a stream of it.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn render_with(
+        &mut self,
+        frame: u32,
+        particles: &Particles,
+        white: &Particles,
+    ) -> Result<Image, RenderError> {
         let count = self.load(frame, particles)?;
+        if let Some(whitewater) = &mut self.whitewater {
+            let grew = whitewater.load(&mut self.program, &self.scene, frame, white)?;
+            if grew {
+                self.record();
+            }
+        }
         let setting = Setting {
             origin: self.scene.origin + self.scene.domain.min,
             size: self.plan.extent.size,
@@ -193,9 +217,14 @@ impl Renderer {
         let capacity = room(particles);
         self.program.refit(&[PARTICLES.sized(capacity)], &[])?;
         self.capacity = capacity;
+        self.record();
+        Ok(())
+    }
+
+    /// Binds every command to the buffers as they are now.
+    fn record(&mut self) {
         self.sample = Recording::new(&self.program, &self.plan.sample);
         self.aovs = Recording::new(&self.program, &self.plan.aovs);
-        Ok(())
     }
 
     /// Draws what does not change from frame to frame.

@@ -23,7 +23,7 @@ pub(super) struct Shade {
 /// Plans the shading of the plan's bands; `surface` is where the smoothed depth stands.
 pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
     let has_aovs = !look.spec().output.aovs.is_empty();
-    if look.spec().water.spray.is_some() {
+    if look.spec().water.spray.is_some() || look.spec().whitewater.is_some() {
         plan.define("ssfr/shade", "SPRAY");
     }
     if has_aovs {

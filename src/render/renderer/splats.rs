@@ -6,7 +6,10 @@ use crate::{
         recording::{Bind, Command, Groups},
     },
     render::{
-        buffers::{DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, SPRAY, THICKNESS, THICKNESS_PARAMS},
+        buffers::{
+            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, SPRAY, THICKNESS, THICKNESS_PARAMS,
+            WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS,
+        },
         frame::FAR,
         plan::Plan,
         uniform::Thickness,
@@ -20,7 +23,7 @@ pub(super) struct Splats {
     pub(super) body: Vec<Command>,
     /// Whose sphere is the nearest, while the depth is still that of the spheres; nothing where no one asks.
     pub(super) owner: Vec<Command>,
-    /// Aerated water before the surface; nothing where the look has none.
+    /// Aerated water and whitewater before the surface; nothing where the look has none.
     pub(super) spray: Vec<Command>,
 }
 
@@ -63,16 +66,24 @@ pub(super) fn plan_splats(
         }
         false => Vec::new(),
     };
-    let spray = match look.spec().water.spray {
-        Some(_) => {
-            plan.buffer(&SPRAY, pixels / 4);
-            let binds = vec![params(), Bind::whole("surface", surface)];
-            vec![
-                Command::clear(&SPRAY),
-                over_particles("ssfr/splat_spray", binds),
-            ]
-        }
-        None => Vec::new(),
-    };
+    let mut spray = Vec::new();
+    let (drawn, white) = (&look.spec().water.spray, &look.spec().whitewater);
+    if drawn.is_some() || white.is_some() {
+        plan.buffer(&SPRAY, pixels / 4);
+        spray.push(Command::clear(&SPRAY));
+    }
+    let before = || Bind::whole("surface", surface);
+    if drawn.is_some() {
+        let binds = vec![params(), before()];
+        spray.push(over_particles("ssfr/splat_spray", binds));
+    }
+    if white.is_some() {
+        plan.buffer(&WHITEWATER, 1);
+        plan.buffer(&WHITEWATER_PARAMS, 1);
+        plan.buffer(&WHITEWATER_GROUPS, 1);
+        let groups = Groups::at(&WHITEWATER_GROUPS, 0);
+        let binds = vec![before()];
+        spray.push(Command::in_groups("ssfr/splat_whitewater", groups, binds));
+    }
     Splats { body, owner, spray }
 }

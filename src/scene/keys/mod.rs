@@ -12,7 +12,7 @@ mod study;
 #[cfg(test)]
 mod tests;
 
-use super::{key::Key, look, tolerance};
+use super::{key::Key, look, tolerance, whitewater};
 
 pub use page::page;
 
@@ -30,15 +30,18 @@ pub enum File {
     Study,
     /// A tolerance file.
     Tolerance,
+    /// Settings of whitewater.
+    Whitewater,
 }
 
 impl File {
     /// With the names that the command line uses.
-    pub const NAMED: [(&'static str, Self); 4] = [
+    pub const NAMED: [(&'static str, Self); 5] = [
         ("scene", Self::Scene),
         ("look", Self::Look),
         ("study", Self::Study),
         ("tolerance", Self::Tolerance),
+        ("whitewater", Self::Whitewater),
     ];
 
     /// Its keys, in the order of the page.
@@ -48,6 +51,7 @@ impl File {
             Self::Look => look::KEYS,
             Self::Study => STUDY,
             Self::Tolerance => tolerance::KEYS,
+            Self::Whitewater => whitewater::KEYS,
         }
     }
 }

@@ -31,6 +31,10 @@ fn chapter(out: &mut String, file: File) {
             "Tolerance keys",
             "What a file does not name is shown and not judged. `NAME` is a name of an attribute or an aggregate.",
         ),
+        File::Whitewater => (
+            "Whitewater keys",
+            "Of the file that `swell whitewater CACHE --settings FILE` takes. None of them is physics of the bake.",
+        ),
     };
     *out += &format!("\n## {title}\n\n{intro}\n");
     section(out, file, "", "", file.keys());

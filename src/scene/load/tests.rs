@@ -257,6 +257,10 @@ fn overrides_reach_everywhere_and_take_bare_words() {
             "solver.pbf.iteratons: unknown key in [solver.pbf]; the nearest is \"iterations\"",
         ),
         (
+            "shot.fps=24",
+            "shot.fps: unknown key in [shot]; the nearest is \"frames_per_second\"",
+        ),
+        (
             "water.block=[{min=[0,0,0],max=[99,1,1]}]",
             "water.block[0].max: the water does not fit",
         ),

@@ -14,6 +14,9 @@ pub(in super::super) const KEYS: &[Key] = &[
     Key::table("water", WATER)
         .default("{}")
         .about("What the water is like inside"),
+    Key::table("whitewater", WHITEWATER)
+        .absent()
+        .about("Spray, foam and bubbles of a stream that `swell whitewater` made"),
     Key::table("sun", SUN).default("{}").about("The sun"),
     Key::table("sky", SKY).about("What the water mirrors"),
     Key::table("ground", GROUND)
@@ -163,6 +166,21 @@ const SPRAY: &[Key] = &[
     Key::number("speed_m_per_s", 1e-3..=1e4)
         .unit("m/s")
         .about("speed from which the surface begins to whiten"),
+];
+
+const WHITEWATER: &[Key] = &[
+    Key::file_stem("stream")
+        .default("\"default\"")
+        .about("its name, which is that of its folder in CACHE/whitewater"),
+    Key::number("density_per_metre", PER_METRE)
+        .unit("1/m")
+        .default("40.0")
+        .about(
+            "optical density within a whitewater particle, which stands for many drops or bubbles",
+        ),
+    Key::number("size", 1e-3..=1e3)
+        .default("1.0")
+        .about("factor on its radius"),
 ];
 
 const SUN: &[Key] = &[

@@ -16,6 +16,8 @@ pub struct LookSpec {
     pub surface: SurfaceSpec,
     /// What the water is like inside.
     pub water: WaterSpec,
+    /// A stream of spray, foam and bubbles; none is drawn unless named.
+    pub whitewater: Option<WhitewaterLook>,
     /// The sun.
     pub sun: SunSpec,
     /// What the water mirrors.
@@ -127,6 +129,18 @@ pub struct WaterSpec {
     pub scattering_per_metre: [f64; 3],
     /// White water where particles are thrown clear or fast; none unless named.
     pub spray: Option<SpraySpec>,
+}
+
+/// How a stream of whitewater is drawn.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WhitewaterLook {
+    /// Name of the stream, of `CACHE/whitewater`.
+    pub stream: String,
+    /// Optical density within a whitewater particle, 1/m.
+    pub density_per_metre: f64,
+    /// Factor on its radius.
+    pub size: f64,
 }
 
 /// Whitening of thrown and fast water.

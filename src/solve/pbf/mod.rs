@@ -4,7 +4,7 @@ pub mod buffers;
 mod iteration;
 pub(super) mod plan;
 mod projection;
-mod record;
+pub(super) mod record;
 
 use glam::DVec3;
 
@@ -60,6 +60,47 @@ pub struct Pbf {
     /// Positions relative to the domain's least corner, metres, and pressures, Pa, of the last substep's particles; empty
     /// where the scene asks for none.
     pressed: Vec<(DVec3, f64)>,
+}
+
+/// What the passes of a substep know that ends at `time` and is `step` seconds long.
+pub(super) fn params(
+    scene: &Scene,
+    calibration: &Calibration,
+    plan: &Plan,
+    time: f64,
+    step: f64,
+) -> Params {
+    let pbf = scene.solver.pbf();
+    let walls = scene.walls(time);
+    let wall_velocity = scene.wall_velocity(time, step);
+    let Period(period) = scene.period();
+    let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
+    Params {
+        velocity_step: (scene.predicted_gravity() * step).as_vec3().to_array(),
+        particle_count: plan.counts.particles as u32,
+        grid_dims: plan.grid_dims,
+        max_correction: (MAX_CORRECTION * pbf.particle_spacing) as f32,
+        wall_min: walls.min.as_vec3().to_array(),
+        time_step: step as f32,
+        wall_max: walls.max.as_vec3().to_array(),
+        inverse_time_step: if step > 0.0 { (1.0 / step) as f32 } else { 0.0 },
+        support_radius: calibration.support_radius as f32,
+        inverse_support_radius: (1.0 / calibration.support_radius) as f32,
+        nobody: (plan.counts.particles + plan.counts.boundary_samples) as u32,
+        density_scale: calibration.density_scale as f32,
+        gradient_scale: calibration.gradient_scale as f32,
+        wall_density_scale: calibration.wall_density_scale as f32,
+        regularization: (REGULARIZATION * calibration.bulk_gradient_squares) as f32,
+        relaxation: pbf.relaxation as f32,
+        contact_distance: (CONTACT * pbf.particle_spacing) as f32,
+        max_displacement: (CAP * pbf.cfl * pbf.particle_spacing) as f32,
+        artificial_pressure: (pbf.artificial_pressure * natural_lambda) as f32,
+        period_x: period.x as f32,
+        wall_velocity_min: wall_velocity.min.as_vec3().to_array(),
+        period_y: period.y as f32,
+        wall_velocity_max: wall_velocity.max.as_vec3().to_array(),
+        period_z: period.z as f32,
+    }
 }
 
 impl Pbf {
@@ -138,38 +179,7 @@ impl Pbf {
     }
 
     fn params(&self, time: f64, step: f64) -> Params {
-        let pbf = self.scene.solver.pbf();
-        let calibration = &self.calibration;
-        let walls = self.scene.walls(time);
-        let wall_velocity = self.scene.wall_velocity(time, step);
-        let Period(period) = self.scene.period();
-        let natural_lambda = 1.0 / calibration.bulk_gradient_squares;
-        Params {
-            velocity_step: (self.scene.predicted_gravity() * step).as_vec3().to_array(),
-            particle_count: self.plan.counts.particles as u32,
-            grid_dims: self.plan.grid_dims,
-            max_correction: (MAX_CORRECTION * pbf.particle_spacing) as f32,
-            wall_min: walls.min.as_vec3().to_array(),
-            time_step: step as f32,
-            wall_max: walls.max.as_vec3().to_array(),
-            inverse_time_step: if step > 0.0 { (1.0 / step) as f32 } else { 0.0 },
-            support_radius: calibration.support_radius as f32,
-            inverse_support_radius: (1.0 / calibration.support_radius) as f32,
-            nobody: (self.plan.counts.particles + self.plan.counts.boundary_samples) as u32,
-            density_scale: calibration.density_scale as f32,
-            gradient_scale: calibration.gradient_scale as f32,
-            wall_density_scale: calibration.wall_density_scale as f32,
-            regularization: (REGULARIZATION * calibration.bulk_gradient_squares) as f32,
-            relaxation: pbf.relaxation as f32,
-            contact_distance: (CONTACT * pbf.particle_spacing) as f32,
-            max_displacement: (CAP * pbf.cfl * pbf.particle_spacing) as f32,
-            artificial_pressure: (pbf.artificial_pressure * natural_lambda) as f32,
-            period_x: period.x as f32,
-            wall_velocity_min: wall_velocity.min.as_vec3().to_array(),
-            period_y: period.y as f32,
-            wall_velocity_max: wall_velocity.max.as_vec3().to_array(),
-            period_z: period.z as f32,
-        }
+        params(&self.scene, &self.calibration, &self.plan, time, step)
     }
 
     /// Zeroes what adds up over a frame.

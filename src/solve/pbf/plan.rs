@@ -179,6 +179,6 @@ fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
 }
 
 /// Cells that particles are sorted by.
-pub(super) fn cell_count(plan: &Plan) -> usize {
+pub(in crate::solve) fn cell_count(plan: &Plan) -> usize {
     plan.grid_dims.iter().map(|&n| n as usize).product()
 }

@@ -30,7 +30,8 @@ impl Commands {
     }
 }
 
-fn sorting(plan: &Plan) -> Vec<Command> {
+/// Particles by cell, and within a cell by id.
+pub(in crate::solve) fn sorting(plan: &Plan) -> Vec<Command> {
     let n = plan.counts.particles;
     let mut commands = vec![
         Command::clear(&CELL_START),

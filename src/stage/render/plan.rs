@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{RenderJobError, baked_scene, render_scene, told};
+use super::{RenderJobError, render_scene, told};
 use crate::{
     cache::CacheReader,
     domain::bounds::Bounds,
@@ -14,7 +14,7 @@ use crate::{
     },
     render::{Limits, Plan, RenderScene, Runs},
     scene::{Scene, look::Look},
-    stage::prepare::Start,
+    stage::{baked_scene, prepare::Start},
 };
 
 /// What is planned to stand before the camera.

@@ -231,8 +231,8 @@ fn a_probe_that_cannot_be_is_told() {
         (
             "kind = \"volume\"\nname = \"energy-1\"\n[[probe]]\nkind = \"energy\"",
             &[],
-            "probe[1].kind",
-            "a second probe of the name \"energy-1\"",
+            "probe[1].name",
+            "a second probe of the name \"energy-1\", which it has by its kind and place",
         ),
         (
             "kind = \"volume\"",

@@ -2,6 +2,7 @@
 mod controls;
 mod frames;
 mod periodic;
+mod whitewater;
 
 use swell::{
     check::pbf,

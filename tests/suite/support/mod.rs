@@ -9,6 +9,7 @@ pub mod paper;
 pub mod pressure;
 #[cfg(target_os = "linux")]
 pub mod tmpfs;
+pub mod whitewater;
 
 use glam::DVec3;
 use swell::{

@@ -1,0 +1,67 @@
+// Spray, foam and bubbles before the surface or just under it, at half resolution: what whitens the water.
+#import "shared/camera.wgsl"
+#import "shared/ssfr_splat.wgsl"
+
+struct Whitewater {
+    // World position, and radius, metres.
+    position: vec3f,
+    radius: f32,
+    velocity: vec3f,
+    pad: f32,
+}
+
+struct WhitewaterParams {
+    // How many there are.
+    count: u32,
+    // Factor on radii.
+    size: f32,
+    // Optical density over that which the sums stand for.
+    density: f32,
+    // Depth at which the water over a bubble has taken 63 % of its white, metres.
+    fading: f32,
+}
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<uniform> whitewater_params: WhitewaterParams;
+@group(0) @binding(2) var<storage, read> whitewater: array<Whitewater>;
+@group(0) @binding(3) var<storage, read> solid_depth: array<f32>;
+@group(0) @binding(4) var<storage, read> surface: array<f32>;
+@group(0) @binding(5) var<storage, read_write> spray: array<atomic<u32>>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = (group.x + group.y * groups.x) * 64u + lane;
+    if index >= whitewater_params.count {
+        return;
+    }
+    let one = whitewater[index];
+    let half_size = camera.size / 2u;
+    let c = eye_from_world(camera, one.position + one.velocity * camera.seconds);
+    let own = whitewater_params.size * one.radius;
+    // At least 0.7 pixels of the half resolution, so that a small one is fainter and never missed: its volume stays.
+    let radius = max(own, 1.4 * c.z / camera.focal);
+    let shrunk = own / radius;
+    let weight = whitewater_params.density * shrunk * shrunk * shrunk * THICKNESS_SCALE;
+    let bounds = sphere_bounds(camera, c, radius, 0.5, half_size);
+    for (var y = bounds.y; y <= bounds.w; y++) {
+        for (var x = bounds.x; x <= bounds.z; x++) {
+            let pixel = vec2u(vec2i(x, y));
+            let at = 2u * (pixel.y * camera.size.x + pixel.x);
+            if c.z >= solid_depth[at] {
+                continue;
+            }
+            let ray = eye_ray(camera, 2.0 * vec2f(pixel) + 1.0);
+            let chord = max(hit_sphere(ray, c, radius).chord, 0.0);
+            // Under the surface the water over it takes its white away.
+            let under = max(c.z - surface[at], 0.0);
+            let amount = u32(chord * weight * exp(-under / whitewater_params.fading) + 0.5);
+            if amount > 0u {
+                atomicAdd(&spray[pixel.y * half_size.x + pixel.x], amount);
+            }
+        }
+    }
+}

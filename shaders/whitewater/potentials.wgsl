@@ -1,0 +1,65 @@
+// What at each water particle makes whitewater (Ihmsen et al. 2012, eqs. 2 to 7): air that is trapped where water meets water, the
+// crest of a wave that moves outward, and the energy that both need. W = 1 − r/h.
+#import "shared/thread.wgsl"
+#import "shared/pbf_params.wgsl"
+#import "shared/search.wgsl"
+#import "shared/whitewater.wgsl"
+
+@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
+@group(0) @binding(10) var<storage, read> share: array<f32>;
+@group(0) @binding(11) var<storage, read> surface: array<vec4f>;
+@group(0) @binding(12) var<storage, read> sorted_velocity: array<vec4f>;
+// Trapped air, wave crest, energy, share of water.
+@group(0) @binding(13) var<storage, read_write> potential: array<vec4f>;
+
+// Cosines between velocity and normal from which a crest moves outward, and fully does: domain::whitewater.
+override OUTWARD_LEAST: f32;
+override OUTWARD_FULL: f32;
+
+var<private> own_position: vec3f;
+var<private> own_velocity: vec3f;
+var<private> own_surface: vec4f;
+var<private> trapped_air: f32;
+var<private> wave_crest: f32;
+
+fn visit(i: u32, j: u32) {
+#ifdef SOLIDS
+    if j >= fluid_count {
+        return;
+    }
+#endif
+    let d = between(own_position, predicted[j].xyz);
+    let r2 = dot(d, d);
+    let inverse_r = inverseSqrt(max(r2, 1e-30));
+    let w = max(1.0 - r2 * inverse_r * inverse_h, 0.0);
+    let against = own_velocity - sorted_velocity[j].xyz;
+    trapped_air += (length(against) - dot(against, d) * inverse_r) * w;
+    // Where the surface bends away from its neighbours: they lie behind the normal's plane.
+    let other = surface[j];
+    let behind = clamp(4.0 * dot(d, own_surface.xyz) * inverse_r, 0.0, 1.0);
+    wave_crest += (1.0 - dot(own_surface.xyz, other.xyz)) * other.w * behind * w;
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let i = thread_index(workgroup, workgroups, local, 64u);
+    if i >= params.particle_count {
+        return;
+    }
+    begin_water();
+    own_position = predicted[i].xyz;
+    own_velocity = sorted_velocity[i].xyz;
+    own_surface = surface[i];
+    trapped_air = 0.0;
+    wave_crest = 0.0;
+    search_neighbors(own_position, i);
+    let speed = length(own_velocity);
+    let cosine = dot(own_velocity, own_surface.xyz) / max(speed, 1e-30);
+    let outward = clamp((cosine - OUTWARD_LEAST) / (OUTWARD_FULL - OUTWARD_LEAST), 0.0, 1.0);
+    let crest = wave_crest * own_surface.w * outward;
+    potential[i] = vec4f(trapped_air, crest, 0.5 * speed * speed, share[i]);
+}

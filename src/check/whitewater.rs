@@ -1,0 +1,452 @@
+//! A frame of whitewater: its passes on the GPU against their f64 twins, from the same water and the same whitewater.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::{
+    compare::{
+        rounding::{GRADIENT, KERNEL, Sums, U, WALL_DENSITY, WALL_GRADIENT, WALL_PLACE},
+        tolerance::bounds,
+    },
+    domain::{
+        boundary::Boundary,
+        particles::Particles,
+        whitewater::{KIND, Kind, OUTWARD, Potentials, SURFACE, Settings},
+    },
+    gpu::adapter::Context,
+    reference::whitewater::{Moved, Neighbor, Surveyed, Water, White},
+    scene::Scene,
+    solve::{
+        SolveError,
+        whitewater::{SHARE, SURFACE_AT, Whitewater},
+    },
+};
+
+use super::{
+    Table,
+    table::{entries, pair},
+};
+
+bounds! {
+    SHARE_ERROR = [scale: "the kernel's scale", fluid: "of the water " KERNEL, solid: "of the solids " KERNEL, walls: "" WALL_DENSITY,
+        share: "the share of water", free: "what walls and solids leave free"]
+        (scale * fluid + share * (walls + scale * solid)) / free + 12.0 * U * share, "a quotient";
+    STEEPNESS = [scale: "the gradient's scale", sums: "" GRADIENT, walls: "over h " WALL_GRADIENT] scale * sums + walls, "";
+    DIRECTION = [steepness: "|∇|", error: "" STEEPNESS] 2.0 * error / steepness + 12.0 * U, "a vector over its own length";
+    SURENESS = [error: "h times " STEEPNESS, span: "from where a surface begins to where it is full"] error / span + 12.0 * U, "";
+    NO_SURFACE = [error: "h times " STEEPNESS, least: "where a surface begins"] least - error,
+        "a gradient so small that there is surely no surface: its direction is noise";
+    TRAPPED = [n: "candidates", speeds: "Σ |v_ij|", weighted: "Σ |v_ij| W"] U * (24.0 * speeds + (n + 60.0) * weighted),
+        "W errs by 11 u, the length by 9 u, the cosine by 14 u, each term is at most 2 |v_ij| W";
+    CREST = [sums: "Σ W (what the normals and their sureness err by)", n: "candidates", weight: "Σ W",
+        crest: "the sum itself", own: "by what the particle's own sureness and direction of motion err"]
+        sums + U * (22.0 * n + 2.0 * (n + 20.0) * weight) + crest * own, "";
+    PLACE = [place: "|x| + |way|", way: "of a drop: what air takes of it; else by what the water's velocity errs, times Δt"]
+        8.0 * U * place + way, "";
+    CARRIED = [sums: "with w = |v| " KERNEL, kernel: "Σ p³", speed: "the largest |v| about", spread: "|Δv| about over h, times " PLACE]
+        2.0 * sums / kernel + 8.0 * U * speed + spread, "a weighted mean";
+    FLOWN = [drag: "what air takes", pull: "|v| + |g| Δt"] 1e-5 * drag + 60.0 * U * pull,
+        "eight steps; a power by way of exp2 and log2 errs by 4e-6";
+    DECIDED = [place: "" PLACE, h: "", scale: "the kernel's scale", sums: "" KERNEL, free: "what walls and solids leave free"]
+        (4.0 * place / h + 4.0 * scale * sums + 64.0 * U) / free, "what a share errs by on the way: both outcomes are right";
+}
+
+entries! {
+    "whitewater/survey" {
+        SHARE_OF = "share of water", "": [error: "" SHARE_ERROR] error, "";
+        NORMAL = "normal", "": [error: "" DIRECTION] error, "", tie NO_SURFACE;
+        SURE = "surface", "": [error: "" SURENESS] error, "";
+    }
+    "whitewater/potentials" {
+        TRAPPED_AIR = "trapped air", "m/s": [error: "" TRAPPED] error, "";
+        WAVE_CREST = "wave crest", "": [error: "" CREST] error, "";
+        ENERGY = "energy", "J/kg": [energy: "v²/2"] 24.0 * U * energy, "";
+    }
+    "whitewater/advance" {
+        POSITION = "position", "m": [error: "" PLACE] error, "", tie DECIDED;
+        VELOCITY = "velocity", "m/s": [error: "of water " CARRIED] error, "", tie DECIDED;
+        KIND_OF = "kind", "": [] 0.0, "whole numbers", tie DECIDED;
+    }
+}
+
+/// What a frame of whitewater is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// [`Scene::of_whitewater`] of what was baked.
+    pub scene: &'a Scene,
+    /// Its solids.
+    pub boundary: &'a Boundary,
+    /// Of the stream.
+    pub settings: &'a Settings,
+    /// Water at the frame's end.
+    pub water: &'a Particles,
+    /// Whitewater at the frame before.
+    pub white: &'a Particles,
+    /// Of the frame's end, seconds.
+    pub time: f64,
+    /// Since the frame before.
+    pub seconds: f64,
+}
+
+/// Holds the frame's passes against their twins.
+///
+/// # Errors
+/// The device and its numbers.
+pub fn check(context: &Context, frame: Frame<'_>) -> Result<Table, SolveError> {
+    let Frame {
+        scene,
+        boundary,
+        water,
+        ..
+    } = frame;
+    let n = water.len();
+    let mut device = Whitewater::new(context, scene, boundary, n, false)?;
+    device.set(frame.settings)?;
+    let potentials = device.survey(water, frame.time, frame.seconds)?;
+    let mut table = Table::default();
+    let twin = Twin::of(frame);
+    twin.survey(
+        &mut table,
+        &device.field(SHARE, n)?,
+        &device.field(SURFACE_AT, n)?,
+    );
+    twin.potentials(&mut table, &potentials);
+    if !frame.white.is_empty() {
+        let mut moved = frame.white.clone();
+        device.advance(&mut moved, 0)?;
+        twin.advance(&mut table, &moved);
+    }
+    let sorting = "its order is what the survey is read in";
+    for pass in [
+        "pbf/assign_cells",
+        "sort/scan_blocks",
+        "sort/add_block_sums",
+    ] {
+        table.unchecked.push((pass, sorting));
+    }
+    for pass in ["sort/place", "sort/stabilize", "pbf/reorder"] {
+        table.unchecked.push((pass, sorting));
+    }
+    Ok(table)
+}
+
+/// The water in f64, and what rounding may do to each particle's sums.
+struct Twin<'a> {
+    frame: Frame<'a>,
+    water: Water,
+    surveyed: Vec<Surveyed>,
+    errors: Vec<Errors>,
+}
+
+/// What rounding may do about a place.
+#[derive(Clone, Copy, Debug, Default)]
+struct Errors {
+    share: f64,
+    /// Of |∇| h.
+    steepness: f64,
+    /// Of the normal; 0 where there is surely no surface.
+    direction: f64,
+    /// Of the sureness.
+    sure: f64,
+}
+
+impl<'a> Twin<'a> {
+    fn of(frame: Frame<'a>) -> Self {
+        let water = Water::new(frame.scene, frame.boundary, frame.water, frame.time);
+        let n = water.points.len();
+        let surveyed: Vec<Surveyed> = (0..n).into_par_iter().map(|i| water.survey(i)).collect();
+        let errors = (0..n).into_par_iter();
+        let errors = errors.map(|i| errors_of(&water, i, &surveyed[i])).collect();
+        Self {
+            frame,
+            water,
+            surveyed,
+            errors,
+        }
+    }
+
+    fn survey(&self, table: &mut Table, share: &[f32], surface: &[[f32; 4]]) {
+        let n = self.surveyed.len();
+        let [least, _] = SURFACE;
+        table.each(&SHARE_OF, 0..n, |i| {
+            pair(i, share[i], self.surveyed[i].share, [self.errors[i].share])
+        });
+        table.each(&NORMAL, 0..n, |i| {
+            let (one, error) = (&self.surveyed[i], &self.errors[i]);
+            let found = Vec3::from_slice(&surface[i]).as_dvec3();
+            let is_noise = one.steepness < NO_SURFACE.of([error.steepness, least]);
+            (!is_noise).then(|| pair(i, found, one.normal, [error.direction]))
+        });
+        table.each(&SURE, 0..n, |i| {
+            pair(
+                i,
+                surface[i][3],
+                self.surveyed[i].sure,
+                [self.errors[i].sure],
+            )
+        });
+    }
+
+    /// `found` is in the order of the water that was handed in.
+    fn potentials(&self, table: &mut Table, found: &[Potentials]) {
+        let n = self.surveyed.len();
+        let rows: Vec<(Potentials, [f64; 3], [f64; 5])> = (0..n)
+            .into_par_iter()
+            .map(|i| {
+                let exact = self.water.potentials(i, &self.surveyed);
+                (exact, self.trapped(i), self.crest(i))
+            })
+            .collect();
+        let found = |i: usize| &found[self.water.order[i]];
+        table.each(&TRAPPED_AIR, 0..n, |i| {
+            let (exact, trapped, _) = &rows[i];
+            pair(
+                i,
+                found(i).trapped_air,
+                exact.trapped_air,
+                [TRAPPED.of(*trapped)],
+            )
+        });
+        table.each(&WAVE_CREST, 0..n, |i| {
+            let (exact, _, crest) = &rows[i];
+            pair(i, found(i).wave_crest, exact.wave_crest, [CREST.of(*crest)])
+        });
+        table.each(&ENERGY, 0..n, |i| {
+            let exact = rows[i].0.energy;
+            pair(i, found(i).energy, exact, [exact])
+        });
+    }
+
+    /// Magnitudes of [`TRAPPED`].
+    fn trapped(&self, i: usize) -> [f64; 3] {
+        let h = self.water.model.calibration.support_radius;
+        let (mut n, mut speeds, mut weighted) = (0.0, 0.0, 0.0);
+        self.water.about(self.water.points[i], |neighbor, way| {
+            if let Neighbor::Water(j) = neighbor {
+                let speed = self.water.velocity[i].distance(self.water.velocity[j]);
+                let w = (1.0 - way.length() / h).max(0.0);
+                n += 1.0;
+                // What lies beyond h weighs nothing, but by rounding.
+                speeds += if way.length() < 1.001 * h { speed } else { 0.0 };
+                weighted += speed * w;
+            }
+        });
+        [n, speeds, weighted]
+    }
+
+    /// Magnitudes of [`CREST`].
+    fn crest(&self, i: usize) -> [f64; 5] {
+        let h = self.water.model.calibration.support_radius;
+        let (own, own_error) = (&self.surveyed[i], &self.errors[i]);
+        if own_error.sure == 0.0 {
+            return [0.0; 5];
+        }
+        let (mut sums, mut n, mut weight, mut crest) = (0.0, 0.0, 0.0, 0.0);
+        self.water.about(self.water.points[i], |neighbor, way| {
+            let Neighbor::Water(j) = neighbor else {
+                return;
+            };
+            let w = (1.0 - way.length() / h).max(0.0);
+            let (other, error) = (&self.surveyed[j], &self.errors[j]);
+            n += 1.0;
+            weight += w;
+            let along = way.normalize_or_zero();
+            let behind = (4.0 * along.dot(own.normal)).clamp(0.0, 1.0);
+            crest += (1.0 - own.normal.dot(other.normal)) * other.sure * behind * w;
+            let of_normals = (own_error.direction + error.direction) * other.sure;
+            let of_behind = 8.0 * (own_error.direction + 12.0 * U) * other.sure;
+            sums += w * (of_normals + 2.0 * error.sure + of_behind);
+        });
+        let [least, full] = OUTWARD;
+        let outward = (own_error.direction + 16.0 * U) / (full - least);
+        [sums, n, weight, crest, own_error.sure + outward]
+    }
+
+    fn advance(&self, table: &mut Table, found: &Particles) {
+        let Frame {
+            scene,
+            settings,
+            seconds,
+            white,
+            ..
+        } = self.frame;
+        let (corner, gravity) = (scene.domain.min, scene.water.gravity);
+        let wide = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+        let rows: Vec<(Moved, Option<[f64; 2]>)> = (0..white.len())
+            .into_par_iter()
+            .map(|k| {
+                let before = White {
+                    position: (wide(white.position[k]) - corner).as_vec3().as_dvec3(),
+                    velocity: wide(white.velocity[k]),
+                    kind: Kind::of_number(white.attributes[KIND][k]).unwrap_or(Kind::Foam),
+                };
+                let moved = self.water.advance(settings, gravity, seconds, before);
+                (moved, self.moved_errors(&before, &moved, gravity))
+            })
+            .collect();
+        let n = rows.len();
+        table.each(&POSITION, 0..n, |k| {
+            let (moved, errors) = &rows[k];
+            let [place, _] = (*errors)?;
+            let position = wide(found.position[k]) - corner;
+            let period = self.water.model.period();
+            // By rounding alone a place may stand at the other end.
+            let near = period.image_by_rounding(position, moved.white.position);
+            Some(pair(k, near, moved.white.position, [place]))
+        });
+        table.each(&VELOCITY, 0..n, |k| {
+            let (moved, errors) = &rows[k];
+            let [_, velocity] = (*errors)?;
+            Some(pair(
+                k,
+                wide(found.velocity[k]),
+                moved.white.velocity,
+                [velocity],
+            ))
+        });
+        table.each(&KIND_OF, 0..n, |k| {
+            let (moved, errors) = &rows[k];
+            let kind = f64::from(moved.white.kind.number());
+            errors.map(|_| pair(k, f64::from(found.attributes[KIND][k]), kind, []))
+        });
+    }
+
+    /// What rounding may do to the place and the velocity of one; `None` where it decides which way it goes, or where a solid
+    /// pushed it, which the twins of the solvers hold.
+    fn moved_errors(&self, before: &White, moved: &Moved, gravity: DVec3) -> Option<[f64; 2]> {
+        if moved.is_pushed {
+            return None;
+        }
+        let (settings, seconds) = (self.frame.settings, self.frame.seconds);
+        let model = &self.water.model;
+        let h = model.calibration.support_radius;
+        let now = &moved.white;
+        let about = self.about(now.position);
+        let pull = before.velocity.length().max(now.velocity.length()) + gravity.length() * seconds;
+        let wind = DVec3::from_array(settings.wind);
+        let drag = (before.velocity + seconds * gravity - now.velocity).length();
+        let flown = FLOWN.of([drag.min((before.velocity - wind).length() + pull), pull]);
+        let way = now.position.length() + seconds * pull;
+        let flight = PLACE.of([way, seconds * flown]);
+        // A place in the water is found by a way that errs as a flight does; a carried one errs by the velocity there as well.
+        let spread = about.spread / h * flight;
+        let carried = CARRIED.of([about.speeds, about.kernel.max(1e-3), about.fastest, spread]);
+        let place = PLACE.of([way, seconds * (flown + carried)]);
+        let scale = model.calibration.density_scale;
+        let decided = DECIDED.of([place, h, scale, about.sums.kernel(), about.free]);
+        (moved.margin > decided).then_some([place, flown + carried])
+    }
+
+    /// What lies about a place.
+    fn about(&self, x: DVec3) -> About {
+        let h = self.water.model.calibration.support_radius;
+        let mut about = About::default();
+        let (mut weighted, mut solid) = (Sums::default(), 0.0);
+        let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        self.water.about(x, |neighbor, way| {
+            let q = way.length() / h;
+            match neighbor {
+                Neighbor::Water(j) => {
+                    let v = self.water.velocity[j];
+                    about.sums.add(q, 1.0);
+                    weighted.add(q, v.length());
+                    if q < 1.001 {
+                        (least, most) = (least.min(v), most.max(v));
+                        about.fastest = about.fastest.max(v.length());
+                    }
+                    about.kernel += (1.0 - q * q).max(0.0).powi(3);
+                }
+                Neighbor::Sample(weight) => {
+                    about.sums.add(q, weight);
+                    solid += weight * (1.0 - q * q).max(0.0).powi(3);
+                }
+            }
+        });
+        about.speeds = weighted.kernel() + about.fastest * about.sums.kernel();
+        // Slopes of weights are at most 4/h of them: a mean moves by no more of the spread.
+        about.spread = match most.cmpge(least).all() {
+            true => 8.0 * (most - least).length(),
+            false => 0.0,
+        };
+        let (wall, _) = self.water.model.wall_term(x, &self.water.walls);
+        let scale = self.water.model.calibration.density_scale;
+        about.free = (1.0 - wall - scale * solid).max(0.1);
+        about
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct About {
+    sums: Sums,
+    /// Σ p³ of the water.
+    kernel: f64,
+    /// [`KERNEL`] with speeds as weights.
+    speeds: f64,
+    fastest: f64,
+    spread: f64,
+    free: f64,
+}
+
+fn errors_of(water: &Water, i: usize, surveyed: &Surveyed) -> Errors {
+    let (x, h) = (water.points[i], water.model.calibration.support_radius);
+    let (mut fluid, mut solids, mut all) = (Sums::default(), Sums::default(), Sums::default());
+    let mut solid = 0.0;
+    water.about(x, |neighbor, way| {
+        let q = way.length() / h;
+        match neighbor {
+            Neighbor::Water(_) => {
+                fluid.add(q, 1.0);
+                all.add(q, 1.0);
+            }
+            Neighbor::Sample(weight) => {
+                solids.add(q, weight);
+                all.add(q, weight);
+                solid += weight * (1.0 - q * q).max(0.0).powi(3);
+            }
+        }
+    });
+    let gaps = [
+        (x - water.walls.min).to_array(),
+        (water.walls.max - x).to_array(),
+    ];
+    let faces = gaps
+        .iter()
+        .flatten()
+        .filter(|&&gap| gap < h * 1.001)
+        .count() as f64;
+    let off = |x: DVec3| (x - x.as_vec3().as_dvec3()).abs().max_element();
+    let misplaced = off(water.walls.min).max(off(water.walls.max));
+    let q = WALL_PLACE.of([misplaced / h]);
+    let walls = WALL_DENSITY.of([faces, q]);
+    let wall_gradient = WALL_GRADIENT.of([faces, q, walls]);
+    let calibration = &water.model.calibration;
+    let (wall, _) = water.model.wall_term(x, &water.walls);
+    let free = (1.0 - wall - calibration.density_scale * solid).max(0.1);
+    let share = SHARE_ERROR.of([
+        calibration.density_scale,
+        fluid.kernel(),
+        solids.kernel(),
+        walls,
+        surveyed.share,
+        free,
+    ]);
+    let steepness = h * STEEPNESS.of([
+        calibration.gradient_scale,
+        all.gradient(),
+        wall_gradient / h,
+    ]);
+    let [least, full] = SURFACE;
+    if surveyed.steepness < NO_SURFACE.of([steepness, least]) {
+        return Errors {
+            share,
+            steepness,
+            ..Errors::default()
+        };
+    }
+    Errors {
+        share,
+        steepness,
+        direction: DIRECTION.of([surveyed.steepness, steepness]),
+        sure: SURENESS.of([steepness, full - least]),
+    }
+}

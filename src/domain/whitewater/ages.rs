@@ -1,0 +1,163 @@
+//! Deaths: foam lives for its time, and for less where it is crowded.
+
+use rayon::prelude::*;
+
+use super::{AGE, KIND, Kind, LIFE, Settings};
+use crate::domain::particles::Particles;
+
+/// Lets `seconds` pass: all grow older, foam loses life, by as many times more as its cube of one spacing holds more foam than
+/// `settings.crowd`; those that have none left are taken out. How many went.
+pub fn grow_older(
+    settings: &Settings,
+    particles: &mut Particles,
+    spacing: f64,
+    seconds: f64,
+) -> usize {
+    let crowds = Crowds::of(particles, spacing);
+    let loss: Vec<f32> = (0..particles.len())
+        .into_par_iter()
+        .map(|k| match is_foam(particles, k) {
+            true => {
+                let crowd = crowds.about(particles.position[k]) as f64 / f64::from(settings.crowd);
+                (seconds * crowd.max(1.0)) as f32
+            }
+            false => 0.0,
+        })
+        .collect();
+    let column = |name: &str, particles: &mut Particles, by: &dyn Fn(usize) -> f32| {
+        let values = particles.attributes.get_mut(name).into_iter().flatten();
+        values.enumerate().for_each(|(k, value)| *value += by(k));
+    };
+    column(AGE, particles, &|_| seconds as f32);
+    column(LIFE, particles, &|k| -loss[k]);
+    let before = particles.len();
+    let lives: Vec<bool> = particles.attributes[LIFE]
+        .iter()
+        .map(|&life| life > 0.0)
+        .collect();
+    retain(particles, &lives);
+    before - particles.len()
+}
+
+fn is_foam(particles: &Particles, k: usize) -> bool {
+    particles.attributes[KIND][k] == Kind::Foam.number()
+}
+
+/// The cubes in which foam is, one entry a particle, sorted.
+struct Crowds {
+    spacing: f64,
+    cubes: Vec<[i32; 3]>,
+}
+
+impl Crowds {
+    fn of(particles: &Particles, spacing: f64) -> Self {
+        let foam = (0..particles.len()).into_par_iter();
+        let foam = foam.filter(|&k| is_foam(particles, k));
+        let mut cubes: Vec<[i32; 3]> = foam
+            .map(|k| cube_of(particles.position[k], spacing))
+            .collect();
+        cubes.par_sort_unstable();
+        Self { spacing, cubes }
+    }
+
+    /// How much foam is in the cube of a place.
+    fn about(&self, place: [f32; 3]) -> usize {
+        let cube = cube_of(place, self.spacing);
+        let end = self.cubes.partition_point(|other| *other <= cube);
+        end - self.cubes.partition_point(|other| *other < cube)
+    }
+}
+
+fn cube_of(position: [f32; 3], spacing: f64) -> [i32; 3] {
+    position.map(|x| (f64::from(x) / spacing).floor() as i32)
+}
+
+/// Keeps those that are marked, in their order.
+fn retain(particles: &mut Particles, keep: &[bool]) {
+    fn kept<T>(values: &mut Vec<T>, keep: &[bool]) {
+        let mut marks = keep.iter();
+        values.retain(|_| marks.next() == Some(&true));
+    }
+    kept(&mut particles.position, keep);
+    kept(&mut particles.velocity, keep);
+    kept(&mut particles.id, keep);
+    for column in particles.attributes.values_mut() {
+        kept(column, keep);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{RADIUS, none, tests_support::settings};
+    use super::*;
+
+    fn crowd(count: u32, kind: Kind, life: f32) -> Particles {
+        let mut all = none();
+        for id in 0..count {
+            all.position.push([0.05, 0.05, 0.05]);
+            all.velocity.push([0.0; 3]);
+            all.id.push(id);
+            for (name, value) in [
+                (AGE, 0.0),
+                (KIND, kind.number()),
+                (LIFE, life),
+                (RADIUS, 0.01),
+            ] {
+                all.attributes
+                    .entry(name.to_owned())
+                    .or_default()
+                    .push(value);
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn foam_ages_and_the_others_only_grow_older() {
+        let settings = settings();
+        let mut foam = crowd(2, Kind::Foam, 1.0);
+        assert_eq!(grow_older(&settings, &mut foam, 0.1, 0.25), 0);
+        assert_eq!(foam.attributes[LIFE], [0.75, 0.75]);
+        assert_eq!(foam.attributes[AGE], [0.25, 0.25]);
+        assert_eq!(grow_older(&settings, &mut foam, 0.1, 0.75), 2);
+        assert!(foam.is_empty() && foam.attributes[AGE].is_empty());
+        for kind in [Kind::Spray, Kind::Bubble] {
+            let mut other = crowd(1, kind, 0.1);
+            assert_eq!(grow_older(&settings, &mut other, 0.1, 5.0), 0);
+            assert_eq!(other.attributes[LIFE], [0.1]);
+        }
+    }
+
+    #[test]
+    fn crowded_foam_dies_sooner() {
+        let settings = settings();
+        let mut packed = crowd(3 * settings.crowd, Kind::Foam, 1.0);
+        assert_eq!(grow_older(&settings, &mut packed, 0.1, 0.25), 0);
+        assert_eq!(packed.attributes[LIFE][0], 0.25);
+        // Bubbles in the same place crowd no one.
+        let mut few = crowd(settings.crowd, Kind::Foam, 1.0);
+        let mut bubbles = crowd(3 * settings.crowd, Kind::Bubble, 1.0);
+        few.position.append(&mut bubbles.position);
+        few.velocity.append(&mut bubbles.velocity);
+        few.id.extend(settings.crowd..4 * settings.crowd);
+        for (name, column) in &mut bubbles.attributes {
+            few.attributes
+                .entry(name.clone())
+                .or_default()
+                .append(column);
+        }
+        grow_older(&settings, &mut few, 0.1, 0.25);
+        assert_eq!(few.attributes[LIFE][0], 0.75);
+    }
+
+    #[test]
+    fn who_is_left_keeps_what_it_has() {
+        let settings = settings();
+        let mut some = crowd(3, Kind::Foam, 1.0);
+        some.attributes.entry(LIFE.to_owned()).or_default()[1] = 0.1;
+        some.position[2] = [0.07, 0.05, 0.05];
+        assert_eq!(grow_older(&settings, &mut some, 0.1, 0.5), 1);
+        assert_eq!(some.id, [0, 2]);
+        assert_eq!(some.position[1], [0.07, 0.05, 0.05]);
+    }
+}

@@ -1,0 +1,244 @@
+//! Births: how much whitewater each water particle gives, and where it begins.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{AGE, KIND, Kind, LIFE, Potentials, RADIUS, Settings, random, thresholds::grown};
+use crate::domain::{bounds::Bounds, particles::Particles, period::Period};
+
+/// Random numbers of a birth, from which on those of the next begin.
+const CHANNELS: u32 = 8;
+
+/// Water at a frame's end.
+#[derive(Clone, Copy, Debug)]
+pub struct Source<'a> {
+    /// Its particles.
+    pub water: &'a Particles,
+    /// Of each of them.
+    pub potentials: &'a [Potentials],
+    /// Frame number.
+    pub frame: u32,
+    /// Since the frame before, seconds.
+    pub seconds: f64,
+    /// Between particles, metres.
+    pub spacing: f64,
+    /// The box now, wave-makers included.
+    pub walls: Bounds,
+    /// The domain's least corner, metres.
+    pub corner: DVec3,
+    /// Where the domain joins its own end.
+    pub period: Period,
+}
+
+/// What was born at a frame.
+#[derive(Clone, Debug, Default)]
+pub struct Births {
+    born: Vec<Born>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Born {
+    position: Vec3,
+    velocity: Vec3,
+    kind: Kind,
+    life: f32,
+    radius: f32,
+}
+
+impl Births {
+    /// n = Φ_ke (k_ta Φ_ta + k_wc Φ_wc) Δt of each particle (Ihmsen 2012, eq. 8), a part of one by chance, in a cylinder about its
+    /// place along its velocity: its radius is half a spacing, and so is its length, as a frame's own way would lead ahead of the
+    /// water.
+    pub fn of(settings: &Settings, source: &Source<'_>) -> Self {
+        let n = source.water.len();
+        let born = (0..n).into_par_iter().flat_map_iter(|i| {
+            let (potential, strength) = strength(settings, &source.potentials[i], source.seconds);
+            let id = source.water.id[i];
+            let chance = random(settings.seed, id, source.frame, 0);
+            let count = (strength + chance).floor() as u32;
+            (0..count).map(move |k| seed(settings, source, i, potential, 1 + k * CHANNELS))
+        });
+        Self {
+            born: born.collect(),
+        }
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.born.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.born.is_empty()
+    }
+
+    /// Puts them behind those that are there, with ids from `next` on; the next free one.
+    pub fn join(&self, particles: &mut Particles, next: u32) -> u32 {
+        let born = &self.born;
+        particles
+            .position
+            .extend(born.iter().map(|b| b.position.to_array()));
+        particles
+            .velocity
+            .extend(born.iter().map(|b| b.velocity.to_array()));
+        particles.id.extend((next..).take(born.len()));
+        let mut extend = |name: &str, of: &dyn Fn(&Born) -> f32| {
+            let column = particles.attributes.entry(name.to_owned()).or_default();
+            column.extend(born.iter().map(of));
+        };
+        extend(AGE, &|_| 0.0);
+        extend(KIND, &|b| b.kind.number());
+        extend(LIFE, &|b| b.life);
+        extend(RADIUS, &|b| b.radius);
+        next + born.len() as u32
+    }
+}
+
+/// How strong the stronger of its two causes is, 0 to 1, and how many a particle gives in `seconds`.
+fn strength(settings: &Settings, potentials: &Potentials, seconds: f64) -> (f64, f64) {
+    let thresholds = &settings.thresholds;
+    let trapped_air = grown(potentials.trapped_air, thresholds.trapped_air);
+    let wave_crest = grown(potentials.wave_crest, thresholds.wave_crest);
+    let energy = grown(potentials.energy, thresholds.energy);
+    let rate = settings.trapped_air_rate * trapped_air + settings.wave_crest_rate * wave_crest;
+    (
+        energy * trapped_air.max(wave_crest),
+        energy * rate * seconds,
+    )
+}
+
+fn seed(settings: &Settings, source: &Source<'_>, i: usize, potential: f64, channel: u32) -> Born {
+    let random = |k: u32| random(settings.seed, source.water.id[i], source.frame, channel + k);
+    let (x, v) = (
+        Vec3::from_array(source.water.position[i]).as_dvec3(),
+        Vec3::from_array(source.water.velocity[i]).as_dvec3(),
+    );
+    let along = v.try_normalize().unwrap_or(DVec3::Y);
+    let (across, aside) = along.any_orthonormal_pair();
+    let (sin, cos) = (std::f64::consts::TAU * random(0)).sin_cos();
+    // Even over the disc.
+    let r = 0.5 * source.spacing * random(1).sqrt();
+    let offset =
+        r * (cos * across + sin * aside) + 0.5 * source.spacing * (random(2) - 0.5) * along;
+    let inside = (x + offset).clamp(source.walls.min, source.walls.max);
+    let between = |[least, greatest]: [f64; 2], part: f64| least + (greatest - least) * part;
+    // Stronger causes leave foam that lives longer (Ihmsen 2012, section 3.3).
+    let life = between(settings.lifetime, potential * random(3));
+    let place = source.period.wrap(inside - source.corner) + source.corner;
+    Born {
+        position: place.as_vec3(),
+        velocity: v.as_vec3(),
+        kind: Kind::of_share(source.potentials[i].share),
+        life: life as f32,
+        // Small ones are many: the square puts the mean at a third of the way.
+        radius: between(settings.radius, random(4).powi(2)) as f32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{none, tests_support::settings};
+    use super::*;
+
+    fn water(count: u32) -> Particles {
+        Particles {
+            position: vec![[0.5; 3]; count as usize],
+            velocity: vec![[3.0, 0.0, 0.0]; count as usize],
+            id: (0..count).collect(),
+            ..Particles::default()
+        }
+    }
+
+    fn source<'a>(water: &'a Particles, potentials: &'a [Potentials]) -> Source<'a> {
+        Source {
+            water,
+            potentials,
+            frame: 3,
+            seconds: 0.04,
+            spacing: 0.1,
+            walls: Bounds {
+                min: DVec3::ZERO,
+                max: DVec3::ONE,
+            },
+            corner: DVec3::ZERO,
+            period: Period::default(),
+        }
+    }
+
+    fn potentials(count: usize, trapped_air: f64) -> Vec<Potentials> {
+        vec![
+            Potentials {
+                trapped_air,
+                wave_crest: 0.0,
+                energy: 4.5,
+                share: 0.5,
+            };
+            count
+        ]
+    }
+
+    /// Rate times seconds times particles, within four standard errors of that many chances of a half.
+    #[test]
+    fn births_follow_the_rate() {
+        let water = water(4000);
+        let settings = settings();
+        // Half way between the thresholds: 25 a second and particle, 1 in 0.04 s; energy is full.
+        let [least, greatest] = settings.thresholds.trapped_air;
+        let half = potentials(4000, 0.5 * (least + greatest));
+        let count = Births::of(&settings, &source(&water, &half)).len() as f64;
+        let expected = 0.5 * settings.trapped_air_rate * 0.04 * 4000.0;
+        assert!(
+            (count - expected).abs() < 4.0 * (0.25 * 4000f64).sqrt(),
+            "{count} {expected}"
+        );
+        // Below the threshold nothing is born, and without energy neither.
+        let none = potentials(4000, least);
+        assert!(Births::of(&settings, &source(&water, &none)).is_empty());
+        let mut slow = half;
+        slow.iter_mut()
+            .for_each(|p| p.energy = settings.thresholds.energy[0]);
+        assert!(Births::of(&settings, &source(&water, &slow)).is_empty());
+    }
+
+    #[test]
+    fn births_are_about_their_water_with_ids_of_their_own() {
+        let water = water(50);
+        let settings = settings();
+        let full = potentials(50, settings.thresholds.trapped_air[1]);
+        let births = Births::of(&settings, &source(&water, &full));
+        let mut all = none();
+        let next = births.join(&mut all, 7);
+        assert_eq!(next, 7 + births.len() as u32);
+        assert_eq!(all.id, (7..next).collect::<Vec<_>>());
+        assert!(
+            all.attributes
+                .values()
+                .all(|column| column.len() == all.len())
+        );
+        for (k, x) in all.position.iter().enumerate() {
+            let offset = Vec3::from_array(*x) - Vec3::splat(0.5);
+            // Across the velocity half a spacing, along it a quarter.
+            assert!(
+                offset.x.abs() <= 0.0251 && offset.length() < 0.06,
+                "{offset}"
+            );
+            let (life, radius) = (all.attributes[LIFE][k], all.attributes[RADIUS][k]);
+            let within =
+                |value: f32, [least, most]: [f64; 2]| (least as f32..=most as f32).contains(&value);
+            assert!(within(life, settings.lifetime) && within(radius, settings.radius));
+        }
+        // The same again, and others with another seed.
+        let again = Births::of(&settings, &source(&water, &full));
+        let mut twice = none();
+        again.join(&mut twice, 7);
+        assert_eq!(all, twice);
+        let other = Settings {
+            seed: 9,
+            ..settings.clone()
+        };
+        let mut others = none();
+        Births::of(&other, &source(&water, &full)).join(&mut others, 7);
+        assert_ne!(all.position[0], others.position[0]);
+    }
+}

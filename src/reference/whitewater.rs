@@ -1,0 +1,412 @@
+//! Twins of shaders/whitewater in f64, and whitewater on the CPU: one function a pass, under its name.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::{
+    domain::{
+        boundary::Boundary,
+        bounds::Bounds,
+        budget::Breach,
+        particles::Particles,
+        signed_distance::SignedDistance,
+        whitewater::{
+            AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, Kind, OUTWARD, Potentials, SURFACE, Settings,
+            air_drag,
+        },
+    },
+    scene::Scene,
+};
+
+use super::{ReferenceError, pbf::Model};
+
+/// Water at a frame's end, sorted by cell, and the walls and solids about it. Places relative to the domain's least corner.
+#[derive(Clone, Debug)]
+pub struct Water {
+    /// Kernels, samples on solids, cells.
+    pub model: Model,
+    /// The box now, wave-makers included.
+    pub walls: Bounds,
+    /// Places, metres. Shape (particles).
+    pub points: Vec<DVec3>,
+    /// m/s. Shape (particles).
+    pub velocity: Vec<DVec3>,
+    /// Of each its place in the water that was handed in. Shape (particles).
+    pub order: Vec<usize>,
+    /// Solids that move, as they stand now.
+    pub movers: Vec<SignedDistance>,
+    starts: Vec<usize>,
+    sample_starts: Vec<usize>,
+}
+
+/// What whitewater/survey finds of a water particle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Surveyed {
+    /// Share of its place that is water.
+    pub share: f64,
+    /// Outward, of length 1; 0 where the density has no slope.
+    pub normal: DVec3,
+    /// Length of the density's gradient times h.
+    pub steepness: f64,
+    /// How surely there is a surface, 0 to 1.
+    pub sure: f64,
+}
+
+/// A whitewater particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct White {
+    /// Place, metres.
+    pub position: DVec3,
+    /// m/s.
+    pub velocity: DVec3,
+    /// What it is.
+    pub kind: Kind,
+}
+
+/// Where a frame took one, and how nearly it went elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moved {
+    /// Now.
+    pub white: White,
+    /// Share of water about it.
+    pub share: f64,
+    /// Least distance of a share that decided something from what it was held against.
+    pub margin: f64,
+    /// Whether a solid pushed it, or may have by rounding.
+    pub is_pushed: bool,
+}
+
+/// Water about a place.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    share: f64,
+    velocity: DVec3,
+}
+
+impl Water {
+    /// Of the water of `scene`, which is [`Scene::of_whitewater`] of what was baked, at `time`, seconds.
+    pub fn new(scene: &Scene, boundary: &Boundary, water: &Particles, time: f64) -> Self {
+        let model = Model::new(scene, boundary);
+        let origin = scene.domain.min;
+        let wide = |v: &[f32; 3]| Vec3::from_array(*v).as_dvec3();
+        // The device has them in 32 bits about the same corner.
+        let local = |p: &[f32; 3]| (wide(p) - origin).as_vec3().as_dvec3();
+        let places: Vec<DVec3> = water.position.iter().map(local).collect();
+        let order = model.cells.order(&places, &water.id);
+        let points: Vec<DVec3> = order.iter().map(|&k| places[k]).collect();
+        let moved = scene.moving_solids.iter().zip(&boundary.moving);
+        let movers = moved.map(|(solid, grid)| SignedDistance {
+            origin: grid.origin - origin + solid.displacement(time),
+            ..grid.clone()
+        });
+        Self {
+            starts: model.cells.starts(&points),
+            sample_starts: model.cells.starts(&model.samples),
+            velocity: order.iter().map(|&k| wide(&water.velocity[k])).collect(),
+            walls: scene.walls(time),
+            movers: movers.collect(),
+            model,
+            points,
+            order,
+        }
+    }
+
+    /// Calls `visit` with each water particle and each sample on a solid in the cells about `x`, and the way from it to `x`.
+    pub fn about(&self, x: DVec3, mut visit: impl FnMut(Neighbor, DVec3)) {
+        let period = self.model.period();
+        for cells in self.model.cells.runs(x) {
+            for j in self.starts[cells.start]..self.starts[cells.end] {
+                visit(Neighbor::Water(j), period.shortest(x - self.points[j]));
+            }
+            for b in self.sample_starts[cells.start]..self.sample_starts[cells.end] {
+                let way = period.shortest(x - self.model.samples[b]);
+                visit(Neighbor::Sample(self.model.sample_weights[b]), way);
+            }
+        }
+    }
+
+    fn share_of(&self, kernel: f64, solid: f64, wall: f64) -> f64 {
+        let scale = self.model.calibration.density_scale;
+        scale * kernel / (1.0 - wall - scale * solid).max(0.1)
+    }
+
+    /// [`Surveyed`] of particle `i` (whitewater/survey).
+    pub fn survey(&self, i: usize) -> Surveyed {
+        let (x, h) = (self.points[i], self.model.calibration.support_radius);
+        let (mut kernel, mut solid, mut gradient) = (0.0, 0.0, DVec3::ZERO);
+        self.about(x, |neighbor, way| {
+            let q = way.length() / h;
+            let w = (1.0 - q * q).max(0.0).powi(3);
+            let mass = match neighbor {
+                Neighbor::Water(_) => {
+                    kernel += w;
+                    1.0
+                }
+                Neighbor::Sample(weight) => {
+                    solid += weight * w;
+                    weight
+                }
+            };
+            gradient += mass * (1.0 - q).max(0.0).powi(2) * way.normalize_or_zero();
+        });
+        let (wall, wall_gradient) = self.model.wall_term(x, &self.walls);
+        let outward = self.model.calibration.gradient_scale * gradient - wall_gradient;
+        let steepness = outward.length() * h;
+        let [least, full] = SURFACE;
+        Surveyed {
+            share: self.share_of(kernel, solid, wall),
+            normal: outward.normalize_or_zero(),
+            steepness,
+            sure: ((steepness - least) / (full - least)).clamp(0.0, 1.0),
+        }
+    }
+
+    /// [`Potentials`] of particle `i` (whitewater/potentials), from what was surveyed of all. Shape (particles).
+    pub fn potentials(&self, i: usize, surveyed: &[Surveyed]) -> Potentials {
+        let h = self.model.calibration.support_radius;
+        let (own, v) = (&surveyed[i], self.velocity[i]);
+        let (mut trapped_air, mut crest) = (0.0, 0.0);
+        self.about(self.points[i], |neighbor, way| {
+            let Neighbor::Water(j) = neighbor else {
+                return;
+            };
+            let w = (1.0 - way.length() / h).max(0.0);
+            let (against, along) = (v - self.velocity[j], way.normalize_or_zero());
+            trapped_air += (against.length() - against.dot(along)) * w;
+            let other = &surveyed[j];
+            let behind = (4.0 * along.dot(own.normal)).clamp(0.0, 1.0);
+            crest += (1.0 - own.normal.dot(other.normal)) * other.sure * behind * w;
+        });
+        let speed = v.length();
+        let cosine = v.dot(own.normal) / speed.max(1e-30);
+        let [least, full] = OUTWARD;
+        let outward = ((cosine - least) / (full - least)).clamp(0.0, 1.0);
+        Potentials {
+            trapped_air,
+            wave_crest: crest * own.sure * outward,
+            energy: 0.5 * speed * speed,
+            share: own.share,
+        }
+    }
+
+    fn at(&self, x: DVec3) -> Found {
+        let h = self.model.calibration.support_radius;
+        let (mut kernel, mut solid, mut velocity) = (0.0, 0.0, DVec3::ZERO);
+        self.about(x, |neighbor, way| {
+            let w = (1.0 - (way.length() / h).powi(2)).max(0.0).powi(3);
+            match neighbor {
+                Neighbor::Water(j) => {
+                    kernel += w;
+                    velocity += w * self.velocity[j];
+                }
+                Neighbor::Sample(weight) => solid += weight * w,
+            }
+        });
+        let (wall, _) = self.model.wall_term(x, &self.walls);
+        Found {
+            share: self.share_of(kernel, solid, wall),
+            velocity: velocity / kernel.max(1e-20),
+        }
+    }
+
+    /// Off walls, out of solids, in the domain.
+    fn allowed(&self, x: DVec3) -> DVec3 {
+        let kept = self.model.confine(x + self.push(x), &self.walls);
+        self.model.period().wrap(kept)
+    }
+
+    /// What solids that move add to a place.
+    fn push(&self, x: DVec3) -> DVec3 {
+        let contact = self.model.contact_distance();
+        let mut y = x;
+        for solid in &self.movers {
+            let distance = solid.sample(y);
+            if distance < contact {
+                y += solid.gradient(y).normalize_or_zero() * (contact - distance);
+            }
+        }
+        y - x
+    }
+
+    /// Whether a solid pushes at a place, or may by rounding.
+    fn is_touched(&self, x: DVec3) -> bool {
+        let reach = 1.001 * self.model.contact_distance();
+        let solids = self.movers.iter().chain(&self.model.distance);
+        solids.into_iter().any(|solid| solid.sample(x) < reach)
+    }
+
+    /// Takes a whitewater particle over `seconds` to this water's frame, under `gravity`, m/s² (whitewater/advance).
+    pub fn advance(
+        &self,
+        settings: &Settings,
+        gravity: DVec3,
+        seconds: f64,
+        white: White,
+    ) -> Moved {
+        let start = white.position;
+        let before = white.velocity;
+        let is_drop = white.kind == Kind::Spray;
+        let (way, mut velocity) = match is_drop {
+            true => fly(settings, gravity, seconds, before),
+            false => (seconds * before, before),
+        };
+        let mut margin = f64::INFINITY;
+        let mut look = |x: DVec3| {
+            let found = self.at(x);
+            margin = margin.min((found.share - AIR_BELOW).abs());
+            (found, found.share >= AIR_BELOW)
+        };
+        let mut is_pushed = self.is_touched(start + way);
+        let mut place = self.allowed(start + way);
+        let (mut water, is_in_water) = look(place);
+        if white.kind != Kind::Foam && is_in_water == is_drop {
+            let (mut near, mut far) = (0.0, 1.0);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (near + far);
+                is_pushed |= self.is_touched(start + middle * way);
+                let there = self.allowed(start + middle * way);
+                let (found, is_found) = look(there);
+                if is_found {
+                    (place, water) = (there, found);
+                }
+                match is_found == is_in_water {
+                    true => far = middle,
+                    false => near = middle,
+                }
+            }
+            velocity = match water.share >= AIR_BELOW {
+                true => water.velocity,
+                false => before,
+            };
+        } else if white.kind == Kind::Foam && !is_in_water {
+            velocity = before + seconds * gravity;
+        } else if !is_drop {
+            let (rise, kept) = match white.kind {
+                Kind::Bubble => (settings.rise_speed, (-seconds / settings.response).exp()),
+                Kind::Foam | Kind::Spray => (0.0, 0.0),
+            };
+            let aim = water.velocity - rise * gravity.normalize_or_zero();
+            velocity = aim + kept * (before - aim);
+            let end = start + 0.5 * seconds * (before + velocity);
+            is_pushed |= self.is_touched(end);
+            place = self.allowed(end);
+        }
+        let white = White {
+            position: place,
+            velocity,
+            kind: Kind::of_share(water.share),
+        };
+        Moved {
+            white,
+            share: water.share,
+            margin: Kind::THRESHOLDS
+                .iter()
+                .map(|threshold| (water.share - threshold).abs())
+                .fold(margin, f64::min),
+            is_pushed,
+        }
+    }
+}
+
+/// Who is about a place.
+#[derive(Clone, Copy, Debug)]
+pub enum Neighbor {
+    /// Index of a water particle.
+    Water(usize),
+    /// Weight of a sample on a solid.
+    Sample(f64),
+}
+
+/// Way, metres, and velocity after it, m/s, of a drop in the air.
+fn fly(settings: &Settings, gravity: DVec3, seconds: f64, start: DVec3) -> (DVec3, DVec3) {
+    let wind = DVec3::from_array(settings.wind);
+    let step = seconds / f64::from(FLIGHT_STEPS);
+    let (mut way, mut velocity) = (DVec3::ZERO, start);
+    for _ in 0..FLIGHT_STEPS {
+        let before = velocity;
+        let against = before - wind;
+        let drag = air_drag(settings.drop_radius, against.length());
+        velocity = wind + (against + step * gravity) / (1.0 + step * drag);
+        way += 0.5 * step * (before + velocity);
+    }
+    (way, velocity)
+}
+
+/// Whitewater over the frames of one bake, on the CPU.
+#[derive(Debug)]
+pub struct Whitewater {
+    scene: Scene,
+    boundary: Boundary,
+    settings: Option<Settings>,
+    water: Option<(Water, f64)>,
+}
+
+impl Whitewater {
+    /// For the water of `scene`, which is [`Scene::of_whitewater`] of what was baked.
+    pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
+        Self {
+            scene: scene.clone(),
+            boundary: boundary.clone(),
+            settings: None,
+            water: None,
+        }
+    }
+
+    /// Makes ready to move whitewater by these settings.
+    pub fn set(&mut self, settings: &Settings) {
+        self.settings = Some(settings.clone());
+    }
+
+    /// Takes the water of a frame at `time`, `seconds` after the one before, and gives what of each particle makes
+    /// whitewater, in the order of the water.
+    pub fn survey(&mut self, water: &Particles, time: f64, seconds: f64) -> Vec<Potentials> {
+        let sorted = Water::new(&self.scene, &self.boundary, water, time);
+        let n = water.len();
+        let surveyed: Vec<Surveyed> = (0..n).into_par_iter().map(|i| sorted.survey(i)).collect();
+        let found: Vec<Potentials> = (0..n)
+            .into_par_iter()
+            .map(|i| sorted.potentials(i, &surveyed))
+            .collect();
+        let mut in_order = vec![Potentials::default(); n];
+        for (&place, potentials) in sorted.order.iter().zip(found) {
+            in_order[place] = potentials;
+        }
+        self.water = Some((sorted, seconds));
+        in_order
+    }
+
+    /// Moves whitewater from the frame before to that of the last [`Self::survey`].
+    ///
+    /// # Errors
+    /// What is not finite.
+    ///
+    /// # Panics
+    /// Before [`Self::set`] and [`Self::survey`].
+    pub fn advance(&self, white: &mut Particles, frame: u32) -> Result<(), ReferenceError> {
+        let (Some(settings), Some((water, seconds))) = (&self.settings, &self.water) else {
+            panic!("settings and water come before moves");
+        };
+        let (origin, gravity) = (self.scene.domain.min, self.scene.water.gravity);
+        let wide = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+        let one = |k: usize| {
+            let one = White {
+                position: (wide(white.position[k]) - origin).as_vec3().as_dvec3(),
+                velocity: wide(white.velocity[k]),
+                kind: Kind::of_number(white.attributes[KIND][k]).unwrap_or(Kind::Foam),
+            };
+            water.advance(settings, gravity, *seconds, one).white
+        };
+        let moved: Vec<White> = (0..white.len()).into_par_iter().map(one).collect();
+        for (k, moved) in moved.iter().enumerate() {
+            white.position[k] = (moved.position + origin).as_vec3().to_array();
+            white.velocity[k] = moved.velocity.as_vec3().to_array();
+            if let Some(own) = white.attributes.get_mut(KIND) {
+                own[k] = moved.kind.number();
+            }
+        }
+        match white.first_not_finite(None) {
+            None => Ok(()),
+            Some((count, first)) => Err(Breach::not_finite(frame, count, Some(first)).into()),
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! Whitewater of a frame on its way to the device.
+
+use crate::{
+    domain::{particles::Particles, whitewater::RADIUS},
+    gpu::{program::Program, recording::spread},
+    render::{
+        RenderError, RenderScene,
+        buffers::{WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS},
+        lighting::spray_density,
+        uniform,
+    },
+    scene::look::Look,
+};
+
+use super::room;
+
+/// Depth, in particle spacings, at which the water over a bubble has taken most of its white.
+const FADING: f64 = 2.0;
+
+/// How a look draws whitewater.
+pub(super) struct Whitewater {
+    params: uniform::WhitewaterParams,
+    /// Whitewater that there is room for.
+    capacity: usize,
+}
+
+impl Whitewater {
+    /// `None` where the look draws none.
+    pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
+        let spec = look.spec().whitewater.as_ref()?;
+        Some(Self {
+            params: uniform::WhitewaterParams {
+                count: 0,
+                size: spec.size as f32,
+                density: (spec.density_per_metre / spray_density(look).max(1e-30)) as f32,
+                fading: (FADING * scene.particle_spacing) as f32,
+            },
+            capacity: 1,
+        })
+    }
+
+    /// Moves a frame's whitewater to the device, relative to the domain's least corner; whether its buffer is a new one.
+    pub(super) fn load(
+        &mut self,
+        program: &mut Program,
+        scene: &RenderScene,
+        frame: u32,
+        white: &Particles,
+    ) -> Result<bool, RenderError> {
+        let origin = scene.domain.min;
+        let radii = white.attributes.get(RADIUS).map_or(&[][..], Vec::as_slice);
+        let mut packed = Vec::with_capacity(white.len());
+        let places = white.position.iter().zip(&white.velocity).zip(radii);
+        for (index, ((p, v), &radius)) in places.enumerate() {
+            if !p.iter().chain(v).chain([&radius]).all(|x| x.is_finite()) {
+                return Err(RenderError::NotFinite { index, frame });
+            }
+            packed.push(uniform::Whitewater {
+                position: [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32),
+                radius,
+                velocity: *v,
+                pad: 0.0,
+            });
+        }
+        let grew = packed.len() > self.capacity;
+        if grew {
+            self.capacity = room(packed.len());
+            program.refit(&[WHITEWATER.sized(self.capacity)], &[])?;
+        }
+        self.params.count = packed.len() as u32;
+        let groups = spread(&program.context, 64, packed.len() as u64);
+        program.upload(WHITEWATER_GROUPS, 0, &[groups.into()]);
+        program.upload(WHITEWATER_PARAMS, 0, &[self.params]);
+        program.upload(WHITEWATER, 0, &packed);
+        Ok(grew)
+    }
+}

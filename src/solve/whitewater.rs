@@ -1,0 +1,362 @@
+//! Whitewater on the device: what makes it, and where it goes between two frames.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::{
+    domain::{
+        boundary::Boundary,
+        budget::Breach,
+        particles::Particles,
+        sph::Calibration,
+        whitewater::{
+            AIR_BELOW, AIR_DENSITY, AIR_VISCOSITY, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD,
+            Potentials, SURFACE, Settings, WATER_ABOVE,
+        },
+    },
+    gpu::{
+        adapter::Context,
+        buffer::Buf,
+        program::{PassSpec, Program},
+        recording::{Command, Recording, Timer},
+        sort,
+    },
+    scene::Scene,
+};
+
+use super::{
+    SolveError,
+    boundary::Movers,
+    flip::buffers::SOLID_GRIDS,
+    pbf::{buffers::*, params, plan::cell_count, record::sorting},
+    plan::{Counts, Plan, Table, in_order},
+};
+
+/// Share of the place of each water particle that is water, in sorted order.
+pub const SHARE: Buf<f32> = Buf::new("share");
+/// Outward normal of the surface at each water particle, in sorted order, and how surely there is one, 0 to 1.
+pub const SURFACE_AT: Buf<[f32; 4]> = Buf::new("surface");
+/// Trapped air, m/s, wave crest, energy, J/kg, and share of water, in sorted order.
+pub const POTENTIAL: Buf<[f32; 4]> = Buf::new("potential");
+/// x, y, z of each whitewater particle and its kind.
+pub const WHITE_POSITION: Buf<[f32; 4]> = Buf::new("white_position");
+/// Of each whitewater particle, and after a frame the share of water about it.
+pub const WHITE_VELOCITY: Buf<[f32; 4]> = Buf::new("white_velocity");
+/// How many there are, in the first component.
+pub const WHITE_COUNT: Buf<[u32; 4]> = Buf::uniform("white_count");
+
+/// What is found of each water particle.
+pub const SURVEY: [&str; 2] = ["whitewater/survey", "whitewater/potentials"];
+/// What moves each whitewater particle.
+pub const ADVANCE: &str = "whitewater/advance";
+
+/// Whitewater's passes over the frames of one bake.
+pub struct Whitewater {
+    program: Program,
+    plan: Plan,
+    scene: Scene,
+    calibration: Calibration,
+    survey: Recording,
+    movers: Option<Movers>,
+    settings: Option<Settings>,
+    /// Whitewater that the buffers hold.
+    capacity: usize,
+    timer: Option<Timer>,
+}
+
+/// What the passes before whitewater's own moves need, with so many whitewater particles.
+fn plan(scene: &Scene, boundary: &Boundary, water: usize, white: usize) -> Plan {
+    let pbf = scene.solver.pbf();
+    let support = Calibration::new(pbf.particle_spacing, pbf.support_ratio).support_radius;
+    let counts = Counts {
+        particles: water,
+        ..boundary.counts()
+    };
+    let mut plan = Plan::bare(counts, scene.period().cells(scene.domain.size(), support));
+    let cells = cell_count(&plan);
+    let mut table = Table::default();
+    table.add("sort", CELL_START.sized(cells + 1));
+    table.extend("sort", sort::scan_buffers(&CELL_START, cells));
+    let keys = [CELL_OF, SLOT_IN_CELL, PLACED, ORDER];
+    table.extend("sort", keys.map(|buffer| buffer.sized(water)));
+    table.add("sort", ELEMENT_COUNT.sized(1));
+    table.add("whitewater", PARAMS.sized(1));
+    table.add(
+        "whitewater",
+        PREDICTED.sized(2 * water + counts.boundary_samples),
+    );
+    let vectors = [
+        VELOCITY,
+        START_POSITION,
+        SORTED_VELOCITY,
+        SURFACE_AT,
+        POTENTIAL,
+    ];
+    table.extend("whitewater", vectors.map(|buffer| buffer.sized(water)));
+    table.extend(
+        "whitewater",
+        [ID.sized(water), SORTED_ID.sized(water), SHARE.sized(water)],
+    );
+    table.extend(
+        "whitewater",
+        [WHITE_POSITION, WHITE_VELOCITY].map(|b| b.sized(white)),
+    );
+    table.add("whitewater", WHITE_COUNT.sized(1));
+    if plan.has_solids() {
+        let nodes: usize = counts.solid_grid.iter().product();
+        table.add("solids", SOLID_DISTANCE.sized(nodes + counts.moving_nodes));
+        table.add("solids", BOUNDARY_CELL_START.sized(cells + 1));
+        match counts.moving_nodes {
+            0 => table.add("solids", SOLID_GRID.sized(1)),
+            _ => table.add("solids", SOLID_GRIDS.sized(1)),
+        }
+    }
+    plan.declare(table);
+    plan
+}
+
+fn survey_commands(plan: &Plan) -> Vec<Command> {
+    let n = plan.counts.particles;
+    let mut commands = sorting(plan);
+    commands.extend(SURVEY.map(|pass| Command::over(pass, n)));
+    commands
+}
+
+fn pass(name: &'static str, plan: &Plan, scene: &Scene, settings: Option<&Settings>) -> PassSpec {
+    let conditions = [
+        ("SOLIDS", plan.has_solids()),
+        ("MOVING_SOLIDS", plan.counts.moving_nodes > 0),
+        ("PERIODIC", scene.is_periodic()),
+    ];
+    let constants = match (name, settings) {
+        ("whitewater/survey", _) => {
+            vec![("SURFACE_LEAST", SURFACE[0]), ("SURFACE_FULL", SURFACE[1])]
+        }
+        ("whitewater/potentials", _) => {
+            vec![("OUTWARD_LEAST", OUTWARD[0]), ("OUTWARD_FULL", OUTWARD[1])]
+        }
+        (ADVANCE, Some(settings)) => vec![
+            ("AIR_BELOW", AIR_BELOW),
+            ("WATER_ABOVE", WATER_ABOVE),
+            ("FLIGHT_STEPS", f64::from(FLIGHT_STEPS)),
+            ("HALVINGS", f64::from(HALVINGS)),
+            ("AIR_DENSITY", AIR_DENSITY),
+            ("AIR_VISCOSITY", AIR_VISCOSITY),
+            ("DROP_RADIUS", settings.drop_radius),
+            ("WIND_X", settings.wind[0]),
+            ("WIND_Y", settings.wind[1]),
+            ("WIND_Z", settings.wind[2]),
+            ("RISE_SPEED", settings.rise_speed),
+            ("RESPONSE", settings.response),
+        ],
+        _ => Vec::new(),
+    };
+    let holding = conditions.into_iter().filter(|(_, holds)| *holds);
+    PassSpec {
+        name,
+        defines: holding.map(|(define, _)| define).collect(),
+        constants,
+    }
+}
+
+impl Whitewater {
+    /// For `water` particles of `scene`, which is [`Scene::of_whitewater`] of what was baked. Nothing moves before
+    /// [`Self::set`].
+    ///
+    /// # Errors
+    /// A buffer over the adapter's limits, with the figures; a shader or the device at fault.
+    pub fn new(
+        context: &Context,
+        scene: &Scene,
+        boundary: &Boundary,
+        water: usize,
+        is_timed: bool,
+    ) -> Result<Self, SolveError> {
+        let plan = plan(scene, boundary, water, 0);
+        let commands = survey_commands(&plan);
+        let passes: Vec<PassSpec> = in_order(&commands)
+            .map(|name| pass(name, &plan, scene, None))
+            .collect();
+        let program = Program::new(context, &plan.buffer_specs(), &passes, &[])?;
+        sort::upload_lengths(&program, &CELL_START, cell_count(&plan));
+        program.upload(ELEMENT_COUNT, 0, &[[water as u32, 0, 0, 0]]);
+        let pbf = scene.solver.pbf();
+        let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
+        boundary.upload(&program, scene, &plan, &calibration);
+        if boundary.distance.is_none() {
+            boundary.upload_distance(&program, scene);
+        }
+        Ok(Self {
+            survey: Recording::new(&program, &commands),
+            movers: Movers::of(boundary, scene),
+            timer: is_timed.then(|| Timer::new(context)),
+            scene: scene.clone(),
+            settings: None,
+            capacity: 0,
+            calibration,
+            program,
+            plan,
+        })
+    }
+
+    /// Makes ready to move whitewater by these settings.
+    ///
+    /// # Errors
+    /// A shader or the device at fault.
+    pub fn set(&mut self, settings: &Settings) -> Result<(), SolveError> {
+        let pass = pass(ADVANCE, &self.plan, &self.scene, Some(settings));
+        self.program.refit(&[], &[pass])?;
+        self.settings = Some(settings.clone());
+        Ok(())
+    }
+
+    /// Names of the passes and buffers that exist on the device, sorted.
+    pub fn built(&self) -> (Vec<&str>, Vec<&str>) {
+        self.program.names()
+    }
+
+    /// Pass, seconds, runs, by name; nothing unless timed.
+    pub fn times(&self) -> Vec<(&'static str, f64, u64)> {
+        self.timer.as_ref().map(Timer::times).unwrap_or_default()
+    }
+
+    /// A buffer's first `count` values.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn field<T: bytemuck::Pod>(
+        &self,
+        buffer: Buf<T>,
+        count: usize,
+    ) -> Result<Vec<T>, SolveError> {
+        Ok(self.program.read(buffer, count)?)
+    }
+
+    /// Takes the water of a frame at `time`, `seconds` after the one before, and gives what of each particle makes
+    /// whitewater, in the order of the water.
+    ///
+    /// # Errors
+    /// The device; another number of particles than it was made for.
+    pub fn survey(
+        &mut self,
+        water: &Particles,
+        time: f64,
+        seconds: f64,
+    ) -> Result<Vec<Potentials>, SolveError> {
+        let n = self.plan.counts.particles;
+        if water.len() != n {
+            return Err(SolveError::Count {
+                planned: n,
+                given: water.len(),
+            });
+        }
+        let vectors = |of: &[[f32; 3]]| -> Vec<[f32; 4]> {
+            of.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()
+        };
+        let local = local(&self.scene, &water.position);
+        self.program.upload(PREDICTED, n, &vectors(&local));
+        self.program.upload(VELOCITY, 0, &vectors(&water.velocity));
+        self.program.upload(ID, 0, &water.id);
+        let mut params = params(&self.scene, &self.calibration, &self.plan, time, seconds);
+        // Whitewater falls, whatever the water's own solver does with gravity.
+        params.velocity_step = (self.scene.water.gravity * seconds).as_vec3().to_array();
+        self.program.upload(PARAMS, 0, &[params]);
+        if let Some(movers) = &self.movers {
+            movers.upload(&self.program, &self.scene, time, seconds);
+        }
+        self.survey.run(&self.program, self.timer.as_mut())?;
+        let (potential, order) = (self.program).download((POTENTIAL.first(n), ORDER.first(n)))?;
+        let mut found = vec![Potentials::default(); n];
+        for (&place, values) in order.iter().zip(&potential) {
+            let [trapped_air, wave_crest, energy, share] = values.map(f64::from);
+            found[place as usize] = Potentials {
+                trapped_air,
+                wave_crest,
+                energy,
+                share,
+            };
+        }
+        Ok(found)
+    }
+
+    /// Moves whitewater from the frame before to that of the last [`Self::survey`]: positions, velocities, kinds.
+    ///
+    /// # Errors
+    /// The device; what is not finite.
+    ///
+    /// # Panics
+    /// Before [`Self::set`].
+    pub fn advance(&mut self, white: &mut Particles, frame: u32) -> Result<(), SolveError> {
+        assert!(self.settings.is_some(), "settings come before moves");
+        let n = white.len();
+        if n == 0 {
+            return Ok(());
+        }
+        if n > self.capacity {
+            // A quarter more, so that a stream that grows does not ask every frame.
+            self.capacity = n + n / 4;
+            let specs = [WHITE_POSITION, WHITE_VELOCITY].map(|b| b.sized(self.capacity));
+            self.program.refit(&specs, &[])?;
+        }
+        let kinds = &white.attributes[KIND];
+        let local = local(&self.scene, &white.position);
+        let order = self.by_cell(&local);
+        let at = |&k: &u32| k as usize;
+        let position: Vec<[f32; 4]> = (order.par_iter().map(at))
+            .map(|k| [local[k][0], local[k][1], local[k][2], kinds[k]])
+            .collect();
+        let velocity: Vec<[f32; 4]> = (order.par_iter().map(at))
+            .map(|k| white.velocity[k])
+            .map(|[x, y, z]| [x, y, z, 0.0])
+            .collect();
+        self.program.upload(WHITE_POSITION, 0, &position);
+        self.program.upload(WHITE_VELOCITY, 0, &velocity);
+        self.program.upload(WHITE_COUNT, 0, &[[n as u32, 0, 0, 0]]);
+        let recording = Recording::new(&self.program, &[Command::over(ADVANCE, n)]);
+        recording.run(&self.program, self.timer.as_mut())?;
+        let (position, velocity) =
+            (self.program).download((WHITE_POSITION.first(n), WHITE_VELOCITY.first(n)))?;
+        let origin = self.scene.domain.min;
+        let moved = position.iter().zip(&velocity);
+        for (k, ([x, y, z, kind], [u, v, w, _])) in order.iter().map(at).zip(moved) {
+            let world = Vec3::new(*x, *y, *z).as_dvec3() + origin;
+            white.position[k] = world.as_vec3().to_array();
+            white.velocity[k] = [*u, *v, *w];
+            if let Some(own) = white.attributes.get_mut(KIND) {
+                own[k] = *kind;
+            }
+        }
+        match white.first_not_finite(None) {
+            None => Ok(()),
+            Some((count, first)) => Err(Breach::not_finite(frame, count, Some(first)).into()),
+        }
+    }
+}
+
+impl Whitewater {
+    /// The order of places by the cells of the water about them: neighbouring threads then look at the same water.
+    fn by_cell(&self, places: &[[f32; 3]]) -> Vec<u32> {
+        let h = self.calibration.support_radius as f32;
+        let [nx, ny, _] = self.plan.grid_dims.map(u64::from);
+        let key = |[x, y, z]: &[f32; 3]| {
+            // A cast saturates: what is below 0 becomes 0.
+            let [x, y, z] = [x, y, z].map(|x| (x / h) as u64);
+            (z * ny + y) * nx + x
+        };
+        let mut order: Vec<(u64, u32)> = (places.par_iter().zip(0..places.len() as u32))
+            .map(|(place, k)| (key(place), k))
+            .collect();
+        order.par_sort_unstable();
+        order.into_iter().map(|(_, k)| k).collect()
+    }
+}
+
+/// Positions relative to the domain's least corner.
+fn local(scene: &Scene, positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let origin = scene.domain.min;
+    let one = |p: &[f32; 3]| {
+        let x: DVec3 = Vec3::from_array(*p).as_dvec3() - origin;
+        x.as_vec3().to_array()
+    };
+    positions.iter().map(one).collect()
+}

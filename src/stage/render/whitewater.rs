@@ -1,0 +1,88 @@
+//! The stream of whitewater that a look draws.
+
+use std::path::{Path, PathBuf};
+
+use crate::{
+    cache::{self, CacheError, CacheReader},
+    domain::particles::Particles,
+    stage::whitewater::{directory, is_of},
+};
+
+/// Why a stream cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum StreamError {
+    /// There is none of that name.
+    #[error(
+        "the look draws whitewater `{stream}`, and {} is not there: make it with `swell whitewater {}` (--name {stream})",
+        directory.display(), cache.display()
+    )]
+    Missing {
+        /// Its name.
+        stream: String,
+        /// Where it would be.
+        directory: PathBuf,
+        /// Of the bake.
+        cache: PathBuf,
+    },
+    /// It lacks a frame, or has that of other water.
+    #[error("{}: frame {frame} {how}: make it again with `swell whitewater`", directory.display())]
+    Frame {
+        /// Of the stream.
+        directory: PathBuf,
+        /// The frame.
+        frame: u32,
+        /// What is wrong with it.
+        how: &'static str,
+    },
+    /// Its files.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+}
+
+/// A stream that stands beside the water.
+pub(super) struct Whitewater {
+    stream: CacheReader,
+}
+
+impl Whitewater {
+    /// Opens it and looks for all the frames that are wanted, each made from the water that stands in `water` now.
+    pub(super) fn open(
+        cache: &Path,
+        stream: &str,
+        water: &CacheReader,
+        frames: &[u32],
+    ) -> Result<Self, StreamError> {
+        let directory = directory(cache, stream);
+        if !cache::exists(&directory) {
+            return Err(StreamError::Missing {
+                stream: stream.to_owned(),
+                directory,
+                cache: cache.to_owned(),
+            });
+        }
+        let stream = CacheReader::open(&directory)?;
+        for &frame in frames {
+            let how = match stream.has_particles(frame) {
+                false => "is not in it",
+                true if !is_of(stream.entry(frame)?, water) => {
+                    "was made from water that is no longer there"
+                }
+                true => continue,
+            };
+            return Err(StreamError::Frame {
+                directory,
+                frame,
+                how,
+            });
+        }
+        Ok(Self { stream })
+    }
+
+    pub(super) fn read(&self, frame: u32) -> Result<Particles, CacheError> {
+        self.stream.read(frame)
+    }
+
+    pub(super) fn frame_hash(&self, frame: u32) -> Result<&str, CacheError> {
+        self.stream.frame_hash(frame)
+    }
+}

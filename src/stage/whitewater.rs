@@ -1,0 +1,549 @@
+//! `whitewater`: spray, foam and bubbles from a finished bake, as a stream beside it. The bake is only read.
+//!
+//! A stream is a cache of its own in `CACHE/whitewater/NAME`: its frames are checkpoints, so it is resumable, and the same bake,
+//! settings and adapter give the same bytes.
+
+mod checked;
+mod engine;
+mod water;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
+
+use serde_json::{Value, json};
+
+use crate::{
+    cache::{self, Asset, CacheError, CacheReader, CacheWriter, Clock, Entry, Manifest},
+    domain::{
+        bounds::Bounds,
+        particles::Particles,
+        signed_distance::SignedDistanceError,
+        whitewater::{self, Births, Settings, Source, Thresholds},
+    },
+    gpu::adapter::{GpuError, Needs},
+    scene::{
+        Scene, SceneError,
+        whitewater::{WhitewaterSettings, written_out},
+    },
+};
+
+use super::{
+    Blame,
+    device::{Device, Identity, SolverError},
+    prepare::Start,
+};
+
+use self::{engine::Engine, water::Water};
+
+pub use self::checked::Stream;
+
+/// Folder of the streams in a cache.
+const FOLDER: &str = "whitewater";
+/// The settings that a stream was made with, all of them, among its assets.
+const SETTINGS: &str = "whitewater.toml";
+/// Frames that a shot's thresholds are calibrated on, at most.
+const CALIBRATED_ON: usize = 16;
+
+/// What to make.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Cache of a bake.
+    pub cache: PathBuf,
+    /// Name of the stream.
+    pub name: String,
+    /// Settings; what they leave open the shot decides.
+    pub settings: WhitewaterSettings,
+    /// Last frame wanted; the bake's last where `None`.
+    pub last: Option<u32>,
+    /// Whether a stream of this name that was made otherwise is removed first.
+    pub overwrite: bool,
+    /// What to compute on.
+    pub device: Device,
+    /// Whether passes are timed, which runs them one by one.
+    pub time_passes: bool,
+}
+
+/// What a job has to tell while it runs.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The device is open, and the thresholds stand.
+    Ready {
+        /// Adapter and driver, or the f64 reference.
+        device: Identity,
+        /// Water particles.
+        water: usize,
+        /// Where the stream goes.
+        directory: PathBuf,
+        /// Thresholds.
+        thresholds: Thresholds,
+        /// How many frames they were calibrated on now; `None` where the settings or an earlier run say them.
+        calibrated_on: Option<usize>,
+        /// First frame that will be computed.
+        first: u32,
+        /// Last one.
+        last: u32,
+    },
+    /// A frame was computed.
+    Frame {
+        /// Its number.
+        frame: u32,
+        /// Spray, foam, bubbles.
+        census: [usize; 3],
+        /// New ones.
+        born: usize,
+        /// Wall clock for it.
+        seconds: f64,
+    },
+}
+
+/// How a job ended.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Last frame in the stream.
+    pub last_frame: u32,
+    /// Frames computed now.
+    pub frames: u32,
+    /// Bytes of frames written now.
+    pub bytes: u64,
+    /// Where the stream is.
+    pub directory: PathBuf,
+    /// Whether a signal ended it.
+    pub interrupted: bool,
+    /// Pass, seconds, runs, by name; nothing unless that was asked for.
+    pub passes: Vec<(&'static str, f64, u64)>,
+}
+
+/// Why whitewater could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum WhitewaterError {
+    /// The bake's cache, or the stream's.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// The scene in the cache, or the stream's own settings.
+    #[error("the cache's scene: {0}")]
+    Scene(#[from] SceneError),
+    /// Its solids.
+    #[error(transparent)]
+    Solid(#[from] SignedDistanceError),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The passes.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
+    /// A stream of whitewater is no water.
+    #[error("{} is a stream of whitewater; give the cache that it was made from", .0.display())]
+    IsWhitewater(PathBuf),
+    /// A stream without the bake that it was made from.
+    #[error("{} was made from a bake in {}, which is not there or another now: frame {frame}", stream.display(), cache.display())]
+    NoBake {
+        /// Of the stream.
+        stream: PathBuf,
+        /// Where the bake should be.
+        cache: PathBuf,
+        /// Of the stream.
+        frame: u32,
+    },
+    /// The bake does not go so far.
+    #[error("frame {asked} was asked for, and the bake has frames {first} to {last}")]
+    NoFrame {
+        /// The frame.
+        asked: u32,
+        /// First of the bake.
+        first: u32,
+        /// Last of the bake.
+        last: u32,
+    },
+    /// The stream that stands there was made otherwise.
+    #[error(
+        "{} was made {how}; choose another --name, or --overwrite it",
+        directory.display()
+    )]
+    Other {
+        /// Of the stream.
+        directory: PathBuf,
+        /// What differs, in words.
+        how: &'static str,
+    },
+    /// More than the settings allow.
+    #[error(
+        "frame {frame} has {count} whitewater particles, and max_particles is {allowed}: raise it, or lower \
+         emission.trapped_air_rate and emission.wave_crest_rate; the frames before it stand"
+    )]
+    TooMany {
+        /// The frame.
+        frame: u32,
+        /// So many.
+        count: usize,
+        /// `max_particles`.
+        allowed: u32,
+    },
+    /// A stream cannot be removed.
+    #[error("cannot remove {}: {source}", directory.display())]
+    Remove {
+        /// Of the stream.
+        directory: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+impl From<&WhitewaterError> for Blame {
+    fn from(error: &WhitewaterError) -> Self {
+        match error {
+            WhitewaterError::Cache(error) => error.into(),
+            WhitewaterError::Scene(_)
+            | WhitewaterError::NoBake { .. }
+            | WhitewaterError::Other { .. }
+            | WhitewaterError::Remove { .. } => Self::Files,
+            WhitewaterError::Solid(error) => error.into(),
+            WhitewaterError::Gpu(error) => error.into(),
+            WhitewaterError::Solver(error) => error.into(),
+            WhitewaterError::IsWhitewater(_) | WhitewaterError::NoFrame { .. } => Self::Input,
+            WhitewaterError::TooMany { .. } => Self::Numbers,
+        }
+    }
+}
+
+/// Whether a stream's frame was made from the frame of this number that stands in `cache`; the first is always empty.
+pub fn is_of(frame: &Entry, cache: &CacheReader) -> bool {
+    let now = cache.entry(frame.frame).map(|entry| &*entry.chain).ok();
+    frame.frame == cache.first_frame() || frame.report[WATER].as_str() == now
+}
+
+/// Folder of a stream of a cache.
+pub fn directory(cache: &Path, name: &str) -> PathBuf {
+    cache.join(FOLDER).join(name)
+}
+
+/// Makes a stream, or goes on with the one that stands there; `tell` hears of progress, and `stop` ends it after the current
+/// frame.
+///
+/// # Errors
+/// [`WhitewaterError`]; frames that were finished before are in the stream.
+pub fn whitewater(
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Outcome, WhitewaterError> {
+    let cache = CacheReader::open(&request.cache)?;
+    if cache.manifest().is_whitewater() {
+        return Err(WhitewaterError::IsWhitewater(request.cache.clone()));
+    }
+    let last = request.last.unwrap_or(cache.last_frame());
+    if !(cache.first_frame()..=cache.last_frame()).contains(&last) {
+        return Err(WhitewaterError::NoFrame {
+            asked: last,
+            first: cache.first_frame(),
+            last: cache.last_frame(),
+        });
+    }
+    let directory = directory(&request.cache, &request.name);
+    let scene = super::baked_scene(&cache, &request.cache)?.of_whitewater();
+    let mut water = Water::of(&cache, scene.period());
+    let begin = water.at(cache.first_frame())?;
+    let particles = begin.len();
+    let boundary = Start::with(&scene, begin)?.boundary;
+    let opened = request.device.open(Needs::default())?;
+    let identity = opened.identity();
+    let mut engine = Engine::new(&opened, &scene, &boundary, particles, request.time_passes)?;
+    let manifest = manifest(&cache, request, &identity)?;
+    let standing = standing(request, &directory, &manifest)?;
+    let (settings, calibrated_on) = match &standing {
+        Some(stream) => (recorded(stream, &directory, &scene)?, None),
+        None => settle(request, &scene, &mut engine, &mut water)?,
+    };
+    engine.set(&settings)?;
+    let mut stream = match standing {
+        Some(_) => Growing::resume(&directory, &manifest, &cache)?,
+        None => Growing::create(&directory, manifest, &cache, &settings)?,
+    };
+    tell(Event::Ready {
+        device: identity,
+        water: particles,
+        directory: directory.clone(),
+        thresholds: settings.thresholds,
+        calibrated_on,
+        first: stream.clock.frame + 1,
+        last,
+    });
+    let mut interrupted = false;
+    while stream.clock.frame < last {
+        interrupted = stop.load(Ordering::Relaxed);
+        if interrupted {
+            break;
+        }
+        let began = Instant::now();
+        let step = Step {
+            settings: &settings,
+            scene: &scene,
+            cache: &cache,
+        };
+        match step.run(&mut stream, &mut engine, &mut water) {
+            Ok(born) => tell(Event::Frame {
+                frame: stream.clock.frame,
+                census: whitewater::census(&stream.white),
+                born,
+                seconds: began.elapsed().as_secs_f64(),
+            }),
+            Err(error) => {
+                // What was computed before is kept.
+                stream.writer.finish()?;
+                return Err(error);
+            }
+        }
+    }
+    let summary = stream.writer.finish()?;
+    Ok(Outcome {
+        last_frame: summary.last_frame,
+        frames: summary.frames,
+        bytes: summary.bytes,
+        directory,
+        interrupted,
+        passes: engine.times(),
+    })
+}
+
+/// A frame of a stream from the one before.
+struct Step<'a> {
+    settings: &'a Settings,
+    scene: &'a Scene,
+    cache: &'a CacheReader,
+}
+
+impl Step<'_> {
+    /// How many were born.
+    fn run(
+        &self,
+        stream: &mut Growing,
+        engine: &mut Engine,
+        water: &mut Water<'_>,
+    ) -> Result<usize, WhitewaterError> {
+        let frame = stream.clock.frame + 1;
+        let before = stream.clock.time;
+        let clock = Clock {
+            substeps: 1,
+            steps: stream.clock.steps + 1,
+            ..self.cache.entry(frame)?.clock
+        };
+        let seconds = clock.time - before;
+        let now = water.at(frame)?;
+        let potentials = engine.survey(&now, clock.time, seconds)?;
+        let mut white = stream.white.clone();
+        engine.advance(&mut white, frame)?;
+        let spacing = self.scene.particle_spacing();
+        let died = whitewater::grow_older(self.settings, &mut white, spacing, seconds);
+        let corner = self.scene.domain.min;
+        let walls = self.scene.walls(clock.time);
+        let births = Births::of(
+            self.settings,
+            &Source {
+                water: &now,
+                potentials: &potentials,
+                frame,
+                seconds,
+                spacing,
+                walls: Bounds {
+                    min: walls.min + corner,
+                    max: walls.max + corner,
+                },
+                corner,
+                period: self.scene.period(),
+            },
+        );
+        let count = white.len() + births.len();
+        if count > self.settings.max_particles as usize {
+            return Err(WhitewaterError::TooMany {
+                frame,
+                count,
+                allowed: self.settings.max_particles,
+            });
+        }
+        let next = births.join(&mut white, stream.next_id);
+        let [spray, foam, bubbles] = whitewater::census(&white);
+        let report = json!({
+            "spray": spray, "foam": foam, "bubbles": bubbles, "born": births.len(), "died": died,
+            NEXT_ID: next, WATER: self.cache.entry(frame)?.chain,
+        });
+        (stream.writer).submit(clock, white.clone(), Vec::new(), report, Value::Null)?;
+        stream.clock = clock;
+        stream.white = white;
+        stream.next_id = next;
+        Ok(births.len())
+    }
+}
+
+/// In a frame's report: the id that the next birth gets.
+const NEXT_ID: &str = "next_id";
+/// In a frame's report: the chained hash of the bake's frame.
+const WATER: &str = "water";
+
+/// The stream as it is written.
+struct Growing {
+    writer: CacheWriter,
+    clock: Clock,
+    white: Particles,
+    next_id: u32,
+}
+
+impl Growing {
+    fn create(
+        directory: &Path,
+        manifest: Manifest,
+        cache: &CacheReader,
+        settings: &Settings,
+    ) -> Result<Self, WhitewaterError> {
+        let settings = Asset {
+            name: SETTINGS.to_owned(),
+            bytes: written_out(settings).into_bytes(),
+        };
+        let clock = cache.entry(cache.first_frame())?.clock;
+        let (white, scene) = (whitewater::none(), cache.scene_toml());
+        let writer = CacheWriter::create(
+            directory,
+            manifest,
+            scene,
+            &[settings],
+            clock,
+            &white,
+            &Vec::new(),
+        )?;
+        Ok(Self {
+            writer,
+            clock,
+            white,
+            next_id: 0,
+        })
+    }
+
+    fn resume(
+        directory: &Path,
+        manifest: &Manifest,
+        cache: &CacheReader,
+    ) -> Result<Self, WhitewaterError> {
+        let (writer, entry, white) = CacheWriter::resume(directory, manifest)?;
+        let other = |how: &'static str| WhitewaterError::Other {
+            directory: directory.to_owned(),
+            how,
+        };
+        if !is_of(&entry, cache) {
+            return Err(other("from water that is no longer there"));
+        }
+        let next_id = match entry.report[NEXT_ID].as_u64() {
+            Some(next) => next as u32,
+            None => 0,
+        };
+        Ok(Self {
+            writer,
+            clock: entry.clock,
+            white,
+            next_id,
+        })
+    }
+}
+
+/// The stream that stands there, made as this one would be; `None` where there is none, or it was removed as asked.
+fn standing(
+    request: &Request,
+    directory: &Path,
+    manifest: &Manifest,
+) -> Result<Option<CacheReader>, WhitewaterError> {
+    if !cache::exists(directory) {
+        return Ok(None);
+    }
+    let stream = CacheReader::open(directory)?;
+    let how = if stream.manifest().scene_hash == manifest.scene_hash {
+        None
+    } else {
+        Some("with other settings, or from another bake")
+    };
+    match (how, request.overwrite) {
+        (None, false) => Ok(Some(stream)),
+        (_, true) => {
+            fs::remove_dir_all(directory).map_err(|source| WhitewaterError::Remove {
+                directory: directory.to_owned(),
+                source,
+            })?;
+            Ok(None)
+        }
+        (Some(how), false) => Err(WhitewaterError::Other {
+            directory: directory.to_owned(),
+            how,
+        }),
+    }
+}
+
+/// The settings that a stream was made with.
+fn recorded(
+    stream: &CacheReader,
+    directory: &Path,
+    scene: &Scene,
+) -> Result<Settings, WhitewaterError> {
+    let bytes = stream.asset(SETTINGS)?;
+    let text = String::from_utf8_lossy(&bytes);
+    let file = directory.join("assets").join(SETTINGS);
+    let settings = WhitewaterSettings::parse(&text, &file)?;
+    // All of them stand there: the shot decides nothing.
+    Ok(settings.settled(scene.particle_spacing(), &Thresholds::calibrate(&[])))
+}
+
+/// Settings of a new stream, and how many frames decided what they leave open.
+fn settle(
+    request: &Request,
+    scene: &Scene,
+    engine: &mut Engine,
+    water: &mut Water<'_>,
+) -> Result<(Settings, Option<usize>), WhitewaterError> {
+    let cache = water.cache();
+    let frames: Vec<u32> = match request.settings.needs_calibration() {
+        true => (cache.first_frame() + 1..=cache.last_frame())
+            .filter(|&frame| cache.has_particles(frame))
+            .collect(),
+        false => Vec::new(),
+    };
+    let step = frames.len().div_ceil(CALIBRATED_ON).max(1);
+    // The last frame is one of them.
+    let mut chosen: Vec<u32> = frames.into_iter().rev().step_by(step).collect();
+    chosen.reverse();
+    let mut all = Vec::new();
+    for &frame in &chosen {
+        let time = cache.entry(frame)?.clock.time;
+        let seconds = 1.0 / cache.manifest().frames_per_second;
+        all.extend(engine.survey(&water.at(frame)?, time, seconds)?);
+    }
+    let shot = Thresholds::calibrate(&all);
+    let settings = request.settings.settled(scene.particle_spacing(), &shot);
+    let calibrated = request.settings.needs_calibration().then_some(chosen.len());
+    Ok((settings, calibrated))
+}
+
+/// Of the stream: the bake's own, but for what was made and by what.
+fn manifest(
+    cache: &CacheReader,
+    request: &Request,
+    identity: &Identity,
+) -> Result<Manifest, WhitewaterError> {
+    let baked = cache.manifest();
+    let first = &cache.entry(cache.first_frame())?.chain;
+    let hash = blake3::hash(format!("{} {first}", request.settings.hash()).as_bytes());
+    Ok(Manifest {
+        format_version: Manifest::FORMAT_VERSION,
+        program: env!("CARGO_PKG_NAME").into(),
+        program_version: env!("CARGO_PKG_VERSION").into(),
+        shaders: identity.shaders.clone(),
+        scene_hash: hash.to_hex().to_string(),
+        solver: Manifest::WHITEWATER.to_owned(),
+        device: identity.name.clone(),
+        driver: identity.driver.clone(),
+        backend: identity.backend.clone(),
+        attributes: whitewater::ATTRIBUTES.map(str::to_owned).to_vec(),
+        grids: None,
+        probes: Vec::new(),
+        warnings: Vec::new(),
+        ..baked.clone()
+    })
+}

@@ -1,0 +1,98 @@
+//! A stream of whitewater beside the bake that it was made from, for `check`.
+
+use std::path::{Path, PathBuf};
+
+use crate::{
+    cache::CacheReader,
+    check::{self, Table},
+    domain::{boundary::Boundary, whitewater::Settings},
+    gpu::adapter::Context,
+    scene::Scene,
+    stage::{baked_scene, device::SolverError, prepare::Start},
+};
+
+use super::{WhitewaterError, is_of, recorded, water::Water};
+
+/// A stream, and all that its frames are made from.
+pub struct Stream {
+    stream: CacheReader,
+    cache: CacheReader,
+    scene: Scene,
+    boundary: Boundary,
+    settings: Settings,
+    particles: usize,
+}
+
+impl Stream {
+    /// The stream in `directory`, whose bake stands two folders above, as it stood for each of `frames`.
+    ///
+    /// # Errors
+    /// A bake that is not there or another, its scene, its solids; frames whose whitewater before was not kept.
+    pub fn open(
+        directory: &Path,
+        stream: CacheReader,
+        frames: &[u32],
+    ) -> Result<Self, WhitewaterError> {
+        let real = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
+        let parent = real.parent().and_then(Path::parent);
+        let place = parent.map_or_else(PathBuf::new, Path::to_owned);
+        let cache = CacheReader::open(&place)?;
+        for &frame in frames {
+            if frame == stream.first_frame() {
+                let (first, last) = (frame + 1, stream.last_frame());
+                return Err(WhitewaterError::NoFrame {
+                    asked: frame,
+                    first,
+                    last,
+                });
+            }
+            // From the frame before.
+            stream.kept(frame - 1)?;
+            if !is_of(stream.entry(frame)?, &cache) {
+                return Err(WhitewaterError::NoBake {
+                    stream: directory.to_owned(),
+                    cache: place,
+                    frame,
+                });
+            }
+        }
+        let scene = baked_scene(&cache, &place)?.of_whitewater();
+        let begin = Water::of(&cache, scene.period()).at(cache.first_frame())?;
+        let particles = begin.len();
+        let boundary = Start::with(&scene, begin)?.boundary;
+        let settings = recorded(&stream, directory, &scene)?;
+        Ok(Self {
+            stream,
+            cache,
+            scene,
+            boundary,
+            settings,
+            particles,
+        })
+    }
+
+    /// Particles of its water.
+    pub fn water(&self) -> usize {
+        self.particles
+    }
+
+    /// Holds the passes that made a frame against their twins.
+    ///
+    /// # Errors
+    /// The files; the device.
+    pub fn check(&self, context: &Context, frame: u32) -> Result<Table, WhitewaterError> {
+        let water = Water::of(&self.cache, self.scene.period()).at(frame)?;
+        let time = self.cache.entry(frame)?.clock.time;
+        let white = self.stream.read(frame - 1)?;
+        let one = check::whitewater::Frame {
+            scene: &self.scene,
+            boundary: &self.boundary,
+            settings: &self.settings,
+            water: &water,
+            white: &white,
+            time,
+            seconds: time - self.cache.entry(frame - 1)?.clock.time,
+        };
+        Ok(check::whitewater::check(context, one).map_err(SolverError::from)?)
+    }
+}

@@ -1,0 +1,238 @@
+//! Streams of whitewater: made, stopped, gone on with, tuned, refused.
+
+use std::fs;
+
+use swell::{
+    cache::CacheReader,
+    domain::{
+        particles::Particles,
+        whitewater::{self, KIND},
+    },
+    render::image::read_png,
+};
+
+use crate::support::job::{Job, assert_has};
+
+/// Thresholds low enough for the small splash of a job, and lives as short as it.
+const SETTINGS: &str = "[emission]\ntrapped_air = [0.2, 2.0]\nwave_crest = [0.2, 2.0]\nenergy = [0.02, 0.5]\n\
+    [foam]\nlifetime = [0.02, 0.1]\n";
+const MAKE: &str = "whitewater cache/small/pbf --settings tuned.toml";
+const STREAM: &str = "cache/small/pbf/whitewater/tuned";
+
+fn baked() -> Job {
+    let job = Job::new();
+    job.write("tuned.toml", SETTINGS);
+    job.expect(0, "bake small.toml");
+    job
+}
+
+fn census(job: &Job, stream: &str) -> Vec<usize> {
+    let reader = CacheReader::open(&job.path(stream)).unwrap();
+    let frames = reader.first_frame()..=reader.last_frame();
+    let count = |frame| {
+        whitewater::census(&reader.read(frame).unwrap())
+            .iter()
+            .sum()
+    };
+    frames.map(count).collect()
+}
+
+#[test]
+fn a_stream_is_made_beside_its_bake_and_leaves_it_as_it_was() {
+    let job = baked();
+    let bake = job.hash("cache/small/pbf");
+    job.expect(0, MAKE);
+    let counts = census(&job, STREAM);
+    assert_eq!(counts.len(), 9);
+    assert!(counts[0] == 0 && counts[8] > 100, "{counts:?}");
+    let reader = CacheReader::open(&job.path(STREAM)).unwrap();
+    let last = reader.read(8).unwrap();
+    assert_eq!(
+        last.attributes.keys().collect::<Vec<_>>(),
+        whitewater::ATTRIBUTES
+    );
+    assert!(
+        last.attributes[KIND]
+            .iter()
+            .all(|k| [0.0, 1.0, 2.0].contains(k))
+    );
+    // Ids are for ever: some died, and no number came again.
+    let next = reader.entry(8).unwrap().report["next_id"].as_u64().unwrap();
+    assert!(last.id.windows(2).all(|w| w[0] < w[1]) && u64::from(*last.id.last().unwrap()) < next);
+    assert!((last.id.len() as u64) < next);
+    job.expect(0, &format!("verify {STREAM}"));
+    job.expect(0, &format!("check {STREAM} --frames 3,8"));
+    // The bake: checked, and gone on with, as if nothing stood beside it.
+    job.expect(0, "verify cache/small/pbf");
+    let said = job.expect(0, "bake small.toml --resume --frames 1-9");
+    assert_has(&said, &["frame 9 of 9"]);
+    fs::remove_dir_all(job.path("cache/small/pbf/whitewater")).unwrap();
+    let other = Job::new();
+    other.expect(0, "bake small.toml");
+    assert_eq!(other.hash("cache/small/pbf"), bake);
+}
+
+#[test]
+fn a_stopped_stream_goes_on_to_the_same_bytes() {
+    let job = baked();
+    job.expect(0, MAKE);
+    let whole = job.hash(STREAM);
+    job.expect(0, &format!("{MAKE} --overwrite --last 3"));
+    assert_ne!(job.hash(STREAM), whole);
+    let said = job.expect(0, MAKE);
+    assert_has(&said, &["frame    4", "5 frames"]);
+    assert_eq!(job.hash(STREAM), whole);
+    // Nothing is left to do.
+    assert_has(&job.expect(0, MAKE), &["0 frames"]);
+    // Control: another seed gives other bytes.
+    job.write("tuned.toml", &format!("seed = 2\n{SETTINGS}"));
+    job.expect(0, &format!("{MAKE} --overwrite"));
+    assert_ne!(job.hash(STREAM), whole);
+}
+
+#[test]
+fn other_settings_are_another_stream() {
+    let job = baked();
+    job.expect(0, MAKE);
+    let first = job.hash(STREAM);
+    job.write("tuned.toml", &SETTINGS.replace("0.1]", "0.2]"));
+    let said = job.expect(4, MAKE);
+    assert_has(&said, &["other settings", "--name", "--overwrite"]);
+    assert_eq!(job.hash(STREAM), first);
+    job.expect(0, &format!("{MAKE} --name longer"));
+    assert_eq!(job.hash(STREAM), first);
+    let longer = census(&job, "cache/small/pbf/whitewater/longer");
+    assert!(longer[8] > census(&job, STREAM)[8], "{longer:?}");
+    // What was calibrated and what had a default stands written out, and makes the same stream.
+    job.expect(0, "whitewater cache/small/pbf --name a");
+    let written = "cache/small/pbf/whitewater/a/assets/whitewater.toml";
+    job.expect(
+        0,
+        &format!("whitewater cache/small/pbf --name b --settings {written}"),
+    );
+    let frame = |name: &str| {
+        fs::read(job.path(&format!(
+            "cache/small/pbf/whitewater/{name}/frames/small.0008.ply"
+        )))
+        .unwrap()
+    };
+    assert_eq!(frame("a"), frame("b"));
+}
+
+/// From every second frame the water between is made by a cubic, and the stream has frames where the water has.
+#[test]
+fn frames_that_were_not_kept_are_bridged() {
+    let job = baked();
+    let small = fs::read_to_string(job.path("small.toml")).unwrap();
+    let thin = small.replace("[effects]", "[keep]\nparticles = \"every 2\"\n[effects]");
+    job.write("thin.toml", &thin.replace("\"small\"", "\"thin\""));
+    job.expect(0, "bake thin.toml");
+    job.expect(0, "whitewater cache/thin/pbf --settings tuned.toml");
+    job.expect(0, MAKE);
+    let thin = CacheReader::open(&job.path("cache/thin/pbf/whitewater/tuned")).unwrap();
+    assert!(thin.has_particles(4) && !thin.has_particles(5));
+    let total = |particles: &Particles| particles.len() as f64;
+    let full = CacheReader::open(&job.path(STREAM)).unwrap();
+    let (a, b) = (total(&thin.read(8).unwrap()), total(&full.read(8).unwrap()));
+    // Two streams of one splash; births depend on the water between by little.
+    assert!((a / b - 1.0).abs() < 0.2, "{a} {b}");
+}
+
+#[test]
+fn the_reference_makes_a_stream_without_a_device() {
+    let job = baked();
+    job.expect(0, MAKE);
+    job.expect(0, &format!("{MAKE} --name cpu --device cpu"));
+    let (gpu, cpu) = (
+        census(&job, STREAM),
+        census(&job, "cache/small/pbf/whitewater/cpu"),
+    );
+    // Births hang on potentials that agree to rounding: a few chances fall the other way.
+    assert!(
+        (gpu[8] as f64 / cpu[8] as f64 - 1.0).abs() < 0.02,
+        "{gpu:?} {cpu:?}"
+    );
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let job = baked();
+    let said = job.expect(2, "whitewater cache/small/pbf --last 9");
+    assert_has(&said, &["frame 9", "0 to 8"]);
+    job.write("few.toml", &format!("max_particles = 50\n{SETTINGS}"));
+    let said = job.expect(5, "whitewater cache/small/pbf --settings few.toml");
+    assert_has(&said, &["max_particles", "50"]);
+    // Its last good frame stands.
+    assert!(
+        census(&job, "cache/small/pbf/whitewater/few")
+            .iter()
+            .all(|&count| count <= 50)
+    );
+    job.write("bad.toml", "[foam]\nlifetime = [4, 1]\n");
+    let said = job.expect(2, "whitewater cache/small/pbf --settings bad.toml");
+    assert_has(&said, &["bad.toml:2", "foam.lifetime"]);
+    job.expect(2, "whitewater cache/small/pbf --name a/b");
+    job.expect(0, MAKE);
+    let said = job.expect(2, &format!("whitewater {STREAM}"));
+    assert_has(&said, &["stream of whitewater"]);
+    let said = job.expect(2, &format!("render {STREAM} --look look.toml"));
+    assert_has(&said, &["stream of whitewater"]);
+    // A damaged frame of water.
+    let frame = job.path("cache/small/pbf/frames/small.0005.ply");
+    let mut bytes = fs::read(&frame).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    fs::write(&frame, bytes).unwrap();
+    let said = job.expect(4, &format!("{MAKE} --name damaged"));
+    assert_has(&said, &["small.0005.ply"]);
+    assert_eq!(census(&job, "cache/small/pbf/whitewater/damaged").len(), 5);
+}
+
+#[test]
+fn a_look_draws_the_stream_that_it_names() {
+    let job = baked();
+    job.expect(0, MAKE);
+    let look = fs::read_to_string(job.path("look.toml")).unwrap();
+    job.write(
+        "white.toml",
+        &format!("{look}\n[whitewater]\nstream = \"tuned\"\ndensity_per_metre = 400\n"),
+    );
+    job.expect(
+        0,
+        "render cache/small/pbf --look look.toml -o plain --frames 8",
+    );
+    job.expect(
+        0,
+        "render cache/small/pbf --look white.toml -o white --frames 8",
+    );
+    let mean = |folder: &str| {
+        let (_, _, pixels) = read_png(&job.path(folder).join("small.0008.png")).unwrap();
+        pixels
+            .as_flattened()
+            .iter()
+            .map(|&x| f64::from(x))
+            .sum::<f64>()
+    };
+    assert!(
+        mean("white") > 1.005 * mean("plain"),
+        "{} {}",
+        mean("white"),
+        mean("plain")
+    );
+    // A stream of another name, and one that lacks the frame.
+    job.write(
+        "other.toml",
+        &format!("{look}\n[whitewater]\nstream = \"other\"\n"),
+    );
+    let said = job.expect(
+        4,
+        "render cache/small/pbf --look other.toml -o other --frames 8",
+    );
+    assert_has(&said, &["swell whitewater", "other"]);
+    job.expect(0, &format!("{MAKE} --overwrite --last 5"));
+    let said = job.expect(
+        4,
+        "render cache/small/pbf --look white.toml -o late --frames 8",
+    );
+    assert_has(&said, &["frame 8", "not in it"]);
+}

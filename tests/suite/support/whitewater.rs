@@ -1,0 +1,105 @@
+//! Whitewater over water that tests lay out.
+use glam::{DVec3, Vec3};
+use swell::{
+    domain::{
+        boundary::Boundary,
+        particles::Particles,
+        whitewater::{AGE, KIND, Kind, LIFE, Potentials, RADIUS, Settings, Thresholds, none},
+    },
+    gpu::adapter::Context,
+    reference,
+    scene::Scene,
+    solve,
+};
+
+pub fn settings() -> Settings {
+    Settings {
+        seed: 1,
+        max_particles: 1_000_000,
+        radius: [0.005, 0.02],
+        trapped_air_rate: 50.0,
+        wave_crest_rate: 50.0,
+        thresholds: Thresholds {
+            trapped_air: [6.0, 24.0],
+            wave_crest: [2.0, 8.0],
+            energy: [0.5, 2.0],
+        },
+        drop_radius: 1e-3,
+        wind: [0.0; 3],
+        lifetime: [0.5, 4.0],
+        crowd: 64,
+        rise_speed: 0.25,
+        response: 0.05,
+    }
+}
+
+/// Whitewater of these places, velocities and kinds.
+pub fn white(all: &[(DVec3, DVec3, Kind)]) -> Particles {
+    let mut made = none();
+    for (id, (x, v, kind)) in (0..).zip(all) {
+        made.position.push(x.as_vec3().to_array());
+        made.velocity.push(v.as_vec3().to_array());
+        made.id.push(id);
+        let values = [
+            (AGE, 0.0),
+            (KIND, kind.number()),
+            (LIFE, 1.0),
+            (RADIUS, 0.01),
+        ];
+        for (name, value) in values {
+            made.attributes
+                .entry(name.to_owned())
+                .or_default()
+                .push(value);
+        }
+    }
+    made
+}
+
+pub fn place(white: &Particles, k: usize) -> DVec3 {
+    Vec3::from_array(white.position[k]).as_dvec3()
+}
+
+pub fn velocity(white: &Particles, k: usize) -> DVec3 {
+    Vec3::from_array(white.velocity[k]).as_dvec3()
+}
+
+pub fn kind(white: &Particles, k: usize) -> Kind {
+    Kind::of_number(white.attributes[KIND][k]).unwrap()
+}
+
+/// What the GPU, or without a context the reference, finds of the water, and makes of whitewater over `frames` frames of
+/// `seconds` each, in which the water stays.
+pub fn run(
+    context: Option<&Context>,
+    (scene, water): (&Scene, &Particles),
+    settings: &Settings,
+    white: &Particles,
+    (frames, seconds): (u32, f64),
+) -> (Vec<Potentials>, Particles) {
+    let scene = &scene.of_whitewater();
+    let boundary = Boundary::default();
+    let mut white = white.clone();
+    let mut found = Vec::new();
+    match context {
+        Some(context) => {
+            let n = water.len();
+            let mut engine =
+                solve::whitewater::Whitewater::new(context, scene, &boundary, n, false).unwrap();
+            engine.set(settings).unwrap();
+            for frame in 1..=frames {
+                found = engine.survey(water, 0.0, seconds).unwrap();
+                engine.advance(&mut white, frame).unwrap();
+            }
+        }
+        None => {
+            let mut engine = reference::whitewater::Whitewater::new(scene, &boundary);
+            engine.set(settings);
+            for frame in 1..=frames {
+                found = engine.survey(water, 0.0, seconds);
+                engine.advance(&mut white, frame).unwrap();
+            }
+        }
+    }
+    (found, white)
+}
