@@ -158,6 +158,12 @@ impl Manifest {
         self.solver == Self::WHITEWATER
     }
 
+    /// Names of the scene's own files, as [`Asset`](super::Asset) has them.
+    pub fn asset_names(&self) -> impl Iterator<Item = &str> {
+        let files = self.files.iter().map(|record| &*record.file);
+        files.filter_map(|file| file.strip_prefix(ASSETS)?.strip_prefix('/'))
+    }
+
     /// Number of the first frame: 0 is a scene's own start.
     pub fn first_frame(&self) -> u32 {
         self.parent.as_ref().map_or(0, |parent| parent.frame)

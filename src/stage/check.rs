@@ -207,60 +207,63 @@ pub fn check(
 
 /// What is checked.
 enum Subject {
-    /// A solver's step: of a scene's start, or from frames of a cache.
-    Step {
-        scene: Box<Scene>,
-        start: Start,
-        cache: Option<CacheReader>,
-    },
+    Step(Box<Step>),
     /// Frames of a stream of whitewater.
     Whitewater(Box<Stream>),
+}
+
+/// A solver's step: of a scene's start, or from frames of a cache.
+struct Step {
+    scene: Scene,
+    start: Start,
+    cache: Option<CacheReader>,
+}
+
+impl Step {
+    fn check(&self, context: &Context, frame: u32, which: Which) -> Result<Checked, CheckError> {
+        let particles = match &self.cache {
+            Some(cache) => cache.read(frame)?,
+            None => self.start.particles.clone(),
+        };
+        let (scene, start) = (&self.scene, &self.start);
+        Ok(check_substep(
+            context, scene, start, frame, &particles, which,
+        )?)
+    }
 }
 
 impl Subject {
     fn needs(&self) -> Needs {
         match self {
-            Self::Step { scene, .. } => needs(scene),
+            Self::Step(step) => needs(&step.scene),
             Self::Whitewater(_) => Needs::default(),
         }
     }
 
     fn name(&self) -> &'static str {
         match self {
-            Self::Step { scene, .. } => scene.solver.method.name(),
+            Self::Step(step) => step.scene.solver.method.name(),
             Self::Whitewater(_) => Manifest::WHITEWATER,
         }
     }
 
     fn particles(&self) -> usize {
         match self {
-            Self::Step { start, .. } => start.particles.len(),
+            Self::Step(step) => step.start.particles.len(),
             Self::Whitewater(stream) => stream.water(),
         }
     }
 
     fn warnings(&self) -> Vec<String> {
         match self {
-            Self::Step { scene, .. } => scene.warnings(),
+            Self::Step(step) => step.scene.warnings(),
             Self::Whitewater(_) => Vec::new(),
         }
     }
 
     fn check(&self, context: &Context, frame: u32, which: Which) -> Result<Checked, CheckError> {
         match self {
-            Self::Step {
-                scene,
-                start,
-                cache,
-            } => {
-                let particles = match cache {
-                    Some(cache) => cache.read(frame)?,
-                    None => start.particles.clone(),
-                };
-                Ok(check_substep(
-                    context, scene, start, frame, &particles, which,
-                )?)
-            }
+            Self::Step(step) => step.check(context, frame, which),
             Self::Whitewater(stream) => Ok(Checked {
                 table: stream.check(context, frame)?,
                 // A frame of whitewater is one step.
@@ -274,13 +277,12 @@ fn open(source: &Source) -> Result<(Subject, Vec<u32>), CheckError> {
     match source {
         Source::Scene(scene) => {
             let start = Start::of(scene)?;
-            let scene = scene.clone();
-            let subject = Subject::Step {
-                scene,
+            let step = Step {
+                scene: (**scene).clone(),
                 start,
                 cache: None,
             };
-            Ok((subject, vec![0]))
+            Ok((Subject::Step(Box::new(step)), vec![0]))
         }
         Source::Cache(directory, frames) => {
             let cache = CacheReader::open(directory)?;
@@ -297,12 +299,12 @@ fn open(source: &Source) -> Result<(Subject, Vec<u32>), CheckError> {
             }
             let scene = super::baked_scene(&cache, directory)?;
             let start = Start::of_cache::<CheckError>(&scene, &cache)?;
-            let subject = Subject::Step {
-                scene: Box::new(scene),
+            let step = Step {
+                scene,
                 start,
                 cache: Some(cache),
             };
-            Ok((subject, frames))
+            Ok((Subject::Step(Box::new(step)), frames))
         }
     }
 }

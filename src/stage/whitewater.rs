@@ -397,21 +397,37 @@ impl Growing {
         cache: &CacheReader,
         settings: &Settings,
     ) -> Result<Self, WhitewaterError> {
-        let settings = Asset {
+        let mut assets = vec![Asset {
             name: SETTINGS.to_owned(),
             bytes: written_out(settings).into_bytes(),
-        };
+        }];
+        // The scene names its own, wherever the stream is moved to.
+        for name in cache.manifest().asset_names() {
+            assets.push(Asset {
+                name: name.to_owned(),
+                bytes: cache.asset(name)?,
+            });
+        }
         let clock = cache.entry(cache.first_frame())?.clock;
         let (white, scene) = (whitewater::none(), cache.scene_toml());
-        let writer = CacheWriter::create(
+        let made = CacheWriter::create(
             directory,
             manifest,
             scene,
-            &[settings],
+            &assets,
             clock,
             &white,
             &Vec::new(),
-        )?;
+        );
+        let writer = match made {
+            Err(CacheError::Exists { .. }) => {
+                return Err(WhitewaterError::Other {
+                    directory: directory.to_owned(),
+                    how: "meanwhile, by another process",
+                });
+            }
+            made => made?,
+        };
         Ok(Self {
             writer,
             clock,

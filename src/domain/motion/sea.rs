@@ -2,7 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use super::{Spectrum, piston_height_ratio, smooth_ramp, wave_number};
+use super::{
+    Spectrum, piston_height_ratio,
+    sines::{Sine, Sines},
+    wave_number,
+};
 use crate::domain::sampling::uniform;
 
 /// Frequencies within the peak's own: the sea comes again after so many peak periods.
@@ -10,10 +14,6 @@ const LINES: u32 = 200;
 
 /// The longest waves have this part of the peak's frequency; below it a spectrum has 2e-9 of its energy.
 const LEAST_RATIO: f64 = 0.5;
-
-/// What a sum of sines may be over its samples, as part of its root mean square: between two of them a function is off the
-/// line through both by no more than an eighth of the step's square times its greatest curvature.
-const MISSED: f64 = 0.01;
 
 /// Waves as a scene asks for them.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,8 +75,8 @@ struct Wave {
 pub struct Sea {
     asked: Asked,
     waves: Vec<Wave>,
-    /// X, the wall's mean place, metres.
-    mean: f64,
+    /// X is the wall's mean place.
+    pub(super) sines: Sines,
 }
 
 impl Sea {
@@ -121,9 +121,16 @@ impl Sea {
                 phase,
             }
         });
-        let mut sea = Self {
-            waves: waves.collect(),
+        let waves: Vec<Wave> = waves.collect();
+        let sines = Sines {
+            lines: Vec::new(),
             mean: 0.0,
+            ramp: asked.ramp,
+            whole: f64::from(LINES) * asked.peak_period,
+        };
+        let mut sea = Self {
+            waves,
+            sines,
             asked,
         };
         sea.find_mean();
@@ -138,7 +145,7 @@ impl Sea {
     /// Elevation by linear theory at a distance from the domain's face once the ramp is over, metres; waves that the ramp
     /// weakened are taken as if it had not.
     pub fn elevation(&self, distance: f64, t: f64) -> f64 {
-        let way = distance - self.mean;
+        let way = distance - self.sines.mean;
         let of = |wave: &Wave| {
             let phase = wave.frequency * t - wave.number * way + self.phase(wave);
             let ratio = piston_height_ratio(wave.number, self.asked.depth);
@@ -164,7 +171,7 @@ impl Sea {
     fn phase(&self, wave: &Wave) -> f64 {
         match self.asked.phases {
             Phases::Random { .. } => wave.phase,
-            Phases::Focused { .. } => wave.phase - wave.number * self.mean,
+            Phases::Focused { .. } => wave.phase - wave.number * self.sines.mean,
         }
     }
 
@@ -172,129 +179,26 @@ impl Sea {
     /// depend on it.
     fn find_mean(&mut self) {
         loop {
-            let least = self.least();
-            if self.mean + least >= 0.0 {
+            self.sines.lines = self.lines();
+            let least = self.sines.least();
+            if self.sines.mean + least >= 0.0 {
                 return;
             }
-            self.mean = match self.asked.phases {
+            self.sines.mean = match self.asked.phases {
                 Phases::Random { .. } => -least,
                 Phases::Focused { .. } => -1.05 * least,
             };
         }
     }
 
-    /// A lower bound on Σ Aᵢ sin(ωᵢ t + φᵢ) over all times, metres.
-    fn least(&self) -> f64 {
-        let curvature = self.most(2);
-        let step = (8.0 * MISSED * self.root_mean_square(0) / curvature).sqrt();
-        let whole = f64::from(LINES) * self.asked.peak_period;
-        let count = (whole / step).ceil() as u64;
-        // Turned from one sample to the next: 2e4 times, which takes 2e4 ε of the amplitude.
-        let mut turning: Vec<[f64; 4]> = self
-            .waves
-            .iter()
-            .map(|wave| {
-                let (sin, cos) = self.phase(wave).sin_cos();
-                let (turn_sin, turn_cos) = (wave.frequency * step).sin_cos();
-                [
-                    wave.amplitude * cos,
-                    wave.amplitude * sin,
-                    turn_cos,
-                    turn_sin,
-                ]
-            })
-            .collect();
-        let mut least = 0.0f64;
-        for _ in 0..=count {
-            let mut sum = 0.0;
-            for [re, im, cos, sin] in &mut turning {
-                sum += *im;
-                (*re, *im) = (*re * *cos - *im * *sin, *re * *sin + *im * *cos);
-            }
-            least = least.min(sum);
-        }
-        least - curvature * step * step / 8.0
-    }
-
-    /// Σ Aᵢ ωᵢⁿ: no derivative of that order is greater, m/sⁿ.
-    fn most(&self, order: i32) -> f64 {
-        let of = |wave: &Wave| wave.amplitude * wave.frequency.powi(order);
-        self.waves.iter().map(of).sum()
-    }
-
-    /// Of the sum's derivative of that order, m/sⁿ.
-    fn root_mean_square(&self, order: i32) -> f64 {
-        let of = |wave: &Wave| (wave.amplitude * wave.frequency.powi(order)).powi(2);
-        (0.5 * self.waves.iter().map(of).sum::<f64>()).sqrt()
-    }
-
-    /// Displacement, metres, and velocity, m/s, at a time from 0 on.
-    pub(super) fn state(&self, t: f64) -> (f64, f64) {
-        let (amount, amount_rate) = smooth_ramp(t, self.asked.ramp);
-        let (mut way, mut rate) = (self.mean, 0.0);
-        for wave in &self.waves {
-            let (sin, cos) = (wave.frequency * t + self.phase(wave)).sin_cos();
-            way += wave.amplitude * sin;
-            rate += wave.amplitude * wave.frequency * cos;
-        }
-        // 0 but for what `mean` is off by rounding.
-        ((amount * way).max(0.0), amount * rate + amount_rate * way)
-    }
-
-    /// An upper bound on the displacement within `[0, t]`, metres.
-    pub(super) fn peak_displacement(&self, t: f64) -> f64 {
-        self.peak(0, 0.0, t)
-    }
-
-    /// An upper bound on |velocity| within `[t0, t1]`, m/s.
-    pub(super) fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
-        self.peak(1, t0, t1)
-    }
-
-    /// An upper bound on the size of the way's derivative of that order, 0 or 1. After the ramp the sea comes again.
-    fn peak(&self, order: i32, t0: f64, t1: f64) -> f64 {
-        let ramp = self.asked.ramp;
-        let whole = f64::from(LINES) * self.asked.peak_period;
-        // Of the ramp's quintic in t / ramp the greatest derivatives are 1.875, 10 / √3 and 60.
-        let before = [
-            1.0,
-            1.875 / ramp,
-            10.0 / 3f64.sqrt() / ramp.powi(2),
-            60.0 / ramp.powi(3),
-        ];
-        let rising = match t0 < ramp {
-            true => self.peak_of(order, [t0, t1.min(ramp)], before),
-            false => 0.0,
+    /// The wall's way, wave by wave.
+    fn lines(&self) -> Vec<Sine> {
+        let of = |wave: &Wave| Sine {
+            amplitude: wave.amplitude,
+            frequency: wave.frequency,
+            phase: self.phase(wave),
         };
-        let after = t0.max(ramp);
-        let full = match after < t1 {
-            true => self.peak_of(order, [after, t1.min(after + whole)], [1.0, 0.0, 0.0, 0.0]),
-            false => 0.0,
-        };
-        rising.max(full)
-    }
-
-    /// The same where the ramp's derivatives are at most `ramp`: by samples, and the greatest curvature between them (Leibniz).
-    fn peak_of(&self, order: i32, [t0, t1]: [f64; 2], ramp: [f64; 4]) -> f64 {
-        let order_of_curvature = order + 2;
-        let binomials = [[1.0, 2.0, 1.0, 0.0], [1.0, 3.0, 3.0, 1.0]][order as usize];
-        let mean = |order: i32| if order == 0 { self.mean } else { 0.0 };
-        let curvature: f64 = (0..=order_of_curvature)
-            .map(|j| {
-                let rest = order_of_curvature - j;
-                binomials[j as usize] * ramp[j as usize] * (self.most(rest) + mean(rest))
-            })
-            .sum();
-        let off = MISSED * self.root_mean_square(order);
-        let step = (8.0 * off / curvature).sqrt();
-        let count = ((t1 - t0) / step).ceil().max(1.0);
-        let step = (t1 - t0) / count;
-        let at = |i: u64| {
-            let (way, rate) = self.state(t0 + step * i as f64);
-            if order == 0 { way } else { rate.abs() }
-        };
-        let seen = (0..=count as u64).map(at).fold(0.0, f64::max);
-        seen + curvature * step * step / 8.0
+        self.waves.iter().map(of).collect()
     }
 }
 
@@ -329,7 +233,8 @@ mod tests {
         let samples = 2048;
         let ways: Vec<f64> = (0..samples)
             .map(|i| {
-                sea.state(100.0 + whole * f64::from(i) / f64::from(samples))
+                sea.sines
+                    .state(100.0 + whole * f64::from(i) / f64::from(samples))
                     .0
             })
             .collect();
@@ -386,6 +291,7 @@ mod tests {
         for wave in &mut spoiled.waves {
             wave.amplitude *= 1.06;
         }
+        spoiled.sines.lines = spoiled.lines();
         assert!((significant_height(&made(&spoiled)) / 0.1 - 1.0).abs() > 0.05);
         assert!(sea(0).waves != sea(7).waves);
     }
@@ -406,8 +312,8 @@ mod tests {
         });
         let celerity = (9.81 * depth).sqrt();
         for (x, t) in [(0.0, 100.0), (2.0, 131.0), (5.0, 170.0), (9.0, 263.0)] {
-            let way = x - sea.mean;
-            let expected = depth / celerity * sea.state(t - way / celerity).1;
+            let way = x - sea.sines.mean;
+            let expected = depth / celerity * sea.sines.state(t - way / celerity).1;
             // (kh)²/6 of the celerity, 7e-6, is what dispersion takes: over 9 m a phase of 1e-4, and as much of the height.
             let off = (sea.elevation(x, t) - expected).abs();
             assert!(off < 1e-6, "{x} {t}: {off} of {expected}");
@@ -442,13 +348,13 @@ mod tests {
     fn a_wall_stands_no_farther_in_than_its_way_asks() {
         let sea = sea(1);
         let whole = 200.0 * 1.6;
-        let least = (0..40_000).map(|i| sea.state(10.0 + whole * f64::from(i) / 4e4).0);
+        let least = (0..40_000).map(|i| sea.sines.state(10.0 + whole * f64::from(i) / 4e4).0);
         let least = least.fold(f64::INFINITY, f64::min);
         assert!(
-            least >= 0.0 && least < 0.03 * sea.mean,
+            least >= 0.0 && least < 0.03 * sea.sines.mean,
             "{least} {}",
-            sea.mean
+            sea.sines.mean
         );
-        assert!(sea.mean < 0.5 * sea.most(0));
+        assert!(sea.sines.mean < 0.5 * sea.sines.most(0));
     }
 }

@@ -62,6 +62,7 @@ fn a_stream_is_made_beside_its_bake_and_leaves_it_as_it_was() {
     assert!((last.id.len() as u64) < next);
     job.expect(0, &format!("verify {STREAM}"));
     job.expect(0, &format!("check {STREAM} --frames 3,8"));
+    job.expect(0, &format!("diff {STREAM} {STREAM}"));
     // The bake: checked, and gone on with, as if nothing stood beside it.
     job.expect(0, "verify cache/small/pbf");
     let said = job.expect(0, "bake small.toml --resume --frames 1-9");
