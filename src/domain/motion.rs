@@ -8,7 +8,6 @@ mod sea;
 mod sines;
 mod solitary;
 mod spectrum;
-mod stokes;
 mod table;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -17,7 +16,6 @@ pub use linear_theory::{piston_height_ratio, wave_number};
 pub use sea::{Asked, Phases, Sea};
 use solitary::Goring;
 pub use spectrum::Spectrum;
-pub use stokes::{RegularWaves, Stokes};
 use table::Segment;
 
 /// Displacement of a wave-maker over time.
@@ -50,8 +48,6 @@ pub enum Motion {
     },
     /// A sea or a packet of waves, by a spectrum.
     Sea(Sea),
-    /// Regular waves of finite height.
-    Stokes(Stokes),
     /// Through given points by a monotone cubic (Fritsch and Carlson 1980), at rest before the
     /// first and after the last; it never leaves the range of the two points around it.
     Table {
@@ -101,7 +97,6 @@ impl Motion {
                 gravity,
             } => Goring::new(height, depth, gravity).state(t),
             Self::Sea(ref sea) => sea.sines.state(t),
-            Self::Stokes(ref stokes) => stokes.sines.state(t),
             Self::Table { ref points } => table::state(points, t),
         }
     }
@@ -147,7 +142,6 @@ impl Motion {
                 goring.state(peak.clamp(t0, t1)).1
             }
             Self::Sea(ref sea) => sea.sines.peak_speed(t0, t1),
-            Self::Stokes(ref stokes) => stokes.sines.peak_speed(t0, t1),
             Self::Table { ref points } => points
                 .windows(2)
                 .enumerate()
@@ -174,7 +168,6 @@ impl Motion {
                 }
             }
             Self::Sea(ref sea) => sea.sines.peak_displacement(t),
-            Self::Stokes(ref stokes) => stokes.sines.peak_displacement(t),
             Self::Table { ref points } => points
                 .iter()
                 .filter(|p| p[0] <= t)
@@ -264,13 +257,6 @@ mod tests {
                     at: 2.0,
                     time: 7.0,
                 },
-            })),
-            Motion::Stokes(Stokes::new(RegularWaves {
-                height: 0.2,
-                period: 1.7,
-                depth: 0.6,
-                gravity: 9.81,
-                ramp: 2.5,
             })),
         ]
     }

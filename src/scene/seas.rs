@@ -3,9 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{document::Document, error::SceneError, motion_spec::check_speed, words::shown};
-use crate::domain::motion::{
-    Asked, Motion, Phases, RegularWaves, Sea, Spectrum, Stokes, wave_number,
-};
+use crate::domain::motion::{Asked, Motion, Phases, Sea, Spectrum, wave_number};
 
 /// Shortest of the waves over the peak's period, where a scene does not say it. What is left out has 1.5 % of the energy of
 /// Pierson and Moskowitz's spectrum.
@@ -18,7 +16,7 @@ const SHORTEST_RANGE: std::ops::RangeInclusive<f64> = 0.1..=0.9;
 const PEAK_ENHANCEMENT: f64 = 3.3;
 
 /// Peak periods until a motion's full size, where a scene does not say it.
-pub(super) const RAMP: f64 = 2.0;
+const RAMP: f64 = 2.0;
 
 /// Least length of a wave, in particle spacings: five cells of FLIP, below which little of one is left after its own length.
 const LEAST_WAVE: f64 = 10.0;
@@ -76,58 +74,6 @@ pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Moti
     check_speed(motion.peak_speed(0.0, whole))
         .map_err(|problem| doc.fault_of_plain(path, problem))?;
     Ok(motion)
-}
-
-/// The motion of the table at `path`, of regular waves.
-pub(super) fn regular(doc: &Document<'_>, path: &str, asked: RegularWaves) -> Result<Motion> {
-    let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
-    if asked.gravity == 0.0 {
-        return refuse("kind", "waves need gravity".to_owned());
-    }
-    if asked.ramp == 0.0 {
-        return refuse("ramp", "such a motion has no start at rest".to_owned());
-    }
-    let (height, depth, period) = (shown(asked.height), shown(asked.depth), shown(asked.period));
-    let number = TAU / asked.length();
-    if asked.height > STEEPEST * asked.length() * (number * asked.depth).tanh() {
-        let problem = format!(
-            "waves of {period} s on {depth} m of water break before they are {height} m high (Miche 1944)"
-        );
-        return refuse("height", problem);
-    }
-    let nonlinearity = asked.nonlinearity();
-    if nonlinearity > 1.0 {
-        let problem = format!(
-            "waves of {period} s on {depth} m of water can be {} m high by theory of the second order, whose troughs else have crests of \
-             their own (Madsen 1971)",
-            shown((asked.height / nonlinearity * 1e4).floor() / 1e4)
-        );
-        return refuse("height", problem);
-    }
-    let whole = asked.ramp + asked.period;
-    let motion = Motion::Stokes(Stokes::new(asked));
-    check_speed(motion.peak_speed(0.0, whole))
-        .map_err(|problem| doc.fault_of_plain(path, problem))?;
-    Ok(motion)
-}
-
-/// That the wave of twice the frequency, which regular waves carry along, can be told from particles, so many metres apart.
-pub(super) fn check_regular(
-    doc: &Document<'_>,
-    path: &str,
-    stokes: &Stokes,
-    spacing: f64,
-) -> Result<()> {
-    let length = 0.5 * stokes.asked().length();
-    if length >= LEAST_WAVE * spacing {
-        return Ok(());
-    }
-    let problem = format!(
-        "waves of {} s carry one of {length:.3} m along, {:.1} particle spacings",
-        shown(stokes.asked().period),
-        length / spacing
-    );
-    Err(doc.fault_of(&format!("{path}.period"), problem))
 }
 
 /// The form of a spectrum and its γ, which Pierson and Moskowitz's has none of.

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::domain::{
     bounds::Bounds,
-    motion::{Motion, Phases, RegularWaves},
+    motion::{Motion, Phases},
 };
 
 /// Largest motion table read, bytes: ten hours at 60 points a second.
@@ -53,9 +53,6 @@ pub(super) fn build_all(
         if let Motion::Sea(sea) = &motion {
             let size = around.domain.size()[spec.wall.axis];
             seas::check(doc, &place, sea, (size, around.spacing))?;
-        }
-        if let Motion::Stokes(stokes) = &motion {
-            seas::check_regular(doc, &place, stokes, around.spacing)?;
         }
         let maker = WaveMaker {
             wall: spec.wall,
@@ -161,21 +158,6 @@ pub(super) fn motion(
                 depth,
                 gravity: gravity.length(),
             })
-        }
-        MotionSpec::Stokes {
-            height,
-            period,
-            depth,
-            ramp,
-        } => {
-            let asked = RegularWaves {
-                height,
-                period,
-                depth,
-                gravity: gravity.length(),
-                ramp: ramp.unwrap_or(seas::RAMP * period),
-            };
-            seas::regular(doc, path, asked)
         }
         MotionSpec::Sea {
             significant_height,

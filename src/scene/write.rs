@@ -289,16 +289,6 @@ fn motion(motion: &Motion) -> Value {
             ("solitary", rows)
         }
         Motion::Sea(sea) => waves(sea.asked()),
-        Motion::Stokes(stokes) => {
-            let asked = stokes.asked();
-            let rows = table([
-                ("height", value(&asked.height)),
-                ("period", value(&asked.period)),
-                ("depth", value(&asked.depth)),
-                ("ramp", value(&asked.ramp)),
-            ]);
-            ("stokes", rows)
-        }
         Motion::Table { points } => ("table", table([("points", value(points))])),
     };
     let mut all = table([("kind", value(&kind))]);

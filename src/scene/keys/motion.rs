@@ -54,7 +54,7 @@ const POINTS: Key = Key::points(
 
 pub(super) const SOLID_MOTION: &[Key] = &[
     Key::choice("kind", &["constant_velocity", "sine", "table"])
-        .also("; waves of a theory are made by a wall")
+        .also("; solitary waves, seas and packets are made by a wall")
         .about("kind of motion"),
     VELOCITY,
     UNTIL,
@@ -73,31 +73,28 @@ const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
 pub(super) const WALL_MOTION: &[Key] = &[
     Key::choice(
         "kind",
-        &["constant_velocity", "sine", "stokes", "solitary", "sea", "focused", "table"],
+        &["constant_velocity", "sine", "solitary", "sea", "focused", "table"],
     )
-    .about("kind of motion; `stokes` makes regular waves of second order (Madsen 1971), `solitary` is Goring 1978, `sea` and `focused` follow a spectrum by linear theory"),
+    .about("kind of motion; `solitary` is Goring 1978, `sea` and `focused` follow a spectrum by linear theory"),
     VELOCITY,
     UNTIL,
     STROKE,
-    Key::number("period", PERIOD)
-        .unit("seconds")
-        .only("kind", &["sine", "stokes"])
-        .about("of one cycle, there and back"),
+    WAVE_PERIOD,
     Key::number_or_zero("ramp", PERIOD)
         .unit("seconds")
-        .computed(|| "one period, or two of regular waves or of the peak's,".to_owned())
-        .only("kind", &["sine", "stokes", "sea", "focused"])
+        .computed(|| "one period, or two of the peak's,".to_owned())
+        .only("kind", &["sine", "sea", "focused"])
         .about(
             "how long the motion takes to reach its full size; 0, of a sine alone: it begins with it",
         ),
     Key::number("height", LENGTH)
         .unit("metres")
-        .only("kind", &["stokes", "solitary", "focused"])
+        .only("kind", &["solitary", "focused"])
         .also(", at most the depth")
-        .about("of regular waves from trough to crest; of a solitary wave, whose crest leaves the wall (6 d/K + H/K)/c after the start, K = √(3H/4d), c = √(g (d + H)); of a packet's crest by linear theory"),
+        .about("of a solitary wave, whose crest leaves the wall (6 d/K + H/K)/c after the start, K = √(3H/4d), c = √(g (d + H)); of a packet's crest by linear theory"),
     Key::number("depth", LENGTH)
         .unit("metres")
-        .only("kind", &["stokes", "solitary", "sea", "focused"])
+        .only("kind", &["solitary", "sea", "focused"])
         .about("of the water at rest"),
     Key::choice("spectrum", &SPECTRA)
         .default("\"jonswap\"")

@@ -407,35 +407,6 @@ pub const VALUE_FAULTS: &[Fault] = &[
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"stokes\", height = 0.4, period = 5.0, depth = 1.0",
-        24,
-        &[
-            "motion.height: waves of 5 s on 1 m of water can be 0.1133 m high",
-            "(Madsen 1971)",
-        ],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"stokes\", height = 0.4, period = 1.0, depth = 1.0",
-        24,
-        &[
-            "motion.height: waves of 1 s on 1 m of water break before they are 0.4 m high (Miche 1944)",
-        ],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"stokes\", height = 0.05, period = 0.6, depth = 1.0",
-        24,
-        &["motion.period: waves of 0.6 s carry one of 0.281 m along"],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
-        "kind = \"stokes\", height = 0.05, period = 3.0, depth = 1.0, ramp = 0",
-        24,
-        &["motion.ramp: such a motion has no start at rest"],
-    ),
-    (
-        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
         "kind = \"sea\", significant_height = 1.5, peak_period = 3.0, depth = 1.0",
         24,
         &["motion.significant_height: waves of 1.5 m on 1 m of water; allowed: "],
