@@ -3,19 +3,28 @@
 //! A displacement is measured from the domain's face, positive inward, metres; it is 0 at the
 //! start and never negative, so that no water is ever behind the wall.
 
+mod cnoidal;
+mod elliptic;
 mod linear_theory;
+mod regular;
 mod sea;
+mod second_order;
 mod sines;
 mod solitary;
 mod spectrum;
+mod stokes;
 mod table;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+pub use cnoidal::{Cnoidal, LEAST_CNOIDAL_LENGTH, NoCnoidal};
 pub use linear_theory::{piston_height_ratio, wave_number};
+use regular::Cycle as _;
+pub use regular::RegularWaves;
 pub use sea::{Asked, Phases, Sea};
 use solitary::Goring;
 pub use spectrum::Spectrum;
+pub use stokes::{MADSEN_LIMIT, Stokes};
 use table::Segment;
 
 /// Displacement of a wave-maker over time.
@@ -46,6 +55,10 @@ pub enum Motion {
         /// m/s², positive.
         gravity: f64,
     },
+    /// Regular waves to second order (Schäffer 1996).
+    Stokes(Stokes),
+    /// Regular waves of permanent form in shallow water (Goring 1978).
+    Cnoidal(Cnoidal),
     /// A sea or a packet of waves, by a spectrum.
     Sea(Sea),
     /// Through given points by a monotone cubic (Fritsch and Carlson 1980), at rest before the
@@ -96,6 +109,8 @@ impl Motion {
                 depth,
                 gravity,
             } => Goring::new(height, depth, gravity).state(t),
+            Self::Stokes(ref stokes) => stokes.state(t),
+            Self::Cnoidal(ref cnoidal) => cnoidal.state(t),
             Self::Sea(ref sea) => sea.sines.state(t),
             Self::Table { ref points } => table::state(points, t),
         }
@@ -141,6 +156,8 @@ impl Motion {
                 let peak = goring.crest_time();
                 goring.state(peak.clamp(t0, t1)).1
             }
+            Self::Stokes(ref stokes) => stokes.peak_speed(t0, t1),
+            Self::Cnoidal(ref cnoidal) => cnoidal.peak_speed(t0, t1),
             Self::Sea(ref sea) => sea.sines.peak_speed(t0, t1),
             Self::Table { ref points } => points
                 .windows(2)
@@ -167,6 +184,8 @@ impl Motion {
                     stroke * smooth_ramp(t, ramp).0
                 }
             }
+            Self::Stokes(ref stokes) => stokes.peak_displacement(t),
+            Self::Cnoidal(ref cnoidal) => cnoidal.peak_displacement(t),
             Self::Sea(ref sea) => sea.sines.peak_displacement(t),
             Self::Table { ref points } => points
                 .iter()
@@ -203,8 +222,34 @@ fn smooth_ramp(t: f64, ramp: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
+    fn regular(ramp: f64) -> RegularWaves {
+        RegularWaves {
+            height: 0.1,
+            period: 2.0,
+            depth: 0.6,
+            gravity: 9.81,
+            ramp,
+        }
+    }
+
+    fn cnoidal(ramp: f64) -> Motion {
+        let waves = RegularWaves {
+            period: 4.0,
+            ..regular(ramp)
+        };
+        Motion::Cnoidal(Cnoidal::new(waves).expect("long enough"))
+    }
+
     fn motions() -> Vec<Motion> {
         vec![
+            Motion::Stokes(Stokes::new(regular(0.0))),
+            Motion::Stokes(Stokes::new(regular(4.0))),
+            Motion::Stokes(Stokes::new(RegularWaves {
+                period: 0.9,
+                ..regular(2.0)
+            })),
+            cnoidal(0.0),
+            cnoidal(5.0),
             Motion::ConstantVelocity {
                 velocity: 2.0,
                 until: Some(1.5),

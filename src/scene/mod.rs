@@ -29,6 +29,7 @@ mod origin;
 mod overrides;
 mod projection;
 mod reach;
+mod regular_waves;
 mod seas;
 mod settle;
 mod spec;

@@ -24,6 +24,18 @@ pub(super) enum MotionSpec {
         height: f64,
         depth: f64,
     },
+    Stokes {
+        height: f64,
+        period: f64,
+        depth: f64,
+        ramp: Option<f64>,
+    },
+    Cnoidal {
+        height: f64,
+        period: f64,
+        depth: f64,
+        ramp: Option<f64>,
+    },
     Sea {
         significant_height: f64,
         seed: u32,

@@ -15,11 +15,11 @@ const SHORTEST_RANGE: std::ops::RangeInclusive<f64> = 0.1..=0.9;
 /// γ where a scene does not say it: the mean of the waves off Sylt by which it was found (Hasselmann et al. 1973).
 const PEAK_ENHANCEMENT: f64 = 3.3;
 
-/// Peak periods until a motion's full size, where a scene does not say it.
-const RAMP: f64 = 2.0;
+/// Periods, of a sea the peak's, until the full size of a motion that makes waves, where a scene does not say it.
+pub(super) const RAMP: f64 = 2.0;
 
 /// Least length of a wave, in particle spacings: five cells of FLIP, below which little of one is left after its own length.
-const LEAST_WAVE: f64 = 10.0;
+pub(super) const LEAST_WAVE: f64 = 10.0;
 
 /// Steepest that a wave of one height can be, H / (λ tanh kh) (Miche 1944).
 const STEEPEST: f64 = 0.142;
@@ -57,15 +57,10 @@ pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Moti
         let (height, depth) = (shown(height), shown(asked.depth));
         return refuse(key, format!("waves of {height} m on {depth} m of water"));
     }
-    let number = wave_number(TAU / asked.peak_period, asked.depth, asked.gravity);
-    let most = STEEPEST * TAU / number * (number * asked.depth).tanh();
-    if key == "significant_height" && height > most {
-        let problem = format!(
-            "waves of {} s on {} m of water break before they are {} m high (Miche 1944)",
-            shown(asked.peak_period),
-            shown(asked.depth),
-            shown(height)
-        );
+    let water = [asked.depth, asked.gravity];
+    if key == "significant_height"
+        && let Err(problem) = check_steepness(height, asked.peak_period, water)
+    {
         return refuse(key, problem);
     }
     let sea = Sea::new(asked);
@@ -74,6 +69,24 @@ pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Moti
     check_speed(motion.peak_speed(0.0, whole))
         .map_err(|problem| doc.fault_of_plain(path, problem))?;
     Ok(motion)
+}
+
+/// That waves of a height and a period stand on water of a depth, by gravity.
+pub(super) fn check_steepness(
+    height: f64,
+    period: f64,
+    [depth, gravity]: [f64; 2],
+) -> std::result::Result<(), String> {
+    let number = wave_number(TAU / period, depth, gravity);
+    if height <= STEEPEST * TAU / number * (number * depth).tanh() {
+        return Ok(());
+    }
+    Err(format!(
+        "waves of {} s on {} m of water break before they are {} m high (Miche 1944)",
+        shown(period),
+        shown(depth),
+        shown(height)
+    ))
 }
 
 /// The form of a spectrum and its γ, which Pierson and Moskowitz's has none of.

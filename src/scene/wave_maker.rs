@@ -9,7 +9,7 @@ use super::{
     document::Document,
     error::SceneError,
     motion_spec::{MotionSpec, check_speed},
-    seas,
+    regular_waves, seas,
     spec::WaveMakerSpec,
     words::{chain, shown, shown_all},
 };
@@ -54,6 +54,7 @@ pub(super) fn build_all(
             let size = around.domain.size()[spec.wall.axis];
             seas::check(doc, &place, sea, (size, around.spacing))?;
         }
+        regular_waves::check_length(doc, &place, &motion, around.spacing)?;
         let maker = WaveMaker {
             wall: spec.wall,
             motion,
@@ -158,6 +159,24 @@ pub(super) fn motion(
                 depth,
                 gravity: gravity.length(),
             })
+        }
+        MotionSpec::Stokes {
+            height,
+            period,
+            depth,
+            ramp,
+        } => {
+            let water = [height, period, depth, gravity.length()];
+            regular_waves::stokes(doc, path, regular_waves::asked(water, ramp))
+        }
+        MotionSpec::Cnoidal {
+            height,
+            period,
+            depth,
+            ramp,
+        } => {
+            let water = [height, period, depth, gravity.length()];
+            regular_waves::cnoidal(doc, path, regular_waves::asked(water, ramp))
         }
         MotionSpec::Sea {
             significant_height,

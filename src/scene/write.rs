@@ -15,7 +15,7 @@ use super::{
 };
 use crate::domain::{
     bounds::Bounds,
-    motion::{Asked, Motion, Phases, Spectrum},
+    motion::{Asked, Motion, Phases, RegularWaves, Spectrum},
     probe::Rate,
 };
 
@@ -288,12 +288,24 @@ fn motion(motion: &Motion) -> Value {
             let rows = table([("height", value(height)), ("depth", value(depth))]);
             ("solitary", rows)
         }
+        Motion::Stokes(stokes) => ("stokes", regular(stokes.waves())),
+        Motion::Cnoidal(cnoidal) => ("cnoidal", regular(cnoidal.waves())),
         Motion::Sea(sea) => waves(sea.asked()),
         Motion::Table { points } => ("table", table([("points", value(points))])),
     };
     let mut all = table([("kind", value(&kind))]);
     all.extend(rows);
     Value::Table(all)
+}
+
+/// Their gravity is the water's.
+fn regular(waves: &RegularWaves) -> Table {
+    table([
+        ("height", value(&waves.height)),
+        ("period", value(&waves.period)),
+        ("depth", value(&waves.depth)),
+        ("ramp", value(&waves.ramp)),
+    ])
 }
 
 /// Its gravity is the water's.

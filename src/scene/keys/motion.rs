@@ -26,7 +26,7 @@ const STROKE: Key = Key::number("stroke", LENGTH)
         "the whole distance from one end of the way to the other, twice the amplitude: x(t) = stroke/2 (1 − cos(2π t / period)), \
          times the ramp; the S of H/S in wave maker theory (Dean and Dalrymple 1991)",
     );
-const WAVE_PERIOD: Key = Key::number("period", PERIOD)
+const CYCLE: Key = Key::number("period", PERIOD)
     .unit("seconds")
     .only("kind", &["sine"])
     .about("of one cycle, there and back");
@@ -54,12 +54,12 @@ const POINTS: Key = Key::points(
 
 pub(super) const SOLID_MOTION: &[Key] = &[
     Key::choice("kind", &["constant_velocity", "sine", "table"])
-        .also("; solitary waves, seas and packets are made by a wall")
+        .also("; solitary and regular waves, seas and packets are made by a wall")
         .about("kind of motion"),
     VELOCITY,
     UNTIL,
     STROKE,
-    WAVE_PERIOD,
+    CYCLE,
     RAMP,
     FILE,
     POINTS,
@@ -73,28 +73,44 @@ const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
 pub(super) const WALL_MOTION: &[Key] = &[
     Key::choice(
         "kind",
-        &["constant_velocity", "sine", "solitary", "sea", "focused", "table"],
+        &[
+            "constant_velocity",
+            "sine",
+            "solitary",
+            "stokes",
+            "cnoidal",
+            "sea",
+            "focused",
+            "table",
+        ],
     )
-    .about("kind of motion; `solitary` is Goring 1978, `sea` and `focused` follow a spectrum by linear theory"),
+    .about(
+        "kind of motion; `solitary` is Goring 1978; `stokes` (second order, Schäffer 1996 and Madsen 1971) and `cnoidal` (shallow \
+         water, Goring 1978) make regular waves without free ones; `sea` and `focused` follow a spectrum by linear theory",
+    ),
     VELOCITY,
     UNTIL,
     STROKE,
-    WAVE_PERIOD,
+    Key::number("period", PERIOD)
+        .unit("seconds")
+        .only("kind", &["sine", "stokes", "cnoidal"])
+        .also("; regular waves are at least 10 particle spacings long, cnoidal ones 8 depths")
+        .about("of one cycle, there and back; of regular waves"),
     Key::number_or_zero("ramp", PERIOD)
         .unit("seconds")
-        .computed(|| "one period, or two of the peak's,".to_owned())
-        .only("kind", &["sine", "sea", "focused"])
+        .computed(|| "one period of a sine, two (of the peak) of other waves,".to_owned())
+        .only("kind", &["sine", "stokes", "cnoidal", "sea", "focused"])
         .about(
-            "how long the motion takes to reach its full size; 0, of a sine alone: it begins with it",
+            "how long the motion takes to reach its full size; 0, of a sine and of regular waves alone: it begins with it",
         ),
     Key::number("height", LENGTH)
         .unit("metres")
-        .only("kind", &["solitary", "focused"])
-        .also(", at most the depth")
-        .about("of a solitary wave, whose crest leaves the wall (6 d/K + H/K)/c after the start, K = √(3H/4d), c = √(g (d + H)); of a packet's crest by linear theory"),
+        .only("kind", &["solitary", "stokes", "cnoidal", "focused"])
+        .also(", at most the depth; regular waves are up to 0.78 depths high and do not break")
+        .about("of a solitary wave, whose crest leaves the wall (6 d/K + H/K)/c after the start, K = √(3H/4d), c = √(g (d + H)); of regular waves, trough to crest; of a packet's crest by linear theory"),
     Key::number("depth", LENGTH)
         .unit("metres")
-        .only("kind", &["solitary", "sea", "focused"])
+        .only("kind", &["solitary", "stokes", "cnoidal", "sea", "focused"])
         .about("of the water at rest"),
     Key::choice("spectrum", &SPECTRA)
         .default("\"jonswap\"")

@@ -162,7 +162,7 @@ fn allowed_words_follow_from_the_declaration() {
         ("solver.flip.transfer", "\"flip\" or \"apic\""),
         (
             "wave_maker[0].motion.ramp",
-            "0 or a number from 1e-4 to 1e6, seconds; one period, or two of the peak's, if left out",
+            "0 or a number from 1e-4 to 1e6, seconds; one period of a sine, two (of the peak) of other waves, if left out",
         ),
         (
             "budget.speed",

@@ -417,6 +417,38 @@ absorbing_zone = { walls = ["+x"], length = 1.0, period = 2.0 }
     assert_eq!(missing, [] as [&str; 0]);
 }
 
+/// With what is left out, and once more with what was written.
+#[test]
+fn regular_waves_are_written_with_their_ramp() {
+    let flume = r#"
+[shot]
+name = "flume"
+frames = 1
+frames_per_second = 30
+[domain]
+min = [0, 0, 0]
+max = [8, 2, 1]
+[solver]
+method = "flip"
+[solver.flip]
+cell_size = 0.25
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "KIND", height = 0.1, period = 4.0, depth = 1.0 }
+"#;
+    let dir = assets();
+    for kind in ["stokes", "cnoidal"] {
+        let scene = parse(dir.path(), &flume.replace("KIND", kind), &[]).expect("valid");
+        let text = scene.to_toml(&|_, _| "a.obj".to_owned());
+        assert!(text.contains(&format!("kind = \"{kind}\"")), "{text}");
+        assert!(text.contains("ramp = 8.0"), "{text}");
+        assert_eq!(scene, parse(dir.path(), &text, &[]).expect("valid"));
+        // Control: another height is another scene.
+        let higher = text.replace("height = 0.1", "height = 0.11");
+        assert_ne!(scene, parse(dir.path(), &higher, &[]).expect("valid"));
+    }
+}
+
 /// Dotted keys of a table and of those below it, without indices.
 fn collect_keys(path: &str, table: &toml::Table, keys: &mut BTreeSet<String>) {
     for (name, value) in table {

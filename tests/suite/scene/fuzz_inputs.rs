@@ -141,6 +141,10 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("wave_maker[3].motion.peak_enhancement", "{}", true),
     ("wave_maker[3].motion.shortest_period", "{}", false),
     ("wave_maker[3].motion.depth", "{}", false),
+    ("wave_maker[4].motion.height", "{}", false),
+    ("wave_maker[4].motion.period", "{}", false),
+    ("wave_maker[4].motion.depth", "{}", false),
+    ("wave_maker[4].motion.ramp", "{}", false),
     ("effects.absorbing_zone.length", "{}", false),
     ("effects.absorbing_zone.period", "{}", true),
 ];
@@ -149,11 +153,12 @@ const NUMBERS: &[(&str, &str, bool)] = &[
 fn numbered() -> String {
     let makers = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
         [[wave_maker]]\nwall = \"+z\"\nmotion = { kind = \"solitary\", height = 0.1, depth = 1.0 }\n\
-        [[wave_maker]]\nwall = \"+y\"\nmotion = { kind = \"sea\", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }\n";
+        [[wave_maker]]\nwall = \"+y\"\nmotion = { kind = \"sea\", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }\n\
+        [[wave_maker]]\nwall = \"-z\"\nmotion = { kind = \"stokes\", height = 0.1, period = 2.0, depth = 1.0 }\n";
     let more = "[[water.particles]]\nat = [[20.0, 3.0, 3.0]]\nvelocity = [1.0, 0.0, 0.0]\n[[solid]]\nmesh = \"cube.obj\"\n\
         translate = [15.0, 3.0, 3.0]\ndirection = [1.0, 0.0, 0.0]\n\
         motion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n";
-    let zone = "absorbing_zone = { walls = [\"-z\"], length = 1.0, period = 1.0 }\n";
+    let zone = "absorbing_zone = { walls = [\"-y\"], length = 1.0, period = 1.0 }\n";
     SCENE
         .replace("[effects]\n", &format!("[effects]\n{zone}"))
         .replace("[solver]\n", &format!("{makers}{more}[solver]\n"))

@@ -465,6 +465,32 @@ pub const VALUE_FAULTS: &[Fault] = &[
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"stokes\", height = 0.3, period = 8.0, depth = 1.0",
+        24,
+        &["motion.height: waves of 0.3 m and 8 s on 1 m of water: H L² / h³ is 1"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"stokes\", height = 0.5, period = 1.4, depth = 1.0",
+        24,
+        &[
+            "motion.height: waves of 1.4 s on 1 m of water break before they are 0.5 m high (Miche 1944)",
+        ],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"cnoidal\", height = 0.9, period = 8.0, depth = 1.0",
+        24,
+        &["motion.height: waves of 0.9 m on 1 m of water break: the highest are 0.78 depths"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"cnoidal\", height = 0.2, period = 2.0, depth = 1.0",
+        24,
+        &["motion.period: waves of 2 s on 1 m of water are shorter than 8 depths"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
         "kind = \"solitary\", height = 2, depth = 1",
         24,
         &["motion.height: a wave of 2 m on 1 m"],
