@@ -154,7 +154,7 @@ fn numbered() -> String {
     let makers = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
         [[wave_maker]]\nwall = \"+z\"\nmotion = { kind = \"solitary\", height = 0.1, depth = 1.0 }\n\
         [[wave_maker]]\nwall = \"+y\"\nmotion = { kind = \"sea\", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }\n\
-        [[wave_maker]]\nwall = \"-z\"\nmotion = { kind = \"stokes\", height = 0.1, period = 2.0, depth = 1.0 }\n";
+        [[wave_maker]]\nwall = \"-z\"\nmotion = { kind = \"stokes\", height = 0.0005, period = 2.0, depth = 1.0 }\n";
     let more = "[[water.particles]]\nat = [[20.0, 3.0, 3.0]]\nvelocity = [1.0, 0.0, 0.0]\n[[solid]]\nmesh = \"cube.obj\"\n\
         translate = [15.0, 3.0, 3.0]\ndirection = [1.0, 0.0, 0.0]\n\
         motion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n";
