@@ -3,7 +3,7 @@
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_cell.wgsl"
-#import "shared/absorbing_zone.wgsl"
+#import "shared/zone.wgsl"
 
 @group(0) @binding(3) var<storage, read> face_open: array<f32>;
 @group(0) @binding(4) var<storage, read_write> face_velocity: array<f32>;
@@ -26,7 +26,7 @@ fn main(
         let face = component * params.stride + element;
         var place = corner + 0.5;
         place[component] = corner[component];
-        let part = absorbed(place * params.cell_size, params.time_step);
+        let part = led(place * params.cell_size, params.time_step);
         face_velocity[face] -= select(0.0, part * face_change[face], face_open[face] > 0.0);
     }
 }

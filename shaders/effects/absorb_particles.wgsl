@@ -4,7 +4,7 @@
 #import "shared/thread.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/pbf_params.wgsl"
-#import "shared/absorbing_zone.wgsl"
+#import "shared/zone.wgsl"
 
 @group(0) @binding(10) var<storage, read> position: array<vec4f>;
 @group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
@@ -21,6 +21,6 @@ fn main(
     }
     let i = phase_particle(thread);
     let is_drop = velocity[i].w > 0.0;
-    let kept = 1.0 - select(absorbed(position[i].xyz, params.time_step), 0.0, is_drop);
+    let kept = 1.0 - select(led(position[i].xyz, params.time_step), 0.0, is_drop);
     velocity[i] = vec4f(kept * velocity[i].xyz, velocity[i].w);
 }

@@ -23,6 +23,7 @@ use crate::{
 use super::{
     DeviceArgs, Failure, count,
     interrupt::{self, Interrupt},
+    lint::DenyArgs,
     output,
     progress::{Mode, Progress},
     size,
@@ -55,6 +56,8 @@ pub(super) struct BakeArgs {
     /// Take meshes and tables that lie outside of the scene's folder.
     #[arg(long)]
     allow_outside: bool,
+    #[command(flatten)]
+    deny: DenyArgs,
     #[command(flatten)]
     device: DeviceArgs,
     /// Time each pass and print a table; passes then run one by one.
@@ -113,6 +116,7 @@ fn load_lengthened(args: &BakeArgs) -> Result<Scene, SceneError> {
 pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
     let device = args.device.read()?;
     let scene = load_lengthened(args)?;
+    args.deny.check(&args.scene, &scene)?;
     let method = scene.solver.method.name();
     let default = || PathBuf::from("cache").join(&scene.shot.name).join(method);
     let request = Request {

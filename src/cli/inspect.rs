@@ -19,7 +19,7 @@ use crate::{
     },
 };
 
-use super::{Failure, bake, check::Misplaced, is_cache, output, size};
+use super::{Failure, bake, check::Misplaced, is_cache, lint::DenyArgs, output, size};
 
 #[derive(Args, Debug)]
 #[command(
@@ -50,6 +50,8 @@ pub(super) struct InspectArgs {
     /// Plan for the limits of this adapter.
     #[arg(long, value_name = "NAME", requires = "subject")]
     adapter: Option<String>,
+    #[command(flatten)]
+    deny: DenyArgs,
 }
 
 pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
@@ -93,6 +95,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         }
         Some(file) => {
             let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
+            args.deny.check(file, &scene)?;
             let planned = plan(&scene, args.adapter.as_deref())?;
             let _ = show_plan(&mut text, &scene, &planned);
             misfit = planned.misfit;

@@ -6,6 +6,7 @@ mod diff;
 mod inspect;
 pub mod interrupt;
 mod keys;
+mod lint;
 mod output;
 mod progress;
 mod render;

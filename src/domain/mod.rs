@@ -15,6 +15,7 @@ pub mod keep;
 pub mod mesh;
 pub mod mesh_file;
 pub mod motion;
+pub mod open_waves;
 pub mod particles;
 pub mod pbf;
 pub mod period;

@@ -208,7 +208,7 @@ fn cos_range(a: f64, b: f64) -> (f64, f64) {
 
 /// 6u⁵ − 15u⁴ + 10u³ with u = t/ramp, and its derivative: from rest to one without a jump in
 /// velocity or acceleration.
-fn smooth_ramp(t: f64, ramp: f64) -> (f64, f64) {
+pub(super) fn smooth_ramp(t: f64, ramp: f64) -> (f64, f64) {
     if t >= ramp {
         return (1.0, 0.0);
     }

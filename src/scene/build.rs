@@ -74,6 +74,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         domain: &domain,
         periodic,
         wave_makers: &wave_makers,
+        gravity: water.gravity,
         least_length: 2.0 * lattice.spacing,
     };
     spec.effects.check(doc, &around)?;

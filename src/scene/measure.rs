@@ -5,8 +5,8 @@
 pub enum Measure {
     /// Waves of a piston, at the scene's elevation probes.
     RegularWaves,
-    /// A sea or a packet of a wall that moves by a spectrum, at the scene's elevation probes.
-    IrregularWaves,
+    /// Waves whose elevation a theory gives, of a wall that moves by it or of a generation zone, at the scene's elevation probes.
+    WavesByTheory,
     /// One solitary wave, at the scene's elevation probes.
     SolitaryWave,
     /// A column that collapses along x: front, and height at the wall.
@@ -27,7 +27,7 @@ impl Measure {
     /// As studies name them.
     pub(super) const NAMED: [(&'static str, Self); 9] = [
         ("regular_waves", Self::RegularWaves),
-        ("irregular_waves", Self::IrregularWaves),
+        ("waves_by_theory", Self::WavesByTheory),
         ("solitary_wave", Self::SolitaryWave),
         ("dam_break", Self::DamBreak),
         ("dry_bed", Self::DryBed),
@@ -41,7 +41,7 @@ impl Measure {
     pub(super) fn needs(self) -> &'static [&'static str] {
         match self {
             Self::RegularWaves => &["stroke", "period", "after"],
-            Self::IrregularWaves => &["after"],
+            Self::WavesByTheory => &["after"],
             Self::SolitaryWave => &["depth", "height"],
             Self::DamBreak => &["length"],
             Self::DryBed => &["depth", "length"],
@@ -71,20 +71,25 @@ impl Measure {
                     "largest speed in the flume over the paddle's; waves double where the far wall turns them",
                 ),
             ],
-            Self::IrregularWaves => &[
+            Self::WavesByTheory => &[
                 (
                     "variance_ratio",
-                    "root of the elevation's variance over linear theory's of the same waves in the same time",
+                    "root of the elevation's variance over theory's of the same waves in the same time",
                 ),
                 (
                     "elevation_error",
-                    "elevation, root mean square of what it is off linear theory's over that of theory's, worst gauge",
+                    "elevation, root mean square of what it is off theory's over that of theory's, worst gauge",
+                ),
+                ("crest", "highest crest at the last gauge over theory's"),
+                ("crest_time", "how far off in time it is, s"),
+                (
+                    "second_harmonic",
+                    "of regular waves: amplitude at twice the frequency over theory's, mean of the gauges",
                 ),
                 (
-                    "crest",
-                    "highest crest at the last gauge over linear theory's",
+                    "second_harmonic_spread",
+                    "its largest less its least over theory's: what free waves of that frequency make",
                 ),
-                ("crest_time", "how far off in time it is, s"),
             ],
             Self::SolitaryWave => &[
                 ("height", "height of the crest over the depth, H/d"),
@@ -190,7 +195,7 @@ impl Measure {
                     "η / S",
                 ],
             )],
-            Self::IrregularWaves => &[(
+            Self::WavesByTheory => &[(
                 "elevation",
                 ["elevation at the last gauge", "time, s", "η, m"],
             )],

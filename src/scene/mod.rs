@@ -24,6 +24,7 @@ mod document;
 mod error;
 mod keep;
 mod key;
+mod lint;
 mod load;
 mod origin;
 mod overrides;
@@ -211,14 +212,12 @@ impl PlacedMesh {
 }
 
 impl Scene {
-    /// What a user has to know of a scene that is taken all the same, a sentence each.
+    /// What a user has to know of a scene that is taken all the same, a sentence each: its open meshes, and its lints.
     pub fn warnings(&self) -> Vec<String> {
         let placed = self.water.meshes.iter().chain(&self.solids);
         let moving = self.moving_solids.iter().map(|solid| &solid.placed);
-        placed
-            .chain(moving)
-            .filter_map(PlacedMesh::warning)
-            .collect()
+        let open = placed.chain(moving).filter_map(PlacedMesh::warning);
+        open.chain(self.lints()).collect()
     }
 }
 

@@ -29,7 +29,13 @@ pub(super) fn asked([height, period, depth, gravity]: [f64; 4], ramp: Option<f64
 
 /// The motion of the table at `path`, to second order.
 pub(super) fn stokes(doc: &Document<'_>, path: &str, waves: RegularWaves) -> Result<Motion> {
-    check_height(doc, path, &waves)?;
+    check_stokes(doc, path, &waves)?;
+    finished(doc, path, Motion::Stokes(Stokes::new(waves)), &waves)
+}
+
+/// That the second order holds for them.
+pub(super) fn check_stokes(doc: &Document<'_>, path: &str, waves: &RegularWaves) -> Result<()> {
+    check_height(doc, path, waves)?;
     if waves.ursell() >= MADSEN_LIMIT {
         let problem = format!(
             "waves of {} m and {} s on {} m of water: H L² / h³ is {:.1}, and the second order holds below {MADSEN_LIMIT:.1} \
@@ -41,7 +47,7 @@ pub(super) fn stokes(doc: &Document<'_>, path: &str, waves: RegularWaves) -> Res
         );
         return Err(doc.fault_of(&format!("{path}.height"), problem));
     }
-    finished(doc, path, Motion::Stokes(Stokes::new(waves)), &waves)
+    Ok(())
 }
 
 /// The motion of the table at `path`, by cnoidal theory.
@@ -106,13 +112,26 @@ pub(super) fn check_length(
         Motion::Cnoidal(cnoidal) => (cnoidal.waves(), cnoidal.wave_length()),
         _ => return Ok(()),
     };
-    if length < LEAST_WAVE * spacing {
-        let problem = format!(
-            "waves of {} s are {length:.3} m long, {:.1} particle spacings of at least {LEAST_WAVE}",
-            shown(waves.period),
-            length / spacing
-        );
-        return Err(doc.fault_of(&format!("{path}.period"), problem));
+    check_spacings(
+        doc,
+        &format!("{path}.period"),
+        [waves.period, length, spacing],
+    )
+}
+
+/// That waves of a period and a length are long enough for particles `spacing` metres apart; `key` says which waves they are.
+pub(super) fn check_spacings(
+    doc: &Document<'_>,
+    key: &str,
+    [period, length, spacing]: [f64; 3],
+) -> Result<()> {
+    if length >= LEAST_WAVE * spacing {
+        return Ok(());
     }
-    Ok(())
+    let problem = format!(
+        "waves of {} s are {length:.3} m long, {:.1} particle spacings of at least {LEAST_WAVE}",
+        shown(period),
+        length / spacing
+    );
+    Err(doc.fault_of(key, problem))
 }

@@ -2,12 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use super::{document::Document, error::SceneError, motion_spec::check_speed, words::shown};
+use super::{
+    document::Document, error::SceneError, motion_spec::check_speed, regular_waves::check_spacings,
+    words::shown,
+};
 use crate::domain::motion::{Asked, Motion, Phases, Sea, Spectrum, wave_number};
 
 /// Shortest of the waves over the peak's period, where a scene does not say it. What is left out has 1.5 % of the energy of
 /// Pierson and Moskowitz's spectrum.
-const SHORTEST: f64 = 1.0 / 3.0;
+pub(super) const SHORTEST: f64 = 1.0 / 3.0;
 
 /// What it may be.
 const SHORTEST_RANGE: std::ops::RangeInclusive<f64> = 0.1..=0.9;
@@ -29,46 +32,72 @@ type Result<T> = std::result::Result<T, SceneError>;
 /// The motion of the table at `path`, of a sea or a packet.
 pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Motion> {
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
-    if asked.gravity == 0.0 {
-        return refuse("kind", "waves need gravity".to_owned());
-    }
-    if !SHORTEST_RANGE.contains(&(asked.shortest_period / asked.peak_period)) {
-        let problem = format!(
-            "{} s is {} of the peak's {} s",
-            shown(asked.shortest_period),
-            shown(asked.shortest_period / asked.peak_period),
-            shown(asked.peak_period)
-        );
-        return refuse("shortest_period", problem);
-    }
-    if asked.ramp == 0.0 {
-        return refuse(
-            "ramp",
-            "a spectrum's motion has none that is at rest".to_owned(),
-        );
-    }
+    let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
+    check_periods(doc, path, periods, asked.gravity)?;
     let (key, height) = match asked.phases {
         Phases::Random {
             significant_height, ..
         } => ("significant_height", significant_height),
         Phases::Focused { height, .. } => ("height", height),
     };
-    if height > asked.depth {
-        let (height, depth) = (shown(height), shown(asked.depth));
-        return refuse(key, format!("waves of {height} m on {depth} m of water"));
-    }
     let water = [asked.depth, asked.gravity];
-    if key == "significant_height"
-        && let Err(problem) = check_steepness(height, asked.peak_period, water)
-    {
-        return refuse(key, problem);
+    match key {
+        "significant_height" => check_height(height, asked.peak_period, water),
+        _ => check_depth(height, asked.depth),
     }
+    .or_else(|problem| refuse(key, problem))?;
     let sea = Sea::new(asked);
     let whole = sea.asked().ramp + sea.asked().peak_period;
     let motion = Motion::Sea(sea);
     check_speed(motion.peak_speed(0.0, whole))
         .map_err(|problem| doc.fault_of_plain(path, problem))?;
     Ok(motion)
+}
+
+/// That a spectrum's peak period, shortest period and ramp, seconds, are those of waves.
+pub(super) fn check_periods(
+    doc: &Document<'_>,
+    path: &str,
+    [peak, shortest, ramp]: [f64; 3],
+    gravity: f64,
+) -> Result<()> {
+    let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
+    if gravity == 0.0 {
+        return refuse("kind", "waves need gravity".to_owned());
+    }
+    if !SHORTEST_RANGE.contains(&(shortest / peak)) {
+        let problem = format!(
+            "{} s is {} of the peak's {} s",
+            shown(shortest),
+            shown(shortest / peak),
+            shown(peak)
+        );
+        return refuse("shortest_period", problem);
+    }
+    if ramp == 0.0 {
+        let problem = "a spectrum's motion has none that is at rest";
+        return refuse("ramp", problem.to_owned());
+    }
+    Ok(())
+}
+
+/// That a sea of a significant height and a peak period stands on water of a depth, by gravity.
+pub(super) fn check_height(
+    height: f64,
+    peak_period: f64,
+    water: [f64; 2],
+) -> std::result::Result<(), String> {
+    check_depth(height, water[0])?;
+    check_steepness(height, peak_period, water)
+}
+
+/// That waves are no higher than the water is deep.
+fn check_depth(height: f64, depth: f64) -> std::result::Result<(), String> {
+    if height <= depth {
+        return Ok(());
+    }
+    let (height, depth) = (shown(height), shown(depth));
+    Err(format!("waves of {height} m on {depth} m of water"))
 }
 
 /// That waves of a height and a period stand on water of a depth, by gravity.
@@ -101,8 +130,15 @@ pub(super) fn shape(
             let problem = "Pierson and Moskowitz's peak is not raised";
             Err(doc.fault_of(&format!("{path}.peak_enhancement"), problem))
         }
-        (Spectrum::PiersonMoskowitz, None) => Ok((spectrum, 1.0)),
-        (_, given) => Ok((spectrum, given.unwrap_or(PEAK_ENHANCEMENT))),
+        _ => Ok((spectrum, self::peak_enhancement(spectrum, peak_enhancement))),
+    }
+}
+
+/// γ, which Pierson and Moskowitz's form has none of.
+pub(super) fn peak_enhancement(spectrum: Spectrum, given: Option<f64>) -> f64 {
+    match spectrum {
+        Spectrum::PiersonMoskowitz => 1.0,
+        _ => given.unwrap_or(PEAK_ENHANCEMENT),
     }
 }
 
@@ -134,15 +170,12 @@ pub(super) fn check(
     (size, spacing): (f64, f64),
 ) -> Result<()> {
     let refuse = |key: &str, problem: String| Err(doc.fault_of(&format!("{path}.{key}"), problem));
-    let length = sea.least_wave_length();
-    if length < LEAST_WAVE * spacing {
-        let problem = format!(
-            "waves of {} s are {length:.3} m long, {:.1} particle spacings",
-            shown(sea.asked().shortest_period),
-            length / spacing
-        );
-        return refuse("shortest_period", problem);
-    }
+    let shortest = [
+        sea.asked().shortest_period,
+        sea.least_wave_length(),
+        spacing,
+    ];
+    check_spacings(doc, &format!("{path}.shortest_period"), shortest)?;
     let Phases::Focused { at, time, .. } = sea.asked().phases else {
         return Ok(());
     };

@@ -65,10 +65,10 @@ mod scene {
     mod edits;
     mod faults;
     mod fuzz_inputs;
+    mod lint;
     mod untrusted;
 }
 mod solve {
-    mod absorbing;
     mod analytic;
     mod analytic_water;
     mod flip;
@@ -83,6 +83,7 @@ mod solve {
     mod projected;
     mod walls;
     mod whitewater;
+    mod zones;
 }
 mod stage {
     mod branch;

@@ -4,6 +4,8 @@ use crate::scene::effects::with_effects;
 
 use super::{engine::Twin, flip::FlipState, pbf::PbfState};
 
+mod zone;
+
 macro_rules! checks {
     ($($name:ident),+ $(,)?) => {
         $(mod $name;)+

@@ -31,7 +31,7 @@ impl Spectrum {
 
     /// Density at a frequency over that of the peak, up to a factor that is the same for all frequencies. The peak is of
     /// `peak` Hz, raised `enhancement` times (γ), in water of `depth` metres under `gravity`, m/s².
-    pub(super) fn density(
+    pub(in crate::domain) fn density(
         self,
         frequency: f64,
         peak: f64,

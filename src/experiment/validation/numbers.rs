@@ -45,7 +45,7 @@ pub(super) fn of(record: &Record<'_>) -> Measured {
     let mut out = Measured::default();
     match record.benchmark.measure {
         Measure::RegularWaves => regular_waves(record, &mut out),
-        Measure::IrregularWaves => irregular_waves(record, &mut out),
+        Measure::WavesByTheory => waves_by_theory(record, &mut out),
         Measure::SolitaryWave => solitary_wave(record, &mut out),
         Measure::DamBreak => dam_break(record, &mut out),
         Measure::DryBed => dry_bed(record, &mut out),
@@ -137,26 +137,60 @@ fn regular_waves(record: &Record<'_>, out: &mut Measured) {
     }
 }
 
-/// Against linear theory for the same wall's way, wave by wave: from `after` on, about the mean level, which is higher than the
-/// still water's by what the wall has come in.
-fn irregular_waves(record: &Record<'_>, out: &mut Measured) {
-    let makers = record.scene.wave_makers.iter();
-    let mut seas = makers.filter_map(|maker| match &maker.motion {
-        Motion::Sea(sea) => Some(sea),
-        _ => None,
-    });
-    let Some(sea) = seas.next() else {
+/// What theory says of a scene's waves.
+struct Theory<'a> {
+    /// Elevation at x and z, metres from the domain's least corner, and a time, s.
+    elevation: Box<dyn Fn(DVec2, f64) -> f64 + 'a>,
+    /// Of regular waves, seconds.
+    period: Option<f64>,
+}
+
+impl<'a> Theory<'a> {
+    /// Of the first wall that moves by a theory, else of a generation zone.
+    fn of(scene: &'a Scene) -> Option<Self> {
+        let of_wall = |motion: &'a Motion| -> Option<Self> {
+            let (elevation, period): (Box<dyn Fn(DVec2, f64) -> f64>, _) = match motion {
+                Motion::Sea(sea) => (Box::new(|at, t| sea.elevation(at.x, t)), None),
+                Motion::Stokes(waves) => (
+                    Box::new(|at, t| waves.elevation(at.x, t)),
+                    Some(waves.waves().period),
+                ),
+                Motion::Cnoidal(waves) => (
+                    Box::new(|at, t| waves.elevation(at.x, t)),
+                    Some(waves.waves().period),
+                ),
+                _ => return None,
+            };
+            Some(Self { elevation, period })
+        };
+        let makers = scene.wave_makers.iter();
+        let mut makers = makers.filter_map(|maker| of_wall(&maker.motion));
+        makers.next().or_else(|| {
+            let waves = scene.effects.waves(scene.water.gravity)?;
+            Some(Self {
+                period: waves.period,
+                elevation: Box::new(move |at, t| waves.elevation(at, t)),
+            })
+        })
+    }
+}
+
+/// A gauge's samples that count: seconds, elevation, and theory's, metres.
+type Both = Vec<[f64; 3]>;
+
+/// Against theory from `after` on, about the mean level, which is higher than the still water's by what a wall has come in.
+fn waves_by_theory(record: &Record<'_>, out: &mut Measured) {
+    let Some(theory) = Theory::of(record.scene) else {
         return;
     };
-    // Per gauge (seconds, elevation, theory's).
-    let gauge = |(gauge, at): (usize, &DVec2)| -> Option<Vec<[f64; 3]>> {
+    let gauge = |(gauge, at): (usize, &DVec2)| -> Option<Both> {
         let mut samples = level(record, gauge);
         samples.retain(|sample| sample.0 >= record.benchmark.scale.after);
         let still = mean(samples.iter().map(|sample| sample.1))?;
-        let theory = samples.iter().map(|sample| sea.elevation(at.x, sample.0));
-        let theory: Vec<f64> = theory.collect();
-        let offset = mean(theory.iter().copied())?;
-        let both = samples.iter().zip(theory);
+        let of_theory = samples.iter().map(|&(t, _)| (theory.elevation)(*at, t));
+        let of_theory: Vec<f64> = of_theory.collect();
+        let offset = mean(of_theory.iter().copied())?;
+        let both = samples.iter().zip(of_theory);
         Some(
             both.map(|(&(t, y), of)| [t, y - still, of - offset])
                 .collect(),
@@ -164,7 +198,7 @@ fn irregular_waves(record: &Record<'_>, out: &mut Measured) {
     };
     let gauges: Option<Vec<_>> = record.gauges().iter().enumerate().map(gauge).collect();
     let gauges = gauges.unwrap_or_default();
-    let square = |of: &dyn Fn(&[f64; 3]) -> f64, samples: &[[f64; 3]]| -> f64 {
+    let square = |of: &dyn Fn(&[f64; 3]) -> f64, samples: &Both| -> f64 {
         samples.iter().map(|sample| of(sample).powi(2)).sum()
     };
     let ratios = gauges
@@ -175,6 +209,9 @@ fn irregular_waves(record: &Record<'_>, out: &mut Measured) {
         .iter()
         .map(|samples| (square(&|s| s[1] - s[2], samples) / square(&|s| s[2], samples)).sqrt());
     out.put("elevation_error", errors.reduce(f64::max));
+    if let Some(period) = theory.period {
+        second_harmonic(period, record.benchmark.scale.after, &gauges, out);
+    }
     if let Some(last) = gauges.last() {
         let crest = |k: usize| last.iter().max_by(|a, b| a[k].total_cmp(&b[k]));
         if let (Some(found), Some(theory)) = (crest(1), crest(2)) {
@@ -183,6 +220,28 @@ fn irregular_waves(record: &Record<'_>, out: &mut Measured) {
         }
         out.draw("elevation", last.iter().map(|s| (s[0], s[1])).collect());
     }
+}
+
+/// What regular waves have at twice their frequency: bound to them it is the same all along the flume, and a free wave, which goes
+/// slower, makes it rise and fall.
+fn second_harmonic(period: f64, after: f64, gauges: &[Both], out: &mut Measured) {
+    let omega = 2.0 * TAU / period;
+    let amplitude = |samples: &Both, k: usize| -> Option<f64> {
+        let curve: Curve = samples.iter().map(|s| (s[0], s[k])).collect();
+        let window = waves::whole_periods(&curve, period, after);
+        Some(waves::harmonic(window, omega)?.amplitude)
+    };
+    let of_theory = mean(gauges.iter().filter_map(|gauge| amplitude(gauge, 2)));
+    let found: Option<Vec<f64>> = gauges.iter().map(|gauge| amplitude(gauge, 1)).collect();
+    let (Some(of_theory), Some(found)) = (of_theory, found) else {
+        return;
+    };
+    let ratio = mean(found.iter().copied()).map(|found| found / of_theory);
+    out.put("second_harmonic", ratio);
+    let [least, most] = found
+        .iter()
+        .fold([f64::INFINITY, 0.0], |[a, b], v| [v.min(a), v.max(b)]);
+    out.put("second_harmonic_spread", Some((most - least) / of_theory));
 }
 
 fn solitary_wave(record: &Record<'_>, out: &mut Measured) {

@@ -40,6 +40,8 @@ pub struct Model {
 /// One substep.
 #[derive(Clone, Debug)]
 pub struct Step<'a> {
+    /// When it begins, seconds into the shot.
+    pub start: f64,
     /// Δt, seconds.
     pub length: f64,
     /// Gravity times Δt, m/s.
@@ -144,6 +146,7 @@ impl Model {
         let Substep { start, length, .. } = *substep;
         let (before, after) = (self.scene.walls(start), self.scene.walls(start + length));
         Step {
+            start,
             length,
             velocity_step: self.scene.water.gravity * length,
             walls: after,

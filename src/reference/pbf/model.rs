@@ -56,11 +56,15 @@ pub struct Model {
     pub sample_weights: Vec<f64>,
     /// Distance to the solids; `None` without any.
     pub distance: Option<SignedDistance>,
+    /// Of the scene, m/s², whoever adds it.
+    pub scene_gravity: DVec3,
 }
 
 /// A substep's length and walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substep {
+    /// When it ends, seconds into the shot.
+    pub time: f64,
     /// Δt, seconds; 0 measures only.
     pub time_step: f64,
     /// The box now, wave-makers included.
@@ -73,6 +77,7 @@ impl Substep {
     /// That ends at `time` and is `time_step` long, seconds.
     pub fn new(scene: &Scene, time: f64, time_step: f64) -> Self {
         Self {
+            time,
             time_step,
             walls: scene.walls(time),
             wall_velocity: scene.wall_velocity(time, time_step),
@@ -114,6 +119,7 @@ impl Model {
             settings: settings.clone(),
             gravity: scene.predicted_gravity(),
             cells,
+            scene_gravity: scene.water.gravity,
         }
     }
 
@@ -301,6 +307,7 @@ mod tests {
                 "{z}: {gradient}"
             );
             let substep = Substep {
+                time: 0.0,
                 time_step: 0.01,
                 walls: walls(),
                 wall_velocity: Bounds {

@@ -1,6 +1,5 @@
 //! Zones before walls in which waves die out instead of being turned back: a sponge layer (Israeli and Orszag 1981).
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -9,21 +8,18 @@ use super::{
         document::Document,
         error::SceneError,
         key::{Key, words},
-        words::shown,
     },
-    Effect, Surroundings,
+    Absorbs, Effect, Surroundings,
+    zone::Zone,
 };
-
-/// The key that names the walls.
-const KEY: &str = "effects.absorbing_zone.walls";
-
-/// The key that says how long a zone is.
-const LENGTH: &str = "effects.absorbing_zone.length";
 
 /// The rate at the wall over the angular frequency of the waves. In shallow water a zone of one and a half wave lengths
 /// then turns back 0.1 % of a wave's height, one of a wave length 1.8 % and one of three quarters 7.7 %: the velocity there
 /// follows u″ + k² (1 − i r/ω) u = 0, and is 0 at the wall. (1.5 turns back 1.2, 5.8 and 11 %, and so does 5.)
 const RATE: f64 = 2.5;
+
+/// Of a wave length: in shallow water a zone that is half as long turns back 4 % of a wave's height, one of 0.3 a quarter.
+const LEAST: f64 = 0.5;
 
 /// `absorbing_zone = { walls = ["+x"], length = 9.4, period = 2.3 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,28 +34,13 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Rate at which velocities fall at the wall, 1/s.
-    pub fn rate(&self) -> f64 {
-        RATE * std::f64::consts::TAU / self.period
-    }
-
-    /// How far into the zone a place lies, metres from the domain's least corner: 0 where it begins and before, 1 at the
-    /// wall. The domain has `size`, metres.
-    pub fn way(&self, size: DVec3, place: DVec3) -> f64 {
-        let off = |wall: &Wall| match wall.is_max {
-            false => place[wall.axis],
-            true => size[wall.axis] - place[wall.axis],
-        };
-        let ways = self.walls.iter().map(|wall| 1.0 - off(wall) / self.length);
-        ways.fold(0.0, f64::max).min(1.0)
-    }
-
-    /// Part of its velocity that water at that place loses in a step of so many seconds: r Δt / (1 + r Δt), with r the rate
-    /// times the square of the way into the zone.
-    pub fn absorbed(&self, size: DVec3, place: DVec3, step: f64) -> f64 {
-        let way = self.way(size, place);
-        let lost = self.rate() * step * way * way;
-        lost / (1.0 + lost)
+    /// Where it takes what.
+    pub fn zone(&self) -> Zone<'_> {
+        Zone {
+            walls: &self.walls,
+            length: self.length,
+            rate: RATE * std::f64::consts::TAU / self.period,
+        }
     }
 }
 
@@ -81,46 +62,22 @@ impl Effect for Settings {
     ];
 
     fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
-        let refuse = |problem: String| Err(doc.fault_of(KEY, problem));
-        if self.walls.is_empty() {
-            return refuse("names no wall".to_owned());
-        }
-        if self.length < around.least_length {
-            let problem = format!(
-                "a zone of {} m is shorter than two particle spacings, {} m",
-                shown(self.length),
-                shown(around.least_length)
-            );
-            return Err(doc.fault_of(LENGTH, problem));
-        }
-        for (index, wall) in self.walls.iter().enumerate() {
-            let name = wall.name();
-            if self.walls[..index].contains(wall) {
-                return refuse(format!("{name:?} stands there twice"));
-            }
-            if around.periodic[wall.axis] {
-                let problem = "domain.periodic joins both ends";
-                return refuse(format!("there is no wall {name}: {problem}"));
-            }
-            if around.wave_makers.iter().any(|maker| maker.wall == *wall) {
-                return refuse(format!("the wall {name} is a wave maker's"));
-            }
-            let room = around.domain.size()[wall.axis];
-            if self.length > room {
-                let problem = format!(
-                    "before the wall {name} lie {} m, and the zone is {} m long",
-                    shown(room),
-                    shown(self.length)
-                );
-                return Err(doc.fault_of(LENGTH, problem));
-            }
-        }
-        Ok(())
+        self.zone().check(doc, "effects.absorbing_zone", around)
+    }
+
+    fn absorbs(&self) -> Option<Absorbs<'_>> {
+        Some(Absorbs {
+            zone: self.zone(),
+            period: self.period,
+            least: LEAST,
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
     /// Part of a wave's height that a zone of so many wave lengths turns back in shallow water: u″ + k² (1 − i r/ω) u = 0 from
@@ -139,7 +96,7 @@ mod tests {
         // Of a step so short that what is lost is r Δt.
         let step = 1e-9;
         let lost = |x: f64| {
-            let part = zone.absorbed(DVec3::splat(1e3), DVec3::splat(x), step) / step;
+            let part = zone.zone().led(DVec3::splat(1e3), DVec3::splat(x), step) / step;
             part * rate_over_frequency / RATE
         };
         // (u, u′), each real and imaginary.

@@ -3,14 +3,21 @@
 //! An effect's file here holds its settings and their keys. What it adds to each solver stands in a file of the
 //! same name in `solve::effects`, its f64 twins in `reference`, and what holds the two against each other in `check`.
 
-use super::{WaveMaker, document::Document, error::SceneError, key::Key};
-use crate::domain::bounds::Bounds;
+pub mod zone;
+
+use glam::DVec3;
+
+use super::{WaveMaker, document::Document, error::SceneError, key::Key, lint::Made};
+use crate::domain::{bounds::Bounds, open_waves::OpenWaves};
+use zone::Zone;
 
 /// What of a scene an effect has to fit into.
 pub(super) struct Surroundings<'a> {
     pub(super) domain: &'a Bounds,
     pub(super) periodic: [bool; 3],
     pub(super) wave_makers: &'a [WaveMaker],
+    /// m/s².
+    pub(super) gravity: DVec3,
     /// Two particle spacings, metres: shorter than that, nothing lies in a zone.
     pub(super) least_length: f64,
 }
@@ -31,12 +38,36 @@ pub(super) trait Effect {
     fn blend(&self) -> f64 {
         0.0
     }
+
+    /// Zones in which waves die.
+    fn absorbs(&self) -> Option<Absorbs<'_>> {
+        None
+    }
+
+    /// Waves that it makes.
+    fn makes(&self) -> Option<Made> {
+        None
+    }
+
+    /// What theory says of them in a gravity, m/s².
+    fn waves(&self, _gravity: DVec3) -> Option<OpenWaves> {
+        None
+    }
+}
+
+/// Zones in which waves die.
+pub(super) struct Absorbs<'a> {
+    pub(super) zone: Zone<'a>,
+    /// Of the longest, s.
+    pub(super) period: f64,
+    /// What a zone's length is at least, of their length.
+    pub(super) least: f64,
 }
 
 /// Gives the list of effects, in the order in which they act, to a macro.
 macro_rules! with_effects {
     ($callback:ident) => {
-        $callback!(viscosity, vorticity_confinement, absorbing_zone);
+        $callback! { viscosity, vorticity_confinement, absorbing_zone, generation_zone }
     };
 }
 pub(crate) use with_effects;
@@ -78,6 +109,25 @@ macro_rules! effects {
                 let mut blends = Vec::new();
                 $(blends.extend(self.$name.as_ref().map(Effect::blend));)+
                 blends
+            }
+
+            /// Zones of the named effects in which waves die, by the effect's name.
+            pub(super) fn absorbing(&self) -> Vec<(&'static str, Absorbs<'_>)> {
+                let mut zones = Vec::new();
+                $(zones.extend(self.$name.as_ref().and_then(Effect::absorbs).map(|zone| (stringify!($name), zone)));)+
+                zones
+            }
+
+            /// Waves that the named effects make.
+            pub(super) fn made(&self) -> Vec<Made> {
+                let mut made = Vec::new();
+                $(made.extend(self.$name.as_ref().and_then(Effect::makes));)+
+                made
+            }
+
+            /// What theory says of the waves of the first of the named effects that makes any, in a gravity, m/s².
+            pub fn waves(&self, gravity: DVec3) -> Option<OpenWaves> {
+                None$(.or_else(|| self.$name.as_ref()?.waves(gravity)))+
             }
         }
     };

@@ -375,6 +375,7 @@ about = [1.0, 0.0, 0.0]
             "solver.method=flip",
             "effects.viscosity.xsph=0.02",
             "domain.no_slip=[\"-y\"]",
+            "effects.generation_zone={walls=[\"-z\"],length=1.0,waves={kind=\"stokes\",height=0.1,period=3.0,depth=1.0,direction_degrees=90.0}}",
         ];
         let all: Vec<&str> = flip.iter().chain(overrides).copied().collect();
         let scene = parse(dir.path(), &text, &all).expect("valid");
@@ -404,6 +405,7 @@ wall = "-y"
 motion = { kind = "focused", height = 0.1, at = 1.0, time = 9.0, spectrum = "tma", peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }
 [effects]
 absorbing_zone = { walls = ["+x"], length = 1.0, period = 2.0 }
+generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", significant_height = 0.1, peak_period = 3.0, depth = 1.0, peak_enhancement = 2.0, shortest_period = 2.0, ramp = 3.0, spreading = 4.0, direction_degrees = 180.0 } }
 "#;
     let scene = parse(dir.path(), slab, &[]).expect("valid");
     let toml = scene.to_toml(&|_, _| "a.obj".to_owned());

@@ -1,8 +1,10 @@
 //! Absorbing zones on the device: PBF's particles lose velocity at a step's end, FLIP's faces before the projection.
 
-use crate::scene::{Scene, Wall, effects::absorbing_zone::Settings};
+use crate::scene::{Scene, effects::absorbing_zone::Settings};
 
-use super::{Addition, pass};
+use super::{Addition, OnDevice, pass, zone::constants};
+
+impl OnDevice for Settings {}
 
 pub(super) fn pbf(settings: &Settings, scene: &Scene, _particles: usize) -> Addition {
     absorption("effects/absorb_particles", settings, scene)
@@ -13,18 +15,8 @@ pub(super) fn flip(settings: &Settings, scene: &Scene, _cells: usize) -> Additio
 }
 
 fn absorption(name: &'static str, settings: &Settings, scene: &Scene) -> Addition {
-    let size = scene.domain.size();
-    let walls: u32 = settings.walls.iter().map(Wall::bit).sum();
-    let constants = [
-        ("ABSORBING", f64::from(walls)),
-        ("RATE", settings.rate()),
-        ("INVERSE_LENGTH", 1.0 / settings.length),
-        ("SIZE_X", size.x),
-        ("SIZE_Y", size.y),
-        ("SIZE_Z", size.z),
-    ];
     Addition {
-        passes: vec![pass(name, &constants)],
+        passes: vec![pass(name, &constants(settings.zone(), scene))],
         buffers: Vec::new(),
     }
 }

@@ -3,8 +3,10 @@
 //! Its passes bind buffers by name and run in order: of PBF after the velocity update, of FLIP on the grid before the
 //! projection.
 
+mod zone;
+
 use crate::{
-    gpu::program::{BufferSpec, PassSpec},
+    gpu::program::{BufferSpec, PassSpec, Program},
     scene::{Scene, effects::with_effects},
 };
 
@@ -26,6 +28,12 @@ fn pass(name: &'static str, constants: &[(&'static str, f64)]) -> PassSpec {
     }
 }
 
+/// What an effect's settings do on the device beside its passes.
+trait OnDevice {
+    /// Fills what its passes are told anew of each substep; `time` is the one at which velocities stand when they run, s.
+    fn upload(&self, _program: &Program, _scene: &Scene, _time: f64) {}
+}
+
 macro_rules! additions {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
@@ -35,6 +43,11 @@ macro_rules! additions {
             let mut all = Vec::new();
             $(all.extend(scene.effects.$name.iter().map(|settings| (stringify!($name), $name::pbf(settings, scene, particles))));)+
             all
+        }
+
+        /// Fills what effects are told anew of each substep; `time` is the one at which velocities stand when their passes run, s.
+        pub(super) fn upload(program: &Program, scene: &Scene, time: f64) {
+            $(scene.effects.$name.iter().for_each(|settings| settings.upload(program, scene, time));)+
         }
 
         /// What they add to FLIP with so many cells in its arrays.

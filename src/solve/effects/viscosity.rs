@@ -5,7 +5,9 @@ use crate::{
     scene::{Scene, effects::viscosity::Settings},
 };
 
-use super::{Addition, pass};
+use super::{Addition, OnDevice, pass};
+
+impl OnDevice for Settings {}
 
 /// What each particle's velocity changes by, and 0, in sorted order, m/s.
 pub const CHANGE: Buf<[f32; 4]> = Buf::new("viscosity_change");

@@ -5,7 +5,9 @@ use crate::{
     scene::{Scene, effects::vorticity_confinement::Settings},
 };
 
-use super::{Addition, pass};
+use super::{Addition, OnDevice, pass};
+
+impl OnDevice for Settings {}
 
 /// Curl of the velocity and its length: of each particle in sorted order (PBF), or of each cell (FLIP), 1/s.
 pub const VORTICITY: Buf<[f32; 4]> = Buf::new("vorticity");

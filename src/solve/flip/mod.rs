@@ -233,6 +233,7 @@ impl Flip {
         if let Some(movers) = &self.movers {
             movers.upload(&self.program, &self.scene, substep.start, substep.length);
         }
+        effects::upload(&self.program, &self.scene, substep.start);
         Ok(())
     }
 

@@ -7,13 +7,16 @@ mod whitewater;
 use swell::{
     check::pbf,
     domain::{
-        motion::Motion, particles::Particles, sampling::BoundarySample,
-        signed_distance::SignedDistance, substep::Which,
+        motion::{Motion, Spectrum},
+        particles::Particles,
+        sampling::BoundarySample,
+        signed_distance::SignedDistance,
+        substep::Which,
     },
     gpu::adapter::{Context, Needs, Spoil},
     scene::{
         Effects, Iteration, Method, Scene, Stop, Wall, WaveMaker,
-        effects::{absorbing_zone, viscosity, vorticity_confinement},
+        effects::{absorbing_zone, generation_zone, viscosity, vorticity_confinement},
         flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
     },
     solve::{
@@ -87,6 +90,22 @@ fn case(method: Method) -> (Scene, Start) {
         walls: vec![Wall::NAMED[0].1, Wall::NAMED[5].1],
         length: 1.3,
         period: 0.3,
+    });
+    scene.effects.generation_zone = Some(generation_zone::Settings {
+        walls: vec![Wall::NAMED[1].1],
+        length: 1.4,
+        waves: generation_zone::Waves::Sea(generation_zone::Sea {
+            significant_height: 0.2,
+            seed: 1,
+            spectrum: Spectrum::Jonswap,
+            peak_enhancement: None,
+            peak_period: 0.8,
+            shortest_period: None,
+            depth: 1.0,
+            ramp: Some(0.0),
+            direction_degrees: 20.0,
+            spreading: Some(10.0),
+        }),
     });
     scene.solver.pbf.as_mut().unwrap().cfl = CFL;
     let mut particles = lattice([-0.01, 0.2, -0.01], [8, 6, 7], [0.9 * D; 3]);

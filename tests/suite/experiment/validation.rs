@@ -93,6 +93,7 @@ macro_rules! benchmarks {
 benchmarks! {
     a_piston_makes_the_waves_of_linear_theory: "piston, kh = 1",
     a_zone_absorbs_the_waves_of_a_piston: "absorbing zone, kh = 2",
+    waves_come_in_from_a_zone_as_theory_has_them: "generation zone, kh = 2",
     a_packet_meets_where_and_when_it_was_asked_to: "focused packet",
     a_solitary_wave_keeps_its_height_and_celerity: "solitary wave",
     a_column_collapses_as_in_the_experiment: "dam break of a column",
@@ -133,6 +134,20 @@ fn a_flume_without_its_zone_fails_a_benchmark() {
     let found = only.strip_prefix("reflection is Some(").unwrap();
     let found: f64 = found.split(')').next().unwrap().parse().unwrap();
     assert!(found > 0.5, "{missed:?}");
+}
+
+/// Negative control: in a zone of a fifth of a wave length the wall at its end undoes what it does.
+#[test]
+fn waves_from_too_short_a_zone_fail_a_benchmark() {
+    let mut zone = benchmark(&COARSE, "generation zone, kh = 2");
+    let settings = &mut zone.runs[0].scene.effects.generation_zone;
+    settings.as_mut().unwrap().length = 0.6;
+    let missed = missed(&crate::support::context(), &zone);
+    assert_eq!(missed.len(), 2, "{missed:?}");
+    assert!(
+        missed.iter().all(|words| words.contains("is Some(0.")),
+        "{missed:?}"
+    );
 }
 
 /// A reflection is measured once the energy of the whole wave, which goes at the group velocity, would be back at the first gauge
@@ -248,7 +263,8 @@ fn points_of_seas_are_those_of_linear_theory() {
     for benchmark in [parsed(&text), parsed(&COARSE)]
         .iter()
         .flat_map(|v| &v.benchmarks)
-        .filter(|benchmark| benchmark.measure == Measure::IrregularWaves)
+        .filter(|benchmark| benchmark.measure == Measure::WavesByTheory)
+        .filter(|benchmark| !benchmark.points.is_empty())
     {
         let scene = &benchmark.runs[0].scene;
         let Motion::Sea(sea) = &scene.wave_makers[0].motion else {

@@ -8,7 +8,7 @@ use swell::{
     scene::{Method, Scene, SceneError, study::Study, tolerance},
 };
 
-use super::faults::{FLIP_FAULTS, KEY_FAULTS, SCENE, VALUE_FAULTS};
+use super::faults::{FLIP_FAULTS, KEY_FAULTS, SCENE, VALUE_FAULTS, ZONE_FAULTS};
 use crate::support::mutate::mutate;
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
@@ -45,7 +45,7 @@ fn each_fault_names_file_line_key_and_what_is_allowed() {
     parse(SCENE, &[]).expect("the good scene is good");
     parse(SCENE, &flip).expect("the good scene is good for FLIP");
     let mut wrong = Vec::new();
-    let of_pbf = KEY_FAULTS.iter().chain(VALUE_FAULTS);
+    let of_pbf = KEY_FAULTS.iter().chain(VALUE_FAULTS).chain(ZONE_FAULTS);
     let of_pbf = of_pbf.map(|fault| (fault, &[][..]));
     let of_flip = FLIP_FAULTS.iter().map(|fault| (fault, &flip[..]));
     for ((old, new, line, expected), overrides) in of_pbf.chain(of_flip) {
@@ -149,6 +149,31 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("effects.absorbing_zone.period", "{}", true),
 ];
 
+/// Those of a zone in which waves come in: of a sea, and of regular waves.
+const OF_SEA: &[(&str, &str, bool)] = &[
+    ("effects.generation_zone.length", "{}", false),
+    (
+        "effects.generation_zone.waves.significant_height",
+        "{}",
+        false,
+    ),
+    ("effects.generation_zone.waves.peak_period", "{}", false),
+    ("effects.generation_zone.waves.peak_enhancement", "{}", true),
+    ("effects.generation_zone.waves.shortest_period", "{}", false),
+    ("effects.generation_zone.waves.spreading", "{}", true),
+    (
+        "effects.generation_zone.waves.direction_degrees",
+        "{}",
+        false,
+    ),
+    ("effects.generation_zone.waves.depth", "{}", false),
+    ("effects.generation_zone.waves.ramp", "{}", true),
+];
+const OF_STOKES: &[(&str, &str, bool)] = &[
+    ("effects.generation_zone.waves.height", "{}", false),
+    ("effects.generation_zone.waves.period", "{}", false),
+];
+
 /// The good scene with all that [`NUMBERS`] changes in it.
 fn numbered() -> String {
     let makers = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
@@ -177,14 +202,27 @@ fn range_of(message: &str) -> Option<[f64; 2]> {
 /// range is the one that holds.
 #[test]
 fn every_number_has_a_range_and_says_it() {
+    each_number_has_a_range(&numbered(), NUMBERS);
+    let zone = |waves: &str| {
+        let zone = format!(
+            "[effects]\ngeneration_zone = {{ walls = [\"-z\"], length = 3.0, waves = {{ {waves}, direction_degrees = 90.0 }} }}\n"
+        );
+        SCENE.replace("[effects]\n", &zone)
+    };
+    let sea = zone("kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0");
+    each_number_has_a_range(&sea, OF_SEA);
+    let stokes = zone("kind = \"stokes\", height = 0.1, period = 3.0, depth = 1.0");
+    each_number_has_a_range(&stokes, OF_STOKES);
+}
+
+fn each_number_has_a_range(text: &str, numbers: &[(&str, &str, bool)]) {
     let dir = assets();
-    let text = numbered();
     let load = |set: &str| {
         let set = [set.to_owned(), Method::Flip.as_override()];
-        Scene::parse(&text, Path::new("s.toml"), dir.path(), &set)
+        Scene::parse(text, Path::new("s.toml"), dir.path(), &set)
     };
     load("shot.frames=240").expect("the scene is good");
-    for (key, value, is_free) in NUMBERS {
+    for (key, value, is_free) in numbers {
         let set = |number: &str| format!("{key}={}", value.replace("{}", number));
         let refused = |number: &str| {
             let set = set(number);

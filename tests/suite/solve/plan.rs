@@ -4,7 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 use swell::{
-    domain::{bounds::Bounds, motion::Motion, probe::Rate},
+    domain::{
+        bounds::Bounds,
+        motion::{Motion, Spectrum},
+        probe::Rate,
+    },
     gpu::{
         buffer::Scalar,
         recording::{Command, Groups},
@@ -13,7 +17,7 @@ use swell::{
     },
     scene::{
         Iteration, Method, Scene, Stop, Wall, WaveMaker,
-        effects::{absorbing_zone, viscosity, vorticity_confinement},
+        effects::{absorbing_zone, generation_zone, viscosity, vorticity_confinement},
         flip::{Precision, Preconditioner, Surface, Transfer},
         probe::{Probe, ProbeKind},
     },
@@ -66,6 +70,22 @@ fn with_effects(mut scene: Scene) -> Scene {
         walls: vec![Wall::NAMED[1].1],
         length: 0.5,
         period: 1.0,
+    });
+    scene.effects.generation_zone = Some(generation_zone::Settings {
+        walls: vec![Wall::NAMED[0].1],
+        length: 0.5,
+        waves: generation_zone::Waves::Sea(generation_zone::Sea {
+            significant_height: 0.05,
+            seed: 1,
+            spectrum: Spectrum::Jonswap,
+            peak_enhancement: None,
+            peak_period: 1.0,
+            shortest_period: None,
+            depth: 1.0,
+            ramp: None,
+            direction_degrees: 20.0,
+            spreading: Some(10.0),
+        }),
     });
     scene
 }

@@ -4,6 +4,7 @@ import itertools
 import math
 
 from . import BrokenMesh
+from .breakwater import CREST, END, FLOOR, HALF_CREST, SLOPE, START
 from .check import box, check_solids
 from .city import ALLEY, BLOCKS_X, BLOCKS_Z, CITY_X, CITY_Z, CROSS_STREET, FOOTPRINTS, HEIGHTS
 from .obj import from_obj
@@ -63,4 +64,20 @@ def check_beach(text):
         raise BrokenMesh(f"beach: {inside} m³ and not {expected}")
     if extent != ((11.2, -0.2, -0.2), (20.2, 2.05, 3.2)):
         raise BrokenMesh(f"beach: reaches {extent}")
+    return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.2f} m³"
+
+
+def check_breakwater(text):
+    """Refuses a breakwater that is not about as large as its plain mound; returns a line about it."""
+    vertices, triangles = from_obj(text)
+    [(extent, inside)] = check_solids(vertices, triangles)
+    rise = CREST - FLOOR
+    reach = HALF_CREST + SLOPE * rise
+    # A prism of the profile, and half of a cone without its tip.
+    prism = rise * (HALF_CREST + reach) * (END - START)
+    head = math.pi * rise / 6 * (HALF_CREST**2 + HALF_CREST * reach + reach**2)
+    if abs(inside / (prism + head) - 1) > 0.02:
+        raise BrokenMesh(f"breakwater: {inside} m³ and not {prism + head}")
+    if extent[0][1] != FLOOR or not CREST <= extent[1][1] <= CREST + 0.1:
+        raise BrokenMesh(f"breakwater: reaches {extent}")
     return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.2f} m³"

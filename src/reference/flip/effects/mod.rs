@@ -2,26 +2,55 @@
 
 use glam::DVec3;
 
-use super::{Model, Room, Step};
+use super::{
+    Model, Room, Step,
+    grid::{corner, per_cell},
+};
 use crate::{
     domain::bricks::Bricks,
     reference::Timings,
-    scene::effects::{Effects, with_effects},
+    scene::effects::{Effects, with_effects, zone::Zone},
 };
 
 /// What an effect knows beside the velocities.
 #[derive(Clone, Copy)]
-pub(super) struct Water<'a> {
+pub struct Water<'a> {
     /// Settings.
-    pub(super) model: &'a Model,
+    pub model: &'a Model,
     /// The substep.
-    pub(super) step: &'a Step<'a>,
+    pub step: &'a Step<'a>,
     /// Where the elements lie.
-    pub(super) bricks: &'a Bricks,
+    pub bricks: &'a Bricks,
     /// What of the cells is water.
-    pub(super) room: &'a Room,
+    pub room: &'a Room,
     /// Velocities at faces before gravity, m/s.
-    pub(super) old: &'a [DVec3],
+    pub old: &'a [DVec3],
+}
+
+/// Velocities at faces after a zone led them towards `wanted`, which is asked for at places in metres from the domain's least
+/// corner, from those before gravity on; m/s, shapes (elements).
+pub fn led_faces(
+    zone: Zone<'_>,
+    water: Water<'_>,
+    velocity: &[DVec3],
+    wanted: impl Fn(DVec3) -> DVec3 + Sync,
+) -> Vec<DVec3> {
+    let Water { model, bricks, .. } = water;
+    let size = model.scene.domain.size();
+    per_cell(bricks, |element| {
+        let e = element as usize;
+        let change = |axis: usize| {
+            let place = corner(bricks, element) + 0.5 - 0.5 * DVec3::AXES[axis];
+            let place = place * model.cell_size();
+            match zone.led(size, place, water.step.length) {
+                0.0 => 0.0,
+                part => part * (wanted(place) - water.old[e])[axis],
+            }
+        };
+        let change = DVec3::new(change(0), change(1), change(2));
+        let is_open = water.room.open[e].cmpgt(DVec3::ZERO);
+        velocity[e] + DVec3::select(is_open, change, DVec3::ZERO)
+    })
 }
 
 macro_rules! twins {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::passes::Inputs;
 use crate::{
     reference::Timings,
-    scene::effects::{Effects, with_effects},
+    scene::effects::{Effects, with_effects, zone::Zone},
 };
 
 macro_rules! twins {
@@ -30,6 +30,25 @@ macro_rules! twins {
 }
 
 with_effects!(twins);
+
+/// The velocities of particles at `places` after a zone led them towards `wanted` in a step of so many seconds, in a domain of `size`;
+/// m/s and metres, shapes (particles). Drops are let be; `is_drop` is empty where nobody tells them.
+pub fn led_particles(
+    zone: Zone<'_>,
+    (size, step): (DVec3, f64),
+    (places, is_drop): (&[DVec3], &[bool]),
+    velocity: &[DVec3],
+    wanted: impl Fn(DVec3) -> DVec3 + Sync + Send,
+) -> Vec<DVec3> {
+    (velocity.par_iter().zip(places).enumerate())
+        .map(
+            |(i, (&v, &x))| match (is_drop.get(i), zone.led(size, x, step)) {
+                (Some(true), _) | (_, 0.0) => v,
+                (_, part) => v + part * (wanted(x) - v),
+            },
+        )
+        .collect()
+}
 
 /// The sum of `term(i, j)` over the fluid neighbours j of every particle i.
 fn fluid_sums<'a>(

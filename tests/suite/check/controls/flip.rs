@@ -151,6 +151,20 @@ pub const FLIP: &[Control] = &[
         &["velocity at faces"],
     ),
     control(
+        "effects/generate_faces",
+        "(speed.x * along,",
+        "(1.02 * speed.x * along,",
+        "effects/generate_faces",
+        &["velocity at faces"],
+    ),
+    control(
+        "effects/generate_faces",
+        "exp(wave.w * (y - WAVE_DEPTH))",
+        "exp(wave.w * 1.05 * (y - WAVE_DEPTH))",
+        "effects/generate_faces",
+        &["velocity at faces"],
+    ),
+    control(
         "pressure/divergence",
         "pressure_rhs[own + 64u * c] = -b.lo[c]",
         "pressure_rhs[own + 64u * c] = b.lo[c]",

@@ -67,6 +67,13 @@ pub const PBF: &[Control] = &[
         &["velocity"],
     ),
     control(
+        "effects/generate_particles",
+        "v + part * (wave",
+        "v + 1.1 * part * (wave",
+        "effects/generate_particles",
+        &["velocity"],
+    ),
+    control(
         "pbf/assign_cells",
         "atomicAdd(&cell_start[cell], 1u)",
         "atomicAdd(&cell_start[cell], 1u) * 2u",

@@ -2,7 +2,10 @@
 use glam::DVec3;
 use swell::{
     domain::{
-        boundary::Boundary, bounds::Bounds, motion::Motion, particles::Particles,
+        boundary::Boundary,
+        bounds::Bounds,
+        motion::{Motion, Spectrum},
+        particles::Particles,
         signed_distance::SignedDistance,
     },
     scene::{
@@ -179,6 +182,22 @@ pub fn effects() -> Case {
         walls: vec![Wall::NAMED[1].1],
         length: 0.6,
         period: 0.5,
+    });
+    case.scene.effects.generation_zone = Some(effects::generation_zone::Settings {
+        walls: vec![Wall::NAMED[0].1],
+        length: 0.6,
+        waves: effects::generation_zone::Waves::Sea(effects::generation_zone::Sea {
+            significant_height: 0.05,
+            seed: 1,
+            spectrum: Spectrum::Jonswap,
+            peak_enhancement: None,
+            peak_period: 0.8,
+            shortest_period: None,
+            depth: 0.5,
+            ramp: Some(0.0),
+            direction_degrees: 20.0,
+            spreading: Some(10.0),
+        }),
     });
     Case {
         name: "effects",

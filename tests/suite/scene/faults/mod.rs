@@ -2,10 +2,12 @@
 mod flip;
 mod keys;
 mod values;
+mod zones;
 
 pub use flip::FLIP_FAULTS;
 pub use keys::KEY_FAULTS;
 pub use values::VALUE_FAULTS;
+pub use zones::ZONE_FAULTS;
 
 pub const SCENE: &str = r#"[shot]
 name = "base"

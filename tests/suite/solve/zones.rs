@@ -1,11 +1,14 @@
-//! Absorbing zones: what they take of a flow, and what they leave alone.
+//! Absorbing and generation zones: where they lead water, and what they leave alone.
 
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, particles::Particles, solver::Solver},
     gpu::adapter::Context,
     reference,
-    scene::{Method, Scene, Wall, effects::absorbing_zone::Settings},
+    scene::{
+        Effects, Method, Scene, Wall,
+        effects::{absorbing_zone::Settings, generation_zone},
+    },
     solve::plan::Plan,
 };
 
@@ -29,6 +32,21 @@ fn zone(walls: &[Wall], length: f64, period: f64) -> Option<Settings> {
         walls: walls.to_vec(),
         length,
         period,
+    })
+}
+
+/// Waves on the water of [`half_full`].
+fn waves(walls: &[Wall], length: f64) -> Option<generation_zone::Settings> {
+    Some(generation_zone::Settings {
+        walls: walls.to_vec(),
+        length,
+        waves: generation_zone::Waves::Stokes(generation_zone::Regular {
+            height: 0.05,
+            period: 0.9,
+            depth: 0.4,
+            ramp: Some(0.1),
+            direction_degrees: 180.0,
+        }),
     })
 }
 
@@ -155,7 +173,6 @@ fn drops_over_a_zone_fall_freely() {
             particles.position.push([x, 0.74, 0.4]);
             particles.velocity.push([0.0; 3]);
         }
-        scene.effects.absorbing_zone = zone(&[RIGHT], 0.8, 0.5);
         let falls = |state: &Particles| -> Vec<f32> {
             let last = particles.len() - 2;
             let ids = last as u32..=last as u32 + 1;
@@ -163,22 +180,69 @@ fn drops_over_a_zone_fall_freely() {
             slots.map(|slot| state.velocity[slot][1]).collect()
         };
         let free = -9.81 * step * frames as f32;
-        for state in [
+        for is_generating in [false, true] {
+            scene.effects = Effects::default();
+            match is_generating {
+                false => scene.effects.absorbing_zone = zone(&[RIGHT], 0.8, 0.5),
+                true => scene.effects.generation_zone = waves(&[RIGHT], 0.8),
+            }
+            for state in [
+                on_gpu(&context, &scene, &particles, frames),
+                on_cpu(&scene, &particles, frames),
+            ] {
+                let found = falls(&state);
+                println!("{method:?}: {found:?}, expected {free}");
+                assert!(
+                    found.iter().all(|v| (v / free - 1.0).abs() < 1e-4),
+                    "{found:?}"
+                );
+            }
+            if method == Method::Pbf {
+                let mut scene = scene.clone();
+                scene.solver.pbf.as_mut().unwrap().grid_projection = false;
+                let found = falls(&on_gpu(&context, &scene, &particles, frames));
+                assert!(found[1] > 0.8 * free, "{found:?}");
+            }
+        }
+    }
+}
+
+/// A place in the zone has the velocity of the waves there, from which it is off by what walls and the pressure do within a step:
+/// on the mean over the zone's half at the wall, where there is water all the time, by a third of the waves', which are seven cells long.
+#[test]
+fn water_in_a_generation_zone_goes_as_the_waves_do() {
+    let context = context();
+    for method in METHODS {
+        let (mut scene, particles) = half_full(method);
+        scene.periodic = [false, false, true];
+        scene.effects.generation_zone = waves(&[RIGHT], 1.6);
+        let theory = scene.effects.waves(scene.water.gravity).unwrap();
+        let frames = 40;
+        // FLIP's velocities at a frame's end are those of its end, too.
+        let time = f64::from(frames) / 50.0;
+        let apart = |state: &Particles, time: f64| {
+            let of = |(x, v): (&[f32; 3], &[f32; 3])| {
+                let [x, v] = [x, v].map(|a| DVec3::from_array(a.map(f64::from)));
+                let is_inside = (0.8..1.4).contains(&x.x) && x.y < 0.3;
+                let wanted = theory.velocity(x, time);
+                is_inside.then(|| [(v - wanted).length_squared(), wanted.length_squared()])
+            };
+            let both = state.position.iter().zip(&state.velocity).filter_map(of);
+            let [off, all] = both.fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
+            (off / all).sqrt()
+        };
+        let states = [
             on_gpu(&context, &scene, &particles, frames),
             on_cpu(&scene, &particles, frames),
-        ] {
-            let found = falls(&state);
-            println!("{method:?}: {found:?}, expected {free}");
-            assert!(
-                found.iter().all(|v| (v / free - 1.0).abs() < 1e-4),
-                "{found:?}"
-            );
+        ];
+        for state in &states {
+            let found = apart(state, time);
+            println!("{method:?}: {found}");
+            assert!(found < 0.4, "{found}");
         }
-        if method == Method::Pbf {
-            scene.solver.pbf.as_mut().unwrap().grid_projection = false;
-            let found = falls(&on_gpu(&context, &scene, &particles, frames));
-            assert!(found[1] > 0.5 * free, "{found:?}");
-        }
+        // Negative control: the waves of a quarter of a period later.
+        let other = apart(&states[0], time + 0.225);
+        assert!(other > 0.75, "{other}");
     }
 }
 
@@ -195,17 +259,28 @@ fn a_scene_that_names_no_zone_pays_for_none() {
             plan.passes.iter().map(|pass| pass.spec.name).collect()
         };
         let bare = plan(&scene);
+        let names_of_bare = names(&bare);
+        let added = |plan: &Plan| -> Vec<&'static str> {
+            let names = names(plan).into_iter();
+            names.filter(|name| !names_of_bare.contains(name)).collect()
+        };
         scene.effects.absorbing_zone = zone(&[RIGHT, FLOOR], 0.3, 1.0);
         let with = plan(&scene);
         assert_eq!(with.bytes(), bare.bytes());
-        let added: Vec<_> = names(&with)
-            .into_iter()
-            .filter(|name| !names(&bare).contains(name))
-            .collect();
         let expected = match method {
             Method::Flip => "effects/absorb_faces",
             Method::Pbf => "effects/absorb_particles",
         };
-        assert_eq!(added, [expected]);
+        assert_eq!(added(&with), [expected]);
+        scene.effects = Effects::default();
+        scene.effects.generation_zone = waves(&[RIGHT], 0.3);
+        let with = plan(&scene);
+        // A wave and its second harmonic, of 32 bytes each.
+        assert_eq!(with.bytes().0, bare.bytes().0 + 64);
+        let expected = match method {
+            Method::Flip => "effects/generate_faces",
+            Method::Pbf => "effects/generate_particles",
+        };
+        assert_eq!(added(&with), [expected]);
     }
 }

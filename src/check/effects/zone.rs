@@ -1,0 +1,82 @@
+//! Zones that lead water, of particles and of faces: what those that absorb and those that generate share.
+
+use glam::DVec3;
+
+use crate::{
+    check::{
+        engine::{Io, Outcome, State, wide},
+        flip::FlipState,
+        pbf::PbfState,
+        table::{Entry, pair},
+    },
+    compare::{rounding::U, tolerance::bounds},
+    reference::{
+        flip::effects::{Water, led_faces},
+        pbf::effects::led_particles,
+    },
+    scene::effects::zone::Zone,
+    solve::{flip, pbf},
+};
+
+bounds! {
+    // r Δt w² changes by 2 r Δt w of the way w's own change. Of the part x / (1 + x) that is 2 √(r Δt) √x / (1 + x)², whose
+    // greatest value is 0.65 √(r Δt), at x = 1/3; and no more than 2 r Δt.
+    pub(super) PART = [most: "r Δt at the wall", ratio: "the domain's longest side over the zone's length"]
+        U * ((2.0 * most).min(0.65 * most.sqrt()) * (6.0 * ratio + 4.0) + 8.0 * most.min(1.0)), "of the part of the way that water is led, by where a place is";
+}
+
+/// [`PART`] of a step of so many seconds in a domain of `size`.
+pub(super) fn part(zone: Zone<'_>, size: DVec3, step: f64) -> f64 {
+    PART.of([zone.rate * step, size.max_element() / zone.length])
+}
+
+/// Particles that a zone led towards `wanted`; `magnitudes` are those of a velocity before.
+pub(super) fn particles<const N: usize>(
+    state: &PbfState,
+    io: &mut Io<'_>,
+    zone: Zone<'_>,
+    entry: &'static Entry<N>,
+    wanted: impl Fn(DVec3) -> DVec3 + Send + Sync,
+    magnitudes: impl Fn(f64) -> [f64; N] + Send + Sync,
+) -> Outcome {
+    let n = state.particles();
+    let places = io.before.vectors(pbf::buffers::POSITION, n)?;
+    let before = io.before.get(pbf::buffers::VELOCITY, n)?;
+    let velocity = wide(&before);
+    let is_drop: Vec<bool> = before.iter().map(|v| v[3] > 0.0).collect();
+    let step = (state.scene.domain.size(), state.substep.time_step);
+    let twin = led_particles(zone, step, (&places, &is_drop), &velocity, wanted);
+    let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;
+    io.table.each(entry, 0..n, |i| {
+        pair(i, found[i], twin[i], magnitudes(velocity[i].length()))
+    });
+    Ok(())
+}
+
+/// Faces that a zone led towards `wanted`; `magnitudes` are those of the velocities before gravity and after it.
+pub(super) fn faces<const N: usize>(
+    state: &FlipState,
+    io: &mut Io<'_>,
+    zone: Zone<'_>,
+    entry: &'static Entry<N>,
+    wanted: impl Fn(DVec3) -> DVec3 + Send + Sync,
+    magnitudes: impl Fn([f64; 2]) -> [f64; N] + Send + Sync,
+) -> Outcome {
+    let (elements, step) = (state.elements(), state.step());
+    let old = elements.planes(&io.before, flip::buffers::FACE_CHANGE)?;
+    let before = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
+    let found = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
+    let water = Water {
+        model: &state.model,
+        step: &step,
+        bricks: &elements.bricks,
+        room: state.room(),
+        old: &old,
+    };
+    let twin = led_faces(zone, water, &before, wanted);
+    io.table.each(entry, elements.active(), |e| {
+        let sizes = [old[e].length(), before[e].length()];
+        pair(e, found[e], twin[e], magnitudes(sizes))
+    });
+    Ok(())
+}

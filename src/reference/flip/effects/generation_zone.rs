@@ -1,0 +1,21 @@
+//! Generation zones: faces in one go a part of the way from the velocity that particles gave them to that of the waves.
+
+use glam::DVec3;
+
+use super::{Water, led_faces};
+use crate::{reference::Timings, scene::effects::generation_zone::Settings};
+
+pub(super) fn apply(
+    settings: &Settings,
+    water: Water<'_>,
+    velocity: &mut Vec<DVec3>,
+    timings: &mut Timings,
+) {
+    *velocity = timings.time("effects/generate_faces", || {
+        let waves = settings.incoming(water.model.scene.water.gravity);
+        let time = water.step.start;
+        led_faces(settings.zone(), water, velocity, |place| {
+            waves.velocity(place, time)
+        })
+    });
+}

@@ -1,0 +1,434 @@
+//! Zones before walls in which water is led towards given waves: they come in, and what runs out dies (a relaxation zone, Jacobsen,
+//! Fuhrman and Fredsøe 2012).
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    super::{
+        Wall,
+        document::Document,
+        error::SceneError,
+        key::{Interval, Key, words},
+        lint::{CREST, Made},
+        motion_spec::check_speed,
+        regular_waves, seas,
+        words::shown,
+    },
+    Absorbs, Effect, Surroundings,
+    zone::Zone,
+};
+use crate::domain::{
+    motion::{RegularWaves, Spectrum, wave_number},
+    open_waves::{OpenSea, OpenWaves},
+};
+
+/// The effect's own key, and that of its waves.
+const KEY: &str = "effects.generation_zone";
+const WAVES: &str = "effects.generation_zone.waves";
+
+/// The rate at the wall over the angular frequency of the waves. What differs from the waves that are wanted follows the equation of an
+/// absorbing zone, and at the wall, which stands still, it is all of them. In shallow water a zone of one and a half wave lengths then
+/// lets 1.2 % of them through, in which its waves are wrong, and turns 0.6 % of what runs into it back; one of a wave length 5.9 and 4.1 %.
+/// (2.5 lets 4.6 and 14 % through, 6 turns 2.0 and 7.3 % back.)
+const RATE: f64 = 4.0;
+
+/// Of a wave length: in shallow water 13 % of the waves' height from such a zone is wrong, and from one of half a wave length 30 %.
+const LEAST: f64 = 0.75;
+
+const LENGTH: Interval = 1e-9..=1e6;
+
+const PERIOD: Interval = 1e-4..=1e6;
+
+/// `generation_zone = { walls = ["-x"], length = 9.4, waves = { kind = "stokes", height = 0.1, period = 2.3, depth = 1.0 } }`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// Walls before which a zone lies, each once.
+    pub walls: Vec<Wall>,
+    /// Of each zone from its wall, metres.
+    pub length: f64,
+    /// What comes in.
+    pub waves: Waves,
+}
+
+/// Waves as a scene asks for them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Waves {
+    /// Regular ones to second order.
+    Stokes(Regular),
+    /// Those of a spectrum.
+    Sea(Sea),
+}
+
+/// Regular waves as a scene asks for them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Regular {
+    /// From trough to crest, metres.
+    pub height: f64,
+    /// Seconds.
+    pub period: f64,
+    /// Of the water at rest, metres.
+    pub depth: f64,
+    /// Seconds until the full height.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ramp: Option<f64>,
+    /// In which they go, from +x towards +z.
+    pub direction_degrees: f64,
+}
+
+/// A sea as a scene asks for it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sea {
+    /// Four times the root of the elevation's variance, metres.
+    pub significant_height: f64,
+    /// Chooses one sea of many.
+    pub seed: u32,
+    /// How the energy is spread over frequencies.
+    pub spectrum: Spectrum,
+    /// γ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_enhancement: Option<f64>,
+    /// Seconds.
+    pub peak_period: f64,
+    /// Of the shortest waves, seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shortest_period: Option<f64>,
+    /// Of the water at rest, metres.
+    pub depth: f64,
+    /// Seconds until the full height.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ramp: Option<f64>,
+    /// In which most of them go, from +x towards +z.
+    pub direction_degrees: f64,
+    /// s of the spread (cos ½θ)^2s over directions; without it all go one way.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spreading: Option<f64>,
+}
+
+impl Regular {
+    fn asked(&self, gravity: f64) -> RegularWaves {
+        let water = [self.height, self.period, self.depth, gravity];
+        regular_waves::asked(water, self.ramp)
+    }
+}
+
+impl Sea {
+    fn asked(&self, gravity: f64) -> OpenSea {
+        OpenSea {
+            spectrum: self.spectrum,
+            significant_height: self.significant_height,
+            peak_period: self.peak_period,
+            peak_enhancement: seas::peak_enhancement(self.spectrum, self.peak_enhancement),
+            shortest_period: (self.shortest_period).unwrap_or(seas::SHORTEST * self.peak_period),
+            depth: self.depth,
+            gravity,
+            ramp: self.ramp.unwrap_or(seas::RAMP * self.peak_period),
+            spreading: self.spreading,
+            seed: self.seed,
+        }
+    }
+}
+
+impl Waves {
+    /// Period, of a sea the peak's, seconds; the water's depth at rest, metres; direction, degrees.
+    fn common(&self) -> [f64; 3] {
+        match self {
+            Self::Stokes(waves) => [waves.period, waves.depth, waves.direction_degrees],
+            Self::Sea(sea) => [sea.peak_period, sea.depth, sea.direction_degrees],
+        }
+    }
+
+    /// Of the waves, of a sea those with the most energy, seconds.
+    pub fn period(&self) -> f64 {
+        self.common()[0]
+    }
+
+    /// By g, m/s².
+    fn by(&self, gravity: f64) -> OpenWaves {
+        let direction = self.common()[2].to_radians();
+        match self {
+            Self::Stokes(waves) => {
+                OpenWaves::regular(&waves.asked(gravity), DVec2::from_angle(direction))
+            }
+            Self::Sea(sea) => OpenWaves::sea(&sea.asked(gravity), direction),
+        }
+    }
+
+    /// Refuses waves that no theory has, or that particles `spacing` metres apart cannot carry.
+    fn check(&self, doc: &Document<'_>, gravity: f64, spacing: f64) -> Result<(), SceneError> {
+        let refuse = |key: &str, problem| Err(doc.fault_of(&format!("{WAVES}.{key}"), problem));
+        match self {
+            Self::Stokes(waves) => {
+                let asked = waves.asked(gravity);
+                regular_waves::check_stokes(doc, WAVES, &asked)?;
+                let length = TAU / asked.wave_number();
+                let period = format!("{WAVES}.period");
+                regular_waves::check_spacings(doc, &period, [asked.period, length, spacing])?;
+            }
+            Self::Sea(sea) => {
+                seas::shape(doc, WAVES, sea.spectrum, sea.peak_enhancement)?;
+                let asked = sea.asked(gravity);
+                let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
+                seas::check_periods(doc, WAVES, periods, gravity)?;
+                let steepness = seas::check_height(
+                    asked.significant_height,
+                    asked.peak_period,
+                    [asked.depth, gravity],
+                );
+                if let Err(problem) = steepness {
+                    return refuse("significant_height", problem);
+                }
+                let k = wave_number(TAU / asked.shortest_period, asked.depth, gravity);
+                let shortest = [asked.shortest_period, TAU / k, spacing];
+                let key = format!("{WAVES}.shortest_period");
+                regular_waves::check_spacings(doc, &key, shortest)?;
+            }
+        }
+        check_speed(self.by(gravity).most_speed())
+            .map_err(|problem| doc.fault_of_plain(WAVES, problem))
+    }
+}
+
+impl Settings {
+    /// Where water is led how fast.
+    pub fn zone(&self) -> Zone<'_> {
+        Zone {
+            walls: &self.walls,
+            length: self.length,
+            rate: RATE * TAU / self.waves.period(),
+        }
+    }
+
+    /// What comes in, in a gravity, m/s².
+    pub fn incoming(&self, gravity: DVec3) -> OpenWaves {
+        self.waves.by(gravity.length())
+    }
+}
+
+impl Effect for Settings {
+    const ABOUT: &'static str = "Zones before walls in which water is led towards given waves, which run in from there, and in which what \
+                                 runs out dies (relaxation zones, Jacobsen, Fuhrman and Fredsøe 2012)";
+
+    const KEYS: &'static [Key] = &[
+        Key::choices("walls", &words(&Wall::NAMED))
+            .also(", upright ones, each once, none of them periodic or a wave maker's, one at least from which the waves come")
+            .about("the walls before which the zones lie; the water's gravity goes along -y"),
+        Key::number("length", 1e-7..=1e6)
+            .unit("metres")
+            .also(", at least two particle spacings and no longer than the domain is")
+            .about("of each zone from its wall; with one and a half wave lengths waves are within 5 % of those asked for"),
+        Key::inline("waves", WAVES_KEYS).about("what comes in; height, phase and velocity are given at each place of the zones"),
+    ];
+
+    fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
+        self.zone().check(doc, KEY, around)?;
+        let refuse = |key: &str, problem| Err(doc.fault_of(&format!("{KEY}.{key}"), problem));
+        if let Some(wall) = self.walls.iter().find(|wall| wall.axis == 1) {
+            let problem = format!("{} does not stand upright", wall.name());
+            return refuse("walls", problem);
+        }
+        let gravity = around.gravity;
+        if gravity.x != 0.0 || gravity.z != 0.0 || gravity.y > 0.0 {
+            let problem = "waves need gravity along -y".to_owned();
+            return refuse("waves.kind", problem);
+        }
+        self.waves
+            .check(doc, gravity.length(), 0.5 * around.least_length)?;
+        let [_, depth, degrees] = self.waves.common();
+        let height = around.domain.size().y;
+        if depth > height {
+            let (depth, height) = (shown(depth), shown(height));
+            let problem = format!("{depth} m of water in a domain that is {height} m high");
+            return refuse("waves.depth", problem);
+        }
+        let direction = DVec2::from_angle(degrees.to_radians());
+        let comes_from = |wall: &Wall| {
+            let along = if wall.axis == 0 {
+                direction.x
+            } else {
+                direction.y
+            };
+            let inward = if wall.is_max { -along } else { along };
+            inward > 0.01
+        };
+        if !self.walls.iter().any(comes_from) {
+            let problem = format!(
+                "waves that go towards {} degrees come from none of the walls",
+                shown(degrees)
+            );
+            return refuse("waves.direction_degrees", problem);
+        }
+        Ok(())
+    }
+
+    fn absorbs(&self) -> Option<Absorbs<'_>> {
+        Some(Absorbs {
+            zone: self.zone(),
+            period: self.waves.period(),
+            least: LEAST,
+        })
+    }
+
+    fn makes(&self) -> Option<Made> {
+        let (height, crest) = match &self.waves {
+            Waves::Stokes(waves) => (waves.height, 0.5 * waves.height),
+            Waves::Sea(sea) => (sea.significant_height, CREST * sea.significant_height),
+        };
+        let [period, depth, _] = self.waves.common();
+        Some(Made {
+            key: WAVES.to_owned(),
+            height,
+            crest,
+            period: Some(period),
+            depth: Some(depth),
+            ramp: 0.0,
+        })
+    }
+
+    fn waves(&self, gravity: DVec3) -> Option<OpenWaves> {
+        Some(self.incoming(gravity))
+    }
+}
+
+const SEA: &[&str] = &["sea"];
+
+const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
+
+const WAVES_KEYS: &[Key] = &[
+    Key::choice("kind", &["stokes", "sea"])
+        .about("`stokes`: regular waves to second order (Stokes 1847); `sea`: 64 waves of a spectrum by linear theory"),
+    Key::number("height", LENGTH)
+        .unit("metres")
+        .only("kind", &["stokes"])
+        .also(", up to 0.78 depths and no steeper than waves can be")
+        .about("from trough to crest"),
+    Key::number("period", PERIOD)
+        .unit("seconds")
+        .only("kind", &["stokes"])
+        .also(", of waves that are at least 10 particle spacings long")
+        .about("of the waves"),
+    Key::number("significant_height", LENGTH)
+        .unit("metres")
+        .only("kind", SEA)
+        .also(", at most the depth and no steeper at the peak than waves can be")
+        .about("four times the root of the elevation's variance"),
+    Key::number("peak_period", PERIOD)
+        .unit("seconds")
+        .only("kind", SEA)
+        .about("of the waves with the most energy"),
+    Key::choice("spectrum", &SPECTRA)
+        .default("\"jonswap\"")
+        .only("kind", SEA)
+        .about("as a wave maker's"),
+    Key::number("peak_enhancement", 1.0..=20.0)
+        .computed(|| "3.3".to_owned())
+        .only("kind", SEA)
+        .also(", not with spectrum = \"pierson_moskowitz\"")
+        .about("γ, how much higher the peak is than Pierson and Moskowitz's"),
+    Key::number("shortest_period", PERIOD)
+        .unit("seconds")
+        .computed(|| "a third of the peak's".to_owned())
+        .only("kind", SEA)
+        .also(", a tenth to nine tenths of the peak's, of waves that are at least 10 particle spacings long")
+        .about("of the shortest waves; what is left out is given to the others"),
+    Key::number("spreading", 0.5..=1000.0)
+        .absent()
+        .only("kind", SEA)
+        .about("s of the spread over directions, (cos ½θ)^2s (Longuet-Higgins, Cartwright and Smith 1963): wind seas about 10, swell 75; left out, all waves go one way"),
+    Key::whole("seed", 0..=u32::MAX)
+        .default("0")
+        .only("kind", SEA)
+        .about("another number makes another sea of the same spectrum"),
+    Key::number("depth", LENGTH)
+        .unit("metres")
+        .also(", no more than the domain is high")
+        .about("of the water at rest, from the domain's floor"),
+    Key::number_or_zero("ramp", PERIOD)
+        .unit("seconds")
+        .computed(|| "two periods (of the peak)".to_owned())
+        .also("; 0 of regular waves alone")
+        .about("how long the waves take to grow to their full height"),
+    Key::number("direction_degrees", -360.0..=360.0)
+        .unit("degrees")
+        .default("0.0")
+        .about("where most of the waves go, from +x towards +z"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Complex = DVec2;
+
+    /// What of the waves' height a zone of so many wave lengths gets wrong, and what of a wave that runs into it is turned back, in shallow
+    /// water, by the classical Runge–Kutta method on u″ + k² (1 + i r/ω) u = 0 from the wall to the zone's beginning. What is wrong is
+    /// as large as the waves at the wall and runs out of the zone, u′ = iku; what is turned back is 0 at the wall. Lengths are in 1/k.
+    fn wrong_and_turned_back(wave_lengths: f64, rate: f64) -> [f64; 2] {
+        let walls = [Wall {
+            axis: 0,
+            is_max: false,
+        }];
+        let zone = Zone {
+            walls: &walls,
+            length: TAU * wave_lengths,
+            rate,
+        };
+        let slope = |x: f64, [u, v]: [Complex; 2]| {
+            // Of a step so short that what is led is r Δt.
+            let r = zone.led(DVec3::splat(1e3), DVec3::splat(x), 1e-9) / 1e-9;
+            [v, -(u + r * u.perp())]
+        };
+        let run = |start: [Complex; 2]| {
+            let (steps, mut x, mut y) = (2000, 0.0, start);
+            let h = zone.length / f64::from(steps);
+            let add =
+                |y: [Complex; 2], by: f64, k: [Complex; 2]| [y[0] + by * k[0], y[1] + by * k[1]];
+            for _ in 0..steps {
+                let k1 = slope(x, y);
+                let k2 = slope(x + 0.5 * h, add(y, 0.5 * h, k1));
+                let k3 = slope(x + 0.5 * h, add(y, 0.5 * h, k2));
+                let k4 = slope(x + h, add(y, h, k3));
+                let sum = |i: usize| k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i];
+                y = [y[0] + h / 6.0 * sum(0), y[1] + h / 6.0 * sum(1)];
+                x += h;
+            }
+            y
+        };
+        // 1 and 0, then 0 and 1, for u and u′ at the wall.
+        let one = run([Complex::X, Complex::ZERO]);
+        let other = run([Complex::ZERO, Complex::X]);
+        // (one + c other)′ = i (one + c other).
+        let off = |y: [Complex; 2]| y[0].perp() - y[1];
+        let (top, bottom) = (off(one), -off(other));
+        let c = Complex::new(bottom.x, -bottom.y).rotate(top) / bottom.length_squared();
+        let wrong = (one[0] + c.rotate(other[0])).length();
+        // 2a = u − iu′ and 2b = u + iu′ but for their phases.
+        let [u, v] = other;
+        let (a, b) = ((u - v.perp()).length(), (u + v.perp()).length());
+        [wrong, a.min(b) / a.max(b)]
+    }
+
+    #[test]
+    fn waves_in_shallow_water_are_as_right_as_documented() {
+        for (rate, wave_lengths, expected) in [
+            (RATE, 1.5, [0.012, 0.006]),
+            (RATE, 1.0, [0.059, 0.041]),
+            (2.5, 1.5, [0.046, 0.001]),
+            (2.5, 1.0, [0.140, 0.018]),
+            (6.0, 1.5, [0.003, 0.020]),
+            (6.0, 1.0, [0.023, 0.073]),
+        ] {
+            let found = wrong_and_turned_back(wave_lengths, rate);
+            for (found, expected) in found.into_iter().zip(expected) {
+                let off = (found - expected).abs();
+                assert!(off < 6e-4, "{rate} {wave_lengths}: {found} {expected}");
+            }
+        }
+    }
+}

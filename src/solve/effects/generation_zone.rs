@@ -1,0 +1,55 @@
+//! Generation zones on the device: PBF's particles are led at a step's end, FLIP's faces before the projection.
+
+use std::f64::consts::TAU;
+
+use crate::{
+    domain::open_waves::Line,
+    gpu::{buffer::Buf, program::Program},
+    scene::{Scene, effects::generation_zone::Settings},
+};
+
+use super::{Addition, OnDevice, pass, zone::constants};
+
+/// Two of each wave, as shared/open_waves.wgsl has them.
+pub const OPEN_WAVES: Buf<[f32; 4]> = Buf::new("open_waves");
+
+pub(super) fn pbf(settings: &Settings, scene: &Scene, _particles: usize) -> Addition {
+    generation("effects/generate_particles", settings, scene)
+}
+
+pub(super) fn flip(settings: &Settings, scene: &Scene, _cells: usize) -> Addition {
+    generation("effects/generate_faces", settings, scene)
+}
+
+fn generation(name: &'static str, settings: &Settings, scene: &Scene) -> Addition {
+    let waves = settings.incoming(scene.water.gravity);
+    let count = waves.lines.len();
+    let mut constants = constants(settings.zone(), scene);
+    constants.push(("WAVE_COUNT", count as f64));
+    constants.push(("WAVE_DEPTH", waves.depth()));
+    Addition {
+        passes: vec![pass(name, &constants)],
+        buffers: vec![OPEN_WAVES.sized(2 * count)],
+    }
+}
+
+impl OnDevice for Settings {
+    /// The waves as they are then. Phases are reduced here, where there are the digits for it.
+    fn upload(&self, program: &Program, scene: &Scene, time: f64) {
+        let waves = self.incoming(scene.water.gravity);
+        let grown = waves.grown(time);
+        let of = |line: &Line| {
+            let k = line.number.length();
+            let turns = line.number / TAU;
+            let phase = ((line.phase - line.frequency * time) / TAU).rem_euclid(1.0);
+            let speed = grown * line.speed / (1.0 + (-2.0 * k * waves.depth()).exp());
+            let along = speed * line.number / k;
+            [
+                [turns.x, turns.y, phase, k].map(|v| v as f32),
+                [along.x, along.y, speed, 0.0].map(|v| v as f32),
+            ]
+        };
+        let rows: Vec<[f32; 4]> = waves.lines.iter().flat_map(of).collect();
+        program.upload(OPEN_WAVES, 0, &rows);
+    }
+}

@@ -1,0 +1,16 @@
+//! Zones on the device.
+
+use crate::scene::{Scene, effects::zone::Zone};
+
+/// What shared/zone.wgsl is told.
+pub(super) fn constants(zone: Zone<'_>, scene: &Scene) -> Vec<(&'static str, f64)> {
+    let size = scene.domain.size();
+    vec![
+        ("ZONE_WALLS", f64::from(zone.bits())),
+        ("ZONE_RATE", zone.rate),
+        ("ZONE_INVERSE_LENGTH", 1.0 / zone.length),
+        ("ZONE_SIZE_X", size.x),
+        ("ZONE_SIZE_Y", size.y),
+        ("ZONE_SIZE_Z", size.z),
+    ]
+}
