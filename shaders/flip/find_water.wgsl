@@ -3,7 +3,11 @@
 // beside a wall that comes or goes, and were it air, all of the water's pressure would leak there; and drops in the air
 // have no pressure.
 //
-// A cell whose centre lies within a wall or a solid is what the water before it is.
+// A cell whose centre lies within a wall or a solid is what the water before it is. With a density correction a cell that a
+// solid cuts is more than that where it holds more itself, and all of it where the solid reaches just to its centre: of water
+// that runs up a slope the edge lies in such cells, and below the centres of those before them. Were it air, nothing would
+// hold it up or apart, and it gathered there to five times what there was room for. PBF's projection goes without, as in
+// flip/spread_centers.
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_buried.wgsl"
@@ -65,6 +69,11 @@ fn main(
     for (var once = 0; once < select(0, 1, is_buried(element, cell)); once++) {
         open_neighborhood(element);
         relative = density_before(element, cell);
+#ifdef SOLIDS
+#ifdef CORRECTION
+        relative += min(2.0 * open_volume[element], 1.0) * max(density[element] - relative, 0.0);
+#endif
+#endif
     }
     // Water lies in bricks that hold particles, or a wall beside them.
     let is_water = relative >= 0.5 && thread < params.wet_cells;

@@ -81,6 +81,7 @@ mod solve {
     mod plan;
     mod pressure;
     mod projected;
+    mod thin_water;
     mod walls;
     mod whitewater;
     mod zones;

@@ -231,7 +231,7 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
 pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, step, room) = (state.elements(), state.step(), state.room());
     let (bricks, density) = (&elements.bricks, state.density());
-    let depth = find_depth(&step, bricks, room, density);
+    let depth = find_depth(&state.model, &step, bricks, room, density);
     let (twin, distances) = twin_find_water(&state.model, bricks, room, &depth);
     let cut = CUT.of([state.place()]);
     let active = elements.active();

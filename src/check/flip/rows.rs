@@ -18,7 +18,7 @@ bounds! {
         least: "half of the open volume about, at least 0.02", part: "share × count / least, or the density where it is less"]
         share * place * 48.0 * count / least + part * (U * (count + 40.0) + 16.0 * place),
         "along three axes a place and twice a wall's, times two weights of 2 at most, as images double them";
-    pub(super) OF_MEAN = [density: "the largest about"] 16.0 * U * density, "a mean over six faces";
+    pub(super) OF_MEAN = [density: "the largest about"] 20.0 * U * density, "a mean over six faces, and the cell's own with a part";
     pub(super) OF_HALF = [mean: "" OF_MEAN] mean + 0.25 * U, "a density's difference from a half, which is half of 1 at most";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
         "a half, of the density or of what is open of a cell about";

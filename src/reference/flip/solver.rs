@@ -183,7 +183,7 @@ impl Flip {
                 model,
                 &bricks,
                 &room,
-                &find_depth(&step, &bricks, &room, &density),
+                &find_depth(model, &step, &bricks, &room, &density),
             )
         });
         room.kind = kind;

@@ -197,14 +197,28 @@ fn density_before(
     }
 }
 
-/// How deep below the surface cell centres are, in cells, up to one either way; that of the water before it where a centre
-/// lies within a wall or a solid. Shapes (elements).
-pub fn find_depth(step: &Step<'_>, bricks: &Bricks, room: &Room, density: &[f64]) -> Vec<f64> {
+/// How deep below the surface cell centres are, in cells, up to one either way. Where a centre lies within a wall or a solid
+/// it is that of the water before it; with a density correction more, where a cell that a solid cuts holds more itself.
+/// Shapes (elements).
+pub fn find_depth(
+    model: &Model,
+    step: &Step<'_>,
+    bricks: &Bricks,
+    room: &Room,
+    density: &[f64],
+) -> Vec<f64> {
+    let counts_own = model.settings().density_correction && !step.solids.is_empty();
     per_cell(bricks, |element| {
+        let own = density[element as usize];
         let relative = if is_buried(step, bricks, room, element) {
-            density_before(step, bricks, room, density, element)
+            let before = density_before(step, bricks, room, density, element);
+            let part = match counts_own {
+                true => (2.0 * room.volume[element as usize]).min(1.0),
+                false => 0.0,
+            };
+            before + part * (own - before).max(0.0)
         } else {
-            density[element as usize]
+            own
         };
         // Across a flat surface the density is 1/2 at it, and falls as s − s²/2 with the distance s in cells.
         let off = relative.clamp(0.0, 1.0) - 0.5;
