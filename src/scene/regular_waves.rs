@@ -4,7 +4,7 @@ use super::{
     document::Document,
     error::SceneError,
     motion_spec::check_speed,
-    seas::{LEAST_WAVE, RAMP, check_steepness},
+    seas::{RAMP, check_spacings, check_steepness},
     words::shown,
 };
 use crate::domain::motion::{
@@ -117,21 +117,4 @@ pub(super) fn check_length(
         &format!("{path}.period"),
         [waves.period, length, spacing],
     )
-}
-
-/// That waves of a period and a length are long enough for particles `spacing` metres apart; `key` says which waves they are.
-pub(super) fn check_spacings(
-    doc: &Document<'_>,
-    key: &str,
-    [period, length, spacing]: [f64; 3],
-) -> Result<()> {
-    if length >= LEAST_WAVE * spacing {
-        return Ok(());
-    }
-    let problem = format!(
-        "waves of {} s are {length:.3} m long, {:.1} particle spacings of at least {LEAST_WAVE}",
-        shown(period),
-        length / spacing
-    );
-    Err(doc.fault_of(key, problem))
 }

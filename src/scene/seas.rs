@@ -2,10 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{
-    document::Document, error::SceneError, motion_spec::check_speed, regular_waves::check_spacings,
-    words::shown,
-};
+use super::{document::Document, error::SceneError, motion_spec::check_speed, words::shown};
 use crate::domain::motion::{Asked, Motion, Phases, Sea, Spectrum, wave_number};
 
 /// Shortest of the waves over the peak's period, where a scene does not say it. What is left out has 1.5 % of the energy of
@@ -22,7 +19,7 @@ const PEAK_ENHANCEMENT: f64 = 3.3;
 pub(super) const RAMP: f64 = 2.0;
 
 /// Least length of a wave, in particle spacings: five cells of FLIP, below which little of one is left after its own length.
-pub(super) const LEAST_WAVE: f64 = 10.0;
+const LEAST_WAVE: f64 = 10.0;
 
 /// Steepest that a wave of one height can be, H / (λ tanh kh) (Miche 1944).
 const STEEPEST: f64 = 0.142;
@@ -196,4 +193,21 @@ pub(super) fn check(
         return refuse("time", problem);
     }
     Ok(())
+}
+
+/// That waves of a period and a length are long enough for particles `spacing` metres apart; `key` says which waves they are.
+pub(super) fn check_spacings(
+    doc: &Document<'_>,
+    key: &str,
+    [period, length, spacing]: [f64; 3],
+) -> Result<()> {
+    if length >= LEAST_WAVE * spacing {
+        return Ok(());
+    }
+    let problem = format!(
+        "waves of {} s are {length:.3} m long, {:.1} particle spacings of at least {LEAST_WAVE}",
+        shown(period),
+        length / spacing
+    );
+    Err(doc.fault_of(key, problem))
 }

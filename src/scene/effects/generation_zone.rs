@@ -169,7 +169,7 @@ impl Waves {
                 regular_waves::check_stokes(doc, WAVES, &asked)?;
                 let length = TAU / asked.wave_number();
                 let period = format!("{WAVES}.period");
-                regular_waves::check_spacings(doc, &period, [asked.period, length, spacing])?;
+                seas::check_spacings(doc, &period, [asked.period, length, spacing])?;
             }
             Self::Sea(sea) => {
                 seas::shape(doc, WAVES, sea.spectrum, sea.peak_enhancement)?;
@@ -187,7 +187,7 @@ impl Waves {
                 let k = wave_number(TAU / asked.shortest_period, asked.depth, gravity);
                 let shortest = [asked.shortest_period, TAU / k, spacing];
                 let key = format!("{WAVES}.shortest_period");
-                regular_waves::check_spacings(doc, &key, shortest)?;
+                seas::check_spacings(doc, &key, shortest)?;
             }
         }
         check_speed(self.by(gravity).most_speed())
