@@ -11,6 +11,7 @@ use std::{path::Path, time::Instant};
 use swell::{
     gpu::adapter::Needs,
     scene::Scene,
+    solve::plan::Plan,
     stage::{
         device::{Device, Opened},
         prepare::Start,
@@ -98,7 +99,7 @@ fn measure(
     let mut built = opened.build(&scene, &start, false)?;
     let solver = &mut built.solver;
     println!("\n{} particles", particles.len());
-    if let Some((all, lists)) = built.bytes {
+    if let Some((all, lists)) = built.plan.as_ref().map(Plan::bytes) {
         println!(
             "{:.0} bytes each, and {:.0} for neighbour lists",
             (all - lists) as f64 / n,
@@ -129,7 +130,7 @@ fn measure(
         times.len(),
         1e6 * median(times) / n
     );
-    if built.bytes.is_some() {
+    if built.plan.is_some() {
         let overflowed = searched as f64 / (n * f64::from(steps_timed));
         println!("{overflowed:.2e} of lists overflowed");
     }

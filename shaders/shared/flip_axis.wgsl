@@ -20,9 +20,9 @@ fn turned_back(v: vec3i) -> vec3i {
 // much of a weight gives it that of the particles nearby, and changes others by their rounding.
 const LEAST_WEIGHT = 2.4e-7;
 
-// Hats at the lower and the upper face, for a place `f` of a cell.
+// Hats at the lower and the upper face, for a place `f` of a cell, which rounding may take out of it.
 fn face_weights(f: f32) -> vec2f {
-    return vec2f(1.0 - f, f) + LEAST_WEIGHT;
+    return max(vec2f(1.0 - f, f), vec2f(0.0)) + LEAST_WEIGHT;
 }
 
 // Hats at the centres of the cell before, of its own, and of the one after.

@@ -6,6 +6,7 @@
 #import "shared/walls.wgsl"
 #import "shared/confine.wgsl"
 #import "shared/whitewater.wgsl"
+#import "shared/air.wgsl"
 
 @group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
 @group(0) @binding(12) var<storage, read> sorted_velocity: array<vec4f>;
@@ -25,13 +26,7 @@ override AIR_BELOW: f32;
 override WATER_ABOVE: f32;
 override FLIGHT_STEPS: u32;
 override HALVINGS: u32;
-override AIR_DENSITY: f32;
-override AIR_VISCOSITY: f32;
 // Of the settings.
-override DROP_RADIUS: f32;
-override WIND_X: f32;
-override WIND_Y: f32;
-override WIND_Z: f32;
 override RISE_SPEED: f32;
 override RESPONSE: f32;
 
@@ -92,13 +87,6 @@ fn allowed(x: vec3f) -> vec3f {
 #endif
 }
 
-// Rate at which air takes from a drop's speed: Schiller and Naumann 1933.
-fn air_drag(speed: f32) -> f32 {
-    let reynolds = max(2.0 * DROP_RADIUS * speed / AIR_VISCOSITY, 1e-9);
-    let coefficient = max(24.0 / reynolds * (1.0 + 0.15 * pow(reynolds, 0.687)), 0.44);
-    return 0.375 * AIR_DENSITY * coefficient * speed / DROP_RADIUS;
-}
-
 struct Flight {
     way: vec3f,
     velocity: vec3f,
@@ -106,14 +94,13 @@ struct Flight {
 
 // Drag is taken implicitly, so that a drop of any size falls steadily in the end.
 fn fly(start: vec3f) -> Flight {
-    let wind = vec3f(WIND_X, WIND_Y, WIND_Z);
     let step = params.time_step / f32(FLIGHT_STEPS);
     var flight = Flight(vec3f(0.0), start);
     for (var k = 0u; k < FLIGHT_STEPS; k++) {
         let before = flight.velocity;
-        let against = before - wind;
+        let against = before - wind();
         let pulled = against + params.velocity_step / f32(FLIGHT_STEPS);
-        flight.velocity = wind + pulled / (1.0 + step * air_drag(length(against)));
+        flight.velocity = wind() + pulled / (1.0 + step * air_drag(length(against)));
         flight.way += 0.5 * step * (before + flight.velocity);
     }
     return flight;

@@ -33,6 +33,9 @@ pub struct Clock {
     pub substeps: u32,
     /// Substeps since the start.
     pub steps: u64,
+    /// Of the particle that enters next; only where water enters or leaves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub next_id: Option<u32>,
 }
 
 /// Files of a frame by the names of their streams.

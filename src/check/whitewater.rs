@@ -45,7 +45,7 @@ bounds! {
         8.0 * U * place + way, "";
     CARRIED = [sums: "with w = |v| " KERNEL, kernel: "Σ p³", speed: "the largest |v| about", spread: "|Δv| about over h, times " PLACE]
         2.0 * sums / kernel + 8.0 * U * speed + spread, "a weighted mean";
-    FLOWN = [drag: "what air takes", pull: "|v| + |g| Δt"] 1e-5 * drag + 60.0 * U * pull,
+    FLOWN = [taken: "what air takes", pull: "|v| + |g| Δt"] 1e-5 * taken + 60.0 * U * pull,
         "eight steps; a power by way of exp2 and log2 errs by 4e-6";
     DECIDED = [place: "" PLACE, h: "", scale: "the kernel's scale", sums: "" KERNEL, free: "what walls and solids leave free"]
         (4.0 * place / h + 4.0 * scale * sums + 64.0 * U) / free, "what a share errs by on the way: both outcomes are right";
@@ -324,8 +324,8 @@ impl<'a> Twin<'a> {
         let about = self.about(now.position);
         let pull = before.velocity.length().max(now.velocity.length()) + gravity.length() * seconds;
         let wind = DVec3::from_array(settings.wind);
-        let drag = (before.velocity + seconds * gravity - now.velocity).length();
-        let flown = FLOWN.of([drag.min((before.velocity - wind).length() + pull), pull]);
+        let taken = (before.velocity + seconds * gravity - now.velocity).length();
+        let flown = FLOWN.of([taken.min((before.velocity - wind).length() + pull), pull]);
         let way = now.position.length() + seconds * pull;
         let flight = PLACE.of([way, seconds * flown]);
         // A place in the water is found by a way that errs as a flight does; a carried one errs by the velocity there as well.

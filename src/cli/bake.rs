@@ -159,6 +159,12 @@ pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
         }),
     );
     output::print_pass_times(&outcome.passes);
+    if !outcome.shares.is_empty() {
+        output::print(&format!(
+            "\n{}",
+            output::shares(&outcome.shares, Some(outcome.frames))
+        ));
+    }
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
     } else {
@@ -367,6 +373,7 @@ mod tests {
             boundary_work: 0.0,
             volume: None,
             projection,
+            exchange: None,
         }
     }
 

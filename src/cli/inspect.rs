@@ -16,6 +16,7 @@ use crate::{
             Adapter, Entry, Manifest, PARTICLES, PROBES, ScenePlan, adapters, cache, plan, plot,
         },
         replay::is_failed,
+        time::{Timed, time},
     },
 };
 
@@ -47,6 +48,10 @@ pub(super) struct InspectArgs {
     /// Take meshes and tables that lie outside of the scene's folder.
     #[arg(long)]
     allow_outside: bool,
+    /// Compute so many frames of the scene after its first, keep nothing, and tell what they took, by what passes are there for. Later
+    /// frames of a shot may take more substeps.
+    #[arg(long, value_name = "FRAMES", requires = "subject", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    time: Option<u32>,
     /// Plan for the limits of this adapter.
     #[arg(long, value_name = "NAME", requires = "subject")]
     adapter: Option<String>,
@@ -62,6 +67,11 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         && !look::is_look(subject)
     {
         return Err(misplaced("--scene", "looks", "none", subject));
+    }
+    if let (Some(_), Some(subject)) = (args.time, &args.subject)
+        && look::is_look(subject)
+    {
+        return Err(misplaced("--time", "scenes", "a look", subject));
     }
     let plotted = match (&args.plot, &args.subject) {
         (Some(folder), Some(directory)) => plot(directory, folder)?,
@@ -99,6 +109,16 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
             let planned = plan(&scene, args.adapter.as_deref())?;
             let _ = show_plan(&mut text, &scene, &planned);
             misfit = planned.misfit;
+            match args.time {
+                Some(frames) if misfit.is_none() => {
+                    let timed = time(&scene, args.adapter.as_deref(), frames)?;
+                    let _ = show_time(&mut text, &timed);
+                }
+                _ => {
+                    let shares = planned.plan.shares(&[]);
+                    let _ = write!(text, "\n{}", output::shares(&shares, None));
+                }
+            }
         }
         None => {}
     }
@@ -111,13 +131,17 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
 
 /// A cache says itself what it was baked with, and on what.
 fn refuse_scene_options(args: &InspectArgs, directory: &Path) -> Result<(), Failure> {
+    let is = "a cache: it says what it was baked with";
+    if args.time.is_some() {
+        return Err(misplaced("--time", "scenes", is, directory));
+    }
     if args.set.is_empty() && args.solver.is_none() && args.adapter.is_none() {
         return Ok(());
     }
     Err(misplaced(
         "--set, --solver or --adapter",
         "scenes",
-        "a cache: it says what it was baked with",
+        is,
         directory,
     ))
 }
@@ -184,6 +208,19 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
         plan.grid_dims[1],
         plan.grid_dims[2]
     )?;
+    for (index, rate) in scene.flow_rates().enumerate() {
+        match rate {
+            Some(rate) => writeln!(out, "emitter[{index}] brings {rate:.4} m³/s")?,
+            None => writeln!(out, "emitter[{index}] keeps a level")?,
+        }
+    }
+    if scene.has_inlets() {
+        let most = scene.most_entering().ceil();
+        writeln!(
+            out,
+            "at most {most} particles more by the last frame, but for levels"
+        )?;
+    }
     match &planned.adapter {
         Some(name) => writeln!(out, "planned for {name}")?,
         None => writeln!(out, "planned for common limits: no adapter here")?,
@@ -216,6 +253,20 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
         lists => writeln!(out, ", and {:.0} for neighbour lists", each(lists))?,
     }
     Ok(())
+}
+
+fn show_time(out: &mut String, timed: &Timed) -> fmt::Result {
+    let [least, median, most] = timed.seconds;
+    let frames = match timed.frames {
+        1 => "one frame after the first".to_owned(),
+        frames => format!("{frames} frames after the first"),
+    };
+    writeln!(
+        out,
+        "\n{median:.3} s a frame ({least:.3} to {most:.3}), {:.1} substeps, over {frames}, on {}; by pass, one by one:\n",
+        timed.substeps, timed.device
+    )?;
+    write!(out, "{}", output::shares(&timed.shares, Some(timed.frames)))
 }
 
 fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::Result {

@@ -11,6 +11,8 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
+use crate::stage::time::Share;
+
 /// The exit code where a file cannot be written; standard output is one.
 const CANNOT_WRITE: u8 = 4;
 
@@ -30,6 +32,28 @@ pub(super) fn print_pass_times(passes: &[(&'static str, f64, u64)]) {
             "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s\n"
         ));
     }
+}
+
+/// A line for each thing that passes and buffers are there for: passes, bytes, and milliseconds of each of so many frames where they
+/// were timed.
+pub(super) fn shares(shares: &[Share], frames: Option<u32>) -> String {
+    let all: f64 = shares.iter().map(|share| share.seconds).sum();
+    let mut text = format!("{:24}  passes         bytes", "for");
+    text += if frames.is_some() {
+        "  ms a frame\n"
+    } else {
+        "\n"
+    };
+    for share in shares {
+        text += &format!("{:24}  {:6}  {:12}", share.owner, share.passes, share.bytes);
+        if let Some(frames) = frames {
+            let each = 1e3 * share.seconds / f64::from(frames.max(1));
+            let part = 100.0 * share.seconds / all.max(f64::MIN_POSITIVE);
+            text += &format!("  {each:10.3}  {part:5.1} %");
+        }
+        text += "\n";
+    }
+    text
 }
 
 /// Writes a line to standard error: progress, and what a user has to know.

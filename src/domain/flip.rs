@@ -40,6 +40,10 @@ pub const APART: f64 = 0.9;
 /// nearer than in the lattice, and a stirred tank lose 2 % of its volume.
 pub const LEAST_APART: f64 = 0.5;
 
+/// Water in the open ones of the 27 cells about a particle of a plane surface, over what those hold: the layer of cells below has the
+/// least that there can be.
+pub const PLANE_SHARE: f64 = 1.0 / 3.0;
+
 /// A distance in cells; below half a cell, so that whoever is nearer lies in one of eight.
 pub fn apart(wanted: f64) -> f64 {
     wanted.min(0.49)

@@ -1,6 +1,7 @@
 //! What every stage speaks: particles, meshes, signed distance, sampling, wave-maker motion.
 
 pub mod aggregates;
+pub mod air;
 pub mod boundary;
 pub mod bounds;
 pub mod bricks;
@@ -25,6 +26,7 @@ pub mod sampling;
 pub mod shores;
 pub mod signed_distance;
 pub mod solver;
+pub mod sources;
 pub mod sparse_grid;
 pub mod sph;
 pub mod statistics;

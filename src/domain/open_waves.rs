@@ -23,9 +23,9 @@ const LEAST_RATIO: f64 = 0.5;
 pub struct OpenSea {
     /// How the energy is spread over frequencies.
     pub spectrum: Spectrum,
-    /// Four times the root of the elevation's variance, metres.
-    pub significant_height: f64,
-    /// Seconds.
+    /// How the waves come together.
+    pub meeting: Meeting,
+    /// Of the peak, seconds.
     pub peak_period: f64,
     /// γ of JONSWAP and TMA.
     pub peak_enhancement: f64,
@@ -39,8 +39,28 @@ pub struct OpenSea {
     pub ramp: f64,
     /// s of the spread over directions, (cos ½(θ − θ₀))^2s (Longuet-Higgins, Cartwright and Smith 1963); `None` has all waves go one way.
     pub spreading: Option<f64>,
-    /// Other numbers make other seas of the same spectrum.
-    pub seed: u32,
+}
+
+/// How the waves of a spectrum come together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Meeting {
+    /// A sea: by chance.
+    Random {
+        /// Four times the root of the elevation's variance, metres.
+        significant_height: f64,
+        /// Other numbers make other seas of the same spectrum.
+        seed: u32,
+    },
+    /// One packet whose crests meet: the most probable form of a sea about a high crest (Lindgren 1970; Tromans et al. 1991), where each
+    /// wave has the part of the crest that it has of the energy.
+    Focused {
+        /// The crest above still water by linear theory, metres.
+        height: f64,
+        /// Metres along x and z.
+        at: DVec2,
+        /// Seconds.
+        time: f64,
+    },
 }
 
 /// One of the waves: elevation a cos θ with θ = k·x − ωt + φ.
@@ -112,12 +132,21 @@ impl OpenWaves {
         }
     }
 
-    /// A sea of [`LINES`] waves of the same energy, whose frequencies stand in the middle of as many equal parts of the spectrum's energy;
+    /// A sea or a packet of [`LINES`] waves of the same energy, whose frequencies stand in the middle of as many equal parts of the spectrum's energy;
     /// each goes its own way (a single summation, Miles and Funke 1989), about `direction`, radians from x towards z.
     pub fn sea(asked: &OpenSea, direction: f64) -> Self {
-        let a = asked.significant_height * (1.0 / (8.0 * f64::from(LINES))).sqrt();
+        let (a, seed) = match asked.meeting {
+            Meeting::Random {
+                significant_height,
+                seed,
+            } => {
+                let a = significant_height * (1.0 / (8.0 * f64::from(LINES))).sqrt();
+                (a, seed)
+            }
+            Meeting::Focused { height, .. } => (height / f64::from(LINES), 0),
+        };
         let chance = |line: usize, what: u64| {
-            let seed = u64::from(asked.seed) << 32 | what << 24;
+            let seed = u64::from(seed) << 32 | what << 24;
             uniform(seed | line as u64)
         };
         let lines = frequencies(asked).into_iter().enumerate();
@@ -125,7 +154,11 @@ impl OpenWaves {
             let off = asked.spreading.map_or(0.0, |s| spread(s, chance(line, 1)));
             let k = wave_number(frequency, asked.depth, asked.gravity);
             let number = k * DVec2::from_angle(direction + off);
-            Line::free(a, frequency, number, TAU * chance(line, 0), asked.depth)
+            let phase = match asked.meeting {
+                Meeting::Random { .. } => TAU * chance(line, 0),
+                Meeting::Focused { at, time, .. } => frequency * time - number.dot(at),
+            };
+            Line::free(a, frequency, number, phase, asked.depth)
         });
         Self {
             lines: lines.collect(),
@@ -163,6 +196,11 @@ impl OpenWaves {
         self.grown(t) * self.lines.iter().map(of).sum::<f64>()
     }
 
+    /// Seconds until the full height.
+    pub fn ramp(&self) -> f64 {
+        self.ramp
+    }
+
     /// Still water, metres.
     pub fn depth(&self) -> f64 {
         self.depth
@@ -172,6 +210,16 @@ impl OpenWaves {
     pub fn least_wave_length(&self) -> f64 {
         let numbers = self.lines.iter().map(|line| line.number.length());
         TAU / numbers.fold(0.0, f64::max)
+    }
+
+    /// Slowest that the energy of a free wave goes, m/s (Dean and Dalrymple 1991, eq. 4.82).
+    pub fn least_group_speed(&self) -> f64 {
+        let of = |line: &Line| {
+            let k = line.number.length();
+            let twice = 2.0 * k * self.depth;
+            0.5 * line.frequency / k * (1.0 + twice / twice.min(300.0).sinh())
+        };
+        self.lines.iter().map(of).fold(f64::INFINITY, f64::min)
     }
 
     /// Fastest that the water at the still level can be, m/s.
@@ -239,7 +287,10 @@ mod tests {
     fn asked(spreading: Option<f64>, seed: u32) -> OpenSea {
         OpenSea {
             spectrum: Spectrum::Jonswap,
-            significant_height: 0.2,
+            meeting: Meeting::Random {
+                significant_height: 0.2,
+                seed,
+            },
             peak_period: 1.6,
             peak_enhancement: 3.3,
             shortest_period: 0.55,
@@ -247,7 +298,6 @@ mod tests {
             gravity: 9.81,
             ramp: 0.0,
             spreading,
-            seed,
         }
     }
 
@@ -364,6 +414,32 @@ mod tests {
             );
         }
         assert!(OpenWaves::sea(&asked(None, 0), 0.0) != OpenWaves::sea(&asked(None, 1), 0.0));
+    }
+
+    /// At the place and the time that are asked for the crest is as high as was asked for and nowhere higher; a quarter of the peak's
+    /// period before it is half as high at most, and the sum of the waves' energies is that of their lines.
+    #[test]
+    fn crests_of_a_packet_meet_where_they_are_asked_to() {
+        for spreading in [None, Some(12.0)] {
+            let (at, time) = (DVec2::new(6.0, 2.5), 21.0);
+            let packet = OpenSea {
+                meeting: Meeting::Focused {
+                    height: 0.15,
+                    at,
+                    time,
+                },
+                ..asked(spreading, 0)
+            };
+            let waves = OpenWaves::sea(&packet, 0.4);
+            assert!((waves.elevation(at, time) - 0.15).abs() < 1e-12);
+            for i in 1..60 {
+                let way = DVec2::from_angle(0.7 * f64::from(i)) * 0.1 * f64::from(i);
+                assert!(waves.elevation(at + way, time) < 0.15, "{way}");
+            }
+            assert!(waves.elevation(at, time - 0.4) < 0.075);
+            // Long before the waves have not met yet.
+            assert!(waves.elevation(at, time - 15.0).abs() < 0.075);
+        }
     }
 
     /// Of (cos ½θ)^2s the mean of cos θ is s / (s + 1) (Longuet-Higgins, Cartwright and Smith 1963).

@@ -43,6 +43,20 @@ impl Particles {
         self
     }
 
+    /// Keeps those that are marked, in their order.
+    pub fn retain(&mut self, keep: &[bool]) {
+        fn kept<T>(values: &mut Vec<T>, keep: &[bool]) {
+            let mut marks = keep.iter();
+            values.retain(|_| marks.next() == Some(&true));
+        }
+        kept(&mut self.position, keep);
+        kept(&mut self.velocity, keep);
+        kept(&mut self.id, keep);
+        for column in self.attributes.values_mut() {
+            kept(column, keep);
+        }
+    }
+
     /// Largest speed, m/s; 0 without particles.
     pub fn max_speed(&self) -> f64 {
         self.velocity

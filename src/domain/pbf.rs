@@ -14,6 +14,10 @@ pub const CAP: f64 = 2.0;
 /// ε of λ's denominator over the bulk's Σ|∇C|². As large as that sum it doubles the iterations (measured).
 pub const REGULARIZATION: f64 = 1e-3;
 
+/// Density that the others make at a particle of a plane surface, over what they make deep in the water. The topmost layer of a
+/// lattice has 0.77, a lone layer 0.53.
+pub const PLANE_SHARE: f64 = 2.0 / 3.0;
+
 /// Factors of the Chebyshev semi-iteration (Golub and Varga 1961; Wang 2015, eq. 9), one an iteration: 1,
 /// 2 / (2 − ρ²), and then 4 / (4 − ρ² ω).
 pub fn chebyshev_factors(spectral_radius: f64) -> impl Iterator<Item = f64> {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{particles::Particles, probe::Patch};
+use super::{particles::Particles, probe::Patch, sources::Exchange};
 
 /// Report of one output frame's steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,6 +37,9 @@ pub struct StepReport {
     /// Report of the pressure projections; only of solvers that have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub projection: Option<Projection>,
+    /// What then entered and left, which the figures above do not see; only of scenes with emitters or drains.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exchange: Option<Exchange>,
 }
 
 /// Report of one output frame's pressure projections; iterations stand in the frame's report.

@@ -41,10 +41,6 @@ pub const OUTWARD: [f64; 2] = [0.5, 0.7];
 pub const FLIGHT_STEPS: u32 = 8;
 /// Halvings of a frame's way in the search of where it meets the surface.
 pub const HALVINGS: u32 = 5;
-/// Density of air over that of water, at 15 °C.
-pub const AIR_DENSITY: f64 = 1.225 / 999.1;
-/// Kinematic viscosity of air at 15 °C, m²/s.
-pub const AIR_VISCOSITY: f64 = 1.48e-5;
 
 /// What a whitewater particle is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,15 +137,6 @@ pub fn census(particles: &Particles) -> [usize; 3] {
     Kind::ALL.map(|kind| kinds.iter().filter(|&&k| k == kind.number()).count())
 }
 
-/// Rate at which air takes from a drop's speed against it, 1/s: 3/8 (ρ_air/ρ) C_D |w| / r, with the drag coefficient of a sphere
-/// by Schiller and Naumann 1933 (Clift, Grace and Weber 1978, table 5.1): 24/Re (1 + 0.15 Re^0.687), at least 0.44. `radius` in
-/// metres, `speed` against the air in m/s.
-pub fn air_drag(radius: f64, speed: f64) -> f64 {
-    let reynolds = (2.0 * radius * speed / AIR_VISCOSITY).max(1e-9);
-    let coefficient = (24.0 / reynolds * (1.0 + 0.15 * reynolds.powf(0.687))).max(0.44);
-    0.375 * AIR_DENSITY * coefficient * speed / radius
-}
-
 /// A number in 0..1 that belongs to these, as splitmix64 mixes them (Steele, Lea and Flood 2014).
 fn random(seed: u32, id: u32, frame: u32, channel: u32) -> f64 {
     let mut z = (u64::from(seed) << 32 | u64::from(id)).wrapping_mul(0x9E37_79B9_7F4A_7C15)
@@ -188,38 +175,6 @@ mod tests_support {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Speed at which a drop falls steadily, by the fixed point of gravity and drag.
-    fn terminal_speed(radius: f64) -> f64 {
-        let mut speed = 1.0;
-        for _ in 0..200 {
-            // g = drag(speed) speed; half way, since drag grows with the speed.
-            speed = 0.5 * (speed + 9.81 / air_drag(radius, speed));
-        }
-        speed
-    }
-
-    /// Gunn and Kinzer 1949, table 2 (drops in stagnant air, 20 °C): diameters of 0.2, 0.5, 1 and 2 mm fall at 0.72, 2.06, 4.03 and
-    /// 6.49 m/s. The sphere's drag meets them within 5 %, and the largest, which flattens and falls slower than a sphere, within 7 %.
-    #[test]
-    fn drops_fall_as_gunn_and_kinzer_measured() {
-        let cases = [
-            (0.2e-3, 0.72, 0.05),
-            (0.5e-3, 2.06, 0.05),
-            (1e-3, 4.03, 0.05),
-            (2e-3, 6.49, 0.07),
-        ];
-        for (diameter, measured, allowed) in cases {
-            let speed = terminal_speed(0.5 * diameter);
-            let off = speed / measured - 1.0;
-            assert!(
-                off.abs() < allowed,
-                "{diameter}: {speed} against {measured}"
-            );
-            // Half the radius falls at another speed: the comparison tells.
-            assert!((terminal_speed(0.25 * diameter) / measured - 1.0).abs() > 0.2);
-        }
-    }
 
     #[test]
     fn random_numbers_are_even_and_belong_to_their_place() {

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::{
     domain::{
+        air,
         boundary::Boundary,
         bounds::Bounds,
         budget::Breach,
@@ -12,7 +13,6 @@ use crate::{
         signed_distance::SignedDistance,
         whitewater::{
             AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, Kind, OUTWARD, Potentials, SURFACE, Settings,
-            air_drag,
         },
     },
     scene::Scene,
@@ -325,8 +325,8 @@ fn fly(settings: &Settings, gravity: DVec3, seconds: f64, start: DVec3) -> (DVec
     for _ in 0..FLIGHT_STEPS {
         let before = velocity;
         let against = before - wind;
-        let drag = air_drag(settings.drop_radius, against.length());
-        velocity = wind + (against + step * gravity) / (1.0 + step * drag);
+        let resistance = air::resistance(settings.drop_radius, against.length());
+        velocity = wind + (against + step * gravity) / (1.0 + step * resistance);
         way += 0.5 * step * (before + velocity);
     }
     (way, velocity)

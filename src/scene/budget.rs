@@ -80,7 +80,7 @@ pub(super) fn residual_words() -> String {
 
 /// The default of `budget.energy`, in words.
 pub(super) fn energy_words() -> String {
-    format!("{PBF_ENERGY} with pbf, {FLIP_ENERGY} with flip")
+    format!("{PBF_ENERGY} with pbf, {FLIP_ENERGY} with flip, false in a wind")
 }
 
 #[derive(Deserialize)]
@@ -121,6 +121,8 @@ impl<'de> Deserialize<'de> for Limit {
 pub(super) struct Scales {
     pub(super) fall: f64,
     pub(super) push: f64,
+    /// Of the wind, m/s, which does work that nothing counts.
+    pub(super) wind: f64,
     pub(super) spacing: f64,
 }
 
@@ -134,11 +136,12 @@ pub(super) fn build(
 ) -> Result<Budget, SceneError> {
     let tolerance = (solver.flip.as_ref()).map_or(0.0, |flip| flip.pressure.tolerance);
     let slowest = LEAST_SPEED * scales.spacing * shot.frames_per_second;
-    let speed = (SPEED * (scales.fall + scales.push)).max(slowest);
+    let speed = (SPEED * (scales.fall + scales.push + scales.wind)).max(slowest);
     let energy = match solver.method {
         Method::Pbf => PBF_ENERGY,
         Method::Flip => FLIP_ENERGY,
     };
+    let energy = (scales.wind == 0.0).then_some(energy);
     let of_flip = |limit: f64| (solver.method == Method::Flip).then_some(limit);
     let residual = match spec.residual {
         Some(Limit(Some(limit))) if limit < tolerance => {
@@ -159,7 +162,7 @@ pub(super) fn build(
         residual,
         divergence: spec.divergence.0,
         volume: spec.volume.0,
-        energy: spec.energy.map_or(Some(energy), |limit| limit.0),
+        energy: spec.energy.map_or(energy, |limit| limit.0),
     })
 }
 
@@ -235,7 +238,7 @@ impl Budget {
             check(Watched::SpeedJump, report.max_speed, Some(times * reached)).map_err(
                 |breach| {
                     let detail = format!(
-                        "{} times {reached:.4} m/s, which gravity and walls can bring {speed:.4} m/s of the fastest before to",
+                        "{} times {reached:.4} m/s, which gravity, effects and walls can bring {speed:.4} m/s of the fastest before to",
                         shown(times)
                     );
                     Breach {
@@ -284,7 +287,8 @@ impl Scene {
         let start = f64::from(frame.saturating_sub(1)) * length;
         let push = self.peak_boundary_speed(start, start + length);
         let least = LEAST_ENERGY_SPEED * self.particle_spacing() / length;
-        (speed + push + self.water.gravity.length() * length).max(least)
+        let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
+        (speed + push + gained).max(least)
     }
 
     /// Kinetic and potential energy of a state of so many particles, the latter against the domain's lowest place,

@@ -13,7 +13,7 @@ use super::{
     error::SceneError,
     grids, keep,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
-    no_slip, origin, periodic, probe,
+    no_slip, origin, periodic, probe, sources,
     spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
     wave_maker,
     words::{chain, extent, shown, shown_all},
@@ -54,7 +54,6 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let no_slip = no_slip::build(doc, &spec.domain, solver.method, periodic)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     periodic::check_gravity(doc, periodic, water.gravity)?;
-    check_particle_count(doc, &water, &domain, &lattice)?;
     let around = wave_maker::Surroundings {
         base_dir,
         domain: &domain,
@@ -70,6 +69,19 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     periodic::check_solids(doc, periodic, &moving_solids, |k| moving[k])?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
     periodic::check_makers(doc, periodic, &wave_makers)?;
+    let around = sources::Around {
+        domain: &domain,
+        shot: &shot,
+        gravity: water.gravity,
+        spacing: lattice.spacing,
+        solids: &solids,
+        mesh: &|path, spec| placed_mesh(doc, base_dir, path, "file", spec),
+        block: &|path, spec| bounds(doc, path, spec),
+    };
+    let emitters = sources::emitters(doc, &spec.emitter, &around)?;
+    let drains = sources::drains(doc, &spec.drain, &around)?;
+    let entering = sources::most_entering(&emitters, lattice.spacing, &shot);
+    check_particle_count(doc, &water, entering, &domain, &lattice)?;
     let around = effects::Surroundings {
         domain: &domain,
         periodic,
@@ -101,6 +113,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let scales = budget::Scales {
         fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
         push: (motions.map(|motion| motion.peak_speed(0.0, duration))).fold(0.0, f64::max),
+        wind: spec.effects.push().speed,
         spacing: lattice.spacing,
     };
     let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
@@ -114,6 +127,8 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         solids,
         moving_solids,
         wave_makers,
+        emitters,
+        drains,
         solver,
         grids,
         keep,
@@ -296,6 +311,7 @@ fn fits(inner: &Bounds, domain: &Bounds) -> bool {
 fn check_particle_count(
     doc: &Document<'_>,
     water: &Water,
+    entering: f64,
     domain: &Bounds,
     lattice: &Lattice,
 ) -> Result<()> {
@@ -318,7 +334,7 @@ fn check_particle_count(
         .map(|b| b.volume() / d.powi(3))
         .sum::<f64>();
     let placed: usize = water.particles.iter().map(|swarm| swarm.at.len()).sum();
-    let count = in_blocks + in_meshes + placed as f64;
+    let count = in_blocks + in_meshes + placed as f64 + entering;
     if count > MAX_PARTICLES {
         let problem = format!(
             "the water would take about {count:.3e} particles {} m apart",

@@ -15,6 +15,8 @@ pub enum Measure {
     DryBed,
     /// A dam that breaks onto a block: the scene's probes of elevation and pressure.
     BlockImpact,
+    /// A jet along x that a wall turns: the scene's probe of the force on it.
+    JetImpact,
     /// A wave between two walls along x, which starts at rest from its highest.
     StandingWave,
     /// Water at rest: the scene's probes of pressure.
@@ -25,13 +27,14 @@ pub enum Measure {
 
 impl Measure {
     /// As studies name them.
-    pub(super) const NAMED: [(&'static str, Self); 9] = [
+    pub(super) const NAMED: [(&'static str, Self); 10] = [
         ("regular_waves", Self::RegularWaves),
         ("waves_by_theory", Self::WavesByTheory),
         ("solitary_wave", Self::SolitaryWave),
         ("dam_break", Self::DamBreak),
         ("dry_bed", Self::DryBed),
         ("block_impact", Self::BlockImpact),
+        ("jet_impact", Self::JetImpact),
         ("standing_wave", Self::StandingWave),
         ("hydrostatic", Self::Hydrostatic),
         ("taylor_green", Self::TaylorGreen),
@@ -46,6 +49,7 @@ impl Measure {
             Self::DamBreak => &["length"],
             Self::DryBed => &["depth", "length"],
             Self::BlockImpact => &[],
+            Self::JetImpact => &["length", "speed", "after"],
             Self::StandingWave => &["depth", "length", "height"],
             Self::Hydrostatic => &["depth", "after"],
             Self::TaylorGreen => &["length", "speed"],
@@ -159,6 +163,7 @@ impl Measure {
                     "volume, most that it is off that of the start",
                 ),
             ],
+            Self::JetImpact => &[("force_ratio", "force on the wall over ρ A v², mean of time")],
             Self::StandingWave => &[
                 ("period", "period, s"),
                 (
@@ -220,6 +225,7 @@ impl Measure {
                 ("height_4", ["H4", "time, s", "height, m"]),
                 ("pressure_1", ["P1", "time, s", "Pa"]),
             ],
+            Self::JetImpact => &[("force", ["force", "time, s", "F / (ρ A v²)"])],
             Self::StandingWave => &[(
                 "amplitude",
                 ["amplitude of the first mode", "time, s", "of the start's"],

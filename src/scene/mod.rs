@@ -33,6 +33,7 @@ mod reach;
 mod regular_waves;
 mod seas;
 mod settle;
+pub mod sources;
 mod spec;
 mod wave_maker;
 pub mod whitewater;
@@ -43,7 +44,14 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DQuat, DVec3};
 
-use crate::domain::{bounds::Bounds, holes::Holes, keep::Keep, mesh::TriangleMesh, motion::Motion};
+use crate::domain::{
+    bounds::Bounds,
+    holes::Holes,
+    keep::Keep,
+    mesh::TriangleMesh,
+    motion::Motion,
+    sources::{Drain, Emitter},
+};
 
 use key::read_by_name;
 
@@ -76,6 +84,10 @@ pub struct Scene {
     pub moving_solids: Vec<moving_solid::MovingSolid>,
     /// Domain walls that move; at most one a wall.
     pub wave_makers: Vec<WaveMaker>,
+    /// Where water enters while the shot runs.
+    pub emitters: Vec<Emitter<sources::Region>>,
+    /// Where it leaves.
+    pub drains: Vec<Drain<sources::Region>>,
     /// Which solver, and the solvers' settings.
     pub solver: Solver,
     /// Grids that each frame gets beside its particles, where the scene asks for any.
@@ -216,7 +228,8 @@ impl Scene {
     pub fn warnings(&self) -> Vec<String> {
         let placed = self.water.meshes.iter().chain(&self.solids);
         let moving = self.moving_solids.iter().map(|solid| &solid.placed);
-        let open = placed.chain(moving).filter_map(PlacedMesh::warning);
+        let placed = placed.chain(moving).chain(self.source_meshes());
+        let open = placed.filter_map(PlacedMesh::warning);
         open.chain(self.lints()).collect()
     }
 }

@@ -46,9 +46,14 @@ impl Scene {
         for block in &mut self.water.blocks {
             *block = block.moved(way);
         }
+        let swarms = self.water.particles.iter_mut();
+        swarms
+            .flat_map(|swarm| &mut swarm.at)
+            .for_each(|at| *at += way);
         let placed = self.water.meshes.iter_mut().chain(&mut self.solids);
         let moving = self.moving_solids.iter_mut().map(|solid| &mut solid.placed);
         placed.chain(moving).for_each(|mesh| carry(mesh, way));
+        self.carry_sources(way, &carry);
         for probe in &mut self.probes {
             match &mut probe.kind {
                 ProbeKind::Elevation { at } => *at += DVec2::new(way.x, way.z),
@@ -71,6 +76,20 @@ fn carry(placed: &mut PlacedMesh, way: DVec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Single particles go with the rest of the scene.
+    #[test]
+    fn particles_are_carried_with_their_domain() {
+        let text = "[shot]\nname = \"a\"\nframes = 1\nframes_per_second = 30\n[domain]\nmin = [100, 0, 100]\nmax = [102, 2, 102]\n\
+            [[water.particles]]\nat = [[101.5, 1.0, 101.25]]\n[solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.1\n";
+        let world = Scene::parse(text, "s.toml".as_ref(), "".as_ref(), &[]).expect("valid");
+        let way = world.origin;
+        assert!(way.x > 90.0 && way.z > 90.0, "{way}");
+        let at = world.water.particles[0].at[0];
+        let local = DVec3::new(101.5, 1.0, 101.25) - way;
+        assert_eq!(at, local);
+        assert!(at.cmpge(world.domain.min).all() && at.cmple(world.domain.max).all());
+    }
 
     #[test]
     fn far_domains_begin_near_their_own_zero() {

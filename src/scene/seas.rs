@@ -89,7 +89,7 @@ pub(super) fn check_height(
 }
 
 /// That waves are no higher than the water is deep.
-fn check_depth(height: f64, depth: f64) -> std::result::Result<(), String> {
+pub(super) fn check_depth(height: f64, depth: f64) -> std::result::Result<(), String> {
     if height <= depth {
         return Ok(());
     }

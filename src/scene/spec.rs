@@ -18,6 +18,10 @@ pub(super) struct SceneSpec {
     pub(super) solid: Vec<MeshSpec>,
     #[serde(default)]
     pub(super) wave_maker: Vec<WaveMakerSpec>,
+    #[serde(default)]
+    pub(super) emitter: Vec<EmitterSpec>,
+    #[serde(default)]
+    pub(super) drain: Vec<DrainSpec>,
     pub(super) solver: SolverSpec,
     pub(super) grids: Option<GridsSpec>,
     pub(super) keep: Option<KeepSpec>,
@@ -101,6 +105,30 @@ impl From<ScaleSpec> for DVec3 {
 pub(super) struct WaveMakerSpec {
     pub(super) wall: Wall,
     pub(super) motion: MotionSpec,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct EmitterSpec {
+    pub(super) min: Option<[f64; 3]>,
+    pub(super) max: Option<[f64; 3]>,
+    pub(super) mesh: Option<MeshSpec>,
+    pub(super) velocity: [f64; 3],
+    pub(super) level: Option<f64>,
+    pub(super) from: f64,
+    pub(super) until: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DrainSpec {
+    pub(super) min: Option<[f64; 3]>,
+    pub(super) max: Option<[f64; 3]>,
+    pub(super) mesh: Option<MeshSpec>,
+    pub(super) level: Option<f64>,
+    pub(super) rate: Option<f64>,
+    pub(super) from: f64,
+    pub(super) until: Option<f64>,
 }
 
 #[derive(Deserialize)]

@@ -73,8 +73,13 @@ impl Scene {
         !self.wave_makers.is_empty() || !self.moving_solids.is_empty()
     }
 
+    /// Whether something does work on the water of FLIP: what moves, and what pushes new water in.
+    pub fn is_worked_on(&self) -> bool {
+        self.has_movers() || self.has_inlets()
+    }
+
     /// Equal substeps that PBF's CFL number asks of the frame after `frame`: from the fastest particle, `speed` in
-    /// m/s, what gravity adds within the frame, and the fastest wave maker.
+    /// m/s, what gravity and effects add within the frame, and the fastest wave maker.
     ///
     /// # Errors
     /// Where they are more than `max_substeps`.
@@ -86,7 +91,8 @@ impl Scene {
             .wave_makers
             .iter()
             .map(|w| w.motion.peak_speed(start, start + length));
-        let speed = wall.fold(speed + self.water.gravity.length() * length, f64::max);
+        let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
+        let speed = wall.fold(speed + gained, f64::max);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
             .ceil()
             .max(1.0);
@@ -99,6 +105,14 @@ impl Scene {
             });
         }
         Ok(wanted as u32)
+    }
+
+    /// From `start`, where a substep of `length` begins, to the end of its frame, seconds; no less than the substep is long.
+    pub fn seconds_left(&self, start: f64, length: f64) -> f64 {
+        let frame = self.shot.frame_seconds();
+        // Starts add up with roundings.
+        let before = (start / frame + 1e-6).floor();
+        ((before + 1.0) * frame - start).max(length)
     }
 
     /// How many equal substeps FLIP's CFL number asks of the `remaining` seconds from `start` on, where the fastest
@@ -116,20 +130,23 @@ impl Scene {
     ) -> Result<(f64, Substep), Breach> {
         let flip = self.solver.flip();
         let fastest = speed.max(self.peak_boundary_speed(start, start + remaining));
-        let gravity = self.water.gravity.length();
+        let (gravity, push) = (self.water.gravity.length(), self.effects.push());
         // v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;
-        let longest = 2.0 * room / (fastest + (fastest * fastest + 4.0 * gravity * room).sqrt());
+        let longest = |v: f64, g: f64| 2.0 * room / (v + (v * v + 4.0 * g * room).sqrt());
+        // Whichever of what an effect adds is the less.
+        let by_acceleration = longest(fastest, gravity + push.acceleration);
+        let longest = by_acceleration.max(longest(fastest + push.speed, gravity));
         let wanted = if longest.is_finite() {
             (remaining / longest).ceil().max(1.0)
         } else {
             1.0
         };
         let length = remaining / wanted;
-        let reached = fastest + gravity * length;
+        let reached = fastest + (gravity * length + push.gained(length));
         if f64::from(done) + wanted > f64::from(flip.max_substeps) {
             let detail = format!(
-                "up to {reached:.3} m/s, particles {speed:.3}, with gravity, wave makers and moving solids, at \
+                "up to {reached:.3} m/s, particles {speed:.3}, with gravity, effects, wave makers and moving solids, at \
                  solver.flip.cfl {}",
                 flip.cfl
             );
@@ -180,6 +197,7 @@ impl Scene {
             boundary_work: 0.0,
             volume: None,
             projection: None,
+            exchange: None,
         }
     }
 }
@@ -239,6 +257,45 @@ viscosity = { xsph = 0.2 }
         }
         let still = scene(&["water.gravity=[0, 0, 0]", "solver.pbf.cfl=1.0"]);
         assert_eq!(still.pbf_substeps(0, 0.0).ok(), Some(1));
+    }
+
+    /// Drops of 0.05 mm are as fast as their wind at once, and no faster: (2 + 9) m/s × 0.2 s / 0.1 m.
+    #[test]
+    fn no_wind_makes_a_drop_faster_than_itself() {
+        let windy = "effects.drag={drop_radius=0.00005,wind=[9,0,0]}";
+        let found = scene(&["solver.pbf.cfl=1.0", windy]).pbf_substeps(0, 0.0);
+        assert_eq!(found.ok(), Some(22));
+        let flip = scene(&["solver.method=flip", windy]);
+        // 9 t + g t² = 0.6 m.
+        let longest = (-9.0 + f64::sqrt(81.0 + 24.0)) / 20.0;
+        let substep = flip
+            .flip_substep(1, 0.0, 0.2, 0.0, 0)
+            .expect("few enough")
+            .1;
+        assert!(
+            (substep.length - 0.2 / (0.2 / longest).ceil()).abs() < 1e-12,
+            "{substep:?}"
+        );
+    }
+
+    /// Wind of 20 m/s pushes a drop of 1 mm radius, C_D = 0.44, by 3/8 × 1.225/999.1 × 0.44 × 20² / 0.001 = 80.9 m/s², which are 16.2 m/s
+    /// in a frame of 0.2 s.
+    #[test]
+    fn wind_shortens_substeps() {
+        let of = |more: &[&str]| scene(&[&["solver.pbf.cfl=1.0"], more].concat());
+        let windy = "effects.drag={drop_radius=0.001,wind=[0,0,20]}";
+        assert_eq!(of(&[]).pbf_substeps(0, 0.0).ok(), Some(4));
+        // (2 + 16.2) m/s × 0.2 s / 0.1 m.
+        assert_eq!(of(&[windy]).pbf_substeps(0, 0.0).ok(), Some(37));
+        let still = "effects.drag={drop_radius=0.001}";
+        assert_eq!(of(&[still]).pbf_substeps(0, 0.0).ok(), Some(4));
+        let flip = |more: &str| {
+            let scene = of(&["solver.method=flip", more]);
+            let substep = scene.flip_substep(1, 0.0, 0.2, 0.0, 0);
+            substep.expect("few enough").1.length
+        };
+        // g t² = 3 × 0.2 m: 0.245 s with gravity alone, 0.081 s in the wind; of 0.2 s one step, or three.
+        assert!((flip(still) - 0.2).abs() < 1e-12 && (flip(windy) - 0.2 / 3.0).abs() < 1e-12);
     }
 
     #[test]

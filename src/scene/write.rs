@@ -12,6 +12,7 @@ use super::{
     key::{Key, Kind},
     keys,
     probe::{Probe, ProbeKind},
+    sources::Written,
 };
 use crate::domain::{
     bounds::Bounds,
@@ -48,7 +49,8 @@ impl Scene {
     pub fn mesh_files(&self) -> Vec<(PathBuf, String)> {
         let mut files = Vec::new();
         let moving = self.moving_solids.iter().map(|solid| &solid.placed);
-        for placed in self.solids.iter().chain(moving).chain(&self.water.meshes) {
+        let placed = self.solids.iter().chain(moving).chain(&self.water.meshes);
+        for placed in placed.chain(self.source_meshes()) {
             let file = (placed.file.clone(), placed.file_hash.clone());
             if !files.contains(&file) {
                 files.push(file);
@@ -93,6 +95,15 @@ impl Scene {
             ])
         });
         insert_tables(&mut scene, "wave_maker", makers);
+        let sources = Written {
+            corners: &corners,
+            mesh: &|placed| mesh("file", placed, mesh_path),
+            origin: self.origin,
+        };
+        let emitters = self.emitters.iter().map(|it| sources.emitter(it));
+        insert_tables(&mut scene, "emitter", emitters);
+        let drains = self.drains.iter().map(|it| sources.drain(it));
+        insert_tables(&mut scene, "drain", drains);
         if let Some(grids) = &self.grids {
             scene.insert("grids".to_owned(), value(grids));
         }

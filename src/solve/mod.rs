@@ -1,5 +1,6 @@
 //! Particle solvers on the GPU.
 
+mod air;
 pub mod boundary;
 pub mod buffers;
 pub mod effects;
@@ -18,7 +19,8 @@ use crate::{
 };
 
 use params::{
-    Counters, FlipParams, IterationControl, Params, Phase, SolidGrid, SolidGrids, SurveyHead,
+    Counters, FlipParams, Inlets, IterationControl, Params, Phase, SolidGrid, SolidGrids,
+    SurveyHead,
 };
 use pressure::{PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats};
 
@@ -30,6 +32,7 @@ pub fn mirrors() -> Vec<Layout> {
         FlipParams::layout(),
         SolidGrid::layout(),
         SolidGrids::layout(),
+        Inlets::layout(),
         Counters::layout(),
         IterationControl::layout(),
         SurveyHead::layout(),

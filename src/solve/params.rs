@@ -7,7 +7,7 @@ use crate::{
         buffer::{Element, Mirror, Scalar, Workgroups, mirror},
         reflect::Layout,
     },
-    scene::moving_solid::MAX_MOVING_SOLIDS,
+    scene::{moving_solid::MAX_MOVING_SOLIDS, sources::MAX_INLETS},
 };
 
 mirror!(
@@ -170,6 +170,24 @@ mirror!(
         fastest: f32,
         /// Unused.
         padding: [u32; 2],
+    }
+);
+
+mirror!(
+    /// `Inlets` of shared/inlets.wgsl.
+    Inlets {
+        /// Boxes in use.
+        count: u32,
+        /// Unused.
+        unused: u32,
+        /// Unused.
+        padding: [u32; 2],
+        /// First cells along each axis.
+        low: [[u32; 4]; MAX_INLETS],
+        /// Last cells.
+        high: [[u32; 4]; MAX_INLETS],
+        /// At which what is too much there flows out, 1/s, first of four.
+        rate: [[f32; 4]; MAX_INLETS],
     }
 );
 

@@ -79,7 +79,7 @@ impl Capacity {
 pub struct PlannedBuffer {
     /// Name and bytes.
     pub spec: BufferSpec,
-    /// `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, `probes`, `budget`, or an effect's name.
+    /// `pbf`, `flip`, `pressure`, `sort`, `solids`, `lists`, `probes`, `budget`, `emitters`, or an effect's name.
     pub owner: &'static str,
     /// Whether FLIP looks for what is not finite in it at a substep's end, where it may be hidden from all that follows.
     pub is_watched: bool,
@@ -137,6 +137,19 @@ pub struct PlannedPass {
     pub spec: PassSpec,
     /// As for buffers.
     pub owner: &'static str,
+}
+
+/// What all of a plan takes that is there for one thing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Share {
+    /// As for buffers and passes.
+    pub owner: &'static str,
+    /// Passes.
+    pub passes: usize,
+    /// Of its buffers.
+    pub bytes: u64,
+    /// That its passes took, where they were timed.
+    pub seconds: f64,
 }
 
 /// Particles that one binding of the neighbour lists covers.
@@ -213,6 +226,44 @@ impl Plan {
         (sum(false) + of_projection, sum(true))
     }
 
+    /// What there is for each owner, in the order of its first buffer; `times` are seconds and runs by pass, as a solver tells them.
+    pub fn shares(&self, times: &[(&'static str, f64, u64)]) -> Vec<Share> {
+        let mut shares: Vec<Share> = Vec::new();
+        let mut add = |owner, passes, bytes, seconds| match shares
+            .iter_mut()
+            .find(|share| share.owner == owner)
+        {
+            Some(share) => {
+                share.passes += passes;
+                share.bytes += bytes;
+                share.seconds += seconds;
+            }
+            None => shares.push(Share {
+                owner,
+                passes,
+                bytes,
+                seconds,
+            }),
+        };
+        let mut timed: Vec<&str> = Vec::new();
+        for part in self.parts() {
+            for buffer in &part.buffers {
+                add(buffer.owner, 0, buffer.spec.bytes, 0.0);
+            }
+            for PlannedPass { spec, owner } in &part.passes {
+                // A pass of two parts is timed as one.
+                let of_pass = times.iter().filter(|(name, ..)| *name == spec.name);
+                let seconds = match timed.contains(&spec.name) {
+                    true => 0.0,
+                    false => of_pass.map(|(_, seconds, _)| seconds).sum(),
+                };
+                timed.push(spec.name);
+                add(owner, 1, 0, seconds);
+            }
+        }
+        shares
+    }
+
     /// Itself, and the plan of its projection.
     pub fn parts(&self) -> impl Iterator<Item = &Self> {
         std::iter::once(self).chain(self.projection.as_deref())
@@ -253,7 +304,7 @@ impl Plan {
             }
             let mut owner = owner_of(spec.name);
             for (effect, addition) in effects {
-                if let Some(own) = addition.passes.iter().find(|own| own.name == spec.name) {
+                if let Some(own) = addition.all().find(|own| own.name == spec.name) {
                     spec.constants.extend_from_slice(&own.constants);
                     owner = effect;
                 }
@@ -278,6 +329,7 @@ pub(super) fn in_order<'a>(
 fn owner_of(pass: &'static str) -> &'static str {
     match pass {
         "pbf/boundary_work" | "flip/boundary_work" | "flip/find_not_finite" => "budget",
+        "flip/let_in" => "emitters",
         _ => pass.split('/').next().unwrap_or(pass),
     }
 }

@@ -16,6 +16,22 @@ use super::{
     buffers::{ID, POSITION, VELOCITY},
 };
 
+/// Whether a state has another count of particles than was planned for.
+///
+/// # Errors
+/// That it has, and no water enters or leaves.
+pub(super) fn is_other_count(
+    scene: &Scene,
+    planned: usize,
+    state: &Particles,
+) -> Result<bool, SolveError> {
+    let given = state.len();
+    match given == planned {
+        false if !scene.has_sources() => Err(SolveError::Count { planned, given }),
+        is_same => Ok(!is_same),
+    }
+}
+
 /// Positions go up relative to the domain's least corner.
 pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
     let origin = scene.domain.min;

@@ -10,8 +10,8 @@ use crate::{
         particles::Particles,
         sph::Calibration,
         whitewater::{
-            AIR_BELOW, AIR_DENSITY, AIR_VISCOSITY, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD,
-            Potentials, SURFACE, Settings, WATER_ABOVE,
+            AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE, Settings,
+            WATER_ABOVE,
         },
     },
     gpu::{
@@ -22,6 +22,7 @@ use crate::{
         sort,
     },
     scene::Scene,
+    solve::air,
 };
 
 use super::{
@@ -30,6 +31,7 @@ use super::{
     flip::buffers::SOLID_GRIDS,
     pbf::{buffers::*, params, plan::cell_count, record::sorting},
     plan::{Counts, Plan, Table, in_order},
+    state::is_other_count,
 };
 
 /// Share of the place of each water particle that is water, in sorted order.
@@ -57,6 +59,8 @@ pub struct Whitewater {
     scene: Scene,
     calibration: Calibration,
     survey: Recording,
+    /// Where water enters or leaves: what is uploaded anew for another count of it.
+    boundary: Option<Boundary>,
     movers: Option<Movers>,
     settings: Option<Settings>,
     /// Whitewater that the buffers hold.
@@ -135,20 +139,17 @@ fn pass(name: &'static str, plan: &Plan, scene: &Scene, settings: Option<&Settin
         ("whitewater/potentials", _) => {
             vec![("OUTWARD_LEAST", OUTWARD[0]), ("OUTWARD_FULL", OUTWARD[1])]
         }
-        (ADVANCE, Some(settings)) => vec![
-            ("AIR_BELOW", AIR_BELOW),
-            ("WATER_ABOVE", WATER_ABOVE),
-            ("FLIGHT_STEPS", f64::from(FLIGHT_STEPS)),
-            ("HALVINGS", f64::from(HALVINGS)),
-            ("AIR_DENSITY", AIR_DENSITY),
-            ("AIR_VISCOSITY", AIR_VISCOSITY),
-            ("DROP_RADIUS", settings.drop_radius),
-            ("WIND_X", settings.wind[0]),
-            ("WIND_Y", settings.wind[1]),
-            ("WIND_Z", settings.wind[2]),
-            ("RISE_SPEED", settings.rise_speed),
-            ("RESPONSE", settings.response),
-        ],
+        (ADVANCE, Some(settings)) => {
+            let own = vec![
+                ("AIR_BELOW", AIR_BELOW),
+                ("WATER_ABOVE", WATER_ABOVE),
+                ("FLIGHT_STEPS", f64::from(FLIGHT_STEPS)),
+                ("HALVINGS", f64::from(HALVINGS)),
+                ("RISE_SPEED", settings.rise_speed),
+                ("RESPONSE", settings.response),
+            ];
+            [own, air::constants(settings.drop_radius, settings.wind)].concat()
+        }
         _ => Vec::new(),
     };
     let holding = conditions.into_iter().filter(|(_, holds)| *holds);
@@ -157,6 +158,24 @@ fn pass(name: &'static str, plan: &Plan, scene: &Scene, settings: Option<&Settin
         defines: holding.map(|(define, _)| define).collect(),
         constants,
     }
+}
+
+/// Uploads what does not change from frame to frame; the recording of a survey.
+fn set_up(
+    program: &Program,
+    plan: &Plan,
+    scene: &Scene,
+    boundary: &Boundary,
+    calibration: &Calibration,
+) -> Recording {
+    sort::upload_lengths(program, &CELL_START, cell_count(plan));
+    let water = plan.counts.particles as u32;
+    program.upload(ELEMENT_COUNT, 0, &[[water, 0, 0, 0]]);
+    boundary.upload(program, scene, plan, calibration);
+    if boundary.distance.is_none() {
+        boundary.upload_distance(program, scene);
+    }
+    Recording::new(program, &survey_commands(plan))
 }
 
 impl Whitewater {
@@ -178,16 +197,11 @@ impl Whitewater {
             .map(|name| pass(name, &plan, scene, None))
             .collect();
         let program = Program::new(context, &plan.buffer_specs(), &passes, &[])?;
-        sort::upload_lengths(&program, &CELL_START, cell_count(&plan));
-        program.upload(ELEMENT_COUNT, 0, &[[water as u32, 0, 0, 0]]);
         let pbf = scene.solver.pbf();
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
-        boundary.upload(&program, scene, &plan, &calibration);
-        if boundary.distance.is_none() {
-            boundary.upload_distance(&program, scene);
-        }
         Ok(Self {
-            survey: Recording::new(&program, &commands),
+            survey: set_up(&program, &plan, scene, boundary, &calibration),
+            boundary: scene.has_sources().then(|| boundary.clone()),
             movers: Movers::of(boundary, scene),
             timer: is_timed.then(|| Timer::new(context)),
             scene: scene.clone(),
@@ -207,6 +221,17 @@ impl Whitewater {
         let pass = pass(ADVANCE, &self.plan, &self.scene, Some(settings));
         self.program.refit(&[], &[pass])?;
         self.settings = Some(settings.clone());
+        Ok(())
+    }
+
+    /// Makes room for so many particles of water.
+    fn resize(&mut self, water: usize) -> Result<(), SolveError> {
+        let boundary = self.boundary.as_ref();
+        let boundary = boundary.expect("a scene in which water enters or leaves");
+        self.plan = plan(&self.scene, boundary, water, self.capacity);
+        self.program.refit(&self.plan.buffer_specs(), &[])?;
+        let (program, scene) = (&self.program, &self.scene);
+        self.survey = set_up(program, &self.plan, scene, boundary, &self.calibration);
         Ok(())
     }
 
@@ -236,19 +261,16 @@ impl Whitewater {
     /// whitewater, in the order of the water.
     ///
     /// # Errors
-    /// The device; another number of particles than it was made for.
+    /// The device; another number of particles than it was made for, where none enters or leaves.
     pub fn survey(
         &mut self,
         water: &Particles,
         time: f64,
         seconds: f64,
     ) -> Result<Vec<Potentials>, SolveError> {
-        let n = self.plan.counts.particles;
-        if water.len() != n {
-            return Err(SolveError::Count {
-                planned: n,
-                given: water.len(),
-            });
+        let n = water.len();
+        if is_other_count(&self.scene, self.plan.counts.particles, water)? {
+            self.resize(n)?;
         }
         let vectors = |of: &[[f32; 3]]| -> Vec<[f32; 4]> {
             of.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()

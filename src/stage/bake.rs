@@ -24,6 +24,7 @@ use super::{
     prepare::Start,
     probes,
     replay::{self, Failure, ReplayError},
+    time::Share,
 };
 
 /// What to bake, and where to.
@@ -99,6 +100,8 @@ pub struct Outcome {
     pub interrupted: bool,
     /// Seconds and runs by pass, where measured.
     pub passes: Vec<(&'static str, f64, u64)>,
+    /// The same by what they are there for, with bytes.
+    pub shares: Vec<Share>,
 }
 
 /// Why a bake failed.
@@ -216,7 +219,7 @@ pub fn bake(
         removed: start.removed,
         boundary_samples: start.boundary.samples.len(),
         solver: scene.solver.method.name(),
-        bytes: drive.bytes,
+        bytes: drive.bytes(),
         first,
         last,
         parent,
@@ -224,6 +227,7 @@ pub fn bake(
         warnings: scene.warnings(),
     });
     drive.load_watched(&start.particles, clock.frame, &state)?;
+    drive.go_on_with(clock.next_id);
     let ended = drive.run(last, stop, |step| {
         let begin = Instant::now();
         let time = scene.shot.time(step.frame);
@@ -233,9 +237,11 @@ pub fn bake(
         let Step {
             frame,
             particles,
+            next_id,
             report,
             ..
         } = step;
+        clock.next_id = next_id;
         clock.frame = frame;
         clock.time = time;
         clock.substeps = report.substeps;
@@ -260,7 +266,10 @@ pub fn bake(
     };
     // What was computed before a failure is kept.
     let summary = writer.finish()?;
-    let passes = drive.timings();
+    let (passes, shares) = match request.time_passes {
+        true => (drive.timings(), drive.shares()),
+        false => Default::default(),
+    };
     if let Some(error) = broken {
         drop(drive);
         return Err(self::end(request, &opened, &start, error));
@@ -271,11 +280,8 @@ pub fn bake(
         bytes: summary.bytes,
         waited: summary.waiting.as_secs_f64(),
         interrupted: end == End::Stopped,
-        passes: if request.time_passes {
-            passes
-        } else {
-            Vec::new()
-        },
+        passes,
+        shares,
     })
 }
 

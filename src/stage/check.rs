@@ -340,7 +340,7 @@ pub fn check_substep(
     if particles.is_empty() {
         return Ok(Checked::default());
     }
-    let plan = start.plan(scene, device_limits(context));
+    let plan = start.plan_of(scene, particles, device_limits(context));
     let boundary = &start.boundary;
     match scene.solver.method {
         Method::Pbf => {

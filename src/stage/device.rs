@@ -16,7 +16,12 @@ use crate::{
     gpu::adapter::{Context, GpuError, Needs},
     reference::{self, ReferenceError},
     scene::{Method, Scene, flip::Precision},
-    solve::{SolveError, flip::Flip, pbf::Pbf, plan::device_limits},
+    solve::{
+        SolveError,
+        flip::Flip,
+        pbf::Pbf,
+        plan::{Plan, device_limits},
+    },
 };
 
 use super::{Blame, prepare::Start};
@@ -162,12 +167,12 @@ pub fn needs(scene: &Scene) -> Needs {
     }
 }
 
-/// A solver of a scene, and the GPU memory that it takes: bytes in all and for neighbour lists.
+/// A solver of a scene, and what it was planned to take.
 pub struct Built {
     /// Not loaded yet.
     pub solver: Box<dyn Solver<Error = SolverError>>,
-    /// `None` on the CPU.
-    pub bytes: Option<(u64, u64)>,
+    /// Of the GPU; `None` on the CPU.
+    pub plan: Option<Plan>,
 }
 
 impl Opened {
@@ -206,20 +211,20 @@ impl Opened {
                 Method::Pbf => Box::new(Unified(reference::pbf::Pbf::new(scene, boundary))),
                 Method::Flip => Box::new(Unified(reference::flip::Flip::new(scene, boundary))),
             };
-            return Ok(Built {
-                solver,
-                bytes: None,
-            });
+            return Ok(Built { solver, plan: None });
         };
         let plan = start.plan(scene, device_limits(context));
-        let bytes = Some(plan.bytes());
+        let planned = Some(start.shown_plan(scene, device_limits(context)));
         let solver: Box<dyn Solver<Error = SolverError>> = match method {
             Method::Pbf => Box::new(Unified(Pbf::new(context, scene, plan, boundary, is_timed)?)),
             Method::Flip => Box::new(Unified(Flip::new(
                 context, scene, plan, boundary, is_timed,
             )?)),
         };
-        Ok(Built { solver, bytes })
+        Ok(Built {
+            solver,
+            plan: planned,
+        })
     }
 }
 

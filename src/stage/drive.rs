@@ -11,9 +11,12 @@ use crate::{
     cache::ProbeValues,
     domain::{
         particles::Particles,
+        signed_distance::SignedDistance,
         solver::{Solver, StepReport},
+        sources::{Exchange, Sources},
     },
     scene::Scene,
+    solve::plan::{Plan, Share},
 };
 
 use super::{
@@ -26,10 +29,16 @@ use super::{
 /// A scene's solver, and the frame at which it stands.
 pub struct Drive<'a> {
     scene: &'a Scene,
+    /// What enters and leaves, and solids at rest; nothing where neither happens.
+    sources: Option<(Sources, Option<SignedDistance>)>,
+    /// The least that a particle may have which enters.
+    first_id: u32,
     solver: Box<dyn Solver<Error = SolverError>>,
-    /// GPU memory in all and for neighbour lists, bytes; `None` on the CPU.
-    pub bytes: Option<(u64, u64)>,
+    /// What the GPU was planned to hold and run; `None` on the CPU.
+    plan: Option<Plan>,
     frame: u32,
+    /// Of the particle that enters next.
+    next_id: u32,
     watch: Option<Watch<'a>>,
     /// Where pressures are read after each frame.
     pressure_points: Vec<DVec3>,
@@ -44,8 +53,10 @@ pub struct Drive<'a> {
 pub struct Step {
     /// Its number.
     pub frame: u32,
-    /// State at its end.
+    /// State at its end, with what entered and without what left.
     pub particles: Particles,
+    /// Of the particle that enters next; only where water enters or leaves.
+    pub next_id: Option<u32>,
     /// What its substeps did.
     pub report: StepReport,
     /// Pressures at the scene's [`pressure_points`](Scene::pressure_points), Pa; empty where none are read.
@@ -89,12 +100,16 @@ impl<'a> Drive<'a> {
         start: &Start,
         is_timed: bool,
     ) -> Result<Self, SolverError> {
-        let Built { solver, bytes } = opened.build(scene, start, is_timed)?;
+        let Built { solver, plan } = opened.build(scene, start, is_timed)?;
         Ok(Self {
             scene,
+            sources: (!start.sources.is_empty())
+                .then(|| (start.sources.clone(), start.boundary.distance.clone())),
+            first_id: next_after(&start.particles),
             solver,
-            bytes,
+            plan,
             frame: 0,
+            next_id: 0,
             watch: None,
             pressure_points: Vec::new(),
             is_recorded: false,
@@ -102,14 +117,21 @@ impl<'a> Drive<'a> {
         })
     }
 
-    /// Takes over `state`, the end of frame `frame`. Nothing is held against budgets from there on.
+    /// Takes over `state`, the end of frame `frame`. Nothing is held against budgets from there on. Where water enters, ids
+    /// go on after those of the state and of the scene's start.
     ///
     /// # Errors
     /// The device; a state that is not the scene's.
     pub fn load(&mut self, frame: u32, state: &Particles) -> Result<(), SolverError> {
         self.solver.load(frame, state)?;
         (self.frame, self.watch) = (frame, None);
+        self.next_id = self.first_id.max(next_after(state));
         Ok(())
+    }
+
+    /// Ids go on with that one, where there is one.
+    pub(super) fn go_on_with(&mut self, next_id: Option<u32>) {
+        self.next_id = next_id.unwrap_or(self.next_id);
     }
 
     /// Loads a state and holds each frame after it against the scene's budgets; `start` is that of the bake.
@@ -131,7 +153,7 @@ impl<'a> Drive<'a> {
     }
 
     /// The same, and with looks while a frame is computed for the probes that ask for them.
-    pub(super) fn with_probes(mut self) -> Self {
+    pub fn with_probes(mut self) -> Self {
         let mut probes = self.scene.probes.iter();
         self.is_recorded = probes.any(is_recorded);
         self.with_pressures()
@@ -144,7 +166,7 @@ impl<'a> Drive<'a> {
     pub fn advance(&mut self) -> Result<Step, SolverError> {
         let begin = Instant::now();
         let mut recorder = Recorder::new(self.scene, self.scene.shot.time(self.frame + 1));
-        let (particles, mut report) = match self.is_recorded {
+        let (mut particles, mut report) = match self.is_recorded {
             true => self.solver.advance_watched(&mut recorder)?,
             false => self.solver.advance()?,
         };
@@ -159,14 +181,32 @@ impl<'a> Drive<'a> {
             _ => self.solver.pressures(&self.pressure_points)?,
         };
         self.frame += 1;
+        report.exchange = self.exchange(&mut particles)?;
         Ok(Step {
             frame: self.frame,
             particles,
+            next_id: self.sources.as_ref().map(|_| self.next_id),
             report,
             pressures,
             looks: recorder.into_values(),
             seconds: begin.elapsed().as_secs_f64(),
         })
+    }
+
+    /// Lets water in and out at the frame's end, where the scene does that.
+    fn exchange(&mut self, particles: &mut Particles) -> Result<Option<Exchange>, SolverError> {
+        let Some((sources, solid)) = &self.sources else {
+            return Ok(None);
+        };
+        let (solid, next_id) = (solid.as_ref(), &mut self.next_id);
+        let exchange = sources.exchange(self.frame, solid, particles, next_id);
+        if exchange != Exchange::default() {
+            self.solver.load(self.frame, particles)?;
+            if let Some(watch) = &mut self.watch {
+                watch.take_over(particles);
+            }
+        }
+        Ok(Some(exchange))
     }
 
     /// Computes frames up to `last` and hands each to `observe`; `stop` ends it between two frames.
@@ -193,8 +233,24 @@ impl<'a> Drive<'a> {
         self.report.as_ref()
     }
 
+    /// GPU memory in all and for neighbour lists, bytes; `None` on the CPU.
+    pub fn bytes(&self) -> Option<(u64, u64)> {
+        self.plan.as_ref().map(Plan::bytes)
+    }
+
+    /// What the GPU takes, by what it is there for, with the times of passes where they were measured; empty on the CPU.
+    pub fn shares(&self) -> Vec<Share> {
+        let plan = self.plan.as_ref();
+        plan.map_or(Vec::new(), |plan| plan.shares(&self.timings()))
+    }
+
     /// Seconds and runs by pass, where measured.
     pub fn timings(&self) -> Vec<(&'static str, f64, u64)> {
         self.solver.timings()
     }
+}
+
+/// The id behind those of a state.
+fn next_after(particles: &Particles) -> u32 {
+    particles.id.last().map_or(0, |id| id + 1)
 }

@@ -145,7 +145,7 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
         Err(error) => return Err(error.into()),
     };
     let limits = context.as_ref().map_or(COMMON_LIMITS, device_limits);
-    let plan = start.plan(scene, limits);
+    let plan = start.shown_plan(scene, limits);
     let misfit = context
         .as_ref()
         .and_then(|context| {

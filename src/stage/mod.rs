@@ -12,6 +12,7 @@ pub mod prepare;
 mod probes;
 pub mod render;
 pub mod replay;
+pub mod time;
 pub mod verify;
 mod watch;
 pub mod whitewater;

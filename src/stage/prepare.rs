@@ -13,6 +13,7 @@ use crate::{
         pbf,
         sampling::{BoundarySample, boundary_samples, fill_water},
         signed_distance::{SignedDistance, SignedDistanceError},
+        sources::Sources,
     },
     scene::{Method, Scene},
     solve::{
@@ -34,6 +35,8 @@ pub struct Start {
     pub removed: usize,
     /// Solids as the solver meets them.
     pub boundary: Boundary,
+    /// What enters and leaves at the frames' ends.
+    pub sources: Sources,
 }
 
 impl Start {
@@ -74,6 +77,7 @@ impl Start {
             particles,
             removed: fill.removed,
             boundary,
+            sources: scene.sources()?,
         })
     }
 
@@ -86,6 +90,7 @@ impl Start {
             particles,
             removed: 0,
             boundary: boundary(scene)?,
+            sources: scene.sources()?,
         })
     }
 
@@ -105,13 +110,30 @@ impl Start {
 
     /// What the scene needs on a device with these limits.
     pub fn plan(&self, scene: &Scene, limits: DeviceLimits) -> Plan {
+        self.plan_of(scene, &self.particles, limits)
+    }
+
+    /// The same to be shown: of one particle where it starts dry, as passes over particles are none without.
+    pub fn shown_plan(&self, scene: &Scene, limits: DeviceLimits) -> Plan {
+        if !self.particles.is_empty() {
+            return self.plan(scene, limits);
+        }
+        let mut one = self.particles.clone();
+        one.id.push(0);
+        one.position.push(scene.domain.min.as_vec3().to_array());
+        one.velocity.push([0.0; 3]);
+        self.plan_of(scene, &one, limits)
+    }
+
+    /// What it needs for the frame after one that ended with `particles`.
+    pub fn plan_of(&self, scene: &Scene, particles: &Particles, limits: DeviceLimits) -> Plan {
         let bricks = match (scene.solver.method, scene.of_projection()) {
             (Method::Pbf, None) => Capacity::default(),
-            (Method::Pbf, Some(grid)) => flip::capacity(&grid, &self.particles),
-            (Method::Flip, _) => flip::capacity(scene, &self.particles),
+            (Method::Pbf, Some(grid)) => flip::capacity(&grid, particles),
+            (Method::Flip, _) => flip::capacity(scene, particles),
         };
         let counts = Counts {
-            particles: self.particles.len(),
+            particles: particles.len(),
             bricks,
             ..self.boundary.counts()
         };

@@ -121,7 +121,7 @@ pub fn replay(
         is_correcting: false,
         place: None,
     };
-    let plan = start.plan(scene, device_limits(context));
+    let plan = start.plan_of(scene, state, device_limits(context));
     let boundary = &start.boundary;
     match scene.solver.method {
         Method::Pbf => finder.trace(last, Pbf::new(context, scene, plan, boundary, false)?)?,

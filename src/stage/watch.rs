@@ -29,17 +29,30 @@ pub(super) struct Watch<'a> {
 impl<'a> Watch<'a> {
     /// Before the frame after `last`, of which `state` is the end; `start` is that of the bake.
     pub(super) fn new(scene: &'a Scene, start: &Particles, last: u32, state: &Particles) -> Self {
-        let report = scene.report(state, [].into_iter());
-        Self {
+        let mut watch = Self {
             scene,
             frame: last + 1,
             before: Before {
-                energy: scene.total_energy(state.len(), &report),
-                speed: state.max_speed(),
                 start_volume: scene.budget.volume.map(|_| volume_of(scene, start)),
+                ..Before::default()
             },
-            id: state.id.clone(),
+            id: start.id.clone(),
+        };
+        watch.take_over(state);
+        watch
+    }
+
+    /// Before the next frame, which begins with `state`: what entered and left is in its energy, its volume and its ids.
+    pub(super) fn take_over(&mut self, state: &Particles) {
+        let scene = self.scene;
+        let report = scene.report(state, [].into_iter());
+        self.before.energy = scene.total_energy(state.len(), &report);
+        self.before.speed = state.max_speed();
+        let more = state.len() as f64 - self.id.len() as f64;
+        if let Some(volume) = &mut self.before.start_volume {
+            *volume += more * scene.particle_spacing().powi(3);
         }
+        self.id.clone_from(&state.id);
     }
 
     /// Joule, of the state before the frame that comes next.

@@ -26,6 +26,7 @@ mod cache {
 }
 mod check;
 mod cli {
+    mod inspect;
     mod pipeline;
     mod shaders;
     #[cfg(target_os = "linux")]
@@ -71,6 +72,7 @@ mod scene {
 mod solve {
     mod analytic;
     mod analytic_water;
+    mod drag;
     mod flip;
     mod flip_passes;
     mod independent;
@@ -81,6 +83,7 @@ mod solve {
     mod plan;
     mod pressure;
     mod projected;
+    mod sources;
     mod thin_water;
     mod walls;
     mod whitewater;
@@ -92,5 +95,6 @@ mod stage {
     mod device_cpu;
     mod drive;
     mod far_origin;
+    mod sources;
     mod whitewater;
 }

@@ -13,7 +13,8 @@ use crate::{
         Model, Room, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
         find_change as twin_find_change, find_depth, find_excess as twin_find_excess,
         find_water as twin_find_water, friction_rates, gather_centers as twin_gather_centers,
-        gather_faces as twin_gather_faces, is_near_half, wall_friction as twin_wall_friction,
+        gather_faces as twin_gather_faces, is_near_half, let_in as twin_let_in,
+        wall_friction as twin_wall_friction,
     },
     scene::flip::Surface,
     solve::flip::buffers,
@@ -272,6 +273,41 @@ pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     io.table.each(&EXCESS, elements.active(), |e| {
         let size = (density[e] - 1.0).abs().min(1.0) + density[e];
         pair(e, excess[e], twin[e], [size, cut])
+    });
+    Ok(())
+}
+
+/// From the densities, the flux and the excess that the device has.
+pub(super) fn let_in(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let (elements, density) = (state.elements(), state.density());
+    let corrects = state.model.settings().density_correction;
+    let mut excess = match corrects {
+        true => elements.scalars(&io.before, buffers::DENSITY_EXCESS)?,
+        false => Vec::new(),
+    };
+    let mut twin = state.room().clone();
+    twin.solid_flux = elements.scalars(&io.before, buffers::SOLID_FLUX)?;
+    let (step, size) = (state.step(), state.model.cell_size());
+    let inlets = state.model.scene.inlets(step.start, step.length);
+    let bricks = &elements.bricks;
+    twin_let_in(&inlets, size, bricks, &mut twin, density, &mut excess);
+    let found = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
+    let rates = inlets.iter().map(|inlet| inlet.rate);
+    let rate = size * rates.fold(0.0, f64::max);
+    let cut = CUT.of([state.place()]);
+    io.table.each(&LET_IN, elements.active(), |e| {
+        let sizes = [rate * (1.0 + density[e]), cut, twin.solid_flux[e].abs()];
+        pair(e, found[e], twin.solid_flux[e], sizes)
+    });
+    if corrects {
+        let found = elements.scalars(&io.after, buffers::DENSITY_EXCESS)?;
+        io.table.each(&LEFT_EXCESS, elements.active(), |e| {
+            pair(e, found[e], excess[e], [])
+        });
+    }
+    state.room = Some(Room {
+        solid_flux: found,
+        ..twin
     });
     Ok(())
 }

@@ -11,6 +11,8 @@ mod sort;
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
+
 use crate::{
     domain::{
         boundary::Boundary, particles::Particles, poisson::FLUID, solver::Solver, substep::Which,
@@ -49,6 +51,11 @@ const TWINS: &[Twin<FlipState>] = &[
     twin("flip/gather_centers", NONE, grid::gather_centers),
     twin("flip/find_water", NONE, grid::find_water),
     twin("flip/find_excess", NONE, grid::find_excess),
+    twin(
+        "flip/let_in",
+        || names![buffers::SOLID_FLUX, buffers::DENSITY_EXCESS],
+        grid::let_in,
+    ),
     twin(
         "flip/wall_friction",
         elements::faces_kept,
@@ -178,8 +185,15 @@ impl FlipState {
         self.scene.is_periodic()
     }
 
-    fn sorted(&self) -> &Sorted {
+    pub(super) fn sorted(&self) -> &Sorted {
         self.sorted.as_ref().expect("after flip/reorder")
+    }
+
+    /// Gives the sorted particles the velocities that the device has now.
+    pub(super) fn carry_velocities(&mut self, velocity: Vec<DVec3>) {
+        if let Some(sorted) = &mut self.sorted {
+            sorted.cloud.velocity = velocity;
+        }
     }
 
     pub(super) fn room(&self) -> &Room {

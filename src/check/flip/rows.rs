@@ -95,6 +95,11 @@ entries! {
         EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT] 4.0 * U * excess + cut * excess,
             "a difference, and the product with the open volume";
     }
+    "flip/let_in" {
+        LET_IN = "flux with what enters", "m/s": [rate: "(1 + ρ) Δx times the rate", cut: "" CUT, flux: "its own value"]
+            (6.0 * U + cut) * rate + U * flux, "4 products, a difference, the open volume, and a sum";
+        LEFT_EXCESS = "density excess", "": [] 0.0, "a choice";
+    }
     "flip/wall_friction" {
         FRICTION = "velocity slowed by walls", "m/s": [place: "" PLACE, moved: "what it is slowed by in Δt where a row is a whole cell nearer to each wall",
             slowed: "Δt times the rate", v: "|v|"] (2.0 * place * moved + U * (16.0 * slowed + 4.0)) * v, "";

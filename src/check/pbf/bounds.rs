@@ -24,6 +24,8 @@ pub(in crate::check) struct Confined {
     pub(in crate::check) push_error: f64,
     /// Whether they pushed, or may have by rounding alone.
     pub(in crate::check) is_touched: bool,
+    /// By how much the place errs where it is looked up in the solids' grid, metres.
+    pub(in crate::check) reach: f64,
 }
 
 impl Bounds<'_> {
@@ -141,6 +143,7 @@ impl Bounds<'_> {
                 magnitudes: [error, 0.0, if is_touched { place } else { 0.0 }, 0.0],
                 push_error: PUSHED.of([error, 0.0, place, 0.0]),
                 is_touched,
+                reach,
             };
         }
         let (centre, push) = model.confine_by(x, walls);
@@ -165,6 +168,7 @@ impl Bounds<'_> {
             magnitudes,
             push_error: PUSHED.of([error, pushed, place, x.length()]),
             is_touched,
+            reach,
         }
     }
 }

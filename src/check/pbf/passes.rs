@@ -67,17 +67,14 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         let [error, moved, place, pushed] = confined.magnitudes;
         // What is stopped at once where it touches has another velocity a rounding beside it.
         let answer = |(axis, side): (usize, f64)| {
-            let (_, other, _) = predict(
-                model,
-                &state.substep,
-                x + side * error * DVec3::AXES[axis],
-                v,
-            );
+            let (_, other, _) = predict(model, &state.substep, x + side * DVec3::AXES[axis], v);
             (other - then).length()
         };
-        let sides = (0..3).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]);
+        // Each coordinate errs on its own: what they change adds up.
+        let moves = [error, confined.reach].into_iter().flat_map(|by| [-by, by]);
+        let along = |axis| (moves.clone().map(|by| answer((axis, by)))).fold(0.0, f64::max);
         let jump = match goes_along(i) {
-            true => sides.map(answer).fold(0.0, f64::max),
+            true => (0..3).map(along).sum(),
             false => 0.0,
         };
         let magnitudes = [error, moved, place, pushed + state.carried(x, at)];

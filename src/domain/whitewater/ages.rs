@@ -35,7 +35,7 @@ pub fn grow_older(
         .iter()
         .map(|&life| life > 0.0)
         .collect();
-    retain(particles, &lives);
+    particles.retain(&lives);
     before - particles.len()
 }
 
@@ -70,20 +70,6 @@ impl Crowds {
 
 fn cube_of(position: [f32; 3], spacing: f64) -> [i32; 3] {
     position.map(|x| (f64::from(x) / spacing).floor() as i32)
-}
-
-/// Keeps those that are marked, in their order.
-fn retain(particles: &mut Particles, keep: &[bool]) {
-    fn kept<T>(values: &mut Vec<T>, keep: &[bool]) {
-        let mut marks = keep.iter();
-        values.retain(|_| marks.next() == Some(&true));
-    }
-    kept(&mut particles.position, keep);
-    kept(&mut particles.velocity, keep);
-    kept(&mut particles.id, keep);
-    for column in particles.attributes.values_mut() {
-        kept(column, keep);
-    }
 }
 
 #[cfg(test)]

@@ -113,7 +113,7 @@ fn go(
     let mut start = Start::of(scene)?;
     start::prepare(benchmark, scene, &mut start.particles);
     run.particles = start.particles.len();
-    let mut drive = Drive::new(devices.of(trial.device), scene, &start, false)?.with_pressures();
+    let mut drive = Drive::new(devices.of(trial.device), scene, &start, false)?.with_probes();
     let mut record = Record::new(benchmark, scene, &start.particles);
     let mut seconds = 0.0;
     let ended = until_done(&mut drive, scene.shot.frames, stop, |step| {

@@ -50,6 +50,7 @@ pub(super) fn of(record: &Record<'_>) -> Measured {
         Measure::DamBreak => dam_break(record, &mut out),
         Measure::DryBed => dry_bed(record, &mut out),
         Measure::BlockImpact => block_impact(record, &mut out),
+        Measure::JetImpact => jet_impact(record, &mut out),
         Measure::StandingWave => standing_wave(record, &mut out),
         Measure::Hydrostatic => hydrostatic(record, &mut out),
         Measure::TaylorGreen => taylor_green(record, &mut out),
@@ -401,6 +402,16 @@ fn block_impact(record: &Record<'_>, out: &mut Measured) {
     out.draw("height_2", levels[1].clone());
     out.draw("height_4", levels[3].clone());
     out.draw("pressure_1", pressure(0));
+}
+
+/// A wall that turns a jet of cross-section A takes all of its momentum, ρ A v² a second.
+fn jet_impact(record: &Record<'_>, out: &mut Measured) {
+    let scale = record.benchmark.scale;
+    let whole = DENSITY * scale.length.powi(2) * scale.speed.powi(2);
+    let force = over_time(&record.rows, |row| Some(row.force? / whole));
+    let steady = force.iter().filter(|(time, _)| *time > scale.after);
+    out.put("force_ratio", mean(steady.map(|(_, force)| *force)));
+    out.draw("force", force);
 }
 
 fn standing_wave(record: &Record<'_>, out: &mut Measured) {

@@ -3,6 +3,7 @@
 use glam::{DVec2, Vec3};
 
 use crate::{
+    cache::ProbeValues,
     domain::{
         particles::Particles,
         probe::{elevation, front, volume as volume_of},
@@ -33,6 +34,8 @@ pub(super) struct Row {
     pub(super) levels: Vec<Option<f64>>,
     /// At the probes of pressure, Pa.
     pub(super) pressures: Vec<Option<f64>>,
+    /// Along x at the probe of force, N; the start has none.
+    pub(super) force: Option<f64>,
     /// What the measure takes from the particles.
     pub(super) of_water: Vec<f64>,
 }
@@ -73,6 +76,7 @@ impl<'a> Record<'a> {
             speed: step.report.max_speed,
             levels: self.levels(&step.particles),
             pressures: step.pressures.clone(),
+            force: self.force(&step.looks),
             of_water: self.of_water(&step.particles),
         });
     }
@@ -96,6 +100,12 @@ impl<'a> Record<'a> {
             _ => None,
         });
         levels.map(|level| Some(level? - domain.min.y)).collect()
+    }
+
+    fn force(&self, looks: &ProbeValues) -> Option<f64> {
+        let mut probes = self.scene.probes.iter();
+        let probe = probes.position(|probe| matches!(probe.kind, ProbeKind::Force { .. }))?;
+        *looks.get(probe)?.first()?
     }
 
     /// Frames of a tenth of a second.

@@ -9,6 +9,7 @@ pub mod effects;
 mod grid;
 mod model;
 mod pressure;
+mod projection;
 mod rotation;
 mod solids;
 mod solver;
@@ -21,9 +22,10 @@ mod water;
 pub use grid::planes;
 pub use model::{Model, Step};
 pub use pressure::{Waters, density_source};
+pub use projection::Projected;
 pub use rotation::{grid_confinement, grid_curl};
 pub use solids::Solid;
-pub use solver::{Flip, Projected, Trace};
+pub use solver::{Flip, Trace};
 pub use sort::{Cloud, Sorted, Survey, assign_cells, reorder, survey};
 pub use to_grid::{Faces, Room, cut_cells, gather_faces};
 pub use to_particles::{
@@ -31,5 +33,5 @@ pub use to_particles::{
 };
 pub use wall_friction::{friction_rates, wall_friction};
 pub use water::{
-    Centers, find_buried, find_depth, find_excess, find_water, gather_centers, is_near_half,
+    Centers, find_buried, find_depth, find_excess, find_water, gather_centers, is_near_half, let_in,
 };

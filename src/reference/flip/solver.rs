@@ -4,10 +4,12 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::{
     Centers, Cloud, Faces, Given, Model, Room, Sorted, Waters, advect, aim, assign_cells,
-    cut_cells, density_source,
-    effects::{self, Water},
+    cut_cells,
+    effects::{self, Flying, Water},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
-    gather_faces, grid_to_particle, push_apart, reorder, survey, wall_friction,
+    gather_faces, grid_to_particle, let_in,
+    projection::{Projected, project},
+    push_apart, reorder, survey, wall_friction,
 };
 use crate::{
     domain::{
@@ -16,13 +18,10 @@ use crate::{
         budget::Breach,
         gauge::Gauge,
         particles::Particles,
-        poisson::{FLUID, System},
+        poisson::FLUID,
         solver::{Projection, Seen, Solver, Span, StepReport, Watch},
     },
-    reference::{
-        ReferenceError, Timings,
-        poisson::{self, gradients::Solution},
-    },
+    reference::{ReferenceError, Timings},
     scene::{
         Scene,
         flip::{AFFINE, Transfer},
@@ -49,23 +48,8 @@ struct Field {
     is_buried: Vec<bool>,
     /// Pa, by element.
     pressure: Vec<f64>,
-}
-
-/// What the pressure of a substep did.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Projected {
-    /// The rows.
-    pub system: System,
-    /// q of each, m/s; pascal after multiplication by ρ Δx / Δt.
-    pub solution: Solution,
-    /// Of the density correction's displacements, where there is one; metres.
-    pub correction: Option<Solution>,
-    /// Bodies of water that no air touches.
-    pub pockets: u32,
-    /// Largest |mean of ∇·u| over one of them, 1/s.
-    pub incompatible: f64,
-    /// Largest |∇·u| in a row's cell before and after, 1/s.
-    pub divergence: [f64; 2],
+    /// See [`Gauge::taken`].
+    taken: Vec<[f32; 3]>,
 }
 
 /// A substep from its beginning to its end, with all that stood between.
@@ -95,10 +79,6 @@ pub struct Trace {
     pub capped: u64,
 }
 
-fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |most, value| most.max(value.abs()))
-}
-
 impl Flip {
     /// Of a scene that FLIP solves, and its solids. Pressures are those of conjugate gradients, which come as near to
     /// the system's solution as a factor does, in a tenth of its time.
@@ -113,7 +93,7 @@ impl Flip {
         }
     }
 
-    /// Solves by sparse Cholesky factors of up to so many bytes from now on; see [`poisson::BUDGET`].
+    /// Solves by sparse Cholesky factors of up to so many bytes from now on; see [`crate::reference::poisson::BUDGET`].
     pub fn set_factor_budget(&mut self, bytes: u64) {
         self.factor_budget = bytes;
     }
@@ -165,13 +145,20 @@ impl Flip {
             ..
         } = self;
         let step = model.step(substep);
-        let (bricks, sorted) = timings.time("flip/reorder", || {
+        let (bricks, mut sorted) = timings.time("flip/reorder", || {
             let bricks = model.bricks(is_wet, &step);
             let cell = assign_cells(model, &bricks, &cloud.position);
             let sorted = reorder(&bricks, cloud, &cell);
             (bricks, sorted)
         });
         let mut room = timings.time("flip/cut_cells", || cut_cells(model, &step, &bricks));
+        let flying = Flying {
+            model,
+            step: &step,
+            bricks: &bricks,
+            kind: &room.kind,
+        };
+        effects::on_particles(&model.scene.effects, flying, &mut sorted, timings);
         let mut faces = timings.time("flip/gather_faces", || {
             gather_faces(model, &step, &bricks, &sorted, &room)
         });
@@ -187,10 +174,17 @@ impl Flip {
             )
         });
         room.kind = kind;
-        let excess = match model.settings().density_correction {
+        let mut excess = match model.settings().density_correction {
             true => timings.time("flip/find_excess", || find_excess(&bricks, &room, &density)),
             false => Vec::new(),
         };
+        if model.scene.has_inlets() {
+            timings.time("flip/let_in", || {
+                let inlets = model.scene.inlets(step.start, step.length);
+                let size = model.cell_size();
+                let_in(&inlets, size, &bricks, &mut room, &density, &mut excess);
+            });
+        }
         let centers = Centers {
             density,
             excess,
@@ -208,7 +202,7 @@ impl Flip {
             room: &room,
             old: &faces.change,
         };
-        effects::apply(&model.scene.effects, water, &mut faces.velocity, timings);
+        effects::on_faces(&model.scene.effects, water, &mut faces.velocity, timings);
         let waters = Waters::new(model, &bricks, &room, &centers);
         let (projected, displacement) = project(
             model,
@@ -288,11 +282,13 @@ impl Flip {
             substep.length,
         )?;
         let step = self.model.step(substep);
+        let taken = |change: &DVec3| (-*change / substep.length).as_vec3().to_array();
         self.field = Some(Field {
             is_buried: find_buried(&step, &trace.bricks, &trace.room),
             bricks: trace.bricks.clone(),
             kind: trace.room.kind.clone(),
             pressure: trace.pressure.clone(),
+            taken: trace.faces.change.iter().map(taken).collect(),
         });
         Ok(trace)
     }
@@ -315,7 +311,7 @@ impl Flip {
             return Err(breach.in_substep(number).into());
         }
         let mut trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
-        add(all, &trace.projected);
+        trace.projected.add_to(all);
         let work = self.model.boundary_work(&trace, substep.length);
         let order = by_id(&trace.sorted.cloud);
         let step = self.model.step(substep);
@@ -364,7 +360,7 @@ impl Flip {
             report.boundary_work += self.model.boundary_work(&trace, substep.length);
             report.iterations += u64::from(trace.projected.solution.iterations);
             report.capped += trace.capped;
-            add(&mut all, &trace.projected);
+            trace.projected.add_to(&mut all);
             let span = Span {
                 start: start + elapsed,
                 end: start + (elapsed + substep.length),
@@ -395,6 +391,8 @@ impl Flip {
             kind: &field.kind,
             is_buried: &field.is_buried,
             pressure: &field.pressure,
+            taken: &field.taken,
+            density: self.model.scene.water.rest_density,
             rise: self.model.scene.water.rise(),
         })
     }
@@ -458,61 +456,6 @@ impl Model {
         let sum: f64 = cells.map(|(pressure, flux)| -pressure * flux).sum();
         self.cell_size().powi(2) * length * sum
     }
-}
-
-fn add(all: &mut Projection, projected: &Projected) {
-    all.residual = all.residual.max(projected.solution.residual);
-    let [before, after] = projected.divergence;
-    all.divergence_before = all.divergence_before.max(before);
-    all.divergence_after = all.divergence_after.max(after);
-    all.pockets = all.pockets.max(projected.pockets);
-    all.incompatible = all.incompatible.max(projected.incompatible);
-    all.dropped += projected.system.dropped.len() as u64;
-    let correction = projected.correction.iter().map(|s| u64::from(s.iterations));
-    all.correction_iterations += correction.sum::<u64>();
-}
-
-/// Makes the velocities free of divergence; what the solves did, and the density correction's displacements.
-fn project(
-    model: &Model,
-    timings: &mut Timings,
-    factor_budget: u64,
-    waters: &Waters<'_>,
-    centers: &Centers,
-    faces: &mut Faces,
-) -> Result<(Projected, Option<Vec<DVec3>>), ReferenceError> {
-    let system = timings.time("pressure/build_system", || waters.system());
-    let solver = timings.time("pressure/prepare", || {
-        poisson::Solver::new(&system, factor_budget)
-    })?;
-    let b = waters.divergence(&system, &faces.velocity);
-    let solution = timings.time("pressure/solve", || solver.solve(&b));
-    waters.project(
-        &waters.by_element(&system, &solution.x),
-        &mut faces.velocity,
-    );
-    let after = waters.divergence(&system, &faces.velocity);
-    let correction = model.settings().density_correction.then(|| {
-        let source = density_source(model, &system, centers);
-        timings.time("pressure/solve", || solver.solve(&source))
-    });
-    let displacement = (correction.as_ref())
-        .map(|correction| waters.displace(&waters.by_element(&system, &correction.x)));
-    let means = solver.pockets().iter().map(|pocket| {
-        let sum: f64 = pocket.iter().map(|&row| b[row as usize]).sum();
-        sum / pocket.len() as f64
-    });
-    let incompatible = largest(&means.collect::<Vec<_>>()) / model.cell_size();
-    let pockets = solver.pockets().len() as u32;
-    let projected = Projected {
-        divergence: [&b, &after].map(|b| largest(b) / model.cell_size()),
-        solution,
-        correction,
-        pockets,
-        incompatible,
-        system,
-    };
-    Ok((projected, displacement))
 }
 
 impl Solver for Flip {

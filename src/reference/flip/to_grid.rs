@@ -60,7 +60,12 @@ impl Hats {
     fn of(place: DVec3) -> Self {
         let least = DVec3::splat(LEAST_WEIGHT);
         Self {
-            face: [DVec3::ZERO, 1.0 - place + least, place + least],
+            // Rounding may have taken a place out of its cell.
+            face: [
+                DVec3::ZERO,
+                (1.0 - place).max(DVec3::ZERO) + least,
+                place.max(DVec3::ZERO) + least,
+            ],
             center: [
                 (0.5 - place).max(DVec3::ZERO) + least,
                 1.0 - (place - 0.5).abs() + least,

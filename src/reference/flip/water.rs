@@ -8,10 +8,13 @@ use super::{
     grid::{along, corner, neighborhood, per_cell},
     to_grid::hats,
 };
-use crate::domain::{
-    bricks::{Bricks, CELLS},
-    flip::{HALF, part_of_solids},
-    poisson::{AIR, FLUID, SOLID},
+use crate::{
+    domain::{
+        bricks::{Bricks, CELLS},
+        flip::{HALF, part_of_solids},
+        poisson::{AIR, FLUID, SOLID},
+    },
+    scene::sources::Inlet,
 };
 
 /// Of a cell's excess a substep corrects at most this much either way.
@@ -142,6 +145,34 @@ fn is_buried(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> boo
 pub fn find_buried(step: &Step<'_>, bricks: &Bricks, room: &Room) -> Vec<bool> {
     per_cell(bricks, |element| is_buried(step, bricks, room, element))
 }
+
+/// What entered where water was already makes room for itself: the projection lets as much flow out of such cells as they hold too
+/// much, and the density correction leaves it alone.
+pub fn let_in(
+    inlets: &[Inlet],
+    cell_size: f64,
+    bricks: &Bricks,
+    room: &mut Room,
+    density: &[f64],
+    excess: &mut [f64],
+) {
+    for element in CELLS..room.kind.len() as u32 {
+        let (e, cell) = (element as usize, bricks.cell(element));
+        let within = inlets.iter().filter(|inlet| inlet.contains(cell));
+        let rate = within.map(|inlet| inlet.rate).fold(0.0, f64::max);
+        if room.kind[e] != FLUID || rate == 0.0 {
+            continue;
+        }
+        let over = (density[e] - 1.0).clamp(0.0, MOST_OVER);
+        room.solid_flux[e] -= over * room.volume[e] * cell_size * rate;
+        if let Some(excess) = excess.get_mut(e) {
+            *excess = excess.min(0.0);
+        }
+    }
+}
+
+/// Of a cell's room that what entered may fill beyond it.
+const MOST_OVER: f64 = 1.0;
 
 /// Whether rounding of `error` may decide where the centre of a cell, or of one of those about it, lies.
 pub fn is_near_half(

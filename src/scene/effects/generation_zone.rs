@@ -22,7 +22,7 @@ use super::{
 };
 use crate::domain::{
     motion::{RegularWaves, Spectrum, wave_number},
-    open_waves::{OpenSea, OpenWaves},
+    open_waves::{Meeting, OpenSea, OpenWaves},
 };
 
 /// The effect's own key, and that of its waves.
@@ -62,6 +62,8 @@ pub enum Waves {
     Stokes(Regular),
     /// Those of a spectrum.
     Sea(Sea),
+    /// Those of a spectrum, of which the crests meet at a place and a time.
+    Focused(Packet),
 }
 
 /// Regular waves as a scene asks for them.
@@ -111,6 +113,38 @@ pub struct Sea {
     pub spreading: Option<f64>,
 }
 
+/// A packet as a scene asks for it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Packet {
+    /// Of the crest above still water by linear theory, metres.
+    pub height: f64,
+    /// Where crests meet: along x and z, metres.
+    pub at: [f64; 2],
+    /// When, seconds.
+    pub time: f64,
+    /// How the energy is spread over frequencies.
+    pub spectrum: Spectrum,
+    /// γ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_enhancement: Option<f64>,
+    /// Seconds.
+    pub peak_period: f64,
+    /// Of the shortest waves, seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shortest_period: Option<f64>,
+    /// Of the water at rest, metres.
+    pub depth: f64,
+    /// Seconds until the full height.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ramp: Option<f64>,
+    /// In which most of them go, from +x towards +z.
+    pub direction_degrees: f64,
+    /// s of the spread (cos ½θ)^2s over directions; without it all go one way.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spreading: Option<f64>,
+}
+
 impl Regular {
     fn asked(&self, gravity: f64) -> RegularWaves {
         let water = [self.height, self.period, self.depth, gravity];
@@ -122,7 +156,10 @@ impl Sea {
     fn asked(&self, gravity: f64) -> OpenSea {
         OpenSea {
             spectrum: self.spectrum,
-            significant_height: self.significant_height,
+            meeting: Meeting::Random {
+                significant_height: self.significant_height,
+                seed: self.seed,
+            },
             peak_period: self.peak_period,
             peak_enhancement: seas::peak_enhancement(self.spectrum, self.peak_enhancement),
             shortest_period: (self.shortest_period).unwrap_or(seas::SHORTEST * self.peak_period),
@@ -130,17 +167,54 @@ impl Sea {
             gravity,
             ramp: self.ramp.unwrap_or(seas::RAMP * self.peak_period),
             spreading: self.spreading,
-            seed: self.seed,
+        }
+    }
+}
+
+impl Packet {
+    fn asked(&self, gravity: f64) -> OpenSea {
+        OpenSea {
+            spectrum: self.spectrum,
+            meeting: Meeting::Focused {
+                height: self.height,
+                at: DVec2::from_array(self.at),
+                time: self.time,
+            },
+            peak_period: self.peak_period,
+            peak_enhancement: seas::peak_enhancement(self.spectrum, self.peak_enhancement),
+            shortest_period: (self.shortest_period).unwrap_or(seas::SHORTEST * self.peak_period),
+            depth: self.depth,
+            gravity,
+            ramp: self.ramp.unwrap_or(seas::RAMP * self.peak_period),
+            spreading: self.spreading,
         }
     }
 }
 
 impl Waves {
+    /// Of a spectrum, with the γ that the scene has; `None` of regular waves.
+    fn spectral(&self, gravity: f64) -> Option<(OpenSea, Option<f64>)> {
+        match self {
+            Self::Stokes(_) => None,
+            Self::Sea(sea) => Some((sea.asked(gravity), sea.peak_enhancement)),
+            Self::Focused(packet) => Some((packet.asked(gravity), packet.peak_enhancement)),
+        }
+    }
+
     /// Period, of a sea the peak's, seconds; the water's depth at rest, metres; direction, degrees.
     fn common(&self) -> [f64; 3] {
         match self {
             Self::Stokes(waves) => [waves.period, waves.depth, waves.direction_degrees],
             Self::Sea(sea) => [sea.peak_period, sea.depth, sea.direction_degrees],
+            Self::Focused(packet) => [packet.peak_period, packet.depth, packet.direction_degrees],
+        }
+    }
+
+    fn spreading(&self) -> Option<f64> {
+        match self {
+            Self::Stokes(_) => None,
+            Self::Sea(sea) => sea.spreading,
+            Self::Focused(packet) => packet.spreading,
         }
     }
 
@@ -157,38 +231,40 @@ impl Waves {
                 OpenWaves::regular(&waves.asked(gravity), DVec2::from_angle(direction))
             }
             Self::Sea(sea) => OpenWaves::sea(&sea.asked(gravity), direction),
+            Self::Focused(packet) => OpenWaves::sea(&packet.asked(gravity), direction),
         }
     }
 
     /// Refuses waves that no theory has, or that particles `spacing` metres apart cannot carry.
     fn check(&self, doc: &Document<'_>, gravity: f64, spacing: f64) -> Result<(), SceneError> {
-        let refuse = |key: &str, problem| Err(doc.fault_of(&format!("{WAVES}.{key}"), problem));
-        match self {
-            Self::Stokes(waves) => {
-                let asked = waves.asked(gravity);
-                regular_waves::check_stokes(doc, WAVES, &asked)?;
-                let length = TAU / asked.wave_number();
-                let period = format!("{WAVES}.period");
-                seas::check_spacings(doc, &period, [asked.period, length, spacing])?;
-            }
-            Self::Sea(sea) => {
-                seas::shape(doc, WAVES, sea.spectrum, sea.peak_enhancement)?;
-                let asked = sea.asked(gravity);
-                let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
-                seas::check_periods(doc, WAVES, periods, gravity)?;
-                let steepness = seas::check_height(
-                    asked.significant_height,
-                    asked.peak_period,
-                    [asked.depth, gravity],
-                );
-                if let Err(problem) = steepness {
-                    return refuse("significant_height", problem);
+        if let Self::Stokes(waves) = self {
+            let asked = waves.asked(gravity);
+            regular_waves::check_stokes(doc, WAVES, &asked)?;
+            let length = TAU / asked.wave_number();
+            let period = format!("{WAVES}.period");
+            seas::check_spacings(doc, &period, [asked.period, length, spacing])?;
+        }
+        if let Some((asked, enhancement)) = self.spectral(gravity) {
+            seas::shape(doc, WAVES, asked.spectrum, enhancement)?;
+            let periods = [asked.peak_period, asked.shortest_period, asked.ramp];
+            seas::check_periods(doc, WAVES, periods, gravity)?;
+            let (key, stands) = match asked.meeting {
+                Meeting::Random {
+                    significant_height, ..
+                } => {
+                    let water = [asked.depth, gravity];
+                    let stands = seas::check_height(significant_height, asked.peak_period, water);
+                    ("significant_height", stands)
                 }
-                let k = wave_number(TAU / asked.shortest_period, asked.depth, gravity);
-                let shortest = [asked.shortest_period, TAU / k, spacing];
-                let key = format!("{WAVES}.shortest_period");
-                seas::check_spacings(doc, &key, shortest)?;
-            }
+                Meeting::Focused { height, .. } => {
+                    ("height", seas::check_depth(height, asked.depth))
+                }
+            };
+            stands.map_err(|problem| doc.fault_of(&format!("{WAVES}.{key}"), problem))?;
+            let k = wave_number(TAU / asked.shortest_period, asked.depth, gravity);
+            let shortest = [asked.shortest_period, TAU / k, spacing];
+            let key = format!("{WAVES}.shortest_period");
+            seas::check_spacings(doc, &key, shortest)?;
         }
         check_speed(self.by(gravity).most_speed())
             .map_err(|problem| doc.fault_of_plain(WAVES, problem))
@@ -203,6 +279,51 @@ impl Settings {
             length: self.length,
             rate: RATE * TAU / self.waves.period(),
         }
+    }
+
+    /// Refuses a packet whose crests meet out of the domain, or before the slowest of its waves came from the nearest zone.
+    fn check_packet<'a>(
+        &self,
+        packet: &Packet,
+        doc: &Document<'_>,
+        from: impl Iterator<Item = &'a Wall>,
+        around: &Surroundings<'_>,
+    ) -> Result<(), SceneError> {
+        let refuse = |key: &str, problem| Err(doc.fault_of(&format!("{WAVES}.{key}"), problem));
+        let size = around.domain.size();
+        let at = DVec3::new(packet.at[0], 0.0, packet.at[1]);
+        if let Some(axis) = [0, 2]
+            .into_iter()
+            .find(|&axis| !(0.0..=size[axis]).contains(&at[axis]))
+        {
+            let problem = format!(
+                "{} m along {} from the domain's least corner, and the domain is {} m long",
+                shown(at[axis]),
+                ["x", "y", "z"][axis],
+                shown(size[axis])
+            );
+            return refuse("at", problem);
+        }
+        let direction = DVec2::from_angle(packet.direction_degrees.to_radians());
+        let way = |wall: &Wall| {
+            let off = match wall.is_max {
+                false => at[wall.axis],
+                true => size[wall.axis] - at[wall.axis],
+            };
+            let along = [direction.x, 0.0, direction.y][wall.axis].abs();
+            (off - self.length).max(0.0) / along
+        };
+        let way = from.map(way).fold(f64::INFINITY, f64::min);
+        let waves = self.incoming(around.gravity);
+        let (ramp, speed) = (waves.ramp(), waves.least_group_speed());
+        let least = ramp + way / speed;
+        if way.is_finite() && packet.time < least {
+            let problem = format!(
+                "its slowest waves, of {speed:.3} m/s, are there after {least:.3} s if they leave the zone when the ramp is over"
+            );
+            return refuse("time", problem);
+        }
+        Ok(())
     }
 
     /// What comes in, in a gravity, m/s².
@@ -257,6 +378,25 @@ impl Effect for Settings {
             let inward = if wall.is_max { -along } else { along };
             inward > 0.01
         };
+        for axis in [0, 2].into_iter().filter(|&axis| around.periodic[axis]) {
+            let across = if axis == 0 { direction.x } else { direction.y };
+            let name = ["x", "y", "z"][axis];
+            if self.waves.spreading().is_some() {
+                let problem = format!("spread waves do not fit the period along {name}");
+                return refuse("waves.spreading", problem);
+            }
+            if across.abs() > 1e-6 {
+                let problem = format!(
+                    "waves that go towards {} degrees do not fit the period along {name}",
+                    shown(degrees)
+                );
+                return refuse("waves.direction_degrees", problem);
+            }
+        }
+        if let Waves::Focused(packet) = &self.waves {
+            let walls = self.walls.iter().filter(|wall| comes_from(wall));
+            self.check_packet(packet, doc, walls, around)?;
+        }
         if !self.walls.iter().any(comes_from) {
             let problem = format!(
                 "waves that go towards {} degrees come from none of the walls",
@@ -279,6 +419,7 @@ impl Effect for Settings {
         let (height, crest) = match &self.waves {
             Waves::Stokes(waves) => (waves.height, 0.5 * waves.height),
             Waves::Sea(sea) => (sea.significant_height, CREST * sea.significant_height),
+            Waves::Focused(packet) => (packet.height, packet.height),
         };
         let [period, depth, _] = self.waves.common();
         Some(Made {
@@ -298,16 +439,20 @@ impl Effect for Settings {
 
 const SEA: &[&str] = &["sea"];
 
+const PACKET: &[&str] = &["focused"];
+
+const SPECTRAL: &[&str] = &["sea", "focused"];
+
 const SPECTRA: [&str; 3] = words(&Spectrum::NAMED);
 
 const WAVES_KEYS: &[Key] = &[
-    Key::choice("kind", &["stokes", "sea"])
-        .about("`stokes`: regular waves to second order (Stokes 1847); `sea`: 64 waves of a spectrum by linear theory"),
+    Key::choice("kind", &["stokes", "sea", "focused"])
+        .about("`stokes`: regular waves to second order (Stokes 1847); `sea`: 64 waves of a spectrum by linear theory; `focused`: such waves, whose crests meet"),
     Key::number("height", LENGTH)
         .unit("metres")
-        .only("kind", &["stokes"])
-        .also(", up to 0.78 depths and no steeper than waves can be")
-        .about("from trough to crest"),
+        .only("kind", &["stokes", "focused"])
+        .also(", at most the depth; regular waves up to 0.78 depths and no steeper than waves can be")
+        .about("of regular waves, from trough to crest; of a packet's crest above still water by linear theory"),
     Key::number("period", PERIOD)
         .unit("seconds")
         .only("kind", &["stokes"])
@@ -320,31 +465,41 @@ const WAVES_KEYS: &[Key] = &[
         .about("four times the root of the elevation's variance"),
     Key::number("peak_period", PERIOD)
         .unit("seconds")
-        .only("kind", SEA)
+        .only("kind", SPECTRAL)
         .about("of the waves with the most energy"),
     Key::choice("spectrum", &SPECTRA)
         .default("\"jonswap\"")
-        .only("kind", SEA)
+        .only("kind", SPECTRAL)
         .about("as a wave maker's"),
     Key::number("peak_enhancement", 1.0..=20.0)
         .computed(|| "3.3".to_owned())
-        .only("kind", SEA)
+        .only("kind", SPECTRAL)
         .also(", not with spectrum = \"pierson_moskowitz\"")
         .about("γ, how much higher the peak is than Pierson and Moskowitz's"),
     Key::number("shortest_period", PERIOD)
         .unit("seconds")
         .computed(|| "a third of the peak's".to_owned())
-        .only("kind", SEA)
+        .only("kind", SPECTRAL)
         .also(", a tenth to nine tenths of the peak's, of waves that are at least 10 particle spacings long")
         .about("of the shortest waves; what is left out is given to the others"),
     Key::number("spreading", 0.5..=1000.0)
         .absent()
-        .only("kind", SEA)
+        .only("kind", SPECTRAL)
         .about("s of the spread over directions, (cos ½θ)^2s (Longuet-Higgins, Cartwright and Smith 1963): wind seas about 10, swell 75; left out, all waves go one way"),
     Key::whole("seed", 0..=u32::MAX)
         .default("0")
         .only("kind", SEA)
         .about("another number makes another sea of the same spectrum"),
+    Key::vector("at", 2, 0.0..=1e6)
+        .unit("metres")
+        .only("kind", PACKET)
+        .also(", in the domain")
+        .about("where crests meet: x and z from the domain's least corner"),
+    Key::number("time", PERIOD)
+        .unit("seconds")
+        .only("kind", PACKET)
+        .also(", late enough for its slowest waves to be there")
+        .about("when they meet there"),
     Key::number("depth", LENGTH)
         .unit("metres")
         .also(", no more than the domain is high")
@@ -361,74 +516,4 @@ const WAVES_KEYS: &[Key] = &[
 ];
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    type Complex = DVec2;
-
-    /// What of the waves' height a zone of so many wave lengths gets wrong, and what of a wave that runs into it is turned back, in shallow
-    /// water, by the classical Runge–Kutta method on u″ + k² (1 + i r/ω) u = 0 from the wall to the zone's beginning. What is wrong is
-    /// as large as the waves at the wall and runs out of the zone, u′ = iku; what is turned back is 0 at the wall. Lengths are in 1/k.
-    fn wrong_and_turned_back(wave_lengths: f64, rate: f64) -> [f64; 2] {
-        let walls = [Wall {
-            axis: 0,
-            is_max: false,
-        }];
-        let zone = Zone {
-            walls: &walls,
-            length: TAU * wave_lengths,
-            rate,
-        };
-        let slope = |x: f64, [u, v]: [Complex; 2]| {
-            // Of a step so short that what is led is r Δt.
-            let r = zone.led(DVec3::splat(1e3), DVec3::splat(x), 1e-9) / 1e-9;
-            [v, -(u + r * u.perp())]
-        };
-        let run = |start: [Complex; 2]| {
-            let (steps, mut x, mut y) = (2000, 0.0, start);
-            let h = zone.length / f64::from(steps);
-            let add =
-                |y: [Complex; 2], by: f64, k: [Complex; 2]| [y[0] + by * k[0], y[1] + by * k[1]];
-            for _ in 0..steps {
-                let k1 = slope(x, y);
-                let k2 = slope(x + 0.5 * h, add(y, 0.5 * h, k1));
-                let k3 = slope(x + 0.5 * h, add(y, 0.5 * h, k2));
-                let k4 = slope(x + h, add(y, h, k3));
-                let sum = |i: usize| k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i];
-                y = [y[0] + h / 6.0 * sum(0), y[1] + h / 6.0 * sum(1)];
-                x += h;
-            }
-            y
-        };
-        // 1 and 0, then 0 and 1, for u and u′ at the wall.
-        let one = run([Complex::X, Complex::ZERO]);
-        let other = run([Complex::ZERO, Complex::X]);
-        // (one + c other)′ = i (one + c other).
-        let off = |y: [Complex; 2]| y[0].perp() - y[1];
-        let (top, bottom) = (off(one), -off(other));
-        let c = Complex::new(bottom.x, -bottom.y).rotate(top) / bottom.length_squared();
-        let wrong = (one[0] + c.rotate(other[0])).length();
-        // 2a = u − iu′ and 2b = u + iu′ but for their phases.
-        let [u, v] = other;
-        let (a, b) = ((u - v.perp()).length(), (u + v.perp()).length());
-        [wrong, a.min(b) / a.max(b)]
-    }
-
-    #[test]
-    fn waves_in_shallow_water_are_as_right_as_documented() {
-        for (rate, wave_lengths, expected) in [
-            (RATE, 1.5, [0.012, 0.006]),
-            (RATE, 1.0, [0.059, 0.041]),
-            (2.5, 1.5, [0.046, 0.001]),
-            (2.5, 1.0, [0.140, 0.018]),
-            (6.0, 1.5, [0.003, 0.020]),
-            (6.0, 1.0, [0.023, 0.073]),
-        ] {
-            let found = wrong_and_turned_back(wave_lengths, rate);
-            for (found, expected) in found.into_iter().zip(expected) {
-                let off = (found - expected).abs();
-                assert!(off < 6e-4, "{rate} {wave_lengths}: {found} {expected}");
-            }
-        }
-    }
-}
+mod tests;

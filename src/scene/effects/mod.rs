@@ -39,6 +39,16 @@ pub(super) trait Effect {
         0.0
     }
 
+    /// How it makes particles faster.
+    fn push(&self) -> Push {
+        Push::default()
+    }
+
+    /// What of it is hardly meant among particles so far apart, metres, with its key first.
+    fn lint(&self, _spacing: f64) -> Option<String> {
+        None
+    }
+
     /// Zones in which waves die.
     fn absorbs(&self) -> Option<Absorbs<'_>> {
         None
@@ -55,6 +65,22 @@ pub(super) trait Effect {
     }
 }
 
+/// Makes particles faster.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Push {
+    /// By no more than this, m/s².
+    pub(super) acceleration: f64,
+    /// And by no more than this in all, m/s.
+    pub(super) speed: f64,
+}
+
+impl Push {
+    /// The most that a particle gains in so many seconds, m/s.
+    pub(super) fn gained(self, seconds: f64) -> f64 {
+        (self.acceleration * seconds).min(self.speed)
+    }
+}
+
 /// Zones in which waves die.
 pub(super) struct Absorbs<'a> {
     pub(super) zone: Zone<'a>,
@@ -67,7 +93,7 @@ pub(super) struct Absorbs<'a> {
 /// Gives the list of effects, in the order in which they act, to a macro.
 macro_rules! with_effects {
     ($callback:ident) => {
-        $callback! { viscosity, vorticity_confinement, absorbing_zone, generation_zone }
+        $callback! { viscosity, vorticity_confinement, drag, absorbing_zone, generation_zone }
     };
 }
 pub(crate) use with_effects;
@@ -109,6 +135,24 @@ macro_rules! effects {
                 let mut blends = Vec::new();
                 $(blends.extend(self.$name.as_ref().map(Effect::blend));)+
                 blends
+            }
+
+            /// How the named effects make particles faster, all at once.
+            pub(super) fn push(&self) -> Push {
+                let mut all = Push::default();
+                $(
+                    let push = self.$name.as_ref().map(Effect::push).unwrap_or_default();
+                    all.acceleration += push.acceleration;
+                    all.speed += push.speed;
+                )+
+                all
+            }
+
+            /// What of the named effects is hardly meant among particles so far apart, metres.
+            pub(super) fn lints(&self, spacing: f64) -> Vec<String> {
+                let mut lints = Vec::new();
+                $(lints.extend(self.$name.as_ref().and_then(|settings| settings.lint(spacing)));)+
+                lints
             }
 
             /// Zones of the named effects in which waves die, by the effect's name.

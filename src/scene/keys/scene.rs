@@ -25,6 +25,8 @@ pub(in super::super) const KEYS: &[Key] = &[
         .about("The water and where it is at the start"),
     Key::tables("solid", SOLID).about("What the water meets: meshes, at rest or in motion"),
     Key::tables("wave_maker", WAVE_MAKER).about("Walls of the domain that move inward"),
+    Key::tables("emitter", EMITTER).about("Where water enters while the shot runs"),
+    Key::tables("drain", DRAIN).about("Where water leaves while the shot runs; before any enters"),
     Key::table("solver", SOLVER)
         .about("Which solver, and the settings of each; both tables may stand"),
     Key::table("grids", GRIDS)
@@ -197,6 +199,65 @@ const WAVE_MAKER: &[Key] = &[
     Key::inline("motion", WALL_MOTION)
         .also(", that leaves at least two particle spacings (PBF) or three cells (FLIP) between the walls")
         .about("How far inward the wall has come"),
+];
+
+const ROOM_MIN: Key = Key::vector("min", 3, COORDINATE)
+    .unit("metres")
+    .without(&["mesh"])
+    .also(", in the domain and below max")
+    .about("least corner of its room, where that is a box");
+const ROOM_MAX: Key = Key::vector("max", 3, COORDINATE)
+    .unit("metres")
+    .without(&["mesh"])
+    .also(", in the domain and above min")
+    .about("greatest corner");
+const ROOM_MESH: Key = Key::inline("mesh", WATER_MESH)
+    .absent()
+    .without(&["min", "max"])
+    .about("A mesh that is its room, where that is no box");
+const FROM: Key = Key::number("from", 0.0..=1e9)
+    .unit("s")
+    .default("0.0")
+    .about("it acts at the ends of frames after this time");
+const UNTIL: Key = Key::number("until", 0.0..=1e9)
+    .unit("s")
+    .absent()
+    .also(", after from")
+    .about("and not after this one");
+
+const EMITTER: &[Key] = &[
+    ROOM_MIN,
+    ROOM_MAX,
+    ROOM_MESH,
+    Key::vector("velocity", 3, VECTOR)
+        .unit("m/s")
+        .default("[0.0, 0.0, 0.0]")
+        .also(", by which water goes no farther in a frame than the room is long; not 0 without a level")
+        .about("of the water that enters, and without a level how much does: velocity × the room's cross-section"),
+    Key::number("level", COORDINATE)
+        .unit("metres")
+        .absent()
+        .also(", within the room; only with gravity along -y")
+        .about("height up to which the room is kept full, whatever the velocity is"),
+    FROM,
+    UNTIL,
+];
+
+const DRAIN: &[Key] = &[
+    ROOM_MIN,
+    ROOM_MAX,
+    ROOM_MESH,
+    Key::number("level", COORDINATE)
+        .unit("metres")
+        .absent()
+        .also(", within the room; only with gravity along -y")
+        .about("height below which water stays"),
+    Key::number("rate", 1e-18..=1e12)
+        .unit("m³/s")
+        .absent()
+        .about("the most that leaves; without it, all that is in the room at a frame's end"),
+    FROM,
+    UNTIL,
 ];
 
 const WALLS: [&str; 6] = words(&Wall::NAMED);

@@ -24,6 +24,11 @@ mesh = "cube.obj"
 [[wave_maker]]
 wall = "-x"
 motion = { kind = "sine", stroke = 0.5, period = 2.0 }
+[[emitter]]
+mesh = { file = "room.obj" }
+level = 0.5
+[[drain]]
+mesh = { file = "room.obj" }
 [solver]
 method = "pbf"
 [solver.pbf]
@@ -41,7 +46,10 @@ const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 
 
 fn load(set: &[&str]) -> Scene {
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
+    let room = CUBE.replace("v 0", "v 2").replace("v 1", "v 3");
+    for (file, text) in [("cube.obj", CUBE), ("room.obj", &room)] {
+        std::fs::write(folder.path().join(file), text).expect("written");
+    }
     let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
     Scene::parse(LEAST, Path::new("least.toml"), folder.path(), &set).expect("the least is enough")
 }
@@ -74,7 +82,8 @@ fn what_is_left_out_is_the_default_of_the_table() {
     let chebyshev = load(&["solver.pbf.iteration=chebyshev"]).written(&|_, _| "a.obj".to_owned());
     let written = load(&[]).written(&|_, _| "a.obj".to_owned());
     let zone = "effects.generation_zone={walls=[\"-x\"],length=1.0,waves={kind=\"sea\",significant_height=0.1,peak_period=3.0,depth=1.0}}";
-    let sea = load(&[SEA, "wave_maker.0.wall=+x", zone]).written(&|_, _| "a.obj".to_owned());
+    let drag = "effects.drag={drop_radius=0.001}";
+    let sea = load(&[SEA, "wave_maker.0.wall=+x", zone, drag]).written(&|_, _| "a.obj".to_owned());
     let mut compared = BTreeSet::new();
     for path in paths(SCENE) {
         let key = find(SCENE, &path).expect("a key");
@@ -145,7 +154,15 @@ fn what_is_no_physics_is_said_once() {
         "budget",
     ];
     assert_eq!(of(Physics::No), free);
-    assert_eq!(of(Physics::ByHash), ["water.mesh.file", "solid.mesh"]);
+    assert_eq!(
+        of(Physics::ByHash),
+        [
+            "water.mesh.file",
+            "solid.mesh",
+            "emitter.mesh.file",
+            "drain.mesh.file"
+        ]
+    );
 }
 
 #[test]

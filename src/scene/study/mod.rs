@@ -269,7 +269,7 @@ mod tests {
         }
         assert_eq!(
             (comparisons, sweeps, stabilities, validations),
-            (2, 11, 1, 2)
+            (2, 12, 1, 2)
         );
     }
 }

@@ -18,5 +18,6 @@ fn absorption(name: &'static str, settings: &Settings, scene: &Scene) -> Additio
     Addition {
         passes: vec![pass(name, &constants(settings.zone(), scene))],
         buffers: Vec::new(),
+        ..Addition::default()
     }
 }

@@ -30,6 +30,7 @@ fn generation(name: &'static str, settings: &Settings, scene: &Scene) -> Additio
     Addition {
         passes: vec![pass(name, &constants)],
         buffers: vec![OPEN_WAVES.sized(2 * count)],
+        ..Addition::default()
     }
 }
 

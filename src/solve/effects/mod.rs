@@ -1,7 +1,7 @@
 //! What each effect adds to a solver: a file an effect, for both.
 //!
 //! Its passes bind buffers by name and run in order: of PBF after the velocity update, of FLIP on the grid before the
-//! projection.
+//! projection, or on the particles before the grid.
 
 mod zone;
 
@@ -15,8 +15,17 @@ use crate::{
 pub struct Addition {
     /// In the order in which they run, with their own constants.
     pub passes: Vec<PassSpec>,
+    /// Of FLIP on the sorted particles, before the grid is given their velocities; over cells of water.
+    pub on_particles: Vec<PassSpec>,
     /// Beyond what the solver has anyway.
     pub buffers: Vec<BufferSpec>,
+}
+
+impl Addition {
+    /// Every pass.
+    pub(super) fn all(&self) -> impl Iterator<Item = &PassSpec> {
+        self.passes.iter().chain(&self.on_particles)
+    }
 }
 
 /// An effect's pass with its constants.

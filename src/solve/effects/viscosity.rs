@@ -19,6 +19,7 @@ pub(super) fn pbf(settings: &Settings, _: &Scene, particles: usize) -> Addition 
             pass("effects/viscosity_apply", &[]),
         ],
         buffers: vec![CHANGE.sized(particles)],
+        ..Addition::default()
     }
 }
 

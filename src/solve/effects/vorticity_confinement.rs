@@ -35,5 +35,6 @@ fn confinement([curl, force]: [&'static str; 2], settings: &Settings, count: usi
             pass(force, &[("STRENGTH", settings.strength)]),
         ],
         buffers: vec![VORTICITY.sized(count)],
+        ..Addition::default()
     }
 }

@@ -6,7 +6,7 @@
 use crate::{
     domain::bricks::Brick,
     gpu::buffer::{Buf, Windows, Workgroups},
-    solve::params::{FlipParams, SolidGrids, SurveyHead},
+    solve::params::{FlipParams, Inlets, SolidGrids, SurveyHead},
 };
 
 pub use crate::solve::buffers::*;
@@ -62,5 +62,7 @@ pub const LIQUID_DISTANCE: Buf<f32> = Buf::new("liquid_distance");
 pub const OPEN_VOLUME: Buf<f32> = Buf::new("open_volume");
 /// Planes: velocity of what closes a face, m/s; with solids that move alone.
 pub const CLOSED_VELOCITY: Buf<f32> = Buf::new("closed_velocity");
+/// Rooms in which water enters; with emitters that have a velocity alone.
+pub const INLETS: Buf<Inlets> = Buf::uniform("inlets");
 /// Where the nodes of all solids stand, and how they move.
 pub const SOLID_GRIDS: Buf<SolidGrids> = Buf::uniform("solid_grids");

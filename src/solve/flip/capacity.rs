@@ -1,4 +1,4 @@
-//! Which bricks a state takes.
+//! Which bricks a state takes, and room for other counts.
 
 use crate::{
     domain::{
@@ -6,9 +6,15 @@ use crate::{
         flip::{layers, stored_cells},
         particles::Particles,
     },
-    scene::Scene,
-    solve::{plan::Capacity, pressure::LEVELS},
+    scene::{Scene, step::Substep},
+    solve::{
+        SolveError,
+        plan::{Capacity, Counts},
+        pressure::LEVELS,
+    },
 };
+
+use super::{Flip, PARAMS, plan, pressure_solver, recordings, step, upload_constants};
 
 /// No flag set, one a brick of the domain.
 pub(super) fn no_water(scene: &Scene, grid_dims: [u32; 3]) -> Vec<bool> {
@@ -43,4 +49,38 @@ pub fn capacity(scene: &Scene, particles: &Particles) -> Capacity {
     }
     // As deep as layers of a first step reach that is not yet fast.
     capacity_of(&bricks(scene, grid_dims, &is_wet, layers(1.0)))
+}
+
+/// For the first survey, which reads what does not depend on the substep.
+pub(super) fn whole_frame(scene: &Scene) -> Substep {
+    Substep {
+        start: 0.0,
+        length: scene.shot.frame_seconds(),
+        displacement: 0.0,
+    }
+}
+
+impl Flip {
+    /// Makes room for other counts.
+    pub(super) fn refit(&mut self, counts: Counts) -> Result<(), SolveError> {
+        self.plan = plan::plan(&self.scene, counts, self.plan.moves);
+        let (buffers, passes) = (self.plan.buffer_specs(), self.plan.pass_specs());
+        self.program.refit(&buffers, &passes)?;
+        upload_constants(&self.program, &self.plan, &self.scene);
+        self.recordings = recordings(&self.program, &self.plan, &self.scene);
+        self.pressure = pressure_solver(&self.scene, &self.plan);
+        Ok(())
+    }
+
+    /// Makes room for so many particles.
+    pub(super) fn resize(&mut self, particles: usize) -> Result<(), SolveError> {
+        self.refit(Counts {
+            particles,
+            ..self.plan.counts
+        })?;
+        let frame = whole_frame(&self.scene);
+        let params = step::params(&self.scene, &self.plan, &self.bricks, &frame);
+        self.program.upload(PARAMS, 0, &[params]);
+        Ok(())
+    }
 }

@@ -45,12 +45,12 @@ use super::{
     params::Counters,
     plan::{Counts, Plan},
     pressure::{self, PressureSolver},
-    state::{check_finite, check_ids, slots_by_id, take_over, upload},
+    state::{check_finite, check_ids, is_other_count, slots_by_id, take_over, upload},
     trace::{Begun, Observe, Run, Span, TraceFrame, trace},
 };
 use buffers::*;
 pub use capacity::capacity;
-use capacity::{bricks, capacity_of, no_water};
+use capacity::{bricks, capacity_of, no_water, whole_frame};
 use record::{Commands, Recordings, groups, numbers};
 pub(super) use totals::FrameTotals;
 
@@ -70,6 +70,8 @@ pub struct Flip {
     bricks: Bricks,
     /// The walls that cut its cells, in cells.
     cut: Bounds,
+    /// Its length, s.
+    step: f64,
 }
 
 /// What `flip/survey` found.
@@ -97,12 +99,7 @@ impl Flip {
         boundary.upload_distance(&program, scene);
         upload_constants(&program, &plan, scene);
         let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
-        // The first survey reads what does not depend on the substep.
-        let frame = Substep {
-            start: 0.0,
-            length: scene.shot.frame_seconds(),
-            displacement: 0.0,
-        };
+        let frame = whole_frame(scene);
         program.upload(PARAMS, 0, &[step::params(scene, &plan, &bricks, &frame)]);
         Ok(Self {
             recordings: recordings(&program, &plan, scene),
@@ -110,6 +107,7 @@ impl Flip {
             timer: is_timed.then(|| Timer::new(context)),
             bricks,
             cut: step::cut(scene, &frame),
+            step: frame.length,
             program,
             plan,
             scene: scene.clone(),
@@ -211,27 +209,26 @@ impl Flip {
         let needed = capacity_of(&self.bricks);
         let grown = self.plan.counts.bricks.grown(needed);
         if grown != self.plan.counts.bricks {
-            let counts = Counts {
+            self.refit(Counts {
                 bricks: grown,
                 ..self.plan.counts
-            };
-            self.plan = plan::plan(&self.scene, counts, self.plan.moves);
-            let (buffers, passes) = (self.plan.buffer_specs(), self.plan.pass_specs());
-            self.program.refit(&buffers, &passes)?;
-            upload_constants(&self.program, &self.plan, &self.scene);
-            self.recordings = recordings(&self.program, &self.plan, &self.scene);
-            self.pressure = pressure_solver(&self.scene, &self.plan);
+            })?;
         }
         let bricks = &self.bricks;
         let params = step::params(&self.scene, &self.plan, bricks, substep);
         let groups = groups(&self.program, &self.scene, &params, layers);
         self.cut = step::cut(&self.scene, substep);
+        self.step = substep.length;
         self.program.upload(PARAMS, 0, &[params]);
         self.program.upload(BRICKS, 0, &bricks.records);
         self.program.upload(BRICK_SLOT, 0, &bricks.table);
         self.program.upload(GROUPS, 0, &groups);
         if let Some(movers) = &self.movers {
             movers.upload(&self.program, &self.scene, substep.start, substep.length);
+        }
+        if self.scene.has_inlets() {
+            let inlets = step::inlets(&self.scene, substep);
+            self.program.upload(INLETS, 0, &[inlets]);
         }
         effects::upload(&self.program, &self.scene, substep.start);
         Ok(())
@@ -345,7 +342,7 @@ impl Flip {
 
     /// Whether all that the substep left is finite; then the work over Δx² Δt that was done in it, W/m².
     fn watched(&self, substep: u32) -> Result<f64, SolveError> {
-        let groups = match self.scene.has_movers() {
+        let groups = match self.scene.is_worked_on() {
             true => self.bricks.wet as usize * (CELLS / 64) as usize,
             false => 0,
         };
@@ -448,12 +445,8 @@ impl Solver for Flip {
     type Error = SolveError;
 
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), SolveError> {
-        let planned = self.plan.counts.particles;
-        if particles.len() != planned {
-            return Err(SolveError::Count {
-                planned,
-                given: particles.len(),
-            });
+        if is_other_count(&self.scene, self.plan.counts.particles, particles)? {
+            self.resize(particles.len())?;
         }
         self.state = particles.clone();
         self.frame = frame;

@@ -101,7 +101,7 @@ fn buffers(plan: &Plan, scene: &Scene) -> Table {
     let mut table = Table::default();
     particles(plan, scene, &mut table);
     bricks(plan, scene, &mut table);
-    if scene.has_movers() {
+    if scene.is_worked_on() {
         let cells = plan.counts.bricks.wet * CELLS as usize;
         table.add("budget", BOUNDARY_WORK.sized(cells / 64));
     }
@@ -167,6 +167,9 @@ fn bricks(plan: &Plan, scene: &Scene, table: &mut Table) {
         } else {
             table.add("solids", SOLID_GRID.sized(1));
         }
+    }
+    if scene.has_inlets() {
+        table.add("emitters", INLETS.sized(1));
     }
     let layers = layers(flip.cfl);
     table.add("flip", PARAMS.sized(1));

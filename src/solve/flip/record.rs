@@ -145,6 +145,12 @@ fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> 
     commands.extend(sort::SORT_PASSES.map(|pass| Command::over(pass, n)));
     commands.push(Command::over("flip/reorder", n));
     commands.push(over("flip/cut_cells", ACTIVE));
+    for pass in effects
+        .iter()
+        .flat_map(|(_, addition)| &addition.on_particles)
+    {
+        commands.push(over(pass.name, WET));
+    }
     for axis in 0..3 {
         commands.push(along("flip/spread_faces", WET, axis));
         commands.push(along("flip/gather_faces", ACTIVE, axis));
@@ -154,6 +160,9 @@ fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> 
     commands.push(over("flip/find_water", ACTIVE));
     if scene.solver.flip().density_correction {
         commands.push(over("flip/find_excess", ACTIVE));
+    }
+    if scene.has_inlets() {
+        commands.push(over("flip/let_in", ACTIVE));
     }
     if !scene.no_slip.is_empty() {
         commands.push(over(WALL_FRICTION, ACTIVE));
@@ -176,7 +185,7 @@ fn watch(plan: &Plan, scene: &Scene) -> Vec<Command> {
     };
     let watched = plan.buffers.iter().filter(|buffer| buffer.is_watched);
     let mut commands: Vec<Command> = watched.map(look).collect();
-    if scene.has_movers() {
+    if scene.is_worked_on() {
         commands.push(over("flip/boundary_work", WET));
     }
     commands

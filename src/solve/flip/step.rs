@@ -7,7 +7,10 @@ use crate::{
         flip::{CAP, CONTACT, stored_cells},
     },
     scene::{Scene, step::Substep},
-    solve::{params::FlipParams, plan::Plan},
+    solve::{
+        params::{FlipParams, Inlets},
+        plan::Plan,
+    },
 };
 
 /// The walls that cut a substep's cells, in cells.
@@ -53,4 +56,17 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
         apart_from_walls: flip.apart_from_walls() as f32,
         padding: [0; 2],
     }
+}
+
+/// Rooms in which water enters, as the passes know them.
+pub(super) fn inlets(scene: &Scene, step: &Substep) -> Inlets {
+    let mut inlets = Inlets::default();
+    let all = scene.inlets(step.start, step.length);
+    for (k, inlet) in all.into_iter().enumerate() {
+        inlets.low[k][..3].copy_from_slice(&inlet.low);
+        inlets.high[k][..3].copy_from_slice(&inlet.high);
+        inlets.rate[k][0] = inlet.rate as f32;
+        inlets.count += 1;
+    }
+    inlets
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{
     super::{SolveError, pressure, state::look, trace::Run},
-    CELL_KIND, Flip, FrameTotals, OPEN_VOLUME,
+    CELL_KIND, FACE_CHANGE, Flip, FrameTotals, OPEN_VOLUME,
 };
 use crate::domain::{
     bricks::CELLS,
@@ -78,6 +78,8 @@ impl Flip {
             kind: &kind,
             is_buried: &self.find_buried()?,
             pressure: &pressure,
+            taken: &self.taken()?,
+            density: self.scene.water.rest_density,
             rise: self.scene.water.rise(),
         };
         let origin = self.scene.domain.min;
@@ -85,6 +87,15 @@ impl Flip {
             .iter()
             .map(|one| look(&gauge, place(one) - origin, one))
             .collect())
+    }
+
+    /// See [`Gauge::taken`].
+    fn taken(&self) -> Result<Vec<[f32; 3]>, SolveError> {
+        let stride = self.plan.counts.bricks.slots * CELLS as usize;
+        let change: Vec<f32> = self.field(FACE_CHANGE, 3 * stride)?;
+        let step = self.step as f32;
+        let of = |element: usize| [0, 1, 2].map(|axis| -change[axis * stride + element] / step);
+        Ok((0..self.elements()).map(of).collect())
     }
 
     /// Whether each element's centre lies within a wall or a solid, of the last substep.

@@ -33,8 +33,8 @@ use crate::{
 use super::{
     SolveError, effects,
     params::{Counters, IterationControl, Params},
-    plan::Plan,
-    state::{check_finite, check_ids, look, slots_by_id, take_over, upload},
+    plan::{Counts, Plan, device_limits},
+    state::{check_finite, check_ids, is_other_count, look, slots_by_id, take_over, upload},
     trace::{Begun, Observe, Run, Span, TraceFrame, Traced, trace},
 };
 use buffers::*;
@@ -54,6 +54,8 @@ pub struct Pbf {
     substep: Recording,
     measure: Recording,
     grid: Option<Grid>,
+    /// Where water enters or leaves: what is uploaded anew for another count of particles.
+    boundary: Option<Boundary>,
     timer: Option<Timer>,
     state: Particles,
     frame: u32,
@@ -103,6 +105,26 @@ pub(super) fn params(
     }
 }
 
+/// Uploads what does not change from substep to substep; the recordings of a substep and of a frame's end.
+fn set_up(
+    program: &Program,
+    plan: &Plan,
+    scene: &Scene,
+    boundary: &Boundary,
+    calibration: &Calibration,
+) -> [Recording; 2] {
+    let particles = plan.counts.particles;
+    let effects = effects::of_pbf(scene, particles);
+    let commands = Commands::new(plan, scene, &effects);
+    program.upload_windows(&PHASES, &commands.phases);
+    sort::upload_lengths(program, &CELL_START, cell_count(plan));
+    program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
+    let last = 2 * particles + plan.counts.boundary_samples;
+    program.upload(PREDICTED, last, &[NOBODY]);
+    boundary.upload(program, scene, plan, calibration);
+    [&commands.substep, &commands.measure].map(|commands| Recording::new(program, commands))
+}
+
 impl Pbf {
     /// Builds what `plan` names, and nothing more. It must have been made for `scene` and `boundary`.
     ///
@@ -115,23 +137,13 @@ impl Pbf {
         boundary: &Boundary,
         is_timed: bool,
     ) -> Result<Self, SolveError> {
-        let counts = plan.counts;
-        let particles = counts.particles;
         let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
         let program = Program::new(context, &buffers, &passes, &SHARED_CONSTANTS)?;
         let pbf = scene.solver.pbf();
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
-        let effects = effects::of_pbf(scene, particles);
-        let commands = Commands::new(&plan, scene, &effects);
-        let substep = Recording::new(&program, &commands.substep);
-        let measure = Recording::new(&program, &commands.measure);
-        program.upload_windows(&PHASES, &commands.phases);
-        sort::upload_lengths(&program, &CELL_START, cell_count(&plan));
-        program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
-        let last = 2 * particles + counts.boundary_samples;
-        program.upload(PREDICTED, last, &[NOBODY]);
-        boundary.upload(&program, scene, &plan, &calibration);
+        let [substep, measure] = set_up(&program, &plan, scene, boundary, &calibration);
         Ok(Self {
+            boundary: scene.has_sources().then(|| boundary.clone()),
             grid: Grid::of(context, scene, &plan, boundary)?,
             timer: is_timed.then(|| Timer::new(context)),
             program,
@@ -176,6 +188,30 @@ impl Pbf {
         count: usize,
     ) -> Result<Vec<T>, SolveError> {
         Ok(self.program.read(buffer, count)?)
+    }
+
+    /// Makes room for so many particles.
+    fn resize(&mut self, particles: usize) -> Result<(), SolveError> {
+        let counts = Counts {
+            particles,
+            ..self.plan.counts
+        };
+        let limits = device_limits(&self.program.context);
+        let plan = plan::plan(&self.scene, counts, limits);
+        let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
+        if plan.has_lists == self.plan.has_lists {
+            self.program.refit(&buffers, &passes)?;
+        } else {
+            // Their conditions are others.
+            let context = self.program.context.clone();
+            self.program = Program::new(&context, &buffers, &passes, &SHARED_CONSTANTS)?;
+        }
+        self.plan = plan;
+        let boundary = self.boundary.as_ref();
+        let boundary = boundary.expect("a scene in which water enters or leaves");
+        let (program, plan, scene) = (&self.program, &self.plan, &self.scene);
+        [self.substep, self.measure] = set_up(program, plan, scene, boundary, &self.calibration);
+        Ok(())
     }
 
     fn params(&self, time: f64, step: f64) -> Params {
@@ -329,12 +365,8 @@ impl Solver for Pbf {
     type Error = SolveError;
 
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), SolveError> {
-        let planned = self.plan.counts.particles;
-        if particles.len() != planned {
-            return Err(SolveError::Count {
-                planned,
-                given: particles.len(),
-            });
+        if is_other_count(&self.scene, self.plan.counts.particles, particles)? {
+            self.resize(particles.len())?;
         }
         self.state = particles.clone();
         self.frame = frame;

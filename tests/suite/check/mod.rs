@@ -1,5 +1,6 @@
 //! `check` passes on what the device computes, and each of its rows fails where that pass is spoiled.
 mod controls;
+mod drops;
 mod frames;
 mod periodic;
 mod whitewater;
@@ -7,17 +8,20 @@ mod whitewater;
 use swell::{
     check::pbf,
     domain::{
+        bounds::Bounds,
         motion::{Motion, Spectrum},
         particles::Particles,
         sampling::BoundarySample,
         signed_distance::SignedDistance,
+        sources::{Emitter, Window},
         substep::Which,
     },
     gpu::adapter::{Context, Needs, Spoil},
     scene::{
         Effects, Iteration, Method, Scene, Stop, Wall, WaveMaker,
-        effects::{absorbing_zone, generation_zone, viscosity, vorticity_confinement},
+        effects::{absorbing_zone, drag, generation_zone, viscosity, vorticity_confinement},
         flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
+        sources::Region,
     },
     solve::{
         SolveError,
@@ -85,6 +89,10 @@ fn case(method: Method) -> (Scene, Start) {
     });
     scene.effects.viscosity = Some(viscosity::Settings { xsph: 0.1 });
     scene.effects.vorticity_confinement = Some(vorticity_confinement::Settings { strength: 1.0 });
+    scene.effects.drag = Some(drag::Settings {
+        drop_radius: 1e-3,
+        wind: [5.0, 1.0, -2.0],
+    });
     // From both ends, and longer than the water is.
     scene.effects.absorbing_zone = Some(absorbing_zone::Settings {
         walls: vec![Wall::NAMED[0].1, Wall::NAMED[5].1],
@@ -107,6 +115,18 @@ fn case(method: Method) -> (Scene, Start) {
             spreading: Some(10.0),
         }),
     });
+    if method == Method::Flip {
+        // A part of the water, which is too dense, counts as having just entered.
+        scene.emitters.push(Emitter {
+            shape: Region::Block(Bounds {
+                min: DVec3::ZERO,
+                max: DVec3::new(0.4, 6.4, 1.6),
+            }),
+            velocity: DVec3::X,
+            level: None,
+            window: Window::default(),
+        });
+    }
     scene.solver.pbf.as_mut().unwrap().cfl = CFL;
     let mut particles = lattice([-0.01, 0.2, -0.01], [8, 6, 7], [0.9 * D; 3]);
     jitter(&mut particles, 0.02 * D);
@@ -117,6 +137,7 @@ fn case(method: Method) -> (Scene, Start) {
     let start = Start {
         particles,
         removed: 0,
+        sources: Default::default(),
         boundary: swell::domain::boundary::Boundary {
             samples: if method == Method::Pbf {
                 samples

@@ -156,8 +156,8 @@ const SPOILS: [(&str, &str, &str, &str); 14] = [
     ),
     (
         "advance",
-        "pow(reynolds, 0.687)",
-        "pow(reynolds, 0.69)",
+        "pow(max(reynolds, 1e-12), 0.687)",
+        "pow(max(reynolds, 1e-12), 0.69)",
         "velocity",
     ),
     (

@@ -99,6 +99,7 @@ benchmarks! {
     a_column_collapses_as_in_the_experiment: "dam break of a column",
     a_dry_bed_is_run_over_as_ritter_has_it: "dam break on a dry bed",
     a_dam_breaks_onto_a_block: "dam break onto a block",
+    a_jet_presses_on_a_wall_with_its_momentum: "jet on a wall",
     a_standing_wave_has_its_period: "standing wave",
     a_column_at_rest_weighs_what_it_weighs: "column at rest",
     a_vortex_turns_on: "Taylor–Green vortex",
@@ -134,6 +135,16 @@ fn a_flume_without_its_zone_fails_a_benchmark() {
     let found = only.strip_prefix("reflection is Some(").unwrap();
     let found: f64 = found.split(')').next().unwrap().parse().unwrap();
     assert!(found > 0.5, "{missed:?}");
+}
+
+/// Negative control: a twentieth less speed is a tenth less force.
+#[test]
+fn a_jet_that_is_slower_by_a_twentieth_fails_a_benchmark() {
+    let mut jet = benchmark(&COARSE, "jet on a wall");
+    jet.runs[0].scene.emitters[0].velocity *= 0.95;
+    let missed = missed(&crate::support::context(), &jet);
+    assert_eq!(missed.len(), 1, "{missed:?}");
+    assert!(missed[0].contains("force_ratio is Some(0.8"), "{missed:?}");
 }
 
 /// Negative control: in a zone of a fifth of a wave length the wall at its end undoes what it does.

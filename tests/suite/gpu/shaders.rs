@@ -414,7 +414,9 @@ fn mentions(files: &[(String, String)], effect: &str) -> Vec<String> {
     let own = EFFECT_FILES.map(|folder| format!("{folder}/{effect}.rs"));
     files
         .iter()
-        .filter(|(file, _)| !own.contains(file) && !file.ends_with("/tests.rs"))
+        .filter(|(file, _)| {
+            !own.contains(file) && !file.ends_with("/tests.rs") && !file.contains("/tests/")
+        })
         .flat_map(|(file, text)| {
             let code = text.split("#[cfg(test)]").next().unwrap_or("");
             code.lines()

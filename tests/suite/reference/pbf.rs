@@ -355,6 +355,7 @@ fn iterations_approach_what_is_converged() {
                 particles: particles.clone(),
                 removed: 0,
                 boundary: boundary.clone(),
+                sources: Default::default(),
             };
             let (state, _) = reference(&scene, &start);
             distances.push(distance_to_converged(&scene, &boundary, 1, &state, 1e-8).unwrap());

@@ -17,7 +17,7 @@ use swell::{
     },
     scene::{
         Iteration, Method, Scene, Stop, Wall, WaveMaker,
-        effects::{absorbing_zone, generation_zone, viscosity, vorticity_confinement},
+        effects::{absorbing_zone, drag, generation_zone, viscosity, vorticity_confinement},
         flip::{Precision, Preconditioner, Surface, Transfer},
         probe::{Probe, ProbeKind},
     },
@@ -66,6 +66,10 @@ impl Case {
 fn with_effects(mut scene: Scene) -> Scene {
     scene.effects.viscosity = Some(viscosity::Settings { xsph: 0.01 });
     scene.effects.vorticity_confinement = Some(vorticity_confinement::Settings { strength: 0.1 });
+    scene.effects.drag = Some(drag::Settings {
+        drop_radius: 1e-3,
+        wind: [5.0, 0.0, 0.0],
+    });
     scene.effects.absorbing_zone = Some(absorbing_zone::Settings {
         walls: vec![Wall::NAMED[1].1],
         length: 0.5,

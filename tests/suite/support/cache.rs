@@ -123,6 +123,7 @@ pub fn step(before: &Particles, clock: Clock, frame: u32) -> (Clock, Particles, 
         time: clock.time + 1.0 / 60.0,
         substeps: 1 + frame % 3,
         steps: clock.steps + u64::from(1 + frame % 3),
+        next_id: None,
     };
     let report = json!({ "density_error": { "mean": 0.1 / f64::from(frame) }, "capped": frame });
     (clock, after, report)

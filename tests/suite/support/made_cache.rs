@@ -121,6 +121,7 @@ pub fn report(frame: u32) -> Value {
         boundary_work: 0.0,
         volume: None,
         projection: None,
+        exchange: None,
     })
     .unwrap()
 }
@@ -184,6 +185,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
             time: f64::from(frame) / 60.0,
             substeps: 1,
             steps: frame.into(),
+            next_id: None,
         };
         writer
             .submit(

@@ -56,6 +56,8 @@ pub fn scene(size: [f64; 3]) -> Scene {
         solids: Vec::new(),
         moving_solids: Vec::new(),
         wave_makers: Vec::new(),
+        emitters: Vec::new(),
+        drains: Vec::new(),
         solver: SolverSettings {
             method: Method::Pbf,
             flip: None,

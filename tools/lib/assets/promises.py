@@ -6,6 +6,7 @@ import math
 from . import BrokenMesh
 from .breakwater import CREST, END, FLOOR, HALF_CREST, SLOPE, START
 from .check import box, check_solids
+from . import quay
 from .city import ALLEY, BLOCKS_X, BLOCKS_Z, CITY_X, CITY_Z, CROSS_STREET, FOOTPRINTS, HEIGHTS
 from .obj import from_obj
 
@@ -81,3 +82,23 @@ def check_breakwater(text):
     if extent[0][1] != FLOOR or not CREST <= extent[1][1] <= CREST + 0.1:
         raise BrokenMesh(f"breakwater: reaches {extent}")
     return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.2f} m³"
+
+
+def check_harbour(text):
+    """Refuses a harbour whose culvert is not free; returns a line about it."""
+    vertices, triangles = from_obj(text)
+    found = check_solids(vertices, triangles)
+
+    def area(low, high):
+        return (high[0] - low[0]) * (high[1] - low[1])
+
+    wall = area((quay.ENDS[0], quay.FLOOR), (quay.ENDS[1], quay.TOP))
+    hole = area((quay.CULVERT_Z[0], quay.CULVERT_Y[0]), (quay.CULVERT_Z[1], quay.CULVERT_Y[1]))
+    mole = area((quay.MOLE_X[0], quay.MOLE_Z[0]), (quay.MOLE_X[1], quay.MOLE_Z[1]))
+    post = quay.SIDES / 2 * math.sin(2 * math.pi / quay.SIDES) * quay.DOLPHIN_RADIUS**2
+    expected = [(wall - hole) * (quay.FRONT - quay.BACK), mole * (quay.MOLE_TOP - quay.FLOOR)]
+    expected += [post * (quay.DOLPHIN_TOP - quay.FLOOR)] * len(quay.DOLPHINS)
+    volumes = [inside for _, inside in found]
+    if len(volumes) != len(expected) or any(abs(a / b - 1) > 1e-3 for a, b in zip(volumes, expected)):
+        raise BrokenMesh(f"harbour: {volumes} m³ and not {expected}")
+    return f"{len(triangles)} triangles, {len(text.encode())} bytes, {sum(volumes):.2f} m³"

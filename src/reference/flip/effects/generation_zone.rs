@@ -2,20 +2,17 @@
 
 use glam::DVec3;
 
-use super::{Water, led_faces};
+use super::{Acts, Water, led_faces};
 use crate::{reference::Timings, scene::effects::generation_zone::Settings};
 
-pub(super) fn apply(
-    settings: &Settings,
-    water: Water<'_>,
-    velocity: &mut Vec<DVec3>,
-    timings: &mut Timings,
-) {
-    *velocity = timings.time("effects/generate_faces", || {
-        let waves = settings.incoming(water.model.scene.water.gravity);
-        let time = water.step.start;
-        led_faces(settings.zone(), water, velocity, |place| {
-            waves.velocity(place, time)
-        })
-    });
+impl Acts for Settings {
+    fn on_faces(&self, water: Water<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {
+        *velocity = timings.time("effects/generate_faces", || {
+            let waves = self.incoming(water.model.scene.water.gravity);
+            let time = water.step.start;
+            led_faces(self.zone(), water, velocity, |place| {
+                waves.velocity(place, time)
+            })
+        });
+    }
 }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    Model, Room, Step,
+    Model, Room, Sorted, Step,
     grid::{corner, per_cell},
 };
 use crate::{
@@ -53,12 +53,48 @@ pub fn led_faces(
     })
 }
 
+/// What an effect on the sorted particles knows beside them.
+#[derive(Clone, Copy)]
+pub struct Flying<'a> {
+    /// Settings.
+    pub model: &'a Model,
+    /// The substep.
+    pub step: &'a Step<'a>,
+    /// Where the elements lie.
+    pub bricks: &'a Bricks,
+    /// What solids leave of the cells.
+    pub kind: &'a [u32],
+}
+
+/// What an effect's settings do, with times by pass.
+trait Acts {
+    /// To the sorted particles, before the grid is given their velocities.
+    fn on_particles(&self, _: Flying<'_>, _: &mut Sorted, _: &mut Timings) {}
+
+    /// To the velocities at the faces, m/s, before the projection.
+    fn on_faces(&self, _: Water<'_>, _velocity: &mut Vec<DVec3>, _: &mut Timings) {}
+}
+
 macro_rules! twins {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
 
+        /// Runs the effects that a scene names on the sorted particles.
+        pub(super) fn on_particles(
+            named: &Effects,
+            flying: Flying<'_>,
+            sorted: &mut Sorted,
+            timings: &mut Timings,
+        ) {
+            $(
+                if let Some(settings) = &named.$name {
+                    settings.on_particles(flying, sorted, timings);
+                }
+            )+
+        }
+
         /// Runs the effects that a scene names on the velocities at the faces, m/s.
-        pub(super) fn apply(
+        pub(super) fn on_faces(
             named: &Effects,
             water: Water<'_>,
             velocity: &mut Vec<DVec3>,
@@ -66,7 +102,7 @@ macro_rules! twins {
         ) {
             $(
                 if let Some(settings) = &named.$name {
-                    $name::apply(settings, water, velocity, timings);
+                    settings.on_faces(water, velocity, timings);
                 }
             )+
         }

@@ -3,9 +3,7 @@
 //!
 //! [`Scene::substep_pic_blend`]: crate::scene::Scene::substep_pic_blend
 
-use glam::DVec3;
+use super::Acts;
+use crate::scene::effects::viscosity::Settings;
 
-use super::Water;
-use crate::{reference::Timings, scene::effects::viscosity::Settings};
-
-pub(super) fn apply(_: &Settings, _: Water<'_>, _: &mut Vec<DVec3>, _: &mut Timings) {}
+impl Acts for Settings {}

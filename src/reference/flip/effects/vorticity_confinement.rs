@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Water;
+use super::{Acts, Water};
 use crate::{
     reference::{
         Timings,
@@ -11,24 +11,21 @@ use crate::{
     scene::effects::vorticity_confinement::Settings,
 };
 
-pub(super) fn apply(
-    settings: &Settings,
-    water: Water<'_>,
-    velocity: &mut Vec<DVec3>,
-    timings: &mut Timings,
-) {
-    let Water {
-        model,
-        step,
-        bricks,
-        room,
-        ..
-    } = water;
-    let vorticity = timings.time("effects/grid_curl", || {
-        grid_curl(model, bricks, room, velocity)
-    });
-    *velocity = timings.time("effects/grid_confinement", || {
-        let strength = settings.strength;
-        grid_confinement(model, step, bricks, room, strength, &vorticity, velocity)
-    });
+impl Acts for Settings {
+    fn on_faces(&self, water: Water<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {
+        let Water {
+            model,
+            step,
+            bricks,
+            room,
+            ..
+        } = water;
+        let vorticity = timings.time("effects/grid_curl", || {
+            grid_curl(model, bricks, room, velocity)
+        });
+        *velocity = timings.time("effects/grid_confinement", || {
+            let strength = self.strength;
+            grid_confinement(model, step, bricks, room, strength, &vorticity, velocity)
+        });
+    }
 }

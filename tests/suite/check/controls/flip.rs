@@ -32,6 +32,13 @@ pub const SYSTEM: &[&str] = &[
 
 pub const FLIP: &[Control] = &[
     control(
+        "flip/boundary_work",
+        "for (var k = 0u;",
+        "for (var k = 16u;",
+        "flip/boundary_work",
+        &["shares of the work"],
+    ),
+    control(
         "flip/survey",
         "dot(v, v)",
         "dot(v, v) * 1.001",
@@ -130,6 +137,20 @@ pub const FLIP: &[Control] = &[
         &["density excess"],
     ),
     control(
+        "flip/let_in",
+        "solid_flux[element] -= over",
+        "solid_flux[element] -= 0.999 * over",
+        "flip/let_in",
+        &["flux with what enters"],
+    ),
+    control(
+        "flip/let_in",
+        "min(density_excess[element], 0.0)",
+        "density_excess[element]",
+        "flip/let_in",
+        &["density excess"],
+    ),
+    control(
         "effects/grid_curl",
         "by_y.z - by_z.y",
         "by_y.z + by_z.y",
@@ -142,6 +163,13 @@ pub const FLIP: &[Control] = &[
         "omega = -0.5",
         "effects/grid_confinement",
         &["velocity at faces"],
+    ),
+    control(
+        "effects/drag_by_cells",
+        "params.velocity_step, share",
+        "0.99 * params.velocity_step, share",
+        "effects/drag_by_cells",
+        &["velocity"],
     ),
     control(
         "effects/absorb_faces",

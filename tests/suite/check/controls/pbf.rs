@@ -67,6 +67,13 @@ pub const PBF: &[Control] = &[
         &["velocity"],
     ),
     control(
+        "effects/drag_by_density",
+        "- fall, fall, share",
+        "- fall, 0.99 * fall, share",
+        "effects/drag_by_density",
+        &["velocity"],
+    ),
+    control(
         "effects/generate_particles",
         "v + part * (wave",
         "v + 1.1 * part * (wave",

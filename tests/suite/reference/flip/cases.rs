@@ -178,6 +178,10 @@ pub fn effects() -> Case {
     case.scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.1 });
     case.scene.effects.vorticity_confinement =
         Some(effects::vorticity_confinement::Settings { strength: 0.5 });
+    case.scene.effects.drag = Some(effects::drag::Settings {
+        drop_radius: 1e-3,
+        wind: [5.0, 1.0, -2.0],
+    });
     case.scene.effects.absorbing_zone = Some(effects::absorbing_zone::Settings {
         walls: vec![Wall::NAMED[1].1],
         length: 0.6,

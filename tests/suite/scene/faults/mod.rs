@@ -1,11 +1,13 @@
 //! A good scene, and what each change to it is told.
 mod flip;
 mod keys;
+mod sources;
 mod values;
 mod zones;
 
 pub use flip::FLIP_FAULTS;
 pub use keys::KEY_FAULTS;
+pub use sources::SOURCE_FAULTS;
 pub use values::VALUE_FAULTS;
 pub use zones::ZONE_FAULTS;
 

@@ -127,4 +127,20 @@ pub const ZONE_FAULTS: &[Fault] = &[
         34,
         &["effects.generation_zone.waves.kind: \"solitary\""],
     ),
+    (
+        "viscosity = { xsph = 0.01 }",
+        "viscosity = { xsph = 0.01 }\ngeneration_zone = { walls = [\"-z\"], length = 3.0, waves = { kind = \"focused\", height = 0.1, at = [5.0, 16.0], time = 30.0, peak_period = 2.0, shortest_period = 1.0, depth = 1.0, direction_degrees = 90.0 } }",
+        34,
+        &[
+            "effects.generation_zone.waves.at: 16 m along z from the domain's least corner, and the domain is 15 m long; allowed: ",
+        ],
+    ),
+    (
+        "viscosity = { xsph = 0.01 }",
+        "viscosity = { xsph = 0.01 }\ngeneration_zone = { walls = [\"-z\"], length = 3.0, waves = { kind = \"focused\", height = 0.1, at = [5.0, 12.0], time = 9.0, peak_period = 2.0, shortest_period = 1.0, depth = 1.0, direction_degrees = 90.0 } }",
+        34,
+        &[
+            "effects.generation_zone.waves.time: its slowest waves, of 0.815 m/s, are there after 15.",
+        ],
+    ),
 ];

@@ -1,0 +1,62 @@
+// Air slows water that flies: the more, the less water there is about it, by the density at its place.
+#import "shared/thread.wgsl"
+#import "shared/pbf_params.wgsl"
+#import "shared/phase.wgsl"
+#import "shared/neighbors.wgsl"
+#import "shared/walls.wgsl"
+#import "shared/drag.wgsl"
+
+override GRAVITY_X: f32;
+override GRAVITY_Y: f32;
+override GRAVITY_Z: f32;
+
+#ifdef SOLIDS
+// Samples on solids stand behind the particles.
+@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
+#endif
+@group(0) @binding(10) var<storage, read> position: array<vec4f>;
+@group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
+
+var<private> own_position: vec3f;
+var<private> kernel_sum: f32;
+
+fn visit(i: u32, j: u32) {
+    var other = vec4f(0.0);
+    if j < fluid_count {
+        other = vec4f(position[j].xyz, 0.0);
+    } else {
+#ifdef SOLIDS
+        other = predicted[j + fluid_count];
+#else
+        return;
+#endif
+    }
+    let d = between(own_position, other.xyz);
+    let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
+    kernel_sum += weight(other.w) * p * p * p;
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= phase.count {
+        return;
+    }
+    let i = phase_particle(thread);
+    own_position = position[i].xyz;
+    kernel_sum = 0.0;
+    begin_phase();
+    for_each_neighbor(own_position, i);
+    // Without the particle's own, over what a full neighborhood has without it.
+    let others = params.density_scale * kernel_sum + wall_term(own_position).density;
+    let share = others / (1.0 - params.density_scale);
+    // What gravity added in this step is in it already.
+    let fall = params.time_step * vec3f(GRAVITY_X, GRAVITY_Y, GRAVITY_Z);
+    let before = velocity[i];
+    let after = blown(before.xyz - fall, fall, share, params.time_step);
+    velocity[i] = vec4f(select(before.xyz, after, is_exposed(share)), before.w);
+}

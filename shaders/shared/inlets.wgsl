@@ -1,0 +1,22 @@
+// Rooms in which water enters, as boxes of cells.
+struct Inlets {
+    count: u32,
+    unused: u32,
+    padding: vec2u,
+    // First and last cells along each axis.
+    low: array<vec4u, 8>,
+    high: array<vec4u, 8>,
+    // At which what is too much there flows out, 1/s, in the first component.
+    rate: array<vec4f, 8>,
+}
+@group(0) @binding(7) var<uniform> inlets: Inlets;
+
+// 0 where no water enters.
+fn rate_in_inlet(cell: vec3u) -> f32 {
+    var rate = 0.0;
+    for (var k = 0u; k < inlets.count; k++) {
+        let is_in = all(cell >= inlets.low[k].xyz) && all(cell <= inlets.high[k].xyz);
+        rate = max(rate, select(0.0, inlets.rate[k].x, is_in));
+    }
+    return rate;
+}

@@ -1,0 +1,402 @@
+//! Water that enters and leaves while a shot runs: emitters and drains, which act at the ends of output frames.
+//!
+//! An emitter's water is a lattice of the particle spacing that moves with the emitter's velocity. A particle is born at the
+//! end of the frame in which its place on the lattice came into the emitter. So `velocity · area` enters a second,
+//! whatever the frame rate, and particles of one frame and the next fit together. An emitter with a level keeps its part
+//! below that level full instead.
+
+use glam::DVec3;
+
+use super::{
+    bounds::Bounds,
+    mesh::TriangleMesh,
+    particles::Particles,
+    sampling::uniform,
+    signed_distance::{SignedDistance, SignedDistanceError},
+};
+
+/// Distance from solids that water keeps where it is born, spacings: as at the start.
+const CLEARANCE: f64 = 0.5;
+
+/// Of a spacing: a place as near to a face of a room counts as on it, however far from zero coordinates round.
+const ON_FACE: f64 = 1e-6;
+
+/// Of a float, relative: what a place may be off where it is compared.
+const ROUNDING: f64 = 1e-9;
+
+/// Where water enters; `S` is how its room is told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Emitter<S> {
+    /// Its room.
+    pub shape: S,
+    /// Of the water that enters, m/s.
+    pub velocity: DVec3,
+    /// Height up to which it keeps its room full, metres; where there is none, water enters as fast as `velocity` says.
+    pub level: Option<f64>,
+    /// When it acts.
+    pub window: Window,
+}
+
+/// Where water leaves; `S` is how its room is told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drain<S> {
+    /// Its room.
+    pub shape: S,
+    /// Height below which water stays, metres.
+    pub level: Option<f64>,
+    /// The most that leaves, m³/s.
+    pub rate: Option<f64>,
+    /// When it acts.
+    pub window: Window,
+}
+
+impl<S> Emitter<S> {
+    /// The same with its room told another way.
+    pub fn with_shape<T>(self, shape: T) -> Emitter<T> {
+        Emitter {
+            shape,
+            velocity: self.velocity,
+            level: self.level,
+            window: self.window,
+        }
+    }
+}
+
+impl<S> Drain<S> {
+    /// The same with its room told another way.
+    pub fn with_shape<T>(self, shape: T) -> Drain<T> {
+        Drain {
+            shape,
+            level: self.level,
+            rate: self.rate,
+            window: self.window,
+        }
+    }
+}
+
+/// From when to when something acts: at the frames that end after `from`, and not after `until`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Window {
+    /// Seconds from the shot's start.
+    pub from: f64,
+    /// Seconds from the shot's start; to the shot's end where there is none.
+    pub until: Option<f64>,
+}
+
+impl Window {
+    fn holds(&self, time: f64) -> bool {
+        time > self.from && self.until.is_none_or(|until| time <= until)
+    }
+
+    /// How much of a shot of so many seconds lies in it, seconds.
+    pub fn length(&self, duration: f64) -> f64 {
+        let end = self.until.map_or(duration, |until| until.min(duration));
+        (end - self.from).max(0.0)
+    }
+}
+
+/// A box, or a mesh within its bounds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    bounds: Bounds,
+    mesh: Option<SignedDistance>,
+}
+
+impl From<Bounds> for Shape {
+    fn from(bounds: Bounds) -> Self {
+        Self { bounds, mesh: None }
+    }
+}
+
+impl Shape {
+    /// Of a closed mesh; `spacing` is that of the particles, metres.
+    ///
+    /// # Errors
+    /// Those of [`SignedDistance::from_mesh`].
+    pub fn of_mesh(mesh: &TriangleMesh, spacing: f64) -> Result<Self, SignedDistanceError> {
+        let bounds = mesh.bounds().unwrap_or_default();
+        let room = bounds.grown(spacing);
+        Ok(Self {
+            bounds,
+            mesh: Some(SignedDistance::from_mesh(mesh, &room, 0.5 * spacing)?),
+        })
+    }
+
+    fn contains(&self, p: DVec3) -> bool {
+        let is_inside = |mesh: &SignedDistance| mesh.sample(p) < 0.0;
+        self.bounds.contains(p) && self.mesh.as_ref().is_none_or(is_inside)
+    }
+}
+
+/// What came and went at a frame's end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Exchange {
+    /// Particles that entered.
+    pub entered: u64,
+    /// Particles that left.
+    pub left: u64,
+}
+
+/// All emitters and drains of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct Sources {
+    /// In the order in which they act.
+    pub emitters: Vec<Emitter<Shape>>,
+    /// They act before the emitters.
+    pub drains: Vec<Drain<Shape>>,
+    /// Of the particles, metres.
+    pub spacing: f64,
+    /// Output frames a second.
+    pub frames_per_second: f64,
+}
+
+impl Sources {
+    /// Whether there is nothing that acts.
+    pub fn is_empty(&self) -> bool {
+        self.emitters.is_empty() && self.drains.is_empty()
+    }
+
+    /// What the end of a frame takes from `particles` and adds to them, away from `solid`. Those that enter come last; their
+    /// ids go on from `next_id`, which is then the next free one.
+    pub fn exchange(
+        &self,
+        frame: u32,
+        solid: Option<&SignedDistance>,
+        particles: &mut Particles,
+        next_id: &mut u32,
+    ) -> Exchange {
+        let (begin, end) = (self.time(frame.saturating_sub(1)), self.time(frame));
+        let before = particles.len();
+        for drain in self.drains.iter().filter(|drain| drain.window.holds(end)) {
+            let keep = self.kept(drain, frame, particles);
+            particles.retain(&keep);
+        }
+        let left = (before - particles.len()) as u64;
+        let mut entered = 0;
+        for emitter in self.emitters.iter().filter(|it| it.window.holds(end)) {
+            let mut born = match emitter.level {
+                None => self.flowed(emitter, begin, end),
+                Some(level) => self.lacking(emitter, level, frame, particles, solid),
+            };
+            born.retain(|p| is_open(solid, *p, self.spacing));
+            for (place, id) in born.iter().zip(*next_id..) {
+                particles.position.push(place.as_vec3().to_array());
+                particles
+                    .velocity
+                    .push(emitter.velocity.as_vec3().to_array());
+                particles.id.push(id);
+            }
+            *next_id += born.len() as u32;
+            entered += born.len() as u64;
+        }
+        for column in particles.attributes.values_mut() {
+            column.resize(particles.position.len(), 0.0);
+        }
+        Exchange { entered, left }
+    }
+
+    fn time(&self, frame: u32) -> f64 {
+        f64::from(frame) / self.frames_per_second
+    }
+
+    /// Places on the moving lattice that came into the emitter from `begin` to `end`, seconds, at `end`.
+    fn flowed(&self, emitter: &Emitter<Shape>, begin: f64, end: f64) -> Vec<DVec3> {
+        let (shape, velocity) = (&emitter.shape, emitter.velocity);
+        let lines: [Line; 3] =
+            std::array::from_fn(|axis| Line::of(&shape.bounds, axis, velocity[axis], self.spacing));
+        let at = |cell: [i64; 3], time: f64| {
+            DVec3::from_array(std::array::from_fn(|axis| lines[axis].at(cell[axis], time)))
+        };
+        let is_inside = |cell: [i64; 3], time: f64| {
+            let along = |axis: usize| lines[axis].is_inside(cell[axis], time);
+            let is_in_mesh = |mesh: &SignedDistance| mesh.sample(at(cell, time)) < 0.0;
+            (0..3).all(along) && shape.mesh.as_ref().is_none_or(is_in_mesh)
+        };
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| lines[axis].cells(end));
+        let mut born = Vec::new();
+        for k in z {
+            for j in y.clone() {
+                for i in x.clone() {
+                    let cell = [i, j, k];
+                    if is_inside(cell, end) && !is_inside(cell, begin) {
+                        born.push(at(cell, end));
+                    }
+                }
+            }
+        }
+        born
+    }
+
+    /// Places below `level` that the emitter lacks particles at. Its room is a lattice; where eight neighbouring places
+    /// hold fewer particles than places, some of those that hold none are filled.
+    fn lacking(
+        &self,
+        emitter: &Emitter<Shape>,
+        level: f64,
+        frame: u32,
+        particles: &Particles,
+        solid: Option<&SignedDistance>,
+    ) -> Vec<DVec3> {
+        let (shape, d) = (&emitter.shape, self.spacing);
+        let mut room = shape.bounds;
+        room.max.y = room.max.y.min(level);
+        let dims = (0..3).map(|axis| places(room.size()[axis], d));
+        let dims: Vec<usize> = dims.collect();
+        let count: usize = dims.iter().product();
+        let place = |n: usize| {
+            let cell = [n % dims[0], n / dims[0] % dims[1], n / (dims[0] * dims[1])];
+            (
+                cell,
+                room.min + d * DVec3::from_array(cell.map(|i| i as f64 + 0.5)),
+            )
+        };
+        let mut held = vec![0u32; count];
+        for x in &particles.position {
+            let from = (glam::Vec3::from_array(*x).as_dvec3() - room.min) / d;
+            let cell = from.floor().to_array();
+            let is_there = |axis: usize| cell[axis] >= 0.0 && cell[axis] < dims[axis] as f64;
+            if (0..3).all(is_there) {
+                let [i, j, k] = cell.map(|i| i as usize);
+                held[(k * dims[1] + j) * dims[0] + i] += 1;
+            }
+        }
+        let blocks: Vec<usize> = dims.iter().map(|n| n.div_ceil(2)).collect();
+        let mut wanted = vec![0i64; blocks.iter().product()];
+        let block_of = |[i, j, k]: [usize; 3]| (k / 2 * blocks[1] + j / 2) * blocks[0] + i / 2;
+        let mut open = Vec::new();
+        for (n, &held) in held.iter().enumerate() {
+            let (cell, at) = place(n);
+            let block = block_of(cell);
+            let is_place = shape.contains(at) && is_open(solid, at, d);
+            wanted[block] += i64::from(is_place) - i64::from(held);
+            if is_place && held == 0 {
+                open.push((block, by_chance(frame, n as u32), at));
+            }
+        }
+        open.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).expect("numbers"));
+        let mut born = Vec::new();
+        for (block, _, at) in open {
+            if wanted[block] > 0 {
+                wanted[block] -= 1;
+                born.push(at);
+            }
+        }
+        born
+    }
+
+    /// Whether each particle stays.
+    fn kept(&self, drain: &Drain<Shape>, frame: u32, particles: &Particles) -> Vec<bool> {
+        let is_taken = |x: &[f32; 3]| {
+            let x = glam::Vec3::from_array(*x).as_dvec3();
+            drain.shape.contains(x) && drain.level.is_none_or(|level| x.y > level)
+        };
+        let mut keep: Vec<bool> = particles.position.iter().map(|x| !is_taken(x)).collect();
+        let Some(rate) = drain.rate else {
+            return keep;
+        };
+        let volume = self.spacing.powi(3);
+        let gone = |frame: u32| (rate * self.time(frame) / volume * (1.0 + ROUNDING)).floor();
+        let most = (gone(frame) - gone(frame.saturating_sub(1))) as usize;
+        let mut taken: Vec<usize> = (0..keep.len()).filter(|&k| !keep[k]).collect();
+        // All over the drain alike.
+        let order = |k: &usize| by_chance(frame, particles.id[*k]);
+        taken.sort_by(|a, b| order(a).total_cmp(&order(b)).then(a.cmp(b)));
+        for k in taken.into_iter().skip(most) {
+            keep[k] = true;
+        }
+        keep
+    }
+}
+
+/// From 0 to 1, the same in each bake.
+fn by_chance(frame: u32, of: u32) -> f64 {
+    uniform(u64::from(frame) << 32 | u64::from(of))
+}
+
+fn is_open(solid: Option<&SignedDistance>, place: DVec3, spacing: f64) -> bool {
+    solid.is_none_or(|solid| solid.sample(place) >= CLEARANCE * spacing)
+}
+
+/// How many particles `length` holds, one at least.
+pub fn places(length: f64, spacing: f64) -> usize {
+    ((length / spacing).round() as usize).max(1)
+}
+
+/// An axis of a lattice that moves through a box.
+struct Line {
+    min: f64,
+    max: f64,
+    /// Of the place 0 at the start, metres.
+    first: f64,
+    spacing: f64,
+    /// m/s.
+    speed: f64,
+    /// Where it stands still, how many places it has.
+    places: Option<usize>,
+}
+
+impl Line {
+    fn of(bounds: &Bounds, axis: usize, speed: f64, spacing: f64) -> Self {
+        let (min, max) = (bounds.min[axis], bounds.max[axis]);
+        let places = (speed == 0.0).then(|| places(max - min, spacing));
+        // Across the flow places lie about the middle.
+        let first = match places {
+            Some(n) => 0.5 * (min + max) - 0.5 * spacing * (n as f64 - 1.0),
+            None => min + 0.5 * spacing,
+        };
+        Self {
+            min,
+            max,
+            first,
+            spacing,
+            speed,
+            places,
+        }
+    }
+
+    fn at(&self, cell: i64, time: f64) -> f64 {
+        self.first + self.spacing * cell as f64 + self.speed * time
+    }
+
+    /// A place on a face of the room is one at its least face, however it rounds.
+    fn is_inside(&self, cell: i64, time: f64) -> bool {
+        let at = self.at(cell, time) + ON_FACE * self.spacing;
+        self.places.is_some() || (at >= self.min && at < self.max)
+    }
+
+    /// Those that may be inside.
+    fn cells(&self, time: f64) -> std::ops::Range<i64> {
+        match self.places {
+            Some(n) => 0..n as i64,
+            None => {
+                let cell = |x: f64| (x - self.first - self.speed * time) / self.spacing;
+                cell(self.min).floor() as i64..cell(self.max).ceil() as i64 + 1
+            }
+        }
+    }
+}
+
+/// Whether water of this velocity stays in a box of this size for a frame of so many seconds: else places of the lattice would
+/// pass it between two looks.
+pub fn is_long_enough(size: DVec3, velocity: DVec3, seconds: f64) -> bool {
+    (velocity.abs() * seconds)
+        .cmple(size * (1.0 + ROUNDING))
+        .all()
+}
+
+/// Of a flow through a box, m³/s: of its swept area, which is that of the faces that look along the velocity.
+pub fn flow(size: DVec3, velocity: DVec3, spacing: f64) -> f64 {
+    let across = DVec3::from_array(std::array::from_fn(|axis| match velocity[axis] {
+        0.0 => places(size[axis], spacing) as f64 * spacing,
+        _ => size[axis],
+    }));
+    let faces = DVec3::new(
+        across.y * across.z,
+        across.z * across.x,
+        across.x * across.y,
+    );
+    velocity.abs().dot(faces)
+}
+
+#[cfg(test)]
+mod tests;

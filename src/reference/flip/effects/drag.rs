@@ -1,0 +1,83 @@
+//! Drag of air on particles before the grid is given their velocities.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{
+    super::{Model, Sorted, Step, grid::neighborhood},
+    Acts, Flying,
+};
+use crate::{
+    domain::{
+        air::{blown, exposure},
+        bricks::{Bricks, CELLS},
+        flip::PLANE_SHARE,
+        poisson::SOLID,
+    },
+    reference::Timings,
+    scene::effects::drag::Settings,
+};
+
+/// Water about a particle of a cell, over what the open cells of 27 hold: 0 of one alone, 1 deep in the water. `kind` says what cells
+/// are; walls and solids are left out.
+pub fn share(model: &Model, bricks: &Bricks, kind: &[u32], sorted: &Sorted, element: u32) -> f64 {
+    let cell = bricks.cell(element);
+    let is_beyond = |offset: [i32; 3]| {
+        (0..3).any(|axis| {
+            let there = i64::from(cell[axis]) + i64::from(offset[axis]);
+            !model.scene.periodic[axis] && !(0..i64::from(model.cells[axis])).contains(&there)
+        })
+    };
+    let is_open = |offset: &[i32; 3]| {
+        let other = bricks.near(element, *offset);
+        !is_beyond(*offset) && (other < CELLS || kind[other as usize] != SOLID)
+    };
+    let open: Vec<[i32; 3]> = neighborhood().filter(is_open).collect();
+    let inside = |offset: &[i32; 3]| sorted.of(bricks.near(element, *offset)).len();
+    let particles: usize = open.iter().map(inside).sum();
+    let held = open.len().max(1) as f64 * f64::from(model.settings().particles_per_cell);
+    (particles.max(1) - 1) as f64 / held
+}
+
+/// Velocities of the sorted particles after drag in a step, without what gravity adds in it, m/s (effects/drag_by_cells).
+pub fn drag_by_cells(
+    settings: &Settings,
+    step: &Step<'_>,
+    sorted: &Sorted,
+    share: impl Fn(u32) -> f64 + Sync,
+) -> Vec<DVec3> {
+    let wet = CELLS..sorted.start.len() as u32 - 1;
+    (wet.into_par_iter())
+        .flat_map_iter(|element| {
+            let own = sorted.of(element);
+            let part = match own.is_empty() {
+                true => 0.0,
+                false => exposure(share(element), PLANE_SHARE),
+            };
+            sorted.cloud.velocity[own].iter().map(move |&v| match part {
+                0.0 => v,
+                part => {
+                    let both = [v, step.velocity_step];
+                    let seconds = part * step.length;
+                    blown(both, settings.wind(), settings.drop_radius, seconds) - step.velocity_step
+                }
+            })
+        })
+        .collect()
+}
+
+impl Acts for Settings {
+    fn on_particles(&self, flying: Flying<'_>, sorted: &mut Sorted, timings: &mut Timings) {
+        let Flying {
+            model,
+            step,
+            bricks,
+            kind,
+        } = flying;
+        sorted.cloud.velocity = timings.time("effects/drag_by_cells", || {
+            drag_by_cells(self, step, sorted, |element| {
+                share(model, bricks, kind, sorted, element)
+            })
+        });
+    }
+}

@@ -1,0 +1,91 @@
+//! The projection of a substep: the system, its direct solve, and what that does to the faces.
+
+use glam::DVec3;
+
+use super::{Centers, Faces, Model, Waters, density_source};
+use crate::{
+    domain::{poisson::System, solver::Projection},
+    reference::{
+        ReferenceError, Timings,
+        poisson::{self, gradients::Solution},
+    },
+};
+
+/// What the pressure of a substep did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Projected {
+    /// The rows.
+    pub system: System,
+    /// q of each, m/s; pascal after multiplication by ρ Δx / Δt.
+    pub solution: Solution,
+    /// Of the density correction's displacements, where there is one; metres.
+    pub correction: Option<Solution>,
+    /// Bodies of water that no air touches.
+    pub pockets: u32,
+    /// Largest |mean of ∇·u| over one of them, 1/s.
+    pub incompatible: f64,
+    /// Largest |∇·u| in a row's cell before and after, 1/s.
+    pub divergence: [f64; 2],
+}
+
+impl Projected {
+    /// Adds it to what a frame's projections did.
+    pub(super) fn add_to(&self, all: &mut Projection) {
+        all.residual = all.residual.max(self.solution.residual);
+        let [before, after] = self.divergence;
+        all.divergence_before = all.divergence_before.max(before);
+        all.divergence_after = all.divergence_after.max(after);
+        all.pockets = all.pockets.max(self.pockets);
+        all.incompatible = all.incompatible.max(self.incompatible);
+        all.dropped += self.system.dropped.len() as u64;
+        let correction = self.correction.iter().map(|s| u64::from(s.iterations));
+        all.correction_iterations += correction.sum::<u64>();
+    }
+}
+
+/// Makes the velocities free of divergence; what the solves did, and the density correction's displacements.
+pub(super) fn project(
+    model: &Model,
+    timings: &mut Timings,
+    factor_budget: u64,
+    waters: &Waters<'_>,
+    centers: &Centers,
+    faces: &mut Faces,
+) -> Result<(Projected, Option<Vec<DVec3>>), ReferenceError> {
+    let system = timings.time("pressure/build_system", || waters.system());
+    let solver = timings.time("pressure/prepare", || {
+        poisson::Solver::new(&system, factor_budget)
+    })?;
+    let b = waters.divergence(&system, &faces.velocity);
+    let solution = timings.time("pressure/solve", || solver.solve(&b));
+    waters.project(
+        &waters.by_element(&system, &solution.x),
+        &mut faces.velocity,
+    );
+    let after = waters.divergence(&system, &faces.velocity);
+    let correction = model.settings().density_correction.then(|| {
+        let source = density_source(model, &system, centers);
+        timings.time("pressure/solve", || solver.solve(&source))
+    });
+    let displacement = (correction.as_ref())
+        .map(|correction| waters.displace(&waters.by_element(&system, &correction.x)));
+    let means = solver.pockets().iter().map(|pocket| {
+        let sum: f64 = pocket.iter().map(|&row| b[row as usize]).sum();
+        sum / pocket.len() as f64
+    });
+    let incompatible = largest(&means.collect::<Vec<_>>()) / model.cell_size();
+    let pockets = solver.pockets().len() as u32;
+    let projected = Projected {
+        divergence: [&b, &after].map(|b| largest(b) / model.cell_size()),
+        solution,
+        correction,
+        pockets,
+        incompatible,
+        system,
+    };
+    Ok((projected, displacement))
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, value| most.max(value.abs()))
+}

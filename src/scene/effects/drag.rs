@@ -1,0 +1,62 @@
+//! Drag of air on water that flies: drops, and sheets that are thinner than a neighbourhood.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    super::{key::Key, words::shown},
+    Effect, Push,
+};
+use crate::domain::air;
+
+/// `drag = { drop_radius = 0.001, wind = [8.0, 0.0, 0.0] }`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// Of the drops that a particle stands for which flies alone, metres.
+    pub drop_radius: f64,
+    /// Velocity of the air, m/s.
+    pub wind: [f64; 3],
+}
+
+impl Settings {
+    /// Velocity of the air, m/s.
+    pub fn wind(&self) -> DVec3 {
+        DVec3::from_array(self.wind)
+    }
+}
+
+impl Effect for Settings {
+    const ABOUT: &'static str = "Drag of air on drops and thin sheets (Schiller and Naumann 1933)";
+
+    const KEYS: &'static [Key] = &[
+        Key::number("drop_radius", 1e-6..=10.0)
+            .unit("metres")
+            .about("of the drops that a particle stands for which flies alone; the air slows small ones more"),
+        Key::vector("wind", 3, -1e3..=1e3)
+            .unit("m/s")
+            .default("[0.0, 0.0, 0.0]")
+            .about("velocity of the air"),
+    ];
+
+    fn lint(&self, spacing: f64) -> Option<String> {
+        let worth = 4.0 / 3.0 * PI * (self.drop_radius / spacing).powi(3);
+        (worth > 1.0).then(|| {
+            format!(
+                "effects.drag.drop_radius: a drop of {} m radius holds {worth:.1} times the water of a particle, of which it is to be a part",
+                shown(self.drop_radius)
+            )
+        })
+    }
+
+    /// What wind does to a drop at rest, and no more than its own speed; one that flies gains less from it.
+    fn push(&self) -> Push {
+        let wind = self.wind().length();
+        Push {
+            acceleration: air::resistance(self.drop_radius, wind) * wind,
+            speed: wind,
+        }
+    }
+}

@@ -1,0 +1,106 @@
+use super::*;
+
+type Complex = DVec2;
+
+/// What of the waves' height a zone of so many wave lengths gets wrong, and what of a wave that runs into it is turned back, in shallow
+/// water, by the classical Runge–Kutta method on u″ + k² (1 + i r/ω) u = 0 from the wall to the zone's beginning. What is wrong is
+/// as large as the waves at the wall and runs out of the zone, u′ = iku; what is turned back is 0 at the wall. Lengths are in 1/k.
+fn wrong_and_turned_back(wave_lengths: f64, rate: f64) -> [f64; 2] {
+    let walls = [Wall {
+        axis: 0,
+        is_max: false,
+    }];
+    let zone = Zone {
+        walls: &walls,
+        length: TAU * wave_lengths,
+        rate,
+    };
+    let slope = |x: f64, [u, v]: [Complex; 2]| {
+        // Of a step so short that what is led is r Δt.
+        let r = zone.led(DVec3::splat(1e3), DVec3::splat(x), 1e-9) / 1e-9;
+        [v, -(u + r * u.perp())]
+    };
+    let run = |start: [Complex; 2]| {
+        let (steps, mut x, mut y) = (2000, 0.0, start);
+        let h = zone.length / f64::from(steps);
+        let add = |y: [Complex; 2], by: f64, k: [Complex; 2]| [y[0] + by * k[0], y[1] + by * k[1]];
+        for _ in 0..steps {
+            let k1 = slope(x, y);
+            let k2 = slope(x + 0.5 * h, add(y, 0.5 * h, k1));
+            let k3 = slope(x + 0.5 * h, add(y, 0.5 * h, k2));
+            let k4 = slope(x + h, add(y, h, k3));
+            let sum = |i: usize| k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i];
+            y = [y[0] + h / 6.0 * sum(0), y[1] + h / 6.0 * sum(1)];
+            x += h;
+        }
+        y
+    };
+    // 1 and 0, then 0 and 1, for u and u′ at the wall.
+    let one = run([Complex::X, Complex::ZERO]);
+    let other = run([Complex::ZERO, Complex::X]);
+    // (one + c other)′ = i (one + c other).
+    let off = |y: [Complex; 2]| y[0].perp() - y[1];
+    let (top, bottom) = (off(one), -off(other));
+    let c = Complex::new(bottom.x, -bottom.y).rotate(top) / bottom.length_squared();
+    let wrong = (one[0] + c.rotate(other[0])).length();
+    // 2a = u − iu′ and 2b = u + iu′ but for their phases.
+    let [u, v] = other;
+    let (a, b) = ((u - v.perp()).length(), (u + v.perp()).length());
+    [wrong, a.min(b) / a.max(b)]
+}
+
+/// What runs across a period, or comes from all about, has another phase at either end of it.
+#[test]
+fn waves_fit_into_a_period_or_are_refused() {
+    let load = |waves: &str| {
+        let text = format!(
+            "[shot]\nname = \"a\"\nframes = 9\nframes_per_second = 30\n[domain]\nmin = [0, 0, 0]\nmax = [16, 3, 1.6]\n\
+             periodic = [\"z\"]\n[solver]\nmethod = \"flip\"\n[solver.flip]\ncell_size = 0.1\n[effects]\n\
+             generation_zone = {{ walls = [\"-x\"], length = 5.0, waves = {{ {waves}, depth = 1.0 }} }}\n"
+        );
+        let said = crate::scene::Scene::parse(&text, "s.toml".as_ref(), "".as_ref(), &[]);
+        said.map(|_| ()).map_err(|error| error.to_string())
+    };
+    let stokes = "kind = \"stokes\", height = 0.1, period = 2.0";
+    assert_eq!(load(stokes), Ok(()));
+    let askew = load(&format!("{stokes}, direction_degrees = 30.0")).expect_err("refused");
+    assert!(askew.contains("waves.direction_degrees: waves that go towards 30 degrees do not fit the period along z"), "{askew}");
+    let sea = "kind = \"sea\", significant_height = 0.1, peak_period = 2.0, shortest_period = 1.0";
+    assert_eq!(load(sea), Ok(()));
+    let spread = load(&format!("{sea}, spreading = 10.0")).expect_err("refused");
+    assert!(
+        spread.contains("waves.spreading: spread waves do not fit the period along z"),
+        "{spread}"
+    );
+}
+
+#[test]
+fn waves_in_shallow_water_are_as_right_as_documented() {
+    // Of waves of a period of 2π s the frequency is 1.
+    let settings = Settings {
+        walls: Vec::new(),
+        length: 1.0,
+        waves: Waves::Stokes(Regular {
+            height: 0.1,
+            period: TAU,
+            depth: 1.0,
+            ramp: None,
+            direction_degrees: 0.0,
+        }),
+    };
+    let own = settings.zone().rate;
+    for (rate, wave_lengths, expected) in [
+        (own, 1.5, [0.012, 0.006]),
+        (own, 1.0, [0.059, 0.041]),
+        (2.5, 1.5, [0.046, 0.001]),
+        (2.5, 1.0, [0.140, 0.018]),
+        (6.0, 1.5, [0.003, 0.020]),
+        (6.0, 1.0, [0.023, 0.073]),
+    ] {
+        let found = wrong_and_turned_back(wave_lengths, rate);
+        for (found, expected) in found.into_iter().zip(expected) {
+            let off = (found - expected).abs();
+            assert!(off < 6e-4, "{rate} {wave_lengths}: {found} {expected}");
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! What shaders/shared/air.wgsl is told.
+
+use crate::domain::air::{DENSITY, VISCOSITY};
+
+/// Of drops of that radius, metres, in such a wind, m/s.
+pub(super) fn constants(drop_radius: f64, wind: [f64; 3]) -> Vec<(&'static str, f64)> {
+    vec![
+        ("AIR_DENSITY", DENSITY),
+        ("AIR_VISCOSITY", VISCOSITY),
+        ("DROP_RADIUS", drop_radius),
+        ("WIND_X", wind[0]),
+        ("WIND_Y", wind[1]),
+        ("WIND_Z", wind[2]),
+    ]
+}

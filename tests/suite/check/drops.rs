@@ -1,0 +1,78 @@
+//! Drops alone in the air, where users put them: at round coordinates, at rest, in still air and in wind.
+
+use swell::{
+    domain::{boundary::Boundary, particles::Particles},
+    gpu::adapter::Spoil,
+    scene::{Method, effects::drag},
+    stage::{check::check_frame, prepare::Start},
+};
+
+use super::{lines, over};
+use crate::support::{context, flip as of_flip};
+
+/// Places are on faces and corners of cells of 0.1 m, the last beside a wall.
+#[test]
+fn drops_at_round_places_are_within_tolerance_and_a_fault_in_drag_is_seen() {
+    let context = context();
+    for method in [Method::Flip, Method::Pbf] {
+        let (pass, row) = match method {
+            Method::Flip => (
+                "effects/drag_by_cells",
+                ("effects/drag_by_cells", "velocity"),
+            ),
+            Method::Pbf => (
+                "effects/drag_by_density",
+                ("effects/drag_by_density", "velocity"),
+            ),
+        };
+        for (drop_radius, wind) in [
+            (1e-5, [0.0; 3]),
+            (5e-4, [0.0; 3]),
+            (1e-3, [12.0, 0.0, -3.0]),
+        ] {
+            let mut scene = of_flip::scene([16.0, 40.0, 8.0]);
+            let pbf = scene.solver.pbf.as_mut().unwrap();
+            pbf.particle_spacing = of_flip::DX / 2.0;
+            pbf.grid_projection = true;
+            scene.solver.method = method;
+            scene.effects.drag = Some(drag::Settings { drop_radius, wind });
+            let start = Start {
+                particles: Particles {
+                    id: (0..4).collect(),
+                    position: vec![
+                        [0.3, 3.3, 0.4],
+                        [0.7, 3.1, 0.35],
+                        [1.1, 2.05, 0.4],
+                        [0.04, 3.7, 0.1],
+                    ],
+                    velocity: vec![[0.0; 3], [0.0; 3], [1.0, -0.5, 0.0], [0.0; 3]],
+                    ..Particles::default()
+                },
+                removed: 0,
+                sources: Default::default(),
+                boundary: Boundary::default(),
+            };
+            let checked =
+                |context: &_| check_frame(context, &scene, &start, 0, &start.particles).unwrap();
+            let clean = checked(&context);
+            assert!(
+                over(&clean).is_empty(),
+                "{method:?} {drop_radius}: {}",
+                lines(&clean)
+            );
+            // Negative control: a hundredth less of the time that drag has.
+            let mut spoiled = context.clone();
+            spoiled.spoil = Some(Spoil {
+                pass,
+                from: "share, params.time_step)",
+                to: "share, 0.99 * params.time_step)",
+            });
+            let found = checked(&spoiled);
+            assert!(
+                over(&found).contains(&row),
+                "{method:?} {drop_radius}: {}",
+                lines(&found)
+            );
+        }
+    }
+}

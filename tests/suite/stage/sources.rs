@@ -1,0 +1,170 @@
+//! Water that enters and leaves while a bake runs: ledger, ids, resumed and branched bakes, and the step after it.
+
+use std::collections::BTreeSet;
+
+use crate::support::job::Job;
+use swell::cache::CacheReader;
+
+/// A first emitter whose water all goes down the drain below it, so that the newest ids are gone when the second begins, and
+/// one that keeps a level in a mesh.
+const SOURCES: &str = r#"
+[[emitter]]
+min = [0.3, 1.9, 0.55]
+max = [0.7, 2.2, 0.95]
+velocity = [0.0, -3.0, 0.0]
+until = 0.055
+
+[[emitter]]
+min = [-0.9, 1.9, 0.45]
+max = [-0.5, 2.2, 0.95]
+velocity = [0.5, 1.5, 0.0]
+from = 0.09
+
+[[emitter]]
+mesh = { file = "box.obj", translate = [-1.1, 0.1, 0.0], scale = [0.8, 1.0, 1.0] }
+level = 0.95
+from = 0.09
+
+[[drain]]
+min = [0.2, 1.1, 0.45]
+max = [0.8, 2.3, 1.05]
+from = 0.055
+
+[[drain]]
+min = [-1.0, 0.5, 0.25]
+max = [-0.2, 0.8, 1.25]
+rate = 0.4
+"#;
+
+const FRAMES: u32 = 8;
+
+fn job() -> Job {
+    let job = Job::new();
+    job.edit(
+        "small.toml",
+        "[solver]\n",
+        &format!("{SOURCES}\n[solver]\n"),
+    );
+    job
+}
+
+/// Ids of each frame.
+fn ids(reader: &CacheReader) -> Vec<Vec<u32>> {
+    let frames = reader.first_frame()..=FRAMES;
+    frames.map(|frame| reader.read(frame).unwrap().id).collect()
+}
+
+/// Whether each frame's line says what came and went, and no id is given twice; how many came and went in all.
+fn closes(ids: &[Vec<u32>], exchanges: &[[u64; 2]]) -> Result<[u64; 2], String> {
+    let mut gone = BTreeSet::new();
+    let mut newest = *ids[0].last().expect("water at the start");
+    let mut all = [0, 0];
+    for (k, pair) in ids.windows(2).enumerate() {
+        let [before, now] =
+            [&pair[0], &pair[1]].map(|ids| ids.iter().copied().collect::<BTreeSet<_>>());
+        let entered: Vec<u32> = now.difference(&before).copied().collect();
+        let left: Vec<u32> = before.difference(&now).copied().collect();
+        let found = [entered.len() as u64, left.len() as u64];
+        if found != exchanges[k] {
+            return Err(format!("frame {}: {found:?} of {:?}", k + 1, exchanges[k]));
+        }
+        if let Some(id) = entered
+            .iter()
+            .find(|id| **id <= newest || gone.contains(*id))
+        {
+            return Err(format!("frame {}: {id} was given before", k + 1));
+        }
+        newest = newest.max(entered.last().copied().unwrap_or(0));
+        gone.extend(left);
+        all = [all[0] + found[0], all[1] + found[1]];
+    }
+    Ok(all)
+}
+
+fn exchanges(reader: &CacheReader) -> Vec<[u64; 2]> {
+    let entries = reader.entries()[1..].iter();
+    let count = |value: &serde_json::Value, key: &str| value["exchange"][key].as_u64().unwrap();
+    entries
+        .map(|entry| ["entered", "left"].map(|key| count(&entry.report, key)))
+        .collect()
+}
+
+fn holds(solver: &str, device: &str) {
+    let job = job();
+    let bake = format!("bake small.toml --solver {solver} --device {device}");
+    job.expect(0, &format!("{bake} -o whole"));
+    job.expect(0, "verify whole");
+    let reader = CacheReader::open(&job.path("whole")).unwrap();
+    let (all, exchanges) = (ids(&reader), exchanges(&reader));
+    let [entered, left] = closes(&all, &exchanges).unwrap();
+    assert!(entered > 50 && left > 60, "{entered} {left}");
+    // Negative controls: a particle that is in no line, and one that has the id of another that is gone.
+    let mut spoiled = all.clone();
+    spoiled[4].pop();
+    assert!(closes(&spoiled, &exchanges).is_err());
+    let newest_gone = all[3].last().copied().unwrap();
+    assert!(
+        !all[6].contains(&newest_gone) && *all[6].last().unwrap() > newest_gone,
+        "the newest ids have to be gone before the next come"
+    );
+    let mut spoiled = all;
+    for ids in &mut spoiled[6..] {
+        ids.pop();
+        ids.push(newest_gone);
+    }
+    let said = closes(&spoiled, &exchanges).unwrap_err();
+    assert!(said.contains("was given before"), "{said}");
+
+    // Stopped where the newest ids are gone and none has come, and gone on with; and begun from there.
+    let whole = job.hash("whole");
+    job.expect(0, &format!("{bake} --frames 1-5 -o parts"));
+    job.expect(0, &format!("{bake} --resume -o parts"));
+    assert_eq!(job.hash("parts"), whole);
+    job.expect(0, &format!("{bake} --from whole:5 -o branch"));
+    let branch = CacheReader::open(&job.path("branch")).unwrap();
+    for frame in 5..=FRAMES {
+        assert_eq!(branch.read(frame).unwrap(), reader.read(frame).unwrap());
+    }
+}
+
+#[test]
+fn pbf_bakes_in_which_water_comes_and_goes_close_and_go_on() {
+    holds("pbf", "gpu");
+}
+
+#[test]
+fn flip_bakes_in_which_water_comes_and_goes_close_and_go_on() {
+    holds("flip", "gpu");
+}
+
+#[test]
+fn so_do_those_of_the_reference() {
+    holds("pbf", "cpu");
+    holds("flip", "cpu");
+}
+
+/// The step after water came in is the reference's, of another count of particles than the start had.
+#[test]
+fn the_step_after_an_exchange_is_the_references() {
+    for solver in ["pbf", "flip"] {
+        let job = job();
+        job.expect(0, &format!("bake small.toml --solver {solver} -o whole"));
+        let reader = CacheReader::open(&job.path("whole")).unwrap();
+        let counts = [0, 3, 7].map(|frame| reader.read(frame).unwrap().len());
+        assert!(
+            counts[1..].iter().all(|count| *count != counts[0]),
+            "{counts:?}"
+        );
+        let said = job.expect(0, "check whole --frames 3-7x4");
+        assert!(said.contains("within tolerance"), "{said}");
+        // So do the stages that read the cache.
+        job.write(
+            "tuned.toml",
+            "[emission]\ntrapped_air = [0.2, 2.0]\nwave_crest = [0.2, 2.0]\nenergy = [0.02, 0.5]\n",
+        );
+        job.expect(0, "whitewater whole --settings tuned.toml");
+        job.expect(0, "verify whole/whitewater/tuned");
+        job.expect(0, "check whole/whitewater/tuned --frames 3-7x4");
+        job.expect(0, "render whole --look look.toml --frames 1-8 -o pictures");
+    }
+}
