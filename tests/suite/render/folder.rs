@@ -198,16 +198,35 @@ fn pictures_of_something_else_are_refused_and_left() {
     assert!(pictures(&day) == pictures(&job.path("wide")));
 }
 
-/// A process in the middle of its work, standing still.
+/// Whether some process has a frame of a folder in hand.
+#[cfg(unix)]
+fn is_claimed(folder: &Path) -> bool {
+    let locks = fs::read_dir(folder.join(".swell")).unwrap();
+    let mut locks = locks.map(|entry| entry.unwrap().path());
+    let is_lock = |path: &Path| path.extension().is_some_and(|end| end == "lock");
+    locks.any(|path| is_lock(&path) && fs::File::open(path).unwrap().try_lock().is_err())
+}
+
+/// A process in the middle of its work on the folder `busy`, standing still with a frame in hand: between two frames it has
+/// none, and whoever comes then waits for nothing.
 #[cfg(unix)]
 fn stopped(job: &Job, words: &str) -> Child {
     let mut child = spawn(job, words);
     let said = BufReader::new(child.stdout.take().unwrap());
     let mut lines = said.lines().map(Result::unwrap);
     assert!(lines.any(|line| line.contains("\"event\":\"frame\"")));
-    let stop = ["-STOP".to_owned(), child.id().to_string()];
-    let status = std::process::Command::new("kill").args(stop).status();
-    assert!(status.unwrap().success());
+    let signal = |name: &str| {
+        let words = [name.to_owned(), child.id().to_string()];
+        let status = std::process::Command::new("kill").args(words).status();
+        assert!(status.unwrap().success());
+        // A call into the kernel that has begun is ended before a process stands.
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    signal("-STOP");
+    while !is_claimed(&job.path("busy")) {
+        signal("-CONT");
+        signal("-STOP");
+    }
     child
 }
 
