@@ -5,6 +5,7 @@
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
+#import "shared/unit.wgsl"
 
 // A bit a no-slip wall: of the least faces along x, y and z, then of the greatest.
 override NO_SLIP: u32;
@@ -29,10 +30,6 @@ fn parts(place: vec3f) -> vec3f {
 
 fn is_known(element: u32, component: u32) -> bool {
     return (face_layer[element] & (0x80u << (8u * component))) != 0u;
-}
-
-fn unit(axis: u32) -> vec3i {
-    return select(vec3i(0), vec3i(1), vec3u(axis) == vec3u(0u, 1u, 2u));
 }
 
 // The particles' velocity along `other` at the lower face along `own`: the mean of the four faces about it, of those that

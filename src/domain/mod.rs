@@ -22,6 +22,7 @@ pub mod pbf;
 pub mod period;
 pub mod poisson;
 pub mod probe;
+pub mod relaxation;
 pub mod sampling;
 pub mod shores;
 pub mod signed_distance;

@@ -51,7 +51,8 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let (solver, lattice) = solver::solver(doc, spec.solver, &domain)?;
     let periodic = periodic::read(doc, &spec.domain.periodic)?;
     periodic::check_solver(doc, periodic, &domain, &solver)?;
-    let no_slip = no_slip::build(doc, &spec.domain, solver.method, periodic)?;
+    let between = between_projections(doc, &spec.effects, &solver)?;
+    let no_slip = no_slip::build(doc, &spec.domain, (solver.method, between), periodic)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     periodic::check_gravity(doc, periodic, water.gravity)?;
     let around = wave_maker::Surroundings {
@@ -137,6 +138,21 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         effects: spec.effects,
     };
     Ok(scene.into_local())
+}
+
+/// Whether an effect is solved between two projections, which PBF has with its grid alone.
+fn between_projections(
+    doc: &Document<'_>,
+    effects: &effects::Effects,
+    solver: &super::Solver,
+) -> Result<bool> {
+    match effects.between_projections().1 {
+        Some(key) if solver.method == super::Method::Pbf && !solver.pbf().grid_projection => {
+            let problem = "it is solved on the grid of PBF's projection; set solver.pbf.grid_projection = true";
+            Err(doc.fault_of_plain(&key, problem))
+        }
+        key => Ok(key.is_some()),
+    }
 }
 
 /// Solids at rest, and those that move.

@@ -12,11 +12,12 @@ impl Scene {
     }
 }
 
-/// The walls that `domain.walls` or `domain.no_slip` names, in the order of [`Wall::NAMED`]; a periodic axis has none.
+/// The walls that `domain.walls` or `domain.no_slip` names, in the order of [`Wall::NAMED`]; a periodic axis has none. `has_own` says
+/// whether an effect holds water to them, with either solver.
 pub(super) fn build(
     doc: &Document<'_>,
     spec: &DomainSpec,
-    method: Method,
+    (method, has_own): (Method, bool),
     periodic: [bool; 3],
 ) -> Result<Vec<Wall>, SceneError> {
     let is_all = spec.walls.as_deref() == Some(WALLS[1]);
@@ -41,8 +42,8 @@ pub(super) fn build(
         return Err(doc.fault_of_plain(key, problem));
     }
     let walls: Vec<Wall> = walls.into_iter().filter(|wall| !is_none(wall)).collect();
-    if method == Method::Pbf && !walls.is_empty() {
-        let problem = "solver pbf has free-slip walls alone; choose solver.method = \"flip\"";
+    if method == Method::Pbf && !has_own && !walls.is_empty() {
+        let problem = "without effects.viscosity.coefficient solver pbf has free-slip walls alone; choose solver.method = \"flip\"";
         return Err(doc.fault_of_plain(key, problem));
     }
     Ok(walls)

@@ -2,7 +2,6 @@
 
 use super::{
     Method, Scene,
-    effects::Effects,
     flip::{Flip, Precision, Preconditioner, Pressure, Surface, Transfer},
 };
 
@@ -46,7 +45,7 @@ impl Scene {
         let mut scene = self.clone();
         scene.solver.method = Method::Flip;
         scene.solver.flip = Some(flip);
-        scene.effects = Effects::default();
+        scene.effects = self.effects.between_projections().0;
         Some(scene)
     }
 

@@ -55,6 +55,7 @@ mod gpu {
 mod reference {
     mod flip;
     mod pbf;
+    mod viscous;
 }
 mod render {
     mod analytic;
@@ -85,6 +86,7 @@ mod solve {
     mod projected;
     mod sources;
     mod thin_water;
+    mod viscous;
     mod walls;
     mod whitewater;
     mod zones;

@@ -81,7 +81,7 @@ const _: () = assert!(
 
 impl FlipState {
     /// Counts a run of a pass on a level; true for the first few.
-    pub(super) fn is_due(&mut self, io: &Io<'_>, level: u32) -> bool {
+    pub(in crate::check) fn is_due(&mut self, io: &Io<'_>, level: u32) -> bool {
         let runs = self.runs.entry((io.pass, level)).or_default();
         *runs += 1;
         *runs <= PRODUCTS

@@ -43,13 +43,14 @@ impl Projected {
     }
 }
 
-/// Makes the velocities free of divergence; what the solves did, and the density correction's displacements.
+/// Makes the velocities free of divergence; what the solves did, and the density correction's displacements, where there is one and
+/// `centers` are given.
 pub(super) fn project(
     model: &Model,
     timings: &mut Timings,
     factor_budget: u64,
     waters: &Waters<'_>,
-    centers: &Centers,
+    centers: Option<&Centers>,
     faces: &mut Faces,
 ) -> Result<(Projected, Option<Vec<DVec3>>), ReferenceError> {
     let system = timings.time("pressure/build_system", || waters.system());
@@ -63,7 +64,8 @@ pub(super) fn project(
         &mut faces.velocity,
     );
     let after = waters.divergence(&system, &faces.velocity);
-    let correction = model.settings().density_correction.then(|| {
+    let corrected = centers.filter(|_| model.settings().density_correction);
+    let correction = corrected.map(|centers| {
         let source = density_source(model, &system, centers);
         timings.time("pressure/solve", || solver.solve(&source))
     });

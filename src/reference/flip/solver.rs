@@ -65,8 +65,10 @@ pub struct Trace {
     pub centers: Centers,
     /// Velocities as the last layer of the extrapolation left them.
     pub faces: Faces,
-    /// The solve.
+    /// The solve: the last one.
     pub projected: Projected,
+    /// The one before, where an effect acts between two.
+    pub earlier: Option<Projected>,
     /// Pa, by element; 0 where there is no water.
     pub pressure: Vec<f64>,
     /// Displacements of the density correction at the lower faces, metres, where there is one.
@@ -77,6 +79,13 @@ pub struct Trace {
     pub after: Cloud,
     /// Particles that were slowed to the displacement cap.
     pub capped: u64,
+}
+
+impl Trace {
+    /// Every solve, in order.
+    fn projections(&self) -> impl Iterator<Item = &Projected> {
+        self.earlier.iter().chain([&self.projected])
+    }
 }
 
 impl Flip {
@@ -190,7 +199,8 @@ impl Flip {
             excess,
             distance,
         };
-        if !model.scene.no_slip.is_empty() {
+        let acts_between = model.scene.effects.between_projections().1.is_some();
+        if !model.scene.no_slip.is_empty() && !acts_between {
             timings.time("flip/wall_friction", || {
                 wall_friction(model, &step, &bricks, &room, &mut faces);
             });
@@ -204,14 +214,23 @@ impl Flip {
         };
         effects::on_faces(&model.scene.effects, water, &mut faces.velocity, timings);
         let waters = Waters::new(model, &bricks, &room, &centers);
-        let (projected, displacement) = project(
-            model,
-            timings,
-            *factor_budget,
-            &waters,
-            &centers,
-            &mut faces,
-        )?;
+        let project = |centers, faces: &mut Faces, timings: &mut Timings| {
+            project(model, timings, *factor_budget, &waters, centers, faces)
+        };
+        let mut earlier = None;
+        if acts_between {
+            earlier = Some(project(None, &mut faces, timings)?.0);
+            let water = Water {
+                model,
+                step: &step,
+                bricks: &bricks,
+                room: &room,
+                old: &faces.change,
+            };
+            let named = &model.scene.effects;
+            effects::between_projections(named, water, &mut faces.velocity, timings);
+        }
+        let (projected, displacement) = project(Some(&centers), &mut faces, timings)?;
         timings.time("flip/extrapolate", || {
             find_change(model, &bricks, &room, &mut faces);
             for layer in 2..=step.layers as u32 {
@@ -243,9 +262,14 @@ impl Flip {
             advect(model, &step, &bricks, position, &faces.velocity, &given)
         });
         let scale = model.scene.water.rest_density * model.cell_size() / step.length;
-        let pressure = waters.by_element(&projected.system, &projected.solution.x);
+        let mut pressure = waters.by_element(&projected.system, &projected.solution.x);
+        if let Some(earlier) = &earlier {
+            let before = waters.by_element(&earlier.system, &earlier.solution.x);
+            (pressure.iter_mut().zip(before)).for_each(|(now, before)| *now += before);
+        }
         Ok(Trace {
             pressure: pressure.into_iter().map(|q| scale * q).collect(),
+            earlier,
             after: Cloud {
                 position: moved.position,
                 velocity: moved.velocity,
@@ -273,14 +297,16 @@ impl Flip {
         substep: &Substep,
     ) -> Result<Trace, ReferenceError> {
         let trace = self.substep(cloud, is_wet, substep)?;
-        let [_, divergence] = trace.projected.divergence;
-        self.model.scene.budget.check_projection(
-            frame,
-            number,
-            trace.projected.solution.residual,
-            divergence,
-            substep.length,
-        )?;
+        for projected in trace.projections() {
+            let [_, divergence] = projected.divergence;
+            self.model.scene.budget.check_projection(
+                frame,
+                number,
+                projected.solution.residual,
+                divergence,
+                substep.length,
+            )?;
+        }
         let step = self.model.step(substep);
         let taken = |change: &DVec3| (-*change / substep.length).as_vec3().to_array();
         self.field = Some(Field {
@@ -311,7 +337,9 @@ impl Flip {
             return Err(breach.in_substep(number).into());
         }
         let mut trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
-        trace.projected.add_to(all);
+        trace
+            .projections()
+            .for_each(|projected| projected.add_to(all));
         let work = self.model.boundary_work(&trace, substep.length);
         let order = by_id(&trace.sorted.cloud);
         let step = self.model.step(substep);
@@ -358,9 +386,11 @@ impl Flip {
             let number = (frame, report.substeps);
             let trace = self.judged_substep(number, cloud, &surveyed.is_wet, &substep)?;
             report.boundary_work += self.model.boundary_work(&trace, substep.length);
-            report.iterations += u64::from(trace.projected.solution.iterations);
+            for projected in trace.projections() {
+                report.iterations += u64::from(projected.solution.iterations);
+                projected.add_to(&mut all);
+            }
             report.capped += trace.capped;
-            trace.projected.add_to(&mut all);
             let span = Span {
                 start: start + elapsed,
                 end: start + (elapsed + substep.length),

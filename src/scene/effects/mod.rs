@@ -34,6 +34,11 @@ pub(super) trait Effect {
         Ok(())
     }
 
+    /// Its key that is solved on the grid, on velocities that are free of divergence, between two projections; it holds water to no-slip walls.
+    fn between_projections(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Part of the velocity that a frame of FLIP takes from the grid for it.
     fn blend(&self) -> f64 {
         0.0
@@ -128,6 +133,19 @@ macro_rules! effects {
             pub(super) fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
                 $(self.$name.iter().try_for_each(|settings| settings.check(doc, around))?;)+
                 Ok(())
+            }
+
+            /// Those that are solved between two projections, by their key; a grid that projects another solver's velocities has them alone.
+            pub fn between_projections(&self) -> (Self, Option<String>) {
+                let mut all = Self::default();
+                let mut key = None;
+                $(
+                    if let Some((settings, own)) = self.$name.as_ref().and_then(|it| Some((it, it.between_projections()?))) {
+                        all.$name = Some(settings.clone());
+                        key = Some(format!("effects.{}.{own}", stringify!($name)));
+                    }
+                )+
+                (all, key)
             }
 
             /// Part of the velocity that a frame of FLIP takes from the grid, of each of the named effects.

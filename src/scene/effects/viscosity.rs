@@ -1,30 +1,121 @@
-//! XSPH viscosity (Schechter and Bridson 2012; Macklin and Müller 2013, eq. 17).
+//! Viscosity: of so many Pa s, or XSPH's.
 
 use serde::{Deserialize, Serialize};
 
-use super::{super::key::Key, Effect};
+use super::{
+    super::{document::Document, error::SceneError, key::Key},
+    Effect, Surroundings,
+};
+use crate::domain::relaxation::Relaxation;
 
-/// `viscosity = { xsph = 0.01 }`.
+/// Of the error of the velocities.
+const TOLERANCE: f64 = 1e-3;
+
+/// `viscosity = { coefficient = 10.0 }`, or `viscosity = { xsph = 0.01 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, from = "Given")]
 pub struct Settings {
+    /// μ, Pa s: solved on the grid, between two projections (Batty and Bridson 2008).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coefficient: Option<f64>,
+    /// With a coefficient: to which part of what it was a substep's solve brings the error of the velocities.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
     /// c: the part of the neighbours' mean relative velocity that a substep of PBF, or a frame of FLIP, takes
-    /// over, 0 to 1.
-    pub xsph: f64,
+    /// over, 0 to 1 (Schechter and Bridson 2012; Macklin and Müller 2013, eq. 17).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub xsph: Option<f64>,
+}
+
+/// As a scene gives them: a tolerance that is left out is the default's.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Given {
+    coefficient: Option<f64>,
+    tolerance: Option<f64>,
+    xsph: Option<f64>,
+}
+
+impl From<Given> for Settings {
+    fn from(given: Given) -> Self {
+        let default = given.coefficient.map(|_| TOLERANCE);
+        Self {
+            coefficient: given.coefficient,
+            tolerance: given.tolerance.or(default),
+            xsph: given.xsph,
+        }
+    }
+}
+
+impl Settings {
+    /// Of so many Pa s.
+    pub fn newtonian(coefficient: f64) -> Self {
+        Self {
+            coefficient: Some(coefficient),
+            tolerance: Some(TOLERANCE),
+            xsph: None,
+        }
+    }
+
+    /// XSPH's c.
+    pub fn xsph(c: f64) -> Self {
+        Self {
+            coefficient: None,
+            tolerance: None,
+            xsph: Some(c),
+        }
+    }
+
+    /// How its solve goes in a step of so many seconds in cells of edge `cell_size`, metres, of water of `density`, kg/m³; `None`
+    /// without a coefficient.
+    pub fn relaxation(&self, time_step: f64, cell_size: f64, density: f64) -> Option<Relaxation> {
+        let (coefficient, tolerance) = self.coefficient.zip(self.tolerance)?;
+        Some(Relaxation::new(
+            coefficient / density,
+            time_step,
+            cell_size,
+            tolerance,
+        ))
+    }
 }
 
 impl Effect for Settings {
-    const ABOUT: &'static str = "XSPH viscosity (Schechter and Bridson 2012)";
+    const ABOUT: &'static str = "viscosity: of so many Pa s (Batty and Bridson 2008), or XSPH's (Schechter and Bridson 2012)";
 
     const KEYS: &'static [Key] = &[
+        Key::number("coefficient", 1e-6..=1e9)
+            .unit("Pa s")
+            .absent()
+            .without(&["xsph"])
+            .about("μ, solved implicitly on FLIP's grid, or on that of PBF's projection; water holds to solids, and to the walls of `domain.no_slip`"),
+        Key::number("tolerance", 1e-6..=0.5)
+            .computed(|| TOLERANCE.to_string())
+            .with("coefficient")
+            .about("to which part of what it was a substep's solve brings the error of the velocities"),
         // A millionth is what a frame of 32-bit velocities hardly shows.
         Key::number("xsph", 1e-6..=1.0)
+            .absent()
+            .without(&["coefficient"])
             .about("c, the part of the neighbours' mean relative velocity that a substep of PBF, or a frame of FLIP, takes over"),
     ];
+
+    fn check(&self, doc: &Document<'_>, _: &Surroundings<'_>) -> Result<(), SceneError> {
+        match (self.coefficient, self.xsph) {
+            (None, None) => Err(doc.fault_of_plain(
+                "effects.viscosity",
+                "neither a coefficient, Pa s, nor xsph is given: one of them is needed",
+            )),
+            _ => Ok(()),
+        }
+    }
 
     /// XSPH's mean of the neighbours' velocities is what the grid holds: c is a further part taken from it, without a
     /// pass of its own.
     fn blend(&self) -> f64 {
-        self.xsph
+        self.xsph.unwrap_or(0.0)
+    }
+
+    fn between_projections(&self) -> Option<&'static str> {
+        self.coefficient.map(|_| "coefficient")
     }
 }

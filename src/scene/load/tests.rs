@@ -236,7 +236,7 @@ fn overrides_reach_everywhere_and_take_bare_words() {
     assert_eq!(scene.solver.pbf().particle_spacing, 0.2);
     assert_eq!(scene.water.blocks[0].max.x, 2.0);
     assert_eq!(scene.water.blocks[0].min.x, 0.5);
-    assert_eq!(scene.effects.viscosity.map(|v| v.xsph), Some(0.02));
+    assert_eq!(scene.effects.viscosity.and_then(|v| v.xsph), Some(0.02));
     assert_eq!(scene.shot.name, "other-name");
 
     for (bad, expected) in [

@@ -36,7 +36,7 @@ fn generation(name: &'static str, settings: &Settings, scene: &Scene) -> Additio
 
 impl OnDevice for Settings {
     /// The waves as they are then. Phases are reduced here, where there are the digits for it.
-    fn upload(&self, program: &Program, scene: &Scene, time: f64) {
+    fn upload(&self, program: &Program, scene: &Scene, (time, _): (f64, f64)) {
         let waves = self.incoming(scene.water.gravity);
         let grown = waves.grown(time);
         let of = |line: &Line| {

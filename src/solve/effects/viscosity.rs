@@ -1,21 +1,50 @@
-//! XSPH viscosity on the device.
+//! Viscosity on the device: of so many Pa s on FLIP's grid, or XSPH's on PBF's particles.
 
 use crate::{
-    gpu::buffer::Buf,
-    scene::{Scene, effects::viscosity::Settings},
+    domain::relaxation::Relaxation,
+    gpu::{
+        buffer::{Buf, Windows},
+        program::Program,
+        recording::{Bind, Command},
+    },
+    scene::{Method, Scene, effects::viscosity::Settings},
+    solve::flip::{buffers::FACE_VELOCITY, over_cells},
 };
 
-use super::{Addition, OnDevice, pass};
+use super::{Addition, Between, OnDevice, Turns, pass};
 
-impl OnDevice for Settings {}
-
-/// What each particle's velocity changes by, and 0, in sorted order, m/s.
+/// What XSPH changes each particle's velocity by, and 0, in sorted order, m/s.
 pub const CHANGE: Buf<[f32; 4]> = Buf::new("viscosity_change");
 
+/// Cells: what the solve knows of them, as shared/viscous_word.wgsl has it.
+pub const WORD: Buf<u32> = Buf::new("viscous_word");
+/// Planes: velocities from which the solve starts, m/s.
+pub const START: Buf<f32> = Buf::new("viscous_start");
+/// Planes: velocities after every other iteration, m/s.
+pub const OTHER: Buf<f32> = Buf::new("viscous_other");
+/// Planes: what the last iteration changed, m/s.
+pub const STEP: Buf<f32> = Buf::new("viscous_change");
+/// Cells: pressure of the projection before the solve, Pa.
+pub const EARLIER: Buf<f32> = Buf::new("viscous_pressure");
+/// Of the first iteration and of the others, [`Relaxation::of_iteration`].
+pub const GAINS: Windows<[f32; 4]> = Windows::new("viscous_gain", "viscous_gains");
+
+/// Variable of the velocities that an iteration starts from, m/s; and of those that it comes to.
+pub const FROM: Buf<f32> = Buf::new("viscous_from");
+/// See [`FROM`].
+pub const TO: Buf<f32> = Buf::new("viscous_to");
+
+const WEIGH: &str = "effects/viscosity_weigh";
+const RELAX: &str = "effects/viscosity_relax";
+const ADD_PRESSURE: &str = "effects/viscosity_pressure";
+
 pub(super) fn pbf(settings: &Settings, _: &Scene, particles: usize) -> Addition {
+    let Some(xsph) = settings.xsph else {
+        return Addition::default();
+    };
     Addition {
         passes: vec![
-            pass("effects/viscosity_gather", &[("XSPH", settings.xsph)]),
+            pass("effects/viscosity_gather", &[("XSPH", xsph)]),
             pass("effects/viscosity_apply", &[]),
         ],
         buffers: vec![CHANGE.sized(particles)],
@@ -23,7 +52,79 @@ pub(super) fn pbf(settings: &Settings, _: &Scene, particles: usize) -> Addition 
     }
 }
 
-/// Nothing of its own: the grid holds the mean of the neighbours' velocities already, and the blend takes more of it.
-pub(super) fn flip(_: &Settings, _: &Scene, _cells: usize) -> Addition {
-    Addition::default()
+/// XSPH is nothing of its own: the grid holds the mean of the neighbours' velocities already, and the blend takes more of it.
+pub(super) fn flip(settings: &Settings, scene: &Scene, cells: usize) -> Addition {
+    if settings.coefficient.is_none() {
+        return Addition::default();
+    }
+    let no_slip = f64::from(scene.no_slip_bits());
+    Addition {
+        between: Some(Between {
+            passes: vec![
+                pass(WEIGH, &[("NO_SLIP", no_slip)]),
+                pass(RELAX, &[]),
+                pass(ADD_PRESSURE, &[]),
+            ],
+            begin: vec![over_cells(WEIGH, Vec::new()), there(0), back()],
+            again: vec![there(1), back()],
+            end: vec![over_cells(ADD_PRESSURE, Vec::new())],
+        }),
+        buffers: vec![
+            WORD.sized(cells),
+            START.sized(3 * cells),
+            OTHER.sized(3 * cells),
+            STEP.sized(3 * cells),
+            EARLIER.sized(cells),
+            GAINS.sized(2),
+        ],
+        ..Addition::default()
+    }
+}
+
+/// An iteration between two arrays of velocities.
+fn relax(from: &Buf<f32>, to: &Buf<f32>, gains: usize) -> Command {
+    let binds = vec![
+        Bind::whole("viscous_from", from),
+        Bind::whole("viscous_to", to),
+        GAINS.bind(gains),
+    ];
+    over_cells(RELAX, binds)
+}
+
+fn there(gains: usize) -> Command {
+    relax(&FACE_VELOCITY, &OTHER, gains)
+}
+
+fn back() -> Command {
+    relax(&OTHER, &FACE_VELOCITY, 1)
+}
+
+/// On the grid of a scene.
+fn relaxation(settings: &Settings, scene: &Scene, length: f64) -> Option<Relaxation> {
+    // PBF's own scene has none: its projection's has.
+    if scene.solver.method != Method::Flip {
+        return None;
+    }
+    settings.relaxation(
+        length,
+        scene.solver.flip().cell_size,
+        scene.water.rest_density,
+    )
+}
+
+impl OnDevice for Settings {
+    fn upload(&self, program: &Program, scene: &Scene, (_, length): (f64, f64)) {
+        if let Some(relaxation) = relaxation(self, scene, length) {
+            let gains = [true, false].map(|is_first| relaxation.of_iteration(is_first));
+            program.upload_windows(&GAINS, &gains.map(|gains| gains.map(|value| value as f32)));
+        }
+    }
+
+    fn turns(&self, scene: &Scene, length: f64) -> Option<Turns> {
+        let relaxation = relaxation(self, scene, length)?;
+        Some(Turns {
+            again: relaxation.iterations / 2 - 1,
+            is_short: relaxation.is_short,
+        })
+    }
 }

@@ -51,6 +51,7 @@ use super::{
 use buffers::*;
 pub use capacity::capacity;
 use capacity::{bricks, capacity_of, no_water, whole_frame};
+pub(super) use record::over_cells;
 use record::{Commands, Recordings, groups, numbers};
 pub(super) use totals::FrameTotals;
 
@@ -135,7 +136,8 @@ impl Flip {
         let before = recordings
             .survey
             .passes()
-            .chain(recordings.to_grid.passes());
+            .chain(recordings.to_grid.passes())
+            .chain(recordings.between());
         let after = recordings
             .to_particles
             .passes()
@@ -230,7 +232,7 @@ impl Flip {
             let inlets = step::inlets(&self.scene, substep);
             self.program.upload(INLETS, 0, &[inlets]);
         }
-        effects::upload(&self.program, &self.scene, substep.start);
+        effects::upload(&self.program, &self.scene, (substep.start, substep.length));
         Ok(())
     }
 
@@ -308,6 +310,23 @@ impl Flip {
         self.pressure.project_by(&self.program, scale, run)
     }
 
+    fn project_within_budget(
+        &mut self,
+        substep: &Substep,
+        totals: &mut FrameTotals,
+        run: &mut Run<'_>,
+    ) -> Result<(), SolveError> {
+        let projected = self.project_by(substep, run)?;
+        totals.add(&projected);
+        Ok(self.scene.budget.check_projection(
+            self.frame + 1,
+            totals.substeps,
+            projected.solved.residual,
+            projected.divergence_after,
+            substep.length,
+        )?)
+    }
+
     fn run_substep(
         &mut self,
         is_wet: &[bool],
@@ -316,15 +335,13 @@ impl Flip {
         run: &mut Run<'_>,
     ) -> Result<(), SolveError> {
         self.carry(is_wet, substep, run)?;
-        let projected = self.project_by(substep, run)?;
-        totals.add(&projected);
-        self.scene.budget.check_projection(
-            self.frame + 1,
-            totals.substeps,
-            projected.solved.residual,
-            projected.divergence_after,
-            substep.length,
-        )?;
+        self.project_within_budget(substep, totals, run)?;
+        if let Some(turns) = effects::turns(&self.scene, substep.length) {
+            totals.projection.missed += u32::from(turns.is_short);
+            self.recordings
+                .run_between(&self.program, turns.again, run)?;
+            self.project_within_budget(substep, totals, run)?;
+        }
         if self.scene.solver.flip().density_correction {
             let corrected = self.pressure.correct_by(&self.program, run)?;
             totals.projection.correction_iterations += u64::from(corrected.iterations);

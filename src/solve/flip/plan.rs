@@ -60,7 +60,11 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan
         pressure::passes(settings, flip.surface, has_correction, scene.is_periodic()),
         &[],
     );
-    plan.add_passes(in_order(commands.after_projection()).map(&plain), &[]);
+    plan.add_passes(
+        in_order(commands.between_projections()).map(&plain),
+        &effects,
+    );
+    plan.add_passes(in_order(commands.after_projection()).map(&plain), &effects);
     plan
 }
 
@@ -71,8 +75,13 @@ pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
     let commands = Commands::new(plan, scene, &effects);
     let projection = pressure::all_commands(flip.pressure.preconditioner, flip.density_correction);
     let before = commands.before_projection().cloned();
+    let between = commands.between_projections().cloned();
     let after = commands.after_projection().cloned();
-    before.chain(projection).chain(after).collect()
+    before
+        .chain(projection)
+        .chain(between)
+        .chain(after)
+        .collect()
 }
 
 /// Whether particles that are too near to each other are pushed apart: with the density correction, which knows cells alone,

@@ -10,9 +10,11 @@ use crate::{
     },
     scene::Scene,
     solve::{
+        SolveError,
         effects::Addition,
         params::FlipParams,
         plan::{Plan, PlannedBuffer},
+        trace::Run,
     },
 };
 
@@ -45,6 +47,8 @@ pub(super) struct Recordings {
     pub(super) survey: Recording,
     /// Up to what the projection reads.
     pub(super) to_grid: Recording,
+    /// Between two projections: what begins, and what goes on.
+    between: [Recording; 2],
     /// From what it wrote.
     pub(super) to_particles: Recording,
     /// What the host is told of the substep.
@@ -56,9 +60,29 @@ impl Recordings {
         Self {
             survey: Recording::new(program, &commands.survey),
             to_grid: Recording::new(program, &commands.to_grid),
+            between: [&commands.begin, &commands.again].map(|part| Recording::new(program, part)),
             to_particles: Recording::new(program, &commands.to_particles),
             watch: Recording::new(program, &commands.watch),
         }
+    }
+
+    /// Names of the passes between two projections.
+    pub(super) fn between(&self) -> impl Iterator<Item = &'static str> {
+        self.between.iter().flat_map(Recording::passes)
+    }
+
+    /// Runs what stands between two projections, with so many turns after the first.
+    pub(super) fn run_between(
+        &self,
+        program: &Program,
+        again: u32,
+        run: &mut Run<'_>,
+    ) -> Result<(), SolveError> {
+        let [begin, turn] = &self.between;
+        run(program, &[begin])?;
+        // So many at once that the device has work, and that no submission grows without bound.
+        let turns = vec![turn; again as usize];
+        turns.chunks(64).try_for_each(|turns| run(program, turns))
     }
 }
 
@@ -66,6 +90,8 @@ impl Recordings {
 pub(super) struct Commands {
     survey: Vec<Command>,
     to_grid: Vec<Command>,
+    begin: Vec<Command>,
+    again: Vec<Command>,
     to_particles: Vec<Command>,
     watch: Vec<Command>,
 }
@@ -74,19 +100,36 @@ impl Commands {
     /// For the counts and buffers of `plan`.
     pub(super) fn new(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Self {
         let n = plan.counts.particles;
+        let between = || {
+            effects
+                .iter()
+                .filter_map(|(_, addition)| addition.between.as_ref())
+        };
+        let mut end: Vec<Command> = between().flat_map(|between| between.end.clone()).collect();
+        end.extend(to_particles(plan, scene));
         Self {
             survey: vec![
                 Command::clear(&SURVEY),
                 Command::over("flip/survey", n.div_ceil(SURVEY_RUN)),
             ],
             to_grid: to_grid(plan, scene, effects),
-            to_particles: to_particles(plan, scene),
+            begin: between()
+                .flat_map(|between| between.begin.clone())
+                .collect(),
+            again: between()
+                .flat_map(|between| between.again.clone())
+                .collect(),
+            to_particles: end,
             watch: watch(plan, scene),
         }
     }
 
     pub(super) fn before_projection(&self) -> impl Iterator<Item = &Command> {
         self.survey.iter().chain(&self.to_grid)
+    }
+
+    pub(super) fn between_projections(&self) -> impl Iterator<Item = &Command> {
+        self.begin.iter().chain(&self.again)
     }
 
     pub(super) fn after_projection(&self) -> impl Iterator<Item = &Command> {
@@ -122,6 +165,11 @@ fn over(pass: &'static str, size: usize) -> Command {
     bound(pass, size, Vec::new())
 }
 
+/// A pass over cells within reach.
+pub(in crate::solve) fn over_cells(pass: &'static str, binds: Vec<Bind>) -> Command {
+    bound(pass, ACTIVE, binds)
+}
+
 fn bound(pass: &'static str, size: usize, binds: Vec<Bind>) -> Command {
     Command::Dispatch {
         pass,
@@ -132,6 +180,11 @@ fn bound(pass: &'static str, size: usize, binds: Vec<Bind>) -> Command {
 
 fn along(pass: &'static str, size: usize, axis: usize) -> Command {
     bound(pass, size, vec![AXES.bind(axis)])
+}
+
+/// Whether no-slip walls slow the water below what the grid resolves: not where an effect resolves it.
+fn slows_along_walls(scene: &Scene) -> bool {
+    !scene.no_slip.is_empty() && scene.effects.between_projections().1.is_none()
 }
 
 fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Vec<Command> {
@@ -164,7 +217,7 @@ fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> 
     if scene.has_inlets() {
         commands.push(over("flip/let_in", ACTIVE));
     }
-    if !scene.no_slip.is_empty() {
+    if slows_along_walls(scene) {
         commands.push(over(WALL_FRICTION, ACTIVE));
     }
     for pass in effects.iter().flat_map(|(_, addition)| &addition.passes) {

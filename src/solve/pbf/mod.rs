@@ -254,7 +254,7 @@ impl Pbf {
             grid.project(&self.program, (time - step, step), run)?;
         }
         self.program.upload(PARAMS, 0, &[self.params(time, step)]);
-        effects::upload(&self.program, &self.scene, time);
+        effects::upload(&self.program, &self.scene, (time, step));
         if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {
             self.program.upload(CONTROL, 0, &[self.control()]);
         }

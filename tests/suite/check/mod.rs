@@ -3,6 +3,7 @@ mod controls;
 mod drops;
 mod frames;
 mod periodic;
+mod viscous;
 mod whitewater;
 
 use swell::{
@@ -87,7 +88,7 @@ fn case(method: Method) -> (Scene, Start) {
             max_iterations: 40,
         },
     });
-    scene.effects.viscosity = Some(viscosity::Settings { xsph: 0.1 });
+    scene.effects.viscosity = Some(viscosity::Settings::xsph(0.1));
     scene.effects.vorticity_confinement = Some(vorticity_confinement::Settings { strength: 1.0 });
     scene.effects.drag = Some(drag::Settings {
         drop_radius: 1e-3,

@@ -1,5 +1,5 @@
 //! FLIP on the GPU against its f64 reference, from the same particles over one substep.
-mod cases;
+pub mod cases;
 
 use std::cell::RefCell;
 
@@ -317,6 +317,7 @@ fn the_gpu_follows_the_reference() {
         wall(),
         moving_solid(),
         pocket(),
+        viscous(),
         effects(),
     ];
     let mut missed = Vec::new();
@@ -478,7 +479,7 @@ fn whole_frames_agree_in_aggregates() {
     let (mut scene, _) = tank([16, 12, 8], 6);
     scene.shot.frames_per_second = 50.0;
     flip(&mut scene).cfl = 0.3;
-    scene.effects.viscosity = Some(viscosity::Settings { xsph: 0.05 });
+    scene.effects.viscosity = Some(viscosity::Settings::xsph(0.05));
     let particles = block([0; 3], [7, 8, 8]);
     let context = context();
     let mut gpu = solver(&context, &scene, &particles);

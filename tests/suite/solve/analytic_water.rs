@@ -97,7 +97,7 @@ fn flip_still_water_stays_and_weighs_what_it_weighs() {
 fn pbf_still_water_weighs_about_what_it_weighs() {
     let mut scene = support::scene([0.8, 1.6, 0.8]);
     ask_for_pressure(&mut scene);
-    scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.05 });
+    scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.05));
     let particles = lattice([0.0; 3], [8, 10, 8], [D; 3]);
     let mut solver = built(&context(), &scene, &particles);
     let frames = 150;
@@ -278,7 +278,7 @@ fn pbf_standing_waves_have_about_their_period() {
     let length = spacings as f64 * D;
     let mut scene = support::scene([length, 0.6 * length, 0.4]);
     scene.solver.pbf.as_mut().unwrap().stop = Stop::Iterations(16);
-    scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.1 });
+    scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.1));
     let particles = lattice([0.0; 3], [spacings, spacings * 10 / 32, 4], [D; 3]);
     let settled = support::run(&context, &scene, &particles, 150).0;
     scene.effects.viscosity = None;

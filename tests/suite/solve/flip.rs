@@ -489,7 +489,7 @@ fn effects_add_what_they_need_and_act() {
     };
     let passes = names(&scene);
     assert!(!passes.contains("effects/"), "{passes}");
-    scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.2 });
+    scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.2));
     assert_eq!(names(&scene), passes);
     let viscous = run(&context, &scene, &particles, 10).1.kinetic_energy;
     scene.effects.viscosity = None;

@@ -178,7 +178,7 @@ fn two_particles_are_slowed_by_xsph() {
     let paper = Paper::new(D, 2.0);
     let mut scene = scene([2.0; 3]);
     scene.water.gravity = DVec3::ZERO;
-    scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.3 });
+    scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.3));
     let speeds = [[0.5f32, 0.0, -0.25], [-0.125, 0.25, 0.0]];
     let particles = Particles {
         position: vec![[1.0, 1.0, 1.0], [1.08, 1.03, 0.98]],

@@ -192,7 +192,7 @@ fn still_water_settles() {
     let mut scene = scene([1.6, 2.0, 1.6]);
     let particles = lattice([0.0; 3], [16, 10, 16], [D; 3]);
     let (_, restless) = run(&context, &scene, &particles, 200);
-    scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.05 });
+    scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.05));
     let (state, report) = run(&context, &scene, &particles, 200);
     assert!(
         report.density_error_mean < 0.01 && report.density_error_max < 0.05,
@@ -225,7 +225,7 @@ fn still_water_settles() {
 fn same_bytes_twice_and_from_any_frame() {
     let context = context();
     let mut scene = scene([2.4, 1.6, 1.0]);
-    scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.02 });
+    scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.02));
     scene.effects.vorticity_confinement =
         Some(effects::vorticity_confinement::Settings { strength: 0.1 });
     let mut particles = lattice([0.0; 3], [10, 10, 10], [D; 3]);
@@ -433,7 +433,7 @@ fn only_what_the_scene_calls_for() {
             && !name.contains("solid"))
     );
 
-    scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.01 });
+    scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.01));
     let viscous = plan(&context, &scene, particles.len(), &Boundary::default());
     let added = |after: &[&str], before: &[&str]| -> Vec<String> {
         after
@@ -501,7 +501,7 @@ fn viscosity_damps_and_confinement_feeds() {
     }
     let energy = |scene: &Scene| run(&context, scene, &particles, 5).1.kinetic_energy;
     let plain = energy(&scene);
-    scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.1 });
+    scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.1));
     let damped = energy(&scene);
     scene.effects = Default::default();
     scene.effects.vorticity_confinement =

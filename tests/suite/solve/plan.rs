@@ -64,7 +64,7 @@ impl Case {
 }
 
 fn with_effects(mut scene: Scene) -> Scene {
-    scene.effects.viscosity = Some(viscosity::Settings { xsph: 0.01 });
+    scene.effects.viscosity = Some(viscosity::Settings::xsph(0.01));
     scene.effects.vorticity_confinement = Some(vorticity_confinement::Settings { strength: 0.1 });
     scene.effects.drag = Some(drag::Settings {
         drop_radius: 1e-3,

@@ -73,6 +73,9 @@ trait Acts {
 
     /// To the velocities at the faces, m/s, before the projection.
     fn on_faces(&self, _: Water<'_>, _velocity: &mut Vec<DVec3>, _: &mut Timings) {}
+
+    /// To the velocities at the faces, m/s, between two projections.
+    fn between_projections(&self, _: Water<'_>, _velocity: &mut Vec<DVec3>, _: &mut Timings) {}
 }
 
 macro_rules! twins {
@@ -89,6 +92,20 @@ macro_rules! twins {
             $(
                 if let Some(settings) = &named.$name {
                     settings.on_particles(flying, sorted, timings);
+                }
+            )+
+        }
+
+        /// Runs the effects that a scene names between two projections on the velocities at the faces, m/s.
+        pub(super) fn between_projections(
+            named: &Effects,
+            water: Water<'_>,
+            velocity: &mut Vec<DVec3>,
+            timings: &mut Timings,
+        ) {
+            $(
+                if let Some(settings) = &named.$name {
+                    settings.between_projections(water, velocity, timings);
                 }
             )+
         }

@@ -29,8 +29,12 @@ pub(super) fn apply(
     velocity: &[DVec3],
     timings: &mut Timings,
 ) -> Vec<DVec3> {
+    let Some(xsph) = settings.xsph else {
+        // A coefficient is solved on the grid of the projection.
+        return velocity.to_vec();
+    };
     let change = timings.time("effects/viscosity_gather", || {
-        viscosity_gather(inputs, settings.xsph, velocity)
+        viscosity_gather(inputs, xsph, velocity)
     });
     timings.time("effects/viscosity_apply", || {
         viscosity_apply(&change, velocity)

@@ -87,6 +87,10 @@ about = [1.0, 0.0, 0.0]
             "effects.generation_zone={walls=[\"-z\"],length=1.0,waves={kind=\"stokes\",height=0.1,period=3.0,depth=1.0,direction_degrees=90.0}}",
         ];
         let all: Vec<&str> = flip.iter().chain(overrides).copied().collect();
+        // One of the three has viscosity in Pa s.
+        let viscous = ["effects.viscosity={coefficient=2.0}"];
+        let viscous = &viscous[..usize::from(overrides.is_empty())];
+        let all: Vec<&str> = all.iter().chain(viscous).copied().collect();
         let scene = parse(dir.path(), &text, &all).expect("valid");
         let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
         let table: toml::Table = toml::from_str(&toml).expect("TOML");

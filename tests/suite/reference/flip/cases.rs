@@ -173,9 +173,20 @@ pub fn pocket() -> Case {
     case("pocket", scene, particles)
 }
 
+/// A solve between two projections, over a slope and between walls of which some hold water.
+pub fn viscous() -> Case {
+    let mut case = slope();
+    case.scene.effects.viscosity = Some(effects::viscosity::Settings::newtonian(20.0));
+    case.scene.no_slip = [0, 4].map(|k| Wall::NAMED[k].1).to_vec();
+    Case {
+        name: "viscous",
+        ..case
+    }
+}
+
 pub fn effects() -> Case {
     let mut case = dam();
-    case.scene.effects.viscosity = Some(effects::viscosity::Settings { xsph: 0.1 });
+    case.scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.1));
     case.scene.effects.vorticity_confinement =
         Some(effects::vorticity_confinement::Settings { strength: 0.5 });
     case.scene.effects.drag = Some(effects::drag::Settings {

@@ -206,7 +206,38 @@ pub const KEY_FAULTS: &[Fault] = &[
         26,
         &["solver.method: missing", "\"pbf\""],
     ),
-    ("xsph = 0.01", "", 33, &["effects.viscosity.xsph: missing"]),
+    (
+        "xsph = 0.01",
+        "",
+        33,
+        &["neither a coefficient, Pa s, nor xsph is given"],
+    ),
+    (
+        "xsph = 0.01",
+        "xsph = 0.01, coefficient = 1.0",
+        33,
+        &["effects.viscosity.xsph", "coefficient"],
+    ),
+    (
+        "xsph = 0.01",
+        "xsph = 0.01, tolerance = 0.1",
+        33,
+        &["effects.viscosity.tolerance", "coefficient"],
+    ),
+    (
+        "xsph = 0.01",
+        "coefficient = 0.0",
+        33,
+        &[
+            "effects.viscosity.coefficient: 0 is out of range; allowed: a number from 1e-6 to 1e9, Pa s",
+        ],
+    ),
+    (
+        "iterations = 4\n\n[effects]\nviscosity = { xsph = 0.01 }",
+        "iterations = 4\ngrid_projection = false\n\n[effects]\nviscosity = { coefficient = 1.0 }",
+        34,
+        &["effects.viscosity.coefficient: it is solved on the grid of PBF's projection"],
+    ),
     (
         "xsph = 0.01",
         "xsph = true",

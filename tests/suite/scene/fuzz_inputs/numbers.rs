@@ -98,6 +98,12 @@ const OF_PACKET: &[(&str, &str, bool)] = &[
     ("effects.generation_zone.waves.time", "{}", false),
 ];
 
+/// Those of a viscosity that is solved.
+const OF_VISCOSITY: &[(&str, &str, bool)] = &[
+    ("effects.viscosity.coefficient", "{}", true),
+    ("effects.viscosity.tolerance", "{}", true),
+];
+
 /// Those of rooms in which a level is kept, which gravity has to go with.
 const OF_LEVELS: &[(&str, &str, bool)] = &[
     ("emitter[0].level", "{}", false),
@@ -138,6 +144,8 @@ fn every_number_has_a_range_and_says_it() {
     let room = "min = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nlevel = 2.5\n";
     let levels = format!("[[emitter]]\n{room}[[drain]]\n{room}[solver]\n");
     each_number_has_a_range(&SCENE.replace("[solver]\n", &levels), OF_LEVELS);
+    let viscous = SCENE.replace("xsph = 0.01", "coefficient = 1.0, tolerance = 0.1");
+    each_number_has_a_range(&viscous, OF_VISCOSITY);
     let zone = |waves: &str| {
         let zone = format!(
             "[effects]\ngeneration_zone = {{ walls = [\"-z\"], length = 3.0, waves = {{ {waves}, direction_degrees = 90.0 }} }}\n"
