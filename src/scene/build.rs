@@ -7,13 +7,13 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{
-    PlacedMesh, Placement, Scene, Swarm, Water, budget,
+    Method, PlacedMesh, Placement, Scene, Swarm, Water, budget,
     document::Document,
     effects,
     error::SceneError,
     grids, keep,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
-    no_slip, origin, periodic, probe, sources,
+    no_slip, origin, periodic, probe, projection, sources,
     spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
     wave_maker,
     words::{chain, extent, shown, shown_all},
@@ -88,6 +88,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         wave_makers: &wave_makers,
         gravity: water.gravity,
         least_length: 2.0 * lattice.spacing,
+        has_projection: solver.method == Method::Flip || solver.pbf().grid_projection,
     };
     spec.effects.check(doc, &around)?;
     let grids = match &spec.grids {
@@ -113,7 +114,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let scales = budget::Scales {
         fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
         push: (motions.map(|motion| motion.peak_speed(0.0, duration))).fold(0.0, f64::max),
-        wind: spec.effects.push().speed,
+        wind: spec.effects.push(projection::grain(&water, &solver)).speed,
         spacing: lattice.spacing,
     };
     let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;

@@ -55,7 +55,7 @@ impl Scene {
             self.lint_zones(level, &mut lints);
         }
         self.lint_layers(level, &mut lints);
-        lints.extend(self.effects.lints(self.particle_spacing()));
+        lints.extend(self.effects.lints(self.grain()));
         lints
     }
 

@@ -91,14 +91,17 @@ impl Scene {
             .wave_makers
             .iter()
             .map(|w| w.motion.peak_speed(start, start + length));
-        let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
+        let gained =
+            self.water.gravity.length() * length + self.effects.push(self.grain()).gained(length);
         let speed = wall.fold(speed + gained, f64::max);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
+            .max(length / self.effects.longest_step(self.grain()).0)
             .ceil()
             .max(1.0);
         if wanted > f64::from(pbf.max_substeps) {
             let most = f64::from(pbf.max_substeps);
-            let detail = format!("{speed:.3} m/s at solver.pbf.cfl {}", pbf.cfl);
+            let stable = self.stable_step();
+            let detail = format!("{speed:.3} m/s at solver.pbf.cfl {}{stable}", pbf.cfl);
             return Err(Breach {
                 detail: Some(detail),
                 ..Breach::new(frame + 1, Watched::Substeps, wanted, most)
@@ -130,13 +133,14 @@ impl Scene {
     ) -> Result<(f64, Substep), Breach> {
         let flip = self.solver.flip();
         let fastest = speed.max(self.peak_boundary_speed(start, start + remaining));
-        let (gravity, push) = (self.water.gravity.length(), self.effects.push());
+        let (gravity, push) = (self.water.gravity.length(), self.effects.push(self.grain()));
         // v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;
         let longest = |v: f64, g: f64| 2.0 * room / (v + (v * v + 4.0 * g * room).sqrt());
         // Whichever of what an effect adds is the less.
         let by_acceleration = longest(fastest, gravity + push.acceleration);
         let longest = by_acceleration.max(longest(fastest + push.speed, gravity));
+        let longest = longest.min(self.effects.longest_step(self.grain()).0);
         let wanted = if longest.is_finite() {
             (remaining / longest).ceil().max(1.0)
         } else {
@@ -147,8 +151,9 @@ impl Scene {
         if f64::from(done) + wanted > f64::from(flip.max_substeps) {
             let detail = format!(
                 "up to {reached:.3} m/s, particles {speed:.3}, with gravity, effects, wave makers and moving solids, at \
-                 solver.flip.cfl {}",
-                flip.cfl
+                 solver.flip.cfl {}{}",
+                flip.cfl,
+                self.stable_step()
             );
             let (asked, most) = (f64::from(done) + wanted, f64::from(flip.max_substeps));
             return Err(Breach {
@@ -163,6 +168,16 @@ impl Scene {
             displacement,
         };
         Ok((wanted, substep))
+    }
+
+    /// What effects say of a substep's length, as a breach's last words.
+    fn stable_step(&self) -> String {
+        match self.effects.longest_step(self.grain()) {
+            (longest, name) if longest.is_finite() => {
+                format!(", and at effects.{name} no longer than {longest:.3e} s")
+            }
+            _ => String::new(),
+        }
     }
 
     /// α of a FLIP substep of `length` seconds, so that a frame takes the same part of the grid's velocity in however

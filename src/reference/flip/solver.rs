@@ -200,6 +200,7 @@ impl Flip {
             step: &step,
             bricks: &bricks,
             room: &room,
+            centers: &centers,
             old: &faces.change,
         };
         effects::on_faces(&model.scene.effects, water, &mut faces.velocity, timings);

@@ -20,6 +20,8 @@ pub(super) struct Surroundings<'a> {
     pub(super) gravity: DVec3,
     /// Two particle spacings, metres: shorter than that, nothing lies in a zone.
     pub(super) least_length: f64,
+    /// Whether the solver makes velocities free of divergence on a grid.
+    pub(super) has_projection: bool,
 }
 
 /// What an effect's settings say of themselves.
@@ -28,6 +30,9 @@ pub(super) trait Effect {
     const ABOUT: &'static str;
     /// Its keys, each with its range.
     const KEYS: &'static [Key];
+
+    /// Whether it acts on the pressure, and so in PBF's projection as in FLIP's.
+    const IS_OF_PRESSURE: bool = false;
 
     /// Refuses settings that do not fit into the scene.
     fn check(&self, _: &Document<'_>, _: &Surroundings<'_>) -> Result<(), SceneError> {
@@ -40,12 +45,17 @@ pub(super) trait Effect {
     }
 
     /// How it makes particles faster.
-    fn push(&self) -> Push {
+    fn push(&self, _: Grain) -> Push {
         Push::default()
     }
 
-    /// What of it is hardly meant among particles so far apart, metres, with its key first.
-    fn lint(&self, _spacing: f64) -> Option<String> {
+    /// The longest substep that it is stable in, s.
+    fn longest_step(&self, _: Grain) -> f64 {
+        f64::INFINITY
+    }
+
+    /// What of it is hardly meant, with its key first.
+    fn lint(&self, _: Grain) -> Option<String> {
         None
     }
 
@@ -63,6 +73,19 @@ pub(super) trait Effect {
     fn waves(&self, _gravity: DVec3) -> Option<OpenWaves> {
         None
     }
+}
+
+/// What an effect's numbers are judged by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grain {
+    /// Of the water, kg/m³.
+    pub(super) density: f64,
+    /// Magnitude, m/s².
+    pub(super) gravity: f64,
+    /// Between particles, metres.
+    pub(super) spacing: f64,
+    /// Edge of a cell of the grid that the pressure is found on, metres.
+    pub(super) cell: f64,
 }
 
 /// Makes particles faster.
@@ -93,7 +116,7 @@ pub(super) struct Absorbs<'a> {
 /// Gives the list of effects, in the order in which they act, to a macro.
 macro_rules! with_effects {
     ($callback:ident) => {
-        $callback! { viscosity, vorticity_confinement, drag, absorbing_zone, generation_zone }
+        $callback! { viscosity, vorticity_confinement, drag, absorbing_zone, generation_zone, surface_tension }
     };
 }
 pub(crate) use with_effects;
@@ -138,20 +161,44 @@ macro_rules! effects {
             }
 
             /// How the named effects make particles faster, all at once.
-            pub(super) fn push(&self) -> Push {
+            pub(super) fn push(&self, grain: Grain) -> Push {
                 let mut all = Push::default();
                 $(
-                    let push = self.$name.as_ref().map(Effect::push).unwrap_or_default();
+                    let push = self.$name.as_ref().map(|settings| settings.push(grain)).unwrap_or_default();
                     all.acceleration += push.acceleration;
                     all.speed += push.speed;
                 )+
                 all
             }
 
-            /// What of the named effects is hardly meant among particles so far apart, metres.
-            pub(super) fn lints(&self, spacing: f64) -> Vec<String> {
+            /// The longest substep that the named effects are stable in, s, with the name of the one that says so; infinite where none
+            /// does.
+            pub(super) fn longest_step(&self, grain: Grain) -> (f64, &'static str) {
+                let mut least = (f64::INFINITY, "");
+                $(
+                    let longest = self.$name.as_ref().map_or(f64::INFINITY, |settings| settings.longest_step(grain));
+                    if longest < least.0 {
+                        least = (longest, stringify!($name));
+                    }
+                )+
+                least
+            }
+
+            /// Those that act on the pressure.
+            pub(super) fn of_pressure(&self) -> Self {
+                let mut all = Self::default();
+                $(
+                    if <$name::Settings as Effect>::IS_OF_PRESSURE {
+                        all.$name.clone_from(&self.$name);
+                    }
+                )+
+                all
+            }
+
+            /// What of the named effects is hardly meant.
+            pub(super) fn lints(&self, grain: Grain) -> Vec<String> {
                 let mut lints = Vec::new();
-                $(lints.extend(self.$name.as_ref().and_then(|settings| settings.lint(spacing)));)+
+                $(lints.extend(self.$name.as_ref().and_then(|settings| settings.lint(grain)));)+
                 lints
             }
 
