@@ -289,9 +289,8 @@ impl Scene {
         let start = f64::from(frame.saturating_sub(1)) * length;
         let push = self.peak_boundary_speed(start, start + length);
         let least = LEAST_ENERGY_SPEED * self.particle_spacing() / length;
-        let gained =
-            self.water.gravity.length() * length + self.effects.push(self.grain()).gained(length);
-        (speed + push + gained).max(least)
+        let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
+        (speed + push + gained + self.effects.frees(self.grain())).max(least)
     }
 
     /// Kinetic and potential energy of a state of so many particles, the latter against the domain's lowest place,

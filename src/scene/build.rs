@@ -114,7 +114,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let scales = budget::Scales {
         fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
         push: (motions.map(|motion| motion.peak_speed(0.0, duration))).fold(0.0, f64::max),
-        wind: spec.effects.push(projection::grain(&water, &solver)).speed,
+        wind: spec.effects.push().speed + spec.effects.frees(projection::grain(&water, &solver)),
         spacing: lattice.spacing,
     };
     let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;

@@ -91,8 +91,7 @@ impl Scene {
             .wave_makers
             .iter()
             .map(|w| w.motion.peak_speed(start, start + length));
-        let gained =
-            self.water.gravity.length() * length + self.effects.push(self.grain()).gained(length);
+        let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
         let speed = wall.fold(speed + gained, f64::max);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
             .max(length / self.effects.longest_step(self.grain()).0)
@@ -133,7 +132,7 @@ impl Scene {
     ) -> Result<(f64, Substep), Breach> {
         let flip = self.solver.flip();
         let fastest = speed.max(self.peak_boundary_speed(start, start + remaining));
-        let (gravity, push) = (self.water.gravity.length(), self.effects.push(self.grain()));
+        let (gravity, push) = (self.water.gravity.length(), self.effects.push());
         // v t + g t² = cfl Δx.
         let room = flip.cfl * flip.cell_size;
         let longest = |v: f64, g: f64| 2.0 * room / (v + (v * v + 4.0 * g * room).sqrt());
@@ -311,6 +310,37 @@ viscosity = { xsph = 0.2 }
         };
         // g t² = 3 × 0.2 m: 0.245 s with gravity alone, 0.081 s in the wind; of 0.2 s one step, or three.
         assert!((flip(still) - 0.2).abs() < 1e-12 && (flip(windy) - 0.2 / 3.0).abs() < 1e-12);
+    }
+
+    /// √(1000 kg/m³ × (0.2 m)³ / (2π σ)) is 0.0598 s of σ = 356 N/m, and √8 less of cells of 0.1 m: of a frame of 0.2 s four
+    /// substeps, and ten on PBF's cells of twice 0.05 m. A breach says so.
+    #[test]
+    fn capillary_waves_shorten_substeps() {
+        let tension = "effects.surface_tension={coefficient=356.0}";
+        let still = [
+            "water.gravity=[0, 0, 0]",
+            "water.rest_density=1000",
+            "solver.pbf.cfl=1.0",
+        ];
+        let of = |more: &[&str]| scene(&[&still[..], &[tension], more].concat());
+        assert_eq!(of(&[]).pbf_substeps(0, 0.0).ok(), Some(4));
+        let fine = of(&["solver.pbf.particle_spacing=0.05"]);
+        assert_eq!(fine.pbf_substeps(0, 0.0).ok(), Some(10));
+        let flip = of(&["solver.method=flip"]);
+        let substep = flip.flip_substep(1, 0.0, 0.2, 0.0, 0);
+        assert!((substep.expect("few enough").1.length - 0.05).abs() < 1e-12);
+        let few = of(&["solver.method=flip", "solver.flip.max_substeps=3"]);
+        let breach = few
+            .flip_substep(1, 0.0, 0.2, 0.0, 0)
+            .expect_err("4 are asked");
+        let said = breach.to_string();
+        assert!(
+            said.contains("effects.surface_tension no longer than 5.98"),
+            "{said}"
+        );
+        // Negative control: without it one is enough.
+        let scene = scene(&still);
+        assert_eq!(scene.pbf_substeps(0, 0.0).ok(), Some(1));
     }
 
     #[test]

@@ -84,6 +84,7 @@ mod solve {
     mod pressure;
     mod projected;
     mod sources;
+    mod tension;
     mod thin_water;
     mod walls;
     mod whitewater;

@@ -52,7 +52,7 @@ impl Effect for Settings {
     }
 
     /// What wind does to a drop at rest, and no more than its own speed; one that flies gains less from it.
-    fn push(&self, _: Grain) -> Push {
+    fn push(&self) -> Push {
         let wind = self.wind().length();
         Push {
             acceleration: air::resistance(self.drop_radius, wind) * wind,

@@ -45,8 +45,13 @@ pub(super) trait Effect {
     }
 
     /// How it makes particles faster.
-    fn push(&self, _: Grain) -> Push {
+    fn push(&self) -> Push {
         Push::default()
+    }
+
+    /// Speed that what it sets free may give to water, m/s: a budget allows for it.
+    fn frees(&self, _: Grain) -> f64 {
+        0.0
     }
 
     /// The longest substep that it is stable in, s.
@@ -161,13 +166,20 @@ macro_rules! effects {
             }
 
             /// How the named effects make particles faster, all at once.
-            pub(super) fn push(&self, grain: Grain) -> Push {
+            pub(super) fn push(&self) -> Push {
                 let mut all = Push::default();
                 $(
-                    let push = self.$name.as_ref().map(|settings| settings.push(grain)).unwrap_or_default();
+                    let push = self.$name.as_ref().map(Effect::push).unwrap_or_default();
                     all.acceleration += push.acceleration;
                     all.speed += push.speed;
                 )+
+                all
+            }
+
+            /// Speed that what the named effects set free may give to water, m/s.
+            pub(super) fn frees(&self, grain: Grain) -> f64 {
+                let mut all = 0.0;
+                $(all += self.$name.as_ref().map_or(0.0, |settings| settings.frees(grain));)+
                 all
             }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     super::{document::Document, error::SceneError, key::Key, words::shown},
-    Effect, Grain, Push, Surroundings,
+    Effect, Grain, Surroundings,
 };
 
 /// Bond number ρ g d² / σ of a particle spacing d above which nothing of surface tension is seen: what it shapes, a capillary length
@@ -52,15 +52,10 @@ impl Effect for Settings {
         })
     }
 
-    /// What the sharpest surface that cells know, κ = 2 / Δx, does to a cell of water; and the speed of a particle whose own
-    /// surface, that of a lone drop, all became motion.
-    fn push(&self, grain: Grain) -> Push {
-        let share = self.coefficient / grain.density;
+    /// Of a particle whose own surface, that of a lone drop, all became motion.
+    fn frees(&self, grain: Grain) -> f64 {
         let radius = grain.spacing * (3.0 / (4.0 * PI)).cbrt();
-        Push {
-            acceleration: 2.0 * share / grain.cell.powi(2),
-            speed: (6.0 * share / radius).sqrt(),
-        }
+        (6.0 * self.coefficient / (grain.density * radius)).sqrt()
     }
 
     /// Capillary waves of two cells go by no more than what cells follow (Denner and van Wachem 2015, eq. 20, air without mass).
