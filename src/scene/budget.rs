@@ -80,7 +80,9 @@ pub(super) fn residual_words() -> String {
 
 /// The default of `budget.energy`, in words.
 pub(super) fn energy_words() -> String {
-    format!("{PBF_ENERGY} with pbf, {FLIP_ENERGY} with flip, false in a wind")
+    format!(
+        "{PBF_ENERGY} with pbf, {FLIP_ENERGY} with flip, false in a wind or with surface tension"
+    )
 }
 
 #[derive(Deserialize)]
@@ -121,7 +123,7 @@ impl<'de> Deserialize<'de> for Limit {
 pub(super) struct Scales {
     pub(super) fall: f64,
     pub(super) push: f64,
-    /// Of the wind, m/s, which does work that nothing counts.
+    /// Of the wind and of what else does work that nothing counts, m/s.
     pub(super) wind: f64,
     pub(super) spacing: f64,
 }
@@ -288,7 +290,7 @@ impl Scene {
         let push = self.peak_boundary_speed(start, start + length);
         let least = LEAST_ENERGY_SPEED * self.particle_spacing() / length;
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
-        (speed + push + gained).max(least)
+        (speed + push + gained + self.effects.frees(self.grain())).max(least)
     }
 
     /// Kinetic and potential energy of a state of so many particles, the latter against the domain's lowest place,

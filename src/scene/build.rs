@@ -7,13 +7,13 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{
-    PlacedMesh, Placement, Scene, Swarm, Water, budget,
+    Method, PlacedMesh, Placement, Scene, Swarm, Water, budget,
     document::Document,
     effects,
     error::SceneError,
     grids, keep,
     moving_solid::{self, MAX_MOVING_SOLIDS, MovingSolid},
-    no_slip, origin, periodic, probe, sources,
+    no_slip, origin, periodic, probe, projection, sources,
     spec::{BoxSpec, DomainSpec, MeshSpec, SceneSpec, SwarmSpec, WaterSpec},
     wave_maker,
     words::{chain, extent, shown, shown_all},
@@ -51,7 +51,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let (solver, lattice) = solver::solver(doc, spec.solver, &domain)?;
     let periodic = periodic::read(doc, &spec.domain.periodic)?;
     periodic::check_solver(doc, periodic, &domain, &solver)?;
-    let between = between_projections(doc, &spec.effects, &solver)?;
+    let between = spec.effects.act_between_projections();
     let no_slip = no_slip::build(doc, &spec.domain, (solver.method, between), periodic)?;
     let water = water(doc, base_dir, &spec.water, &domain, &lattice)?;
     periodic::check_gravity(doc, periodic, water.gravity)?;
@@ -89,6 +89,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         wave_makers: &wave_makers,
         gravity: water.gravity,
         least_length: 2.0 * lattice.spacing,
+        has_projection: solver.method == Method::Flip || solver.pbf().grid_projection,
     };
     spec.effects.check(doc, &around)?;
     let grids = match &spec.grids {
@@ -114,7 +115,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
     let scales = budget::Scales {
         fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
         push: (motions.map(|motion| motion.peak_speed(0.0, duration))).fold(0.0, f64::max),
-        wind: spec.effects.push().speed,
+        wind: spec.effects.push().speed + spec.effects.frees(projection::grain(&water, &solver)),
         spacing: lattice.spacing,
     };
     let budget = budget::build(doc, &spec.budget, &shot, &solver, &scales)?;
@@ -138,21 +139,6 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         effects: spec.effects,
     };
     Ok(scene.into_local())
-}
-
-/// Whether an effect is solved between two projections, which PBF has with its grid alone.
-fn between_projections(
-    doc: &Document<'_>,
-    effects: &effects::Effects,
-    solver: &super::Solver,
-) -> Result<bool> {
-    match effects.between_projections().1 {
-        Some(key) if solver.method == super::Method::Pbf && !solver.pbf().grid_projection => {
-            let problem = "it is solved on the grid of PBF's projection; set solver.pbf.grid_projection = true";
-            Err(doc.fault_of_plain(&key, problem))
-        }
-        key => Ok(key.is_some()),
-    }
 }
 
 /// Solids at rest, and those that move.

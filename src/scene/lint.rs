@@ -55,7 +55,7 @@ impl Scene {
             self.lint_zones(level, &mut lints);
         }
         self.lint_layers(level, &mut lints);
-        lints.extend(self.effects.lints(self.particle_spacing()));
+        lints.extend(self.effects.lints(self.grain()));
         lints
     }
 
@@ -352,6 +352,12 @@ particle_spacing = 0.04
                 vec!["effects.drag={drop_radius=0.04}".into()],
                 vec!["effects.drag={drop_radius=0.03}".into()],
                 "effects.drag.drop_radius: a drop of 0.04 m radius holds 2.1 times the water of a particle",
+            ),
+            // Bond numbers of a spacing of 0.05 m: 1000 × 9.81 × 0.05² / σ.
+            (
+                vec!["effects.surface_tension={coefficient=0.0728}".into()],
+                vec!["effects.surface_tension={coefficient=24.6}".into()],
+                "effects.surface_tension.coefficient: the Bond number ρ g d² / σ of a particle spacing of 0.05 m is 33",
             ),
         ] {
             let set: Vec<&str> = set.iter().map(String::as_str).collect();

@@ -1,7 +1,8 @@
 //! The grid on which PBF's velocities are made free of divergence, as the FLIP scene whose projection that is.
 
 use super::{
-    Method, Scene,
+    Method, Scene, Solver, Water,
+    effects::Grain,
     flip::{Flip, Precision, Preconditioner, Pressure, Surface, Transfer},
 };
 
@@ -45,8 +46,13 @@ impl Scene {
         let mut scene = self.clone();
         scene.solver.method = Method::Flip;
         scene.solver.flip = Some(flip);
-        scene.effects = self.effects.between_projections().0;
+        scene.effects = self.effects.on_projection();
         Some(scene)
+    }
+
+    /// What its effects are judged by.
+    pub(super) fn grain(&self) -> Grain {
+        grain(&self.water, &self.solver)
     }
 
     /// What gravity adds to a velocity in a second as PBF predicts with it, m/s²: nothing where the projection has done so.
@@ -60,5 +66,25 @@ impl Scene {
     /// Whether pressures are read from PBF's multipliers, rather than from a projection.
     pub fn reads_multipliers(&self) -> bool {
         !self.solver.pbf().grid_projection && !self.pressure_points().is_empty()
+    }
+}
+
+/// What effects in such water are judged by.
+pub(super) fn grain(water: &Water, solver: &Solver) -> Grain {
+    let (spacing, cell) = match solver.method {
+        Method::Pbf => {
+            let spacing = solver.pbf().particle_spacing;
+            (spacing, PROJECTION_CELL * spacing)
+        }
+        Method::Flip => {
+            let flip = solver.flip();
+            (flip.particle_spacing(), flip.cell_size)
+        }
+    };
+    Grain {
+        density: water.rest_density,
+        gravity: water.gravity.length(),
+        spacing,
+        cell,
     }
 }

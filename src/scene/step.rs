@@ -94,11 +94,13 @@ impl Scene {
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
         let speed = wall.fold(speed + gained, f64::max);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
+            .max(length / self.effects.longest_step(self.grain()).0)
             .ceil()
             .max(1.0);
         if wanted > f64::from(pbf.max_substeps) {
             let most = f64::from(pbf.max_substeps);
-            let detail = format!("{speed:.3} m/s at solver.pbf.cfl {}", pbf.cfl);
+            let stable = self.stable_step();
+            let detail = format!("{speed:.3} m/s at solver.pbf.cfl {}{stable}", pbf.cfl);
             return Err(Breach {
                 detail: Some(detail),
                 ..Breach::new(frame + 1, Watched::Substeps, wanted, most)
@@ -137,6 +139,7 @@ impl Scene {
         // Whichever of what an effect adds is the less.
         let by_acceleration = longest(fastest, gravity + push.acceleration);
         let longest = by_acceleration.max(longest(fastest + push.speed, gravity));
+        let longest = longest.min(self.effects.longest_step(self.grain()).0);
         let wanted = if longest.is_finite() {
             (remaining / longest).ceil().max(1.0)
         } else {
@@ -147,8 +150,9 @@ impl Scene {
         if f64::from(done) + wanted > f64::from(flip.max_substeps) {
             let detail = format!(
                 "up to {reached:.3} m/s, particles {speed:.3}, with gravity, effects, wave makers and moving solids, at \
-                 solver.flip.cfl {}",
-                flip.cfl
+                 solver.flip.cfl {}{}",
+                flip.cfl,
+                self.stable_step()
             );
             let (asked, most) = (f64::from(done) + wanted, f64::from(flip.max_substeps));
             return Err(Breach {
@@ -163,6 +167,16 @@ impl Scene {
             displacement,
         };
         Ok((wanted, substep))
+    }
+
+    /// What effects say of a substep's length, as a breach's last words.
+    fn stable_step(&self) -> String {
+        match self.effects.longest_step(self.grain()) {
+            (longest, name) if longest.is_finite() => {
+                format!(", and at effects.{name} no longer than {longest:.3e} s")
+            }
+            _ => String::new(),
+        }
     }
 
     /// α of a FLIP substep of `length` seconds, so that a frame takes the same part of the grid's velocity in however
@@ -296,6 +310,37 @@ viscosity = { xsph = 0.2 }
         };
         // g t² = 3 × 0.2 m: 0.245 s with gravity alone, 0.081 s in the wind; of 0.2 s one step, or three.
         assert!((flip(still) - 0.2).abs() < 1e-12 && (flip(windy) - 0.2 / 3.0).abs() < 1e-12);
+    }
+
+    /// √(1000 kg/m³ × (0.2 m)³ / (2π σ)) is 0.0598 s of σ = 356 N/m, and √8 less of cells of 0.1 m: of a frame of 0.2 s four
+    /// substeps, and ten on PBF's cells of twice 0.05 m. A breach says so.
+    #[test]
+    fn capillary_waves_shorten_substeps() {
+        let tension = "effects.surface_tension={coefficient=356.0}";
+        let still = [
+            "water.gravity=[0, 0, 0]",
+            "water.rest_density=1000",
+            "solver.pbf.cfl=1.0",
+        ];
+        let of = |more: &[&str]| scene(&[&still[..], &[tension], more].concat());
+        assert_eq!(of(&[]).pbf_substeps(0, 0.0).ok(), Some(4));
+        let fine = of(&["solver.pbf.particle_spacing=0.05"]);
+        assert_eq!(fine.pbf_substeps(0, 0.0).ok(), Some(10));
+        let flip = of(&["solver.method=flip"]);
+        let substep = flip.flip_substep(1, 0.0, 0.2, 0.0, 0);
+        assert!((substep.expect("few enough").1.length - 0.05).abs() < 1e-12);
+        let few = of(&["solver.method=flip", "solver.flip.max_substeps=3"]);
+        let breach = few
+            .flip_substep(1, 0.0, 0.2, 0.0, 0)
+            .expect_err("4 are asked");
+        let said = breach.to_string();
+        assert!(
+            said.contains("effects.surface_tension no longer than 5.98"),
+            "{said}"
+        );
+        // Negative control: without it one is enough.
+        let scene = scene(&still);
+        assert_eq!(scene.pbf_substeps(0, 0.0).ok(), Some(1));
     }
 
     #[test]

@@ -85,6 +85,7 @@ mod solve {
     mod pressure;
     mod projected;
     mod sources;
+    mod tension;
     mod thin_water;
     mod viscous;
     mod walls;

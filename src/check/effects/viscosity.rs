@@ -16,6 +16,7 @@ use crate::{
         tolerance::bounds,
     },
     reference::{
+        flip::Centers,
         flip::effects::{
             Water,
             viscosity::{Cell, viscosity_relax, viscosity_weigh},
@@ -91,6 +92,8 @@ fn weigh(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         step: &step,
         bricks: &elements.bricks,
         room: state.room(),
+        // The solve asks for neither.
+        centers: &Centers::default(),
         old: &[],
     });
     let words: Vec<u32> = cells.iter().map(Cell::word).collect();

@@ -11,7 +11,10 @@ use crate::{
     },
     compare::{rounding::U, tolerance::bounds},
     reference::{
-        flip::effects::{Water, led_faces},
+        flip::{
+            Centers,
+            effects::{Water, led_faces},
+        },
         pbf::effects::led_particles,
     },
     scene::effects::zone::Zone,
@@ -71,6 +74,8 @@ pub(super) fn faces<const N: usize>(
         step: &step,
         bricks: &elements.bricks,
         room: state.room(),
+        // No zone asks for them.
+        centers: &Centers::default(),
         old: &old,
     };
     let twin = led_faces(zone, water, &before, wanted);

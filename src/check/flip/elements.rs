@@ -55,7 +55,7 @@ impl Elements {
     }
 
     /// An array of cells.
-    pub(super) fn scalars(
+    pub(in crate::check) fn scalars(
         &self,
         view: &View<'_>,
         buffer: Buf<f32>,

@@ -199,7 +199,7 @@ impl Flip {
             excess,
             distance,
         };
-        let acts_between = model.scene.effects.between_projections().1.is_some();
+        let acts_between = model.scene.effects.act_between_projections();
         if !model.scene.no_slip.is_empty() && !acts_between {
             timings.time("flip/wall_friction", || {
                 wall_friction(model, &step, &bricks, &room, &mut faces);
@@ -210,6 +210,7 @@ impl Flip {
             step: &step,
             bricks: &bricks,
             room: &room,
+            centers: &centers,
             old: &faces.change,
         };
         effects::on_faces(&model.scene.effects, water, &mut faces.velocity, timings);
@@ -225,6 +226,7 @@ impl Flip {
                 step: &step,
                 bricks: &bricks,
                 room: &room,
+                centers: &centers,
                 old: &faces.change,
             };
             let named = &model.scene.effects;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     super::{key::Key, words::shown},
-    Effect, Push,
+    Effect, Grain, Push,
 };
 use crate::domain::air;
 
@@ -41,7 +41,7 @@ impl Effect for Settings {
             .about("velocity of the air"),
     ];
 
-    fn lint(&self, spacing: f64) -> Option<String> {
+    fn lint(&self, Grain { spacing, .. }: Grain) -> Option<String> {
         let worth = 4.0 / 3.0 * PI * (self.drop_radius / spacing).powi(3);
         (worth > 1.0).then(|| {
             format!(

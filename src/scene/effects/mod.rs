@@ -20,6 +20,8 @@ pub(super) struct Surroundings<'a> {
     pub(super) gravity: DVec3,
     /// Two particle spacings, metres: shorter than that, nothing lies in a zone.
     pub(super) least_length: f64,
+    /// Whether the solver makes velocities free of divergence on a grid.
+    pub(super) has_projection: bool,
 }
 
 /// What an effect's settings say of themselves.
@@ -34,9 +36,17 @@ pub(super) trait Effect {
         Ok(())
     }
 
-    /// Its key that is solved on the grid, on velocities that are free of divergence, between two projections; it holds water to no-slip walls.
-    fn between_projections(&self) -> Option<&'static str> {
+    /// What of it acts on the grid that makes PBF's velocities free of divergence, as it does on FLIP's.
+    fn on_projection(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
         None
+    }
+
+    /// Whether it is solved on the grid between two projections; it then holds water to no-slip walls.
+    fn acts_between_projections(&self) -> bool {
+        false
     }
 
     /// Part of the velocity that a frame of FLIP takes from the grid for it.
@@ -49,8 +59,18 @@ pub(super) trait Effect {
         Push::default()
     }
 
-    /// What of it is hardly meant among particles so far apart, metres, with its key first.
-    fn lint(&self, _spacing: f64) -> Option<String> {
+    /// Speed that what it sets free may give to water, m/s: a budget allows for it.
+    fn frees(&self, _: Grain) -> f64 {
+        0.0
+    }
+
+    /// The longest substep that it is stable in, s.
+    fn longest_step(&self, _: Grain) -> f64 {
+        f64::INFINITY
+    }
+
+    /// What of it is hardly meant, with its key first.
+    fn lint(&self, _: Grain) -> Option<String> {
         None
     }
 
@@ -68,6 +88,19 @@ pub(super) trait Effect {
     fn waves(&self, _gravity: DVec3) -> Option<OpenWaves> {
         None
     }
+}
+
+/// What an effect's numbers are judged by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grain {
+    /// Of the water, kg/m³.
+    pub(super) density: f64,
+    /// Magnitude, m/s².
+    pub(super) gravity: f64,
+    /// Between particles, metres.
+    pub(super) spacing: f64,
+    /// Edge of a cell of the grid that the pressure is found on, metres.
+    pub(super) cell: f64,
 }
 
 /// Makes particles faster.
@@ -98,7 +131,7 @@ pub(super) struct Absorbs<'a> {
 /// Gives the list of effects, in the order in which they act, to a macro.
 macro_rules! with_effects {
     ($callback:ident) => {
-        $callback! { viscosity, vorticity_confinement, drag, absorbing_zone, generation_zone }
+        $callback! { viscosity, vorticity_confinement, drag, absorbing_zone, generation_zone, surface_tension }
     };
 }
 pub(crate) use with_effects;
@@ -135,17 +168,9 @@ macro_rules! effects {
                 Ok(())
             }
 
-            /// Those that are solved between two projections, by their key; a grid that projects another solver's velocities has them alone.
-            pub fn between_projections(&self) -> (Self, Option<String>) {
-                let mut all = Self::default();
-                let mut key = None;
-                $(
-                    if let Some((settings, own)) = self.$name.as_ref().and_then(|it| Some((it, it.between_projections()?))) {
-                        all.$name = Some(settings.clone());
-                        key = Some(format!("effects.{}.{own}", stringify!($name)));
-                    }
-                )+
-                (all, key)
+            /// Whether one is solved between two projections.
+            pub fn act_between_projections(&self) -> bool {
+                false$(|| self.$name.as_ref().is_some_and(Effect::acts_between_projections))+
             }
 
             /// Part of the velocity that a frame of FLIP takes from the grid, of each of the named effects.
@@ -166,10 +191,35 @@ macro_rules! effects {
                 all
             }
 
-            /// What of the named effects is hardly meant among particles so far apart, metres.
-            pub(super) fn lints(&self, spacing: f64) -> Vec<String> {
+            /// Speed that what the named effects set free may give to water, m/s.
+            pub(super) fn frees(&self, grain: Grain) -> f64 {
+                let mut all = 0.0;
+                $(all += self.$name.as_ref().map_or(0.0, |settings| settings.frees(grain));)+
+                all
+            }
+
+            /// The longest substep that the named effects are stable in, s, with the name of the one that says so; infinite where none
+            /// does.
+            pub(super) fn longest_step(&self, grain: Grain) -> (f64, &'static str) {
+                let mut least = (f64::INFINITY, "");
+                $(
+                    let longest = self.$name.as_ref().map_or(f64::INFINITY, |settings| settings.longest_step(grain));
+                    if longest < least.0 {
+                        least = (longest, stringify!($name));
+                    }
+                )+
+                least
+            }
+
+            /// What of them acts on the grid that makes PBF's velocities free of divergence.
+            pub(super) fn on_projection(&self) -> Self {
+                Self { $($name: self.$name.as_ref().and_then(Effect::on_projection)),+ }
+            }
+
+            /// What of the named effects is hardly meant.
+            pub(super) fn lints(&self, grain: Grain) -> Vec<String> {
                 let mut lints = Vec::new();
-                $(lints.extend(self.$name.as_ref().and_then(|settings| settings.lint(spacing)));)+
+                $(lints.extend(self.$name.as_ref().and_then(|settings| settings.lint(grain)));)+
                 lints
             }
 

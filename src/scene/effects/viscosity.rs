@@ -99,11 +99,15 @@ impl Effect for Settings {
             .about("c, the part of the neighbours' mean relative velocity that a substep of PBF, or a frame of FLIP, takes over"),
     ];
 
-    fn check(&self, doc: &Document<'_>, _: &Surroundings<'_>) -> Result<(), SceneError> {
+    fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
         match (self.coefficient, self.xsph) {
             (None, None) => Err(doc.fault_of_plain(
                 "effects.viscosity",
                 "neither a coefficient, Pa s, nor xsph is given: one of them is needed",
+            )),
+            (Some(_), _) if !around.has_projection => Err(doc.fault_of_plain(
+                "effects.viscosity.coefficient",
+                "it is solved on the grid of PBF's projection, which solver.pbf.grid_projection = false goes without: only true is allowed",
             )),
             _ => Ok(()),
         }
@@ -115,7 +119,11 @@ impl Effect for Settings {
         self.xsph.unwrap_or(0.0)
     }
 
-    fn between_projections(&self) -> Option<&'static str> {
-        self.coefficient.map(|_| "coefficient")
+    fn on_projection(&self) -> Option<Self> {
+        self.coefficient.map(|_| self.clone())
+    }
+
+    fn acts_between_projections(&self) -> bool {
+        self.coefficient.is_some()
     }
 }

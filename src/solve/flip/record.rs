@@ -184,7 +184,7 @@ fn along(pass: &'static str, size: usize, axis: usize) -> Command {
 
 /// Whether no-slip walls slow the water below what the grid resolves: not where an effect resolves it.
 fn slows_along_walls(scene: &Scene) -> bool {
-    !scene.no_slip.is_empty() && scene.effects.between_projections().1.is_none()
+    !scene.no_slip.is_empty() && !scene.effects.act_between_projections()
 }
 
 fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> Vec<Command> {

@@ -20,7 +20,10 @@ use swell::{
     gpu::adapter::{Context, Needs, Spoil},
     scene::{
         Effects, Iteration, Method, Scene, Stop, Wall, WaveMaker,
-        effects::{absorbing_zone, drag, generation_zone, viscosity, vorticity_confinement},
+        effects::{
+            absorbing_zone, drag, generation_zone, surface_tension, viscosity,
+            vorticity_confinement,
+        },
         flip::{Precision, Preconditioner, Pressure, Surface, Transfer},
         sources::Region,
     },
@@ -39,6 +42,7 @@ use controls::{
     Control, control,
     flip::{FLIP, FLIP_WALLS},
     pbf::{CHUNKED, PBF, PBF_WALLS, SEARCHED},
+    tension::TENSION,
     variants::{VARIANTS, Variant},
 };
 use glam::DVec3;
@@ -264,6 +268,7 @@ fn pbf_is_within_tolerance_and_each_row_fails_where_it_should() {
 fn pbf_with_a_projection_is_within_tolerance_and_fails_where_it_should() {
     let (mut scene, start) = case(Method::Pbf);
     scene.solver.pbf.as_mut().unwrap().grid_projection = true;
+    scene.effects.surface_tension = Some(surface_tension::Settings { coefficient: 50.0 });
     let controls = [
         control(
             "flip/aim",
@@ -287,7 +292,7 @@ fn pbf_with_a_projection_is_within_tolerance_and_fails_where_it_should() {
             &["velocity"],
         ),
     ];
-    let others: Vec<&str> = (PBF.iter().chain(FLIP))
+    let others: Vec<&str> = (PBF.iter().chain(FLIP).chain(TENSION))
         .map(|control| control.pass)
         .chain(["upload of solids"])
         .collect();

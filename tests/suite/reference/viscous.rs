@@ -54,6 +54,7 @@ impl Grid {
             step: &step,
             bricks: &self.trace.bricks,
             room: &self.trace.room,
+            centers: &self.trace.centers,
             old: &self.trace.faces.change,
         })
     }

@@ -17,7 +17,10 @@ use swell::{
     },
     scene::{
         Iteration, Method, Scene, Stop, Wall, WaveMaker,
-        effects::{absorbing_zone, drag, generation_zone, viscosity, vorticity_confinement},
+        effects::{
+            absorbing_zone, drag, generation_zone, surface_tension, viscosity,
+            vorticity_confinement,
+        },
         flip::{Precision, Preconditioner, Surface, Transfer},
         probe::{Probe, ProbeKind},
     },
@@ -66,6 +69,7 @@ impl Case {
 fn with_effects(mut scene: Scene) -> Scene {
     scene.effects.viscosity = Some(viscosity::Settings::xsph(0.01));
     scene.effects.vorticity_confinement = Some(vorticity_confinement::Settings { strength: 0.1 });
+    scene.effects.surface_tension = Some(surface_tension::Settings { coefficient: 0.1 });
     scene.effects.drag = Some(drag::Settings {
         drop_radius: 1e-3,
         wind: [5.0, 0.0, 0.0],

@@ -68,6 +68,18 @@ def check_beach(text):
     return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.2f} m³"
 
 
+def check_drop(text):
+    """Refuses a drop that is not about as large as its sphere; returns a line about it."""
+    vertices, triangles = from_obj(text)
+    [(extent, inside)] = check_solids(vertices, triangles)
+    # An inscribed polyhedron of 1280 triangles holds less than the sphere, by about a hundredth.
+    if not 0.98 < inside / (4 / 3 * math.pi) < 1:
+        raise BrokenMesh(f"drop: {inside} m³")
+    if any(abs(abs(side) - 1) > 1e-2 for corner in extent for side in corner):
+        raise BrokenMesh(f"drop: reaches {extent}")
+    return f"{len(triangles)} triangles, {len(text.encode())} bytes, {inside:.2f} m³"
+
+
 def check_breakwater(text):
     """Refuses a breakwater that is not about as large as its plain mound; returns a line about it."""
     vertices, triangles = from_obj(text)

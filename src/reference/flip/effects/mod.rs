@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    Model, Room, Sorted, Step,
+    Centers, Model, Room, Sorted, Step,
     grid::{corner, per_cell},
 };
 use crate::{
@@ -23,6 +23,8 @@ pub struct Water<'a> {
     pub bricks: &'a Bricks,
     /// What of the cells is water.
     pub room: &'a Room,
+    /// What cell centres know of it.
+    pub centers: &'a Centers,
     /// Velocities at faces before gravity, m/s.
     pub old: &'a [DVec3],
 }

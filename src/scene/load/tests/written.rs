@@ -136,6 +136,7 @@ mesh = { file = "cube.obj", translate = [2.0, 1.0, 0.5], scale = 0.5, rotate_deg
 rate = 0.01
 [effects]
 drag = { drop_radius = 0.002, wind = [1.0, 0.0, 0.0] }
+surface_tension = { coefficient = 0.0728 }
 absorbing_zone = { walls = ["+x"], length = 1.0, period = 2.0 }
 generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", significant_height = 0.1, peak_period = 3.0, depth = 1.0, peak_enhancement = 2.0, shortest_period = 2.0, ramp = 3.0, direction_degrees = 180.0 } }
 "#;

@@ -1,6 +1,7 @@
 //! A fault for each row of a check.
 pub(super) mod flip;
 pub(super) mod pbf;
+pub(super) mod tension;
 pub(super) mod variants;
 
 use swell::gpu::adapter::Spoil;

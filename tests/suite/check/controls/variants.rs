@@ -8,12 +8,13 @@ use swell::{
     },
     scene::{
         Scene, Wall,
+        effects::surface_tension,
         flip::{AFFINE, Flip, Preconditioner, Surface, Transfer},
     },
     stage::prepare::Start,
 };
 
-use super::{Control, control, flip::SYSTEM};
+use super::{Control, control, flip::SYSTEM, tension::TENSION};
 use crate::support::{D, lattice, mover, noise};
 
 /// A change of the common case, and what must fail by which fault.
@@ -42,6 +43,11 @@ fn apic(scene: &mut Scene, start: &mut Start) {
         let values = (0..n).map(slope).collect();
         (start.particles.attributes).insert(name.to_owned(), values);
     }
+}
+
+/// As strong as gravity is in a cell.
+fn tension(scene: &mut Scene, _: &mut Start) {
+    scene.effects.surface_tension = Some(surface_tension::Settings { coefficient: 50.0 });
 }
 
 fn voxel(scene: &mut Scene, _: &mut Start) {
@@ -158,6 +164,11 @@ pub const VARIANTS: &[Variant] = &[
                 &["velocity"],
             ),
         ],
+    },
+    Variant {
+        name: "surface tension",
+        change: tension,
+        controls: TENSION,
     },
     Variant {
         name: "voxel surface",

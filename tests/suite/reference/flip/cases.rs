@@ -189,6 +189,8 @@ pub fn effects() -> Case {
     case.scene.effects.viscosity = Some(effects::viscosity::Settings::xsph(0.1));
     case.scene.effects.vorticity_confinement =
         Some(effects::vorticity_confinement::Settings { strength: 0.5 });
+    case.scene.effects.surface_tension =
+        Some(effects::surface_tension::Settings { coefficient: 10.0 });
     case.scene.effects.drag = Some(effects::drag::Settings {
         drop_radius: 1e-3,
         wind: [5.0, 1.0, -2.0],

@@ -4,6 +4,21 @@ use super::Fault;
 
 pub const ZONE_FAULTS: &[Fault] = &[
     (
+        "iterations = 4\n\n[effects]\nviscosity = { xsph = 0.01 }",
+        "iterations = 4\ngrid_projection = false\n[effects]\nviscosity = { xsph = 0.01 }\nsurface_tension = { coefficient = 0.07 }",
+        34,
+        &[
+            "effects.surface_tension: is a part of the projection",
+            "only true is allowed",
+        ],
+    ),
+    (
+        "iterations = 4\n\n[effects]\nviscosity = { xsph = 0.01 }",
+        "iterations = 4\n\n[effects]\nviscosity = { xsph = 0.01 }\nsurface_tension = { coefficient = 0.07 }",
+        0,
+        &[],
+    ),
+    (
         "viscosity = { xsph = 0.01 }",
         "viscosity = { xsph = 0.01 }\nabsorbing_zone = { walls = [], length = 3.0, period = 2.0 }",
         34,

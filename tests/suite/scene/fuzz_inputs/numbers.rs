@@ -57,6 +57,7 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("wave_maker[4].motion.ramp", "{}", false),
     ("effects.drag.drop_radius", "{}", true),
     ("effects.drag.wind", "[{}, 0, 0]", true),
+    ("effects.surface_tension.coefficient", "{}", true),
     ("effects.absorbing_zone.length", "{}", false),
     ("effects.absorbing_zone.period", "{}", true),
     ("emitter[0].velocity", "[{}, 0, 0]", false),
@@ -121,7 +122,7 @@ fn numbered() -> String {
         motion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
         [[emitter]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nvelocity = [0.001, 0.0, 0.0]\nfrom = 1.0\nuntil = 2.0\n\
         [[drain]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nrate = 1.0\nfrom = 1.0\nuntil = 2.0\n";
-    let zone = "drag = { drop_radius = 0.001, wind = [1.0, 0, 0] }\nabsorbing_zone = { walls = [\"-y\"], length = 1.0, period = 1.0 }\n";
+    let zone = "drag = { drop_radius = 0.001, wind = [1.0, 0, 0] }\nsurface_tension = { coefficient = 0.07 }\nabsorbing_zone = { walls = [\"-y\"], length = 1.0, period = 1.0 }\n";
     SCENE
         .replace("[effects]\n", &format!("[effects]\n{zone}"))
         .replace("[solver]\n", &format!("{makers}{more}[solver]\n"))

@@ -1,0 +1,15 @@
+//! Surface tension of PBF: its projection has it, as FLIP's.
+
+use glam::DVec3;
+
+use super::Inputs;
+use crate::{reference::Timings, scene::effects::surface_tension::Settings};
+
+pub(super) fn apply(
+    _: &Settings,
+    _: Inputs<'_>,
+    velocity: &[DVec3],
+    _: &mut Timings,
+) -> Vec<DVec3> {
+    velocity.to_vec()
+}

@@ -1,0 +1,67 @@
+//! Surface tension: the pressure in water is σ κ above the air's at a surface of curvature κ.
+
+use std::f64::consts::{PI, TAU};
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    super::{document::Document, error::SceneError, key::Key, words::shown},
+    Effect, Grain, Surroundings,
+};
+
+/// Bond number ρ g d² / σ of a particle spacing d above which nothing of surface tension is seen: what it shapes, a capillary length
+/// wide, is smaller than a particle.
+const MOST_BOND: f64 = 1.0;
+
+/// `surface_tension = { coefficient = 0.0728 }`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// σ, N/m.
+    pub coefficient: f64,
+}
+
+impl Effect for Settings {
+    const ABOUT: &'static str =
+        "Surface tension, as the jump of the pressure at the surface (Kang, Fedkiw and Liu 2000)";
+
+    const KEYS: &'static [Key] = &[Key::number("coefficient", 1e-9..=1e6).unit("N/m").about(
+        "σ, of water in air 0.0728 at 20 °C; a substep is no longer than √(ρ Δx³ / (2π σ))",
+    )];
+
+    fn on_projection(&self) -> Option<Self> {
+        Some(self.clone())
+    }
+
+    fn check(&self, doc: &Document<'_>, around: &Surroundings<'_>) -> Result<(), SceneError> {
+        match around.has_projection {
+            true => Ok(()),
+            false => Err(doc.fault_of_plain(
+                "effects.surface_tension",
+                "is a part of the projection, which solver.pbf.grid_projection = false goes without: only true is allowed",
+            )),
+        }
+    }
+
+    fn lint(&self, grain: Grain) -> Option<String> {
+        let bond = grain.density * grain.gravity * grain.spacing.powi(2) / self.coefficient;
+        (bond > MOST_BOND).then(|| {
+            format!(
+                "effects.surface_tension.coefficient: the Bond number ρ g d² / σ of a particle spacing of {} m is {bond:.1}; above \
+                 {MOST_BOND} it changes nothing that is seen",
+                shown(grain.spacing)
+            )
+        })
+    }
+
+    /// Of a particle whose own surface, that of a lone drop, all became motion.
+    fn frees(&self, grain: Grain) -> f64 {
+        let radius = grain.spacing * (3.0 / (4.0 * PI)).cbrt();
+        (6.0 * self.coefficient / (grain.density * radius)).sqrt()
+    }
+
+    /// Capillary waves of two cells go by no more than what cells follow (Denner and van Wachem 2015, eq. 20, air without mass).
+    fn longest_step(&self, grain: Grain) -> f64 {
+        (grain.density * grain.cell.powi(3) / (TAU * self.coefficient)).sqrt()
+    }
+}
