@@ -353,6 +353,12 @@ particle_spacing = 0.04
                 vec!["effects.drag={drop_radius=0.03}".into()],
                 "effects.drag.drop_radius: a drop of 0.04 m radius holds 2.1 times the water of a particle",
             ),
+            // √(9.81 × 0.1) × 0.1 × 1000 / μ.
+            (
+                vec!["effects.viscosity={coefficient=0.001}".into()],
+                vec!["effects.viscosity={coefficient=0.1}".into()],
+                "effects.viscosity.coefficient: the Reynolds number √(g Δx) Δx / ν of a cell of 0.1 m is 990",
+            ),
             // Bond numbers of a spacing of 0.05 m: 1000 × 9.81 × 0.05² / σ.
             (
                 vec!["effects.surface_tension={coefficient=0.0728}".into()],

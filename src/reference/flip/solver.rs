@@ -83,7 +83,7 @@ pub struct Trace {
 
 impl Trace {
     /// Every solve, in order.
-    fn projections(&self) -> impl Iterator<Item = &Projected> {
+    pub fn projections(&self) -> impl Iterator<Item = &Projected> {
         self.earlier.iter().chain([&self.projected])
     }
 }

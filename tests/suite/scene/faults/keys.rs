@@ -216,7 +216,7 @@ pub const KEY_FAULTS: &[Fault] = &[
         "xsph = 0.01",
         "xsph = 0.01, coefficient = 1.0",
         33,
-        &["effects.viscosity.xsph", "coefficient"],
+        &["effects.viscosity.coefficient: given together with xsph"],
     ),
     (
         "xsph = 0.01",
