@@ -16,8 +16,8 @@ const LEAST_SLOPE = 1e-3;
 const FARTHEST = 2.0;
 // Half of the variance of three binomial filters and of the hats, 3 × 1/2 + 1/6 cells².
 const SHIFT = 0.8333333;
-// A drop of one cell's radius: smaller ones are not seen.
-const MOST = 2.0;
+// A drop of two cells' radius: of smaller ones cells see too little.
+const MOST = 1.0;
 
 var<private> shares: array<f32, 27>;
 

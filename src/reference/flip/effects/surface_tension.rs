@@ -27,8 +27,8 @@ pub const FARTHEST: f64 = 2.0;
 /// Half of the variance along an axis of three binomial filters, 1/2 each, and of the hats, 1/6; in cells².
 pub const SHIFT: f64 = (3.0 / 2.0 + 1.0 / 6.0) / 2.0;
 
-/// κ Δx of a drop of one cell's radius: smaller ones are not seen.
-pub const MOST: f64 = 2.0;
+/// κ Δx of a drop of two cells' radius: of smaller ones cells see too little.
+pub const MOST: f64 = 1.0;
 
 /// Where the share is flatter than this on both sides of a face, nothing is known of κ.
 pub const LEAST_WEIGHT: f64 = 1e-6;

@@ -45,8 +45,11 @@ fn apic(scene: &mut Scene, start: &mut Start) {
     }
 }
 
-/// As strong as gravity is in a cell.
-fn tension(scene: &mut Scene, _: &mut Start) {
+/// As strong as gravity is in a cell, on water off the walls: with air on both of its sides.
+fn tension(scene: &mut Scene, start: &mut Start) {
+    for x in &mut start.particles.position {
+        x[0] += 0.3;
+    }
     scene.effects.surface_tension = Some(surface_tension::Settings { coefficient: 50.0 });
 }
 
