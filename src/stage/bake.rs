@@ -113,6 +113,16 @@ pub enum BakeError {
     /// A solid without inside, or too large a grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
+    /// More particles than the budget has, known before the bake.
+    #[error("budget.particles is {limit}: {}", more_than(*.frame, *.count))]
+    Particles {
+        /// The budget.
+        limit: f64,
+        /// The frame after which there are more, 0 for the start.
+        frame: u32,
+        /// How many there are then.
+        count: usize,
+    },
     /// The device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -184,9 +194,10 @@ impl From<&BakeError> for Blame {
             BakeError::Branch(_) => Self::Input,
             BakeError::OtherPhysics { .. } => Self::Files,
             BakeError::Budget { .. } | BakeError::NotKept { .. } => Self::Numbers,
-            BakeError::Frames(_) | BakeError::NothingLeft { .. } | BakeError::Asset { .. } => {
-                Self::Input
-            }
+            BakeError::Particles { .. }
+            | BakeError::Frames(_)
+            | BakeError::NothingLeft { .. }
+            | BakeError::Asset { .. } => Self::Input,
         }
     }
 }
@@ -208,6 +219,7 @@ pub fn bake(
         parent,
         notes,
     } = beginning(request, last)?;
+    check_count(scene, &start, parent.as_ref(), last)?;
     let opened = request.device.open(needs(scene))?;
     let mut drive = Drive::unloaded(&opened, scene, &start, request.time_passes)?.with_probes();
     let device = opened.identity();
@@ -283,6 +295,44 @@ pub fn bake(
         passes,
         shares,
     })
+}
+
+/// Refuses a bake that is known to come to more particles than the budget has: with its start, or with what emitters bring to it where no
+/// drain may take some.
+fn check_count(
+    scene: &Scene,
+    start: &Start,
+    parent: Option<&Parent>,
+    last: u32,
+) -> Result<(), BakeError> {
+    let Some(limit) = scene.budget.particles else {
+        return Ok(());
+    };
+    let first = parent.map_or(0, |parent| parent.frame);
+    let particles = start.particles.len();
+    let solid = start.boundary.distance.as_ref();
+    let later = start
+        .sources
+        .least_counts(particles, first + 1..last + 1, solid);
+    let mut counts = std::iter::once((0, particles)).chain(later);
+    match counts.find(|(_, count)| *count as f64 > limit) {
+        Some((frame, count)) => Err(BakeError::Particles {
+            limit,
+            frame,
+            count,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// What there is when, in words.
+fn more_than(frame: u32, count: usize) -> String {
+    match frame {
+        0 => format!("the start has {count} particles"),
+        _ => format!(
+            "with what emitters bring there are {count} particles or more after frame {frame}"
+        ),
+    }
 }
 
 /// What is said of a frame that could not be computed; of one that broke a budget, once its inputs are kept.

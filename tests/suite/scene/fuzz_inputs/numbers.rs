@@ -44,6 +44,7 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("budget.divergence", "{}", true),
     ("budget.volume", "{}", true),
     ("budget.energy", "{}", true),
+    ("budget.particles", "{}", true),
     ("effects.viscosity.xsph", "{}", true),
     ("effects.vorticity_confinement.strength", "{}", true),
     ("wave_maker[3].motion.significant_height", "{}", false),
