@@ -98,6 +98,8 @@ pub struct Outcome {
     pub waited: f64,
     /// Whether a signal ended it before the last frame.
     pub interrupted: bool,
+    /// What a user has to know of the frames computed now, a sentence each.
+    pub warnings: Vec<String>,
     /// Seconds and runs by pass, where measured.
     pub passes: Vec<(&'static str, f64, u64)>,
     /// The same by what they are there for, with bytes.
@@ -240,7 +242,9 @@ pub fn bake(
     });
     drive.load_watched(&start.particles, clock.frame, &state)?;
     drive.go_on_with(clock.next_id);
+    let mut looked = probes::Looked::new(scene);
     let ended = drive.run(last, stop, |step| {
+        looked.add(scene, step.frame, &step.looks);
         let begin = Instant::now();
         let time = scene.shot.time(step.frame);
         let looks = Some(step.looks);
@@ -292,6 +296,7 @@ pub fn bake(
         bytes: summary.bytes,
         waited: summary.waiting.as_secs_f64(),
         interrupted: end == End::Stopped,
+        warnings: looked.warnings(scene),
         passes,
         shares,
     })

@@ -418,6 +418,10 @@ impl Effect for Settings {
             period: Some(period),
             depth: Some(depth),
             ramp: 0.0,
+            meets: match &self.waves {
+                Waves::Focused(packet) => Some(packet.time),
+                Waves::Stokes(_) | Waves::Sea(_) => None,
+            },
         })
     }
 
