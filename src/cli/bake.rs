@@ -143,6 +143,10 @@ pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
     } else {
         "done:"
     };
+    for warning in &outcome.warnings {
+        let (text, event) = warned(warning);
+        progress.say(&text, event);
+    }
     progress.say(
         &format!(
             "{end} frame {} of {} in {} ({}, {} written now, waited {:.1} s for the disk)",

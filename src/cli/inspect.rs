@@ -106,6 +106,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         Some(file) => {
             let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
             args.deny.check(file, &scene)?;
+            refuse_frames_beyond(args, file, scene.shot.frames)?;
             let planned = plan(&scene, args.adapter.as_deref())?;
             let _ = show_plan(&mut text, &scene, &planned);
             misfit = planned.misfit;
@@ -127,6 +128,24 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     }
     output::print(&text);
     misfit.map_or(Ok(0), |misfit| Err(misfit.into()))
+}
+
+/// A scene moves as it says until its shot's end; the first frame warms the device up.
+fn refuse_frames_beyond(args: &InspectArgs, file: &Path, frames: u32) -> Result<(), Failure> {
+    match args.time {
+        Some(asked) if asked >= frames => {
+            let error = format!(
+                "--time {asked}: {} has {frames} frames, and the first is not timed: up to {} are possible; raise shot.frames",
+                file.display(),
+                frames - 1
+            );
+            Err(Failure {
+                code: 2,
+                error: error.into(),
+            })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// A cache says itself what it was baked with, and on what.

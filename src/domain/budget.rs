@@ -12,6 +12,8 @@ pub enum Watched {
     NotFinite,
     /// Whether every particle that a frame began with is there at its end, once, within the domain.
     Particles,
+    /// Particles after a frame, with those that entered at its end.
+    Count,
     /// Substeps that a frame asks for.
     Substeps,
     /// Largest speed of a particle at a frame's end, m/s.
@@ -38,12 +40,17 @@ pub enum Watched {
 
 impl Watched {
     /// Each quantity, its name in reports, and its words in a message.
-    const NAMED: [(Self, &'static str, &'static str); 13] = [
+    const NAMED: [(Self, &'static str, &'static str); 14] = [
         (Self::NotFinite, "not_finite", "values that are not finite"),
         (
             Self::Particles,
-            "particles",
+            "particles_lost",
             "particles lost, doubled or outside",
+        ),
+        (
+            Self::Count,
+            "particles",
+            "the count of particles with what entered",
         ),
         (Self::Substeps, "max_substeps", "substeps asked for"),
         (Self::Speed, "speed", "the largest speed, m/s,"),

@@ -4,8 +4,10 @@
 //! start and never negative, so that no water is ever behind the wall.
 
 mod cnoidal;
+mod complex;
 mod elliptic;
 mod linear_theory;
+mod pairs;
 mod regular;
 mod sea;
 mod second_order;
@@ -19,6 +21,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 pub use cnoidal::{Cnoidal, LEAST_CNOIDAL_LENGTH, NoCnoidal};
 pub use linear_theory::{piston_height_ratio, wave_number};
+pub use pairs::DEEPEST;
 use regular::Cycle as _;
 pub use regular::RegularWaves;
 pub use sea::{Asked, Phases, Sea};
@@ -288,6 +291,7 @@ mod tests {
                     significant_height: 0.1,
                     seed: 5,
                 },
+                second_order: false,
             })),
             Motion::Sea(Sea::new(Asked {
                 spectrum: Spectrum::Tma,
@@ -302,6 +306,7 @@ mod tests {
                     at: 2.0,
                     time: 7.0,
                 },
+                second_order: true,
             })),
         ]
     }

@@ -32,6 +32,8 @@ pub struct Budget {
     /// Rise of the total energy within a frame beyond the work done by walls and solids, over the total: kinetic, and
     /// potential against the lowest place of the domain.
     pub energy: Option<f64>,
+    /// Particles at a frame's end.
+    pub particles: Option<f64>,
 }
 
 /// Defaults that depend on the scene; the others stand in the table of keys.
@@ -98,6 +100,7 @@ pub(super) struct BudgetSpec {
     divergence: Limit,
     volume: Limit,
     energy: Option<Limit>,
+    particles: Limit,
 }
 
 /// A number, or `false` for none.
@@ -165,6 +168,7 @@ pub(super) fn build(
         divergence: spec.divergence.0,
         volume: spec.volume.0,
         energy: spec.energy.map_or(energy, |limit| limit.0),
+        particles: spec.particles.0,
     })
 }
 
@@ -181,7 +185,7 @@ pub struct Before {
 
 impl Budget {
     /// Each limit with its name, in the order of the table of keys.
-    pub(super) fn rows(&self) -> [(Watched, Option<f64>); 10] {
+    pub(super) fn rows(&self) -> [(Watched, Option<f64>); 11] {
         [
             (Watched::Speed, self.speed),
             (Watched::SpeedJump, self.speed_jump),
@@ -193,7 +197,16 @@ impl Budget {
             (Watched::Divergence, self.divergence),
             (Watched::Volume, self.volume),
             (Watched::Energy, self.energy),
+            (Watched::Count, self.particles),
         ]
+    }
+
+    /// Holds the count of particles after frame `frame` to its limit.
+    ///
+    /// # Errors
+    /// The breach.
+    pub fn check_count(&self, frame: u32, particles: usize) -> Result<(), Breach> {
+        Breach::check(frame, Watched::Count, particles as f64, self.particles)
     }
 
     /// Holds a projection of `length` seconds to its limits; `divergence` is the largest |∇·u| after it, 1/s.

@@ -1,9 +1,12 @@
 //! What is allowed, and hardly what was meant: each found by a number, and said with it.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::{Method, Scene, Wall, WaveMaker, words::shown};
-use crate::domain::motion::{Motion, Phases, piston_height_ratio, wave_number};
+use crate::domain::{
+    motion::{Motion, Phases, piston_height_ratio, wave_number},
+    sources::Window,
+};
 
 /// In particle spacings, half a cell of FLIP. Of a sea 1.2 spacings high FLIP keeps 0.96 of the height (docs/validation.md).
 const LEAST_HEIGHT: f64 = 1.0;
@@ -13,6 +16,9 @@ const LEAST_FRAMES: f64 = 10.0;
 
 /// Part by which a depth that theory is told may be off the water's own. The length of long waves is off by half of it.
 const DEPTH: f64 = 0.1;
+
+/// k a of a wave that breaks, over tanh kh: half of 0.142 wave lengths high (Miche 1944).
+const BREAKS: f64 = 0.142 * PI;
 
 /// Layers of particles above which PBF's iterations alone do not hold water at rest (docs/studies.md, pbf-rest).
 const LAYERS: f64 = 20.0;
@@ -34,6 +40,8 @@ pub(super) struct Made {
     pub(super) depth: Option<f64>,
     /// Seconds until the waves have their full height.
     pub(super) ramp: f64,
+    /// When a packet's crests meet, seconds.
+    pub(super) meets: Option<f64>,
 }
 
 impl Scene {
@@ -47,14 +55,16 @@ impl Scene {
             .collect();
         for (wall, waves) in &made {
             self.lint_waves(waves, level, &mut lints);
+            self.lint_packet(waves, &mut lints);
             if let (Some(wall), Some(level)) = (wall, level) {
                 self.lint_return(*wall, waves, level, &mut lints);
             }
         }
         if let Some(level) = level {
-            self.lint_zones(level, &mut lints);
+            self.lint_zones(level, &made, &mut lints);
         }
         self.lint_layers(level, &mut lints);
+        self.lint_sources(&mut lints);
         lints.extend(self.effects.lints(self.grain()));
         lints
     }
@@ -147,8 +157,55 @@ impl Scene {
         }
     }
 
-    /// Zones that are short beside the waves that they are for.
-    fn lint_zones(&self, level: f64, lints: &mut Vec<String>) {
+    /// Crests that break before they meet, or meet when the shot is over.
+    fn lint_packet(&self, waves: &Made, lints: &mut Vec<String>) {
+        let (Some(meets), Some(period), Some(depth)) = (waves.meets, waves.period, waves.depth)
+        else {
+            return;
+        };
+        let k = TAU / self.wave_length(period, depth);
+        let (steep, breaks) = (k * waves.crest, BREAKS * (k * depth).tanh());
+        if steep > breaks {
+            lints.push(format!(
+                "{}: a crest of {} m has k a = {steep:.2} at the peak's {} s; waves break from {breaks:.2} on (Miche 1944)",
+                waves.key,
+                shown(waves.crest),
+                shown(period)
+            ));
+        }
+        let duration = self.shot.duration();
+        if meets > duration {
+            lints.push(format!(
+                "{}: its crests meet after {} s, and the shot ends after {} s",
+                waves.key,
+                shown(meets),
+                shown(duration)
+            ));
+        }
+    }
+
+    /// Water that enters or leaves only when the shot is over.
+    fn lint_sources(&self, lints: &mut Vec<String>) {
+        let mut emitters = self.emitters.iter().map(|it| ("emitter", it.window));
+        let mut drains = self.drains.iter().map(|it| ("drain", it.window));
+        let duration = self.shot.duration();
+        let late = |list: &mut dyn Iterator<Item = (&str, Window)>, lints: &mut Vec<String>| {
+            for (index, (name, window)) in list.enumerate() {
+                if window.from >= duration {
+                    lints.push(format!(
+                        "{name}[{index}].from: it begins after {} s, and the shot ends after {} s",
+                        shown(window.from),
+                        shown(duration)
+                    ));
+                }
+            }
+        };
+        late(&mut emitters, lints);
+        late(&mut drains, lints);
+    }
+
+    /// Zones that are short beside the waves that they are for, or that the scene makes.
+    fn lint_zones(&self, level: f64, made: &[(Option<Wall>, Made)], lints: &mut Vec<String>) {
         for (name, absorbs) in self.effects.absorbing() {
             let (length, period, least) = (absorbs.zone.length, absorbs.period, absorbs.least);
             let wave = self.wave_length(period, level);
@@ -161,6 +218,24 @@ impl Scene {
                     shown(period),
                     shown(level)
                 ));
+                continue;
+            }
+            for (_, waves) in made {
+                let Some(longer) = waves.period.filter(|other| *other > period) else {
+                    continue;
+                };
+                let wave = self.wave_length(longer, level);
+                if length < least * wave {
+                    lints.push(format!(
+                        "effects.{name}.length: {} m is {:.2} of a wave length of {}'s waves of {} s; {least} is the least, and its \
+                         period is {} s",
+                        shown(length),
+                        length / wave,
+                        waves.key,
+                        shown(longer),
+                        shown(period)
+                    ));
+                }
             }
         }
     }
@@ -189,6 +264,7 @@ fn made_by(index: usize, maker: &WaveMaker, scene: &Scene, level: Option<f64>) -
         period: Some(period),
         depth: Some(depth),
         ramp,
+        meets: None,
     };
     Some(match &maker.motion {
         Motion::Sine {
@@ -208,6 +284,7 @@ fn made_by(index: usize, maker: &WaveMaker, scene: &Scene, level: Option<f64>) -
             period: None,
             depth: Some(*depth),
             ramp: 0.0,
+            meets: None,
         },
         Motion::Stokes(stokes) => {
             let waves = stokes.waves();
@@ -237,7 +314,14 @@ fn made_by(index: usize, maker: &WaveMaker, scene: &Scene, level: Option<f64>) -
                 } => (significant_height, CREST * significant_height),
                 Phases::Focused { height, .. } => (height, height),
             };
-            of(height, crest, asked.peak_period, asked.depth, asked.ramp)
+            let meets = match asked.phases {
+                Phases::Focused { time, .. } => Some(time),
+                Phases::Random { .. } => None,
+            };
+            Made {
+                meets,
+                ..of(height, crest, asked.peak_period, asked.depth, asked.ramp)
+            }
         }
         Motion::ConstantVelocity { .. } | Motion::Table { .. } => return None,
     })
@@ -283,6 +367,15 @@ particle_spacing = 0.04
             let waves = format!("kind=\"stokes\",period=2.2987,{more}");
             format!("effects.generation_zone={{walls=[\"-x\"],length=9.0,waves={{{waves}}}}}")
         };
+        let packet = |more: &str| {
+            let waves = format!(
+                "kind=\"focused\",at=[2.0,0.5],peak_period=2.2987,ramp=0.1,shortest_period=2.0,depth=1.0,{more}"
+            );
+            format!("effects.generation_zone={{walls=[\"-x\"],length=9.0,waves={{{waves}}}}}")
+        };
+        let room = "min=[1.0,1.0,0.0],max=[2.0,2.0,1.0]";
+        let emitter = |more: &str| format!("emitter=[{{{room},velocity=[1.0,0.0,0.0],{more}}}]");
+        let drain = |more: &str| format!("drain=[{{{room},{more}}}]");
         for (set, good, expected) in [
             (
                 vec![stokes("height=0.04,depth=1.0")],
@@ -349,6 +442,37 @@ particle_spacing = 0.04
                 "solver.pbf.grid_projection: 25 layers of particles without it",
             ),
             (
+                vec![packet("height=0.35,time=4.9")],
+                vec![packet("height=0.33,time=4.9")],
+                "effects.generation_zone.waves: a crest of 0.35 m has k a = 0.35 at the peak's 2.2987 s; waves break from 0.34 on",
+            ),
+            (
+                vec![packet("height=0.2,time=5.1")],
+                vec![packet("height=0.2,time=5.0")],
+                "effects.generation_zone.waves: its crests meet after 5.1 s, and the shot ends after 5 s",
+            ),
+            (
+                vec![emitter("from=5.0")],
+                vec![emitter("from=4.9")],
+                "emitter[0].from: it begins after 5 s, and the shot ends after 5 s",
+            ),
+            (
+                vec![drain("from=6.0")],
+                vec![drain("from=1.0")],
+                "drain[0].from: it begins after 6 s, and the shot ends after 5 s",
+            ),
+            (
+                vec![
+                    sine.into(),
+                    "effects.absorbing_zone={walls=[\"+x\"],length=3.0,period=1.5}".into(),
+                ],
+                vec![
+                    sine.into(),
+                    "effects.absorbing_zone={walls=[\"+x\"],length=3.2,period=1.5}".into(),
+                ],
+                "effects.absorbing_zone.length: 3 m is 0.48 of a wave length of wave_maker[0].motion's waves of 2.2987 s",
+            ),
+            (
                 vec!["effects.drag={drop_radius=0.04}".into()],
                 vec!["effects.drag={drop_radius=0.03}".into()],
                 "effects.drag.drop_radius: a drop of 0.04 m radius holds 2.1 times the water of a particle",
@@ -386,7 +510,7 @@ particle_spacing = 0.04
             "kind=\"stokes\",height=0.02,period=2.2987,depth=1.0",
             "kind=\"cnoidal\",height=0.02,period=4.0,depth=1.0",
             "kind=\"sea\",significant_height=0.02,peak_period=2.5,depth=1.0",
-            "kind=\"focused\",height=0.02,at=3.0,time=20.0,peak_period=2.5,depth=1.0",
+            "kind=\"focused\",height=0.02,at=0.5,time=4.0,ramp=0.5,peak_period=2.5,depth=1.0",
         ] {
             let maker = format!("wave_maker=[{{wall=\"-x\",motion={{{motion}}}}}]");
             let found = lints(&[&maker]);

@@ -45,6 +45,7 @@ pub(super) enum MotionSpec {
         shortest_period: Option<f64>,
         depth: f64,
         ramp: Option<f64>,
+        second_order: bool,
     },
     Focused {
         height: f64,
@@ -56,6 +57,7 @@ pub(super) enum MotionSpec {
         shortest_period: Option<f64>,
         depth: f64,
         ramp: Option<f64>,
+        second_order: bool,
     },
     Table {
         file: Option<String>,

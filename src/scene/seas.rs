@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::{document::Document, error::SceneError, motion_spec::check_speed, words::shown};
-use crate::domain::motion::{Asked, Motion, Phases, Sea, Spectrum, wave_number};
+use crate::domain::motion::{
+    Asked, DEEPEST, MADSEN_LIMIT, Motion, Phases, Sea, Spectrum, wave_number,
+};
 
 /// Shortest of the waves over the peak's period, where a scene does not say it. What is left out has 1.5 % of the energy of
 /// Pierson and Moskowitz's spectrum.
@@ -43,12 +45,46 @@ pub(super) fn build(doc: &Document<'_>, path: &str, asked: Asked) -> Result<Moti
         _ => check_depth(height, asked.depth),
     }
     .or_else(|problem| refuse(key, problem))?;
+    if asked.second_order {
+        check_second_order(&asked).or_else(|problem| refuse("second_order", problem))?;
+    }
     let sea = Sea::new(asked);
     let whole = sea.asked().ramp + sea.asked().peak_period;
     let motion = Motion::Sea(sea);
     check_speed(motion.peak_speed(0.0, whole))
         .map_err(|problem| doc.fault_of_plain(path, problem))?;
     Ok(motion)
+}
+
+/// That the second order holds for the waves, and is known for the shortest.
+fn check_second_order(asked: &Asked) -> std::result::Result<(), String> {
+    let (depth, gravity) = (asked.depth, asked.gravity);
+    let shortest = wave_number(TAU / asked.shortest_period, depth, gravity) * depth;
+    if shortest > DEEPEST {
+        return Err(format!(
+            "waves of {} s on {} m of water have kh = {shortest:.1}, and it is known up to {DEEPEST}; a longer shortest_period has less",
+            shown(asked.shortest_period),
+            shown(depth)
+        ));
+    }
+    // A packet's trough is no lower than its crest is high.
+    let (height, of) = match asked.phases {
+        Phases::Random {
+            significant_height, ..
+        } => (significant_height, "significant_height"),
+        Phases::Focused { height, .. } => (2.0 * height, "twice the height"),
+    };
+    let length = TAU / wave_number(TAU / asked.peak_period, depth, gravity);
+    let ursell = height * length.powi(2) / depth.powi(3);
+    if ursell >= MADSEN_LIMIT {
+        return Err(format!(
+            "H L² / h³ is {ursell:.1} with {of} and the peak's {} s on {} m of water, and the second order holds below \
+             {MADSEN_LIMIT:.1} (Madsen 1971)",
+            shown(asked.peak_period),
+            shown(depth)
+        ));
+    }
+    Ok(())
 }
 
 /// That a spectrum's peak period, shortest period and ramp, seconds, are those of waves.
@@ -155,6 +191,7 @@ pub(super) fn asked(
         gravity,
         ramp: ramp.unwrap_or(RAMP * peak_period),
         phases,
+        second_order: false,
     }
 }
 

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::domain::{
     bounds::Bounds,
-    motion::{Motion, Phases},
+    motion::{Asked, Motion, Phases},
 };
 
 /// Largest motion table read, bytes: ten hours at 60 points a second.
@@ -187,6 +187,7 @@ pub(super) fn motion(
             shortest_period,
             depth,
             ramp,
+            second_order,
         } => {
             let water = [peak_period, depth, gravity.length()];
             let phases = Phases::Random {
@@ -195,7 +196,12 @@ pub(super) fn motion(
             };
             let left_out = [shortest_period, ramp];
             let shape = seas::shape(doc, path, spectrum, peak_enhancement)?;
-            seas::build(doc, path, seas::asked(shape, water, left_out, phases))
+            let asked = seas::asked(shape, water, left_out, phases);
+            let asked = Asked {
+                second_order,
+                ..asked
+            };
+            seas::build(doc, path, asked)
         }
         MotionSpec::Focused {
             height,
@@ -207,12 +213,18 @@ pub(super) fn motion(
             shortest_period,
             depth,
             ramp,
+            second_order,
         } => {
             let water = [peak_period, depth, gravity.length()];
             let phases = Phases::Focused { height, at, time };
             let left_out = [shortest_period, ramp];
             let shape = seas::shape(doc, path, spectrum, peak_enhancement)?;
-            seas::build(doc, path, seas::asked(shape, water, left_out, phases))
+            let asked = seas::asked(shape, water, left_out, phases);
+            let asked = Asked {
+                second_order,
+                ..asked
+            };
+            seas::build(doc, path, asked)
         }
         MotionSpec::Table {
             ref file,

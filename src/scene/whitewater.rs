@@ -60,16 +60,16 @@ const EMISSION: &[Key] = &[
         .about("the same at the sharpest crests"),
     Key::vector("trapped_air", 2, POTENTIAL)
         .unit("m/s")
-        .computed(|| "from the shot".to_owned())
+        .computed(|| "what the shot gives".to_owned())
         .also(", rising")
         .about("from where to where the potential of trapped air grows from 0 to 1"),
     Key::vector("wave_crest", 2, POTENTIAL)
-        .computed(|| "from the shot".to_owned())
+        .computed(|| "what the shot gives".to_owned())
         .also(", rising")
         .about("the same of wave crests"),
     Key::vector("energy", 2, POTENTIAL)
         .unit("J/kg")
-        .computed(|| "from the shot".to_owned())
+        .computed(|| "what the shot gives".to_owned())
         .also(", rising")
         .about("the same of v²/2, which the other two are multiplied by"),
 ];

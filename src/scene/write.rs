@@ -327,6 +327,7 @@ fn waves(asked: &Asked) -> (&'static str, Table) {
         ("peak_period", value(&asked.peak_period)),
         ("shortest_period", value(&asked.shortest_period)),
         ("ramp", value(&asked.ramp)),
+        ("second_order", value(&asked.second_order)),
     ]);
     if asked.spectrum != Spectrum::PiersonMoskowitz {
         rows.insert(

@@ -98,6 +98,8 @@ pub struct Outcome {
     pub waited: f64,
     /// Whether a signal ended it before the last frame.
     pub interrupted: bool,
+    /// What a user has to know of the frames computed now, a sentence each.
+    pub warnings: Vec<String>,
     /// Seconds and runs by pass, where measured.
     pub passes: Vec<(&'static str, f64, u64)>,
     /// The same by what they are there for, with bytes.
@@ -113,6 +115,16 @@ pub enum BakeError {
     /// A solid without inside, or too large a grid.
     #[error(transparent)]
     Solid(#[from] SignedDistanceError),
+    /// More particles than the budget has, known before the bake.
+    #[error("budget.particles is {limit}: {}", more_than(*.frame, *.count))]
+    Particles {
+        /// The budget.
+        limit: f64,
+        /// The frame after which there are more, 0 for the start.
+        frame: u32,
+        /// How many there are then.
+        count: usize,
+    },
     /// The device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -184,9 +196,10 @@ impl From<&BakeError> for Blame {
             BakeError::Branch(_) => Self::Input,
             BakeError::OtherPhysics { .. } => Self::Files,
             BakeError::Budget { .. } | BakeError::NotKept { .. } => Self::Numbers,
-            BakeError::Frames(_) | BakeError::NothingLeft { .. } | BakeError::Asset { .. } => {
-                Self::Input
-            }
+            BakeError::Particles { .. }
+            | BakeError::Frames(_)
+            | BakeError::NothingLeft { .. }
+            | BakeError::Asset { .. } => Self::Input,
         }
     }
 }
@@ -208,6 +221,7 @@ pub fn bake(
         parent,
         notes,
     } = beginning(request, last)?;
+    check_count(scene, &start, parent.as_ref(), last)?;
     let opened = request.device.open(needs(scene))?;
     let mut drive = Drive::unloaded(&opened, scene, &start, request.time_passes)?.with_probes();
     let device = opened.identity();
@@ -228,7 +242,9 @@ pub fn bake(
     });
     drive.load_watched(&start.particles, clock.frame, &state)?;
     drive.go_on_with(clock.next_id);
+    let mut looked = probes::Looked::new(scene);
     let ended = drive.run(last, stop, |step| {
+        looked.add(scene, step.frame, &step.looks);
         let begin = Instant::now();
         let time = scene.shot.time(step.frame);
         let looks = Some(step.looks);
@@ -280,9 +296,48 @@ pub fn bake(
         bytes: summary.bytes,
         waited: summary.waiting.as_secs_f64(),
         interrupted: end == End::Stopped,
+        warnings: looked.warnings(scene),
         passes,
         shares,
     })
+}
+
+/// Refuses a bake that is known to come to more particles than the budget has: with its start, or with what emitters bring to it where no
+/// drain may take some.
+fn check_count(
+    scene: &Scene,
+    start: &Start,
+    parent: Option<&Parent>,
+    last: u32,
+) -> Result<(), BakeError> {
+    let Some(limit) = scene.budget.particles else {
+        return Ok(());
+    };
+    let first = parent.map_or(0, |parent| parent.frame);
+    let particles = start.particles.len();
+    let solid = start.boundary.distance.as_ref();
+    let later = start
+        .sources
+        .least_counts(particles, first + 1..last + 1, solid);
+    let mut counts = std::iter::once((0, particles)).chain(later);
+    match counts.find(|(_, count)| *count as f64 > limit) {
+        Some((frame, count)) => Err(BakeError::Particles {
+            limit,
+            frame,
+            count,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// What there is when, in words.
+fn more_than(frame: u32, count: usize) -> String {
+    match frame {
+        0 => format!("the start has {count} particles"),
+        _ => format!(
+            "with what emitters bring there are {count} particles or more after frame {frame}"
+        ),
+    }
 }
 
 /// What is said of a frame that could not be computed; of one that broke a budget, once its inputs are kept.

@@ -200,6 +200,10 @@ impl<'a> Drive<'a> {
         };
         let (solid, next_id) = (solid.as_ref(), &mut self.next_id);
         let exchange = sources.exchange(self.frame, solid, particles, next_id);
+        if self.watch.is_some() {
+            let budget = &self.scene.budget;
+            budget.check_count(self.frame, particles.len())?;
+        }
         if exchange != Exchange::default() {
             self.solver.load(self.frame, particles)?;
             if let Some(watch) = &mut self.watch {

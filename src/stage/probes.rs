@@ -72,6 +72,45 @@ pub(super) fn is_recorded(probe: &Probe) -> bool {
     probe.rate != Rate::Frame || matches!(probe.kind, ProbeKind::Force { .. })
 }
 
+/// How often probes with a rate of their own looked, of the times that they were asked to: not more than once a substep.
+#[derive(Clone, Debug)]
+pub(super) struct Looked {
+    /// By probe.
+    times: Vec<[u64; 2]>,
+}
+
+impl Looked {
+    /// Of no frame yet.
+    pub(super) fn new(scene: &Scene) -> Self {
+        Self {
+            times: vec![[0, 0]; scene.probes.len()],
+        }
+    }
+
+    /// Adds frame `frame`, in which probes took these looks.
+    pub(super) fn add(&mut self, scene: &Scene, frame: u32, looks: &ProbeValues) {
+        let [start, end] = [frame.saturating_sub(1), frame].map(|frame| scene.shot.time(frame));
+        for ((times, values), probe) in self.times.iter_mut().zip(looks).zip(&scene.probes) {
+            times[0] += (values.len() / (1 + probe.kind.columns().len())) as u64;
+            times[1] += probe.rate.times(start, end);
+        }
+    }
+
+    /// A sentence for each probe that looked less often.
+    pub(super) fn warnings(&self, scene: &Scene) -> Vec<String> {
+        let probes = self.times.iter().zip(&scene.probes);
+        let short = probes.filter(|([looked, asked], _)| *looked > 0 && looked < asked);
+        short
+            .map(|([looked, asked], probe)| {
+                format!(
+                    "probe {} looked {looked} times of the {asked} that its rate_hz asks for: it looks at the ends of substeps",
+                    probe.name
+                )
+            })
+            .collect()
+    }
+}
+
 /// What probes see of a frame while it is computed.
 pub(super) struct Recorder<'a> {
     scene: &'a Scene,

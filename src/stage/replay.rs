@@ -67,6 +67,8 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}; ", self.breach)?;
         match &self.place {
+            // No pass lets water in.
+            None if self.breach.watched == Watched::Count => write!(f, "emitters brought them"),
             Some(Place {
                 substep,
                 pass,
@@ -102,6 +104,12 @@ pub fn replay(
             None => return Err(error),
         },
     };
+    if breach.watched == Watched::Count {
+        return Ok(Some(Failure {
+            breach,
+            place: None,
+        }));
+    }
     let made = drive.report().cloned();
     // Two solvers at once may be more than the device holds.
     drop(drive);

@@ -40,7 +40,7 @@ pub(super) fn second_harmonic(frequency: f64, depth: f64, gravity: f64) -> [f64;
 }
 
 /// κⱼ, 1/m, and Dⱼ of an evanescent mode: κh tan κh = −νh with κh a little less than jπ.
-fn evanescent(index: u32, deep: f64, depth: f64) -> [f64; 2] {
+pub(super) fn evanescent(index: u32, deep: f64, depth: f64) -> [f64; 2] {
     let whole = PI * f64::from(index);
     let mut less = 0.0f64;
     // Each step takes the error to a third or less.

@@ -28,9 +28,17 @@ impl Rate {
         match self {
             Self::Frame => false,
             Self::Substep => true,
+            Self::Hertz(_) => self.times(start, end) > 0,
+        }
+    }
+
+    /// How many of its own times lie after `start` and up to `end`, seconds; 0 of one that has none.
+    pub fn times(self, start: f64, end: f64) -> u64 {
+        match self {
+            Self::Frame | Self::Substep => 0,
             Self::Hertz(rate) => {
                 let passed = |time: f64| (time * rate + Self::NEAR).floor();
-                passed(end) > passed(start)
+                (passed(end) - passed(start)) as u64
             }
         }
     }

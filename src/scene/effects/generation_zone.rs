@@ -83,66 +83,75 @@ pub struct Regular {
     pub direction_degrees: f64,
 }
 
-/// A sea as a scene asks for it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Sea {
-    /// Four times the root of the elevation's variance, metres.
-    pub significant_height: f64,
-    /// Chooses one sea of many.
-    pub seed: u32,
-    /// How the energy is spread over frequencies.
-    pub spectrum: Spectrum,
-    /// γ.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub peak_enhancement: Option<f64>,
-    /// Seconds.
-    pub peak_period: f64,
-    /// Of the shortest waves, seconds.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shortest_period: Option<f64>,
-    /// Of the water at rest, metres.
-    pub depth: f64,
-    /// Seconds until the full height.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ramp: Option<f64>,
-    /// In which most of them go, from +x towards +z.
-    pub direction_degrees: f64,
-    /// s of the spread (cos ½θ)^2s over directions; without it all go one way.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub spreading: Option<f64>,
+/// Waves of a spectrum as a scene asks for them: what is said of `$name`, its own keys, and those of every spectrum.
+macro_rules! of_spectrum {
+    ($(#[$about:meta])* $name:ident { $($own:tt)* }) => {
+        $(#[$about])*
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($own)*
+            /// How the energy is spread over frequencies.
+            pub spectrum: Spectrum,
+            /// γ.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub peak_enhancement: Option<f64>,
+            /// Seconds.
+            pub peak_period: f64,
+            /// Of the shortest waves, seconds.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub shortest_period: Option<f64>,
+            /// Of the water at rest, metres.
+            pub depth: f64,
+            /// Seconds until the full height.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub ramp: Option<f64>,
+            /// In which most of them go, from +x towards +z.
+            pub direction_degrees: f64,
+            /// s of the spread (cos ½θ)^2s over directions; without it all go one way.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub spreading: Option<f64>,
+        }
+
+        impl $name {
+            fn asked(&self, gravity: f64) -> OpenSea {
+                OpenSea {
+                    spectrum: self.spectrum,
+                    meeting: self.meeting(),
+                    peak_period: self.peak_period,
+                    peak_enhancement: seas::peak_enhancement(self.spectrum, self.peak_enhancement),
+                    shortest_period: (self.shortest_period)
+                        .unwrap_or(seas::SHORTEST * self.peak_period),
+                    depth: self.depth,
+                    gravity,
+                    ramp: self.ramp.unwrap_or(seas::RAMP * self.peak_period),
+                    spreading: self.spreading,
+                }
+            }
+        }
+    };
 }
 
-/// A packet as a scene asks for it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Packet {
-    /// Of the crest above still water by linear theory, metres.
-    pub height: f64,
-    /// Where crests meet: along x and z, metres.
-    pub at: [f64; 2],
-    /// When, seconds.
-    pub time: f64,
-    /// How the energy is spread over frequencies.
-    pub spectrum: Spectrum,
-    /// γ.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub peak_enhancement: Option<f64>,
-    /// Seconds.
-    pub peak_period: f64,
-    /// Of the shortest waves, seconds.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shortest_period: Option<f64>,
-    /// Of the water at rest, metres.
-    pub depth: f64,
-    /// Seconds until the full height.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ramp: Option<f64>,
-    /// In which most of them go, from +x towards +z.
-    pub direction_degrees: f64,
-    /// s of the spread (cos ½θ)^2s over directions; without it all go one way.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub spreading: Option<f64>,
+of_spectrum! {
+    /// A sea as a scene asks for it.
+    Sea {
+        /// Four times the root of the elevation's variance, metres.
+        pub significant_height: f64,
+        /// Chooses one sea of many.
+        pub seed: u32,
+    }
+}
+
+of_spectrum! {
+    /// A packet as a scene asks for it.
+    Packet {
+        /// Of the crest above still water by linear theory, metres.
+        pub height: f64,
+        /// Where crests meet: along x and z, metres.
+        pub at: [f64; 2],
+        /// When, seconds.
+        pub time: f64,
+    }
 }
 
 impl Regular {
@@ -153,40 +162,20 @@ impl Regular {
 }
 
 impl Sea {
-    fn asked(&self, gravity: f64) -> OpenSea {
-        OpenSea {
-            spectrum: self.spectrum,
-            meeting: Meeting::Random {
-                significant_height: self.significant_height,
-                seed: self.seed,
-            },
-            peak_period: self.peak_period,
-            peak_enhancement: seas::peak_enhancement(self.spectrum, self.peak_enhancement),
-            shortest_period: (self.shortest_period).unwrap_or(seas::SHORTEST * self.peak_period),
-            depth: self.depth,
-            gravity,
-            ramp: self.ramp.unwrap_or(seas::RAMP * self.peak_period),
-            spreading: self.spreading,
+    fn meeting(&self) -> Meeting {
+        Meeting::Random {
+            significant_height: self.significant_height,
+            seed: self.seed,
         }
     }
 }
 
 impl Packet {
-    fn asked(&self, gravity: f64) -> OpenSea {
-        OpenSea {
-            spectrum: self.spectrum,
-            meeting: Meeting::Focused {
-                height: self.height,
-                at: DVec2::from_array(self.at),
-                time: self.time,
-            },
-            peak_period: self.peak_period,
-            peak_enhancement: seas::peak_enhancement(self.spectrum, self.peak_enhancement),
-            shortest_period: (self.shortest_period).unwrap_or(seas::SHORTEST * self.peak_period),
-            depth: self.depth,
-            gravity,
-            ramp: self.ramp.unwrap_or(seas::RAMP * self.peak_period),
-            spreading: self.spreading,
+    fn meeting(&self) -> Meeting {
+        Meeting::Focused {
+            height: self.height,
+            at: DVec2::from_array(self.at),
+            time: self.time,
         }
     }
 }
@@ -429,6 +418,10 @@ impl Effect for Settings {
             period: Some(period),
             depth: Some(depth),
             ramp: 0.0,
+            meets: match &self.waves {
+                Waves::Focused(packet) => Some(packet.time),
+                Waves::Stokes(_) | Waves::Sea(_) => None,
+            },
         })
     }
 

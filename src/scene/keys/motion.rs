@@ -86,7 +86,7 @@ pub(super) const WALL_MOTION: &[Key] = &[
     )
     .about(
         "kind of motion; `solitary` is Goring 1978; `stokes` (second order, Schäffer 1996 and Madsen 1971) and `cnoidal` (shallow \
-         water, Goring 1978) make regular waves without free ones; `sea` and `focused` follow a spectrum by linear theory",
+         water, Goring 1978) make regular waves without free ones; `sea` and `focused` follow a spectrum, by linear theory or to second order",
     ),
     VELOCITY,
     UNTIL,
@@ -152,6 +152,11 @@ pub(super) const WALL_MOTION: &[Key] = &[
         .only("kind", &["focused"])
         .also(", late enough for its slowest waves to be there")
         .about("when they meet"),
+    Key::flag("second_order")
+        .default("false")
+        .only("kind", SEAS)
+        .also(", for waves that the second order holds for, the shortest at least a quarter of the depth long")
+        .about("whether the wall moves at sums and differences of frequencies too, so that it makes no free waves of them (Schäffer 1996)"),
     FILE,
     POINTS,
 ];

@@ -517,4 +517,7 @@ const BUDGET: &[Key] = &[
         .unit("of the total energy in a frame")
         .computed(budget::energy_words)
         .about("rise of kinetic and potential energy beyond the work of walls and solids"),
+    Key::number_or_false("particles", 1.0..=134_217_728.0)
+        .default("false")
+        .about("how many there may be, with what emitters bring; a bake that is known to have more is refused before it begins"),
 ];

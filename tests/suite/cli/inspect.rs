@@ -64,6 +64,11 @@ fn inspect_says_what_each_part_takes() {
         job.expect(2, "inspect small.toml --time 0")
             .contains("--time")
     );
+    // Of 8 frames; the last that is possible was not refused above.
+    let said = job.expect(2, "inspect small.toml --time 8");
+    let expected = "--time 8: small.toml has 8 frames, and the first is not timed: up to 7 are possible; raise shot.frames";
+    assert!(said.contains(expected), "{said}");
+    shown("inspect small.toml --time 7");
 }
 
 /// Names in the first column of the table that begins with `heading`.

@@ -144,8 +144,8 @@ fn at<'a>(root: &'a mut Value, path: &[Step]) -> &'a mut Value {
 /// Other values that a key might take.
 fn others(value: &Value) -> Vec<Value> {
     match value {
-        // Some limits are `false` or a number.
-        Value::Boolean(is) => vec![Value::Boolean(!is), Value::Float(0.5)],
+        // Some limits are `false` or a number, some of particles.
+        Value::Boolean(is) => vec![Value::Boolean(!is), Value::Float(0.5), Value::Float(1e6)],
         Value::Integer(n) => [n + 1, n - 1, 2 * n].map(Value::Integer).into(),
         Value::Float(x) => [
             x * 1.03125,

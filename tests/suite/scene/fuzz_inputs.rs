@@ -1,6 +1,7 @@
 //! Bad input: each fault of a scene has its message, and no bytes make a reader panic.
 
 mod numbers;
+mod whitewater;
 
 use std::path::Path;
 

@@ -1,4 +1,6 @@
 //! Lints where a user meets them: said by inspect and by a bake, kept with the cache, and the end of either where they are denied.
+use swell::cache::CacheReader;
+
 use crate::support::job::{Job, assert_has};
 
 #[test]
@@ -24,4 +26,33 @@ fn lints_are_warnings_unless_they_are_denied() {
     assert_has(&job.expect(0, "inspect told"), &["warning: ", lint]);
     // Nothing to deny.
     job.expect(0, "inspect small.toml --deny lint");
+}
+
+/// A probe looks no more often than the solver steps, which is known once it has.
+#[test]
+fn a_probe_that_looks_less_often_than_it_should_is_told_of() {
+    let job = Job::new();
+    let bake = |rate: &str, to: &str| {
+        let probe = format!("probe=[{{kind=\"volume\",rate_hz={rate}}}]");
+        let words = format!("bake small.toml --device cpu --frames 1-2 --set {probe} -o {to}");
+        let said = job.expect(0, &words);
+        let reader = CacheReader::open(&job.path(to)).unwrap();
+        let steps = reader.entries()[1..].iter();
+        (
+            said,
+            steps
+                .map(|entry| entry.report["substeps"].as_u64().unwrap())
+                .sum::<u64>(),
+        )
+    };
+    // 33 times in two frames of a sixtieth of a second.
+    let (said, substeps) = bake("1000", "often");
+    assert!(substeps < 33);
+    let expected = format!(
+        "warning: probe volume-1 looked {substeps} times of the 33 that its rate_hz asks for"
+    );
+    assert_has(&said, &[&expected]);
+    // Negative control: as often as a step at least.
+    let (said, _) = bake("60", "each");
+    assert!(!said.contains("rate_hz"), "{said}");
 }

@@ -2,13 +2,14 @@
 
 use glam::DVec3;
 use swell::{
-    domain::{air, boundary::Boundary, particles::Particles, solver::Solver},
-    gpu::adapter::Context,
-    reference,
+    domain::{air, boundary::Boundary, particles::Particles},
     scene::{Method, Scene, effects::drag::Settings},
 };
 
-use crate::support::{self, context, flip as of_flip};
+use crate::support::{
+    self, context, flip as of_flip,
+    solvers::{on_cpu, on_gpu},
+};
 
 const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
 
@@ -24,26 +25,6 @@ fn scene(method: Method, cells: [f64; 3]) -> Scene {
     scene.periodic = [true, false, false];
     scene.shot.frames_per_second = FRAMES_PER_SECOND;
     scene
-}
-
-fn on_gpu(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> Particles {
-    match scene.solver.method {
-        Method::Flip => of_flip::run(context, scene, particles, frames).0,
-        Method::Pbf => support::run(context, scene, particles, frames).0,
-    }
-}
-
-fn on_cpu(scene: &Scene, particles: &Particles, frames: u32) -> Particles {
-    let none = Boundary::default();
-    let advance = |solver: &mut dyn Solver<Error = reference::ReferenceError>| {
-        solver.load(0, particles).unwrap();
-        let states = (0..frames).map(|_| solver.advance().unwrap().0);
-        states.last().unwrap()
-    };
-    match scene.solver.method {
-        Method::Flip => advance(&mut reference::flip::Flip::new(scene, &none)),
-        Method::Pbf => advance(&mut reference::pbf::Pbf::new(scene, &none)),
-    }
 }
 
 fn drag(drop_radius: f64, wind: [f64; 3]) -> Option<Settings> {

@@ -2,9 +2,7 @@
 
 use glam::DVec3;
 use swell::{
-    domain::{boundary::Boundary, particles::Particles, solver::Solver},
-    gpu::adapter::Context,
-    reference,
+    domain::{boundary::Boundary, particles::Particles},
     scene::{
         Effects, Method, Scene, Wall,
         effects::{absorbing_zone::Settings, generation_zone},
@@ -12,7 +10,10 @@ use swell::{
     solve::plan::Plan,
 };
 
-use crate::support::{self, context, flip as of_flip, plan};
+use crate::support::{
+    context, flip as of_flip, plan,
+    solvers::{on_cpu, on_gpu},
+};
 
 const METHODS: [Method; 2] = [Method::Flip, Method::Pbf];
 
@@ -59,26 +60,6 @@ fn half_full(method: Method) -> (Scene, Particles) {
     scene.solver.method = method;
     scene.shot.frames_per_second = 50.0;
     (scene, of_flip::block([0; 3], [16, 4, 8]))
-}
-
-fn on_gpu(context: &Context, scene: &Scene, particles: &Particles, frames: u32) -> Particles {
-    match scene.solver.method {
-        Method::Flip => of_flip::run(context, scene, particles, frames).0,
-        Method::Pbf => support::run(context, scene, particles, frames).0,
-    }
-}
-
-fn on_cpu(scene: &Scene, particles: &Particles, frames: u32) -> Particles {
-    let none = Boundary::default();
-    let advance = |solver: &mut dyn Solver<Error = reference::ReferenceError>| {
-        solver.load(0, particles).unwrap();
-        let states = (0..frames).map(|_| solver.advance().unwrap().0);
-        states.last().unwrap()
-    };
-    match scene.solver.method {
-        Method::Flip => advance(&mut reference::flip::Flip::new(scene, &none)),
-        Method::Pbf => advance(&mut reference::pbf::Pbf::new(scene, &none)),
-    }
 }
 
 /// Mean of a velocity's component over each layer of cells.

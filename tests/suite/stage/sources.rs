@@ -168,3 +168,82 @@ fn the_step_after_an_exchange_is_the_references() {
         job.expect(0, "render whole --look look.toml --frames 1-8 -o pictures");
     }
 }
+
+/// Particles of each frame of a cache.
+fn counts(job: &Job, cache: &str) -> Vec<usize> {
+    let reader = CacheReader::open(&job.path(cache)).unwrap();
+    let frames = reader.first_frame()..=reader.last_frame();
+    frames
+        .map(|frame| reader.read(frame).unwrap().len())
+        .collect()
+}
+
+/// Where drains take water too it is not known before how much there will be: the bake ends after the frame that has more, and is gone on
+/// with where the budget is raised.
+#[test]
+fn a_bake_with_more_particles_than_its_budget_ends_there() {
+    let job = job();
+    let bake = "bake small.toml --solver flip --device cpu";
+    job.expect(0, &format!("{bake} -o whole"));
+    let counts = counts(&job, "whole");
+    let most = *counts.iter().max().unwrap();
+    let frame = counts.iter().position(|count| *count == most).unwrap();
+    assert!(frame > 1, "{counts:?}");
+    let limited =
+        |limit: usize| format!("{bake} -o limited --resume --set budget.particles={limit}");
+    let said = job.expect(5, &limited(most - 1));
+    let expected = format!(
+        "frame {frame}: the count of particles with what entered is {most}, and budget.particles is {}; emitters brought them; the last \
+         good frame is kept",
+        most - 1
+    );
+    assert!(said.contains(&expected), "{said}");
+    let reader = CacheReader::open(&job.path("limited")).unwrap();
+    assert_eq!(reader.last_frame() as usize, frame - 1);
+    let said = job.expect(5, "check limited/failed");
+    assert!(said.contains("budget.particles"), "{said}");
+    // Negative control: one more.
+    job.expect(0, &limited(most));
+    assert!(!job.path("limited/failed").exists());
+    let [whole, limited] =
+        ["whole", "limited"].map(|cache| CacheReader::open(&job.path(cache)).unwrap());
+    for frame in 0..=FRAMES {
+        assert_eq!(whole.read(frame).unwrap(), limited.read(frame).unwrap());
+    }
+}
+
+/// Without drains what emitters bring at least is known, and nothing is written.
+#[test]
+fn a_bake_that_is_known_to_have_more_particles_is_refused_before_it_begins() {
+    let job = job();
+    let begin = SOURCES.find("[[drain]]").unwrap();
+    job.edit("small.toml", &SOURCES[begin..], "");
+    // What a level keeps is not known, and only more.
+    let level = SOURCES.find("[[emitter]]\nmesh").unwrap();
+    job.edit("small.toml", &SOURCES[level..begin], "");
+    let bake = "bake small.toml --solver flip --device cpu";
+    job.expect(0, &format!("{bake} -o whole"));
+    let counts = counts(&job, "whole");
+    let [first, .., last] = counts[..] else {
+        panic!("{counts:?}")
+    };
+    let frame = counts.iter().position(|count| *count == last).unwrap();
+    assert!(last > first && frame > 0, "{counts:?}");
+    let limited = |limit: usize| format!("{bake} -o limited --set budget.particles={limit}");
+    let said = job.expect(2, &limited(first - 1));
+    let expected = format!(
+        "budget.particles is {}: the start has {first} particles",
+        first - 1
+    );
+    assert!(said.contains(&expected), "{said}");
+    let said = job.expect(2, &limited(last - 1));
+    let expected = format!("there are {last} particles or more after frame {frame}");
+    assert!(said.contains(&expected), "{said}");
+    assert!(!job.path("limited").exists());
+    // Negative control: one more, and a shorter bake.
+    job.expect(
+        0,
+        &format!("{} --frames 1-{}", limited(last - 1), frame - 1),
+    );
+    job.expect(0, &limited(last).replace("limited", "other"));
+}

@@ -7,6 +7,7 @@ pub mod made_cache;
 pub mod mutate;
 pub mod paper;
 pub mod pressure;
+pub mod solvers;
 #[cfg(target_os = "linux")]
 pub mod tmpfs;
 pub mod whitewater;

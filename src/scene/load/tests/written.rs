@@ -112,7 +112,7 @@ method = "flip"
 cell_size = 0.25
 [[wave_maker]]
 wall = "-x"
-motion = { kind = "sea", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0, seed = 3 }
+motion = { kind = "sea", significant_height = 0.1, peak_period = 3.0, shortest_period = 2.0, depth = 1.0, seed = 3, second_order = true }
 [[wave_maker]]
 wall = "-y"
 motion = { kind = "focused", height = 0.1, at = 1.0, time = 9.0, spectrum = "tma", peak_period = 3.0, shortest_period = 2.0, depth = 1.0 }

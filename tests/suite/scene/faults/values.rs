@@ -453,6 +453,29 @@ pub const VALUE_FAULTS: &[Fault] = &[
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"sea\", significant_height = 0.1, peak_period = 6.0, depth = 1.0, second_order = true",
+        24,
+        &[
+            "motion.second_order: H L² / h³ is 34.",
+            "with significant_height and the peak's 6 s on 1 m of water, and the second order holds below 26.3 (Madsen 1971); allowed: ",
+        ],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"focused\", height = 0.1, at = 3.0, time = 60.0, peak_period = 2.0, shortest_period = 0.35, depth = 1.0, second_order = true",
+        24,
+        &[
+            "motion.second_order: waves of 0.35 s on 1 m of water have kh = 32.9, and it is known up to 25",
+        ],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"stokes\", height = 0.1, period = 3.0, depth = 1.0, second_order = true",
+        24,
+        &["motion.second_order: "],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
         "kind = \"focused\", height = 0.1, at = 30.0, time = 60.0, peak_period = 3.0, depth = 1.0",
         24,
         &["motion.at: 30 m from a face that is 25 m from the other"],

@@ -44,6 +44,7 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("budget.divergence", "{}", true),
     ("budget.volume", "{}", true),
     ("budget.energy", "{}", true),
+    ("budget.particles", "{}", true),
     ("effects.viscosity.xsph", "{}", true),
     ("effects.vorticity_confinement.strength", "{}", true),
     ("wave_maker[3].motion.significant_height", "{}", false),
@@ -141,12 +142,12 @@ fn range_of(message: &str) -> Option<[f64; 2]> {
 /// range is the one that holds.
 #[test]
 fn every_number_has_a_range_and_says_it() {
-    each_number_has_a_range(&numbered(), NUMBERS);
+    each_number_of_a_scene_has_a_range(&numbered(), NUMBERS);
     let room = "min = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nlevel = 2.5\n";
     let levels = format!("[[emitter]]\n{room}[[drain]]\n{room}[solver]\n");
-    each_number_has_a_range(&SCENE.replace("[solver]\n", &levels), OF_LEVELS);
+    each_number_of_a_scene_has_a_range(&SCENE.replace("[solver]\n", &levels), OF_LEVELS);
     let viscous = SCENE.replace("xsph = 0.01", "coefficient = 1.0, tolerance = 0.1");
-    each_number_has_a_range(&viscous, OF_VISCOSITY);
+    each_number_of_a_scene_has_a_range(&viscous, OF_VISCOSITY);
     let zone = |waves: &str| {
         let zone = format!(
             "[effects]\ngeneration_zone = {{ walls = [\"-z\"], length = 3.0, waves = {{ {waves}, direction_degrees = 90.0 }} }}\n"
@@ -154,27 +155,35 @@ fn every_number_has_a_range_and_says_it() {
         SCENE.replace("[effects]\n", &zone)
     };
     let sea = zone("kind = \"sea\", significant_height = 0.1, peak_period = 3.0, depth = 1.0");
-    each_number_has_a_range(&sea, OF_SEA);
+    each_number_of_a_scene_has_a_range(&sea, OF_SEA);
     let stokes = zone("kind = \"stokes\", height = 0.1, period = 3.0, depth = 1.0");
-    each_number_has_a_range(&stokes, OF_STOKES);
+    each_number_of_a_scene_has_a_range(&stokes, OF_STOKES);
     let packet = zone(
         "kind = \"focused\", height = 0.1, at = [2.0, 8.0], time = 40.0, peak_period = 3.0, depth = 1.0",
     );
-    each_number_has_a_range(&packet, OF_PACKET);
+    each_number_of_a_scene_has_a_range(&packet, OF_PACKET);
 }
 
-fn each_number_has_a_range(text: &str, numbers: &[(&str, &str, bool)]) {
+fn each_number_of_a_scene_has_a_range(text: &str, numbers: &[(&str, &str, bool)]) {
     let dir = assets();
     let load = |set: &str| {
         let set = [set.to_owned(), Method::Flip.as_override()];
-        Scene::parse(text, Path::new("s.toml"), dir.path(), &set)
+        Scene::parse(text, Path::new("s.toml"), dir.path(), &set).map(|_| ())
     };
     load("shot.frames=240").expect("the scene is good");
+    each_number_has_a_range(load, numbers);
+}
+
+/// `load` reads what is good with one key set to something else.
+pub(super) fn each_number_has_a_range(
+    load: impl Fn(&str) -> Result<(), SceneError>,
+    numbers: &[(&str, &str, bool)],
+) {
     for (key, value, is_free) in numbers {
         let set = |number: &str| format!("{key}={}", value.replace("{}", number));
         let refused = |number: &str| {
             let set = set(number);
-            let said = load(&set).map(|_| ()).expect_err(&set).to_string();
+            let said = load(&set).expect_err(&set).to_string();
             let words = said.rsplit_once(&format!(": {key}: "));
             let (_, words) = words.unwrap_or_else(|| panic!("{set}: {said}"));
             assert!(words.contains("; allowed: "), "{set}: {said}");

@@ -1,0 +1,23 @@
+// A pass over the particles in a zone. What imports it says by `lead` what is done to one at a place. Drops, which a projection on a
+// grid tells from water, fall as they do elsewhere.
+#import "shared/thread.wgsl"
+#import "shared/phase.wgsl"
+#import "shared/pbf_params.wgsl"
+#import "shared/zone.wgsl"
+
+@group(0) @binding(10) var<storage, read> position: array<vec4f>;
+@group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= phase.count {
+        return;
+    }
+    let i = phase_particle(thread);
+    lead(i, position[i].xyz, velocity[i].w > 0.0);
+}
