@@ -36,8 +36,7 @@ pub fn physics_difference(old_toml: &str, new_toml: &str) -> Result<Option<Strin
     }
     let keys: std::collections::BTreeSet<_> = old.keys().chain(new.keys()).collect();
     let show = |key: &str, value: Option<&String>| {
-        let as_before = YOUNGER.iter().find(|(younger, _)| *younger == key);
-        let absent = as_before.map_or("absent", |(_, value)| value);
+        let absent = as_before(key).unwrap_or("absent");
         value.map_or(absent.to_owned(), Clone::clone)
     };
     let method = METHOD.to_owned();
@@ -77,7 +76,21 @@ fn read(text: &str) -> Result<Table, SceneError> {
 }
 
 /// Keys that caches may be older than, each with the value by which nothing differs from before there was one.
-const YOUNGER: [(&str, &str); 1] = [("solver.pbf.grid_projection", "false")];
+const YOUNGER: [(&str, &str); 2] = [
+    ("solver.pbf.grid_projection", "false"),
+    ("wave_maker.motion.second_order", "false"),
+];
+
+/// What a key of a scene is in [`YOUNGER`]: there without the places in arrays.
+fn as_before(key: &str) -> Option<&'static str> {
+    let parts = key
+        .split('.')
+        .map(|part| part.split('[').next().unwrap_or(part));
+    let plain: Vec<&str> = parts.collect();
+    let plain = plain.join(".");
+    let found = YOUNGER.iter().find(|(younger, _)| *younger == plain);
+    found.map(|(_, value)| *value)
+}
 
 /// What a scene of a cache has to be given that is older than some keys, as overrides.
 pub(super) fn younger(text: &str) -> Result<Vec<String>, SceneError> {
@@ -112,7 +125,7 @@ fn flatten(table: &Table) -> BTreeMap<String, String> {
         let along = key::along(keys::SCENE, path);
         along.iter().all(|key| key.physics != Physics::No)
     };
-    let is_as_before = |key: &str, value: &str| YOUNGER.contains(&(key, value));
+    let is_as_before = |key: &str, value: &str| as_before(key) == Some(value);
     values.retain(|key, value| is_physics(key) && !is_idle(key) && !is_as_before(key, value));
     values
 }

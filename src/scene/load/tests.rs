@@ -295,6 +295,21 @@ fn the_scene_of_a_cache_that_is_older_than_a_key_is_read_as_it_was_baked() {
     );
     let today = Scene::parse(&older, file, dir.path(), &[]).expect("valid");
     assert!(today.solver.pbf().grid_projection);
+    // A key in a table of an array.
+    let sea = "{kind=\"sea\",significant_height=0.1,peak_period=3.0,shortest_period=2.0,depth=1.0}";
+    let sea = format!("wave_maker=[{{wall=\"-x\",motion={sea}}}]");
+    let scene = parse(dir.path(), FULL, &[&sea]).expect("valid");
+    let written = scene.to_toml(&|_, _| "cube.obj".to_owned());
+    let older = written.replace(", second_order = false", "");
+    assert_ne!(older, written);
+    assert_eq!(physics_difference(&older, &written).expect("TOML"), None);
+    let corrected = written.replace("second_order = false", "second_order = true");
+    assert_eq!(
+        physics_difference(&older, &corrected)
+            .expect("TOML")
+            .as_deref(),
+        Some("wave_maker[0].motion.second_order was false, is now true")
+    );
 }
 
 #[test]
