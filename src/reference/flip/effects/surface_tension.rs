@@ -42,7 +42,8 @@ pub fn mirrored(model: &Model, bricks: &Bricks, kind: &[u32], element: u32) -> [
         let is_inside =
             model.scene.periodic[axis] || (0..i64::from(model.cells[axis])).contains(&there);
         // Beyond the upper faces along other axes nothing is open either.
-        let is_beyond = (0..3).any(|k| !model.scene.periodic[k] && cell[k] >= model.cells[k]);
+        let is_behind = |k: usize| !model.scene.periodic[k] && cell[k] >= model.cells[k];
+        let is_beyond = (0..3).any(|k| k != axis && is_behind(k));
         !is_inside || is_beyond || is_solid(bricks.near(element, along(axis, step)))
     };
     let closed = [0, 1, 2].map(|axis| [is_closed(axis, -1), is_closed(axis, 1)]);
