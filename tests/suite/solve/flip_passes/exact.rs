@@ -218,7 +218,7 @@ fn what_the_grid_does_not_see_decays_by_the_blend_alone() {
         move |scene: &mut Scene| {
             flip(scene).pic_blend = blend;
             flip(scene).cfl = cfl;
-            scene.effects.viscosity = xsph.map(|xsph| effects::viscosity::Settings::xsph(xsph));
+            scene.effects.viscosity = xsph.map(effects::viscosity::Settings::xsph);
         }
     };
     for (alpha, cfl, xsph, is_split) in [
