@@ -22,7 +22,7 @@ const NODES: usize = 96;
 const POINTS: usize = 6;
 
 /// kh of the shortest waves that it is solved for: four of them are as long as the water is deep. In deeper water the
-/// differences need more nodes than [`NODES`].
+/// differences need more nodes than `NODES`.
 pub const DEEPEST: f64 = 25.0;
 
 /// Which product of two waves.
