@@ -47,7 +47,12 @@ fn main(
         let face = axis * params.stride + element;
         viscous_to[face] = viscous_from[face];
     }
-    for (var once = 0; once < select(0, 1, ((word >> MOVED) & 7u) != 0u); once++) {
+    let moves_any = ((word >> MOVED) & 7u) != 0u;
+    // What an earlier substep left where none moves now.
+    for (var axis = 0u; axis < select(3u, 0u, moves_any); axis++) {
+        viscous_change[axis * params.stride + element] = 0.0;
+    }
+    for (var once = 0; once < select(0, 1, moves_any); once++) {
         open_neighborhood(element);
         for (var axis = 0u; axis < 3u; axis++) {
             let face = axis * params.stride + element;

@@ -331,8 +331,8 @@ fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
     if projection.missed > 0 {
         warnings.push((
             format!(
-                "warning: frame {frame}: {} pressure solves missed their tolerance; residual up to {:.1e}, divergence up \
-                 to {:.1e} /s",
+                "warning: frame {frame}: {} solves missed their tolerance; of pressure the residual is up to {:.1e}, the divergence \
+                 up to {:.1e} /s, and where these are small it was an effect's solve that needed more iterations than it may take",
                 projection.missed, projection.residual, projection.divergence_after
             ),
             json!({

@@ -98,11 +98,13 @@ pub(super) fn check_periods(
     if gravity == 0.0 {
         return refuse("kind", "waves need gravity".to_owned());
     }
-    if !SHORTEST_RANGE.contains(&(shortest / peak)) {
+    // 0.3 s of 3 s are a tenth, but for rounding.
+    let ratio = (shortest / peak * 1e12).round() / 1e12;
+    if !SHORTEST_RANGE.contains(&ratio) {
         let problem = format!(
             "{} s is {} of the peak's {} s",
             shown(shortest),
-            shown(shortest / peak),
+            shown(ratio),
             shown(peak)
         );
         return refuse("shortest_period", problem);

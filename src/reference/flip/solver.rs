@@ -69,6 +69,8 @@ pub struct Trace {
     pub projected: Projected,
     /// The one before, where an effect acts between two.
     pub earlier: Option<Projected>,
+    /// Whether that effect needed more iterations than it may take.
+    pub is_short: bool,
     /// Pa, by element; 0 where there is no water.
     pub pressure: Vec<f64>,
     /// Displacements of the density correction at the lower faces, metres, where there is one.
@@ -85,6 +87,13 @@ impl Trace {
     /// Every solve, in order.
     pub fn projections(&self) -> impl Iterator<Item = &Projected> {
         self.earlier.iter().chain([&self.projected])
+    }
+
+    /// Adds what they did to what a frame's did.
+    fn add_to(&self, all: &mut Projection) {
+        self.projections()
+            .for_each(|projected| projected.add_to(all));
+        all.missed += u32::from(self.is_short);
     }
 }
 
@@ -218,7 +227,7 @@ impl Flip {
         let project = |centers, faces: &mut Faces, timings: &mut Timings| {
             project(model, timings, *factor_budget, &waters, centers, faces)
         };
-        let mut earlier = None;
+        let (mut earlier, mut is_short) = (None, false);
         if acts_between {
             earlier = Some(project(None, &mut faces, timings)?.0);
             let water = Water {
@@ -230,7 +239,7 @@ impl Flip {
                 old: &faces.change,
             };
             let named = &model.scene.effects;
-            effects::between_projections(named, water, &mut faces.velocity, timings);
+            is_short = effects::between_projections(named, water, &mut faces.velocity, timings);
         }
         let (projected, displacement) = project(Some(&centers), &mut faces, timings)?;
         timings.time("flip/extrapolate", || {
@@ -272,6 +281,7 @@ impl Flip {
         Ok(Trace {
             pressure: pressure.into_iter().map(|q| scale * q).collect(),
             earlier,
+            is_short,
             after: Cloud {
                 position: moved.position,
                 velocity: moved.velocity,
@@ -339,9 +349,7 @@ impl Flip {
             return Err(breach.in_substep(number).into());
         }
         let mut trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
-        trace
-            .projections()
-            .for_each(|projected| projected.add_to(all));
+        trace.add_to(all);
         let work = self.model.boundary_work(&trace, substep.length);
         let order = by_id(&trace.sorted.cloud);
         let step = self.model.step(substep);
@@ -390,8 +398,8 @@ impl Flip {
             report.boundary_work += self.model.boundary_work(&trace, substep.length);
             for projected in trace.projections() {
                 report.iterations += u64::from(projected.solution.iterations);
-                projected.add_to(&mut all);
             }
+            trace.add_to(&mut all);
             report.capped += trace.capped;
             let span = Span {
                 start: start + elapsed,

@@ -76,8 +76,15 @@ trait Acts {
     /// To the velocities at the faces, m/s, before the projection.
     fn on_faces(&self, _: Water<'_>, _velocity: &mut Vec<DVec3>, _: &mut Timings) {}
 
-    /// To the velocities at the faces, m/s, between two projections.
-    fn between_projections(&self, _: Water<'_>, _velocity: &mut Vec<DVec3>, _: &mut Timings) {}
+    /// To the velocities at the faces, m/s, between two projections; whether it needed more iterations than it may take.
+    fn between_projections(
+        &self,
+        _: Water<'_>,
+        _velocity: &mut Vec<DVec3>,
+        _: &mut Timings,
+    ) -> bool {
+        false
+    }
 }
 
 macro_rules! twins {
@@ -98,18 +105,21 @@ macro_rules! twins {
             )+
         }
 
-        /// Runs the effects that a scene names between two projections on the velocities at the faces, m/s.
+        /// Runs the effects that a scene names between two projections on the velocities at the faces, m/s; whether one needed more
+        /// iterations than it may take.
         pub(super) fn between_projections(
             named: &Effects,
             water: Water<'_>,
             velocity: &mut Vec<DVec3>,
             timings: &mut Timings,
-        ) {
+        ) -> bool {
+            let mut is_short = false;
             $(
                 if let Some(settings) = &named.$name {
-                    settings.between_projections(water, velocity, timings);
+                    is_short |= settings.between_projections(water, velocity, timings);
                 }
             )+
+            is_short
         }
 
         /// Runs the effects that a scene names on the velocities at the faces, m/s.

@@ -290,12 +290,12 @@ impl Acts for Settings {
         water: Water<'_>,
         velocity: &mut Vec<DVec3>,
         timings: &mut Timings,
-    ) {
+    ) -> bool {
         let model = water.model;
         let density = model.scene.water.rest_density;
         let Some(relaxation) = self.relaxation(water.step.length, model.cell_size(), density)
         else {
-            return;
+            return false;
         };
         let cells = timings.time("effects/viscosity_weigh", || viscosity_weigh(water));
         let start = velocity.clone();
@@ -308,5 +308,6 @@ impl Acts for Settings {
                 (*velocity, change) = viscosity_relax(grid, by, &start, last);
             }
         });
+        relaxation.is_short
     }
 }
