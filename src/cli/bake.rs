@@ -406,7 +406,7 @@ mod tests {
         assert!(told[0].0.contains("frame 5: a cell holds 2.4 times"));
         let missed = Projection { missed: 2, ..good };
         let warnings = warnings(7, &report(Some(missed)));
-        assert!(warnings[0].0.contains("frame 7: 2 pressure solves missed"));
+        assert!(warnings[0].0.contains("frame 7: 2 solves missed"));
         assert_eq!(warnings[0].1["missed"], 2);
         let dense = StepReport {
             density_error_mean: 0.4,

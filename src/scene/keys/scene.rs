@@ -88,12 +88,12 @@ const DOMAIN: &[Key] = &[
         .about("greatest corner"),
     Key::choice("walls", &no_slip::WALLS)
         .computed(|| "free_slip, but for those of no_slip".to_owned())
-        .also(", the last of the solver flip, or with effects.viscosity.coefficient")
+        .also(", the last of the solver flip, or where an effect resolves them")
         .about("how water meets all six walls: free-slip ones it slides along, no-slip ones slow what is within a cell"),
     Key::choices("no_slip", &WALLS)
         .absent()
         .without(&["walls"])
-        .also(", each once; of the solver flip, or with effects.viscosity.coefficient")
+        .also(", each once; of the solver flip, or where an effect resolves them")
         .about("the no-slip walls, where not all six are"),
     Key::choices("periodic", &AXES)
         .absent()
