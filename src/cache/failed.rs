@@ -15,7 +15,7 @@ use super::{
     manifest,
     record::FileRecord,
 };
-use crate::domain::particles::Particles;
+use crate::domain::{answer::Answers, particles::Particles};
 
 /// The folder.
 pub const FAILED: &str = "failed";
@@ -25,6 +25,8 @@ const START: &str = "start.ply";
 const FILES: &str = "files";
 /// Key of the report: BLAKE3 of all that it says beside this.
 const CHECKSUM: &str = "blake3";
+/// Key of the report: what walls that absorb do after the state; only where there are some.
+const WALLS: &str = "walls";
 
 /// A frame that could not be computed.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +67,9 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
         .ok_or_else(|| CacheError::Unfit("a report that is no object".to_owned()))?;
     let files = [FileRecord::new(manifest::SCENE, scene), start];
     fields.insert(FILES.to_owned(), json!(files));
+    if failed.start.walls != Answers::default() {
+        fields.insert(WALLS.to_owned(), json!(failed.start.walls));
+    }
     let checksum = checksum(fields);
     fields.insert(CHECKSUM.to_owned(), checksum.into());
     // Last: it is what makes the folder one to replay.
@@ -111,10 +116,18 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
     let last_frame = last_frame
         .and_then(|frame| u32::try_from(frame).ok())
         .ok_or_else(|| damaged("it names no last_frame"))?;
+    let walls = match fields.remove(WALLS) {
+        Some(walls) => Answers::deserialize(walls).map_err(|error| damaged(&error.to_string()))?,
+        None => Answers::default(),
+    };
+    let start = Particles {
+        walls,
+        ..frame::decode(&start.read(dir)?, &dir.join(START))?
+    };
     Ok(Failed {
         scene_toml: String::from_utf8(scene.read(dir)?)
             .map_err(|_| CacheError::damaged(dir.join(manifest::SCENE), "it is not UTF-8"))?,
-        start: frame::decode(&start.read(dir)?, &dir.join(START))?,
+        start,
         last_frame,
         report: Value::Object(fields),
     })

@@ -14,6 +14,7 @@ use super::manifest::{self, Manifest};
 use super::probes::{ProbeRecord, ProbeValues};
 use super::record::FileRecord;
 use super::stream::{self, STREAMS, Stream};
+use crate::domain::answer::Answers;
 
 /// File name of the ledger.
 pub(super) const FILE: &str = "frames.jsonl";
@@ -36,6 +37,13 @@ pub struct Clock {
     /// Of the particle that enters next; only where water enters or leaves.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub next_id: Option<u32>,
+    /// What walls that absorb do from then on; only where there are some.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub walls: Answers,
+}
+
+fn is_none(walls: &Answers) -> bool {
+    walls.iter().all(Option::is_none)
 }
 
 /// Files of a frame by the names of their streams.

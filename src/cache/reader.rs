@@ -396,7 +396,8 @@ pub(super) fn read_frame(
     let record = particles_record(dir, entry)?;
     let path = dir.join(&record.file);
     let bytes = record.read(dir)?;
-    let particles = frame::decode(&bytes, &path)?;
+    let mut particles = frame::decode(&bytes, &path)?;
+    particles.walls = entry.clock.walls;
     if particles.len() as u64 != entry.particles {
         return Err(CacheError::damaged(
             path,

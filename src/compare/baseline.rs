@@ -512,6 +512,7 @@ mod tests {
             velocity: vec![[0.0; 3]],
             id: vec![7],
             attributes: BTreeMap::from([("foam".to_owned(), vec![0.5])]),
+            ..Particles::default()
         };
         let hash = particles_hash(&particles);
         assert_eq!(hash, particles_hash(&particles.clone()));

@@ -398,6 +398,7 @@ mod tests {
             velocity: id.iter().map(|&i| [0.0, i as f32, 0.0]).collect(),
             attributes: BTreeMap::from([("c".to_owned(), id.iter().map(|&i| i as f32).collect())]),
             id,
+            ..Particles::default()
         }
     }
 

@@ -1,7 +1,9 @@
 //! What every stage speaks: particles, meshes, signed distance, sampling, wave-maker motion.
 
+pub mod absorption;
 pub mod aggregates;
 pub mod air;
+pub mod answer;
 pub mod boundary;
 pub mod bounds;
 pub mod bricks;

@@ -20,7 +20,7 @@ mod table;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 pub use cnoidal::{Cnoidal, LEAST_CNOIDAL_LENGTH, NoCnoidal};
-pub use linear_theory::{piston_height_ratio, wave_number};
+pub use linear_theory::{piston_elevation, piston_height_ratio, wave_number};
 pub use pairs::DEEPEST;
 use regular::Cycle as _;
 pub use regular::RegularWaves;
@@ -33,6 +33,8 @@ use table::Segment;
 /// Displacement of a wave-maker over time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
+    /// None: a wall that only takes in what comes to it.
+    Still,
     /// Moves from the first moment, stops dead.
     ConstantVelocity {
         /// m/s, not negative.
@@ -89,6 +91,7 @@ impl Motion {
             return (0.0, 0.0);
         }
         match *self {
+            Self::Still => (0.0, 0.0),
             Self::ConstantVelocity { velocity, until } => match until {
                 Some(end) if t >= end => (velocity * end, 0.0),
                 _ => (velocity * t, velocity),
@@ -126,6 +129,7 @@ impl Motion {
         }
         let t0 = t0.max(0.0);
         match *self {
+            Self::Still => 0.0,
             Self::ConstantVelocity { velocity, until } => match until {
                 Some(end) if t0 >= end => 0.0,
                 _ => velocity.abs(),
@@ -175,7 +179,9 @@ impl Motion {
     pub fn peak_displacement(&self, t: f64) -> f64 {
         match *self {
             // These never turn back.
-            Self::ConstantVelocity { .. } | Self::Solitary { .. } => self.displacement(t),
+            Self::Still | Self::ConstantVelocity { .. } | Self::Solitary { .. } => {
+                self.displacement(t)
+            }
             Self::Sine {
                 stroke,
                 period,

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3};
 
+use super::answer::Answers;
+
 /// Particles in the order of their ids.
 ///
 /// The state between two frames is this and nothing else, so every frame is a checkpoint.
@@ -17,6 +19,8 @@ pub struct Particles {
     pub id: Vec<u32>,
     /// Further attributes that an effect declares, one value a particle, by name.
     pub attributes: BTreeMap<String, Vec<f32>>,
+    /// What walls that absorb do from then on; a cache has it in its ledger.
+    pub walls: Answers,
 }
 
 impl Particles {

@@ -67,7 +67,7 @@ pub fn fill_water<'a>(
         position: positions.iter().map(|p| p.as_vec3().to_array()).collect(),
         velocity: vec![[0.0; 3]; positions.len()],
         id: (0..positions.len() as u32).collect(),
-        attributes: Default::default(),
+        ..Particles::default()
     };
     Ok(Fill { particles, removed })
 }

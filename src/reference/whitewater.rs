@@ -103,7 +103,7 @@ impl Water {
             starts: model.cells.starts(&points),
             sample_starts: model.cells.starts(&model.samples),
             velocity: order.iter().map(|&k| wide(&water.velocity[k])).collect(),
-            walls: scene.walls(time),
+            walls: scene.walls_after(water, time),
             movers: movers.collect(),
             model,
             points,

@@ -19,6 +19,7 @@ use super::{
     words::{chain, extent, shown, shown_all},
 };
 use crate::domain::{
+    answer::Answers,
     bounds::Bounds,
     mesh::TriangleMesh,
     mesh_file::{self, MeshFormat},
@@ -137,6 +138,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         probes,
         budget,
         effects: spec.effects,
+        answers: Answers::default(),
     };
     Ok(scene.into_local())
 }

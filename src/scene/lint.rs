@@ -137,6 +137,8 @@ impl Scene {
         let mut walls = zones.iter().flat_map(|(_, absorbs)| absorbs.zone.walls);
         let is_absorbed = walls.any(|other| other.axis == wall.axis);
         let makers = self.wave_makers.iter();
+        let takes = |maker: &WaveMaker| maker.wall == wall && maker.absorption.is_some();
+        let is_absorbed = is_absorbed || self.wave_makers.iter().any(takes);
         let mut moving = makers.filter(|other| other.wall.axis == wall.axis && other.wall != wall);
         let Some(period) = waves.period else {
             return;
@@ -323,7 +325,7 @@ fn made_by(index: usize, maker: &WaveMaker, scene: &Scene, level: Option<f64>) -
                 ..of(height, crest, asked.peak_period, asked.depth, asked.ramp)
             }
         }
-        Motion::ConstantVelocity { .. } | Motion::Table { .. } => return None,
+        Motion::Still | Motion::ConstantVelocity { .. } | Motion::Table { .. } => return None,
     })
 }
 

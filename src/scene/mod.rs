@@ -18,6 +18,7 @@ pub mod step;
 pub mod study;
 pub mod tolerance;
 
+mod absorption;
 mod build;
 mod difference;
 mod document;
@@ -45,6 +46,8 @@ use std::path::PathBuf;
 use glam::{DAffine3, DQuat, DVec3};
 
 use crate::domain::{
+    absorption::Absorption,
+    answer::Answers,
     bounds::Bounds,
     holes::Holes,
     keep::Keep,
@@ -55,6 +58,7 @@ use crate::domain::{
 
 use key::read_by_name;
 
+pub use absorption::Held;
 pub use budget::Budget;
 pub use difference::{physics_difference, physics_hash};
 pub use effects::Effects;
@@ -100,6 +104,8 @@ pub struct Scene {
     pub budget: Budget,
     /// Effects that the scene names; what is `None` does not exist.
     pub effects: Effects,
+    /// What walls that absorb do now, by the state that a solver has taken over; none at the start.
+    pub answers: Answers,
 }
 
 impl Scene {
@@ -306,8 +312,10 @@ impl Wall {
 pub struct WaveMaker {
     /// Which wall.
     pub wall: Wall,
-    /// Displacement from the domain's face, positive inward, metres.
+    /// Displacement from where it is at the start, positive inward, metres.
     pub motion: Motion,
+    /// How it takes in waves that come to it, where it does.
+    pub absorption: Option<Absorption>,
 }
 
 /// Solvers' settings. The chosen one's are always there; those of the other may be.

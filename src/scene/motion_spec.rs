@@ -11,6 +11,7 @@ read_by_name!(Spectrum);
 #[derive(Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum MotionSpec {
+    Still,
     ConstantVelocity {
         velocity: f64,
         until: Option<f64>,

@@ -105,6 +105,15 @@ impl From<ScaleSpec> for DVec3 {
 pub(super) struct WaveMakerSpec {
     pub(super) wall: Wall,
     pub(super) motion: MotionSpec,
+    pub(super) absorption: Option<AbsorptionSpec>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AbsorptionSpec {
+    pub(super) depth: f64,
+    pub(super) period: f64,
+    pub(super) room: f64,
 }
 
 #[derive(Deserialize)]

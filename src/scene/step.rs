@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::Scene;
 use crate::domain::{
+    answer::Answers,
     bounds::{Bounds, FAR},
     budget::{Breach, Watched},
     particles::Particles,
@@ -39,12 +40,21 @@ impl Scene {
     /// The box's faces at `time`, wave makers included, relative to the domain's least corner, metres; [`FAR`] off where
     /// the domain joins its own end.
     pub fn walls(&self, time: f64) -> Bounds {
+        self.walls_by(&self.answers, time)
+    }
+
+    /// The same after a state that no solver has taken over.
+    pub fn walls_after(&self, state: &Particles, time: f64) -> Bounds {
+        self.walls_by(&self.answers_in(state), time)
+    }
+
+    fn walls_by(&self, answers: &Answers, time: f64) -> Bounds {
         let (mut min, mut max) = (DVec3::ZERO, self.domain.size());
         for axis in (0..3).filter(|&axis| self.periodic[axis]) {
             (min[axis], max[axis]) = (-FAR, FAR);
         }
-        for maker in &self.wave_makers {
-            let inward = maker.motion.displacement(time);
+        for (maker, answer) in self.wave_makers.iter().zip(answers) {
+            let inward = maker.displacement(answer.as_ref(), time);
             if maker.wall.is_max {
                 max[maker.wall.axis] -= inward;
             } else {
@@ -88,9 +98,8 @@ impl Scene {
         let length = self.shot.frame_seconds();
         let start = f64::from(frame) * length;
         let wall = self
-            .wave_makers
-            .iter()
-            .map(|w| w.motion.peak_speed(start, start + length));
+            .makers()
+            .map(|(maker, answer)| maker.peak_speed(answer, start, start + length));
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
         let speed = wall.fold(speed + gained, f64::max);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))

@@ -5,7 +5,7 @@ use std::{f64::consts::PI, fs::File, io::Read as _, path::Path};
 use glam::DVec3;
 
 use super::{
-    Shot, WaveMaker,
+    Shot, WaveMaker, absorption,
     document::Document,
     error::SceneError,
     motion_spec::{MotionSpec, check_speed},
@@ -55,9 +55,16 @@ pub(super) fn build_all(
             seas::check(doc, &place, sea, (size, around.spacing))?;
         }
         regular_waves::check_length(doc, &place, &motion, around.spacing)?;
+        let table = format!("{path}.absorption");
+        let in_time = (around.gravity, around.shot.frame_seconds());
+        let absorbs =
+            |table_of| absorption::build(doc, &table, (table_of, spec.wall.axis), in_time);
+        let absorption = spec.absorption.as_ref().map(absorbs).transpose()?;
+        absorption::check_still(doc, &place, &motion, absorption.as_ref())?;
         let maker = WaveMaker {
             wall: spec.wall,
             motion,
+            absorption,
         };
         check_room(doc, &place, &maker, &makers, around)?;
         makers.push(maker);
@@ -77,7 +84,7 @@ fn check_room(
     let size = around.domain.size()[wall.axis];
     let room = size - around.least_gap;
     let duration = around.shot.duration();
-    let reach = maker.motion.peak_displacement(duration);
+    let reach = maker.farthest(duration);
     if reach > room {
         let problem = format!(
             "the wall {} crosses the whole domain: within the {} s of the shot it moves {} m of {} m",
@@ -92,7 +99,7 @@ fn check_room(
         .iter()
         .find(|m| m.wall.axis == wall.axis && m.wall.is_max != wall.is_max);
     if let Some(opposite) = opposite
-        && let Some(t) = meeting_time(&maker.motion, &opposite.motion, room, duration)
+        && let Some(t) = meeting_time(maker, opposite, room, duration)
     {
         let problem = format!(
             "the walls {} and {} collide {t:.3} s into the shot",
@@ -106,9 +113,12 @@ fn check_room(
 
 /// When two motions together first use up `room`. Steps through the shot, and from each time no
 /// farther than the walls can get at their peak speed, so that no meeting is stepped over.
-fn meeting_time(a: &Motion, b: &Motion, room: f64, duration: f64) -> Option<f64> {
+fn meeting_time(a: &WaveMaker, b: &WaveMaker, room: f64, duration: f64) -> Option<f64> {
     const STEPS: u32 = 10_000;
     let step = duration / f64::from(STEPS);
+    // Walls that absorb may come as far off their own way as they have room.
+    let room = room - 2.0 * (a.room() + b.room());
+    let (a, b) = (&a.motion, &b.motion);
     (0..STEPS).map(|i| step * f64::from(i)).find(|&t| {
         let gap = room - a.displacement(t) - b.displacement(t);
         let closing = a.peak_speed(t, t + step) + b.peak_speed(t, t + step);
@@ -125,6 +135,7 @@ pub(super) fn motion(
     gravity: DVec3,
 ) -> Result<Motion> {
     match *spec {
+        MotionSpec::Still => Ok(Motion::Still),
         MotionSpec::ConstantVelocity { velocity, until } => {
             Ok(Motion::ConstantVelocity { velocity, until })
         }

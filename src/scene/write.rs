@@ -89,10 +89,20 @@ impl Scene {
         insert_tables(&mut scene, "solid", still.chain(moving));
         let makers = self.wave_makers.iter();
         let makers = makers.map(|maker| {
-            table([
+            let mut rows = table([
                 ("wall", value(&maker.wall)),
                 ("motion", motion(&maker.motion)),
-            ])
+            ]);
+            if let Some(absorption) = &maker.absorption {
+                let asked = absorption.asked();
+                let absorption = Value::Table(table([
+                    ("depth", value(&asked.depth)),
+                    ("period", value(&asked.period)),
+                    ("room", value(&asked.room)),
+                ]));
+                rows.insert("absorption".to_owned(), absorption);
+            }
+            rows
         });
         insert_tables(&mut scene, "wave_maker", makers);
         let sources = Written {
@@ -275,6 +285,7 @@ fn pbf(pbf: &Pbf) -> Table {
 
 fn motion(motion: &Motion) -> Value {
     let (kind, rows) = match motion {
+        Motion::Still => ("still", Table::new()),
         Motion::ConstantVelocity { velocity, until } => {
             let mut rows = table([("velocity", value(velocity))]);
             if let Some(until) = until {

@@ -272,6 +272,7 @@ impl Whitewater {
         if is_other_count(&self.scene, self.plan.counts.particles, water)? {
             self.resize(n)?;
         }
+        self.scene.take_answers(water);
         let vectors = |of: &[[f32; 3]]| -> Vec<[f32; 4]> {
             of.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()
         };

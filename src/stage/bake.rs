@@ -13,7 +13,7 @@ use crate::{
         signed_distance::SignedDistanceError, solver::StepReport,
     },
     gpu::adapter::GpuError,
-    scene::{self, Scene, SceneError, grids::Grids},
+    scene::{self, Held, Scene, SceneError, grids::Grids},
 };
 
 use super::{
@@ -243,6 +243,7 @@ pub fn bake(
     drive.load_watched(&start.particles, clock.frame, &state)?;
     drive.go_on_with(clock.next_id);
     let mut looked = probes::Looked::new(scene);
+    let mut held = Held::default();
     let ended = drive.run(last, stop, |step| {
         looked.add(scene, step.frame, &step.looks);
         let begin = Instant::now();
@@ -258,6 +259,8 @@ pub fn bake(
             ..
         } = step;
         clock.next_id = next_id;
+        clock.walls = particles.walls;
+        held.add(scene, &particles);
         clock.frame = frame;
         clock.time = time;
         clock.substeps = report.substeps;
@@ -296,7 +299,7 @@ pub fn bake(
         bytes: summary.bytes,
         waited: summary.waiting.as_secs_f64(),
         interrupted: end == End::Stopped,
-        warnings: looked.warnings(scene),
+        warnings: [looked.warnings(scene), held.warnings()].concat(),
         passes,
         shares,
     })

@@ -237,7 +237,7 @@ fn check_walls(
     scene: &Scene,
     particles: &Particles,
 ) -> Result<(), BranchError> {
-    let walls = scene.walls(clock.time);
+    let walls = scene.walls_after(particles, clock.time);
     let corner = scene.domain.min;
     // Along periodic axes walls are far off, and the domain is what particles have to lie in.
     let room = Bounds {
@@ -335,6 +335,7 @@ mod tests {
             attributes: [("a", 1.0), ("b", 2.0)]
                 .map(|(name, value)| (name.to_owned(), vec![value; 2]))
                 .into(),
+            ..Particles::default()
         };
         let mut same = particles.clone();
         assert!(take_attributes(&mut same, &["a", "b"]).is_empty());

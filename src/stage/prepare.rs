@@ -54,11 +54,17 @@ impl Start {
             _ => distance(scene, meshes(scene).chain(movers))?,
         };
         let water = scene.water.meshes.iter().map(|placed| &placed.mesh);
+        let room = scene.start_domain();
+        let within = |block: &Bounds| Bounds {
+            min: block.min.max(room.min),
+            max: block.max.min(room.max),
+        };
+        let blocks: Vec<Bounds> = scene.water.blocks.iter().map(within).collect();
         let fill = fill_water(
-            &scene.water.blocks,
+            &blocks,
             water,
             at_start.as_ref().or(boundary.distance.as_ref()),
-            &scene.domain,
+            &room,
             spacing,
         )?;
         let mut particles = fill.particles;

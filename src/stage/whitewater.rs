@@ -331,14 +331,15 @@ impl Step<'_> {
             ..self.cache.entry(frame)?.clock
         };
         let seconds = clock.time - before;
-        let now = water.at(frame)?;
+        let mut now = water.at(frame)?;
+        now.walls = clock.walls;
         let potentials = engine.survey(&now, clock.time, seconds)?;
         let mut white = stream.white.clone();
         engine.advance(&mut white, frame)?;
         let spacing = self.scene.particle_spacing();
         let died = whitewater::grow_older(self.settings, &mut white, spacing, seconds);
         let corner = self.scene.domain.min;
-        let walls = self.scene.walls(clock.time);
+        let walls = self.scene.walls_after(&now, clock.time);
         let births = Births::of(
             self.settings,
             &Source {

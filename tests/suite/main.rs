@@ -93,6 +93,7 @@ mod solve {
     mod zones;
 }
 mod stage {
+    mod absorption;
     mod branch;
     mod budget;
     mod device_cpu;

@@ -25,6 +25,7 @@ fn water(n: u32, attributes: &[&str]) -> Particles {
             .zip(attributes)
             .map(|(k, name)| ((*name).to_owned(), (0..n).map(|i| value(i, k)).collect()))
             .collect(),
+        ..Particles::default()
     }
 }
 
@@ -303,6 +304,7 @@ proptest! {
             velocity: rows.iter().map(|r| float(r.1)).collect(),
             id: gaps[..rows.len()].iter().map(|gap| { id += gap; id }).collect(),
             attributes: [("age".to_owned(), rows.iter().map(|r| f32::from_bits(r.2)).collect())].into(),
+            ..Particles::default()
         };
         let back = decode(&encoded(&particles), Path::new("")).unwrap();
         prop_assert_eq!(bits(&back), bits(&particles));

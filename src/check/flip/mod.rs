@@ -96,6 +96,7 @@ pub fn check(
 ) -> Result<Checked, SolveError> {
     let mut solver = Flip::new(context, scene, plan, boundary, false)?;
     solver.load(frame, particles)?;
+    let scene = &scene.after(particles);
     let mut engine = Engine::new(FlipState::new(scene, boundary, (frame, particles.len())));
     let traced = solver.trace_frame(Span::Only(which), &mut |begun, traced| {
         engine.state.begun = begun;

@@ -94,6 +94,7 @@ pub fn check(
 ) -> Result<Checked, SolveError> {
     let mut solver = Pbf::new(context, scene, plan.clone(), uploaded, false)?;
     solver.load(frame, particles)?;
+    let scene = &scene.after(particles);
     let substeps = scene.pbf_substeps(frame, particles.max_speed())?;
     let length = scene.shot.frame_seconds();
     let time_step = length / f64::from(substeps);

@@ -1,5 +1,7 @@
 //! Linear wave theory: what a piston makes.
 
+use std::f64::consts::PI;
+
 /// The wavenumber k in rad/m of a wave of `angular_frequency` (rad/s) on water of `depth` metres:
 /// ω² = g k tanh kh.
 pub fn wave_number(angular_frequency: f64, depth: f64, gravity: f64) -> f64 {
@@ -30,6 +32,46 @@ pub fn piston_height_ratio(wave_number: f64, depth: f64) -> f64 {
     2.0 * (twice.cosh() - 1.0) / (twice.sinh() + twice)
 }
 
+/// Local waves of a piston whose count is enough: what those behind add to their sum falls as 1/count².
+const LOCAL_WAVES: u32 = 400;
+
+/// The waves that stay beside a piston (Biésel 1951; Dean and Dalrymple 1991, 6.2): kⱼh with ω² = −g kⱼ tan kⱼh, and the
+/// amplitude of their elevation at the piston over that of its way, cⱼ = 4 sin² kⱼh / (2kⱼh + sin 2kⱼh). They rise with
+/// the piston's way, as water that is pushed does.
+fn local_waves(
+    angular_frequency: f64,
+    depth: f64,
+    gravity: f64,
+) -> impl Iterator<Item = (f64, f64)> {
+    let deep = angular_frequency.powi(2) * depth / gravity;
+    (1..=LOCAL_WAVES).map(move |j| {
+        // x sin x + y cos x changes its sign once between (j − ½)π and jπ.
+        let (mut low, mut high) = ((f64::from(j) - 0.5) * PI, f64::from(j) * PI);
+        let of = |x: f64| x * x.sin() + deep * x.cos();
+        let at_low = of(low) < 0.0;
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            match (of(middle) < 0.0) == at_low {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        let x = 0.5 * (low + high);
+        (x, 4.0 * x.sin().powi(2) / (2.0 * x + (2.0 * x).sin()))
+    })
+}
+
+/// Elevation at a piston over its way, in linear theory: the part that goes with its velocity, and that which goes with
+/// the way itself (the local waves'). As complex amplitudes η = (i a + b) ξ for a motion as e^iωt.
+pub fn piston_elevation(angular_frequency: f64, depth: f64, gravity: f64) -> [f64; 2] {
+    let number = wave_number(angular_frequency, depth, gravity);
+    let local = local_waves(angular_frequency, depth, gravity);
+    [
+        piston_height_ratio(number, depth),
+        local.map(|(_, amplitude)| amplitude).sum(),
+    ]
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
@@ -49,5 +91,23 @@ mod tests {
         assert!((piston_height_ratio(1e-3, 1.0) - 1e-3).abs() < 1e-8);
         assert!((piston_height_ratio(40.0, 1.0) - 2.0).abs() < 1e-12);
         assert_eq!(piston_height_ratio(1e6, 1.0), 2.0);
+    }
+
+    /// A piston pushes alike at every depth: modes are complete, and at the surface their profiles add up to one. Those of an
+    /// elevation c have c coth kh and cⱼ cot kⱼh there.
+    #[test]
+    fn all_waves_of_a_piston_together_are_its_own_profile() {
+        for (frequency, depth) in [(2.0, 0.3), (3.0, 1.0), (5.0, 1.0), (9.0, 0.5)] {
+            let number = wave_number(frequency, depth, 9.81);
+            let progressive = piston_height_ratio(number, depth) / (number * depth).tanh();
+            let sum = |scale: f64| {
+                let local = local_waves(frequency, depth, 9.81);
+                progressive + scale * local.map(|(x, c)| c / x.tan()).sum::<f64>()
+            };
+            // What is left out falls as 2 y / (π² count).
+            let left = 2.0 * frequency.powi(2) * depth / 9.81 / (PI * PI * f64::from(LOCAL_WAVES));
+            assert!((sum(1.0) - 1.0).abs() < 1.2 * left, "{}", sum(1.0) - 1.0);
+            assert!((sum(1.1) - 1.0).abs() > 1.5 * left, "{}", sum(1.1) - 1.0);
+        }
     }
 }

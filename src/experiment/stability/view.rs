@@ -84,7 +84,8 @@ impl<'a> View<'a> {
 
     /// The box's faces now, wave makers included, in the world.
     pub(super) fn walls(&self) -> Bounds {
-        let (walls, origin) = (self.scene.walls(self.time()), self.scene.domain.min);
+        let walls = self.scene.walls_after(&self.state, self.time());
+        let origin = self.scene.domain.min;
         Bounds {
             min: origin + walls.min,
             max: origin + walls.max,

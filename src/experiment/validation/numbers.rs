@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use crate::{
     domain::motion::{Motion, wave_number},
-    scene::{Method, Scene, study::validation::Measure},
+    scene::{Method, Scene, WaveMaker, study::validation::Measure},
     study::waves,
 };
 
@@ -149,15 +149,16 @@ struct Theory<'a> {
 impl<'a> Theory<'a> {
     /// Of the first wall that moves by a theory, else of a generation zone.
     fn of(scene: &'a Scene) -> Option<Self> {
-        let of_wall = |motion: &'a Motion| -> Option<Self> {
-            let (elevation, period): (Box<dyn Fn(DVec2, f64) -> f64>, _) = match motion {
-                Motion::Sea(sea) => (Box::new(|at, t| sea.elevation(at.x, t)), None),
+        let of_wall = |maker: &'a WaveMaker| -> Option<Self> {
+            let rest = maker.room();
+            let (elevation, period): (Box<dyn Fn(DVec2, f64) -> f64>, _) = match &maker.motion {
+                Motion::Sea(sea) => (Box::new(move |at, t| sea.elevation(at.x - rest, t)), None),
                 Motion::Stokes(waves) => (
-                    Box::new(|at, t| waves.elevation(at.x, t)),
+                    Box::new(move |at, t| waves.elevation(at.x - rest, t)),
                     Some(waves.waves().period),
                 ),
                 Motion::Cnoidal(waves) => (
-                    Box::new(|at, t| waves.elevation(at.x, t)),
+                    Box::new(move |at, t| waves.elevation(at.x - rest, t)),
                     Some(waves.waves().period),
                 ),
                 _ => return None,
@@ -165,7 +166,7 @@ impl<'a> Theory<'a> {
             Some(Self { elevation, period })
         };
         let makers = scene.wave_makers.iter();
-        let mut makers = makers.filter_map(|maker| of_wall(&maker.motion));
+        let mut makers = makers.filter_map(of_wall);
         makers.next().or_else(|| {
             let waves = scene.effects.waves(scene.water.gravity)?;
             Some(Self {

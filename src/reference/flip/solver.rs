@@ -331,6 +331,11 @@ impl Flip {
         Ok(trace)
     }
 
+    /// Takes over where walls that absorb stand after a state.
+    pub fn take_answers(&mut self, state: &Particles) {
+        self.model.scene.take_answers(state);
+    }
+
     /// Makes the velocities of particles in the order of their ids those of the projection over a substep, m/s, and aims the
     /// particles with them; returns which of them are drops, and what moving walls did, joule. The substep's numbers are the frame and, from 1, its own.
     ///
@@ -504,6 +509,7 @@ impl Solver for Flip {
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
         self.state = particles.clone();
         self.frame = frame;
+        self.take_answers(particles);
         Ok(())
     }
 
@@ -531,6 +537,7 @@ impl Solver for Flip {
             return Err(Breach::not_finite(frame, count, Some(first)).into());
         }
         self.frame = frame;
+        self.model.scene.answer(&mut self.state, frame);
         let report = StepReport {
             substeps: done.substeps,
             iterations: done.iterations,

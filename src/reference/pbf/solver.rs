@@ -379,6 +379,13 @@ impl Pbf {
         });
         sorted.unsorted(&density)
     }
+
+    /// Where walls that absorb stand now.
+    fn tell_grid(&mut self) {
+        if let Some(grid) = &mut self.grid {
+            grid.take_answers(&self.state);
+        }
+    }
 }
 
 impl Solver for Pbf {
@@ -387,6 +394,8 @@ impl Solver for Pbf {
     fn load(&mut self, frame: u32, particles: &Particles) -> Result<(), ReferenceError> {
         self.state = particles.clone();
         self.frame = frame;
+        self.scene.take_answers(particles);
+        self.tell_grid();
         Ok(())
     }
 
@@ -427,6 +436,8 @@ impl Solver for Pbf {
             return Err(Breach::not_finite(frame, count, Some(first)).into());
         }
         self.frame = frame;
+        self.scene.answer(&mut self.state, frame);
+        self.tell_grid();
         (self.position, self.step) = (position, step);
         let report = StepReport {
             substeps,

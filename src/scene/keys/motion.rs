@@ -74,6 +74,7 @@ pub(super) const WALL_MOTION: &[Key] = &[
     Key::choice(
         "kind",
         &[
+            "still",
             "constant_velocity",
             "sine",
             "solitary",
@@ -85,7 +86,7 @@ pub(super) const WALL_MOTION: &[Key] = &[
         ],
     )
     .about(
-        "kind of motion; `solitary` is Goring 1978; `stokes` (second order, Schäffer 1996 and Madsen 1971) and `cnoidal` (shallow \
+        "kind of motion; `still`, with absorption alone, makes no waves; `solitary` is Goring 1978; `stokes` (second order, Schäffer 1996 and Madsen 1971) and `cnoidal` (shallow \
          water, Goring 1978) make regular waves without free ones; `sea` and `focused` follow a spectrum, by linear theory or to second order",
     ),
     VELOCITY,

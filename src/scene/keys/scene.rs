@@ -199,6 +199,30 @@ const WAVE_MAKER: &[Key] = &[
     Key::inline("motion", WALL_MOTION)
         .also(", that leaves at least two particle spacings (PBF) or three cells (FLIP) between the walls")
         .about("How far inward the wall has come"),
+    Key::inline("absorption", ABSORPTION)
+        .absent()
+        .also(", of a wall along x or z under gravity straight down, with frames short enough for it")
+        .about(
+            "Whether the wall also takes in waves that come to it (active absorption, Schäffer and Klopman 2000): once a frame it \
+             answers by how much the water beside it stands over the wall's own waves",
+        ),
+];
+
+/// Of a wall that takes in waves.
+const ABSORPTION: &[Key] = &[
+    Key::number("depth", 1e-3..=1e6)
+        .unit("metres")
+        .about("of the water at rest"),
+    Key::number("period", 1e-3..=1e6)
+        .unit("seconds")
+        .about("of the waves that it absorbs best, as linear theory has it"),
+    Key::number("room", 1e-6..=1e6)
+        .unit("metres")
+        .also(", twice of it inside of the domain")
+        .about(
+            "how far the wall may come off its own way; it rests as far inside of the domain's face, and all distances of its \
+             motion are from there",
+        ),
 ];
 
 const ROOM_MIN: Key = Key::vector("min", 3, COORDINATE)

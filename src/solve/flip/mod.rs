@@ -376,6 +376,11 @@ impl Flip {
         Ok(sums.into_iter().map(f64::from).sum())
     }
 
+    /// Takes over where walls that absorb stand after a state.
+    pub(in crate::solve) fn take_answers(&mut self, state: &Particles) {
+        self.scene.take_answers(state);
+    }
+
     /// What the next substep is, and whether it is the frame's last.
     fn look(
         &mut self,
@@ -467,6 +472,7 @@ impl Solver for Flip {
         }
         self.state = particles.clone();
         self.frame = frame;
+        self.scene.take_answers(particles);
         self.upload_state();
         Ok(())
     }
@@ -495,6 +501,7 @@ impl Solver for Flip {
         };
         let capped = self.field(COUNTERS, 1)?[0].capped;
         self.frame += 1;
+        self.scene.answer(&mut self.state, self.frame);
         if self.scene.domain.min != DVec3::ZERO {
             // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
             self.upload_state();

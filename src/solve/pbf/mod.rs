@@ -370,6 +370,7 @@ impl Solver for Pbf {
         }
         self.state = particles.clone();
         self.frame = frame;
+        self.scene.take_answers(particles);
         upload(&self.program, &self.scene, &self.state);
         match &mut self.grid {
             Some(grid) => grid.load(frame, particles),
@@ -408,6 +409,10 @@ impl Solver for Pbf {
             return Err(Breach::not_finite(self.frame, count, None).into());
         }
         check_finite(self.frame, &self.state, Some(&density))?;
+        self.scene.answer(&mut self.state, self.frame);
+        if let Some(grid) = &mut self.grid {
+            grid.take_answers(&self.state);
+        }
         if self.scene.domain.min != DVec3::ZERO {
             // The frame's world positions are rounded: go on from what was written, as a resumed bake would.
             upload(&self.program, &self.scene, &self.state);

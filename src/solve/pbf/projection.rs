@@ -45,6 +45,11 @@ impl Grid {
         self.flip.load(frame, particles)
     }
 
+    /// Its walls stand where those of the particles do.
+    pub(super) fn take_answers(&mut self, state: &Particles) {
+        self.flip.take_answers(state);
+    }
+
     /// Zeroes what adds up over a frame.
     pub(super) fn begin_frame(&mut self, frame: u32) {
         self.totals = FrameTotals::default();

@@ -423,7 +423,7 @@ fn a_cache_that_begins_at_a_frame_is_numbered_from_there() {
         time: 2.0,
         substeps: 3,
         steps: 400,
-        next_id: None,
+        ..Clock::default()
     };
     let attempt = |d: &Path, clock| {
         let (start, seen) = (start(), seen(clock));

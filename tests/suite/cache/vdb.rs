@@ -301,7 +301,7 @@ fn go_on(mut writer: CacheWriter, first: u32, last: u32) {
             time: f64::from(frame) / 24.0,
             substeps: 1,
             steps: frame.into(),
-            next_id: None,
+            ..Clock::default()
         };
         let particles = ball(clock.time);
         writer

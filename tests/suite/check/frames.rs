@@ -209,6 +209,7 @@ fn push_is_seen(
 fn close_in(scene: &mut Scene, walls: &[(usize, f64)]) {
     for &(index, velocity) in walls {
         scene.wave_makers.push(WaveMaker {
+            absorption: None,
             wall: Wall::NAMED[index].1,
             motion: Motion::ConstantVelocity {
                 velocity,

@@ -492,6 +492,7 @@ fn work_of_moving_walls_is_within_tolerance_and_fails_where_it_should() {
         let (mut scene, start) = case(method);
         for (index, velocity) in [(0, 2.0), (5, 0.7)] {
             scene.wave_makers.push(WaveMaker {
+                absorption: None,
                 wall: Wall::NAMED[index].1,
                 motion: Motion::ConstantVelocity {
                     velocity,

@@ -24,6 +24,7 @@ fn splash(periodic: bool) -> (Scene, Particles) {
     let mut scene = support::scene([1.6, 1.6, 0.9]);
     scene.periodic = [false, false, periodic];
     scene.wave_makers.push(WaveMaker {
+        absorption: None,
         wall: Wall::NAMED[0].1,
         motion: Motion::ConstantVelocity {
             velocity: 0.5,

@@ -122,6 +122,7 @@ fn pushed(side: &str) -> (Scene, Particles) {
         until: Some(1.0),
     };
     scene.wave_makers.push(WaveMaker {
+        absorption: None,
         wall: wall(side),
         motion,
     });

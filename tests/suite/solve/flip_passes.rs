@@ -101,6 +101,7 @@ fn particle_to_grid_matches_the_naive_twin() {
 fn pushed_by(width: f64) -> f64 {
     let mut scene = scene([8.0, 8.0, width]);
     scene.wave_makers.push(WaveMaker {
+        absorption: None,
         wall: Wall::NAMED[0].1,
         motion: Motion::ConstantVelocity {
             velocity: 0.2,

@@ -443,6 +443,7 @@ fn a_wall_works_on_a_particle_by_its_momentum() {
 
 fn wall(velocity: f64) -> WaveMaker {
     WaveMaker {
+        absorption: None,
         wall: Wall {
             axis: 0,
             is_max: false,

@@ -100,6 +100,7 @@ fn with_effects(mut scene: Scene) -> Scene {
 
 fn with_wave_maker(mut scene: Scene) -> Scene {
     scene.wave_makers.push(WaveMaker {
+        absorption: None,
         wall: Wall::NAMED[0].1,
         motion: Motion::ConstantVelocity {
             velocity: 0.1,

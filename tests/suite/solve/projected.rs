@@ -170,6 +170,7 @@ fn a_standing_wave_keeps_its_height_and_its_period() {
 fn pushed() -> (Scene, Particles) {
     let mut scene = projected([2.4, 2.0, 0.6], 60.0);
     scene.wave_makers.push(WaveMaker {
+        absorption: None,
         wall: Wall::NAMED[0].1,
         motion: Motion::ConstantVelocity {
             velocity: 1.5,

@@ -69,6 +69,7 @@ fn water_before_a_wall_that_cuts_cells_has_its_density() {
     for part in [0.1, 0.25, 0.4, 0.5] {
         let (mut scene, mut particles) = rig::tank([8, 8, 8], 6);
         scene.wave_makers = vec![WaveMaker {
+            absorption: None,
             wall: Wall::NAMED[0].1,
             motion: Motion::ConstantVelocity {
                 velocity: part * DX,

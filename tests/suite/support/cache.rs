@@ -123,7 +123,7 @@ pub fn step(before: &Particles, clock: Clock, frame: u32) -> (Clock, Particles, 
         time: clock.time + 1.0 / 60.0,
         substeps: 1 + frame % 3,
         steps: clock.steps + u64::from(1 + frame % 3),
-        next_id: None,
+        ..Clock::default()
     };
     let report = json!({ "density_error": { "mean": 0.1 / f64::from(frame) }, "capped": frame });
     (clock, after, report)
@@ -138,6 +138,7 @@ pub fn start() -> Particles {
         attributes: [("age", 1.0), ("foam", 0.0)]
             .map(|(name, value)| (name.to_owned(), vec![value; n]))
             .into(),
+        ..Particles::default()
     }
 }
 

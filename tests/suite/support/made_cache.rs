@@ -185,7 +185,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
             time: f64::from(frame) / 60.0,
             substeps: 1,
             steps: frame.into(),
-            next_id: None,
+            ..Clock::default()
         };
         writer
             .submit(

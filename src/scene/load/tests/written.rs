@@ -44,6 +44,7 @@ motion = { kind = "KIND" }
 [[wave_maker]]
 wall = "+x"
 motion = { kind = "KIND" }
+absorption = { depth = 1.0, period = 3.0, room = 0.1 }
 [grids]
 surface = true
 velocity = true

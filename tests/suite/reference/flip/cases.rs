@@ -126,6 +126,7 @@ pub fn wall() -> Case {
     let particles = kept(&particles, |x| x.x > 0.13);
     let side = Wall::NAMED.iter().find(|(name, _)| *name == "-x");
     scene.wave_makers.push(WaveMaker {
+        absorption: None,
         wall: side.unwrap().1,
         motion: Motion::ConstantVelocity {
             velocity: 2.5,

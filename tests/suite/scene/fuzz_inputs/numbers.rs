@@ -112,6 +112,13 @@ const OF_LEVELS: &[(&str, &str, bool)] = &[
     ("drain[0].level", "{}", false),
 ];
 
+/// Of a wall that absorbs.
+const OF_ABSORPTION: &[(&str, &str, bool)] = &[
+    ("wave_maker[1].absorption.depth", "{}", false),
+    ("wave_maker[1].absorption.period", "{}", false),
+    ("wave_maker[1].absorption.room", "{}", false),
+];
+
 /// The good scene with all that [`NUMBERS`] changes in it.
 fn numbered() -> String {
     let makers = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
@@ -148,6 +155,9 @@ fn every_number_has_a_range_and_says_it() {
     each_number_of_a_scene_has_a_range(&SCENE.replace("[solver]\n", &levels), OF_LEVELS);
     let viscous = SCENE.replace("xsph = 0.01", "coefficient = 1.0, tolerance = 0.1");
     each_number_of_a_scene_has_a_range(&viscous, OF_VISCOSITY);
+    let wall = "[[wave_maker]]\nwall = \"+x\"\nmotion = { kind = \"still\" }\n\
+        absorption = { depth = 3.0, period = 3.0, room = 0.01 }\n[solver]\n";
+    each_number_of_a_scene_has_a_range(&SCENE.replace("[solver]\n", wall), OF_ABSORPTION);
     let zone = |waves: &str| {
         let zone = format!(
             "[effects]\ngeneration_zone = {{ walls = [\"-z\"], length = 3.0, waves = {{ {waves}, direction_degrees = 90.0 }} }}\n"

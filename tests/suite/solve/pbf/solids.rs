@@ -62,6 +62,7 @@ fn nothing_stays_behind_a_piston() {
     let context = context();
     let mut scene = scene([3.0, 1.5, 0.6]);
     scene.wave_makers.push(WaveMaker {
+        absorption: None,
         wall: Wall {
             axis: 0,
             is_max: false,

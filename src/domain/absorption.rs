@@ -1,0 +1,390 @@
+//! A wave maker that takes in the waves which come to it: active absorption (Milgram 1970; reviewed by Schäffer and Klopman 2000).
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+
+use super::{
+    answer::Answer,
+    bounds::Bounds,
+    motion::{Motion, piston_elevation},
+    particles::Particles,
+    probe::{self, SUPPORT},
+};
+
+/// After so many periods a wall forgets: where its water stands on the mean, and how far it has come from its own way. What is
+/// slower is not absorbed; of a wave of the period itself 1/(2π · 8) = 2 % of the answer is lost to each, a quarter of a period off.
+const MEMORY: f64 = 8.0;
+
+/// Most of the depth that a level counts as: a splash up the wall is no wave.
+const HIGHEST: f64 = 0.5;
+
+/// Columns of water that a level is the mean of, at most.
+const COLUMNS: f64 = 32.0;
+
+/// The most that `gain` × the seconds between two answers may be. A wall that moves raises the water beside it at about its
+/// speed (the local waves), and the next answer takes that for a wave: at 1 it would go on growing.
+pub const MOST_GAIN: f64 = 0.5;
+
+/// What a wall is to absorb.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Asked {
+    /// How far inside of the domain's face the wall is at the start, and how far it may come off its own way, metres.
+    pub room: f64,
+    /// Of the water at rest, metres.
+    pub depth: f64,
+    /// Of the waves that it absorbs best, seconds.
+    pub period: f64,
+    /// m/s².
+    pub gravity: f64,
+}
+
+/// How a wall absorbs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Absorption {
+    asked: Asked,
+    /// 1/s.
+    gain: f64,
+    /// Seconds.
+    lag: f64,
+}
+
+impl Absorption {
+    /// By linear theory of a piston at the period.
+    ///
+    /// A wave of amplitude a that comes to a wall is thrown back, 2a at the wall. A velocity U radiates one of c₀ U/ω, and raises
+    /// the water at the wall by (c₀ − i Σcⱼ) U/ω ([`piston_elevation`]). Nothing comes back where U = −a ω/c₀; the level is then
+    /// η = a (1 + i Σcⱼ/c₀), so that U = −ω/(c₀ + i Σcⱼ) η: so much, and so much later.
+    pub fn new(asked: Asked) -> Self {
+        let frequency = TAU / asked.period;
+        let [progressive, local] = piston_elevation(frequency, asked.depth, asked.gravity);
+        Self {
+            asked,
+            gain: frequency / progressive.hypot(local),
+            lag: local.atan2(progressive) / frequency,
+        }
+    }
+
+    /// What was asked for.
+    pub fn asked(&self) -> &Asked {
+        &self.asked
+    }
+
+    /// The wall's velocity over the level that it answers, 1/s.
+    pub fn gain(&self) -> f64 {
+        self.gain
+    }
+
+    /// The level that the wall's own waves have beside it, metres, by the linear theory of waves of the period: (c₀ − i Σcⱼ) U/ω.
+    fn own_level(&self, motion: &Motion, t: f64) -> f64 {
+        motion.velocity(t - self.lag) / self.gain
+    }
+
+    /// What the wall does for `seconds` from the time `now` on, where the water beside it stands `level` metres over the still
+    /// water; `None` where there is none.
+    ///
+    /// The velocity goes over `seconds` to what the level asks for as it will be then, by the line through the last two; the wall
+    /// keeps to its room.
+    pub fn answer(
+        &self,
+        motion: &Motion,
+        before: Option<&Answer>,
+        (now, seconds): (f64, f64),
+        level: Option<f64>,
+    ) -> Answer {
+        let over = level.map(|level| {
+            let most = HIGHEST * self.asked.depth;
+            (level - self.own_level(motion, now)).clamp(-most, most)
+        });
+        let Some(before) = before else {
+            // What the water stands at before there are waves.
+            let level = over.unwrap_or_default();
+            return Answer {
+                start: now,
+                displacement: 0.0,
+                velocity: 0.0,
+                acceleration: 0.0,
+                level,
+                mean: level,
+            };
+        };
+        let level = over.unwrap_or(before.level);
+        let Asked { period, room, .. } = self.asked;
+        let memory = MEMORY * period;
+        let mean = before.mean - (level - before.mean) * (-seconds / memory).exp_m1();
+        let rate = (level - before.level) / seconds;
+        let foreseen = level - mean + (seconds - self.lag) * rate;
+        let (displacement, velocity) = before.state(now);
+        let wanted = -self.gain * foreseen - displacement / memory;
+        // Where it is when it has slowed down again over as many seconds.
+        let coming = displacement + 0.5 * velocity * seconds;
+        let wanted = wanted.clamp((-room - coming) / seconds, (room - coming) / seconds);
+        Answer {
+            start: now,
+            displacement,
+            velocity,
+            acceleration: (wanted - velocity) / seconds,
+            level,
+            mean,
+        }
+    }
+}
+
+/// Mean level of the water along a wall, half a particle spacing off it, metres above the world's y = 0; `None` where there is none.
+///
+/// `walls` are the box's faces in the frame of the particles, of which the wall is the least or the greatest along an axis other
+/// than y.
+pub fn level_along(
+    particles: &Particles,
+    spacing: f64,
+    walls: &Bounds,
+    (axis, is_max): (usize, bool),
+) -> Option<f64> {
+    let along = 2 - axis;
+    let (face, inward) = match is_max {
+        true => (walls.max[axis], -1.0),
+        false => (walls.min[axis], 1.0),
+    };
+    let at = face + inward * 0.5 * spacing;
+    let reach = (SUPPORT + 1.0) * spacing;
+    let is_near = |x: &&[f32; 3]| (f64::from(x[axis]) - at).abs() < reach;
+    let near = Particles {
+        position: particles.position.iter().filter(is_near).copied().collect(),
+        ..Particles::default()
+    };
+    let size = walls.max[along] - walls.min[along];
+    let count = (size / (2.0 * spacing)).floor().clamp(1.0, COLUMNS);
+    let columns = (0..count as u32).map(|k| {
+        let mut place = DVec3::ZERO;
+        place[axis] = at;
+        place[along] = walls.min[along] + size * (f64::from(k) + 0.5) / count;
+        probe::elevation(&near, spacing, walls, DVec2::new(place.x, place.z))
+    });
+    let wet: Vec<f64> = columns.flatten().collect();
+    (!wet.is_empty()).then(|| wet.iter().sum::<f64>() / wet.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::motion::wave_number;
+    use super::*;
+
+    const DEPTH: f64 = 1.0;
+    const GRAVITY: f64 = 9.81;
+    const SECONDS: f64 = 1.0 / 48.0;
+
+    fn asked(period: f64) -> Asked {
+        Asked {
+            room: 10.0,
+            depth: DEPTH,
+            period,
+            gravity: GRAVITY,
+        }
+    }
+
+    fn absorption(period: f64) -> Absorption {
+        Absorption::new(asked(period))
+    }
+
+    /// Seconds of waves with this kh.
+    fn period(kh: f64) -> f64 {
+        TAU / (GRAVITY / DEPTH * kh * kh.tanh()).sqrt()
+    }
+
+    /// The velocity inward that answers to a level of cos ωt: parts with the cosine and with the sine, over the last of many
+    /// periods.
+    fn response(wall: &Absorption, period: f64) -> [f64; 2] {
+        let frequency = TAU / period;
+        let (settled, measured) = ((40.0 * wall.asked.period / SECONDS) as u32, 20_000);
+        let mut before = None;
+        let (mut with_cos, mut with_sin) = (0.0, 0.0);
+        for k in 0..settled + measured {
+            let now = f64::from(k) * SECONDS;
+            // It begins at rest, as water does.
+            let level = 1e-3 * (frequency * now).cos() * (now / wall.asked.period).min(1.0);
+            let answer = wall.answer(&Motion::Still, before.as_ref(), (now, SECONDS), Some(level));
+            for part in 0..8 {
+                let t = now + SECONDS * (f64::from(part) + 0.5) / 8.0;
+                if k >= settled {
+                    let (_, velocity) = answer.state(t);
+                    with_cos += velocity * (frequency * t).cos();
+                    with_sin += velocity * (frequency * t).sin();
+                }
+            }
+            before = Some(answer);
+        }
+        [with_cos, with_sin].map(|sum| sum * 2.0 / (8.0 * f64::from(measured)) / 1e-3)
+    }
+
+    /// Amplitude thrown back of waves with this kh, by linear theory, from what the wall does with a level. As complex amplitudes
+    /// of e^iωt: the wall's velocity is U = −F η, the level η = 2a + Z U with Z = (c₀ − i Σcⱼ)/ω, and a + c₀ U/ω goes back.
+    fn reflection(wall: &Absorption, kh: f64) -> f64 {
+        let frequency = TAU / period(kh);
+        let [progressive, local] = piston_elevation(frequency, DEPTH, GRAVITY);
+        // V cos ωt + W sin ωt is the real part of (V − iW) e^iωt.
+        let [with_cos, with_sin] = response(wall, period(kh));
+        let f = [-with_cos, with_sin];
+        let [zr, zi] = [progressive / frequency, -local / frequency];
+        // 1 + F Z.
+        let below = [1.0 + f[0] * zr - f[1] * zi, f[0] * zi + f[1] * zr];
+        let size = below[0].powi(2) + below[1].powi(2);
+        let ratio = [
+            (f[0] * below[0] + f[1] * below[1]) / size,
+            (f[1] * below[0] - f[0] * below[1]) / size,
+        ];
+        let scale = 2.0 * progressive / frequency;
+        (1.0 - scale * ratio[0]).hypot(scale * ratio[1])
+    }
+
+    #[test]
+    fn waves_of_its_period_are_taken_in_and_others_for_the_most_part() {
+        for (kh, most) in [(0.5, 0.03), (1.0, 0.03), (2.0, 0.03), (3.0, 0.04)] {
+            let found = reflection(&absorption(period(kh)), kh);
+            assert!(found < most, "{kh}: {found}");
+        }
+        let wall = absorption(period(1.0));
+        for (kh, most) in [(0.5, 0.06), (0.7, 0.04), (1.5, 0.08), (2.0, 0.13)] {
+            let found = reflection(&wall, kh);
+            assert!(found < most, "{kh}: {found}");
+        }
+        // Negative control: half of the gain, by a depth that is four times the water's.
+        let other = Absorption::new(Asked {
+            depth: 4.0 * DEPTH,
+            ..asked(period(0.5))
+        });
+        let found = reflection(&other, 0.5);
+        assert!(found > 0.15, "{found}");
+    }
+
+    /// A wall that makes waves has their level beside it, and does nothing about that: by linear theory, (c₀ − i Σcⱼ) of the motion.
+    #[test]
+    fn its_own_waves_are_none_that_come_to_it() {
+        let period = period(1.5);
+        let wall = absorption(period);
+        let motion = Motion::Sine {
+            stroke: 0.02,
+            period,
+            ramp: 0.0,
+        };
+        let frequency = TAU / period;
+        let [progressive, local] = piston_elevation(frequency, DEPTH, GRAVITY);
+        let furthest = |scale: f64| {
+            let (mut before, mut furthest) = (None, 0.0f64);
+            for k in 0..2000 {
+                // Once the wall is under way.
+                let now = 10.0 * period + f64::from(k) * SECONDS;
+                // With its velocity, and with its way about the mean.
+                let way = motion.displacement(now) - 0.01;
+                let level = progressive * motion.velocity(now) / frequency + local * way;
+                let level = Some(scale * level);
+                let answer = wall.answer(&motion, before.as_ref(), (now, SECONDS), level);
+                furthest = furthest.max(answer.displacement.abs());
+                before = Some(answer);
+            }
+            furthest
+        };
+        // Of a stroke of 20 mm.
+        assert!(furthest(1.0) < 1e-12, "{}", furthest(1.0));
+        assert!(furthest(1.3) > 1e-3, "{}", furthest(1.3));
+    }
+
+    #[test]
+    fn it_goes_on_without_a_jump_and_keeps_to_its_room() {
+        let wall = Absorption::new(Asked {
+            room: 0.05,
+            ..asked(2.0)
+        });
+        let mut before: Option<Answer> = None;
+        let mut farthest = 0.0f64;
+        for k in 0..3000 {
+            let now = f64::from(k) * SECONDS;
+            let level = (k > 10).then(|| 0.3 * (TAU * now / 2.0).sin());
+            let answer = wall.answer(&Motion::Still, before.as_ref(), (now, SECONDS), level);
+            if let Some(before) = before {
+                let (x, v) = before.state(now);
+                assert!((x - answer.displacement).abs() < 1e-15);
+                assert!((v - answer.velocity).abs() < 1e-12);
+            }
+            for part in 0..5 {
+                let (x, v) = answer.state(now + SECONDS * f64::from(part) / 4.0);
+                farthest = farthest.max(x.abs());
+                assert!(v.abs() <= answer.peak_speed(now, now + SECONDS) + 1e-12);
+            }
+            before = Some(answer);
+        }
+        // It gets to the end of its room, where without it it would go 0.4 m.
+        assert!((0.049..0.0501).contains(&farthest), "{farthest}");
+    }
+
+    /// Still water that stands higher or lower than was said is no wave.
+    #[test]
+    fn it_stands_where_the_water_does() {
+        let wall = absorption(2.0);
+        let run = |level: &dyn Fn(f64) -> f64| {
+            let mut before: Option<Answer> = None;
+            for k in 0..4000 {
+                let now = f64::from(k) * SECONDS;
+                let level = Some(level(now));
+                before = Some(wall.answer(&Motion::Still, before.as_ref(), (now, SECONDS), level));
+            }
+            before.unwrap().displacement.abs()
+        };
+        assert!(run(&|_| 0.01) == 0.0);
+        // A step in the level is forgotten: e^-5.2 of 0.01 m × gain × memory after as many memories.
+        let at_once = 0.01 * wall.gain * MEMORY * wall.asked.period;
+        let left = run(&|t| if t < 1.0 { 0.0 } else { 0.01 });
+        assert!(left < 0.1 * at_once, "{left} of {at_once}");
+        assert!(left > 0.0);
+    }
+
+    /// Along a wall that has come in: the block's top, whatever stands elsewhere.
+    #[test]
+    fn a_level_is_that_of_the_water_beside_the_wall() {
+        let spacing = 0.1;
+        let at = |i: u32| 0.1 * (f64::from(i) + 0.5);
+        let mut water = Particles::default();
+        for (i, j, k) in
+            (0..20).flat_map(|i| (0..20).flat_map(move |j| (0..12).map(move |k| (i, j, k))))
+        {
+            // Twelve layers to x = 1, sixteen beyond.
+            if i >= 3 && j < if i < 10 { 12 } else { 16 } {
+                let p = DVec3::new(at(i), at(j), at(k));
+                water.position.push(p.as_vec3().to_array());
+            }
+        }
+        let walls = Bounds {
+            min: DVec3::new(0.3, 0.0, 0.0),
+            max: DVec3::new(2.0, 3.0, 1.2),
+        };
+        let level = |axis, is_max| level_along(&water, spacing, &walls, (axis, is_max));
+        assert!((level(0, false).unwrap() - 1.2).abs() < 0.01);
+        assert!((level(0, true).unwrap() - 1.6).abs() < 0.01);
+        let across = level(2, false).unwrap();
+        assert!((1.3..1.5).contains(&across), "{across}");
+        let dry = Bounds {
+            max: DVec3::new(4.0, 3.0, 1.2),
+            ..walls
+        };
+        assert_eq!(level_along(&water, spacing, &dry, (0, true)), None);
+    }
+
+    /// By hand for kh = 1: kⱼh = 2.883 and 6.158, cⱼ = 0.0497 and 0.0050, and c₀ = 0.982.
+    #[test]
+    fn the_gain_is_that_of_linear_theory() {
+        let period = period(1.0);
+        let k = wave_number(TAU / period, DEPTH, GRAVITY);
+        assert!((k - 1.0).abs() < 1e-12);
+        let [progressive, local] = piston_elevation(TAU / period, DEPTH, GRAVITY);
+        assert!(
+            (progressive - 0.982).abs() < 1e-3 && (0.054..0.062).contains(&local),
+            "{local}"
+        );
+        // On shallow water √(g/h), without a lag.
+        let Absorption { gain, lag, .. } = absorption(60.0);
+        assert!(
+            (gain / (GRAVITY / DEPTH).sqrt() - 1.0).abs() < 1e-2,
+            "{gain}"
+        );
+        assert!(lag < 0.01, "{lag}");
+    }
+}

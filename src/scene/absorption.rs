@@ -1,0 +1,189 @@
+//! Wave makers that take in the waves which come to them: how they are read, and where they then stand.
+
+use glam::DVec3;
+
+use super::{
+    Scene, WaveMaker, document::Document, error::SceneError, spec::AbsorptionSpec, words::shown,
+};
+use crate::domain::{
+    absorption::{Absorption, Asked, MOST_GAIN, level_along},
+    answer::{Answer, Answers, MOST},
+    bounds::Bounds,
+    motion::Motion,
+    particles::Particles,
+};
+
+/// Reads and checks the table at `path`, of a wall along an axis, with frames of so many seconds.
+pub(super) fn build(
+    doc: &Document<'_>,
+    path: &str,
+    (spec, axis): (&AbsorptionSpec, usize),
+    (gravity, seconds): (DVec3, f64),
+) -> Result<Absorption, SceneError> {
+    if axis == 1 || gravity.x != 0.0 || gravity.z != 0.0 || gravity.y >= 0.0 {
+        let problem = "a wall absorbs by the water's level: it is one along x or z, and gravity is straight down";
+        return Err(doc.fault_of_plain(path, problem));
+    }
+    let absorption = Absorption::new(Asked {
+        room: spec.room,
+        depth: spec.depth,
+        period: spec.period,
+        gravity: gravity.length(),
+    });
+    let gain = absorption.gain();
+    if gain * seconds > MOST_GAIN {
+        let problem = format!(
+            "the wall answers once a frame, and on {} m of water that has to be {:.1} times a second or more; raise \
+             shot.frames_per_second",
+            shown(spec.depth),
+            gain / MOST_GAIN
+        );
+        return Err(doc.fault_of_plain(path, problem));
+    }
+    Ok(absorption)
+}
+
+impl WaveMaker {
+    /// Metres inward from the domain's face at a time, seconds.
+    pub(super) fn displacement(&self, answer: Option<&Answer>, t: f64) -> f64 {
+        let off = answer.map_or(0.0, |answer| answer.state(t).0);
+        self.room() + self.motion.displacement(t) + off
+    }
+
+    /// An upper bound on the speed between two times, m/s.
+    pub(super) fn peak_speed(&self, answer: Option<&Answer>, t0: f64, t1: f64) -> f64 {
+        let off = answer.map_or(0.0, |answer| answer.peak_speed(t0, t1));
+        self.motion.peak_speed(t0, t1) + off
+    }
+
+    /// How far inside of the domain's face it is at the start, metres.
+    pub fn room(&self) -> f64 {
+        self.absorption.as_ref().map_or(0.0, |it| it.asked().room)
+    }
+
+    /// The farthest inward that it may come until `t`, metres.
+    pub(super) fn farthest(&self, t: f64) -> f64 {
+        2.0 * self.room() + self.motion.peak_displacement(t)
+    }
+}
+
+impl Scene {
+    /// The wave makers, each with what it answers.
+    pub(super) fn makers(&self) -> impl Iterator<Item = (&WaveMaker, Option<&Answer>)> {
+        let answers = self.answers.iter().map(Option::as_ref);
+        self.wave_makers.iter().zip(answers)
+    }
+
+    /// The scene as it stands after a state.
+    #[must_use]
+    pub fn after(&self, state: &Particles) -> Self {
+        let mut scene = self.clone();
+        scene.take_answers(state);
+        scene
+    }
+
+    /// Takes over what walls that absorb do after a state.
+    pub fn take_answers(&mut self, state: &Particles) {
+        self.answers = self.answers_in(state);
+    }
+
+    /// Those in a state, of walls that absorb in this scene too.
+    pub(super) fn answers_in(&self, state: &Particles) -> Answers {
+        let mut answers = state.walls;
+        for (k, answer) in answers.iter_mut().enumerate() {
+            let maker = self.wave_makers.get(k);
+            *answer = answer.filter(|_| maker.is_some_and(|maker| maker.absorption.is_some()));
+        }
+        answers
+    }
+
+    /// Has walls that absorb answer the state at the end of `frame`, and writes into it what they do from then on.
+    pub fn answer(&mut self, state: &mut Particles, frame: u32) {
+        self.answers = self.answers_to(state, self.shot.time(frame));
+        state.walls = self.answers;
+    }
+
+    fn answers_to(&self, state: &Particles, time: f64) -> Answers {
+        let mut answers = Answers::default();
+        let walls = self.walls(time);
+        // Along an axis that joins its own end the water ends with the domain.
+        let (min, max) = (self.domain.min, self.domain.max);
+        let room = Bounds {
+            min: (min + walls.min).max(min),
+            max: (min + walls.max).min(max),
+        };
+        for ((maker, before), answer) in self.makers().zip(&mut answers) {
+            let Some(absorption) = &maker.absorption else {
+                continue;
+            };
+            let wall = (maker.wall.axis, maker.wall.is_max);
+            let still = min.y + absorption.asked().depth;
+            let level = level_along(state, self.particle_spacing(), &room, wall);
+            let level = level.map(|level| level - still);
+            let span = (time, self.shot.frame_seconds());
+            *answer = Some(absorption.answer(&maker.motion, before, span, level));
+        }
+        answers
+    }
+
+    /// What of the domain lies between the walls at the start, metres.
+    pub fn start_domain(&self) -> Bounds {
+        let mut domain = self.domain;
+        for maker in &self.wave_makers {
+            let mut inward = DVec3::ZERO;
+            inward[maker.wall.axis] = maker.room();
+            match maker.wall.is_max {
+                true => domain.max -= inward,
+                false => domain.min += inward,
+            }
+        }
+        domain
+    }
+}
+
+/// Refuses a wall that never moves.
+pub(super) fn check_still(
+    doc: &Document<'_>,
+    path: &str,
+    motion: &Motion,
+    absorption: Option<&Absorption>,
+) -> Result<(), SceneError> {
+    match (motion, absorption) {
+        (Motion::Still, None) => {
+            let problem =
+                "a wall that makes no waves and takes none in: it needs wave_maker.absorption";
+            Err(doc.fault_of(&format!("{path}.kind"), problem))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Frames in which walls that absorb were at the end of their room.
+#[derive(Default)]
+pub struct Held([u32; MOST]);
+
+/// Part of the room from which on a wall is at its end.
+const AT_THE_END: f64 = 0.99;
+
+impl Held {
+    /// Counts a frame by the state at its end.
+    pub fn add(&mut self, scene: &Scene, state: &Particles) {
+        let answers = scene.answers_in(state);
+        let makers = scene.wave_makers.iter().zip(&answers);
+        for ((maker, answer), count) in makers.zip(&mut self.0) {
+            let off = answer.map_or(0.0, |answer| answer.displacement.abs());
+            *count += u32::from(maker.absorption.is_some() && off > AT_THE_END * maker.room());
+        }
+    }
+
+    /// What a user has to know of them, a sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let held = self.0.iter().enumerate().filter(|(_, count)| **count > 0);
+        held.map(|(k, count)| {
+            format!(
+                "wave_maker[{k}].absorption.room: the wall was at its end in {count} frames and threw waves back; give it more"
+            )
+        })
+        .collect()
+    }
+}

@@ -1,0 +1,188 @@
+//! Wave makers that take in waves: what they leave of a tank's sloshing, and where they stand in a cache.
+
+use glam::{DVec2, DVec3};
+use swell::{
+    cache::CacheReader,
+    domain::{answer::Answer, bounds::Bounds, probe::elevation},
+};
+
+use crate::support::job::Job;
+
+/// A step of water that sloshes to and fro between walls 0.9 m apart: kh = π · 0.4 / 0.9 and 1.14 s of the longest wave. 48
+/// frames are 1.75 of them.
+const TANK: &str = r#"
+[shot]
+name = "tank"
+frames = 48
+frames_per_second = 24
+[domain]
+min = [0.0, 0.0, 0.0]
+max = [1.0, 0.8, 0.15]
+[[water.block]]
+min = [0.0, 0.0, 0.0]
+max = [0.45, 0.425, 0.15]
+[[water.block]]
+min = [0.45, 0.0, 0.0]
+max = [1.0, 0.375, 0.15]
+[[wave_maker]]
+wall = "+x"
+motion = { kind = "still" }
+absorption = { depth = 0.4, period = 1.14, room = 0.1 }
+[solver]
+method = "flip"
+[solver.flip]
+cell_size = 0.05
+[solver.pbf]
+particle_spacing = 0.025
+grid_projection = true
+"#;
+
+/// The same between walls that stand.
+const WALLED: &str =
+    "--set wave_maker=[] --set domain.max=[0.9,0.8,0.15] --set water.block.1.max=[0.9,0.375,0.15]";
+
+/// What the one wall does after each frame, as the ledger has it.
+fn answers(reader: &CacheReader) -> Vec<Option<Answer>> {
+    let entries = reader.entries().iter();
+    entries.map(|entry| entry.clock.walls[0]).collect()
+}
+
+/// Root mean square of the difference between the levels at both ends in the last 1.1 s, metres.
+fn sloshing(reader: &CacheReader) -> f64 {
+    let domain = Bounds {
+        min: DVec3::ZERO,
+        max: DVec3::new(1.0, 0.8, 0.15),
+    };
+    let last = reader.last_frame();
+    let squares: Vec<f64> = (last - 26..=last)
+        .map(|frame| {
+            let state = reader.read(frame).unwrap();
+            let at = |x: f64| elevation(&state, 0.025, &domain, DVec2::new(x, 0.075));
+            (at(0.1).expect("water") - at(0.75).expect("water")).powi(2)
+        })
+        .collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+/// The wave is at the wall once within the first second; a wall that stands throws it back.
+#[test]
+fn sloshing_is_taken_out_by_a_wall_that_absorbs() {
+    let job = Job::of(&[("tank.toml", TANK)]);
+    for solver in ["flip", "pbf"] {
+        let bake = format!("bake tank.toml --solver {solver}");
+        let said = job.expect(0, &format!("{bake} -o {solver}"));
+        assert!(!said.contains("absorption.room"), "{said}");
+        job.expect(0, &format!("{bake} {WALLED} -o {solver}-walled"));
+        let [absorbed, walled] = ["", "-walled"].map(|which| {
+            sloshing(&CacheReader::open(&job.path(&format!("{solver}{which}"))).unwrap())
+        });
+        println!("{solver}: {absorbed} of {walled}");
+        // Negative control: between walls that stand, it goes on.
+        assert!(walled > 0.01, "{solver}: {walled}");
+        // A step has waves of all periods, of which the wall is tuned to the longest.
+        assert!(absorbed < 0.4 * walled, "{solver}: {absorbed} of {walled}");
+    }
+}
+
+#[test]
+fn a_wall_without_room_says_so() {
+    let job = Job::of(&[("tank.toml", TANK)]);
+    let small = "--frames 1-20 --set wave_maker.0.absorption.room=0.002";
+    let said = job.expect(0, &format!("bake tank.toml {small} -o small"));
+    assert!(
+        said.contains("wave_maker[0].absorption.room: the wall was at its end in"),
+        "{said}"
+    );
+}
+
+/// The wall's place is a state of its own: resumed, begun from a frame and checked, it goes on from there.
+#[test]
+fn a_bake_goes_on_with_the_wall_where_it_stood() {
+    let job = Job::of(&[("tank.toml", TANK)]);
+    for (solver, device) in [
+        ("flip", "gpu"),
+        ("pbf", "gpu"),
+        ("flip", "cpu"),
+        ("pbf", "cpu"),
+    ] {
+        let name = format!("{solver}-{device}");
+        let bake = format!("bake tank.toml --solver {solver} --device {device}");
+        job.expect(0, &format!("{bake} --frames 1-12 -o {name}"));
+        let reader = CacheReader::open(&job.path(&name)).unwrap();
+        let whole = answers(&reader);
+        assert_eq!(whole[0], None);
+        let at_eight = whole[8].expect("it absorbs");
+        assert!(at_eight.displacement.abs() > 1e-3, "{at_eight:?}");
+
+        job.expect(0, &format!("{bake} --frames 1-8 -o {name}-parts"));
+        job.expect(0, &format!("{bake} --frames 1-12 --resume -o {name}-parts"));
+        assert_eq!(job.hash(&format!("{name}-parts")), job.hash(&name));
+        job.expect(
+            0,
+            &format!("{bake} --frames 9-12 --from {name}:8 -o {name}-branch"),
+        );
+        let branch = CacheReader::open(&job.path(&format!("{name}-branch"))).unwrap();
+        for frame in 8..=12 {
+            let [there, here] = [&branch, &reader].map(|reader| reader.read(frame).unwrap());
+            assert_eq!(there, here, "{name} {frame}");
+        }
+        if device == "gpu" {
+            job.expect(0, &format!("check {name} --frames 8-9"));
+        }
+    }
+    // Both devices have the wall at one place, but for what rounding makes of a level.
+    for solver in ["flip", "pbf"] {
+        let [gpu, cpu] = ["gpu", "cpu"].map(|device| {
+            let reader = CacheReader::open(&job.path(&format!("{solver}-{device}"))).unwrap();
+            answers(&reader)[8].unwrap().displacement
+        });
+        assert!(
+            (gpu - cpu).abs() < 0.02 * gpu.abs(),
+            "{solver}: {gpu} {cpu}"
+        );
+    }
+}
+
+/// Without absorption no line of the ledger names a wall.
+#[test]
+fn other_caches_have_no_byte_of_it() {
+    let job = Job::of(&[("tank.toml", TANK)]);
+    job.expect(0, &format!("bake tank.toml --frames 1-2 {WALLED} -o plain"));
+    job.expect(0, "bake tank.toml --frames 1-2 -o absorbs");
+    let ledger =
+        |cache: &str| std::fs::read_to_string(job.path(cache).join("frames.jsonl")).unwrap();
+    assert!(!ledger("plain").contains("walls"));
+    assert!(ledger("absorbs").contains("\"walls\""));
+}
+
+#[test]
+fn walls_that_cannot_absorb_are_refused_with_their_key() {
+    let job = Job::of(&[("tank.toml", TANK)]);
+    job.expect(0, "inspect tank.toml");
+    for (set, words) in [
+        (
+            "wave_maker.0.wall=+y",
+            "wave_maker[0].absorption: a wall absorbs by",
+        ),
+        (
+            "water.gravity=[1,-9,0]",
+            "wave_maker[0].absorption: a wall absorbs by",
+        ),
+        ("shot.frames_per_second=5", "raise shot.frames_per_second"),
+        (
+            "wave_maker.0.absorption.room=0.6",
+            "wave_maker[0].motion: the wall +x crosses",
+        ),
+        (
+            "wave_maker=[{wall=\"+x\",motion={kind=\"still\"}}]",
+            "wave_maker[0].motion.kind: a wall that makes no waves and takes none in",
+        ),
+        (
+            "wave_maker.0.absorption.gain=1",
+            "wave_maker[0].absorption.gain",
+        ),
+    ] {
+        let said = job.expect(2, &format!("inspect tank.toml --set {set}"));
+        assert!(said.contains(words), "{set}: {said}");
+    }
+}
