@@ -97,23 +97,27 @@ impl Absorption {
             (level - self.own_level(motion, now)).clamp(-most, most)
         });
         let Some(before) = before else {
-            // What the water stands at before there are waves.
-            let level = over.unwrap_or_default();
             return Answer {
                 start: now,
                 displacement: 0.0,
                 velocity: 0.0,
                 acceleration: 0.0,
-                level,
-                mean: level,
+                level: over,
+                mean: over.unwrap_or_default(),
             };
         };
-        let level = over.unwrap_or(before.level);
         let Asked { period, room, .. } = self.asked;
         let memory = MEMORY * period;
-        let mean = before.mean - (level - before.mean) * (-seconds / memory).exp_m1();
-        let rate = (level - before.level) / seconds;
-        let foreseen = level - mean + (seconds - self.lag) * rate;
+        let (mean, foreseen) = match (before.level, over) {
+            (Some(last), Some(level)) => {
+                let mean = before.mean - (level - before.mean) * (-seconds / memory).exp_m1();
+                let rate = (level - last) / seconds;
+                (mean, level - mean + (seconds - self.lag) * rate)
+            }
+            // The first water that comes is what later waves are told by.
+            (None, Some(level)) => (level, 0.0),
+            (_, None) => (before.mean, 0.0),
+        };
         let (displacement, velocity) = before.state(now);
         let wanted = -self.gain * foreseen - displacement / memory;
         // Where it is when it has slowed down again over as many seconds.
@@ -124,7 +128,7 @@ impl Absorption {
             displacement,
             velocity,
             acceleration: (wanted - velocity) / seconds,
-            level,
+            level: over,
             mean,
         }
     }
@@ -314,6 +318,25 @@ mod tests {
         }
         // It gets to the end of its room, where without it it would go 0.4 m.
         assert!((0.049..0.0501).contains(&farthest), "{farthest}");
+    }
+
+    /// A wall on dry ground is at rest, and water that comes is no trough of still water that was never there.
+    #[test]
+    fn the_first_water_at_a_dry_wall_is_no_wave() {
+        let wall = absorption(2.0);
+        let run = |wet: f64, wave: f64| {
+            let (mut before, mut fastest) = (None, 0.0f64);
+            for k in 0..200 {
+                let now = f64::from(k) * SECONDS;
+                let level = (k >= 100).then_some(wet + if k >= 150 { wave } else { 0.0 });
+                let answer = wall.answer(&Motion::Still, before.as_ref(), (now, SECONDS), level);
+                fastest = fastest.max(answer.state(now + SECONDS).1.abs());
+                before = Some(answer);
+            }
+            fastest
+        };
+        assert_eq!(run(-0.4, 0.0), 0.0);
+        assert!(run(-0.4, 0.1) > 0.1);
     }
 
     /// Still water that stands higher or lower than was said is no wave.

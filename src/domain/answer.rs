@@ -17,9 +17,10 @@ pub struct Answer {
     pub velocity: f64,
     /// From then on, m/s² inward.
     pub acceleration: f64,
-    /// By how much the water beside the wall then stood over what the wall's own waves have there, metres.
-    pub level: f64,
-    /// What that was on the mean, metres.
+    /// By how much the water beside the wall then stood over what the wall's own waves have there, metres; `None` where there was
+    /// none.
+    pub level: Option<f64>,
+    /// What that was on the mean since there was water, metres.
     pub mean: f64,
 }
 

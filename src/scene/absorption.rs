@@ -82,6 +82,28 @@ impl Scene {
         scene
     }
 
+    /// Answers of the walls of another scene, as this scene's walls have them: by wall, of those that absorb here too; and why
+    /// one of them has none, a sentence each.
+    pub fn carried(&self, other: &Self, answers: &Answers) -> (Answers, Vec<String>) {
+        let (mut carried, mut notes) = (Answers::default(), Vec::new());
+        for ((k, maker), answer) in self.wave_makers.iter().enumerate().zip(&mut carried) {
+            let mut theirs = other.wave_makers.iter().zip(answers);
+            let theirs = theirs.find(|(their, _)| their.wall == maker.wall);
+            let Some(found) = theirs.and_then(|(_, answer)| *answer) else {
+                continue;
+            };
+            match &maker.absorption {
+                Some(it) if found.displacement.abs() <= it.asked().room => *answer = Some(found),
+                _ => notes.push(format!(
+                    "wave_maker[{k}]: the wall {} was {} m off its own way and begins on it",
+                    maker.wall.name(),
+                    shown(found.displacement)
+                )),
+            }
+        }
+        (carried, notes)
+    }
+
     /// Takes over what walls that absorb do after a state.
     pub fn take_answers(&mut self, state: &Particles) {
         self.answers = self.answers_in(state);

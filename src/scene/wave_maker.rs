@@ -51,7 +51,8 @@ pub(super) fn build_all(
         }
         let motion = motion(doc, &place, around.base_dir, &spec.motion, around.gravity)?;
         if let Motion::Sea(sea) = &motion {
-            let size = around.domain.size()[spec.wall.axis];
+            let rest = spec.absorption.as_ref().map_or(0.0, |it| it.room);
+            let size = around.domain.size()[spec.wall.axis] - rest;
             seas::check(doc, &place, sea, (size, around.spacing))?;
         }
         regular_waves::check_length(doc, &place, &motion, around.spacing)?;
@@ -85,6 +86,10 @@ fn check_room(
     let room = size - around.least_gap;
     let duration = around.shot.duration();
     let reach = maker.farthest(duration);
+    let place = &match maker.room() {
+        0.0 => place.to_owned(),
+        _ => place.replace(".motion", ".absorption.room"),
+    };
     if reach > room {
         let problem = format!(
             "the wall {} crosses the whole domain: within the {} s of the shot it moves {} m of {} m",

@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     cache::{CacheError, CacheReader, Clock, Parent},
-    domain::{boundary::Boundary, bounds::Bounds, particles::Particles},
+    domain::{answer::Answers, boundary::Boundary, bounds::Bounds, particles::Particles},
     scene::{self, Scene, SceneError},
 };
 
@@ -138,7 +138,17 @@ impl Branch {
         check_keys(from, &cache, scene)?;
         let origin = cache.manifest().origin.into();
         let mut particles = cache.read(from.frame)?.about(origin, scene.origin);
-        let clock = entry.clock;
+        let mut clock = entry.clock;
+        let mut notes = Vec::new();
+        if clock.walls != Answers::default() {
+            let baked = super::baked_scene(&cache, &from.directory);
+            let baked = baked.map_err(|source| BranchError::Scene {
+                file: from.directory.clone(),
+                source,
+            })?;
+            (clock.walls, notes) = scene.carried(&baked, &clock.walls);
+            particles.walls = clock.walls;
+        }
         check_walls(from, clock, scene, &particles)?;
         let manifest = cache.manifest();
         let parent = Parent {
@@ -149,7 +159,6 @@ impl Branch {
             blake3: cache.frame_hash(from.frame)?.to_owned(),
             shaders: manifest.edited_shaders().map(str::to_owned),
         };
-        let mut notes = Vec::new();
         if origin != scene.origin {
             notes.push(
                 "positions are rounded about another origin: the domain is another".to_owned(),

@@ -1,6 +1,7 @@
 //! The loop that takes a scene from frame to frame, on a GPU or on the CPU: bakes, replays and experiments stand on it.
 
 use std::{
+    borrow::Cow,
     sync::atomic::{AtomicBool, Ordering},
     time::Instant,
 };
@@ -10,6 +11,7 @@ use glam::DVec3;
 use crate::{
     cache::ProbeValues,
     domain::{
+        answer::Answers,
         particles::Particles,
         signed_distance::SignedDistance,
         solver::{Solver, StepReport},
@@ -37,6 +39,8 @@ pub struct Drive<'a> {
     /// What the GPU was planned to hold and run; `None` on the CPU.
     plan: Option<Plan>,
     frame: u32,
+    /// What walls that absorb do from there on.
+    walls: Answers,
     /// Of the particle that enters next.
     next_id: u32,
     watch: Option<Watch<'a>>,
@@ -109,6 +113,7 @@ impl<'a> Drive<'a> {
             solver,
             plan,
             frame: 0,
+            walls: Answers::default(),
             next_id: 0,
             watch: None,
             pressure_points: Vec::new(),
@@ -125,6 +130,7 @@ impl<'a> Drive<'a> {
     pub fn load(&mut self, frame: u32, state: &Particles) -> Result<(), SolverError> {
         self.solver.load(frame, state)?;
         (self.frame, self.watch) = (frame, None);
+        self.walls = state.walls;
         self.next_id = self.first_id.max(next_after(state));
         Ok(())
     }
@@ -165,7 +171,8 @@ impl<'a> Drive<'a> {
     /// The device, the numbers, or a budget where frames are held against those.
     pub fn advance(&mut self) -> Result<Step, SolverError> {
         let begin = Instant::now();
-        let mut recorder = Recorder::new(self.scene, self.scene.shot.time(self.frame + 1));
+        let scene = self.standing();
+        let mut recorder = Recorder::new(&scene, self.scene.shot.time(self.frame + 1));
         let (mut particles, mut report) = match self.is_recorded {
             true => self.solver.advance_watched(&mut recorder)?,
             false => self.solver.advance()?,
@@ -181,6 +188,7 @@ impl<'a> Drive<'a> {
             _ => self.solver.pressures(&self.pressure_points)?,
         };
         self.frame += 1;
+        self.walls = particles.walls;
         report.exchange = self.exchange(&mut particles)?;
         Ok(Step {
             frame: self.frame,
@@ -191,6 +199,18 @@ impl<'a> Drive<'a> {
             looks: recorder.into_values(),
             seconds: begin.elapsed().as_secs_f64(),
         })
+    }
+
+    /// The scene with its walls where they stand: probes look at them while a frame is computed.
+    fn standing(&self) -> Cow<'a, Scene> {
+        if self.walls == Answers::default() || !self.is_recorded {
+            return Cow::Borrowed(self.scene);
+        }
+        let walls = self.walls;
+        Cow::Owned(self.scene.after(&Particles {
+            walls,
+            ..Particles::default()
+        }))
     }
 
     /// Lets water in and out at the frame's end, where the scene does that.

@@ -67,9 +67,14 @@ impl Start {
             &room,
             spacing,
         )?;
-        let mut particles = fill.particles;
+        let (mut particles, mut removed) = (fill.particles, fill.removed);
         for swarm in &scene.water.particles {
             for at in &swarm.at {
+                if room != scene.domain && !room.contains(*at) {
+                    // Behind a wall that rests inside of the domain.
+                    removed += 1;
+                    continue;
+                }
                 particles.id.push(particles.id.len() as u32);
                 particles.position.push(at.as_vec3().to_array());
                 particles.velocity.push(swarm.velocity.as_vec3().to_array());
@@ -81,7 +86,7 @@ impl Start {
         }
         Ok(Self {
             particles,
-            removed: fill.removed,
+            removed,
             boundary,
             sources: scene.sources()?,
         })

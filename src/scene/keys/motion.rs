@@ -147,7 +147,7 @@ pub(super) const WALL_MOTION: &[Key] = &[
         .unit("metres")
         .only("kind", &["focused"])
         .also(", inside of the domain")
-        .about("where the packet's crests meet, from the domain's face"),
+        .about("where the packet's crests meet, from where the wall is at the start"),
     Key::number("time", PERIOD)
         .unit("seconds")
         .only("kind", &["focused"])

@@ -3,7 +3,11 @@
 use glam::{DVec2, DVec3};
 use swell::{
     cache::CacheReader,
-    domain::{answer::Answer, bounds::Bounds, probe::elevation},
+    domain::{
+        answer::{Answer, Answers},
+        bounds::Bounds,
+        probe::elevation,
+    },
 };
 
 use crate::support::job::Job;
@@ -143,6 +147,90 @@ fn a_bake_goes_on_with_the_wall_where_it_stood() {
     }
 }
 
+/// A wall that cannot be where it was begins where the scene has it, and says so; by wall, in whatever order walls stand.
+#[test]
+fn a_branch_takes_answers_by_wall() {
+    let job = Job::of(&[("tank.toml", TANK)]);
+    job.expect(0, "bake tank.toml --frames 1-12 -o cache");
+    let first = |cache: &str| {
+        CacheReader::open(&job.path(cache)).unwrap().entries()[0]
+            .clock
+            .walls
+    };
+    let there = CacheReader::open(&job.path("cache")).unwrap();
+    let [still, ours] = [
+        r#"wall="-x",motion={kind="table",points=[[0,0],[9,0]]}"#,
+        r#"wall="+x",motion={kind="still"},absorption={depth=0.4,period=1.14,room=0.1}"#,
+    ];
+    let both = format!("--set wave_maker=[{{{still}}},{{{ours}}}]");
+    job.expect(
+        0,
+        &format!("bake tank.toml --frames 13-13 --from cache:12 {both} -o second"),
+    );
+    assert_eq!(first("second")[0], None);
+    assert_eq!(first("second")[1], there.entries()[12].clock.walls[0]);
+    let small = "--set wave_maker.0.absorption.room=0.001";
+    let said = job.expect(
+        0,
+        &format!("bake tank.toml --frames 13-13 --from cache:12 {small} -o small"),
+    );
+    assert!(
+        said.contains("wave_maker[0]: the wall +x was -0.0"),
+        "{said}"
+    );
+    assert!(said.contains("off its own way and begins on it"), "{said}");
+    assert_eq!(first("small"), Answers::default());
+}
+
+/// Water pushed against a wall that gives way as far as it can, to the domain's face.
+const PUSHED: &str = r#"
+[shot]
+name = "pushed"
+frames = 39
+frames_per_second = 24
+[domain]
+min = [0.0, 0.0, 0.0]
+max = [2.0, 1.0, 0.2]
+[[water.block]]
+min = [0.0, 0.0, 0.0]
+max = [2.0, 0.4, 0.2]
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "table", points = [[0.0, 0.0], [0.8, 0.4]] }
+[[wave_maker]]
+wall = "+x"
+motion = { kind = "still" }
+absorption = { depth = 0.4, period = 1.5, room = 0.3 }
+[[probe]]
+kind = "force"
+solid = "+x"
+[solver]
+method = "flip"
+[solver.flip]
+cell_size = 0.05
+"#;
+
+/// A force is read on the wall where it stands: here the same as of the domain's own face.
+#[test]
+fn forces_are_those_on_the_wall_where_it_stands() {
+    let job = Job::of(&[("pushed.toml", PUSHED)]);
+    job.expect(0, "bake pushed.toml --frames 1-38 -o cache");
+    let reader = CacheReader::open(&job.path("cache")).unwrap();
+    let answer = reader.entries()[38].clock.walls[1].unwrap();
+    assert!((answer.displacement + 0.3).abs() < 1e-9 && answer.velocity.abs() < 1e-9);
+    let bake = "bake pushed.toml --frames 39-39 --from cache:38";
+    let table = r#"wave_maker=[{wall="-x",motion={kind="table",points=[[0,0],[0.8,0.4]]}}]"#;
+    job.expect(0, &format!("{bake} -o absorbs"));
+    job.expect(0, &format!("{bake} --set {table} -o face"));
+    let [found, there] = ["absorbs", "face"].map(|cache| {
+        let reader = CacheReader::open(&job.path(cache)).unwrap();
+        reader.entry(39).unwrap().row("probes", 0)[0].expect("wet")
+    });
+    // On patches 0.3 m before the wall it was 195 N.
+    assert!((found / there - 1.0).abs() < 1e-3, "{found} N of {there}");
+    assert!(found > 210.0, "{found} N");
+}
+
 /// Without absorption no line of the ledger names a wall.
 #[test]
 fn other_caches_have_no_byte_of_it() {
@@ -171,7 +259,7 @@ fn walls_that_cannot_absorb_are_refused_with_their_key() {
         ("shot.frames_per_second=5", "raise shot.frames_per_second"),
         (
             "wave_maker.0.absorption.room=0.6",
-            "wave_maker[0].motion: the wall +x crosses",
+            "wave_maker[0].absorption.room: the wall +x crosses",
         ),
         (
             "wave_maker=[{wall=\"+x\",motion={kind=\"still\"}}]",
