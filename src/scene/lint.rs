@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::{Method, Scene, Wall, WaveMaker, words::shown};
 use crate::domain::{
+    bounds::Bounds,
     motion::{Motion, Phases, piston_height_ratio, wave_number},
     sources::Window,
 };
@@ -62,6 +63,12 @@ impl Scene {
         }
         if let Some(level) = level {
             self.lint_zones(level, &made, &mut lints);
+            for (k, maker) in self.wave_makers.iter().enumerate() {
+                if let Some(absorption) = &maker.absorption {
+                    let key = format!("wave_maker[{k}].absorption");
+                    lints.extend(lint_depth(&key, absorption.asked().depth, level));
+                }
+            }
         }
         self.lint_layers(level, &mut lints);
         self.lint_sources(&mut lints);
@@ -109,15 +116,8 @@ impl Scene {
         let Some(level) = level else {
             return;
         };
-        if let Some(depth) = waves.depth
-            && (depth / level - 1.0).abs() > DEPTH
-        {
-            lints.push(format!(
-                "{key}: depth is {} m, and the scene's water stands {} m deep, {:.2} times as much",
-                shown(depth),
-                shown(level),
-                level / depth
-            ));
+        if let Some(depth) = waves.depth {
+            lints.extend(lint_depth(key, depth, level));
         }
         let height = self.domain.size().y;
         if level + waves.crest > height {
@@ -204,6 +204,26 @@ impl Scene {
         };
         late(&mut emitters, lints);
         late(&mut drains, lints);
+        self.lint_rooms(lints);
+    }
+
+    /// Water that enters where a wall stands.
+    fn lint_rooms(&self, lints: &mut Vec<String>) {
+        for (index, emitter) in self.emitters.iter().enumerate() {
+            let Bounds { min, max } = emitter.shape.bounds();
+            for (k, maker) in self.wave_makers.iter().enumerate() {
+                let axis = maker.wall.axis;
+                let behind = match maker.wall.is_max {
+                    true => max[axis] - (self.domain.max[axis] - maker.room()),
+                    false => self.domain.min[axis] + maker.room() - min[axis],
+                };
+                if behind > 1e-6 {
+                    lints.push(format!(
+                        "emitter[{index}]: {behind:.3} m of its room are behind wave_maker[{k}] at rest, and nothing enters there"
+                    ));
+                }
+            }
+        }
     }
 
     /// Zones that are short beside the waves that they are for, or that the scene makes.
@@ -254,6 +274,18 @@ impl Scene {
             ));
         }
     }
+}
+
+/// A depth that theory is told and the water does not have.
+fn lint_depth(key: &str, depth: f64, level: f64) -> Option<String> {
+    ((depth / level - 1.0).abs() > DEPTH).then(|| {
+        format!(
+            "{key}: depth is {} m, and the scene's water stands {} m deep, {:.2} times as much",
+            shown(depth),
+            shown(level),
+            level / depth
+        )
+    })
 }
 
 /// The waves of the `index`-th wave maker, where its motion makes waves of a height that theory knows.
@@ -377,6 +409,10 @@ particle_spacing = 0.04
         };
         let room = "min=[1.0,1.0,0.0],max=[2.0,2.0,1.0]";
         let emitter = |more: &str| format!("emitter=[{{{room},velocity=[1.0,0.0,0.0],{more}}}]");
+        let absorbing = |asked: &str| {
+            let still = "wall=\"-x\",motion={kind=\"still\"}";
+            format!("wave_maker=[{{{still},absorption={{{asked}}}}}]")
+        };
         let drain = |more: &str| format!("drain=[{{{room},{more}}}]");
         for (set, good, expected) in [
             (
@@ -457,6 +493,22 @@ particle_spacing = 0.04
                 vec![emitter("from=5.0")],
                 vec![emitter("from=4.9")],
                 "emitter[0].from: it begins after 5 s, and the shot ends after 5 s",
+            ),
+            (
+                vec![absorbing("depth=1.2,period=2.3,room=0.2")],
+                vec![absorbing("depth=1.05,period=2.3,room=0.2")],
+                "wave_maker[0].absorption: depth is 1.2 m, and the scene's water stands 1 m deep, 0.83 times as much",
+            ),
+            (
+                vec![
+                    absorbing("depth=1.0,period=2.3,room=1.2"),
+                    emitter("from=1.0"),
+                ],
+                vec![
+                    absorbing("depth=1.0,period=2.3,room=0.9"),
+                    emitter("from=1.0"),
+                ],
+                "emitter[0]: 0.200 m of its room are behind wave_maker[0] at rest",
             ),
             (
                 vec![drain("from=6.0")],
