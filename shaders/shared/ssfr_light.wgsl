@@ -138,3 +138,17 @@ fn hazed(colour: vec3f, distance: f32, direction: vec3f) -> vec3f {
     let level = normalize(vec3f(direction.x, 0.0, direction.z) + vec3f(1e-4, 0.0, 0.0));
     return mix(sky_radiance(vec3f(level.x, 0.02, level.z)), colour, kept);
 }
+
+// Light that enters water or foam through a surface of this normal and is scattered, per unit albedo.
+fn diffuse_light(position: vec3f, n: vec3f) -> vec3f {
+    let sun = shading.sun_irradiance * max(dot(n, shading.sun_direction), 0.0)
+        * sunlit(position, vec3f(0.0, 1.0, 0.0));
+    return (sun + sky_irradiance(n)) / PI;
+}
+
+// Diffuse reflectance of deep water of that single-scattering albedo (Hapke 1981, equation 38).
+fn deep_albedo() -> vec3f {
+    let extinction = shading.absorption + shading.scattering;
+    let g = sqrt(shading.absorption / max(extinction, vec3f(1e-6)));
+    return select(vec3f(0.0), (1.0 - g) / (1.0 + g), extinction > vec3f(0.0));
+}

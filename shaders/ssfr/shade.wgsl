@@ -1,19 +1,15 @@
 // One sample of the picture: sky, ground and solids, and the water before them. With AOVS, the channels
 // that stand beside the picture instead.
 #import "shared/camera.wgsl"
-#import "shared/ssfr_splat.wgsl"
+#import "shared/ssfr_band.wgsl"
+#import "shared/ssfr_half.wgsl"
 #import "shared/ssfr_solid.wgsl"
 #import "shared/ssfr_optics.wgsl"
 #import "shared/ssfr_light.wgsl"
-#import "shared/ssfr_ripple.wgsl"
-
-struct Band {
-    // First picture row of this band, and how many.
-    row: u32,
-    rows: u32,
-    pad0: u32,
-    pad1: u32,
-}
+#import "shared/ssfr_facet.wgsl"
+#ifdef AOVS
+#import "shared/ssfr_aovs.wgsl"
+#endif
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<uniform> shading: Shading;
@@ -73,27 +69,6 @@ fn surface_normal(pixel: vec2i, z: f32) -> vec3f {
         return -normalize(ray);
     }
     return normalize(select(n, -n, dot(n, ray) > 0.0));
-}
-
-fn half_load(words: ptr<function, vec4u>, part: vec2f) -> f32 {
-    let v = vec4f(*words) / THICKNESS_SCALE;
-    return mix(mix(v.x, v.y, part.x), mix(v.z, v.w, part.x), part.y);
-}
-
-struct HalfTap {
-    at: vec4u,
-    part: vec2f,
-}
-
-// The four half-resolution cells about a padded pixel position.
-fn half_tap(position: vec2f) -> HalfTap {
-    let size = vec2i(camera.size / 2u);
-    let p = position * 0.5 - 0.5;
-    let base = vec2i(floor(p));
-    let a = clamp(base, vec2i(0), size - 1);
-    let b = clamp(base + 1, vec2i(0), size - 1);
-    let at = vec4u(vec4i(a.y * size.x + a.x, a.y * size.x + b.x, b.y * size.x + a.x, b.y * size.x + b.x));
-    return HalfTap(at, p - floor(p));
 }
 
 fn thickness_at(position: vec2f) -> f32 {
@@ -209,13 +184,6 @@ fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32) -> March {
     return March(high, u32(pixel.y) * camera.size.x + u32(pixel.x), q);
 }
 
-// Light that enters water or foam through a surface of this normal and is scattered, per unit albedo.
-fn diffuse_light(position: vec3f, n: vec3f) -> vec3f {
-    let sun = shading.sun_irradiance * max(dot(n, shading.sun_direction), 0.0)
-        * sunlit(position, vec3f(0.0, 1.0, 0.0));
-    return (sun + sky_irradiance(n)) / PI;
-}
-
 struct Water {
     position: vec3f,
     eye: vec3f,
@@ -271,10 +239,7 @@ fn transmitted(water: Water, pixel: vec2i, straight: Behind) -> vec3f {
     }
     let extinction = shading.absorption + shading.scattering;
     let clear = exp(-extinction * way);
-    // Diffuse reflectance of a deep medium of that single-scattering albedo (Hapke 1981, equation 38).
-    let g = sqrt(shading.absorption / max(extinction, vec3f(1e-6)));
-    let body = select(vec3f(0.0), (1.0 - g) / (1.0 + g), extinction > vec3f(0.0));
-    return light * clear + diffuse_light(water.position, water.normal) * body * (1.0 - clear);
+    return light * clear + diffuse_light(water.position, water.normal) * deep_albedo() * (1.0 - clear);
 }
 
 fn shade_water(pixel: vec2i, z: f32, ray: vec3f, view: vec3f, straight: Behind) -> vec3f {
@@ -282,46 +247,17 @@ fn shade_water(pixel: vec2i, z: f32, ray: vec3f, view: vec3f, straight: Behind) 
     let position = world_from_eye(camera, eye);
     var normal = world_direction(camera, surface_normal(pixel, z));
     let footprint = z / camera.focal / max(dot(normal, view), 0.1);
-    let ripple = ripple_at(
-        position.xz, camera.clock, shading.ripple.x, shading.ripple.y, footprint);
-    // Ripples ride on what faces up.
-    let rides = smoothstep(0.2, 0.8, normal.y);
-    normal = normalize(normal - vec3f(ripple.slope.x, 0.0, ripple.slope.y) * rides);
+    let facet = facet_at(position, normal, footprint);
     // No facet that is seen faces away.
-    let facing = dot(normal, view);
-    normal = normalize(normal + view * max(0.03 - facing, 0.0) * 1.5);
-    let variance = shading.roughness * shading.roughness + ripple.lost * rides;
-    let water = Water(position, eye, normal, view, variance);
+    normal = normalize(facet.normal + view * max(0.03 - dot(facet.normal, view), 0.0) * 1.5);
+    let water = Water(position, eye, normal, view, facet.variance);
 
     let reflectance = fresnel(clamp(dot(normal, view), 0.0, 1.0), shading.index);
     let sun = shading.sun_irradiance * sunlit(position, vec3f(0.0, 1.0, 0.0))
-        * glitter(normal, view, shading.sun_direction, variance, shading.index);
+        * glitter(normal, view, shading.sun_direction, facet.variance, shading.index);
     return reflectance * mirrored(water) + (1.0 - reflectance) * transmitted(water, pixel, straight)
         + sun;
 }
-
-#ifdef AOVS
-// Where `next`, in the eye space of the next frame, stands in its picture less where `pixel` is, in pixels; rightward and
-// upward are positive, as motion vectors are counted in compositing (rows of the picture are counted downward).
-fn motion_to(next: vec3f, pixel: vec2i) -> vec2f {
-    let shift = project(next_camera, vec3f(next.xy, max(next.z, 1e-3))) - (vec2f(pixel) + 0.5);
-    return vec2f(shift.x, -shift.y);
-}
-
-fn store(at: u32, depth: f32, normal: vec3f, position: vec3f, motion: vec2f, through: f32) {
-    let base = 10u * at;
-    output[base] = depth;
-    output[base + 1u] = normal.x;
-    output[base + 2u] = normal.y;
-    output[base + 3u] = normal.z;
-    output[base + 4u] = position.x;
-    output[base + 5u] = position.y;
-    output[base + 6u] = position.z;
-    output[base + 7u] = motion.x;
-    output[base + 8u] = motion.y;
-    output[base + 9u] = through;
-}
-#endif
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -351,14 +287,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         store(out, z, normal, position, motion, through);
         return;
     }
-    // The sky is infinitely far: only where the next camera looks moves it, not where it stands.
-    let sky_next = vec3f(
-        dot(direction, next_camera.right),
-        dot(direction, next_camera.up),
-        dot(direction, next_camera.forward),
-    );
     let seen = straight.depth < 0.1 * FAR;
-    let next = select(sky_next, eye_from_world(next_camera, straight.surface.position), seen);
+    let next = select(sky_in_next(direction), eye_from_world(next_camera, straight.surface.position), seen);
     let motion = motion_to(next, pixel);
     store(out, straight.depth, straight.surface.normal, straight.surface.position, motion, through);
 #else

@@ -52,6 +52,18 @@ impl Bvh {
         }
     }
 
+    /// Its boxes for other walks: least and greatest corner, first entry of a leaf or right child of an inner node (whose left one
+    /// follows it), entries of a leaf or 0.
+    pub fn boxes(&self) -> impl Iterator<Item = ([DVec3; 2], u32, u32)> {
+        let nodes = self.nodes.iter();
+        nodes.map(|node| ([node.min, node.max], node.first_or_right, node.count))
+    }
+
+    /// Index in the mesh of each entry of the leaves.
+    pub fn entries(&self) -> &[u32] {
+        &self.index
+    }
+
     /// Distance in metres to the nearest triangle, and its index in the mesh; `None` where none
     /// is nearer than `bound`.
     pub fn nearest(&self, p: DVec3, bound: f64) -> Option<(f64, u32)> {

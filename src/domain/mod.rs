@@ -15,6 +15,7 @@ pub mod gauge;
 pub mod holes;
 pub mod inside;
 pub mod keep;
+pub mod level_set;
 pub mod mesh;
 pub mod mesh_file;
 pub mod motion;

@@ -1,8 +1,8 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Shading, Thickness, Tile, Triangle,
-    Whitewater, WhitewaterParams,
+    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Rays, SetNode, Shading, Thickness, Tile,
+    Triangle, Whitewater, WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
 
@@ -51,6 +51,19 @@ pub(super) const FLOW: Buf<Flow> = Buf::uniform("flow");
 pub(super) const FLOW_LEVELS: Windows<FlowLevel> = Windows::new("level", "flow_levels");
 /// Settings of the narrow-range filter, of each axis.
 pub(super) const NARROW_RANGE: Windows<Narrow> = Windows::new("params", "narrow_range");
+
+/// Box, bricks and set of the rays.
+pub(super) const RAYS: Buf<Rays> = Buf::uniform("rays");
+/// What the level set says of each brick.
+pub(super) const LEVEL_TABLE: Buf<u32> = Buf::new("level_table");
+/// Its values, brick by brick.
+pub(super) const LEVEL_VALUES: Buf<f32> = Buf::new("level_values");
+/// Metres that sunlight has gone through water, on a coarse lattice.
+pub(super) const SUN_PATHS: Buf<f32> = Buf::new("sun_paths");
+/// Tree over what is opaque.
+pub(super) const SET_NODES: Buf<SetNode> = Buf::new("set_nodes");
+/// Its triangles, leaf by leaf.
+pub(super) const SET_TRIANGLES: Buf<Triangle> = Buf::new("set_triangles");
 
 /// Rows of each band of the picture.
 pub(super) const BANDS: Windows<Band> = Windows::new("band", "bands");

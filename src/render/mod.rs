@@ -13,6 +13,7 @@ mod frame;
 pub mod image;
 mod lighting;
 mod plan;
+mod rays;
 mod renderer;
 mod set;
 mod sky;

@@ -175,7 +175,9 @@ impl Plan {
     /// Lays out what [`Self::fill`] was asked for; after the last of them.
     pub(super) fn end_fills(&mut self) {
         let fills = std::mem::take(&mut self.fills);
-        self.windows(&FILLS, &fills);
+        if !fills.is_empty() {
+            self.windows(&FILLS, &fills);
+        }
     }
 }
 
@@ -301,7 +303,13 @@ mod tests {
                 sizes.insert(plan.bytes());
             }
         }
-        assert_eq!(sizes.len(), 6, "each look takes what it needs: {sizes:?}");
+        const RAYS: &str = "[renderer]\nmethod = \"ray\"\n";
+        for more in ["", depth_alone, ALL] {
+            let plan = plan("curvature_flow", &format!("{RAYS}{more}"));
+            assert_eq!(used(&plan), planned(&plan), "rays {more}");
+            sizes.insert(plan.bytes());
+        }
+        assert_eq!(sizes.len(), 9, "each look takes what it needs: {sizes:?}");
         // Controls: a buffer that nothing uses, and a command whose buffer is not planned.
         let mut spare = plan("narrow_range", "");
         spare.buffer(&crate::render::buffers::SPRAY, 1);

@@ -154,17 +154,13 @@ const SHADOW: RasterSpec = RasterSpec {
     compare: CompareFunction::Less,
 };
 
-/// Plans the shadow map, drawn once since solids do not move, and gives what draws the solids into the frame's buffers,
-/// tile by tile. Without solids the map is one texel that shades nothing.
-pub(super) fn plan_solids(
+/// Plans the shadow map, and gives what draws it: once, since solids do not move. Without solids it is one texel that shades nothing.
+pub(super) fn plan_shadow(
     plan: &mut Plan,
     triangles: &[Triangle],
     shadow_from_world: &Mat4,
     limits: &Limits,
-) -> Vec<Command> {
-    let pixels = plan.extent.pixels();
-    plan.buffer(&SOLID_DEPTH, pixels);
-    plan.buffer(&SOLID_PACKED, pixels);
+) -> Command {
     let side = match triangles.is_empty() {
         true => 1,
         false => SHADOW_SIZE.min(limits.texture),
@@ -180,18 +176,31 @@ pub(super) fn plan_solids(
         is_kept: true,
     };
     if triangles.is_empty() {
-        plan.once.push(Command::ClearDepth(shadow_map));
-        return vec![plan.fill(&SOLID_DEPTH, FAR.to_bits(), pixels)];
+        return Command::ClearDepth(shadow_map);
     }
     plan.values(&TRIANGLES, triangles);
     plan.values(&SHADOW_FROM_WORLD, &[shadow_from_world.to_cols_array_2d()]);
-    plan.once.push(Command::Draw(Draw {
+    Command::Draw(Draw {
         raster: SHADOW,
         binds: Vec::new(),
         vertices: 3 * triangles.len() as u32,
         colours: Vec::new(),
         depth: shadow_map,
-    }));
+    })
+}
+
+/// Plans what draws the solids into the frame's buffers, tile by tile.
+pub(super) fn plan_solids(
+    plan: &mut Plan,
+    triangles: &[Triangle],
+    limits: &Limits,
+) -> Vec<Command> {
+    let pixels = plan.extent.pixels();
+    plan.buffer(&SOLID_DEPTH, pixels);
+    plan.buffer(&SOLID_PACKED, pixels);
+    if triangles.is_empty() {
+        return vec![plan.fill(&SOLID_DEPTH, FAR.to_bits(), pixels)];
+    }
     let mut tiles = Vec::new();
     let [width, height] = plan.extent.size;
     for y in (0..height).step_by(limits.tile as usize) {

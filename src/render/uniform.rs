@@ -157,12 +157,38 @@ mirror!(
 );
 
 mirror!(
-    /// `Band` of ssfr/shade.wgsl.
+    /// `Band` of shared/ssfr_band.wgsl.
     Band {
         row: u32,
         rows: u32,
         pad0: u32,
         pad1: u32,
+    }
+);
+
+mirror!(
+    /// `Rays` of shared/rays_water.wgsl.
+    Rays {
+        size: [f32; 3],
+        voxel: f32,
+        bricks: [u32; 3],
+        triangles: u32,
+        nodes: [u32; 3],
+        pitch: f32,
+        walls: u32,
+        pad0: u32,
+        pad1: u32,
+        pad2: u32,
+    }
+);
+
+mirror!(
+    /// `SetNode` of shared/rays_set.wgsl.
+    SetNode {
+        min: [f32; 3],
+        first_or_right: u32,
+        max: [f32; 3],
+        count: u32,
     }
 );
 
@@ -182,5 +208,7 @@ pub fn mirrors() -> Vec<Layout> {
         WhitewaterParams::layout(),
         Tile::layout(),
         Band::layout(),
+        Rays::layout(),
+        SetNode::layout(),
     ]
 }

@@ -15,8 +15,8 @@ use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 pub(super) use keys::KEYS;
 pub use spec::{
     AovSpec, BasinSpec, CameraSpec, FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LookSpec,
-    OutputSpec, RippleSpec, SkySpec, SpraySpec, SunSpec, SurfaceSpec, TransformSpec, ViewSpec,
-    WaterSpec, WhitewaterLook, WindowsSpec,
+    MethodSpec, OutputSpec, RendererSpec, RippleSpec, SkySpec, SpraySpec, SunSpec, SurfaceSpec,
+    TransformSpec, ViewSpec, WaterSpec, WhitewaterLook, WindowsSpec,
 };
 
 /// Why a look cannot be used.
@@ -145,8 +145,10 @@ fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
     }
-    // A look without whitewater has the hash that it had before there was any.
-    let text = format!("{canonical:?}").replace("whitewater: None, ", "");
+    // A look that does without has the hash that it had before there were whitewater and rays.
+    let text = format!("{canonical:?}")
+        .replace("whitewater: None, ", "")
+        .replace("renderer: RendererSpec { method: Ssfr }, ", "");
     hasher.update(text.as_bytes());
     if let Some(bytes) = panorama {
         hasher.update(blake3::hash(bytes).as_bytes());

@@ -1,24 +1,31 @@
 //! A plan from a look and a scene.
 
-use super::{shade::plan_shade, splats::plan_splats};
+use super::{
+    shade::{plan_cast, plan_shade},
+    splats::{plan_body, plan_owner, plan_owner_before_rays, plan_particles, plan_spray},
+};
 use crate::{
     render::{
         RenderError, RenderScene,
-        buffers::{CAMERA, DEPTHS, NEXT_CAMERA, SHADING},
+        buffers::{CAMERA, DEPTHS, NEXT_CAMERA, SHADING, SOLID_DEPTH},
         camera::longest_focal_px,
         frame::{Extent, bands},
         lighting::{plan_light, shading},
         plan::{Limits, Plan},
-        set::{plan_solids, shadow_from_world, triangles},
+        rays::{first, plan_rays},
+        set::{plan_shadow, plan_solids, shadow_from_world, triangles},
         sky::Sky,
         surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
+        uniform::Triangle,
     },
-    scene::look::{FilterSpec, Look},
+    scene::look::{AovSpec, FilterSpec, Look, MethodSpec},
 };
 
 /// Splat radius over particle spacing where the look leaves it out: 0.5 √3 closes a lattice seen along its
 /// diagonal.
 const RADIUS: f64 = 0.87;
+/// Pixels that rays are cast for in one dispatch, so that none runs long enough to lose a device.
+const CAST: u32 = 1 << 17;
 /// Smoothing width over particle spacing where the look leaves it out.
 const SMOOTHING: f64 = 1.6;
 
@@ -38,9 +45,13 @@ impl Plan {
         let has_aovs = !spec.output.aovs.is_empty();
         let extent = Extent::new(spec.image.width, spec.image.height);
         let radius = (spec.surface.radius_m).unwrap_or(RADIUS * scene.particle_spacing);
+        let rows = match spec.renderer.method {
+            MethodSpec::Ssfr => limits.tile,
+            MethodSpec::Ray => limits.tile.min((CAST / extent.picture[0]).max(1)),
+        };
         let mut plan = Self {
             extent,
-            bands: bands(&extent, has_aovs, limits.storage, limits.tile),
+            bands: bands(&extent, has_aovs, limits.storage, rows),
             radius,
             ..Self::default()
         };
@@ -48,34 +59,86 @@ impl Plan {
         if has_aovs {
             plan.buffer(&NEXT_CAMERA, 1);
         }
-        for depth in &DEPTHS {
-            plan.buffer(depth, extent.pixels());
-        }
         let opaque = triangles(look, scene)?;
         let matrix = shadow_from_world(&opaque, scene.domain.size(), look.sun_direction());
         let sky = Sky::new(look, limits.texture)?;
         plan_light(&mut plan, &sky);
         let light = shading(look, &sky, matrix.to_cols_array_2d());
         plan.values(&SHADING, &[light]);
-        let solids = plan_solids(&mut plan, &opaque, &matrix, limits);
-        let Smoothing { commands, surface } = smoothing(&mut plan, look, scene);
-        let spacing = scene.particle_spacing;
-        let splats = plan_splats(&mut plan, look, room(particles), spacing, radius, &surface);
-        let shade = plan_shade(&mut plan, look, &surface);
-        plan.end_fills();
-        if has_aovs {
-            let splats = [splats.body.clone(), splats.owner];
-            let all = [
-                solids.clone(),
-                splats.concat(),
-                commands.clone(),
-                shade.aovs,
-            ];
-            plan.aovs = all.concat();
+        let shadow = plan_shadow(&mut plan, &opaque, &matrix, limits);
+        plan.once.push(shadow);
+        let particles = room(particles);
+        match spec.renderer.method {
+            MethodSpec::Ssfr => plan_ssfr(&mut plan, look, scene, (&opaque, particles), limits),
+            MethodSpec::Ray => plan_ray(&mut plan, look, scene, (&opaque, particles)),
         }
-        plan.sample = [solids, splats.body, commands, splats.spray, shade.picture].concat();
+        plan.end_fills();
         Ok(plan)
     }
+}
+
+/// Plans pictures of splats.
+fn plan_ssfr(
+    plan: &mut Plan,
+    look: &Look,
+    scene: &RenderScene,
+    (opaque, particles): (&[Triangle], usize),
+    limits: &Limits,
+) {
+    for depth in &DEPTHS {
+        plan.buffer(depth, plan.extent.pixels());
+    }
+    let solids = plan_solids(plan, opaque, limits);
+    plan_particles(plan, particles, scene.particle_spacing, plan.radius);
+    let body = plan_body(plan);
+    let owner = match look.wants(AovSpec::Forward) {
+        true => plan_owner(plan),
+        false => Vec::new(),
+    };
+    let Smoothing { commands, surface } = smoothing(plan, look, scene);
+    let spray = plan_spray(plan, look, &surface, &SOLID_DEPTH);
+    let shade = plan_shade(plan, look, &surface);
+    if !shade.aovs.is_empty() {
+        let before = [solids.clone(), body.clone(), owner];
+        plan.aovs = [before.concat(), commands.clone(), shade.aovs].concat();
+    }
+    plan.sample = [solids, body, commands, spray, shade.picture].concat();
+}
+
+/// Plans pictures by rays.
+fn plan_ray(
+    plan: &mut Plan,
+    look: &Look,
+    scene: &RenderScene,
+    (opaque, particles): (&[Triangle], usize),
+) {
+    plan_rays(plan, look, scene, opaque);
+    let has_drops = look.spec().water.spray.is_some();
+    let has_spray = has_drops || look.spec().whitewater.is_some();
+    let has_owner = look.wants(AovSpec::Forward);
+    if has_spray || has_owner {
+        for depth in &DEPTHS {
+            plan.buffer(depth, plan.extent.pixels());
+        }
+    }
+    if has_drops || has_owner {
+        plan_particles(plan, particles, scene.particle_spacing, plan.radius);
+    }
+    let mut sample = Vec::new();
+    if has_spray {
+        sample.push(first(plan));
+        sample.extend(plan_spray(plan, look, &DEPTHS[0], &DEPTHS[1]));
+    }
+    let mut before = Vec::new();
+    if has_owner {
+        before.push(first(plan));
+        before.extend(plan_owner_before_rays(plan));
+    }
+    let shade = plan_cast(plan, look);
+    if !shade.aovs.is_empty() {
+        plan.aovs = [before, shade.aovs].concat();
+    }
+    plan.sample = [sample, shade.picture].concat();
 }
 
 /// How many particles there is room for where so many are asked for: frames differ, and few of them then need more.

@@ -4,6 +4,7 @@ mod aovs;
 mod build;
 mod shade;
 mod splats;
+mod water;
 mod whitewater;
 
 use bytemuck::Pod;
@@ -23,6 +24,7 @@ use crate::gpu::{
 };
 use crate::scene::look::Look;
 use build::room;
+use water::Water;
 use whitewater::Whitewater;
 
 /// Renders frames of one scene with one look.
@@ -37,6 +39,8 @@ pub struct Renderer {
     aovs: Recording,
     /// Particles that there is room for.
     capacity: usize,
+    /// `None` where the look casts no rays.
+    water: Option<Water>,
     /// `None` where the look draws none.
     whitewater: Option<Whitewater>,
     timer: Option<Timer>,
@@ -80,6 +84,7 @@ impl Renderer {
             plan,
             program,
             capacity: room(0),
+            water: Water::of(look),
             whitewater: Whitewater::of(look, scene),
             timer: None,
         };
@@ -195,6 +200,12 @@ impl Renderer {
         if let Some(spray) = &self.look.spec().water.spray {
             aeration::classify(&mut packed, self.scene.particle_spacing as f32, spray);
         }
+        if let Some(water) = &mut self.water {
+            water.take(&packed);
+        }
+        if !self.program.has(PARTICLES.name()) {
+            return Ok(packed.len() as u32);
+        }
         // Front to back, so that splats find what hides them already there.
         let eye = pose(&self.look.spec().camera, frame.into());
         let forward = (eye.target - eye.position).normalize().as_vec3();
@@ -237,6 +248,12 @@ impl Renderer {
 
     /// Draws one sample, into the picture's mean or, with `aovs`, into the channels beside it.
     fn sample(&mut self, camera: &uniform::Camera, aovs: bool) -> Result<(), RenderError> {
+        if let Some(water) = &mut self.water {
+            let grew = water.stand_at(camera.seconds, &mut self.program, &self.scene)?;
+            if grew {
+                self.record();
+            }
+        }
         self.program.upload(CAMERA, 0, &[*camera]);
         let recording = if aovs { &self.aovs } else { &self.sample };
         recording.run(&self.program, self.timer.as_mut())?;

@@ -6,7 +6,7 @@ use crate::{
         recording::{Bind, Command, Groups},
     },
     render::{
-        buffers::{BANDS, OWNER, THICKNESS, aovs, picture},
+        buffers::{BANDS, DEPTHS, OWNER, THICKNESS, aovs, picture},
         plan::Plan,
         uniform::Band,
     },
@@ -20,15 +20,14 @@ pub(super) struct Shade {
     pub(super) aovs: Vec<Command>,
 }
 
-/// Plans the shading of the plan's bands; `surface` is where the smoothed depth stands.
-pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
+/// Plans the shading of the plan's bands by two passes; `surface` is where the depth of the water stands.
+fn plan_bands(
+    plan: &mut Plan,
+    look: &Look,
+    passes: [&'static str; 2],
+    binds: [&dyn Fn() -> Vec<Bind>; 2],
+) -> Shade {
     let has_aovs = !look.spec().output.aovs.is_empty();
-    if look.spec().water.spray.is_some() || look.spec().whitewater.is_some() {
-        plan.define("ssfr/shade", "SPRAY");
-    }
-    if has_aovs {
-        plan.define("ssfr/shade_aovs", "AOVS");
-    }
     let bands: Vec<Band> = plan
         .bands
         .iter()
@@ -44,36 +43,69 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
         .collect();
     plan.windows(&BANDS, &bands);
     let width = plan.extent.picture[0];
-    // Without `forward` no one is asked for, and any buffer of words stands in.
-    let owner = match look.wants(AovSpec::Forward) {
-        true => OWNER,
-        false => THICKNESS,
-    };
     let mut shade = Shade {
         picture: Vec::new(),
         aovs: Vec::new(),
     };
     for (index, band) in bands.iter().enumerate() {
         let pixels = width as usize * band.rows as usize;
-        let binds = |output| {
-            vec![
-                BANDS.bind(index),
-                Bind::whole("surface", surface),
-                output,
-                Bind::whole("owner", &owner),
-            ]
-        };
         let groups = Groups::Pixels([width, band.rows]);
+        let into = |output, binds: &dyn Fn() -> Vec<Bind>| {
+            [binds(), vec![BANDS.bind(index), output]].concat()
+        };
         plan.buffer(&picture(index), pixels);
         let output = Bind::whole("output", &picture(index));
-        let command = Command::in_groups("ssfr/shade", groups.clone(), binds(output));
+        let command = Command::in_groups(passes[0], groups.clone(), into(output, binds[0]));
         shade.picture.push(command);
         if has_aovs {
             plan.buffer(&aovs(index), pixels);
             let output = Bind::whole("output", &aovs(index));
-            let command = Command::in_groups("ssfr/shade_aovs", groups, binds(output));
+            let command = Command::in_groups(passes[1], groups, into(output, binds[1]));
             shade.aovs.push(command);
         }
     }
     shade
+}
+
+fn draws_spray(look: &Look) -> bool {
+    look.spec().water.spray.is_some() || look.spec().whitewater.is_some()
+}
+
+/// Plans the shading of what was splatted; `surface` is where the smoothed depth stands.
+pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
+    if draws_spray(look) {
+        plan.define("ssfr/shade", "SPRAY");
+    }
+    plan.define("ssfr/shade_aovs", "AOVS");
+    // Without `forward` no one is asked for, and any buffer of words stands in.
+    let owner = match look.wants(AovSpec::Forward) {
+        true => OWNER,
+        false => THICKNESS,
+    };
+    let binds = || {
+        let surface = Bind::whole("surface", surface);
+        vec![surface, Bind::whole("owner", &owner)]
+    };
+    let passes = ["ssfr/shade", "ssfr/shade_aovs"];
+    plan_bands(plan, look, passes, [&binds, &binds])
+}
+
+/// Plans the casting of rays.
+pub(super) fn plan_cast(plan: &mut Plan, look: &Look) -> Shade {
+    if draws_spray(look) {
+        plan.define("rays/cast", "SPRAY");
+    }
+    if look.wants(AovSpec::Forward) {
+        plan.define("rays/aovs", "FORWARD");
+    }
+    let picture = || {
+        let surface = Bind::whole("surface", &DEPTHS[0]);
+        vec![surface, Bind::whole("solid_depth", &DEPTHS[1])]
+    };
+    plan_bands(
+        plan,
+        look,
+        ["rays/cast", "rays/aovs"],
+        [&picture, &Vec::new],
+    )
 }

@@ -8,6 +8,9 @@ pub(in super::super) const KEYS: &[Key] = &[
     Key::table("image", IMAGE)
         .default("{}")
         .about("Size and sampling"),
+    Key::table("renderer", RENDERER)
+        .default("{}")
+        .about("How the water is drawn"),
     Key::table("surface", SURFACE)
         .default("{}")
         .about("How splats become a surface"),
@@ -112,6 +115,12 @@ const IMAGE: &[Key] = &[
         .default("0.0")
         .about("how long the shutter is open, centred on the frame; 0 is no motion blur"),
 ];
+
+const RENDERER: &[Key] = &[Key::choice("method", &["ssfr", "ray"])
+    .default("\"ssfr\"")
+    .about(
+        "splats in screen space, fast, or rays through a level set of the particles, for final frames",
+    )];
 
 const SURFACE: &[Key] = &[
     Key::choice("filter", &["curvature_flow", "narrow_range"])

@@ -12,6 +12,8 @@ pub struct LookSpec {
     pub camera: CameraSpec,
     /// Size and sampling.
     pub image: ImageSpec,
+    /// How the water is drawn.
+    pub renderer: RendererSpec,
     /// How splats become a surface.
     pub surface: SurfaceSpec,
     /// What the water is like inside.
@@ -79,6 +81,24 @@ pub struct ImageSpec {
     pub samples: u32,
     /// Fraction of a frame for which the shutter is open, centred on the frame; 0 = no motion blur.
     pub shutter: f64,
+}
+
+/// How the water is drawn.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RendererSpec {
+    /// Which way.
+    pub method: MethodSpec,
+}
+
+/// Ways to draw the water.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodSpec {
+    /// Screen-space fluid rendering: splats, smoothed. Fast.
+    Ssfr,
+    /// Rays through a level set of the particles. For final frames.
+    Ray,
 }
 
 /// The filter that turns splats into a surface.

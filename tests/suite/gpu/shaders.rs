@@ -47,6 +47,7 @@ const VARIANTS: [&[&str]; 20] = [
     &["PERIODIC", "F64"],
     &["SPRAY"],
     &["AOVS"],
+    &["FORWARD"],
 ];
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them.
@@ -70,7 +71,8 @@ fn every_pass_validates_in_every_variant() {
             let is_wide = pass.starts_with("pressure/") && defines.contains(&"F64");
             assert!(is_wide || !reflection.has_f64, "{pass} {defines:?}");
             let size = reflection.workgroup_size;
-            let is_known = match (pass.starts_with("ssfr/"), reflection.stage) {
+            let is_drawing = pass.starts_with("ssfr/") || pass.starts_with("rays/");
+            let is_known = match (is_drawing, reflection.stage) {
                 (true, Stage::Raster { .. }) => true,
                 (true, Stage::Compute) => [[64, 1, 1], [32, 1, 1], [16, 4, 1]].contains(&size),
                 (false, stage) => {

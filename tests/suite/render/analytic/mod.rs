@@ -6,6 +6,7 @@
 
 mod geometry;
 mod light;
+mod rays;
 mod ripples;
 mod support;
 mod surface;

@@ -119,6 +119,8 @@ pub(crate) struct Setup {
     pub(crate) next: Option<Eye>,
     pub(crate) samples: u32,
     pub(crate) shutter: f64,
+    /// Of the renderer.
+    pub(crate) method: &'static str,
     /// Lines of `[surface]` and `[water]`.
     pub(crate) surface: String,
     pub(crate) water: String,
@@ -141,6 +143,7 @@ impl Setup {
             next: None,
             samples: 1,
             shutter: 0.0,
+            method: "ssfr",
             surface: "smoothing_width_m = 0.0\n".to_owned(),
             water: String::new(),
             sun: [0.0, 45.0, 0.0],
@@ -161,13 +164,14 @@ impl Setup {
         let [azimuth, elevation, intensity] = self.sun;
         format!(
             "{camera}[image]\nwidth = {side}\nheight = {side}\nsamples = {}\nshutter = {:?}\n\
-             [surface]\n{}[water]\n{}[sun]\nazimuth_degrees = {azimuth:?}\n\
+             [renderer]\nmethod = \"{}\"\n[surface]\n{}[water]\n{}[sun]\nazimuth_degrees = {azimuth:?}\n\
              elevation_degrees = {elevation:?}\nintensity = {intensity:?}\n[sky]\n{}\
              [ground]\ncolour = {:?}\nvariation = 0.0\nhaze_m = {:?}\n[solids]\ncolour = {:?}\n\
              [output]\nformats = [\"exr\"]\nbackground = {}\n\
              aovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n",
             self.samples,
             self.shutter,
+            self.method,
             self.surface,
             self.water,
             self.sky,

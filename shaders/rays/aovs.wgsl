@@ -1,0 +1,78 @@
+// The channels that stand beside the picture, by rays: what the ray through a pixel's centre meets first, and the water on the
+// straight line of sight.
+#import "shared/camera.wgsl"
+#import "shared/ssfr_band.wgsl"
+#import "shared/ssfr_splat.wgsl"
+#import "shared/ssfr_aovs.wgsl"
+#import "shared/rays_trace.wgsl"
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<uniform> next_camera: Camera;
+@group(0) @binding(2) var<uniform> band: Band;
+@group(0) @binding(3) var<uniform> rays: Rays;
+@group(0) @binding(4) var<storage, read> level_table: array<u32>;
+@group(0) @binding(5) var<storage, read> level_values: array<f32>;
+@group(0) @binding(6) var<storage, read> set_nodes: array<SetNode>;
+@group(0) @binding(7) var<storage, read> set_triangles: array<Triangle>;
+@group(0) @binding(8) var<storage, read_write> output: array<f32>;
+#ifdef FORWARD
+@group(0) @binding(9) var<storage, read> owner: array<u32>;
+@group(0) @binding(10) var<storage, read> particles: array<Particle>;
+#endif
+
+// Surfaces on a line of sight, at most.
+const MOST_SURFACES: i32 = 32;
+
+// Metres of water on a straight line up to what is opaque.
+fn water_along(start: vec3f, direction: vec3f) -> f32 {
+    var origin = start;
+    var inside = is_wet(origin);
+    var sum = 0.0;
+    for (var k = 0; k < MOST_SURFACES; k++) {
+        let found = trace(origin, direction, inside);
+        if found.kind == SKY {
+            break;
+        }
+        if inside {
+            sum += found.t;
+        }
+        if found.kind == OPAQUE {
+            break;
+        }
+        origin += direction * found.after;
+        inside = !inside;
+    }
+    return sum;
+}
+
+@compute @workgroup_size(16, 4)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= camera.picture.x || id.y >= band.rows {
+        return;
+    }
+    let pixel = vec2u(id.x, id.y + band.row) + camera.margin;
+    let out = id.y * camera.picture.x + id.x;
+    let ray = eye_ray(camera, vec2f(pixel) + 0.5);
+    let along = length(ray);
+    let direction = world_direction(camera, ray) / along;
+    let through = water_along(camera.position, direction);
+    let found = trace(camera.position, direction, is_wet(camera.position));
+    if found.kind == SKY {
+        let motion = motion_to(sky_in_next(direction), vec2i(pixel));
+        store(out, FAR, vec3f(0.0), vec3f(0.0), motion, through);
+        return;
+    }
+    let position = camera.position + direction * found.t;
+    let normal = select(found.normal, -found.normal, dot(found.normal, direction) > 0.0);
+    var moved = position;
+#ifdef FORWARD
+    if found.kind == WATER {
+        let particle = owner[pixel.y * camera.size.x + pixel.x];
+        if particle < camera.particle_count {
+            moved += particles[particle].velocity * camera.frame_seconds;
+        }
+    }
+#endif
+    let motion = motion_to(eye_from_world(next_camera, moved), vec2i(pixel));
+    store(out, found.t / along, normal, position, motion, through);
+}

@@ -1,0 +1,62 @@
+// One sample of the picture by rays: sky, ground and solids, the water and what is seen in and through it.
+#import "shared/camera.wgsl"
+#import "shared/ssfr_band.wgsl"
+#import "shared/rays_light.wgsl"
+#ifdef SPRAY
+#import "shared/ssfr_half.wgsl"
+#endif
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<uniform> shading: Shading;
+@group(0) @binding(2) var<uniform> band: Band;
+@group(0) @binding(3) var<uniform> rays: Rays;
+@group(0) @binding(4) var<storage, read> level_table: array<u32>;
+@group(0) @binding(5) var<storage, read> level_values: array<f32>;
+@group(0) @binding(6) var<storage, read> sun_paths: array<f32>;
+@group(0) @binding(7) var<storage, read> set_nodes: array<SetNode>;
+@group(0) @binding(8) var<storage, read> set_triangles: array<Triangle>;
+@group(0) @binding(9) var sky: texture_2d<f32>;
+@group(0) @binding(10) var sky_sampler: sampler;
+@group(0) @binding(11) var shadow_map: texture_depth_2d;
+@group(0) @binding(12) var shadow_sampler: sampler_comparison;
+@group(0) @binding(13) var<storage, read_write> output: array<vec4f>;
+#ifdef SPRAY
+@group(0) @binding(14) var<storage, read> spray: array<u32>;
+// Depths of what each ray meets first.
+@group(0) @binding(15) var<storage, read> surface: array<f32>;
+@group(0) @binding(16) var<storage, read> solid_depth: array<f32>;
+#endif
+
+@compute @workgroup_size(16, 4)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= camera.picture.x || id.y >= band.rows {
+        return;
+    }
+    let pixel = vec2u(id.x, id.y + band.row) + camera.margin;
+    let out = id.y * camera.picture.x + id.x;
+    let ray = eye_ray(camera, vec2f(pixel) + 0.5);
+    let direction = normalize(world_direction(camera, ray));
+    let inside = is_wet(camera.position);
+#ifdef SPRAY
+    // What the ray meets first is known; in air it is taken up a little before.
+    let at = pixel.y * camera.size.x + pixel.x;
+    let known = min(surface[at], solid_depth[at]);
+    let start = select(max(known * length(ray) - 2.0 * rays.voxel, 0.0), 0.0, inside || known >= FAR);
+    var value = radiance_along(camera.position + direction * start, direction, inside, start);
+    let tap = half_tap(vec2f(pixel) + 0.5);
+    var words = vec4u(spray[tap.at.x], spray[tap.at.y], spray[tap.at.z], spray[tap.at.w]);
+    let cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
+    if cover > 0.0 {
+        let far = min(surface[at], 1e4) * length(ray);
+        let white = diffuse_light(camera.position + direction * far, vec3f(0.0, 1.0, 0.0)) * 0.85;
+        value = mix(value, vec4f(white, 1.0), cover);
+    }
+#else
+    let value = radiance_along(camera.position, direction, inside, 0.0);
+#endif
+    if camera.sample_index == 0u {
+        output[out] = value * camera.weight;
+    } else {
+        output[out] += value * camera.weight;
+    }
+}

@@ -1,0 +1,27 @@
+// Depth of the first thing that each ray of the padded frame meets, for what is drawn before it.
+#import "shared/camera.wgsl"
+#import "shared/rays_trace.wgsl"
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<uniform> rays: Rays;
+@group(0) @binding(2) var<storage, read> level_table: array<u32>;
+@group(0) @binding(3) var<storage, read> level_values: array<f32>;
+@group(0) @binding(4) var<storage, read> set_nodes: array<SetNode>;
+@group(0) @binding(5) var<storage, read> set_triangles: array<Triangle>;
+// Of the water, or FAR, and of what is opaque before it, or FAR.
+@group(0) @binding(6) var<storage, read_write> depth: array<f32>;
+@group(0) @binding(7) var<storage, read_write> solid_depth: array<f32>;
+
+@compute @workgroup_size(16, 4)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= camera.size) {
+        return;
+    }
+    let at = id.y * camera.size.x + id.x;
+    let ray = eye_ray(camera, vec2f(id.xy) + 0.5);
+    let along = length(ray);
+    let direction = world_direction(camera, ray) / along;
+    let found = trace(camera.position, direction, is_wet(camera.position));
+    depth[at] = select(FAR, found.t / along, found.kind == WATER);
+    solid_depth[at] = select(FAR, found.t / along, found.kind == OPAQUE);
+}

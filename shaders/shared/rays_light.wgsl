@@ -1,0 +1,181 @@
+// Light along rays: what a path through water and air brings to the eye. Needs the bindings of rays_water, rays_set and ssfr_light,
+// and `camera`.
+#import "shared/rays_trace.wgsl"
+#import "shared/rays_sun.wgsl"
+#import "shared/ssfr_light.wgsl"
+#import "shared/ssfr_facet.wgsl"
+
+// Rays that wait while another is followed, and rays of one picture ray in all.
+const WAITING: i32 = 8;
+const MOST_RAYS: i32 = 24;
+// Surfaces on the way to a ray after which the sky's mean stands for the rest.
+const MOST_SURFACES: u32 = 10u;
+// Part of a picture ray that a side branch has at least: below it the other branch takes it along.
+const LEAST_BRANCH: f32 = 0.004;
+// Parts of a way through water in which it scatters.
+const PARTS: i32 = 4;
+
+struct Ray {
+    origin: vec3f,
+    inside: bool,
+    direction: vec3f,
+    // Of the picture ray that came this far.
+    weight: vec3f,
+    // Metres from the eye to its origin.
+    travelled: f32,
+    surfaces: u32,
+}
+
+fn strongest(weight: vec3f) -> f32 {
+    return max(weight.x, max(weight.y, weight.z));
+}
+
+// Light that water on a way of `length` metres scatters towards its beginning: once, from the sun and the sky through what stands
+// above, scaled so that deep flat water seen from above has the reflectance of `deep_albedo`.
+fn scattered(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
+    let extinction = shading.absorption + shading.scattering;
+    let up = vec3f(0.0, 1.0, 0.0);
+    let sun = shading.sun_irradiance * max(shading.sun_direction.y, 0.0) * (1.0 + shading.sun_path);
+    let sky = sky_irradiance(up) * 2.0;
+    var light = vec3f(0.0);
+    var from_t = 0.0;
+    for (var k = 1; k <= PARTS; k++) {
+        // Finer near the eye, where most of it comes from.
+        let part = f32(k) / f32(PARTS);
+        let to_t = length * part * part;
+        let p = origin + direction * 0.5 * (from_t + to_t);
+        let path = sun_path_at(p);
+        let through = exp(-extinction * path);
+        let weight = exp(-extinction * from_t) - exp(-extinction * to_t);
+        light += weight * (sun * through * sunlit(p, up) + sky * exp(-extinction * path / shading.sun_path));
+        from_t = to_t;
+    }
+    return light * deep_albedo() / PI;
+}
+
+struct Split {
+    // Towards where the ray came from.
+    normal: vec3f,
+    mirrored: vec3f,
+    refracted: vec3f,
+    reflectance: f32,
+    variance: f32,
+}
+
+// What the water's surface does with a ray.
+fn split_at(ray: Ray, found: Found) -> Split {
+    let view = -ray.direction;
+    let side = select(1.0, -1.0, ray.inside);
+    let p = ray.origin + ray.direction * found.t;
+    let footprint = (ray.travelled + found.t) / camera.focal / max(abs(dot(found.normal, view)), 0.1);
+    let facet = facet_at(p, found.normal, footprint);
+    var normal = facet.normal * side;
+    // No facet that is seen faces away.
+    normal = normalize(normal + view * max(0.03 - dot(normal, view), 0.0) * 1.5);
+    let index = select(shading.index, 1.0 / shading.index, ray.inside);
+    let facing = clamp(dot(normal, view), 0.0, 1.0);
+    var mirrored = reflect(-view, normal);
+    // A mirrored ray goes back to where it came from, whatever a ripple says.
+    let grazes = max(0.005 - dot(mirrored, found.normal * side), 0.0);
+    mirrored = normalize(mirrored + found.normal * side * grazes);
+    var refracted = refract(-view, normal, 1.0 / index);
+    let sinks = max(0.005 + dot(refracted, found.normal * side), 0.0);
+    refracted = refracted - found.normal * side * sinks;
+    let reflectance = select(fresnel(facing, index), 1.0, dot(refracted, refracted) < 0.25);
+    return Split(normal, mirrored, normalize(refracted - found.normal * side * 1e-6), reflectance, facet.variance);
+}
+
+// Radiance of something opaque, in the light that the water above it lets through.
+fn opaque_radiance(ray: Ray, found: Found) -> vec3f {
+    let p = ray.origin + ray.direction * found.t;
+    let n = select(found.normal, -found.normal, dot(found.normal, ray.direction) > 0.0);
+    let depth = sun_path_at(p) / shading.sun_path;
+    let footprint = (ray.travelled + found.t) / camera.focal;
+    return radiance_of(Surface(p, n, found.material), -ray.direction, footprint, depth);
+}
+
+// Radiance and coverage along a ray from `origin`, in air or water, that has come `travelled` metres from the eye on its way there
+// and met nothing.
+fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32) -> vec4f {
+    var waiting: array<Ray, WAITING>;
+    var held = 1;
+    waiting[0] = Ray(origin, inside, direction, vec3f(1.0), travelled, 0u);
+    var light = vec3f(0.0);
+    var alpha = 1.0;
+    for (var k = 0; k < MOST_RAYS && held > 0; k++) {
+        held -= 1;
+        let ray = waiting[held];
+        let found = trace(ray.origin, ray.direction, ray.inside);
+        // The way that leads from the eye is whole, wherever it was taken up.
+        let far = min(found.t + select(0.0, ray.travelled, ray.surfaces == 0u), 1e6);
+        var weight = ray.weight;
+        if ray.inside {
+            light += weight * scattered(ray.origin, ray.direction, far);
+            weight *= exp(-(shading.absorption + shading.scattering) * far);
+        } else if found.kind != SKY {
+            light += weight * hazed(vec3f(0.0), far, ray.direction);
+            weight *= exp(-far / shading.haze);
+        }
+        if found.kind == SKY {
+            var sky = sky_radiance(ray.direction);
+            if ray.surfaces == 0u {
+                // Half of the sun's angle across: 0.2666°.
+                if dot(ray.direction, shading.sun_direction) > 0.99998918 {
+                    sky += min(shading.sun_irradiance * shading.disc, vec3f(60000.0));
+                }
+                sky *= shading.background;
+                alpha = shading.background;
+            }
+            light += weight * sky;
+            continue;
+        }
+        if found.kind == OPAQUE {
+            light += weight * opaque_radiance(ray, found);
+            continue;
+        }
+        let split = split_at(ray, found);
+        let p = ray.origin + ray.direction * found.t;
+        if !ray.inside {
+            light += weight * shading.sun_irradiance * sunlit(p, vec3f(0.0, 1.0, 0.0))
+                * glitter(split.normal, -ray.direction, shading.sun_direction, split.variance, shading.index);
+        }
+        if ray.surfaces >= MOST_SURFACES {
+            light += weight * sky_irradiance(vec3f(0.0, 1.0, 0.0)) / PI;
+            continue;
+        }
+        var mirror = split.reflectance;
+        if strongest(weight) * mirror < LEAST_BRANCH && mirror < 0.5 {
+            mirror = 0.0;
+        } else if strongest(weight) * (1.0 - mirror) < LEAST_BRANCH {
+            mirror = 1.0;
+        }
+        let travelled = ray.travelled + found.t;
+        let before = ray.origin + ray.direction * found.before;
+        let after = ray.origin + ray.direction * found.after;
+        let reflected = Ray(before, ray.inside, split.mirrored, weight * mirror, travelled, ray.surfaces + 1u);
+        let through = Ray(after, !ray.inside, split.refracted, weight * (1.0 - mirror), travelled, ray.surfaces + 1u);
+        // The stronger one is followed first, and so are those that it splits into; without room for both it stands for both.
+        let is_mirror = mirror > 0.5;
+        var next = through;
+        var later = reflected;
+        if is_mirror {
+            next = reflected;
+            later = through;
+        }
+        if strongest(later.weight) > 0.0 {
+            if held < WAITING - 1 {
+                waiting[held] = later;
+                held += 1;
+            } else {
+                next.weight = weight;
+            }
+        }
+        waiting[held] = next;
+        held += 1;
+    }
+    // What was left waiting sees the sky's mean.
+    for (var k = 0; k < held; k++) {
+        light += waiting[k].weight * sky_irradiance(vec3f(0.0, 1.0, 0.0)) / PI;
+    }
+    return vec4f(light, alpha);
+}

@@ -1,0 +1,17 @@
+// The water's surface within a pixel. Needs the bindings `camera` and `shading` of whoever imports it.
+#import "shared/ssfr_light.wgsl"
+#import "shared/ssfr_ripple.wgsl"
+
+// How ripples turn a normal out of the water, and the mean square slope of those that a pixel cannot hold.
+struct Facet {
+    normal: vec3f,
+    variance: f32,
+}
+
+fn facet_at(p: vec3f, normal: vec3f, footprint: f32) -> Facet {
+    let ripple = ripple_at(p.xz, camera.clock, shading.ripple.x, shading.ripple.y, footprint);
+    // Ripples ride on what faces up.
+    let rides = smoothstep(0.2, 0.8, normal.y);
+    let turned = normalize(normal - vec3f(ripple.slope.x, 0.0, ripple.slope.y) * rides);
+    return Facet(turned, shading.roughness * shading.roughness + ripple.lost * rides);
+}

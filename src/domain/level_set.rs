@@ -1,0 +1,279 @@
+//! The water of a frame as a sparse level set for rays: bricks of 8³ voxels along the surface.
+//!
+//! The field is Σ V det(G) P(|G (x − x̄)|) over particles with anisotropic kernels ([`kernels`]; Yu and Turk 2013), sampled at the
+//! voxels' corners, over its value at a calm surface, less 1: positive in water. Bricks that the surface stays out of are one
+//! word. All follows from the frame alone, in an order that no number of threads changes.
+
+pub mod eigen;
+pub mod kernels;
+pub mod sunlight;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use kernels::{Ellipsoid, Kernels};
+
+/// Voxels along a brick's edge.
+pub const EDGE: u32 = 8;
+
+/// Corners of voxels along a brick's edge that are kept with it: its own, and one more on each side, so that a gradient's
+/// differences need no other brick.
+pub const NODES: u32 = EDGE + 3;
+
+/// Values of a brick.
+pub const VALUES: usize = (NODES * NODES * NODES) as usize;
+
+/// In the table, of a brick without water.
+pub const EMPTY: u32 = 0;
+/// In the table, of a brick that is all water.
+pub const FULL: u32 = 1;
+/// In the table, of the first brick that has values; the next ones count on.
+pub const FIRST: u32 = 2;
+
+/// Voxels a particle spacing.
+pub const VOXELS: f64 = 2.0;
+
+/// A sparse level set over a box from the origin on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LevelSet {
+    /// Of the box, metres.
+    pub size: DVec3,
+    /// Edge length of a voxel, metres.
+    pub voxel: f64,
+    /// Bricks along each axis.
+    pub bricks: [u32; 3],
+    /// [`EMPTY`], [`FULL`], or [`FIRST`] and the place in `values` of each brick, x fastest.
+    pub table: Vec<u32>,
+    /// [`VALUES`] of each brick that the surface is in or beside; corner (i, j, k), from −1 on, is element
+    /// (i + 1) + 11 (j + 1) + 121 (k + 1).
+    pub values: Vec<f32>,
+}
+
+/// Bricks along each axis over a box of `size` metres with particles of `spacing` metres.
+pub fn bricks_over(size: DVec3, spacing: f64) -> [u32; 3] {
+    let edge = spacing / VOXELS * f64::from(EDGE);
+    size.to_array()
+        .map(|length| (length / edge).ceil().max(1.0) as u32)
+}
+
+impl LevelSet {
+    /// That of particles at `positions`, metres from the box's least corner, of `spacing` metres between neighbours at rest.
+    /// The sides of the box are mirrors: water that stands at one meets it at a right angle.
+    pub fn new(positions: &[DVec3], size: DVec3, spacing: f64) -> Self {
+        Self::of_kernels(&Kernels::fit(positions, size, spacing), size, spacing)
+    }
+
+    /// That of kernels that were fitted in this box.
+    pub fn of_kernels(kernels: &Kernels, size: DVec3, spacing: f64) -> Self {
+        let voxel = spacing / VOXELS;
+        let bricks = bricks_over(size, spacing);
+        let lists = Lists::new(&kernels.ellipsoids, bricks, voxel);
+        let level = kernels.level as f32;
+        let filled: Vec<Filled> = (0..lists.len())
+            .into_par_iter()
+            .map(|brick| lists.fill(kernels, brick, voxel, level))
+            .collect();
+        let mut set = Self {
+            size,
+            voxel,
+            bricks,
+            table: Vec::with_capacity(filled.len()),
+            values: Vec::new(),
+        };
+        for brick in filled {
+            set.table.push(match brick {
+                Filled::Empty => EMPTY,
+                Filled::Full => FULL,
+                Filled::Values(values) => {
+                    let slot = set.values.len() / VALUES;
+                    set.values.extend_from_slice(&values[..]);
+                    FIRST + slot as u32
+                }
+            });
+        }
+        set
+    }
+
+    /// Bricks that have values.
+    pub fn active(&self) -> usize {
+        self.values.len() / VALUES
+    }
+
+    /// The field at `p`, metres from the box's least corner: between the voxels' corners it is trilinear. −1 in bricks without
+    /// water, 1 in those that are all water.
+    pub fn value(&self, p: DVec3) -> f64 {
+        let (slot, q) = self.brick_at(p);
+        match slot {
+            EMPTY => -1.0,
+            FULL => 1.0,
+            slot => self.within(slot, q),
+        }
+    }
+
+    /// ∇ of the field in 1/m, by differences over two voxels; zero in bricks without values.
+    pub fn gradient(&self, p: DVec3) -> DVec3 {
+        let (slot, q) = self.brick_at(p);
+        if slot < FIRST {
+            return DVec3::ZERO;
+        }
+        let along = |axis: DVec3| self.within(slot, q + axis) - self.within(slot, q - axis);
+        DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)) / (2.0 * self.voxel)
+    }
+
+    /// What the table says of the brick at `p`, and where in it that is, in voxels.
+    fn brick_at(&self, p: DVec3) -> (u32, DVec3) {
+        let last = DVec3::from_array(self.bricks.map(|n| f64::from(n * EDGE) - 1e-9));
+        let at = (p / self.voxel).clamp(DVec3::ZERO, last);
+        let brick = (at / f64::from(EDGE)).floor();
+        let [x, y, z] = brick.to_array().map(|c| c as usize);
+        let [nx, ny] = [self.bricks[0] as usize, self.bricks[1] as usize];
+        let slot = self.table[(z * ny + y) * nx + x];
+        (slot, at - f64::from(EDGE) * brick)
+    }
+
+    fn within(&self, slot: u32, q: DVec3) -> f64 {
+        let values = &self.values[(slot - FIRST) as usize * VALUES..][..VALUES];
+        let q = q + 1.0;
+        let low = q
+            .floor()
+            .clamp(DVec3::ZERO, DVec3::splat(f64::from(NODES - 2)));
+        let part = q - low;
+        let [x, y, z] = low.to_array().map(|c| c as usize);
+        let nodes = NODES as usize;
+        let mut sum = 0.0;
+        for corner in 0..8usize {
+            let [i, j, k] = [corner & 1, corner >> 1 & 1, corner >> 2];
+            let weigh = |bit: usize, part: f64| if bit == 1 { part } else { 1.0 - part };
+            let weight = weigh(i, part.x) * weigh(j, part.y) * weigh(k, part.z);
+            let at = (x + i) + nodes * ((y + j) + nodes * (z + k));
+            sum += weight * f64::from(values[at]);
+        }
+        sum
+    }
+}
+
+/// A brick's content.
+enum Filled {
+    Empty,
+    Full,
+    Values(Box<[f32; VALUES]>),
+}
+
+/// Which ellipsoids reach each brick, by index.
+struct Lists {
+    bricks: [u32; 3],
+    starts: Vec<u32>,
+    entries: Vec<u32>,
+}
+
+impl Lists {
+    fn new(ellipsoids: &[Ellipsoid], bricks: [u32; 3], voxel: f64) -> Self {
+        let edge = voxel * f64::from(EDGE);
+        // Bricks whose nodes, with the one beyond each side, an ellipsoid's box holds; none where the first is after the last.
+        let range = |ellipsoid: &Ellipsoid| {
+            let low = (ellipsoid.centre - ellipsoid.reach - voxel) / edge;
+            let high = (ellipsoid.centre + ellipsoid.reach + voxel) / edge;
+            [0, 1, 2].map(|axis| {
+                let last = f64::from(bricks[axis]);
+                let first = low[axis].floor().clamp(0.0, last) as u32;
+                first..(high[axis].floor() + 1.0).clamp(0.0, last) as u32
+            })
+        };
+        let count = bricks.iter().map(|&n| n as usize).product::<usize>();
+        let each = |visit: &mut dyn FnMut(usize, u32)| {
+            for (index, ellipsoid) in ellipsoids.iter().enumerate() {
+                let [xs, ys, zs] = range(ellipsoid);
+                for z in zs {
+                    for y in ys.clone() {
+                        for x in xs.clone() {
+                            let row = (z * bricks[1] + y) as usize * bricks[0] as usize;
+                            visit(row + x as usize, index as u32);
+                        }
+                    }
+                }
+            }
+        };
+        let mut starts = vec![0u32; count + 1];
+        each(&mut |brick, _| starts[brick + 1] += 1);
+        for brick in 0..count {
+            starts[brick + 1] += starts[brick];
+        }
+        let mut next = starts.clone();
+        let mut entries = vec![0; starts[count] as usize];
+        each(&mut |brick, index| {
+            entries[next[brick] as usize] = index;
+            next[brick] += 1;
+        });
+        Self {
+            bricks,
+            starts,
+            entries,
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    fn fill(&self, kernels: &Kernels, brick: usize, voxel: f64, level: f32) -> Filled {
+        let entries = &self.entries[self.starts[brick] as usize..self.starts[brick + 1] as usize];
+        if entries.is_empty() {
+            return Filled::Empty;
+        }
+        let [nx, ny] = [self.bricks[0] as usize, self.bricks[1] as usize];
+        let place = [brick % nx, brick / nx % ny, brick / nx / ny];
+        // Of node −1, so that nodes count from 0.
+        let edge = f64::from(EDGE);
+        let corner = DVec3::from_array(place.map(|c| (c as f64 * edge - 1.0) * voxel));
+        let mut values = Box::new([0.0f32; VALUES]);
+        for &index in entries {
+            add(
+                &mut values,
+                &kernels.ellipsoids[index as usize],
+                corner,
+                voxel,
+            );
+        }
+        let is_water = |value: &f32| *value > level;
+        match () {
+            () if !values.iter().any(is_water) => Filled::Empty,
+            () if values.iter().all(is_water) => Filled::Full,
+            () => {
+                for value in values.iter_mut() {
+                    *value = *value / level - 1.0;
+                }
+                Filled::Values(values)
+            }
+        }
+    }
+}
+
+/// Adds an ellipsoid to the nodes of a brick whose first node lies at `corner`.
+fn add(values: &mut [f32; VALUES], ellipsoid: &Ellipsoid, corner: DVec3, voxel: f64) {
+    let nodes = NODES as usize;
+    let from = (ellipsoid.centre - corner) / voxel;
+    let reach = ellipsoid.reach / voxel;
+    let low = (from - reach).ceil().max(DVec3::ZERO).to_array();
+    let end = (from + reach).floor() + 1.0;
+    let end = end.clamp(DVec3::ZERO, DVec3::splat(nodes as f64));
+    let [x0, y0, z0] = low.map(|c| c as usize);
+    let [x1, y1, z1] = end.to_array().map(|c| c as usize);
+    let by = (ellipsoid.inverse * voxel).as_mat3();
+    let from = from.as_vec3();
+    let peak = ellipsoid.peak as f32;
+    for z in z0..z1 {
+        for y in y0..y1 {
+            let start = by * (Vec3::new(0.0, y as f32, z as f32) - from);
+            let row = nodes * (y + nodes * z);
+            for x in x0..x1 {
+                let q = start + by.x_axis * x as f32;
+                let s = (1.0 - q.length_squared()).max(0.0);
+                values[row + x] += peak * s * s * s;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "level_set/tests.rs"]
+mod tests;

@@ -1,0 +1,214 @@
+//! Against lattices whose surface is known.
+
+use std::f64::consts::PI;
+
+use glam::DMat3;
+
+use super::{
+    kernels::{Ellipsoid, Kernels},
+    sunlight::Sunlight,
+    *,
+};
+
+const D: f64 = 0.1;
+
+/// A number in −0.5..0.5 that follows from its index.
+fn noise(index: usize) -> f64 {
+    let x = (index as f64 * 12.9898).sin() * 43758.5453;
+    x - x.floor() - 0.5
+}
+
+/// A cubic lattice of so many particles along each axis, each moved by up to half of `jitter` spacings along each axis.
+fn lattice(counts: [usize; 3], corner: DVec3, jitter: f64) -> Vec<DVec3> {
+    let [nx, ny, nz] = counts;
+    (0..nx * ny * nz)
+        .map(|at| {
+            let place = [at % nx, at / nx % ny, at / nx / ny].map(|c| c as f64 + 0.5);
+            let off = [0, 1, 2].map(|axis| jitter * noise(3 * at + axis));
+            corner + D * (DVec3::from_array(place) + DVec3::from_array(off))
+        })
+        .collect()
+}
+
+/// Heights at which the field changes its sign over a grid of places, spacings above `level`.
+fn heights(set: &LevelSet, level: f64) -> Vec<f64> {
+    let columns = (0..400).map(|k| (f64::from(k % 20), f64::from(k / 20)));
+    columns
+        .map(|(x, z)| {
+            let at = |y: f64| {
+                let (x, z) = ((x + 0.5) / 20.0 * set.size.x, (z + 0.5) / 20.0 * set.size.z);
+                set.value(DVec3::new(x, y, z))
+            };
+            let (mut low, mut high) = (level - 2.0 * D, level + 2.0 * D);
+            assert!(at(low) > 0.0 && at(high) < 0.0, "{x} {z}: no surface near");
+            for _ in 0..40 {
+                let middle = 0.5 * (low + high);
+                match at(middle) > 0.0 {
+                    true => low = middle,
+                    false => high = middle,
+                }
+            }
+            (low - level) / D
+        })
+        .collect()
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// A pool from wall to wall: level and flat up to the walls. Control: without mirrors the surface falls at the walls.
+#[test]
+fn a_pool_is_flat_up_to_its_walls() {
+    let size = DVec3::new(2.0, 2.0, 1.6);
+    let pool = lattice([20, 10, 16], DVec3::ZERO, 0.0);
+    let set = LevelSet::new(&pool, size, D);
+    // What is interpolated over two voxels a spacing, of a field that is 0 half a spacing above the lattice on average.
+    let off = heights(&set, 1.0);
+    let most = off.iter().fold(0.0f64, |a, h| a.max(h.abs()));
+    assert!(most < 0.06, "{most} spacings off");
+    let lonely: Vec<_> = pool
+        .iter()
+        .map(|&p| p + DVec3::new(5.0, 0.0, 5.0))
+        .collect();
+    let far = Kernels::fit(&lonely, DVec3::splat(20.0), D);
+    let corner = DVec3::new(5.0 + 0.2 * D, 1.0 - 0.3 * D, 5.0 + 0.2 * D);
+    assert!(far.value(corner) < 0.0);
+    assert!(set.value(corner - DVec3::new(5.0, 0.0, 5.0)) > 0.0);
+}
+
+/// Particles a fifth of a spacing off their places leave a surface that is 0.08 spacings rough at most, the silhouette's gate.
+/// Control: kernels that no neighbour stretches leave more.
+#[test]
+fn noise_of_particles_is_smoothed_out_of_the_surface() {
+    let size = DVec3::new(2.0, 2.0, 2.0);
+    let pool = lattice([20, 10, 20], DVec3::ZERO, 0.4);
+    let rough = |set: &LevelSet| {
+        let off = heights(set, 1.0);
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        (rms(&off.iter().map(|h| h - mean).collect::<Vec<_>>()), mean)
+    };
+    let (stretched, mean) = rough(&LevelSet::new(&pool, size, D));
+    assert!(
+        stretched < 0.08 && mean.abs() < 0.1,
+        "{stretched} about {mean}"
+    );
+    let balls = pool.iter().map(|&centre| Ellipsoid {
+        centre,
+        inverse: DMat3::from_diagonal(DVec3::splat(0.5 / D)),
+        reach: DVec3::splat(2.0 * D),
+        peak: 315.0 / (64.0 * PI) / 8.0,
+    });
+    let balls = Kernels {
+        ellipsoids: balls.collect(),
+        level: 0.5,
+    };
+    let (plain, _) = rough(&LevelSet::of_kernels(&balls, size, D));
+    assert!(plain > 1.3 * stretched, "{plain} of balls, {stretched}");
+}
+
+/// A sheet one particle thick has no hole between its particles, nor has one that is stretched by a third.
+#[test]
+fn a_sheet_one_particle_thick_holds_together() {
+    let size = DVec3::new(4.0, 2.0, 4.0);
+    for stretch in [1.0, 1.33] {
+        let sheet: Vec<_> = lattice([16, 1, 16], DVec3::ZERO, 0.2)
+            .into_iter()
+            .map(|p| DVec3::new(1.0 + stretch * p.x, 1.0, 1.0 + stretch * p.z))
+            .collect();
+        let set = LevelSet::new(&sheet, size, D);
+        let middle = DVec3::new(1.0 + 0.8 * stretch, 1.0, 1.0 + 0.8 * stretch);
+        for k in 0..100 {
+            let off = DVec3::new(f64::from(k % 10), 0.0, f64::from(k / 10)) * 0.05 - 0.25;
+            let at = middle + DVec3::new(off.x, 0.0, off.z);
+            assert!(set.value(at) > 0.0, "{stretch}: a hole at {at}");
+        }
+        let above = middle + DVec3::Y * 1.2 * D;
+        assert!(set.value(above) < 0.0, "{stretch}: too thick");
+    }
+}
+
+/// A lone particle is a ball of its own volume.
+#[test]
+fn a_lone_particle_is_a_ball_of_its_volume() {
+    let place = DVec3::new(1.013, 0.977, 1.001);
+    let set = LevelSet::new(&[place], DVec3::splat(2.0), D);
+    let step = D / 20.0;
+    let cells = 40i32;
+    let inside = (0..cells.pow(3)).filter(|at| {
+        let c =
+            [at % cells, at / cells % cells, at / cells / cells].map(|c| f64::from(c - 20) + 0.5);
+        set.value(place + step * DVec3::from_array(c)) > 0.0
+    });
+    let volume = inside.count() as f64 * step.powi(3) / D.powi(3);
+    // The field is a hat 2.5 voxels wide, and trilinear values lie below a hat's: h²/8 of its curvature take a quarter.
+    assert!((0.6..1.0).contains(&volume), "{volume} of its volume");
+    let radius = (3.0 / (4.0 * PI)).cbrt() * D;
+    let exact = Kernels::fit(&[place], DVec3::splat(2.0), D);
+    assert!(exact.value(place + DVec3::X * radius * 1.001) < 0.0);
+    assert!(exact.value(place + DVec3::X * radius * 0.999) > 0.0);
+}
+
+/// Bricks say what the kernels say: of full and empty ones the sign, of the others the value.
+#[test]
+fn bricks_hold_the_field_of_the_kernels() {
+    let size = DVec3::new(2.0, 2.1, 1.7);
+    let pool = lattice([20, 9, 17], DVec3::ZERO, 0.3);
+    let kernels = Kernels::fit(&pool, size, D);
+    let set = LevelSet::of_kernels(&kernels, size, D);
+    let [mut full, mut empty, mut between] = [0; 3];
+    for k in 0..2000 {
+        let part = DVec3::new(noise(3 * k), noise(3 * k + 1), noise(3 * k + 2)) + 0.5;
+        let (held, exact) = (set.value(part * size), kernels.value(part * size));
+        let (slot, _) = set.brick_at(part * size);
+        match slot {
+            EMPTY => {
+                empty += 1;
+                assert!(exact < 0.0);
+            }
+            FULL => {
+                full += 1;
+                assert!(exact > 0.0);
+            }
+            _ => {
+                between += 1;
+                // (Δx²/8) |∇²| of kernels whose shortest half axis is 1.25 voxels, over a peak of about 2.
+                assert!((held - exact).abs() < 0.35, "{held} is {exact}");
+            }
+        }
+    }
+    assert!(full > 100 && empty > 100 && between > 100);
+    // Near the surface a gradient points downward, into the water.
+    let down = set.gradient(DVec3::new(1.0, 0.9, 0.8)).normalize();
+    assert!(down.y < -0.95, "{down}");
+}
+
+/// The same frame gives the same set.
+#[test]
+fn a_level_set_does_not_depend_on_threads() {
+    let size = DVec3::splat(1.5);
+    let pool = lattice([15, 6, 15], DVec3::ZERO, 0.4);
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let alone = one
+        .expect("a thread")
+        .install(|| LevelSet::new(&pool, size, D));
+    assert_eq!(alone, LevelSet::new(&pool, size, D));
+}
+
+/// Beneath a pool light has gone its depth over the cosine, and beside a wall of water less, as a part of its way is dry.
+#[test]
+fn light_goes_straight_down_through_a_pool() {
+    let size = DVec3::new(3.0, 2.0, 3.0);
+    let set = LevelSet::new(&lattice([30, 12, 30], DVec3::ZERO, 0.0), size, D);
+    let towards = DVec3::new(0.3, 0.9, 0.1).normalize();
+    let light = Sunlight::new(&set, towards);
+    let deep = |y: f64| light.path(DVec3::new(1.0, y, 1.2));
+    for y in [0.2, 0.5, 0.8] {
+        let wanted = (1.2 - y) / towards.y;
+        // A look every twentieth of the pitch of two spacings, and the surface between two nodes.
+        assert!((deep(y) - wanted).abs() < D, "{} is {wanted}", deep(y));
+    }
+    assert!(deep(1.5) < 1e-6, "there is no water above");
+    let straight = Sunlight::new(&set, DVec3::Y);
+    assert!(straight.path(DVec3::new(1.0, 0.2, 1.2)) < deep(0.2) - 0.02);
+}

@@ -1,0 +1,101 @@
+//! What rays are cast into: the water as a level set, the opaque set as a tree.
+
+use glam::{DVec3, Vec3};
+
+use super::{
+    RenderScene,
+    buffers::{DEPTHS, LEVEL_TABLE, LEVEL_VALUES, RAYS, SET_NODES, SET_TRIANGLES, SUN_PATHS},
+    plan::Plan,
+    uniform::{Rays, SetNode, Triangle},
+};
+use crate::{
+    domain::{
+        bvh::Bvh,
+        level_set::{LevelSet, VALUES, VOXELS, bricks_over, sunlight::nodes_over},
+        mesh::TriangleMesh,
+    },
+    gpu::recording::{Bind, Command, Groups},
+    scene::look::Look,
+};
+
+/// Sides of the box at which the look's quay walls stand: those along z.
+const QUAYS: u32 = 0b11_0000;
+
+/// Plans the level set, with no bricks yet, the light in it, and the tree over what is opaque.
+pub(super) fn plan_rays(plan: &mut Plan, look: &Look, scene: &RenderScene, triangles: &[Triangle]) {
+    let size = scene.domain.size();
+    let spacing = scene.particle_spacing;
+    let bricks = bricks_over(size, spacing);
+    let voxel = spacing / VOXELS;
+    let (nodes, pitch) = nodes_over(size, voxel);
+    let rays = Rays {
+        size: size.as_vec3().to_array(),
+        voxel: voxel as f32,
+        bricks,
+        triangles: triangles.len() as u32,
+        nodes,
+        pitch: pitch as f32,
+        walls: look.spec().basin.as_ref().map_or(0, |_| QUAYS),
+        ..Rays::default()
+    };
+    let count = |n: [u32; 3]| n.iter().map(|&n| n as usize).product();
+    plan.values(&RAYS, &[rays]);
+    plan.buffer(&LEVEL_TABLE, count(bricks));
+    plan.buffer(&LEVEL_VALUES, VALUES);
+    plan.buffer(&SUN_PATHS, count(nodes));
+    let (boxes, sorted) = tree(triangles);
+    plan.values(&SET_NODES, &boxes);
+    plan.values(&SET_TRIANGLES, &sorted);
+}
+
+/// Depths of the first thing that a ray of each pixel of the padded frame meets: of water into the first of [`DEPTHS`], of what is
+/// opaque into the second.
+pub(super) fn first(plan: &Plan) -> Command {
+    let binds = vec![
+        Bind::whole("depth", &DEPTHS[0]),
+        Bind::whole("solid_depth", &DEPTHS[1]),
+    ];
+    Command::in_groups("rays/first", Groups::Pixels(plan.extent.size), binds)
+}
+
+/// Nodes of a tree over triangles, and the triangles in its order; one of each that nothing meets where there are none.
+fn tree(triangles: &[Triangle]) -> (Vec<SetNode>, Vec<Triangle>) {
+    if triangles.is_empty() {
+        return (vec![SetNode::default()], vec![Triangle::default()]);
+    }
+    let corners = triangles.iter().flat_map(|it| [it.a, it.b, it.c]);
+    let mesh = TriangleMesh {
+        vertices: corners.map(|p| Vec3::from(p).as_dvec3()).collect(),
+        triangles: (0..triangles.len() as u32)
+            .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
+            .collect(),
+    };
+    let tree = Bvh::new(&mesh);
+    let corner = |p: DVec3| p.as_vec3().to_array();
+    let nodes = tree
+        .boxes()
+        .map(|([min, max], first_or_right, count)| SetNode {
+            min: corner(min),
+            first_or_right,
+            max: corner(max),
+            count,
+        });
+    let sorted = tree.entries().iter().map(|&k| triangles[k as usize]);
+    (nodes.collect(), sorted.collect())
+}
+
+/// The level set of particles seconds from where they stand, relative to the box's least corner.
+pub(super) fn level_set(scene: &RenderScene, places: &[(Vec3, Vec3)], seconds: f64) -> LevelSet {
+    let moved: Vec<DVec3> = places
+        .iter()
+        .map(|(position, velocity)| position.as_dvec3() + seconds * velocity.as_dvec3())
+        .collect();
+    LevelSet::new(&moved, scene.domain.size(), scene.particle_spacing)
+}
+
+/// Unit vector to the sun as it stands seen from within flat water.
+pub(super) fn sun_in_water(look: &Look) -> DVec3 {
+    let sun = look.sun_direction();
+    let bent = DVec3::new(sun.x, 0.0, sun.z) / look.spec().water.index;
+    bent + DVec3::Y * (1.0 - bent.length_squared()).sqrt()
+}

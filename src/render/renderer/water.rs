@@ -1,0 +1,71 @@
+//! The water that rays are cast into, on its way to the device.
+
+use glam::{DVec3, Vec3};
+
+use crate::{
+    domain::level_set::sunlight::Sunlight,
+    gpu::program::Program,
+    render::{
+        RenderError, RenderScene,
+        buffers::{LEVEL_TABLE, LEVEL_VALUES, SUN_PATHS},
+        rays::{level_set, sun_in_water},
+        uniform::Particle,
+    },
+    scene::look::{Look, MethodSpec},
+};
+
+/// A frame's particles, and the level set of them that the device holds.
+pub(super) struct Water {
+    /// Where the body's particles are and how fast they go.
+    places: Vec<(Vec3, Vec3)>,
+    /// Seconds from the frame at which the level set on the device stands; `None` before there is one of this frame.
+    seconds: Option<f32>,
+    /// Values that there is room for.
+    capacity: usize,
+    sun: DVec3,
+}
+
+impl Water {
+    /// `None` where the look casts no rays.
+    pub(super) fn of(look: &Look) -> Option<Self> {
+        (look.spec().renderer.method == MethodSpec::Ray).then(|| Self {
+            places: Vec::new(),
+            seconds: None,
+            capacity: 0,
+            sun: sun_in_water(look),
+        })
+    }
+
+    /// Takes a frame's particles: those that belong to the body.
+    pub(super) fn take(&mut self, particles: &[Particle]) {
+        let body = particles.iter().filter(|particle| particle.tag & 1 == 1);
+        self.places = body
+            .map(|particle| (particle.position.into(), particle.velocity.into()))
+            .collect();
+        self.seconds = None;
+    }
+
+    /// Has the device hold the level set of so many seconds from the frame; whether a buffer is a new one.
+    pub(super) fn stand_at(
+        &mut self,
+        seconds: f32,
+        program: &mut Program,
+        scene: &RenderScene,
+    ) -> Result<bool, RenderError> {
+        if self.seconds == Some(seconds) {
+            return Ok(false);
+        }
+        let level = level_set(scene, &self.places, seconds.into());
+        let light = Sunlight::new(&level, self.sun);
+        let grew = level.values.len() > self.capacity;
+        if grew {
+            self.capacity = level.values.len();
+            program.refit(&[LEVEL_VALUES.sized(self.capacity)], &[])?;
+        }
+        program.upload(LEVEL_TABLE, 0, &level.table);
+        program.upload(LEVEL_VALUES, 0, &level.values);
+        program.upload(SUN_PATHS, 0, &light.paths);
+        self.seconds = Some(seconds);
+        Ok(grew)
+    }
+}

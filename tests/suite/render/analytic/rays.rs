@@ -1,0 +1,307 @@
+//! Rays through water: a flat pool, a furnace, Snell's window.
+
+use glam::{DVec2, DVec3};
+use swell::domain::bounds::Bounds;
+use swell::domain::particles::Particles;
+use swell::gpu::adapter::Context;
+use swell::render::RenderScene;
+
+use super::geometry::box_mesh;
+use super::support::{Eye, Setup, context, draw, scene, spoiled, uniform_sky};
+
+const INDEX: f64 = 1.333;
+const ABSORPTION: [f64; 3] = [0.02, 0.15, 0.4];
+/// Of particles, metres.
+const SPACING: f64 = 0.25;
+/// Of the pool, metres.
+const LEVEL: f64 = 2.0;
+const SIDE: f64 = 10.0;
+
+/// A pool that fills a box of 10 m up to [`LEVEL`].
+fn water() -> Particles {
+    let [n, layers] = [SIDE / SPACING, LEVEL / SPACING].map(|n| n as usize);
+    let place = |k: usize| (k as f32 + 0.5) * SPACING as f32;
+    let position: Vec<[f32; 3]> = (0..n * n * layers)
+        .map(|k| [place(k % n), place(k / n % layers), place(k / n / layers)])
+        .collect();
+    Particles {
+        velocity: vec![[0.0; 3]; position.len()],
+        id: (0..position.len() as u32).collect(),
+        position,
+        ..Particles::default()
+    }
+}
+
+fn pool_scene() -> RenderScene {
+    RenderScene {
+        particle_spacing: SPACING,
+        ..scene(1.0, 1.0)
+    }
+}
+
+fn by_rays(eye: Eye) -> Setup {
+    Setup {
+        method: "ray",
+        ground: [1.0; 3],
+        ..Setup::new(eye)
+    }
+}
+
+/// Snell: the part of a unit direction along a level surface shrinks by the index.
+fn refracted(along: DVec3, index: f64) -> DVec3 {
+    let level = DVec3::new(along.x, 0.0, along.z) / index;
+    level - DVec3::Y * (1.0 - level.length_squared()).sqrt()
+}
+
+fn reflectance(cosine: f64, index: f64) -> f64 {
+    let inside = (1.0 - (1.0 - cosine * cosine) / (index * index)).sqrt();
+    let s = (cosine - index * inside) / (cosine + index * inside);
+    let p = (index * cosine - inside) / (index * cosine + inside);
+    0.5 * (s * s + p * p)
+}
+
+/// Of what a picture of a flat pool over a white floor, under a sky of radiance 1, shows: the worst relative error against Snell,
+/// Fresnel, and Beer and Lambert.
+fn pool_error(context: &Context, theta: f64) -> f64 {
+    let (sin, cos) = f64::to_radians(theta).sin_cos();
+    let target = DVec3::new(5.0, LEVEL, 5.0);
+    let eye = Eye {
+        up: DVec3::Z,
+        ..Eye::new(
+            (target + 6.0 * DVec3::new(-sin, cos, 0.0)).to_array(),
+            target.to_array(),
+            600.0,
+        )
+    };
+    let setup = Setup {
+        water: format!("index = {INDEX:?}\nabsorption_per_metre = {ABSORPTION:?}\n"),
+        sun: [0.0, 90.0, 0.0],
+        ..by_rays(eye)
+    };
+    let image = draw(context, &setup, &uniform_sky, &pool_scene(), &water(), 1);
+    let mut worst = 0.0f64;
+    for (i, pixel) in image.beauty.iter().enumerate() {
+        let along = eye.direction(i);
+        let mirrored = reflectance(-along.y, INDEX);
+        let way = LEVEL / -refracted(along, INDEX).y;
+        for c in 0..3 {
+            // Daylight comes straight down: the sun, which is too dim to be seen, stands at the zenith.
+            let floor = (-ABSORPTION[c] * (way + LEVEL)).exp();
+            // What the floor sends up comes to the eye and, thrown back below the surface, is the floor's once more: not counted.
+            let expected = mirrored + (1.0 - mirrored) * floor;
+            worst = worst.max((f64::from(pixel[c]) / expected - 1.0).abs());
+        }
+    }
+    worst
+}
+
+/// Absorption and refraction within 1 %.
+#[test]
+fn a_pool_over_a_white_floor_is_as_snell_fresnel_and_beer_say() {
+    for theta in [0.0, 40.0, 70.0] {
+        let error = pool_error(&context(), theta);
+        assert!(error < 0.01, "{theta}°: {error}");
+    }
+    for (from, to) in [
+        (
+            "exp(-(shading.absorption + shading.scattering) * far)",
+            "exp(-1.05 * (shading.absorption + shading.scattering) * far)",
+        ),
+        (
+            "refract(-view, normal, 1.0 / index)",
+            "refract(-view, normal, 1.0)",
+        ),
+        (
+            "select(fresnel(facing, index), 1.0,",
+            "select(1.5 * fresnel(facing, index), 1.0,",
+        ),
+    ] {
+        let error = pool_error(&spoiled("rays/cast", from, to), 70.0);
+        assert!(error > 0.01, "{to}: {error}");
+    }
+}
+
+/// A splash of clear water before white things under a white sky is not seen.
+fn furnace_error(context: &Context) -> f64 {
+    let mut splash = water();
+    for p in &mut splash.position {
+        let [x, y, z] = p.map(f64::from);
+        let wave = 0.6 * (1.7 * x).sin() * (1.3 * z).cos() * y / LEVEL;
+        p[1] = (y + wave) as f32;
+        // And drops above it.
+        if (37.0 * x + 11.0 * z).sin() > 0.97 && y > LEVEL - SPACING {
+            p[1] += 1.5;
+        }
+    }
+    let eye = Eye::new([-1.0, 3.5, 5.2], [5.0, 2.3, 5.0], 60.0);
+    let setup = Setup {
+        water: format!("index = {INDEX:?}\nabsorption_per_metre = [0.0, 0.0, 0.0]\n"),
+        ..by_rays(eye)
+    };
+    let image = draw(context, &setup, &uniform_sky, &pool_scene(), &splash, 1);
+    let off = image.beauty.iter().flat_map(|p| [p[0], p[1], p[2]]);
+    off.fold(0.0, |worst, x| (f64::from(x) - 1.0).abs().max(worst))
+}
+
+#[test]
+fn clear_water_in_a_white_furnace_is_not_seen() {
+    let error = furnace_error(&context());
+    assert!(error < 0.01, "{error}");
+    let (from, to) = (
+        "weight * (1.0 - mirror), travelled",
+        "weight * (0.98 - mirror), travelled",
+    );
+    let control = furnace_error(&spoiled("rays/cast", from, to));
+    assert!(control > 0.01, "{control}");
+}
+
+/// Half of the angle across the part of the surface through which an eye half a metre below sees the sky, degrees.
+fn window(context: &Context) -> f64 {
+    let eye = Eye {
+        up: DVec3::Z,
+        ..Eye::new([5.0, LEVEL - 0.5, 5.0], [5.0, LEVEL, 5.0], 20.0)
+    };
+    let setup = Setup {
+        water: format!("index = {INDEX:?}\nabsorption_per_metre = [0.0, 0.0, 0.0]\n"),
+        ground: [0.0; 3],
+        ..by_rays(eye)
+    };
+    let image = draw(context, &setup, &uniform_sky, &pool_scene(), &water(), 1);
+    // Solid angle of what is brighter than half: a cone's is 2π (1 − cos θ).
+    let mut seen = 0.0;
+    for (i, pixel) in image.beauty.iter().enumerate() {
+        if pixel[0] > 0.5 {
+            seen += eye.direction(i).y.powi(3) / (eye.focal * eye.focal);
+        }
+    }
+    (1.0 - seen / std::f64::consts::TAU).acos().to_degrees()
+}
+
+/// Within 1° of 48.6°, arcsin of 1 / 1.333.
+#[test]
+fn an_eye_under_water_sees_snells_window() {
+    let angle = window(&context());
+    assert!((angle - 48.6).abs() < 1.0, "{angle}°");
+    let (from, to) = (
+        "1.0 / shading.index, ray.inside",
+        "1.0 / (1.05 * shading.index), ray.inside",
+    );
+    let control = window(&spoiled("rays/cast", from, to));
+    assert!((control - 48.6).abs() > 1.0, "{control}°");
+}
+
+/// How far the foot of a black step under water is from where Snell puts it, pixels.
+fn edge_error(context: &Context) -> f64 {
+    const FOOT: f64 = 5.0;
+    let eye = Eye::new([1.0, 6.0, 5.0], [4.0, LEVEL, 5.0], 120.0);
+    let step = box_mesh(Bounds {
+        min: DVec3::new(FOOT, -1.0, -20.0),
+        max: DVec3::new(30.0, 0.5, 30.0),
+    });
+    let setup = Setup {
+        water: format!("index = {INDEX:?}\nabsorption_per_metre = [0.0, 0.0, 0.0]\n"),
+        solids: [0.0; 3],
+        samples: 16,
+        ..by_rays(eye)
+    };
+    let scene = RenderScene {
+        solids: vec![step],
+        ..pool_scene()
+    };
+    let image = draw(context, &setup, &uniform_sky, &scene, &water(), 1);
+    let side = eye.size as usize;
+    // The floor is as bright as the sky, so that a pixel of it is 1 however much the surface throws back; the step sends nothing.
+    let lit: f64 = (0..side)
+        .map(|row| {
+            let i = row * side + side / 2;
+            let mirrored = reflectance(-eye.direction(i).y, INDEX);
+            (f64::from(image.beauty[i][1]) - mirrored) / (1.0 - mirrored)
+        })
+        .sum();
+    // Where on the surface the ray to the foot goes in, by halving.
+    let (mut low, mut high) = (eye.position.x, FOOT);
+    for _ in 0..60 {
+        let x = 0.5 * (low + high);
+        let below = refracted(
+            (DVec3::new(x, LEVEL, 5.0) - eye.position).normalize(),
+            INDEX,
+        );
+        match x + below.x / -below.y * LEVEL < FOOT {
+            true => low = x,
+            false => high = x,
+        }
+    }
+    let place = eye.place(DVec3::new(low, LEVEL, 5.0) - eye.position);
+    (lit - (0.5 * side as f64 + place.y)).abs()
+}
+
+/// Within half a pixel.
+#[test]
+fn an_edge_under_water_is_seen_where_snell_puts_it() {
+    let error = edge_error(&context());
+    assert!(error < 0.5, "{error} pixels");
+    let (from, to) = (
+        "refract(-view, normal, 1.0 / index)",
+        "refract(-view, normal, 1.0 / (1.1 * index))",
+    );
+    let control = edge_error(&spoiled("rays/cast", from, to));
+    assert!(control > 0.5, "{control} pixels");
+}
+
+/// Channels of a pool that flows at 3 m/s: depth, normal, place and motion of its level surface, and the water on the straight line
+/// down to the floor, in shares of what they have to be.
+fn channel_error(context: &Context) -> f64 {
+    let velocity = DVec3::new(1.0, 0.0, 3.0);
+    let mut flowing = water();
+    flowing.velocity.fill(velocity.as_vec3().to_array());
+    let eye = Eye::new([1.0, 5.0, 4.0], [5.0, LEVEL, 5.0], 400.0);
+    let image = draw(
+        context,
+        &by_rays(eye),
+        &uniform_sky,
+        &pool_scene(),
+        &flowing,
+        1,
+    );
+    let aovs = &image.aovs;
+    let (z, n) = (aovs.z.as_ref().unwrap(), aovs.n.as_ref().unwrap());
+    let (p, motion) = (aovs.p.as_ref().unwrap(), aovs.forward.as_ref().unwrap());
+    let through = aovs.thickness.as_ref().unwrap();
+    let mut worst = 0.0f64;
+    for i in 0..z.len() {
+        let along = eye.direction(i);
+        let far = (LEVEL - eye.position.y) / along.y;
+        let place = eye.position + far * along;
+        let moved = eye.place(place + velocity / 24.0 - eye.position) - eye.place(along);
+        let seen = DVec2::new(f64::from(motion[i][0]), f64::from(motion[i][1]));
+        for (found, wanted) in [
+            (f64::from(z[i]), far * along.dot(eye.forward())),
+            (f64::from(n[i][1]), 1.0),
+            (f64::from(p[i][0]), place.x),
+            (f64::from(p[i][2]), place.z),
+            (f64::from(through[i]), LEVEL / -along.y),
+            (moved.length() + (seen - moved).length(), moved.length()),
+        ] {
+            worst = worst.max((found / wanted - 1.0).abs());
+        }
+    }
+    worst
+}
+
+#[test]
+fn channels_of_rays_are_those_of_a_flowing_pool() {
+    // The surface is level to a thousandth of a spacing, and seen from 5 m at a slope of a half.
+    let error = channel_error(&context());
+    assert!(error < 2e-3, "{error}");
+    for (from, to) in [
+        ("found.t / along, normal", "found.t, normal"),
+        ("sum += found.t;", "sum += 1.01 * found.t;"),
+        (
+            "velocity * camera.frame_seconds",
+            "velocity * 1.1 * camera.frame_seconds",
+        ),
+    ] {
+        let control = channel_error(&spoiled("rays/aovs", from, to));
+        assert!(control > 2e-3, "{to}: {control}");
+    }
+}
