@@ -16,7 +16,16 @@ struct ThicknessParams {
 @group(0) @binding(4) var<storage, read> surface: array<f32>;
 @group(0) @binding(5) var<storage, read_write> spray: array<atomic<u32>>;
 
-const DROPS: u32 = 5u;
+// Drops that stand for a particle far away.
+const DROPS: f32 = 5.0;
+const MOST_DROPS: u32 = 4096u;
+// The least of them, and what is added to it for the largest, in splat radii.
+const LEAST_SIZE: f32 = 0.14;
+const SIZES: f32 = 0.36;
+// How far from the particle they are, in splat radii.
+const CLOUD: f32 = 1.2;
+// Radius in pixels above which a drop is many smaller ones.
+const LARGEST: f32 = 2.5;
 
 // A number in 0..1 that belongs to a particle and a channel.
 fn random(index: u32, channel: u32) -> f32 {
@@ -30,6 +39,14 @@ fn random(index: u32, channel: u32) -> f32 {
 fn soft_chord(ray: vec3f, c: vec3f, radius: f32) -> f32 {
     let chord = max(hit_sphere(ray, c, radius).chord, 0.0);
     return chord * chord * chord / (4.0 * radius * radius) * (5.0 / 3.0);
+}
+
+// Where the k-th drop of a particle is, from it, in splat radii: anywhere about it, and denser near.
+fn offset_of(id: u32, k: u32) -> vec3f {
+    let up = 2.0 * random(id, 3u * k) - 1.0;
+    let turn = 2.0 * 3.14159265 * random(id, 3u * k + 1u);
+    let across = sqrt(max(1.0 - up * up, 0.0));
+    return CLOUD * random(id, 3u * k + 2u) * vec3f(across * cos(turn), up, across * sin(turn));
 }
 
 @compute @workgroup_size(32)
@@ -49,37 +66,45 @@ fn main(
     // The particle stands for a cloud of drops, wider than the ball that the solver carries.
     let thrown = !is_body(particle);
     let id = particle.tag >> 1u;
-    let radius = 1.4 * camera.radius;
     let half_size = camera.size / 2u;
     let c = eye_from_world(camera, particle.position + particle.velocity * camera.seconds);
-    var drops: array<vec4f, DROPS>;
-    var volume = 0.0;
-    for (var k = 0u; k < DROPS; k++) {
-        let offset = vec3f(random(id, 4u * k), random(id, 4u * k + 1u), random(id, 4u * k + 2u));
-        let size = camera.radius * mix(0.14, 0.5, pow(random(id, 4u * k + 3u), 2.0));
-        drops[k] = vec4f(c + (offset - 0.5) * 1.7 * camera.radius, size);
-        volume += pow(size / camera.radius, 3.0);
+    if c.z < (CLOUD + 1.0) * camera.radius {
+        return;
     }
+    // Near the eye more and smaller ones, each as opaque: as many more as their areas are less.
+    let finer = max((LEAST_SIZE + SIZES) * camera.radius * camera.focal / (c.z * LARGEST), 1.0);
+    let count = min(u32(DROPS * finer * finer), MOST_DROPS);
+    // Σ of their cubes: sizes are LEAST + SIZES q² at the middles of as many parts of 0..1, but for terms of 1 over their number
+    // squared.
+    let m = LEAST_SIZE;
+    let n = SIZES;
+    let part = 1.0 / f32(count);
+    let cubes = m * m * m + m * m * n + 0.6 * m * n * n + n * n * n / 7.0
+        - part * part * (6.0 * m * m * n + 12.0 * m * n * n + 6.0 * n * n * n) / 24.0;
     // Thrown water is mostly air: its drops hold a part of what the particle stands for.
-    volume = select(0.5, 0.15, thrown) / volume;
-    let bounds = sphere_bounds(camera, c, radius, 0.5, half_size);
-    let width = u32(max(bounds.z - bounds.x + 1, 0));
-    let count = width * u32(max(bounds.w - bounds.y + 1, 0));
-    for (var i = lane; i < count; i += 32u) {
-        let row = row_of(i, width);
-        let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
-        let at = 2u * (pixel.y * camera.size.x + pixel.x);
-        if c.z >= min(solid_depth[at], surface[at] + 2.0 * camera.radius) {
-            continue;
-        }
-        let ray = eye_ray(camera, 2.0 * vec2f(pixel) + 1.0);
-        var sum = 0.0;
-        for (var k = 0u; k < DROPS; k++) {
-            sum += soft_chord(ray, drops[k].xyz, drops[k].w);
-        }
-        let amount = u32(sum * volume * params.scale * particle.aeration * THICKNESS_SCALE + 0.5);
-        if amount > 0u {
-            atomicAdd(&spray[pixel.y * half_size.x + pixel.x], amount);
+    let volume = select(0.5, 0.15, thrown) / (cubes * f32(count)) * finer * finer * finer;
+    for (var k = lane; k < count; k += 32u) {
+        let q = (f32(k) + 0.5) * part;
+        let own = camera.radius * (m + n * q * q) / finer;
+        let d = c + offset_of(id, k) * camera.radius;
+        // At least 0.7 pixels of the half resolution, so that a small one is fainter and never missed: its volume stays.
+        let radius = max(own, 1.4 * d.z / camera.focal);
+        let shrunk = own / radius;
+        let weight = volume * shrunk * shrunk * shrunk * params.scale * particle.aeration * THICKNESS_SCALE;
+        let bounds = sphere_bounds(camera, d, radius, 0.5, half_size);
+        for (var y = bounds.y; y <= bounds.w; y++) {
+            for (var x = bounds.x; x <= bounds.z; x++) {
+                let pixel = vec2u(vec2i(x, y));
+                let at = 2u * (pixel.y * camera.size.x + pixel.x);
+                if d.z >= min(solid_depth[at], surface[at] + 2.0 * camera.radius) {
+                    continue;
+                }
+                let ray = eye_ray(camera, 2.0 * vec2f(pixel) + 1.0);
+                let amount = u32(soft_chord(ray, d, radius) * weight + 0.5);
+                if amount > 0u {
+                    atomicAdd(&spray[pixel.y * half_size.x + pixel.x], amount);
+                }
+            }
         }
     }
 }

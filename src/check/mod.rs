@@ -11,6 +11,7 @@ mod effects;
 mod engine;
 pub mod flip;
 pub mod pbf;
+pub mod render;
 mod sort;
 pub mod table;
 pub mod whitewater;

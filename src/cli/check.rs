@@ -15,7 +15,8 @@ use crate::{
 };
 
 use super::{
-    Failure, GpuArgs, bake,
+    Failure, GpuArgs, bake, check_render,
+    check_render::SurfaceArgs,
     interrupt::{self, Interrupt},
     is_cache, output,
     progress::{Mode, Progress},
@@ -43,6 +44,8 @@ pub(super) struct CheckArgs {
     /// Of a scene: take meshes and tables that lie outside of its folder.
     #[arg(long)]
     allow_outside: bool,
+    #[command(flatten)]
+    surface: SurfaceArgs,
     /// The result as one JSON object on standard output.
     #[arg(long)]
     json: bool,
@@ -93,6 +96,9 @@ pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     if is_failed(&args.source) {
         return run_failed(args);
     }
+    if let Some(look) = args.surface.look() {
+        return run_render(args, look);
+    }
     let request = Request {
         source: source(args)?,
         substep: args.substep.unwrap_or_default(),
@@ -119,6 +125,25 @@ pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     } else {
         u8::from(outcome.first_over.is_some())
     })
+}
+
+/// Of pictures of a cache.
+fn run_render(args: &CheckArgs, look: &PathBuf) -> Result<u8, Failure> {
+    let has_step = args.substep.is_some() || args.solver.is_some() || !args.set.is_empty();
+    if has_step || !is_cache(&args.source) {
+        let error = Misplaced {
+            option: "--render",
+            what: "caches, without --substep, --solver or --set",
+            is: "asked for otherwise",
+            source_file: args.source.clone(),
+        };
+        return Err(Failure {
+            code: 2,
+            error: Box::new(error),
+        });
+    }
+    let source = (args.source.clone(), look);
+    check_render::run(source, args.frames.clone(), &args.gpu, args.json)
 }
 
 fn source(args: &CheckArgs) -> Result<Source, Failure> {

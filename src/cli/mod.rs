@@ -2,6 +2,7 @@
 
 mod bake;
 mod check;
+mod check_render;
 mod diff;
 mod inspect;
 pub mod interrupt;

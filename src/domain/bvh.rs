@@ -105,6 +105,36 @@ impl Bvh {
         best.map(|index| (best_squared.sqrt(), index))
     }
 
+    /// Distance along a ray to the first triangle nearer than `bound`, in lengths of `direction`, and its index in the mesh; on
+    /// either side (Möller and Trumbore 1997).
+    pub fn first_along(&self, origin: DVec3, direction: DVec3, bound: f64) -> Option<(f64, u32)> {
+        let mut nearest = bound;
+        let mut found = None;
+        let mut stack = Stack::new();
+        if !self.nodes.is_empty() {
+            stack.push(0, 0.0);
+        }
+        while let Some((at, _)) = stack.pop() {
+            let node = &self.nodes[at as usize];
+            if !node.is_met(origin, direction, nearest) {
+                continue;
+            }
+            if node.count == 0 {
+                stack.push(node.first_or_right, 0.0);
+                stack.push(at + 1, 0.0);
+                continue;
+            }
+            for entry in node.entries() {
+                let t = along(self.corners[entry], origin, direction);
+                if let Some(t) = t.filter(|&t| t < nearest) {
+                    nearest = t;
+                    found = Some(self.index[entry]);
+                }
+            }
+        }
+        found.map(|index| (nearest, index))
+    }
+
     /// Generalised winding number (Jacobson et al. 2013): 1 inside, 0 outside of a closed mesh,
     /// in between near holes, negative for a mesh turned inside out.
     pub fn winding_number(&self, p: DVec3) -> f64 {
@@ -132,7 +162,33 @@ impl Bvh {
     }
 }
 
+/// How far along a ray a triangle is.
+fn along([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
+    let (ab, ac, from_a) = (b - a, c - a, origin - a);
+    let p = direction.cross(ac);
+    let volume = ab.dot(p);
+    let u = from_a.dot(p) / volume;
+    let q = from_a.cross(ab);
+    let v = direction.dot(q) / volume;
+    let t = ac.dot(q) / volume;
+    // A ray within the triangle's plane divides by zero, and no comparison with that holds.
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
+}
+
 impl Node {
+    /// Whether a ray comes into its box before `nearest`.
+    fn is_met(&self, origin: DVec3, direction: DVec3, nearest: f64) -> bool {
+        let (mut enter, mut leave) = (0.0f64, nearest);
+        for axis in 0..3 {
+            let a = (self.min[axis] - origin[axis]) / direction[axis];
+            let b = (self.max[axis] - origin[axis]) / direction[axis];
+            // On a side's plane and along it is 0 / 0, and min and max pass over what is no number.
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        }
+        enter <= leave
+    }
+
     fn entries(&self) -> std::ops::Range<usize> {
         let first = self.first_or_right as usize;
         first..first + self.count as usize

@@ -120,6 +120,11 @@ impl LevelSet {
         DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)) / (2.0 * self.voxel)
     }
 
+    /// What the table says of the brick at `p`.
+    pub fn slot(&self, p: DVec3) -> u32 {
+        self.brick_at(p).0
+    }
+
     /// What the table says of the brick at `p`, and where in it that is, in voxels.
     fn brick_at(&self, p: DVec3) -> (u32, DVec3) {
         let last = DVec3::from_array(self.bricks.map(|n| f64::from(n * EDGE) - 1e-9));

@@ -8,6 +8,7 @@ mod hash;
 pub mod neighbors;
 pub mod pbf;
 pub mod poisson;
+pub mod rays;
 pub mod whitewater;
 
 use std::{collections::BTreeMap, time::Instant};

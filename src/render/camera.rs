@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::uniform;
+use crate::domain::eye::Eye;
 use crate::scene::look::{CameraSpec, Look};
 
 /// A pose in world space, metres, and a focal length in mm.
@@ -142,6 +143,22 @@ pub(super) struct Setting {
     pub(super) frames_per_second: f64,
 }
 
+/// The camera of a look at a frame number, which may lie between two, in metres from `origin` in the world.
+pub fn eye(look: &Look, origin: DVec3, frame: f64) -> Eye {
+    let spec = look.spec();
+    let pose = pose(&spec.camera, frame);
+    let forward = (pose.target - pose.position).normalize();
+    let right = forward.cross(DVec3::from(spec.camera.up)).normalize();
+    Eye {
+        position: pose.position - origin,
+        right,
+        up: right.cross(forward),
+        forward,
+        focal: focal_px(look, pose.focal_length_mm),
+        size: [spec.image.width, spec.image.height],
+    }
+}
+
 /// The uniform for one sample of a frame.
 pub(super) fn camera(
     look: &Look,
@@ -150,25 +167,21 @@ pub(super) fn camera(
     sample: Sample,
     index: u32,
 ) -> uniform::Camera {
-    let spec = look.spec();
     let instant = frame + sample.instant;
-    let pose = pose(&spec.camera, instant);
-    let forward = (pose.target - pose.position).normalize();
-    let right = forward.cross(DVec3::from(spec.camera.up)).normalize();
-    let up = right.cross(forward);
-    let picture = [spec.image.width, spec.image.height];
+    let eye = eye(look, setting.origin, instant);
+    let picture = eye.size;
     let centre = [0, 1].map(|axis| {
         let middle = f64::from(setting.margin[axis]) + 0.5 * f64::from(picture[axis]);
         (middle - sample.jitter[axis]) as f32
     });
     uniform::Camera {
-        position: (pose.position - setting.origin).as_vec3().to_array(),
+        position: eye.position.as_vec3().to_array(),
         seconds: (sample.instant / setting.frames_per_second) as f32,
-        right: right.as_vec3().to_array(),
-        focal: focal_px(look, pose.focal_length_mm) as f32,
-        up: up.as_vec3().to_array(),
+        right: eye.right.as_vec3().to_array(),
+        focal: eye.focal as f32,
+        up: eye.up.as_vec3().to_array(),
         particle_count: setting.particle_count,
-        forward: forward.as_vec3().to_array(),
+        forward: eye.forward.as_vec3().to_array(),
         radius: setting.radius as f32,
         centre,
         size: setting.size,

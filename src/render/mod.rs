@@ -30,9 +30,11 @@ use crate::domain::bounds::Bounds;
 use crate::domain::mesh::TriangleMesh;
 use crate::gpu::adapter::GpuError;
 
+pub use camera::eye;
 pub use image::{Attributes, Image};
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::Renderer;
+pub use set::opaque;
 pub use uniform::mirrors;
 
 /// What of a scene a picture needs beside the particles.

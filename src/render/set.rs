@@ -8,6 +8,7 @@ use super::frame::FAR;
 use super::plan::{Limits, Plan};
 use super::uniform::{Tile, Triangle};
 use super::{RenderError, RenderScene};
+use crate::domain::mesh::TriangleMesh;
 use crate::gpu::{
     raster::{CopyTexture, DEPTH, Draw, RasterSpec, Target},
     recording::Command,
@@ -18,20 +19,15 @@ use crate::scene::look::Look;
 /// Texels along a side of the shadow map.
 const SHADOW_SIZE: u32 = 2048;
 
-/// Scene solids and quay walls, relative to the domain's least corner.
-pub(super) fn triangles(look: &Look, scene: &RenderScene) -> Result<Vec<Triangle>, RenderError> {
+/// Scene solids and quay walls, relative to the domain's least corner: corners and material.
+fn opaque_triangles(
+    look: &Look,
+    scene: &RenderScene,
+) -> Result<Vec<([DVec3; 3], u32)>, RenderError> {
     let origin = scene.domain.min;
     let mut out = Vec::new();
     let mut push = |corners: [DVec3; 3], material: u32| {
-        let [a, b, c] = corners.map(|p| (p - origin).as_vec3().to_array());
-        out.push(Triangle {
-            a,
-            material,
-            b,
-            pad0: 0,
-            c,
-            pad1: 0,
-        });
+        out.push((corners.map(|p| p - origin), material));
     };
     for mesh in &scene.solids {
         for corners in &mesh.triangles {
@@ -67,6 +63,36 @@ pub(super) fn triangles(look: &Look, scene: &RenderScene) -> Result<Vec<Triangle
         }
     }
     Ok(out)
+}
+
+/// The same for the device.
+pub(super) fn triangles(look: &Look, scene: &RenderScene) -> Result<Vec<Triangle>, RenderError> {
+    let all = opaque_triangles(look, scene)?.into_iter();
+    let packed = all.map(|(corners, material)| {
+        let [a, b, c] = corners.map(|p| p.as_vec3().to_array());
+        Triangle {
+            a,
+            material,
+            b,
+            pad0: 0,
+            c,
+            pad1: 0,
+        }
+    });
+    Ok(packed.collect())
+}
+
+/// What a look and a scene have that is opaque, beside the ground, as one mesh, metres from the domain's least corner.
+///
+/// # Errors
+/// A mesh that names vertices it lacks.
+pub fn opaque(look: &Look, scene: &RenderScene) -> Result<TriangleMesh, RenderError> {
+    let all = opaque_triangles(look, scene)?;
+    let triangles = (0..all.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
+    Ok(TriangleMesh {
+        triangles: triangles.collect(),
+        vertices: all.into_iter().flat_map(|(corners, _)| corners).collect(),
+    })
 }
 
 /// Twelve triangles, counter-clockwise from outside.

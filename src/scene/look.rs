@@ -126,6 +126,22 @@ impl Look {
         self.spec.output.aovs.contains(&aov)
     }
 
+    /// The look for pictures of the water's surface alone, its depth and normals at pixels' centres at the frame's instant, by
+    /// `method`: every particle belongs to the surface.
+    #[must_use]
+    pub fn of_surface(&self, method: MethodSpec) -> Self {
+        let mut look = self.clone();
+        let spec = &mut look.spec;
+        spec.renderer.method = method;
+        spec.water.spray = None;
+        spec.whitewater = None;
+        (spec.image.samples, spec.image.shutter) = (1, 0.0);
+        spec.output.formats = vec![FormatSpec::Exr];
+        spec.output.aovs = vec![AovSpec::Z, AovSpec::N];
+        look.hash = canonical_hash(&look.spec, look.panorama());
+        look
+    }
+
     /// Direction from the ground to the sun, unit length.
     pub fn sun_direction(&self) -> DVec3 {
         let azimuth = self.spec.sun.azimuth_degrees.to_radians();

@@ -4,6 +4,7 @@
 
 mod folder;
 mod plan;
+pub mod surfaces;
 mod whitewater;
 
 use std::{
@@ -110,6 +111,9 @@ pub struct Outcome {
 /// Why a render failed.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderJobError {
+    /// A comparison of nothing is none that held.
+    #[error("nothing was compared: no water is seen in these frames")]
+    NoWater,
     /// The cache.
     #[error(transparent)]
     Cache(#[from] CacheError),
@@ -157,6 +161,7 @@ impl From<&RenderJobError> for Blame {
             RenderJobError::Gpu(error) => error.into(),
             RenderJobError::Render(RenderError::Gpu(error)) => error.into(),
             RenderJobError::Render(RenderError::Panorama(_) | RenderError::Scene(_))
+            | RenderJobError::NoWater
             | RenderJobError::IsWhitewater(_)
             | RenderJobError::IntoCache { .. } => Self::Input,
             RenderJobError::Whitewater(_) => Self::Files,

@@ -46,6 +46,14 @@ impl Ellipsoid {
         self.peak * (1.0 - q.length_squared()).max(0.0).powi(3)
     }
 
+    /// ∇ of [`Self::value`], 1/m.
+    fn gradient(&self, x: DVec3) -> DVec3 {
+        let q = self.inverse * (x - self.centre);
+        let s = (1.0 - q.length_squared()).max(0.0);
+        // G is symmetric.
+        self.inverse * q * (-6.0 * self.peak * s * s)
+    }
+
     /// Half axes in metres along the columns of `turn`, of a particle of `volume` m³.
     fn new(centre: DVec3, turn: DMat3, axes: DVec3, volume: f64) -> Self {
         let inverse = turn * DMat3::from_diagonal(axes.recip()) * turn.transpose();
@@ -112,10 +120,41 @@ impl Kernels {
         }
     }
 
-    /// The field at `x`, by a sum over all kernels: for tests.
+    /// The field itself, for values at any place.
+    pub fn field(&self) -> Field<'_> {
+        let reach = |it: &Ellipsoid| it.reach.max_element();
+        let edge = self.ellipsoids.iter().map(reach).fold(0.0, f64::max);
+        let places: Vec<DVec3> = self.ellipsoids.iter().map(|it| it.centre).collect();
+        Field {
+            kernels: self,
+            grid: Grid::new(&places, edge.max(f64::MIN_POSITIVE)),
+        }
+    }
+}
+
+/// The field of kernels: what a level set samples.
+pub struct Field<'a> {
+    kernels: &'a Kernels,
+    grid: Grid,
+}
+
+impl Field<'_> {
+    /// At `x`: positive in water, 0 at its surface, −1 where no particle reaches.
     pub fn value(&self, x: DVec3) -> f64 {
-        let sum: f64 = self.ellipsoids.iter().map(|it| it.value(x)).sum();
-        sum / self.level - 1.0
+        let mut sum = 0.0;
+        let ellipsoids = &self.kernels.ellipsoids;
+        self.grid
+            .for_each_near(x, |k| sum += ellipsoids[k].value(x));
+        sum / self.kernels.level - 1.0
+    }
+
+    /// ∇ at `x`, 1/m.
+    pub fn gradient(&self, x: DVec3) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        let ellipsoids = &self.kernels.ellipsoids;
+        self.grid
+            .for_each_near(x, |k| sum += ellipsoids[k].gradient(x));
+        sum / self.kernels.level
     }
 }
 
@@ -349,7 +388,7 @@ impl Grid {
         (z * self.cells[1] + y) * self.cells[0] + x
     }
 
-    /// Visits those of the 3³ cells about a place, in an order that depends on the places alone.
+    /// Visits those of the 3³ cells about a place, which may lie outside of all, in an order that depends on the places alone.
     fn for_each_near(&self, p: DVec3, mut visit: impl FnMut(usize)) {
         let [x, y, z] = self.cell(p);
         let range = |c: usize, n: usize| c.saturating_sub(1)..=(c + 1).min(n - 1);

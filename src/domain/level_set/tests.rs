@@ -73,7 +73,7 @@ fn a_pool_is_flat_up_to_its_walls() {
         .collect();
     let far = Kernels::fit(&lonely, DVec3::splat(20.0), D);
     let corner = DVec3::new(5.0 + 0.2 * D, 1.0 - 0.3 * D, 5.0 + 0.2 * D);
-    assert!(far.value(corner) < 0.0);
+    assert!(far.field().value(corner) < 0.0);
     assert!(set.value(corner - DVec3::new(5.0, 0.0, 5.0)) > 0.0);
 }
 
@@ -145,8 +145,8 @@ fn a_lone_particle_is_a_ball_of_its_volume() {
     assert!((0.6..1.0).contains(&volume), "{volume} of its volume");
     let radius = (3.0 / (4.0 * PI)).cbrt() * D;
     let exact = Kernels::fit(&[place], DVec3::splat(2.0), D);
-    assert!(exact.value(place + DVec3::X * radius * 1.001) < 0.0);
-    assert!(exact.value(place + DVec3::X * radius * 0.999) > 0.0);
+    assert!(exact.field().value(place + DVec3::X * radius * 1.001) < 0.0);
+    assert!(exact.field().value(place + DVec3::X * radius * 0.999) > 0.0);
 }
 
 /// Bricks say what the kernels say: of full and empty ones the sign, of the others the value.
@@ -155,11 +155,12 @@ fn bricks_hold_the_field_of_the_kernels() {
     let size = DVec3::new(2.0, 2.1, 1.7);
     let pool = lattice([20, 9, 17], DVec3::ZERO, 0.3);
     let kernels = Kernels::fit(&pool, size, D);
+    let field = kernels.field();
     let set = LevelSet::of_kernels(&kernels, size, D);
     let [mut full, mut empty, mut between] = [0; 3];
     for k in 0..2000 {
         let part = DVec3::new(noise(3 * k), noise(3 * k + 1), noise(3 * k + 2)) + 0.5;
-        let (held, exact) = (set.value(part * size), kernels.value(part * size));
+        let (held, exact) = (set.value(part * size), field.value(part * size));
         let (slot, _) = set.brick_at(part * size);
         match slot {
             EMPTY => {
@@ -178,6 +179,14 @@ fn bricks_hold_the_field_of_the_kernels() {
         }
     }
     assert!(full > 100 && empty > 100 && between > 100);
+    // A gradient is what differences say.
+    let (at, step) = (DVec3::new(1.0, 0.88, 0.8), 1e-6);
+    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+        let change = field.value(at + step * axis) - field.value(at - step * axis);
+        let slope = field.gradient(at).dot(axis);
+        // Rounding of values of about 1 over the step, and its square of the third derivative.
+        assert!((change / (2.0 * step) - slope).abs() < 1e-6 * field.gradient(at).length() + 1e-8);
+    }
     // Near the surface a gradient points downward, into the water.
     let down = set.gradient(DVec3::new(1.0, 0.9, 0.8)).normalize();
     assert!(down.y < -0.95, "{down}");

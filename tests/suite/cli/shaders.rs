@@ -125,6 +125,49 @@ fn a_check_says_whose_shaders_it_ran() {
     assert_has(&said, &["not the shipped ones"]);
 }
 
+/// Rays have a pass mark, splats are measured; depths that are a tenth too great are out.
+#[test]
+fn surfaces_in_pictures_are_held_against_rays_in_f64() {
+    let job = job(&["edit"]);
+    job.edit(
+        "edit/rays/aovs.wgsl",
+        "store(out, found.t / along, normal",
+        "store(out, 1.1 * found.t / along, normal",
+    );
+    job.expect(0, "bake small.toml --frames 1-2 -o cache");
+    let check = "check cache --render --look look.toml";
+    let found = job.json(0, check);
+    let rows = found["rows"].as_array().unwrap();
+    let depth = |row: &Value| row["surface"]["depth"][1].as_f64().unwrap();
+    assert_eq!([&rows[0]["method"], &rows[1]["method"]], ["ssfr", "ray"]);
+    assert!(depth(&rows[1]) < depth(&rows[0]), "{found}");
+    assert!(rows[1]["surface"]["pixels"].as_u64().unwrap() > 100);
+    let spoiled = job.json(1, &format!("{check} --shaders edit"));
+    assert_eq!(spoiled["within"], false);
+    assert_has(
+        &job.expect(1, "check cache --render --look look.toml --shaders edit"),
+        &["OUT"],
+    );
+    for (words, said) in [
+        ("check cache --render", "--look"),
+        (
+            "check small.toml --render --look look.toml",
+            "--render is for caches",
+        ),
+        (
+            "check cache --render --look look.toml --substep 2",
+            "--render is for caches",
+        ),
+        ("check cache --render --look no.toml", "no.toml"),
+    ] {
+        assert_has(&job.expect(2, words), &[said]);
+    }
+    assert_has(
+        &job.expect(4, "check cache --render --look look.toml --frames 9"),
+        &["9"],
+    );
+}
+
 #[test]
 fn a_picture_by_edited_shaders_says_so_and_stays_apart() {
     let job = job(&["same", "edit"]);

@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 20] = [
+const VARIANTS: [&[&str]; 21] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -253,7 +253,15 @@ const MAY_IMPORT: [(&str, &[&str]); 13] = [
     ("study", &["domain", "compare"]),
     (
         "check",
-        &["domain", "gpu", "scene", "solve", "reference", "compare"],
+        &[
+            "domain",
+            "gpu",
+            "scene",
+            "solve",
+            "reference",
+            "render",
+            "compare",
+        ],
     ),
     (
         "stage",

@@ -15,7 +15,7 @@ use swell::{
     reference,
     scene::{
         Method, Scene,
-        effects::surface_tension::Settings,
+        effects::{surface_tension::Settings, viscosity},
         flip::Transfer,
         probe::{Probe, ProbeKind},
     },
@@ -110,8 +110,8 @@ fn speeds(particles: &Particles) -> [f64; 2] {
 }
 
 /// 2 σ / R inside a drop of six cells' radius within 5 %, on the device as in f64; and where the water is as viscous as in the
-/// usual test (Popinet 2009: a Laplace number σ D ρ / μ² of 120) nothing moves faster than a hundredth of √(σ / (ρ R)). FLIP's
-/// viscosity is α Δx² / (6 Δt) (Zhu and Bridson 2005).
+/// usual test (Popinet 2009: a Laplace number σ D ρ / μ² of 120) nothing moves faster than a hundredth of √(σ / (ρ R)) with FLIP.
+/// PBF's viscosity is the effect of that name; FLIP's is α Δx² / (6 Δt) (Zhu and Bridson 2005).
 #[test]
 fn a_drop_at_rest_has_laplaces_pressure_and_keeps_still() {
     let context = context();
@@ -119,13 +119,24 @@ fn a_drop_at_rest_has_laplaces_pressure_and_keeps_still() {
     let particles = drop(cells, size, 0.0);
     let r = radius(&particles);
     let capillary = (SIGMA / (RHO * r)).sqrt();
-    let frames = 30;
     for method in METHODS {
+        let frames = 30;
         let mut scene = scene(method, cells);
         let step = scene.shot.frame_seconds() / 4.0;
         let viscosity = (SIGMA * 2.0 * r / (RHO * 120.0)).sqrt();
-        let blend = 6.0 * viscosity * step / DX.powi(2);
-        of_flip::flip(&mut scene).pic_blend = 1.0 - (1.0 - blend).powi(4);
+        match method {
+            Method::Flip => {
+                let blend = 6.0 * viscosity * step / DX.powi(2);
+                of_flip::flip(&mut scene).pic_blend = 1.0 - (1.0 - blend).powi(4);
+            }
+            Method::Pbf => {
+                scene.effects.viscosity = Some(viscosity::Settings {
+                    coefficient: Some(RHO * viscosity),
+                    tolerance: Some(1e-3),
+                    xsph: None,
+                });
+            }
+        }
         let run = |scene: &Scene, frames: u32| -> (f64, [f64; 2], StepReport) {
             let mut solver = solver(&context, scene, &particles);
             let mut last = None;
@@ -151,8 +162,8 @@ fn a_drop_at_rest_has_laplaces_pressure_and_keeps_still() {
         );
         let least = match method {
             Method::Flip => 0.01,
-            // Without gravity its projection has next to no viscosity.
-            Method::Pbf => 0.2,
+            // Misses the gate by two: particles of its lattice go on pushing each other, as fast after 90 frames as after 30.
+            Method::Pbf => 0.03,
         };
         assert!(most / capillary < least, "{}", most / capillary);
         assert_eq!(report.substeps, 4);
@@ -199,37 +210,38 @@ fn the_reference_has_laplaces_pressure() {
 }
 
 /// ω² = 8 σ / (ρ R³) of the second mode (Lamb 1932, §275), within 5 %: the time between the first and the third passage of the second
-/// moment through that of a sphere, for a drop of ten cells' radius, a tenth longer than round. PBF's projection has
-/// the same passes; its period was not measured.
+/// moment through that of a sphere, for a drop of ten cells' radius, a tenth longer than round.
 #[test]
 fn an_ellipsoid_oscillates_with_lambs_period() {
     let context = context();
     let (cells, size) = (32.0, 10.0);
     let particles = drop(cells, size, 0.1);
-    let r = radius(&particles);
-    let period = TAU / (8.0 * SIGMA / (RHO * r.powi(3))).sqrt();
-    let mut scene = scene(Method::Flip, cells);
-    let flip = of_flip::flip(&mut scene);
-    (flip.transfer, flip.pic_blend) = (Transfer::Flip, 0.02);
-    let length = scene.shot.frame_seconds();
-    let mut solver = solver(&context, &scene, &particles);
-    let mut moments = vec![moment(&particles)];
-    let mut passed = Vec::new();
-    while passed.len() < 3 && (moments.len() as f64) * length < 1.6 * period {
-        let (state, _) = solver.advance().unwrap();
-        let (before, now) = (moments[moments.len() - 1], moment(&state));
-        if before * now < 0.0 {
-            let part = before / (before - now);
-            passed.push((moments.len() as f64 - 1.0 + part) * length);
+    for method in METHODS {
+        let r = radius(&particles);
+        let period = TAU / (8.0 * SIGMA / (RHO * r.powi(3))).sqrt();
+        let mut scene = scene(method, cells);
+        let flip = of_flip::flip(&mut scene);
+        (flip.transfer, flip.pic_blend) = (Transfer::Flip, 0.02);
+        let length = scene.shot.frame_seconds();
+        let mut solver = solver(&context, &scene, &particles);
+        let mut moments = vec![moment(&particles)];
+        let mut passed = Vec::new();
+        while passed.len() < 3 && (moments.len() as f64) * length < 1.6 * period {
+            let (state, _) = solver.advance().unwrap();
+            let (before, now) = (moments[moments.len() - 1], moment(&state));
+            if before * now < 0.0 {
+                let part = before / (before - now);
+                passed.push((moments.len() as f64 - 1.0 + part) * length);
+            }
+            moments.push(now);
         }
-        moments.push(now);
+        let [first, _, third] = passed[..] else {
+            panic!("{passed:?} {moments:?}")
+        };
+        let found = (third - first) / period;
+        println!("{method:?}: {found:.4} of Lamb's period");
+        assert!((found - 1.0).abs() < 0.05, "{found}");
     }
-    let [first, _, third] = passed[..] else {
-        panic!("{passed:?} {moments:?}")
-    };
-    let found = (third - first) / period;
-    println!("{found:.4} of Lamb's period");
-    assert!((found - 1.0).abs() < 0.05, "{found}");
 }
 
 /// ⟨z² − (x² + y²)/2⟩ about the centre, m².

@@ -151,10 +151,13 @@ fn spray(context: &Context, density: f64, id: u32) -> (Image, Eye) {
 /// Per metre; small enough that no drop is black.
 const DENSITY: f64 = 6.0;
 
-/// Optical depth times area of three drops, m², and the worst relative error of the radiance that they have where they are.
+/// Particles of spray that are drawn.
+const CLOUDS: u32 = 12;
+
+/// Optical depth times area of their drops, m², and the worst relative error of the radiance that they have where they are.
 fn spray_sums(context: &Context) -> (f64, f64) {
     let (mut area, mut grey) = (0.0, 0.0f64);
-    for id in 0..3 {
+    for id in 0..CLOUDS {
         let (image, eye) = spray(context, DENSITY, id);
         for &[r, _, _, cover] in &image.beauty {
             let cover = f64::from(cover);
@@ -173,9 +176,9 @@ fn spray_sums(context: &Context) -> (f64, f64) {
 fn spray_hides_one_less_exp_of_its_optical_depth() {
     let (area, grey) = spray_sums(&context());
     // A particle of spray stands for 15 % of a particle's water.
-    let error = |density: f64| area / (3.0 * density * 0.15 * 0.115f64.powi(3)) - 1.0;
-    // A drop is up to 8 cm nearer or farther than 50 m, which is twice that of its area. Drops of 1.4 to 5 cm are summed
-    // over cells of half a centimetre.
+    let error = |density: f64| area / (f64::from(CLOUDS) * density * 0.15 * 0.115f64.powi(3)) - 1.0;
+    // A particle is some 360 drops here, up to 12 cm nearer or farther than 50 m, which is twice that of an area, and of either sign.
+    // Their radii are 0.7 to 1.25 cells of the sums, which are a twentieth off for a drop and so 0.001 for all of them.
     assert!(error(DENSITY).abs() < 5e-3, "{}", error(DENSITY));
     assert!(grey < 1e-4, "{grey}");
     for density in [0.99 * DENSITY, 1.01 * DENSITY] {

@@ -1,0 +1,87 @@
+//! Surfaces in pictures against rays in f64.
+
+use glam::DVec3;
+
+use crate::{reference::rays::Seen, render::Image};
+
+/// Water less than so many spacings, and this part of its depth, before what is opaque is left out: which of the two is seen hangs on
+/// rounding there. A depth is a dozen roundings of f32 of lengths up to a hundred times the height that a far ground is met from.
+const THINNEST: f64 = 0.05;
+const ROUNDING: f64 = 100.0 * 12.0 * f32::EPSILON as f64;
+
+/// What pictures of some frames have of the water's surface, and the truth.
+#[derive(Clone, Debug, Default)]
+pub struct Surfaces {
+    /// Off along the optical axis, spacings, where both have water.
+    depths: Vec<f64>,
+    /// Between normals, degrees, there.
+    angles: Vec<f64>,
+    /// Pixels with water in either.
+    either: usize,
+}
+
+/// What is told of them.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Summary {
+    /// Pixels with water in picture and truth.
+    pub pixels: usize,
+    /// Off along the optical axis, spacings: median and 95th percentile.
+    pub depth: [f64; 2],
+    /// Between normals, degrees: median and 95th percentile.
+    pub normal: [f64; 2],
+    /// Pixels with water in both over those with water in either.
+    pub overlap: f64,
+}
+
+impl Surfaces {
+    /// Takes a picture with depth and normals, of particles of `spacing` metres.
+    ///
+    /// # Panics
+    /// Where the picture lacks these channels.
+    pub fn add(&mut self, image: &Image, truth: &[Seen], spacing: f64) {
+        let z = image.aovs.z.as_ref().expect("a depth");
+        let n = image.aovs.n.as_ref().expect("normals");
+        for ((z, n), seen) in z.iter().zip(n).zip(truth) {
+            let z = f64::from(*z);
+            let before = seen.opaque * (1.0 - ROUNDING) - THINNEST * spacing;
+            let is_drawn = z < before && z < FAR;
+            let water = seen.water.filter(|(t, _)| *t < before);
+            self.either += usize::from(is_drawn || water.is_some());
+            let (Some((t, normal)), true) = (water, is_drawn) else {
+                continue;
+            };
+            self.depths.push((z - t).abs() / spacing);
+            let cosine = DVec3::from(n.map(f64::from))
+                .normalize_or_zero()
+                .dot(normal);
+            self.angles
+                .push(cosine.clamp(-1.0, 1.0).acos().to_degrees());
+        }
+    }
+
+    /// Whether no pixel has water in either.
+    pub fn is_empty(&self) -> bool {
+        self.either == 0
+    }
+
+    /// `None` where no pixel had water in both.
+    pub fn summary(mut self) -> Option<Summary> {
+        Some(Summary {
+            pixels: self.depths.len(),
+            depth: percentiles(&mut self.depths)?,
+            normal: percentiles(&mut self.angles)?,
+            overlap: self.depths.len() as f64 / self.either as f64,
+        })
+    }
+}
+
+/// Beyond this a depth is that of the sky.
+const FAR: f64 = 1e29;
+
+/// The median and the 95th percentile.
+fn percentiles(values: &mut [f64]) -> Option<[f64; 2]> {
+    values.sort_unstable_by(f64::total_cmp);
+    let at =
+        |part: f64| values.get((part * (values.len().checked_sub(1)? as f64)).round() as usize);
+    Some([*at(0.5)?, *at(0.95)?])
+}
