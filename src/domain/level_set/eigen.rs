@@ -22,19 +22,19 @@ pub fn symmetric(matrix: DMat3) -> (DVec3, DMat3) {
             for row in &mut a {
                 (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
             }
-            for k in 0..3 {
-                (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-            }
-            for k in 0..3 {
-                (vectors[p][k], vectors[q][k]) = (
-                    c * vectors[p][k] - s * vectors[q][k],
-                    s * vectors[p][k] + c * vectors[q][k],
-                );
-            }
+            turn(&mut a, [p, q], [c, s]);
+            turn(&mut vectors, [p, q], [c, s]);
         }
     }
     let values = DVec3::new(a[0][0], a[1][1], a[2][2]);
     (values, DMat3::from_cols_array_2d(&vectors))
+}
+
+/// Turns two rows in their plane.
+fn turn(rows: &mut [[f64; 3]; 3], [p, q]: [usize; 2], [c, s]: [f64; 2]) {
+    let (x, y) = (rows[p], rows[q]);
+    rows[p] = std::array::from_fn(|k| c * x[k] - s * y[k]);
+    rows[q] = std::array::from_fn(|k| s * x[k] + c * y[k]);
 }
 
 #[cfg(test)]
