@@ -136,7 +136,7 @@ fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
 fn hazed(colour: vec3f, distance: f32, direction: vec3f) -> vec3f {
     let kept = exp(-distance / shading.haze);
     let level = normalize(vec3f(direction.x, 0.0, direction.z) + vec3f(1e-4, 0.0, 0.0));
-    return mix(sky_radiance(vec3f(level.x, 0.02, level.z)), colour, kept);
+    return mix(sky_radiance(vec3f(level.x, 0.0, level.z)), colour, kept);
 }
 
 // Light that enters water or foam through a surface of this normal and is scattered, per unit albedo.

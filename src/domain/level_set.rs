@@ -94,11 +94,6 @@ impl LevelSet {
         set
     }
 
-    /// Bricks that have values.
-    pub fn active(&self) -> usize {
-        self.values.len() / VALUES
-    }
-
     /// The field at `p`, metres from the box's least corner: between the voxels' corners it is trilinear. −1 in bricks without
     /// water, 1 in those that are all water.
     pub fn value(&self, p: DVec3) -> f64 {

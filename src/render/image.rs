@@ -7,7 +7,10 @@ mod png_file;
 use std::io::Write;
 use std::path::Path;
 
+use glam::{DMat4, DVec4};
+
 use super::RenderError;
+use crate::domain::eye::Eye;
 
 pub use exr_file::{read_exr_attributes, write_exr};
 pub use pixels::{Pixels, read_exr, read_png, write_rgb_png};
@@ -24,6 +27,43 @@ pub struct Image {
     pub beauty: Vec<[f32; 4]>,
     /// What the look asked for.
     pub aovs: Aovs,
+    /// From where it was taken; `None` of a picture that no camera took.
+    pub view: Option<View>,
+}
+
+/// The camera of a picture at the frame's instant, as the standard attributes of OpenEXR have it: matrices row by row, for points
+/// that stand before them as rows (x, y, z, 1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// To x right, y up, and z towards the viewer; metres.
+    pub world_to_camera: [f32; 16],
+    /// To the picture, (0, 0) its upper left corner and (1, 1) the lower right one, once divided by the last coordinate.
+    pub world_to_ndc: [f32; 16],
+    /// Frames a second.
+    pub frames_per_second: f64,
+}
+
+impl View {
+    /// That of a camera in the world.
+    pub fn of(eye: &Eye, frames_per_second: f64) -> Self {
+        let [width, height] = eye.size.map(f64::from);
+        let (right, up, forward) = (eye.right, eye.up, eye.forward);
+        let columns = [right, up, -forward];
+        let camera = columns.map(|axis| axis.extend(-axis.dot(eye.position)));
+        let depth = -camera[2];
+        let across = eye.focal / width * camera[0] + 0.5 * depth;
+        let down = 0.5 * depth - eye.focal / height * camera[1];
+        let rows = |columns: [DVec4; 4]| {
+            let matrix = DMat4::from_cols_array_2d(&columns.map(|c| c.to_array()));
+            // Columns one after the other, of the transposed matrix, are rows.
+            matrix.transpose().to_cols_array().map(|x| x as f32)
+        };
+        Self {
+            world_to_camera: rows([camera[0], camera[1], camera[2], DVec4::W]),
+            world_to_ndc: rows([across, down, DVec4::W, depth]),
+            frames_per_second,
+        }
+    }
 }
 
 /// Channels beside the picture, at pixel centres and the frame's instant; `None` where not asked for.
@@ -50,6 +90,7 @@ impl Image {
             height,
             beauty: vec![[0.0; 4]; width as usize * height as usize],
             aovs: Aovs::default(),
+            view: None,
         }
     }
 }

@@ -21,8 +21,17 @@ use crate::{
 /// Sides of the box at which the look's quay walls stand: those along z.
 const QUAYS: u32 = 0b11_0000;
 
-/// Plans the level set, with no bricks yet, the light in it, and the tree over what is opaque.
-pub(super) fn plan_rays(plan: &mut Plan, look: &Look, scene: &RenderScene, triangles: &[Triangle]) {
+/// Particles for each brick that is planned for. The quickstart has one for 83 of them at its start and for 27 in its splash; a
+/// frame that has more makes room for them.
+const PARTICLES_A_BRICK: usize = 24;
+
+/// Plans the level set of `particles` particles, the light in it, and the tree over what is opaque.
+pub(super) fn plan_rays(
+    plan: &mut Plan,
+    look: &Look,
+    scene: &RenderScene,
+    (triangles, particles): (&[Triangle], usize),
+) {
     let size = scene.domain.size();
     let spacing = scene.particle_spacing;
     let bricks = bricks_over(size, spacing);
@@ -41,7 +50,10 @@ pub(super) fn plan_rays(plan: &mut Plan, look: &Look, scene: &RenderScene, trian
     let count = |n: [u32; 3]| n.iter().map(|&n| n as usize).product();
     plan.values(&RAYS, &[rays]);
     plan.buffer(&LEVEL_TABLE, count(bricks));
-    plan.buffer(&LEVEL_VALUES, VALUES);
+    plan.buffer(
+        &LEVEL_VALUES,
+        (particles / PARTICLES_A_BRICK).max(1) * VALUES,
+    );
     plan.buffer(&SUN_PATHS, count(nodes));
     let (boxes, sorted) = tree(triangles);
     plan.values(&SET_NODES, &boxes);

@@ -181,6 +181,10 @@ impl Sky {
                 let ground = light * DVec3::from(spec.ground.colour) / PI;
                 let below = texels.len() / 2;
                 texels[below..].fill(ground);
+                // Just below it far ground is lost in the air: a row of the sky's, so that none of the ground's is mixed into the
+                // horizon.
+                let row = size[0] as usize;
+                texels.copy_within(below - row..below, below);
                 (size, texels, 1.0 / SUN_SOLID_ANGLE)
             }
             SkySpec::Panorama {

@@ -16,7 +16,8 @@ fn text(value: &str) -> Text {
 }
 
 /// Writes one part: `R G B A` half, and the AOVs float: `Z`, `N.X/.Y/.Z`, `P.X/.Y/.Z`, `forward.u/.v`,
-/// `thickness.Y`. ZIP, lossless; Rec. 709 chromaticities stated.
+/// `thickness.Y`. ZIP, lossless; Rec. 709 chromaticities stated, and the standard attributes `worldToCamera`, `worldToNDC` and
+/// `framesPerSecond`.
 ///
 /// # Errors
 /// [`RenderError::Write`], [`RenderError::Format`].
@@ -55,8 +56,12 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
     }
 
     let size = Vec2(image.width as usize, image.height as usize);
+    let view = image.view.as_ref();
     let layer_attributes = LayerAttributes {
         software_name: Some(text(&attributes.software)),
+        world_to_camera: view.map(|view| view.world_to_camera),
+        world_to_normalized_device: view.map(|view| view.world_to_ndc),
+        frames_per_second: view.map(|view| rational(view.frames_per_second)),
         ..LayerAttributes::default()
     };
     let encoding = Encoding {
@@ -103,6 +108,15 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
         message: "the header that was just written cannot be read".to_owned(),
     })?;
     write_whole(path, &bytes)
+}
+
+/// A rate as broadcasting writes it: whole, over 1001, or to a thousandth.
+fn rational(rate: f64) -> (i32, u32) {
+    let over = |parts: u32| (rate * f64::from(parts)).round() as i32;
+    let near = |parts: u32| (f64::from(over(parts)) / f64::from(parts) / rate - 1.0).abs() < 1e-6;
+    let parts = [1, 1001].into_iter().find(|&parts| near(parts));
+    let parts = parts.unwrap_or(1000);
+    (over(parts), parts)
 }
 
 /// Puts the header's attributes in the order of their names. The encoder keeps them in a hash map, whose order

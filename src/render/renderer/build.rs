@@ -112,7 +112,7 @@ fn plan_ray(
     scene: &RenderScene,
     (opaque, particles): (&[Triangle], usize),
 ) {
-    plan_rays(plan, look, scene, opaque);
+    plan_rays(plan, look, scene, (opaque, particles));
     let has_drops = look.spec().water.spray.is_some();
     let has_spray = has_drops || look.spec().whitewater.is_some();
     let has_owner = look.wants(AovSpec::Forward);

@@ -8,11 +8,12 @@ mod water;
 mod whitewater;
 
 use bytemuck::Pod;
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, picture};
-use super::camera::{Sample, Setting, camera, pose, samples};
-use super::image::Image;
+use super::camera::{Sample, Setting, camera, eye, pose, samples};
+use super::image::{Image, View};
 use super::plan::{Limits, Plan};
 use super::{RenderError, RenderScene, aeration, uniform};
 use crate::domain::particles::Particles;
@@ -149,6 +150,8 @@ impl Renderer {
         }
         let [width, height] = self.plan.extent.picture;
         let mut image = Image::new(width, height);
+        let eye = eye(&self.look, DVec3::ZERO, frame.into());
+        image.view = Some(View::of(&eye, self.scene.frames_per_second));
         if !self.plan.aovs.is_empty() {
             // Depths and normals have no mean: they are taken at pixel centres, at the frame's instant.
             let still = Sample {

@@ -310,6 +310,7 @@ fn a_file_holds_each_channel_under_its_own_name() {
             forward: Some(vec![[8.0, 9.0]]),
             thickness: Some(vec![10.0]),
         },
+        view: None,
     };
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("frame.exr");
@@ -345,4 +346,54 @@ fn a_file_holds_each_channel_under_its_own_name() {
         ("thickness.Y", 10.0),
     ];
     assert_eq!(found, expected.map(|(name, x)| (name.to_owned(), x)).into());
+}
+
+/// The header's matrices put each pixel's position where that pixel is, and as deep as its Z.
+#[test]
+fn an_exr_says_where_its_camera_stood() {
+    let eye = Eye::new([2.0, 3.0, 1.0], [5.0, 1.0, 6.0], 60.0);
+    let scene = RenderScene {
+        origin: DVec3::new(100.0, 20.0, -300.0),
+        ..scene(1.0, 1.0)
+    };
+    let setup = Setup::new(Eye {
+        position: eye.position + scene.origin,
+        target: eye.target + scene.origin,
+        ..eye
+    });
+    let water = ball(DVec3::new(5.0, 1.0, 6.0), DVec3::ZERO);
+    let image = draw(&context(), &setup, &uniform_sky, &scene, &water, 1);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("frame.exr");
+    write_exr(&file, &image, &Attributes::default()).unwrap();
+    let read = exr::prelude::read_all_data_from_file(&file).unwrap();
+    let header = &read.layer_data[0].attributes;
+    let (parts, whole) = header.frames_per_second.unwrap();
+    assert!((f64::from(parts) / f64::from(whole) - scene.frames_per_second).abs() < 1e-6);
+    let through = |matrix: [f32; 16], p: [f32; 3]| -> [f64; 4] {
+        let [x, y, z] = p;
+        let row = [x, y, z, 1.0];
+        std::array::from_fn(|k| (0..4).map(|i| f64::from(row[i] * matrix[4 * i + k])).sum())
+    };
+    let ndc = header.world_to_normalized_device.unwrap();
+    let camera = header.world_to_camera.unwrap();
+    let (p, z) = (
+        image.aovs.p.as_ref().unwrap(),
+        image.aovs.z.as_ref().unwrap(),
+    );
+    let [width, height] = [image.width, image.height].map(f64::from);
+    let mut worst = 0.0f64;
+    for (i, (&p, &z)) in p.iter().zip(z).enumerate() {
+        if z > 1e3 {
+            continue;
+        }
+        let [x, y, _, w] = through(ndc, p);
+        let (column, row) = (i % image.width as usize, i / image.width as usize);
+        let off = [x / w * width - column as f64, y / w * height - row as f64];
+        worst = off.into_iter().fold(worst, |a, x| a.max((x - 0.5).abs()));
+        let [.., deep, _] = through(camera, p);
+        assert!((-deep / f64::from(z) - 1.0).abs() < 1e-4, "{deep} {z}");
+    }
+    // Positions and the matrix's shift are rounded to f32 at 300 m, under a focal length of 60 pixels and metres away.
+    assert!(worst < 0.01, "{worst} pixels");
 }

@@ -352,3 +352,38 @@ fn haze_grows_exponentially_with_the_distance() {
     assert!(worst(8.0) < 1e-5, "{}", worst(8.0));
     assert!(worst(8.08) > 1e-3, "{}", worst(8.08));
 }
+
+/// The largest change from a row to the next, a twentieth of a degree on, from ground that is lost in haze to the sky above it.
+fn horizon_step(context: &Context) -> f64 {
+    let eye = Eye::new([5.0, 5.0, 5.0], [6.0, 5.0, 5.0], 1146.0);
+    let setup = Setup {
+        sun: [90.0, 45.0, 1.0],
+        sky: "model = \"hosek_wilkie\"\n".to_owned(),
+        ground: [0.34, 0.31, 0.27],
+        haze: 200.0,
+        ..Setup::new(eye)
+    };
+    let image = draw(context, &setup, &uniform_sky, &scene(0.1, 1.0), &dry(), 1);
+    let side = eye.size as usize;
+    let column: Vec<f64> = (0..side)
+        .map(|row| luminance(image.beauty[row * side + side / 2]))
+        .collect();
+    let changes = column
+        .windows(2)
+        .map(|pair| (pair[1] / pair[0] - 1.0).abs());
+    changes.fold(0.0, f64::max)
+}
+
+/// No line and no band where ground and sky meet: haze leads to the sky's own colour there.
+#[test]
+fn the_horizon_has_no_line() {
+    let step = horizon_step(&context());
+    // The haze's own slope: five metres' height at 1.6° are 180 m away, and a row less by 3 % of that.
+    assert!(step < 0.02, "{step}");
+    let (from, to) = (
+        "vec3f(level.x, 0.0, level.z)",
+        "vec3f(level.x, 0.1, level.z)",
+    );
+    let control = horizon_step(&spoiled("ssfr/shade", from, to));
+    assert!(control > 0.02, "{control}");
+}
