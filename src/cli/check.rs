@@ -130,13 +130,23 @@ pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
 /// Of pictures of a cache.
 fn run_render(args: &CheckArgs, look: &PathBuf) -> Result<u8, Failure> {
     let has_step = args.substep.is_some() || args.solver.is_some() || !args.set.is_empty();
-    if has_step || !is_cache(&args.source) {
-        let error = Misplaced {
+    let source_file = args.source.clone();
+    let misplaced = match (has_step, is_cache(&args.source)) {
+        (false, true) => None,
+        (true, _) => Some(Misplaced {
+            option: "--substep, --solver or --set",
+            what: "checks of passes",
+            is: "checked by its pictures",
+            source_file,
+        }),
+        (false, false) => Some(Misplaced {
             option: "--render",
-            what: "caches, without --substep, --solver or --set",
-            is: "asked for otherwise",
-            source_file: args.source.clone(),
-        };
+            what: "caches",
+            is: "none: bake it first",
+            source_file,
+        }),
+    };
+    if let Some(error) = misplaced {
         return Err(Failure {
             code: 2,
             error: Box::new(error),

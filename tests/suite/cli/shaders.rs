@@ -156,7 +156,7 @@ fn surfaces_in_pictures_are_held_against_rays_in_f64() {
         ),
         (
             "check cache --render --look look.toml --substep 2",
-            "--render is for caches",
+            "--substep, --solver or --set is for checks of passes",
         ),
         ("check cache --render --look no.toml", "no.toml"),
     ] {
