@@ -32,25 +32,36 @@ fn strongest(weight: vec3f) -> f32 {
     return max(weight.x, max(weight.y, weight.z));
 }
 
+// ∫ σ exp(−σ (t + s)) dt from `start` to `end` of a way through water, where the light's own way s changes evenly from `before` to
+// `after`: as it does in flat water, where this is exact at any depth.
+fn gathered(extinction: vec3f, start: f32, end: f32, before: f32, after: f32) -> vec3f {
+    let x = extinction * (end - start + after - before);
+    let first = exp(-extinction * (start + before));
+    let last = exp(-extinction * (end + after));
+    let mean = select((first - last) / x, first * (1.0 - 0.5 * x), abs(x) < vec3f(1e-3));
+    return extinction * (end - start) * mean;
+}
+
 // Light that water on a way of `length` metres scatters towards its beginning: once, from the sun and the sky through what stands
-// above, scaled so that deep flat water seen from above has the reflectance of `deep_albedo`.
+// above, scaled so that deep flat water seen from straight above has the reflectance of `deep_albedo`.
 fn scattered(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
     let extinction = shading.absorption + shading.scattering;
     let up = vec3f(0.0, 1.0, 0.0);
     let sun = shading.sun_irradiance * max(shading.sun_direction.y, 0.0) * (1.0 + shading.sun_path);
     let sky = sky_irradiance(up) * 2.0;
     var light = vec3f(0.0);
-    var from_t = 0.0;
+    var start = 0.0;
+    var before = sun_path_at(origin);
     for (var k = 1; k <= PARTS; k++) {
         // Finer near the eye, where most of it comes from.
         let part = f32(k) / f32(PARTS);
-        let to_t = length * part * part;
-        let p = origin + direction * 0.5 * (from_t + to_t);
-        let path = sun_path_at(p);
-        let through = exp(-extinction * path);
-        let weight = exp(-extinction * from_t) - exp(-extinction * to_t);
-        light += weight * (sun * through * sunlit(p, up) + sky * exp(-extinction * path / shading.sun_path));
-        from_t = to_t;
+        let end = length * part * part;
+        let after = sun_path_at(origin + direction * end);
+        let seen = sunlit(origin + direction * 0.5 * (start + end), up);
+        light += sun * seen * gathered(extinction, start, end, before, after);
+        light += sky * gathered(extinction, start, end, before / shading.sun_path, after / shading.sun_path);
+        start = end;
+        before = after;
     }
     return light * deep_albedo() / PI;
 }
