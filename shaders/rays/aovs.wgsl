@@ -20,6 +20,11 @@
 @group(0) @binding(10) var<storage, read> particles: array<Particle>;
 #endif
 
+#ifdef SEA
+@group(0) @binding(11) var<uniform> sea: Sea;
+@group(0) @binding(12) var<storage, read> sea_values: array<vec4f>;
+#endif
+
 // Surfaces on a line of sight, at most.
 const MOST_SURFACES: i32 = 32;
 
@@ -29,7 +34,7 @@ fn water_along(start: vec3f, direction: vec3f) -> f32 {
     var inside = is_wet(origin);
     var sum = 0.0;
     for (var k = 0; k < MOST_SURFACES; k++) {
-        let found = trace(origin, direction, inside);
+        let found = trace(origin, direction, inside, length(origin - start));
         if found.kind == SKY {
             break;
         }
@@ -56,7 +61,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let along = length(ray);
     let direction = world_direction(camera, ray) / along;
     let through = water_along(camera.position, direction);
-    let found = trace(camera.position, direction, is_wet(camera.position));
+    let found = trace(camera.position, direction, is_wet(camera.position), 0.0);
     if found.kind == SKY {
         let motion = motion_to(sky_in_next(direction), vec2i(pixel));
         store(out, FAR, vec3f(0.0), vec3f(0.0), motion, through);
@@ -65,6 +70,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let position = camera.position + direction * found.t;
     let normal = select(found.normal, -found.normal, dot(found.normal, direction) > 0.0);
     var moved = position;
+#ifdef SEA
+    let is_beyond = is_sea(position.xz);
+    if found.kind == WATER && is_beyond {
+        moved += sea_velocity(position.xz) * camera.frame_seconds;
+    }
+#endif
 #ifdef FORWARD
     if found.kind == WATER {
         let particle = owner[pixel.y * camera.size.x + pixel.x];

@@ -26,6 +26,13 @@
 @group(0) @binding(15) var<storage, read> surface: array<f32>;
 @group(0) @binding(16) var<storage, read> solid_depth: array<f32>;
 #endif
+#ifdef SEA
+@group(0) @binding(17) var<uniform> sea: Sea;
+@group(0) @binding(18) var<storage, read> sea_values: array<vec4f>;
+#endif
+#ifdef PALETTE
+@group(0) @binding(19) var<uniform> palette: array<vec4f, 252>;
+#endif
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -11,6 +11,10 @@
 // Of the water, or FAR, and of what is opaque before it, or FAR.
 @group(0) @binding(6) var<storage, read_write> depth: array<f32>;
 @group(0) @binding(7) var<storage, read_write> solid_depth: array<f32>;
+#ifdef SEA
+@group(0) @binding(8) var<uniform> sea: Sea;
+@group(0) @binding(9) var<storage, read> sea_values: array<vec4f>;
+#endif
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -21,7 +25,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let ray = eye_ray(camera, vec2f(id.xy) + 0.5);
     let along = length(ray);
     let direction = world_direction(camera, ray) / along;
-    let found = trace(camera.position, direction, is_wet(camera.position));
+    let found = trace(camera.position, direction, is_wet(camera.position), 0.0);
     depth[at] = select(FAR, found.t / along, found.kind == WATER);
     solid_depth[at] = select(FAR, found.t / along, found.kind == OPAQUE);
 }

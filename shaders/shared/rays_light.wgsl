@@ -28,6 +28,16 @@ struct Ray {
     surfaces: u32,
 }
 
+// Metres that sunlight has gone through water on its way to `p`.
+fn water_above(p: vec3f) -> f32 {
+#ifdef SEA
+    if any(p.xz < vec2f(0.0)) || any(p.xz > rays.size.xz) {
+        return select(0.0, max(sea.level - p.y, 0.0) * shading.sun_path, is_sea(p.xz));
+    }
+#endif
+    return sun_path_at(p);
+}
+
 fn strongest(weight: vec3f) -> f32 {
     return max(weight.x, max(weight.y, weight.z));
 }
@@ -51,12 +61,12 @@ fn scattered(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
     let sky = sky_irradiance(up) * 2.0;
     var light = vec3f(0.0);
     var start = 0.0;
-    var before = sun_path_at(origin);
+    var before = water_above(origin);
     for (var k = 1; k <= PARTS; k++) {
         // Finer near the eye, where most of it comes from.
         let part = f32(k) / f32(PARTS);
         let end = length * part * part;
-        let after = sun_path_at(origin + direction * end);
+        let after = water_above(origin + direction * end);
         let seen = sunlit(origin + direction * 0.5 * (start + end), up);
         light += sun * seen * gathered(extinction, start, end, before, after);
         light += sky * gathered(extinction, start, end, before / shading.sun_path, after / shading.sun_path);
@@ -95,14 +105,16 @@ fn split_at(ray: Ray, found: Found) -> Split {
     let sinks = max(0.005 + dot(refracted, found.normal * side), 0.0);
     refracted = refracted - found.normal * side * sinks;
     let reflectance = select(fresnel(facing, index), 1.0, dot(refracted, refracted) < 0.25);
-    return Split(normal, mirrored, normalize(refracted - found.normal * side * 1e-6), reflectance, facet.variance);
+    return Split(
+        normal, mirrored, normalize(refracted - found.normal * side * 1e-6), reflectance,
+        facet.variance + found.variance);
 }
 
 // Radiance of something opaque, in the light that the water above it lets through.
 fn opaque_radiance(ray: Ray, found: Found) -> vec3f {
     let p = ray.origin + ray.direction * found.t;
     let n = select(found.normal, -found.normal, dot(found.normal, ray.direction) > 0.0);
-    let depth = sun_path_at(p) / shading.sun_path;
+    let depth = water_above(p) / shading.sun_path;
     let footprint = (ray.travelled + found.t) / camera.focal;
     return radiance_of(Surface(p, n, found.material), -ray.direction, footprint, depth);
 }
@@ -118,7 +130,7 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32)
     for (var k = 0; k < MOST_RAYS && held > 0; k++) {
         held -= 1;
         let ray = waiting[held];
-        let found = trace(ray.origin, ray.direction, ray.inside);
+        let found = trace(ray.origin, ray.direction, ray.inside, ray.travelled);
         // The way that leads from the eye is whole, wherever it was taken up.
         let far = min(found.t + select(0.0, ray.travelled, ray.surfaces == 0u), 1e6);
         var weight = ray.weight;

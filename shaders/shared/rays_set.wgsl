@@ -26,10 +26,12 @@ struct Found {
     normal: vec3f,
     // As in ssfr_solid; 2 is the ground.
     material: u32,
+    // Mean square slope of waves that a pixel there cannot hold.
+    variance: f32,
 }
 
 fn met(kind: u32, t: f32, normal: vec3f, material: u32) -> Found {
-    return Found(kind, t, t, t, normal, material);
+    return Found(kind, t, t, t, normal, material, 0.0);
 }
 
 // Distance along a ray to a triangle, FAR where it misses (Möller and Trumbore 1997).

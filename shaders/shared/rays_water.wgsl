@@ -1,6 +1,7 @@
 // The water as a sparse level set (`LevelSet` of domain/level_set.rs), and where a ray comes through its surface. Needs the bindings
 // `rays`, `level_table` and `level_values` of whoever imports it.
 #import "shared/camera.wgsl"
+#import "shared/box.wgsl"
 
 struct Rays {
     // Of the box that holds the water, metres.
@@ -114,10 +115,6 @@ fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, inside: bool)
     return Crossing(low, high);
 }
 
-fn safe_inverse(d: vec3f) -> vec3f {
-    return 1.0 / select(d, vec3f(1e-9), abs(d) < vec3f(1e-9));
-}
-
 // Where a ray that is `inside` of the water, or not, at `from_t` first is otherwise, up to `to_t`: a voxel a step, and a brick a
 // step where the surface is not.
 fn crossing(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, inside: bool) -> Crossing {
@@ -150,12 +147,7 @@ fn crossing(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, inside: boo
 
 // Distances at which a ray comes into the box and leaves it; the second is less where it misses.
 fn box_span(origin: vec3f, direction: vec3f) -> vec2f {
-    let inverse = safe_inverse(direction);
-    let a = -origin * inverse;
-    let b = (rays.size - origin) * inverse;
-    let low = min(a, b);
-    let high = max(a, b);
-    return vec2f(max(low.x, max(low.y, low.z)), min(high.x, min(high.y, high.z)));
+    return span_of(rays.size, origin, direction);
 }
 
 // Which side of the box a point on it is on: axis and whether it is the greater end.

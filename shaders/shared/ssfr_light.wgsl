@@ -83,13 +83,27 @@ fn window_edge(x: f32, duty: f32, footprint: f32) -> f32 {
     return clamp(inside / w + 0.5, 0.0, 1.0);
 }
 
+#ifdef PALETTE
+// First of the materials whose colours the palette has.
+const FIRST_OF_PALETTE: u32 = 4u;
+#endif
+
+fn has_windows(material: u32) -> bool {
+#ifdef PALETTE
+    if material >= FIRST_OF_PALETTE {
+        return palette[material - FIRST_OF_PALETTE].a > 0.0;
+    }
+#endif
+    return material == 0u;
+}
+
 struct Facade {
     glass: f32,
     glow: f32,
 }
 
 fn facade(at: Surface, footprint: f32) -> Facade {
-    if shading.windows.x <= 0.0 || at.material != 0u || abs(at.normal.y) > 0.3 {
+    if shading.windows.x <= 0.0 || !has_windows(at.material) || abs(at.normal.y) > 0.3 {
         return Facade(0.0, 0.0);
     }
     let along = select(at.position.x, at.position.z, abs(at.normal.x) > abs(at.normal.z));
@@ -117,7 +131,12 @@ fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
         let n = 0.5 * value_noise(p * 0.35) + 0.3 * value_noise(p * 1.3) + 0.2 * value_noise(p * 5.1);
         return light * shading.ground_colour * (1.0 + shading.ground_variation * (2.0 * n - 1.0));
     }
-    let wall = select(shading.solid_colour, shading.ground_colour * 1.1, at.material == 1u);
+    var wall = select(shading.solid_colour, shading.ground_colour * 1.1, at.material == 1u);
+#ifdef PALETTE
+    if at.material >= FIRST_OF_PALETTE {
+        wall = palette[at.material - FIRST_OF_PALETTE].rgb;
+    }
+#endif
     let stain = 1.0 - 0.25 * shading.ground_variation * value_noise(vec2f(
         at.position.x * 1.7 + at.position.z * 1.3, at.position.y * 2.3));
     var colour = light * wall * stain;

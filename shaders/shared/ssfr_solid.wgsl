@@ -2,7 +2,7 @@
 
 struct Triangle {
     a: vec3f,
-    // 0 = solid of the scene, 1 = quay wall of the look.
+    // 0 = solid of the scene, 1 = quay wall of the look; from 4 on colours of the palette.
     material: u32,
     b: vec3f,
     pad0: u32,

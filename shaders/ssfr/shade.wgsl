@@ -10,6 +10,9 @@
 #ifdef AOVS
 #import "shared/ssfr_aovs.wgsl"
 #endif
+#ifdef SEA
+#import "shared/ssfr_sea.wgsl"
+#endif
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<uniform> shading: Shading;
@@ -33,6 +36,14 @@
 #ifdef SPRAY
 @group(0) @binding(12) var<storage, read> spray: array<u32>;
 #endif
+#endif
+
+#ifdef SEA
+@group(0) @binding(15) var<uniform> sea: Sea;
+@group(0) @binding(16) var<storage, read> sea_values: array<vec4f>;
+#endif
+#ifdef PALETTE
+@group(0) @binding(17) var<uniform> palette: array<vec4f, 252>;
 #endif
 
 fn surface_at(pixel: vec2i) -> f32 {
@@ -207,13 +218,13 @@ fn mirrored(water: Water) -> vec3f {
 }
 
 // Light that comes up through the surface.
-fn transmitted(water: Water, pixel: vec2i, straight: Behind) -> vec3f {
+// `seen` metres of water lie on the straight line of sight.
+fn transmitted(water: Water, seen: f32, straight: Behind) -> vec3f {
     let n = shading.index;
     let ci = clamp(dot(water.normal, water.view), 0.0, 1.0);
     let ct = sqrt(max(1.0 - (1.0 - ci * ci) / (n * n), 0.0));
     let t = normalize(refract(-water.view, water.normal, 1.0 / n));
     // Splats measure the straight way; through a sheet the bent one is shorter.
-    let seen = thickness_at(vec2f(pixel) + 0.5);
     let path = seen * max(ci, 0.3) / ct;
 
     var reach = ground_distance(water.position, t);
@@ -242,20 +253,24 @@ fn transmitted(water: Water, pixel: vec2i, straight: Behind) -> vec3f {
     return light * clear + diffuse_light(water.position, water.normal) * deep_albedo() * (1.0 - clear);
 }
 
-fn shade_water(pixel: vec2i, z: f32, ray: vec3f, view: vec3f, straight: Behind) -> vec3f {
+// Water `z` metres along the optical axis, whose normal is `smooth_normal` but for ripples; `lost` is the mean square slope of waves that
+// a pixel there cannot hold.
+fn shade_water(
+    z: f32, ray: vec3f, view: vec3f, smooth_normal: vec3f, lost: f32, seen: f32, straight: Behind,
+) -> vec3f {
     let eye = ray * z;
     let position = world_from_eye(camera, eye);
-    var normal = world_direction(camera, surface_normal(pixel, z));
+    var normal = smooth_normal;
     let footprint = z / camera.focal / max(dot(normal, view), 0.1);
     let facet = facet_at(position, normal, footprint);
     // No facet that is seen faces away.
     normal = normalize(facet.normal + view * max(0.03 - dot(facet.normal, view), 0.0) * 1.5);
-    let water = Water(position, eye, normal, view, facet.variance);
+    let water = Water(position, eye, normal, view, facet.variance + lost);
 
     let reflectance = fresnel(clamp(dot(normal, view), 0.0, 1.0), shading.index);
     let sun = shading.sun_irradiance * sunlit(position, vec3f(0.0, 1.0, 0.0))
-        * glitter(normal, view, shading.sun_direction, facet.variance, shading.index);
-    return reflectance * mirrored(water) + (1.0 - reflectance) * transmitted(water, pixel, straight)
+        * glitter(normal, view, shading.sun_direction, water.slope_variance, shading.index);
+    return reflectance * mirrored(water) + (1.0 - reflectance) * transmitted(water, seen, straight)
         + sun;
 }
 
@@ -273,8 +288,25 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let straight = behind(pixel, ray, direction);
     let z = surface[at];
     let wet = z < straight.depth && z < 0.1 * FAR;
+    var through = thickness_at(vec2f(pixel) + 0.5);
+#ifdef SEA
+    let open = sea_from_eye(direction, min(straight.far, select(FAR, z * length(ray), wet)));
+    through += sea_behind(direction);
+    let beside = open.distance < FAR;
+    if beside {
+        through = (camera.position.y + direction.y * open.distance) / max(-direction.y, 1e-3);
+    }
+#endif
 #ifdef AOVS
-    let through = thickness_at(vec2f(pixel) + 0.5);
+#ifdef SEA
+    if beside {
+        let position = camera.position + direction * open.distance;
+        let moved = position + sea_velocity(position.xz) * camera.frame_seconds;
+        let motion = motion_to(eye_from_world(next_camera, moved), pixel);
+        store(out, open.distance / length(ray), open.normal, position, motion, through);
+        return;
+    }
+#endif
     if wet {
         let position = world_from_eye(camera, ray * z);
         let normal = world_direction(camera, surface_normal(pixel, z));
@@ -294,9 +326,23 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 #else
     var colour: vec3f;
     var alpha = 1.0;
-    if wet {
-        let far = z * length(ray);
-        colour = hazed(shade_water(pixel, z, ray, view, straight), far, direction);
+    var depth = z;
+    var is_water = wet;
+    var lost = 0.0;
+#ifdef SEA
+    if beside {
+        depth = open.distance / length(ray);
+        is_water = true;
+        lost = open.variance;
+    }
+#endif
+    if is_water {
+        var normal = world_direction(camera, surface_normal(pixel, z));
+#ifdef SEA
+        normal = select(normal, open.normal, beside);
+#endif
+        colour = hazed(
+            shade_water(depth, ray, view, normal, lost, through, straight), depth * length(ray), direction);
     } else {
         colour = behind_radiance(straight, direction);
         if straight.depth >= 0.1 * FAR {

@@ -4,6 +4,7 @@
 //! voxels' corners, over its value at a calm surface, less 1: positive in water. Bricks that the surface stays out of are one
 //! word. All follows from the frame alone, in an order that no number of threads changes.
 
+pub mod edges;
 pub mod eigen;
 pub mod kernels;
 pub mod sunlight;

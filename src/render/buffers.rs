@@ -1,8 +1,8 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Rays, SetNode, Shading, Thickness, Tile,
-    Triangle, Whitewater, WhitewaterParams,
+    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Rays, Sea, SetNode, Shading, Thickness,
+    Tile, Triangle, Whitewater, WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
 
@@ -12,6 +12,12 @@ pub(super) const CAMERA: Buf<Camera> = Buf::uniform("camera");
 pub(super) const NEXT_CAMERA: Buf<Camera> = Buf::uniform("next_camera");
 /// Light, water and set.
 pub(super) const SHADING: Buf<Shading> = Buf::uniform("shading");
+/// Colours of materials.
+pub(super) const PALETTE: Buf<[f32; 4]> = Buf::uniform("palette");
+/// The sea beyond the box.
+pub(super) const SEA: Buf<Sea> = Buf::uniform("sea");
+/// Its waves, and the heights of its edge.
+pub(super) const SEA_VALUES: Buf<[f32; 4]> = Buf::new("sea_values");
 /// From the world to the shadow map.
 pub(super) const SHADOW_FROM_WORLD: Buf<[[f32; 4]; 4]> = Buf::uniform("shadow_from_world");
 

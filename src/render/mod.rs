@@ -12,9 +12,11 @@ mod camera;
 mod frame;
 pub mod image;
 mod lighting;
+mod opaque;
 mod plan;
 mod rays;
 mod renderer;
+mod sea;
 mod set;
 mod sky;
 mod surface;
@@ -26,15 +28,15 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use crate::domain::bounds::Bounds;
-use crate::domain::mesh::TriangleMesh;
+use crate::domain::{bounds::Bounds, mesh::TriangleMesh, open_waves::OpenWaves};
 use crate::gpu::adapter::GpuError;
+use crate::scene::Wall;
 
 pub use camera::eye;
 pub use image::{Attributes, Image};
+pub use opaque::opaque;
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::Renderer;
-pub use set::opaque;
 pub use uniform::mirrors;
 
 /// What of a scene a picture needs beside the particles.
@@ -50,6 +52,10 @@ pub struct RenderScene {
     pub particle_spacing: f64,
     /// Frames a second, which turns the shutter and velocities into metres.
     pub frames_per_second: f64,
+    /// Walls that make waves, and how far inward of the domain's side each stands, metres.
+    pub wave_makers: Vec<(Wall, f64)>,
+    /// Waves that come in from the sea.
+    pub waves: Option<OpenWaves>,
 }
 
 /// Why there is no picture.

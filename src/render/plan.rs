@@ -224,6 +224,8 @@ mod tests {
             solids: Vec::new(),
             particle_spacing: 0.1,
             frames_per_second: 24.0,
+            wave_makers: Vec::new(),
+            waves: None,
         };
         Plan::new(&look, &scene, 9, &LIMITS).unwrap()
     }

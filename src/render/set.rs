@@ -1,122 +1,21 @@
-//! What is opaque: the scene's solids and the look's quay walls, drawn and in the sun's shadow map.
+//! What is opaque, drawn and in the sun's shadow map.
 
 use glam::{DVec3, Mat4, Vec3};
 use wgpu::{CompareFunction, TextureFormat};
 
-use super::buffers::{SHADOW_FROM_WORLD, SOLID_DEPTH, SOLID_PACKED, TILES, TRIANGLES};
+use super::buffers::{PALETTE, SHADOW_FROM_WORLD, SOLID_DEPTH, SOLID_PACKED, TILES, TRIANGLES};
 use super::frame::FAR;
+use super::opaque::MOST_COLOURS;
 use super::plan::{Limits, Plan};
 use super::uniform::{Tile, Triangle};
-use super::{RenderError, RenderScene};
-use crate::domain::mesh::TriangleMesh;
 use crate::gpu::{
     raster::{CopyTexture, DEPTH, Draw, RasterSpec, Target},
     recording::Command,
     texture::TextureSpec,
 };
-use crate::scene::look::Look;
 
 /// Texels along a side of the shadow map.
 const SHADOW_SIZE: u32 = 2048;
-
-/// Scene solids and quay walls, relative to the domain's least corner: corners and material.
-fn opaque_triangles(
-    look: &Look,
-    scene: &RenderScene,
-) -> Result<Vec<([DVec3; 3], u32)>, RenderError> {
-    let origin = scene.domain.min;
-    let mut out = Vec::new();
-    let mut push = |corners: [DVec3; 3], material: u32| {
-        out.push((corners.map(|p| p - origin), material));
-    };
-    for mesh in &scene.solids {
-        for corners in &mesh.triangles {
-            let mut points = [DVec3::ZERO; 3];
-            for (point, &index) in points.iter_mut().zip(corners) {
-                *point = *mesh.vertices.get(index as usize).ok_or_else(|| {
-                    RenderError::Scene(format!(
-                        "a triangle names vertex {index}, which is not there"
-                    ))
-                })?;
-            }
-            // A triangle without area has no normal, and nothing of it would be seen.
-            let area = (points[1] - points[0]).cross(points[2] - points[0]);
-            if area.length() > 1e-12 {
-                push(points, 0);
-            }
-        }
-    }
-    if let Some(basin) = &look.spec().basin {
-        let (min, max) = (scene.domain.min, scene.domain.max);
-        let top = min.y + basin.height_m;
-        // Past the domain's ends, so that no end of a wall is in the picture.
-        let (start, end) = (min.x - 2.0 * scene.domain.size().x, max.x);
-        for (near, far) in [
-            (min.z - basin.thickness_m, min.z - 1e-3),
-            (max.z + 1e-3, max.z + basin.thickness_m),
-        ] {
-            let low = DVec3::new(start, min.y, near);
-            let high = DVec3::new(end + basin.thickness_m, top, far);
-            for corners in box_triangles(low, high) {
-                push(corners, 1);
-            }
-        }
-    }
-    Ok(out)
-}
-
-/// The same for the device.
-pub(super) fn triangles(look: &Look, scene: &RenderScene) -> Result<Vec<Triangle>, RenderError> {
-    let all = opaque_triangles(look, scene)?.into_iter();
-    let packed = all.map(|(corners, material)| {
-        let [a, b, c] = corners.map(|p| p.as_vec3().to_array());
-        Triangle {
-            a,
-            material,
-            b,
-            pad0: 0,
-            c,
-            pad1: 0,
-        }
-    });
-    Ok(packed.collect())
-}
-
-/// What a look and a scene have that is opaque, beside the ground, as one mesh, metres from the domain's least corner.
-///
-/// # Errors
-/// A mesh that names vertices it lacks.
-pub fn opaque(look: &Look, scene: &RenderScene) -> Result<TriangleMesh, RenderError> {
-    let all = opaque_triangles(look, scene)?;
-    let triangles = (0..all.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
-    Ok(TriangleMesh {
-        triangles: triangles.collect(),
-        vertices: all.into_iter().flat_map(|(corners, _)| corners).collect(),
-    })
-}
-
-/// Twelve triangles, counter-clockwise from outside.
-fn box_triangles(low: DVec3, high: DVec3) -> Vec<[DVec3; 3]> {
-    let corner = |i: usize| {
-        DVec3::new(
-            if i & 1 == 0 { low.x } else { high.x },
-            if i & 2 == 0 { low.y } else { high.y },
-            if i & 4 == 0 { low.z } else { high.z },
-        )
-    };
-    [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ]
-    .iter()
-    .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-    .map(|face| face.map(corner))
-    .collect()
-}
 
 /// The sun's view of everything opaque, and of the domain: an orthographic box.
 pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec3) -> Mat4 {
@@ -163,6 +62,19 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
         glam::Vec4::W,
     )
     .transpose()
+}
+
+/// Plans the colours of materials in the passes that shade; nothing where all have the look's own.
+pub(super) fn plan_palette(plan: &mut Plan, palette: &[[f32; 4]], passes: &[&'static str]) {
+    if palette.is_empty() {
+        return;
+    }
+    for pass in passes {
+        plan.define(pass, "PALETTE");
+    }
+    let mut all = palette.to_vec();
+    all.resize(MOST_COLOURS, [0.0; 4]);
+    plan.values(&PALETTE, &all);
 }
 
 /// Depth, normal and material of the solids in a tile.

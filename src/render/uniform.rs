@@ -183,6 +183,21 @@ mirror!(
 );
 
 mirror!(
+    /// `Sea` of shared/sea.wgsl.
+    Sea {
+        size: [f32; 3],
+        level: f32,
+        low: f32,
+        high: f32,
+        band: f32,
+        hair: f32,
+        nodes: [u32; 2],
+        lines: u32,
+        sides: u32,
+    }
+);
+
+mirror!(
     /// `SetNode` of shared/rays_set.wgsl.
     SetNode {
         min: [f32; 3],
@@ -209,6 +224,7 @@ pub fn mirrors() -> Vec<Layout> {
         Tile::layout(),
         Band::layout(),
         Rays::layout(),
+        Sea::layout(),
         SetNode::layout(),
     ]
 }

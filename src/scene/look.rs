@@ -15,8 +15,9 @@ use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 pub(super) use keys::KEYS;
 pub use spec::{
     AovSpec, BasinSpec, CameraSpec, FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LookSpec,
-    MethodSpec, OutputSpec, RendererSpec, RippleSpec, SkySpec, SpraySpec, SunSpec, SurfaceSpec,
-    TransformSpec, ViewSpec, WaterSpec, WhitewaterLook, WindowsSpec,
+    MethodSpec, OutputSpec, RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec, SpraySpec,
+    SunSpec, SurfaceSpec, TransformSpec, ViewSpec, WaterSpec, WaveMakersSpec, WhitewaterLook,
+    WindowsSpec,
 };
 
 /// Why a look cannot be used.
@@ -82,6 +83,7 @@ impl Look {
             .map_err(|error| doc.translate(&error))?;
         check_camera(&doc, &spec)?;
         check_output(&doc, &spec.output)?;
+        check_sea(&doc, &spec)?;
         let panorama = match &spec.sky {
             SkySpec::Panorama { file: name, .. } => Some(panorama(&doc, file, name)?),
             SkySpec::HosekWilkie { .. } => None,
@@ -154,6 +156,10 @@ impl Look {
     }
 }
 
+/// What a basin has had to say since its sides could be chosen, where it stands at those that it had before.
+const PLAIN_QUAYS: &str =
+    ", sides: [Wall { axis: 2, is_max: false }, Wall { axis: 2, is_max: true }], colour: None";
+
 fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     let mut hasher = blake3::Hasher::new();
     // `Debug` of a float is its shortest exact text, so equal values give equal text and only they do.
@@ -164,7 +170,9 @@ fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     // A look that does without has the hash that it had before there were whitewater and rays.
     let text = format!("{canonical:?}")
         .replace("whitewater: None, ", "")
-        .replace("renderer: RendererSpec { method: Ssfr }, ", "");
+        .replace("renderer: RendererSpec { method: Ssfr }, ", "")
+        .replace("wave_makers: None, sea: None, ", "")
+        .replace(PLAIN_QUAYS, "");
     hasher.update(text.as_bytes());
     if let Some(bytes) = panorama {
         hasher.update(blake3::hash(bytes).as_bytes());
@@ -253,6 +261,24 @@ fn check_output(doc: &Document<'_>, output: &OutputSpec) -> Result<(), SceneErro
     if !output.aovs.is_empty() && !output.formats.contains(&FormatSpec::Exr) {
         let message = "AOVs are written to EXR; add it to `formats`";
         return Err(doc.fault_of_plain("output.aovs", message));
+    }
+    Ok(())
+}
+
+fn check_sea(doc: &Document<'_>, spec: &LookSpec) -> Result<(), SceneError> {
+    let Some(sea) = &spec.sea else {
+        return Ok(());
+    };
+    if sea.sides.is_empty() {
+        return Err(doc.fault_of("sea.sides", "is empty"));
+    }
+    if let Some(waves) = &sea.waves
+        && waves
+            .shortest_period_s
+            .is_some_and(|it| it >= waves.peak_period_s)
+    {
+        let problem = "is not below sea.waves.peak_period_s";
+        return Err(doc.fault_of("sea.waves.shortest_period_s", problem));
     }
     Ok(())
 }

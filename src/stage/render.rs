@@ -18,14 +18,17 @@ use glam::DAffine3;
 
 use crate::{
     cache::{self, CacheError, CacheReader, Manifest},
-    domain::{frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError},
+    domain::{
+        bounds::Bounds, frame_range::FrameRange, particles::Particles,
+        signed_distance::SignedDistanceError,
+    },
     gpu::adapter::{Context, GpuError, Needs},
     render::{
         Attributes, Image, RenderError, RenderScene, Renderer,
         image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
     },
     scene::{
-        Scene, SceneError,
+        Scene, SceneError, Wall,
         look::{FormatSpec, Look, LookError},
     },
 };
@@ -384,15 +387,17 @@ impl Job<'_> {
 
     fn draw(&mut self, frame: u32) -> Result<Image, RenderJobError> {
         let look = &self.request.look;
+        let water = self.cache.read(frame)?;
         let mut renderer = match self.kept.take() {
             Some(renderer) => renderer,
-            None => Renderer::new(&self.context, look, &render_scene(&self.scene, frame))
-                .map_err(|error| told(error, look))?,
+            None => {
+                let set = render_scene(&self.scene, frame, &water);
+                Renderer::new(&self.context, look, &set).map_err(|error| told(error, look))?
+            }
         };
         if self.request.time_passes {
             renderer.time_passes();
         }
-        let water = self.cache.read(frame)?;
         let white = match &self.whitewater {
             Some(stream) => stream.read(frame)?,
             None => Particles::default(),
@@ -405,13 +410,15 @@ impl Job<'_> {
         }
         // Solids that move are drawn where they stand at the frame's time, not blurred over its shutter:
         // a renderer draws its solids once.
-        self.kept = self.scene.moving_solids.is_empty().then_some(renderer);
+        let draws_plates = look.spec().wave_makers.is_some() && !self.scene.wave_makers.is_empty();
+        let stands = self.scene.moving_solids.is_empty() && !draws_plates;
+        self.kept = stands.then_some(renderer);
         Ok(picture)
     }
 }
 
 /// A scene as it stands at a frame.
-fn render_scene(scene: &Scene, frame: u32) -> RenderScene {
+fn render_scene(scene: &Scene, frame: u32, state: &Particles) -> RenderScene {
     let time = f64::from(frame) / scene.shot.frames_per_second;
     let moving = scene.moving_solids.iter().map(|solid| {
         let way = DAffine3::from_translation(solid.displacement(time));
@@ -424,7 +431,21 @@ fn render_scene(scene: &Scene, frame: u32) -> RenderScene {
         solids: solids.chain(moving).collect(),
         particle_spacing: scene.particle_spacing(),
         frames_per_second: scene.shot.frames_per_second,
+        wave_makers: plates(scene, &scene.walls_after(state, time)),
+        waves: scene.effects.waves(scene.water.gravity),
     }
+}
+
+/// The scene's wave makers, and how far inward each stands of the domain's side, metres.
+fn plates(scene: &Scene, walls: &Bounds) -> Vec<(Wall, f64)> {
+    let size = scene.domain.size();
+    let makers = scene.wave_makers.iter().map(|maker| maker.wall);
+    makers
+        .map(|wall| match wall.is_max {
+            true => (wall, size[wall.axis] - walls.max[wall.axis]),
+            false => (wall, walls.min[wall.axis]),
+        })
+        .collect()
 }
 
 fn attributes(

@@ -23,6 +23,8 @@ const ALONE: f64 = 0.5 * SUPPORT;
 const NEAR: f64 = 3.0;
 /// The longest half axis over the shortest one, at most; the paper's k_r.
 const FLATTEST: f64 = 4.0;
+/// How far from a place particles may stand that its field depends on, in particle spacings: kernels that reach it, and what shapes them.
+pub(super) const REACH: f64 = SUPPORT + NEAR;
 /// Weights of neighbours between which a kernel goes from a lone particle's to a stretched one.
 const JOINED: [f64; 2] = [1.0, 6.0];
 

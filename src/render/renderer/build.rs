@@ -11,9 +11,11 @@ use crate::{
         camera::longest_focal_px,
         frame::{Extent, bands},
         lighting::{plan_light, shading},
+        opaque::Opaque,
         plan::{Limits, Plan},
         rays::{first, plan_rays},
-        set::{plan_shadow, plan_solids, shadow_from_world, triangles},
+        sea::plan_sea,
+        set::{plan_palette, plan_shadow, plan_solids, shadow_from_world},
         sky::Sky,
         surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
         uniform::Triangle,
@@ -59,12 +61,22 @@ impl Plan {
         if has_aovs {
             plan.buffer(&NEXT_CAMERA, 1);
         }
-        let opaque = triangles(look, scene)?;
+        let Opaque {
+            triangles: opaque,
+            palette,
+        } = Opaque::new(look, scene)?;
         let matrix = shadow_from_world(&opaque, scene.domain.size(), look.sun_direction());
         let sky = Sky::new(look, limits.texture)?;
         plan_light(&mut plan, &sky);
         let light = shading(look, &sky, matrix.to_cols_array_2d());
         plan.values(&SHADING, &[light]);
+        let shaded: &[&str] = match (spec.renderer.method, has_aovs) {
+            (MethodSpec::Ssfr, false) => &["ssfr/shade"],
+            (MethodSpec::Ssfr, true) => &["ssfr/shade", "ssfr/shade_aovs"],
+            (MethodSpec::Ray, _) => &["rays/cast", "rays/aovs", "rays/first"],
+        };
+        plan_palette(&mut plan, &palette, shaded);
+        plan_sea(&mut plan, look, scene, shaded);
         let shadow = plan_shadow(&mut plan, &opaque, &matrix, limits);
         plan.once.push(shadow);
         let particles = room(particles);

@@ -15,7 +15,7 @@ use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, picture};
 use super::camera::{Sample, Setting, camera, eye, pose, samples};
 use super::image::{Image, View};
 use super::plan::{Limits, Plan};
-use super::{RenderError, RenderScene, aeration, uniform};
+use super::{RenderError, RenderScene, aeration, sea::Sea, uniform};
 use crate::domain::particles::Particles;
 use crate::gpu::{
     adapter::Context,
@@ -42,6 +42,8 @@ pub struct Renderer {
     capacity: usize,
     /// `None` where the look casts no rays.
     water: Option<Water>,
+    /// `None` where the look has none.
+    sea: Option<Sea>,
     /// `None` where the look draws none.
     whitewater: Option<Whitewater>,
     timer: Option<Timer>,
@@ -86,6 +88,7 @@ impl Renderer {
             program,
             capacity: room(0),
             water: Water::of(look),
+            sea: Sea::of(look, scene),
             whitewater: Whitewater::of(look, scene),
             timer: None,
         };
@@ -206,6 +209,9 @@ impl Renderer {
         if let Some(water) = &mut self.water {
             water.take(&packed);
         }
+        if let Some(sea) = &mut self.sea {
+            sea.take(&packed);
+        }
         if !self.program.has(PARTICLES.name()) {
             return Ok(packed.len() as u32);
         }
@@ -256,6 +262,9 @@ impl Renderer {
             if grew {
                 self.record();
             }
+        }
+        if let Some(sea) = &mut self.sea {
+            sea.stand_at(camera, &mut self.program, &self.scene);
         }
         self.program.upload(CAMERA, 0, &[*camera]);
         let recording = if aovs { &self.aovs } else { &self.sample };

@@ -27,7 +27,13 @@ pub(in super::super) const KEYS: &[Key] = &[
         .about("The plane at the domain's floor, which runs to the horizon"),
     Key::table("basin", BASIN)
         .absent()
-        .about("Quay walls just outside the domain's ±z sides"),
+        .about("Quay walls just outside the domain's sides"),
+    Key::table("wave_makers", WAVE_MAKERS)
+        .absent()
+        .about("The scene's wave makers as plates, where they stand at the frame"),
+    Key::table("sea", SEA)
+        .absent()
+        .about("Water beyond the domain's sides, as far as the horizon"),
     Key::table("solids", SOLIDS)
         .default("{}")
         .about("The scene's solids"),
@@ -255,6 +261,66 @@ const BASIN: &[Key] = &[
         .unit("metres")
         .default("0.6")
         .about("of the walls"),
+    Key::choices("sides", SIDES)
+        .default("[\"-z\", \"+z\"]")
+        .about("at which walls stand"),
+    COLOUR.computed(|| "1.1 times the ground's".to_owned()),
+];
+
+const SIDES: &[&str] = &["-x", "+x", "-z", "+z"];
+
+const WAVE_MAKERS: &[Key] = &[
+    Key::number("height_m", SIZE)
+        .unit("metres")
+        .about("above the domain's floor"),
+    Key::number("thickness_m", SIZE)
+        .unit("metres")
+        .default("0.3")
+        .about("of the plates, away from the water"),
+    COLOUR.default("[0.42, 0.45, 0.46]"),
+];
+
+const SEA: &[Key] = &[
+    Key::number("level_m", SIZE)
+        .unit("metres")
+        .about("still water, above the domain's floor"),
+    Key::number("band_m", SIZE)
+        .unit("metres")
+        .default("6.0")
+        .about("from the domain's side to where the sea has its own waves alone"),
+    Key::choices("sides", SIDES)
+        .default("[\"-x\", \"+x\", \"-z\", \"+z\"]")
+        .also(", at least one")
+        .about("beyond which there is water"),
+    Key::table("waves", SEA_WAVES)
+        .computed(|| "those of the scene's generation zone; none where it has none".to_owned())
+        .about("Waves of the sea: JONSWAP's, spread over directions"),
+];
+
+const SEA_WAVES: &[Key] = &[
+    Key::number("significant_height_m", 0.0..=100.0)
+        .unit("metres")
+        .about("four times the root of the elevation's variance"),
+    Key::number("peak_period_s", 1e-2..=100.0)
+        .unit("s")
+        .about("of the highest waves"),
+    Key::number("shortest_period_s", 1e-2..=100.0)
+        .unit("s")
+        .computed(|| "0.35 of the peak's".to_owned())
+        .also(", below the peak's")
+        .about("of the shortest waves"),
+    Key::number("direction_degrees", DEGREES)
+        .unit("degrees")
+        .default("0.0")
+        .about("where they go: 0 is along +x, 90 along +z"),
+    Key::number("spreading", 0.5..=1000.0)
+        .default("12.0")
+        .about(
+            "s of the spread over directions, cos^2s of half the angle; a larger one is narrower",
+        ),
+    Key::whole("seed", 0..=u32::MAX)
+        .default("0")
+        .about("another number makes another sea of the same spectrum"),
 ];
 
 const SOLIDS: &[Key] = &[

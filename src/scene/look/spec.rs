@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
+use crate::scene::Wall;
+
 /// A look file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -28,6 +30,10 @@ pub struct LookSpec {
     pub ground: GroundSpec,
     /// Quay walls just outside the domain's sides; none unless named.
     pub basin: Option<BasinSpec>,
+    /// The scene's wave makers; not drawn unless named.
+    pub wave_makers: Option<WaveMakersSpec>,
+    /// Water beyond the domain; none unless named.
+    pub sea: Option<SeaSpec>,
     /// The scene's solids.
     pub solids: SolidsSpec,
     /// From scene-linear light to a picture.
@@ -219,7 +225,7 @@ pub struct GroundSpec {
     pub haze_m: f64,
 }
 
-/// Quay walls along the domain's ±z sides.
+/// Quay walls along sides of the domain.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BasinSpec {
@@ -227,6 +233,54 @@ pub struct BasinSpec {
     pub height_m: f64,
     /// Metres.
     pub thickness_m: f64,
+    /// Where they stand.
+    pub sides: Vec<Wall>,
+    /// Reflectance, linear red, green, blue; 1.1 times the ground's where left out.
+    pub colour: Option<[f64; 3]>,
+}
+
+/// The scene's wave makers, as plates.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WaveMakersSpec {
+    /// Above the domain's floor, metres.
+    pub height_m: f64,
+    /// Metres.
+    pub thickness_m: f64,
+    /// Reflectance, linear red, green, blue.
+    pub colour: [f64; 3],
+}
+
+/// Water beyond the domain's sides.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SeaSpec {
+    /// Still water above the domain's floor, metres.
+    pub level_m: f64,
+    /// Over which the edge of the simulated water goes over into the sea, metres.
+    pub band_m: f64,
+    /// Beyond which it lies.
+    pub sides: Vec<Wall>,
+    /// Its own waves; the scene's where left out.
+    pub waves: Option<SeaWavesSpec>,
+}
+
+/// Waves of a sea.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SeaWavesSpec {
+    /// Four times the root of the elevation's variance, metres.
+    pub significant_height_m: f64,
+    /// Seconds.
+    pub peak_period_s: f64,
+    /// Seconds; 0.35 of the peak's where left out.
+    pub shortest_period_s: Option<f64>,
+    /// Where they go, from +x towards +z.
+    pub direction_degrees: f64,
+    /// s of (cos ½θ)^2s.
+    pub spreading: f64,
+    /// Of chance.
+    pub seed: u32,
 }
 
 /// How the scene's solids look.

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{RenderJobError, render_scene, told};
 use crate::{
     cache::CacheReader,
-    domain::bounds::Bounds,
+    domain::{bounds::Bounds, particles::Particles},
     gpu::{
         adapter::{Context, GpuError},
         program::check_sizes,
@@ -73,14 +73,21 @@ pub fn plan(
         Subject::Nothing => (empty(), 0),
         Subject::Scene(scene) => {
             let start = Start::of(scene)?;
-            (render_scene(scene, 0), start.particles.len())
+            (
+                render_scene(scene, 0, &start.particles),
+                start.particles.len(),
+            )
         }
         Subject::Cache(directory) => {
             let cache = CacheReader::open(directory)?;
             let most = cache.entries().iter().map(|entry| entry.particles).max();
             let scene = baked_scene(&cache, directory)?;
             let first = cache.first_frame();
-            (render_scene(&scene, first), most.unwrap_or(0) as usize)
+            let still = Particles::default();
+            (
+                render_scene(&scene, first, &still),
+                most.unwrap_or(0) as usize,
+            )
         }
     };
     let plan = Plan::new(look, &scene, particles, &limits).map_err(|error| told(error, look))?;
@@ -116,5 +123,7 @@ fn empty() -> RenderScene {
         solids: Vec::new(),
         particle_spacing: 1.0,
         frames_per_second: 1.0,
+        wave_makers: Vec::new(),
+        waves: None,
     }
 }

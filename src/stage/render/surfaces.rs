@@ -107,7 +107,7 @@ pub fn check_render(request: &Request, stop: &AtomicBool) -> Result<Outcome, Ren
             break;
         }
         let water = cache.read(frame)?;
-        let set = render_scene(&scene, frame);
+        let set = render_scene(&scene, frame, &water);
         let begun = Instant::now();
         let (truth, out) = truth(&request.look, &set, frame, &water)?;
         outcome.truth_seconds += begun.elapsed().as_secs_f64();

@@ -57,6 +57,8 @@ fn tank(spacing: f64) -> RenderScene {
         solids: Vec::new(),
         particle_spacing: spacing,
         frames_per_second: 24.0,
+        wave_makers: Vec::new(),
+        waves: None,
     }
 }
 

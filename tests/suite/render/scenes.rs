@@ -95,6 +95,8 @@ pub(crate) fn city_scene() -> RenderScene {
         solids,
         particle_spacing: 0.17,
         frames_per_second: 60.0,
+        wave_makers: Vec::new(),
+        waves: None,
     }
 }
 

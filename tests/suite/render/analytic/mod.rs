@@ -8,6 +8,7 @@ mod geometry;
 mod light;
 mod rays;
 mod ripples;
+mod sea;
 mod support;
 mod surface;
 mod water;

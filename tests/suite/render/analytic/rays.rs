@@ -9,17 +9,17 @@ use swell::render::RenderScene;
 use super::geometry::box_mesh;
 use super::support::{Eye, Setup, context, draw, scene, spoiled, uniform_sky};
 
-const INDEX: f64 = 1.333;
-const ABSORPTION: [f64; 3] = [0.02, 0.15, 0.4];
+pub(super) const INDEX: f64 = 1.333;
+pub(super) const ABSORPTION: [f64; 3] = [0.02, 0.15, 0.4];
 const CLEAR: [f64; 3] = [0.0; 3];
 /// Of particles, metres.
-const SPACING: f64 = 0.25;
+pub(super) const SPACING: f64 = 0.25;
 /// Of the pool, metres.
-const LEVEL: f64 = 2.0;
-const SIDE: f64 = 10.0;
+pub(super) const LEVEL: f64 = 2.0;
+pub(super) const SIDE: f64 = 10.0;
 
 /// A pool that fills a box of 10 m up to [`LEVEL`].
-fn water() -> Particles {
+pub(super) fn water() -> Particles {
     let [n, layers] = [SIDE / SPACING, LEVEL / SPACING].map(|n| n as usize);
     let place = |k: usize| (k as f32 + 0.5) * SPACING as f32;
     let position: Vec<[f32; 3]> = (0..n * n * layers)
@@ -33,7 +33,7 @@ fn water() -> Particles {
     }
 }
 
-fn pool_scene() -> RenderScene {
+pub(super) fn pool_scene() -> RenderScene {
     RenderScene {
         particle_spacing: SPACING,
         ..scene(1.0, 1.0)
@@ -49,12 +49,12 @@ fn by_rays(eye: Eye) -> Setup {
 }
 
 /// Snell: the part of a unit direction along a level surface shrinks by the index.
-fn refracted(along: DVec3, index: f64) -> DVec3 {
+pub(super) fn refracted(along: DVec3, index: f64) -> DVec3 {
     let level = DVec3::new(along.x, 0.0, along.z) / index;
     level - DVec3::Y * (1.0 - level.length_squared()).sqrt()
 }
 
-fn reflectance(cosine: f64, index: f64) -> f64 {
+pub(super) fn reflectance(cosine: f64, index: f64) -> f64 {
     let inside = (1.0 - (1.0 - cosine * cosine) / (index * index)).sqrt();
     let s = (cosine - index * inside) / (cosine + index * inside);
     let p = (index * cosine - inside) / (index * cosine + inside);

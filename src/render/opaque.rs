@@ -1,0 +1,188 @@
+//! What is opaque: the scene's solids and wave makers, and the look's quay walls, as triangles with materials.
+
+use glam::DVec3;
+
+use super::{RenderError, RenderScene, uniform::Triangle};
+use crate::domain::mesh::TriangleMesh;
+use crate::scene::look::{BasinSpec, Look};
+
+/// Materials of a triangle, as in ssfr_solid.wgsl: a solid of the look's colour, a wall of 1.1 times the ground's; from [`FIRST`] on
+/// those of the palette.
+const SOLID: u32 = 0;
+const WALL: u32 = 1;
+const FIRST: u32 = 4;
+
+/// Colours of a palette: a material takes eight bits of a pixel.
+pub(super) const MOST_COLOURS: usize = 256 - FIRST as usize;
+
+/// Between a wall and the domain, metres over the domain's size: two faces in one place would flicker.
+const GAP: f64 = 1e-4;
+
+/// Triangles, and the colours of their materials.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Opaque {
+    /// Metres from the domain's least corner.
+    pub(super) triangles: Vec<Triangle>,
+    /// Linear reflectance, and 1 where rows of windows may be, of the materials from [`FIRST`] on.
+    pub(super) palette: Vec<[f32; 4]>,
+}
+
+impl Opaque {
+    /// That of a look and a scene.
+    pub(super) fn new(look: &Look, scene: &RenderScene) -> Result<Self, RenderError> {
+        let mut opaque = Self::default();
+        opaque.add_solids(scene)?;
+        let size = scene.domain.size();
+        if let Some(basin) = &look.spec().basin {
+            let material = match basin.colour {
+                Some(colour) => opaque.material(colour, false)?,
+                None => WALL,
+            };
+            for [low, high] in quays(basin, size) {
+                opaque.add_box(low, high, material);
+            }
+        }
+        if let Some(plates) = &look.spec().wave_makers {
+            let material = opaque.material(plates.colour, false)?;
+            for &(wall, inward) in &scene.wave_makers {
+                let (mut low, mut high) = (DVec3::ZERO, size);
+                high.y = plates.height_m;
+                let face = match wall.is_max {
+                    true => size[wall.axis] - inward,
+                    false => inward,
+                };
+                let back = match wall.is_max {
+                    true => face + plates.thickness_m,
+                    false => face - plates.thickness_m,
+                };
+                (low[wall.axis], high[wall.axis]) = (face.min(back), face.max(back));
+                opaque.add_box(low, high, material);
+            }
+        }
+        Ok(opaque)
+    }
+
+    fn add_solids(&mut self, scene: &RenderScene) -> Result<(), RenderError> {
+        let origin = scene.domain.min;
+        for mesh in &scene.solids {
+            for corners in &mesh.triangles {
+                let mut points = [DVec3::ZERO; 3];
+                for (point, &index) in points.iter_mut().zip(corners) {
+                    *point = *mesh.vertices.get(index as usize).ok_or_else(|| {
+                        RenderError::Scene(format!(
+                            "a triangle names vertex {index}, which is not there"
+                        ))
+                    })?;
+                }
+                // A triangle without area has no normal, and nothing of it would be seen.
+                let area = (points[1] - points[0]).cross(points[2] - points[0]);
+                if area.length() > 1e-12 {
+                    self.push(points.map(|p| p - origin), SOLID);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The material of a colour.
+    fn material(&mut self, colour: [f64; 3], has_windows: bool) -> Result<u32, RenderError> {
+        let [r, g, b] = colour.map(|c| c as f32);
+        let entry = [r, g, b, f32::from(u8::from(has_windows))];
+        let found = self.palette.iter().position(|it| *it == entry);
+        let index = found.unwrap_or(self.palette.len());
+        if index == MOST_COLOURS {
+            return Err(RenderError::Scene(format!(
+                "more than {MOST_COLOURS} colours of solids, walls and wave makers"
+            )));
+        }
+        if found.is_none() {
+            self.palette.push(entry);
+        }
+        Ok(FIRST + index as u32)
+    }
+
+    fn push(&mut self, corners: [DVec3; 3], material: u32) {
+        let [a, b, c] = corners.map(|p| p.as_vec3().to_array());
+        self.triangles.push(Triangle {
+            a,
+            material,
+            b,
+            pad0: 0,
+            c,
+            pad1: 0,
+        });
+    }
+
+    fn add_box(&mut self, low: DVec3, high: DVec3, material: u32) {
+        for corners in box_triangles(low, high) {
+            self.push(corners, material);
+        }
+    }
+}
+
+/// What a look and a scene have that is opaque, beside the ground, as one mesh, metres from the domain's least corner.
+///
+/// # Errors
+/// A mesh that names vertices it lacks; more colours than a pixel can name.
+pub fn opaque(look: &Look, scene: &RenderScene) -> Result<TriangleMesh, RenderError> {
+    let all = Opaque::new(look, scene)?.triangles;
+    let corner = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+    Ok(TriangleMesh {
+        triangles: (0..all.len() as u32)
+            .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
+            .collect(),
+        vertices: all
+            .iter()
+            .flat_map(|it| [it.a, it.b, it.c].map(corner))
+            .collect(),
+    })
+}
+
+/// Two corners of each quay wall. A wall reaches past an end where none stands across, so that no end is in the picture.
+fn quays(basin: &BasinSpec, size: DVec3) -> Vec<[DVec3; 2]> {
+    let thick = basin.thickness_m;
+    let stands = |axis: usize, is_max: bool| {
+        let mut sides = basin.sides.iter();
+        sides.any(|wall| wall.axis == axis && wall.is_max == is_max)
+    };
+    let gap = GAP * size.max_element();
+    let walls = basin.sides.iter().map(|wall| {
+        let along = 2 - wall.axis;
+        let (mut low, mut high) = (DVec3::ZERO, DVec3::new(0.0, basin.height_m, 0.0));
+        let face = if wall.is_max { size[wall.axis] } else { 0.0 };
+        let way = if wall.is_max { 1.0 } else { -1.0 };
+        let (near, far) = (face + way * gap, face + way * thick);
+        (low[wall.axis], high[wall.axis]) = (near.min(far), near.max(far));
+        // Those along x go on a good way past -x, where a wave comes from; all others end at a corner.
+        low[along] = match (along, stands(along, false)) {
+            (0, false) => -2.0 * size.x,
+            _ => -thick,
+        };
+        high[along] = size[along] + thick;
+        [low, high]
+    });
+    walls.collect()
+}
+
+/// Twelve triangles, counter-clockwise from outside.
+fn box_triangles(low: DVec3, high: DVec3) -> Vec<[DVec3; 3]> {
+    let corner = |i: usize| {
+        DVec3::new(
+            if i & 1 == 0 { low.x } else { high.x },
+            if i & 2 == 0 { low.y } else { high.y },
+            if i & 4 == 0 { low.z } else { high.z },
+        )
+    };
+    [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ]
+    .iter()
+    .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+    .map(|face| face.map(corner))
+    .collect()
+}

@@ -1,0 +1,180 @@
+//! The sea beyond the box: its still level, its waves, and the heights at which the simulated water meets it.
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::{
+    RenderScene,
+    buffers::{SEA, SEA_VALUES},
+    plan::Plan,
+    uniform,
+};
+use crate::{
+    domain::{
+        level_set::{
+            VOXELS,
+            edges::{Edges, nodes_along},
+        },
+        motion::Spectrum,
+        open_waves::{LINES, Line, Meeting, OpenSea, OpenWaves},
+    },
+    gpu::program::Program,
+    scene::look::{Look, SeaSpec, SeaWavesSpec},
+};
+
+/// γ of a sea that still grows (Hasselmann et al. 1973).
+const PEAK_ENHANCEMENT: f64 = 3.3;
+/// Shortest period over the peak's where the look leaves it out: beyond it JONSWAP has 3 % of its slopes' variance a halving.
+const SHORTEST: f64 = 0.35;
+/// m/s².
+const GRAVITY: f64 = 9.81;
+/// Heights of the sea lie within so many times the root of their variance: of 64 waves one in 10⁷ is higher.
+const HIGHEST: f64 = 5.5;
+
+/// Waves of a sea, lengths in metres from the domain's least corner; none where it lies still.
+fn waves(look: &SeaSpec, scene: &RenderScene) -> Option<OpenWaves> {
+    let Some(asked) = &look.waves else {
+        return scene.waves.clone();
+    };
+    Some(OpenWaves::sea(
+        &open_sea(asked, look.level_m),
+        asked.direction_degrees.to_radians(),
+    ))
+}
+
+fn open_sea(asked: &SeaWavesSpec, depth: f64) -> OpenSea {
+    OpenSea {
+        spectrum: Spectrum::Jonswap,
+        meeting: Meeting::Random {
+            significant_height: asked.significant_height_m,
+            seed: asked.seed,
+        },
+        peak_period: asked.peak_period_s,
+        peak_enhancement: PEAK_ENHANCEMENT,
+        shortest_period: (asked.shortest_period_s).unwrap_or(SHORTEST * asked.peak_period_s),
+        depth,
+        gravity: GRAVITY,
+        ramp: 0.0,
+        spreading: Some(asked.spreading),
+    }
+}
+
+/// Plans the sea; nothing where the look has none.
+pub(super) fn plan_sea(plan: &mut Plan, look: &Look, scene: &RenderScene, passes: &[&'static str]) {
+    if look.spec().sea.is_none() {
+        return;
+    }
+    for pass in passes {
+        plan.define(pass, "SEA");
+    }
+    let [nx, nz] = nodes_along(scene.domain.size(), scene.particle_spacing).map(|n| n as usize);
+    plan.buffer(&SEA, 1);
+    plan.buffer(
+        &SEA_VALUES,
+        2 * LINES as usize + (2 * (nx + nz)).div_ceil(4),
+    );
+}
+
+/// The sea of a look, on its way to the device.
+pub(super) struct Sea {
+    look: SeaSpec,
+    /// Those with the longest waves first.
+    lines: Vec<Line>,
+    waves: Option<OpenWaves>,
+    /// Particles of the body, and how fast they go.
+    places: Vec<(Vec3, Vec3)>,
+    /// Seconds from the frame, and since frame 0, at which the device holds it.
+    stands: Option<[f32; 2]>,
+}
+
+impl Sea {
+    /// `None` where the look has no sea.
+    pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
+        let look = look.spec().sea.clone()?;
+        let waves = waves(&look, scene);
+        let mut lines = waves.as_ref().map_or_else(Vec::new, |it| it.lines.clone());
+        lines.sort_by(|a, b| a.number.length().total_cmp(&b.number.length()));
+        Some(Self {
+            look,
+            lines,
+            waves,
+            places: Vec::new(),
+            stands: None,
+        })
+    }
+
+    /// Takes a frame's particles: those that belong to the body.
+    pub(super) fn take(&mut self, particles: &[uniform::Particle]) {
+        let body = particles.iter().filter(|particle| particle.tag & 1 == 1);
+        self.places = body
+            .map(|it| (it.position.into(), it.velocity.into()))
+            .collect();
+        self.stands = None;
+    }
+
+    /// Has the device hold the sea of a sample.
+    pub(super) fn stand_at(
+        &mut self,
+        camera: &uniform::Camera,
+        program: &mut Program,
+        scene: &RenderScene,
+    ) {
+        let stands = [camera.seconds, camera.clock];
+        if self.stands == Some(stands) {
+            return;
+        }
+        self.stands = Some(stands);
+        let seconds = f64::from(camera.seconds);
+        let moved: Vec<DVec3> = self
+            .places
+            .iter()
+            .map(|(p, v)| p.as_dvec3() + seconds * v.as_dvec3())
+            .collect();
+        let edges = Edges::new(&moved, scene.domain.size(), scene.particle_spacing);
+        program.upload(SEA, 0, &[self.uniform(&edges, scene)]);
+        program.upload(SEA_VALUES, 0, &self.values(&edges, camera.clock.into()));
+    }
+
+    fn uniform(&self, edges: &Edges, scene: &RenderScene) -> uniform::Sea {
+        let level = self.look.level_m;
+        let variance: f64 = self.lines.iter().map(|it| 0.5 * it.elevation.powi(2)).sum();
+        // Of a few waves the sum of their heights is less.
+        let sum: f64 = self.lines.iter().map(|it| it.elevation.abs()).sum();
+        let swing = (HIGHEST * variance.sqrt()).min(sum);
+        let heights = edges.heights.iter().map(|&h| f64::from(h));
+        let low = heights.clone().fold(level - swing, f64::min);
+        let high = heights.fold(level + swing, f64::max);
+        let sides = self.look.sides.iter();
+        uniform::Sea {
+            size: scene.domain.size().as_vec3().to_array(),
+            level: level as f32,
+            low: low as f32,
+            high: high as f32,
+            band: self.look.band_m as f32,
+            hair: (1e-3 * scene.particle_spacing / VOXELS) as f32,
+            nodes: edges.nodes,
+            lines: self.lines.len() as u32,
+            sides: sides.fold(0, |bits, wall| {
+                bits | 1 << (2 * wall.axis + usize::from(wall.is_max))
+            }),
+        }
+    }
+
+    /// Two quads for each wave: k, phase now and amplitude; ω and amplitude of the horizontal velocity. Then the heights at the
+    /// edges, four a quad.
+    fn values(&self, edges: &Edges, clock: f64) -> Vec<[f32; 4]> {
+        let grown = self.waves.as_ref().map_or(0.0, |waves| waves.grown(clock));
+        let mut quads = vec![[0.0; 4]; 2 * LINES as usize];
+        for (pair, line) in quads.chunks_exact_mut(2).zip(&self.lines) {
+            let DVec2 { x, y } = line.number;
+            let phase = (line.phase - line.frequency * clock).rem_euclid(std::f64::consts::TAU);
+            pair[0] = [x, y, phase, grown * line.elevation].map(|x| x as f32);
+            pair[1] = [line.frequency, grown * line.speed, 0.0, 0.0].map(|x| x as f32);
+        }
+        for heights in edges.heights.chunks(4) {
+            let mut quad = [0.0; 4];
+            quad[..heights.len()].copy_from_slice(heights);
+            quads.push(quad);
+        }
+        quads
+    }
+}
