@@ -11,6 +11,7 @@ use glam::{DMat4, DVec4};
 
 use super::RenderError;
 use crate::domain::eye::Eye;
+use crate::scene::look::ColourSpaceSpec;
 
 pub use exr_file::{read_exr_attributes, write_exr};
 pub use pixels::{Pixels, read_exr, read_png, write_rgb_png};
@@ -29,6 +30,8 @@ pub struct Image {
     pub aovs: Aovs,
     /// From where it was taken; `None` of a picture that no camera took.
     pub view: Option<View>,
+    /// Of the light in its EXR; in memory it is that of Rec. 709.
+    pub exr_space: ColourSpaceSpec,
 }
 
 /// The camera of a picture at the frame's instant, as the standard attributes of OpenEXR have it: matrices row by row, for points
@@ -91,6 +94,7 @@ impl Image {
             beauty: vec![[0.0; 4]; width as usize * height as usize],
             aovs: Aovs::default(),
             view: None,
+            exr_space: ColourSpaceSpec::default(),
         }
     }
 }

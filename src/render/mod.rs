@@ -9,6 +9,7 @@
 mod aeration;
 mod buffers;
 mod camera;
+pub mod colour;
 mod frame;
 pub mod image;
 mod lighting;

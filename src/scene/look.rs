@@ -14,9 +14,9 @@ use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 
 pub(super) use keys::KEYS;
 pub use spec::{
-    AovSpec, BasinSpec, CameraSpec, FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LookSpec,
-    MethodSpec, OutputSpec, RendererSpec, RippleSpec, SkySpec, SpraySpec, SunSpec, SurfaceSpec,
-    TransformSpec, ViewSpec, WaterSpec, WhitewaterLook, WindowsSpec,
+    AovSpec, BasinSpec, CameraSpec, ColourSpaceSpec, FilterSpec, FormatSpec, ImageSpec,
+    KeyframeSpec, LookSpec, MethodSpec, OutputSpec, RendererSpec, RippleSpec, SkySpec, SpraySpec,
+    SunSpec, SurfaceSpec, TransformSpec, ViewSpec, WaterSpec, WhitewaterLook, WindowsSpec,
 };
 
 /// Why a look cannot be used.
@@ -154,6 +154,14 @@ impl Look {
     }
 }
 
+/// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
+/// that it had before there was such a key.
+const NEWER: [&str; 3] = [
+    "whitewater: None, ",
+    "renderer: RendererSpec { method: Ssfr }, ",
+    "colour_space: Rec709, ",
+];
+
 fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     let mut hasher = blake3::Hasher::new();
     // `Debug` of a float is its shortest exact text, so equal values give equal text and only they do.
@@ -161,10 +169,10 @@ fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
     }
-    // A look that does without has the hash that it had before there were whitewater and rays.
-    let text = format!("{canonical:?}")
-        .replace("whitewater: None, ", "")
-        .replace("renderer: RendererSpec { method: Ssfr }, ", "");
+    let text = format!("{canonical:?}");
+    let text = NEWER
+        .iter()
+        .fold(text, |text, newer| text.replace(newer, ""));
     hasher.update(text.as_bytes());
     if let Some(bytes) = panorama {
         hasher.update(blake3::hash(bytes).as_bytes());

@@ -152,6 +152,7 @@ impl Renderer {
         let mut image = Image::new(width, height);
         let eye = eye(&self.look, DVec3::ZERO, frame.into());
         image.view = Some(View::of(&eye, self.scene.frames_per_second));
+        image.exr_space = self.look.spec().output.colour_space;
         if !self.plan.aovs.is_empty() {
             // Depths and normals have no mean: they are taken at pixel centres, at the frame's instant.
             let still = Sample {

@@ -282,9 +282,11 @@ pub(super) const VIEW: &[Key] = &[
         .unit("stops")
         .default("0.0")
         .about("factor of 2 to this power on the light, in the PNG only"),
-    Key::choice("transform", &["agx", "srgb"])
+    Key::choice("transform", &["agx", "aces", "srgb"])
         .default("\"agx\"")
-        .about("tone curve of the PNG: Sobotka's, which lets colours run to white, or none"),
+        .about(
+            "tone curve of the PNG: Sobotka's, which lets colours run to white, the ACES 1.0 output for sRGB displays, or none",
+        ),
     Key::number("saturation", 0.0..=3.0)
         .default("1.0")
         .about("factor on the distance from grey after the tone curve"),
@@ -304,6 +306,12 @@ const OUTPUT: &[Key] = &[
         .about(
             "depth along the axis, m; normal; position, m; motion to the next frame, pixels, u to the right, v upward; water \
              along the line of sight, m",
+        ),
+    Key::choice("colour_space", &["rec709", "acescg"])
+        .default("\"rec709\"")
+        .about(
+            "primaries and white of the EXR's linear light: Rec. 709 with D65, or ACEScg (AP1) with the white of ACES, adapted \
+             by Bradford",
         ),
     Key::flag("background")
         .default("true")

@@ -277,6 +277,8 @@ impl Default for ViewSpec {
 pub enum TransformSpec {
     /// Sobotka's AgX: a filmic curve in log light that lets colours run to white.
     Agx,
+    /// ACES 1.0: reference rendering transform and output transform for sRGB displays of 100 nits in a dim room.
+    Aces,
     /// None: clipped at 1, sRGB-encoded.
     Srgb,
 }
@@ -308,6 +310,17 @@ pub enum AovSpec {
     Thickness,
 }
 
+/// Primaries and white of linear light.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum ColourSpaceSpec {
+    /// ITU-R BT.709, white D65.
+    #[default]
+    Rec709,
+    /// AP1 with the white of ACES.
+    AcesCg,
+}
+
 /// What is written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -316,6 +329,8 @@ pub struct OutputSpec {
     pub formats: Vec<FormatSpec>,
     /// In the EXR.
     pub aovs: Vec<AovSpec>,
+    /// Of the EXR's light.
+    pub colour_space: ColourSpaceSpec,
     /// Whether the sky is in the picture, or left transparent.
     pub background: bool,
 }
