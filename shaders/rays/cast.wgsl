@@ -2,6 +2,7 @@
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
 #import "shared/rays_light.wgsl"
+#import "shared/ssfr_store.wgsl"
 #ifdef SPRAY
 #import "shared/ssfr_half.wgsl"
 #endif
@@ -50,13 +51,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let far = min(surface[at], 1e4) * length(ray);
         let white = diffuse_light(camera.position + direction * far, vec3f(0.0, 1.0, 0.0)) * 0.85;
         value = mix(value, vec4f(white, 1.0), cover);
+        dim_parts(1.0 - cover);
+        light_part(WHITE, white * cover);
     }
 #else
     let value = radiance_along(camera.position, direction, inside, 0.0);
 #endif
-    if camera.sample_index == 0u {
-        output[out] = value * camera.weight;
-    } else {
-        output[out] += value * camera.weight;
-    }
+    store_light(out, value, camera.weight, camera.sample_index == 0u);
 }

@@ -2,12 +2,17 @@
 
 struct Triangle {
     a: vec3f,
-    // 0 = solid of the scene, 1 = quay wall of the look.
+    // 0 = solid of the scene, 1 = quay wall of the look; 4 and more are solids that are told apart.
     material: u32,
     b: vec3f,
     pad0: u32,
     c: vec3f,
     pad1: u32,
+}
+
+// 2 = ground, 3 = sky.
+fn material_of(code: u32) -> u32 {
+    return select(code, 0u, code >= 4u);
 }
 
 fn corner(triangle: Triangle, index: u32) -> vec3f {

@@ -112,7 +112,9 @@ mod tests {
         // Twelve places are printed; f64 loses four of its sixteen in three inversions.
         const PLACES: f64 = 1e-11;
         assert!(off(REC_709.to(ACES_CG), &TO_ACES_CG) < PLACES);
-        assert!(off(REC_709.to(ACES_2065), &TO_ACES_2065) < PLACES);
+        // The library takes AP0's own matrix as the Academy rounds it, to ten places.
+        const ROUNDED: f64 = 1e-9;
+        assert!(off(REC_709.to(ACES_2065), &TO_ACES_2065) < ROUNDED);
         // Control: another adaptation is told apart.
         assert!(off(REC_709.to(ACES_CG), &BY_CAT02) > 1e-3);
     }

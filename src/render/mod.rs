@@ -10,6 +10,7 @@ mod aeration;
 mod buffers;
 mod camera;
 pub mod colour;
+pub mod cryptomatte;
 mod frame;
 pub mod image;
 mod lighting;

@@ -4,6 +4,7 @@ use glam::{DVec3, Mat4, Vec3};
 use wgpu::{CompareFunction, TextureFormat};
 
 use super::buffers::{SHADOW_FROM_WORLD, SOLID_DEPTH, SOLID_PACKED, TILES, TRIANGLES};
+use super::cryptomatte::{MOST_SOLIDS, SOLIDS};
 use super::frame::FAR;
 use super::plan::{Limits, Plan};
 use super::uniform::{Tile, Triangle};
@@ -29,7 +30,15 @@ fn opaque_triangles(
     let mut push = |corners: [DVec3; 3], material: u32| {
         out.push((corners.map(|p| p - origin), material));
     };
-    for mesh in &scene.solids {
+    let tells_apart = look.spec().output.cryptomatte;
+    if tells_apart && scene.solids.len() > MOST_SOLIDS {
+        return Err(RenderError::Scene(format!(
+            "output.cryptomatte tells {MOST_SOLIDS} solids apart at most, and the scene has {}",
+            scene.solids.len()
+        )));
+    }
+    for (code, mesh) in (SOLIDS..).zip(&scene.solids) {
+        let material = if tells_apart { code } else { 0 };
         for corners in &mesh.triangles {
             let mut points = [DVec3::ZERO; 3];
             for (point, &index) in points.iter_mut().zip(corners) {
@@ -42,7 +51,7 @@ fn opaque_triangles(
             // A triangle without area has no normal, and nothing of it would be seen.
             let area = (points[1] - points[0]).cross(points[2] - points[0]);
             if area.length() > 1e-12 {
-                push(points, 0);
+                push(points, material);
             }
         }
     }
@@ -145,7 +154,8 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
             pick(2, size.z),
         ));
     }
-    for triangle in triangles.iter().filter(|triangle| triangle.material == 0) {
+    let is_solid = |triangle: &&Triangle| triangle.material == 0 || triangle.material >= SOLIDS;
+    for triangle in triangles.iter().filter(is_solid) {
         for p in [triangle.a, triangle.b, triangle.c] {
             take(p.into());
         }

@@ -25,7 +25,7 @@ use crate::{
         image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
     },
     scene::{
-        Scene, SceneError,
+        PlacedMesh, Scene, SceneError,
         look::{FormatSpec, Look, LookError},
     },
 };
@@ -389,6 +389,7 @@ impl Job<'_> {
             None => Renderer::new(&self.context, look, &render_scene(&self.scene, frame))
                 .map_err(|error| told(error, look))?,
         };
+        renderer.name_solids(&solid_names(&self.scene));
         if self.request.time_passes {
             renderer.time_passes();
         }
@@ -425,6 +426,13 @@ fn render_scene(scene: &Scene, frame: u32) -> RenderScene {
         particle_spacing: scene.particle_spacing(),
         frames_per_second: scene.shot.frames_per_second,
     }
+}
+
+/// What the scene's solids are called, in the order of [`render_scene`]: as their meshes' files, without the ending.
+fn solid_names(scene: &Scene) -> Vec<String> {
+    let moving = scene.moving_solids.iter().map(|solid| &solid.placed);
+    let placed = scene.solids.iter().chain(moving);
+    placed.map(PlacedMesh::name).collect()
 }
 
 fn attributes(

@@ -12,10 +12,11 @@ use half::f16;
 use super::super::{
     RenderError,
     colour::{REC_709, Space},
+    cryptomatte::Matte,
     sky::white_luminance,
 };
 use super::{Attributes, Image, write_whole};
-use crate::scene::look::ColourSpaceSpec;
+use crate::scene::look::{ColourSpaceSpec, LightSpec};
 
 fn text(value: &str) -> Text {
     Text::new_or_none(value).unwrap_or_else(|| Text::from("?"))
@@ -45,8 +46,8 @@ impl Light {
     }
 }
 
-/// Writes one part: `R G B A` half, and the AOVs float: `Z`, `N.X/.Y/.Z`, `P.X/.Y/.Z`, `forward.u/.v`,
-/// `thickness.Y`. ZIP, lossless. The light is in the picture's `exr_space`, whose chromaticities are stated, as are, of a picture that
+/// Writes one part: `R G B A` half, parts of the light half (`sun.R/.G/.B`), and the AOVs float: `Z`, `N.X/.Y/.Z`, `P.X/.Y/.Z`, `forward.u/.v`,
+/// `thickness.Y`. ZIP, lossless. The display window is the image that is shown, the data window what was rendered. The light is in the picture's `exr_space`, whose chromaticities are stated, as are, of a picture that
 /// a camera took, the standard attributes `worldToCamera`, `worldToNDC`, `framesPerSecond` and `whiteLuminance`.
 ///
 /// # Errors
@@ -62,6 +63,17 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
     }
     let alpha = image.beauty.iter().map(|pixel| f16::from_f32(pixel[3]));
     channels.push(AnyChannel::new("A", FlatSamples::F16(alpha.collect())));
+    for (part, pixels) in &image.lights {
+        let named = LightSpec::NAMED.iter().find(|(_, light)| light == part);
+        for (index, suffix) in ["R", "G", "B"].into_iter().enumerate() {
+            let name = format!("{}.{suffix}", named.map_or("", |(name, _)| name));
+            let samples = pixels.iter().map(|&pixel| light.half(pixel, index));
+            channels.push(AnyChannel::new(
+                name.as_str(),
+                FlatSamples::F16(samples.collect()),
+            ));
+        }
+    }
     let mut float = |name: &str, samples: Vec<f32>| {
         channels.push(AnyChannel::new(name, FlatSamples::F32(samples)));
     };
@@ -84,10 +96,15 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
     if let Some(thickness) = &aovs.thickness {
         float("thickness.Y", thickness.clone());
     }
+    for (name, samples) in image.matte.iter().flat_map(Matte::channels) {
+        float(&name, samples);
+    }
 
     let size = Vec2(image.width as usize, image.height as usize);
+    let shown = Vec2(image.display[0] as usize, image.display[1] as usize);
     let view = image.view.as_ref();
     let layer_attributes = LayerAttributes {
+        layer_position: Vec2(image.corner[0], image.corner[1]),
         software_name: Some(text(&attributes.software)),
         world_to_camera: view.map(|view| view.world_to_camera),
         world_to_normalized_device: view.map(|view| view.world_to_ndc),
@@ -106,7 +123,7 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
         encoding,
         AnyChannels::sort(channels.into()),
     );
-    let mut header = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    let mut header = ImageAttributes::new(IntegerBounds::from_dimensions(shown));
     let [red, green, blue] = space.primaries.map(chromaticity);
     header.chromaticities = Some(exr::meta::attribute::Chromaticities {
         red,
@@ -120,6 +137,10 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
                 .other
                 .insert(text(name), AttributeValue::Text(text(value)));
         }
+    }
+    for (name, value) in image.matte.iter().flat_map(Matte::attributes) {
+        let value = AttributeValue::Text(text(&value));
+        header.other.insert(text(&name), value);
     }
     let frame = i32::try_from(attributes.frame).unwrap_or(i32::MAX);
     header

@@ -43,7 +43,8 @@ impl Plan {
         check(scene)?;
         let spec = look.spec();
         let has_aovs = !spec.output.aovs.is_empty();
-        let extent = Extent::new(spec.image.width, spec.image.height);
+        let extent = Extent::of(look);
+        let stride = 1 + look.lights().len();
         let radius = (spec.surface.radius_m).unwrap_or(RADIUS * scene.particle_spacing);
         let rows = match spec.renderer.method {
             MethodSpec::Ssfr => limits.tile,
@@ -51,7 +52,8 @@ impl Plan {
         };
         let mut plan = Self {
             extent,
-            bands: bands(&extent, has_aovs, limits.storage, rows),
+            bands: bands(&extent, (stride, has_aovs), limits.storage, rows),
+            stride,
             radius,
             ..Self::default()
         };

@@ -8,6 +8,6 @@ mod geometry;
 mod light;
 mod rays;
 mod ripples;
-mod support;
+pub(super) mod support;
 mod surface;
 mod water;

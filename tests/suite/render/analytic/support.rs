@@ -132,6 +132,8 @@ pub(crate) struct Setup {
     pub(crate) haze: f64,
     pub(crate) solids: [f64; 3],
     pub(crate) background: bool,
+    /// More lines of `[output]`.
+    pub(crate) output: String,
 }
 
 pub(crate) const PANORAMA: &str = "model = \"panorama\"\nfile = \"sky.exr\"\n";
@@ -152,6 +154,7 @@ impl Setup {
             haze: 1e7,
             solids: [1.0; 3],
             background: true,
+            output: String::new(),
         }
     }
 
@@ -168,7 +171,7 @@ impl Setup {
              elevation_degrees = {elevation:?}\nintensity = {intensity:?}\n[sky]\n{}\
              [ground]\ncolour = {:?}\nvariation = 0.0\nhaze_m = {:?}\n[solids]\ncolour = {:?}\n\
              [output]\nformats = [\"exr\"]\nbackground = {}\n\
-             aovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n",
+             aovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n{}",
             self.samples,
             self.shutter,
             self.method,
@@ -179,6 +182,7 @@ impl Setup {
             self.haze,
             self.solids,
             self.background,
+            self.output,
         )
     }
 }
