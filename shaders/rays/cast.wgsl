@@ -2,6 +2,7 @@
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
 #import "shared/rays_light.wgsl"
+#import "shared/ssfr_store.wgsl"
 #ifdef SPRAY
 #import "shared/ssfr_half.wgsl"
 #endif
@@ -31,7 +32,7 @@
 @group(0) @binding(18) var<storage, read> sea_values: array<vec4f>;
 #endif
 #ifdef PALETTE
-@group(0) @binding(19) var<uniform> palette: array<vec4f, 252>;
+@group(0) @binding(19) var<uniform> palette: array<vec4f, 64>;
 #endif
 
 @compute @workgroup_size(16, 4)
@@ -57,13 +58,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let far = min(surface[at], 1e4) * length(ray);
         let white = diffuse_light(camera.position + direction * far, vec3f(0.0, 1.0, 0.0)) * 0.85;
         value = mix(value, vec4f(white, 1.0), cover);
+        dim_parts(1.0 - cover);
+        light_part(WHITE, white * cover);
     }
 #else
     let value = radiance_along(camera.position, direction, inside, 0.0);
 #endif
-    if camera.sample_index == 0u {
-        output[out] = value * camera.weight;
-    } else {
-        output[out] += value * camera.weight;
-    }
+    store_light(out, value, camera.weight, camera.sample_index == 0u);
 }

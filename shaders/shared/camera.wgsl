@@ -14,13 +14,13 @@ struct Camera {
     forward: vec3f,
     // Splat radius, metres.
     radius: f32,
-    // Principal point in padded pixels, less the sample's jitter.
+    // Principal point in pixels from `corner`, less the sample's jitter: the same bits with overscan and without.
     centre: vec2f,
     // Padded size in pixels.
     size: vec2u,
-    // Pixels of padding left and above.
+    // Pixels of padding left of and above what is shaded.
     margin: vec2u,
-    // Size of the picture in pixels.
+    // Size of what is shaded in pixels.
     picture: vec2u,
     // Of this sample in the pixel's mean; the first sample replaces what was there.
     weight: f32,
@@ -29,13 +29,17 @@ struct Camera {
     clock: f32,
     // Seconds from this frame to the next.
     frame_seconds: f32,
+    // Where the padded frame would begin without overscan, in padded pixels: a multiple of 64.
+    corner: vec2f,
+    pad0: f32,
+    pad1: f32,
 }
 
 // Where nothing was hit. Finite, because fast-math drivers may assume that there is no infinity.
 const FAR: f32 = 1e30;
 
 fn eye_ray(camera: Camera, pixel: vec2f) -> vec3f {
-    let offset = (pixel - camera.centre) / camera.focal;
+    let offset = (pixel - camera.corner - camera.centre) / camera.focal;
     return vec3f(offset.x, -offset.y, 1.0);
 }
 
@@ -52,7 +56,7 @@ fn world_from_eye(camera: Camera, eye: vec3f) -> vec3f {
     return camera.position + world_direction(camera, eye);
 }
 
-// Padded pixel coordinates; z must be positive.
+// In pixels from `corner`; z must be positive.
 fn project(camera: Camera, eye: vec3f) -> vec2f {
     return camera.centre + camera.focal * vec2f(eye.x, -eye.y) / eye.z;
 }

@@ -1,9 +1,11 @@
 // Light along rays: what a path through water and air brings to the eye. Needs the bindings of rays_water, rays_set and ssfr_light,
-// and `camera`.
+// `camera`.
 #import "shared/rays_trace.wgsl"
 #import "shared/rays_sun.wgsl"
 #import "shared/ssfr_light.wgsl"
 #import "shared/ssfr_facet.wgsl"
+#import "shared/ssfr_lights.wgsl"
+#import "shared/ssfr_holdout.wgsl"
 
 // Rays that wait while another is followed, and rays of one picture ray in all.
 const WAITING: i32 = 8;
@@ -26,6 +28,15 @@ struct Ray {
     // Metres from the eye to its origin.
     travelled: f32,
     surfaces: u32,
+    // REFLECTION or REFRACTION behind the first surface.
+    part: u32,
+}
+
+// The part of the picture's light that something belongs to which would be `own` on the ray from the eye: what the first surface
+// mirrors is one part, and so is what comes through it, but for what water scatters.
+fn part_of(ray: Ray, own: u32) -> u32 {
+    let is_own = ray.surfaces == 0u || (ray.part == REFRACTION && own == SCATTERING);
+    return select(ray.part, own, is_own);
 }
 
 // Metres that sunlight has gone through water on its way to `p`.
@@ -116,7 +127,7 @@ fn opaque_radiance(ray: Ray, found: Found) -> vec3f {
     let n = select(found.normal, -found.normal, dot(found.normal, ray.direction) > 0.0);
     let depth = water_above(p) / shading.sun_path;
     let footprint = (ray.travelled + found.t) / camera.focal;
-    return radiance_of(Surface(p, n, found.material), -ray.direction, footprint, depth);
+    return radiance_of(Surface(p, n, material_of(found.material)), -ray.direction, footprint, depth);
 }
 
 // Radiance and coverage along a ray from `origin`, in air or water, that has come `travelled` metres from the eye on its way there
@@ -124,48 +135,62 @@ fn opaque_radiance(ray: Ray, found: Found) -> vec3f {
 fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32) -> vec4f {
     var waiting: array<Ray, WAITING>;
     var held = 1;
-    waiting[0] = Ray(origin, inside, direction, vec3f(1.0), travelled, 0u);
+    waiting[0] = Ray(origin, inside, direction, vec3f(1.0), travelled, 0u, SKYLIGHT);
     var light = vec3f(0.0);
     var alpha = 1.0;
     for (var k = 0; k < MOST_RAYS && held > 0; k++) {
         held -= 1;
         let ray = waiting[held];
         let found = trace(ray.origin, ray.direction, ray.inside, ray.travelled);
+        if HOLDS_OUT && ray.surfaces == 0u && !ray.inside && found.kind == OPAQUE {
+            return vec4f(0.0);
+        }
         // The way that leads from the eye is whole, wherever it was taken up.
         let far = min(found.t + select(0.0, ray.travelled, ray.surfaces == 0u), 1e6);
         var weight = ray.weight;
         if ray.inside {
-            light += weight * scattered(ray.origin, ray.direction, far);
+            let gained = weight * scattered(ray.origin, ray.direction, far);
+            light += gained;
+            light_part(part_of(ray, SCATTERING), gained);
             weight *= exp(-(shading.absorption + shading.scattering) * far);
         } else if found.kind != SKY {
-            light += weight * hazed(vec3f(0.0), far, ray.direction);
+            let air = weight * hazed(vec3f(0.0), far, ray.direction);
+            light += air;
+            light_part(part_of(ray, SKYLIGHT), air);
             weight *= exp(-far / shading.haze);
         }
         if found.kind == SKY {
             var sky = sky_radiance(ray.direction);
             if ray.surfaces == 0u {
-                // Half of the sun's angle across: 0.2666°.
-                if dot(ray.direction, shading.sun_direction) > 0.99998918 {
-                    sky += min(shading.sun_irradiance * shading.disc, vec3f(60000.0));
-                }
-                sky *= shading.background;
+                let disc = disc_radiance(ray.direction);
+                light_part(SKYLIGHT, weight * sky * shading.background);
+                light_part(SUN, weight * disc * shading.background);
+                sky = (sky + disc) * shading.background;
                 alpha = shading.background;
+            } else {
+                light_part(ray.part, weight * sky);
             }
             light += weight * sky;
             continue;
         }
         if found.kind == OPAQUE {
-            light += weight * opaque_radiance(ray, found);
+            let seen = weight * opaque_radiance(ray, found);
+            light += seen;
+            light_part(part_of(ray, SOLIDS), seen);
             continue;
         }
         let split = split_at(ray, found);
         let p = ray.origin + ray.direction * found.t;
         if !ray.inside {
-            light += weight * shading.sun_irradiance * sunlit(p, vec3f(0.0, 1.0, 0.0))
+            let sun = weight * shading.sun_irradiance * sunlit(p, vec3f(0.0, 1.0, 0.0))
                 * glitter(split.normal, -ray.direction, shading.sun_direction, split.variance, shading.index);
+            light += sun;
+            light_part(part_of(ray, SUN), sun);
         }
         if ray.surfaces >= MOST_SURFACES {
-            light += weight * sky_irradiance(vec3f(0.0, 1.0, 0.0)) / PI;
+            let rest = weight * sky_irradiance(vec3f(0.0, 1.0, 0.0)) / PI;
+            light += rest;
+            light_part(ray.part, rest);
             continue;
         }
         var mirror = split.reflectance;
@@ -178,8 +203,11 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32)
         let travelled = ray.travelled + found.t;
         let before = ray.origin + ray.direction * found.before;
         let after = ray.origin + ray.direction * found.after;
-        let reflected = Ray(before, ray.inside, split.mirrored, weight * mirror, travelled, ray.surfaces + 1u);
-        let through = Ray(after, !ray.inside, split.refracted, weight * (1.0 - mirror), travelled, ray.surfaces + 1u);
+        let surfaces = ray.surfaces + 1u;
+        let mirrored = part_of(ray, REFLECTION);
+        let bent = part_of(ray, REFRACTION);
+        let reflected = Ray(before, ray.inside, split.mirrored, weight * mirror, travelled, surfaces, mirrored);
+        let through = Ray(after, !ray.inside, split.refracted, weight * (1.0 - mirror), travelled, surfaces, bent);
         // The stronger one is followed first, and so are those that it splits into; without room for both it stands for both.
         let is_mirror = mirror > 0.5;
         var next = through;
@@ -201,7 +229,9 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32)
     }
     // What was left waiting sees the sky's mean.
     for (var k = 0; k < held; k++) {
-        light += waiting[k].weight * sky_irradiance(vec3f(0.0, 1.0, 0.0)) / PI;
+        let rest = waiting[k].weight * sky_irradiance(vec3f(0.0, 1.0, 0.0)) / PI;
+        light += rest;
+        light_part(waiting[k].part, rest);
     }
     return vec4f(light, alpha);
 }

@@ -5,7 +5,8 @@
 // Where `next`, in the eye space of the next frame, stands in its picture less where `pixel` is, in pixels; rightward and
 // upward are positive, as motion vectors are counted in compositing (rows of the picture are counted downward).
 fn motion_to(next: vec3f, pixel: vec2i) -> vec2f {
-    let shift = project(next_camera, vec3f(next.xy, max(next.z, 1e-3))) - (vec2f(pixel) + 0.5);
+    let shift = project(next_camera, vec3f(next.xy, max(next.z, 1e-3)))
+        - (vec2f(pixel) - next_camera.corner + 0.5);
     return vec2f(shift.x, -shift.y);
 }
 

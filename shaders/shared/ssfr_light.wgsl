@@ -41,6 +41,14 @@ fn sky_radiance(direction: vec3f) -> vec3f {
     return textureSampleLevel(sky, sky_sampler, uv, 0.0).rgb;
 }
 
+// The sun's disc, where a direction meets it. Half of its angle across is 0.2666°.
+fn disc_radiance(direction: vec3f) -> vec3f {
+    if dot(direction, shading.sun_direction) > 0.99998918 {
+        return min(shading.sun_irradiance * shading.disc, vec3f(60000.0));
+    }
+    return vec3f(0.0);
+}
+
 fn sky_irradiance(n: vec3f) -> vec3f {
     let c = &shading.irradiance;
     return max(
@@ -82,11 +90,6 @@ fn window_edge(x: f32, duty: f32, footprint: f32) -> f32 {
     let inside = 0.5 * duty - abs(fract(x) - 0.5);
     return clamp(inside / w + 0.5, 0.0, 1.0);
 }
-
-#ifdef PALETTE
-// First of the materials whose colours the palette has.
-const FIRST_OF_PALETTE: u32 = 4u;
-#endif
 
 fn has_windows(material: u32) -> bool {
 #ifdef PALETTE

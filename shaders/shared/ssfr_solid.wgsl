@@ -2,12 +2,20 @@
 
 struct Triangle {
     a: vec3f,
-    // 0 = solid of the scene, 1 = quay wall of the look; from 4 on colours of the palette.
+    // 0 = solid of the scene, 1 = quay wall of the look; from 4 on solids that are told apart, from 192 on colours of the palette.
     material: u32,
     b: vec3f,
     pad0: u32,
     c: vec3f,
     pad1: u32,
+}
+
+// First of the materials whose colours the palette has.
+const FIRST_OF_PALETTE: u32 = 192u;
+
+// 2 = ground, 3 = sky.
+fn material_of(code: u32) -> u32 {
+    return select(code, 0u, code >= 4u && code < FIRST_OF_PALETTE);
 }
 
 fn corner(triangle: Triangle, index: u32) -> vec3f {

@@ -30,11 +30,14 @@ fn sphere_bounds(camera: Camera, c: vec3f, radius: f32, scale: f32, size: vec2u)
     let y = -c.y * c.z + vec2f(-radius, radius) * sqrt(max(c.y * c.y + squared, 0.0));
     let low = (camera.centre + camera.focal * vec2f(x.x, y.x) / squared) * scale - 0.5;
     let high = (camera.centre + camera.focal * vec2f(x.y, y.y) / squared) * scale - 0.5;
-    let edge = vec2f(size) - 1.0;
-    if any(high < vec2f(0.0)) || any(low > edge) {
+    // Counted from `corner`, and moved from there once they are whole.
+    let shift = camera.corner * scale;
+    let edge = vec2f(size) - 1.0 - shift;
+    if any(high < -shift) || any(low > edge) {
         return vec4i(0, 0, -1, -1);
     }
-    return vec4i(vec2i(ceil(max(low, vec2f(0.0)))), vec2i(floor(min(high, edge))));
+    let least = vec2i(ceil(max(low, -shift))) + vec2i(shift);
+    return vec4i(least, vec2i(floor(min(high, edge))) + vec2i(shift));
 }
 
 struct Hit {

@@ -1,5 +1,5 @@
 // One sample of the picture: sky, ground and solids, and the water before them. With AOVS, the channels
-// that stand beside the picture instead.
+// that stand beside the picture instead; with OBJECTS, what is seen first.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
 #import "shared/ssfr_half.wgsl"
@@ -9,10 +9,16 @@
 #import "shared/ssfr_facet.wgsl"
 #ifdef AOVS
 #import "shared/ssfr_aovs.wgsl"
+#else
+#ifndef OBJECTS
+#import "shared/ssfr_store.wgsl"
+#endif
 #endif
 #ifdef SEA
 #import "shared/ssfr_sea.wgsl"
 #endif
+#import "shared/ssfr_lights.wgsl"
+#import "shared/ssfr_holdout.wgsl"
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<uniform> shading: Shading;
@@ -32,7 +38,12 @@
 @group(0) @binding(13) var<storage, read> particles: array<Particle>;
 @group(0) @binding(14) var<uniform> next_camera: Camera;
 #else
+#ifdef OBJECTS
+// What is seen first, and the bits of the part of it that spray covers.
+@group(0) @binding(11) var<storage, read_write> output: array<vec2u>;
+#else
 @group(0) @binding(11) var<storage, read_write> output: array<vec4f>;
+#endif
 #ifdef SPRAY
 @group(0) @binding(12) var<storage, read> spray: array<u32>;
 #endif
@@ -43,7 +54,7 @@
 @group(0) @binding(16) var<storage, read> sea_values: array<vec4f>;
 #endif
 #ifdef PALETTE
-@group(0) @binding(17) var<uniform> palette: array<vec4f, 252>;
+@group(0) @binding(17) var<uniform> palette: array<vec4f, 64>;
 #endif
 
 fn surface_at(pixel: vec2i) -> f32 {
@@ -99,7 +110,7 @@ fn ground_distance(origin: vec3f, direction: vec3f) -> f32 {
 fn solid_surface(at: u32, eye: vec3f, view: vec3f) -> Surface {
     let word = solid_packed[at];
     let n = unpack_normal(word);
-    return Surface(world_from_eye(camera, eye), select(n, -n, dot(n, view) < 0.0), word >> 24u);
+    return Surface(world_from_eye(camera, eye), select(n, -n, dot(n, view) < 0.0), material_of(word >> 24u));
 }
 
 struct Behind {
@@ -132,12 +143,12 @@ fn behind_radiance(found: Behind, direction: vec3f) -> vec3f {
         let colour = radiance_of(found.surface, -direction, found.far / camera.focal, 0.0);
         return hazed(colour, found.far, direction);
     }
-    var colour = sky_radiance(direction);
-    // Half of the sun's angle across: 0.2666°.
-    if dot(direction, shading.sun_direction) > 0.99998918 {
-        colour += min(shading.sun_irradiance * shading.disc, vec3f(60000.0));
-    }
-    return colour * shading.background;
+    return (sky_radiance(direction) + disc_radiance(direction)) * shading.background;
+}
+
+// The padded pixel that a place in eye space is seen at.
+fn pixel_of(eye: vec3f) -> vec2i {
+    return vec2i(floor(project(camera, eye))) + vec2i(camera.corner);
 }
 
 struct March {
@@ -162,7 +173,7 @@ fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, n
         if q.z < 0.05 {
             break;
         }
-        let pixel = vec2i(floor(project(camera, q)));
+        let pixel = pixel_of(q);
         if any(pixel < vec2i(0)) || any(pixel >= vec2i(camera.size)) {
             break;
         }
@@ -182,7 +193,7 @@ fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32) -> March {
     for (var i = 0; i < 5; i++) {
         let middle = 0.5 * (low + high);
         let q = origin + direction * middle;
-        let pixel = clamp(vec2i(floor(project(camera, q))), vec2i(0), vec2i(camera.size) - 1);
+        let pixel = clamp(pixel_of(q), vec2i(0), vec2i(camera.size) - 1);
         let z = solid_depth[u32(pixel.y) * camera.size.x + u32(pixel.x)];
         if z < q.z {
             high = middle;
@@ -191,7 +202,7 @@ fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32) -> March {
         }
     }
     let q = origin + direction * high;
-    let pixel = clamp(vec2i(floor(project(camera, q))), vec2i(0), vec2i(camera.size) - 1);
+    let pixel = clamp(pixel_of(q), vec2i(0), vec2i(camera.size) - 1);
     return March(high, u32(pixel.y) * camera.size.x + u32(pixel.x), q);
 }
 
@@ -218,8 +229,15 @@ fn mirrored(water: Water) -> vec3f {
 }
 
 // Light that comes up through the surface.
+struct Through {
+    // From what stands behind.
+    seen: vec3f,
+    // That the water scattered.
+    scattered: vec3f,
+}
+
 // `seen` metres of water lie on the straight line of sight.
-fn transmitted(water: Water, seen: f32, straight: Behind) -> vec3f {
+fn transmitted(water: Water, seen: f32, straight: Behind) -> Through {
     let n = shading.index;
     let ci = clamp(dot(water.normal, water.view), 0.0, 1.0);
     let ct = sqrt(max(1.0 - (1.0 - ci * ci) / (n * n), 0.0));
@@ -250,7 +268,7 @@ fn transmitted(water: Water, seen: f32, straight: Behind) -> vec3f {
     }
     let extinction = shading.absorption + shading.scattering;
     let clear = exp(-extinction * way);
-    return light * clear + diffuse_light(water.position, water.normal) * deep_albedo() * (1.0 - clear);
+    return Through(light * clear, diffuse_light(water.position, water.normal) * deep_albedo() * (1.0 - clear));
 }
 
 // Water `z` metres along the optical axis, whose normal is `smooth_normal` but for ripples; `lost` is the mean square slope of waves that
@@ -270,8 +288,27 @@ fn shade_water(
     let reflectance = fresnel(clamp(dot(normal, view), 0.0, 1.0), shading.index);
     let sun = shading.sun_irradiance * sunlit(position, vec3f(0.0, 1.0, 0.0))
         * glitter(normal, view, shading.sun_direction, water.slope_variance, shading.index);
-    return reflectance * mirrored(water) + (1.0 - reflectance) * transmitted(water, seen, straight)
-        + sun;
+    let mirror = reflectance * mirrored(water);
+    let through = transmitted(water, seen, straight);
+    light_part(REFLECTION, mirror);
+    light_part(REFRACTION, (1.0 - reflectance) * through.seen);
+    light_part(SCATTERING, (1.0 - reflectance) * through.scattered);
+    light_part(SUN, sun);
+    return mirror + (1.0 - reflectance) * (through.seen + through.scattered) + sun;
+}
+
+// The parts of `behind_radiance`, which is `colour`.
+fn behind_parts(found: Behind, direction: vec3f, colour: vec3f) {
+#ifdef LIGHTS
+    if found.depth < 0.1 * FAR {
+        let air = hazed(vec3f(0.0), found.far, direction);
+        light_part(SKYLIGHT, air);
+        light_part(SOLIDS, colour - air);
+    } else {
+        light_part(SKYLIGHT, sky_radiance(direction) * shading.background);
+        light_part(SUN, disc_radiance(direction) * shading.background);
+    }
+#endif
 }
 
 @compute @workgroup_size(16, 4)
@@ -324,6 +361,26 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let motion = motion_to(next, pixel);
     store(out, straight.depth, straight.surface.normal, straight.surface.position, motion, through);
 #else
+    var cover = 0.0;
+#ifdef SPRAY
+    let tap = half_tap(vec2f(pixel) + 0.5);
+    var words = vec4u(spray[tap.at.x], spray[tap.at.y], spray[tap.at.z], spray[tap.at.w]);
+    cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
+#endif
+#ifdef OBJECTS
+    var object = straight.surface.material;
+#ifdef SEA
+    let has_water = wet || beside;
+#else
+    let has_water = wet;
+#endif
+    if has_water {
+        object = 0u;
+    } else if straight.depth < 0.1 * FAR && object != 2u {
+        object = solid_packed[at] >> 24u;
+    }
+    output[out] = vec2u(object, bitcast<u32>(cover));
+#else
     var colour: vec3f;
     var alpha = 1.0;
     var depth = z;
@@ -341,30 +398,28 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 #ifdef SEA
         normal = select(normal, open.normal, beside);
 #endif
-        colour = hazed(
-            shade_water(depth, ray, view, normal, lost, through, straight), depth * length(ray), direction);
+        let far = depth * length(ray);
+        colour = hazed(shade_water(depth, ray, view, normal, lost, through, straight), far, direction);
+        dim_parts(exp(-far / shading.haze));
+        light_part(SKYLIGHT, hazed(vec3f(0.0), far, direction));
+    } else if HOLDS_OUT && straight.depth < 0.1 * FAR {
+        alpha = 0.0;
     } else {
         colour = behind_radiance(straight, direction);
+        behind_parts(straight, direction, colour);
         if straight.depth >= 0.1 * FAR {
             alpha = shading.background;
         }
     }
-#ifdef SPRAY
-    let tap = half_tap(vec2f(pixel) + 0.5);
-    var words = vec4u(spray[tap.at.x], spray[tap.at.y], spray[tap.at.z], spray[tap.at.w]);
-    let cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
     if cover > 0.0 {
         let where_to = camera.position + direction * min(z, min(straight.depth, 1e4)) * length(ray);
         let white = diffuse_light(where_to, vec3f(0.0, 1.0, 0.0)) * 0.85;
         colour = mix(colour, white, cover);
         alpha = mix(alpha, 1.0, cover);
+        dim_parts(1.0 - cover);
+        light_part(WHITE, white * cover);
     }
+    store_light(out, vec4f(colour, alpha), camera.weight, camera.sample_index == 0u);
 #endif
-    let value = vec4f(colour, alpha) * camera.weight;
-    if camera.sample_index == 0u {
-        output[out] = value;
-    } else {
-        output[out] += value;
-    }
 #endif
 }

@@ -51,8 +51,9 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
         let pb = project(camera, b);
         let pc = project(camera, c);
         // A pixel wider, for rounding.
-        low = clamp(min(pa, min(pb, pc)) - tile.corner - 1.0, vec2f(0.0), tile.size);
-        high = clamp(max(pa, max(pb, pc)) - tile.corner + 1.0, vec2f(0.0), tile.size);
+        let corner = tile.corner - camera.corner;
+        low = clamp(min(pa, min(pb, pc)) - corner - 1.0, vec2f(0.0), tile.size);
+        high = clamp(max(pa, max(pb, pc)) - corner + 1.0, vec2f(0.0), tile.size);
     } else if out.range.y <= NEAR {
         high = vec2f(0.0);
     }

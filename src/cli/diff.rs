@@ -424,9 +424,14 @@ fn show_pictures(out: &mut String, diff: &PicturesDiff, gain: f64) -> std::fmt::
 
 fn show_pair(out: &mut String, pair: &PairDiff, width: usize) -> std::fmt::Result {
     let Some(diff) = &pair.diff else {
-        let [a, b] = pair
-            .sizes
-            .map(|[width, height]| format!("{width} × {height}"));
+        let part = |k: usize| {
+            let ([width, height], [x, y]) = (pair.sizes[k], pair.corners[k]);
+            match [x, y] == [0, 0] {
+                true => format!("{width} × {height}"),
+                false => format!("{width} × {height} from {x}, {y}"),
+            }
+        };
+        let [a, b] = [part(0), part(1)];
         return writeln!(
             out,
             "{:width$}  A is {a}, B is {b}: not compared",

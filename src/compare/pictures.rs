@@ -25,6 +25,8 @@ pub struct Picture {
     pub width: usize,
     /// Pixels.
     pub height: usize,
+    /// Where its upper left pixel stands in the image that is shown: not at [0, 0] in an EXR with overscan or of a crop.
+    pub corner: [i32; 2],
     /// Red, green, blue, alpha; `width × height`.
     pub pixels: Vec<[f32; 4]>,
     /// Meaning of the values.
@@ -79,7 +81,9 @@ pub struct PairDiff {
     pub name: String,
     /// Width and height of a and of b, pixels.
     pub sizes: [[usize; 2]; 2],
-    /// `None` where the sizes differ.
+    /// Where the upper left pixels of a and of b stand in the images that are shown.
+    pub corners: [[i32; 2]; 2],
+    /// `None` where the sizes or the corners differ.
     pub diff: Option<PictureDiff>,
     /// Measures that are out of tolerance.
     pub faults: Vec<PictureFault>,
@@ -103,9 +107,10 @@ impl PicturesDiff {
     }
 }
 
-/// Compares two pictures; b is the reference. `None` where sizes or encodings differ.
+/// Compares two pictures; b is the reference. `None` where sizes, corners or encodings differ.
 pub fn compare(a: &Picture, b: &Picture) -> Option<PictureDiff> {
-    if (a.width, a.height, a.encoding) != (b.width, b.height, b.encoding) {
+    let of = |it: &Picture| (it.width, it.height, it.corner, it.encoding);
+    if of(a) != of(b) {
         return None;
     }
     let errors = errors(a, b);
@@ -243,6 +248,7 @@ mod tests {
         Picture {
             width,
             height,
+            corner: [0, 0],
             pixels: (0..width * height).map(pixel).collect(),
             encoding,
         }
@@ -308,6 +314,12 @@ mod tests {
             ..picture.clone()
         };
         assert_eq!(compare(&cut, &picture), None);
+        let aside = Picture {
+            corner: [1, 0],
+            ..picture.clone()
+        };
+        assert_eq!(compare(&aside, &picture), None);
+        assert!(compare(&picture, &picture).is_some(), "the control");
         let linear = self::picture(Encoding::Linear);
         assert_eq!(compare(&linear, &picture), None);
     }
@@ -352,6 +364,7 @@ mod tests {
         let tiny = Picture {
             width: 2,
             height: 2,
+            corner: [0, 0],
             pixels: vec![[0.5, 0.5, 0.5, 1.0]; 4],
             encoding: Encoding::Srgb,
         };

@@ -76,9 +76,14 @@ pub(super) const BANDS: Windows<Band> = Windows::new("band", "bands");
 /// Word and count of each fill.
 pub(super) const FILLS: Windows<Fill> = Windows::new("params", "fills");
 
-/// A band of the picture: linear radiance and coverage.
+/// A band of the picture: linear radiance and coverage, and behind them, for each pixel, the parts of the light that are asked for.
 pub(super) fn picture(band: usize) -> Buf<[f32; 4]> {
     Buf::named(format!("picture.{band}"))
+}
+
+/// A band of what a sample sees first: its code, and the bits of the part of it that spray covers.
+pub(super) fn objects(band: usize) -> Buf<[u32; 2]> {
+    Buf::named(format!("objects.{band}"))
 }
 
 /// A band of the channels beside it: Z, N, P, forward, thickness.

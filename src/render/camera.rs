@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::uniform;
+use super::{frame::Extent, uniform};
 use crate::domain::eye::Eye;
 use crate::scene::look::{CameraSpec, Look};
 
@@ -136,8 +136,7 @@ pub(super) fn samples(count: u32, shutter: f64) -> Vec<Sample> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting {
     pub(super) origin: DVec3,
-    pub(super) size: [u32; 2],
-    pub(super) margin: [u32; 2],
+    pub(super) extent: Extent,
     pub(super) particle_count: u32,
     pub(super) radius: f64,
     pub(super) frames_per_second: f64,
@@ -169,9 +168,10 @@ pub(super) fn camera(
 ) -> uniform::Camera {
     let instant = frame + sample.instant;
     let eye = eye(look, setting.origin, instant);
-    let picture = eye.size;
+    let extent = &setting.extent;
+    let [before, image] = extent.image;
     let centre = [0, 1].map(|axis| {
-        let middle = f64::from(setting.margin[axis]) + 0.5 * f64::from(picture[axis]);
+        let middle = f64::from(before[axis]) + 0.5 * f64::from(image[axis]);
         (middle - sample.jitter[axis]) as f32
     });
     uniform::Camera {
@@ -184,13 +184,16 @@ pub(super) fn camera(
         forward: eye.forward.as_vec3().to_array(),
         radius: setting.radius as f32,
         centre,
-        size: setting.size,
-        margin: setting.margin,
-        picture,
+        size: extent.size,
+        margin: extent.margin,
+        picture: extent.picture,
         weight: sample.weight as f32,
         sample_index: index,
         clock: (instant / setting.frames_per_second) as f32,
         frame_seconds: (1.0 / setting.frames_per_second) as f32,
+        corner: extent.corner.map(|side| side as f32),
+        pad0: 0.0,
+        pad1: 0.0,
     }
 }
 
@@ -241,8 +244,10 @@ mod tests {
         let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 1.0, 0.0]\n";
         let setting = Setting {
             origin: DVec3::ZERO,
-            size: [192, 128],
-            margin: [16, 19],
+            extent: Extent {
+                image: [[16, 19], [160, 90]],
+                ..Extent::default()
+            },
             particle_count: 0,
             radius: 0.1,
             frames_per_second: 24.0,

@@ -5,28 +5,55 @@
 //! tiles, and the picture itself is gathered in bands of rows: those two are what limits apply to.
 
 use super::buffers::{aovs, picture};
+use crate::scene::look::{Look, Window};
 
 /// Sizes in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Extent {
+    /// Columns and rows that are shaded.
     pub(super) picture: [u32; 2],
     /// With a margin on all sides, so that filters have neighbours at the picture's edge. The width is a
     /// multiple of 64, which makes a row of four-byte texels one that textures can be copied to.
     pub(super) size: [u32; 2],
+    /// Padding left of and above the pixels that are shaded.
     pub(super) margin: [u32; 2],
+    /// Where the padded frame of the image without overscan begins. Places are counted from there, so that those of the image's
+    /// pixels are the same bits with overscan and without.
+    pub(super) corner: [u32; 2],
+    /// From there to the image's own upper left pixel, and that one's size.
+    pub(super) image: [[u32; 2]; 2],
 }
 
+/// What is put before a frame with overscan is a multiple of this: pairs of pixels and rows of textures stay together.
+const STEP: u32 = 64;
+
 impl Extent {
-    pub(super) fn new(width: u32, height: u32) -> Self {
+    /// Of a look. A crop is shaded within the frame of the whole image: what its pixels look up beyond it is there.
+    pub(super) fn of(look: &Look) -> Self {
+        let image = &look.spec().image;
+        Self::new([image.width, image.height], image.overscan, look.window())
+    }
+
+    fn new([width, height]: [u32; 2], overscan: u32, window: Window) -> Self {
         // 4 % of the width: about the reach of the widest smoothing at the usual distances.
         let margin = (width / 25).max(16);
         let padded = (width + 2 * margin).next_multiple_of(64);
         let tall = (height + 2 * margin).next_multiple_of(4);
+        let own = [(padded - width) / 2, (tall - height) / 2];
+        let before = overscan.next_multiple_of(STEP);
         Self {
-            picture: [width, height],
-            size: [padded, tall],
-            margin: [(padded - width) / 2, (tall - height) / 2],
+            picture: window.size,
+            size: [padded, tall].map(|side| side + 2 * before),
+            margin: [0, 1]
+                .map(|axis| (before + own[axis]).saturating_add_signed(window.corner[axis])),
+            corner: [before; 2],
+            image: [own, [width, height]],
         }
+    }
+
+    /// Pixels that are shaded.
+    pub(super) fn shaded(&self) -> usize {
+        self.picture[0] as usize * self.picture[1] as usize
     }
 
     pub(super) fn pixels(&self) -> usize {
@@ -34,14 +61,21 @@ impl Extent {
     }
 }
 
-/// Rows of each band of the picture: as many as a storage buffer of `most` bytes holds, but no more than `row_limit`.
-pub(super) fn bands(extent: &Extent, has_aovs: bool, most: u64, row_limit: u32) -> Vec<u32> {
+/// Rows of each band of the picture, of `stride` vectors a pixel: as many as a storage buffer of `most` bytes holds, but no more
+/// than `row_limit`.
+pub(super) fn bands(
+    extent: &Extent,
+    (stride, has_aovs): (usize, bool),
+    most: u64,
+    row_limit: u32,
+) -> Vec<u32> {
     let [width, height] = extent.picture;
-    let row = match has_aovs {
-        true => aovs(0).sized(width as usize),
-        false => picture(0).sized(width as usize),
+    let beside = match has_aovs {
+        true => aovs(0).sized(width as usize).bytes,
+        false => 0,
     };
-    let fitting = u32::try_from(most / row.bytes).unwrap_or(u32::MAX);
+    let row = picture(0).sized(stride * width as usize).bytes.max(beside);
+    let fitting = u32::try_from(most / row).unwrap_or(u32::MAX);
     let rows = fitting.min(row_limit).max(1);
     (0..height)
         .step_by(rows as usize)
@@ -51,3 +85,48 @@ pub(super) fn bands(extent: &Extent, has_aovs: bool, most: u64, row_limit: u32) 
 
 /// `FAR` of `camera.wgsl`.
 pub(super) const FAR: f32 = 1e30;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_images_pixels_have_the_same_places_with_overscan_and_crop() {
+        let size = [640, 360];
+        let whole = Window {
+            corner: [0, 0],
+            size,
+        };
+        let plain = Extent::new(size, 0, whole);
+        assert_eq!((plain.size, plain.margin), ([704, 412], [32, 26]));
+        let wide = Window {
+            corner: [-40, -40],
+            size: [720, 440],
+        };
+        let wide = Extent::new(size, 40, wide);
+        let part = Window {
+            corner: [100, 30],
+            size: [50, 20],
+        };
+        let part = Extent::new(size, 0, part);
+        // Padded pixel of an image's pixel, counted from the corner.
+        let place = |extent: &Extent, window: [i32; 2], pixel: [i32; 2]| {
+            [0, 1].map(|axis| {
+                let shaded = pixel[axis] - window[axis];
+                extent.margin[axis] as i32 + shaded - extent.corner[axis] as i32
+            })
+        };
+        for pixel in [[100, 30], [149, 49]] {
+            let expected = place(&plain, [0, 0], pixel);
+            assert_eq!(place(&wide, [-40, -40], pixel), expected);
+            assert_eq!(place(&part, [100, 30], pixel), expected);
+        }
+        assert_eq!(part.size, plain.size);
+        // The padding about what is shaded is no less than that about the plain image.
+        assert!([0, 1].iter().all(|&axis| {
+            let after = wide.size[axis] - wide.margin[axis] - wide.picture[axis];
+            wide.margin[axis] >= plain.margin[axis] && after >= plain.margin[axis]
+        }));
+        assert!(wide.corner[0].is_multiple_of(STEP) && wide.size[0].is_multiple_of(STEP));
+    }
+}

@@ -9,8 +9,9 @@ use std::path::Path;
 
 use glam::{DMat4, DVec4};
 
-use super::RenderError;
+use super::{RenderError, cryptomatte::Matte};
 use crate::domain::eye::Eye;
+use crate::scene::look::{ColourSpaceSpec, LightSpec, Window};
 
 pub use exr_file::{read_exr_attributes, write_exr};
 pub use pixels::{Pixels, read_exr, read_png, write_rgb_png};
@@ -23,12 +24,22 @@ pub struct Image {
     pub width: u32,
     /// Pixels.
     pub height: u32,
+    /// Where its upper left pixel stands in the image that is shown: before it with overscan, within it with a crop.
+    pub corner: [i32; 2],
+    /// Columns and rows of the image that is shown.
+    pub display: [u32; 2],
     /// Scene-linear Rec. 709, premultiplied by alpha; `width × height`.
     pub beauty: Vec<[f32; 4]>,
     /// What the look asked for.
     pub aovs: Aovs,
+    /// Parts of the light that the look asked for: as the beauty, without coverage.
+    pub lights: Vec<(LightSpec, Vec<[f32; 3]>)>,
+    /// Which objects each pixel sees, where the look asks for that.
+    pub matte: Option<Matte>,
     /// From where it was taken; `None` of a picture that no camera took.
     pub view: Option<View>,
+    /// Of the light in its EXR; in memory it is that of Rec. 709.
+    pub exr_space: ColourSpaceSpec,
 }
 
 /// The camera of a picture at the frame's instant, as the standard attributes of OpenEXR have it: matrices row by row, for points
@@ -85,13 +96,45 @@ pub struct Aovs {
 impl Image {
     /// A black, transparent picture without AOVs.
     pub fn new(width: u32, height: u32) -> Self {
+        let size = [width, height];
+        let corner = [0, 0];
+        Self::of(Window { corner, size }, size)
+    }
+
+    /// As [`Image::new`], of the pixels of a window of an image of so many columns and rows.
+    pub fn of(window: Window, display: [u32; 2]) -> Self {
+        let [width, height] = window.size;
         Self {
             width,
             height,
+            corner: window.corner,
+            display,
             beauty: vec![[0.0; 4]; width as usize * height as usize],
             aovs: Aovs::default(),
+            lights: Vec::new(),
+            matte: None,
             view: None,
+            exr_space: ColourSpaceSpec::default(),
         }
+    }
+}
+
+impl Image {
+    /// Beauty of each pixel of the image that is shown: black and transparent where it was not rendered.
+    pub fn shown(&self) -> Vec<[f32; 4]> {
+        let [width, height] = self.display.map(|side| side as i32);
+        let within = |at: i32, axis: usize, size: u32| {
+            let at = at - self.corner[axis];
+            (0..size as i32).contains(&at).then_some(at as usize)
+        };
+        let pixel = |y: i32, x: i32| {
+            let (row, column) = (within(y, 1, self.height)?, within(x, 0, self.width)?);
+            self.beauty.get(row * self.width as usize + column).copied()
+        };
+        (0..height)
+            .flat_map(|y| (0..width).map(move |x| (y, x)))
+            .map(|(y, x)| pixel(y, x).unwrap_or_default())
+            .collect()
     }
 }
 

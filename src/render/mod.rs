@@ -9,6 +9,8 @@
 mod aeration;
 mod buffers;
 mod camera;
+pub mod colour;
+pub mod cryptomatte;
 mod frame;
 pub mod image;
 mod lighting;

@@ -2,18 +2,21 @@
 
 use glam::DVec3;
 
-use super::{RenderError, RenderScene, uniform::Triangle};
+use super::{
+    RenderError, RenderScene,
+    cryptomatte::{MOST_SOLIDS, PALETTE, SOLIDS},
+    uniform::Triangle,
+};
 use crate::domain::mesh::TriangleMesh;
 use crate::scene::look::{BasinSpec, Look};
 
-/// Materials of a triangle, as in ssfr_solid.wgsl: a solid of the look's colour, a wall of 1.1 times the ground's; from [`FIRST`] on
-/// those of the palette.
+/// Materials of a triangle, as in ssfr_solid.wgsl: a solid of the look's colour, a wall of 1.1 times the ground's; from [`SOLIDS`] on
+/// solids that are told apart, from [`PALETTE`] on those of the palette.
 const SOLID: u32 = 0;
 const WALL: u32 = 1;
-const FIRST: u32 = 4;
 
 /// Colours of a palette: a material takes eight bits of a pixel.
-pub(super) const MOST_COLOURS: usize = 256 - FIRST as usize;
+pub(super) const MOST_COLOURS: usize = 256 - PALETTE as usize;
 
 /// Between a wall and the domain, metres over the domain's size: two faces in one place would flicker.
 const GAP: f64 = 1e-4;
@@ -23,7 +26,7 @@ const GAP: f64 = 1e-4;
 pub(super) struct Opaque {
     /// Metres from the domain's least corner.
     pub(super) triangles: Vec<Triangle>,
-    /// Linear reflectance, and 1 where rows of windows may be, of the materials from [`FIRST`] on.
+    /// Linear reflectance, and 1 where rows of windows may be, of the materials from [`PALETTE`] on.
     pub(super) palette: Vec<[f32; 4]>,
 }
 
@@ -31,7 +34,7 @@ impl Opaque {
     /// That of a look and a scene.
     pub(super) fn new(look: &Look, scene: &RenderScene) -> Result<Self, RenderError> {
         let mut opaque = Self::default();
-        opaque.add_solids(scene)?;
+        opaque.add_solids(scene, look.spec().output.cryptomatte)?;
         let size = scene.domain.size();
         if let Some(basin) = &look.spec().basin {
             let material = match basin.colour {
@@ -62,9 +65,16 @@ impl Opaque {
         Ok(opaque)
     }
 
-    fn add_solids(&mut self, scene: &RenderScene) -> Result<(), RenderError> {
+    fn add_solids(&mut self, scene: &RenderScene, tells_apart: bool) -> Result<(), RenderError> {
+        if tells_apart && scene.solids.len() > MOST_SOLIDS {
+            return Err(RenderError::Scene(format!(
+                "output.cryptomatte tells {MOST_SOLIDS} solids apart at most, and the scene has {}",
+                scene.solids.len()
+            )));
+        }
         let origin = scene.domain.min;
-        for mesh in &scene.solids {
+        for (code, mesh) in (SOLIDS..).zip(&scene.solids) {
+            let material = if tells_apart { code } else { SOLID };
             for corners in &mesh.triangles {
                 let mut points = [DVec3::ZERO; 3];
                 for (point, &index) in points.iter_mut().zip(corners) {
@@ -77,7 +87,7 @@ impl Opaque {
                 // A triangle without area has no normal, and nothing of it would be seen.
                 let area = (points[1] - points[0]).cross(points[2] - points[0]);
                 if area.length() > 1e-12 {
-                    self.push(points.map(|p| p - origin), SOLID);
+                    self.push(points.map(|p| p - origin), material);
                 }
             }
         }
@@ -98,7 +108,7 @@ impl Opaque {
         if found.is_none() {
             self.palette.push(entry);
         }
-        Ok(FIRST + index as u32)
+        Ok(PALETTE + index as u32)
     }
 
     fn push(&mut self, corners: [DVec3; 3], material: u32) {

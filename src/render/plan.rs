@@ -65,9 +65,12 @@ pub struct Plan {
     pub(super) extent: Extent,
     /// Rows of the picture in each of its buffers.
     pub(super) bands: Vec<u32>,
+    /// Vectors of a pixel in the picture's buffers: its own, and one for each part of the light that is asked for.
+    pub(super) stride: usize,
     /// Of a splat, metres.
     pub(super) radius: f64,
     pub(super) defines: BTreeMap<&'static str, Vec<&'static str>>,
+    pub(super) constants: BTreeMap<&'static str, Vec<(&'static str, f64)>>,
     pub(super) fills: Vec<Fill>,
     pub(super) contents: Vec<(String, Vec<u8>)>,
     pub(super) texels: Vec<(String, Vec<u8>)>,
@@ -109,7 +112,7 @@ impl Plan {
                     let spec = PassSpec {
                         name: pass,
                         defines: self.defines.get(pass).cloned().unwrap_or_default(),
-                        constants: Vec::new(),
+                        constants: self.constants.get(pass).cloned().unwrap_or_default(),
                     };
                     passes.insert(pass, spec);
                 }
@@ -297,21 +300,24 @@ mod tests {
         const ALL: &str = "[output]\nformats = [\"exr\"]\naovs = [\"Z\", \"forward\"]\n[basin]\nheight_m = 0.5\n\
             [water]\nspray = { density_per_metre = 9.0, speed_m_per_s = 5.5 }\n";
         let depth_alone = "[output]\nformats = [\"exr\"]\naovs = [\"Z\"]\n";
+        const LIGHTS: &str = "[output]\nformats = [\"exr\"]\ncryptomatte = true\nlights = [\"sun\", \"spray\"]\nsolids = \"holdout\"\n";
+        const SEA: &str = "[output]\nformats = [\"exr\"]\naovs = [\"Z\"]\ncryptomatte = true\n[sea]\nlevel_m = 0.5\n\
+            [basin]\nheight_m = 0.5\ncolour = [0.5, 0.5, 0.5]\n";
         let mut sizes = BTreeSet::new();
         for surface in ["curvature_flow", "narrow_range"] {
-            for more in ["", depth_alone, ALL] {
+            for more in ["", depth_alone, ALL, LIGHTS, SEA] {
                 let plan = plan(surface, more);
                 assert_eq!(used(&plan), planned(&plan), "{surface} {more}");
                 sizes.insert(plan.bytes());
             }
         }
         const RAYS: &str = "[renderer]\nmethod = \"ray\"\n";
-        for more in ["", depth_alone, ALL] {
+        for more in ["", depth_alone, ALL, LIGHTS, SEA] {
             let plan = plan("curvature_flow", &format!("{RAYS}{more}"));
             assert_eq!(used(&plan), planned(&plan), "rays {more}");
             sizes.insert(plan.bytes());
         }
-        assert_eq!(sizes.len(), 9, "each look takes what it needs: {sizes:?}");
+        assert_eq!(sizes.len(), 15, "each look takes what it needs: {sizes:?}");
         // Controls: a buffer that nothing uses, and a command whose buffer is not planned.
         let mut spare = plan("narrow_range", "");
         spare.buffer(&crate::render::buffers::SPRAY, 1);

@@ -4,6 +4,7 @@ use glam::{DVec3, Mat4, Vec3};
 use wgpu::{CompareFunction, TextureFormat};
 
 use super::buffers::{PALETTE, SHADOW_FROM_WORLD, SOLID_DEPTH, SOLID_PACKED, TILES, TRIANGLES};
+use super::cryptomatte::{PALETTE as OWN_COLOURS, SOLIDS};
 use super::frame::FAR;
 use super::opaque::MOST_COLOURS;
 use super::plan::{Limits, Plan};
@@ -44,7 +45,10 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
             pick(2, size.z),
         ));
     }
-    for triangle in triangles.iter().filter(|triangle| triangle.material == 0) {
+    let is_solid = |triangle: &&Triangle| {
+        triangle.material == 0 || (SOLIDS..OWN_COLOURS).contains(&triangle.material)
+    };
+    for triangle in triangles.iter().filter(is_solid) {
         for p in [triangle.a, triangle.b, triangle.c] {
             take(p.into());
         }

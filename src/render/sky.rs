@@ -32,6 +32,18 @@ const REFERENCE_DIFFUSE: f64 = 0.18;
 /// Solid angle of the sun, sr.
 const SUN_SOLID_ANGLE: f64 = 6.794e-5;
 
+/// Illuminance of sunlight outside of the air, lux: the solar illuminance constant.
+const SOLAR_ILLUMINANCE: f64 = 133e3;
+
+/// Luminance, cd/m², of radiance 1 in all three channels. White under the reference sun and sky has it: the sun's illuminance outside
+/// of the air, times what of it the air lets through, on a level face; with the sky's part; over π, for white paint sends light
+/// everywhere alike.
+pub(super) fn white_luminance() -> f64 {
+    let through = luminance(transmittance(REFERENCE_ELEVATION, REFERENCE_TURBIDITY));
+    let sun = SOLAR_ILLUMINANCE * through * REFERENCE_ELEVATION.sin();
+    sun / (1.0 - REFERENCE_DIFFUSE) / PI
+}
+
 fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
@@ -312,6 +324,18 @@ mod tests {
         let total = luminance(up(&high.irradiance))
             + luminance(high.sun_irradiance.as_dvec3()) * REFERENCE_ELEVATION.sin();
         assert!((total / PI - 1.0).abs() < 0.05, "{total}");
+    }
+
+    #[test]
+    fn white_is_as_bright_as_daylight() {
+        // A clear sky of the Illuminating Engineering Society (Handbook, 9th edition, chapter 8): the sun's 127.5 klx times
+        // exp(−0.21 / sin h), and 0.8 + 15.5 √sin h klx from the sky, on a level face. It is for air clearer than turbidity 3.
+        let sin = REFERENCE_ELEVATION.sin();
+        let clear = 127.5e3 * (-0.21 / sin).exp() * sin + 800.0 + 15_500.0 * sin.sqrt();
+        let part = white_luminance() * PI / clear;
+        assert!((0.8..1.0).contains(&part), "{part}");
+        // Control: light on a face towards the sun.
+        assert!(!(0.8..1.0).contains(&(part / sin)), "{}", part / sin);
     }
 
     #[test]

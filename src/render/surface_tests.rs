@@ -27,6 +27,7 @@ fn camera() -> Camera {
         sample_index: 0,
         clock: 0.0,
         frame_seconds: 1.0,
+        ..Camera::default()
     }
 }
 

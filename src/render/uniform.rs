@@ -24,6 +24,9 @@ mirror!(
         sample_index: u32,
         clock: f32,
         frame_seconds: f32,
+        corner: [f32; 2],
+        pad0: f32,
+        pad1: f32,
     }
 );
 

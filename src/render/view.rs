@@ -1,5 +1,7 @@
 //! From scene-linear light to what a screen shows.
 
+mod aces;
+
 use glam::{DMat3, DVec3};
 
 use crate::scene::look::{TransformSpec, ViewSpec};
@@ -21,6 +23,7 @@ pub fn apply(view: &ViewSpec, colour: [f32; 3]) -> [f64; 3] {
     let scene = DVec3::from(colour.map(f64::from)).max(DVec3::ZERO) * view.exposure_stops.exp2();
     let mut display = match view.transform {
         TransformSpec::Agx => agx(scene),
+        TransformSpec::Aces => aces::aces(scene),
         TransformSpec::Srgb => scene.min(DVec3::ONE),
     };
     const GREY: f64 = 0.18;

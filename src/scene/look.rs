@@ -14,11 +14,20 @@ use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 
 pub(super) use keys::KEYS;
 pub use spec::{
-    AovSpec, BasinSpec, CameraSpec, FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LookSpec,
-    MethodSpec, OutputSpec, RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec, SpraySpec,
-    SunSpec, SurfaceSpec, TransformSpec, ViewSpec, WaterSpec, WaveMakersSpec, WhitewaterLook,
-    WindowsSpec,
+    AovSpec, BasinSpec, CameraSpec, ColourSpaceSpec, FilterSpec, FormatSpec, ImageSpec,
+    KeyframeSpec, LightSpec, LookSpec, MethodSpec, OutputSpec, RendererSpec, RippleSpec, SeaSpec,
+    SeaWavesSpec, SkySpec, SolidsOutput, SpraySpec, SunSpec, SurfaceSpec, TransformSpec, ViewSpec,
+    WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
 };
+
+/// Pixels of a picture, counted from the upper left one of the look's image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Window {
+    /// The upper left one.
+    pub corner: [i32; 2],
+    /// Columns and rows.
+    pub size: [u32; 2],
+}
 
 /// Why a look cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -82,6 +91,7 @@ impl Look {
         let spec = LookSpec::deserialize(toml::Deserializer::from(root))
             .map_err(|error| doc.translate(&error))?;
         check_camera(&doc, &spec)?;
+        check_crop(&doc, &spec.image)?;
         check_output(&doc, &spec.output)?;
         check_sea(&doc, &spec)?;
         let panorama = match &spec.sky {
@@ -123,9 +133,33 @@ impl Look {
         self.hash.clone()
     }
 
+    /// Which pixels are rendered.
+    pub fn window(&self) -> Window {
+        let image = &self.spec.image;
+        let over = image.overscan;
+        match image.crop {
+            // Whole, and within the image.
+            Some([x0, y0, x1, y1]) => Window {
+                corner: [x0 as i32, y0 as i32],
+                size: [(x1 - x0) as u32, (y1 - y0) as u32],
+            },
+            None => Window {
+                corner: [-(over as i32); 2],
+                size: [image.width, image.height].map(|side| side + 2 * over),
+            },
+        }
+    }
+
     /// Whether the EXR asks for this AOV.
     pub fn wants(&self, aov: AovSpec) -> bool {
         self.spec.output.aovs.contains(&aov)
+    }
+
+    /// The parts of the light that the EXR has in layers, each once, in the order of [`LightSpec::NAMED`].
+    pub fn lights(&self) -> Vec<LightSpec> {
+        let all = LightSpec::NAMED.iter().map(|(_, light)| *light);
+        all.filter(|light| self.spec.output.lights.contains(light))
+            .collect()
     }
 
     /// The look for pictures of the water's surface alone, its depth and normals at pixels' centres at the frame's instant, by
@@ -138,8 +172,11 @@ impl Look {
         spec.water.spray = None;
         spec.whitewater = None;
         (spec.image.samples, spec.image.shutter) = (1, 0.0);
+        (spec.image.overscan, spec.image.crop) = (0, None);
         spec.output.formats = vec![FormatSpec::Exr];
         spec.output.aovs = vec![AovSpec::Z, AovSpec::N];
+        spec.output.lights = Vec::new();
+        spec.output.cryptomatte = false;
         look.hash = canonical_hash(&look.spec, look.panorama());
         look
     }
@@ -156,9 +193,21 @@ impl Look {
     }
 }
 
-/// What a basin has had to say since its sides could be chosen, where it stands at those that it had before.
-const PLAIN_QUAYS: &str =
-    ", sides: [Wall { axis: 2, is_max: false }, Wall { axis: 2, is_max: true }], colour: None";
+/// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
+/// that it had before there was such a key.
+const NEWER: [&str; 10] = [
+    "whitewater: None, ",
+    "renderer: RendererSpec { method: Ssfr }, ",
+    "overscan: 0, ",
+    "crop: None, ",
+    "colour_space: Rec709, ",
+    "solids: Draw, ",
+    "lights: [], ",
+    "cryptomatte: false, ",
+    "wave_makers: None, sea: None, ",
+    // Quay walls stood at these sides before others could be chosen.
+    ", sides: [Wall { axis: 2, is_max: false }, Wall { axis: 2, is_max: true }], colour: None",
+];
 
 fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     let mut hasher = blake3::Hasher::new();
@@ -167,12 +216,10 @@ fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
     }
-    // A look that does without has the hash that it had before there were whitewater and rays.
-    let text = format!("{canonical:?}")
-        .replace("whitewater: None, ", "")
-        .replace("renderer: RendererSpec { method: Ssfr }, ", "")
-        .replace("wave_makers: None, sea: None, ", "")
-        .replace(PLAIN_QUAYS, "");
+    let text = format!("{canonical:?}");
+    let text = NEWER
+        .iter()
+        .fold(text, |text, newer| text.replace(newer, ""));
     hasher.update(text.as_bytes());
     if let Some(bytes) = panorama {
         hasher.update(blake3::hash(bytes).as_bytes());
@@ -254,6 +301,28 @@ fn check_pose(
     Ok(())
 }
 
+fn check_crop(doc: &Document<'_>, image: &ImageSpec) -> Result<(), SceneError> {
+    let Some(crop) = image.crop else {
+        return Ok(());
+    };
+    let fault = |message: String| Err(doc.fault_of_plain("image.crop", message));
+    if image.overscan > 0 {
+        return fault("given together with overscan".to_owned());
+    }
+    if crop.iter().any(|side| side.fract() != 0.0) {
+        return fault(format!("{crop:?} is not of whole pixels"));
+    }
+    let [x0, y0, x1, y1] = crop;
+    let (width, height) = (image.width, image.height);
+    if x0 >= x1 || y0 >= y1 || x1 > f64::from(width) || y1 > f64::from(height) {
+        return fault(format!(
+            "{crop:?} is no part of a {width} × {height} image; allowed is [x0, y0, x1, y1] with 0 ≤ x0 < x1 ≤ {width} and \
+             0 ≤ y0 < y1 ≤ {height}"
+        ));
+    }
+    Ok(())
+}
+
 fn check_output(doc: &Document<'_>, output: &OutputSpec) -> Result<(), SceneError> {
     if output.formats.is_empty() {
         return Err(doc.fault_of("output.formats", "is empty"));
@@ -261,6 +330,14 @@ fn check_output(doc: &Document<'_>, output: &OutputSpec) -> Result<(), SceneErro
     if !output.aovs.is_empty() && !output.formats.contains(&FormatSpec::Exr) {
         let message = "AOVs are written to EXR; add it to `formats`";
         return Err(doc.fault_of_plain("output.aovs", message));
+    }
+    if !output.lights.is_empty() && !output.formats.contains(&FormatSpec::Exr) {
+        let message = "layers of light are written to EXR; add it to `formats`";
+        return Err(doc.fault_of_plain("output.lights", message));
+    }
+    if output.cryptomatte && !output.formats.contains(&FormatSpec::Exr) {
+        let message = "mattes are written to EXR; add it to `formats`";
+        return Err(doc.fault_of_plain("output.cryptomatte", message));
     }
     Ok(())
 }

@@ -36,12 +36,26 @@ pub fn asset_path(file: &Path, file_hash: &str) -> String {
             })
             .collect()
     };
-    let short = file_hash.get(..16).unwrap_or(file_hash);
     format!(
-        "assets/{}-{short}.{}",
+        "assets/{}{}.{}",
         part(file.file_stem()),
+        mark(file_hash),
         part(file.extension()).to_ascii_lowercase()
     )
+}
+
+/// What a copy's name has behind the original's.
+fn mark(file_hash: &str) -> String {
+    format!("-{}", file_hash.get(..16).unwrap_or(file_hash))
+}
+
+impl PlacedMesh {
+    /// The name of its file without the ending, the same of the original and of a cache's copy.
+    pub fn name(&self) -> String {
+        let stem = self.file.file_stem().unwrap_or_default().to_string_lossy();
+        let original = stem.strip_suffix(mark(&self.file_hash).as_str());
+        original.unwrap_or(&stem).to_owned()
+    }
 }
 
 impl Scene {

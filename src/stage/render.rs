@@ -28,7 +28,7 @@ use crate::{
         image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
     },
     scene::{
-        Scene, SceneError, Wall,
+        PlacedMesh, Scene, SceneError, Wall,
         look::{FormatSpec, Look, LookError},
     },
 };
@@ -395,6 +395,7 @@ impl Job<'_> {
                 Renderer::new(&self.context, look, &set).map_err(|error| told(error, look))?
             }
         };
+        renderer.name_solids(&solid_names(&self.scene));
         if self.request.time_passes {
             renderer.time_passes();
         }
@@ -446,6 +447,13 @@ fn plates(scene: &Scene, walls: &Bounds) -> Vec<(Wall, f64)> {
             false => (wall, walls.min[wall.axis]),
         })
         .collect()
+}
+
+/// What the scene's solids are called, in the order of [`render_scene`]: as their meshes' files, without the ending.
+fn solid_names(scene: &Scene) -> Vec<String> {
+    let moving = scene.moving_solids.iter().map(|solid| &solid.placed);
+    let placed = scene.solids.iter().chain(moving);
+    placed.map(PlacedMesh::name).collect()
 }
 
 fn attributes(

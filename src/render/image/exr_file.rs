@@ -6,31 +6,73 @@ use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples,
     ImageAttributes, IntegerBounds, Layer, LayerAttributes, LineOrder, Text, Vec2, WritableImage,
 };
+use glam::{DMat3, DVec3};
 use half::f16;
 
-use super::super::RenderError;
+use super::super::{
+    RenderError,
+    colour::{REC_709, Space},
+    cryptomatte::Matte,
+    sky::white_luminance,
+};
 use super::{Attributes, Image, write_whole};
+use crate::scene::look::{ColourSpaceSpec, LightSpec};
 
 fn text(value: &str) -> Text {
     Text::new_or_none(value).unwrap_or_else(|| Text::from("?"))
 }
 
-/// Writes one part: `R G B A` half, and the AOVs float: `Z`, `N.X/.Y/.Z`, `P.X/.Y/.Z`, `forward.u/.v`,
-/// `thickness.Y`. ZIP, lossless; Rec. 709 chromaticities stated, and the standard attributes `worldToCamera`, `worldToNDC` and
-/// `framesPerSecond`.
+fn chromaticity([x, y]: [f64; 2]) -> Vec2<f32> {
+    Vec2(x as f32, y as f32)
+}
+
+/// From Rec. 709 to the light of a file; `None` where it is the same.
+struct Light(Option<DMat3>);
+
+impl Light {
+    fn to(space: ColourSpaceSpec) -> Self {
+        let is_same = space == ColourSpaceSpec::Rec709;
+        Self((!is_same).then(|| REC_709.to(Space::of(space))))
+    }
+
+    /// One channel of a pixel.
+    fn half(&self, pixel: [f32; 3], channel: usize) -> f16 {
+        let value = match &self.0 {
+            Some(matrix) => matrix.row(channel).dot(DVec3::from(pixel.map(f64::from))) as f32,
+            None => pixel[channel],
+        };
+        // Half ends at 65 504; a brighter glint would become infinite.
+        f16::from_f32(value.min(65504.0))
+    }
+}
+
+/// Writes one part: `R G B A` half, parts of the light half (`sun.R/.G/.B`), and the AOVs float: `Z`, `N.X/.Y/.Z`, `P.X/.Y/.Z`, `forward.u/.v`,
+/// `thickness.Y`. ZIP, lossless. The display window is the image that is shown, the data window what was rendered. The light is in the picture's `exr_space`, whose chromaticities are stated, as are, of a picture that
+/// a camera took, the standard attributes `worldToCamera`, `worldToNDC`, `framesPerSecond` and `whiteLuminance`.
 ///
 /// # Errors
 /// [`RenderError::Write`], [`RenderError::Format`].
 pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<(), RenderError> {
+    let space = Space::of(image.exr_space);
+    let light = Light::to(image.exr_space);
     let mut channels = Vec::new();
-    for (index, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
-        let samples = image
-            .beauty
-            .iter()
-            // Half ends at 65 504; a brighter glint would become infinite.
-            .map(|pixel| f16::from_f32(pixel[index].min(65504.0)))
-            .collect();
-        channels.push(AnyChannel::new(name, FlatSamples::F16(samples)));
+    for (index, name) in ["R", "G", "B"].into_iter().enumerate() {
+        let pixels = image.beauty.iter();
+        let samples = pixels.map(|&[r, g, b, _]| light.half([r, g, b], index));
+        channels.push(AnyChannel::new(name, FlatSamples::F16(samples.collect())));
+    }
+    let alpha = image.beauty.iter().map(|pixel| f16::from_f32(pixel[3]));
+    channels.push(AnyChannel::new("A", FlatSamples::F16(alpha.collect())));
+    for (part, pixels) in &image.lights {
+        let named = LightSpec::NAMED.iter().find(|(_, light)| light == part);
+        for (index, suffix) in ["R", "G", "B"].into_iter().enumerate() {
+            let name = format!("{}.{suffix}", named.map_or("", |(name, _)| name));
+            let samples = pixels.iter().map(|&pixel| light.half(pixel, index));
+            channels.push(AnyChannel::new(
+                name.as_str(),
+                FlatSamples::F16(samples.collect()),
+            ));
+        }
     }
     let mut float = |name: &str, samples: Vec<f32>| {
         channels.push(AnyChannel::new(name, FlatSamples::F32(samples)));
@@ -54,14 +96,20 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
     if let Some(thickness) = &aovs.thickness {
         float("thickness.Y", thickness.clone());
     }
+    for (name, samples) in image.matte.iter().flat_map(Matte::channels) {
+        float(&name, samples);
+    }
 
     let size = Vec2(image.width as usize, image.height as usize);
+    let shown = Vec2(image.display[0] as usize, image.display[1] as usize);
     let view = image.view.as_ref();
     let layer_attributes = LayerAttributes {
+        layer_position: Vec2(image.corner[0], image.corner[1]),
         software_name: Some(text(&attributes.software)),
         world_to_camera: view.map(|view| view.world_to_camera),
         world_to_normalized_device: view.map(|view| view.world_to_ndc),
         frames_per_second: view.map(|view| rational(view.frames_per_second)),
+        white_luminance: view.map(|_| white_luminance() as f32),
         ..LayerAttributes::default()
     };
     let encoding = Encoding {
@@ -75,12 +123,13 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
         encoding,
         AnyChannels::sort(channels.into()),
     );
-    let mut header = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    let mut header = ImageAttributes::new(IntegerBounds::from_dimensions(shown));
+    let [red, green, blue] = space.primaries.map(chromaticity);
     header.chromaticities = Some(exr::meta::attribute::Chromaticities {
-        red: Vec2(0.64, 0.33),
-        green: Vec2(0.30, 0.60),
-        blue: Vec2(0.15, 0.06),
-        white: Vec2(0.3127, 0.3290),
+        red,
+        green,
+        blue,
+        white: chromaticity(space.white),
     });
     for (name, value) in attributes.texts() {
         if name != "software" {
@@ -88,6 +137,10 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &Attributes) -> Result<
                 .other
                 .insert(text(name), AttributeValue::Text(text(value)));
         }
+    }
+    for (name, value) in image.matte.iter().flat_map(Matte::attributes) {
+        let value = AttributeValue::Text(text(&value));
+        header.other.insert(text(&name), value);
     }
     let frame = i32::try_from(attributes.frame).unwrap_or(i32::MAX);
     header

@@ -64,11 +64,12 @@ pub fn read_png(path: &Path) -> Result<Pixels, RenderError> {
     Ok((info.width as usize, info.height as usize, pixels))
 }
 
-/// The beauty of an EXR, `R G B` and `A` (1 where there is none) of its first layer that has them.
+/// The beauty of an EXR, `R G B` and `A` (1 where there is none) of its first layer that has them, in all of its data window, and
+/// where that begins in the display window.
 ///
 /// # Errors
 /// [`RenderError::Format`] where it cannot be opened, is no whole EXR, or has no such layer.
-pub fn read_exr(path: &Path) -> Result<Pixels, RenderError> {
+pub fn read_exr(path: &Path) -> Result<(Pixels, [i32; 2]), RenderError> {
     let image = read_first_rgba_layer_from_file(
         path,
         |size, _| (size.0, vec![[0.0; 4]; size.area()]),
@@ -77,8 +78,11 @@ pub fn read_exr(path: &Path) -> Result<Pixels, RenderError> {
         },
     )
     .map_err(|error| fault(path, error))?;
-    let size = image.layer_data.size;
-    Ok((size.0, size.1, image.layer_data.channel_data.pixels.1))
+    let layer = image.layer_data;
+    let (size, begins) = (layer.size, layer.attributes.layer_position);
+    let shown = image.attributes.display_window.position;
+    let pixels = (size.0, size.1, layer.channel_data.pixels.1);
+    Ok((pixels, [begins.0 - shown.0, begins.1 - shown.1]))
 }
 
 /// Writes an 8-bit RGB PNG without a colour space, with one line of text.

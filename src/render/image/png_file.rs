@@ -9,7 +9,7 @@ use super::super::view;
 use super::{Attributes, Image, write_whole};
 use crate::scene::look::ViewSpec;
 
-/// Writes an 8-bit RGBA PNG, encoded sRGB, alpha not premultiplied.
+/// Writes an 8-bit RGBA PNG of the image that is shown, encoded sRGB, alpha not premultiplied.
 ///
 /// # Errors
 /// [`RenderError::Write`], [`RenderError::Format`].
@@ -40,10 +40,10 @@ fn write(
         file: path.to_owned(),
         message: error.to_string(),
     };
-    let opaque = image.beauty.iter().all(|pixel| pixel[3] >= 1.0 - 1e-6);
+    let shown = image.shown();
+    let opaque = shown.iter().all(|pixel| pixel[3] >= 1.0 - 1e-6);
     let depth = if opaque { 3 } else { 4 };
-    let pixels: Vec<u8> = image
-        .beauty
+    let pixels: Vec<u8> = shown
         .par_iter()
         .flat_map_iter(|&[r, g, b, a]| {
             let clear = if a > 0.0 { 1.0 / a } else { 0.0 };
@@ -55,7 +55,7 @@ fn write(
         })
         .collect();
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, image.width, image.height);
+    let mut encoder = png::Encoder::new(&mut bytes, image.display[0], image.display[1]);
     encoder.set_color(if opaque {
         png::ColorType::Rgb
     } else {

@@ -8,7 +8,7 @@ use crate::{
 
 impl Renderer {
     pub(super) fn read_aovs(&self) -> Result<Aovs, RenderError> {
-        let values: Vec<[f32; 10]> = self.read_bands(aovs)?;
+        let values: Vec<[f32; 10]> = self.read_bands(aovs, 1)?;
         let origin = self.scene.origin + self.scene.domain.min;
         let seen = |v: &[f32; 10]| v[0] < 0.1 * FAR;
         let wants = |aov| self.look.wants(aov);

@@ -45,7 +45,8 @@ impl Plan {
         check(scene)?;
         let spec = look.spec();
         let has_aovs = !spec.output.aovs.is_empty();
-        let extent = Extent::new(spec.image.width, spec.image.height);
+        let extent = Extent::of(look);
+        let stride = 1 + look.lights().len();
         let radius = (spec.surface.radius_m).unwrap_or(RADIUS * scene.particle_spacing);
         let rows = match spec.renderer.method {
             MethodSpec::Ssfr => limits.tile,
@@ -53,7 +54,8 @@ impl Plan {
         };
         let mut plan = Self {
             extent,
-            bands: bands(&extent, has_aovs, limits.storage, rows),
+            bands: bands(&extent, (stride, has_aovs), limits.storage, rows),
+            stride,
             radius,
             ..Self::default()
         };
@@ -70,10 +72,9 @@ impl Plan {
         plan_light(&mut plan, &sky);
         let light = shading(look, &sky, matrix.to_cols_array_2d());
         plan.values(&SHADING, &[light]);
-        let shaded: &[&str] = match (spec.renderer.method, has_aovs) {
-            (MethodSpec::Ssfr, false) => &["ssfr/shade"],
-            (MethodSpec::Ssfr, true) => &["ssfr/shade", "ssfr/shade_aovs"],
-            (MethodSpec::Ray, _) => &["rays/cast", "rays/aovs", "rays/first"],
+        let shaded = match spec.renderer.method {
+            MethodSpec::Ssfr => &["ssfr/shade", "ssfr/shade_aovs", "ssfr/shade_objects"][..],
+            MethodSpec::Ray => &["rays/cast", "rays/aovs", "rays/first", "rays/objects"],
         };
         plan_palette(&mut plan, &palette, shaded);
         plan_sea(&mut plan, look, scene, shaded);

@@ -11,8 +11,9 @@ use bytemuck::Pod;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, picture};
+use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, objects, picture};
 use super::camera::{Sample, Setting, camera, eye, pose, samples};
+use super::cryptomatte::{Covers, unique};
 use super::image::{Image, View};
 use super::plan::{Limits, Plan};
 use super::{RenderError, RenderScene, aeration, sea::Sea, uniform};
@@ -25,6 +26,7 @@ use crate::gpu::{
 };
 use crate::scene::look::Look;
 use build::room;
+use shade::draws_spray;
 use water::Water;
 use whitewater::Whitewater;
 
@@ -47,6 +49,8 @@ pub struct Renderer {
     /// `None` where the look draws none.
     whitewater: Option<Whitewater>,
     timer: Option<Timer>,
+    /// Names of the scene's solids.
+    solids: Vec<String>,
 }
 
 impl Renderer {
@@ -91,9 +95,15 @@ impl Renderer {
             sea: Sea::of(look, scene),
             whitewater: Whitewater::of(look, scene),
             timer: None,
+            solids: unique(&vec!["solid".to_owned(); scene.solids.len()]),
         };
         context.wait()?;
         Ok(renderer)
+    }
+
+    /// Names the scene's solids in mattes, in the order of [`RenderScene::solids`]; each is "solid" else, with a number.
+    pub fn name_solids(&mut self, names: &[String]) {
+        self.solids = unique(names);
     }
 
     /// What it was built from.
@@ -139,22 +149,26 @@ impl Renderer {
         }
         let setting = Setting {
             origin: self.scene.origin + self.scene.domain.min,
-            size: self.plan.extent.size,
-            margin: self.plan.extent.margin,
+            extent: self.plan.extent,
             particle_count: count,
             radius: self.plan.radius,
             frames_per_second: self.scene.frames_per_second,
         };
         self.draw_once()?;
         let spec = self.look.spec().image.clone();
+        let wants_objects = self.look.spec().output.cryptomatte;
+        let mut covers = wants_objects.then(|| Covers::new(self.plan.extent.shaded()));
         for (index, sample) in (0u32..).zip(samples(spec.samples, spec.shutter)) {
             let camera = camera(&self.look, &setting, frame.into(), sample, index);
             self.sample(&camera, false)?;
+            if let Some(covers) = &mut covers {
+                covers.add(&self.read_bands(objects, 1)?, camera.weight);
+            }
         }
-        let [width, height] = self.plan.extent.picture;
-        let mut image = Image::new(width, height);
         let eye = eye(&self.look, DVec3::ZERO, frame.into());
+        let mut image = Image::of(self.look.window(), eye.size);
         image.view = Some(View::of(&eye, self.scene.frames_per_second));
+        image.exr_space = self.look.spec().output.colour_space;
         if !self.plan.aovs.is_empty() {
             // Depths and normals have no mean: they are taken at pixel centres, at the frame's instant.
             let still = Sample {
@@ -168,13 +182,37 @@ impl Renderer {
             self.sample(&camera, true)?;
             image.aovs = self.read_aovs()?;
         }
-        image.beauty = self.read_bands(picture)?;
+        image.matte = covers.map(|covers| {
+            let has_walls = self.look.spec().basin.is_some();
+            covers.matte(&self.solids, has_walls, draws_spray(&self.look))
+        });
+        self.read_picture(&mut image)?;
         Ok(image)
     }
 
-    /// Every pixel of what is kept in the buffers that `of` gives for each band.
-    fn read_bands<T: Pod>(&self, of: fn(usize) -> Buf<T>) -> Result<Vec<T>, RenderError> {
-        let width = self.plan.extent.picture[0] as usize;
+    /// Beauty and the parts of its light.
+    fn read_picture(&self, image: &mut Image) -> Result<(), RenderError> {
+        let stride = self.plan.stride;
+        let values = self.read_bands(picture, stride)?;
+        for (index, light) in self.look.lights().into_iter().enumerate() {
+            let part = values.iter().skip(1 + index).step_by(stride);
+            let part = part.map(|&[r, g, b, _]| [r, g, b]).collect();
+            image.lights.push((light, part));
+        }
+        image.beauty = match stride {
+            1 => values,
+            _ => values.into_iter().step_by(stride).collect(),
+        };
+        Ok(())
+    }
+
+    /// What is kept, so many values a pixel, in the buffers that `of` gives for each band.
+    fn read_bands<T: Pod>(
+        &self,
+        of: fn(usize) -> Buf<T>,
+        values: usize,
+    ) -> Result<Vec<T>, RenderError> {
+        let width = values * self.plan.extent.picture[0] as usize;
         let mut pixels = Vec::new();
         for (band, &rows) in self.plan.bands.iter().enumerate() {
             pixels.extend(self.program.read(of(band), width * rows as usize)?);

@@ -6,11 +6,11 @@ use crate::{
         recording::{Bind, Command, Groups},
     },
     render::{
-        buffers::{BANDS, DEPTHS, OWNER, THICKNESS, aovs, picture},
+        buffers::{BANDS, DEPTHS, OWNER, THICKNESS, aovs, objects, picture},
         plan::Plan,
         uniform::Band,
     },
-    scene::look::{AovSpec, Look},
+    scene::look::{AovSpec, LightSpec, Look, SolidsOutput},
 };
 
 /// Shading, band by band.
@@ -53,7 +53,7 @@ fn plan_bands(
         let into = |output, binds: &dyn Fn() -> Vec<Bind>| {
             [binds(), vec![BANDS.bind(index), output]].concat()
         };
-        plan.buffer(&picture(index), pixels);
+        plan.buffer(&picture(index), plan.stride * pixels);
         let output = Bind::whole("output", &picture(index));
         let command = Command::in_groups(passes[0], groups.clone(), into(output, binds[0]));
         shade.picture.push(command);
@@ -67,15 +67,68 @@ fn plan_bands(
     shade
 }
 
-fn draws_spray(look: &Look) -> bool {
+/// Says to the pass that shades the picture what the look does with what is opaque, and which parts of the light it asks for.
+fn plan_output(plan: &mut Plan, look: &Look, pass: &'static str) {
+    if draws_spray(look) {
+        plan.define(pass, "SPRAY");
+    }
+    if look.spec().output.solids == SolidsOutput::Holdout {
+        plan.define(pass, "HOLDOUT");
+    }
+    let lights = look.lights();
+    if lights.is_empty() {
+        return;
+    }
+    plan.define(pass, "LIGHTS");
+    let parts = LightSpec::NAMED.iter().enumerate();
+    let written: u32 = parts
+        .filter(|(_, (_, light))| lights.contains(light))
+        .map(|(part, _)| 1 << part)
+        .sum();
+    let constants = vec![
+        ("WRITTEN_LIGHTS", f64::from(written)),
+        ("STRIDE", plan.stride as f64),
+    ];
+    plan.constants.insert(pass, constants);
+}
+
+/// Plans what tells the objects of a sample apart; nothing where the look asks for no mattes. After the shading, whose bands it takes.
+pub(super) fn plan_objects(
+    plan: &mut Plan,
+    look: &Look,
+    pass: &'static str,
+    binds: &dyn Fn() -> Vec<Bind>,
+) -> Vec<Command> {
+    if !look.spec().output.cryptomatte {
+        return Vec::new();
+    }
+    plan.define(pass, "OBJECTS");
+    if draws_spray(look) {
+        plan.define(pass, "SPRAY");
+    }
+    let width = plan.extent.picture[0];
+    let mut commands = Vec::new();
+    for (index, rows) in plan.bands.clone().into_iter().enumerate() {
+        let into = objects(index);
+        plan.buffer(&into, width as usize * rows as usize);
+        let own = vec![BANDS.bind(index), Bind::whole("output", &into)];
+        let binds = [binds(), own].concat();
+        commands.push(Command::in_groups(
+            pass,
+            Groups::Pixels([width, rows]),
+            binds,
+        ));
+    }
+    commands
+}
+
+pub(super) fn draws_spray(look: &Look) -> bool {
     look.spec().water.spray.is_some() || look.spec().whitewater.is_some()
 }
 
 /// Plans the shading of what was splatted; `surface` is where the smoothed depth stands.
 pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
-    if draws_spray(look) {
-        plan.define("ssfr/shade", "SPRAY");
-    }
+    plan_output(plan, look, "ssfr/shade");
     plan.define("ssfr/shade_aovs", "AOVS");
     // Without `forward` no one is asked for, and any buffer of words stands in.
     let owner = match look.wants(AovSpec::Forward) {
@@ -87,14 +140,16 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
         vec![surface, Bind::whole("owner", &owner)]
     };
     let passes = ["ssfr/shade", "ssfr/shade_aovs"];
-    plan_bands(plan, look, passes, [&binds, &binds])
+    let mut shade = plan_bands(plan, look, passes, [&binds, &binds]);
+    let seen = || vec![Bind::whole("surface", surface)];
+    let objects = plan_objects(plan, look, "ssfr/shade_objects", &seen);
+    shade.picture.extend(objects);
+    shade
 }
 
 /// Plans the casting of rays.
 pub(super) fn plan_cast(plan: &mut Plan, look: &Look) -> Shade {
-    if draws_spray(look) {
-        plan.define("rays/cast", "SPRAY");
-    }
+    plan_output(plan, look, "rays/cast");
     if look.wants(AovSpec::Forward) {
         plan.define("rays/aovs", "FORWARD");
     }
@@ -102,10 +157,9 @@ pub(super) fn plan_cast(plan: &mut Plan, look: &Look) -> Shade {
         let surface = Bind::whole("surface", &DEPTHS[0]);
         vec![surface, Bind::whole("solid_depth", &DEPTHS[1])]
     };
-    plan_bands(
-        plan,
-        look,
-        ["rays/cast", "rays/aovs"],
-        [&picture, &Vec::new],
-    )
+    let passes = ["rays/cast", "rays/aovs"];
+    let mut shade = plan_bands(plan, look, passes, [&picture, &Vec::new]);
+    let objects = plan_objects(plan, look, "rays/objects", &Vec::new);
+    shade.picture.extend(objects);
+    shade
 }

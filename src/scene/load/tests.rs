@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use super::super::{
-    Iteration, Method, Stop,
+    Iteration, Method, PlacedMesh, Stop, asset_path,
     flip::{Preconditioner, Surface, Transfer},
     physics_difference, physics_hash,
 };
@@ -91,6 +91,13 @@ fn everything_that_is_written_is_meant() {
         solid.file_hash,
         blake3::hash(CUBE.as_bytes()).to_hex().to_string()
     );
+    // A cache's copy of the file has the same name.
+    let copy = PlacedMesh {
+        file: asset_path(&solid.file, &solid.file_hash).into(),
+        ..solid.clone()
+    };
+    assert_ne!(copy.file.file_stem(), solid.file.file_stem());
+    assert_eq!([copy.name(), solid.name()], ["cube", "cube"]);
     // The corner (1, 0, 0) scaled, then turned by 30° about y, then moved.
     let corner = solid.placement.world_from_file().transform_point3(DVec3::X);
     let expected = DVec3::new(8.0 + 30f64.to_radians().cos(), 0.0, 2.0 - 0.5);

@@ -113,6 +113,18 @@ const IMAGE: &[Key] = &[
         .unit("pixels")
         .default("360")
         .about("height"),
+    Key::whole("overscan", 0..=8192)
+        .unit("pixels")
+        .default("0")
+        .also(", not together with crop")
+        .about("pixels on each side beyond the image, in the EXR's data window alone"),
+    Key::vector("crop", 4, 0.0..=32768.0)
+        .unit("pixels")
+        .absent()
+        .also(", whole, x0 < x1 and y0 < y1 within the image")
+        .about(
+            "[x0, y0, x1, y1] from the upper left corner: only these pixels are rendered, x1 and y1 are the first beyond them",
+        ),
     Key::whole("samples", 1..=1024)
         .default("3")
         .about("samples a pixel, spread over the pixel and over the shutter"),
@@ -348,15 +360,27 @@ pub(super) const VIEW: &[Key] = &[
         .unit("stops")
         .default("0.0")
         .about("factor of 2 to this power on the light, in the PNG only"),
-    Key::choice("transform", &["agx", "srgb"])
+    Key::choice("transform", &["agx", "aces", "srgb"])
         .default("\"agx\"")
-        .about("tone curve of the PNG: Sobotka's, which lets colours run to white, or none"),
+        .about(
+            "tone curve of the PNG: Sobotka's, which lets colours run to white, the ACES 1.0 output for sRGB displays, or none",
+        ),
     Key::number("saturation", 0.0..=3.0)
         .default("1.0")
         .about("factor on the distance from grey after the tone curve"),
     Key::number("contrast", 0.2..=3.0)
         .default("1.0")
         .about("power about middle grey after the tone curve"),
+];
+
+const LIGHTS: &[&str] = &[
+    "reflection",
+    "refraction",
+    "scattering",
+    "sun",
+    "sky",
+    "spray",
+    "solids",
 ];
 
 const OUTPUT: &[Key] = &[
@@ -370,6 +394,28 @@ const OUTPUT: &[Key] = &[
         .about(
             "depth along the axis, m; normal; position, m; motion to the next frame, pixels, u to the right, v upward; water \
              along the line of sight, m",
+        ),
+    Key::choice("colour_space", &["rec709", "acescg"])
+        .default("\"rec709\"")
+        .about(
+            "primaries and white of the EXR's linear light: Rec. 709 with D65, or ACEScg (AP1) with the white of ACES, adapted \
+             by Bradford",
+        ),
+    Key::choice("solids", &["draw", "holdout"])
+        .default("\"draw\"")
+        .about(
+            "whether ground, solids and walls are in the picture, or black and transparent where they are seen directly, so that \
+             they cut the water",
+        ),
+    Key::choices("lights", LIGHTS)
+        .default("[]")
+        .also(", with formats = [\"exr\"]")
+        .about("parts of the light in layers of their own, premultiplied; all of them add up to R, G, B"),
+    Key::flag("cryptomatte")
+        .default("false")
+        .also(", with formats = [\"exr\"]")
+        .about(
+            "mattes of water, spray, ground, walls and each solid, by the name of its mesh's file, as Cryptomatte's layer CryptoObject",
         ),
     Key::flag("background")
         .default("true")

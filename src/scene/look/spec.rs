@@ -83,6 +83,10 @@ pub struct ImageSpec {
     pub width: u32,
     /// Pixels.
     pub height: u32,
+    /// Pixels on each side beyond the image.
+    pub overscan: u32,
+    /// Left, upper, right and lower end of the pixels that are rendered; all of the image where left out.
+    pub crop: Option<[f64; 4]>,
     /// Samples a pixel, spread over the pixel and over the shutter.
     pub samples: u32,
     /// Fraction of a frame for which the shutter is open, centred on the frame; 0 = no motion blur.
@@ -331,6 +335,8 @@ impl Default for ViewSpec {
 pub enum TransformSpec {
     /// Sobotka's AgX: a filmic curve in log light that lets colours run to white.
     Agx,
+    /// ACES 1.0: reference rendering transform and output transform for sRGB displays of 100 nits in a dim room.
+    Aces,
     /// None: clipped at 1, sRGB-encoded.
     Srgb,
 }
@@ -362,6 +368,61 @@ pub enum AovSpec {
     Thickness,
 }
 
+/// Primaries and white of linear light.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum ColourSpaceSpec {
+    /// ITU-R BT.709, white D65.
+    #[default]
+    Rec709,
+    /// AP1 with the white of ACES.
+    AcesCg,
+}
+
+/// What becomes of what is opaque and seen directly.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum SolidsOutput {
+    /// It is in the picture.
+    Draw,
+    /// It is black and transparent, and cuts what stands behind it.
+    Holdout,
+}
+
+/// Parts of a picture's light. Each light belongs to one, so that all of them add up to the picture; what spray covers is dimmed in
+/// each of them.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum LightSpec {
+    /// What the first surface of the water mirrors.
+    Reflection,
+    /// What comes through that surface, but for what water scatters.
+    Refraction,
+    /// What water scatters.
+    Scattering,
+    /// Glitter of the sun on that surface, and the sun's disc.
+    Sun,
+    /// The sky, and the light of the air before something.
+    Sky,
+    /// White water.
+    Spray,
+    /// What is opaque and seen directly.
+    Solids,
+}
+
+impl LightSpec {
+    /// All of them, in the order of the shaders' `light_parts`, with the names of their layers.
+    pub const NAMED: [(&'static str, Self); 7] = [
+        ("reflection", Self::Reflection),
+        ("refraction", Self::Refraction),
+        ("scattering", Self::Scattering),
+        ("sun", Self::Sun),
+        ("sky", Self::Sky),
+        ("spray", Self::Spray),
+        ("solids", Self::Solids),
+    ];
+}
+
 /// What is written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -370,6 +431,14 @@ pub struct OutputSpec {
     pub formats: Vec<FormatSpec>,
     /// In the EXR.
     pub aovs: Vec<AovSpec>,
+    /// Of the EXR's light.
+    pub colour_space: ColourSpaceSpec,
+    /// What becomes of ground, solids and walls.
+    pub solids: SolidsOutput,
+    /// Layers of the EXR.
+    pub lights: Vec<LightSpec>,
+    /// Whether the EXR has mattes of objects.
+    pub cryptomatte: bool,
     /// Whether the sky is in the picture, or left transparent.
     pub background: bool,
 }

@@ -313,6 +313,82 @@ fn the_panorama_counts_in_the_hash_and_its_name_does_not() {
     );
 }
 
+/// Keys that came later, with values that are not their defaults: (table, line).
+const NEWER: [(&str, &str); 6] = [
+    ("image", "overscan = 8"),
+    ("image", "crop = [1, 2, 60, 30]"),
+    ("output", "colour_space = \"acescg\""),
+    ("output", "solids = \"holdout\""),
+    ("output", "formats = [\"exr\"]\nlights = [\"sun\"]"),
+    ("output", "formats = [\"exr\"]\ncryptomatte = true"),
+];
+
+/// A look with more lines in a table.
+fn with(table: &str, lines: &str) -> String {
+    let head = format!("[{table}]\n");
+    match PLAIN.contains(&head) {
+        true => PLAIN.replace(&head, &format!("{head}{lines}\n")),
+        false => format!("{PLAIN}{head}{lines}\n"),
+    }
+}
+
+#[test]
+fn a_look_without_newer_keys_keeps_its_hash() {
+    let hash = |text: &str| Look::parse(text, Path::new("a.toml")).unwrap().hash();
+    // As it was before there were any of them.
+    const BEFORE: &str = "023f42bda0627032e91d99f5fb5b472c5f3a4c996b6ea8ba9b58729051c346b6";
+    assert_eq!(hash(PLAIN), BEFORE);
+    for (table, line) in NEWER {
+        assert_ne!(hash(&with(table, line)), BEFORE, "{line}");
+    }
+}
+
+#[test]
+fn a_crop_lies_within_the_image_on_whole_pixels_and_without_overscan() {
+    for (lines, words) in [
+        ("crop = [0, 0, 65, 36]", "is no part of a 64 × 36 image"),
+        ("crop = [0, 0, 64, 37]", "is no part of a 64 × 36 image"),
+        ("crop = [10, 0, 10, 36]", "is no part of a 64 × 36 image"),
+        ("crop = [0, 20, 64, 19]", "is no part of a 64 × 36 image"),
+        ("crop = [0.5, 0, 64, 36]", "is not of whole pixels"),
+        ("crop = [-1, 0, 64, 36]", "out of range"),
+        (
+            "crop = [0, 0, 8, 8]\noverscan = 1",
+            "given together with overscan",
+        ),
+    ] {
+        let (_, key, message) = fault(&with("image", lines));
+        assert_eq!(key, "image.crop", "{lines}");
+        assert!(message.contains(words), "{lines}: {message}");
+    }
+    let window = |lines: &str| {
+        let look = Look::parse(&with("image", lines), Path::new("a.toml")).unwrap();
+        let window = look.window();
+        (window.corner, window.size)
+    };
+    assert_eq!(window(""), ([0, 0], [64, 36]));
+    assert_eq!(window("crop = [0, 0, 64, 36]"), ([0, 0], [64, 36]));
+    assert_eq!(window("crop = [3, 5, 10, 6]"), ([3, 5], [7, 1]));
+    assert_eq!(window("overscan = 8"), ([-8, -8], [80, 52]));
+}
+
+#[test]
+fn layers_of_an_exr_need_one() {
+    for (line, key) in [
+        ("lights = [\"sun\"]", "output.lights"),
+        ("cryptomatte = true", "output.cryptomatte"),
+    ] {
+        let (_, found, message) = fault(&with("output", line));
+        assert_eq!(found, key);
+        assert!(message.contains("add it to `formats`"), "{message}");
+    }
+    let (_, key, message) = fault(&with("output", "formats = [\"exr\"]\nlights = [\"sum\"]"));
+    assert!(
+        key.starts_with("output.lights") && message.contains("the nearest is \"sun\""),
+        "{key}: {message}"
+    );
+}
+
 #[test]
 fn shipped_looks_parse() {
     for name in ["day", "dusk"] {

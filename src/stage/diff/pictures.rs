@@ -172,6 +172,7 @@ fn compare_pair(
     Ok(PairDiff {
         name: name.to_owned(),
         sizes: [[a.width, a.height], [b.width, b.height]],
+        corners: [a.corner, b.corner],
         faults: diff.map_or(Vec::new(), |diff| diff.faults(limits)),
         diff,
         image,
@@ -179,13 +180,14 @@ fn compare_pair(
 }
 
 fn load(path: &Path) -> Result<Picture, RenderError> {
-    let (encoding, (width, height, pixels)) = match encoding(path) {
+    let (encoding, ((width, height, pixels), corner)) = match encoding(path) {
         Some(Encoding::Linear) => (Encoding::Linear, read_exr(path)?),
-        _ => (Encoding::Srgb, read_png(path)?),
+        _ => (Encoding::Srgb, (read_png(path)?, [0, 0])),
     };
     Ok(Picture {
         width,
         height,
+        corner,
         pixels,
         encoding,
     })

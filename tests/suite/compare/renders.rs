@@ -105,6 +105,35 @@ fn renders_are_compared_by_name_with_a_difference_image() {
 }
 
 #[test]
+fn pictures_of_other_windows_do_not_compare() {
+    let job = Job::of(&[]);
+    let write = |name: &str, corner: [i32; 2]| {
+        let image = Image {
+            corner,
+            display: [80, 64],
+            ..picture(48, 0.0)
+        };
+        write_exr(&job.path(name), &image, &Attributes::default()).unwrap();
+    };
+    write("a.exr", [16, 16]);
+    write("b.exr", [16, 16]);
+    write("beside.exr", [17, 16]);
+    write("before.exr", [-4, -4]);
+    job.expect(0, "diff a.exr b.exr");
+    job.expect(0, "diff before.exr before.exr");
+    let said = job.expect(1, "diff a.exr beside.exr");
+    assert_has(
+        &said,
+        &[
+            "A is 48 × 32 from 16, 16, B is 48 × 32 from 17, 16",
+            "not compared",
+        ],
+    );
+    let said = job.expect(1, "diff before.exr a.exr");
+    assert_has(&said, &["A is 48 × 32 from -4, -4"]);
+}
+
+#[test]
 fn what_does_not_compare_is_refused_in_words() {
     let job = Job::of(&[]);
     write_cache(

@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 21] = [
+const VARIANTS: [&[&str]; 31] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -48,6 +48,16 @@ const VARIANTS: [&[&str]; 21] = [
     &["SPRAY"],
     &["AOVS"],
     &["FORWARD"],
+    &["HOLDOUT"],
+    &["LIGHTS"],
+    &["LIGHTS", "SPRAY", "HOLDOUT"],
+    &["OBJECTS"],
+    &["OBJECTS", "SPRAY"],
+    &["SEA"],
+    &["SEA", "AOVS", "FORWARD"],
+    &["SEA", "PALETTE", "SPRAY", "LIGHTS"],
+    &["SEA", "PALETTE", "SPRAY", "OBJECTS"],
+    &["PALETTE"],
 ];
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them.

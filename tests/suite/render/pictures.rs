@@ -156,7 +156,7 @@ fn water_absorbs_as_beer_and_lambert_say() {
     }
 }
 
-const OBLIQUE: &str = "[camera]
+pub(super) const OBLIQUE: &str = "[camera]
 focal_length_mm = 24.0
 film_back_mm = [36.0, 20.25]
 position = [-1.5, 2.0, 0.2]
@@ -178,7 +178,7 @@ height_m = 1.0
 windows = { storey_m = 0.4, bay_m = 0.3, lit = 0.3 }
 ";
 
-fn harbour() -> (RenderScene, Particles) {
+pub(super) fn harbour() -> (RenderScene, Particles) {
     let mut scene = tank(SPACING);
     scene.solids = vec![
         box_mesh(DVec3::new(3.0, 0.0, 0.5), DVec3::new(4.0, 1.8, 1.6)),
@@ -366,7 +366,7 @@ fn solids_stand_before_behind_and_in_the_water() {
     );
 }
 
-fn attributes() -> Attributes {
+pub(super) fn attributes() -> Attributes {
     Attributes {
         frame: 7,
         shot: "wave-city".into(),

@@ -310,7 +310,7 @@ fn a_file_holds_each_channel_under_its_own_name() {
             forward: Some(vec![[8.0, 9.0]]),
             thickness: Some(vec![10.0]),
         },
-        view: None,
+        ..Image::new(1, 1)
     };
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("frame.exr");

@@ -9,6 +9,6 @@ mod light;
 mod rays;
 mod ripples;
 mod sea;
-mod support;
+pub(super) mod support;
 mod surface;
 mod water;

@@ -5,6 +5,7 @@ use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
 use swell::gpu::adapter::Context;
 use swell::render::RenderScene;
+use swell::scene::look::LightSpec;
 
 use super::geometry::box_mesh;
 use super::support::{Eye, Setup, context, draw, scene, spoiled, uniform_sky};
@@ -146,6 +147,72 @@ fn a_milky_pool_has_the_light_that_its_body_scatters() {
         ("after / shading.sun_path", "before / shading.sun_path"),
     ] {
         let error = pool_error(&spoiled("rays/cast", from, to), 40.0, milky);
+        assert!(error > 0.01, "{to}: {error}");
+    }
+}
+
+/// Of the parts of a milky pool's light: the worst error against the same optics, part by part, of the whole.
+fn parts_error(context: &Context) -> f64 {
+    const THETA: f64 = 40.0;
+    let milky = [0.3, 3.0, 10.0];
+    let (sin, cos) = THETA.to_radians().sin_cos();
+    let target = DVec3::new(5.0, LEVEL, 5.0);
+    let eye = Eye {
+        up: DVec3::Z,
+        ..Eye::new(
+            (target + 6.0 * DVec3::new(-sin, cos, 0.0)).to_array(),
+            target.to_array(),
+            600.0,
+        )
+    };
+    let setup = Setup {
+        water: format!(
+            "index = {INDEX:?}\nabsorption_per_metre = {ABSORPTION:?}\nscattering_per_metre = {milky:?}\n"
+        ),
+        sun: [0.0, 90.0, 0.0],
+        output: "lights = [\"scattering\", \"reflection\", \"refraction\"]\n".to_owned(),
+        ..by_rays(eye)
+    };
+    let image = draw(context, &setup, &uniform_sky, &pool_scene(), &water(), 1);
+    let names: Vec<LightSpec> = image.lights.iter().map(|(light, _)| *light).collect();
+    let order = [
+        LightSpec::Reflection,
+        LightSpec::Refraction,
+        LightSpec::Scattering,
+    ];
+    assert_eq!(names, order);
+    let mut worst = 0.0f64;
+    for i in 0..image.beauty.len() {
+        let along = eye.direction(i);
+        let mirrored = reflectance(-along.y, INDEX);
+        let cosine = -refracted(along, INDEX).y;
+        let way = LEVEL / cosine;
+        for c in 0..3 {
+            let extinction = ABSORPTION[c] + milky[c];
+            let floor = (-extinction * (way + LEVEL)).exp();
+            let gamma = (ABSORPTION[c] / extinction).sqrt();
+            let whole = 1.0 - (-extinction * way * (1.0 + cosine)).exp();
+            let body = (1.0 - gamma) / (1.0 + gamma) * 2.0 / (1.0 + cosine) * whole;
+            let parts = [mirrored, (1.0 - mirrored) * floor, (1.0 - mirrored) * body];
+            let all: f64 = parts.iter().sum();
+            for ((_, found), part) in image.lights.iter().zip(parts) {
+                worst = worst.max((f64::from(found[i][c]) - part).abs() / all);
+            }
+        }
+    }
+    worst
+}
+
+/// Within 1 % of the whole, as the whole is.
+#[test]
+fn parts_of_a_pools_light_are_what_it_mirrors_lets_through_and_scatters() {
+    let error = parts_error(&context());
+    assert!(error < 0.01, "{error}");
+    for (from, to) in [
+        ("own == SCATTERING)", "own == SKYLIGHT)"),
+        ("part_of(ray, REFLECTION);", "part_of(ray, REFRACTION);"),
+    ] {
+        let error = parts_error(&spoiled("rays/cast", from, to));
         assert!(error > 0.01, "{to}: {error}");
     }
 }

@@ -134,6 +134,8 @@ pub(crate) struct Setup {
     pub(crate) background: bool,
     /// Tables beside these.
     pub(crate) more: String,
+    /// More lines of `[output]`.
+    pub(crate) output: String,
 }
 
 pub(crate) const PANORAMA: &str = "model = \"panorama\"\nfile = \"sky.exr\"\n";
@@ -155,6 +157,7 @@ impl Setup {
             solids: [1.0; 3],
             background: true,
             more: String::new(),
+            output: String::new(),
         }
     }
 
@@ -171,7 +174,7 @@ impl Setup {
              elevation_degrees = {elevation:?}\nintensity = {intensity:?}\n[sky]\n{}\
              [ground]\ncolour = {:?}\nvariation = 0.0\nhaze_m = {:?}\n[solids]\ncolour = {:?}\n\
              [output]\nformats = [\"exr\"]\nbackground = {}\n\
-             aovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n{}",
+             aovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n{}{}",
             self.samples,
             self.shutter,
             self.method,
@@ -182,6 +185,7 @@ impl Setup {
             self.haze,
             self.solids,
             self.background,
+            self.output,
             self.more,
         )
     }

@@ -208,8 +208,8 @@ fn a_pool_shows_sky_floor_and_body_as_optics_say() {
             0.0,
             2.0,
             clear,
-            "(1.0 - reflectance) * transmitted",
-            "0.99 * (1.0 - reflectance) * transmitted",
+            "mirror + (1.0 - reflectance)",
+            "mirror + 0.99 * (1.0 - reflectance)",
         ),
         (
             20.0,

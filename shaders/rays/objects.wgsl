@@ -1,0 +1,54 @@
+// What each ray of a sample meets first, and the part of it that spray covers.
+#import "shared/camera.wgsl"
+#import "shared/ssfr_band.wgsl"
+#import "shared/rays_trace.wgsl"
+#ifdef SPRAY
+#import "shared/ssfr_half.wgsl"
+#import "shared/ssfr_light.wgsl"
+#endif
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<uniform> band: Band;
+@group(0) @binding(2) var<uniform> rays: Rays;
+@group(0) @binding(3) var<storage, read> level_table: array<u32>;
+@group(0) @binding(4) var<storage, read> level_values: array<f32>;
+@group(0) @binding(5) var<storage, read> set_nodes: array<SetNode>;
+@group(0) @binding(6) var<storage, read> set_triangles: array<Triangle>;
+@group(0) @binding(7) var<storage, read_write> output: array<vec2u>;
+#ifdef SPRAY
+@group(0) @binding(8) var<storage, read> spray: array<u32>;
+@group(0) @binding(9) var<uniform> shading: Shading;
+@group(0) @binding(10) var sky: texture_2d<f32>;
+@group(0) @binding(11) var sky_sampler: sampler;
+@group(0) @binding(12) var shadow_map: texture_depth_2d;
+@group(0) @binding(13) var shadow_sampler: sampler_comparison;
+#endif
+
+#ifdef PALETTE
+@group(0) @binding(16) var<uniform> palette: array<vec4f, 64>;
+#endif
+#ifdef SEA
+@group(0) @binding(14) var<uniform> sea: Sea;
+@group(0) @binding(15) var<storage, read> sea_values: array<vec4f>;
+#endif
+
+@compute @workgroup_size(16, 4)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= camera.picture.x || id.y >= band.rows {
+        return;
+    }
+    let pixel = vec2u(id.x, id.y + band.row) + camera.margin;
+    let direction = normalize(world_direction(camera, eye_ray(camera, vec2f(pixel) + 0.5)));
+    let found = trace(camera.position, direction, is_wet(camera.position), 0.0);
+    var object = found.material;
+    if found.kind == WATER {
+        object = 0u;
+    }
+    var cover = 0.0;
+#ifdef SPRAY
+    let tap = half_tap(vec2f(pixel) + 0.5);
+    var words = vec4u(spray[tap.at.x], spray[tap.at.y], spray[tap.at.z], spray[tap.at.w]);
+    cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
+#endif
+    output[id.y * camera.picture.x + id.x] = vec2u(object, bitcast<u32>(cover));
+}

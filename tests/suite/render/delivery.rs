@@ -1,0 +1,62 @@
+//! Pictures as they are handed on: windows, spaces of light, layers and mattes.
+
+mod colour;
+mod holdout;
+mod lights;
+mod mattes;
+mod windows;
+
+use std::path::Path;
+
+use swell::{
+    domain::particles::Particles,
+    gpu::adapter::Context,
+    render::{Image, RenderScene, Renderer},
+    scene::look::Look,
+};
+
+use super::pictures::{OBLIQUE, harbour};
+
+/// Both ways to draw water.
+const METHODS: [&str; 2] = ["ssfr", "ray"];
+
+/// A look at the harbour, sun, spray, walls and all: lines of `[image]`, `[surface]` and `[output]`.
+struct Setup<'a> {
+    method: &'a str,
+    image: &'a str,
+    surface: &'a str,
+    output: &'a str,
+}
+
+impl Setup<'_> {
+    fn look(&self) -> Look {
+        let Self {
+            method,
+            image,
+            surface,
+            output,
+        } = self;
+        let text = OBLIQUE
+            .replace("[image]\n", &format!("[image]\n{image}\n"))
+            .replace("[surface]\n", &format!("[surface]\n{surface}\n"))
+            .replace(
+                "[water]\n",
+                "[water]\nscattering_per_metre = [0.1, 0.3, 0.3]\n",
+            );
+        let text = format!(
+            "{text}[renderer]\nmethod = \"{method}\"\n[output]\nformats = [\"exr\"]\n{output}\n"
+        );
+        Look::parse(&text, Path::new("test.toml")).unwrap()
+    }
+
+    fn draw(&self, context: &Context) -> Image {
+        let (scene, water) = harbour();
+        draw(context, &self.look(), &scene, &water)
+    }
+}
+
+fn draw(context: &Context, look: &Look, scene: &RenderScene, water: &Particles) -> Image {
+    let mut renderer = Renderer::new(context, look, scene).unwrap();
+    renderer.name_solids(&["tower".to_owned(), "shed".to_owned()]);
+    renderer.render(3, water).unwrap()
+}
