@@ -15,6 +15,7 @@ mod lighting;
 mod plan;
 mod rays;
 mod renderer;
+mod samples;
 mod set;
 mod sky;
 mod surface;

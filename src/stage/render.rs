@@ -78,6 +78,8 @@ pub enum Event {
         frames: usize,
         /// Frames of the cache that are left out: their particles were not kept.
         left_out: usize,
+        /// What of the look is allowed and hardly meant.
+        warnings: Vec<String>,
     },
     /// A frame is on the disk.
     Frame {
@@ -232,6 +234,7 @@ pub fn render(
         size: [image.width, image.height],
         frames: frames.len(),
         left_out,
+        warnings: request.look.lints(),
     });
     let mut job = Job {
         request,

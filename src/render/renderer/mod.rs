@@ -12,9 +12,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, picture};
-use super::camera::{Sample, Setting, camera, eye, pose, samples};
+use super::camera::{Setting, camera, eye, pose};
 use super::image::{Image, View};
 use super::plan::{Limits, Plan};
+use super::samples::{Curve, Sample, samples};
 use super::{RenderError, RenderScene, aeration, uniform};
 use crate::domain::particles::Particles;
 use crate::gpu::{
@@ -143,25 +144,24 @@ impl Renderer {
             frames_per_second: self.scene.frames_per_second,
         };
         self.draw_once()?;
-        let spec = self.look.spec().image.clone();
-        for (index, sample) in (0u32..).zip(samples(spec.samples, spec.shutter)) {
+        let spec = self.look.spec();
+        let (image, has_lens) = (&spec.image, spec.camera.lens.is_some());
+        let samples = samples(image.samples, image.shutter, Curve::of(image), has_lens);
+        for (index, sample) in (0u32..).zip(samples) {
             let camera = camera(&self.look, &setting, frame.into(), sample, index);
             self.sample(&camera, false)?;
         }
         let [width, height] = self.plan.extent.picture;
         let mut image = Image::new(width, height);
-        let eye = eye(&self.look, DVec3::ZERO, frame.into());
-        image.view = Some(View::of(&eye, self.scene.frames_per_second));
+        let rate = self.scene.frames_per_second;
+        let eye = eye(&self.look, DVec3::ZERO, frame.into(), rate);
+        image.view = Some(View::of(&eye, rate));
         if !self.plan.aovs.is_empty() {
-            // Depths and normals have no mean: they are taken at pixel centres, at the frame's instant.
-            let still = Sample {
-                jitter: [0.0; 2],
-                instant: 0.0,
-                weight: 1.0,
-            };
-            let next = camera(&self.look, &setting, f64::from(frame) + 1.0, still, 0);
+            // Depths and normals have no mean: they are taken at pixel centres, at the frame's instant, by a pinhole.
+            let next = f64::from(frame) + 1.0;
+            let next = camera(&self.look, &setting, next, Sample::STILL, 0);
             self.program.upload(NEXT_CAMERA, 0, &[next]);
-            let camera = camera(&self.look, &setting, frame.into(), still, 0);
+            let camera = camera(&self.look, &setting, frame.into(), Sample::STILL, 0);
             self.sample(&camera, true)?;
             image.aovs = self.read_aovs()?;
         }
@@ -210,8 +210,8 @@ impl Renderer {
             return Ok(packed.len() as u32);
         }
         // Front to back, so that splats find what hides them already there.
-        let eye = pose(&self.look.spec().camera, frame.into());
-        let forward = (eye.target - eye.position).normalize().as_vec3();
+        let rate = self.scene.frames_per_second;
+        let forward = pose(&self.look, frame.into(), rate).forward.as_vec3();
         packed.par_sort_unstable_by(|a, b| {
             let depth = |p: &uniform::Particle| glam::Vec3::from(p.position).dot(forward);
             depth(a).total_cmp(&depth(b)).then(a.tag.cmp(&b.tag))
