@@ -10,6 +10,10 @@
 #ifdef AOVS
 #import "shared/ssfr_aovs.wgsl"
 #endif
+#ifdef SPRAY
+#import "shared/ssfr_spray_read.wgsl"
+#import "shared/ssfr_spray_light.wgsl"
+#endif
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<uniform> shading: Shading;
@@ -30,9 +34,10 @@
 @group(0) @binding(14) var<uniform> next_camera: Camera;
 #else
 @group(0) @binding(11) var<storage, read_write> output: array<vec4f>;
-#ifdef SPRAY
-@group(0) @binding(12) var<storage, read> spray: array<u32>;
 #endif
+#ifdef SPRAY
+@group(0) @binding(15) var<storage, read> spray: array<u32>;
+@group(0) @binding(16) var<uniform> spray_params: SprayParams;
 #endif
 
 fn surface_at(pixel: vec2i) -> f32 {
@@ -275,6 +280,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let wet = z < straight.depth && z < 0.1 * FAR;
 #ifdef AOVS
     let through = thickness_at(vec2f(pixel) + 0.5);
+    let over = spray_over(pixel, ray);
     if wet {
         let position = world_from_eye(camera, ray * z);
         let normal = world_direction(camera, surface_normal(pixel, z));
@@ -284,13 +290,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             let moved = position + particles[particle].velocity * camera.frame_seconds;
             motion = motion_to(eye_from_world(next_camera, moved), pixel);
         }
-        store(out, z, normal, position, motion, through);
+        store_under(over, out, z, normal, position, motion, through);
         return;
     }
     let seen = straight.depth < 0.1 * FAR;
     let next = select(sky_in_next(direction), eye_from_world(next_camera, straight.surface.position), seen);
     let motion = motion_to(next, pixel);
-    store(out, straight.depth, straight.surface.normal, straight.surface.position, motion, through);
+    store_under(over, out, straight.depth, straight.surface.normal, straight.surface.position, motion, through);
 #else
     var colour: vec3f;
     var alpha = 1.0;
@@ -304,14 +310,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
     }
 #ifdef SPRAY
-    let tap = half_tap(vec2f(pixel) + 0.5);
-    var words = vec4u(spray[tap.at.x], spray[tap.at.y], spray[tap.at.z], spray[tap.at.w]);
-    let cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
-    if cover > 0.0 {
-        let where_to = camera.position + direction * min(z, min(straight.depth, 1e4)) * length(ray);
-        let white = diffuse_light(where_to, vec3f(0.0, 1.0, 0.0)) * 0.85;
-        colour = mix(colour, white, cover);
-        alpha = mix(alpha, 1.0, cover);
+    let mist = spray_at(vec2f(pixel) + 0.5);
+    if mist.cover > 0.0 {
+        let far = mist.depth * length(ray);
+        let light = spray_radiance(camera.position + direction * far, view, mist.optical_depth);
+        colour = mix(colour, hazed(light, far, direction), mist.cover);
+        alpha = mix(alpha, 1.0, mist.cover);
     }
 #endif
     let value = vec4f(colour, alpha) * camera.weight;

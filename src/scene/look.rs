@@ -30,6 +30,9 @@ pub struct LookError(#[from] SceneError);
 /// The key of the panorama's file.
 const PANORAMA: &str = "sky.file";
 
+/// The key of how water is drawn.
+const METHOD: &str = "renderer.method";
+
 /// The keys of a camera's file, and of its name there.
 const CAMERA_FILE: &str = "camera.file";
 const CAMERA_NAME: &str = "camera.name";
@@ -43,6 +46,8 @@ pub struct Look {
     spec: LookSpec,
     panorama: Option<Panorama>,
     camera: Option<Arc<CameraFile>>,
+    /// Where the look says how water is drawn.
+    method: Fault,
     hash: String,
 }
 
@@ -106,6 +111,7 @@ impl Look {
             spec,
             panorama,
             camera,
+            method: doc.place_of(METHOD),
             hash: String::new(),
         };
         look.hash = look.canonical_hash();
@@ -152,6 +158,15 @@ impl Look {
             ..sky.place.clone()
         };
         Some(LookError(SceneError::Fault(Box::new(fault))))
+    }
+
+    /// That its method cannot draw what it is asked for, in the words of who tried.
+    pub fn method_fault(&self, problem: &str) -> LookError {
+        let fault = Fault {
+            message: problem.to_owned(),
+            ..self.method.clone()
+        };
+        LookError(SceneError::Fault(Box::new(fault)))
     }
 
     /// BLAKE3, hex, over the content: every value with its default, and the bytes of panorama and camera, whatever

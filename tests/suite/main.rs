@@ -59,6 +59,7 @@ mod reference {
 }
 mod render {
     mod analytic;
+    mod flicker;
     mod folder;
     mod pictures;
     mod scenes;

@@ -2,6 +2,7 @@
 
 mod aovs;
 mod build;
+mod load;
 mod shade;
 mod splats;
 mod water;
@@ -9,24 +10,23 @@ mod whitewater;
 
 use bytemuck::Pod;
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, picture};
-use super::camera::{Setting, camera, eye, pose};
+use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLES, picture};
+use super::camera::{Setting, camera, eye};
 use super::image::{Image, View};
 use super::plan::{Limits, Plan};
 use super::samples::{Curve, Sample, samples};
-use super::{RenderError, RenderScene, aeration, uniform};
+use super::{Moment, RenderError, RenderScene, Water, uniform};
 use crate::domain::particles::Particles;
 use crate::gpu::{
     adapter::Context,
     buffer::Buf,
     program::Program,
-    recording::{Recording, Timer, spread},
+    recording::{Recording, Timer},
 };
 use crate::scene::look::Look;
 use build::room;
-use water::Water;
+use water::RayWater;
 use whitewater::Whitewater;
 
 /// Renders frames of one scene with one look.
@@ -42,7 +42,7 @@ pub struct Renderer {
     /// Particles that there is room for.
     capacity: usize,
     /// `None` where the look casts no rays.
-    water: Option<Water>,
+    water: Option<RayWater>,
     /// `None` where the look draws none.
     whitewater: Option<Whitewater>,
     timer: Option<Timer>,
@@ -86,7 +86,7 @@ impl Renderer {
             plan,
             program,
             capacity: room(0),
-            water: Water::of(look),
+            water: RayWater::of(look),
             whitewater: Whitewater::of(look, scene),
             timer: None,
         };
@@ -128,8 +128,19 @@ impl Renderer {
         particles: &Particles,
         white: &Particles,
     ) -> Result<Image, RenderError> {
-        let count = self.load(frame, particles)?;
+        let water = Water::new(particles.clone());
+        self.render_moment(frame, &Moment::alone(&water, white))
+    }
+
+    /// As [`Renderer::render_with`], with what is known of the frames around it: blur and motion then follow the particles' paths, and
+    /// what is spray does not change from frame to frame and back.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`]; [`RenderError::UnderWater`] where splats cannot draw what the camera sees.
+    pub fn render_moment(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Image, RenderError> {
+        let loaded = self.load(frame, moment)?;
         if let Some(whitewater) = &mut self.whitewater {
+            let white = moment.white;
             let grew = whitewater.load(&mut self.program, &self.scene, frame, white)?;
             if grew {
                 self.record();
@@ -139,7 +150,7 @@ impl Renderer {
             origin: self.scene.origin + self.scene.domain.min,
             size: self.plan.extent.size,
             margin: self.plan.extent.margin,
-            particle_count: count,
+            particle_count: loaded.count,
             radius: self.plan.radius,
             frames_per_second: self.scene.frames_per_second,
         };
@@ -161,6 +172,9 @@ impl Renderer {
             let next = f64::from(frame) + 1.0;
             let next = camera(&self.look, &setting, next, Sample::STILL, 0);
             self.program.upload(NEXT_CAMERA, 0, &[next]);
+            if !loaded.ahead.is_empty() {
+                self.program.upload(PARTICLES, 0, &loaded.ahead);
+            }
             let camera = camera(&self.look, &setting, frame.into(), Sample::STILL, 0);
             self.sample(&camera, true)?;
             image.aovs = self.read_aovs()?;
@@ -177,62 +191,6 @@ impl Renderer {
             pixels.extend(self.program.read(of(band), width * rows as usize)?);
         }
         Ok(pixels)
-    }
-
-    /// Moves a frame's particles to the device, relative to the domain's least corner.
-    fn load(&mut self, frame: u32, particles: &Particles) -> Result<u32, RenderError> {
-        let origin = self.scene.domain.min;
-        let mut packed = Vec::with_capacity(particles.len());
-        for (index, (p, v)) in particles
-            .position
-            .iter()
-            .zip(&particles.velocity)
-            .enumerate()
-        {
-            if !p.iter().chain(v).all(|x| x.is_finite()) {
-                return Err(RenderError::NotFinite { index, frame });
-            }
-            let position = [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32);
-            packed.push(uniform::Particle {
-                position,
-                aeration: 0.0,
-                velocity: *v,
-                tag: particles.id.get(index).map_or(index as u32, |&id| id) << 1 | 1,
-            });
-        }
-        if let Some(spray) = &self.look.spec().water.spray {
-            aeration::classify(&mut packed, self.scene.particle_spacing as f32, spray);
-        }
-        if let Some(water) = &mut self.water {
-            water.take(&packed);
-        }
-        if !self.program.has(PARTICLES.name()) {
-            return Ok(packed.len() as u32);
-        }
-        // Front to back, so that splats find what hides them already there.
-        let rate = self.scene.frames_per_second;
-        let forward = pose(&self.look, frame.into(), rate).forward.as_vec3();
-        packed.par_sort_unstable_by(|a, b| {
-            let depth = |p: &uniform::Particle| glam::Vec3::from(p.position).dot(forward);
-            depth(a).total_cmp(&depth(b)).then(a.tag.cmp(&b.tag))
-        });
-        self.reserve(packed.len())?;
-        let groups = spread(&self.program.context, 1, packed.len() as u64);
-        self.program.upload(PARTICLE_GROUPS, 0, &[groups.into()]);
-        self.program.upload(PARTICLES, 0, &packed);
-        Ok(packed.len() as u32)
-    }
-
-    /// Makes room for so many particles.
-    fn reserve(&mut self, particles: usize) -> Result<(), RenderError> {
-        if particles <= self.capacity {
-            return Ok(());
-        }
-        let capacity = room(particles);
-        self.program.refit(&[PARTICLES.sized(capacity)], &[])?;
-        self.capacity = capacity;
-        self.record();
-        Ok(())
     }
 
     /// Binds every command to the buffers as they are now.

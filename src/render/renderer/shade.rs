@@ -67,8 +67,14 @@ fn plan_bands(
     shade
 }
 
-fn draws_spray(look: &Look) -> bool {
+pub(super) fn draws_spray(look: &Look) -> bool {
     look.spec().water.spray.is_some() || look.spec().whitewater.is_some()
+}
+
+/// Whether a channel beside the picture is that of spray, where it hides what is behind.
+pub(super) fn wants_spray_aovs(look: &Look) -> bool {
+    let mut shown = [AovSpec::Z, AovSpec::P, AovSpec::Forward].into_iter();
+    draws_spray(look) && shown.any(|aov| look.wants(aov))
 }
 
 /// Plans the shading of what was splatted; `surface` is where the smoothed depth stands.
@@ -77,6 +83,9 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
         plan.define("ssfr/shade", "SPRAY");
     }
     plan.define("ssfr/shade_aovs", "AOVS");
+    if wants_spray_aovs(look) {
+        plan.define("ssfr/shade_aovs", "SPRAY");
+    }
     // Without `forward` no one is asked for, and any buffer of words stands in.
     let owner = match look.wants(AovSpec::Forward) {
         true => OWNER,
@@ -97,6 +106,9 @@ pub(super) fn plan_cast(plan: &mut Plan, look: &Look) -> Shade {
     }
     if look.wants(AovSpec::Forward) {
         plan.define("rays/aovs", "FORWARD");
+    }
+    if wants_spray_aovs(look) {
+        plan.define("rays/aovs", "SPRAY");
     }
     let picture = || {
         let surface = Bind::whole("surface", &DEPTHS[0]);

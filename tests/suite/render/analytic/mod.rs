@@ -7,8 +7,10 @@
 mod geometry;
 mod lens;
 mod light;
+mod motion;
 mod rays;
 mod ripples;
+mod spray;
 mod support;
 mod surface;
 mod water;

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
 use swell::gpu::adapter::{Context, Spoil};
-use swell::render::{Image, RenderScene, Renderer};
+use swell::render::{Image, Moment, RenderError, RenderScene, Renderer, Water};
 use swell::scene::look::Look;
 use wgpu::util::DeviceExt;
 
@@ -199,11 +199,26 @@ pub(crate) fn draw(
     water: &Particles,
     frame: u32,
 ) -> Image {
+    let water = Water::new(water.clone());
+    let white = Particles::default();
+    let moment = Moment::alone(&water, &white);
+    draw_moment(context, setup, sky, scene, &moment, frame).unwrap()
+}
+
+/// As [`draw`], of a frame with what is around it.
+pub(crate) fn draw_moment(
+    context: &Context,
+    setup: &Setup,
+    sky: &dyn Fn(DVec3, DVec2) -> [f64; 3],
+    scene: &RenderScene,
+    moment: &Moment<'_>,
+    frame: u32,
+) -> Result<Image, RenderError> {
     let folder = tempfile::tempdir().unwrap();
     write_sky(&folder.path().join("sky.exr"), sky);
     let look = Look::parse(&setup.text(), &folder.path().join("look.toml")).unwrap();
     let mut renderer = Renderer::new(context, &look, scene).unwrap();
-    renderer.render(frame, water).unwrap()
+    renderer.render_moment(frame, moment)
 }
 
 /// Texels around the horizon; half as many from zenith to nadir. Their (u, v) are exact in half precision.
