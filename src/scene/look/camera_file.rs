@@ -248,9 +248,10 @@ impl CameraFile {
         let times = self.nodes.iter().flat_map(Hung::times);
         for seconds in times.chain([0.0]) {
             let stand = self.at(seconds);
+            let is_near = stand.position.abs().max_element() <= FARTHEST;
             let what = if !(stand.forward.is_finite() && stand.up.is_finite()) {
                 "its matrix has no inverse"
-            } else if !(stand.position.abs().max_element() <= FARTHEST) {
+            } else if !is_near {
                 "it stands more than 100 km from the origin"
             } else {
                 continue;
