@@ -4,9 +4,11 @@
 // Drops fly in clumps and threads that the sums smear out: light meets in them so many times the optical depth of the mean. By eye.
 const CLUMPED: f32 = 8.0;
 
-// (1 − exp(−x)) / x: of light that comes through a cloud evenly, the part that meets nothing more.
+// (1 − exp(−x)) / x: of light that comes through a cloud evenly, the part that meets nothing more. Where x is small the difference
+// shows what exp is rounded by: there by its series, off by x⁴ / 120.
 fn unmet(x: f32) -> f32 {
-    return select((1.0 - exp(-x)) / x, 1.0 - 0.5 * x, x < 1e-3);
+    let series = 1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0));
+    return select((1.0 - exp(-x)) / max(x, 0.1), series, x < 0.1);
 }
 
 // Per steradian, of sunlight that a cloud scatters towards the eye; `cosine` is that between the ways to the sun and to the eye.
