@@ -5,6 +5,9 @@
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_aovs.wgsl"
 #import "shared/rays_trace.wgsl"
+#ifdef SPRAY
+#import "shared/ssfr_spray_read.wgsl"
+#endif
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<uniform> next_camera: Camera;
@@ -19,10 +22,14 @@
 @group(0) @binding(9) var<storage, read> owner: array<u32>;
 @group(0) @binding(10) var<storage, read> particles: array<Particle>;
 #endif
+#ifdef SPRAY
+@group(0) @binding(11) var<storage, read> spray: array<u32>;
+@group(0) @binding(12) var<uniform> spray_params: SprayParams;
+#endif
 
 #ifdef SEA
-@group(0) @binding(11) var<uniform> sea: Sea;
-@group(0) @binding(12) var<storage, read> sea_values: array<vec4f>;
+@group(0) @binding(13) var<uniform> sea: Sea;
+@group(0) @binding(14) var<storage, read> sea_values: array<vec4f>;
 #endif
 
 // Surfaces on a line of sight, at most.
@@ -62,9 +69,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let direction = world_direction(camera, ray) / along;
     let through = water_along(camera.position, direction);
     let found = trace(camera.position, direction, is_wet(camera.position), 0.0);
+    let over = spray_over(vec2i(pixel), ray);
     if found.kind == SKY {
         let motion = motion_to(sky_in_next(direction), vec2i(pixel));
-        store(out, FAR, vec3f(0.0), vec3f(0.0), motion, through);
+        store_under(over, out, FAR, vec3f(0.0), vec3f(0.0), motion, through);
         return;
     }
     let position = camera.position + direction * found.t;
@@ -85,5 +93,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
 #endif
     let motion = motion_to(eye_from_world(next_camera, moved), vec2i(pixel));
-    store(out, found.t / along, normal, position, motion, through);
+    store_under(over, out, found.t / along, normal, position, motion, through);
 }

@@ -4,7 +4,8 @@
 #import "shared/rays_light.wgsl"
 #import "shared/ssfr_store.wgsl"
 #ifdef SPRAY
-#import "shared/ssfr_half.wgsl"
+#import "shared/ssfr_spray_read.wgsl"
+#import "shared/ssfr_spray_light.wgsl"
 #endif
 
 @group(0) @binding(0) var<uniform> camera: Camera;
@@ -26,6 +27,7 @@
 // Depths of what each ray meets first.
 @group(0) @binding(15) var<storage, read> surface: array<f32>;
 @group(0) @binding(16) var<storage, read> solid_depth: array<f32>;
+@group(0) @binding(20) var<uniform> spray_params: SprayParams;
 #endif
 #ifdef SEA
 @group(0) @binding(17) var<uniform> sea: Sea;
@@ -51,15 +53,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let known = min(surface[at], solid_depth[at]);
     let start = select(max(known * length(ray) - 2.0 * rays.voxel, 0.0), 0.0, inside || known >= FAR);
     var value = radiance_along(camera.position + direction * start, direction, inside, start);
-    let tap = half_tap(vec2f(pixel) + 0.5);
-    var words = vec4u(spray[tap.at.x], spray[tap.at.y], spray[tap.at.z], spray[tap.at.w]);
-    let cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
-    if cover > 0.0 {
-        let far = min(surface[at], 1e4) * length(ray);
-        let white = diffuse_light(camera.position + direction * far, vec3f(0.0, 1.0, 0.0)) * 0.85;
-        value = mix(value, vec4f(white, 1.0), cover);
-        dim_parts(1.0 - cover);
-        light_part(WHITE, white * cover);
+    let mist = spray_at(vec2f(pixel) + 0.5);
+    if mist.cover > 0.0 {
+        let far = mist.depth * length(ray);
+        let light = spray_radiance(camera.position + direction * far, -direction, mist.optical_depth);
+        let white = hazed(light, far, direction);
+        value = mix(value, vec4f(white, 1.0), mist.cover);
+        dim_parts(1.0 - mist.cover);
+        light_part(WHITE, white * mist.cover);
     }
 #else
     let value = radiance_along(camera.position, direction, inside, 0.0);

@@ -3,8 +3,7 @@
 #import "shared/ssfr_band.wgsl"
 #import "shared/rays_trace.wgsl"
 #ifdef SPRAY
-#import "shared/ssfr_half.wgsl"
-#import "shared/ssfr_light.wgsl"
+#import "shared/ssfr_spray_read.wgsl"
 #endif
 
 @group(0) @binding(0) var<uniform> camera: Camera;
@@ -17,16 +16,9 @@
 @group(0) @binding(7) var<storage, read_write> output: array<vec2u>;
 #ifdef SPRAY
 @group(0) @binding(8) var<storage, read> spray: array<u32>;
-@group(0) @binding(9) var<uniform> shading: Shading;
-@group(0) @binding(10) var sky: texture_2d<f32>;
-@group(0) @binding(11) var sky_sampler: sampler;
-@group(0) @binding(12) var shadow_map: texture_depth_2d;
-@group(0) @binding(13) var shadow_sampler: sampler_comparison;
+@group(0) @binding(9) var<uniform> spray_params: SprayParams;
 #endif
 
-#ifdef PALETTE
-@group(0) @binding(16) var<uniform> palette: array<vec4f, 64>;
-#endif
 #ifdef SEA
 @group(0) @binding(14) var<uniform> sea: Sea;
 @group(0) @binding(15) var<storage, read> sea_values: array<vec4f>;
@@ -46,9 +38,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     var cover = 0.0;
 #ifdef SPRAY
-    let tap = half_tap(vec2f(pixel) + 0.5);
-    var words = vec4u(spray[tap.at.x], spray[tap.at.y], spray[tap.at.z], spray[tap.at.w]);
-    cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
+    cover = spray_at(vec2f(pixel) + 0.5).cover;
 #endif
     output[id.y * camera.picture.x + id.x] = vec2u(object, bitcast<u32>(cover));
 }

@@ -1,5 +1,5 @@
-// The channels that stand beside the picture. Needs the bindings `next_camera` and `output` of whoever imports it: ten floats a
-// pixel, Z, N, P, forward and thickness.
+// The channels that stand beside the picture. Needs the bindings `camera`, `next_camera` and `output` of whoever imports it, ten
+// floats a pixel, Z, N, P, forward and thickness; and with SPRAY, and MOTION, what ssfr_spray_read.wgsl needs.
 #import "shared/camera.wgsl"
 
 // Where `next`, in the eye space of the next frame, stands in its picture less where `pixel` is, in pixels; rightward and
@@ -22,6 +22,34 @@ fn store(at: u32, depth: f32, normal: vec3f, position: vec3f, motion: vec2f, thr
     output[base + 7u] = motion.x;
     output[base + 8u] = motion.y;
     output[base + 9u] = through;
+}
+
+// Spray that stands before everything else at a pixel.
+struct Over {
+    is_seen: bool,
+    depth: f32,
+    position: vec3f,
+    motion: vec2f,
+}
+
+// Depth, position and motion are those of spray where it hides more than half of what is behind.
+fn spray_over(pixel: vec2i, ray: vec3f) -> Over {
+#ifdef SPRAY
+    let mist = spray_at(vec2f(pixel) + 0.5);
+    if mist.cover > 0.5 {
+        let position = world_from_eye(camera, ray * mist.depth);
+        let next = position + spray_velocity(vec2f(pixel) + 0.5) * camera.frame_seconds;
+        return Over(true, mist.depth, position, motion_to(eye_from_world(next_camera, next), pixel));
+    }
+#endif
+    return Over(false, FAR, vec3f(0.0), vec2f(0.0));
+}
+
+// As `store`, of what is seen behind the spray.
+fn store_under(over: Over, at: u32, depth: f32, normal: vec3f, position: vec3f, motion: vec2f, through: f32) {
+    store(
+        at, select(depth, over.depth, over.is_seen), normal, select(position, over.position, over.is_seen),
+        select(motion, over.motion, over.is_seen), through);
 }
 
 // A direction in the eye space of the next frame: the sky is infinitely far, and only where that camera looks moves it, not where

@@ -14,7 +14,7 @@ struct Shading {
     // Metres that sunlight goes through water for one metre of depth.
     sun_path: f32,
     scattering: vec3f,
-    spray_density: f32,
+    pad0: f32,
     ground_colour: vec3f,
     ground_variation: f32,
     solid_colour: vec3f,

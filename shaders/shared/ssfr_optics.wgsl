@@ -28,3 +28,28 @@ fn glitter(n: vec3f, v: vec3f, l: vec3f, slope_variance: f32, index: f32) -> f32
     let mask_v = nv + sqrt(a2 + (1.0 - a2) * nv * nv);
     return density * fresnel(clamp(dot(v, h), 0.0, 1.0), index) * nl / (mask_l * mask_v);
 }
+
+// Two lobes of Henyey and Greenstein 1941. Refracted and mirrored light of water drops has a mean cosine of 0.77: large drops have
+// 0.885 in all (van de Hulst 1957), of which half is diffracted straight on and cannot be told from light that met nothing.
+// 0.93 · 0.85 − 0.07 · 0.3 = 0.77, and a part of the mirrored light comes back.
+const AHEAD: f32 = 0.85;
+const BACK: f32 = -0.3;
+const BACKWARD: f32 = 0.07;
+
+fn lobe(g: f32, cosine: f32) -> f32 {
+    let s = max(1.0 + g * g - 2.0 * g * cosine, 1e-6);
+    return (1.0 - g * g) / (4.0 * PI * s * sqrt(s));
+}
+
+// Per steradian, over the cosine between ways before and after; its integral over all ways is 1.
+fn drop_phase(cosine: f32) -> f32 {
+    return mix(lobe(AHEAD, cosine), lobe(BACK, cosine), BACKWARD);
+}
+
+// The same of a white ball in the light of a distant sun, which shades itself: Lambert 1760. `cosine` is that between the ways to
+// the sun and to the eye.
+fn ball_phase(cosine: f32) -> f32 {
+    let c = clamp(cosine, -1.0, 1.0);
+    let angle = acos(c);
+    return 2.0 / (3.0 * PI * PI) * (sqrt(max(1.0 - c * c, 0.0)) + (PI - angle) * c);
+}

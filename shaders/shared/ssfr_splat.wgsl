@@ -1,16 +1,24 @@
 // A particle as a sphere on the screen.
 
 struct Particle {
-    // World position, and how much of it is air (0 to 1).
+    // World position.
     position: vec3f,
-    aeration: f32,
+    // In 65535ths: below, the part of its volume that whitens; above, the radius of what of it belongs to the surface, over that
+    // of a whole one.
+    air: u32,
     velocity: vec3f,
-    // Twice the particle's id, plus 1 where it belongs to the surface, 0 where it was thrown clear of it.
+    // Twice the particle's id, plus 1 where it belongs to the body of water that rays meet, 0 where it was thrown clear of it.
     tag: u32,
 }
 
-fn is_body(particle: Particle) -> bool {
-    return (particle.tag & 1u) == 1u;
+fn air_of(particle: Particle) -> f32 {
+    return f32(particle.air & 0xffffu) / 65535.0;
+}
+
+// Radius of the sphere that stands for it in the surface, metres.
+fn body_radius(camera: Camera, particle: Particle) -> f32 {
+    let part = particle.air >> 16u;
+    return camera.radius * select(f32(part) / 65535.0, 1.0, part == 65535u);
 }
 
 // Row of the i-th pixel of a box `width` wide, exact below 2²² pixels; software adapters divide integers

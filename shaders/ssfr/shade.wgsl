@@ -14,6 +14,10 @@
 #import "shared/ssfr_store.wgsl"
 #endif
 #endif
+#ifdef SPRAY
+#import "shared/ssfr_spray_read.wgsl"
+#import "shared/ssfr_spray_light.wgsl"
+#endif
 #ifdef SEA
 #import "shared/ssfr_sea.wgsl"
 #endif
@@ -44,14 +48,15 @@
 #else
 @group(0) @binding(11) var<storage, read_write> output: array<vec4f>;
 #endif
-#ifdef SPRAY
-@group(0) @binding(12) var<storage, read> spray: array<u32>;
 #endif
+#ifdef SPRAY
+@group(0) @binding(15) var<storage, read> spray: array<u32>;
+@group(0) @binding(16) var<uniform> spray_params: SprayParams;
 #endif
 
 #ifdef SEA
-@group(0) @binding(15) var<uniform> sea: Sea;
-@group(0) @binding(16) var<storage, read> sea_values: array<vec4f>;
+@group(0) @binding(18) var<uniform> sea: Sea;
+@group(0) @binding(19) var<storage, read> sea_values: array<vec4f>;
 #endif
 #ifdef PALETTE
 @group(0) @binding(17) var<uniform> palette: array<vec4f, 64>;
@@ -335,12 +340,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
 #endif
 #ifdef AOVS
+    let over = spray_over(pixel, ray);
 #ifdef SEA
     if beside {
         let position = camera.position + direction * open.distance;
         let moved = position + sea_velocity(position.xz) * camera.frame_seconds;
         let motion = motion_to(eye_from_world(next_camera, moved), pixel);
-        store(out, open.distance / length(ray), open.normal, position, motion, through);
+        store_under(over, out, open.distance / length(ray), open.normal, position, motion, through);
         return;
     }
 #endif
@@ -353,19 +359,18 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             let moved = position + particles[particle].velocity * camera.frame_seconds;
             motion = motion_to(eye_from_world(next_camera, moved), pixel);
         }
-        store(out, z, normal, position, motion, through);
+        store_under(over, out, z, normal, position, motion, through);
         return;
     }
     let seen = straight.depth < 0.1 * FAR;
     let next = select(sky_in_next(direction), eye_from_world(next_camera, straight.surface.position), seen);
     let motion = motion_to(next, pixel);
-    store(out, straight.depth, straight.surface.normal, straight.surface.position, motion, through);
+    store_under(over, out, straight.depth, straight.surface.normal, straight.surface.position, motion, through);
 #else
     var cover = 0.0;
 #ifdef SPRAY
-    let tap = half_tap(vec2f(pixel) + 0.5);
-    var words = vec4u(spray[tap.at.x], spray[tap.at.y], spray[tap.at.z], spray[tap.at.w]);
-    cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
+    let mist = spray_at(vec2f(pixel) + 0.5);
+    cover = mist.cover;
 #endif
 #ifdef OBJECTS
     var object = straight.surface.material;
@@ -411,13 +416,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             alpha = shading.background;
         }
     }
-    if cover > 0.0 {
-        let where_to = camera.position + direction * min(z, min(straight.depth, 1e4)) * length(ray);
-        let white = diffuse_light(where_to, vec3f(0.0, 1.0, 0.0)) * 0.85;
-        colour = mix(colour, white, cover);
-        alpha = mix(alpha, 1.0, cover);
-        dim_parts(1.0 - cover);
-        light_part(WHITE, white * cover);
+#ifdef SPRAY
+    if mist.cover > 0.0 {
+        let far = mist.depth * length(ray);
+        let light = spray_radiance(camera.position + direction * far, view, mist.optical_depth);
+        let white = hazed(light, far, direction);
+        colour = mix(colour, white, mist.cover);
+        alpha = mix(alpha, 1.0, mist.cover);
+        dim_parts(1.0 - mist.cover);
+        light_part(WHITE, white * mist.cover);
     }
     store_light(out, vec4f(colour, alpha), camera.weight, camera.sample_index == 0u);
 #endif

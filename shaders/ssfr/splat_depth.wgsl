@@ -1,12 +1,16 @@
 // Nearest sphere surface at each pixel. One workgroup a particle: its threads share the pixels.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
+#import "shared/ssfr_moved.wgsl"
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<storage, read> particles: array<Particle>;
 @group(0) @binding(2) var<storage, read> solid_depth: array<f32>;
 // Depth bits: positive floats sort as their bits do.
 @group(0) @binding(3) var<storage, read_write> depth: array<atomic<u32>>;
+#ifdef PATHS
+@group(0) @binding(4) var<storage, read> paths: array<Path>;
+#endif
 
 @compute @workgroup_size(32)
 fn main(
@@ -19,12 +23,13 @@ fn main(
         return;
     }
     let particle = particles[index];
-    if !is_body(particle) {
+    let radius = body_radius(camera, particle);
+    if radius <= 0.0 {
         return;
     }
-    let c = eye_from_world(camera, particle.position + particle.velocity * camera.seconds);
-    let nearest = bitcast<u32>(max(c.z - camera.radius, 0.0));
-    let bounds = sphere_bounds(camera, c, camera.radius, 1.0, camera.size);
+    let c = eye_from_world(camera, moved(particle, index));
+    let nearest = bitcast<u32>(max(c.z - radius, 0.0));
+    let bounds = sphere_bounds(camera, c, radius, 1.0, camera.size);
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
     for (var i = lane; i < count; i += 32u) {
@@ -36,7 +41,7 @@ fn main(
         if known <= nearest {
             continue;
         }
-        let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, camera.radius);
+        let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, radius);
         if hit.chord > 0.0 && hit.depth < solid_depth[at] {
             let bits = bitcast<u32>(hit.depth);
             if bits < known {

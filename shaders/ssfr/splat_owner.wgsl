@@ -18,18 +18,19 @@ fn main(
         return;
     }
     let particle = particles[index];
-    if !is_body(particle) {
+    let radius = body_radius(camera, particle);
+    if radius <= 0.0 {
         return;
     }
-    let c = eye_from_world(camera, particle.position + particle.velocity * camera.seconds);
-    let bounds = sphere_bounds(camera, c, camera.radius, 1.0, camera.size);
+    let c = eye_from_world(camera, particle.position);
+    let bounds = sphere_bounds(camera, c, radius, 1.0, camera.size);
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
     for (var i = lane; i < count; i += 32u) {
         let row = row_of(i, width);
         let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let at = pixel.y * camera.size.x + pixel.x;
-        let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, camera.radius);
+        let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, radius);
         // Two shaders may round one formula differently, so equality is asked within a few ulp.
         if hit.chord > 0.0 && hit.depth <= depth[at] * 1.000001 {
             atomicMin(&owner[at], index);

@@ -1,20 +1,18 @@
 // Aerated water near or before the surface, at half resolution: what whitens it.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
-
-struct ThicknessParams {
-    scale: f32,
-    pad0: f32,
-    pad1: f32,
-    pad2: f32,
-}
+#import "shared/ssfr_moved.wgsl"
+#import "shared/ssfr_spray_add.wgsl"
 
 @group(0) @binding(0) var<uniform> camera: Camera;
-@group(0) @binding(1) var<uniform> params: ThicknessParams;
+@group(0) @binding(1) var<uniform> spray_params: SprayParams;
 @group(0) @binding(2) var<storage, read> particles: array<Particle>;
 @group(0) @binding(3) var<storage, read> solid_depth: array<f32>;
 @group(0) @binding(4) var<storage, read> surface: array<f32>;
 @group(0) @binding(5) var<storage, read_write> spray: array<atomic<u32>>;
+#ifdef PATHS
+@group(0) @binding(6) var<storage, read> paths: array<Path>;
+#endif
 
 // Drops that stand for a particle far away.
 const DROPS: f32 = 5.0;
@@ -60,14 +58,14 @@ fn main(
         return;
     }
     let particle = particles[index];
-    if particle.aeration <= 0.0 {
+    let air = air_of(particle);
+    if air <= 0.0 {
         return;
     }
     // The particle stands for a cloud of drops, wider than the ball that the solver carries.
-    let thrown = !is_body(particle);
     let id = particle.tag >> 1u;
     let half_size = camera.size / 2u;
-    let c = eye_from_world(camera, particle.position + particle.velocity * camera.seconds);
+    let c = eye_from_world(camera, moved(particle, index));
     if c.z < (CLOUD + 1.0) * camera.radius {
         return;
     }
@@ -81,8 +79,7 @@ fn main(
     let part = 1.0 / f32(count);
     let cubes = m * m * m + m * m * n + 0.6 * m * n * n + n * n * n / 7.0
         - part * part * (6.0 * m * m * n + 12.0 * m * n * n + 6.0 * n * n * n) / 24.0;
-    // Thrown water is mostly air: its drops hold a part of what the particle stands for.
-    let volume = select(0.5, 0.15, thrown) / (cubes * f32(count)) * finer * finer * finer;
+    let volume = air / (cubes * f32(count)) * finer * finer * finer;
     for (var k = lane; k < count; k += 32u) {
         let q = (f32(k) + 0.5) * part;
         let own = camera.radius * (m + n * q * q) / finer;
@@ -90,20 +87,20 @@ fn main(
         // At least 0.7 pixels of the half resolution, so that a small one is fainter and never missed: its volume stays.
         let radius = max(own, 1.4 * d.z / camera.focal);
         let shrunk = own / radius;
-        let weight = volume * shrunk * shrunk * shrunk * params.scale * particle.aeration * THICKNESS_SCALE;
+        let weight = volume * shrunk * shrunk * shrunk * spray_params.scale;
         let bounds = sphere_bounds(camera, d, radius, 0.5, half_size);
         for (var y = bounds.y; y <= bounds.w; y++) {
             for (var x = bounds.x; x <= bounds.z; x++) {
                 let pixel = vec2u(vec2i(x, y));
                 let at = 2u * (pixel.y * camera.size.x + pixel.x);
-                if d.z >= min(solid_depth[at], surface[at] + 2.0 * camera.radius) {
+                // The water over a drop takes its white away, half of it two radii of a particle down.
+                let under = 1.0 - smoothstep(camera.radius, 3.0 * camera.radius, d.z - surface[at]);
+                let seen = before(solid_depth[at], d.z, radius) * under;
+                if seen <= 0.0 {
                     continue;
                 }
                 let ray = eye_ray(camera, 2.0 * vec2f(pixel) + 1.0);
-                let amount = u32(soft_chord(ray, d, radius) * weight + 0.5);
-                if amount > 0u {
-                    atomicAdd(&spray[pixel.y * half_size.x + pixel.x], amount);
-                }
+                add_spray(pixel, soft_chord(ray, d, radius) * weight * seen, d.z, particle.velocity);
             }
         }
     }

@@ -1,6 +1,7 @@
 // Spray, foam and bubbles before the surface or just under it, at half resolution: what whitens the water.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
+#import "shared/ssfr_spray_add.wgsl"
 
 struct Whitewater {
     // World position, and radius, metres.
@@ -27,6 +28,7 @@ struct WhitewaterParams {
 @group(0) @binding(3) var<storage, read> solid_depth: array<f32>;
 @group(0) @binding(4) var<storage, read> surface: array<f32>;
 @group(0) @binding(5) var<storage, read_write> spray: array<atomic<u32>>;
+@group(0) @binding(6) var<uniform> spray_params: SprayParams;
 
 @compute @workgroup_size(64)
 fn main(
@@ -45,23 +47,22 @@ fn main(
     // At least 0.7 pixels of the half resolution, so that a small one is fainter and never missed: its volume stays.
     let radius = max(own, 1.4 * c.z / camera.focal);
     let shrunk = own / radius;
-    let weight = whitewater_params.density * shrunk * shrunk * shrunk * THICKNESS_SCALE;
+    let weight = whitewater_params.density * shrunk * shrunk * shrunk;
     let bounds = sphere_bounds(camera, c, radius, 0.5, half_size);
     for (var y = bounds.y; y <= bounds.w; y++) {
         for (var x = bounds.x; x <= bounds.z; x++) {
             let pixel = vec2u(vec2i(x, y));
             let at = 2u * (pixel.y * camera.size.x + pixel.x);
-            if c.z >= solid_depth[at] {
+            let seen = before(solid_depth[at], c.z, radius);
+            if seen <= 0.0 {
                 continue;
             }
             let ray = eye_ray(camera, 2.0 * vec2f(pixel) + 1.0);
             let chord = max(hit_sphere(ray, c, radius).chord, 0.0);
             // Under the surface the water over it takes its white away.
             let under = max(c.z - surface[at], 0.0);
-            let amount = u32(chord * weight * exp(-under / whitewater_params.fading) + 0.5);
-            if amount > 0u {
-                atomicAdd(&spray[pixel.y * half_size.x + pixel.x], amount);
-            }
+            let amount = chord * weight * seen * exp(-under / whitewater_params.fading);
+            add_spray(pixel, amount, c.z, one.velocity);
         }
     }
 }

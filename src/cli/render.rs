@@ -33,7 +33,7 @@ pub(super) struct RenderArgs {
     frames: Option<FrameRange>,
     #[command(flatten)]
     gpu: GpuArgs,
-    /// Take a panorama that lies outside of the look's folder.
+    /// Take a panorama or a camera that lies outside of the look's folder.
     #[arg(long)]
     allow_outside: bool,
     /// Render frames again that stand there, also those of another cache or look.
@@ -108,6 +108,7 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             size,
             frames,
             left_out,
+            warnings,
         } => {
             let progress = progress.get_or_init(|| Progress::new(mode, frames as u64));
             let [width, height] = size;
@@ -122,6 +123,12 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
                     "not_kept": left_out,
                 }),
             );
+            for warning in &warnings {
+                progress.say(
+                    &format!("warning: {warning}"),
+                    json!({ "event": "warning", "what": "look", "text": warning }),
+                );
+            }
         }
         Event::Waiting { frames } => {
             if let Some(progress) = progress.get() {

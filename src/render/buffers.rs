@@ -1,8 +1,8 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Rays, Sea, SetNode, Shading, Thickness,
-    Tile, Triangle, Whitewater, WhitewaterParams,
+    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Path, Rays, Sea, SetNode, Shading,
+    SprayParams, Thickness, Tile, Triangle, Whitewater, WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
 
@@ -32,14 +32,18 @@ pub(super) const SOLID_PACKED: Buf<u32> = Buf::new("solid_packed");
 
 /// Particles of a frame.
 pub(super) const PARTICLES: Buf<Particle> = Buf::new("particles");
+/// How each of them goes about the frame's instant.
+pub(super) const PATHS: Buf<Path> = Buf::new("paths");
 /// Workgroups of a dispatch of one a particle.
 pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
-/// What a particle adds to thickness and spray.
+/// What a particle adds to thickness.
 pub(super) const THICKNESS_PARAMS: Buf<Thickness> = Buf::uniform("thickness_params");
 /// Length of the line of sight in water, at half the resolution on both sides.
 pub(super) const THICKNESS: Buf<u32> = Buf::new("thickness");
-/// Aerated water before the surface, as thickness.
+/// Aerated water and whitewater before the surface: planes of the frame at half the resolution on both sides.
 pub(super) const SPRAY: Buf<u32> = Buf::new("spray");
+/// What stands in these sums.
+pub(super) const SPRAY_PARAMS: Buf<SprayParams> = Buf::uniform("spray_params");
 /// Spray, foam and bubbles of a frame.
 pub(super) const WHITEWATER: Buf<Whitewater> = Buf::new("whitewater");
 /// How they are drawn.

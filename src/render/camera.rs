@@ -2,31 +2,100 @@
 
 use glam::DVec3;
 
-use super::{frame::Extent, uniform};
+use super::{frame::Extent, samples::Sample, uniform};
 use crate::domain::eye::Eye;
 use crate::scene::look::{CameraSpec, Look};
 
-/// A pose in world space, metres, and a focal length in mm.
+/// A place and a direction in world space, and a focal length in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pose {
+    /// Metres.
     pub(super) position: DVec3,
-    pub(super) target: DVec3,
+    /// Unit vectors to the picture's right, to its top and into it.
+    pub(super) right: DVec3,
+    pub(super) up: DVec3,
+    pub(super) forward: DVec3,
     pub(super) focal_length_mm: f64,
+    /// `None` of a pinhole.
+    pub(super) lens: Option<Lens>,
 }
 
-/// The camera at a frame number, which may lie between two.
+/// A thin lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lens {
+    /// Of the aperture, metres.
+    pub(super) radius: f64,
+    /// To the plane that is sharp, along the optical axis, metres.
+    pub(super) focus: f64,
+}
+
+/// What keyframes hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Keyed {
+    position: DVec3,
+    target: DVec3,
+    focal_length_mm: f64,
+    /// Metres; 0 of a pinhole.
+    focus: f64,
+}
+
+/// The camera at a frame number, which may lie between two; frame k of a shot is at k / `frames_per_second` of a file's time.
+pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
+    let camera = &look.spec().camera;
+    let lens = |focal_length_mm: f64, focus: f64| {
+        let lens = camera.lens.as_ref()?;
+        let radius = 0.5e-3 * focal_length_mm / lens.f_stop;
+        Some(Lens { radius, focus })
+    };
+    if let Some(file) = look.camera_file() {
+        let stand = file.at(frame / frames_per_second);
+        let focal_length_mm = file.focal_length_mm(look.film_height_mm());
+        let [right, up] = upright(stand.forward, stand.up);
+        return Pose {
+            position: stand.position,
+            right,
+            up,
+            forward: stand.forward,
+            focal_length_mm,
+            lens: lens(focal_length_mm, focus(camera, None)),
+        };
+    }
+    let keyed = keyed(camera, frame);
+    let forward = (keyed.target - keyed.position).normalize();
+    let [right, up] = upright(forward, camera.up.into());
+    Pose {
+        position: keyed.position,
+        right,
+        up,
+        forward,
+        focal_length_mm: keyed.focal_length_mm,
+        lens: lens(keyed.focal_length_mm, keyed.focus),
+    }
+}
+
+/// Right and up of a picture into which `forward` leads and in which `up` stands upright.
+fn upright(forward: DVec3, up: DVec3) -> [DVec3; 2] {
+    let right = forward.cross(up).normalize();
+    [right, right.cross(forward)]
+}
+
+/// Metres to what is sharp; 0 of a pinhole.
+fn focus(camera: &CameraSpec, of_key: Option<f64>) -> f64 {
+    let own = camera.lens.as_ref().map(|lens| lens.focus_distance_m);
+    own.map_or(0.0, |own| of_key.unwrap_or(own))
+}
+
+/// What keyframes say at a frame number.
 ///
 /// Keyframes are joined by cubic Hermite curves whose slopes are those of Catmull and Rom inside and zero at
 /// both ends, so that a move starts and stops softly; before the first and after the last it stands still.
-pub(super) fn pose(camera: &CameraSpec, frame: f64) -> Pose {
-    let keys: Vec<(f64, Pose)> = if camera.keyframes.is_empty() {
-        let position = camera.position.unwrap_or_default().into();
-        let target = camera.target.unwrap_or_default().into();
-        let focal_length_mm = camera.focal_length_mm;
-        let pose = Pose {
-            position,
-            target,
-            focal_length_mm,
+fn keyed(camera: &CameraSpec, frame: f64) -> Keyed {
+    let keys: Vec<(f64, Keyed)> = if camera.keyframes.is_empty() {
+        let pose = Keyed {
+            position: camera.position.unwrap_or_default().into(),
+            target: camera.target.unwrap_or_default().into(),
+            focal_length_mm: camera.focal_length_mm,
+            focus: focus(camera, None),
         };
         vec![(0.0, pose)]
     } else {
@@ -34,10 +103,11 @@ pub(super) fn pose(camera: &CameraSpec, frame: f64) -> Pose {
             .keyframes
             .iter()
             .map(|key| {
-                let pose = Pose {
+                let pose = Keyed {
                     position: key.position.into(),
                     target: key.target.into(),
                     focal_length_mm: key.focal_length_mm.unwrap_or(camera.focal_length_mm),
+                    focus: focus(camera, key.focus_distance_m),
                 };
                 (key.frame, pose)
             })
@@ -53,7 +123,7 @@ pub(super) fn pose(camera: &CameraSpec, frame: f64) -> Pose {
     let i = keys.partition_point(|key| key.0 <= frame) - 1;
     let span = keys[i + 1].0 - keys[i].0;
     let t = (frame - keys[i].0) / span;
-    let blend = |value: &dyn Fn(&Pose) -> f64| {
+    let blend = |value: &dyn Fn(&Keyed) -> f64| {
         let at = |k: usize| value(&keys[k].1);
         let slope = |k: usize| {
             if k == 0 || k == last {
@@ -68,13 +138,16 @@ pub(super) fn pose(camera: &CameraSpec, frame: f64) -> Pose {
             + (3.0 * t2 - 2.0 * t3) * at(i + 1)
             + (t3 - t2) * span * slope(i + 1)
     };
-    let vector = |pick: fn(&Pose) -> DVec3| {
+    let vector = |pick: fn(&Keyed) -> DVec3| {
         DVec3::from_array([0, 1, 2].map(|axis| blend(&|p| pick(p)[axis])))
     };
-    Pose {
+    // A curve that overshoots must not bring the plane that is sharp behind the lens.
+    let nearest = keys[i].1.focus.min(keys[i + 1].1.focus);
+    Keyed {
         position: vector(|p| p.position),
         target: vector(|p| p.target),
         focal_length_mm: blend(&|p| p.focal_length_mm),
+        focus: blend(&|p| p.focus).max(0.5 * nearest),
     }
 }
 
@@ -86,50 +159,7 @@ pub(super) fn focal_px(look: &Look, focal_length_mm: f64) -> f64 {
 
 /// Longest focal length of the shot, pixels.
 pub(super) fn longest_focal_px(look: &Look) -> f64 {
-    let camera = &look.spec().camera;
-    let longest = camera
-        .keyframes
-        .iter()
-        .filter_map(|key| key.focal_length_mm)
-        .fold(camera.focal_length_mm, f64::max);
-    focal_px(look, longest)
-}
-
-/// Where in the pixel and in the shutter a sample lies.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Sample {
-    /// Pixels from the pixel's centre.
-    pub(super) jitter: [f64; 2],
-    /// Frames from the frame's instant.
-    pub(super) instant: f64,
-    /// Part of the pixel's mean.
-    pub(super) weight: f64,
-}
-
-/// The samples of one frame: Halton points over the pixel, evenly spaced instants over the shutter.
-pub(super) fn samples(count: u32, shutter: f64) -> Vec<Sample> {
-    let halton = |base: u32, index: u32| {
-        let (mut value, mut scale, mut rest) = (0.0, 1.0, index);
-        while rest > 0 {
-            scale /= f64::from(base);
-            value += scale * f64::from(rest % base);
-            rest /= base;
-        }
-        value
-    };
-    let points: Vec<[f64; 2]> = (1..=count).map(|i| [halton(2, i), halton(3, i)]).collect();
-    // Few points of the sequence lean to one side, which would shift the picture.
-    let mean =
-        [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / f64::from(count));
-    points
-        .iter()
-        .zip(0u32..)
-        .map(|(point, i)| Sample {
-            jitter: [point[0] - mean[0], point[1] - mean[1]],
-            instant: ((f64::from(i) + 0.5) / f64::from(count) - 0.5) * shutter,
-            weight: 1.0 / f64::from(count),
-        })
-        .collect()
+    focal_px(look, look.longest_focal_length_mm())
 }
 
 /// What of the camera's uniform does not come from the pose.
@@ -142,20 +172,36 @@ pub(super) struct Setting {
     pub(super) frames_per_second: f64,
 }
 
-/// The camera of a look at a frame number, which may lie between two, in metres from `origin` in the world.
-pub fn eye(look: &Look, origin: DVec3, frame: f64) -> Eye {
-    let spec = look.spec();
-    let pose = pose(&spec.camera, frame);
-    let forward = (pose.target - pose.position).normalize();
-    let right = forward.cross(DVec3::from(spec.camera.up)).normalize();
+/// The camera of a look at a frame number, which may lie between two, in metres from `origin` in the world; without its lens.
+pub fn eye(look: &Look, origin: DVec3, frame: f64, frames_per_second: f64) -> Eye {
+    of_pose(look, &pose(look, frame, frames_per_second), origin)
+}
+
+fn of_pose(look: &Look, pose: &Pose, origin: DVec3) -> Eye {
+    let image = &look.spec().image;
     Eye {
         position: pose.position - origin,
-        right,
-        up: right.cross(forward),
-        forward,
+        right: pose.right,
+        up: pose.up,
+        forward: pose.forward,
         focal: focal_px(look, pose.focal_length_mm),
-        size: [spec.image.width, spec.image.height],
+        size: [image.width, image.height],
     }
+}
+
+/// Moves an eye to a point of its lens, and gives how far, in pixels to the right and down, the middle of the picture goes with it so
+/// that what is in focus stays where it is (Haeberli and Akeley 1990, section 3.3).
+///
+/// A point at a depth d is then a disc of A f |1/d_f − 1/d| across on the film, A the aperture's diameter. A thin lens has f / (d_f − f)
+/// where this has f / d_f: its film moves back to v = f d_f / (d_f − f) when it is focused, and what it sees gets narrower. Here the
+/// film stays at f, so that a pull of focus changes no framing.
+fn through_lens(eye: &mut Eye, lens: Option<Lens>, aperture: [f64; 2]) -> [f64; 2] {
+    let Some(lens) = lens else {
+        return [0.0; 2];
+    };
+    let [right, up] = aperture.map(|part| part * lens.radius);
+    eye.position += eye.right * right + eye.up * up;
+    [eye.focal * right / lens.focus, -eye.focal * up / lens.focus]
 }
 
 /// The uniform for one sample of a frame.
@@ -167,12 +213,14 @@ pub(super) fn camera(
     index: u32,
 ) -> uniform::Camera {
     let instant = frame + sample.instant;
-    let eye = eye(look, setting.origin, instant);
+    let pose = pose(look, instant, setting.frames_per_second);
+    let mut eye = of_pose(look, &pose, setting.origin);
+    let shift = through_lens(&mut eye, pose.lens, sample.aperture);
     let extent = &setting.extent;
     let [before, image] = extent.image;
     let centre = [0, 1].map(|axis| {
         let middle = f64::from(before[axis]) + 0.5 * f64::from(image[axis]);
-        (middle - sample.jitter[axis]) as f32
+        (middle - sample.jitter[axis] + shift[axis]) as f32
     });
     uniform::Camera {
         position: eye.position.as_vec3().to_array(),
@@ -225,8 +273,8 @@ mod tests {
             key(11, 1.0),
             key(31, 5.0)
         );
-        let spec = look(&text).spec().camera.clone();
-        let x = |frame: f64| pose(&spec, frame).position.x;
+        let keyed = look(&text);
+        let x = |frame: f64| pose(&keyed, frame, 24.0).position.x;
         assert_eq!(
             [x(-5.0), x(1.0), x(11.0), x(31.0), x(90.0)],
             [0.0, 0.0, 1.0, 5.0, 5.0]
@@ -253,9 +301,8 @@ mod tests {
             frames_per_second: 24.0,
         };
         let sample = Sample {
-            jitter: [0.0; 2],
             instant: 0.25,
-            weight: 1.0,
+            ..Sample::STILL
         };
         let found = camera(&look(text), &setting, 48.0, sample, 0);
         // Frame 48 at 24 a second, a quarter of a frame later.
@@ -265,17 +312,57 @@ mod tests {
         assert_eq!(found.centre, [16.0 + 80.0, 19.0 + 45.0]);
     }
 
+    /// What is sharp stays where it is from any point of the lens, and what is not moves by its disc's radius.
     #[test]
-    fn samples_are_centred_on_pixel_and_shutter() {
-        for count in [1, 2, 3, 4, 16] {
-            let samples = samples(count, 0.5);
-            let sum = |value: fn(&Sample) -> f64| samples.iter().map(value).sum::<f64>();
-            assert!(sum(|s| s.jitter[0]).abs() < 1e-12);
-            assert!(sum(|s| s.jitter[1]).abs() < 1e-12);
-            assert!(sum(|s| s.instant).abs() < 1e-12);
-            assert!((sum(|s| s.weight) - 1.0).abs() < 1e-12);
-            assert!(samples.iter().all(|s| s.instant.abs() < 0.25));
+    fn the_plane_in_focus_stays() {
+        let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 1.0, 0.0]\n\
+                    lens = { f_stop = 2.0, focus_distance_m = 6.0 }\n";
+        let look = look(text);
+        let pose = pose(&look, 1.0, 24.0);
+        let lens = pose.lens.unwrap();
+        assert!((lens.radius - 0.009).abs() < 1e-12);
+        let pinhole = of_pose(&look, &pose, DVec3::ZERO);
+        let shift = |depth: f64, aperture: [f64; 2]| {
+            let point = DVec3::new(depth, 1.7, 0.4);
+            let place = |eye: &Eye, middle: [f64; 2]| {
+                let d = point - eye.position;
+                let along = d.dot(eye.forward);
+                [
+                    middle[0] + eye.focal * d.dot(eye.right) / along,
+                    middle[1] - eye.focal * d.dot(eye.up) / along,
+                ]
+            };
+            let mut eye = pinhole;
+            let middle = through_lens(&mut eye, Some(lens), aperture);
+            let (a, b) = (place(&eye, middle), place(&pinhole, [0.0; 2]));
+            [a[0] - b[0], a[1] - b[1]]
+        };
+        for aperture in [[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]] {
+            let [x, y] = shift(6.0, aperture);
+            assert!(x.abs() < 1e-9 && y.abs() < 1e-9, "{x} {y}");
+            let [x, y] = shift(12.0, aperture);
+            let radius = 160.0 * 0.009 * (1.0 / 6.0 - 1.0 / 12.0);
+            assert!((x.hypot(y) - radius).abs() < 1e-9, "{x} {y} {radius}");
         }
-        assert!(samples(4, 0.0).iter().all(|s| s.instant == 0.0));
+    }
+
+    #[test]
+    fn the_focus_distance_follows_its_keys() {
+        let key = |frame: u32, focus: f64| {
+            format!(
+                "[[camera.keyframe]]\nframe = {frame}\nposition = [0.0, 2.0, 0.0]\ntarget = [9.0, 0.0, 0.0]\n\
+                 focus_distance_m = {focus:?}\n"
+            )
+        };
+        let text = format!(
+            "[camera]\nfocal_length_mm = 36.0\nlens = {{ f_stop = 2.8, focus_distance_m = 5.0 }}\n{}{}",
+            key(1, 2.0),
+            key(11, 8.0)
+        );
+        let look = look(&text);
+        let at = |frame: f64| pose(&look, frame, 24.0).lens.unwrap().focus;
+        assert_eq!([at(0.0), at(1.0), at(11.0), at(50.0)], [2.0, 2.0, 8.0, 8.0]);
+        // Half way between two keys at which it stands still.
+        assert!((at(6.0) - 5.0).abs() < 1e-12);
     }
 }

@@ -27,7 +27,7 @@ pub(super) fn shading(
         absorption: colour(spec.water.absorption_per_metre),
         sun_path: (1.0 / sun_cosine) as f32,
         scattering: colour(spec.water.scattering_per_metre),
-        spray_density: spray_density(look) as f32,
+        pad0: 0.0,
         ground_colour: colour(spec.ground.colour),
         ground_variation: spec.ground.variation as f32,
         solid_colour: colour(spec.solids.colour),

@@ -1,6 +1,6 @@
 //! Screen-space fluid rendering: particles to a picture.
 //!
-//! A sample of the picture: solids are drawn; particles are splatted as spheres into an eye-space depth
+//! A frame is drawn from a [`Moment`]: its particles, and those of the frames around it. A sample of the picture: solids are drawn; particles are splatted as spheres into an eye-space depth
 //! and a thickness; the depth is smoothed by curvature flow or the narrow-range filter; normals are
 //! differences of it; every pixel is shaded from what the water mirrors and what it lets through. Samples
 //! differ in their place in the pixel and in their instant within the shutter; linear radiance is
@@ -14,10 +14,13 @@ pub mod cryptomatte;
 mod frame;
 pub mod image;
 mod lighting;
+mod moment;
 mod opaque;
+mod paths;
 mod plan;
 mod rays;
 mod renderer;
+mod samples;
 mod sea;
 mod set;
 mod sky;
@@ -36,6 +39,7 @@ use crate::scene::Wall;
 
 pub use camera::eye;
 pub use image::{Attributes, Image};
+pub use moment::{Moment, REACH, Water, frames_around};
 pub use opaque::opaque;
 pub use plan::{Limits, Plan, Runs};
 pub use renderer::Renderer;
@@ -72,6 +76,14 @@ pub enum RenderError {
     /// A scene that cannot be drawn.
     #[error("render scene: {0}")]
     Scene(String),
+    /// Screen space has no second side of the surface.
+    #[error(
+        "frame {frame}: the camera is under water, which method \"ssfr\" cannot draw: set [renderer] method = \"ray\""
+    )]
+    UnderWater {
+        /// Frame number.
+        frame: u32,
+    },
     /// A particle whose position or velocity is not a number.
     #[error("particle {index} of frame {frame} has a position or velocity that is not finite")]
     NotFinite {

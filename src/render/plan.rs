@@ -212,9 +212,13 @@ mod tests {
     };
 
     fn plan(surface: &str, more: &str) -> Plan {
+        plan_of("", surface, more)
+    }
+
+    fn plan_of(image: &str, surface: &str, more: &str) -> Plan {
         let text = format!(
             "[camera]\nfocal_length_mm = 35.0\nfilm_back_mm = [36.0, 18.0]\nposition = [-2.0, 3.0, 2.5]\n\
-             target = [0.0, 1.0, 0.75]\n[image]\nwidth = 96\nheight = 48\n[surface]\nfilter = \"{surface}\"\n\
+             target = [0.0, 1.0, 0.75]\n[image]\nwidth = 96\nheight = 48\n{image}[surface]\nfilter = \"{surface}\"\n\
              [sky]\nmodel = \"hosek_wilkie\"\n[sun]\nazimuth_degrees = 120.0\nelevation_degrees = 35.0\n{more}"
         );
         let look = Look::parse(&text, Path::new("look.toml")).unwrap();
@@ -318,6 +322,28 @@ mod tests {
             sizes.insert(plan.bytes());
         }
         assert_eq!(sizes.len(), 15, "each look takes what it needs: {sizes:?}");
+        // Paths are there where the shutter is open, and motion of spray where a channel shows it.
+        let motion_alone = "[output]\nformats = [\"exr\"]\naovs = [\"forward\"]\n";
+        let white = "[whitewater]\n";
+        for method in ["", RAYS] {
+            for more in ["", motion_alone, white, ALL] {
+                let plan = plan_of(
+                    "shutter = 0.5\n",
+                    "narrow_range",
+                    &format!("{method}{more}"),
+                );
+                assert_eq!(used(&plan), planned(&plan), "open: {method} {more}");
+                let has_paths = plan.buffers.iter().any(|buffer| buffer.name == "paths");
+                // Rays move particles on the CPU, but for drops.
+                assert_eq!(
+                    has_paths,
+                    method.is_empty() || more == ALL,
+                    "{method} {more}"
+                );
+                let has_motion = plan.passes().contains_key("ssfr/splat_spray_aovs");
+                assert_eq!(has_motion, more == ALL, "{method} {more}");
+            }
+        }
         // Controls: a buffer that nothing uses, and a command whose buffer is not planned.
         let mut spare = plan("narrow_range", "");
         spare.buffer(&crate::render::buffers::SPRAY, 1);

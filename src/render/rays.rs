@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use super::{
     RenderScene,
     buffers::{DEPTHS, LEVEL_TABLE, LEVEL_VALUES, RAYS, SET_NODES, SET_TRIANGLES, SUN_PATHS},
+    paths::Path,
     plan::Plan,
     uniform::{Rays, SetNode, Triangle},
 };
@@ -96,11 +97,11 @@ fn tree(triangles: &[Triangle]) -> (Vec<SetNode>, Vec<Triangle>) {
     (nodes.collect(), sorted.collect())
 }
 
-/// The level set of particles seconds from where they stand, relative to the box's least corner.
-pub(super) fn level_set(scene: &RenderScene, places: &[(Vec3, Vec3)], seconds: f64) -> LevelSet {
+/// The level set of particles so many seconds on their paths from where they stand, relative to the box's least corner.
+pub(super) fn level_set(scene: &RenderScene, places: &[(Vec3, Path)], seconds: f32) -> LevelSet {
     let moved: Vec<DVec3> = places
         .iter()
-        .map(|(position, velocity)| position.as_dvec3() + seconds * velocity.as_dvec3())
+        .map(|(position, path)| position.as_dvec3() + path.way(seconds))
         .collect();
     LevelSet::new(&moved, scene.domain.size(), scene.particle_spacing)
 }

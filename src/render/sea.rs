@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3, Vec3};
 use super::{
     RenderScene,
     buffers::{SEA, SEA_VALUES},
+    paths::{Path, body_of},
     plan::Plan,
     uniform,
 };
@@ -80,8 +81,8 @@ pub(super) struct Sea {
     /// Those with the longest waves first.
     lines: Vec<Line>,
     waves: Option<OpenWaves>,
-    /// Particles of the body, and how fast they go.
-    places: Vec<(Vec3, Vec3)>,
+    /// Particles of the body, and how they go.
+    places: Vec<(Vec3, Path)>,
     /// Seconds from the frame, and since frame 0, at which the device holds it.
     stands: Option<[f32; 2]>,
 }
@@ -102,12 +103,9 @@ impl Sea {
         })
     }
 
-    /// Takes a frame's particles: those that belong to the body.
-    pub(super) fn take(&mut self, particles: &[uniform::Particle]) {
-        let body = particles.iter().filter(|particle| particle.tag & 1 == 1);
-        self.places = body
-            .map(|it| (it.position.into(), it.velocity.into()))
-            .collect();
+    /// Takes a frame's particles, those that belong to the body; without `paths` they go straight on.
+    pub(super) fn take(&mut self, particles: &[uniform::Particle], paths: &[Path]) {
+        self.places = body_of(particles, paths);
         self.stands = None;
     }
 
@@ -123,11 +121,10 @@ impl Sea {
             return;
         }
         self.stands = Some(stands);
-        let seconds = f64::from(camera.seconds);
         let moved: Vec<DVec3> = self
             .places
             .iter()
-            .map(|(p, v)| p.as_dvec3() + seconds * v.as_dvec3())
+            .map(|(p, path)| p.as_dvec3() + path.way(camera.seconds))
             .collect();
         let edges = Edges::new(&moved, scene.domain.size(), scene.particle_spacing);
         program.upload(SEA, 0, &[self.uniform(&edges, scene)]);

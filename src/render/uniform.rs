@@ -34,9 +34,33 @@ mirror!(
     /// `Particle` of shared/ssfr_splat.wgsl.
     Particle {
         position: [f32; 3],
-        aeration: f32,
+        air: u32,
         velocity: [f32; 3],
         tag: u32,
+    }
+);
+
+mirror!(
+    /// `Path` of shared/ssfr_moved.wgsl.
+    Path {
+        before_square: [f32; 3],
+        pad0: f32,
+        before_cube: [f32; 3],
+        pad1: f32,
+        after_square: [f32; 3],
+        pad2: f32,
+        after_cube: [f32; 3],
+        pad3: f32,
+    }
+);
+
+mirror!(
+    /// `SprayParams` of shared/ssfr_spray.wgsl.
+    SprayParams {
+        density: f32,
+        scale: f32,
+        range: f32,
+        speed: f32,
     }
 );
 
@@ -50,7 +74,7 @@ mirror!(
         absorption: [f32; 3],
         sun_path: f32,
         scattering: [f32; 3],
-        spray_density: f32,
+        pad0: f32,
         ground_colour: [f32; 3],
         ground_variation: f32,
         solid_colour: [f32; 3],
@@ -122,7 +146,7 @@ mirror!(
 );
 
 mirror!(
-    /// `ThicknessParams` of ssfr/splat_thickness.wgsl and ssfr/splat_spray.wgsl.
+    /// `ThicknessParams` of ssfr/splat_thickness.wgsl.
     Thickness as "ThicknessParams" {
         scale: f32,
         pad0: f32,
@@ -215,6 +239,8 @@ pub fn mirrors() -> Vec<Layout> {
     vec![
         Camera::layout(),
         Particle::layout(),
+        Path::layout(),
+        SprayParams::layout(),
         Shading::layout(),
         Flow::layout(),
         FlowLevel::layout(),

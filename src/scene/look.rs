@@ -1,8 +1,10 @@
 //! Looks: camera, light, water and output of a shot, apart from its physics.
 
+pub mod camera_file;
 pub mod spec;
 
 mod keys;
+mod lint;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,12 +14,13 @@ use serde::{Deserialize as _, de::DeserializeOwned};
 
 use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 
+use camera_file::CameraFile;
 pub(super) use keys::KEYS;
 pub use spec::{
-    AovSpec, BasinSpec, CameraSpec, ColourSpaceSpec, FilterSpec, FormatSpec, ImageSpec,
-    KeyframeSpec, LightSpec, LookSpec, MethodSpec, OutputSpec, RendererSpec, RippleSpec, SeaSpec,
-    SeaWavesSpec, SkySpec, SolidsOutput, SpraySpec, SunSpec, SurfaceSpec, TransformSpec, ViewSpec,
-    WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
+    AovSpec, BasinSpec, CameraSpec, ColourSpaceSpec, CurveSpec, FilterSpec, FormatSpec, ImageSpec,
+    KeyframeSpec, LensSpec, LightSpec, LookSpec, MethodSpec, OutputSpec, RendererSpec, RippleSpec,
+    SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput, SpraySpec, SunSpec, SurfaceSpec, TransformSpec,
+    ViewSpec, WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
 };
 
 /// Pixels of a picture, counted from the upper left one of the look's image.
@@ -37,11 +40,24 @@ pub struct LookError(#[from] SceneError);
 /// The key of the panorama's file.
 const PANORAMA: &str = "sky.file";
 
+/// The key of how water is drawn.
+const METHOD: &str = "renderer.method";
+
+/// The keys of a camera's file, and of its name there.
+const CAMERA_FILE: &str = "camera.file";
+const CAMERA_NAME: &str = "camera.name";
+
+/// Part by which the shape of film or of a file's camera may be off that of the image.
+const SHAPE: f64 = 0.005;
+
 /// A validated look: every value in its range, every file that it names read.
 #[derive(Clone, Debug)]
 pub struct Look {
     spec: LookSpec,
     panorama: Option<Panorama>,
+    camera: Option<Arc<CameraFile>>,
+    /// Where the look says how water is drawn.
+    method: Fault,
     hash: String,
 }
 
@@ -63,7 +79,7 @@ impl Look {
         Self::load_within(path, Reach::Folder)
     }
 
-    /// [`Look::load`] with a panorama from as far as `reach` says.
+    /// [`Look::load`] with a panorama and a camera from as far as `reach` says.
     ///
     /// # Errors
     /// As [`Look::load`].
@@ -76,7 +92,7 @@ impl Look {
     }
 
     /// Parses and validates the text of a look; `file` names it in errors, and its folder is where a
-    /// relative panorama is looked for, which it must not leave.
+    /// relative panorama or camera is looked for, which it must not leave.
     ///
     /// # Errors
     /// As [`Look::load`].
@@ -92,19 +108,26 @@ impl Look {
             .map_err(|error| doc.translate(&error))?;
         check_camera(&doc, &spec)?;
         check_crop(&doc, &spec.image)?;
+        check_shutter(&doc, &spec.image)?;
         check_output(&doc, &spec.output)?;
         check_sea(&doc, &spec)?;
         let panorama = match &spec.sky {
             SkySpec::Panorama { file: name, .. } => Some(panorama(&doc, file, name)?),
             SkySpec::HosekWilkie { .. } => None,
         };
-        let bytes = panorama.as_ref().map(|sky| sky.bytes.as_ref());
-        let hash = canonical_hash(&spec, bytes);
-        Ok(Self {
+        let camera = match &spec.camera.file {
+            Some(name) => Some(Arc::new(file_camera(&doc, &spec, file, name)?)),
+            None => None,
+        };
+        let mut look = Self {
             spec,
             panorama,
-            hash,
-        })
+            camera,
+            method: doc.place_of(METHOD),
+            hash: String::new(),
+        };
+        look.hash = look.canonical_hash();
+        Ok(look)
     }
 
     /// What the file says, defaults filled in.
@@ -117,6 +140,28 @@ impl Look {
         self.panorama.as_ref().map(|sky| sky.bytes.as_ref())
     }
 
+    /// The camera of the file that the look names; `None` where it names none.
+    pub fn camera_file(&self) -> Option<&CameraFile> {
+        self.camera.as_deref()
+    }
+
+    /// Longest focal length of the shot, mm.
+    pub fn longest_focal_length_mm(&self) -> f64 {
+        let camera = &self.spec.camera;
+        let own = (self.camera_file()).map_or(camera.focal_length_mm, |file| {
+            file.focal_length_mm(self.film_height_mm())
+        });
+        let keys = camera.keyframes.iter();
+        keys.filter_map(|key| key.focal_length_mm)
+            .fold(own, f64::max)
+    }
+
+    /// Height of the film that the image is on, whose width is `film_back_mm`'s.
+    pub fn film_height_mm(&self) -> f64 {
+        let image = &self.spec.image;
+        self.spec.camera.film_back_mm[0] * f64::from(image.height) / f64::from(image.width)
+    }
+
     /// That its panorama is no picture that can be used, in the words of who tried; `None` where it has none.
     pub fn panorama_fault(&self, problem: &str) -> Option<LookError> {
         let sky = self.panorama.as_ref()?;
@@ -127,7 +172,16 @@ impl Look {
         Some(LookError(SceneError::Fault(Box::new(fault))))
     }
 
-    /// BLAKE3, hex, over the content: every value with its default, and the panorama's bytes, whatever
+    /// That its method cannot draw what it is asked for, in the words of who tried.
+    pub fn method_fault(&self, problem: &str) -> LookError {
+        let fault = Fault {
+            message: problem.to_owned(),
+            ..self.method.clone()
+        };
+        LookError(SceneError::Fault(Box::new(fault)))
+    }
+
+    /// BLAKE3, hex, over the content: every value with its default, and the bytes of panorama and camera, whatever
     /// the files are called and however they are laid out.
     pub fn hash(&self) -> String {
         self.hash.clone()
@@ -171,14 +225,27 @@ impl Look {
         spec.renderer.method = method;
         spec.water.spray = None;
         spec.whitewater = None;
+        spec.camera.lens = None;
         (spec.image.samples, spec.image.shutter) = (1, 0.0);
         (spec.image.overscan, spec.image.crop) = (0, None);
         spec.output.formats = vec![FormatSpec::Exr];
         spec.output.aovs = vec![AovSpec::Z, AovSpec::N];
         spec.output.lights = Vec::new();
         spec.output.cryptomatte = false;
-        look.hash = canonical_hash(&look.spec, look.panorama());
+        look.hash = look.canonical_hash();
         look
+    }
+
+    fn canonical_hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(canonical(&self.spec).as_bytes());
+        if let Some(bytes) = self.panorama() {
+            hasher.update(blake3::hash(bytes).as_bytes());
+        }
+        if let Some(camera) = self.camera_file() {
+            hasher.update(b"camera").update(camera.hash().as_bytes());
+        }
+        hasher.finalize().to_hex().to_string()
     }
 
     /// Direction from the ground to the sun, unit length.
@@ -195,7 +262,7 @@ impl Look {
 
 /// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
 /// that it had before there was such a key.
-const NEWER: [&str; 10] = [
+const NEWER: [&str; 13] = [
     "whitewater: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
     "overscan: 0, ",
@@ -204,27 +271,28 @@ const NEWER: [&str; 10] = [
     "solids: Draw, ",
     "lights: [], ",
     "cryptomatte: false, ",
+    "lens: None, file: None, name: None, ",
+    ", focus_distance_m: None",
+    ", shutter_curve: Box, shutter_ramps: None",
     "wave_makers: None, sea: None, ",
     // Quay walls stood at these sides before others could be chosen.
     ", sides: [Wall { axis: 2, is_max: false }, Wall { axis: 2, is_max: true }], colour: None",
 ];
 
-fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
-    let mut hasher = blake3::Hasher::new();
+/// The content of a look as text, without the names of its files.
+fn canonical(spec: &LookSpec) -> String {
     // `Debug` of a float is its shortest exact text, so equal values give equal text and only they do.
     let mut canonical = spec.clone();
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
     }
-    let text = format!("{canonical:?}");
-    let text = NEWER
-        .iter()
-        .fold(text, |text, newer| text.replace(newer, ""));
-    hasher.update(text.as_bytes());
-    if let Some(bytes) = panorama {
-        hasher.update(blake3::hash(bytes).as_bytes());
+    if let Some(file) = &mut canonical.camera.file {
+        *file = Path::new("").to_owned();
     }
-    hasher.finalize().to_hex().to_string()
+    let text = format!("{canonical:?}");
+    NEWER
+        .iter()
+        .fold(text, |text, newer| text.replace(newer, ""))
 }
 
 /// The values of a table in which every key has a default.
@@ -258,12 +326,15 @@ fn check_camera(doc: &Document<'_>, spec: &LookSpec) -> Result<(), SceneError> {
     let (camera, image) = (&spec.camera, &spec.image);
     let [width, height] = camera.film_back_mm;
     let wanted = width * f64::from(image.height) / f64::from(image.width);
-    if (wanted / height - 1.0).abs() > 0.005 {
+    if (wanted / height - 1.0).abs() > SHAPE {
         let message = format!(
             "is not the shape of a {} × {} image; allowed is [{width}, {wanted:.4}]",
             image.width, image.height
         );
         return Err(doc.fault_of_plain("camera.film_back_mm", message));
+    }
+    if camera.file.is_some() {
+        return Ok(());
     }
     if camera.keyframes.is_empty() {
         let (Some(position), Some(target)) = (camera.position, camera.target) else {
@@ -276,6 +347,10 @@ fn check_camera(doc: &Document<'_>, spec: &LookSpec) -> Result<(), SceneError> {
         let path = format!("camera.keyframe[{index}]");
         if index > 0 && key.frame <= camera.keyframes[index - 1].frame {
             return Err(doc.fault_of_plain(&format!("{path}.frame"), "keyframes must ascend"));
+        }
+        if key.focus_distance_m.is_some() && camera.lens.is_none() {
+            let path = format!("{path}.focus_distance_m");
+            return Err(doc.fault_of_plain(&path, "a pinhole has no focus: add [camera.lens]"));
         }
         check_pose(doc, &path, camera, key.position, key.target)?;
     }
@@ -321,6 +396,53 @@ fn check_crop(doc: &Document<'_>, image: &ImageSpec) -> Result<(), SceneError> {
         ));
     }
     Ok(())
+}
+
+fn check_shutter(doc: &Document<'_>, image: &ImageSpec) -> Result<(), SceneError> {
+    match image.shutter_ramps {
+        Some([open, close]) if open + close > 1.0 => {
+            let problem = format!("opens for {open} and closes for {close} of the time");
+            Err(doc.fault_of("image.shutter_ramps", problem))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Reads the camera that the look `file` names.
+fn file_camera(
+    doc: &Document<'_>,
+    spec: &LookSpec,
+    file: &Path,
+    name: &Path,
+) -> Result<CameraFile, SceneError> {
+    let folder = file.parent().unwrap_or(Path::new("."));
+    let path = doc.find(folder, CAMERA_FILE, &name.to_string_lossy())?;
+    let fault =
+        |problem: String| doc.fault_of_plain(CAMERA_FILE, format!("{}: {problem}", path.display()));
+    let bytes = std::fs::read(&path).map_err(|error| {
+        let problem = format!("cannot read {}: {error}", path.display());
+        doc.fault_of(CAMERA_FILE, problem)
+    })?;
+    let beside = path.parent().unwrap_or(Path::new("."));
+    let read = |name: &str| {
+        let path = doc.reach().find(beside, Path::new(name))?;
+        std::fs::read(&path).map_err(|error| format!("cannot read {}: {error}", path.display()))
+    };
+    let camera =
+        CameraFile::read(&bytes, spec.camera.name.as_deref(), &read).map_err(
+            |error| match error.is_of_name() {
+                true => doc.fault_of_plain(CAMERA_NAME, format!("{}: {error}", path.display())),
+                false => fault(error.to_string()),
+            },
+        )?;
+    let shape = f64::from(spec.image.width) / f64::from(spec.image.height);
+    match camera.aspect_ratio() {
+        Some(aspect) if (aspect / shape - 1.0).abs() > SHAPE => Err(fault(format!(
+            "its camera has an aspect ratio of {aspect:.4}, a {} × {} image has {shape:.4}; make them the same",
+            spec.image.width, spec.image.height
+        ))),
+        _ => Ok(camera),
+    }
 }
 
 fn check_output(doc: &Document<'_>, output: &OutputSpec) -> Result<(), SceneError> {

@@ -10,7 +10,10 @@ mod whitewater;
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -24,7 +27,7 @@ use crate::{
     },
     gpu::adapter::{Context, GpuError, Needs},
     render::{
-        Attributes, Image, RenderError, RenderScene, Renderer,
+        Attributes, Image, Moment, REACH, RenderError, RenderScene, Renderer, Water, frames_around,
         image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
     },
     scene::{
@@ -81,6 +84,8 @@ pub enum Event {
         frames: usize,
         /// Frames of the cache that are left out: their particles were not kept.
         left_out: usize,
+        /// What of the look is allowed and hardly meant.
+        warnings: Vec<String>,
     },
     /// A frame is on the disk.
     Frame {
@@ -163,7 +168,9 @@ impl From<&RenderJobError> for Blame {
             RenderJobError::Look(error) => error.into(),
             RenderJobError::Gpu(error) => error.into(),
             RenderJobError::Render(RenderError::Gpu(error)) => error.into(),
-            RenderJobError::Render(RenderError::Panorama(_) | RenderError::Scene(_))
+            RenderJobError::Render(
+                RenderError::Panorama(_) | RenderError::Scene(_) | RenderError::UnderWater { .. },
+            )
             | RenderJobError::NoWater
             | RenderJobError::IsWhitewater(_)
             | RenderJobError::IntoCache { .. } => Self::Input,
@@ -235,6 +242,7 @@ pub fn render(
         size: [image.width, image.height],
         frames: frames.len(),
         left_out,
+        warnings: request.look.lints(),
     });
     let mut job = Job {
         request,
@@ -243,6 +251,7 @@ pub fn render(
         whitewater,
         scene,
         context,
+        near: BTreeMap::new(),
         kept: None,
         times: BTreeMap::new(),
     };
@@ -251,10 +260,11 @@ pub fn render(
     Ok(outcome)
 }
 
-/// A renderer's fault; that of a panorama at its place in the look.
+/// A renderer's fault; that of a panorama or of the method at its place in the look.
 fn told(error: RenderError, look: &Look) -> RenderJobError {
     let fault = match &error {
         RenderError::Panorama(problem) => look.panorama_fault(problem),
+        RenderError::UnderWater { .. } => Some(look.method_fault(&error.to_string())),
         _ => None,
     };
     fault.map_or_else(|| error.into(), RenderJobError::Look)
@@ -299,6 +309,8 @@ struct Job<'a> {
     whitewater: Option<Whitewater>,
     scene: Scene,
     context: Context,
+    /// Frames about the last one that was drawn, so that each is read once in a row of them.
+    near: BTreeMap<u32, Arc<Water>>,
     /// Of the frame before, where it can draw another.
     kept: Option<Renderer>,
     /// What passes took so far.
@@ -355,6 +367,7 @@ impl Job<'_> {
     fn frame(&mut self, frame: u32) -> Result<Done, RenderJobError> {
         let request = self.request;
         let mut attributes = attributes(&self.cache, request, frame)?;
+        attributes.cache_hash += &self.around(frame)?;
         if let Some(stream) = &self.whitewater {
             attributes.cache_hash += &format!(" {}", stream.frame_hash(frame)?);
         }
@@ -385,6 +398,33 @@ impl Job<'_> {
         Ok(Done::Rendered)
     }
 
+    /// A frame's particles, read once in a row of frames.
+    fn water(&mut self, frame: u32) -> Result<Arc<Water>, CacheError> {
+        if let Some(water) = self.near.get(&frame) {
+            return Ok(water.clone());
+        }
+        let water = Arc::new(Water::new(self.cache.read(frame)?));
+        self.near.insert(frame, water.clone());
+        Ok(water)
+    }
+
+    /// What a picture's header says of the frames around its own that it is drawn from: a hash of theirs, so that it is drawn again when
+    /// the cache has come to have more of them. Nothing where the look takes none.
+    fn around(&self, frame: u32) -> Result<String, CacheError> {
+        let reach = frames_around(&self.request.look);
+        if reach == 0 {
+            return Ok(String::new());
+        }
+        let mut hasher = blake3::Hasher::new();
+        for (side, other) in others(frame) {
+            if other.abs_diff(frame) <= reach && self.cache.has_particles(other) {
+                let hash = self.cache.frame_hash(other)?;
+                hasher.update(format!("{side} {hash}\n").as_bytes());
+            }
+        }
+        Ok(format!(" around {}", hasher.finalize().to_hex()))
+    }
+
     fn draw(&mut self, frame: u32) -> Result<Image, RenderJobError> {
         let look = &self.request.look;
         let water = self.cache.read(frame)?;
@@ -403,7 +443,23 @@ impl Job<'_> {
             Some(stream) => stream.read(frame)?,
             None => Particles::default(),
         };
-        let picture = renderer.render_with(frame, &water, &white)?;
+        let reach = frames_around(look);
+        self.near.retain(|&other, _| other.abs_diff(frame) <= reach);
+        let water = self.water(frame)?;
+        let mut found = [const { None }; 2 * REACH as usize];
+        for (side, other) in others(frame) {
+            if other.abs_diff(frame) <= reach && self.cache.has_particles(other) {
+                found[side] = Some(self.water(other)?);
+            }
+        }
+        let moment = Moment {
+            water: &water,
+            around: found.each_ref().map(Option::as_deref),
+            white: &white,
+        };
+        let picture = renderer
+            .render_moment(frame, &moment)
+            .map_err(|error| told(error, look))?;
         for (name, seconds, runs) in renderer.times() {
             let total = self.times.entry(name).or_insert((name, 0.0, 0));
             total.1 += seconds;
@@ -416,6 +472,15 @@ impl Job<'_> {
         self.kept = stands.then_some(renderer);
         Ok(picture)
     }
+}
+
+/// Frames about a frame, in the order of [`Moment::around`]: with their places there.
+fn others(frame: u32) -> impl Iterator<Item = (usize, u32)> {
+    let reach = i64::from(REACH);
+    let offsets = (-reach..=reach).filter(|&offset| offset != 0);
+    let frames = offsets.map(move |offset| u32::try_from(i64::from(frame) + offset).ok());
+    let placed = frames.enumerate();
+    placed.filter_map(|(side, frame)| Some((side, frame?)))
 }
 
 /// A scene as it stands at a frame.

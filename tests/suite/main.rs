@@ -60,6 +60,7 @@ mod reference {
 mod render {
     mod analytic;
     mod delivery;
+    mod flicker;
     mod folder;
     mod pictures;
     mod scenes;

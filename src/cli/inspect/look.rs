@@ -63,6 +63,9 @@ fn show_plan(
         image.height,
         count(image.samples.into(), "sample")
     )?;
+    for warning in look.lints() {
+        writeln!(out, "warning: {warning}")?;
+    }
     match subject {
         Subject::Nothing => writeln!(out, "for no scene: --scene adds solids and particles")?,
         Subject::Scene(scene) => writeln!(

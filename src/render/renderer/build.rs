@@ -1,7 +1,7 @@
 //! A plan from a look and a scene.
 
 use super::{
-    shade::{plan_cast, plan_shade},
+    shade::{plan_cast, plan_shade, wants_spray_aovs},
     splats::{plan_body, plan_owner, plan_owner_before_rays, plan_particles, plan_spray},
 };
 use crate::{
@@ -102,8 +102,12 @@ fn plan_ssfr(
         plan.buffer(depth, plan.extent.pixels());
     }
     let solids = plan_solids(plan, opaque, limits);
-    plan_particles(plan, particles, scene.particle_spacing, plan.radius);
-    let body = plan_body(plan);
+    let mut moving = vec!["ssfr/splat_depth", "ssfr/splat_thickness"];
+    if look.spec().water.spray.is_some() {
+        moving.push("ssfr/splat_spray");
+    }
+    plan_particles(plan, look, particles, &moving);
+    let body = plan_body(plan, scene.particle_spacing);
     let owner = match look.wants(AovSpec::Forward) {
         true => plan_owner(plan),
         false => Vec::new(),
@@ -113,9 +117,9 @@ fn plan_ssfr(
     let shade = plan_shade(plan, look, &surface);
     if !shade.aovs.is_empty() {
         let before = [solids.clone(), body.clone(), owner];
-        plan.aovs = [before.concat(), commands.clone(), shade.aovs].concat();
+        plan.aovs = [before.concat(), commands.clone(), spray.aovs, shade.aovs].concat();
     }
-    plan.sample = [solids, body, commands, spray, shade.picture].concat();
+    plan.sample = [solids, body, commands, spray.sample, shade.picture].concat();
 }
 
 /// Plans pictures by rays.
@@ -135,16 +139,25 @@ fn plan_ray(
         }
     }
     if has_drops || has_owner {
-        plan_particles(plan, particles, scene.particle_spacing, plan.radius);
+        let moving: &[&str] = if has_drops {
+            &["ssfr/splat_spray"]
+        } else {
+            &[]
+        };
+        plan_particles(plan, look, particles, moving);
     }
     let mut sample = Vec::new();
-    if has_spray {
-        sample.push(first(plan));
-        sample.extend(plan_spray(plan, look, &DEPTHS[0], &DEPTHS[1]));
-    }
     let mut before = Vec::new();
-    if has_owner {
+    if has_owner || wants_spray_aovs(look) {
         before.push(first(plan));
+    }
+    if has_spray {
+        let spray = plan_spray(plan, look, &DEPTHS[0], &DEPTHS[1]);
+        sample.push(first(plan));
+        sample.extend(spray.sample);
+        before.extend(spray.aovs);
+    }
+    if has_owner {
         before.extend(plan_owner_before_rays(plan));
     }
     let shade = plan_cast(plan, look);

@@ -2,6 +2,7 @@
 
 mod aovs;
 mod build;
+mod load;
 mod shade;
 mod splats;
 mod water;
@@ -9,25 +10,25 @@ mod whitewater;
 
 use bytemuck::Pod;
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, objects, picture};
-use super::camera::{Sample, Setting, camera, eye, pose, samples};
+use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLES, objects, picture};
+use super::camera::{Setting, camera, eye};
 use super::cryptomatte::{Covers, unique};
 use super::image::{Image, View};
 use super::plan::{Limits, Plan};
-use super::{RenderError, RenderScene, aeration, sea::Sea, uniform};
+use super::samples::{Curve, Sample, samples};
+use super::{Moment, RenderError, RenderScene, Water, sea::Sea, uniform};
 use crate::domain::particles::Particles;
 use crate::gpu::{
     adapter::Context,
     buffer::Buf,
     program::Program,
-    recording::{Recording, Timer, spread},
+    recording::{Recording, Timer},
 };
 use crate::scene::look::Look;
 use build::room;
 use shade::draws_spray;
-use water::Water;
+use water::RayWater;
 use whitewater::Whitewater;
 
 /// Renders frames of one scene with one look.
@@ -43,7 +44,7 @@ pub struct Renderer {
     /// Particles that there is room for.
     capacity: usize,
     /// `None` where the look casts no rays.
-    water: Option<Water>,
+    water: Option<RayWater>,
     /// `None` where the look has none.
     sea: Option<Sea>,
     /// `None` where the look draws none.
@@ -91,7 +92,7 @@ impl Renderer {
             plan,
             program,
             capacity: room(0),
-            water: Water::of(look),
+            water: RayWater::of(look),
             sea: Sea::of(look, scene),
             whitewater: Whitewater::of(look, scene),
             timer: None,
@@ -140,8 +141,19 @@ impl Renderer {
         particles: &Particles,
         white: &Particles,
     ) -> Result<Image, RenderError> {
-        let count = self.load(frame, particles)?;
+        let water = Water::new(particles.clone());
+        self.render_moment(frame, &Moment::alone(&water, white))
+    }
+
+    /// As [`Renderer::render_with`], with what is known of the frames around it: blur and motion then follow the particles' paths, and
+    /// what is spray does not change from frame to frame and back.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`]; [`RenderError::UnderWater`] where splats cannot draw what the camera sees.
+    pub fn render_moment(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Image, RenderError> {
+        let loaded = self.load(frame, moment)?;
         if let Some(whitewater) = &mut self.whitewater {
+            let white = moment.white;
             let grew = whitewater.load(&mut self.program, &self.scene, frame, white)?;
             if grew {
                 self.record();
@@ -150,40 +162,43 @@ impl Renderer {
         let setting = Setting {
             origin: self.scene.origin + self.scene.domain.min,
             extent: self.plan.extent,
-            particle_count: count,
+            particle_count: loaded.count,
             radius: self.plan.radius,
             frames_per_second: self.scene.frames_per_second,
         };
         self.draw_once()?;
-        let spec = self.look.spec().image.clone();
         let wants_objects = self.look.spec().output.cryptomatte;
         let mut covers = wants_objects.then(|| Covers::new(self.plan.extent.shaded()));
-        for (index, sample) in (0u32..).zip(samples(spec.samples, spec.shutter)) {
+        let spec = self.look.spec();
+        let (image, has_lens) = (&spec.image, spec.camera.lens.is_some());
+        let samples = samples(image.samples, image.shutter, Curve::of(image), has_lens);
+        for (index, sample) in (0u32..).zip(samples) {
             let camera = camera(&self.look, &setting, frame.into(), sample, index);
             self.sample(&camera, false)?;
             if let Some(covers) = &mut covers {
                 covers.add(&self.read_bands(objects, 1)?, camera.weight);
             }
         }
-        let eye = eye(&self.look, DVec3::ZERO, frame.into());
+        let rate = self.scene.frames_per_second;
+        let eye = eye(&self.look, DVec3::ZERO, frame.into(), rate);
         let mut image = Image::of(self.look.window(), eye.size);
-        image.view = Some(View::of(&eye, self.scene.frames_per_second));
+        image.view = Some(View::of(&eye, rate));
         image.exr_space = self.look.spec().output.colour_space;
         if !self.plan.aovs.is_empty() {
-            // Depths and normals have no mean: they are taken at pixel centres, at the frame's instant.
-            let still = Sample {
-                jitter: [0.0; 2],
-                instant: 0.0,
-                weight: 1.0,
-            };
-            let next = camera(&self.look, &setting, f64::from(frame) + 1.0, still, 0);
+            // Depths and normals have no mean: they are taken at pixel centres, at the frame's instant, by a pinhole.
+            let next = f64::from(frame) + 1.0;
+            let next = camera(&self.look, &setting, next, Sample::STILL, 0);
             self.program.upload(NEXT_CAMERA, 0, &[next]);
-            let camera = camera(&self.look, &setting, frame.into(), still, 0);
+            if !loaded.ahead.is_empty() {
+                self.program.upload(PARTICLES, 0, &loaded.ahead);
+            }
+            let camera = camera(&self.look, &setting, frame.into(), Sample::STILL, 0);
             self.sample(&camera, true)?;
             image.aovs = self.read_aovs()?;
         }
         image.matte = covers.map(|covers| {
-            let has_walls = self.look.spec().basin.is_some();
+            let spec = self.look.spec();
+            let has_walls = spec.basin.is_some() || spec.wave_makers.is_some();
             covers.matte(&self.solids, has_walls, draws_spray(&self.look))
         });
         self.read_picture(&mut image)?;
@@ -218,65 +233,6 @@ impl Renderer {
             pixels.extend(self.program.read(of(band), width * rows as usize)?);
         }
         Ok(pixels)
-    }
-
-    /// Moves a frame's particles to the device, relative to the domain's least corner.
-    fn load(&mut self, frame: u32, particles: &Particles) -> Result<u32, RenderError> {
-        let origin = self.scene.domain.min;
-        let mut packed = Vec::with_capacity(particles.len());
-        for (index, (p, v)) in particles
-            .position
-            .iter()
-            .zip(&particles.velocity)
-            .enumerate()
-        {
-            if !p.iter().chain(v).all(|x| x.is_finite()) {
-                return Err(RenderError::NotFinite { index, frame });
-            }
-            let position = [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32);
-            packed.push(uniform::Particle {
-                position,
-                aeration: 0.0,
-                velocity: *v,
-                tag: particles.id.get(index).map_or(index as u32, |&id| id) << 1 | 1,
-            });
-        }
-        if let Some(spray) = &self.look.spec().water.spray {
-            aeration::classify(&mut packed, self.scene.particle_spacing as f32, spray);
-        }
-        if let Some(water) = &mut self.water {
-            water.take(&packed);
-        }
-        if let Some(sea) = &mut self.sea {
-            sea.take(&packed);
-        }
-        if !self.program.has(PARTICLES.name()) {
-            return Ok(packed.len() as u32);
-        }
-        // Front to back, so that splats find what hides them already there.
-        let eye = pose(&self.look.spec().camera, frame.into());
-        let forward = (eye.target - eye.position).normalize().as_vec3();
-        packed.par_sort_unstable_by(|a, b| {
-            let depth = |p: &uniform::Particle| glam::Vec3::from(p.position).dot(forward);
-            depth(a).total_cmp(&depth(b)).then(a.tag.cmp(&b.tag))
-        });
-        self.reserve(packed.len())?;
-        let groups = spread(&self.program.context, 1, packed.len() as u64);
-        self.program.upload(PARTICLE_GROUPS, 0, &[groups.into()]);
-        self.program.upload(PARTICLES, 0, &packed);
-        Ok(packed.len() as u32)
-    }
-
-    /// Makes room for so many particles.
-    fn reserve(&mut self, particles: usize) -> Result<(), RenderError> {
-        if particles <= self.capacity {
-            return Ok(());
-        }
-        let capacity = room(particles);
-        self.program.refit(&[PARTICLES.sized(capacity)], &[])?;
-        self.capacity = capacity;
-        self.record();
-        Ok(())
     }
 
     /// Binds every command to the buffers as they are now.

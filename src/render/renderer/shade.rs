@@ -126,10 +126,19 @@ pub(super) fn draws_spray(look: &Look) -> bool {
     look.spec().water.spray.is_some() || look.spec().whitewater.is_some()
 }
 
+/// Whether a channel beside the picture is that of spray, where it hides what is behind.
+pub(super) fn wants_spray_aovs(look: &Look) -> bool {
+    let mut shown = [AovSpec::Z, AovSpec::P, AovSpec::Forward].into_iter();
+    draws_spray(look) && shown.any(|aov| look.wants(aov))
+}
+
 /// Plans the shading of what was splatted; `surface` is where the smoothed depth stands.
 pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
     plan_output(plan, look, "ssfr/shade");
     plan.define("ssfr/shade_aovs", "AOVS");
+    if wants_spray_aovs(look) {
+        plan.define("ssfr/shade_aovs", "SPRAY");
+    }
     // Without `forward` no one is asked for, and any buffer of words stands in.
     let owner = match look.wants(AovSpec::Forward) {
         true => OWNER,
@@ -152,6 +161,9 @@ pub(super) fn plan_cast(plan: &mut Plan, look: &Look) -> Shade {
     plan_output(plan, look, "rays/cast");
     if look.wants(AovSpec::Forward) {
         plan.define("rays/aovs", "FORWARD");
+    }
+    if wants_spray_aovs(look) {
+        plan.define("rays/aovs", "SPRAY");
     }
     let picture = || {
         let surface = Bind::whole("surface", &DEPTHS[0]);

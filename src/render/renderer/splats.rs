@@ -1,5 +1,6 @@
 //! What splats particles into the frame.
 
+use super::shade::{draws_spray, wants_spray_aovs};
 use crate::{
     gpu::{
         buffer::Buf,
@@ -7,8 +8,8 @@ use crate::{
     },
     render::{
         buffers::{
-            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, SPRAY, THICKNESS, THICKNESS_PARAMS,
-            WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS,
+            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, PATHS, SPRAY, SPRAY_PARAMS, THICKNESS,
+            THICKNESS_PARAMS, WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS,
         },
         frame::FAR,
         plan::Plan,
@@ -22,21 +23,36 @@ fn over_particles(pass: &'static str, binds: Vec<Bind>) -> Command {
     Command::in_groups(pass, Groups::at(&PARTICLE_GROUPS, 0), binds)
 }
 
-/// Plans `particles` particles of a spacing and a splat radius, metres.
-pub(super) fn plan_particles(plan: &mut Plan, particles: usize, spacing: f64, radius: f64) {
-    let volume = spacing.powi(3) / (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3));
-    let scale = Thickness {
-        scale: volume as f32,
-        ..Thickness::default()
-    };
+/// Plans `particles` particles. Where the shutter is open `moving` passes, which draw samples, take them along their paths.
+pub(super) fn plan_particles(
+    plan: &mut Plan,
+    look: &Look,
+    particles: usize,
+    moving: &[&'static str],
+) {
     plan.buffer(&PARTICLES, particles);
     plan.buffer(&PARTICLE_GROUPS, 1);
-    plan.values(&THICKNESS_PARAMS, &[scale]);
+    if look.spec().image.shutter > 0.0 && !moving.is_empty() {
+        plan.buffer(&PATHS, particles);
+        for pass in moving {
+            plan.define(pass, "PATHS");
+        }
+    }
 }
 
-/// Plans depth and thickness.
-pub(super) fn plan_body(plan: &mut Plan) -> Vec<Command> {
+/// The volume that a particle of a spacing stands for over that of its sphere.
+pub(super) fn filled(spacing: f64, radius: f64) -> f64 {
+    spacing.powi(3) / (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3))
+}
+
+/// Plans depth and thickness of particles of a spacing, metres.
+pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
     let pixels = plan.extent.pixels();
+    let scale = Thickness {
+        scale: filled(spacing, plan.radius) as f32,
+        ..Thickness::default()
+    };
+    plan.values(&THICKNESS_PARAMS, &[scale]);
     plan.buffer(&THICKNESS, pixels / 4);
     let params = Bind::whole("params", &THICKNESS_PARAMS);
     vec![
@@ -68,6 +84,18 @@ pub(super) fn plan_owner_before_rays(plan: &mut Plan) -> Vec<Command> {
     [depth, plan_owner(plan)].concat()
 }
 
+/// Words of a half-resolution cell of spray: length and depth, and for the channels beside the picture velocity.
+const PLANES: usize = 2;
+const PLANES_WITH_MOTION: usize = 5;
+
+/// What splats spray, for a sample and for the channels beside the picture.
+#[derive(Default)]
+pub(super) struct Spray {
+    pub(super) sample: Vec<Command>,
+    /// Nothing where these show none.
+    pub(super) aovs: Vec<Command>,
+}
+
 /// Plans aerated water and whitewater before the surface, whose depth stands in `surface`, and before what is opaque; nothing
 /// where the look has none.
 pub(super) fn plan_spray(
@@ -75,33 +103,44 @@ pub(super) fn plan_spray(
     look: &Look,
     surface: &Buf<f32>,
     opaque: &Buf<f32>,
-) -> Vec<Command> {
-    let pixels = plan.extent.pixels();
-    let mut spray = Vec::new();
-    let (drawn, white) = (&look.spec().water.spray, &look.spec().whitewater);
-    if drawn.is_some() || white.is_some() {
-        plan.buffer(&SPRAY, pixels / 4);
-        spray.push(Command::clear(&SPRAY));
+) -> Spray {
+    if !draws_spray(look) {
+        return Spray::default();
     }
-    let before = || {
-        let surface = Bind::whole("surface", surface);
-        vec![surface, Bind::whole("solid_depth", opaque)]
-    };
-    if drawn.is_some() {
-        let params = Bind::whole("params", &THICKNESS_PARAMS);
-        let binds = [before(), vec![params]].concat();
-        spray.push(over_particles("ssfr/splat_spray", binds));
-    }
-    if white.is_some() {
+    let has_aovs = wants_spray_aovs(look);
+    let planes = if has_aovs { PLANES_WITH_MOTION } else { PLANES };
+    plan.buffer(&SPRAY, planes * plan.extent.pixels() / 4);
+    plan.buffer(&SPRAY_PARAMS, 1);
+    let spec = look.spec();
+    let (has_drops, has_white) = (spec.water.spray.is_some(), spec.whitewater.is_some());
+    if has_white {
         plan.buffer(&WHITEWATER, 1);
         plan.buffer(&WHITEWATER_PARAMS, 1);
         plan.buffer(&WHITEWATER_GROUPS, 1);
-        let groups = Groups::at(&WHITEWATER_GROUPS, 0);
-        spray.push(Command::in_groups(
-            "ssfr/splat_whitewater",
-            groups,
-            before(),
-        ));
     }
-    spray
+    let commands = |drops: &'static str, white: &'static str| {
+        let before = || {
+            let surface = Bind::whole("surface", surface);
+            vec![surface, Bind::whole("solid_depth", opaque)]
+        };
+        let mut commands = vec![Command::clear(&SPRAY)];
+        if has_drops {
+            commands.push(over_particles(drops, before()));
+        }
+        if has_white {
+            let groups = Groups::at(&WHITEWATER_GROUPS, 0);
+            commands.push(Command::in_groups(white, groups, before()));
+        }
+        commands
+    };
+    let sample = commands("ssfr/splat_spray", "ssfr/splat_whitewater");
+    let mut aovs = Vec::new();
+    if has_aovs {
+        let passes = ["ssfr/splat_spray_aovs", "ssfr/splat_whitewater_aovs"];
+        aovs = commands(passes[0], passes[1]);
+        for pass in passes {
+            plan.define(pass, "MOTION");
+        }
+    }
+    Spray { sample, aovs }
 }

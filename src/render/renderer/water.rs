@@ -8,6 +8,7 @@ use crate::{
     render::{
         RenderError, RenderScene,
         buffers::{LEVEL_TABLE, LEVEL_VALUES, SUN_PATHS},
+        paths::{Path, body_of},
         rays::{level_set, sun_in_water},
         uniform::Particle,
     },
@@ -15,9 +16,9 @@ use crate::{
 };
 
 /// A frame's particles, and the level set of them that the device holds.
-pub(super) struct Water {
-    /// Where the body's particles are and how fast they go.
-    places: Vec<(Vec3, Vec3)>,
+pub(super) struct RayWater {
+    /// Where the body's particles are and how they go.
+    places: Vec<(Vec3, Path)>,
     /// Seconds from the frame at which the level set on the device stands; `None` before there is one of this frame.
     seconds: Option<f32>,
     /// Values that there is room for.
@@ -25,7 +26,7 @@ pub(super) struct Water {
     sun: DVec3,
 }
 
-impl Water {
+impl RayWater {
     /// `None` where the look casts no rays.
     pub(super) fn of(look: &Look) -> Option<Self> {
         (look.spec().renderer.method == MethodSpec::Ray).then(|| Self {
@@ -36,12 +37,9 @@ impl Water {
         })
     }
 
-    /// Takes a frame's particles: those that belong to the body.
-    pub(super) fn take(&mut self, particles: &[Particle]) {
-        let body = particles.iter().filter(|particle| particle.tag & 1 == 1);
-        self.places = body
-            .map(|particle| (particle.position.into(), particle.velocity.into()))
-            .collect();
+    /// Takes a frame's particles, those that belong to the body; without `paths` they go straight on.
+    pub(super) fn take(&mut self, particles: &[Particle], paths: &[Path]) {
+        self.places = body_of(particles, paths);
         self.seconds = None;
     }
 
@@ -55,7 +53,7 @@ impl Water {
         if self.seconds == Some(seconds) {
             return Ok(false);
         }
-        let level = level_set(scene, &self.places, seconds.into());
+        let level = level_set(scene, &self.places, seconds);
         let light = Sunlight::new(&level, self.sun);
         let grew = level.values.len() > self.capacity;
         if grew {

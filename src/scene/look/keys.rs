@@ -4,7 +4,7 @@ use super::super::key::{Interval, Key};
 
 pub(in super::super) const KEYS: &[Key] = &[
     Key::table("camera", CAMERA)
-        .about("Where the picture is taken from: a pinhole camera, still or keyframed"),
+        .about("Where the picture is taken from: a camera, still, keyframed or from a glTF file"),
     Key::table("image", IMAGE)
         .default("{}")
         .about("Size and sampling"),
@@ -64,6 +64,7 @@ const DEGREES: Interval = -360.0..=360.0;
 const CAMERA: &[Key] = &[
     Key::number("focal_length_mm", FOCAL_LENGTH)
         .unit("mm")
+        .without(&["file"])
         .about("focal length"),
     Key::vector("film_back_mm", 2, 1.0..=500.0)
         .unit("mm")
@@ -73,19 +74,43 @@ const CAMERA: &[Key] = &[
     Key::vector("position", 3, PLACE)
         .unit("metres")
         .absent()
-        .without(&["keyframe"])
+        .without(&["keyframe", "file"])
         .about("where it stands, with `target`"),
     Key::vector("target", 3, PLACE)
         .unit("metres")
         .absent()
-        .without(&["keyframe"])
+        .without(&["keyframe", "file"])
         .about("what it looks at"),
     Key::vector("up", 3, -1.0..=1.0)
         .default("[0.0, 1.0, 0.0]")
+        .without(&["file"])
         .also(", neither zero nor along the line of sight")
         .about("direction that stands upright in the picture"),
+    Key::table("lens", LENS)
+        .absent()
+        .about("A thin lens in place of the pinhole: depth of field"),
+    Key::text("file", "a glTF file (.glb, .gltf), relative to the look file")
+        .absent()
+        .about(
+            "camera from a file, animated, instead of `position`, `target` and `focal_length_mm`; frame k is at k / fps seconds",
+        ),
+    Key::text("name", "the name of a camera's node, or of a camera, in `file`")
+        .absent()
+        .with("file")
+        .about("which of its cameras; may be left out where there is one"),
     Key::tables("keyframe", KEYFRAME)
+        .without(&["file"])
         .about("Poses at frames, in ascending order, instead of position and target"),
+];
+
+/// Metres from the lens to what is sharp.
+const FOCUS: Interval = 1e-3..=1e5;
+
+const LENS: &[Key] = &[
+    Key::number("f_stop", 0.1..=1000.0).about("focal length over the aperture's diameter"),
+    Key::number("focus_distance_m", FOCUS)
+        .unit("metres")
+        .about("to the plane that is sharp, along the optical axis"),
 ];
 
 const KEYFRAME: &[Key] = &[
@@ -102,6 +127,11 @@ const KEYFRAME: &[Key] = &[
         .unit("mm")
         .computed(|| "the camera's own".to_owned())
         .about("focal length"),
+    Key::number("focus_distance_m", FOCUS)
+        .unit("metres")
+        .computed(|| "the lens's own".to_owned())
+        .also(", with [camera.lens]")
+        .about("to the plane that is sharp"),
 ];
 
 const IMAGE: &[Key] = &[
@@ -132,6 +162,15 @@ const IMAGE: &[Key] = &[
         .unit("of a frame")
         .default("0.0")
         .about("how long the shutter is open, centred on the frame; 0 is no motion blur"),
+    Key::choice("shutter_curve", &["box", "triangle", "trapezoid"])
+        .default("\"box\"")
+        .about("how far it is open over that time: at once, steadily up and down, or with ramps"),
+    Key::vector("shutter_ramps", 2, PART)
+        .unit("of the open time")
+        .only("shutter_curve", &["trapezoid"])
+        .default("[0.25, 0.25]")
+        .also(", at most 1 together")
+        .about("how long it takes to open and to close"),
 ];
 
 const RENDERER: &[Key] = &[Key::choice("method", &["ssfr", "ray"])

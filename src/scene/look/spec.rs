@@ -42,11 +42,12 @@ pub struct LookSpec {
     pub output: OutputSpec,
 }
 
-/// A pinhole camera in millimetres, still or keyframed.
+/// A camera in millimetres, still, keyframed or from a file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraSpec {
-    /// mm.
+    /// mm; 0 of a camera from a file, which has its own.
+    #[serde(default)]
     pub focal_length_mm: f64,
     /// Width and height of the exposed film, mm; its shape must be the image's.
     pub film_back_mm: [f64; 2],
@@ -54,11 +55,28 @@ pub struct CameraSpec {
     pub position: Option<[f64; 3]>,
     /// World metres.
     pub target: Option<[f64; 3]>,
-    /// Direction that stands upright in the picture.
+    /// Direction that stands upright in the picture; nothing of a camera from a file.
+    #[serde(default)]
     pub up: [f64; 3],
+    /// A thin lens; a pinhole unless named.
+    pub lens: Option<LensSpec>,
+    /// glTF file with the camera, relative to the look file.
+    pub file: Option<PathBuf>,
+    /// Of the camera in it.
+    pub name: Option<String>,
     /// Poses at frames, in ascending order.
     #[serde(default, rename = "keyframe")]
     pub keyframes: Vec<KeyframeSpec>,
+}
+
+/// A thin lens.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LensSpec {
+    /// Focal length over the aperture's diameter.
+    pub f_stop: f64,
+    /// To the plane that is sharp, along the optical axis, metres.
+    pub focus_distance_m: f64,
 }
 
 /// The camera at one frame.
@@ -73,6 +91,8 @@ pub struct KeyframeSpec {
     pub target: [f64; 3],
     /// mm; the camera's own where left out.
     pub focal_length_mm: Option<f64>,
+    /// Metres; the lens's own where left out.
+    pub focus_distance_m: Option<f64>,
 }
 
 /// Size and sampling of the picture.
@@ -91,6 +111,22 @@ pub struct ImageSpec {
     pub samples: u32,
     /// Fraction of a frame for which the shutter is open, centred on the frame; 0 = no motion blur.
     pub shutter: f64,
+    /// How far it is open over that time.
+    pub shutter_curve: CurveSpec,
+    /// Shares of that time in which a trapezoid's shutter opens and closes.
+    pub shutter_ramps: Option<[f64; 2]>,
+}
+
+/// How far a shutter is open while it is.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum CurveSpec {
+    /// Wholly, all the time.
+    Box,
+    /// Steadily more up to the middle, and less after it.
+    Triangle,
+    /// Steadily more while it opens, then wholly, then steadily less.
+    Trapezoid,
 }
 
 /// How the water is drawn.

@@ -7,7 +7,7 @@ use std::path::Path;
 use proptest::prelude::*;
 
 use super::super::{Place, SceneError};
-use super::{Look, LookError};
+use super::{Look, LookError, camera_file, canonical};
 
 const PLAIN: &str = "[camera]
 focal_length_mm = 35.0
@@ -194,6 +194,13 @@ fn every_number_of_a_look_has_a_range() {
         ("camera", "target", "[10.0, {}, 0.0]"),
         ("camera", "up", "[0.0, {}, 0.0]"),
         ("image", "shutter", "{}"),
+        (
+            "image",
+            "shutter_ramps",
+            "[{}, 0.1]\nshutter_curve = \"trapezoid\"",
+        ),
+        ("camera.lens", "f_stop", "{}\nfocus_distance_m = 1.0"),
+        ("camera.lens", "focus_distance_m", "{}\nf_stop = 1.0"),
         ("surface", "radius_m", "{}"),
         ("surface", "smoothing_width_m", "{}"),
         ("surface", "roughness", "{}"),
@@ -387,6 +394,160 @@ fn layers_of_an_exr_need_one() {
         key.starts_with("output.lights") && message.contains("the nearest is \"sun\""),
         "{key}: {message}"
     );
+}
+
+#[test]
+fn what_a_look_does_not_name_is_not_in_its_hash() {
+    let look = |text: &str| Look::parse(text, Path::new("a.toml")).unwrap();
+    let text = canonical(look(PLAIN).spec());
+    for word in ["lens", "file", "name", "shutter_", "focus"] {
+        assert!(!text.contains(word), "{word}: {text}");
+    }
+    let keyed = PLAIN.replace(POSE, "")
+        + "[[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\n";
+    assert!(!canonical(look(&keyed).spec()).contains("focus"));
+    // The controls: named, each is.
+    let lens = "[camera]\nlens = { f_stop = 2.0, focus_distance_m = 6.0 }\n";
+    let triangle = "[image]\nshutter_curve = \"triangle\"\n";
+    let hash = |text: &str| look(text).hash();
+    let plain = hash(PLAIN);
+    assert_ne!(plain, hash(&PLAIN.replace("[camera]\n", lens)));
+    assert_ne!(plain, hash(&PLAIN.replace("[image]\n", triangle)));
+    let named = "[image]\nshutter_curve = \"box\"\n";
+    assert_eq!(plain, hash(&PLAIN.replace("[image]\n", named)));
+}
+
+const LENS: &str = "[camera]\nlens = { f_stop = 2.0, focus_distance_m = 6.0 }\n";
+
+#[test]
+fn ramps_and_focus_go_with_what_they_are_of() {
+    let ramps = "[image]\nshutter_curve = \"trapezoid\"\nshutter_ramps = [0.6, 0.5]\n";
+    let (_, key, message) = fault(&PLAIN.replace("[image]\n", ramps));
+    assert_eq!(key, "image.shutter_ramps");
+    assert!(message.contains("at most 1 together"), "{message}");
+    let (_, key, _) = fault(&PLAIN.replace("[image]\n", "[image]\nshutter_ramps = [0.1, 0.1]\n"));
+    assert_eq!(key, "image.shutter_ramps");
+    let keyed = PLAIN.replace(POSE, "")
+        + "[[camera.keyframe]]\nframe = 5\nposition = [0, 3, 0]\ntarget = [9, 1, 0]\nfocus_distance_m = 3.0\n";
+    let (_, key, message) = fault(&keyed);
+    assert_eq!(key, "camera.keyframe[0].focus_distance_m");
+    assert!(message.contains("[camera.lens]"), "{message}");
+    Look::parse(&keyed.replace("[camera]\n", LENS), Path::new("a.toml")).unwrap();
+}
+
+/// A lens of f/2 at 35 mm, focused at 6 m, draws infinity as 35/36 · 64 · 0.0175 / 6 = 0.18 pixels; at 3840 pixels it is 10.9, an area
+/// of 93.2.
+#[test]
+fn a_lens_with_too_few_samples_is_said() {
+    let text = PLAIN.replace("[camera]\n", LENS);
+    let lints = |text: &str| Look::parse(text, Path::new("a.toml")).unwrap().lints();
+    assert!(lints(PLAIN).is_empty() && lints(&text).is_empty());
+    let large = text
+        .replace("width = 64", "width = 3840")
+        .replace("height = 36", "height = 2160");
+    let said = lints(&large);
+    assert_eq!(said.len(), 1);
+    assert!(
+        said[0].contains("10.9 pixels") && said[0].contains("from 94 on"),
+        "{said:?}"
+    );
+    let many = large.replace("[image]\n", "[image]\nsamples = 94\n");
+    assert!(lints(&many).is_empty());
+    let many = large.replace("[image]\n", "[image]\nsamples = 93\n");
+    assert_eq!(lints(&many).len(), 1);
+}
+
+fn shot(nodes: serde_json::Value) -> Vec<u8> {
+    let document = serde_json::json!({
+        "asset": { "version": "2.0" }, "nodes": nodes,
+        "cameras": [{ "type": "perspective",
+                      "perspective": { "yfov": 0.5, "znear": 0.1, "aspectRatio": 16.0 / 9.0 } }],
+    });
+    camera_file::tests::glb(&document, &[])
+}
+
+/// A camera's file is found beside its look and no farther, its bytes count in the hash, and it takes the place of other poses.
+#[test]
+fn a_camera_from_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("looks/shot.glb");
+    std::fs::create_dir(folder.path().join("looks")).unwrap();
+    let one = shot(serde_json::json!([{ "name": "a", "camera": 0, "translation": [0, 3, 0] }]));
+    std::fs::write(&file, &one).unwrap();
+    std::fs::write(folder.path().join("out.glb"), &one).unwrap();
+    let text = PLAIN
+        .replace(POSE, "file = \"shot.glb\"\n")
+        .replace("focal_length_mm = 35.0\n", "");
+    let at = folder.path().join("looks/look.toml");
+    let look = |text: &str| Look::parse(text, &at);
+    let told = |text: &str| match look(text) {
+        Err(LookError(SceneError::Fault(fault))) => (fault.key, fault.message),
+        other => panic!("expected a fault, got {other:?}"),
+    };
+    let first = look(&text).unwrap();
+    assert_eq!(first.camera_file().unwrap().at(0.0).position.y, 3.0);
+    std::fs::write(folder.path().join("looks/other.glb"), &one).unwrap();
+    let renamed = look(&text.replace("shot", "other")).unwrap();
+    assert_eq!(first.hash(), renamed.hash());
+    let moved = shot(serde_json::json!([{ "name": "a", "camera": 0, "translation": [0, 4, 0] }]));
+    std::fs::write(&file, &moved).unwrap();
+    assert_ne!(first.hash(), look(&text).unwrap().hash());
+    for (from, to, key, words) in [
+        ("shot.glb", "none.glb", "camera.file", "cannot read"),
+        ("shot.glb", "../out.glb", "camera.file", "--allow-outside"),
+        (
+            "file = \"shot.glb\"",
+            "file = \"shot.glb\"\nname = \"b\"",
+            "camera.name",
+            "there are a",
+        ),
+        (
+            "file = \"shot.glb\"\n",
+            "name = \"a\"\n",
+            "camera.name",
+            "given without file",
+        ),
+        (
+            "[camera]\n",
+            "[camera]\nfocal_length_mm = 35.0\n",
+            "camera.focal_length_mm",
+            "together with file",
+        ),
+        (
+            "[camera]\n",
+            &format!("[camera]\n{POSE}"),
+            "camera.position",
+            "together with file",
+        ),
+        (
+            "height = 36",
+            "height = 64\n",
+            "camera.film_back_mm",
+            "is not the shape",
+        ),
+        (
+            "[camera]\n",
+            "[camera]\nfilm_back_mm = [36.0, 36.0]\n",
+            "camera.film_back_mm",
+            "is not the shape",
+        ),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let (found, message) = told(&text.replace(from, to));
+        assert_eq!(found, key, "{to}: {message}");
+        assert!(message.contains(words), "{to}: {message}");
+    }
+    // A square image with square film, of a wide camera.
+    let square = text
+        .replace("height = 36", "height = 64")
+        .replace("[camera]\n", "[camera]\nfilm_back_mm = [36.0, 36.0]\n");
+    let (key, message) = told(&square);
+    assert_eq!(key, "camera.file");
+    assert!(message.contains("aspect ratio of 1.7778"), "{message}");
+    std::fs::write(&file, &one[..one.len() / 2]).unwrap();
+    let (key, message) = told(&text);
+    assert_eq!(key, "camera.file");
+    assert!(message.contains("no glTF file"), "{message}");
 }
 
 #[test]

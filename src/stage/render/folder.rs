@@ -382,12 +382,20 @@ fn stranger(file: &Path, is_wanted: bool, wanted: &Wanted<'_>) -> Option<String>
         Ok(Some(_)) => return is_wanted.then(|| "a picture of another program".to_owned()),
         Err(_) => return is_wanted.then(|| "no picture that can be read".to_owned()),
     };
-    let cache = (wanted.frame_hash)(found.frame).unwrap_or_else(|| found.cache_hash.clone());
+    let cache = (wanted.frame_hash)(found.frame);
+    let mut found = owner_of(found);
+    if let Some(frame) = &cache {
+        // Behind its frame's hash stand those of what else it was drawn from: other ones are drawn anew, not refused.
+        let rest = found.cache.strip_prefix(frame.as_str());
+        if rest.is_some_and(|rest| rest.starts_with(' ')) {
+            found.cache.clone_from(frame);
+        }
+    }
     let expected = Owner {
-        cache,
+        cache: cache.unwrap_or_else(|| found.cache.clone()),
         ..wanted.owner.clone()
     };
-    let what = owner_of(found).difference(&expected)?;
+    let what = found.difference(&expected)?;
     Some(format!("of another {what}"))
 }
 

@@ -158,7 +158,12 @@ fn truth(
     let field = kernels.field();
     let is_outside = |p: &&DVec3| field.value(**p) <= 0.0;
     let outside = places.par_iter().filter(is_outside).count();
-    let eye = eye(look, set.origin + corner, frame.into());
+    let eye = eye(
+        look,
+        set.origin + corner,
+        frame.into(),
+        set.frames_per_second,
+    );
     let opaque = opaque(look, set)?;
     let seen = cast(&eye, &kernels, (size, set.particle_spacing), &opaque);
     Ok((seen, outside))

@@ -131,8 +131,8 @@ fn surfaces_in_pictures_are_held_against_rays_in_f64() {
     let job = job(&["edit"]);
     job.edit(
         "edit/rays/aovs.wgsl",
-        "store(out, found.t / along, normal",
-        "store(out, 1.1 * found.t / along, normal",
+        "store_under(over, out, found.t / along, normal",
+        "store_under(over, out, 1.1 * found.t / along, normal",
     );
     job.expect(0, "bake small.toml --frames 1-2 -o cache");
     let check = "check cache --render --look look.toml";

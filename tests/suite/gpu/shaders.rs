@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 31] = [
+const VARIANTS: [&[&str]; 35] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -58,6 +58,10 @@ const VARIANTS: [&[&str]; 31] = [
     &["SEA", "PALETTE", "SPRAY", "LIGHTS"],
     &["SEA", "PALETTE", "SPRAY", "OBJECTS"],
     &["PALETTE"],
+    &["PATHS"],
+    &["PATHS", "MOTION"],
+    &["AOVS", "SPRAY"],
+    &["FORWARD", "SPRAY"],
 ];
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them.

@@ -5,10 +5,13 @@
 //! the lens that its surface, its normal and its thickness are those of a sphere.
 
 mod geometry;
+mod lens;
 mod light;
+mod motion;
 mod rays;
 mod ripples;
 mod sea;
+mod spray;
 pub(super) mod support;
 mod surface;
 mod water;

@@ -16,11 +16,11 @@ const CLEAR: [f64; 3] = [0.0; 3];
 /// Of particles, metres.
 pub(super) const SPACING: f64 = 0.25;
 /// Of the pool, metres.
-pub(super) const LEVEL: f64 = 2.0;
+pub(crate) const LEVEL: f64 = 2.0;
 pub(super) const SIDE: f64 = 10.0;
 
 /// A pool that fills a box of 10 m up to [`LEVEL`].
-pub(super) fn water() -> Particles {
+pub(crate) fn water() -> Particles {
     let [n, layers] = [SIDE / SPACING, LEVEL / SPACING].map(|n| n as usize);
     let place = |k: usize| (k as f32 + 0.5) * SPACING as f32;
     let position: Vec<[f32; 3]> = (0..n * n * layers)
@@ -34,7 +34,7 @@ pub(super) fn water() -> Particles {
     }
 }
 
-pub(super) fn pool_scene() -> RenderScene {
+pub(crate) fn pool_scene() -> RenderScene {
     RenderScene {
         particle_spacing: SPACING,
         ..scene(1.0, 1.0)

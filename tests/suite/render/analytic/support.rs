@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
 use swell::gpu::adapter::{Context, Spoil};
-use swell::render::{Image, RenderScene, Renderer};
+use swell::render::{Image, Moment, RenderError, RenderScene, Renderer, Water};
 use swell::scene::look::Look;
 use wgpu::util::DeviceExt;
 
@@ -54,9 +54,9 @@ impl Eye {
     }
 
     /// The look's table of this camera, standing still.
-    fn table(&self) -> String {
+    fn table(&self, lines: &str) -> String {
         format!(
-            "[camera]\nfocal_length_mm = {:?}\nfilm_back_mm = [{FILM:?}, {FILM:?}]\nup = {:?}\n\
+            "[camera]\n{lines}focal_length_mm = {:?}\nfilm_back_mm = [{FILM:?}, {FILM:?}]\nup = {:?}\n\
              position = {:?}\ntarget = {:?}\n",
             self.focal_length_mm(),
             self.up.to_array(),
@@ -119,6 +119,9 @@ pub(crate) struct Setup {
     pub(crate) next: Option<Eye>,
     pub(crate) samples: u32,
     pub(crate) shutter: f64,
+    /// Further lines of `[camera]` and `[image]`.
+    pub(crate) camera: String,
+    pub(crate) image: String,
     /// Of the renderer.
     pub(crate) method: &'static str,
     /// Lines of `[surface]` and `[water]`.
@@ -147,6 +150,8 @@ impl Setup {
             next: None,
             samples: 1,
             shutter: 0.0,
+            camera: String::new(),
+            image: String::new(),
             method: "ssfr",
             surface: "smoothing_width_m = 0.0\n".to_owned(),
             water: String::new(),
@@ -164,19 +169,20 @@ impl Setup {
     fn text(&self) -> String {
         let camera = match &self.next {
             Some(next) => self.eye.moving_table(next),
-            None => self.eye.table(),
+            None => self.eye.table(&self.camera),
         };
         let side = self.eye.size;
         let [azimuth, elevation, intensity] = self.sun;
         format!(
             "{camera}[image]\nwidth = {side}\nheight = {side}\nsamples = {}\nshutter = {:?}\n\
-             [renderer]\nmethod = \"{}\"\n[surface]\n{}[water]\n{}[sun]\nazimuth_degrees = {azimuth:?}\n\
+             {}[renderer]\nmethod = \"{}\"\n[surface]\n{}[water]\n{}[sun]\nazimuth_degrees = {azimuth:?}\n\
              elevation_degrees = {elevation:?}\nintensity = {intensity:?}\n[sky]\n{}\
              [ground]\ncolour = {:?}\nvariation = 0.0\nhaze_m = {:?}\n[solids]\ncolour = {:?}\n\
              [output]\nformats = [\"exr\"]\nbackground = {}\n\
              aovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n{}{}",
             self.samples,
             self.shutter,
+            self.image,
             self.method,
             self.surface,
             self.water,
@@ -201,11 +207,26 @@ pub(crate) fn draw(
     water: &Particles,
     frame: u32,
 ) -> Image {
+    let water = Water::new(water.clone());
+    let white = Particles::default();
+    let moment = Moment::alone(&water, &white);
+    draw_moment(context, setup, sky, scene, &moment, frame).unwrap()
+}
+
+/// As [`draw`], of a frame with what is around it.
+pub(crate) fn draw_moment(
+    context: &Context,
+    setup: &Setup,
+    sky: &dyn Fn(DVec3, DVec2) -> [f64; 3],
+    scene: &RenderScene,
+    moment: &Moment<'_>,
+    frame: u32,
+) -> Result<Image, RenderError> {
     let folder = tempfile::tempdir().unwrap();
     write_sky(&folder.path().join("sky.exr"), sky);
     let look = Look::parse(&setup.text(), &folder.path().join("look.toml")).unwrap();
     let mut renderer = Renderer::new(context, &look, scene).unwrap();
-    renderer.render(frame, water).unwrap()
+    renderer.render_moment(frame, moment)
 }
 
 /// Texels around the horizon; half as many from zenith to nadir. Their (u, v) are exact in half precision.

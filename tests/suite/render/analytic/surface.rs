@@ -164,8 +164,8 @@ fn spray_sums(context: &Context) -> (f64, f64) {
             // Cover is 1 − exp(−τ).
             area -= (1.0 - cover).ln() * (AWAY / eye.focal).powi(2);
             if cover > 0.01 {
-                // An albedo of 0.85 under a sky of radiance 1.
-                grey = grey.max((f64::from(r) / cover / 0.85 - 1.0).abs());
+                // A furnace: drops that take nothing up, under a sky of radiance 1.
+                grey = grey.max((f64::from(r) / cover - 1.0).abs());
             }
         }
     }
@@ -186,15 +186,15 @@ fn spray_hides_one_less_exp_of_its_optical_depth() {
     }
     let linear = spoiled(
         "ssfr/shade",
-        "1.0 - exp(-shading.spray_density * half_load(&words, tap.part))",
-        "clamp(shading.spray_density * half_load(&words, tap.part), 0.0, 0.99)",
+        "Spray(optical_depth, 1.0 - exp(-optical_depth), depth)",
+        "Spray(optical_depth, clamp(optical_depth, 0.0, 0.99), depth)",
     );
     let (more, _) = spray_sums(&linear);
     assert!(more / area > 1.01, "{more} {area}");
     let dimmer = spoiled(
         "ssfr/shade",
-        "vec3f(0.0, 1.0, 0.0)) * 0.85",
-        "vec3f(0.0, 1.0, 0.0)) * 0.8585",
+        "mix(around, sky_irradiance(view), 1.0 - exp(-optical_depth)) / PI",
+        "mix(around, 1.01 * sky_irradiance(view), 1.0 - exp(-optical_depth)) / PI",
     );
     let (_, control) = spray_sums(&dimmer);
     assert!(control > 5e-3, "{control}");

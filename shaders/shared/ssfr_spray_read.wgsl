@@ -1,0 +1,49 @@
+// Spray at a pixel: how much it hides, and where and how fast it is in the mean of what hides. Needs the bindings `camera`,
+// `spray_params` and `spray` of whoever imports it.
+#import "shared/ssfr_spray.wgsl"
+#import "shared/ssfr_half.wgsl"
+
+struct Spray {
+    optical_depth: f32,
+    cover: f32,
+    // Along the optical axis, metres.
+    depth: f32,
+}
+
+fn spray_mean(tap: HalfTap, plane: u32) -> f32 {
+    let words = vec4u(spray[tap.at.x + plane], spray[tap.at.y + plane], spray[tap.at.z + plane], spray[tap.at.w + plane]);
+    let v = vec4f(words) / SPRAY_SCALE;
+    return mix(mix(v.x, v.y, tap.part.x), mix(v.z, v.w, tap.part.x), tap.part.y);
+}
+
+fn spray_plane() -> u32 {
+    let half_size = camera.size / 2u;
+    return half_size.x * half_size.y;
+}
+
+// At a padded pixel position.
+fn spray_at(position: vec2f) -> Spray {
+    let tap = half_tap(position);
+    let length = spray_mean(tap, 0u);
+    if length <= 0.0 {
+        return Spray(0.0, 0.0, FAR);
+    }
+    let optical_depth = spray_params.density * length;
+    let depth = spray_mean(tap, spray_plane()) / length * spray_params.range;
+    return Spray(optical_depth, 1.0 - exp(-optical_depth), depth);
+}
+
+fn spray_signed(tap: HalfTap, plane: u32) -> f32 {
+    let words = vec4u(spray[tap.at.x + plane], spray[tap.at.y + plane], spray[tap.at.z + plane], spray[tap.at.w + plane]);
+    let v = vec4f(bitcast<vec4i>(words)) / SPRAY_SCALE;
+    return mix(mix(v.x, v.y, tap.part.x), mix(v.z, v.w, tap.part.x), tap.part.y);
+}
+
+// Mean velocity, m/s, where there is spray and it was splatted with MOTION.
+fn spray_velocity(position: vec2f) -> vec3f {
+    let tap = half_tap(position);
+    let plane = spray_plane();
+    let sum = vec3f(
+        spray_signed(tap, 2u * plane), spray_signed(tap, 3u * plane), spray_signed(tap, 4u * plane));
+    return sum / spray_mean(tap, 0u) * spray_params.speed;
+}

@@ -1,0 +1,2 @@
+// Spray for the channels that stand beside the picture: as for the picture, with MOTION.
+#import "ssfr/splat_spray.wgsl"

@@ -1,0 +1,191 @@
+//! A frame's particles on their way to the device.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{Renderer, build::room, shade::draws_spray, splats::filled};
+use crate::{
+    domain::{level_set::kernels::Kernels, particles::Particles},
+    gpu::recording::spread,
+    render::{
+        Moment, RenderError,
+        aeration::{self, CLEAR},
+        buffers::{PARTICLE_GROUPS, PARTICLES, PATHS, SPRAY_PARAMS},
+        camera::pose,
+        lighting::spray_density,
+        paths::{Path, paths},
+        uniform::{Particle, SprayParams},
+    },
+    scene::look::{AovSpec, MethodSpec},
+};
+
+/// Particle spacings within which a particle has a part in the field at the eye: a kernel's reach and that of the neighbours that
+/// shape it.
+const ABOUT_THE_EYE: f64 = 6.0;
+/// Particles within [`CLOSE`] spacings of the eye below which it is hit by drops and not under water.
+const FEW: usize = 6;
+const CLOSE: f64 = 2.5;
+
+/// A frame that stands on the device.
+pub(super) struct Loaded {
+    /// Its particles.
+    pub(super) count: u32,
+    /// They again, with the mean velocity of their way to the next frame: for the channels beside the picture, where one asks for
+    /// motion and there is a next frame.
+    pub(super) ahead: Vec<Particle>,
+}
+
+impl Renderer {
+    /// Moves a frame's particles to the device, relative to the domain's least corner.
+    pub(super) fn load(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Loaded, RenderError> {
+        let water = &moment.water.particles;
+        let mut packed = self.pack(frame, water)?;
+        let spacing = self.scene.particle_spacing as f32;
+        if let Some(spray) = &self.look.spec().water.spray {
+            let standing = aeration::standing(moment, spacing);
+            aeration::classify(&mut packed, &standing, spray);
+        }
+        let spec = self.look.spec();
+        if spec.renderer.method == MethodSpec::Ssfr && self.is_under_water(frame, &packed) {
+            return Err(RenderError::UnderWater { frame });
+        }
+        let wants_motion = self.look.wants(AovSpec::Forward);
+        let mut ways = Vec::new();
+        if spec.image.shutter > 0.0 || wants_motion {
+            let size = self.scene.domain.size();
+            ways = paths(water, moment.beside(), self.frame_seconds(), size);
+        }
+        if let Some(water) = &mut self.water {
+            water.take(&packed, &ways);
+        }
+        if let Some(sea) = &mut self.sea {
+            sea.take(&packed, &ways);
+        }
+        let count = packed.len() as u32;
+        self.load_spray(frame, moment);
+        if !self.program.has(PARTICLES.name()) {
+            let ahead = Vec::new();
+            return Ok(Loaded { count, ahead });
+        }
+        self.sort(frame, &mut packed, &mut ways);
+        self.reserve(packed.len())?;
+        let groups = spread(&self.program.context, 1, packed.len() as u64);
+        self.program.upload(PARTICLE_GROUPS, 0, &[groups.into()]);
+        self.program.upload(PARTICLES, 0, &packed);
+        if self.program.has(PATHS.name()) {
+            let packed: Vec<_> = ways.iter().map(Path::packed).collect();
+            self.program.upload(PATHS, 0, &packed);
+        }
+        let mut ahead = Vec::new();
+        if wants_motion && moment.beside()[1].is_some() {
+            let seconds = self.frame_seconds();
+            for (particle, way) in packed.iter_mut().zip(&ways) {
+                particle.velocity = (way.way(seconds).as_vec3() / seconds).to_array();
+            }
+            ahead = packed;
+        }
+        Ok(Loaded { count, ahead })
+    }
+
+    fn frame_seconds(&self) -> f32 {
+        (1.0 / self.scene.frames_per_second) as f32
+    }
+
+    fn pack(&self, frame: u32, particles: &Particles) -> Result<Vec<Particle>, RenderError> {
+        let origin = self.scene.domain.min;
+        let mut packed = Vec::with_capacity(particles.len());
+        let places = particles.position.iter().zip(&particles.velocity);
+        for (index, (p, v)) in places.enumerate() {
+            if !p.iter().chain(v).all(|x| x.is_finite()) {
+                return Err(RenderError::NotFinite { index, frame });
+            }
+            let position = [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32);
+            packed.push(Particle {
+                position,
+                air: CLEAR,
+                velocity: *v,
+                tag: particles.id.get(index).map_or(index as u32, |&id| id) << 1 | 1,
+            });
+        }
+        Ok(packed)
+    }
+
+    /// Front to back, so that splats find what hides them already there.
+    fn sort(&self, frame: u32, packed: &mut Vec<Particle>, ways: &mut Vec<Path>) {
+        let rate = self.scene.frames_per_second;
+        let forward = pose(&self.look, frame.into(), rate).forward.as_vec3();
+        let depth = |p: &Particle| Vec3::from(p.position).dot(forward);
+        let mut order: Vec<(f32, u32, u32)> = (packed.par_iter().zip(0u32..packed.len() as u32))
+            .map(|(particle, index)| (depth(particle), particle.tag, index))
+            .collect();
+        order.par_sort_unstable_by(|a, b| {
+            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2))
+        });
+        let sorted = order.iter().map(|&(_, _, index)| packed[index as usize]);
+        *packed = sorted.collect();
+        if !ways.is_empty() {
+            let sorted = order.iter().map(|&(_, _, index)| ways[index as usize]);
+            *ways = sorted.collect();
+        }
+    }
+
+    /// Makes room for so many particles.
+    fn reserve(&mut self, particles: usize) -> Result<(), RenderError> {
+        if particles <= self.capacity {
+            return Ok(());
+        }
+        let capacity = room(particles);
+        let mut grown = vec![PARTICLES.sized(capacity)];
+        if self.program.has(PATHS.name()) {
+            grown.push(PATHS.sized(capacity));
+        }
+        self.program.refit(&grown, &[])?;
+        self.capacity = capacity;
+        self.record();
+        Ok(())
+    }
+
+    /// Tells the device what stands in the sums of spray: depths up to the domain's farthest corner and speeds up to the fastest, both
+    /// with some room for what moves within a frame, and as powers of two, so that frames differ little in what is rounded.
+    fn load_spray(&self, frame: u32, moment: &Moment<'_>) {
+        if !draws_spray(&self.look) {
+            return;
+        }
+        let rate = self.scene.frames_per_second;
+        let eye = pose(&self.look, frame.into(), rate).position
+            - (self.scene.origin + self.scene.domain.min);
+        let farthest = eye
+            .abs()
+            .max((eye - self.scene.domain.size()).abs())
+            .length();
+        let fastest = (moment.water.particles.max_speed()).max(moment.white.max_speed());
+        let room = |x: f64| (1.25 * x + 1.0).log2().ceil().exp2() as f32;
+        let params = SprayParams {
+            density: spray_density(&self.look) as f32,
+            scale: filled(self.scene.particle_spacing, self.plan.radius) as f32,
+            range: room(farthest),
+            speed: room(fastest),
+        };
+        self.program.upload(SPRAY_PARAMS, 0, &[params]);
+    }
+
+    /// Whether the field of the body's particles, whose level set rays meet, is positive at the eye at the frame's instant.
+    fn is_under_water(&self, frame: u32, packed: &[Particle]) -> bool {
+        let rate = self.scene.frames_per_second;
+        let origin = self.scene.origin + self.scene.domain.min;
+        let eye = pose(&self.look, frame.into(), rate).position - origin;
+        let (size, spacing) = (self.scene.domain.size(), self.scene.particle_spacing);
+        let is_within = |p: DVec3| p.cmpge(DVec3::ZERO).all() && p.cmple(size).all();
+        if !is_within(eye) {
+            return false;
+        }
+        let near: Vec<DVec3> = packed
+            .par_iter()
+            .filter(|particle| particle.tag & 1 == 1)
+            .map(|particle| Vec3::from(particle.position).as_dvec3())
+            .filter(|&p| is_within(p) && p.distance(eye) < ABOUT_THE_EYE * spacing)
+            .collect();
+        let close = near.iter().filter(|p| p.distance(eye) < CLOSE * spacing);
+        close.count() >= FEW && Kernels::fit(&near, size, spacing).field().value(eye) > 0.0
+    }
+}

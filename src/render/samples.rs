@@ -1,0 +1,291 @@
+//! Where in the pixel, in the shutter and on the lens the samples of a frame lie.
+
+use std::f64::consts::PI;
+
+use crate::scene::look::{CurveSpec, ImageSpec};
+
+/// Where in the pixel, in the shutter and on the lens a sample lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Sample {
+    /// Pixels from the pixel's centre.
+    pub(super) jitter: [f64; 2],
+    /// Frames from the frame's instant.
+    pub(super) instant: f64,
+    /// From the middle of the aperture, to the right and upward, in radii of it.
+    pub(super) aperture: [f64; 2],
+    /// Part of the pixel's mean.
+    pub(super) weight: f64,
+}
+
+impl Sample {
+    /// Through the pixel's centre and the middle of the lens, at the frame's instant.
+    pub(super) const STILL: Self = Self {
+        jitter: [0.0; 2],
+        instant: 0.0,
+        aperture: [0.0; 2],
+        weight: 1.0,
+    };
+}
+
+/// How far a shutter is open over its time: steadily more for the first share of it, wholly, and steadily less for the last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Curve {
+    /// Wholly, all the time.
+    Box,
+    /// With shares in which it opens and closes.
+    Ramps([f64; 2]),
+}
+
+impl Curve {
+    pub(super) fn of(image: &ImageSpec) -> Self {
+        match (image.shutter_curve, image.shutter_ramps) {
+            (CurveSpec::Box, _) => Self::Box,
+            (CurveSpec::Triangle, _) => Self::Ramps([0.5; 2]),
+            (CurveSpec::Trapezoid, ramps) => Self::Ramps(ramps.unwrap_or([0.25; 2])),
+        }
+    }
+
+    /// The instant, from the middle of the open time and in units of it, up to which a share of all light has come in.
+    fn instant(self, share: f64) -> f64 {
+        let Self::Ramps([open, close]) = self else {
+            return share - 0.5;
+        };
+        // How far it is open at most, so that all light is 1.
+        let height = 1.0 / (1.0 - 0.5 * (open + close));
+        let time = if share < 0.5 * height * open {
+            (2.0 * open * share / height).sqrt()
+        } else if share > 1.0 - 0.5 * height * close {
+            1.0 - (2.0 * close * (1.0 - share) / height).sqrt()
+        } else {
+            0.5 * open + share / height
+        };
+        time - 0.5
+    }
+}
+
+/// The samples of one frame: Halton points over the pixel, instants with equal shares of the shutter's light between them, and where
+/// there is a lens points of a spiral over its aperture.
+pub(super) fn samples(count: u32, shutter: f64, curve: Curve, has_lens: bool) -> Vec<Sample> {
+    let points = pixel_points(count);
+    let apertures = match has_lens {
+        true => aperture_points(count, &points),
+        false => vec![[0.0; 2]; points.len()],
+    };
+    (points.into_iter().zip(apertures).zip(0u32..))
+        .map(|((jitter, aperture), i)| {
+            let share = (f64::from(i) + 0.5) / f64::from(count);
+            Sample {
+                jitter,
+                instant: curve.instant(share) * shutter,
+                aperture,
+                weight: 1.0 / f64::from(count),
+            }
+        })
+        .collect()
+}
+
+fn pixel_points(count: u32) -> Vec<[f64; 2]> {
+    let halton = |base: u32, index: u32| {
+        let (mut value, mut scale, mut rest) = (0.0, 1.0, index);
+        while rest > 0 {
+            scale /= f64::from(base);
+            value += scale * f64::from(rest % base);
+            rest /= base;
+        }
+        value
+    };
+    let points = (1..=count).map(|i| [halton(2, i), halton(3, i)]).collect();
+    // Few points of the sequence lean to one side, which would shift the picture.
+    centred(points)
+}
+
+fn centred(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    let count = points.len() as f64;
+    let mean = [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / count);
+    for point in &mut points {
+        *point = [point[0] - mean[0], point[1] - mean[1]];
+    }
+    points
+}
+
+/// Orders of the aperture's points that are tried.
+const ORDERS: u32 = 64;
+
+/// Points over the unit disc, each with the same part of its area (Vogel 1979), in an order in which neither their places nor their
+/// distances from the middle go with the samples' places in the pixel or with their instants.
+fn aperture_points(count: u32, pixel: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let golden = PI * (3.0 - 5f64.sqrt());
+    let points: Vec<[f64; 2]> = (0..count)
+        .map(|k| {
+            let radius = ((f64::from(k) + 0.5) / f64::from(count)).sqrt();
+            let (sin, cos) = (f64::from(k) * golden).sin_cos();
+            [radius * cos, radius * sin]
+        })
+        .collect();
+    let points = centred(points);
+    let ordered = |m: u32| {
+        // The ranks of multiples of an irrational number, modulo 1, are a permutation without much order.
+        let step = (f64::from(m) * 2f64.sqrt()).fract();
+        let key = |i: &usize| ((*i + 1) as f64 * step).fract();
+        let mut order: Vec<usize> = (0..points.len()).collect();
+        order.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+        let mut found = vec![[0.0; 2]; points.len()];
+        for (place, point) in order.into_iter().zip(&points) {
+            found[place] = *point;
+        }
+        found
+    };
+    let orders = (1..=ORDERS).map(|m| {
+        let found = ordered(m);
+        (dependence(&found, pixel), found)
+    });
+    let best = orders.min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, points)| points).unwrap_or_default()
+}
+
+/// The largest correlation, of either sign, of aperture points with places in the pixel and with instants.
+fn dependence(aperture: &[[f64; 2]], pixel: &[[f64; 2]]) -> f64 {
+    let column = |points: &[[f64; 2]], value: fn(&[f64; 2]) -> f64| -> Vec<f64> {
+        points.iter().map(value).collect()
+    };
+    let on_lens = [
+        column(aperture, |a| a[0]),
+        column(aperture, |a| a[1]),
+        column(aperture, |a| a[0] * a[0] + a[1] * a[1]),
+    ];
+    let others = [
+        column(pixel, |p| p[0]),
+        column(pixel, |p| p[1]),
+        (0..pixel.len()).map(|i| i as f64).collect(),
+    ];
+    let pairs = on_lens
+        .iter()
+        .flat_map(|a| others.iter().map(|b| correlation(a, b).abs()));
+    pairs.fold(0.0, f64::max)
+}
+
+/// 0 where one of them does not vary.
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let (mean_a, mean_b) = (mean(a), mean(b));
+    let sums = a.iter().zip(b).fold([0.0; 3], |[ab, aa, bb], (x, y)| {
+        let (x, y) = (x - mean_a, y - mean_b);
+        [ab + x * y, aa + x * x, bb + y * y]
+    });
+    match sums[1] * sums[2] {
+        product if product > 0.0 => sums[0] / product.sqrt(),
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_centred_on_pixel_shutter_and_lens() {
+        for count in [1, 2, 3, 4, 16] {
+            for curve in [Curve::Box, Curve::Ramps([0.5; 2]), Curve::Ramps([0.2; 2])] {
+                let samples = samples(count, 0.5, curve, true);
+                let sum = |value: fn(&Sample) -> f64| samples.iter().map(value).sum::<f64>();
+                assert!(sum(|s| s.jitter[0]).abs() < 1e-12);
+                assert!(sum(|s| s.jitter[1]).abs() < 1e-12);
+                assert!(sum(|s| s.instant).abs() < 1e-12);
+                assert!(sum(|s| s.aperture[0]).abs() < 1e-12);
+                assert!(sum(|s| s.aperture[1]).abs() < 1e-12);
+                assert!((sum(|s| s.weight) - 1.0).abs() < 1e-12);
+                assert!(samples.iter().all(|s| s.instant.abs() < 0.25));
+            }
+        }
+        assert!(
+            samples(4, 0.0, Curve::Box, false)
+                .iter()
+                .all(|s| { s.instant == 0.0 && s.aperture == [0.0; 2] })
+        );
+    }
+
+    /// Mean and mean square of the time at which light comes in, from the moment of opening, in closed form: over each of the two
+    /// ramps and between them.
+    fn moments([open, close]: [f64; 2]) -> [f64; 2] {
+        let height = 1.0 / (1.0 - 0.5 * (open + close));
+        let end = 1.0 - close;
+        [
+            height
+                * (open * open / 3.0 + (end * end - open * open) / 2.0 + close / 2.0
+                    - close * close / 3.0),
+            height
+                * (open.powi(3) / 4.0 + (end.powi(3) - open.powi(3)) / 3.0 + close / 2.0
+                    - 2.0 * close * close / 3.0
+                    + close.powi(3) / 4.0),
+        ]
+    }
+
+    #[test]
+    fn instants_have_the_mean_and_the_variance_of_the_shutters_curve() {
+        const COUNT: u32 = 1000;
+        // The middle of a step of a monotone function is off its mean by half of what it rises there at most: all steps together
+        // by 1 / 2 N, for times and for their squares.
+        let bound = 0.5 / f64::from(COUNT);
+        for ramps in [[0.5, 0.5], [0.25, 0.25], [0.1, 0.6], [0.0, 1.0], [0.0, 0.0]] {
+            let found = samples(COUNT, 0.5, Curve::Ramps(ramps), false);
+            let times = || found.iter().map(|s| 2.0 * s.instant + 0.5);
+            let mean = times().sum::<f64>() / f64::from(COUNT);
+            let square = times().map(|t| t * t).sum::<f64>() / f64::from(COUNT);
+            let off = |ramps| {
+                let [first, second] = moments(ramps);
+                (mean - first).abs().max((square - second).abs())
+            };
+            assert!(off(ramps) < bound, "{ramps:?}: {}", off(ramps));
+            // The control: a tenth more of a ramp.
+            let other = [ramps[0], (ramps[1] - 0.1f64).abs()];
+            assert!(off(other) > 3.0 * bound, "{ramps:?}: {}", off(other));
+        }
+        // Of a box and of a triangle the variances that everyone knows.
+        let variance = |ramps| {
+            let [first, second] = moments(ramps);
+            second - first * first
+        };
+        assert!((variance([0.0; 2]) - 1.0 / 12.0).abs() < 1e-12);
+        assert!((variance([0.5; 2]) - 1.0 / 24.0).abs() < 1e-12);
+        let boxed = samples(COUNT, 0.5, Curve::Box, false);
+        let square: f64 = boxed.iter().map(|s| 4.0 * s.instant * s.instant).sum();
+        assert!((square / f64::from(COUNT) - 1.0 / 12.0).abs() < bound);
+    }
+
+    #[test]
+    fn points_on_the_lens_are_spread_and_go_with_nothing() {
+        for count in [8, 16, 24, 64, 100, 256] {
+            let found = samples(count, 0.5, Curve::Box, true);
+            let n = f64::from(count);
+            let apertures: Vec<[f64; 2]> = found.iter().map(|s| s.aperture).collect();
+            let jitters: Vec<[f64; 2]> = found.iter().map(|s| s.jitter).collect();
+            // Of a disc of radius 1 the mean square distance from the middle is a half, and so it is of the spiral, less the
+            // square of a mean that is taken off it.
+            let square = apertures.iter().map(|a| a[0] * a[0] + a[1] * a[1]);
+            let square = square.sum::<f64>() / n;
+            assert!((square - 0.5).abs() < 1.0 / n, "{count}: {square}");
+            // No two are nearer than half of what n points on a square lattice over the disc are.
+            let nearest = |i: usize| {
+                let others = apertures.iter().enumerate().filter(|other| other.0 != i);
+                others
+                    .map(|(_, b)| (apertures[i][0] - b[0]).hypot(apertures[i][1] - b[1]))
+                    .fold(f64::INFINITY, f64::min)
+            };
+            let least = (0..apertures.len())
+                .map(nearest)
+                .fold(f64::INFINITY, f64::min);
+            assert!(least > 0.5 * (PI / n).sqrt(), "{count}: {least}");
+            // The largest of nine correlations of independent draws is 2/√n in the mean.
+            let found = dependence(&apertures, &jitters);
+            assert!(found < 1.5 / n.sqrt(), "{count}: {found}");
+            // The control: as the spiral goes, far points come last.
+            let spiral: Vec<[f64; 2]> = {
+                let mut sorted = apertures.clone();
+                sorted.sort_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));
+                sorted
+            };
+            let control = dependence(&spiral, &jitters);
+            assert!(control > 2.0 / n.sqrt(), "{count}: {control}");
+        }
+    }
+}

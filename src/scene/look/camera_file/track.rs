@@ -1,0 +1,149 @@
+//! Values over time, as the animations of glTF join them (glTF 2.0, appendix C).
+
+use glam::{DQuat, DVec3, DVec4};
+use gltf::animation::{Interpolation, Sampler, util::Rotations};
+
+/// A value over time.
+#[derive(Clone, Debug)]
+pub(super) struct Track<T> {
+    /// Seconds, ascending; one of a value that stays.
+    pub(super) times: Vec<f64>,
+    /// One a time; three where cubic: slope before, value, slope after.
+    values: Vec<T>,
+    interpolation: Interpolation,
+}
+
+/// What tracks hold: how values are joined.
+pub(super) trait Blend: Copy {
+    /// On the way from one to the other.
+    fn between(self, other: Self, part: f64) -> Self;
+    /// The sum of four with weights, as a value again.
+    fn weighted(values: [Self; 4], weights: [f64; 4]) -> Self;
+}
+
+impl Blend for DVec3 {
+    fn between(self, other: Self, part: f64) -> Self {
+        self.lerp(other, part)
+    }
+
+    fn weighted(values: [Self; 4], weights: [f64; 4]) -> Self {
+        values.iter().zip(weights).map(|(v, w)| *v * w).sum()
+    }
+}
+
+impl Blend for DQuat {
+    fn between(self, other: Self, part: f64) -> Self {
+        // The shorter way round: glam takes it too.
+        self.slerp(other, part)
+    }
+
+    fn weighted(values: [Self; 4], weights: [f64; 4]) -> Self {
+        let sum: DVec4 = (values.iter().zip(weights))
+            .map(|(v, w)| DVec4::from(*v) * w)
+            .sum();
+        Self::from_vec4(sum).normalize()
+    }
+}
+
+impl<T: Blend> Track<T> {
+    pub(super) fn still(value: T) -> Self {
+        Self {
+            times: vec![0.0],
+            values: vec![value],
+            interpolation: Interpolation::Step,
+        }
+    }
+
+    /// The first value before the first time, the last one after the last (glTF 2.0, appendix C).
+    pub(super) fn at(&self, seconds: f64) -> T {
+        let is_cubic = self.interpolation == Interpolation::CubicSpline;
+        let value = |k: usize| self.values[if is_cubic { 3 * k + 1 } else { k }];
+        let last = self.times.len() - 1;
+        let after = self.times.partition_point(|&time| time <= seconds);
+        if after == 0 {
+            return value(0);
+        }
+        let k = after - 1;
+        if k == last {
+            return value(last);
+        }
+        let span = self.times[k + 1] - self.times[k];
+        let t = (seconds - self.times[k]) / span;
+        match self.interpolation {
+            Interpolation::Step => value(k),
+            Interpolation::Linear => value(k).between(value(k + 1), t),
+            Interpolation::CubicSpline => {
+                let (t2, t3) = (t * t, t * t * t);
+                let values = [
+                    value(k),
+                    self.values[3 * k + 2],
+                    value(k + 1),
+                    self.values[3 * (k + 1)],
+                ];
+                let weights = [
+                    2.0 * t3 - 3.0 * t2 + 1.0,
+                    span * (t3 - 2.0 * t2 + t),
+                    3.0 * t2 - 2.0 * t3,
+                    span * (t3 - t2),
+                ];
+                T::weighted(values, weights)
+            }
+        }
+    }
+}
+
+/// Rotations over time.
+///
+/// # Errors
+/// As [`track`].
+pub(super) fn rotations(
+    times: Vec<f64>,
+    values: Rotations<'_>,
+    sampler: &Sampler<'_>,
+) -> Result<Track<DQuat>, String> {
+    let values: Vec<DQuat> = (values.into_f32())
+        .map(|q| DQuat::from_array(q.map(f64::from)))
+        .collect();
+    let mut track = track(times, values, sampler)?;
+    // Slopes of a cubic are no rotations.
+    let stride = match track.interpolation {
+        Interpolation::CubicSpline => 3,
+        _ => 1,
+    };
+    for value in track.values.iter_mut().skip(stride / 2).step_by(stride) {
+        *value = value.normalize();
+    }
+    Ok(track)
+}
+
+/// Values over time.
+///
+/// # Errors
+/// In words where there are not as many as there are times, or where these do not ascend.
+pub(super) fn track<T: Blend>(
+    times: Vec<f64>,
+    values: Vec<T>,
+    sampler: &Sampler<'_>,
+) -> Result<Track<T>, String> {
+    let interpolation = sampler.interpolation();
+    let wanted = match interpolation {
+        Interpolation::CubicSpline => 3 * times.len(),
+        _ => times.len(),
+    };
+    if times.is_empty() || values.len() != wanted {
+        return Err(format!(
+            "{} values for {} times; {wanted} are wanted",
+            values.len(),
+            times.len()
+        ));
+    }
+    let ascends = times.windows(2).all(|pair| pair[0] < pair[1]);
+    if !(ascends && times.iter().all(|time| time.is_finite())) {
+        return Err("its times do not ascend".to_owned());
+    }
+    Ok(Track {
+        times,
+        values,
+        interpolation,
+    })
+}

@@ -1,0 +1,38 @@
+//! What of a look is allowed, and hardly what was meant: each found by a number, and said with it.
+
+use std::f64::consts::PI;
+
+use super::Look;
+
+impl Look {
+    /// What of the look is allowed and hardly meant, a sentence each, with its key first and the number that it was judged by.
+    pub fn lints(&self) -> Vec<String> {
+        self.lint_lens().into_iter().collect()
+    }
+
+    /// Pixels across the disc that a point at infinity is drawn as, at its widest in the shot; a point at half of the focus
+    /// distance is as wide. `None` of a pinhole.
+    pub fn widest_blur_px(&self) -> Option<f64> {
+        let (camera, image) = (&self.spec.camera, &self.spec.image);
+        let lens = camera.lens.as_ref()?;
+        let focus = (camera.keyframes.iter())
+            .filter_map(|key| key.focus_distance_m)
+            .fold(lens.focus_distance_m, f64::min);
+        let focal = self.longest_focal_length_mm();
+        let pixels = focal / camera.film_back_mm[0] * f64::from(image.width);
+        Some(pixels * 1e-3 * focal / lens.f_stop / focus)
+    }
+
+    /// N samples show a point as N ghosts, evenly over its disc: of c pixels across, each has π c² / 4 N pixels of it.
+    fn lint_lens(&self) -> Option<String> {
+        let blur = self.widest_blur_px()?;
+        let samples = self.spec.image.samples;
+        let wanted = (PI / 4.0 * blur * blur).ceil();
+        (f64::from(samples) < wanted).then(|| {
+            format!(
+                "image.samples: the lens draws a point at infinity, or at half of the focus distance, as a disc {blur:.1} pixels \
+                 wide, and {samples} samples are as many ghosts of it; they are closer than a pixel from {wanted} on"
+            )
+        })
+    }
+}
