@@ -13,6 +13,7 @@ use serde::{Deserialize as _, de::DeserializeOwned};
 use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 
 pub(super) use keys::KEYS;
+use keys::{MOST_SAMPLES, MOST_VOXELS};
 pub use spec::{
     AovSpec, BasinSpec, CameraSpec, FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LookSpec,
     MethodSpec, OutputSpec, RendererSpec, RippleSpec, SkySpec, SpraySpec, SunSpec, SurfaceSpec,
@@ -130,14 +131,51 @@ impl Look {
     /// `method`: every particle belongs to the surface.
     #[must_use]
     pub fn of_surface(&self, method: MethodSpec) -> Self {
+        self.changed(|spec| {
+            spec.renderer.method = method;
+            spec.water.spray = None;
+            spec.whitewater = None;
+            (spec.image.samples, spec.image.shutter) = (1, 0.0);
+            spec.output.formats = vec![FormatSpec::Exr];
+            spec.output.aovs = vec![AovSpec::Z, AovSpec::N];
+        })
+    }
+
+    /// The look for pictures of the water alone by `method`: spray as the look has it, no whitewater, nothing beside the picture.
+    #[must_use]
+    pub fn of_water(&self, method: MethodSpec) -> Self {
+        self.changed(|spec| {
+            spec.renderer.method = method;
+            spec.whitewater = None;
+            spec.output.aovs = Vec::new();
+        })
+    }
+
+    /// Rays that are `samples` times as many a pixel, through voxels `voxels` times as fine; up to what the keys take.
+    #[must_use]
+    pub fn finer(&self, samples: u32, voxels: f64) -> Self {
+        self.changed(|spec| {
+            spec.renderer.method = MethodSpec::Ray;
+            spec.image.samples = (samples * spec.image.samples).min(MOST_SAMPLES);
+            let finer = voxels * spec.surface.voxels_per_spacing;
+            spec.surface.voxels_per_spacing = finer.min(MOST_VOXELS);
+        })
+    }
+
+    /// With a camera that stands still at `position`, metres, and looks at `target`.
+    #[must_use]
+    pub fn standing(&self, position: DVec3, target: DVec3, focal_length_mm: f64) -> Self {
+        self.changed(|spec| {
+            spec.camera.position = Some(position.to_array());
+            spec.camera.target = Some(target.to_array());
+            spec.camera.focal_length_mm = focal_length_mm;
+            spec.camera.keyframes = Vec::new();
+        })
+    }
+
+    fn changed(&self, change: impl FnOnce(&mut LookSpec)) -> Self {
         let mut look = self.clone();
-        let spec = &mut look.spec;
-        spec.renderer.method = method;
-        spec.water.spray = None;
-        spec.whitewater = None;
-        (spec.image.samples, spec.image.shutter) = (1, 0.0);
-        spec.output.formats = vec![FormatSpec::Exr];
-        spec.output.aovs = vec![AovSpec::Z, AovSpec::N];
+        change(&mut look.spec);
         look.hash = canonical_hash(&look.spec, look.panorama());
         look
     }
@@ -161,10 +199,11 @@ fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
     }
-    // A look that does without has the hash that it had before there were whitewater and rays.
+    // A look that does without has the hash that it had before there were whitewater, rays and a choice of voxels.
     let text = format!("{canonical:?}")
         .replace("whitewater: None, ", "")
-        .replace("renderer: RendererSpec { method: Ssfr }, ", "");
+        .replace("renderer: RendererSpec { method: Ssfr }, ", "")
+        .replace("voxels_per_spacing: 2.0, ", "");
     hasher.update(text.as_bytes());
     if let Some(bytes) = panorama {
         hasher.update(blake3::hash(bytes).as_bytes());

@@ -85,7 +85,7 @@ impl Renderer {
             plan,
             program,
             capacity: room(0),
-            water: Water::of(look),
+            water: Water::of(look, scene),
             whitewater: Whitewater::of(look, scene),
             timer: None,
         };

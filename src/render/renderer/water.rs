@@ -8,7 +8,7 @@ use crate::{
     render::{
         RenderError, RenderScene,
         buffers::{LEVEL_TABLE, LEVEL_VALUES, SUN_PATHS},
-        rays::{level_set, sun_in_water},
+        rays::{level_set, sun_in_water, voxel},
         uniform::Particle,
     },
     scene::look::{Look, MethodSpec},
@@ -22,16 +22,19 @@ pub(super) struct Water {
     seconds: Option<f32>,
     /// Values that there is room for.
     capacity: usize,
+    /// Edge length of a voxel, metres.
+    voxel: f64,
     sun: DVec3,
 }
 
 impl Water {
     /// `None` where the look casts no rays.
-    pub(super) fn of(look: &Look) -> Option<Self> {
+    pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
         (look.spec().renderer.method == MethodSpec::Ray).then(|| Self {
             places: Vec::new(),
             seconds: None,
             capacity: 0,
+            voxel: voxel(look, scene),
             sun: sun_in_water(look),
         })
     }
@@ -55,7 +58,7 @@ impl Water {
         if self.seconds == Some(seconds) {
             return Ok(false);
         }
-        let level = level_set(scene, &self.places, seconds.into());
+        let level = level_set(scene, self.voxel, &self.places, seconds.into());
         let light = Sunlight::new(&level, self.sun);
         let grew = level.values.len() > self.capacity;
         if grew {

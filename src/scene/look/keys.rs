@@ -45,6 +45,12 @@ const PLACE: Interval = -1e5..=1e5;
 /// A part of something, or a reflectance.
 const PART: Interval = 0.0..=1.0;
 
+/// Samples a pixel, at most.
+pub(super) const MOST_SAMPLES: u32 = 1024;
+
+/// Voxels a particle spacing, at most.
+pub(super) const MOST_VOXELS: f64 = 8.0;
+
 const FOCAL_LENGTH: Interval = 1.0..=5000.0;
 
 /// Metres of a wall, a storey.
@@ -107,7 +113,7 @@ const IMAGE: &[Key] = &[
         .unit("pixels")
         .default("360")
         .about("height"),
-    Key::whole("samples", 1..=1024)
+    Key::whole("samples", 1..=MOST_SAMPLES)
         .default("3")
         .about("samples a pixel, spread over the pixel and over the shutter"),
     Key::number("shutter", PART)
@@ -136,6 +142,9 @@ const SURFACE: &[Key] = &[
         .unit("metres")
         .computed(|| "1.6 particle spacings".to_owned())
         .about("standard deviation of the smoothing, in the world"),
+    Key::number("voxels_per_spacing", 1.0..=MOST_VOXELS)
+        .default("2.0")
+        .about("voxels a particle spacing of the level set, with `method = \"ray\"`"),
     Key::number("roughness", 1e-3..=1.0).default("0.08").about(
         "root mean square slope of the waves too small to be drawn, which widens the glitter",
     ),

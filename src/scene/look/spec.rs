@@ -121,6 +121,8 @@ pub struct SurfaceSpec {
     pub radius_m: Option<f64>,
     /// Standard deviation of the smoothing, metres in the world; 1.6 particle spacings where left out.
     pub smoothing_width_m: Option<f64>,
+    /// Voxels a particle spacing of the level set that rays are cast into.
+    pub voxels_per_spacing: f64,
     /// Root mean square slope of the waves too small to be drawn, which widens the glitter.
     pub roughness: f64,
     /// Fine waves drawn into the normals; none unless named.

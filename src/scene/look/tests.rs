@@ -196,6 +196,7 @@ fn every_number_of_a_look_has_a_range() {
         ("image", "shutter", "{}"),
         ("surface", "radius_m", "{}"),
         ("surface", "smoothing_width_m", "{}"),
+        ("surface", "voxels_per_spacing", "{}"),
         ("surface", "roughness", "{}"),
         ("surface.ripple", "wavelength_m", "{}\nslope = 0.1"),
         ("surface.ripple", "slope", "{}\nwavelength_m = 1.0"),
