@@ -47,7 +47,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var words = vec4u(spray[tap.at.x], spray[tap.at.y], spray[tap.at.z], spray[tap.at.w]);
     let cover = 1.0 - exp(-shading.spray_density * half_load(&words, tap.part));
     if cover > 0.0 {
-        let far = min(surface[at], 1e4) * length(ray);
+        let far = min(surface[at], endless()) * length(ray);
         let white = diffuse_light(camera.position + direction * far, vec3f(0.0, 1.0, 0.0)) * 0.85;
         value = mix(value, vec4f(white, 1.0), cover);
     }

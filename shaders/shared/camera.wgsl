@@ -29,6 +29,11 @@ struct Camera {
     clock: f32,
     // Seconds from this frame to the next.
     frame_seconds: f32,
+    // Depth before which nothing is drawn, metres.
+    near: f32,
+    pad0: f32,
+    pad1: f32,
+    pad2: f32,
 }
 
 // Where nothing was hit. Finite, because fast-math drivers may assume that there is no infinity.

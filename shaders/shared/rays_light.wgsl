@@ -120,7 +120,7 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32)
         let ray = waiting[held];
         let found = trace(ray.origin, ray.direction, ray.inside);
         // The way that leads from the eye is whole, wherever it was taken up.
-        let far = min(found.t + select(0.0, ray.travelled, ray.surfaces == 0u), 1e6);
+        let far = min(found.t + select(0.0, ray.travelled, ray.surfaces == 0u), 100.0 * endless());
         var weight = ray.weight;
         if ray.inside {
             light += weight * scattered(ray.origin, ray.direction, far);

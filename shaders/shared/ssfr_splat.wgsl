@@ -30,6 +30,10 @@ fn sphere_bounds(camera: Camera, c: vec3f, radius: f32, scale: f32, size: vec2u)
     let y = -c.y * c.z + vec2f(-radius, radius) * sqrt(max(c.y * c.y + squared, 0.0));
     let low = (camera.centre + camera.focal * vec2f(x.x, y.x) / squared) * scale - 0.5;
     let high = (camera.centre + camera.focal * vec2f(x.y, y.y) / squared) * scale - 0.5;
+    return pixels_between(low, high, size);
+}
+
+fn pixels_between(low: vec2f, high: vec2f, size: vec2u) -> vec4i {
     let edge = vec2f(size) - 1.0;
     if any(high < vec2f(0.0)) || any(low > edge) {
         return vec4i(0, 0, -1, -1);

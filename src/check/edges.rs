@@ -120,7 +120,7 @@ struct Deviation {
 pub struct Outlines(Vec<Deviation>);
 
 /// What is told of edges of one kind.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outline {
     /// Edge points that have one of the truth's near them.
     pub points: usize,
@@ -184,9 +184,8 @@ impl Outlines {
         let near: Vec<(f64, &Deviation)> =
             all.iter().filter_map(|it| Some((it.off?, *it))).collect();
         let count = near.len() as f64;
-        let mean = |value: &dyn Fn(&(f64, &Deviation)) -> f64| {
-            near.iter().map(value).sum::<f64>() / count
-        };
+        let mean =
+            |value: &dyn Fn(&(f64, &Deviation)) -> f64| near.iter().map(value).sum::<f64>() / count;
         (!near.is_empty()).then(|| Outline {
             points: near.len(),
             offset: mean(&|(off, _)| *off),
@@ -235,7 +234,7 @@ mod tests {
     const PIXELS: f64 = 0.6 / UNIT;
 
     /// A disc 6 pixels wider than the truth's is 0.3 spacings off and smooth; beads of a spacing's length are rough by their
-    /// amplitude over √2, and waves ten times as long are not.
+    /// amplitude over √2, and waves twenty times as long are not.
     #[test]
     fn beads_are_rough_and_waves_are_not() {
         const RADIUS: f64 = 150.0;
@@ -252,11 +251,17 @@ mod tests {
             let waved = disc(|angle| RADIUS + 6.0 * (count * angle).cos(), sky);
             compared(&waved, &truth).silhouette().expect("edges")
         };
-        let (beads, waves) = (waved(47.0), waved(4.0));
+        let (beads, waves) = (waved(47.0), waved(2.0));
         // Of slanted flanks there are more edge points, of which fewer lie far from the mean.
         let amplitude = 0.3 / 2f64.sqrt();
-        assert!((0.75 * amplitude..1.1 * amplitude).contains(&beads.roughness), "{beads:?}");
-        assert!(waves.roughness < 0.2 * beads.roughness, "{waves:?} {beads:?}");
+        assert!(
+            (0.75 * amplitude..1.1 * amplitude).contains(&beads.roughness),
+            "{beads:?}"
+        );
+        assert!(
+            waves.roughness < 0.2 * beads.roughness,
+            "{waves:?} {beads:?}"
+        );
     }
 
     /// What stands a spacing behind makes a waterline, what stands before the water no edge of its own, and an outline far from the

@@ -66,14 +66,22 @@ fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
 
+    /// A number in −0.5..0.5 that belongs to a pixel of a frame.
+    fn random(pixel: usize, frame: usize) -> f32 {
+        let mut h =
+            (pixel as u32).wrapping_mul(0x9E37_79B1) ^ (frame as u32).wrapping_mul(0x85EB_CA77);
+        h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
+        h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
+        ((h ^ (h >> 15)) >> 8) as f32 / 16_777_216.0 - 0.5
+    }
+
     /// A soft ball that has gone `way` pixels to the right, and noise of this strength that every frame has anew.
     fn frame(way: f32, noise: f32, seed: usize) -> Picture {
         let (width, height) = (96, 64);
         let pixel = |k: usize| {
             let (x, y) = ((k % width) as f32 - 40.0 - way, (k / width) as f32 - 32.0);
             let ball = 0.7 * (-(x * x + y * y) / 300.0).exp();
-            let random = ((k * 7919 + seed * 104_729) % 1009) as f32 / 1009.0 - 0.5;
-            [ball + 0.1 + noise * random, ball, 0.3, 1.0]
+            [ball + 0.1 + noise * random(k, seed), ball, 0.3, 1.0]
         };
         Picture {
             width,

@@ -23,7 +23,7 @@ pub struct Surfaces {
 }
 
 /// What is told of them.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Summary {
     /// Pixels with water in picture and truth.
     pub pixels: usize,

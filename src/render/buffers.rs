@@ -1,8 +1,8 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Rays, SetNode, Shading, Thickness, Tile,
-    Triangle, Whitewater, WhitewaterParams,
+    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Rays, SetNode, Shading, Shape,
+    Thickness, Tile, Triangle, Whitewater, WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
 
@@ -26,6 +26,8 @@ pub(super) const SOLID_PACKED: Buf<u32> = Buf::new("solid_packed");
 
 /// Particles of a frame.
 pub(super) const PARTICLES: Buf<Particle> = Buf::new("particles");
+/// What each of them is splatted as.
+pub(super) const SHAPES: Buf<Shape> = Buf::new("shapes");
 /// Workgroups of a dispatch of one a particle.
 pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
 /// What a particle adds to thickness and spray.

@@ -140,6 +140,7 @@ pub(super) struct Setting {
     pub(super) margin: [u32; 2],
     pub(super) particle_count: u32,
     pub(super) radius: f64,
+    pub(super) near: f64,
     pub(super) frames_per_second: f64,
 }
 
@@ -191,6 +192,8 @@ pub(super) fn camera(
         sample_index: index,
         clock: (instant / setting.frames_per_second) as f32,
         frame_seconds: (1.0 / setting.frames_per_second) as f32,
+        near: setting.near as f32,
+        ..uniform::Camera::default()
     }
 }
 
@@ -245,6 +248,7 @@ mod tests {
             margin: [16, 19],
             particle_count: 0,
             radius: 0.1,
+            near: 0.01,
             frames_per_second: 24.0,
         };
         let sample = Sample {

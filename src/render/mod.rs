@@ -16,6 +16,7 @@ mod plan;
 mod rays;
 mod renderer;
 mod set;
+mod shapes;
 mod sky;
 mod surface;
 #[expect(unreachable_pub, reason = "mirrors are declared public")]
@@ -50,6 +51,14 @@ pub struct RenderScene {
     pub particle_spacing: f64,
     /// Frames a second, which turns the shutter and velocities into metres.
     pub frames_per_second: f64,
+}
+
+impl RenderScene {
+    /// The domain's longer side on the ground, metres: what lies about the water has its lengths from it.
+    fn extent(&self) -> f64 {
+        let size = self.domain.size();
+        size.x.max(size.z)
+    }
 }
 
 /// Why there is no picture.

@@ -16,6 +16,14 @@ use crate::gpu::{
 };
 use crate::scene::look::Look;
 
+/// Between the domain's sides and the quay walls, particle spacings.
+const QUAY_GAP: f64 = 0.006;
+
+/// About what throws shadows, and before and behind it, over the domain's longer side on the ground: quay walls reach far, and in
+/// front of the box they must still be seen by it.
+const SHADOW_MARGIN: f32 = 0.02;
+const SHADOW_DEPTH: f32 = 2.4;
+
 /// Texels along a side of the shadow map.
 const SHADOW_SIZE: u32 = 2048;
 
@@ -41,7 +49,7 @@ fn opaque_triangles(
             }
             // A triangle without area has no normal, and nothing of it would be seen.
             let area = (points[1] - points[0]).cross(points[2] - points[0]);
-            if area.length() > 1e-12 {
+            if area.length() > 1e-10 * scene.particle_spacing.powi(2) {
                 push(points, 0);
             }
         }
@@ -49,11 +57,12 @@ fn opaque_triangles(
     if let Some(basin) = &look.spec().basin {
         let (min, max) = (scene.domain.min, scene.domain.max);
         let top = min.y + basin.height_m;
+        let gap = QUAY_GAP * scene.particle_spacing;
         // Past the domain's ends, so that no end of a wall is in the picture.
         let (start, end) = (min.x - 2.0 * scene.domain.size().x, max.x);
         for (near, far) in [
-            (min.z - basin.thickness_m, min.z - 1e-3),
-            (max.z + 1e-3, max.z + basin.thickness_m),
+            (min.z - basin.thickness_m, min.z - gap),
+            (max.z + gap, max.z + basin.thickness_m),
         ] {
             let low = DVec3::new(start, min.y, near);
             let high = DVec3::new(end + basin.thickness_m, top, far);
@@ -150,10 +159,11 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
             take(p.into());
         }
     }
-    let margin = Vec3::splat(0.5);
+    let extent = size.x.max(size.z);
+    let margin = Vec3::splat(SHADOW_MARGIN * extent);
     let (low, high) = (low - margin, high + margin);
-    // Quay walls reach far; in front of the box they must still be seen by it, so depth gets room.
-    let (near, far) = (low.z - 60.0, high.z + 60.0);
+    let room = SHADOW_DEPTH * extent;
+    let (near, far) = (low.z - room, high.z + room);
     let scale = 2.0 / (high - low);
     let row = |axis: Vec3, scale: f32, shift: f32| (axis * scale).extend(shift);
     Mat4::from_cols(

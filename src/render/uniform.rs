@@ -24,6 +24,10 @@ mirror!(
         sample_index: u32,
         clock: f32,
         frame_seconds: f32,
+        near: f32,
+        pad0: f32,
+        pad1: f32,
+        pad2: f32,
     }
 );
 
@@ -34,6 +38,16 @@ mirror!(
         aeration: f32,
         velocity: [f32; 3],
         tag: u32,
+    }
+);
+
+mirror!(
+    /// `Shape` of shared/ssfr_ellipsoid.wgsl.
+    Shape {
+        diagonal: [f32; 3],
+        pad0: f32,
+        off: [f32; 3],
+        pad1: f32,
     }
 );
 
@@ -58,6 +72,10 @@ mirror!(
         window_radiance: f32,
         background: f32,
         disc: f32,
+        spacing: f32,
+        extent: f32,
+        shadow_offset: f32,
+        pad0: f32,
         irradiance: [[f32; 4]; 9],
         shadow_from_world: [[f32; 4]; 4],
     }
@@ -87,7 +105,7 @@ mirror!(
 );
 
 mirror!(
-    /// `NarrowParams` of ssfr/narrow_range.wgsl.
+    /// `NarrowParams` of shared/ssfr_narrow.wgsl.
     Narrow as "NarrowParams" {
         width: f32,
         range: f32,
@@ -197,6 +215,7 @@ pub fn mirrors() -> Vec<Layout> {
     vec![
         Camera::layout(),
         Particle::layout(),
+        Shape::layout(),
         Shading::layout(),
         Flow::layout(),
         FlowLevel::layout(),

@@ -16,14 +16,14 @@ pub(super) use keys::KEYS;
 use keys::{MOST_SAMPLES, MOST_VOXELS};
 pub use spec::{
     AovSpec, BasinSpec, CameraSpec, FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LookSpec,
-    MethodSpec, OutputSpec, RendererSpec, RippleSpec, SkySpec, SpraySpec, SunSpec, SurfaceSpec,
-    TransformSpec, ViewSpec, WaterSpec, WhitewaterLook, WindowsSpec,
+    MethodSpec, OutputSpec, RendererSpec, RippleSpec, SkySpec, SplatSpec, SpraySpec, SunSpec,
+    SurfaceSpec, TransformSpec, ViewSpec, WaterSpec, WhitewaterLook, WindowsSpec,
 };
 
 /// Why a look cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
-pub struct LookError(#[from] SceneError);
+pub struct LookError(#[from] pub(super) SceneError);
 
 /// The key of the panorama's file.
 const PANORAMA: &str = "sky.file";
@@ -59,11 +59,19 @@ impl Look {
     /// # Errors
     /// As [`Look::load`].
     pub fn load_within(path: &Path, reach: Reach) -> Result<Self, LookError> {
+        Self::load_with(path, &[], reach)
+    }
+
+    /// [`Look::load_within`] with overrides laid over it, as `key=value`.
+    ///
+    /// # Errors
+    /// As [`Look::load`].
+    pub fn load_with(path: &Path, overrides: &[String], reach: Reach) -> Result<Self, LookError> {
         let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
             source,
         })?;
-        Ok(Self::parse_within(&text, path, reach)?)
+        Ok(Self::parse_with(&text, path, overrides, reach)?)
     }
 
     /// Parses and validates the text of a look; `file` names it in errors, and its folder is where a
@@ -72,11 +80,16 @@ impl Look {
     /// # Errors
     /// As [`Look::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, LookError> {
-        Ok(Self::parse_within(text, file, Reach::Folder)?)
+        Ok(Self::parse_with(text, file, &[], Reach::Folder)?)
     }
 
-    fn parse_within(text: &str, file: &Path, reach: Reach) -> Result<Self, SceneError> {
-        let (doc, mut root) = Document::parse(text, file, &[], KEYS)?;
+    fn parse_with(
+        text: &str,
+        file: &Path,
+        overrides: &[String],
+        reach: Reach,
+    ) -> Result<Self, SceneError> {
+        let (doc, mut root) = Document::parse(text, file, overrides, KEYS)?;
         let doc = doc.within(reach);
         doc.settle(&mut root)?;
         let spec = LookSpec::deserialize(toml::Deserializer::from(root))
@@ -199,11 +212,12 @@ fn canonical_hash(spec: &LookSpec, panorama: Option<&[u8]>) -> String {
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
     }
-    // A look that does without has the hash that it had before there were whitewater, rays and a choice of voxels.
+    // A look that does without has the hash that it had before there were whitewater, rays and choices of voxels and splats.
     let text = format!("{canonical:?}")
         .replace("whitewater: None, ", "")
         .replace("renderer: RendererSpec { method: Ssfr }, ", "")
-        .replace("voxels_per_spacing: 2.0, ", "");
+        .replace("voxels_per_spacing: 2.0, ", "")
+        .replace("splat: Ellipsoid, ", "");
     hasher.update(text.as_bytes());
     if let Some(bytes) = panorama {
         hasher.update(blake3::hash(bytes).as_bytes());

@@ -60,7 +60,9 @@ mod reference {
 mod render {
     mod analytic;
     mod folder;
+    mod outlines;
     mod pictures;
+    mod scaled;
     mod scenes;
 }
 mod scene {

@@ -11,11 +11,11 @@ use bytemuck::Pod;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, picture};
+use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLE_GROUPS, PARTICLES, SHAPES, picture};
 use super::camera::{Sample, Setting, camera, eye, pose, samples};
 use super::image::{Image, View};
 use super::plan::{Limits, Plan};
-use super::{RenderError, RenderScene, aeration, uniform};
+use super::{RenderError, RenderScene, aeration, shapes::shapes, uniform};
 use crate::domain::particles::Particles;
 use crate::gpu::{
     adapter::Context,
@@ -24,9 +24,13 @@ use crate::gpu::{
     recording::{Recording, Timer, spread},
 };
 use crate::scene::look::Look;
+pub(super) use build::RADIUS;
 use build::room;
 use water::Water;
 use whitewater::Whitewater;
+
+/// Depth before which nothing solid is drawn, particle spacings.
+const NEAR: f64 = 0.12;
 
 /// Renders frames of one scene with one look.
 pub struct Renderer {
@@ -140,6 +144,7 @@ impl Renderer {
             margin: self.plan.extent.margin,
             particle_count: count,
             radius: self.plan.radius,
+            near: NEAR * self.scene.particle_spacing,
             frames_per_second: self.scene.frames_per_second,
         };
         self.draw_once()?;
@@ -220,6 +225,10 @@ impl Renderer {
         let groups = spread(&self.program.context, 1, packed.len() as u64);
         self.program.upload(PARTICLE_GROUPS, 0, &[groups.into()]);
         self.program.upload(PARTICLES, 0, &packed);
+        if self.program.has(SHAPES.name()) {
+            let shapes = shapes(&packed, &self.scene, self.plan.radius);
+            self.program.upload(SHAPES, 0, &shapes);
+        }
         Ok(packed.len() as u32)
     }
 
@@ -229,7 +238,11 @@ impl Renderer {
             return Ok(());
         }
         let capacity = room(particles);
-        self.program.refit(&[PARTICLES.sized(capacity)], &[])?;
+        let mut buffers = vec![PARTICLES.sized(capacity)];
+        if self.program.has(SHAPES.name()) {
+            buffers.push(SHAPES.sized(capacity));
+        }
+        self.program.refit(&buffers, &[])?;
         self.capacity = capacity;
         self.record();
         Ok(())

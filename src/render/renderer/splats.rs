@@ -7,7 +7,7 @@ use crate::{
     },
     render::{
         buffers::{
-            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, SPRAY, THICKNESS, THICKNESS_PARAMS,
+            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, SHAPES, SPRAY, THICKNESS, THICKNESS_PARAMS,
             WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS,
         },
         frame::FAR,
@@ -32,6 +32,14 @@ pub(super) fn plan_particles(plan: &mut Plan, particles: usize, spacing: f64, ra
     plan.buffer(&PARTICLES, particles);
     plan.buffer(&PARTICLE_GROUPS, 1);
     plan.values(&THICKNESS_PARAMS, &[scale]);
+}
+
+/// Plans a shape of its own for each of `particles` particles.
+pub(super) fn plan_shapes(plan: &mut Plan, particles: usize) {
+    plan.buffer(&SHAPES, particles);
+    for pass in ["ssfr/splat_depth", "ssfr/splat_owner"] {
+        plan.define(pass, "ELLIPSOIDS");
+    }
 }
 
 /// Plans depth and thickness.

@@ -134,10 +134,15 @@ const SURFACE: &[Key] = &[
         .about(
             "van der Laan 2009 with the world-space width of Bagar 2010, or Truong and Yuksel 2018",
         ),
+    Key::choice("splat", &["ellipsoid", "sphere"])
+        .default("\"ellipsoid\"")
+        .about(
+            "what a particle is splatted as, with `method = \"ssfr\"`: flattened as its neighbours lie (Yu and Turk 2013), or a ball",
+        ),
     Key::number("radius_m", 1e-4..=100.0)
         .unit("metres")
         .computed(|| "0.87 particle spacings".to_owned())
-        .about("splat radius"),
+        .about("splat radius; ellipsoids are as much larger or smaller as it is than what it is if left out"),
     Key::number("smoothing_width_m", 0.0..=100.0)
         .unit("metres")
         .computed(|| "1.6 particle spacings".to_owned())

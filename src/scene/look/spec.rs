@@ -111,12 +111,24 @@ pub enum FilterSpec {
     NarrowRange,
 }
 
+/// What a particle is splatted as.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum SplatSpec {
+    /// Flattened and stretched as its neighbours lie (Yu and Turk 2013); a lone one is a ball of its own volume.
+    Ellipsoid,
+    /// A ball of the splat radius.
+    Sphere,
+}
+
 /// How splats become a surface.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSpec {
     /// Which filter.
     pub filter: FilterSpec,
+    /// What a particle is splatted as.
+    pub splat: SplatSpec,
     /// Splat radius, metres; 0.87 particle spacings where left out.
     pub radius_m: Option<f64>,
     /// Standard deviation of the smoothing, metres in the world; 1.6 particle spacings where left out.

@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 21] = [
+const VARIANTS: [&[&str]; 22] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -48,6 +48,7 @@ const VARIANTS: [&[&str]; 21] = [
     &["SPRAY"],
     &["AOVS"],
     &["FORWARD"],
+    &["ELLIPSOIDS"],
 ];
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them.

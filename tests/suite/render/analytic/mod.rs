@@ -11,3 +11,5 @@ mod ripples;
 mod support;
 mod surface;
 mod water;
+
+pub(crate) use support::{context, spoiled};
