@@ -195,15 +195,15 @@ fn mean(values: &[f64]) -> Option<f64> {
 }
 
 /// Where pictures come from.
-struct Set<'a> {
-    cache: &'a CacheReader,
-    scene: &'a Scene,
-    context: &'a Context,
+pub(super) struct Set<'a> {
+    pub(super) cache: &'a CacheReader,
+    pub(super) scene: &'a Scene,
+    pub(super) context: &'a Context,
 }
 
 impl Set<'_> {
     /// The picture of a frame with a look, as a screen shows it.
-    fn draw(&self, look: &Look, frame: u32) -> Result<Picture, RenderJobError> {
+    pub(super) fn draw(&self, look: &Look, frame: u32) -> Result<Picture, RenderJobError> {
         let set = render_scene(self.scene, frame);
         let mut renderer =
             Renderer::new(self.context, look, &set).map_err(|error| told(error, look))?;
@@ -263,7 +263,8 @@ impl<'a> Pictures<'a> {
         let (samples, voxels) = FINER;
         let truth = draw(&still.of_water(MethodSpec::Ray).finer(samples, voxels))?;
         let moved = residual(&truth);
-        self.residuals.extend(moved.as_ref().map(Residual::strength));
+        self.residuals
+            .extend(moved.as_ref().map(Residual::strength));
         for ((_, method), found) in METHODS.iter().zip(&mut self.methods) {
             let all = draw(&still.of_water(*method))?;
             if *colour {
@@ -278,7 +279,7 @@ impl<'a> Pictures<'a> {
 }
 
 /// What rays in f64 meet, and how many particles' centres are outside of the surface.
-fn truth(
+pub(super) fn truth(
     look: &Look,
     set: &RenderScene,
     frame: u32,
