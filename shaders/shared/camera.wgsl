@@ -31,8 +31,9 @@ struct Camera {
     frame_seconds: f32,
     // Where the padded frame would begin without overscan, in padded pixels: a multiple of 64.
     corner: vec2f,
+    // Depth before which nothing is drawn, metres.
+    near: f32,
     pad0: f32,
-    pad1: f32,
 }
 
 // Where nothing was hit. Finite, because fast-math drivers may assume that there is no infinity.

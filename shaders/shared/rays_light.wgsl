@@ -146,7 +146,7 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32)
             return vec4f(0.0);
         }
         // The way that leads from the eye is whole, wherever it was taken up.
-        let far = min(found.t + select(0.0, ray.travelled, ray.surfaces == 0u), 1e6);
+        let far = min(found.t + select(0.0, ray.travelled, ray.surfaces == 0u), 100.0 * endless());
         var weight = ray.weight;
         if ray.inside {
             let gained = weight * scattered(ray.origin, ray.direction, far);

@@ -30,7 +30,7 @@ fn at_side(p: vec3f, t: f32) -> Found {
 #ifdef SEA
 // Where a ray meets the sea's surface between two distances beyond the box; of the sky where it does not.
 fn sea_along(origin: vec3f, direction: vec3f, span: vec2f, inside: bool, travelled: f32) -> Found {
-    let surface = sea_crossing(origin, direction, span.x, min(span.y, 1e6), inside, travelled);
+    let surface = sea_crossing(origin, direction, span.x, min(span.y, sea_end()), inside, travelled);
     if surface.after >= FAR {
         return met(SKY, FAR, vec3f(0.0), 3u);
     }

@@ -35,6 +35,11 @@ const STEEP: f32 = 0.6;
 // Least step of a ray over the distance that it came: a pixel of a picture of a thousand is a tenth of it.
 const LEAST_STEP: f32 = 0.008;
 
+// Distance after which it is not looked for: ten million particle spacings.
+fn sea_end() -> f32 {
+    return 2e10 * sea.hair;
+}
+
 // Whether the sea lies at x and z.
 fn is_sea(at: vec2f) -> bool {
     let below = at < vec2f(sea.hair);

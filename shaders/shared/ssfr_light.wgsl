@@ -14,7 +14,8 @@ struct Shading {
     // Metres that sunlight goes through water for one metre of depth.
     sun_path: f32,
     scattering: vec3f,
-    pad0: f32,
+    // Between particles, metres.
+    spacing: f32,
     ground_colour: vec3f,
     ground_variation: f32,
     solid_colour: vec3f,
@@ -30,9 +31,20 @@ struct Shading {
     background: f32,
     // Radiance of the sun's disc over its irradiance; 0 in a panorama, which has its own.
     disc: f32,
+    // The domain's longer side on the ground, metres: what is seen beside the water has its measure from it.
+    extent: f32,
+    // How far off its face a point is whose shadow is looked up, metres.
+    shadow_offset: f32,
+    pad0: f32,
+    pad1: f32,
     // Irradiance of the sky and the ground over direction: nine spherical harmonics (Ramamoorthi 2001).
     irradiance: array<vec4f, 9>,
     shadow_from_world: mat4x4f,
+}
+
+// Metres after which a way is as good as endless.
+fn endless() -> f32 {
+    return 400.0 * shading.extent;
 }
 
 fn sky_radiance(direction: vec3f) -> vec3f {
@@ -63,7 +75,7 @@ fn sky_irradiance(n: vec3f) -> vec3f {
 
 // 1 in the sun, 0 in the shadow of a solid. `n` keeps a face out of its own shadow.
 fn sunlit(world: vec3f, n: vec3f) -> f32 {
-    let p = (shading.shadow_from_world * vec4f(world + 0.04 * n, 1.0)).xyz;
+    let p = (shading.shadow_from_world * vec4f(world + shading.shadow_offset * n, 1.0)).xyz;
     let uv = vec2f(0.5 * p.x + 0.5, 0.5 - 0.5 * p.y);
     if any(uv <= vec2f(0.0)) || any(uv >= vec2f(1.0)) {
         return 1.0;
@@ -127,11 +139,11 @@ fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
     let sun = shading.sun_irradiance * max(dot(at.normal, shading.sun_direction), 0.0)
         * sunlit(at.position, at.normal);
     // Faces low between other things see less of the sky: a stand-in for its occlusion.
-    let open = select(1.0, mix(0.45, 1.0, smoothstep(0.0, 2.5, at.position.y)), at.material != 2u);
+    let open = select(1.0, mix(0.45, 1.0, smoothstep(0.0, 0.1 * shading.extent, at.position.y)), at.material != 2u);
     let light = (sun + sky_irradiance(at.normal) * open) * through / PI;
     if at.material == 2u {
-        let p = at.position.xz;
-        let n = 0.5 * value_noise(p * 0.35) + 0.3 * value_noise(p * 1.3) + 0.2 * value_noise(p * 5.1);
+        let p = at.position.xz / shading.extent;
+        let n = 0.5 * value_noise(p * 8.75) + 0.3 * value_noise(p * 32.5) + 0.2 * value_noise(p * 127.5);
         return light * shading.ground_colour * (1.0 + shading.ground_variation * (2.0 * n - 1.0));
     }
     var wall = select(shading.solid_colour, shading.ground_colour * 1.1, at.material == 1u);
@@ -140,8 +152,9 @@ fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
         wall = palette[at.material - FIRST_OF_PALETTE].rgb;
     }
 #endif
-    let stain = 1.0 - 0.25 * shading.ground_variation * value_noise(vec2f(
-        at.position.x * 1.7 + at.position.z * 1.3, at.position.y * 2.3));
+    let q = at.position / shading.extent;
+    let stain = 1.0 - 0.25 * shading.ground_variation
+        * value_noise(vec2f(q.x * 42.5 + q.z * 32.5, q.y * 57.5));
     var colour = light * wall * stain;
     let pane = facade(at, footprint);
     if pane.glass > 0.0 {

@@ -38,7 +38,11 @@ fn sphere_bounds(camera: Camera, c: vec3f, radius: f32, scale: f32, size: vec2u)
     let y = -c.y * c.z + vec2f(-radius, radius) * sqrt(max(c.y * c.y + squared, 0.0));
     let low = (camera.centre + camera.focal * vec2f(x.x, y.x) / squared) * scale - 0.5;
     let high = (camera.centre + camera.focal * vec2f(x.y, y.y) / squared) * scale - 0.5;
-    // Counted from `corner`, and moved from there once they are whole.
+    return pixels_between(camera, low, high, scale, size);
+}
+
+// Whole pixels between two places that are counted from `corner`, and moved from there once they are whole.
+fn pixels_between(camera: Camera, low: vec2f, high: vec2f, scale: f32, size: vec2u) -> vec4i {
     let shift = camera.corner * scale;
     let edge = vec2f(size) - 1.0 - shift;
     if any(high < -shift) || any(low > edge) {

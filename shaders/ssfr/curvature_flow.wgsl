@@ -11,12 +11,6 @@
 // Tangent of the steepest slope that counts as one.
 const STEEPEST: f32 = 1.0;
 
-fn load(x: i32, y: i32) -> f32 {
-    if x < 0 || y < 0 || x >= i32(level.size.x) || y >= i32(level.size.y) {
-        return FAR;
-    }
-    return source[u32(y) * level.size.x + u32(x)];
-}
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -38,10 +32,19 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // C_x = 2 / (W F_x) = 1 / focal length in cells; cells are square.
     let c = f32(1u << level.level) / camera.focal;
     let cell = c * z;
-    var left = load(x - 1, y);
-    var right = load(x + 1, y);
-    var above = load(x, y - 1);
-    var below = load(x, y + 1);
+    let row = level.size.x;
+    let at_left = x == 0;
+    let at_right = id.x + 1u == level.size.x;
+    let at_top = y == 0;
+    let at_bottom = id.y + 1u == level.size.y;
+    var left = source[select(at - 1u, at, at_left)];
+    var right = source[select(at + 1u, at, at_right)];
+    var above = source[select(at - row, at, at_top)];
+    var below = source[select(at + row, at, at_bottom)];
+    left = select(left, FAR, at_left);
+    right = select(right, FAR, at_right);
+    above = select(above, FAR, at_top);
+    below = select(below, FAR, at_bottom);
     let no_left = is_edge(params, z, left, cell);
     let no_right = is_edge(params, z, right, cell);
     let no_above = is_edge(params, z, above, cell);
@@ -59,10 +62,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let wyy = 1.0 / below - 2.0 * w + 1.0 / above;
     var wxy = 0.0;
     if !(no_left || no_right || no_above || no_below) {
-        let nw = load(x - 1, y - 1);
-        let ne = load(x + 1, y - 1);
-        let sw = load(x - 1, y + 1);
-        let se = load(x + 1, y + 1);
+        // None of the four sides is past the frame.
+        let nw = source[at - row - 1u];
+        let ne = source[at - row + 1u];
+        let sw = source[at + row - 1u];
+        let se = source[at + row + 1u];
         if max(max(nw, ne), max(sw, se)) < FAR {
             wxy = 0.25 * (1.0 / se - 1.0 / sw - 1.0 / ne + 1.0 / nw);
         }

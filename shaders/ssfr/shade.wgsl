@@ -163,7 +163,7 @@ struct March {
     eye: vec3f,
 }
 
-// Walks a ray over the depth image of the solids. A hit lies just behind that surface, `slack` metres at
+// Walks a ray over the depth image of the solids. A hit lies just behind that surface, a few spacings or steps at
 // most; things nearer to the viewer than `nearest` stand before the water and are no hit.
 fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, nearest: f32) -> March {
     var last = 0.0;
@@ -175,7 +175,7 @@ fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, n
     for (var i = 0; i < steps; i++) {
         let t = last + step;
         let q = origin + direction * t;
-        if q.z < 0.05 {
+        if q.z < camera.near {
             break;
         }
         let pixel = pixel_of(q);
@@ -183,7 +183,7 @@ fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, n
             break;
         }
         let z = solid_depth[u32(pixel.y) * camera.size.x + u32(pixel.x)];
-        if z < q.z && z > nearest && q.z - z < 0.6 + 1.5 * step {
+        if z < q.z && z > nearest && q.z - z < 3.5 * shading.spacing + 1.5 * step {
             return refine(origin, direction, last, t);
         }
         last = t;
@@ -225,7 +225,8 @@ fn mirrored(water: Water) -> vec3f {
     // A mirrored ray that dips into the water would hit its next wave; it is bent up to the horizon.
     r = normalize(vec3f(r.x, max(r.y, 0.01), r.z));
     let eye_r = vec3f(dot(r, camera.right), dot(r, camera.up), dot(r, camera.forward));
-    let hit = march(water.eye + 0.05 * eye_r, eye_r, 14.0, 14, 1.25, 0.0);
+    let start = water.eye + 0.3 * shading.spacing * eye_r;
+    let hit = march(start, eye_r, 0.56 * shading.extent, 14, 1.25, 0.0);
     if hit.distance < FAR {
         let found = solid_surface(hit.at, hit.eye, -r);
         return radiance_of(found, -r, hit.eye.z / camera.focal, 0.0);
@@ -251,18 +252,19 @@ fn transmitted(water: Water, seen: f32, straight: Behind) -> Through {
     let path = seen * max(ci, 0.3) / ct;
 
     var reach = ground_distance(water.position, t);
-    var floor_point = water.position + t * min(reach, 1e4);
+    var floor_point = water.position + t * min(reach, endless());
     var found = Surface(floor_point, vec3f(0.0, 1.0, 0.0), 2u);
     let eye_t = vec3f(dot(t, camera.right), dot(t, camera.up), dot(t, camera.forward));
-    let hit = march(water.eye, eye_t, min(reach, 1.4 * seen + 0.3), 8, 1.0, water.eye.z - 0.1);
+    let far = min(reach, 1.4 * seen + 1.8 * shading.spacing);
+    let hit = march(water.eye, eye_t, far, 8, 1.0, water.eye.z - 0.6 * shading.spacing);
     if hit.distance < reach {
         reach = hit.distance;
         found = solid_surface(hit.at, hit.eye, -t);
     }
     // Water that ends well before the ray meets anything: a sheet or a crest, through which one looks on
     // almost straight.
-    let filled = smoothstep(0.2, 0.5, seen / max(reach, 1e-3));
-    let way = mix(path, min(reach, 1e3), filled);
+    let filled = smoothstep(0.2, 0.5, seen / max(reach, 0.006 * shading.spacing));
+    let way = mix(path, min(reach, endless()), filled);
     var light = vec3f(0.0);
     if filled < 1.0 {
         light += behind_radiance(straight, -water.view) * (1.0 - filled);

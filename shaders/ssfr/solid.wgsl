@@ -13,8 +13,6 @@ struct Tile {
 @group(0) @binding(1) var<uniform> tile: Tile;
 @group(0) @binding(2) var<storage, read> triangles: array<Triangle>;
 
-const NEAR: f32 = 0.02;
-
 struct Corner {
     @builtin(position) clip: vec4f,
     // Eye-space plane: normal and distance.
@@ -46,7 +44,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     out.range = vec2f(min(a.z, min(b.z, c.z)), max(a.z, max(b.z, c.z)));
     var low = vec2f(0.0);
     var high = tile.size;
-    if out.range.x > NEAR {
+    if out.range.x > camera.near {
         let pa = project(camera, a);
         let pb = project(camera, b);
         let pc = project(camera, c);
@@ -54,7 +52,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
         let corner = tile.corner - camera.corner;
         low = clamp(min(pa, min(pb, pc)) - corner - 1.0, vec2f(0.0), tile.size);
         high = clamp(max(pa, max(pb, pc)) - corner + 1.0, vec2f(0.0), tile.size);
-    } else if out.range.y <= NEAR {
+    } else if out.range.y <= camera.near {
         high = vec2f(0.0);
     }
     let k = index % 6u;
@@ -86,6 +84,6 @@ fn fragment(in: Corner) -> Texel {
     if any(inside < vec3f(0.0)) || !(raw > 0.0) {
         discard;
     }
-    let depth = clamp(raw, max(in.range.x, NEAR), max(in.range.y, NEAR));
-    return Texel(depth, in.packed, clamp(NEAR / depth, 0.0, 1.0));
+    let depth = clamp(raw, max(in.range.x, camera.near), max(in.range.y, camera.near));
+    return Texel(depth, in.packed, clamp(camera.near / depth, 0.0, 1.0));
 }

@@ -1,7 +1,10 @@
-// Nearest sphere surface at each pixel. One workgroup a particle: its threads share the pixels.
+// Nearest sphere surface at each pixel, or with ELLIPSOIDS that of ellipsoids. One workgroup a particle: its threads share the pixels.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_moved.wgsl"
+#ifdef ELLIPSOIDS
+#import "shared/ssfr_ellipsoid.wgsl"
+#endif
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<storage, read> particles: array<Particle>;
@@ -10,6 +13,9 @@
 @group(0) @binding(3) var<storage, read_write> depth: array<atomic<u32>>;
 #ifdef PATHS
 @group(0) @binding(4) var<storage, read> paths: array<Path>;
+#endif
+#ifdef ELLIPSOIDS
+@group(0) @binding(5) var<storage, read> shapes: array<Shape>;
 #endif
 
 @compute @workgroup_size(32)
@@ -27,9 +33,16 @@ fn main(
     if radius <= 0.0 {
         return;
     }
-    let c = eye_from_world(camera, moved(particle, index));
+    let place = moved(particle, index);
+#ifdef ELLIPSOIDS
+    let ellipsoid = ellipsoid_at(camera, place - camera.position, shapes[index], radius / camera.radius, camera.size);
+    let nearest = bitcast<u32>(ellipsoid.nearest);
+    let bounds = ellipsoid.bounds;
+#else
+    let c = eye_from_world(camera, place);
     let nearest = bitcast<u32>(max(c.z - radius, 0.0));
     let bounds = sphere_bounds(camera, c, radius, 1.0, camera.size);
+#endif
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
     for (var i = lane; i < count; i += 32u) {
@@ -41,9 +54,13 @@ fn main(
         if known <= nearest {
             continue;
         }
-        let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, radius);
-        if hit.chord > 0.0 && hit.depth < solid_depth[at] {
-            let bits = bitcast<u32>(hit.depth);
+#ifdef ELLIPSOIDS
+        let hit = hit_ellipsoid(ellipsoid, vec2f(pixel) + 0.5);
+#else
+        let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, radius).depth;
+#endif
+        if hit < min(solid_depth[at], FAR) {
+            let bits = bitcast<u32>(hit);
             if bits < known {
                 atomicMin(&depth[at], bits);
             }

@@ -7,10 +7,12 @@
 //!
 //! An effect's twins stand in one file of `effects`, for both solvers.
 
+pub mod edges;
 mod effects;
 mod engine;
 pub mod flip;
 pub mod pbf;
+pub mod pictures;
 pub mod render;
 mod sort;
 pub mod table;

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use crate::{reference::rays::Seen, render::Image};
+use super::edges::{Outline, Outlined, Outlines};
+use crate::{domain::eye::Eye, reference::rays::Seen, render::Image};
 
 /// Water less than so many spacings, and this part of its depth, before what is opaque is left out: which of the two is seen hangs on
 /// rounding there. A depth is a dozen roundings of f32 of lengths up to a hundred times the height that a far ground is met from.
@@ -18,10 +19,11 @@ pub struct Surfaces {
     angles: Vec<f64>,
     /// Pixels with water in either.
     either: usize,
+    outlines: Outlines,
 }
 
 /// What is told of them.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Summary {
     /// Pixels with water in picture and truth.
     pub pixels: usize,
@@ -31,21 +33,33 @@ pub struct Summary {
     pub normal: [f64; 2],
     /// Pixels with water in both over those with water in either.
     pub overlap: f64,
+    /// The water's edge before what stands far behind it.
+    pub silhouette: Option<Outline>,
+    /// The water's edge at what is opaque.
+    pub waterline: Option<Outline>,
 }
 
 impl Surfaces {
-    /// Takes a picture with depth and normals, of particles of `spacing` metres.
+    /// Takes a picture with depth and normals that `eye` sees, of particles of `spacing` metres.
     ///
     /// # Panics
     /// Where the picture lacks these channels.
-    pub fn add(&mut self, image: &Image, truth: &[Seen], spacing: f64) {
+    pub fn add(&mut self, image: &Image, truth: &[Seen], eye: &Eye, spacing: f64) {
         let z = image.aovs.z.as_ref().expect("a depth");
         let n = image.aovs.n.as_ref().expect("normals");
+        let outline = || Outlined {
+            width: image.width as usize,
+            water: Vec::with_capacity(truth.len()),
+            opaque: truth.iter().map(|seen| seen.opaque).collect(),
+        };
+        let [mut drawn, mut exact] = [outline(), outline()];
         for ((z, n), seen) in z.iter().zip(n).zip(truth) {
             let z = f64::from(*z);
             let before = seen.opaque * (1.0 - ROUNDING) - THINNEST * spacing;
             let is_drawn = z < before && z < FAR;
             let water = seen.water.filter(|(t, _)| *t < before);
+            drawn.water.push(if is_drawn { z } else { f64::INFINITY });
+            exact.water.push(water.map_or(f64::INFINITY, |(t, _)| t));
             self.either += usize::from(is_drawn || water.is_some());
             let (Some((t, normal)), true) = (water, is_drawn) else {
                 continue;
@@ -57,6 +71,7 @@ impl Surfaces {
             self.angles
                 .push(cosine.clamp(-1.0, 1.0).acos().to_degrees());
         }
+        self.outlines.add(&drawn, &exact, eye.focal, spacing);
     }
 
     /// Whether no pixel has water in either.
@@ -71,6 +86,8 @@ impl Surfaces {
             depth: percentiles(&mut self.depths)?,
             normal: percentiles(&mut self.angles)?,
             overlap: self.depths.len() as f64 / self.either as f64,
+            silhouette: self.outlines.silhouette(),
+            waterline: self.outlines.waterline(),
         })
     }
 }

@@ -153,7 +153,13 @@ fn run_render(args: &CheckArgs, look: &PathBuf) -> Result<u8, Failure> {
         });
     }
     let source = (args.source.clone(), look);
-    check_render::run(source, args.frames.clone(), &args.gpu, args.json)
+    check_render::run(
+        source,
+        &args.surface,
+        args.frames.clone(),
+        &args.gpu,
+        args.json,
+    )
 }
 
 fn source(args: &CheckArgs) -> Result<Source, Failure> {

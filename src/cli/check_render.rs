@@ -26,6 +26,12 @@ pub(super) struct SurfaceArgs {
     /// With --render: whose camera is taken, and whose surface.
     #[arg(long, value_name = "LOOK", requires = "render")]
     look: Option<PathBuf>,
+    /// With --render: score each method's picture against one by finer rays.
+    #[arg(long, requires = "render")]
+    colour: bool,
+    /// With --render: measure what flickers, from each frame and its two neighbours, against finer rays.
+    #[arg(long, requires = "render")]
+    flicker: bool,
 }
 
 impl SurfaceArgs {
@@ -38,6 +44,7 @@ impl SurfaceArgs {
 /// Checks the pictures that a look makes of a cache.
 pub(super) fn run(
     (cache, look): (PathBuf, &PathBuf),
+    surface: &SurfaceArgs,
     frames: Option<FrameRange>,
     gpu: &GpuArgs,
     json: bool,
@@ -46,6 +53,8 @@ pub(super) fn run(
         cache,
         look: Look::load(look)?,
         frames,
+        colour: surface.colour,
+        flicker: surface.flicker,
         gpu: gpu.read()?,
     };
     let interrupt = Interrupt::install_or_warn();
@@ -68,6 +77,7 @@ fn to_json(outcome: &Outcome, is_within: bool) -> serde_json::Value {
         "interrupted": outcome.interrupted,
         "outside": outcome.outside,
         "truth_seconds": outcome.truth_seconds,
+        "truth_residual": outcome.truth_residual,
         "allowed": { "method": "ray", "depth_p95": DEPTH, "normal_median": NORMAL },
         "within": is_within,
         "rows": outcome.rows,
@@ -106,6 +116,8 @@ fn show(outcome: &Outcome, is_within: bool) -> String {
         };
         let _ = writeln!(text, "{line}{}", if row.is_within() { "" } else { "  OUT" });
     }
+    outlines(&mut text, outcome);
+    pictures(&mut text, outcome);
     let _ = writeln!(
         text,
         "particles outside of the surface: {:.2} %",
@@ -122,4 +134,61 @@ fn show(outcome: &Outcome, is_within: bool) -> String {
     };
     let _ = writeln!(text, "{verdict}");
     text
+}
+
+/// The water's edges: how far out they are drawn, and how rough.
+fn outlines(text: &mut String, outcome: &Outcome) {
+    let _ = writeln!(
+        text,
+        "{:17} {:>9} {:>15} {:>15} {:>15} {:>15}",
+        "edges", "points", "offset", "rough, spacings", "a pixel", "astray"
+    );
+    for row in &outcome.rows {
+        let Some(surface) = &row.surface else {
+            continue;
+        };
+        let kinds = [
+            ("silhouette", &surface.silhouette),
+            ("waterline", &surface.waterline),
+        ];
+        for (kind, outline) in kinds {
+            let name = format!("{:6} {kind}", row.method);
+            let _ = match outline {
+                Some(it) => writeln!(
+                    text,
+                    "{name:17} {:>9} {:>15.4} {:>15.4} {:>15.4} {:>15.4}",
+                    it.points, it.offset, it.roughness, it.pixel, it.astray
+                ),
+                None => writeln!(text, "{name:17} none in picture and truth"),
+            };
+        }
+    }
+}
+
+/// What was asked for of pictures.
+fn pictures(text: &mut String, outcome: &Outcome) {
+    for row in &outcome.rows {
+        if let Some(score) = row.score {
+            let _ = writeln!(
+                text,
+                "{:6} colour against finer rays: SSIMULACRA 2 of {score:.1}",
+                row.method
+            );
+        }
+        if let Some(flicker) = row.flicker {
+            let _ = writeln!(
+                text,
+                "{:6} flicker beyond finer rays: {:.3} % of white",
+                row.method,
+                100.0 * flicker
+            );
+        }
+    }
+    if let Some(residual) = outcome.truth_residual {
+        let _ = writeln!(
+            text,
+            "finer rays themselves are {:.3} % of white off the mean of their neighbours",
+            100.0 * residual
+        );
+    }
 }

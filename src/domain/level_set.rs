@@ -31,7 +31,7 @@ pub const FULL: u32 = 1;
 /// In the table, of the first brick that has values; the next ones count on.
 pub const FIRST: u32 = 2;
 
-/// Voxels a particle spacing.
+/// Voxels a particle spacing, where nothing else is asked for.
 pub const VOXELS: f64 = 2.0;
 
 /// A sparse level set over a box from the origin on.
@@ -50,9 +50,9 @@ pub struct LevelSet {
     pub values: Vec<f32>,
 }
 
-/// Bricks along each axis over a box of `size` metres with particles of `spacing` metres.
-pub fn bricks_over(size: DVec3, spacing: f64) -> [u32; 3] {
-    let edge = spacing / VOXELS * f64::from(EDGE);
+/// Bricks along each axis over a box of `size` metres with voxels of `voxel` metres.
+pub fn bricks_over(size: DVec3, voxel: f64) -> [u32; 3] {
+    let edge = voxel * f64::from(EDGE);
     size.to_array()
         .map(|length| (length / edge).ceil().max(1.0) as u32)
 }
@@ -61,13 +61,13 @@ impl LevelSet {
     /// That of particles at `positions`, metres from the box's least corner, of `spacing` metres between neighbours at rest.
     /// The sides of the box are mirrors: water that stands at one meets it at a right angle.
     pub fn new(positions: &[DVec3], size: DVec3, spacing: f64) -> Self {
-        Self::of_kernels(&Kernels::fit(positions, size, spacing), size, spacing)
+        let kernels = Kernels::fit(positions, size, spacing);
+        Self::of_kernels(&kernels, size, spacing / VOXELS)
     }
 
-    /// That of kernels that were fitted in this box.
-    pub fn of_kernels(kernels: &Kernels, size: DVec3, spacing: f64) -> Self {
-        let voxel = spacing / VOXELS;
-        let bricks = bricks_over(size, spacing);
+    /// That of kernels that were fitted in this box, with voxels of `voxel` metres.
+    pub fn of_kernels(kernels: &Kernels, size: DVec3, voxel: f64) -> Self {
+        let bricks = bricks_over(size, voxel);
         let lists = Lists::new(&kernels.ellipsoids, bricks, voxel);
         let level = kernels.level as f32;
         let filled: Vec<Filled> = (0..lists.len())

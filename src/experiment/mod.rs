@@ -2,7 +2,8 @@
 //!
 //! The `engine` opens devices, runs points and keeps their results; a kind of study is a file or folder beside it: what is
 //! run, what is measured, what is drawn. `sweep` changes one setting at a time, [`stability`] runs scenes that are hard on a
-//! solver against their marks, [`validation`] against theory and experiments, `comparison` bakes and renders a scene with two solvers.
+//! solver against their marks, [`validation`] against theory and experiments, `comparison` bakes and renders a scene with two solvers,
+//! `surface` draws one with one setting of the look changed at a time.
 //!
 //! A further kind is one file here that implements `engine::Kind`, its parser in [`scene::study`](crate::scene::study), and
 //! a line in [`study`].
@@ -13,6 +14,7 @@ mod engine;
 mod error;
 mod report;
 pub mod stability;
+mod surface;
 mod sweep;
 pub mod validation;
 
@@ -115,6 +117,7 @@ pub fn study(
         Study::SolverComparison(comparison) => &**comparison,
         Study::Sweep(sweep) => &**sweep,
         Study::Stability(stability) => &**stability,
+        Study::Surface(surface) => &**surface,
         Study::Validation(validation) => &**validation,
     };
     let mut bench = Bench {

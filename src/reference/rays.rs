@@ -10,7 +10,7 @@ use crate::domain::{
     bvh::Bvh,
     eye::Eye,
     level_set::{
-        FIRST, LevelSet,
+        FIRST, LevelSet, VOXELS,
         kernels::{Field, Kernels},
     },
     mesh::TriangleMesh,
@@ -39,7 +39,7 @@ pub fn cast(
     solids: &TriangleMesh,
 ) -> Vec<Seen> {
     let tree = Bvh::new(solids);
-    let coarse = LevelSet::of_kernels(kernels, size, spacing);
+    let coarse = LevelSet::of_kernels(kernels, size, spacing / VOXELS);
     let water = Water {
         field: kernels.field(),
         coarse: &coarse,

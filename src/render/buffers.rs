@@ -2,7 +2,7 @@
 
 use super::uniform::{
     Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Path, Rays, Sea, SetNode, Shading,
-    SprayParams, Thickness, Tile, Triangle, Whitewater, WhitewaterParams,
+    Shape, SprayParams, Thickness, Tile, Triangle, Whitewater, WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
 
@@ -34,6 +34,8 @@ pub(super) const SOLID_PACKED: Buf<u32> = Buf::new("solid_packed");
 pub(super) const PARTICLES: Buf<Particle> = Buf::new("particles");
 /// How each of them goes about the frame's instant.
 pub(super) const PATHS: Buf<Path> = Buf::new("paths");
+/// What each of them is splatted as.
+pub(super) const SHAPES: Buf<Shape> = Buf::new("shapes");
 /// Workgroups of a dispatch of one a particle.
 pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
 /// What a particle adds to thickness.

@@ -169,6 +169,7 @@ pub(super) struct Setting {
     pub(super) extent: Extent,
     pub(super) particle_count: u32,
     pub(super) radius: f64,
+    pub(super) near: f64,
     pub(super) frames_per_second: f64,
 }
 
@@ -240,8 +241,8 @@ pub(super) fn camera(
         clock: (instant / setting.frames_per_second) as f32,
         frame_seconds: (1.0 / setting.frames_per_second) as f32,
         corner: extent.corner.map(|side| side as f32),
-        pad0: 0.0,
-        pad1: 0.0,
+        near: setting.near as f32,
+        ..uniform::Camera::default()
     }
 }
 
@@ -298,6 +299,7 @@ mod tests {
             },
             particle_count: 0,
             radius: 0.1,
+            near: 0.01,
             frames_per_second: 24.0,
         };
         let sample = Sample {

@@ -1,13 +1,19 @@
 //! What the shading pass is given: the look as a uniform, the sky as a texture.
 
+use super::RenderScene;
 use super::plan::Plan;
 use super::sky::Sky;
 use super::uniform;
 use crate::gpu::texture::{SamplerSpec, TextureSpec};
 use crate::scene::look::Look;
 
+/// How far off its face a point is whose shadow is looked up, over the domain's longer side on the ground: about three texels of the
+/// shadow map, which holds a little more than the domain.
+const SHADOW_OFFSET: f64 = 0.0016;
+
 pub(super) fn shading(
     look: &Look,
+    scene: &RenderScene,
     sky: &Sky,
     shadow_from_world: [[f32; 4]; 4],
 ) -> uniform::Shading {
@@ -27,7 +33,7 @@ pub(super) fn shading(
         absorption: colour(spec.water.absorption_per_metre),
         sun_path: (1.0 / sun_cosine) as f32,
         scattering: colour(spec.water.scattering_per_metre),
-        pad0: 0.0,
+        spacing: scene.particle_spacing as f32,
         ground_colour: colour(spec.ground.colour),
         ground_variation: spec.ground.variation as f32,
         solid_colour: colour(spec.solids.colour),
@@ -39,6 +45,10 @@ pub(super) fn shading(
         window_radiance: 0.06,
         background: if spec.output.background { 1.0 } else { 0.0 },
         disc: sky.disc,
+        extent: scene.extent() as f32,
+        shadow_offset: (SHADOW_OFFSET * scene.extent()) as f32,
+        pad0: 0.0,
+        pad1: 0.0,
         irradiance: sky.irradiance,
         shadow_from_world,
     }

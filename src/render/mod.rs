@@ -23,6 +23,7 @@ mod renderer;
 mod samples;
 mod sea;
 mod set;
+mod shapes;
 mod sky;
 mod surface;
 #[expect(unreachable_pub, reason = "mirrors are declared public")]
@@ -62,6 +63,14 @@ pub struct RenderScene {
     pub wave_makers: Vec<(Wall, f64)>,
     /// Waves that come in from the sea.
     pub waves: Option<OpenWaves>,
+}
+
+impl RenderScene {
+    /// The domain's longer side on the ground, metres: what lies about the water has its lengths from it.
+    fn extent(&self) -> f64 {
+        let size = self.domain.size();
+        size.x.max(size.z)
+    }
 }
 
 /// Why there is no picture.

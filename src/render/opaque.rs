@@ -18,8 +18,8 @@ const WALL: u32 = 1;
 /// Colours of a palette: a material takes eight bits of a pixel.
 pub(super) const MOST_COLOURS: usize = 256 - PALETTE as usize;
 
-/// Between a wall and the domain, metres over the domain's size: two faces in one place would flicker.
-const GAP: f64 = 1e-4;
+/// Between a wall and the domain, particle spacings: two faces in one place would flicker.
+const GAP: f64 = 0.006;
 
 /// Triangles, and the colours of their materials.
 #[derive(Clone, Debug, Default)]
@@ -41,7 +41,7 @@ impl Opaque {
                 Some(colour) => opaque.material(colour, false)?,
                 None => WALL,
             };
-            for [low, high] in quays(basin, size) {
+            for [low, high] in quays(basin, size, GAP * scene.particle_spacing) {
                 opaque.add_box(low, high, material);
             }
         }
@@ -86,7 +86,7 @@ impl Opaque {
                 }
                 // A triangle without area has no normal, and nothing of it would be seen.
                 let area = (points[1] - points[0]).cross(points[2] - points[0]);
-                if area.length() > 1e-12 {
+                if area.length() > 1e-10 * scene.particle_spacing.powi(2) {
                     self.push(points.map(|p| p - origin), material);
                 }
             }
@@ -149,13 +149,12 @@ pub fn opaque(look: &Look, scene: &RenderScene) -> Result<TriangleMesh, RenderEr
 }
 
 /// Two corners of each quay wall. A wall reaches past an end where none stands across, so that no end is in the picture.
-fn quays(basin: &BasinSpec, size: DVec3) -> Vec<[DVec3; 2]> {
+fn quays(basin: &BasinSpec, size: DVec3, gap: f64) -> Vec<[DVec3; 2]> {
     let thick = basin.thickness_m;
     let stands = |axis: usize, is_max: bool| {
         let mut sides = basin.sides.iter();
         sides.any(|wall| wall.axis == axis && wall.is_max == is_max)
     };
-    let gap = GAP * size.max_element();
     let walls = basin.sides.iter().map(|wall| {
         let along = 2 - wall.axis;
         let (mut low, mut high) = (DVec3::ZERO, DVec3::new(0.0, basin.height_m, 0.0));

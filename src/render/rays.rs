@@ -12,7 +12,9 @@ use super::{
 use crate::{
     domain::{
         bvh::Bvh,
-        level_set::{LevelSet, VALUES, VOXELS, bricks_over, sunlight::nodes_over},
+        level_set::{
+            LevelSet, VALUES, VOXELS, bricks_over, kernels::Kernels, sunlight::nodes_over,
+        },
         mesh::TriangleMesh,
     },
     gpu::recording::{Bind, Command, Groups},
@@ -22,7 +24,7 @@ use crate::{
 /// Sides of the box at which the look's quay walls stand: those along z.
 const QUAYS: u32 = 0b11_0000;
 
-/// Particles for each brick that is planned for. The quickstart has one for 83 of them at its start and for 27 in its splash; a
+/// Particles for each brick that is planned for, of two voxels a spacing. The quickstart has one for 83 of them at its start and for 27 in its splash; a
 /// frame that has more makes room for them.
 const PARTICLES_A_BRICK: usize = 24;
 
@@ -34,9 +36,8 @@ pub(super) fn plan_rays(
     (triangles, particles): (&[Triangle], usize),
 ) {
     let size = scene.domain.size();
-    let spacing = scene.particle_spacing;
-    let bricks = bricks_over(size, spacing);
-    let voxel = spacing / VOXELS;
+    let voxel = voxel(look, scene);
+    let bricks = bricks_over(size, voxel);
     let (nodes, pitch) = nodes_over(size, voxel);
     let rays = Rays {
         size: size.as_vec3().to_array(),
@@ -51,10 +52,10 @@ pub(super) fn plan_rays(
     let count = |n: [u32; 3]| n.iter().map(|&n| n as usize).product();
     plan.values(&RAYS, &[rays]);
     plan.buffer(&LEVEL_TABLE, count(bricks));
-    plan.buffer(
-        &LEVEL_VALUES,
-        (particles / PARTICLES_A_BRICK).max(1) * VALUES,
-    );
+    // Bricks lie along a surface: their number goes with the square of how fine they are.
+    let finer = (look.spec().surface.voxels_per_spacing / VOXELS).powi(2);
+    let bricks = (finer * (particles / PARTICLES_A_BRICK) as f64).ceil();
+    plan.buffer(&LEVEL_VALUES, (bricks as usize).max(1) * VALUES);
     plan.buffer(&SUN_PATHS, count(nodes));
     let (boxes, sorted) = tree(triangles);
     plan.values(&SET_NODES, &boxes);
@@ -97,13 +98,26 @@ fn tree(triangles: &[Triangle]) -> (Vec<SetNode>, Vec<Triangle>) {
     (nodes.collect(), sorted.collect())
 }
 
-/// The level set of particles so many seconds on their paths from where they stand, relative to the box's least corner.
-pub(super) fn level_set(scene: &RenderScene, places: &[(Vec3, Path)], seconds: f32) -> LevelSet {
+/// Edge length of a voxel, metres.
+pub(super) fn voxel(look: &Look, scene: &RenderScene) -> f64 {
+    scene.particle_spacing / look.spec().surface.voxels_per_spacing
+}
+
+/// The level set of particles so many seconds on their paths from where they stand, relative to the box's least corner, with voxels of
+/// `voxel` metres.
+pub(super) fn level_set(
+    scene: &RenderScene,
+    voxel: f64,
+    places: &[(Vec3, Path)],
+    seconds: f32,
+) -> LevelSet {
     let moved: Vec<DVec3> = places
         .iter()
         .map(|(position, path)| position.as_dvec3() + path.way(seconds))
         .collect();
-    LevelSet::new(&moved, scene.domain.size(), scene.particle_spacing)
+    let size = scene.domain.size();
+    let kernels = Kernels::fit(&moved, size, scene.particle_spacing);
+    LevelSet::of_kernels(&kernels, size, voxel)
 }
 
 /// Unit vector to the sun as it stands seen from within flat water.

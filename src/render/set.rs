@@ -15,6 +15,11 @@ use crate::gpu::{
     texture::TextureSpec,
 };
 
+/// About what throws shadows, and before and behind it, over the domain's longer side on the ground: quay walls reach far, and in
+/// front of the box they must still be seen by it.
+const SHADOW_MARGIN: f32 = 0.02;
+const SHADOW_DEPTH: f32 = 2.4;
+
 /// Texels along a side of the shadow map.
 const SHADOW_SIZE: u32 = 2048;
 
@@ -53,10 +58,11 @@ pub(super) fn shadow_from_world(triangles: &[Triangle], domain: DVec3, sun: DVec
             take(p.into());
         }
     }
-    let margin = Vec3::splat(0.5);
+    let extent = size.x.max(size.z);
+    let margin = Vec3::splat(SHADOW_MARGIN * extent);
     let (low, high) = (low - margin, high + margin);
-    // Quay walls reach far; in front of the box they must still be seen by it, so depth gets room.
-    let (near, far) = (low.z - 60.0, high.z + 60.0);
+    let room = SHADOW_DEPTH * extent;
+    let (near, far) = (low.z - room, high.z + room);
     let scale = 2.0 / (high - low);
     let row = |axis: Vec3, scale: f32, shift: f32| (axis * scale).extend(shift);
     Mat4::from_cols(

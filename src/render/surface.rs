@@ -179,7 +179,7 @@ pub(super) fn curvature_flow(
     }
 }
 
-/// The narrow-range filter: along x, then along y, by way of the second depth.
+/// The narrow-range filter: along x, then along y by way of the second depth, then over the few pixels about each.
 pub(super) fn narrow_range(plan: &mut Plan, width: f64, radius: f64, size: [u32; 2]) -> Smoothing {
     let params = [0, 1].map(|axis| Narrow {
         width: width as f32,
@@ -197,9 +197,16 @@ pub(super) fn narrow_range(plan: &mut Plan, width: f64, radius: f64, size: [u32;
         ];
         Command::in_groups("ssfr/narrow_range", Groups::Pixels(size), binds)
     };
+    let [depth, other] = &DEPTHS;
+    let binds = vec![
+        NARROW_RANGE.bind(0),
+        Bind::whole("source", depth),
+        Bind::whole("smoothed", other),
+    ];
+    let clean = Command::in_groups("ssfr/narrow_clean", Groups::Pixels(size), binds);
     Smoothing {
-        commands: vec![along(0), along(1)],
-        surface: DEPTHS[0].clone(),
+        commands: vec![along(0), along(1), clean],
+        surface: other.clone(),
     }
 }
 

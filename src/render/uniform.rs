@@ -25,8 +25,8 @@ mirror!(
         clock: f32,
         frame_seconds: f32,
         corner: [f32; 2],
+        near: f32,
         pad0: f32,
-        pad1: f32,
     }
 );
 
@@ -65,6 +65,16 @@ mirror!(
 );
 
 mirror!(
+    /// `Shape` of shared/ssfr_ellipsoid.wgsl.
+    Shape {
+        diagonal: [f32; 3],
+        pad0: f32,
+        off: [f32; 3],
+        pad1: f32,
+    }
+);
+
+mirror!(
     /// `Shading` of shared/ssfr_light.wgsl.
     Shading {
         sun_direction: [f32; 3],
@@ -74,7 +84,7 @@ mirror!(
         absorption: [f32; 3],
         sun_path: f32,
         scattering: [f32; 3],
-        pad0: f32,
+        spacing: f32,
         ground_colour: [f32; 3],
         ground_variation: f32,
         solid_colour: [f32; 3],
@@ -85,6 +95,10 @@ mirror!(
         window_radiance: f32,
         background: f32,
         disc: f32,
+        extent: f32,
+        shadow_offset: f32,
+        pad0: f32,
+        pad1: f32,
         irradiance: [[f32; 4]; 9],
         shadow_from_world: [[f32; 4]; 4],
     }
@@ -114,7 +128,7 @@ mirror!(
 );
 
 mirror!(
-    /// `NarrowParams` of ssfr/narrow_range.wgsl.
+    /// `NarrowParams` of shared/ssfr_narrow.wgsl.
     Narrow as "NarrowParams" {
         width: f32,
         range: f32,
@@ -241,6 +255,7 @@ pub fn mirrors() -> Vec<Layout> {
         Particle::layout(),
         Path::layout(),
         SprayParams::layout(),
+        Shape::layout(),
         Shading::layout(),
         Flow::layout(),
         FlowLevel::layout(),

@@ -16,11 +16,12 @@ use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 
 use camera_file::CameraFile;
 pub(super) use keys::KEYS;
+use keys::{MOST_SAMPLES, MOST_VOXELS};
 pub use spec::{
     AovSpec, BasinSpec, CameraSpec, ColourSpaceSpec, CurveSpec, FilterSpec, FormatSpec, ImageSpec,
     KeyframeSpec, LensSpec, LightSpec, LookSpec, MethodSpec, OutputSpec, RendererSpec, RippleSpec,
-    SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput, SpraySpec, SunSpec, SurfaceSpec, TransformSpec,
-    ViewSpec, WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
+    SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput, SplatSpec, SpraySpec, SunSpec, SurfaceSpec,
+    TransformSpec, ViewSpec, WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
 };
 
 /// Pixels of a picture, counted from the upper left one of the look's image.
@@ -35,7 +36,7 @@ pub struct Window {
 /// Why a look cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
-pub struct LookError(#[from] SceneError);
+pub struct LookError(#[from] pub(super) SceneError);
 
 /// The key of the panorama's file.
 const PANORAMA: &str = "sky.file";
@@ -84,11 +85,19 @@ impl Look {
     /// # Errors
     /// As [`Look::load`].
     pub fn load_within(path: &Path, reach: Reach) -> Result<Self, LookError> {
+        Self::load_with(path, &[], reach)
+    }
+
+    /// [`Look::load_within`] with overrides laid over it, as `key=value`.
+    ///
+    /// # Errors
+    /// As [`Look::load`].
+    pub fn load_with(path: &Path, overrides: &[String], reach: Reach) -> Result<Self, LookError> {
         let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
             file: path.to_owned(),
             source,
         })?;
-        Ok(Self::parse_within(&text, path, reach)?)
+        Ok(Self::parse_with(&text, path, overrides, reach)?)
     }
 
     /// Parses and validates the text of a look; `file` names it in errors, and its folder is where a
@@ -97,11 +106,16 @@ impl Look {
     /// # Errors
     /// As [`Look::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, LookError> {
-        Ok(Self::parse_within(text, file, Reach::Folder)?)
+        Ok(Self::parse_with(text, file, &[], Reach::Folder)?)
     }
 
-    fn parse_within(text: &str, file: &Path, reach: Reach) -> Result<Self, SceneError> {
-        let (doc, mut root) = Document::parse(text, file, &[], KEYS)?;
+    fn parse_with(
+        text: &str,
+        file: &Path,
+        overrides: &[String],
+        reach: Reach,
+    ) -> Result<Self, SceneError> {
+        let (doc, mut root) = Document::parse(text, file, overrides, KEYS)?;
         let doc = doc.within(reach);
         doc.settle(&mut root)?;
         let spec = LookSpec::deserialize(toml::Deserializer::from(root))
@@ -220,18 +234,58 @@ impl Look {
     /// `method`: every particle belongs to the surface.
     #[must_use]
     pub fn of_surface(&self, method: MethodSpec) -> Self {
+        self.changed(|spec| {
+            spec.renderer.method = method;
+            spec.water.spray = None;
+            spec.whitewater = None;
+            spec.camera.lens = None;
+            (spec.image.samples, spec.image.shutter) = (1, 0.0);
+            plain(spec);
+            spec.output.formats = vec![FormatSpec::Exr];
+            spec.output.aovs = vec![AovSpec::Z, AovSpec::N];
+        })
+    }
+
+    /// The look for pictures of the water alone by `method`: spray as the look has it, no whitewater, nothing beside the picture.
+    #[must_use]
+    pub fn of_water(&self, method: MethodSpec) -> Self {
+        self.changed(|spec| {
+            spec.renderer.method = method;
+            spec.whitewater = None;
+            spec.output.aovs = Vec::new();
+            plain(spec);
+        })
+    }
+
+    /// Rays that are `samples` times as many a pixel, through voxels `voxels` times as fine; up to what the keys take.
+    #[must_use]
+    pub fn finer(&self, samples: u32, voxels: f64) -> Self {
+        self.changed(|spec| {
+            spec.renderer.method = MethodSpec::Ray;
+            spec.image.samples = (samples * spec.image.samples).min(MOST_SAMPLES);
+            let finer = voxels * spec.surface.voxels_per_spacing;
+            spec.surface.voxels_per_spacing = finer.min(MOST_VOXELS);
+        })
+    }
+
+    /// With a camera that stands still at `position`, metres, and looks at `target`.
+    #[must_use]
+    pub fn standing(&self, position: DVec3, target: DVec3, focal_length_mm: f64) -> Self {
+        let mut look = self.changed(|spec| {
+            (spec.camera.file, spec.camera.name) = (None, None);
+            spec.camera.position = Some(position.to_array());
+            spec.camera.target = Some(target.to_array());
+            spec.camera.focal_length_mm = focal_length_mm;
+            spec.camera.keyframes = Vec::new();
+        });
+        look.camera = None;
+        look.hash = look.canonical_hash();
+        look
+    }
+
+    fn changed(&self, change: impl FnOnce(&mut LookSpec)) -> Self {
         let mut look = self.clone();
-        let spec = &mut look.spec;
-        spec.renderer.method = method;
-        spec.water.spray = None;
-        spec.whitewater = None;
-        spec.camera.lens = None;
-        (spec.image.samples, spec.image.shutter) = (1, 0.0);
-        (spec.image.overscan, spec.image.crop) = (0, None);
-        spec.output.formats = vec![FormatSpec::Exr];
-        spec.output.aovs = vec![AovSpec::Z, AovSpec::N];
-        spec.output.lights = Vec::new();
-        spec.output.cryptomatte = false;
+        change(&mut look.spec);
         look.hash = look.canonical_hash();
         look
     }
@@ -260,9 +314,16 @@ impl Look {
     }
 }
 
+/// The image alone: neither other windows of it, nor layers of light, nor mattes.
+fn plain(spec: &mut LookSpec) {
+    (spec.image.overscan, spec.image.crop) = (0, None);
+    spec.output.lights = Vec::new();
+    spec.output.cryptomatte = false;
+}
+
 /// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
 /// that it had before there was such a key.
-const NEWER: [&str; 13] = [
+const NEWER: [&str; 15] = [
     "whitewater: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
     "overscan: 0, ",
@@ -271,6 +332,8 @@ const NEWER: [&str; 13] = [
     "solids: Draw, ",
     "lights: [], ",
     "cryptomatte: false, ",
+    "voxels_per_spacing: 2.0, ",
+    "splat: Ellipsoid, ",
     "lens: None, file: None, name: None, ",
     ", focus_distance_m: None",
     ", shutter_curve: Box, shutter_ramps: None",

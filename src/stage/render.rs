@@ -3,6 +3,7 @@
 //! Several processes may render one look of one cache into one folder: each frame is rendered by one of them.
 
 mod folder;
+pub mod gallery;
 mod plan;
 pub mod surfaces;
 mod whitewater;

@@ -62,7 +62,9 @@ mod render {
     mod delivery;
     mod flicker;
     mod folder;
+    mod outlines;
     mod pictures;
+    mod scaled;
     mod scenes;
 }
 mod scene {

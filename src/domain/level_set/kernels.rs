@@ -18,7 +18,7 @@ use super::eigen;
 /// Reach of a kernel that is not flattened, in particle spacings.
 const SUPPORT: f64 = 2.5;
 /// Half axis of a lone particle's kernel, in particle spacings; the paper's k_n is a half.
-const ALONE: f64 = 0.5 * SUPPORT;
+pub const ALONE: f64 = 0.5 * SUPPORT;
 /// Neighbours that shape a kernel lie within so many particle spacings.
 const NEAR: f64 = 3.0;
 /// The longest half axis over the shortest one, at most; the paper's k_r.
@@ -111,15 +111,26 @@ impl Kernels {
     /// `spacing` lies between neighbours at rest, metres.
     pub fn fit(positions: &[DVec3], size: DVec3, spacing: f64) -> Self {
         let calibration = Calibration::new(spacing);
-        let with_mirrored = mirrored(positions, size, NEAR * spacing, &|&p, axis, plane| {
-            reflected(p, axis, plane)
-        });
-        let fitted = fit(&with_mirrored, positions.len(), &calibration);
+        let fitted = Self::of_first(positions.len(), positions, size, spacing);
         let ellipsoids = mirrored(&fitted, size, SUPPORT * spacing, &Ellipsoid::mirrored);
         Self {
             ellipsoids,
             level: calibration.level,
         }
+    }
+
+    /// The kernels of the first `count` of these positions alone, without those that stand in mirrors; the others shape them.
+    pub fn of_first(
+        count: usize,
+        positions: &[DVec3],
+        size: DVec3,
+        spacing: f64,
+    ) -> Vec<Ellipsoid> {
+        let calibration = Calibration::new(spacing);
+        let all = mirrored(positions, size, NEAR * spacing, &|&p, axis, plane| {
+            reflected(p, axis, plane)
+        });
+        fit(&all, count, &calibration)
     }
 
     /// The field itself, for values at any place.

@@ -103,7 +103,7 @@ fn noise_of_particles_is_smoothed_out_of_the_surface() {
         ellipsoids: balls.collect(),
         level: 0.5,
     };
-    let (plain, _) = rough(&LevelSet::of_kernels(&balls, size, D));
+    let (plain, _) = rough(&LevelSet::of_kernels(&balls, size, D / VOXELS));
     assert!(plain > 1.3 * stretched, "{plain} of balls, {stretched}");
 }
 
@@ -156,7 +156,7 @@ fn bricks_hold_the_field_of_the_kernels() {
     let pool = lattice([20, 9, 17], DVec3::ZERO, 0.3);
     let kernels = Kernels::fit(&pool, size, D);
     let field = kernels.field();
-    let set = LevelSet::of_kernels(&kernels, size, D);
+    let set = LevelSet::of_kernels(&kernels, size, D / VOXELS);
     let [mut full, mut empty, mut between] = [0; 3];
     for k in 0..2000 {
         let part = DVec3::new(noise(3 * k), noise(3 * k + 1), noise(3 * k + 2)) + 0.5;

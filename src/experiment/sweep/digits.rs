@@ -1,7 +1,7 @@
 //! Digits of a page: few.
 
 /// The table of a page: titles in words, and what was measured in few digits; `results.csv` has them all.
-pub(super) fn shortened(table: &[Vec<String>]) -> Vec<Vec<String>> {
+pub(in super::super) fn shortened(table: &[Vec<String>]) -> Vec<Vec<String>> {
     let Some((titles, rows)) = table.split_first() else {
         return Vec::new();
     };
@@ -19,7 +19,7 @@ pub(super) fn shortened(table: &[Vec<String>]) -> Vec<Vec<String>> {
 }
 
 /// Three digits.
-pub(super) fn significant(value: f64) -> String {
+pub(in super::super) fn significant(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 {
         "0".to_owned()

@@ -1,6 +1,6 @@
 //! A scene run over and over with one setting changed at a time: errors against time.
 
-mod digits;
+pub(super) mod digits;
 mod frames;
 mod measured;
 mod projection;

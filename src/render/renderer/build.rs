@@ -2,7 +2,9 @@
 
 use super::{
     shade::{plan_cast, plan_shade, wants_spray_aovs},
-    splats::{plan_body, plan_owner, plan_owner_before_rays, plan_particles, plan_spray},
+    splats::{
+        plan_body, plan_owner, plan_owner_before_rays, plan_particles, plan_shapes, plan_spray,
+    },
 };
 use crate::{
     render::{
@@ -20,12 +22,12 @@ use crate::{
         surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
         uniform::Triangle,
     },
-    scene::look::{AovSpec, FilterSpec, Look, MethodSpec},
+    scene::look::{AovSpec, FilterSpec, Look, MethodSpec, SplatSpec},
 };
 
 /// Splat radius over particle spacing where the look leaves it out: 0.5 √3 closes a lattice seen along its
 /// diagonal.
-const RADIUS: f64 = 0.87;
+pub(in crate::render) const RADIUS: f64 = 0.87;
 /// Pixels that rays are cast for in one dispatch, so that none runs long enough to lose a device.
 const CAST: u32 = 1 << 17;
 /// Smoothing width over particle spacing where the look leaves it out.
@@ -70,7 +72,7 @@ impl Plan {
         let matrix = shadow_from_world(&opaque, scene.domain.size(), look.sun_direction());
         let sky = Sky::new(look, limits.texture)?;
         plan_light(&mut plan, &sky);
-        let light = shading(look, &sky, matrix.to_cols_array_2d());
+        let light = shading(look, scene, &sky, matrix.to_cols_array_2d());
         plan.values(&SHADING, &[light]);
         let shaded = match spec.renderer.method {
             MethodSpec::Ssfr => &["ssfr/shade", "ssfr/shade_aovs", "ssfr/shade_objects"][..],
@@ -107,6 +109,9 @@ fn plan_ssfr(
         moving.push("ssfr/splat_spray");
     }
     plan_particles(plan, look, particles, &moving);
+    if look.spec().surface.splat == SplatSpec::Ellipsoid {
+        plan_shapes(plan, particles);
+    }
     let body = plan_body(plan, scene.particle_spacing);
     let owner = match look.wants(AovSpec::Forward) {
         true => plan_owner(plan),

@@ -10,10 +10,11 @@ use crate::{
     render::{
         Moment, RenderError,
         aeration::{self, CLEAR},
-        buffers::{PARTICLE_GROUPS, PARTICLES, PATHS, SPRAY_PARAMS},
+        buffers::{PARTICLE_GROUPS, PARTICLES, PATHS, SHAPES, SPRAY_PARAMS},
         camera::pose,
         lighting::spray_density,
         paths::{Path, paths},
+        shapes::shapes,
         uniform::{Particle, SprayParams},
     },
     scene::look::{AovSpec, MethodSpec},
@@ -72,6 +73,10 @@ impl Renderer {
         let groups = spread(&self.program.context, 1, packed.len() as u64);
         self.program.upload(PARTICLE_GROUPS, 0, &[groups.into()]);
         self.program.upload(PARTICLES, 0, &packed);
+        if self.program.has(SHAPES.name()) {
+            let shapes = shapes(&packed, &self.scene, self.plan.radius);
+            self.program.upload(SHAPES, 0, &shapes);
+        }
         if self.program.has(PATHS.name()) {
             let packed: Vec<_> = ways.iter().map(Path::packed).collect();
             self.program.upload(PATHS, 0, &packed);
@@ -136,6 +141,9 @@ impl Renderer {
         }
         let capacity = room(particles);
         let mut grown = vec![PARTICLES.sized(capacity)];
+        if self.program.has(SHAPES.name()) {
+            grown.push(SHAPES.sized(capacity));
+        }
         if self.program.has(PATHS.name()) {
             grown.push(PATHS.sized(capacity));
         }

@@ -26,10 +26,14 @@ use crate::gpu::{
     recording::{Recording, Timer},
 };
 use crate::scene::look::Look;
+pub(super) use build::RADIUS;
 use build::room;
 use shade::draws_spray;
 use water::RayWater;
 use whitewater::Whitewater;
+
+/// Depth before which nothing solid is drawn, particle spacings.
+const NEAR: f64 = 0.12;
 
 /// Renders frames of one scene with one look.
 pub struct Renderer {
@@ -92,7 +96,7 @@ impl Renderer {
             plan,
             program,
             capacity: room(0),
-            water: RayWater::of(look),
+            water: RayWater::of(look, scene),
             sea: Sea::of(look, scene),
             whitewater: Whitewater::of(look, scene),
             timer: None,
@@ -164,6 +168,7 @@ impl Renderer {
             extent: self.plan.extent,
             particle_count: loaded.count,
             radius: self.plan.radius,
+            near: NEAR * self.scene.particle_spacing,
             frames_per_second: self.scene.frames_per_second,
         };
         self.draw_once()?;

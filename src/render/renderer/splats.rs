@@ -8,8 +8,8 @@ use crate::{
     },
     render::{
         buffers::{
-            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, PATHS, SPRAY, SPRAY_PARAMS, THICKNESS,
-            THICKNESS_PARAMS, WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS,
+            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, PATHS, SHAPES, SPRAY, SPRAY_PARAMS,
+            THICKNESS, THICKNESS_PARAMS, WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS,
         },
         frame::FAR,
         plan::Plan,
@@ -37,6 +37,14 @@ pub(super) fn plan_particles(
         for pass in moving {
             plan.define(pass, "PATHS");
         }
+    }
+}
+
+/// Plans a shape of its own for each of `particles` particles.
+pub(super) fn plan_shapes(plan: &mut Plan, particles: usize) {
+    plan.buffer(&SHAPES, particles);
+    for pass in ["ssfr/splat_depth", "ssfr/splat_owner"] {
+        plan.define(pass, "ELLIPSOIDS");
     }
 }
 

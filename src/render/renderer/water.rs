@@ -9,7 +9,7 @@ use crate::{
         RenderError, RenderScene,
         buffers::{LEVEL_TABLE, LEVEL_VALUES, SUN_PATHS},
         paths::{Path, body_of},
-        rays::{level_set, sun_in_water},
+        rays::{level_set, sun_in_water, voxel},
         uniform::Particle,
     },
     scene::look::{Look, MethodSpec},
@@ -23,16 +23,19 @@ pub(super) struct RayWater {
     seconds: Option<f32>,
     /// Values that there is room for.
     capacity: usize,
+    /// Edge length of a voxel, metres.
+    voxel: f64,
     sun: DVec3,
 }
 
 impl RayWater {
     /// `None` where the look casts no rays.
-    pub(super) fn of(look: &Look) -> Option<Self> {
+    pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
         (look.spec().renderer.method == MethodSpec::Ray).then(|| Self {
             places: Vec::new(),
             seconds: None,
             capacity: 0,
+            voxel: voxel(look, scene),
             sun: sun_in_water(look),
         })
     }
@@ -53,7 +56,7 @@ impl RayWater {
         if self.seconds == Some(seconds) {
             return Ok(false);
         }
-        let level = level_set(scene, &self.places, seconds);
+        let level = level_set(scene, self.voxel, &self.places, seconds);
         let light = Sunlight::new(&level, self.sun);
         let grew = level.values.len() > self.capacity;
         if grew {

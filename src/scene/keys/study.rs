@@ -6,33 +6,37 @@ use super::super::{
 };
 
 pub(in super::super) const KEYS: &[Key] = &[
-    Key::choice("kind", &["solver_comparison", "sweep", "stability", "validation"]).about("what is compared"),
+    Key::choice(
+        "kind",
+        &["solver_comparison", "sweep", "surface", "stability", "validation"],
+    )
+    .about("what is compared"),
     Key::text("scene", "a scene file, relative to the study file")
-        .only("kind", &["solver_comparison", "sweep"])
+        .only("kind", &["solver_comparison", "sweep", "surface"])
         .about("what is simulated"),
     Key::other("about", "an array of paragraphs for the page")
         .absent()
-        .only("kind", &["sweep", "stability", "validation"])
+        .only("kind", &["sweep", "surface", "stability", "validation"])
         .about("in the reader's words"),
     // Of two solvers.
-    Key::text("look", "a look file that writes PNG, relative to the study file")
-        .only("kind", COMPARISON)
-        .about("how both are seen"),
+    Key::text("look", "a look file, relative to the study file; of two solvers one that writes PNG")
+        .only("kind", &["solver_comparison", "surface"])
+        .about("how it is seen"),
     Key::other("solvers", "two of \"pbf\" and \"flip\", each once")
         .only("kind", COMPARISON)
         .about("left and right"),
     Key::other(
         "frames",
-        "frames to measure, such as \"1-240\" or \"1-240x2\", within the shot; all of it if left out",
+        "frames to measure, such as \"1-240\" or \"1-240x2\", within the shot; of two solvers all of it if left out",
     )
     .absent()
-    .only("kind", COMPARISON)
+    .only("kind", &["solver_comparison", "surface"])
     .about("what the curves are drawn from"),
     Key::other("pictures", "frames to render, such as \"60-240x60\", within the shot")
         .only("kind", COMPARISON)
         .about("pairs of pictures"),
     // Of a sweep.
-    SET.only("kind", &["solver_comparison", "sweep"]),
+    SET.only("kind", &["solver_comparison", "sweep", "surface"]),
     KEY.only("kind", SWEEP),
     VALUES.only("kind", SWEEP),
     COARSER.only("kind", SWEEP),
@@ -51,15 +55,16 @@ pub(in super::super) const KEYS: &[Key] = &[
     .about("how long a run is"),
     Key::whole("repeats", 1..=100)
         .default("1")
-        .only("kind", SWEEP)
+        .only("kind", &["sweep", "surface"])
         .about("times are medians over so many runs"),
     Key::other(
         "errors",
         "of \"density_error_mean\", \"density_error_p99\", \"density_error_max\", \"top_speed\", \"weight_error\", or of \"crest_error\", \
          \"front_error\", \"energy_error\", \"profile_error\", or of \"pressure_error\", \"velocity_error\", \
-         \"divergence\", or \"distance_to_converged\"",
+         \"divergence\", or \"distance_to_converged\"; of a surface of \"depth_off\", \"normal_off\", \"silhouette\", \
+         \"silhouette_offset\", \"colour\"",
     )
-    .only("kind", SWEEP)
+    .only("kind", &["sweep", "surface"])
     .about("what is measured"),
     Key::flag("convergence_point")
         .default("false")
@@ -67,6 +72,10 @@ pub(in super::super) const KEYS: &[Key] = &[
         .about("whether that of the paper's Table 1 is looked for"),
     Key::tables("method", METHOD)
         .only("kind", SWEEP)
+        .about("A line of the curves each"),
+    // Of a surface.
+    Key::tables("line", LINE)
+        .only("kind", SURFACE)
         .about("A line of the curves each"),
     // Of stability.
     Key::tables("case", CASE)
@@ -83,6 +92,7 @@ pub(in super::super) const KEYS: &[Key] = &[
 
 const COMPARISON: &[&str] = &["solver_comparison"];
 const SWEEP: &[&str] = &["sweep"];
+const SURFACE: &[&str] = &["surface"];
 const STABILITY: &[&str] = &["stability"];
 const VALIDATION: &[&str] = &["validation"];
 
@@ -133,6 +143,23 @@ const METHOD: &[Key] = &[
     )
     .absent()
     .about("value by value against that method"),
+];
+
+const LINE: &[Key] = &[
+    Key::other("name", "what the line of the curves is called").about("for the legend"),
+    Key::other(
+        "set",
+        "an array of overrides of the look, such as [\"surface.filter=narrow_range\"]",
+    )
+    .absent()
+    .about("laid over the look"),
+    Key::other(
+        "key",
+        "\"surface.filter\", \"surface.splat\", \"surface.radius_m\", \"surface.smoothing_width_m\", \
+         \"surface.voxels_per_spacing\", \"renderer.method\" or \"image.samples\"",
+    )
+    .about("what changes from point to point"),
+    Key::other("values", "one or more values of the key").about("of the key"),
 ];
 
 const SOLVERS: Key = Key::other(

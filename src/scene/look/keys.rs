@@ -51,6 +51,12 @@ const PLACE: Interval = -1e5..=1e5;
 /// A part of something, or a reflectance.
 const PART: Interval = 0.0..=1.0;
 
+/// Samples a pixel, at most.
+pub(super) const MOST_SAMPLES: u32 = 1024;
+
+/// Voxels a particle spacing, at most.
+pub(super) const MOST_VOXELS: f64 = 8.0;
+
 const FOCAL_LENGTH: Interval = 1.0..=5000.0;
 
 /// Metres of a wall, a storey.
@@ -155,7 +161,7 @@ const IMAGE: &[Key] = &[
         .about(
             "[x0, y0, x1, y1] from the upper left corner: only these pixels are rendered, x1 and y1 are the first beyond them",
         ),
-    Key::whole("samples", 1..=1024)
+    Key::whole("samples", 1..=MOST_SAMPLES)
         .default("3")
         .about("samples a pixel, spread over the pixel and over the shutter"),
     Key::number("shutter", PART)
@@ -185,14 +191,22 @@ const SURFACE: &[Key] = &[
         .about(
             "van der Laan 2009 with the world-space width of Bagar 2010, or Truong and Yuksel 2018",
         ),
+    Key::choice("splat", &["ellipsoid", "sphere"])
+        .default("\"ellipsoid\"")
+        .about(
+            "what a particle is splatted as, with `method = \"ssfr\"`: flattened as its neighbours lie (Yu and Turk 2013), or a ball",
+        ),
     Key::number("radius_m", 1e-4..=100.0)
         .unit("metres")
         .computed(|| "0.87 particle spacings".to_owned())
-        .about("splat radius"),
+        .about("splat radius; ellipsoids are as much larger or smaller as it is than what it is if left out"),
     Key::number("smoothing_width_m", 0.0..=100.0)
         .unit("metres")
         .computed(|| "1.6 particle spacings".to_owned())
         .about("standard deviation of the smoothing, in the world"),
+    Key::number("voxels_per_spacing", 1.0..=MOST_VOXELS)
+        .default("2.0")
+        .about("voxels a particle spacing of the level set, with `method = \"ray\"`"),
     Key::number("roughness", 1e-3..=1.0).default("0.08").about(
         "root mean square slope of the waves too small to be drawn, which widens the glitter",
     ),

@@ -157,16 +157,30 @@ pub enum FilterSpec {
     NarrowRange,
 }
 
+/// What a particle is splatted as.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum SplatSpec {
+    /// Flattened and stretched as its neighbours lie (Yu and Turk 2013); a lone one is a ball of its own volume.
+    Ellipsoid,
+    /// A ball of the splat radius.
+    Sphere,
+}
+
 /// How splats become a surface.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSpec {
     /// Which filter.
     pub filter: FilterSpec,
+    /// What a particle is splatted as.
+    pub splat: SplatSpec,
     /// Splat radius, metres; 0.87 particle spacings where left out.
     pub radius_m: Option<f64>,
     /// Standard deviation of the smoothing, metres in the world; 1.6 particle spacings where left out.
     pub smoothing_width_m: Option<f64>,
+    /// Voxels a particle spacing of the level set that rays are cast into.
+    pub voxels_per_spacing: f64,
     /// Root mean square slope of the waves too small to be drawn, which widens the glitter.
     pub roughness: f64,
     /// Fine waves drawn into the normals; none unless named.

@@ -44,6 +44,26 @@ fn a_plain_look_parses_and_layout_does_not_change_its_hash() {
     assert_eq!(look.hash().len(), 64);
 }
 
+/// As version 0.1.0 had it before there were voxels and splats to choose; each choice of another has another.
+#[test]
+fn a_look_that_leaves_choices_out_keeps_its_hash() {
+    const BEFORE: &str = "023f42bda0627032e91d99f5fb5b472c5f3a4c996b6ea8ba9b58729051c346b6";
+    let hash = |surface: &str| {
+        let text = format!("{PLAIN}[surface]\n{surface}");
+        Look::parse(&text, Path::new("a.toml")).unwrap().hash()
+    };
+    assert_eq!(hash(""), BEFORE);
+    assert_eq!(
+        hash("splat = \"ellipsoid\"\nvoxels_per_spacing = 2.0\n"),
+        BEFORE
+    );
+    let others = [
+        hash("splat = \"sphere\"\n"),
+        hash("voxels_per_spacing = 2.5\n"),
+    ];
+    assert!(others[0] != BEFORE && others[1] != BEFORE && others[0] != others[1]);
+}
+
 #[test]
 fn an_unknown_key_names_line_key_and_neighbour() {
     let (line, key, message) = fault(&PLAIN.replace("width", "widht"));
@@ -203,6 +223,7 @@ fn every_number_of_a_look_has_a_range() {
         ("camera.lens", "focus_distance_m", "{}\nf_stop = 1.0"),
         ("surface", "radius_m", "{}"),
         ("surface", "smoothing_width_m", "{}"),
+        ("surface", "voxels_per_spacing", "{}"),
         ("surface", "roughness", "{}"),
         ("surface.ripple", "wavelength_m", "{}\nslope = 0.1"),
         ("surface.ripple", "slope", "{}\nwavelength_m = 1.0"),

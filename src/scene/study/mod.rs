@@ -1,10 +1,12 @@
 //! Study files: what is to be compared, on which scene.
 //!
 //! One file a kind: [`comparison`] sets two solvers side by side, [`sweep`] runs a scene over and over, with one
-//! setting changed at a time, [`stability`] runs scenes that are hard on a solver, [`validation`] those whose answer is known.
+//! setting changed at a time, [`stability`] runs scenes that are hard on a solver, [`validation`] those whose answer is known, [`surface`]
+//! draws one scene's frames with one setting of the look changed at a time.
 
 pub mod comparison;
 pub mod stability;
+pub mod surface;
 pub mod sweep;
 pub mod validation;
 
@@ -23,6 +25,7 @@ use super::{
 
 use comparison::SolverComparison;
 use stability::Stability;
+use surface::SurfaceStudy;
 use sweep::Sweep;
 use validation::Validation;
 
@@ -35,6 +38,8 @@ pub enum Study {
     Sweep(Box<Sweep>),
     /// `kind = "stability"`.
     Stability(Box<Stability>),
+    /// `kind = "surface"`.
+    Surface(Box<SurfaceStudy>),
     /// `kind = "validation"`.
     Validation(Box<Validation>),
 }
@@ -135,6 +140,10 @@ impl Study {
                 let stability = stability::parse(&doc, root, base_dir)?;
                 Ok(Self::Stability(Box::new(stability)))
             }
+            "surface" => {
+                let surface = surface::parse(&doc, root, base_dir)?;
+                Ok(Self::Surface(Box::new(surface)))
+            }
             // The table of keys has no other.
             _ => {
                 let validation = validation::parse(&doc, root, base_dir)?;
@@ -163,6 +172,7 @@ impl Study {
                 points.for_each(|point| of(&point.scene));
             }
             Self::Stability(stability) => stability.for_each_scene(of),
+            Self::Surface(surface) => of(&surface.scene),
             Self::Validation(validation) => {
                 let runs = validation.benchmarks.iter().flat_map(|b| &b.runs);
                 runs.for_each(|run| of(&run.scene));
@@ -236,6 +246,7 @@ mod tests {
     fn the_studies_that_ship_fit_their_scenes() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
         let (mut comparisons, mut sweeps, mut stabilities, mut validations) = (0, 0, 0, 0);
+        let mut surfaces = 0;
         for entry in fs::read_dir(folder).expect("studies") {
             let file = entry.expect("a study").path();
             match Study::load(&file).unwrap_or_else(|error| panic!("{error}")) {
@@ -260,6 +271,10 @@ mod tests {
                     }
                     stabilities += 1;
                 }
+                Study::Surface(surface) => {
+                    assert!(surface.points().count() >= 2);
+                    surfaces += 1;
+                }
                 Study::Validation(validation) => {
                     let mut benchmarks = validation.benchmarks.iter();
                     assert!(benchmarks.all(|benchmark| !benchmark.gates.is_empty()));
@@ -268,8 +283,8 @@ mod tests {
             }
         }
         assert_eq!(
-            (comparisons, sweeps, stabilities, validations),
-            (2, 12, 1, 2)
+            (comparisons, sweeps, stabilities, validations, surfaces),
+            (2, 12, 1, 2, 1)
         );
     }
 }

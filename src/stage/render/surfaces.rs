@@ -1,4 +1,5 @@
-//! `check --render`: how far the surfaces in pictures of a cache are from rays in f64 through the particles' own field.
+//! `check --render`: how far the surfaces in pictures of a cache are from rays in f64 through the particles' own field; and, where it is
+//! asked for, pictures of the water against pictures by finer rays.
 
 use std::{
     path::PathBuf,
@@ -11,16 +12,25 @@ use rayon::prelude::*;
 
 use crate::{
     cache::CacheReader,
-    check::render::{Summary, Surfaces},
-    domain::{frame_range::FrameRange, level_set::kernels::Kernels, particles::Particles},
-    gpu::adapter::Needs,
+    check::{
+        pictures::{Residual, score, shown},
+        render::{Summary, Surfaces},
+    },
+    compare::pictures::Picture,
+    domain::{
+        eye::Eye, frame_range::FrameRange, level_set::kernels::Kernels, particles::Particles,
+    },
+    gpu::adapter::{Context, Needs},
     reference::rays::{Seen, cast},
     render::{RenderError, RenderScene, Renderer, eye, opaque},
     scene::look::{Look, MethodSpec},
 };
 
 use super::{RenderJobError, render_scene, told};
-use crate::stage::{baked_scene, device::Gpu};
+use crate::{
+    scene::Scene,
+    stage::{baked_scene, device::Gpu},
+};
 
 /// What rays may be off by: the 95th percentile of their depths, spacings. Half a voxel, a quarter of a spacing: a surface between
 /// two corners of a voxel is where trilinear values put it.
@@ -29,6 +39,9 @@ pub const DEPTH: f64 = 0.25;
 /// What rays may be off by: the median between normals, degrees. Differences over two voxels of a field that bends over a kernel's
 /// shortest axis, a spacing.
 pub const NORMAL: f64 = 5.0;
+
+/// Samples of the truth's pictures over the look's own, and its voxels a spacing: rays that are as much finer as a check has time for.
+pub const FINER: (u32, f64) = (4, 2.0);
 
 /// What to check.
 #[derive(Clone, Debug)]
@@ -39,6 +52,10 @@ pub struct Request {
     pub look: Look,
     /// Frames; the last one whose particles are cached where `None`.
     pub frames: Option<FrameRange>,
+    /// Whether pictures are scored against finer rays.
+    pub colour: bool,
+    /// Whether what flickers is measured, of each frame between its neighbours.
+    pub flicker: bool,
     /// What to render on.
     pub gpu: Gpu,
 }
@@ -52,6 +69,11 @@ pub struct Row {
     pub surface: Option<Summary>,
     /// Wall clock a frame of rendering its channels, seconds.
     pub seconds: f64,
+    /// SSIMULACRA 2 of its pictures against the truth's, mean over the frames; `None` where not asked for, or a side is shorter than 8
+    /// pixels.
+    pub score: Option<f64>,
+    /// What flickers beyond the truth, in parts of white, mean over the frames; `None` where not asked for.
+    pub flicker: Option<f64>,
 }
 
 impl Row {
@@ -73,6 +95,8 @@ pub struct Outcome {
     pub outside: f64,
     /// Wall clock a frame of the truth, seconds.
     pub truth_seconds: f64,
+    /// What of the truth's pictures is not the mean of its neighbours, in parts of white, mean over the frames.
+    pub truth_residual: Option<f64>,
     /// Adapter.
     pub device: String,
     /// Whether a signal ended it.
@@ -88,14 +112,17 @@ pub fn check_render(request: &Request, stop: &AtomicBool) -> Result<Outcome, Ren
     let scene = baked_scene(&cache, &request.cache)?;
     let frames: Vec<u32> = match &request.frames {
         Some(frames) => frames.iter().collect(),
-        None => vec![cache.last_frame()],
+        // With a frame after it, where that is looked at.
+        None => vec![cache.last_frame() - u32::from(request.flicker)],
     };
     for &frame in &frames {
-        cache.kept(frame)?;
+        for frame in around(frame, request.flicker) {
+            cache.kept(frame)?;
+        }
     }
     let context = request.gpu.open(Needs::default())?;
-    let methods = [("ssfr", MethodSpec::Ssfr), ("ray", MethodSpec::Ray)];
-    let mut surfaces = methods.map(|_| (Surfaces::default(), 0.0));
+    let mut surfaces = METHODS.map(|_| (Surfaces::default(), 0.0));
+    let mut pictures = Pictures::new(request);
     let mut outcome = Outcome {
         device: context.info.name.clone(),
         ..Outcome::default()
@@ -113,15 +140,27 @@ pub fn check_render(request: &Request, stop: &AtomicBool) -> Result<Outcome, Ren
         outcome.truth_seconds += begun.elapsed().as_secs_f64();
         outside += out;
         all += water.len();
-        for ((_, method), (surface, seconds)) in methods.iter().zip(&mut surfaces) {
+        let eye = eye(
+            &request.look,
+            DVec3::ZERO,
+            frame.into(),
+            set.frames_per_second,
+        );
+        for ((_, method), (surface, seconds)) in METHODS.iter().zip(&mut surfaces) {
             let look = request.look.of_surface(*method);
             let mut renderer =
                 Renderer::new(&context, &look, &set).map_err(|error| told(error, &look))?;
             let begun = Instant::now();
             let image = renderer.render(frame, &water)?;
             *seconds += begun.elapsed().as_secs_f64();
-            surface.add(&image, &truth, set.particle_spacing);
+            surface.add(&image, &truth, &eye, set.particle_spacing);
         }
+        let set = Set {
+            cache: &cache,
+            scene: &scene,
+            context: &context,
+        };
+        pictures.take(&set, frame, &eye)?;
         outcome.frames.push(frame);
     }
     let count = outcome.frames.len().max(1) as f64;
@@ -131,18 +170,122 @@ pub fn check_render(request: &Request, stop: &AtomicBool) -> Result<Outcome, Ren
     if !has_water {
         return Err(RenderJobError::NoWater);
     }
-    for ((method, _), (surface, seconds)) in methods.into_iter().zip(surfaces) {
+    outcome.truth_residual = mean(&pictures.residuals);
+    let found = surfaces.into_iter().zip(&pictures.methods);
+    for ((method, _), ((surface, seconds), pictures)) in METHODS.into_iter().zip(found) {
         outcome.rows.push(Row {
             method,
             surface: surface.summary(),
             seconds: seconds / count,
+            score: mean(&pictures.scores),
+            flicker: mean(&pictures.flickers),
         });
     }
     Ok(outcome)
 }
 
+const METHODS: [(&str, MethodSpec); 2] = [("ssfr", MethodSpec::Ssfr), ("ray", MethodSpec::Ray)];
+
+/// A frame, with its neighbours where these are looked at.
+fn around(frame: u32, with_neighbours: bool) -> Vec<u32> {
+    match with_neighbours {
+        // Frame 0 has none before it, which the cache says.
+        true => vec![frame.wrapping_sub(1), frame, frame + 1],
+        false => vec![frame],
+    }
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// Where pictures come from.
+pub(super) struct Set<'a> {
+    pub(super) cache: &'a CacheReader,
+    pub(super) scene: &'a Scene,
+    pub(super) context: &'a Context,
+}
+
+impl Set<'_> {
+    /// The picture of a frame with a look, as a screen shows it.
+    pub(super) fn draw(&self, look: &Look, frame: u32) -> Result<Picture, RenderJobError> {
+        let water = self.cache.read(frame)?;
+        let set = render_scene(self.scene, frame, &water);
+        let mut renderer =
+            Renderer::new(self.context, look, &set).map_err(|error| told(error, look))?;
+        let image = renderer.render(frame, &water)?;
+        Ok(shown(&image, &look.spec().view))
+    }
+}
+
+/// What pictures of one method came to, frame by frame.
+#[derive(Default)]
+struct Pictured {
+    scores: Vec<f64>,
+    flickers: Vec<f64>,
+}
+
+/// Pictures of all methods and of the truth.
+struct Pictures<'a> {
+    request: &'a Request,
+    /// In the order of [`METHODS`].
+    methods: [Pictured; 2],
+    residuals: Vec<f64>,
+}
+
+impl<'a> Pictures<'a> {
+    fn new(request: &'a Request) -> Self {
+        Self {
+            request,
+            methods: METHODS.map(|_| Pictured::default()),
+            residuals: Vec::new(),
+        }
+    }
+
+    /// Draws what is asked for of a frame that `eye` sees, and measures it.
+    fn take(&mut self, set: &Set<'_>, frame: u32, eye: &Eye) -> Result<(), RenderJobError> {
+        let Request {
+            look,
+            colour,
+            flicker,
+            ..
+        } = self.request;
+        if !(*colour || *flicker) {
+            return Ok(());
+        }
+        let film = look.spec().camera.film_back_mm[0];
+        let focal_length_mm = eye.focal * film / f64::from(eye.size[0]);
+        let still = look.standing(eye.position, eye.position + eye.forward, focal_length_mm);
+        let frames = around(frame, *flicker);
+        let middle = frames.len() / 2;
+        let draw = |look: &Look| {
+            let draw = |&frame: &u32| set.draw(look, frame);
+            frames.iter().map(draw).collect::<Result<Vec<_>, _>>()
+        };
+        let residual = |all: &[Picture]| match all {
+            [a, b, c] => Some(Residual::of([a, b, c])),
+            _ => None,
+        };
+        let (samples, voxels) = FINER;
+        let truth = draw(&still.of_water(MethodSpec::Ray).finer(samples, voxels))?;
+        let moved = residual(&truth);
+        self.residuals
+            .extend(moved.as_ref().map(Residual::strength));
+        for ((_, method), found) in METHODS.iter().zip(&mut self.methods) {
+            let all = draw(&still.of_water(*method))?;
+            if *colour {
+                found.scores.extend(score(&all[middle], &truth[middle]));
+            }
+            if let (Some(residual), Some(moved)) = (residual(&all), &moved) {
+                found.flickers.push(residual.beyond(moved));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// What rays in f64 meet, and how many particles' centres are outside of the surface.
-fn truth(
+pub(super) fn truth(
     look: &Look,
     set: &RenderScene,
     frame: u32,

@@ -168,6 +168,75 @@ fn surfaces_in_pictures_are_held_against_rays_in_f64() {
     );
 }
 
+/// Outlines, colour and flicker of both methods, each with a shader that spoils it.
+#[test]
+fn outlines_colour_and_flicker_of_pictures_are_told() {
+    let job = job(&["wide", "dim", "flashing"]);
+    job.edit(
+        "wide/shared/ssfr_ellipsoid.wgsl",
+        "let d = shape.diagonal;",
+        "let d = 0.06 + shape.diagonal;",
+    );
+    job.edit(
+        "dim/ssfr/shade.wgsl",
+        "let value = vec4f(colour, alpha)",
+        "let value = vec4f(0.2 * colour, alpha)",
+    );
+    // Frames stand a sixtieth of a second apart.
+    job.edit(
+        "flashing/ssfr/shade.wgsl",
+        "let value = vec4f(colour, alpha)",
+        "let value = vec4f(colour * (1.0 + 0.5 * cos(188.5 * camera.clock)), alpha)",
+    );
+    job.expect(0, "bake small.toml --frames 1-3 -o cache");
+    let check = "check cache --render --look look.toml";
+    let plain = job.json(0, check);
+    for key in ["score", "flicker"] {
+        assert_eq!(plain["rows"][0][key], Value::Null, "not asked for");
+    }
+    let asked = format!("{check} --colour --flicker");
+    // The frame before the last one, which has neighbours.
+    let found = job.json(0, &asked);
+    assert_eq!(found["frames"], serde_json::json!([2]));
+    let of = |found: &Value, row: usize, key: &str| found["rows"][row][key].as_f64().unwrap();
+    let offset = |found: &Value| {
+        let surface = &found["rows"][0]["surface"];
+        surface["silhouette"]["offset"].as_f64().unwrap()
+    };
+    assert!(of(&found, 1, "score") > of(&found, 0, "score"), "{found}");
+    assert!(found["truth_residual"].as_f64().unwrap() > 0.0, "{found}");
+    let spoiled = |folder: &str| job.json(0, &format!("{asked} --shaders {folder}"));
+    let wide = spoiled("wide");
+    assert!(offset(&wide) > offset(&found) + 0.3, "{wide}");
+    let dim = spoiled("dim");
+    assert!(of(&dim, 0, "score") < of(&found, 0, "score") - 5.0, "{dim}");
+    assert_eq!(
+        of(&dim, 1, "score"),
+        of(&found, 1, "score"),
+        "rays have no part in it"
+    );
+    let flashing = spoiled("flashing");
+    assert!(
+        of(&flashing, 0, "flicker") > 3.0 * of(&found, 0, "flicker"),
+        "{flashing}"
+    );
+    assert_eq!(of(&flashing, 1, "flicker"), of(&found, 1, "flicker"));
+    let said = job.expect(0, &asked);
+    assert_has(
+        &said,
+        &[
+            "silhouette",
+            "waterline",
+            "SSIMULACRA 2",
+            "flicker",
+            "% of white",
+        ],
+    );
+    assert_has(&job.expect(2, "check cache --flicker"), &["--render"]);
+    // The last frame has none after it.
+    assert_has(&job.expect(4, &format!("{asked} --frames 3")), &["4"]);
+}
+
 #[test]
 fn a_picture_by_edited_shaders_says_so_and_stays_apart() {
     let job = job(&["same", "edit"]);

@@ -4,6 +4,7 @@ mod command;
 mod faults;
 mod settings;
 mod stability;
+mod surfaces;
 mod sweeps;
 
 use std::{

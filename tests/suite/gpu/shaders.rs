@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 35] = [
+const VARIANTS: [&[&str]; 36] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -62,6 +62,7 @@ const VARIANTS: [&[&str]; 35] = [
     &["PATHS", "MOTION"],
     &["AOVS", "SPRAY"],
     &["FORWARD", "SPRAY"],
+    &["ELLIPSOIDS"],
 ];
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them.

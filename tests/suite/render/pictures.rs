@@ -111,7 +111,8 @@ fn flat_water_has_flat_normals_and_its_own_thickness() {
 
 #[test]
 fn rough_water_without_smoothing_is_not_flat() {
-    let text = format!("{TOP_DOWN}[surface]\nsmoothing_width_m = 0.0\n{ALL_AOVS}");
+    let text =
+        format!("{TOP_DOWN}[surface]\nsplat = \"sphere\"\nsmoothing_width_m = 0.0\n{ALL_AOVS}");
     let image = render(&look(&text), &tank(SPACING), &tank_water());
     let normals = image.aovs.n.as_ref().unwrap();
     let least = centre(96, 72).map(|i| normals[i][1]).fold(1.0, f32::min);

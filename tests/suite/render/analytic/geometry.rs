@@ -109,7 +109,7 @@ fn picture(context: &Context) -> (Image, [Eye; 2]) {
     ];
     let setup = Setup {
         next: Some(eyes[1]),
-        surface: format!("smoothing_width_m = 0.0\nradius_m = {RADIUS:?}\n"),
+        surface: format!("smoothing_width_m = 0.0\nradius_m = {RADIUS:?}\nsplat = \"sphere\"\n"),
         ..Setup::new(eyes[0])
     };
     let scene = RenderScene {
@@ -260,7 +260,7 @@ fn close(context: &Context, filled: f64) -> (Image, Eye, DVec3) {
     let centre = DVec3::new(5.0, -16.0, 5.0);
     let eye = Eye::new([-10.0, 30.0, 5.0], [5.0, 4.0, 5.0], 3200.0);
     let setup = Setup {
-        surface: "smoothing_width_m = 0.0\nradius_m = 20.0\n".to_owned(),
+        surface: "smoothing_width_m = 0.0\nradius_m = 20.0\nsplat = \"sphere\"\n".to_owned(),
         ..Setup::new(eye)
     };
     let water = ball(centre, DVec3::ZERO);

@@ -15,3 +15,5 @@ mod spray;
 pub(super) mod support;
 mod surface;
 mod water;
+
+pub(crate) use support::{context, spoiled};

@@ -39,7 +39,7 @@ pub(crate) fn eye_at(theta: f64, depth: f64, focal: f64) -> Eye {
 
 pub(crate) fn setup_at(theta: f64, depth: f64, water: String) -> Setup {
     Setup {
-        surface: format!("smoothing_width_m = 0.0\nradius_m = {RADIUS:?}\n"),
+        surface: format!("smoothing_width_m = 0.0\nradius_m = {RADIUS:?}\nsplat = \"sphere\"\n"),
         water,
         ..Setup::new(eye_at(theta, depth, 3200.0))
     }

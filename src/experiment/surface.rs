@@ -1,0 +1,199 @@
+//! How good the drawn surface is for its time: frames of a scene, drawn with one setting of the look changed at a time.
+
+mod report;
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    cache::CacheReader,
+    domain::frame_range::FrameRange,
+    gpu::adapter::{Context, Needs},
+    scene::study::{
+        RunsOn,
+        surface::{PictureError, Point, SurfaceStudy},
+    },
+    stage::{
+        bake,
+        device::{Device, Opened},
+        render::gallery::{Gallery, Summary},
+    },
+};
+
+use super::{
+    Event, PointStatus, Request, StudyError,
+    engine::{self, Bench, Kind, Ledger},
+    report::Report,
+};
+
+/// What a point came to.
+type Run = engine::Run<Measured>;
+
+/// What is measured beside the time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Measured {
+    /// `None` where no water was seen.
+    surface: Option<Summary>,
+    /// SSIMULACRA 2 against finer rays; `None` where colour is not asked for.
+    score: Option<f64>,
+}
+
+impl Measured {
+    /// `None` where it cannot be told.
+    fn error(&self, of: PictureError) -> Option<f64> {
+        let surface = self.surface.as_ref();
+        match of {
+            PictureError::Depth => Some(surface?.depth[0]),
+            PictureError::Normal => Some(surface?.normal[0]),
+            PictureError::Silhouette => Some(surface?.silhouette?.roughness),
+            PictureError::Offset => Some(surface?.silhouette?.offset.abs()),
+            PictureError::Colour => Some(100.0 - self.score?),
+        }
+    }
+}
+
+impl Kind for SurfaceStudy {
+    fn needs(&self) -> Option<Needs> {
+        Some(Needs::default())
+    }
+
+    fn count(&self) -> usize {
+        self.points().count()
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
+        let mut ledger = Ledger::open(&bench.request.directory)?;
+        baked(self, bench)?;
+        let mut room = Room {
+            study: self,
+            gallery: None,
+            frames: hashes(self, bench.request)?,
+        };
+        let mut runs = Vec::new();
+        for line in &self.lines {
+            let mut of_line = Vec::new();
+            for point in &line.points {
+                let name = format!("{}, {} = {}", line.name, line.key, point.label);
+                let hash = room.hash(bench, point);
+                let measure = || room.measure(bench, point);
+                let (run, stood) = bench.point(&mut ledger, &name, hash, measure)?;
+                bench.told(name, status(&self.errors, &run, stood));
+                of_line.push(run);
+            }
+            runs.push(of_line);
+        }
+        Ok(report::draw(self, bench, &runs))
+    }
+}
+
+fn status(errors: &[PictureError], run: &Run, stood: bool) -> PointStatus {
+    let known = |of: &PictureError| Some((of.name(), run.measured.error(*of)?));
+    match &run.ended {
+        _ if stood => PointStatus::Stands,
+        Some(message) => PointStatus::Failed(message.clone()),
+        None => PointStatus::Done(
+            1e3 * run.per_frame()[1],
+            errors.iter().filter_map(known).collect(),
+        ),
+    }
+}
+
+fn cache(request: &Request) -> PathBuf {
+    request.directory.join("cache")
+}
+
+/// Bakes the scene as far as its last frame that is drawn; what stands there is resumed.
+fn baked(study: &SurfaceStudy, bench: &mut Bench<'_>) -> Result<(), StudyError> {
+    let last = study.frames.last();
+    let request = bake::Request {
+        scene: study.scene.clone(),
+        directory: cache(bench.request),
+        frames: FrameRange::inclusive(1, last),
+        resume: true,
+        from: None,
+        device: Device::Gpu(bench.request.gpu.clone()),
+        time_passes: false,
+    };
+    let mut tell = |event| (bench.tell)(Event::Bake(Box::new(event)));
+    match bake::bake(&request, bench.stop, &mut tell)?.interrupted {
+        true => Err(StudyError::Stopped),
+        false => Ok(()),
+    }
+}
+
+/// Of the frames that are drawn.
+fn hashes(study: &SurfaceStudy, request: &Request) -> Result<String, StudyError> {
+    let cache = CacheReader::open(&cache(request))?;
+    let hashes = study
+        .frames
+        .iter()
+        .map(|frame| Ok(cache.frame_hash(frame)?.to_owned()));
+    Ok(hashes.collect::<Result<Vec<_>, StudyError>>()?.join(" "))
+}
+
+/// What the points share.
+struct Room<'s, 'b> {
+    study: &'s SurfaceStudy,
+    /// Opened for the first point that is measured.
+    gallery: Option<Gallery<'b>>,
+    /// Hashes of the frames.
+    frames: String,
+}
+
+impl<'b> Room<'_, 'b> {
+    fn hash(&self, bench: &Bench<'_>, point: &Point) -> String {
+        let study = self.study;
+        let scene = [(&study.scene, RunsOn::Gpu)];
+        let measured = format!(
+            "surface {} {} {} {} {}",
+            study.repeats,
+            self.is_scored(),
+            self.frames,
+            study.look.hash(),
+            point.look.hash(),
+        );
+        bench.devices.hash(&scene, study.frames.last(), &measured)
+    }
+
+    fn is_scored(&self) -> bool {
+        self.study.errors.contains(&PictureError::Colour)
+    }
+
+    fn measure(&mut self, bench: &Bench<'b>, point: &Point) -> Result<Run, StudyError> {
+        let study = self.study;
+        let gallery = match &self.gallery {
+            Some(gallery) => gallery,
+            None => {
+                let opened = Gallery::open(
+                    context(bench),
+                    &cache(bench.request),
+                    &study.look,
+                    &study.frames,
+                    self.is_scored(),
+                )?;
+                self.gallery.insert(opened)
+            }
+        };
+        let drawn = gallery.draw(&point.look, study.repeats)?;
+        Ok(Run {
+            particles: gallery.particles(),
+            frames: study.frames.len() as u32,
+            seconds: drawn.seconds,
+            ended: None,
+            measured: Measured {
+                surface: drawn.surface,
+                score: drawn.score,
+            },
+        })
+    }
+}
+
+/// # Panics
+/// Never: [`Kind::needs`] has the adapter opened.
+fn context<'a>(bench: &Bench<'a>) -> &'a Context {
+    match bench.devices.of(RunsOn::Gpu) {
+        Opened::Gpu(context) => context,
+        Opened::Cpu => unreachable!("an adapter was asked for"),
+    }
+}

@@ -1,0 +1,169 @@
+//! Frames of a cache drawn with one look after another, and held against what is true of them.
+
+use std::{path::Path, time::Instant};
+
+use glam::DVec3;
+
+use super::{
+    RenderJobError, render_scene,
+    surfaces::{FINER, Set, truth},
+    told,
+};
+use crate::{
+    cache::CacheReader,
+    check::{
+        pictures::{score, shown},
+        render::Surfaces,
+    },
+    compare::pictures::Picture,
+    domain::{eye::Eye, frame_range::FrameRange, particles::Particles},
+    gpu::adapter::Context,
+    reference::rays::Seen,
+    render::{RenderScene, Renderer, eye},
+    scene::{
+        Scene,
+        look::{Look, MethodSpec},
+    },
+    stage::baked_scene,
+};
+
+pub use crate::check::render::Summary;
+
+/// Frames of a cache, and what rays in f64 and, where pictures are scored, finer rays see with one look.
+pub struct Gallery<'a> {
+    context: &'a Context,
+    frames: Vec<Framed>,
+}
+
+struct Framed {
+    number: u32,
+    set: RenderScene,
+    water: Particles,
+    eye: Eye,
+    seen: Vec<Seen>,
+    /// `None` where no picture is scored.
+    picture: Option<Picture>,
+}
+
+/// How a look draws the frames.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    /// Wall clock of the pictures of all frames, seconds, of each repeat.
+    pub seconds: Vec<f64>,
+    /// Over all frames; `None` where no water was seen.
+    pub surface: Option<Summary>,
+    /// SSIMULACRA 2 against finer rays, mean over the frames; `None` where no picture is scored.
+    pub score: Option<f64>,
+}
+
+impl<'a> Gallery<'a> {
+    /// Opens frames of a cache and finds what is true of them as `look`, whose camera it is, sees them; with `is_scored` also by
+    /// finer rays.
+    ///
+    /// # Errors
+    /// The cache, its scene, the device.
+    pub fn open(
+        context: &'a Context,
+        cache: &Path,
+        look: &Look,
+        frames: &FrameRange,
+        is_scored: bool,
+    ) -> Result<Self, RenderJobError> {
+        let reader = CacheReader::open(cache)?;
+        let scene = baked_scene(&reader, cache)?;
+        let frames = frames.iter().map(|number| {
+            let framed = Framed::of((&reader, &scene), look, number)?;
+            match is_scored {
+                true => framed.scored(context, (&reader, &scene), look),
+                false => Ok(framed),
+            }
+        });
+        Ok(Self {
+            context,
+            frames: frames.collect::<Result<_, RenderJobError>>()?,
+        })
+    }
+
+    /// Particles of all frames.
+    pub fn particles(&self) -> usize {
+        self.frames.iter().map(|frame| frame.water.len()).sum()
+    }
+
+    /// Draws the frames `repeats` times, after one that is not counted: it makes the device's programs ready.
+    ///
+    /// # Errors
+    /// The device, and a frame that cannot be drawn.
+    pub fn draw(&self, look: &Look, repeats: u32) -> Result<Drawn, RenderJobError> {
+        let mut drawn = Drawn {
+            seconds: vec![0.0; repeats as usize],
+            surface: None,
+            score: None,
+        };
+        let mut surfaces = Surfaces::default();
+        let mut scores = Vec::new();
+        for frame in &self.frames {
+            let picture = look.of_water(look.spec().renderer.method);
+            let mut renderer = frame.renderer(self.context, &picture)?;
+            let image = renderer.render(frame.number, &frame.water)?;
+            for seconds in &mut drawn.seconds {
+                let begun = Instant::now();
+                renderer.render(frame.number, &frame.water)?;
+                *seconds += begun.elapsed().as_secs_f64();
+            }
+            if let Some(truth) = &frame.picture {
+                scores.extend(score(&shown(&image, &look.spec().view), truth));
+            }
+            let surface = look.of_surface(look.spec().renderer.method);
+            let mut renderer = frame.renderer(self.context, &surface)?;
+            let image = renderer.render(frame.number, &frame.water)?;
+            surfaces.add(&image, &frame.seen, &frame.eye, frame.set.particle_spacing);
+        }
+        drawn.surface = surfaces.summary();
+        let count = scores.len() as f64;
+        drawn.score = (!scores.is_empty()).then(|| scores.iter().sum::<f64>() / count);
+        Ok(drawn)
+    }
+}
+
+impl Framed {
+    fn of(
+        (cache, scene): (&CacheReader, &Scene),
+        look: &Look,
+        number: u32,
+    ) -> Result<Self, RenderJobError> {
+        let water = cache.read(number)?;
+        let set = render_scene(scene, number, &water);
+        let (seen, _) = truth(look, &set, number, &water)?;
+        Ok(Self {
+            number,
+            water,
+            eye: eye(look, DVec3::ZERO, number.into(), set.frames_per_second),
+            seen,
+            picture: None,
+            set,
+        })
+    }
+
+    fn scored(
+        self,
+        context: &Context,
+        (cache, scene): (&CacheReader, &Scene),
+        look: &Look,
+    ) -> Result<Self, RenderJobError> {
+        let set = Set {
+            cache,
+            scene,
+            context,
+        };
+        let (samples, voxels) = FINER;
+        let finer = look.of_water(MethodSpec::Ray).finer(samples, voxels);
+        Ok(Self {
+            picture: Some(set.draw(&finer, self.number)?),
+            ..self
+        })
+    }
+
+    fn renderer(&self, context: &Context, look: &Look) -> Result<Renderer, RenderJobError> {
+        Renderer::new(context, look, &self.set).map_err(|error| told(error, look))
+    }
+}
