@@ -428,6 +428,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         dim_parts(1.0 - mist.cover);
         light_part(WHITE, white * mist.cover);
     }
+#endif
     store_light(out, vec4f(colour, alpha), camera.weight, camera.sample_index == 0u);
 #endif
 #endif

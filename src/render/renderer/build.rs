@@ -30,8 +30,14 @@ use crate::{
 pub(in crate::render) const RADIUS: f64 = 0.87;
 /// Pixels that rays are cast for in one dispatch, so that none runs long enough to lose a device.
 const CAST: u32 = 1 << 17;
-/// Smoothing width over particle spacing where the look leaves it out.
-const SMOOTHING: f64 = 1.6;
+/// Smoothing width over particle spacing where the look leaves it out. Balls need as much as hides their beads; ellipsoids are smooth
+/// but for the particles' own noise, and what is wider takes waves with it (`docs/studies.md`, the drawn surface).
+const fn smoothing_of(splat: SplatSpec) -> f64 {
+    match splat {
+        SplatSpec::Ellipsoid => 0.5,
+        SplatSpec::Sphere => 1.6,
+    }
+}
 
 impl Plan {
     /// Plans what the look calls for and nothing more, with room for `particles` particles.
@@ -181,7 +187,7 @@ fn smoothing(plan: &mut Plan, look: &Look, scene: &RenderScene) -> Smoothing {
     let surface = &look.spec().surface;
     let width = surface
         .smoothing_width_m
-        .unwrap_or(SMOOTHING * scene.particle_spacing);
+        .unwrap_or(smoothing_of(surface.splat) * scene.particle_spacing);
     let (radius, size) = (plan.radius, plan.extent.size);
     match surface.filter {
         FilterSpec::CurvatureFlow => {

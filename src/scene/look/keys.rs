@@ -202,7 +202,7 @@ const SURFACE: &[Key] = &[
         .about("splat radius; ellipsoids are as much larger or smaller as it is than what it is if left out"),
     Key::number("smoothing_width_m", 0.0..=100.0)
         .unit("metres")
-        .computed(|| "1.6 particle spacings".to_owned())
+        .computed(|| "0.5 particle spacings, 1.6 of balls".to_owned())
         .about("standard deviation of the smoothing, in the world"),
     Key::number("voxels_per_spacing", 1.0..=MOST_VOXELS)
         .default("2.0")

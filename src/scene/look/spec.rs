@@ -177,7 +177,7 @@ pub struct SurfaceSpec {
     pub splat: SplatSpec,
     /// Splat radius, metres; 0.87 particle spacings where left out.
     pub radius_m: Option<f64>,
-    /// Standard deviation of the smoothing, metres in the world; 1.6 particle spacings where left out.
+    /// Standard deviation of the smoothing, metres in the world; 0.5 particle spacings where left out, 1.6 of balls.
     pub smoothing_width_m: Option<f64>,
     /// Voxels a particle spacing of the level set that rays are cast into.
     pub voxels_per_spacing: f64,
