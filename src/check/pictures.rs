@@ -87,6 +87,7 @@ mod tests {
         Picture {
             width,
             height,
+            corner: [0, 0],
             pixels: (0..width * height).map(pixel).collect(),
             encoding: Encoding::Srgb,
         }

@@ -95,6 +95,8 @@ mod tests {
             solids: Vec::new(),
             particle_spacing: D,
             frames_per_second: 24.0,
+            wave_makers: Vec::new(),
+            waves: None,
         };
         shapes(&particles, &scene, RADIUS * D)
     }

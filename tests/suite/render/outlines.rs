@@ -58,7 +58,7 @@ fn summary(context: &Context, surface: &str) -> Summary {
     scene.solids.clear();
     let water = crest(&scene);
     let look = look(surface);
-    let eye = eye(&look, DVec3::ZERO, 1.0);
+    let eye = eye(&look, DVec3::ZERO, 1.0, 24.0);
     let places: Vec<DVec3> = (water.position.iter())
         .map(|p| DVec3::from(p.map(f64::from)))
         .collect();
