@@ -30,8 +30,13 @@ fn look(folder: &Path, method: &str, output: &str) -> Look {
 
 /// White water under a sky of radiance 1: its albedo.
 const WHITE: f32 = 0.85;
-/// What the sky's irradiance may be off by, of a quadrature of 16 rows: (π/32)²/6.
-const QUADRATURE: f32 = 2e-3;
+/// Rows of the sky's picture.
+const ROWS: usize = 64;
+/// What the sky's irradiance may be off by, of a quadrature of second order: the square of half a row's angle.
+const QUADRATURE: f32 = {
+    let half = std::f32::consts::PI / (2 * ROWS) as f32;
+    half * half
+};
 /// Some roundings of numbers up to 1.
 const ROUNDING: f32 = 1e-6;
 
@@ -46,7 +51,7 @@ fn cover(image: &Image, i: usize, name: &str) -> f32 {
 /// spray, and not held out.
 fn wrong(context: &Context, method: &str) -> (Vec<String>, [usize; 3]) {
     let folder = tempfile::tempdir().unwrap();
-    exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 32, 16, |_, _| {
+    exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 2 * ROWS, ROWS, |_, _| {
         (1.0f32, 1.0f32, 1.0f32)
     })
     .unwrap();

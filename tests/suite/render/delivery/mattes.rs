@@ -160,11 +160,15 @@ fn a_file_has_the_layer_its_manifest_and_its_key() {
     assert!(!names.contains(&"CryptoObject03.R".to_owned()));
     let attribute = |name: &str| {
         let key = Text::from(format!("cryptomatte/3ae39a5/{name}").as_str());
-        let found = header.shared_attributes.other.get(&key);
+        let all = [
+            &header.shared_attributes.other,
+            &header.own_attributes.other,
+        ];
+        let found = all.iter().find_map(|attributes| attributes.get(&key));
         found
             .and_then(|value| value.to_text().ok())
-            .map(ToString::to_string)
             .unwrap()
+            .to_string()
     };
     assert_eq!(attribute("name"), "CryptoObject");
     assert_eq!(attribute("hash"), "MurmurHash3_32");
