@@ -64,12 +64,12 @@ fn ellipsoid_at(camera: Camera, from_eye: vec3f, shape: Shape, part: f32, size: 
     out.middle = inverse * from_eye;
     out.across = inverse * camera.right / camera.focal;
     out.down = inverse * camera.up / -camera.focal;
-    let centre = camera.centre + camera.corner;
-    out.corner = inverse * camera.forward - centre.x * out.across - centre.y * out.down;
+    out.corner = inverse * camera.forward
+        - camera.centre.x * out.across - camera.centre.y * out.down;
     return out;
 }
 
-// Eye-space depth of the near side at a padded pixel position; FAR where the ray misses.
+// Eye-space depth of the near side at a pixel position that is counted from the camera's `corner`; FAR where the ray misses.
 fn hit_ellipsoid(ellipsoid: Ellipsoid, position: vec2f) -> f32 {
     let ray = ellipsoid.corner + position.x * ellipsoid.across + position.y * ellipsoid.down;
     let hit = hit_sphere(ray, ellipsoid.middle, 1.0);

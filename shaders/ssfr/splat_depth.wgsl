@@ -55,7 +55,7 @@ fn main(
             continue;
         }
 #ifdef ELLIPSOIDS
-        let hit = hit_ellipsoid(ellipsoid, vec2f(pixel) + 0.5);
+        let hit = hit_ellipsoid(ellipsoid, vec2f(pixel) + 0.5 - camera.corner);
 #else
         let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, radius).depth;
 #endif

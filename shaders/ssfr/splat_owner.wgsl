@@ -43,7 +43,7 @@ fn main(
         let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let at = pixel.y * camera.size.x + pixel.x;
 #ifdef ELLIPSOIDS
-        let hit = hit_ellipsoid(ellipsoid, vec2f(pixel) + 0.5);
+        let hit = hit_ellipsoid(ellipsoid, vec2f(pixel) + 0.5 - camera.corner);
 #else
         let hit = hit_sphere(eye_ray(camera, vec2f(pixel) + 0.5), c, radius).depth;
 #endif

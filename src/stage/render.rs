@@ -5,6 +5,7 @@
 mod folder;
 pub mod gallery;
 mod plan;
+mod set;
 pub mod surfaces;
 mod whitewater;
 
@@ -18,26 +19,22 @@ use std::{
     time::{Duration, Instant},
 };
 
-use glam::DAffine3;
-
 use crate::{
     cache::{self, CacheError, CacheReader, Manifest},
-    domain::{
-        bounds::Bounds, frame_range::FrameRange, particles::Particles,
-        signed_distance::SignedDistanceError,
-    },
+    domain::{frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError},
     gpu::adapter::{Context, GpuError, Needs},
     render::{
-        Attributes, Image, Moment, REACH, RenderError, RenderScene, Renderer, Water, frames_around,
+        Attributes, Image, Moment, REACH, RenderError, Renderer, Water, frames_around,
         image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
     },
     scene::{
-        PlacedMesh, Scene, SceneError, Wall,
+        Scene, SceneError,
         look::{FormatSpec, Look, LookError},
     },
 };
 
 use self::folder::{Folder, Owner, Wanted};
+use self::set::{render_scene, solid_names};
 use self::whitewater::Whitewater;
 use super::{
     Blame,
@@ -482,44 +479,6 @@ fn others(frame: u32) -> impl Iterator<Item = (usize, u32)> {
     let frames = offsets.map(move |offset| u32::try_from(i64::from(frame) + offset).ok());
     let placed = frames.enumerate();
     placed.filter_map(|(side, frame)| Some((side, frame?)))
-}
-
-/// A scene as it stands at a frame.
-fn render_scene(scene: &Scene, frame: u32, state: &Particles) -> RenderScene {
-    let time = f64::from(frame) / scene.shot.frames_per_second;
-    let moving = scene.moving_solids.iter().map(|solid| {
-        let way = DAffine3::from_translation(solid.displacement(time));
-        solid.placed.mesh.transformed(&way)
-    });
-    let solids = scene.solids.iter().map(|solid| solid.mesh.clone());
-    RenderScene {
-        origin: scene.origin,
-        domain: scene.domain,
-        solids: solids.chain(moving).collect(),
-        particle_spacing: scene.particle_spacing(),
-        frames_per_second: scene.shot.frames_per_second,
-        wave_makers: plates(scene, &scene.walls_after(state, time)),
-        waves: scene.effects.waves(scene.water.gravity),
-    }
-}
-
-/// The scene's wave makers, and how far inward each stands of the domain's side, metres.
-fn plates(scene: &Scene, walls: &Bounds) -> Vec<(Wall, f64)> {
-    let size = scene.domain.size();
-    let makers = scene.wave_makers.iter().map(|maker| maker.wall);
-    makers
-        .map(|wall| match wall.is_max {
-            true => (wall, size[wall.axis] - walls.max[wall.axis]),
-            false => (wall, walls.min[wall.axis]),
-        })
-        .collect()
-}
-
-/// What the scene's solids are called, in the order of [`render_scene`]: as their meshes' files, without the ending.
-fn solid_names(scene: &Scene) -> Vec<String> {
-    let moving = scene.moving_solids.iter().map(|solid| &solid.placed);
-    let placed = scene.solids.iter().chain(moving);
-    placed.map(PlacedMesh::name).collect()
 }
 
 fn attributes(

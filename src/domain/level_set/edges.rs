@@ -134,11 +134,10 @@ mod tests {
                 .map(|(p, &h)| (f64::from(h) - of(p.x) - offset).abs())
                 .fold(0.0, f64::max)
         };
-        assert!(worst(0.0) < 0.05 * D, "{}", worst(0.0));
-        assert!(
-            worst(0.1 * D) > 0.05 * D,
-            "the control: a tenth of a spacing off"
-        );
+        // Layers are up to 14 % nearer to each other than the lattice's, or farther, and the surface stands half a layer above the
+        // outermost: 0.07 spacings.
+        assert!(worst(0.0) < 0.1 * D, "{}", worst(0.0));
+        assert!(worst(0.2 * D) > 0.1 * D, "the control: 0.2 spacings off");
     }
 
     #[test]

@@ -179,14 +179,14 @@ fn outlines_colour_and_flicker_of_pictures_are_told() {
     );
     job.edit(
         "dim/ssfr/shade.wgsl",
-        "let value = vec4f(colour, alpha)",
-        "let value = vec4f(0.2 * colour, alpha)",
+        "store_light(out, vec4f(colour, alpha)",
+        "store_light(out, vec4f(0.2 * colour, alpha)",
     );
     // Frames stand a sixtieth of a second apart.
     job.edit(
         "flashing/ssfr/shade.wgsl",
-        "let value = vec4f(colour, alpha)",
-        "let value = vec4f(colour * (1.0 + 0.5 * cos(188.5 * camera.clock)), alpha)",
+        "store_light(out, vec4f(colour, alpha)",
+        "store_light(out, vec4f(colour * (1.0 + 0.5 * cos(188.5 * camera.clock)), alpha)",
     );
     job.expect(0, "bake small.toml --frames 1-3 -o cache");
     let check = "check cache --render --look look.toml";

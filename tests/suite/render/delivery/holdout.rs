@@ -28,8 +28,8 @@ fn look(folder: &Path, method: &str, output: &str) -> Look {
     Look::parse(&text, &folder.join("look.toml")).unwrap()
 }
 
-/// White water under a sky of radiance 1: its albedo.
-const WHITE: f32 = 0.85;
+/// White water under a sky of radiance 1: drops take nothing up.
+const WHITE: f32 = 1.0;
 /// Rows of the sky's picture.
 const ROWS: usize = 64;
 /// What the sky's irradiance may be off by, of a quadrature of second order: the square of half a row's angle.

@@ -72,12 +72,12 @@ fn all_lights_add_up_to_the_picture() {
         let edits = match method {
             "ssfr" => [
                 ("light_part(SUN, sun);", ""),
-                ("dim_parts(1.0 - cover);", ""),
+                ("dim_parts(1.0 - mist.cover);", ""),
                 ("light_part(SOLIDS, colour - air);", ""),
             ],
             _ => [
                 ("light_part(part_of(ray, SUN), sun);", ""),
-                ("dim_parts(1.0 - cover);", ""),
+                ("dim_parts(1.0 - mist.cover);", ""),
                 ("light_part(part_of(ray, SOLIDS), seen);", ""),
             ],
         };
