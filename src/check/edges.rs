@@ -1,10 +1,10 @@
 //! The water's outline in pictures against the one that rays in f64 have.
 //!
 //! An edge point is the middle between two pixels beside or above each other of which one alone shows water. Where what the dry one
-//! shows stands [`BEHIND`] spacings or more behind the water it is of a silhouette, where it stands nearer of a waterline; where it
+//! shows stands `BEHIND` spacings or more behind the water it is of a silhouette, where it stands nearer of a waterline; where it
 //! stands before the water, the edge is not the water's and is left out. Each point of a picture has a distance to the truth's nearest
 //! edge point, which counts as positive where the truth has no water. Offset is the mean of these distances over the outline, and
-//! roughness their root mean square about their own mean nearby: a Gaussian of [`NEARBY`] spacings along the outline. A wave of
+//! roughness their root mean square about their own mean nearby: a Gaussian of `NEARBY` spacings along the outline. A wave of
 //! the water's own is in both outlines and in neither number; beads of splats one spacing apart are roughness.
 
 use glam::DVec2;
