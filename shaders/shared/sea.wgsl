@@ -30,6 +30,9 @@ const FINEST: f32 = 6.0;
 // Steps after which a ray along the sea has met nothing.
 const MOST_SEA_STEPS: i32 = 320;
 const SEA_HALVINGS: i32 = 12;
+// A ray that comes from the surface may begin so many hairs on its other side, where heights within the box and beyond differ: half a
+// voxel.
+const SKIN: f32 = 500.0;
 // Steeper than the waves are, so that no step jumps over one.
 const STEEP: f32 = 0.6;
 // Least step of a ray over the distance that it came: a pixel of a picture of a thousand is a tenth of it.
@@ -154,6 +157,7 @@ fn sea_crossing(
     let b = (sea.high + sea.hair - origin.y) * inverse;
     let start = max(min(a, b), from_t);
     let end = min(max(a, b), to_t);
+    let leaves = (direction.y > 0.0) != inside;
     // Of the step in which it is otherwise.
     var crossed = vec2f(FAR);
     var last = start;
@@ -168,7 +172,7 @@ fn sea_crossing(
             gap = abs(over);
             wet = over < 0.0;
         }
-        if wet != inside {
+        if wet != inside && !(leaves && gap < SKIN * sea.hair) {
             crossed = vec2f(last, t);
         }
         // After the last place there is none.

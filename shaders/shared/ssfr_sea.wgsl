@@ -34,7 +34,7 @@ fn sea_from_eye(direction: vec3f, bound: f32) -> SeaSeen {
 fn sea_behind(direction: vec3f) -> f32 {
     let span = span_of(sea.size, camera.position, direction);
     let p = camera.position + direction * (span.y + sea.hair);
-    if span.y <= max(span.x, 0.0) || p.y < sea.hair || !is_sea(p.xz) || p.y > sea.level {
+    if span.y <= max(span.x, 0.0) || p.y < sea.hair || !is_sea_water(p, 0.0) {
         return 0.0;
     }
     return p.y / max(-direction.y, 1e-3);
