@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::{
     moment::{Ids, Moment, REACH},
+    neighbors::smoothstep,
     uniform::Particle,
 };
 use crate::scene::look::SpraySpec;
@@ -18,21 +19,12 @@ const SPRAY_BELOW: f32 = 6.0;
 const TORN: [f32; 2] = [4.0, 8.0];
 /// Neighbours of a particle at a calm surface: the lattice's half space has 20, its bulk 32.
 const SURFACE_BELOW: f32 = 24.0;
-/// Distances, in spacings, over which a neighbour stops counting: half of it is left at two.
-const NEAR: [f32; 2] = [1.5, 2.5];
-/// Weight beyond which no more neighbours are looked for.
-const ENOUGH: f32 = 32.0;
 /// Part of its water's volume that drops of thrown water hold: it is mostly air.
 const THROWN: f32 = 0.15;
 /// Of water that is white and not thrown.
 const WHITE: f32 = 0.5;
 /// Frames before, at and after: of numbers that go to and fro from frame to frame, nothing is left.
 const OVER_TIME: [f32; 2 * REACH as usize + 1] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
-
-fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
 
 /// A particle's neighbours over the frames around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,58 +108,6 @@ fn packed(air: f32, radius: f32) -> u32 {
     bits(air) | bits(radius) << 16
 }
 
-/// What neighbours of each particle weigh in all, at most [`ENOUGH`].
-pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
-    let [near, reach] = NEAR.map(|part| part * spacing);
-    let cell = |p: &[f32; 3]| p.map(|x| (x / reach).floor() as i32);
-    // Sorted by cell, with z the fastest: three cells of a column are one contiguous run.
-    let mut order: Vec<([i32; 3], u32)> = positions
-        .par_iter()
-        .zip(0u32..positions.len() as u32)
-        .map(|(position, index)| (cell(position), index))
-        .collect();
-    order.par_sort_unstable();
-    let sorted: Vec<[f32; 3]> = order
-        .par_iter()
-        .map(|&(_, index)| positions[index as usize])
-        .collect();
-    let found: Vec<(u32, f32)> = order
-        .par_iter()
-        .enumerate()
-        .map(|(place, &([cx, cy, cz], index))| {
-            let p = sorted[place];
-            let mut sum = 0.0;
-            'columns: for dx in -1..=1 {
-                for dy in -1..=1 {
-                    let first = [cx + dx, cy + dy, cz - 1];
-                    let after = [cx + dx, cy + dy, cz + 2];
-                    let start = order.partition_point(|&(key, _)| key < first);
-                    for (q, entry) in sorted[start..].iter().zip(&order[start..]) {
-                        if entry.0 >= after {
-                            break;
-                        }
-                        let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-                        let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                        if square < reach * reach && entry.1 != index {
-                            sum += 1.0 - smoothstep(near, reach, square.sqrt());
-                        }
-                        if sum >= ENOUGH {
-                            sum = ENOUGH;
-                            break 'columns;
-                        }
-                    }
-                }
-            }
-            (index, sum)
-        })
-        .collect();
-    let mut weights = vec![0.0; positions.len()];
-    for (index, weight) in found {
-        weights[index as usize] = weight;
-    }
-    weights
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -179,44 +119,6 @@ mod tests {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (seed >> 8) as f32 / 16_777_216.0 * 2.0 - 1.0
         }
-    }
-
-    #[test]
-    fn weights_agree_with_every_pair() {
-        let mut random = random();
-        let places: Vec<[f32; 3]> = (0..300).map(|_| [random(), random(), random()]).collect();
-        let found = weights(&places, 0.2);
-        let mut least = f64::INFINITY;
-        for (p, weight) in places.iter().zip(found) {
-            let others = places.iter().filter(|q| *q != p);
-            let all: f64 = others
-                .map(|q| {
-                    let square: f64 = (0..3).map(|i| f64::from(p[i] - q[i]).powi(2)).sum();
-                    let t = ((square.sqrt() / 0.2 - 1.5) / 1.0).clamp(0.0, 1.0);
-                    1.0 - t * t * (3.0 - 2.0 * t)
-                })
-                .sum();
-            // A dozen terms of f32.
-            assert!(
-                (f64::from(weight) - all.min(32.0)).abs() < 1e-4,
-                "{weight} {all}"
-            );
-            least = least.min(all);
-        }
-        assert!(least < 32.0, "none was counted to its end");
-    }
-
-    /// A lattice's bulk and half space weigh what their neighbours within two spacings are, 32 and 20, to a tenth.
-    #[test]
-    fn weights_are_numbers_of_neighbours() {
-        let lattice: Vec<[f32; 3]> = (0..1000)
-            .map(|i| [i % 10, i / 10 % 10, i / 100].map(|x| x as f32 * 0.1))
-            .collect();
-        let found = weights(&lattice, 0.1);
-        // In the middle, and in the middle of a face.
-        let (bulk, surface) = (found[555], found[55]);
-        assert!((28.8..=32.0).contains(&bulk), "{bulk}");
-        assert!((18.0..=22.0).contains(&surface), "{surface}");
     }
 
     /// Whether each is body in five frames that begin at each of a run of weights but the last four.

@@ -15,6 +15,7 @@ mod frame;
 pub mod image;
 mod lighting;
 mod moment;
+mod neighbors;
 mod opaque;
 mod paths;
 mod plan;

@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, sync::OnceLock};
 
-use super::aeration;
+use super::neighbors;
 use crate::{
     domain::particles::Particles,
     scene::look::{AovSpec, Look},
@@ -32,7 +32,7 @@ impl Water {
     /// Weight of each one's neighbours; `spacing` is always the bake's.
     pub(super) fn weights(&self, spacing: f32) -> &[f32] {
         self.weights
-            .get_or_init(|| aeration::weights(&self.particles.position, spacing))
+            .get_or_init(|| neighbors::weights(&self.particles.position, spacing))
     }
 }
 

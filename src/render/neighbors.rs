@@ -1,0 +1,117 @@
+//! How much of a neighbourhood a particle has.
+
+use rayon::prelude::*;
+
+/// Distances, in spacings, over which a neighbour stops counting: half of it is left at two.
+const NEAR: [f32; 2] = [1.5, 2.5];
+/// Weight beyond which no more neighbours are looked for.
+const ENOUGH: f32 = 32.0;
+
+/// 0 up to `low`, 1 from `high` on, and steadily between.
+pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// What neighbours of each particle weigh in all, at most [`ENOUGH`].
+pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
+    let [near, reach] = NEAR.map(|part| part * spacing);
+    let cell = |p: &[f32; 3]| p.map(|x| (x / reach).floor() as i32);
+    // Sorted by cell, with z the fastest: three cells of a column are one contiguous run.
+    let mut order: Vec<([i32; 3], u32)> = positions
+        .par_iter()
+        .zip(0u32..positions.len() as u32)
+        .map(|(position, index)| (cell(position), index))
+        .collect();
+    order.par_sort_unstable();
+    let sorted: Vec<[f32; 3]> = order
+        .par_iter()
+        .map(|&(_, index)| positions[index as usize])
+        .collect();
+    let found: Vec<(u32, f32)> = order
+        .par_iter()
+        .enumerate()
+        .map(|(place, &([cx, cy, cz], index))| {
+            let p = sorted[place];
+            let mut sum = 0.0;
+            'columns: for dx in -1..=1 {
+                for dy in -1..=1 {
+                    let first = [cx + dx, cy + dy, cz - 1];
+                    let after = [cx + dx, cy + dy, cz + 2];
+                    let start = order.partition_point(|&(key, _)| key < first);
+                    for (q, entry) in sorted[start..].iter().zip(&order[start..]) {
+                        if entry.0 >= after {
+                            break;
+                        }
+                        let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+                        let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                        if square < reach * reach && entry.1 != index {
+                            sum += 1.0 - smoothstep(near, reach, square.sqrt());
+                        }
+                        if sum >= ENOUGH {
+                            sum = ENOUGH;
+                            break 'columns;
+                        }
+                    }
+                }
+            }
+            (index, sum)
+        })
+        .collect();
+    let mut weights = vec![0.0; positions.len()];
+    for (index, weight) in found {
+        weights[index as usize] = weight;
+    }
+    weights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn random() -> impl FnMut() -> f32 {
+        let mut seed = 7u32;
+        move || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / 16_777_216.0 * 2.0 - 1.0
+        }
+    }
+
+    #[test]
+    fn weights_agree_with_every_pair() {
+        let mut random = random();
+        let places: Vec<[f32; 3]> = (0..300).map(|_| [random(), random(), random()]).collect();
+        let found = weights(&places, 0.2);
+        let mut least = f64::INFINITY;
+        for (p, weight) in places.iter().zip(found) {
+            let others = places.iter().filter(|q| *q != p);
+            let all: f64 = others
+                .map(|q| {
+                    let square: f64 = (0..3).map(|i| f64::from(p[i] - q[i]).powi(2)).sum();
+                    let t = ((square.sqrt() / 0.2 - 1.5) / 1.0).clamp(0.0, 1.0);
+                    1.0 - t * t * (3.0 - 2.0 * t)
+                })
+                .sum();
+            // A dozen terms of f32.
+            assert!(
+                (f64::from(weight) - all.min(32.0)).abs() < 1e-4,
+                "{weight} {all}"
+            );
+            least = least.min(all);
+        }
+        assert!(least < 32.0, "none was counted to its end");
+    }
+
+    /// A lattice's bulk and half space weigh what their neighbours within two spacings are, 32 and 20, to a tenth.
+    #[test]
+    fn weights_are_numbers_of_neighbours() {
+        let lattice: Vec<[f32; 3]> = (0..1000)
+            .map(|i| [i % 10, i / 10 % 10, i / 100].map(|x| x as f32 * 0.1))
+            .collect();
+        let found = weights(&lattice, 0.1);
+        // In the middle, and in the middle of a face.
+        let (bulk, surface) = (found[555], found[55]);
+        assert!((28.8..=32.0).contains(&bulk), "{bulk}");
+        assert!((18.0..=22.0).contains(&surface), "{surface}");
+    }
+}
