@@ -10,13 +10,16 @@ use rayon::prelude::*;
 
 use super::{
     RenderScene,
-    renderer::RADIUS,
     uniform::{Particle, Shape},
 };
 use crate::domain::level_set::{
     eigen,
     kernels::{ALONE, Ellipsoid, Kernels},
 };
+
+/// Splat radius over particle spacing where the look leaves it out: 0.5 √3 closes a lattice seen along its
+/// diagonal.
+pub(super) const RADIUS: f64 = 0.87;
 
 /// Least half axis, spacings: half of what a sheet of one layer of particles is thick in the kernels' field.
 const THINNEST: f64 = 0.35;

@@ -18,6 +18,7 @@ use crate::{
         rays::{first, plan_rays},
         sea::plan_sea,
         set::{plan_palette, plan_shadow, plan_solids, shadow_from_world},
+        shapes::RADIUS,
         sky::Sky,
         surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
         uniform::Triangle,
@@ -25,9 +26,6 @@ use crate::{
     scene::look::{AovSpec, FilterSpec, Look, MethodSpec, SplatSpec},
 };
 
-/// Splat radius over particle spacing where the look leaves it out: 0.5 √3 closes a lattice seen along its
-/// diagonal.
-pub(in crate::render) const RADIUS: f64 = 0.87;
 /// Pixels that rays are cast for in one dispatch, so that none runs long enough to lose a device.
 const CAST: u32 = 1 << 17;
 /// Smoothing width over particle spacing where the look leaves it out. Balls need as much as hides their beads; ellipsoids are smooth

@@ -26,7 +26,6 @@ use crate::gpu::{
     recording::{Recording, Timer},
 };
 use crate::scene::look::Look;
-pub(super) use build::RADIUS;
 use build::room;
 use shade::draws_spray;
 use water::RayWater;
