@@ -24,11 +24,11 @@ use crate::{
 
 /// γ of a sea that still grows (Hasselmann et al. 1973).
 const PEAK_ENHANCEMENT: f64 = 3.3;
-/// Shortest period over the peak's where the look leaves it out: beyond it JONSWAP has 3 % of its slopes' variance a halving.
+/// Shortest period over the peak's where the look leaves it out; waves that are shorter are for the look's ripples.
 const SHORTEST: f64 = 0.35;
-/// m/s².
+/// Of waves that the look asks for, m/s²; those of the scene have the scene's.
 const GRAVITY: f64 = 9.81;
-/// Heights of the sea lie within so many times the root of their variance: of 64 waves one in 10⁷ is higher.
+/// Heights of the sea lie within so many times the root of their variance: two places in 10⁸ of a Gaussian sea are higher.
 const HIGHEST: f64 = 5.5;
 
 /// Waves of a sea, lengths in metres from the domain's least corner; none where it lies still.
