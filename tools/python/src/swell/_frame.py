@@ -1,0 +1,136 @@
+"""A frame: a binary PLY file, mapped into memory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._errors import Damaged
+from ._files import Content, FileRecord
+from ._ledger import Record
+
+_HEADER_LIMIT = 1 << 16
+_SCALARS = {"float": "<f4", "double": "<f8", "uint": "<u4"}
+_FIXED = ["x", "y", "z", "vx", "vy", "vz", "id"]
+
+
+class Frame:
+    """The particles of one frame, in the order of their ids.
+
+    Arrays are views of the file, which is mapped into memory: nothing is copied, pages are read when they are touched, and writing to
+    them is an error. They stay valid as long as one of them lives. Rows are packed, so a view need not be aligned or contiguous;
+    `np.ascontiguousarray(frame.position)` is a copy that is.
+
+    World coordinates are right-handed with y up, in metres; `swell.z_up` turns them to z up.
+    """
+
+    def __init__(self, folder: Path, record: Record, file: FileRecord, attributes: list[str], check: bool) -> None:
+        self._folder = folder
+        self._file = file
+        self._record = record
+        content = file.map(folder)
+        if check:
+            file.check_digest(folder, content)
+        self._rows = _parse(content, self.path)
+        if len(self._rows) != record.particles:
+            raise Damaged(self.path, f"{len(self._rows)} particles, and the ledger has {record.particles}")
+        if list(self.attributes) != attributes:
+            raise Damaged(self.path, f"its attributes are {list(self.attributes)}, and the manifest has {attributes}")
+
+    @property
+    def frame(self) -> int:
+        """Number of the frame; 0 is a scene's own start."""
+        return self._record.frame
+
+    @property
+    def time(self) -> float:
+        """Simulated, seconds."""
+        return self._record.time
+
+    @property
+    def record(self) -> Record:
+        """The frame's line of the ledger."""
+        return self._record
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._folder / self._file.file
+
+    @property
+    def rows(self) -> NDArray[np.void]:
+        """All fields as one structured array, (n,): `position`, `velocity`, `id` and the attributes."""
+        return self._rows
+
+    @property
+    def position(self) -> NDArray[np.floating[Any]]:
+        """(n, 3), metres, world coordinates: float32, or float64 where the scene stands far from the world's origin."""
+        return self["position"]
+
+    @property
+    def velocity(self) -> NDArray[np.float32]:
+        """(n, 3), m/s."""
+        return self["velocity"]
+
+    @property
+    def id(self) -> NDArray[np.uint32]:
+        """(n,), ascending. A particle keeps its id for life, and no id is given twice."""
+        return self["id"]
+
+    @property
+    def attributes(self) -> tuple[str, ...]:
+        """Names of what particles carry beside position, velocity and id; of whitewater `age`, `kind`, `life`, `radius`."""
+        names = self._rows.dtype.names or ()
+        return names[3:]
+
+    def __getitem__(self, field: str) -> NDArray[Any]:
+        """A field by its name: `frame["age"]`, (n,) float32."""
+        if field not in (self._rows.dtype.names or ()):
+            raise KeyError(f"{self.path} has no field {field!r}; it has {', '.join(self._rows.dtype.names or ())}")
+        view: NDArray[Any] = self._rows[field]
+        return view
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __repr__(self) -> str:
+        return f"<swell.Frame {self.frame}: {len(self)} particles at {self.time:.6g} s, {self.path}>"
+
+    def verify(self) -> None:
+        """Reads the whole file again and raises `Damaged` where its BLAKE3 is not the ledger's."""
+        self._file.check(self._folder)
+
+
+def _parse(content: Content, path: Path) -> NDArray[np.void]:
+    head = content[:_HEADER_LIMIT]
+    end = head.find(b"end_header\n")
+    if not head.startswith(b"ply\n") or end < 0:
+        raise Damaged(path, "it is no PLY file")
+    start = end + len(b"end_header\n")
+    lines = head[:end].decode("ascii", "replace").splitlines()
+    if lines[1:2] != ["format binary_little_endian 1.0"]:
+        raise Damaged(path, "not binary little-endian PLY 1.0")
+    words = [line.split(" ") for line in lines[2:] if not line.startswith("comment ")]
+    try:
+        [element, *properties] = words
+        count = int(element[2]) if element[:2] == ["element", "vertex"] else -1
+        kinds = {name: np.dtype(_SCALARS[kind]) for key, kind, name in properties if key == "property"}
+    except (ValueError, KeyError, IndexError) as error:
+        raise Damaged(path, "its PLY header is not one of swell's") from error
+    if count < 0 or list(kinds)[:7] != _FIXED or len(kinds) != len(properties):
+        raise Damaged(path, "its PLY header is not one of swell's")
+    dtype = _row(kinds)
+    if len(content) - start != count * dtype.itemsize:
+        raise Damaged(path, f"its header promises {count} particles of {dtype.itemsize} bytes, and {len(content) - start} bytes follow")
+    return np.frombuffer(content, dtype=dtype, count=count, offset=start)
+
+
+def _row(kinds: Mapping[str, np.dtype[Any]]) -> np.dtype[np.void]:
+    """A packed row: its three columns of position, and of velocity, are one field each."""
+    fields: list[Any] = [("position", kinds["x"], (3,)), ("velocity", kinds["vx"], (3,)), ("id", kinds["id"])]
+    fields += [(name, kind) for name, kind in kinds.items() if name not in _FIXED]
+    return np.dtype(fields)
