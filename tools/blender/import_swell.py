@@ -63,13 +63,27 @@ def collection(name: str) -> Any:
     return made
 
 
+def add_socket(group: Any, kind: str, name: str, way: str) -> None:
+    """A socket of a group of nodes; `way` is INPUT or OUTPUT. Blender 4 has another place for them than 3."""
+    if hasattr(group, "interface"):
+        group.interface.new_socket(name=name, in_out=way, socket_type=f"NodeSocket{kind}")
+    else:
+        (group.inputs if way == "INPUT" else group.outputs).new(f"NodeSocket{kind}", name)
+
+
+def identifier(group: Any, name: str) -> str:
+    """Key of a group's input in a modifier."""
+    sockets = group.interface.items_tree if hasattr(group, "interface") else group.inputs
+    return str(next(socket.identifier for socket in sockets if socket.name == name))
+
+
 def frame_group(name: str) -> tuple[Any, Any]:
     """Geometry nodes with the inputs First and End, and the socket of the geometry that is empty but from the one scene frame until
     before the other. Keyed visibility would lose the modifiers of hidden objects where Blender 3.4 builds its dependencies anew."""
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     for kind, socket in (("Geometry", "Geometry"), ("Int", "First"), ("Int", "End")):
-        group.inputs.new(f"NodeSocket{kind}", socket)
-    group.outputs.new("NodeSocketGeometry", "Geometry")
+        add_socket(group, kind, socket, "INPUT")
+    add_socket(group, "Geometry", "Geometry", "OUTPUT")
     nodes, links = group.nodes, group.links
     source, clock = nodes.new("NodeGroupInput"), nodes.new("GeometryNodeInputSceneTime")
     # A shutter's parts of a frame belong to it.
@@ -96,7 +110,7 @@ def show_from_to(thing: Any, group: Any, first: int, end: int) -> None:
     modifier = thing.modifiers.new("swell", "NODES")
     modifier.node_group = group
     for socket, value in (("First", first), ("End", end)):
-        modifier[group.inputs[socket].identifier] = value
+        modifier[identifier(group, socket)] = value
 
 
 def add_attribute(mesh: Any, name: str, values: np.ndarray) -> None:

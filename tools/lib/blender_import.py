@@ -170,6 +170,9 @@ def check_solid():
 
 def main():
     cache = room / "cache"
+    if not bpy.data.filepath:
+        # Blender as a module of Python opens no file by itself.
+        bpy.ops.wm.open_mainfile(filepath=str(room / "tank.blend"))
     scene = bpy.context.scene
     check(abs(scene.render.fps / scene.render.fps_base - 24.0) < 1e-6, f"{scene.render.fps}/{scene.render.fps_base} frames a second")
     check((scene.frame_start, scene.frame_end) == (2, 5), f"scene frames {scene.frame_start} to {scene.frame_end}")
