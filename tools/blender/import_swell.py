@@ -139,22 +139,10 @@ def points_mesh(frame: swell.Frame, name: str) -> Any:
     return mesh
 
 
-def points_group(name: str, radius: float | None, material: Any) -> Any:
-    """`frame_group` that turns vertices into a point cloud, with radius in metres or, where that is None, of the attribute `radius`."""
-    group, shown = frame_group(name)
+def finish(group: Any, geometry: Any, material: Any) -> None:
+    """Gives a group's geometry the attribute `speed` and a material, and ends the group. Cycles keeps the name `velocity` for motion blur, so
+    materials are given its length."""
     nodes, links = group.nodes, group.links
-    to_points = nodes.new("GeometryNodeMeshToPoints")
-    paint = nodes.new("GeometryNodeSetMaterial")
-    paint.inputs["Material"].default_value = material
-    if radius is None:
-        named = nodes.new("GeometryNodeInputNamedAttribute")
-        named.data_type = "FLOAT"
-        named.inputs["Name"].default_value = "radius"
-        value = next(socket for socket in named.outputs if socket.enabled and socket.name == "Attribute")
-        links.new(value, to_points.inputs["Radius"])
-    else:
-        to_points.inputs["Radius"].default_value = radius
-    # Cycles keeps the name `velocity` for motion blur, so materials are given its length.
     velocity = nodes.new("GeometryNodeInputNamedAttribute")
     velocity.data_type = "FLOAT_VECTOR"
     velocity.inputs["Name"].default_value = "velocity"
@@ -163,16 +151,34 @@ def points_group(name: str, radius: float | None, material: Any) -> Any:
     store = nodes.new("GeometryNodeStoreNamedAttribute")
     store.data_type, store.domain = "FLOAT", "POINT"
     store.inputs["Name"].default_value = "speed"
+    paint = nodes.new("GeometryNodeSetMaterial")
+    paint.inputs["Material"].default_value = material
     links.new(next(each for each in velocity.outputs if each.enabled and each.name == "Attribute"), length.inputs[0])
     links.new(length.outputs["Value"], next(each for each in store.inputs if each.enabled and each.name == "Value"))
-    links.new(shown, to_points.inputs["Mesh"])
-    links.new(to_points.outputs[0], store.inputs["Geometry"])
+    links.new(geometry, store.inputs["Geometry"])
     links.new(store.outputs[0], paint.inputs["Geometry"])
     links.new(paint.outputs[0], nodes.new("NodeGroupOutput").inputs["Geometry"])
+
+
+def points_group(name: str, radius: float | None, material: Any) -> Any:
+    """`frame_group` that turns vertices into a point cloud, with radius in metres or, where that is None, of the attribute `radius`."""
+    group, shown = frame_group(name)
+    nodes, links = group.nodes, group.links
+    to_points = nodes.new("GeometryNodeMeshToPoints")
+    if radius is None:
+        named = nodes.new("GeometryNodeInputNamedAttribute")
+        named.data_type = "FLOAT"
+        named.inputs["Name"].default_value = "radius"
+        value = next(socket for socket in named.outputs if socket.enabled and socket.name == "Attribute")
+        links.new(value, to_points.inputs["Radius"])
+    else:
+        to_points.inputs["Radius"].default_value = radius
+    links.new(shown, to_points.inputs["Mesh"])
+    finish(group, to_points.outputs[0], material)
     return group
 
 
-def speed_material(name: str, fastest: float) -> Any:
+def speed_material(name: str, fastest: float, roughness: float = 0.5) -> Any:
     """Blue at rest to white at `fastest` m/s, by the attribute `speed`."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
@@ -186,14 +192,21 @@ def speed_material(name: str, fastest: float) -> Any:
     ramp.color_ramp.elements[1].color = (0.9, 0.95, 1.0, 1.0)
     links.new(speed.outputs["Fac"], scale.inputs["Value"])
     links.new(scale.outputs["Result"], ramp.inputs["Fac"])
-    links.new(ramp.outputs["Color"], nodes["Principled BSDF"].inputs["Base Color"])
+    shader = nodes["Principled BSDF"]
+    shader.inputs["Roughness"].default_value = roughness
+    links.new(ramp.outputs["Color"], shader.inputs["Base Color"])
     return material
 
 
 def fast(frame: swell.Frame) -> float:
-    """Speed that one particle of a hundred is above, m/s."""
+    """Speed that one particle of a hundred is above, m/s; 0 without particles."""
     speeds = np.linalg.norm(frame.velocity, axis=1)
     return float(np.quantile(speeds, 0.99)) if len(speeds) else 0.0
+
+
+def top_speed(cache: swell.Cache, frames: Sequence[int]) -> float:
+    """Speed that is drawn white, m/s: that of the fast water in the first or the last of these frames."""
+    return max([1e-3, *(fast(cache[number]) for number in {*frames[:1], *frames[-1:]})])
 
 
 def import_points(cache: swell.Cache, frames: Sequence[int], name: str, offset: int = 0) -> list[Any]:
@@ -203,7 +216,7 @@ def import_points(cache: swell.Cache, frames: Sequence[int], name: str, offset: 
     step = min((after - before for before, after in zip(frames, frames[1:], strict=False)), default=1)
     ends = [*frames[1:], frames[-1] + step]
     has_radius = "radius" in cache.manifest["attributes"]
-    material = speed_material(name, max(1e-3, *(fast(cache[number]) for number in (frames[0], frames[-1]))))
+    material = speed_material(name, top_speed(cache, frames))
     group = points_group(f"{name} points", None if has_radius else 0.5 * cache.particle_spacing, material)
     into = collection(name)
     made = []
@@ -322,8 +335,8 @@ def water_mesh(path: Path, name: str) -> Any:
     return mesh
 
 
-def import_meshes(folder: Path, frames: Sequence[int] | None, name: str, offset: int = 0) -> list[Any]:
-    """A sequence `NAME.0048.ply` or `.obj` of one folder, an object a frame; the objects."""
+def import_meshes(folder: Path, frames: Sequence[int] | None, name: str, offset: int = 0, fastest: float = 10.0) -> list[Any]:
+    """A sequence `NAME.0048.ply` or `.obj` of one folder, an object a frame, white at `fastest` m/s; the objects."""
     files = {}
     for path in sorted(folder.iterdir()):
         found = re.fullmatch(r".*\.(\d+)\.(ply|obj)", path.name, re.IGNORECASE)
@@ -333,7 +346,7 @@ def import_meshes(folder: Path, frames: Sequence[int] | None, name: str, offset:
         raise ImportFault(f"{folder} has no NAME.0001.ply or .obj of the frames asked for")
     numbers = sorted(files)
     group, shown = frame_group(name)
-    group.links.new(shown, group.nodes.new("NodeGroupOutput").inputs["Geometry"])
+    finish(group, shown, speed_material(name, fastest, roughness=0.1))
     into = collection(name)
     made = []
     for number, end in zip(numbers, [*numbers[1:], numbers[-1] + 1], strict=True):
@@ -426,7 +439,7 @@ def main(words: Sequence[str]) -> None:
     if asked.grids:
         import_grids(cache, asked.frames or frames, f"{cache.shot} grids", asked.offset)
     if asked.meshes is not None:
-        import_meshes(asked.meshes, asked.frames, f"{cache.shot} mesh", asked.offset)
+        import_meshes(asked.meshes, asked.frames, f"{cache.shot} mesh", asked.offset, top_speed(cache, frames))
     if asked.solids:
         import_solids(cache)
     set_scene(cache, asked.frames or frames, asked.offset)

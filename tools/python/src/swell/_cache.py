@@ -15,7 +15,7 @@ from ._blake3 import hex_digests
 from ._errors import CacheError, Damaged, MissingFrame
 from ._files import FileRecord, faults, read_bytes
 from ._frame import Frame
-from ._ledger import GRIDS, LEDGER, MANIFEST, PARTICLES, Record, first_frame, read_ledger, read_manifest
+from ._ledger import GRIDS, LEDGER, MANIFEST, PARTICLES, Record, read_ledger, read_manifest
 from ._probes import Probe
 
 _SCENE = "scene.toml"
@@ -154,9 +154,9 @@ class Cache:
             files += [record for stream, record in entry.files.items() if is_kept or stream != PARTICLES]
         problems += faults(self.path, files)
         for probe in self.probes.values():
-            problems += _fault_of(lambda: probe.check(self.path))
+            problems += _fault_of(probe.check, self.path)
         if (self.path / "failed").exists():
-            problems += _fault_of(lambda: _check_failed(self.path / "failed"))
+            problems += _fault_of(_check_failed, self.path / "failed")
         return problems
 
     def _record(self, frame: int) -> Record:
@@ -198,9 +198,9 @@ class Grids(Mapping[int, Path]):
         return len(self._files)
 
 
-def _fault_of(check: Callable[[], None]) -> list[CacheError]:
+def _fault_of(check: Callable[[Path], None], folder: Path) -> list[CacheError]:
     try:
-        check()
+        check(folder)
     except CacheError as problem:
         return [problem]
     return []
