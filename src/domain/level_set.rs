@@ -8,6 +8,7 @@ pub mod edges;
 pub mod eigen;
 pub mod kernels;
 pub mod sunlight;
+pub mod velocity;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -67,12 +68,18 @@ impl LevelSet {
 
     /// That of kernels that were fitted in this box, with voxels of `voxel` metres.
     pub fn of_kernels(kernels: &Kernels, size: DVec3, voxel: f64) -> Self {
+        Self::with_margin(kernels, size, voxel, 0.0)
+    }
+
+    /// The same with values also where the field comes no nearer to the surface's value than `margin` of it, below 1: surfaces of other
+    /// values, down to −`margin` and up to `margin`, then lie in bricks that have values too.
+    pub fn with_margin(kernels: &Kernels, size: DVec3, voxel: f64, margin: f32) -> Self {
         let bricks = bricks_over(size, voxel);
         let lists = Lists::new(&kernels.ellipsoids, bricks, voxel);
         let level = kernels.level as f32;
         let filled: Vec<Filled> = (0..lists.len())
             .into_par_iter()
-            .map(|brick| lists.fill(kernels, brick, voxel, level))
+            .map(|brick| lists.fill(kernels, brick, voxel, (level, margin)))
             .collect();
         let mut set = Self {
             size,
@@ -114,6 +121,23 @@ impl LevelSet {
         }
         let along = |axis: DVec3| self.within(slot, q + axis) - self.within(slot, q - axis);
         DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)) / (2.0 * self.voxel)
+    }
+
+    /// The value at corner `at` of voxels, counted from the box's least one, as the brick that begins there keeps it; −1 in bricks
+    /// without water, 1 in those that are all water.
+    pub fn node(&self, at: [u32; 3]) -> f32 {
+        let brick = [0, 1, 2].map(|axis| (at[axis] / EDGE).min(self.bricks[axis] - 1));
+        let [nx, ny] = [self.bricks[0] as usize, self.bricks[1] as usize];
+        let [x, y, z] = brick.map(|c| c as usize);
+        match self.table[(z * ny + y) * nx + x] {
+            EMPTY => -1.0,
+            FULL => 1.0,
+            slot => {
+                let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] - EDGE * brick[axis] + 1) as usize);
+                let nodes = NODES as usize;
+                self.values[(slot - FIRST) as usize * VALUES + x + nodes * (y + nodes * z)]
+            }
+        }
     }
 
     /// What the table says of the brick at `p`.
@@ -216,7 +240,13 @@ impl Lists {
         self.starts.len() - 1
     }
 
-    fn fill(&self, kernels: &Kernels, brick: usize, voxel: f64, level: f32) -> Filled {
+    fn fill(
+        &self,
+        kernels: &Kernels,
+        brick: usize,
+        voxel: f64,
+        (level, margin): (f32, f32),
+    ) -> Filled {
         let entries = &self.entries[self.starts[brick] as usize..self.starts[brick + 1] as usize];
         if entries.is_empty() {
             return Filled::Empty;
@@ -235,10 +265,10 @@ impl Lists {
                 voxel,
             );
         }
-        let is_water = |value: &f32| *value > level;
+        let is_beyond = |part: f32| move |value: &f32| *value > level * part;
         match () {
-            () if !values.iter().any(is_water) => Filled::Empty,
-            () if values.iter().all(is_water) => Filled::Full,
+            () if !values.iter().any(is_beyond(1.0 - margin)) => Filled::Empty,
+            () if values.iter().all(is_beyond(1.0 + margin)) => Filled::Full,
             () => {
                 for value in values.iter_mut() {
                     *value = *value / level - 1.0;

@@ -351,7 +351,7 @@ fn lone_factor(level: f64) -> f64 {
 }
 
 /// Places by cell, for neighbours within a cell's edge.
-struct Grid {
+pub(super) struct Grid {
     edge: f64,
     min: DVec3,
     cells: [usize; 3],
@@ -360,7 +360,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(places: &[DVec3], edge: f64) -> Self {
+    pub(super) fn new(places: &[DVec3], edge: f64) -> Self {
         let least = |a: DVec3, b: &DVec3| a.min(*b);
         let min = places.iter().fold(DVec3::INFINITY, least);
         let max = places.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
@@ -392,6 +392,11 @@ impl Grid {
         grid
     }
 
+    /// Of a cell, metres: how far neighbours are found.
+    pub(super) fn edge(&self) -> f64 {
+        self.edge
+    }
+
     fn cell(&self, p: DVec3) -> [usize; 3] {
         let at = ((p - self.min) / self.edge).to_array();
         [0, 1, 2].map(|axis| (at[axis].max(0.0) as usize).min(self.cells[axis] - 1))
@@ -402,7 +407,7 @@ impl Grid {
     }
 
     /// Visits those of the 3³ cells about a place, which may lie outside of all, in an order that depends on the places alone.
-    fn for_each_near(&self, p: DVec3, mut visit: impl FnMut(usize)) {
+    pub(super) fn for_each_near(&self, p: DVec3, mut visit: impl FnMut(usize)) {
         let [x, y, z] = self.cell(p);
         let range = |c: usize, n: usize| c.saturating_sub(1)..=(c + 1).min(n - 1);
         for cz in range(z, self.cells[2]) {

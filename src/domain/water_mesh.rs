@@ -1,0 +1,204 @@
+//! The water of a frame as a mesh that has the particles' volume, with velocities and normals.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{
+    isosurface::{Isosurface, extract},
+    level_set::{LevelSet, kernels::Kernels, velocity::Velocities},
+    mesh::TriangleMesh,
+};
+
+/// How far the volume may be off the particles', of itself, before the surface is moved.
+pub const VOLUME: f64 = 0.01;
+/// How near a surface that was moved comes to it: well within [`VOLUME`], so that a frame's neighbours agree.
+const NEAR: f64 = 1e-3;
+/// How far from its own the field's value at a moved surface may be.
+const MARGIN: f32 = 0.5;
+/// Extractions on the way to a volume, at most: each about halves what is left where the secant does no better.
+const TRIES: usize = 8;
+
+/// The water that a mesh is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Body<'a> {
+    /// Of the particles, metres from the box's least corner.
+    pub places: &'a [DVec3],
+    /// Of the particles, m/s.
+    pub velocities: &'a [[f32; 3]],
+    /// Of the box, metres; its sides are mirrors, and closed where water stands at them.
+    pub size: DVec3,
+    /// Between neighbours at rest, metres.
+    pub spacing: f64,
+    /// Of the grid that the surface is found on, a spacing.
+    pub voxels: f64,
+}
+
+/// A mesh around the water.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WaterMesh {
+    /// Metres from the box's least corner; closed, counter-clockwise seen from the air.
+    pub mesh: TriangleMesh,
+    /// Unit normals of the vertices, outward.
+    pub normals: Vec<[f32; 3]>,
+    /// Velocities of the vertices, m/s.
+    pub velocities: Vec<[f32; 3]>,
+    /// Enclosed, over the particles'; 1 without particles.
+    pub volume: f64,
+    /// Value of the field at the surface: 0, unless its own surface had another volume than the particles.
+    pub iso: f32,
+}
+
+impl WaterMesh {
+    /// The renderer's own surface of a body. Where the volume within it is off the particles' by more than [`VOLUME`], it is that of
+    /// the value at which it is not, so far as one within half of it has; `volume` then says what was reached.
+    pub fn new(body: &Body<'_>) -> Self {
+        let &Body { size, spacing, .. } = body;
+        let kernels = Kernels::fit(body.places, size, spacing);
+        let voxel = spacing / body.voxels;
+        let mut level = LevelSet::of_kernels(&kernels, size, voxel);
+        let mut found = (0.0, extract(&level, 0.0));
+        let particles = body.places.len() as f64 * spacing.powi(3);
+        let ratio = |surface: &Isosurface| match body.places.is_empty() {
+            true => 1.0,
+            false => surface.mesh.signed_volume() / particles,
+        };
+        if (ratio(&found.1) - 1.0).abs() > VOLUME {
+            level = LevelSet::with_margin(&kernels, size, voxel, MARGIN);
+            found = at_volume(&level, found.1, &ratio);
+        }
+        let (iso, surface) = found;
+        Self {
+            volume: ratio(&surface),
+            iso,
+            normals: normals(&surface, &level),
+            velocities: Velocities::new(body.places, body.velocities, spacing)
+                .at(&surface.mesh.vertices),
+            mesh: surface.mesh,
+        }
+    }
+}
+
+/// The surface of the value at which `ratio` is 1, found by halving between [`MARGIN`] and the field's own.
+fn at_volume(
+    level: &LevelSet,
+    own: Isosurface,
+    ratio: &dyn Fn(&Isosurface) -> f64,
+) -> (f32, Isosurface) {
+    let is_too_much = ratio(&own) > 1.0;
+    let (mut inner, mut outer) = match is_too_much {
+        true => (MARGIN, 0.0),
+        false => (0.0, -MARGIN),
+    };
+    let far = if is_too_much { MARGIN } else { -MARGIN };
+    let mut best = (0.0, own);
+    let mut next = far;
+    for _ in 0..TRIES {
+        let surface = extract(level, next);
+        let volume = ratio(&surface);
+        if (volume - 1.0).abs() < (ratio(&best.1) - 1.0).abs() {
+            best = (next, surface);
+        }
+        let is_out_of_reach = next == far && (volume > 1.0) == is_too_much;
+        if (volume - 1.0).abs() < NEAR || is_out_of_reach {
+            break;
+        }
+        match volume > 1.0 {
+            true => outer = next.max(outer),
+            false => inner = next.min(inner),
+        }
+        next = 0.5 * (inner + outer);
+    }
+    best
+}
+
+/// Outward: against the field's gradient, and in a cap those of the sides.
+fn normals(surface: &Isosurface, level: &LevelSet) -> Vec<[f32; 3]> {
+    let mesh = &surface.mesh;
+    let mut areas = vec![DVec3::ZERO; mesh.vertices.len()];
+    for (index, triangle) in mesh.triangles.iter().enumerate() {
+        let area = mesh.area_vector(index);
+        triangle.iter().for_each(|&v| areas[v as usize] += area);
+    }
+    let all = mesh.vertices.par_iter().zip(&surface.caps).zip(areas);
+    let normal = |((&place, &cap), area): ((&DVec3, &DVec3), DVec3)| {
+        let field = -level.gradient(place);
+        // Where the field has no slope the triangles have one.
+        let choices = [cap, field, area];
+        let found = choices.into_iter().find_map(DVec3::try_normalize);
+        found.unwrap_or(DVec3::Y).as_vec3().to_array()
+    };
+    all.map(normal).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const D: f64 = 0.1;
+    const SIZE: DVec3 = DVec3::splat(2.0);
+
+    /// A ball of a lattice whose neighbours are `part` of a spacing apart, which goes along x.
+    fn ball(part: f64) -> Vec<DVec3> {
+        let step = part * D;
+        let n = (0.7 / step).ceil() as i32;
+        let axis = || (-n..=n).map(|k| f64::from(k) * step);
+        let all =
+            axis().flat_map(|x| axis().flat_map(move |y| axis().map(move |z| DVec3::new(x, y, z))));
+        all.filter(|p| p.length() < 0.7).map(|p| p + 1.0).collect()
+    }
+
+    fn mesh(places: &[DVec3]) -> WaterMesh {
+        WaterMesh::new(&Body {
+            places,
+            velocities: &vec![[1.0, 0.0, 0.0]; places.len()],
+            size: SIZE,
+            spacing: D,
+            voxels: 2.0,
+        })
+    }
+
+    #[test]
+    fn a_ball_at_rest_has_its_own_surface() {
+        let found = mesh(&ball(1.0));
+        assert_eq!(found.iso, 0.0);
+        assert!((found.volume - 1.0).abs() <= VOLUME, "{}", found.volume);
+        for (place, normal) in found.mesh.vertices.iter().zip(&found.normals) {
+            let normal = DVec3::from(normal.map(f64::from));
+            assert!((normal.length() - 1.0).abs() < 1e-6);
+            // A ball of a lattice is rough; its normals lead outward all the same.
+            assert!(normal.dot((*place - 1.0).normalize()) > 0.5, "{place}");
+        }
+        assert!(
+            found
+                .velocities
+                .iter()
+                .all(|v| (v[0] - 1.0).abs() < 1e-6 && v[1].abs() < 1e-6)
+        );
+    }
+
+    #[test]
+    fn squeezed_and_stretched_water_has_its_particles_volume() {
+        for part in [0.97, 1.03] {
+            let places = ball(part);
+            let own = extract(&LevelSet::new(&places, SIZE, D), 0.0);
+            let volume = places.len() as f64 * D.powi(3);
+            let of_own = own.mesh.signed_volume() / volume;
+            assert!((of_own - 1.0).abs() > 2.0 * VOLUME, "the control: {of_own}");
+            let found = mesh(&places);
+            assert!(
+                (found.volume - 1.0).abs() <= VOLUME,
+                "{part}: {}",
+                found.volume
+            );
+            assert!((found.mesh.signed_volume() / volume - found.volume).abs() < 1e-12);
+            assert!(found.mesh.open_edges().is_empty());
+            assert_eq!(found.iso > 0.0, of_own > 1.0);
+        }
+    }
+
+    #[test]
+    fn no_water_is_no_mesh() {
+        let found = mesh(&[]);
+        assert_eq!((found.mesh.vertices.len(), found.volume), (0, 1.0));
+    }
+}
