@@ -14,6 +14,7 @@
 //! - [`check`]: a substep on the GPU against the same one in f64, pass by pass.
 //! - [`cache`]: frames, ledger, manifest on disk.
 //! - [`render`]: screen-space fluid rendering.
+//! - [`export`]: files for other programs, from a frame's mesh or particles.
 //! - [`compare`]: by how much two sets of values, two caches or two pictures differ.
 //! - [`study`]: what frames measure, curves, and the page that shows them.
 //! - [`experiment`]: runs studies: points, resumable results, reports.
@@ -29,6 +30,7 @@ pub mod cli;
 pub mod compare;
 pub mod domain;
 pub mod experiment;
+pub mod export;
 pub mod gpu;
 #[cfg(feature = "mutants")]
 pub mod mutants;

@@ -4,6 +4,7 @@ mod bake;
 mod check;
 mod check_render;
 mod diff;
+mod export;
 mod inspect;
 pub mod interrupt;
 mod keys;
@@ -51,6 +52,8 @@ enum Command {
     Bake(bake::BakeArgs),
     /// Render a particle cache with a look into an image sequence.
     Render(render::RenderArgs),
+    /// Export a cache for other programs: meshes, USD shots, tables of particles, grids.
+    Export(export::ExportArgs),
     /// Bake, render and measure what a study compares, and write one page about it.
     Study(study::StudyArgs),
     /// Make spray, foam and bubbles from a finished bake, as a stream beside it.
@@ -170,6 +173,7 @@ fn run(command: Command) -> u8 {
     let result = match command {
         Command::Bake(args) => bake::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Study(args) => study::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Inspect(args) => inspect::run(&args),

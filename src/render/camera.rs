@@ -178,6 +178,13 @@ pub fn eye(look: &Look, origin: DVec3, frame: f64, frames_per_second: f64) -> Ey
     of_pose(look, &pose(look, frame, frames_per_second), origin)
 }
 
+/// The lens of a look at a frame number: its f-number and the distance that is sharp, metres; `None` of a pinhole.
+pub fn lens(look: &Look, frame: f64, frames_per_second: f64) -> Option<[f64; 2]> {
+    let f_stop = look.spec().camera.lens.as_ref()?.f_stop;
+    let lens = pose(look, frame, frames_per_second).lens?;
+    Some([f_stop, lens.focus])
+}
+
 fn of_pose(look: &Look, pose: &Pose, origin: DVec3) -> Eye {
     let image = &look.spec().image;
     Eye {

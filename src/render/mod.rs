@@ -39,7 +39,7 @@ use crate::domain::{bounds::Bounds, mesh::TriangleMesh, open_waves::OpenWaves};
 use crate::gpu::adapter::GpuError;
 use crate::scene::Wall;
 
-pub use camera::eye;
+pub use camera::{eye, lens};
 pub use image::{Attributes, Image};
 pub use moment::{Moment, REACH, Water, frames_around};
 pub use opaque::opaque;

@@ -6,6 +6,7 @@ pub mod check;
 pub mod device;
 pub mod diff;
 pub mod drive;
+pub mod export;
 pub mod gauge;
 pub mod inspect;
 pub mod prepare;

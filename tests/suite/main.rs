@@ -26,6 +26,7 @@ mod cache {
 }
 mod check;
 mod cli {
+    mod export;
     mod inspect;
     mod pipeline;
     mod shaders;

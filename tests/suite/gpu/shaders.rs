@@ -256,7 +256,7 @@ fn composition_faults_name_their_place() {
 }
 
 /// Rooms that each room may import; `stage`, `experiment` and `cli` stand above them all.
-const MAY_IMPORT: [(&str, &[&str]); 13] = [
+const MAY_IMPORT: [(&str, &[&str]); 14] = [
     ("domain", &[]),
     ("gpu", &[]),
     ("scene", &["domain"]),
@@ -265,6 +265,7 @@ const MAY_IMPORT: [(&str, &[&str]); 13] = [
     ("reference", &["domain", "scene"]),
     ("render", &["gpu", "domain", "scene"]),
     ("compare", &["domain"]),
+    ("export", &["domain"]),
     ("study", &["domain", "compare"]),
     (
         "check",
@@ -291,6 +292,7 @@ const MAY_IMPORT: [(&str, &[&str]); 13] = [
             "render",
             "compare",
             "study",
+            "export",
         ],
     ),
     (

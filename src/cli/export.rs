@@ -1,0 +1,213 @@
+//! `swell export CACHE`
+
+use std::{cell::OnceCell, path::PathBuf};
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+
+use crate::{
+    domain::frame_range::FrameRange,
+    scene::look::Look,
+    stage::export::{Chunk, Event, Pattern, Request, Target, UsdWater, VOXELS, export},
+};
+
+use super::{
+    Failure, bake, count,
+    interrupt::{self, Interrupt},
+    progress::{Mode, Progress},
+    size,
+};
+
+#[derive(Args, Debug)]
+pub(super) struct ExportArgs {
+    /// Cache directory.
+    cache: PathBuf,
+    /// The water's surface, closed, with velocities: a file a frame, such as m.%04d.ply (.obj, .usda, .usdc).
+    #[arg(long, value_name = "FILES")]
+    mesh: Option<Pattern>,
+    /// A shot for USD, such as shot.usda (.usdc): water, solids and wave makers, with a layer a frame beside it.
+    #[arg(long, value_name = "FILE")]
+    usd: Option<PathBuf>,
+    /// How the shot has its water.
+    #[arg(
+        long,
+        value_enum,
+        default_value_t,
+        value_name = "WATER",
+        requires = "usd"
+    )]
+    usd_water: Water,
+    /// Particles as NumPy arrays, such as p.%04d.npy.
+    #[arg(long, value_name = "FILES")]
+    npy: Option<Pattern>,
+    /// Particles as tables, such as p.%04d.csv.
+    #[arg(long, value_name = "FILES")]
+    csv: Option<Pattern>,
+    /// Particles as Houdini's classic BGEO, such as p.%04d.bgeo.
+    #[arg(long, value_name = "FILES")]
+    bgeo: Option<Pattern>,
+    /// Level set and velocity grid, such as g.%04d.vdb.
+    #[arg(long, value_name = "FILES")]
+    vdb: Option<Pattern>,
+    /// Frames to export, such as 1-240x2; all that are cached where left out.
+    #[arg(long, value_name = "RANGE")]
+    frames: Option<FrameRange>,
+    /// Share of the frames, such as 1/4 for the first of four: several machines may fill one folder.
+    #[arg(long, value_name = "I/N")]
+    chunk: Option<Chunk>,
+    /// A stream of whitewater in place of the water, as particles.
+    #[arg(long, value_name = "NAME")]
+    stream: Option<String>,
+    /// Look whose camera --usd gets.
+    #[arg(long, value_name = "LOOK")]
+    look: Option<PathBuf>,
+    /// Take a panorama or a camera that lies outside of the look's folder.
+    #[arg(long)]
+    allow_outside: bool,
+    /// Voxels a particle spacing that the surface is found on.
+    #[arg(long, value_name = "N", default_value_t = VOXELS, value_parser = voxels)]
+    voxels: f64,
+    /// Python with usd-core, which names that end in .usdc need.
+    #[arg(long, value_name = "PROGRAM", default_value = "python3")]
+    python: String,
+    /// Export files again that stand there, also those of another cache, and files that are none of swell's.
+    #[arg(long)]
+    overwrite: bool,
+    /// How to tell progress.
+    #[arg(long, value_enum, default_value_t)]
+    progress: Mode,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, Default)]
+enum Water {
+    #[default]
+    Points,
+    Mesh,
+}
+
+/// As looks take it.
+fn voxels(text: &str) -> Result<f64, String> {
+    let allowed = 1.0..=4.0;
+    let found = text.parse().ok().filter(|x| allowed.contains(x));
+    found.ok_or_else(|| "write a number from 1 to 4".to_owned())
+}
+
+impl ExportArgs {
+    fn targets(&self) -> Vec<Target> {
+        let water = match self.usd_water {
+            Water::Points => UsdWater::Points,
+            Water::Mesh => UsdWater::Mesh,
+        };
+        let all = [
+            self.mesh.clone().map(Target::Mesh),
+            self.npy.clone().map(Target::Npy),
+            self.csv.clone().map(Target::Csv),
+            self.bgeo.clone().map(Target::Bgeo),
+            self.vdb.clone().map(Target::Vdb),
+            self.usd.clone().map(|file| Target::Usd(file, water)),
+        ];
+        all.into_iter().flatten().collect()
+    }
+}
+
+pub(super) fn run(args: &ExportArgs) -> Result<u8, Failure> {
+    let look = match &args.look {
+        Some(look) => Some(Look::load_within(look, bake::reach(args.allow_outside))?),
+        None => None,
+    };
+    let request = Request {
+        cache: args.cache.clone(),
+        stream: args.stream.clone(),
+        targets: args.targets(),
+        frames: args.frames.clone(),
+        chunk: args.chunk,
+        voxels: args.voxels,
+        look,
+        python: args.python.clone(),
+        overwrite: args.overwrite,
+    };
+    let interrupt = Interrupt::install_or_warn();
+    let progress = OnceCell::new();
+    let outcome = export(&request, interrupt.flag(), &mut |event| {
+        tell(args.progress, &progress, event);
+    });
+    let progress = progress
+        .into_inner()
+        .unwrap_or_else(|| Progress::new(args.progress, 0));
+    progress.finish();
+    let outcome = outcome?;
+    let elsewhere = match outcome.elsewhere {
+        0 => String::new(),
+        many => format!(", {many} being made by other processes"),
+    };
+    progress.say(
+        &format!(
+            "{} {} made ({}), {} stood there already{elsewhere}",
+            if outcome.interrupted {
+                "ended by a signal:"
+            } else {
+                "done:"
+            },
+            count(outcome.made as u64, "file"),
+            size(outcome.bytes),
+            outcome.standing,
+        ),
+        json!({
+            "event": "end", "made": outcome.made, "bytes": outcome.bytes, "standing": outcome.standing,
+            "elsewhere": outcome.elsewhere, "interrupted": outcome.interrupted,
+        }),
+    );
+    Ok(if outcome.interrupted {
+        interrupt::EXIT_CODE as u8
+    } else {
+        0
+    })
+}
+
+fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
+    match event {
+        Event::Ready { frames, files } => {
+            let progress = progress.get_or_init(|| Progress::new(mode, frames as u64));
+            progress.say(
+                &format!(
+                    "{}, {} each",
+                    count(frames as u64, "frame"),
+                    count(files as u64, "file")
+                ),
+                json!({ "event": "ready", "frames": frames, "files": files }),
+            );
+        }
+        Event::Warning(text) => {
+            if let Some(progress) = progress.get() {
+                progress.say(
+                    &format!("warning: {text}"),
+                    json!({ "event": "warning", "what": "volume", "text": text }),
+                );
+            }
+        }
+        Event::Frame {
+            frame,
+            made,
+            bytes,
+            seconds,
+            volume,
+        } => {
+            let Some(progress) = progress.get() else {
+                return;
+            };
+            let held = volume.map_or_else(String::new, |volume| {
+                format!(", {:.2} % of the particles' volume", 100.0 * volume)
+            });
+            let text = match made {
+                0 => "stands there".to_owned(),
+                _ => format!("{} in {seconds:.2} s{held}", size(bytes)),
+            };
+            progress.frame(
+                &format!("frame {frame:4}  {text}"),
+                json!({
+                    "event": "frame", "frame": frame, "made": made, "bytes": bytes, "seconds": seconds, "volume": volume,
+                }),
+            );
+        }
+    }
+}

@@ -1,0 +1,92 @@
+use super::*;
+
+fn shot() -> Shot<'static> {
+    Shot {
+        source: Source {
+            software: "swell 0",
+            shot: "a-b",
+            frame: 7,
+        },
+        water: "water",
+        frames_per_second: 24.0,
+        frames: [7, 9],
+        origin: DVec3::ZERO,
+    }
+}
+
+#[test]
+fn names_are_what_usd_takes() {
+    assert_eq!(name("wave-city"), "wave_city");
+    assert_eq!(name("2nd.try"), "_2nd_try");
+    assert_eq!(name(""), "_");
+    assert_eq!(quoted("a \"b\""), "\"a \\\"b\\\"\"");
+}
+
+#[test]
+fn a_frame_says_its_units_and_its_points() {
+    let particles = Particles {
+        position: vec![[1.0, 2.0, 3.5]],
+        velocity: vec![[0.1, 0.0, -1.0]],
+        id: vec![5],
+        attributes: [("age".to_owned(), vec![0.5])].into(),
+        ..Particles::default()
+    };
+    let kind = Kind::Points { width: Some(0.2) };
+    let way = [("wall_minus_x".to_owned(), DVec3::X)];
+    let text = String::from_utf8(frame(&shot(), kind, &Water::Points(&particles), &way)).unwrap();
+    for part in [
+        "metersPerUnit = 1\n",
+        "upAxis = \"Y\"",
+        "timeCodesPerSecond = 24\n",
+        "def Points \"water\"",
+        "7: [(1, 2, 3.5)]",
+        "7: [(0.1, 0, -1)]",
+        "7: [5]",
+        "primvars:age.timeSamples",
+        "7: (1, 0, 0),",
+        "widths = [0.2]",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert_eq!(text.matches('{').count(), text.matches('}').count());
+}
+
+#[test]
+fn a_root_plays_the_frames_that_it_is_given() {
+    let solid = |way| Solid {
+        name: "box".to_owned(),
+        mesh: TriangleMesh {
+            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            triangles: vec![[0, 1, 2]],
+        },
+        way,
+    };
+    let root_of = Root {
+        shot: shot(),
+        kind: Kind::Mesh,
+        attributes: Vec::new(),
+        layers: vec![(7, "s.0007.usda".to_owned()), (9, "s.0009.usda".to_owned())],
+        manifest: "s.manifest.usda".to_owned(),
+        solids: vec![solid(Vec::new()), solid(vec![(7, DVec3::X), (9, DVec3::Y)])],
+        wave_makers: Vec::new(),
+        camera: Vec::new(),
+    };
+    let text = String::from_utf8(root(&root_of)).unwrap();
+    for part in [
+        "active = [(7, 0), (9, 1)]",
+        "assetPaths = [@./s.0007.usda@, @./s.0009.usda@]",
+        "times = [(7, 7), (9, 9)]",
+        "primPath = \"/a_b\"",
+        "def Mesh \"box\"",
+        "def Mesh \"box_2\"",
+        "9: (0, 1, 0),",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(!text.contains("Camera") && !text.contains("wave_makers"));
+    assert!(
+        String::from_utf8(manifest(&root_of))
+            .unwrap()
+            .contains("point3f[] points\n")
+    );
+}

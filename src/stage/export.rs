@@ -1,0 +1,556 @@
+//! `export`: a cache to files of other programs: meshes of the water, USD shots, tables of particles, grids. The cache is only read, and no
+//! device is needed.
+//!
+//! Several processes may export shares of one range into one folder. What stands there whole, from the same cache in the same way, is
+//! not made again.
+
+mod asked;
+mod error;
+mod folder;
+mod pattern;
+mod shot;
+mod usdc;
+
+use std::{
+    cell::OnceCell,
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
+
+use glam::DVec3;
+
+use crate::{
+    cache::{self, CacheError, CacheReader, GridRecord, frame::Stamp, vdb},
+    domain::{
+        frame_range::FrameRange,
+        particles::Particles,
+        sparse_grid::Precision,
+        water_mesh::{Body, VOLUME, WaterMesh},
+    },
+    export::{Source, mesh, mesh::Placed, table, usd},
+    scene::{Scene, look::Look},
+};
+
+use super::{
+    baked_scene,
+    whitewater::{directory, is_of},
+};
+
+use self::folder::{Owner, Wanted};
+use self::usdc::Python;
+
+pub use self::{
+    error::ExportError,
+    folder::FolderError,
+    pattern::{Chunk, ChunkError, Pattern, PatternError},
+    usdc::UsdcError,
+};
+
+/// Voxels of the mesh's grid a particle spacing, where nothing else is asked for: those of the renderer.
+pub const VOXELS: f64 = crate::domain::level_set::VOXELS;
+
+/// How a USD shot has its water.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UsdWater {
+    /// The particles.
+    #[default]
+    Points,
+    /// The surface.
+    Mesh,
+}
+
+/// Files of one kind.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Target {
+    /// The water's surface, as PLY, OBJ or USD by the names' ending.
+    Mesh(Pattern),
+    /// Particles as NPY.
+    Npy(Pattern),
+    /// Particles as CSV.
+    Csv(Pattern),
+    /// Particles as BGEO.
+    Bgeo(Pattern),
+    /// Level set and velocity grid as OpenVDB.
+    Vdb(Pattern),
+    /// A shot: this file, and a layer a frame beside it.
+    Usd(PathBuf, UsdWater),
+}
+
+/// What to export.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Cache directory.
+    pub cache: PathBuf,
+    /// A stream of whitewater in place of the water.
+    pub stream: Option<String>,
+    /// At least one.
+    pub targets: Vec<Target>,
+    /// Frames wanted; all whose particles are cached where `None`.
+    pub frames: Option<FrameRange>,
+    /// This process's share of them; all where `None`.
+    pub chunk: Option<Chunk>,
+    /// Voxels of the mesh's grid a particle spacing.
+    pub voxels: f64,
+    /// Whose camera a USD shot has.
+    pub look: Option<Look>,
+    /// Python that is asked for binary USD.
+    pub python: String,
+    /// Whether files that stand there are made again, whosever they are.
+    pub overwrite: bool,
+}
+
+/// What an export has to tell while it runs.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The cache is open.
+    Ready {
+        /// Frames of this process's share.
+        frames: usize,
+        /// Files a frame.
+        files: usize,
+    },
+    /// What is odd about a frame.
+    Warning(String),
+    /// The files of a frame are on the disk, or being made by another process.
+    Frame {
+        /// Its number.
+        frame: u32,
+        /// Files made now.
+        made: usize,
+        /// Bytes of them.
+        bytes: u64,
+        /// Wall clock.
+        seconds: f64,
+        /// Volume within its mesh over the particles', where one was made.
+        volume: Option<f64>,
+    },
+}
+
+/// How an export ended.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// Files made now.
+    pub made: usize,
+    /// Bytes of them.
+    pub bytes: u64,
+    /// Files that stood there.
+    pub standing: usize,
+    /// Files that other processes were making.
+    pub elsewhere: usize,
+    /// Whether a signal ended it.
+    pub interrupted: bool,
+}
+
+/// Exports the frames that are wanted; `tell` hears of progress, and `stop` ends it after the current file.
+///
+/// # Errors
+/// [`ExportError`]. Files that stand there and are of something else are one before anything is written, and so is a frame that
+/// is not in the cache; a damaged frame is one when its turn comes.
+pub fn export(
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Outcome, ExportError> {
+    let job = Job::new(request)?;
+    let share: Vec<u32> = match request.chunk {
+        Some(chunk) => chunk.of(&job.frames).to_vec(),
+        None => job.frames.clone(),
+    };
+    let shots = job.shots()?;
+    let files = |frame: u32| {
+        let targets = request.targets.iter();
+        let of = |target| Ok((target, job.wanted(target, frame)?));
+        targets.map(of).collect::<Result<Vec<_>, CacheError>>()
+    };
+    for &frame in &share {
+        for (_, wanted) in files(frame)? {
+            job.check(&wanted)?;
+        }
+    }
+    for (wanted, _) in &shots {
+        job.check(wanted)?;
+    }
+    tell(Event::Ready {
+        frames: share.len(),
+        files: request.targets.len(),
+    });
+    let mut outcome = Outcome::default();
+    for (wanted, bytes) in shots {
+        job.make(&wanted, &mut outcome, || Ok(bytes))?;
+    }
+    for frame in share {
+        if stop.load(Ordering::Relaxed) {
+            outcome.interrupted = true;
+            break;
+        }
+        let begun = Instant::now();
+        let before = (outcome.made, outcome.bytes);
+        let content = Content::new(&job, frame);
+        for (target, wanted) in files(frame)? {
+            job.make(&wanted, &mut outcome, || job.bytes(target, &content))?;
+        }
+        let volume = content.mesh.get().map(|mesh| mesh.volume);
+        if let Some(warning) = volume.and_then(|volume| warning(frame, volume)) {
+            tell(Event::Warning(warning));
+        }
+        tell(Event::Frame {
+            frame,
+            made: outcome.made - before.0,
+            bytes: outcome.bytes - before.1,
+            seconds: begun.elapsed().as_secs_f64(),
+            volume,
+        });
+    }
+    Ok(outcome)
+}
+
+/// What there is to say of a mesh whose volume could not be brought to the particles'.
+fn warning(frame: u32, volume: f64) -> Option<String> {
+    let is_off = (volume - 1.0).abs() > VOLUME;
+    is_off.then(|| {
+        format!(
+            "frame {frame}: the mesh holds {:.1} % of the particles' volume, and no value of the field near its own has more of it",
+            100.0 * volume
+        )
+    })
+}
+
+/// A frame's content, each part read or made when it is first asked for.
+struct Content<'a> {
+    job: &'a Job<'a>,
+    frame: u32,
+    particles: OnceCell<Particles>,
+    mesh: OnceCell<WaterMesh>,
+}
+
+impl<'a> Content<'a> {
+    fn new(job: &'a Job<'a>, frame: u32) -> Self {
+        Self {
+            job,
+            frame,
+            particles: OnceCell::new(),
+            mesh: OnceCell::new(),
+        }
+    }
+
+    fn particles(&self) -> Result<&Particles, CacheError> {
+        if self.particles.get().is_none() {
+            let particles = self.job.source().read(self.frame)?;
+            // The cell is empty, and no other thread sees it.
+            let _ = self.particles.set(particles);
+        }
+        Ok(self.particles.get_or_init(Particles::default))
+    }
+
+    fn mesh(&self) -> Result<&WaterMesh, CacheError> {
+        let particles = self.particles()?;
+        let scene = &self.job.scene;
+        Ok(self.mesh.get_or_init(|| {
+            let place = |p: &[f32; 3]| DVec3::from(p.map(f64::from)) - scene.domain.min;
+            let places: Vec<DVec3> = particles.position.iter().map(place).collect();
+            WaterMesh::new(&Body {
+                places: &places,
+                velocities: &particles.velocity,
+                size: scene.domain.size(),
+                spacing: scene.particle_spacing(),
+                voxels: self.job.request.voxels,
+            })
+        }))
+    }
+}
+
+/// An export under way.
+struct Job<'a> {
+    request: &'a Request,
+    cache: CacheReader,
+    /// In place of the water.
+    stream: Option<CacheReader>,
+    scene: Scene,
+    /// All that are wanted, of every process.
+    frames: Vec<u32>,
+    /// Where a name needs it.
+    python: Option<Python>,
+    software: String,
+}
+
+impl<'a> Job<'a> {
+    fn new(request: &'a Request) -> Result<Self, ExportError> {
+        asked::check(request)?;
+        let cache = CacheReader::open(&request.cache)?;
+        if cache.manifest().is_whitewater() {
+            return Err(ExportError::Asked(format!(
+                "{} is a stream of whitewater: export the cache that it was made from, with --stream",
+                request.cache.display()
+            )));
+        }
+        let stream = match &request.stream {
+            Some(stream) => Some(open_stream(request, stream)?),
+            None => None,
+        };
+        let source = stream.as_ref().unwrap_or(&cache);
+        let frames: Vec<u32> = match &request.frames {
+            Some(frames) => frames.iter().collect(),
+            None => (source.first_frame() + 1..=source.last_frame())
+                .filter(|&frame| source.has_particles(frame))
+                .collect(),
+        };
+        for &frame in &frames {
+            source.kept(frame)?;
+            if stream.is_some() && !is_of(source.entry(frame)?, &cache) {
+                return Err(ExportError::OldStream {
+                    directory: source.dir().to_owned(),
+                    frame,
+                });
+            }
+        }
+        let scene = baked_scene(&cache, &request.cache)?;
+        let needs_python = |target: &Target| match target {
+            Target::Mesh(files) => files.ending() == "usdc",
+            Target::Usd(file, _) => is_binary(file),
+            _ => false,
+        };
+        let python = match request.targets.iter().any(needs_python) {
+            true => Some(Python::with_usd(&request.python)?),
+            false => None,
+        };
+        Ok(Self {
+            request,
+            cache,
+            stream,
+            scene,
+            frames,
+            python,
+            software: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
+        })
+    }
+
+    /// What is exported: the water, or the stream in its place.
+    fn source(&self) -> &CacheReader {
+        self.stream.as_ref().unwrap_or(&self.cache)
+    }
+
+    /// Digits of frame numbers in the names of a shot's layers.
+    fn layer(&self, shot: &Path, frame: u32) -> PathBuf {
+        let digits = self.cache.last_frame().to_string().len().max(4);
+        beside(shot, &format!("{frame:0digits$}"))
+    }
+
+    fn owner(&self, settings: String) -> Result<Owner, CacheError> {
+        let source = self.source();
+        Ok(Owner {
+            software: self.software.clone(),
+            shot: source.manifest().shot.clone(),
+            cache: source.entry(source.first_frame())?.chain.clone(),
+            settings,
+        })
+    }
+
+    fn wanted(&self, target: &Target, frame: u32) -> Result<Wanted, CacheError> {
+        let voxels = self.request.voxels;
+        let (file, settings) = match target {
+            Target::Mesh(files) => (
+                files.file(frame),
+                format!("mesh as {}, {voxels} voxels a spacing", files.ending()),
+            ),
+            Target::Npy(files) => (files.file(frame), "particles as npy".to_owned()),
+            Target::Csv(files) => (files.file(frame), "particles as csv".to_owned()),
+            Target::Bgeo(files) => (files.file(frame), "particles as bgeo".to_owned()),
+            Target::Vdb(files) => (files.file(frame), "grids as vdb".to_owned()),
+            Target::Usd(file, water) => {
+                let layer = self.layer(file, frame);
+                let water = match water {
+                    UsdWater::Points => "points".to_owned(),
+                    UsdWater::Mesh => format!("mesh, {voxels} voxels a spacing"),
+                };
+                (layer, format!("a frame's layer of usd, {water}"))
+            }
+        };
+        Ok(Wanted {
+            file,
+            owner: self.owner(settings)?,
+            source: self.source().frame_hash(frame)?.to_owned(),
+            follows: false,
+        })
+    }
+
+    fn check(&self, wanted: &Wanted) -> Result<(), ExportError> {
+        if let Some(cache) = cache::around(&wanted.file) {
+            return Err(ExportError::IntoCache {
+                file: wanted.file.clone(),
+                cache,
+            });
+        }
+        match self.request.overwrite {
+            true => Ok(()),
+            false => Ok(wanted.check()?),
+        }
+    }
+
+    /// Makes a file that does not stand there, unless another process is at it.
+    fn make(
+        &self,
+        wanted: &Wanted,
+        outcome: &mut Outcome,
+        bytes: impl FnOnce() -> Result<Vec<u8>, ExportError>,
+    ) -> Result<(), ExportError> {
+        let stands = || !self.request.overwrite && wanted.stands();
+        if stands() {
+            outcome.standing += 1;
+            return Ok(());
+        }
+        let Some(_claim) = wanted.claim()? else {
+            outcome.elsewhere += 1;
+            return Ok(());
+        };
+        if stands() {
+            outcome.standing += 1;
+            return Ok(());
+        }
+        let bytes = bytes()?;
+        match &self.python {
+            Some(python) if is_binary(&wanted.file) => {
+                let text = Wanted {
+                    file: wanted.file.with_extension("part.usda"),
+                    ..wanted.clone()
+                };
+                text.write(&bytes)?;
+                let converted = python.convert(&text.draft(), &wanted.draft());
+                // What stays of it is made anew the next time.
+                let _ = std::fs::remove_file(text.draft());
+                converted?;
+            }
+            _ => wanted.write(&bytes)?,
+        }
+        outcome.bytes += wanted.publish()?;
+        outcome.made += 1;
+        Ok(())
+    }
+
+    fn bytes(&self, target: &Target, content: &Content<'_>) -> Result<Vec<u8>, ExportError> {
+        let (scene, frame) = (&self.scene, content.frame);
+        let source = Source {
+            software: &self.software,
+            shot: &self.source().manifest().shot,
+            frame,
+        };
+        let origin = scene.origin;
+        Ok(match target {
+            Target::Npy(_) => table::npy(content.particles()?, origin),
+            Target::Csv(_) => table::csv(content.particles()?, origin),
+            Target::Bgeo(_) => table::bgeo(content.particles()?, origin),
+            Target::Vdb(_) => self.grids(content)?,
+            Target::Mesh(files) => {
+                let placed = Placed {
+                    water: content.mesh()?,
+                    corner: origin + scene.domain.min,
+                    is_far: origin != DVec3::ZERO,
+                };
+                match files.ending().as_str() {
+                    "ply" => mesh::ply(&placed, &source),
+                    "obj" => mesh::obj(&placed, &source),
+                    _ => self.layer_bytes(UsdWater::Mesh, content, &source)?,
+                }
+            }
+            Target::Usd(_, water) => self.layer_bytes(*water, content, &source)?,
+        })
+    }
+
+    /// Grids as the bake kept them, or would have with the defaults of a scene.
+    fn grids(&self, content: &Content<'_>) -> Result<Vec<u8>, ExportError> {
+        let manifest = self.cache.manifest();
+        let frame = content.frame;
+        let default = || GridRecord {
+            surface: true,
+            velocity: true,
+            voxel_size: 2.0 * self.scene.particle_spacing(),
+            origin: self.scene.domain.min.to_array(),
+            precision: Precision::Half,
+        };
+        let record = manifest.grids.clone().unwrap_or_else(default);
+        let grids = record
+            .grids(content.particles()?, manifest.particle_spacing)
+            .moved(manifest.origin.into());
+        let stamp = Stamp {
+            program: &manifest.program,
+            program_version: &manifest.program_version,
+            shot: &manifest.shot,
+            frame,
+            time: self.cache.entry(frame)?.clock.time,
+            origin: manifest.origin.into(),
+        };
+        let mut bytes = Vec::new();
+        vdb::encode(&mut bytes, &stamp, &grids, record.precision)
+            .map_err(|source| ExportError::Vdb { frame, source })?;
+        Ok(bytes)
+    }
+
+    fn layer_bytes(
+        &self,
+        water: UsdWater,
+        content: &Content<'_>,
+        source: &Source<'_>,
+    ) -> Result<Vec<u8>, ExportError> {
+        let shot = self.shot(source.frame);
+        let makers = match self.stream {
+            Some(_) => Vec::new(),
+            None => shot::ways(&self.scene, content.particles()?, source.frame),
+        };
+        let told = match water {
+            UsdWater::Points => usd::Water::Points(content.particles()?),
+            UsdWater::Mesh => usd::Water::Mesh(content.mesh()?, self.scene.domain.min),
+        };
+        Ok(usd::frame(&shot, self.kind(water), &told, &makers))
+    }
+
+    fn kind(&self, water: UsdWater) -> usd::Kind {
+        let is_own = self.stream.is_some();
+        match water {
+            UsdWater::Points if is_own => usd::Kind::Points { width: None },
+            UsdWater::Points => usd::Kind::Points {
+                width: Some(shot::width(self.scene.particle_spacing())),
+            },
+            UsdWater::Mesh => usd::Kind::Mesh,
+        }
+    }
+
+    fn shot(&self, frame: u32) -> usd::Shot<'_> {
+        usd::Shot {
+            source: Source {
+                software: &self.software,
+                shot: &self.source().manifest().shot,
+                frame,
+            },
+            water: self.request.stream.as_deref().unwrap_or("water"),
+            frames_per_second: self.scene.shot.frames_per_second,
+            frames: [
+                self.frames.first().copied().unwrap_or(0),
+                self.frames.last().copied().unwrap_or(0),
+            ],
+            origin: self.scene.origin,
+        }
+    }
+}
+
+/// `shot.0001.usda` of `shot.usda`.
+fn beside(shot: &Path, part: &str) -> PathBuf {
+    let ending = shot.extension().unwrap_or_default().to_string_lossy();
+    shot.with_extension(format!("{part}.{ending}"))
+}
+
+fn is_binary(file: &Path) -> bool {
+    file.extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("usdc"))
+}
+
+fn open_stream(request: &Request, stream: &str) -> Result<CacheReader, ExportError> {
+    let directory = directory(&request.cache, stream);
+    if !cache::exists(&directory) {
+        return Err(ExportError::NoStream {
+            stream: stream.to_owned(),
+            directory,
+            cache: request.cache.clone(),
+        });
+    }
+    Ok(CacheReader::open(&directory)?)
+}

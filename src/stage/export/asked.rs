@@ -1,0 +1,66 @@
+//! What may be asked of an export.
+
+use std::collections::BTreeSet;
+
+use super::{ExportError, Request, Target, UsdWater, beside};
+
+/// Refuses what does not go together, and names of one file for two.
+pub(super) fn check(request: &Request) -> Result<(), ExportError> {
+    let asked = |what: String| Err(ExportError::Asked(what));
+    if request.targets.is_empty() {
+        return asked(
+            "nothing to export: give --mesh, --usd, --npy, --csv, --bgeo or --vdb".to_owned(),
+        );
+    }
+    let has_shot = request
+        .targets
+        .iter()
+        .any(|it| matches!(it, Target::Usd(..)));
+    if request.look.is_some() && !has_shot {
+        return asked("--look gives --usd its camera, and there is no --usd".to_owned());
+    }
+    let mut names = BTreeSet::new();
+    for target in &request.targets {
+        let (flag, ending, file, allowed): (_, _, _, &[&str]) = match target {
+            Target::Mesh(files) => (
+                "--mesh",
+                files.ending(),
+                files.file(1),
+                &["ply", "obj", "usda", "usdc"],
+            ),
+            Target::Npy(files) => ("--npy", files.ending(), files.file(1), &["npy"]),
+            Target::Csv(files) => ("--csv", files.ending(), files.file(1), &["csv"]),
+            Target::Bgeo(files) => ("--bgeo", files.ending(), files.file(1), &["bgeo"]),
+            Target::Vdb(files) => ("--vdb", files.ending(), files.file(1), &["vdb"]),
+            Target::Usd(file, _) => {
+                let ending = file.extension().unwrap_or_default().to_string_lossy();
+                (
+                    "--usd",
+                    ending.to_lowercase(),
+                    beside(file, "0001"),
+                    &["usda", "usdc"],
+                )
+            }
+        };
+        if !allowed.contains(&ending.as_str()) {
+            let allowed = allowed.join(", .");
+            return asked(format!(
+                "{flag} writes .{allowed}, and the name ends in `{ending}`"
+            ));
+        }
+        let is_water = match target {
+            Target::Mesh(_) | Target::Vdb(_) => true,
+            Target::Usd(_, water) => *water == UsdWater::Mesh,
+            _ => false,
+        };
+        if let (true, Some(stream)) = (is_water, &request.stream) {
+            return asked(format!(
+                "{flag}: the stream `{stream}` has points, and no surface"
+            ));
+        }
+        if !names.insert(file.clone()) {
+            return asked(format!("two kinds of files would be {}", file.display()));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,86 @@
+//! What goes wrong with an export.
+
+use std::{io, path::PathBuf};
+
+use crate::{
+    cache::CacheError,
+    scene::{SceneError, look::LookError},
+    stage::Blame,
+};
+
+use super::{FolderError, UsdcError};
+
+/// Why an export failed.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// What was asked for does not go together.
+    #[error("{0}")]
+    Asked(String),
+    /// The cache.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// The scene in the cache.
+    #[error("the cache's scene: {0}")]
+    Scene(#[from] SceneError),
+    /// The look.
+    #[error(transparent)]
+    Look(#[from] LookError),
+    /// Where files go.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// Binary USD.
+    #[error(transparent)]
+    Usdc(#[from] UsdcError),
+    /// A stream that is not there.
+    #[error("{} is not there: make it with `swell whitewater {}` (--name {stream})", directory.display(), cache.display())]
+    NoStream {
+        /// Its name.
+        stream: String,
+        /// Where it would be.
+        directory: PathBuf,
+        /// Of the bake.
+        cache: PathBuf,
+    },
+    /// A frame of a stream was made from other water.
+    #[error("{}: frame {frame} was made from water that is no longer there: make it again with `swell whitewater`", directory.display())]
+    OldStream {
+        /// Of the stream.
+        directory: PathBuf,
+        /// The frame.
+        frame: u32,
+    },
+    /// The output would go into a cache.
+    #[error("{} is in the cache {}: choose another name", file.display(), cache.display())]
+    IntoCache {
+        /// The file.
+        file: PathBuf,
+        /// This cache or another.
+        cache: PathBuf,
+    },
+    /// A grid file could not be encoded.
+    #[error("frame {frame} as OpenVDB: {source}")]
+    Vdb {
+        /// The frame.
+        frame: u32,
+        /// The fault.
+        source: io::Error,
+    },
+}
+
+impl From<&ExportError> for Blame {
+    fn from(error: &ExportError) -> Self {
+        match error {
+            ExportError::Asked(_)
+            | ExportError::Look(_)
+            | ExportError::IntoCache { .. }
+            | ExportError::Usdc(UsdcError::Missing { .. }) => Self::Input,
+            ExportError::Cache(_)
+            | ExportError::Scene(_)
+            | ExportError::Folder(_)
+            | ExportError::Usdc(UsdcError::Failed { .. })
+            | ExportError::NoStream { .. }
+            | ExportError::OldStream { .. }
+            | ExportError::Vdb { .. } => Self::Files,
+        }
+    }
+}

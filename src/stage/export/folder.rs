@@ -1,0 +1,312 @@
+//! The folders that exported files go to: what stands there, and which process makes a file.
+//!
+//! Beside the files is a folder `.swell-export/`:
+//!
+//! ```text
+//! m.0001.ply.json  whose file m.0001.ply is, from what it was made, and its checksum; stays
+//! m.0001.ply.lock  locked by the process that makes it
+//! m.0001.ply       a file until it is whole
+//! ```
+//!
+//! A record is written before its file takes its name, so that a file without one is none of ours. A file is whole where its bytes are
+//! those of its record. A lock dies with its process.
+
+use std::{
+    fs::{self, File, TryLockError},
+    io::{self, Write as _},
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+/// Folder of records and drafts.
+const ROOM: &str = ".swell-export";
+
+/// What files of one export have in common.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Owner {
+    /// Program and version.
+    pub(super) software: String,
+    /// Shot of the cache.
+    pub(super) shot: String,
+    /// Chained hash of the cache's first frame, which covers its manifest.
+    pub(super) cache: String,
+    /// What the file is, in words.
+    pub(super) settings: String,
+}
+
+/// Of one file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Record {
+    owner: Owner,
+    /// Hash of what it was made from.
+    source: String,
+    bytes: u64,
+    blake3: String,
+}
+
+/// Why a file cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// A file or folder that cannot be read, written or locked.
+    #[error("{}", file.display())]
+    File {
+        /// Which.
+        file: PathBuf,
+        /// The system's words.
+        source: io::Error,
+    },
+    /// Something else stands there.
+    #[error("{} is {what}; choose another name, or export it anew with --overwrite", file.display())]
+    Other {
+        /// Which.
+        file: PathBuf,
+        /// What it is.
+        what: String,
+    },
+}
+
+fn at(file: &Path) -> impl FnOnce(io::Error) -> FolderError + use<> {
+    let file = file.to_owned();
+    move |source| FolderError::File { file, source }
+}
+
+/// A file to be made.
+#[derive(Clone, Debug)]
+pub(super) struct Wanted {
+    pub(super) file: PathBuf,
+    pub(super) owner: Owner,
+    /// Hash of what it is made from.
+    pub(super) source: String,
+    /// Whether one that was made from something else is made anew without being asked.
+    pub(super) follows: bool,
+}
+
+/// The right to make a file, until it is dropped.
+#[derive(Debug)]
+pub(super) struct Claim {
+    lock: PathBuf,
+    _file: File,
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        // One that stays is of no harm.
+        let _ = fs::remove_file(&self.lock);
+    }
+}
+
+impl Wanted {
+    fn folder(&self) -> PathBuf {
+        match self.file.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+            _ => PathBuf::from("."),
+        }
+    }
+
+    fn beside(&self, ending: &str) -> PathBuf {
+        let mut name = self.file.file_name().unwrap_or_default().to_owned();
+        name.push(ending);
+        self.folder().join(ROOM).join(name)
+    }
+
+    /// Where it is written before it is whole; ends as the file does.
+    pub(super) fn draft(&self) -> PathBuf {
+        self.beside("")
+    }
+
+    fn record(&self) -> Option<Record> {
+        serde_json::from_slice(&fs::read(self.beside(".json")).ok()?).ok()
+    }
+
+    /// Refuses what stands there and is of something else.
+    ///
+    /// # Errors
+    /// [`FolderError::Other`].
+    pub(super) fn check(&self) -> Result<(), FolderError> {
+        let other = |what: &str| {
+            Err(FolderError::Other {
+                file: self.file.clone(),
+                what: what.to_owned(),
+            })
+        };
+        if !self.file.exists() {
+            return Ok(());
+        }
+        if self.file.is_dir() {
+            return Err(at(&self.file)(io::ErrorKind::IsADirectory.into()));
+        }
+        let Some(Record { owner, source, .. }) = self.record() else {
+            return other("there, and not from an export");
+        };
+        let rows = [
+            (owner.shot == self.owner.shot, "of another shot"),
+            (owner.cache == self.owner.cache, "of another cache"),
+            (
+                owner.settings == self.owner.settings,
+                "exported in another way",
+            ),
+            (
+                owner.software == self.owner.software,
+                "of another version of the program",
+            ),
+            (source == self.source || self.follows, "of another frame"),
+        ];
+        match rows.into_iter().find(|row| !row.0) {
+            Some((_, what)) => other(what),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether it stands there whole.
+    pub(super) fn stands(&self) -> bool {
+        let is_whole = |record: Record| {
+            let is_ours = record.owner == self.owner && record.source == self.source;
+            let length = fs::metadata(&self.file).map(|found| found.len());
+            is_ours
+                && length.is_ok_and(|length| length == record.bytes)
+                && hash(&self.file).is_ok_and(|hash| hash == record.blake3)
+        };
+        self.record().is_some_and(is_whole)
+    }
+
+    /// Takes the file for this process; `None` while another has it.
+    ///
+    /// # Errors
+    /// [`FolderError::File`].
+    pub(super) fn claim(&self) -> Result<Option<Claim>, FolderError> {
+        let room = self.folder().join(ROOM);
+        fs::create_dir_all(&room).map_err(at(&room))?;
+        let lock = self.beside(".lock");
+        loop {
+            let mut options = File::options();
+            options.read(true).write(true).create(true).truncate(false);
+            let file = options.open(&lock).map_err(at(&lock))?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Ok(None),
+                Err(TryLockError::Error(source)) => return Err(at(&lock)(source)),
+            }
+            // Its last holder may have taken it away meanwhile.
+            if is_at(&file, &lock) {
+                return Ok(Some(Claim { lock, _file: file }));
+            }
+        }
+    }
+
+    /// Writes bytes to the draft.
+    ///
+    /// # Errors
+    /// [`FolderError::File`].
+    pub(super) fn write(&self, bytes: &[u8]) -> Result<(), FolderError> {
+        let draft = self.draft();
+        fs::write(&draft, bytes).map_err(at(&draft))
+    }
+
+    /// Gives the draft, which is whole, its name.
+    ///
+    /// # Errors
+    /// [`FolderError::File`].
+    pub(super) fn publish(&self) -> Result<u64, FolderError> {
+        let draft = self.draft();
+        let bytes = File::open(&draft)
+            .and_then(|file| {
+                file.sync_all()?;
+                Ok(file.metadata()?.len())
+            })
+            .map_err(at(&draft))?;
+        let record = Record {
+            owner: self.owner.clone(),
+            source: self.source.clone(),
+            bytes,
+            blake3: hash(&draft).map_err(at(&draft))?,
+        };
+        let name = self.beside(".json");
+        let partial = self.beside(".json.part");
+        let write = || {
+            let mut file = File::create(&partial)?;
+            file.write_all(serde_json::to_string_pretty(&record)?.as_bytes())?;
+            file.write_all(b"\n")?;
+            file.sync_all()?;
+            fs::rename(&partial, &name)
+        };
+        write().map_err(at(&name))?;
+        fs::rename(&draft, &self.file).map_err(at(&self.file))?;
+        Ok(bytes)
+    }
+}
+
+/// BLAKE3 of a file's bytes, hex.
+fn hash(file: &Path) -> io::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(File::open(file)?)?;
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+/// Whether an open file is the one of this name.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let identity = |meta: io::Result<fs::Metadata>| meta.map(|m| (m.dev(), m.ino())).ok();
+    identity(file.metadata()) == identity(path.metadata())
+}
+
+/// Elsewhere an open file cannot be taken away.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wanted(folder: &Path, source: &str) -> Wanted {
+        Wanted {
+            file: folder.join("m.0001.ply"),
+            owner: Owner {
+                software: "swell 0".to_owned(),
+                shot: "small".to_owned(),
+                cache: "c".to_owned(),
+                settings: "mesh".to_owned(),
+            },
+            source: source.to_owned(),
+            follows: false,
+        }
+    }
+
+    #[test]
+    fn a_file_stands_while_its_bytes_and_its_source_do() {
+        let dir = tempfile::tempdir().unwrap();
+        let one = wanted(dir.path(), "frame 1");
+        assert!(!one.stands() && one.check().is_ok());
+        let claim = one.claim().unwrap().unwrap();
+        assert!(one.claim().unwrap().is_none(), "one process at a time");
+        one.write(b"half").unwrap();
+        assert!(!one.file.exists(), "a draft has no name yet");
+        one.publish().unwrap();
+        drop(claim);
+        assert!(one.stands() && one.check().is_ok());
+        assert!(one.claim().unwrap().is_some());
+        // Other bytes: made anew, for the record is ours.
+        fs::write(&one.file, b"hurt").unwrap();
+        assert!(!one.stands() && one.check().is_ok());
+        let other = wanted(dir.path(), "frame 2");
+        assert!(matches!(other.check(), Err(FolderError::Other { .. })));
+        let follows = Wanted {
+            follows: true,
+            ..other
+        };
+        assert!(follows.check().is_ok() && !follows.stands());
+    }
+
+    #[test]
+    fn what_is_not_ours_is_left() {
+        let dir = tempfile::tempdir().unwrap();
+        let one = wanted(dir.path(), "frame 1");
+        fs::write(&one.file, b"mine").unwrap();
+        assert!(matches!(one.check(), Err(FolderError::Other { .. })));
+    }
+}

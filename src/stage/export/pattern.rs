@@ -1,0 +1,170 @@
+//! Names of files that have a frame's number in them, and shares of a range.
+
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+/// A file name with a place for the frame's number: `out/m.%04d.ply`, or `out/m.####.ply`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pattern {
+    before: String,
+    digits: usize,
+    after: String,
+}
+
+/// A text that is no such name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PatternError {
+    /// It has no place for the number, or two.
+    #[error("`{0}` has to hold one place for the frame's number: write %04d or ####")]
+    Place(String),
+}
+
+impl Pattern {
+    /// Path of a frame's file.
+    pub fn file(&self, frame: u32) -> PathBuf {
+        let Self {
+            before,
+            digits,
+            after,
+        } = self;
+        PathBuf::from(format!("{before}{frame:0digits$}{after}"))
+    }
+
+    /// What the names end in, behind the last dot; lower case.
+    pub fn ending(&self) -> String {
+        let end = Path::new(&self.after)
+            .extension()
+            .or_else(|| Path::new(&self.after).file_name());
+        end.map(|end| end.to_string_lossy().trim_start_matches('.').to_lowercase())
+            .unwrap_or_default()
+    }
+}
+
+impl FromStr for Pattern {
+    type Err = PatternError;
+
+    fn from_str(text: &str) -> Result<Self, PatternError> {
+        let fault = || PatternError::Place(text.to_owned());
+        // The first sign of a place, how long it is, and its digits.
+        let percent = text.find('%').map(|at| {
+            let inner = text[at + 1..]
+                .find('d')
+                .map(|end| &text[at + 1..at + 1 + end]);
+            let digits = inner.and_then(|digits| match digits {
+                "" => Some(1),
+                digits => digits.parse().ok().filter(|n| (1..=9).contains(n)),
+            });
+            (at, inner.map_or(0, |inner| inner.len() + 2), digits)
+        });
+        let hashes = text.find('#').map(|at| {
+            let many = text[at..].chars().take_while(|&c| c == '#').count();
+            (at, many, Some(many))
+        });
+        let (at, length, digits) = match (percent, hashes) {
+            (Some(place), None) | (None, Some(place)) => place,
+            _ => return Err(fault()),
+        };
+        let after = &text[at + length..];
+        if after.contains(['%', '#', '/']) {
+            return Err(fault());
+        }
+        Ok(Self {
+            before: text[..at].to_owned(),
+            digits: digits.ok_or_else(fault)?,
+            after: after.to_owned(),
+        })
+    }
+}
+
+/// Share `index` of `count` of a range, from 1 on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chunk {
+    index: u32,
+    count: u32,
+}
+
+/// A text that is no share.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ChunkError {
+    /// Not two numbers.
+    #[error("`{0}` is no share: write 1/4 for the first of four")]
+    Form(String),
+    /// No such one.
+    #[error("there is no share {index} of {count}: the shares are 1/{count} to {count}/{count}")]
+    Beyond {
+        /// Asked for.
+        index: u32,
+        /// Of so many.
+        count: u32,
+    },
+}
+
+impl Chunk {
+    /// Its frames: as many in a row as in the other shares, or one more.
+    pub fn of(self, frames: &[u32]) -> &[u32] {
+        let end =
+            |share: u32| (frames.len() as u64 * u64::from(share) / u64::from(self.count)) as usize;
+        &frames[end(self.index - 1)..end(self.index)]
+    }
+}
+
+impl FromStr for Chunk {
+    type Err = ChunkError;
+
+    fn from_str(text: &str) -> Result<Self, ChunkError> {
+        let (index, count) = text
+            .split_once('/')
+            .and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)))
+            .ok_or_else(|| ChunkError::Form(text.to_owned()))?;
+        match (1..=count).contains(&index) {
+            true => Ok(Self { index, count }),
+            false if count == 0 => Err(ChunkError::Form(text.to_owned())),
+            false => Err(ChunkError::Beyond { index, count }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_have_one_place_for_a_number() {
+        let file = |text: &str, frame| {
+            let pattern: Pattern = text.parse().unwrap();
+            (pattern.file(frame).display().to_string(), pattern.ending())
+        };
+        let named = |name: &str, end: &str| (name.to_owned(), end.to_owned());
+        assert_eq!(file("a/m.%04d.ply", 7), named("a/m.0007.ply", "ply"));
+        assert_eq!(file("m.###.OBJ", 12345), named("m.12345.OBJ", "obj"));
+        assert_eq!(file("m%d.npy", 7), named("m7.npy", "npy"));
+        assert_eq!(file("m%d.tar.npy", 7).1, "npy");
+        for text in [
+            "m.ply",
+            "m.%04d.%d.ply",
+            "m.%04x.ply",
+            "%04d/m.ply",
+            "m#.#.ply",
+            "m%99d.ply",
+        ] {
+            assert!(text.parse::<Pattern>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn shares_are_disjoint_and_make_up_all() {
+        let frames: Vec<u32> = (1..=10).collect();
+        for count in [1, 3, 10, 12] {
+            let share = |index: u32| format!("{index}/{count}").parse::<Chunk>().unwrap();
+            let all: Vec<u32> = (1..=count)
+                .flat_map(|k| share(k).of(&frames).to_vec())
+                .collect();
+            assert_eq!(all, frames);
+        }
+        for text in ["0/4", "5/4", "1", "a/b", "1/0", "-1/4"] {
+            assert!(text.parse::<Chunk>().is_err(), "{text}");
+        }
+    }
+}

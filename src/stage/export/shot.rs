@@ -1,0 +1,164 @@
+//! What of a scene and a look stands in a USD shot beside the water.
+
+use std::{
+    f64::consts::PI,
+    path::{Path, PathBuf},
+};
+
+use glam::DVec3;
+
+use super::{Job, Target, UsdWater, Wanted, beside};
+use crate::{
+    cache::CacheError,
+    domain::particles::Particles,
+    export::usd::{self, Root, Solid, View, WaveMaker},
+    render,
+    scene::{Scene, Wall},
+};
+
+/// What a layer of a shot is called beside its frames'.
+const MANIFEST: &str = "manifest";
+
+/// Diameter of a ball of a particle's volume, metres.
+pub(super) fn width(spacing: f64) -> f64 {
+    (6.0 / PI).cbrt() * spacing
+}
+
+/// Such as `wall_minus_x`.
+fn name(wall: Wall) -> String {
+    let side = if wall.is_max { "plus" } else { "minus" };
+    format!("wall_{side}_{}", ["x", "y", "z"][wall.axis])
+}
+
+/// How far each wave maker has come from the domain's side at a frame, after the state that it left, metres.
+pub(super) fn ways(scene: &Scene, state: &Particles, frame: u32) -> Vec<(String, DVec3)> {
+    let walls = scene.walls_after(state, scene.shot.time(frame));
+    let size = scene.domain.size();
+    let makers = scene.wave_makers.iter().map(|maker| maker.wall);
+    makers
+        .map(|wall| {
+            let along = match wall.is_max {
+                true => walls.max[wall.axis] - size[wall.axis],
+                false => walls.min[wall.axis],
+            };
+            (name(wall), along * DVec3::AXES[wall.axis])
+        })
+        .collect()
+}
+
+/// A wave maker at the domain's side.
+fn maker(scene: &Scene, wall: Wall) -> WaveMaker {
+    let (min, max) = (scene.domain.min, scene.domain.max);
+    let [first, second] = [(wall.axis + 1) % 3, (wall.axis + 2) % 3];
+    let corner = |along: bool, across: bool| {
+        let mut place = min;
+        place[wall.axis] = if wall.is_max { max } else { min }[wall.axis];
+        place[first] = if along { max } else { min }[first];
+        place[second] = if across { max } else { min }[second];
+        place
+    };
+    let mut corners = [
+        corner(false, false),
+        corner(true, false),
+        corner(true, true),
+        corner(false, true),
+    ];
+    // Seen along the axis the first two sides turn counter-clockwise; from the water at the far wall the other way.
+    if wall.is_max {
+        corners.reverse();
+    }
+    WaveMaker {
+        name: name(wall),
+        corners,
+    }
+}
+
+impl Job<'_> {
+    /// The files of each shot that are no frame's, its manifest and its root, with their bytes.
+    pub(super) fn shots(&self) -> Result<Vec<(Wanted, Vec<u8>)>, CacheError> {
+        let mut found = Vec::new();
+        for target in &self.request.targets {
+            let Target::Usd(file, water) = target else {
+                continue;
+            };
+            let root = self.root(file, *water)?;
+            let parts = [
+                (beside(file, MANIFEST), usd::manifest(&root)),
+                (file.clone(), usd::root(&root)),
+            ];
+            for (file, bytes) in parts {
+                let wanted = Wanted {
+                    file,
+                    owner: self.owner("usd of a shot".to_owned())?,
+                    source: blake3::hash(&bytes).to_hex().to_string(),
+                    follows: true,
+                };
+                found.push((wanted, bytes));
+            }
+        }
+        Ok(found)
+    }
+
+    fn root(&self, file: &Path, water: UsdWater) -> Result<Root<'_>, CacheError> {
+        let named = |path: PathBuf| {
+            path.file_name()
+                .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+        };
+        let layer = |&frame: &u32| (frame, named(self.layer(file, frame)));
+        let scene = &self.scene;
+        let attributes = match water {
+            UsdWater::Points => self.source().manifest().attributes.clone(),
+            UsdWater::Mesh => Vec::new(),
+        };
+        let is_stream = self.stream.is_some();
+        let makers = scene.wave_makers.iter().map(|it| maker(scene, it.wall));
+        Ok(Root {
+            shot: self.shot(self.frames.first().copied().unwrap_or(0)),
+            kind: self.kind(water),
+            attributes,
+            layers: self.frames.iter().map(layer).collect(),
+            manifest: named(beside(file, MANIFEST)),
+            solids: if is_stream { Vec::new() } else { self.solids() },
+            wave_makers: if is_stream {
+                Vec::new()
+            } else {
+                makers.collect()
+            },
+            camera: self.views(),
+        })
+    }
+
+    fn solids(&self) -> Vec<Solid> {
+        let scene = &self.scene;
+        let still = scene.solids.iter().map(|placed| Solid {
+            name: placed.name(),
+            mesh: placed.mesh.clone(),
+            way: Vec::new(),
+        });
+        let moving = scene.moving_solids.iter().map(|solid| Solid {
+            name: solid.placed.name(),
+            mesh: solid.placed.mesh.clone(),
+            way: self
+                .frames
+                .iter()
+                .map(|&frame| (frame, solid.displacement(scene.shot.time(frame))))
+                .collect(),
+        });
+        still.chain(moving).collect()
+    }
+
+    /// The look's camera at each frame; nothing without a look.
+    fn views(&self) -> Vec<View> {
+        let Some(look) = &self.request.look else {
+            return Vec::new();
+        };
+        let per_second = self.scene.shot.frames_per_second;
+        let view = |&frame: &u32| View {
+            frame,
+            eye: render::eye(look, self.scene.origin, frame.into(), per_second),
+            film_width_mm: look.spec().camera.film_back_mm[0],
+            lens: render::lens(look, frame.into(), per_second),
+        };
+        self.frames.iter().map(view).collect()
+    }
+}

@@ -1,0 +1,360 @@
+//! `swell export` as a user runs it: what it writes, resumes, shares out and refuses.
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use glam::DVec3;
+use swell::domain::{mesh::TriangleMesh, mesh_file::MeshFormat};
+use tempfile::TempDir;
+
+use crate::support::{
+    job::Job,
+    made_cache::{Made, write_cache},
+};
+
+/// Particles of a made cache, and their volume, m³.
+const VOLUME: f64 = 800.0 * 0.001;
+
+/// A folder with a cache that no solver made.
+fn made() -> Job {
+    let job = Job::of(&[("look.toml", crate::support::job::LOOK)]);
+    write_cache(&job.path("cache"), &Made::default());
+    job
+}
+
+fn mesh(file: &Path) -> TriangleMesh {
+    TriangleMesh::load(file).unwrap()
+}
+
+/// Names in a folder with their bytes, the folder of records aside.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
+    entries
+        .filter(|entry| entry.path().is_file())
+        .map(|entry| {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            (name, fs::read(entry.path()).unwrap())
+        })
+        .collect()
+}
+
+#[test]
+fn meshes_are_closed_and_hold_the_water() {
+    let job = made();
+    fs::create_dir(job.path("out")).unwrap();
+    let said = job.expect(0, "export cache --mesh out/m.%04d.ply --frames 0,2,4");
+    assert!(said.contains("3 files made"), "{said}");
+    job.expect(0, "export cache --mesh out/m.%04d.obj --frames 2");
+    for name in ["m.0000.ply", "m.0002.ply", "m.0004.ply", "m.0002.obj"] {
+        let found = mesh(&job.path("out").join(name));
+        assert!(found.open_edges().is_empty(), "{name}");
+        let ratio = found.signed_volume() / VOLUME;
+        assert!((ratio - 1.0).abs() <= 0.01, "{name}: {ratio}");
+        // Where the block stands: at the sides of the domain, which are flat there.
+        let bounds = found.bounds().unwrap();
+        let low = DVec3::new(-1.0, 0.5, 0.25);
+        assert!(
+            (bounds.min - low).abs().max_element() < 0.1,
+            "{name}: {bounds:?}"
+        );
+        assert_eq!(bounds.min.z, 0.25, "{name}");
+    }
+    let [ply, obj] = ["m.0002.ply", "m.0002.obj"].map(|name| mesh(&job.path("out").join(name)));
+    assert_eq!(ply.triangles, obj.triangles);
+    // The control: a triangle less is open, and a turned mesh holds less than nothing.
+    let bytes = fs::read(job.path("out/m.0002.ply")).unwrap();
+    let count = format!("element face {}", ply.triangles.len());
+    let fewer = format!("element face {}", ply.triangles.len() - 1);
+    let at = bytes
+        .windows(count.len())
+        .position(|w| w == count.as_bytes())
+        .unwrap();
+    assert_eq!(count.len(), fewer.len());
+    let mut spoiled = bytes.clone();
+    spoiled[at..at + fewer.len()].copy_from_slice(fewer.as_bytes());
+    spoiled.truncate(bytes.len() - 13);
+    let open = TriangleMesh::from_bytes(&spoiled, MeshFormat::Ply, Path::new("m.ply")).unwrap();
+    assert!(!open.open_edges().is_empty());
+}
+
+/// The columns behind x y z nx ny nz of a PLY of ours.
+fn velocities(bytes: &[u8]) -> Vec<[f32; 3]> {
+    let end = b"end_header\n";
+    let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+    let header = String::from_utf8_lossy(&bytes[..start]).into_owned();
+    let count = header
+        .lines()
+        .find_map(|line| line.strip_prefix("element vertex "));
+    let count: usize = count.unwrap().parse().unwrap();
+    let row = |k: usize| {
+        let at = |c: usize| start + 36 * k + 4 * c;
+        [6, 7, 8].map(|c| f32::from_le_bytes(bytes[at(c)..at(c) + 4].try_into().unwrap()))
+    };
+    (0..count).map(row).collect()
+}
+
+#[test]
+fn vertices_go_as_the_particles_do() {
+    let job = made();
+    job.expect(0, "export cache --mesh m.%04d.ply --frames 1");
+    let found = velocities(&fs::read(job.path("m.0001.ply")).unwrap());
+    // All go along x with 1 m/s; along y each with its number's thousandth.
+    assert!(
+        found
+            .iter()
+            .all(|v| (v[0] - 1.0).abs() < 1e-4 && v[2].abs() < 1e-4)
+    );
+    let [least, most] =
+        [f32::min, f32::max].map(|pick| found.iter().map(|v| v[1]).reduce(pick).unwrap());
+    assert!(
+        (-1.3..-0.5).contains(&least) && (-0.2..0.4).contains(&most),
+        "{least} {most}"
+    );
+}
+
+#[test]
+fn tables_hold_what_the_cache_does() {
+    let job = made();
+    job.expect(
+        0,
+        "export cache --npy p.%04d.npy --csv p.%04d.csv --bgeo p.%04d.bgeo --frames 3",
+    );
+    let cache = swell::cache::CacheReader::open(&job.path("cache")).unwrap();
+    let wanted = cache.read(3).unwrap();
+    let text = fs::read_to_string(job.path("p.0003.csv")).unwrap();
+    let rows = text.lines().skip(1).map(|line| {
+        let row: Vec<f32> = line.split(',').map(|x| x.parse().unwrap()).collect();
+        row
+    });
+    let rows: Vec<_> = rows.collect();
+    assert_eq!(rows.len(), wanted.len());
+    for (k, row) in rows.iter().enumerate() {
+        assert_eq!(row[1..4], wanted.position[k]);
+        assert_eq!(row[4..7], wanted.velocity[k]);
+    }
+    let npy = fs::read(job.path("p.0003.npy")).unwrap();
+    let last = &npy[npy.len() - 28..];
+    let place: Vec<f32> = last[..12]
+        .chunks(4)
+        .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
+        .collect();
+    assert_eq!(place, wanted.position[wanted.len() - 1]);
+    assert_eq!(last[24..], wanted.id[wanted.len() - 1].to_le_bytes());
+    let bgeo = fs::read(job.path("p.0003.bgeo")).unwrap();
+    assert!(bgeo.starts_with(b"BgeoV") && bgeo.len() > 800 * 32);
+}
+
+#[test]
+fn grids_are_those_that_the_bake_kept() {
+    let job = Job::of(&[]);
+    write_cache(&job.path("cache"), &Made::watched());
+    job.expect(0, "export cache --vdb g.%04d.vdb --frames 2");
+    let kept = fs::read(job.path("cache/grids/small.0002.vdb")).unwrap();
+    assert!(fs::read(job.path("g.0002.vdb")).unwrap() == kept);
+    assert!(
+        fs::read(job.path("cache/grids/small.0003.vdb")).unwrap() != kept,
+        "the control"
+    );
+    // A bake that kept none has them by the scene's defaults.
+    let bare = made();
+    bare.expect(0, "export cache --vdb g.%04d.vdb --frames 2");
+    let parsed = vdb_rs::VdbReader::new(std::io::Cursor::new(
+        fs::read(bare.path("g.0002.vdb")).unwrap(),
+    ));
+    let reader = parsed.unwrap();
+    let mut names = reader.available_grids();
+    names.sort();
+    assert_eq!(names, ["surface", "vel"]);
+}
+
+#[test]
+fn a_shot_names_its_layers_and_its_camera() {
+    let job = made();
+    job.expect(
+        0,
+        "export cache --usd s.usda --look look.toml --frames 1-4x2",
+    );
+    let root = fs::read_to_string(job.path("s.usda")).unwrap();
+    for part in [
+        "@./s.0001.usda@, @./s.0003.usda@",
+        "def Camera \"camera\"",
+        "def Points \"water\"",
+    ] {
+        assert!(root.contains(part), "{part}: {root}");
+    }
+    assert!(job.path("s.0003.usda").is_file() && job.path("s.manifest.usda").is_file());
+    assert!(!job.path("s.0002.usda").exists());
+    // More frames: the root follows, the layers stand.
+    let said = job.expect(0, "export cache --usd s.usda --look look.toml --frames 1-4");
+    assert!(
+        said.contains("2 stood") || said.contains("3 stood"),
+        "{said}"
+    );
+    assert!(
+        fs::read_to_string(job.path("s.usda"))
+            .unwrap()
+            .contains("s.0002.usda")
+    );
+    let mesh = Job::of(&[]);
+    write_cache(&mesh.path("cache"), &Made::default());
+    mesh.expect(0, "export cache --usd s.usda --usd-water mesh --frames 1");
+    let layer = fs::read_to_string(mesh.path("s.0001.usda")).unwrap();
+    assert!(layer.contains("faceVertexIndices.timeSamples") && !layer.contains("ids"));
+}
+
+#[test]
+fn what_stands_whole_is_not_made_again() {
+    let job = made();
+    fs::create_dir(job.path("out")).unwrap();
+    let words = "export cache --mesh out/m.%04d.ply --npy out/p.%04d.npy";
+    let said = job.expect(0, words);
+    assert!(said.contains("8 files made"), "{said}");
+    let first = files(&job.path("out"));
+    assert_eq!(first.len(), 8);
+    let said = job.expect(0, words);
+    assert!(
+        said.contains("0 files made") && said.contains("8 stood"),
+        "{said}"
+    );
+    // Half a file, and one that is gone, are made again, with the same bytes.
+    let half = &first["m.0002.ply"][..1000];
+    fs::write(job.path("out/m.0002.ply"), half).unwrap();
+    fs::remove_file(job.path("out/p.0004.npy")).unwrap();
+    let said = job.expect(0, words);
+    assert!(said.contains("2 files made"), "{said}");
+    assert_eq!(files(&job.path("out")), first);
+    // Made otherwise: refused, and nothing is touched.
+    let said = job.expect(4, &format!("{words} --voxels 1"));
+    assert!(
+        said.contains("exported in another way") && said.contains("--overwrite"),
+        "{said}"
+    );
+    assert_eq!(files(&job.path("out")), first);
+    job.expect(0, &format!("{words} --voxels 1 --overwrite"));
+    assert_ne!(files(&job.path("out")), first);
+}
+
+#[test]
+fn shares_fill_one_folder_as_one_export_does() {
+    let job = made();
+    for folder in ["whole", "shared"] {
+        fs::create_dir(job.path(folder)).unwrap();
+    }
+    job.expect(0, "export cache --mesh whole/m.%04d.ply --usd whole/s.usda");
+    let share = |k: u32| {
+        let words =
+            format!("export cache --mesh shared/m.%04d.ply --usd shared/s.usda --chunk {k}/3");
+        job.command(&words).spawn().unwrap()
+    };
+    let running: Vec<_> = (1..=3).map(share).collect();
+    for mut process in running {
+        assert!(process.wait().unwrap().success());
+    }
+    assert_eq!(files(&job.path("whole")), files(&job.path("shared")));
+    let said = job.expect(2, "export cache --mesh shared/m.%04d.ply --chunk 4/3");
+    assert!(said.contains("there is no share 4 of 3"), "{said}");
+}
+
+#[test]
+fn faults_are_one_clear_line() {
+    let job = made();
+    let clear = |code: i32, words: &str, part: &str| {
+        let said = job.expect(code, words);
+        assert!(said.contains(part), "{words}: {said}");
+    };
+    clear(2, "export cache", "nothing to export");
+    clear(
+        2,
+        "export cache --mesh m.ply",
+        "place for the frame's number",
+    );
+    clear(
+        2,
+        "export cache --mesh m.%04d.abc",
+        "--mesh writes .ply, .obj, .usda, .usdc",
+    );
+    clear(2, "export cache --usd s.usda --look gone.toml", "gone.toml");
+    clear(
+        2,
+        "export cache --npy p.%04d.npy --look look.toml",
+        "there is no --usd",
+    );
+    clear(2, "export cache --mesh cache/m.%04d.ply", "in the cache");
+    clear(
+        2,
+        "export cache --usd s.usdc --python no-such-python",
+        "pip install usd-core",
+    );
+    clear(
+        4,
+        "export cache --npy p.%04d.npy --frames 3-9",
+        "frames 0 to 4, not 5",
+    );
+    clear(
+        4,
+        "export cache --npy p.%04d.npy --stream default",
+        "swell whitewater",
+    );
+    clear(4, "export gone --npy p.%04d.npy", "gone");
+    fs::write(job.path("p.0002.npy"), "mine").unwrap();
+    clear(
+        4,
+        "export cache --npy p.%04d.npy",
+        "p.0002.npy is there, and not from an export",
+    );
+    assert!(!job.path("p.0001.npy").exists(), "nothing was written");
+    assert_eq!(fs::read(job.path("p.0002.npy")).unwrap(), b"mine");
+    let film = "film_back_mm = [36.0, 20.25]\n";
+    job.edit("look.toml", film, "file = \"gone.glb\"\n");
+    job.edit("look.toml", "focal_length_mm = 35.0\n", film);
+    job.edit(
+        "look.toml",
+        "position = [-2.0, 3.0, 2.5]\ntarget = [0.0, 1.0, 0.75]\n",
+        "",
+    );
+    clear(2, "export cache --usd s.usda --look look.toml", "gone.glb");
+}
+
+#[test]
+fn a_damaged_frame_ends_an_export_with_whole_files() {
+    let job = made();
+    let frame = job.path("cache/frames/small.0003.ply");
+    let mut bytes = fs::read(&frame).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    fs::write(&frame, bytes).unwrap();
+    let said = job.expect(4, "export cache --mesh m.%04d.ply");
+    assert!(said.contains("small.0003.ply is damaged"), "{said}");
+    let there: Vec<String> = files(job.folder.path()).into_keys().collect();
+    assert_eq!(there, ["look.toml", "m.0001.ply", "m.0002.ply"]);
+    assert!(mesh(&job.path("m.0002.ply")).open_edges().is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_export_that_is_killed_leaves_whole_files_and_goes_on() {
+    let job = made();
+    fs::create_dir(job.path("out")).unwrap();
+    let words = "export cache --mesh out/m.%04d.ply --voxels 4";
+    let begun = std::time::Instant::now();
+    let mut process = job.command(words).spawn().unwrap();
+    // Some time in the middle, whatever the machine's speed: behind the first file.
+    while !job.path("out/m.0001.ply").exists() && begun.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    process.kill().unwrap();
+    process.wait().unwrap();
+    for name in files(&job.path("out")).keys() {
+        assert!(
+            mesh(&job.path("out").join(name)).open_edges().is_empty(),
+            "{name}"
+        );
+    }
+    job.expect(0, words);
+    let whole = TempDir::new().unwrap();
+    let all = format!(
+        "export cache --mesh {}/m.%04d.ply --voxels 4",
+        whole.path().display()
+    );
+    job.expect(0, &all);
+    assert_eq!(files(&job.path("out")), files(whole.path()));
+}
