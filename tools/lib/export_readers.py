@@ -1,0 +1,256 @@
+"""What OpenUSD, plyfile, meshio and numpy read of files that swell exported. See tools/lib/export-readers."""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import meshio
+import numpy as np
+from plyfile import PlyData
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdValidation
+
+SCENE = """
+[shot]
+name = "pool-1"
+frames = 3
+frames_per_second = 24
+[domain]
+min = [0.0, 0.0, 0.0]
+max = [2.0, 2.0, 1.0]
+[[water.block]]
+min = [0.0, 0.0, 0.0]
+max = [0.8, 1.0, 1.0]
+[[solid]]
+mesh = "pier.obj"
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "sine", stroke = 0.3, period = 0.5, ramp = 0.1 }
+[solver]
+method = "pbf"
+[solver.pbf]
+particle_spacing = 0.1
+"""
+
+PIER = (
+    "v 1.3 0.0 0.3\nv 1.7 0.0 0.3\nv 1.7 0.8 0.3\nv 1.3 0.8 0.3\n"
+    "v 1.3 0.0 0.7\nv 1.7 0.0 0.7\nv 1.7 0.8 0.7\nv 1.3 0.8 0.7\n"
+    "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n"
+)
+
+EYE, TARGET = np.array([-2.0, 1.8, 2.2]), np.array([1.0, 0.5, 0.5])
+FOCAL_MM, FILM_MM, WIDTH, HEIGHT = 30.0, 36.0, 96, 54
+
+LOOK = f"""
+[camera]
+focal_length_mm = {FOCAL_MM}
+film_back_mm = [{FILM_MM}, 20.25]
+position = {EYE.tolist()}
+target = {TARGET.tolist()}
+lens = {{ f_stop = 2.8, focus_distance_m = 3.5 }}
+[image]
+width = {WIDTH}
+height = {HEIGHT}
+samples = 16
+[sky]
+model = "hosek_wilkie"
+"""
+
+SPACING = 0.1
+FRAMES = [1, 2, 3]
+
+
+def must(condition, what):
+    """Ends the run where something is not as it should be."""
+    if not condition:
+        sys.exit(f"export readers: {what}")
+
+
+def is_closed(triangles):
+    """Whether each directed edge has its opposite once."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    key = edges[:, 0].astype(np.int64) << 32 | edges[:, 1]
+    back = edges[:, 1].astype(np.int64) << 32 | edges[:, 0]
+    return np.array_equal(np.sort(key), np.sort(back))
+
+
+def volume(points, triangles):
+    """Within a closed mesh."""
+    a, b, c = (points[triangles[:, k]].astype(np.float64) for k in range(3))
+    return np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0
+
+
+def messages(stage):
+    """What all of OpenUSD's validators have to say of a stage."""
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    must(len(validators) > 5, "OpenUSD has hardly any validators")
+    found = UsdValidation.ValidationContext(validators).Validate(stage)
+    return [error.GetErrorAsString() for error in found]
+
+
+def check_tables(room):
+    """Tables against the cache's own frames, as plyfile reads them."""
+    for frame in FRAMES:
+        row = PlyData.read(room / f"cache/frames/pool-1.{frame:04}.ply")["vertex"].data
+        place = np.stack([row[c] for c in "xyz"], axis=1)
+        speed = np.stack([row[c] for c in ("vx", "vy", "vz")], axis=1)
+        npy = np.load(room / f"p.{frame:04}.npy")
+        must(np.array_equal(npy["position"], place), "NPY: positions")
+        must(np.array_equal(npy["velocity"], speed), "NPY: velocities")
+        must(np.array_equal(npy["id"], row["id"]), "NPY: ids")
+        csv = np.genfromtxt(room / f"p.{frame:04}.csv", delimiter=",", names=True, dtype=None)
+        must(np.array_equal(csv["x"].astype(np.float32), place[:, 0]), "CSV: x")
+        must(np.array_equal(csv["vz"].astype(np.float32), speed[:, 2]), "CSV: vz")
+        must(not np.array_equal(np.roll(npy["position"], 1, axis=0), place), "the control: rows in another order")
+
+
+def check_meshes(room):
+    """Meshes by plyfile and meshio."""
+    for frame in FRAMES:
+        count = len(np.load(room / f"p.{frame:04}.npy"))
+        data = PlyData.read(room / f"m.{frame:04}.ply")
+        vertex = data["vertex"].data
+        points = np.stack([vertex[c] for c in "xyz"], axis=1)
+        triangles = np.stack(data["face"].data["vertex_indices"])
+        must(is_closed(triangles), f"frame {frame}: the mesh is open")
+        must(not is_closed(triangles[1:]), "the control: a triangle less")
+        ratio = volume(points, triangles) / (count * SPACING**3)
+        must(abs(ratio - 1.0) <= 0.01, f"frame {frame}: the mesh holds {ratio} of the particles' volume")
+        normals = np.stack([vertex[c] for c in ("nx", "ny", "nz")], axis=1)
+        must(np.allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-5), "normals are no unit vectors")
+        speed = np.stack([vertex[c] for c in ("vx", "vy", "vz")], axis=1)
+        must(np.isfinite(speed).all() and np.abs(speed).max() > 0.1, "PLY: velocities")
+        for name in ("ply", "obj"):
+            other = meshio.read(room / f"m.{frame:04}.{name}")
+            must(np.array_equal(other.points.astype(np.float32), points), f"meshio: points of {name}")
+            must(np.array_equal(other.cells_dict["triangle"], triangles), f"meshio: triangles of {name}")
+        print(f"frame {frame}: {len(points)} vertices, {100 * ratio:.2f} % of the particles' volume")
+
+
+def check_points(stage, room):
+    """The points of a shot against the tables, and its units."""
+    must(UsdGeom.GetStageMetersPerUnit(stage) == 1.0, "USD: units")
+    must(UsdGeom.GetStageUpAxis(stage) == "Y", "USD: axis")
+    must(stage.GetTimeCodesPerSecond() == 24.0 and stage.GetFramesPerSecond() == 24.0, "USD: frame rate")
+    must((stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (1.0, 3.0), "USD: range")
+    water = UsdGeom.Points(stage.GetPrimAtPath("/pool_1/water"))
+    for frame in FRAMES:
+        npy = np.load(room / f"p.{frame:04}.npy")
+        must(np.array_equal(np.array(water.GetPointsAttr().Get(frame)), npy["position"]), "USD: points")
+        must(np.array_equal(np.array(water.GetVelocitiesAttr().Get(frame)), npy["velocity"]), "USD: velocities")
+        must(np.array_equal(np.array(water.GetIdsAttr().Get(frame)), npy["id"]), "USD: ids")
+        low, high = water.GetExtentAttr().Get(frame)
+        width = (6 / np.pi) ** (1 / 3) * SPACING
+        must(np.allclose(low, npy["position"].min(axis=0) - width / 2, atol=1e-6), "USD: extent")
+        must(np.allclose(high, npy["position"].max(axis=0) + width / 2, atol=1e-6), "USD: extent")
+    must(np.allclose(water.GetWidthsAttr().Get(), width), "USD: widths")
+    must(water.GetWidthsInterpolation() == "constant", "USD: widths for all")
+    one, two = (np.array(water.GetPointsAttr().Get(frame)) for frame in (1, 2))
+    must(not np.array_equal(one, two), "the control: another frame")
+    between = np.array(water.GetPointsAttr().Get(1.5))
+    must(np.allclose(between, (one + two) / 2, atol=1e-6), "USD: between two frames points of the same ids are halfway")
+
+
+def check_set(stage):
+    """Solids and wave makers where they are."""
+    pier = UsdGeom.Mesh(stage.GetPrimAtPath("/pool_1/solids/pier"))
+    points = np.array(pier.GetPointsAttr().Get())
+    must(np.allclose(points.min(axis=0), [1.3, 0, 0.3]) and np.allclose(points.max(axis=0), [1.7, 0.8, 0.7]), "USD: pier")
+    triangles = np.array(pier.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
+    must(abs(volume(points, triangles) - 0.4 * 0.8 * 0.4) < 1e-6, "USD: the pier's faces look outward")
+    maker = UsdGeom.Xformable(stage.GetPrimAtPath("/pool_1/wave_makers/wall_minus_x"))
+    for frame in FRAMES:
+        found = maker.ComputeLocalToWorldTransform(frame).ExtractTranslation()
+        # Stroke 0.3 m, a sine of 0.5 s, which grows over the first 0.1 s.
+        must(found[1] == 0.0 and found[2] == 0.0 and abs(found[0]) <= 0.3, "USD: way of the wave maker")
+    ways = [maker.ComputeLocalToWorldTransform(frame).ExtractTranslation()[0] for frame in FRAMES]
+    must(len(set(ways)) == 3, f"USD: the wave maker stands still: {ways}")
+    wall = UsdGeom.Mesh(maker.GetPrim())
+    corners = np.array(wall.GetPointsAttr().Get())
+    must(np.all(corners[:, 0] == 0.0) and np.allclose(corners.max(axis=0), [0, 2, 1]), "USD: the wave maker's wall")
+    a, b, c = corners[:3]
+    must(np.cross(b - a, c - a)[0] > 0, "USD: the wave maker faces the water")
+
+
+def pixel(point):
+    """Where the look's camera has a point: parts of the picture's width and height from its middle, by its pose alone."""
+    forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
+    right = np.cross(forward, [0, 1, 0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    depth = np.dot(point - EYE, forward)
+    x = FOCAL_MM * np.dot(point - EYE, right) / depth / FILM_MM
+    return np.array([x, FOCAL_MM * np.dot(point - EYE, up) / depth / (FILM_MM * HEIGHT / WIDTH)])
+
+
+def check_camera(stage):
+    """The camera's frustum against the look's own numbers."""
+    schema = UsdGeom.Camera(stage.GetPrimAtPath("/pool_1/camera"))
+    camera = schema.GetCamera(2)
+    # Tenths of the scene's unit.
+    must(abs(camera.horizontalAperture - FILM_MM / 100) < 1e-6, "USD: film")
+    must(abs(camera.focalLength - FOCAL_MM / 100) < 1e-6, "USD: focal length")
+    must(abs(camera.fStop - 2.8) < 1e-6 and abs(camera.focusDistance - 3.5) < 1e-6, "USD: lens")
+    view = camera.frustum.ComputeViewMatrix() * camera.frustum.ComputeProjectionMatrix()
+    for point in ([0.5, 0.2, 0.5], [1.0, 0.5, 0.5], [0.1, 1.0, 0.9]):
+        found = view.Transform(Gf.Vec3d(*point))
+        wanted = 2 * pixel(np.array(point))
+        must(np.allclose([found[0], found[1]], wanted, atol=1e-5), f"USD: {point} at {found}, not at {wanted}")
+
+
+def check_mesh_shot(stage, room):
+    """The mesh of a shot against the PLY of its frame."""
+    water = UsdGeom.Mesh(stage.GetPrimAtPath("/pool_1/water"))
+    for frame in FRAMES:
+        vertex = PlyData.read(room / f"m.{frame:04}.ply")["vertex"].data
+        points = np.stack([vertex[c] for c in "xyz"], axis=1)
+        must(np.array_equal(np.array(water.GetPointsAttr().Get(frame)), points), "USD: the mesh's points")
+        triangles = np.array(water.GetFaceVertexIndicesAttr().Get(frame)).reshape(-1, 3)
+        must(is_closed(triangles), "USD: the mesh is open")
+        speed = np.stack([vertex[c] for c in ("vx", "vy", "vz")], axis=1)
+        must(np.array_equal(np.array(water.GetVelocitiesAttr().Get(frame)), speed), "USD: the mesh's velocities")
+
+
+def main(swell):
+    """Exports, reads, compares."""
+    with tempfile.TemporaryDirectory() as folder:
+        room = Path(folder)
+        (room / "pool.toml").write_text(SCENE)
+        (room / "pier.obj").write_text(PIER)
+        (room / "look.toml").write_text(LOOK)
+
+        def run(*words):
+            subprocess.run([swell, *words], cwd=room, check=True, stdout=subprocess.DEVNULL)
+
+        run("bake", "pool.toml", "-o", "cache", "--progress", "none")
+        run(
+            *("export", "cache", "--npy", "p.%04d.npy", "--csv", "p.%04d.csv", "--mesh", "m.%04d.ply"),
+            *("--usd", "shot.usda", "--look", "look.toml"),
+        )
+        run("export", "cache", "--mesh", "m.%04d.obj", "--usd", "mesh.usda", "--usd-water", "mesh")
+        run("export", "cache", "--usd", "binary.usdc", "--look", "look.toml", "--python", sys.executable)
+        check_tables(room)
+        check_meshes(room)
+        for name in ("shot.usda", "binary.usdc"):
+            stage = Usd.Stage.Open(str(room / name))
+            must(messages(stage) == [], f"{name}: OpenUSD says {messages(stage)}")
+            check_points(stage, room)
+            check_set(stage)
+            check_camera(stage)
+        stage = Usd.Stage.Open(str(room / "mesh.usda"))
+        must(messages(stage) == [], f"mesh.usda: OpenUSD says {messages(stage)}")
+        check_mesh_shot(stage, room)
+        for name in ("shot.0002.usda", "shot.manifest.usda", "mesh.0003.usda", "binary.0001.usdc"):
+            stage = Usd.Stage.Open(str(room / name))
+            must(messages(stage) == [], f"{name}: OpenUSD says {messages(stage)}")
+        must(Sdf.Layer.FindOrOpen(str(room / "binary.0001.usdc")).GetFileFormat().formatId == "usdc", "binary USD is text")
+        # The control: the validators see what is not there.
+        text = (room / "shot.0002.usda").read_text()
+        spoiled = room / "spoiled.usda"
+        spoiled.write_text(text.replace("    metersPerUnit = 1\n", "").replace('    defaultPrim = "pool_1"\n', ""))
+        must(messages(Usd.Stage.Open(str(spoiled))) != [], "the control: no message of a layer without units")
+    versions = f"OpenUSD {'.'.join(map(str, Usd.GetVersion()))}, meshio {meshio.__version__}, numpy {np.__version__}"
+    print(f"export readers: all is as it should be ({versions}, Python {sys.version.split()[0]})")
+
+
+main(str(Path(sys.argv[1]).resolve()))
