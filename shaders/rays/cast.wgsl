@@ -36,6 +36,10 @@
 #ifdef PALETTE
 @group(0) @binding(19) var<uniform> palette: array<vec4f, 64>;
 #endif
+#ifdef MATERIALS
+@group(0) @binding(24) var<uniform> materials: array<Material, 256>;
+@group(0) @binding(25) var solid_texels: texture_2d<f32>;
+#endif
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -127,7 +127,7 @@ fn opaque_radiance(ray: Ray, found: Found) -> vec3f {
     let n = select(found.normal, -found.normal, dot(found.normal, ray.direction) > 0.0);
     let depth = water_above(p) / shading.sun_path;
     let footprint = (ray.travelled + found.t) / camera.focal;
-    return radiance_of(Surface(p, n, material_of(found.material)), -ray.direction, footprint, depth);
+    return radiance_of(Surface(p, n, material_of(found.material), found.triangle), -ray.direction, footprint, depth);
 }
 
 // Radiance and coverage along a ray from `origin`, in air or water, that has come `travelled` metres from the eye on its way there

@@ -28,10 +28,12 @@ struct Found {
     material: u32,
     // Mean square slope of waves that a pixel there cannot hold.
     variance: f32,
+    // Of the set, or NO_TRIANGLE.
+    triangle: u32,
 }
 
 fn met(kind: u32, t: f32, normal: vec3f, material: u32) -> Found {
-    return Found(kind, t, t, t, normal, material, 0.0);
+    return Found(kind, t, t, t, normal, material, 0.0, NO_TRIANGLE);
 }
 
 // Distance along a ray to a triangle, FAR where it misses (Möller and Trumbore 1997).
@@ -98,6 +100,7 @@ fn opaque_along(origin: vec3f, direction: vec3f) -> Found {
             if t < found.t {
                 let normal = normalize(cross(triangle.b - triangle.a, triangle.c - triangle.a));
                 found = met(OPAQUE, t, normal, triangle.material);
+                found.triangle = k;
             }
         }
     }

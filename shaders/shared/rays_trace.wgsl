@@ -11,7 +11,7 @@ fn hair() -> f32 {
 }
 
 fn pane(t: f32, normal: vec3f) -> Found {
-    return Found(WATER, t, t - hair(), t + hair(), normal, 0u, 0.0);
+    return Found(WATER, t, t - hair(), t + hair(), normal, 0u, 0.0, NO_TRIANGLE);
 }
 
 // A side of the box that water stands at: a pane that is not there, or the wall behind it, or the ground.
@@ -38,7 +38,7 @@ fn sea_along(origin: vec3f, direction: vec3f, span: vec2f, inside: bool, travell
     let footprint = (travelled + surface.after) / camera.focal;
     return Found(
         WATER, surface.after, surface.before, surface.after, sea_normal(at, footprint), 0u,
-        sea_variance(at, footprint));
+        sea_variance(at, footprint), NO_TRIANGLE);
 }
 
 // What a ray meets behind the box, which it leaves at `from_t`.
@@ -93,7 +93,7 @@ fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32) -> Found
         let p = origin + direction * surface.after;
         let towards = select(-direction, direction, inside);
         return Found(
-            WATER, surface.after, surface.before, surface.after, field_normal(p, towards), 0u, 0.0);
+            WATER, surface.after, surface.before, surface.after, field_normal(p, towards), 0u, 0.0, NO_TRIANGLE);
     }
 #ifdef SEA
     if span.y < opaque_one.t {

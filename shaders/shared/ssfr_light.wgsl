@@ -1,6 +1,9 @@
 // Sun, sky, shadow, and what the set looks like under them. Needs the bindings `shading`, `sky`,
 // `sky_sampler`, `shadow_map` and `shadow_sampler` of whoever imports it.
 #import "shared/ssfr_noise.wgsl"
+#ifdef MATERIALS
+#import "shared/materials.wgsl"
+#endif
 #import "shared/ssfr_optics.wgsl"
 
 struct Shading {
@@ -94,6 +97,8 @@ struct Surface {
     normal: vec3f,
     // As in ssfr_solid; 2 = ground.
     material: u32,
+    // Of the set, or NO_TRIANGLE.
+    triangle: u32,
 }
 
 // A box of width `duty` in each unit cell, filtered over `footprint` cells.
@@ -103,13 +108,19 @@ fn window_edge(x: f32, duty: f32, footprint: f32) -> f32 {
     return clamp(inside / w + 0.5, 0.0, 1.0);
 }
 
-fn has_windows(material: u32) -> bool {
+fn has_windows(at: Surface) -> bool {
 #ifdef PALETTE
-    if material >= FIRST_OF_PALETTE {
-        return palette[material - FIRST_OF_PALETTE].a > 0.0;
+    if at.material >= FIRST_OF_PALETTE {
+        return palette[at.material - FIRST_OF_PALETTE].a > 0.0;
     }
 #endif
-    return material == 0u;
+#ifdef MATERIALS
+    let paint = paint_of(at.triangle);
+    if paint > 0u {
+        return materials[paint - 1u].windows > 0.0;
+    }
+#endif
+    return at.material == 0u;
 }
 
 struct Facade {
@@ -118,7 +129,7 @@ struct Facade {
 }
 
 fn facade(at: Surface, footprint: f32) -> Facade {
-    if shading.windows.x <= 0.0 || !has_windows(at.material) || abs(at.normal.y) > 0.3 {
+    if shading.windows.x <= 0.0 || !has_windows(at) || abs(at.normal.y) > 0.3 {
         return Facade(0.0, 0.0);
     }
     let along = select(at.position.x, at.position.z, abs(at.normal.x) > abs(at.normal.z));
@@ -153,8 +164,14 @@ fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
     }
 #endif
     let q = at.position / shading.extent;
-    let stain = 1.0 - 0.25 * shading.ground_variation
+    var stain = 1.0 - 0.25 * shading.ground_variation
         * value_noise(vec2f(q.x * 42.5 + q.z * 32.5, q.y * 57.5));
+#ifdef MATERIALS
+    if paint_of(at.triangle) > 0u {
+        wall = painted(at.triangle, at.position, at.normal, view, footprint);
+        stain = 1.0;
+    }
+#endif
     var colour = light * wall * stain;
     let pane = facade(at, footprint);
     if pane.glass > 0.0 {

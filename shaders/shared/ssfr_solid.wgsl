@@ -5,10 +5,15 @@ struct Triangle {
     // 0 = solid of the scene, 1 = quay wall of the look; from 4 on solids that are told apart, from 192 on colours of the palette.
     material: u32,
     b: vec3f,
-    pad0: u32,
+    // Number of its material, from 1 on; 0 = the colour of all of that kind.
+    paint: u32,
     c: vec3f,
-    pad1: u32,
+    // How the material's picture lies on it: behind the last triangle stand such records, whose words materials.wgsl tells.
+    place: u32,
 }
+
+// What is no triangle: the ground, a side of the box, the sky.
+const NO_TRIANGLE: u32 = 0xffffffffu;
 
 // First of the materials whose colours the palette has.
 const FIRST_OF_PALETTE: u32 = 192u;

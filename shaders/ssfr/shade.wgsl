@@ -61,6 +61,11 @@
 #ifdef PALETTE
 @group(0) @binding(17) var<uniform> palette: array<vec4f, 64>;
 #endif
+#ifdef MATERIALS
+@group(0) @binding(20) var<storage, read> set_triangles: array<Triangle>;
+@group(0) @binding(21) var<uniform> materials: array<Material, 256>;
+@group(0) @binding(22) var solid_texels: texture_2d<f32>;
+#endif
 
 fn surface_at(pixel: vec2i) -> f32 {
     if any(pixel < vec2i(0)) || any(pixel >= vec2i(camera.size)) {
@@ -112,10 +117,27 @@ fn ground_distance(origin: vec3f, direction: vec3f) -> f32 {
     return -origin.y / direction.y;
 }
 
+// What the solid of a pixel is, as in ssfr_solid.
+fn solid_code(at: u32) -> u32 {
+#ifdef MATERIALS
+    return set_triangles[solid_packed[at]].material;
+#else
+    return solid_packed[at] >> 24u;
+#endif
+}
+
 fn solid_surface(at: u32, eye: vec3f, view: vec3f) -> Surface {
     let word = solid_packed[at];
+#ifdef MATERIALS
+    let triangle = set_triangles[word];
+    let n = normalize(cross(triangle.b - triangle.a, triangle.c - triangle.a));
+    let named = word;
+#else
     let n = unpack_normal(word);
-    return Surface(world_from_eye(camera, eye), select(n, -n, dot(n, view) < 0.0), material_of(word >> 24u));
+    let named = NO_TRIANGLE;
+#endif
+    return Surface(
+        world_from_eye(camera, eye), select(n, -n, dot(n, view) < 0.0), material_of(solid_code(at)), named);
 }
 
 struct Behind {
@@ -138,9 +160,9 @@ fn behind(pixel: vec2i, ray: vec3f, direction: vec3f) -> Behind {
     if ground < 0.1 * FAR {
         let far = ground * along;
         let up = vec3f(0.0, 1.0, 0.0);
-        return Behind(ground, far, Surface(camera.position + direction * far, up, 2u));
+        return Behind(ground, far, Surface(camera.position + direction * far, up, 2u, NO_TRIANGLE));
     }
-    return Behind(FAR, FAR, Surface(vec3f(0.0), vec3f(0.0), 3u));
+    return Behind(FAR, FAR, Surface(vec3f(0.0), vec3f(0.0), 3u, NO_TRIANGLE));
 }
 
 fn behind_radiance(found: Behind, direction: vec3f) -> vec3f {
@@ -253,7 +275,7 @@ fn transmitted(water: Water, seen: f32, straight: Behind) -> Through {
 
     var reach = ground_distance(water.position, t);
     var floor_point = water.position + t * min(reach, endless());
-    var found = Surface(floor_point, vec3f(0.0, 1.0, 0.0), 2u);
+    var found = Surface(floor_point, vec3f(0.0, 1.0, 0.0), 2u, NO_TRIANGLE);
     let eye_t = vec3f(dot(t, camera.right), dot(t, camera.up), dot(t, camera.forward));
     let far = min(reach, 1.4 * seen + 1.8 * shading.spacing);
     let hit = march(water.eye, eye_t, far, 8, 1.0, water.eye.z - 0.6 * shading.spacing);
@@ -384,7 +406,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if has_water {
         object = 0u;
     } else if straight.depth < 0.1 * FAR && object != 2u {
-        object = solid_packed[at] >> 24u;
+        object = solid_code(at);
     }
     output[out] = vec2u(object, bitcast<u32>(cover));
 #else

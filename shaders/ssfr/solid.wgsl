@@ -65,7 +65,12 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     out.side_a = orientation * cross(a, b);
     out.side_b = orientation * cross(b, c);
     out.side_c = orientation * cross(c, a);
+#ifdef MATERIALS
+    // Which triangle it is tells the rest.
+    out.packed = index / 6u;
+#else
     out.packed = pack_normal(world_normal, triangle.material);
+#endif
     return out;
 }
 

@@ -4,6 +4,7 @@
 //! header merely promises: counts are first held against the bytes that are there.
 
 mod obj;
+pub mod parts;
 mod ply;
 mod stl;
 
@@ -135,25 +136,40 @@ impl TriangleMesh {
     /// [`MeshError::Malformed`] says what is wrong: no triangles, an index out of range, a vertex
     /// that is no number, a triangle without area, or broken syntax.
     pub fn from_bytes(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Self, MeshError> {
-        let raw = match format {
-            MeshFormat::Obj => obj::read(bytes),
-            MeshFormat::Ply => ply::read(bytes),
-            MeshFormat::Stl => stl::read(bytes),
-        };
-        raw.and_then(weld).map_err(|detail| MeshError::Malformed {
-            file: file.to_owned(),
-            detail,
-        })
+        let welded = welded(bytes, format, file)?;
+        Ok(welded.mesh)
     }
+}
+
+/// What a reader found, checked and welded.
+struct Welded {
+    mesh: TriangleMesh,
+    /// For each triangle of the mesh its number in the file.
+    kept: Vec<u32>,
+    /// Whether the second and the third corner of each changed places.
+    is_turned: bool,
+}
+
+fn welded(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Welded, MeshError> {
+    let raw = match format {
+        MeshFormat::Obj => obj::read(bytes),
+        MeshFormat::Ply => ply::read(bytes),
+        MeshFormat::Stl => stl::read(bytes),
+    };
+    raw.and_then(weld).map_err(|detail| MeshError::Malformed {
+        file: file.to_owned(),
+        detail,
+    })
 }
 
 /// Checks what a reader found and welds vertices at the same place, whatever the format: STL has
 /// no shared vertices, and exporters split OBJ and PLY ones along seams.
-fn weld((vertices, triangles): Raw) -> Result<TriangleMesh, String> {
+fn weld((vertices, triangles): Raw) -> Result<Welded, String> {
     if triangles.is_empty() {
         return Err("no triangles".into());
     }
     let mut mesh = TriangleMesh::default();
+    let mut kept = Vec::with_capacity(triangles.len());
     let mut by_place = HashMap::new();
     for (t, triangle) in triangles.iter().enumerate() {
         let mut welded = [0; 3];
@@ -182,18 +198,25 @@ fn weld((vertices, triangles): Raw) -> Result<TriangleMesh, String> {
         // Exporters leave slivers without area, which bound nothing and turn no winding number.
         if mesh.area_vector(mesh.triangles.len() - 1).length_squared() == 0.0 {
             mesh.triangles.pop();
+            continue;
         }
+        kept.push(t as u32);
     }
     if mesh.triangles.is_empty() {
         return Err("no triangle has an area".into());
     }
-    if mesh.open_edges().is_empty() && mesh.signed_volume() < 0.0 {
+    let is_turned = mesh.open_edges().is_empty() && mesh.signed_volume() < 0.0;
+    if is_turned {
         // Closed and inside out: the sign of a distance does not mind, normals of samples do.
         for [_, b, c] in &mut mesh.triangles {
             std::mem::swap(b, c);
         }
     }
-    Ok(mesh)
+    Ok(Welded {
+        mesh,
+        kept,
+        is_turned,
+    })
 }
 
 /// A text file's bytes without the byte order mark that some editors put first.

@@ -27,6 +27,8 @@ pub struct RasterSpec {
     pub colours: &'static [TextureFormat],
     /// Which depth replaces which.
     pub compare: CompareFunction,
+    /// Conditions that hold in its shader.
+    pub defines: &'static [&'static str],
 }
 
 /// A texture that is drawn into.
@@ -101,7 +103,7 @@ impl Program {
 }
 
 fn compile(context: &Context, spec: &RasterSpec) -> Result<RasterPass, GpuError> {
-    let shader = shader(context, spec.name, &[], &[])?;
+    let shader = shader(context, spec.name, spec.defines, &[])?;
     let has_fragment = match shader.reflection.stage {
         Stage::Raster { has_fragment } if has_fragment != spec.colours.is_empty() => has_fragment,
         stage => {

@@ -1,7 +1,7 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Fill, Flow, FlowLevel, Narrow, Particle, Path, Rays, Sea, SetNode, Shading,
+    Band, Camera, Fill, Flow, FlowLevel, Material, Narrow, Particle, Path, Rays, Sea, SetNode, Shading,
     Shape, SprayParams, Thickness, Tile, Triangle, Whitewater, WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
@@ -14,6 +14,8 @@ pub(super) const NEXT_CAMERA: Buf<Camera> = Buf::uniform("next_camera");
 pub(super) const SHADING: Buf<Shading> = Buf::uniform("shading");
 /// Colours of materials.
 pub(super) const PALETTE: Buf<[f32; 4]> = Buf::uniform("palette");
+/// Materials of solids.
+pub(super) const MATERIALS: Buf<Material> = Buf::uniform("materials");
 /// The sea beyond the box.
 pub(super) const SEA: Buf<Sea> = Buf::uniform("sea");
 /// Its waves, and the heights of its edge.

@@ -14,6 +14,7 @@ pub mod cryptomatte;
 mod frame;
 pub mod image;
 mod lighting;
+mod materials;
 mod moment;
 mod neighbors;
 mod opaque;
@@ -35,7 +36,9 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use crate::domain::{bounds::Bounds, mesh::TriangleMesh, open_waves::OpenWaves};
+use crate::domain::{
+    bounds::Bounds, mesh::TriangleMesh, mesh_file::parts::Parts, open_waves::OpenWaves,
+};
 use crate::gpu::adapter::GpuError;
 use crate::scene::Wall;
 
@@ -56,6 +59,8 @@ pub struct RenderScene {
     pub domain: Bounds,
     /// World space, metres.
     pub solids: Vec<TriangleMesh>,
+    /// Parts of each of `solids`; nothing where the look names no materials.
+    pub parts: Vec<SolidParts>,
     /// d, metres.
     pub particle_spacing: f64,
     /// Frames a second, which turns the shutter and velocities into metres.
@@ -64,6 +69,17 @@ pub struct RenderScene {
     pub wave_makers: Vec<(Wall, f64)>,
     /// Waves that come in from the sea.
     pub waves: Option<OpenWaves>,
+}
+
+/// What materials are told by.
+#[derive(Clone, Debug, Default)]
+pub struct SolidParts {
+    /// The name of the mesh's file without the ending.
+    pub name: String,
+    /// Of its triangles.
+    pub parts: Parts,
+    /// From where it stood at the start, metres.
+    pub moved: DVec3,
 }
 
 impl RenderScene {
@@ -83,6 +99,14 @@ pub enum RenderError {
     /// The sky panorama.
     #[error("sky panorama: {0}")]
     Panorama(String),
+    /// A material of the look.
+    #[error("material {index}: {problem}")]
+    Material {
+        /// Which of the look's.
+        index: usize,
+        /// What is wrong.
+        problem: String,
+    },
     /// A scene that cannot be drawn.
     #[error("render scene: {0}")]
     Scene(String),

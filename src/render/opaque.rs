@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::{
     RenderError, RenderScene,
     cryptomatte::{MOST_SOLIDS, PALETTE, SOLIDS},
+    materials::{Painted, Painter},
     uniform::Triangle,
 };
 use crate::domain::mesh::TriangleMesh;
@@ -28,13 +29,16 @@ pub(super) struct Opaque {
     pub(super) triangles: Vec<Triangle>,
     /// Linear reflectance, and 1 where rows of windows may be, of the materials from [`PALETTE`] on.
     pub(super) palette: Vec<[f32; 4]>,
+    /// What solids are painted with.
+    pub(super) painted: Painted,
 }
 
 impl Opaque {
     /// That of a look and a scene.
     pub(super) fn new(look: &Look, scene: &RenderScene) -> Result<Self, RenderError> {
         let mut opaque = Self::default();
-        opaque.add_solids(scene, look.spec().output.cryptomatte)?;
+        let mut painter = Painter::new(look, scene)?;
+        opaque.add_solids(scene, look.spec().output.cryptomatte, painter.as_mut())?;
         let size = scene.domain.size();
         if let Some(basin) = &look.spec().basin {
             let material = match basin.colour {
@@ -62,10 +66,30 @@ impl Opaque {
                 opaque.add_box(low, high, material);
             }
         }
+        if let Some(painter) = painter {
+            opaque.painted = painter.end()?;
+        }
         Ok(opaque)
     }
 
-    fn add_solids(&mut self, scene: &RenderScene, tells_apart: bool) -> Result<(), RenderError> {
+    /// How pictures lie on triangles, as they stand behind them in a buffer; and the triangles, which find them there.
+    pub(super) fn placed(&mut self) -> Vec<Triangle> {
+        let places = std::mem::take(&mut self.painted.places);
+        if !places.is_empty() {
+            let count = self.triangles.len() as u32;
+            for triangle in &mut self.triangles {
+                triangle.place += count;
+            }
+        }
+        places
+    }
+
+    fn add_solids(
+        &mut self,
+        scene: &RenderScene,
+        tells_apart: bool,
+        mut painter: Option<&mut Painter<'_>>,
+    ) -> Result<(), RenderError> {
         if tells_apart && scene.solids.len() > MOST_SOLIDS {
             return Err(RenderError::Scene(format!(
                 "output.cryptomatte tells {MOST_SOLIDS} solids apart at most, and the scene has {}",
@@ -73,9 +97,13 @@ impl Opaque {
             )));
         }
         let origin = scene.domain.min;
-        for (code, mesh) in (SOLIDS..).zip(&scene.solids) {
+        for (index, (code, mesh)) in (SOLIDS..).zip(&scene.solids).enumerate() {
             let material = if tells_apart { code } else { SOLID };
-            for corners in &mesh.triangles {
+            let mut painter = match &mut painter {
+                Some(painter) => Some(painter.solid(index)?),
+                None => None,
+            };
+            for (k, corners) in mesh.triangles.iter().enumerate() {
                 let mut points = [DVec3::ZERO; 3];
                 for (point, &index) in points.iter_mut().zip(corners) {
                     *point = *mesh.vertices.get(index as usize).ok_or_else(|| {
@@ -87,7 +115,12 @@ impl Opaque {
                 // A triangle without area has no normal, and nothing of it would be seen.
                 let area = (points[1] - points[0]).cross(points[2] - points[0]);
                 if area.length() > 1e-10 * scene.particle_spacing.powi(2) {
-                    self.push(points.map(|p| p - origin), material);
+                    let points = points.map(|p| p - origin);
+                    let paint = match &mut painter {
+                        Some(painter) => painter.paint(k, points)?,
+                        None => [0; 2],
+                    };
+                    self.push(points, material, paint);
                 }
             }
         }
@@ -111,21 +144,21 @@ impl Opaque {
         Ok(PALETTE + index as u32)
     }
 
-    fn push(&mut self, corners: [DVec3; 3], material: u32) {
+    fn push(&mut self, corners: [DVec3; 3], material: u32, [paint, place]: [u32; 2]) {
         let [a, b, c] = corners.map(|p| p.as_vec3().to_array());
         self.triangles.push(Triangle {
             a,
             material,
             b,
-            pad0: 0,
+            paint,
             c,
-            pad1: 0,
+            place,
         });
     }
 
     fn add_box(&mut self, low: DVec3, high: DVec3, material: u32) {
         for corners in box_triangles(low, high) {
-            self.push(corners, material);
+            self.push(corners, material, [0; 2]);
         }
     }
 }

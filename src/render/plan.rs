@@ -229,6 +229,7 @@ mod tests {
                 max: DVec3::ONE,
             },
             solids: Vec::new(),
+            parts: Vec::new(),
             particle_spacing: 0.1,
             frames_per_second: 24.0,
             wave_makers: Vec::new(),

@@ -7,6 +7,7 @@ use super::{
     buffers::{DEPTHS, LEVEL_TABLE, LEVEL_VALUES, RAYS, SET_NODES, SET_TRIANGLES, SUN_PATHS},
     paths::Path,
     plan::Plan,
+    set::Set,
     uniform::{Rays, SetNode, Triangle},
 };
 use crate::{
@@ -33,7 +34,7 @@ pub(super) fn plan_rays(
     plan: &mut Plan,
     look: &Look,
     scene: &RenderScene,
-    (triangles, particles): (&[Triangle], usize),
+    (set, particles): (&Set<'_>, usize),
 ) {
     let size = scene.domain.size();
     let voxel = voxel(look, scene);
@@ -43,7 +44,7 @@ pub(super) fn plan_rays(
         size: size.as_vec3().to_array(),
         voxel: voxel as f32,
         bricks,
-        triangles: triangles.len() as u32,
+        triangles: set.triangles.len() as u32,
         nodes,
         pitch: pitch as f32,
         walls: look.spec().basin.as_ref().map_or(0, |_| QUAYS),
@@ -57,7 +58,8 @@ pub(super) fn plan_rays(
     let bricks = (finer * (particles / PARTICLES_A_BRICK) as f64).ceil();
     plan.buffer(&LEVEL_VALUES, (bricks as usize).max(1) * VALUES);
     plan.buffer(&SUN_PATHS, count(nodes));
-    let (boxes, sorted) = tree(triangles);
+    let (boxes, mut sorted) = tree(set.triangles);
+    sorted.extend(set.places);
     plan.values(&SET_NODES, &boxes);
     plan.values(&SET_TRIANGLES, &sorted);
 }

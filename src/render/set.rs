@@ -93,6 +93,13 @@ const SOLID: RasterSpec = RasterSpec {
     colours: &[TextureFormat::R32Float, TextureFormat::R32Uint],
     // Near over depth: the nearest is the greatest.
     compare: CompareFunction::Greater,
+    defines: &[],
+};
+
+/// Depth and triangle, which tells more.
+const PAINTED: RasterSpec = RasterSpec {
+    defines: &["MATERIALS"],
+    ..SOLID
 };
 
 /// Depth alone, as the sun sees it.
@@ -100,15 +107,28 @@ const SHADOW: RasterSpec = RasterSpec {
     name: "ssfr/shadow",
     colours: &[],
     compare: CompareFunction::Less,
+    defines: &[],
 };
+
+/// What is opaque, as its passes take it.
+#[derive(Clone, Copy)]
+pub(super) struct Set<'a> {
+    /// In the buffer of triangles first.
+    pub(super) triangles: &'a [Triangle],
+    /// Behind them: how pictures lie on them.
+    pub(super) places: &'a [Triangle],
+    /// Whether the look names materials.
+    pub(super) is_painted: bool,
+}
 
 /// Plans the shadow map, and gives what draws it: once, since solids do not move. Without solids it is one texel that shades nothing.
 pub(super) fn plan_shadow(
     plan: &mut Plan,
-    triangles: &[Triangle],
+    set: &Set<'_>,
     shadow_from_world: &Mat4,
     limits: &Limits,
 ) -> Command {
+    let triangles = set.triangles;
     let side = match triangles.is_empty() {
         true => 1,
         false => SHADOW_SIZE.min(limits.texture),
@@ -126,7 +146,7 @@ pub(super) fn plan_shadow(
     if triangles.is_empty() {
         return Command::ClearDepth(shadow_map);
     }
-    plan.values(&TRIANGLES, triangles);
+    plan.values(&TRIANGLES, &[triangles, set.places].concat());
     plan.values(&SHADOW_FROM_WORLD, &[shadow_from_world.to_cols_array_2d()]);
     Command::Draw(Draw {
         raster: SHADOW,
@@ -138,15 +158,15 @@ pub(super) fn plan_shadow(
 }
 
 /// Plans what draws the solids into the frame's buffers, tile by tile.
-pub(super) fn plan_solids(
-    plan: &mut Plan,
-    triangles: &[Triangle],
-    limits: &Limits,
-) -> Vec<Command> {
+pub(super) fn plan_solids(plan: &mut Plan, set: &Set<'_>, limits: &Limits) -> Vec<Command> {
+    let triangles = set.triangles;
     let pixels = plan.extent.pixels();
     plan.buffer(&SOLID_DEPTH, pixels);
     plan.buffer(&SOLID_PACKED, pixels);
     if triangles.is_empty() {
+        if set.is_painted {
+            plan.values(&TRIANGLES, &[Triangle::default()]);
+        }
         return vec![plan.fill(&SOLID_DEPTH, FAR.to_bits(), pixels)];
     }
     let mut tiles = Vec::new();
@@ -166,11 +186,12 @@ pub(super) fn plan_solids(
         })
         .collect();
     plan.windows(&TILES, &uniforms);
+    let raster = if set.is_painted { PAINTED } else { SOLID };
     let vertices = 6 * triangles.len() as u32;
     tiles
         .into_iter()
         .enumerate()
-        .flat_map(|(index, (corner, size))| draw_tile(plan, index, corner, size, vertices))
+        .flat_map(|(index, (corner, size))| draw_tile(plan, index, (corner, size), (raster, vertices)))
         .collect()
 }
 
@@ -178,9 +199,8 @@ pub(super) fn plan_solids(
 fn draw_tile(
     plan: &mut Plan,
     index: usize,
-    [x, y]: [u32; 2],
-    size: [u32; 2],
-    vertices: u32,
+    ([x, y], size): ([u32; 2], [u32; 2]),
+    (raster, vertices): (RasterSpec, u32),
 ) -> [Command; 3] {
     let mut target = |part: &str, format, clear, is_kept| {
         let texture = format!("{part}.{index}");
@@ -212,7 +232,7 @@ fn draw_tile(
         copy(&packed, SOLID_PACKED.name()),
     ];
     let draw = Command::Draw(Draw {
-        raster: SOLID,
+        raster,
         binds: vec![TILES.bind(index)],
         vertices,
         colours: vec![depth, packed],

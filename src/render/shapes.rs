@@ -96,6 +96,7 @@ mod tests {
                 max: DVec3::splat(4.0),
             },
             solids: Vec::new(),
+            parts: Vec::new(),
             particle_spacing: D,
             frames_per_second: 24.0,
             wave_makers: Vec::new(),

@@ -153,9 +153,21 @@ mirror!(
         a: [f32; 3],
         material: u32,
         b: [f32; 3],
-        pad0: u32,
+        paint: u32,
         c: [f32; 3],
-        pad1: u32,
+        place: u32,
+    }
+);
+
+mirror!(
+    /// `Material` of shared/materials.wgsl.
+    Material {
+        colour: [f32; 3],
+        windows: f32,
+        first: u32,
+        size_x: u32,
+        size_y: u32,
+        levels: u32,
     }
 );
 
@@ -262,6 +274,7 @@ pub fn mirrors() -> Vec<Layout> {
         Narrow::layout(),
         Fill::layout(),
         Triangle::layout(),
+        Material::layout(),
         Thickness::layout(),
         Whitewater::layout(),
         WhitewaterParams::layout(),

@@ -5,6 +5,8 @@ pub mod spec;
 
 mod keys;
 mod lint;
+mod materials;
+mod mtl;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,11 +19,12 @@ use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 use camera_file::CameraFile;
 pub(super) use keys::KEYS;
 use keys::{MOST_SAMPLES, MOST_VOXELS};
+pub use materials::{Material, Materials, Picture, Texture};
 pub use spec::{
     AovSpec, BasinSpec, CameraSpec, ColourSpaceSpec, CurveSpec, FilterSpec, FormatSpec, ImageSpec,
-    KeyframeSpec, LensSpec, LightSpec, LookSpec, MethodSpec, OutputSpec, RendererSpec, RippleSpec,
-    SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput, SplatSpec, SpraySpec, SunSpec, SurfaceSpec,
-    TransformSpec, ViewSpec, WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
+    KeyframeSpec, LensSpec, LightSpec, LookSpec, MaterialSpec, MethodSpec, OutputSpec,
+    RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput, SplatSpec, SpraySpec,
+    SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec, WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
 };
 
 /// Pixels of a picture, counted from the upper left one of the look's image.
@@ -57,6 +60,7 @@ pub struct Look {
     spec: LookSpec,
     panorama: Option<Panorama>,
     camera: Option<Arc<CameraFile>>,
+    materials: Option<Arc<Materials>>,
     /// Where the look says how water is drawn.
     method: Fault,
     hash: String,
@@ -133,10 +137,12 @@ impl Look {
             Some(name) => Some(Arc::new(file_camera(&doc, &spec, file, name)?)),
             None => None,
         };
+        let materials = Materials::read(&doc, &spec, file)?;
         let mut look = Self {
             spec,
             panorama,
             camera,
+            materials,
             method: doc.place_of(METHOD),
             hash: String::new(),
         };
@@ -299,6 +305,9 @@ impl Look {
         if let Some(camera) = self.camera_file() {
             hasher.update(b"camera").update(camera.hash().as_bytes());
         }
+        if let Some(materials) = self.materials() {
+            materials.hash(&mut hasher);
+        }
         hasher.finalize().to_hex().to_string()
     }
 
@@ -323,7 +332,7 @@ fn plain(spec: &mut LookSpec) {
 
 /// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
 /// that it had before there was such a key.
-const NEWER: [&str; 15] = [
+const NEWER: [&str; 16] = [
     "whitewater: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
     "overscan: 0, ",
@@ -338,6 +347,7 @@ const NEWER: [&str; 15] = [
     ", focus_distance_m: None",
     ", shutter_curve: Box, shutter_ramps: None",
     "wave_makers: None, sea: None, ",
+    ", materials: None, material: []",
     // Quay walls stood at these sides before others could be chosen.
     ", sides: [Wall { axis: 2, is_max: false }, Wall { axis: 2, is_max: true }], colour: None",
 ];
@@ -349,7 +359,10 @@ fn canonical(spec: &LookSpec) -> String {
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
     }
-    if let Some(file) = &mut canonical.camera.file {
+    let textures = canonical.solids.material.iter_mut();
+    let textures = textures.filter_map(|it| it.texture.as_mut().map(|texture| &mut texture.file));
+    let files = canonical.camera.file.iter_mut().chain(&mut canonical.solids.materials);
+    for file in files.chain(textures) {
         *file = Path::new("").to_owned();
     }
     let text = format!("{canonical:?}");

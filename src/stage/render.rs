@@ -21,7 +21,10 @@ use std::{
 
 use crate::{
     cache::{self, CacheError, CacheReader, Manifest},
-    domain::{frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError},
+    domain::{
+        frame_range::FrameRange, mesh_file::MeshError, particles::Particles,
+        signed_distance::SignedDistanceError,
+    },
     gpu::adapter::{Context, GpuError, Needs},
     render::{
         Attributes, Image, Moment, REACH, RenderError, Renderer, Water, frames_around,
@@ -135,6 +138,9 @@ pub enum RenderJobError {
     /// The device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// The file of a solid's mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
     /// The renderer.
     #[error(transparent)]
     Render(#[from] RenderError),
@@ -167,12 +173,15 @@ impl From<&RenderJobError> for Blame {
             RenderJobError::Gpu(error) => error.into(),
             RenderJobError::Render(RenderError::Gpu(error)) => error.into(),
             RenderJobError::Render(
-                RenderError::Panorama(_) | RenderError::Scene(_) | RenderError::UnderWater { .. },
+                RenderError::Panorama(_)
+                | RenderError::Scene(_)
+                | RenderError::Material { .. }
+                | RenderError::UnderWater { .. },
             )
             | RenderJobError::NoWater
             | RenderJobError::IsWhitewater(_)
             | RenderJobError::IntoCache { .. } => Self::Input,
-            RenderJobError::Whitewater(_) => Self::Files,
+            RenderJobError::Whitewater(_) | RenderJobError::Mesh(_) => Self::Files,
             RenderJobError::Render(
                 RenderError::NotFinite { .. }
                 | RenderError::Write { .. }
@@ -258,10 +267,11 @@ pub fn render(
     Ok(outcome)
 }
 
-/// A renderer's fault; that of a panorama or of the method at its place in the look.
+/// A renderer's fault; that of a panorama, of a material or of the method at its place in the look.
 fn told(error: RenderError, look: &Look) -> RenderJobError {
     let fault = match &error {
         RenderError::Panorama(problem) => look.panorama_fault(problem),
+        RenderError::Material { index, problem } => look.material_fault(*index, problem),
         RenderError::UnderWater { .. } => Some(look.method_fault(&error.to_string())),
         _ => None,
     };
@@ -429,7 +439,7 @@ impl Job<'_> {
         let mut renderer = match self.kept.take() {
             Some(renderer) => renderer,
             None => {
-                let set = render_scene(&self.scene, frame, &water);
+                let set = render_scene(&self.scene, look, frame, &water)?;
                 Renderer::new(&self.context, look, &set).map_err(|error| told(error, look))?
             }
         };

@@ -4,7 +4,7 @@
 //! texture indices near the largest integer wrap around) or asked to open other files. Objects and
 //! groups are names alone: all of them are one mesh.
 
-use std::{fmt::Write as _, io::Cursor};
+use std::{borrow::Cow, fmt::Write as _, io::Cursor};
 
 use glam::DVec3;
 
@@ -14,24 +14,34 @@ use super::{Raw, lines_of, quoted, without_mark};
 pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     let text = lines_of(without_mark(bytes)?);
     let mut geometry = Geometry::default();
-    // A line that ends in a backslash goes on in the next; the number is that of the first.
-    let mut joined = String::new();
-    let mut first = 1;
-    for (index, line) in text.lines().chain([""]).enumerate() {
-        if joined.is_empty() {
-            first = index + 1;
-        }
-        let line = line.split('#').next().unwrap_or_default().trim_end();
-        if let Some(part) = line.strip_suffix('\\') {
-            joined += part;
-            joined.push(' ');
-            continue;
-        }
-        joined += line;
-        geometry.add(first, &joined)?;
-        joined.clear();
+    for (number, line) in statements(&text) {
+        geometry.add(number, &line)?;
     }
     geometry.read()
+}
+
+/// The statements of a text without their comments, each with the number of its first line: one that ends in a backslash goes on in
+/// the next.
+pub(super) fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
+    fn bare(line: &str) -> &str {
+        line.split('#').next().unwrap_or_default().trim_end()
+    }
+    let mut lines = text.lines().zip(1usize..);
+    std::iter::from_fn(move || {
+        let (line, number) = lines.next()?;
+        let mut part = bare(line);
+        let mut joined = String::new();
+        while let Some(begun) = part.strip_suffix('\\') {
+            joined.push_str(begun);
+            joined.push(' ');
+            part = lines.next().map_or("", |(line, _)| bare(line));
+        }
+        if joined.is_empty() {
+            return Some((number, Cow::Borrowed(part)));
+        }
+        joined.push_str(part);
+        Some((number, Cow::Owned(joined)))
+    })
 }
 
 /// The lines that are handed on to tobj.
@@ -118,7 +128,12 @@ impl Geometry {
 
 /// A face corner's vertex, counted from 1; negative ones count back from the vertices so far.
 fn vertex_index(word: &str, vertex_count: i64) -> Option<i64> {
-    let index: i64 = word.split('/').next()?.parse().ok()?;
+    index_of(word.split('/').next()?, vertex_count)
+}
+
+/// An index into what there is so far `vertex_count` of.
+pub(super) fn index_of(word: &str, vertex_count: i64) -> Option<i64> {
+    let index: i64 = word.parse().ok()?;
     let index = if index < 0 {
         vertex_count + 1 + index.max(-i64::from(u32::MAX))
     } else {

@@ -13,15 +13,15 @@ use crate::{
         camera::longest_focal_px,
         frame::{Extent, bands},
         lighting::{plan_light, shading},
+        materials::plan_materials,
         opaque::Opaque,
         plan::{Limits, Plan},
         rays::{first, plan_rays},
         sea::plan_sea,
-        set::{plan_palette, plan_shadow, plan_solids, shadow_from_world},
+        set::{Set, plan_palette, plan_shadow, plan_solids, shadow_from_world},
         shapes::RADIUS,
         sky::Sky,
         surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
-        uniform::Triangle,
     },
     scene::look::{AovSpec, FilterSpec, Look, MethodSpec, SplatSpec},
 };
@@ -69,11 +69,19 @@ impl Plan {
         if has_aovs {
             plan.buffer(&NEXT_CAMERA, 1);
         }
+        let mut opaque = Opaque::new(look, scene)?;
+        let places = opaque.placed();
         let Opaque {
-            triangles: opaque,
+            triangles,
             palette,
-        } = Opaque::new(look, scene)?;
-        let matrix = shadow_from_world(&opaque, scene.domain.size(), look.sun_direction());
+            painted,
+        } = opaque;
+        let set = Set {
+            triangles: &triangles,
+            places: &places,
+            is_painted: look.materials().is_some(),
+        };
+        let matrix = shadow_from_world(&triangles, scene.domain.size(), look.sun_direction());
         let sky = Sky::new(look, limits.texture)?;
         plan_light(&mut plan, &sky);
         let light = shading(look, scene, &sky, matrix.to_cols_array_2d());
@@ -83,13 +91,18 @@ impl Plan {
             MethodSpec::Ray => &["rays/cast", "rays/aovs", "rays/first", "rays/objects"],
         };
         plan_palette(&mut plan, &palette, shaded);
+        let painting = match spec.renderer.method {
+            MethodSpec::Ssfr => shaded,
+            MethodSpec::Ray => &["rays/cast"],
+        };
+        plan_materials(&mut plan, look, &painted, painting, limits)?;
         plan_sea(&mut plan, look, scene, shaded);
-        let shadow = plan_shadow(&mut plan, &opaque, &matrix, limits);
+        let shadow = plan_shadow(&mut plan, &set, &matrix, limits);
         plan.once.push(shadow);
         let particles = room(particles);
         match spec.renderer.method {
-            MethodSpec::Ssfr => plan_ssfr(&mut plan, look, scene, (&opaque, particles), limits),
-            MethodSpec::Ray => plan_ray(&mut plan, look, scene, (&opaque, particles)),
+            MethodSpec::Ssfr => plan_ssfr(&mut plan, look, scene, (&set, particles), limits),
+            MethodSpec::Ray => plan_ray(&mut plan, look, scene, (&set, particles)),
         }
         plan.end_fills();
         Ok(plan)
@@ -101,13 +114,13 @@ fn plan_ssfr(
     plan: &mut Plan,
     look: &Look,
     scene: &RenderScene,
-    (opaque, particles): (&[Triangle], usize),
+    (set, particles): (&Set<'_>, usize),
     limits: &Limits,
 ) {
     for depth in &DEPTHS {
         plan.buffer(depth, plan.extent.pixels());
     }
-    let solids = plan_solids(plan, opaque, limits);
+    let solids = plan_solids(plan, set, limits);
     let mut moving = vec!["ssfr/splat_depth", "ssfr/splat_thickness"];
     if look.spec().water.spray.is_some() {
         moving.push("ssfr/splat_spray");
@@ -136,9 +149,9 @@ fn plan_ray(
     plan: &mut Plan,
     look: &Look,
     scene: &RenderScene,
-    (opaque, particles): (&[Triangle], usize),
+    (set, particles): (&Set<'_>, usize),
 ) {
-    plan_rays(plan, look, scene, (opaque, particles));
+    plan_rays(plan, look, scene, (set, particles));
     let has_drops = look.spec().water.spray.is_some();
     let has_spray = has_drops || look.spec().whitewater.is_some();
     let has_owner = look.wants(AovSpec::Forward);

@@ -6,7 +6,7 @@ use crate::{
         recording::{Bind, Command, Groups},
     },
     render::{
-        buffers::{BANDS, DEPTHS, OWNER, THICKNESS, aovs, objects, picture},
+        buffers::{BANDS, DEPTHS, OWNER, THICKNESS, TRIANGLES, aovs, objects, picture},
         plan::Plan,
         uniform::Band,
     },
@@ -146,11 +146,15 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
     };
     let binds = || {
         let surface = Bind::whole("surface", surface);
-        vec![surface, Bind::whole("owner", &owner)]
+        let triangles = Bind::whole("set_triangles", &TRIANGLES);
+        vec![surface, Bind::whole("owner", &owner), triangles]
     };
     let passes = ["ssfr/shade", "ssfr/shade_aovs"];
     let mut shade = plan_bands(plan, look, passes, [&binds, &binds]);
-    let seen = || vec![Bind::whole("surface", surface)];
+    let seen = || {
+        let triangles = Bind::whole("set_triangles", &TRIANGLES);
+        vec![Bind::whole("surface", surface), triangles]
+    };
     let objects = plan_objects(plan, look, "ssfr/shade_objects", &seen);
     shade.picture.extend(objects);
     shade

@@ -393,6 +393,34 @@ const SOLIDS: &[Key] = &[
     Key::table("windows", WINDOWS)
         .absent()
         .about("Rows of windows on upright faces"),
+    Key::text("materials", "an MTL file, relative to the look file")
+        .absent()
+        .about("colours (Kd) and textures (map_Kd) of the meshes' parts, by the names of their materials (usemtl), groups or objects"),
+    Key::tables("material", MATERIAL)
+        .about("Materials of parts of the scene's meshes, before those of `materials`"),
+];
+
+const MATERIAL: &[Key] = &[
+    Key::text(
+        "name",
+        "the name of a material (usemtl), group (g) or object (o) of a mesh, or of its file without the ending",
+    )
+    .about("what it is for"),
+    COLOUR.computed(|| "white under a texture, else that of all solids".to_owned()),
+    Key::table("texture", TEXTURE)
+        .absent()
+        .about("A picture on it, multiplied by `colour`"),
+    Key::flag("windows")
+        .default("true")
+        .about("whether the windows of [solids] may be on it"),
+];
+
+const TEXTURE: &[Key] = &[
+    Key::text("file", "a PNG file, relative to the look file").about("sRGB picture, repeated"),
+    Key::number("metres", SIZE)
+        .unit("metres")
+        .computed(|| "laid on by the mesh's texture coordinates (vt)".to_owned())
+        .about("what one picture covers, laid on along the axis that a face looks along most"),
 ];
 
 const WINDOWS: &[Key] = &[

@@ -7,7 +7,8 @@ use super::Look;
 impl Look {
     /// What of the look is allowed and hardly meant, a sentence each, with its key first and the number that it was judged by.
     pub fn lints(&self) -> Vec<String> {
-        self.lint_lens().into_iter().collect()
+        let lens = self.lint_lens().into_iter();
+        lens.chain(self.lint_library()).collect()
     }
 
     /// Pixels across the disc that a point at infinity is drawn as, at its widest in the shot; a point at half of the focus

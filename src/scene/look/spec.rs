@@ -345,6 +345,35 @@ pub struct SolidsSpec {
     pub colour: [f64; 3],
     /// Rows of windows on upright faces; none unless named.
     pub windows: Option<WindowsSpec>,
+    /// MTL file, relative to the look file.
+    pub materials: Option<PathBuf>,
+    /// Materials of the look's own.
+    #[serde(default)]
+    pub material: Vec<MaterialSpec>,
+}
+
+/// How a part of a solid looks.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialSpec {
+    /// Of the part, or of the mesh file without its ending.
+    pub name: String,
+    /// Reflectance, linear red, green, blue; white under a texture and that of all solids else where left out.
+    pub colour: Option<[f64; 3]>,
+    /// A picture on it; none unless named.
+    pub texture: Option<TextureSpec>,
+    /// Whether the windows of `[solids]` may be on it.
+    pub windows: bool,
+}
+
+/// A picture on a solid.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TextureSpec {
+    /// PNG, relative to the look file.
+    pub file: PathBuf,
+    /// That it covers, metres; as the mesh's texture coordinates say where left out.
+    pub metres: Option<f64>,
 }
 
 /// Windows on upright faces.

@@ -132,7 +132,7 @@ impl Framed {
         number: u32,
     ) -> Result<Self, RenderJobError> {
         let water = cache.read(number)?;
-        let set = render_scene(scene, number, &water);
+        let set = render_scene(scene, look, number, &water)?;
         let (seen, _) = truth(look, &set, number, &water)?;
         Ok(Self {
             number,

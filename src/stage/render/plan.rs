@@ -74,7 +74,7 @@ pub fn plan(
         Subject::Scene(scene) => {
             let start = Start::of(scene)?;
             (
-                render_scene(scene, 0, &start.particles),
+                render_scene(scene, look, 0, &start.particles)?,
                 start.particles.len(),
             )
         }
@@ -85,7 +85,7 @@ pub fn plan(
             let first = cache.first_frame();
             let still = Particles::default();
             (
-                render_scene(&scene, first, &still),
+                render_scene(&scene, look, first, &still)?,
                 most.unwrap_or(0) as usize,
             )
         }
@@ -121,6 +121,7 @@ fn empty() -> RenderScene {
             max: DVec3::ONE,
         },
         solids: Vec::new(),
+        parts: Vec::new(),
         particle_spacing: 1.0,
         frames_per_second: 1.0,
         wave_makers: Vec::new(),

@@ -1,30 +1,75 @@
 //! What of a scene stands in a picture of a frame.
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
+use super::RenderJobError;
 use crate::{
-    domain::{bounds::Bounds, particles::Particles},
-    render::RenderScene,
-    scene::{PlacedMesh, Scene, Wall},
+    domain::{
+        bounds::Bounds,
+        mesh_file::{MeshError, MeshFormat, parts::Parts, read_bytes},
+        particles::Particles,
+    },
+    render::{RenderScene, SolidParts},
+    scene::{PlacedMesh, Scene, Wall, look::Look},
 };
 
-/// A scene as it stands at a frame.
-pub(super) fn render_scene(scene: &Scene, frame: u32, state: &Particles) -> RenderScene {
+/// A scene as it stands at a frame, with what the look takes of it.
+///
+/// # Errors
+/// Where the look names materials: a mesh file that is no longer what the scene was read from, or has texture coordinates that are none.
+pub(super) fn render_scene(
+    scene: &Scene,
+    look: &Look,
+    frame: u32,
+    state: &Particles,
+) -> Result<RenderScene, RenderJobError> {
     let time = f64::from(frame) / scene.shot.frames_per_second;
     let moving = scene.moving_solids.iter().map(|solid| {
         let way = DAffine3::from_translation(solid.displacement(time));
         solid.placed.mesh.transformed(&way)
     });
     let solids = scene.solids.iter().map(|solid| solid.mesh.clone());
-    RenderScene {
+    let parts = match look.materials() {
+        Some(_) => solid_parts(scene, time)?,
+        None => Vec::new(),
+    };
+    Ok(RenderScene {
         origin: scene.origin,
         domain: scene.domain,
         solids: solids.chain(moving).collect(),
+        parts,
         particle_spacing: scene.particle_spacing(),
         frames_per_second: scene.shot.frames_per_second,
         wave_makers: plates(scene, &scene.walls_after(state, time)),
         waves: scene.effects.waves(scene.water.gravity),
-    }
+    })
+}
+
+/// Parts of each solid, read again from its file: a scene keeps the mesh alone.
+fn solid_parts(scene: &Scene, time: f64) -> Result<Vec<SolidParts>, MeshError> {
+    let still = scene.solids.iter().map(|solid| (solid, DVec3::ZERO));
+    let moving = scene.moving_solids.iter();
+    let moving = moving.map(|solid| (&solid.placed, solid.displacement(time)));
+    let parts = still.chain(moving).map(|(placed, moved)| {
+        let bytes = read_bytes(&placed.file)?;
+        if blake3::hash(&bytes).to_hex().as_str() != placed.file_hash {
+            return Err(MeshError::Malformed {
+                file: placed.file.clone(),
+                detail: "it has changed since the scene was read".to_owned(),
+            });
+        }
+        let mut parts = Parts::from_bytes(&bytes, MeshFormat::of(&placed.file)?, &placed.file)?;
+        let way = placed.placement.world_from_file();
+        if way.matrix3.determinant() < 0.0 {
+            parts.turn();
+        }
+        Ok(SolidParts {
+            name: placed.name(),
+            parts,
+            moved,
+        })
+    });
+    parts.collect()
 }
 
 /// The scene's wave makers, and how far inward each stands of the domain's side, metres.

@@ -134,7 +134,7 @@ pub fn check_render(request: &Request, stop: &AtomicBool) -> Result<Outcome, Ren
             break;
         }
         let water = cache.read(frame)?;
-        let set = render_scene(&scene, frame, &water);
+        let set = render_scene(&scene, &request.look, frame, &water)?;
         let begun = Instant::now();
         let (truth, out) = truth(&request.look, &set, frame, &water)?;
         outcome.truth_seconds += begun.elapsed().as_secs_f64();
@@ -210,7 +210,7 @@ impl Set<'_> {
     /// The picture of a frame with a look, as a screen shows it.
     pub(super) fn draw(&self, look: &Look, frame: u32) -> Result<Picture, RenderJobError> {
         let water = self.cache.read(frame)?;
-        let set = render_scene(self.scene, frame, &water);
+        let set = render_scene(self.scene, look, frame, &water)?;
         let mut renderer =
             Renderer::new(self.context, look, &set).map_err(|error| told(error, look))?;
         let image = renderer.render(frame, &water)?;

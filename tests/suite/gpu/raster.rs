@@ -19,6 +19,7 @@ const SHADOW: RasterSpec = RasterSpec {
     name: "ssfr/shadow",
     colours: &[],
     compare: wgpu::CompareFunction::Less,
+    defines: &[],
 };
 
 /// Depths of the picture after a triangle over its lower left half was drawn at depth 0.25 before a far 0.5.

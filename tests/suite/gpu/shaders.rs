@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 36] = [
+const VARIANTS: [&[&str]; 40] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -63,6 +63,10 @@ const VARIANTS: [&[&str]; 36] = [
     &["AOVS", "SPRAY"],
     &["FORWARD", "SPRAY"],
     &["ELLIPSOIDS"],
+    &["MATERIALS"],
+    &["MATERIALS", "PALETTE", "SEA", "SPRAY", "LIGHTS"],
+    &["MATERIALS", "SEA", "SPRAY", "OBJECTS"],
+    &["MATERIALS", "SEA", "SPRAY", "AOVS", "FORWARD"],
 ];
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them.

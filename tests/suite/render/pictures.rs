@@ -55,6 +55,7 @@ fn tank(spacing: f64) -> RenderScene {
             max: DVec3::new(6.0, 4.0, 4.5),
         },
         solids: Vec::new(),
+        parts: Vec::new(),
         particle_spacing: spacing,
         frames_per_second: 24.0,
         wave_makers: Vec::new(),

@@ -7,6 +7,7 @@
 mod geometry;
 mod lens;
 mod light;
+mod materials;
 mod motion;
 mod rays;
 mod ripples;

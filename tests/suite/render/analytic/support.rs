@@ -166,7 +166,7 @@ impl Setup {
         }
     }
 
-    fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let camera = match &self.next {
             Some(next) => self.eye.moving_table(next),
             None => self.eye.table(&self.camera),
@@ -234,7 +234,7 @@ pub(crate) const SKY_WIDTH: usize = 256;
 
 /// A latitude-longitude panorama: the first row is the zenith, the middle of a row looks along +x, and three quarters
 /// of it along +z.
-fn write_sky(file: &Path, sky: &dyn Fn(DVec3, DVec2) -> [f64; 3]) {
+pub(super) fn write_sky(file: &Path, sky: &dyn Fn(DVec3, DVec2) -> [f64; 3]) {
     let (width, height) = (SKY_WIDTH, SKY_WIDTH / 2);
     let texels: Vec<[f32; 3]> = (0..width * height)
         .map(|i| {
@@ -290,6 +290,7 @@ pub(crate) fn scene(radius: f64, filled: f64) -> RenderScene {
             max: DVec3::splat(10.0),
         },
         solids: Vec::new(),
+        parts: Vec::new(),
         particle_spacing: radius * (filled * 4.0 / 3.0 * std::f64::consts::PI).cbrt(),
         frames_per_second: 24.0,
         wave_makers: Vec::new(),

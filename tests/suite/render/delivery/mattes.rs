@@ -86,7 +86,7 @@ fn mattes_are_of_what_stands_there() {
         let all: usize = seen.values().sum();
         assert!(20 * off < all, "{method}: {off} of {all}");
         let control = match method {
-            "ssfr" => spoiled(pass, "object = solid_packed[at] >> 24u;", "object = 4u;"),
+            "ssfr" => spoiled(pass, "object = solid_code(at);", "object = 4u;"),
             _ => spoiled(pass, "var object = found.material;", "var object = 4u;"),
         };
         let (off, _) = wrong(&control, method);

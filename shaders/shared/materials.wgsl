@@ -1,0 +1,100 @@
+// Colours and pictures of solids. Needs the bindings `set_triangles`, `materials` and `solid_texels` of whoever imports it.
+
+struct Material {
+    colour: vec3f,
+    // 1 where rows of windows may be.
+    windows: f32,
+    // Of its picture: place of the first texel in `solid_texels`, counted row by row, and texels along each side.
+    first: u32,
+    size_x: u32,
+    size_y: u32,
+    // The picture itself and its smaller versions; 0 = no picture.
+    levels: u32,
+}
+
+// Texels that a footprint is cut into along its longer side, at most.
+const MOST_TAPS: f32 = 8.0;
+
+// A texel of the row that all pictures and their smaller versions make up, linear.
+fn solid_texel(index: u32) -> vec3f {
+    let width = textureDimensions(solid_texels).x;
+    return textureLoad(solid_texels, vec2u(index % width, index / width), 0).rgb;
+}
+
+// A level between texels, repeated; `at` in pictures, rows from the top.
+fn level_at(first: u32, size: vec2u, at: vec2f) -> vec3f {
+    let p = fract(at) * vec2f(size) - 0.5;
+    let low = floor(p);
+    let part = p - low;
+    let a = vec2u(vec2i(low) + vec2i(size)) % size;
+    let b = (a + 1u) % size;
+    let above = mix(solid_texel(first + a.y * size.x + a.x), solid_texel(first + a.y * size.x + b.x), part.x);
+    let below = mix(solid_texel(first + b.y * size.x + a.x), solid_texel(first + b.y * size.x + b.x), part.x);
+    return mix(above, below, part.y);
+}
+
+// Between two levels, of texels that are `width` texels of the picture wide (Williams 1983).
+fn picture_at(material: Material, at: vec2f, width: f32) -> vec3f {
+    let last = f32(material.levels - 1u);
+    let level = clamp(log2(max(width, 1.0)), 0.0, last);
+    var first = material.first;
+    var size = vec2u(material.size_x, material.size_y);
+    for (var k = 0u; k < u32(level); k++) {
+        first += size.x * size.y;
+        size = max(size / 2u, vec2u(1u));
+    }
+    let fine = level_at(first, size, at);
+    let next = first + size.x * size.y;
+    if fract(level) == 0.0 {
+        return fine;
+    }
+    return mix(fine, level_at(next, max(size / 2u, vec2u(1u)), at), fract(level));
+}
+
+// What a triangle of the set is painted with, from 1 on; 0 has the look's own colour.
+fn paint_of(triangle: u32) -> u32 {
+    if triangle == NO_TRIANGLE {
+        return 0u;
+    }
+    return set_triangles[triangle].paint;
+}
+
+// Reflectance of a painted triangle at `p`. A pixel there is `footprint` wide across the line of sight, and longer on a face that is
+// seen at a slant: that way it is the mean of several places.
+fn painted(triangle: u32, p: vec3f, n: vec3f, view: vec3f, footprint: f32) -> vec3f {
+    let own = set_triangles[triangle];
+    let material = materials[own.paint - 1u];
+    if material.levels == 0u {
+        return material.colour;
+    }
+    // How the picture lies: `a` and `b` are how fast its two coordinates change, `c` is where they are the numbers beside them.
+    let lie = set_triangles[own.place];
+    let from_c = p - lie.c;
+    let at = vec2f(
+        bitcast<f32>(lie.material) + dot(lie.a, from_c), bitcast<f32>(lie.paint) + dot(lie.b, from_c));
+    let size = vec2f(vec2u(material.size_x, material.size_y));
+    let facing = dot(view, n);
+    let slant = view - n * facing;
+    var along = cross(n, select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(n.x) > 0.5));
+    if dot(slant, slant) > 1e-6 {
+        along = slant;
+    }
+    along = normalize(along);
+    let across = cross(n, along) * footprint;
+    along *= footprint / max(abs(facing), 0.02);
+    var long = vec2f(dot(lie.a, along), dot(lie.b, along));
+    var short = vec2f(dot(lie.a, across), dot(lie.b, across));
+    if length(short * size) > length(long * size) {
+        let other = long;
+        long = short;
+        short = other;
+    }
+    let length_of = length(long * size);
+    let taps = clamp(ceil(length_of / max(length(short * size), 1.0)), 1.0, MOST_TAPS);
+    let width = max(length(short * size), length_of / taps);
+    var sum = vec3f(0.0);
+    for (var k = 0.0; k < taps; k += 1.0) {
+        sum += picture_at(material, at + long * ((k + 0.5) / taps - 0.5), width);
+    }
+    return material.colour * sum / taps;
+}

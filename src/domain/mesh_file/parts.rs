@@ -1,0 +1,287 @@
+//! Of which part of its file each triangle of a mesh is, and where pictures lie on it: for pictures alone. The mesh is the same with
+//! and without.
+
+use std::{collections::HashMap, path::Path};
+
+use super::{MeshError, MeshFormat, lines_of, obj, quoted, welded, without_mark};
+
+/// Texture coordinates of a triangle's corners: u to the right, v upward.
+pub type Places = [[f32; 2]; 3];
+
+/// Parts of a mesh, triangle by triangle in the mesh's order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Parts {
+    /// Names of each part: of its material (`usemtl`), then of its groups (`g`), then of its object (`o`). Only OBJ has any.
+    pub names: Vec<Vec<String>>,
+    /// Which part each triangle is of.
+    pub of: Vec<u32>,
+    /// Texture coordinates of each triangle, `None` where a corner has none; empty where no triangle has any.
+    pub places: Vec<Option<Places>>,
+}
+
+impl Parts {
+    /// Those of the mesh that [`super::TriangleMesh::from_bytes`] reads from the same bytes.
+    ///
+    /// # Errors
+    /// As there; and a texture coordinate (`vt`) that is no number, or a corner that names one that is not there.
+    pub fn from_bytes(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Self, MeshError> {
+        let fail = |detail| MeshError::Malformed {
+            file: file.to_owned(),
+            detail,
+        };
+        let welded = welded(bytes, format, file)?;
+        if format != MeshFormat::Obj {
+            return Ok(Self {
+                names: vec![Vec::new()],
+                of: vec![0; welded.kept.len()],
+                places: Vec::new(),
+            });
+        }
+        let mut parts = Self::of_file(bytes).map_err(fail)?;
+        let picked = |k: &u32| parts.of.get(*k as usize).copied();
+        let of: Option<Vec<u32>> = welded.kept.iter().map(picked).collect();
+        // Both count a polygon of n corners as n − 2 triangles.
+        parts.of = of.ok_or_else(|| fail("its faces are counted in two ways".into()))?;
+        if !parts.places.is_empty() {
+            let kept = welded.kept.iter();
+            parts.places = kept.map(|&k| parts.places[k as usize]).collect();
+        }
+        if welded.is_turned {
+            parts.turn();
+        }
+        Ok(parts)
+    }
+
+    /// Follows triangles whose second and third corners change places, as a mirror's do.
+    pub fn turn(&mut self) {
+        for places in self.places.iter_mut().flatten() {
+            places.swap(1, 2);
+        }
+    }
+
+    /// Of every triangle of an OBJ file, in the order of its faces.
+    fn of_file(bytes: &[u8]) -> Result<Self, String> {
+        let text = lines_of(without_mark(bytes)?);
+        let mut reader = Reader::default();
+        for (number, line) in obj::statements(&text) {
+            reader.add(number, &line)?;
+        }
+        reader.end()
+    }
+}
+
+/// Texture coordinates' numbers of a triangle's corners, counted from 1, and the line of their face.
+type Corners = Option<([i64; 3], usize)>;
+
+#[derive(Default)]
+struct Reader {
+    coordinates: Vec<[f32; 2]>,
+    material: String,
+    groups: Vec<String>,
+    object: String,
+    /// Number of the part with these names.
+    numbers: HashMap<Vec<String>, u32>,
+    /// That of the faces that come next; `None` until there is one.
+    current: Option<u32>,
+    of: Vec<u32>,
+    corners: Vec<Corners>,
+    parts: Parts,
+}
+
+impl Reader {
+    fn add(&mut self, number: usize, line: &str) -> Result<(), String> {
+        let line = line.trim_start();
+        let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let rest = rest.trim();
+        match word {
+            "vt" => {
+                let mut numbers = rest.split_whitespace().map(str::parse::<f32>);
+                let u = numbers.next();
+                // A picture along a line has u alone.
+                let (Some(Ok(u)), Ok(v)) = (u, numbers.next().unwrap_or(Ok(0.0))) else {
+                    return Err(format!(
+                        "line {number}: a texture coordinate needs numbers: {}",
+                        quoted(line)
+                    ));
+                };
+                if !(u.is_finite() && v.is_finite()) {
+                    return Err(format!(
+                        "line {number}: a texture coordinate is not finite: {}",
+                        quoted(line)
+                    ));
+                }
+                self.coordinates.push([u, v]);
+            }
+            "usemtl" => self.name(|it| it.material = rest.to_owned()),
+            "g" => {
+                let groups = rest.split_whitespace().map(str::to_owned);
+                self.name(|it| it.groups = groups.collect());
+            }
+            "o" => self.name(|it| it.object = rest.to_owned()),
+            "f" => self.face(number, rest)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn name(&mut self, set: impl FnOnce(&mut Self)) {
+        set(self);
+        self.current = None;
+    }
+
+    /// A face as a fan about its first corner, as tobj makes one.
+    fn face(&mut self, number: usize, rest: &str) -> Result<(), String> {
+        let part = self.part();
+        let count = self.coordinates.len() as i64;
+        let mut corners = Vec::new();
+        for word in rest.split_whitespace() {
+            let named = word.split('/').nth(1).filter(|index| !index.is_empty());
+            corners.push(match named {
+                None => None,
+                Some(index) => Some(obj::index_of(index, count).ok_or_else(|| {
+                    format!(
+                        "line {number}: {} names no texture coordinate",
+                        quoted(word)
+                    )
+                })?),
+            });
+        }
+        for pair in corners.windows(2).skip(1) {
+            self.of.push(part);
+            let all = [corners[0], pair[0], pair[1]];
+            let [Some(a), Some(b), Some(c)] = all else {
+                self.corners.push(None);
+                continue;
+            };
+            self.corners.push(Some(([a, b, c], number)));
+        }
+        Ok(())
+    }
+
+    fn part(&mut self) -> u32 {
+        if let Some(part) = self.current {
+            return part;
+        }
+        let own = std::iter::once(&self.material)
+            .chain(&self.groups)
+            .chain([&self.object]);
+        let names: Vec<String> = own.filter(|name| !name.is_empty()).cloned().collect();
+        let next = self.parts.names.len() as u32;
+        let part = *self.numbers.entry(names.clone()).or_insert(next);
+        if part == next {
+            self.parts.names.push(names);
+        }
+        self.current = Some(part);
+        part
+    }
+
+    /// Coordinates may stand behind the faces that name them.
+    fn end(mut self) -> Result<Parts, String> {
+        self.parts.of = self.of;
+        if self.corners.iter().all(Option::is_none) {
+            return Ok(self.parts);
+        }
+        let count = self.coordinates.len();
+        for corners in &self.corners {
+            let mut places = None;
+            if let Some((indices, number)) = corners {
+                let mut found = [[0.0; 2]; 3];
+                for (place, &index) in found.iter_mut().zip(indices) {
+                    let at = usize::try_from(index - 1).ok();
+                    *place = *at.and_then(|at| self.coordinates.get(at)).ok_or_else(|| {
+                        format!(
+                            "line {number}: the face refers to texture coordinate {index}, but there are {count}"
+                        )
+                    })?;
+                }
+                places = Some(found);
+            }
+            self.parts.places.push(places);
+        }
+        Ok(self.parts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+    use super::*;
+    use crate::domain::mesh::TriangleMesh;
+
+    const FILE: &str = "mtllib a.mtl\no hut\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n\
+        vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wall\nf 1/1 2/2 3/3 4/4\nf 1 1 2\ng front left\nusemtl roof\nf 1//1 2//1 5/\n";
+
+    fn parts(text: &str) -> Result<Parts, MeshError> {
+        Parts::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("a.obj"))
+    }
+
+    #[test]
+    fn each_triangle_has_its_names_and_its_corners_coordinates() {
+        let found = parts(FILE).unwrap();
+        let mesh =
+            TriangleMesh::from_bytes(FILE.as_bytes(), MeshFormat::Obj, Path::new("a.obj")).unwrap();
+        // The sliver is left out of both.
+        assert_eq!(mesh.triangles.len(), 3);
+        assert_eq!(found.names[0], ["wall", "hut"]);
+        assert_eq!(found.names[1], ["roof", "front", "left", "hut"]);
+        assert_eq!(found.of, [0, 0, 1]);
+        // Coordinates were written as x and y of the vertex that they belong to.
+        for (k, places) in found.places.iter().enumerate().take(2) {
+            let corners = mesh.corners(k).map(|p| [p.x as f32, p.y as f32]);
+            assert_eq!(places.unwrap(), corners, "triangle {k}");
+        }
+        assert_eq!(found.places[2], None);
+        let turned = parts(&FILE.replace("2/2 3/3 4/4", "2/3 3/2 4/4")).unwrap();
+        assert_ne!(turned.places[0], found.places[0], "the control");
+    }
+
+    #[test]
+    fn what_is_turned_inside_out_keeps_its_corners_coordinates() {
+        // A tetrahedron whose faces point inward: the reader turns them.
+        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nvt 0 0\n\
+            f 1/1 2/2 3/3\nf 1/1 4/4 2/2\nf 1/1 3/3 4/4\nf 2/2 4/4 3/3\n";
+        let found = parts(text).unwrap();
+        let mesh =
+            TriangleMesh::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("a.obj")).unwrap();
+        assert!(mesh.signed_volume() > 0.0);
+        for (k, places) in found.places.iter().enumerate() {
+            let corners = mesh.corners(k).map(|p| [p.x as f32, p.y as f32]);
+            assert_eq!(places.unwrap(), corners, "triangle {k}");
+        }
+    }
+
+    #[test]
+    fn a_bad_coordinate_is_told_with_its_line() {
+        for (from, to, words) in [
+            ("vt 1 1", "vt 1 x", "line 10: a texture coordinate needs numbers"),
+            ("vt 1 1", "vt", "line 10: a texture coordinate needs numbers"),
+            ("vt 1 1", "vt nan 0", "line 10: a texture coordinate is not finite"),
+            ("3/3 4/4", "3/3 4/5", "line 13: the face refers to texture coordinate 5, but there are 4"),
+            ("3/3 4/4", "3/3 4/0", "line 13: \"4/0\" names no texture coordinate"),
+            ("3/3 4/4", "3/3 4/-9", "line 13: \"4/-9\" names no texture coordinate"),
+            (
+                "3/3 4/4",
+                "3/3 4/99999999999999999999",
+                "line 13: \"4/99999999999999999999\" names no texture coordinate",
+            ),
+        ] {
+            let text = FILE.replacen(from, to, 1);
+            assert_ne!(text, FILE);
+            let error = parts(&text).unwrap_err().to_string();
+            assert!(error.contains(words), "{from} -> {to}: {error}");
+            // The mesh is read all the same: no bake is refused for what it does not use.
+            TriangleMesh::from_bytes(text.as_bytes(), MeshFormat::Obj, Path::new("a.obj")).unwrap();
+        }
+    }
+
+    #[test]
+    fn other_formats_are_one_part_without_a_name() {
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+            element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        let found =
+            Parts::from_bytes(ply.as_bytes(), MeshFormat::Ply, Path::new("a.ply")).unwrap();
+        assert_eq!(found.names, [Vec::<String>::new()]);
+        assert_eq!((found.of, found.places), (vec![0], Vec::new()));
+    }
+}

@@ -1,0 +1,453 @@
+//! Materials on the scene's solids: which part has which, and how its picture lies on each triangle.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use half::f16;
+use rayon::prelude::*;
+use wgpu::TextureFormat;
+
+use super::{
+    RenderError, RenderScene, SolidParts,
+    buffers::MATERIALS,
+    plan::{Limits, Plan},
+    uniform::{Material, Triangle},
+};
+use crate::{
+    domain::mesh_file::parts::Places,
+    gpu::texture::TextureSpec,
+    scene::look::{Look, Materials, Picture, Texture},
+};
+
+/// Materials that solids of a picture have, at most: a uniform of common size has room for so many.
+const MOST_MATERIALS: usize = 256;
+
+/// Texels of a row of the texture that holds all pictures one after the other.
+const ROW: usize = 4096;
+
+/// What the solids of a scene are painted with.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Painted {
+    /// Materials that a part has, in the order in which they were met.
+    pub(super) materials: Vec<Material>,
+    /// How pictures lie on triangles: words of a [`Triangle`], as materials.wgsl tells.
+    pub(super) places: Vec<Triangle>,
+    /// For each of `materials` its number among the look's.
+    used: Vec<usize>,
+}
+
+/// Paints the triangles of a scene.
+pub(super) struct Painter<'a> {
+    look: &'a Materials,
+    scene: &'a RenderScene,
+    /// For each of the look's materials its number among those used, from 1 on.
+    numbers: Vec<Option<u32>>,
+    /// Whether a part has the name of each of the look's materials.
+    is_named: Vec<bool>,
+    painted: Painted,
+}
+
+/// Paints the triangles of a solid.
+pub(super) struct SolidPainter<'p, 'a> {
+    painter: &'p mut Painter<'a>,
+    solid: &'a SolidParts,
+    /// For each part of the mesh the look's material.
+    of: Vec<Option<usize>>,
+    /// Records of pictures laid on along axes, by material and side.
+    along: HashMap<(usize, usize, bool), u32>,
+}
+
+impl<'a> Painter<'a> {
+    /// `None` where the look names no materials.
+    pub(super) fn new(look: &'a Look, scene: &'a RenderScene) -> Result<Option<Self>, RenderError> {
+        let Some(look) = look.materials() else {
+            return Ok(None);
+        };
+        if scene.parts.len() != scene.solids.len() {
+            return Err(RenderError::Scene(format!(
+                "the look has materials, and the parts of {} of {} solids are known",
+                scene.parts.len(),
+                scene.solids.len()
+            )));
+        }
+        Ok(Some(Self {
+            look,
+            scene,
+            numbers: vec![None; look.list.len()],
+            is_named: vec![false; look.list.len()],
+            painted: Painted::default(),
+        }))
+    }
+
+    /// For one of the scene's solids.
+    pub(super) fn solid(&mut self, index: usize) -> Result<SolidPainter<'_, 'a>, RenderError> {
+        let solid = &self.scene.parts[index];
+        let triangles = self.scene.solids[index].triangles.len();
+        if solid.parts.of.len() != triangles {
+            return Err(RenderError::Scene(format!(
+                "mesh {} has {triangles} triangles, and the parts of {} are known",
+                solid.name,
+                solid.parts.of.len()
+            )));
+        }
+        let names = solid.parts.names.iter();
+        let of = names.map(|names| self.find(names.iter().chain([&solid.name])));
+        let of = of.collect();
+        Ok(SolidPainter {
+            painter: self,
+            solid,
+            of,
+            along: HashMap::new(),
+        })
+    }
+
+    /// The material of the first of these names that has one.
+    fn find<'n>(&mut self, names: impl Iterator<Item = &'n String>) -> Option<usize> {
+        let mut found = None;
+        for name in names {
+            let same = self.look.list.iter().position(|it| it.name == *name);
+            if let Some(index) = same {
+                self.is_named[index] = true;
+                found = found.or(same);
+            }
+        }
+        found
+    }
+
+    fn number(&mut self, index: usize) -> Result<u32, RenderError> {
+        if let Some(number) = self.numbers[index] {
+            return Ok(number);
+        }
+        let used = &mut self.painted.used;
+        if used.len() == MOST_MATERIALS {
+            return Err(RenderError::Material {
+                index,
+                problem: format!("more than {MOST_MATERIALS} materials are on solids"),
+            });
+        }
+        used.push(index);
+        let number = used.len() as u32;
+        let material = &self.look.list[index];
+        self.painted.materials.push(Material {
+            colour: material.colour.map(|c| c as f32),
+            windows: f32::from(u8::from(material.windows)),
+            ..Material::default()
+        });
+        self.numbers[index] = Some(number);
+        Ok(number)
+    }
+
+    /// What was painted. A name of the look's own that no part has is a fault, and so is a library of which none has one; not where
+    /// there are no solids.
+    pub(super) fn end(self) -> Result<Painted, RenderError> {
+        if self.scene.solids.is_empty() {
+            return Ok(self.painted);
+        }
+        let list = || self.look.list.iter().zip(&self.is_named).enumerate();
+        let unnamed = list().find(|(_, (it, named))| it.is_own && !**named);
+        let mut library = list().filter(|(_, (it, _))| !it.is_own).peekable();
+        let first = library.peek().map(|(index, _)| *index);
+        let is_idle = library.all(|(_, (_, named))| !named);
+        let names = || {
+            let mut names: Vec<&str> = Vec::new();
+            for solid in &self.scene.parts {
+                let parts = solid.parts.names.iter().flatten();
+                names.extend(parts.chain([&solid.name]).map(String::as_str));
+            }
+            names.sort_unstable();
+            names.dedup();
+            let more = if names.len() > 24 { ", …" } else { "" };
+            names.truncate(24);
+            format!("{}{more}", names.join(", "))
+        };
+        if let Some((index, (material, _))) = unnamed {
+            return Err(RenderError::Material {
+                index,
+                problem: format!(
+                    "no part of the scene's solids is called {:?}; there are: {}",
+                    material.name,
+                    names()
+                ),
+            });
+        }
+        if let Some(index) = first.filter(|_| is_idle) {
+            return Err(RenderError::Material {
+                index,
+                problem: format!(
+                    "no part of the scene's solids has the name of one of its materials; there are: {}",
+                    names()
+                ),
+            });
+        }
+        Ok(self.painted)
+    }
+}
+
+impl SolidPainter<'_, '_> {
+    /// Material and record of triangle `k`, whose corners are metres from the domain's least corner; zeros where it has the look's colour.
+    pub(super) fn paint(&mut self, k: usize, corners: [DVec3; 3]) -> Result<[u32; 2], RenderError> {
+        let Some(index) = self.of[self.solid.parts.of[k] as usize] else {
+            return Ok([0; 2]);
+        };
+        let paint = self.painter.number(index)?;
+        let Some(texture) = &self.painter.look.list[index].texture else {
+            return Ok([paint, 0]);
+        };
+        let place = match texture.metres {
+            Some(metres) => self.lay_along(index, texture, metres, corners),
+            None => {
+                let places = self.solid.parts.places.get(k).copied().flatten();
+                let places = places.ok_or_else(|| RenderError::Material {
+                    index,
+                    problem: format!(
+                        "faces of mesh {} that it is for have no texture coordinates (vt); a texture of [[solids.material]] with \
+                         metres needs none",
+                        self.solid.name
+                    ),
+                })?;
+                self.record(lie_by(places, texture, corners))
+            }
+        };
+        Ok([paint, place])
+    }
+
+    fn lay_along(&mut self, index: usize, texture: &Texture, metres: f64, corners: [DVec3; 3]) -> u32 {
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a);
+        let size = normal.abs();
+        let axis = match () {
+            () if size.y >= size.x && size.y >= size.z => 1,
+            () if size.x >= size.z => 0,
+            () => 2,
+        };
+        let is_low = normal[axis] < 0.0;
+        if let Some(&place) = self.along.get(&(index, axis, is_low)) {
+            return place;
+        }
+        let scene = self.painter.scene;
+        let [width, height] = self.painter.look.pictures[texture.picture].size.map(f64::from);
+        let (right, up) = sides(axis, is_low);
+        let gradients = [right / metres, -up / (metres * height / width)];
+        // In the world, so that meshes that touch go on in one another; what moves takes its picture along.
+        let corner = scene.origin + scene.domain.min;
+        let starts = gradients.map(|it| it.dot(corner));
+        let place = self.record(lie(gradients, starts, self.solid.moved));
+        self.along.insert((index, axis, is_low), place);
+        place
+    }
+
+    fn record(&mut self, lie: Triangle) -> u32 {
+        let places = &mut self.painter.painted.places;
+        places.push(lie);
+        places.len() as u32 - 1
+    }
+}
+
+/// Where a picture's right and upper sides are on a face that looks along an axis, seen from before it; on level faces its upper side is
+/// along -z.
+fn sides(axis: usize, is_low: bool) -> (DVec3, DVec3) {
+    let sign = if is_low { -1.0 } else { 1.0 };
+    match axis {
+        0 => (DVec3::NEG_Z * sign, DVec3::Y),
+        1 => (DVec3::X * sign, DVec3::NEG_Z),
+        _ => (DVec3::X * sign, DVec3::Y),
+    }
+}
+
+/// A record: how fast both coordinates of a picture change, rows from the top, and what they are at a place.
+fn lie([a, b]: [DVec3; 2], starts: [f64; 2], at: DVec3) -> Triangle {
+    let [u, v] = starts.map(|start| (start - start.floor()) as f32);
+    Triangle {
+        a: a.as_vec3().to_array(),
+        material: u.to_bits(),
+        b: b.as_vec3().to_array(),
+        paint: v.to_bits(),
+        c: at.as_vec3().to_array(),
+        place: 0,
+    }
+}
+
+/// As a mesh's texture coordinates say: they are linear over the triangle, so that their gradients within its plane give them anywhere.
+fn lie_by(places: Places, texture: &Texture, [a, b, c]: [DVec3; 3]) -> Triangle {
+    let place = |k: usize| {
+        let axis = |axis: usize| {
+            f64::from(places[k][axis]) * texture.scale[axis] + texture.offset[axis]
+        };
+        // Rows are counted from the top.
+        [axis(0), 1.0 - axis(1)]
+    };
+    let (first, second, third) = (place(0), place(1), place(2));
+    let (ab, ac) = (b - a, c - a);
+    let normal = ab.cross(ac);
+    let square = normal.length_squared();
+    let gradient = |axis: usize| {
+        let along_ab = second[axis] - first[axis];
+        let along_ac = third[axis] - first[axis];
+        (along_ab * ac.cross(normal) + along_ac * normal.cross(ab)) / square
+    };
+    lie([gradient(0), gradient(1)], first, a)
+}
+
+/// Plans materials and their pictures in the passes that shade; nothing where the look names none.
+pub(super) fn plan_materials(
+    plan: &mut Plan,
+    look: &Look,
+    painted: &Painted,
+    passes: &[&'static str],
+    limits: &Limits,
+) -> Result<(), RenderError> {
+    let Some(own) = look.materials() else {
+        return Ok(());
+    };
+    for pass in passes {
+        plan.define(pass, "MATERIALS");
+    }
+    let mut texels: Vec<[f16; 4]> = Vec::new();
+    let mut firsts: HashMap<usize, (u32, u32)> = HashMap::new();
+    let mut all = painted.materials.clone();
+    for (material, &index) in all.iter_mut().zip(&painted.used) {
+        let Some(texture) = &own.list[index].texture else {
+            continue;
+        };
+        let picture = &own.pictures[texture.picture];
+        let (first, levels) = *firsts.entry(texture.picture).or_insert_with(|| {
+            let first = texels.len() as u32;
+            let levels = levels_of(picture);
+            texels.extend(levels.iter().flatten());
+            (first, levels.len() as u32)
+        });
+        [material.size_x, material.size_y] = picture.size;
+        (material.first, material.levels) = (first, levels);
+    }
+    let rows = texels.len().div_ceil(ROW).max(1);
+    if rows as u32 > limits.texture || ROW as u32 > limits.texture {
+        return Err(RenderError::Scene(format!(
+            "the look's pictures take a texture of {ROW} × {rows} texels, and the adapter takes {} a side",
+            limits.texture
+        )));
+    }
+    texels.resize(rows * ROW, [f16::ZERO; 4]);
+    let bits: Vec<u16> = texels.iter().flatten().map(|x| x.to_bits()).collect();
+    let spec = TextureSpec {
+        name: "solid_texels".into(),
+        size: [ROW as u32, rows as u32],
+        format: TextureFormat::Rgba16Float,
+    };
+    plan.texture(spec, bytemuck::cast_slice(&bits).to_vec());
+    all.resize(MOST_MATERIALS, Material::default());
+    plan.values(&MATERIALS, &all);
+    Ok(())
+}
+
+/// A picture in linear light, and versions of half its size down to one texel, each the mean of the picture's areas.
+fn levels_of(picture: &Picture) -> Vec<Vec<[f16; 4]>> {
+    let linear: Vec<f32> = (0..=255).map(|code| linear(f64::from(code) / 255.0) as f32).collect();
+    let mut size = picture.size.map(|side| side as usize);
+    let texels = picture.texels.par_iter();
+    let mut level: Vec<[f32; 3]> = texels
+        .map(|texel| texel.map(|code| linear[usize::from(code)]))
+        .collect();
+    let half = |[r, g, b]: &[f32; 3]| [*r, *g, *b, 1.0].map(f16::from_f32);
+    let mut levels = vec![level.iter().map(half).collect()];
+    while size != [1, 1] {
+        let smaller = size.map(|side| (side / 2).max(1));
+        level = shrunk(&level, size, smaller);
+        size = smaller;
+        levels.push(level.iter().map(half).collect());
+    }
+    levels
+}
+
+/// IEC 61966-2-1.
+fn linear(code: f64) -> f64 {
+    match code <= 0.04045 {
+        true => code / 12.92,
+        false => ((code + 0.055) / 1.055).powf(2.4),
+    }
+}
+
+/// Means over areas: where a side is odd, texels are shared.
+fn shrunk(texels: &[[f32; 3]], from: [usize; 2], to: [usize; 2]) -> Vec<[f32; 3]> {
+    let parts = |axis: usize, k: usize| {
+        let ratio = from[axis] as f64 / to[axis] as f64;
+        let (low, high) = (k as f64 * ratio, (k + 1) as f64 * ratio);
+        let last = (high.ceil() as usize).min(from[axis]);
+        (low.floor() as usize..last).map(move |at| {
+            let part = high.min(at as f64 + 1.0) - low.max(at as f64);
+            (at, (part / ratio) as f32)
+        })
+    };
+    let texel = |k: usize| {
+        let mut sum = [0.0f32; 3];
+        for (y, of_row) in parts(1, k / to[0]) {
+            for (x, of_column) in parts(0, k % to[0]) {
+                let texel = texels[y * from[0] + x];
+                for (sum, channel) in sum.iter_mut().zip(texel) {
+                    *sum += of_row * of_column * channel;
+                }
+            }
+        }
+        sum
+    };
+    (0..to[0] * to[1]).into_par_iter().map(texel).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_is_decoded_as_the_standard_says() {
+        for (code, value) in [(0.0, 0.0), (0.04045, 0.0031308), (0.5, 0.214_041), (1.0, 1.0)] {
+            assert!((linear(code) - value).abs() < 1e-6, "{code}");
+        }
+    }
+
+    #[test]
+    fn smaller_versions_keep_the_mean() {
+        let size = [7, 5];
+        let texels: Vec<[f32; 3]> = (0..35).map(|k| [k as f32, (k * k % 11) as f32, 1.0]).collect();
+        let mean = |texels: &[[f32; 3]], channel: usize| {
+            texels.iter().map(|it| it[channel]).sum::<f32>() / texels.len() as f32
+        };
+        let smaller = shrunk(&texels, size, [3, 2]);
+        assert_eq!(smaller.len(), 6);
+        for channel in 0..3 {
+            let (before, after) = (mean(&texels, channel), mean(&smaller, channel));
+            assert!((before - after).abs() < 1e-5 * before.max(1.0), "{before} {after}");
+        }
+        // The control: without shared texels the last columns would be lost.
+        let cut: Vec<[f32; 3]> = (0..35).filter(|k| k % 7 < 6).map(|k| texels[k]).collect();
+        assert!((mean(&cut, 0) - mean(&texels, 0)).abs() > 0.1);
+    }
+
+    #[test]
+    fn a_triangle_has_its_corners_coordinates() {
+        let corners = [
+            DVec3::new(3.0, 1.0, 2.0),
+            DVec3::new(5.0, 1.5, 2.0),
+            DVec3::new(3.5, 4.0, 7.0),
+        ];
+        let texture = Texture {
+            picture: 0,
+            metres: None,
+            scale: [2.0, 3.0],
+            offset: [0.25, 0.0],
+        };
+        let places = [[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]];
+        let lie = lie_by(places, &texture, corners);
+        for (corner, place) in corners.iter().zip(places) {
+            let from = corner.as_vec3() - glam::Vec3::from(lie.c);
+            let at = |start: u32, gradient: [f32; 3]| {
+                f32::from_bits(start) + glam::Vec3::from(gradient).dot(from)
+            };
+            let expected = [2.0 * place[0] + 0.25, 1.0 - 3.0 * place[1]];
+            let found = [at(lie.material, lie.a), at(lie.paint, lie.b)];
+            for (found, expected) in found.iter().zip(expected) {
+                // Up to whole pictures.
+                let off = found - expected;
+                assert!((off - off.round()).abs() < 1e-5, "{found} {expected}");
+            }
+        }
+    }
+}

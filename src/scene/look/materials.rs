@@ -1,0 +1,306 @@
+//! Materials of solids: those of the look, and those of a library that it names.
+
+use std::{
+    io::Cursor,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use super::{
+    Look, LookError,
+    mtl::{self, Entry},
+    spec::{LookSpec, MaterialSpec},
+};
+use crate::scene::{Fault, document::Document, error::SceneError};
+
+/// Key of the library.
+const LIBRARY: &str = "solids.materials";
+
+/// Largest file of a library or a picture, bytes.
+const MOST_BYTES: u64 = 256 << 20;
+/// Texels of a picture along a side, and of all pictures of a look, at most: with their smaller versions these are 256 MiB.
+const MOST_SIDE: u32 = 8192;
+const MOST_TEXELS: u64 = 24_000_000;
+
+/// Materials of a look, in the order in which a name is looked for, and the pictures of their textures.
+#[derive(Clone, Debug, Default)]
+pub struct Materials {
+    /// Those of `[[solids.material]]`, then those of the library.
+    pub list: Vec<Material>,
+    /// Each once, whichever materials use it.
+    pub pictures: Vec<Picture>,
+    /// BLAKE3 of the library, where there is one.
+    library: Option<blake3::Hash>,
+    /// What of the library is not used.
+    unused: Vec<String>,
+}
+
+/// How a part of a solid looks.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Of the parts, or of the mesh file without its ending.
+    pub name: String,
+    /// Reflectance, linear red, green, blue; the texture's is multiplied by it.
+    pub colour: [f64; 3],
+    /// `None` of one colour.
+    pub texture: Option<Texture>,
+    /// Whether the look's windows may be on it.
+    pub windows: bool,
+    /// Whether it is the look's own: one of a library may have no part in a scene.
+    pub is_own: bool,
+    /// Where the look names it.
+    place: Fault,
+}
+
+/// A picture on a solid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    /// Number of it in [`Materials::pictures`].
+    pub picture: usize,
+    /// Metres that one picture covers, laid on along the axes; `None` where the mesh's texture coordinates say where it lies.
+    pub metres: Option<f64>,
+    /// Those coordinates are multiplied by it.
+    pub scale: [f64; 2],
+    /// And then moved by it.
+    pub offset: [f64; 2],
+}
+
+/// A picture as its file has it.
+#[derive(Clone)]
+pub struct Picture {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// sRGB, row by row from the top.
+    pub texels: Vec<[u8; 3]>,
+    file: PathBuf,
+    hash: blake3::Hash,
+}
+
+impl std::fmt::Debug for Picture {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {:?}", self.file.display(), self.size)
+    }
+}
+
+impl Look {
+    /// Materials of solids; `None` where the look names none.
+    pub fn materials(&self) -> Option<&Materials> {
+        self.materials.as_deref()
+    }
+
+    /// That a material is no good, in the words of who tried it on a scene.
+    pub fn material_fault(&self, index: usize, problem: &str) -> Option<LookError> {
+        let material = self.materials()?.list.get(index)?;
+        let fault = Fault {
+            message: match material.place.message.as_str() {
+                "" => problem.to_owned(),
+                place => format!("{place}: {problem}"),
+            },
+            ..material.place.clone()
+        };
+        Some(LookError(SceneError::Fault(Box::new(fault))))
+    }
+
+    /// What of its library is not used.
+    pub(super) fn lint_library(&self) -> Option<String> {
+        let unused = &self.materials()?.unused;
+        (!unused.is_empty()).then(|| {
+            format!(
+                "{LIBRARY}: of a library Kd and map_Kd are used; this one also has {}",
+                unused.join(", ")
+            )
+        })
+    }
+}
+
+impl Materials {
+    /// Adds what decides their pictures, apart from the look's text.
+    pub(super) fn hash(&self, hasher: &mut blake3::Hasher) {
+        let pictures = self.pictures.iter().map(|picture| &picture.hash);
+        for hash in self.library.iter().chain(pictures) {
+            hasher.update(b"material").update(hash.as_bytes());
+        }
+    }
+
+    /// Those that the look `file` names, read; `None` where it names none.
+    pub(super) fn read(
+        doc: &Document<'_>,
+        spec: &LookSpec,
+        file: &Path,
+    ) -> Result<Option<Arc<Self>>, SceneError> {
+        let solids = &spec.solids;
+        if solids.materials.is_none() && solids.material.is_empty() {
+            return Ok(None);
+        }
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let mut reader = Reader {
+            doc,
+            folder,
+            all: Self::default(),
+        };
+        for (index, material) in solids.material.iter().enumerate() {
+            let key = format!("solids.material[{index}]");
+            let is_same = |it: &Material| it.name == material.name;
+            if reader.all.list.iter().any(is_same) {
+                let problem = format!("{:?} stands twice", material.name);
+                return Err(doc.fault_of(&format!("{key}.name"), problem));
+            }
+            reader.own(&key, material, solids.colour)?;
+        }
+        if let Some(name) = &solids.materials {
+            reader.library(name)?;
+        }
+        Ok(Some(Arc::new(reader.all)))
+    }
+}
+
+struct Reader<'d, 'a> {
+    doc: &'d Document<'a>,
+    folder: &'d Path,
+    all: Materials,
+}
+
+impl Reader<'_, '_> {
+    /// A material of the look; its colour is white under a texture and that of all solids else.
+    fn own(
+        &mut self,
+        key: &str,
+        material: &MaterialSpec,
+        solids: [f64; 3],
+    ) -> Result<(), SceneError> {
+        let mut texture = None;
+        if let Some(spec) = &material.texture {
+            let key = format!("{key}.texture.file");
+            texture = Some(Texture {
+                picture: self.picture(&key, &spec.file, "")?,
+                metres: spec.metres,
+                scale: [1.0; 2],
+                offset: [0.0; 2],
+            });
+        }
+        let default = if texture.is_some() { [1.0; 3] } else { solids };
+        self.all.list.push(Material {
+            name: material.name.clone(),
+            colour: material.colour.unwrap_or(default),
+            texture,
+            windows: material.windows,
+            is_own: true,
+            place: self.doc.place_of(&format!("{key}.name")),
+        });
+        Ok(())
+    }
+
+    /// Those of a library whose names are not yet taken.
+    fn library(&mut self, name: &Path) -> Result<(), SceneError> {
+        let (path, bytes) = self.bytes(LIBRARY, name, "")?;
+        self.all.library = Some(blake3::hash(&bytes));
+        let shown = path.display();
+        let library = mtl::read(&bytes).map_err(|problem| {
+            let message = format!("the library {shown}: {problem}");
+            self.doc.fault_of_plain(LIBRARY, message)
+        })?;
+        let beside = name.parent().unwrap_or(Path::new(""));
+        for entry in library.entries {
+            self.entry(entry, beside, name)?;
+        }
+        self.all.unused = library.unused;
+        Ok(())
+    }
+
+    fn entry(&mut self, entry: Entry, beside: &Path, library: &Path) -> Result<(), SceneError> {
+        let mut texture = None;
+        if let Some(map) = entry.map {
+            let place = format!("{} line {}: ", library.display(), map.line);
+            texture = Some(Texture {
+                picture: self.picture(LIBRARY, &beside.join(&map.file), &place)?,
+                metres: None,
+                scale: map.scale,
+                offset: map.offset,
+            });
+        }
+        let mut place = self.doc.place_of(LIBRARY);
+        place.message = format!("{} line {}", library.display(), entry.line);
+        self.all.list.push(Material {
+            name: entry.name,
+            colour: entry.colour,
+            texture,
+            windows: true,
+            is_own: false,
+            place,
+        });
+        Ok(())
+    }
+
+    /// The number of a picture; `place` stands before what is wrong with it.
+    fn picture(&mut self, key: &str, name: &Path, place: &str) -> Result<usize, SceneError> {
+        let (path, bytes) = self.bytes(key, name, place)?;
+        let hash = blake3::hash(&bytes);
+        let same = |it: &Picture| it.hash == hash;
+        if let Some(found) = self.all.pictures.iter().position(same) {
+            return Ok(found);
+        }
+        let fault = |problem: String| {
+            let message = format!("{place}the picture {}: {problem}", path.display());
+            self.doc.fault_of_plain(key, message)
+        };
+        let (size, texels) = decoded(&bytes).map_err(&fault)?;
+        let own = texels.len() as u64;
+        let others = self.all.pictures.iter().map(|it| it.texels.len() as u64);
+        if own + others.sum::<u64>() > MOST_TEXELS {
+            return Err(fault(format!(
+                "with it the look's pictures have more than {MOST_TEXELS} texels together"
+            )));
+        }
+        self.all.pictures.push(Picture {
+            size,
+            texels,
+            file: path,
+            hash,
+        });
+        Ok(self.all.pictures.len() - 1)
+    }
+
+    fn bytes(&self, key: &str, name: &Path, place: &str) -> Result<(PathBuf, Vec<u8>), SceneError> {
+        let path = self
+            .doc
+            .find(self.folder, key, &name.to_string_lossy())?;
+        let fault = |problem: String| {
+            let message = format!("{place}cannot read {}: {problem}", path.display());
+            self.doc.fault_of_plain(key, message)
+        };
+        let about = path.metadata().map_err(|error| fault(error.to_string()))?;
+        if !about.is_file() {
+            return Err(fault("not a plain file".to_owned()));
+        }
+        if about.len() > MOST_BYTES {
+            return Err(fault(format!("it is larger than {} MiB", MOST_BYTES >> 20)));
+        }
+        let bytes = std::fs::read(&path).map_err(|error| fault(error.to_string()))?;
+        Ok((path, bytes))
+    }
+}
+
+/// Size and colours of a PNG, without its alpha.
+fn decoded(bytes: &[u8]) -> Result<([u32; 2], Vec<[u8; 3]>), String> {
+    let fail = |error: png::DecodingError| format!("it is no PNG that can be read: {error}");
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    decoder.set_transformations(png::Transformations::normalize_to_color8());
+    let mut reader = decoder.read_info().map_err(fail)?;
+    let size = [reader.info().width, reader.info().height];
+    if size.into_iter().any(|side| side > MOST_SIDE) {
+        return Err(format!(
+            "it is {} × {}; allowed are up to {MOST_SIDE} texels a side",
+            size[0], size[1]
+        ));
+    }
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap_or(0)];
+    let frame = reader.next_frame(&mut pixels).map_err(fail)?;
+    let channels = frame.color_type.samples();
+    let colour = |texel: &[u8]| match *texel {
+        [r, g, b] | [r, g, b, _] => [r, g, b],
+        [grey, ..] => [grey; 3],
+        [] => [0; 3],
+    };
+    let used = &pixels[..frame.buffer_size().min(pixels.len())];
+    Ok((size, used.chunks_exact(channels).map(colour).collect()))
+}
