@@ -211,7 +211,13 @@ impl SolidPainter<'_, '_> {
         Ok([paint, place])
     }
 
-    fn lay_along(&mut self, index: usize, texture: &Texture, metres: f64, corners: [DVec3; 3]) -> u32 {
+    fn lay_along(
+        &mut self,
+        index: usize,
+        texture: &Texture,
+        metres: f64,
+        corners: [DVec3; 3],
+    ) -> u32 {
         let [a, b, c] = corners;
         let normal = (b - a).cross(c - a);
         let size = normal.abs();
@@ -225,7 +231,9 @@ impl SolidPainter<'_, '_> {
             return place;
         }
         let scene = self.painter.scene;
-        let [width, height] = self.painter.look.pictures[texture.picture].size.map(f64::from);
+        let [width, height] = self.painter.look.pictures[texture.picture]
+            .size
+            .map(f64::from);
         let (right, up) = sides(axis, is_low);
         let gradients = [right / metres, -up / (metres * height / width)];
         // In the world, so that meshes that touch go on in one another; what moves takes its picture along.
@@ -270,9 +278,8 @@ fn lie([a, b]: [DVec3; 2], starts: [f64; 2], at: DVec3) -> Triangle {
 /// As a mesh's texture coordinates say: they are linear over the triangle, so that their gradients within its plane give them anywhere.
 fn lie_by(places: Places, texture: &Texture, [a, b, c]: [DVec3; 3]) -> Triangle {
     let place = |k: usize| {
-        let axis = |axis: usize| {
-            f64::from(places[k][axis]) * texture.scale[axis] + texture.offset[axis]
-        };
+        let axis =
+            |axis: usize| f64::from(places[k][axis]) * texture.scale[axis] + texture.offset[axis];
         // Rows are counted from the top.
         [axis(0), 1.0 - axis(1)]
     };
@@ -341,7 +348,9 @@ pub(super) fn plan_materials(
 
 /// A picture in linear light, and versions of half its size down to one texel, each the mean of the picture's areas.
 fn levels_of(picture: &Picture) -> Vec<Vec<[f16; 4]>> {
-    let linear: Vec<f32> = (0..=255).map(|code| linear(f64::from(code) / 255.0) as f32).collect();
+    let linear: Vec<f32> = (0..=255)
+        .map(|code| linear(f64::from(code) / 255.0) as f32)
+        .collect();
     let mut size = picture.size.map(|side| side as usize);
     let texels = picture.texels.par_iter();
     let mut level: Vec<[f32; 3]> = texels
@@ -398,7 +407,12 @@ mod tests {
 
     #[test]
     fn srgb_is_decoded_as_the_standard_says() {
-        for (code, value) in [(0.0, 0.0), (0.04045, 0.0031308), (0.5, 0.214_041), (1.0, 1.0)] {
+        for (code, value) in [
+            (0.0, 0.0),
+            (0.04045, 0.0031308),
+            (0.5, 0.214_041),
+            (1.0, 1.0),
+        ] {
             assert!((linear(code) - value).abs() < 1e-6, "{code}");
         }
     }
@@ -406,7 +420,9 @@ mod tests {
     #[test]
     fn smaller_versions_keep_the_mean() {
         let size = [7, 5];
-        let texels: Vec<[f32; 3]> = (0..35).map(|k| [k as f32, (k * k % 11) as f32, 1.0]).collect();
+        let texels: Vec<[f32; 3]> = (0..35)
+            .map(|k| [k as f32, (k * k % 11) as f32, 1.0])
+            .collect();
         let mean = |texels: &[[f32; 3]], channel: usize| {
             texels.iter().map(|it| it[channel]).sum::<f32>() / texels.len() as f32
         };
@@ -414,7 +430,10 @@ mod tests {
         assert_eq!(smaller.len(), 6);
         for channel in 0..3 {
             let (before, after) = (mean(&texels, channel), mean(&smaller, channel));
-            assert!((before - after).abs() < 1e-5 * before.max(1.0), "{before} {after}");
+            assert!(
+                (before - after).abs() < 1e-5 * before.max(1.0),
+                "{before} {after}"
+            );
         }
         // The control: without shared texels the last columns would be lost.
         let cut: Vec<[f32; 3]> = (0..35).filter(|k| k % 7 < 6).map(|k| texels[k]).collect();

@@ -191,7 +191,9 @@ pub(super) fn plan_solids(plan: &mut Plan, set: &Set<'_>, limits: &Limits) -> Ve
     tiles
         .into_iter()
         .enumerate()
-        .flat_map(|(index, (corner, size))| draw_tile(plan, index, (corner, size), (raster, vertices)))
+        .flat_map(|(index, (corner, size))| {
+            draw_tile(plan, index, (corner, size), (raster, vertices))
+        })
         .collect()
 }
 

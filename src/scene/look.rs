@@ -24,7 +24,8 @@ pub use spec::{
     AovSpec, BasinSpec, CameraSpec, ColourSpaceSpec, CurveSpec, FilterSpec, FormatSpec, ImageSpec,
     KeyframeSpec, LensSpec, LightSpec, LookSpec, MaterialSpec, MethodSpec, OutputSpec,
     RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput, SplatSpec, SpraySpec,
-    SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec, WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
+    SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec, WaterSpec, WaveMakersSpec,
+    WhitewaterLook, WindowsSpec,
 };
 
 /// Pixels of a picture, counted from the upper left one of the look's image.
@@ -361,7 +362,11 @@ fn canonical(spec: &LookSpec) -> String {
     }
     let textures = canonical.solids.material.iter_mut();
     let textures = textures.filter_map(|it| it.texture.as_mut().map(|texture| &mut texture.file));
-    let files = canonical.camera.file.iter_mut().chain(&mut canonical.solids.materials);
+    let files = canonical
+        .camera
+        .file
+        .iter_mut()
+        .chain(&mut canonical.solids.materials);
     for file in files.chain(textures) {
         *file = Path::new("").to_owned();
     }

@@ -254,12 +254,36 @@ mod tests {
     #[test]
     fn a_bad_coordinate_is_told_with_its_line() {
         for (from, to, words) in [
-            ("vt 1 1", "vt 1 x", "line 10: a texture coordinate needs numbers"),
-            ("vt 1 1", "vt", "line 10: a texture coordinate needs numbers"),
-            ("vt 1 1", "vt nan 0", "line 10: a texture coordinate is not finite"),
-            ("3/3 4/4", "3/3 4/5", "line 13: the face refers to texture coordinate 5, but there are 4"),
-            ("3/3 4/4", "3/3 4/0", "line 13: \"4/0\" names no texture coordinate"),
-            ("3/3 4/4", "3/3 4/-9", "line 13: \"4/-9\" names no texture coordinate"),
+            (
+                "vt 1 1",
+                "vt 1 x",
+                "line 10: a texture coordinate needs numbers",
+            ),
+            (
+                "vt 1 1",
+                "vt",
+                "line 10: a texture coordinate needs numbers",
+            ),
+            (
+                "vt 1 1",
+                "vt nan 0",
+                "line 10: a texture coordinate is not finite",
+            ),
+            (
+                "3/3 4/4",
+                "3/3 4/5",
+                "line 13: the face refers to texture coordinate 5, but there are 4",
+            ),
+            (
+                "3/3 4/4",
+                "3/3 4/0",
+                "line 13: \"4/0\" names no texture coordinate",
+            ),
+            (
+                "3/3 4/4",
+                "3/3 4/-9",
+                "line 13: \"4/-9\" names no texture coordinate",
+            ),
             (
                 "3/3 4/4",
                 "3/3 4/99999999999999999999",
@@ -279,8 +303,7 @@ mod tests {
     fn other_formats_are_one_part_without_a_name() {
         let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
             element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-        let found =
-            Parts::from_bytes(ply.as_bytes(), MeshFormat::Ply, Path::new("a.ply")).unwrap();
+        let found = Parts::from_bytes(ply.as_bytes(), MeshFormat::Ply, Path::new("a.ply")).unwrap();
         assert_eq!(found.names, [Vec::<String>::new()]);
         assert_eq!((found.of, found.places), (vec![0], Vec::new()));
     }

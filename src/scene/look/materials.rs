@@ -261,9 +261,7 @@ impl Reader<'_, '_> {
     }
 
     fn bytes(&self, key: &str, name: &Path, place: &str) -> Result<(PathBuf, Vec<u8>), SceneError> {
-        let path = self
-            .doc
-            .find(self.folder, key, &name.to_string_lossy())?;
+        let path = self.doc.find(self.folder, key, &name.to_string_lossy())?;
         let fault = |problem: String| {
             let message = format!("{place}cannot read {}: {problem}", path.display());
             self.doc.fault_of_plain(key, message)

@@ -158,9 +158,7 @@ fn map(rest: &str, line: usize) -> Result<(Map, Vec<String>), String> {
 
 /// The next word, without which the rest begins at its next one.
 fn word<'a>(rest: &mut &'a str) -> &'a str {
-    let (first, after) = rest
-        .split_once(char::is_whitespace)
-        .unwrap_or((*rest, ""));
+    let (first, after) = rest.split_once(char::is_whitespace).unwrap_or((*rest, ""));
     *rest = after.trim_start();
     first
 }
@@ -174,7 +172,9 @@ fn pair(option: &str, rest: &mut &str, default: [f64; 2]) -> Result<[f64; 2], St
             break;
         };
         if !(number.abs() <= MOST) {
-            return Err(format!("map_Kd {option} {next}; allowed are numbers up to {MOST:e}"));
+            return Err(format!(
+                "map_Kd {option} {next}; allowed are numbers up to {MOST:e}"
+            ));
         }
         numbers.push(number);
         word(rest);
@@ -199,9 +199,15 @@ mod tests {
         let [wall, plain] = &library.entries[..] else {
             panic!("{library:?}");
         };
-        assert_eq!((wall.name.as_str(), wall.colour), ("wet wall", [0.5, 0.25, 0.125]));
+        assert_eq!(
+            (wall.name.as_str(), wall.colour),
+            ("wet wall", [0.5, 0.25, 0.125])
+        );
         let map = wall.map.as_ref().unwrap();
-        assert_eq!((map.file.as_path(), map.line), (PathBuf::from("a b.png").as_path(), 5));
+        assert_eq!(
+            (map.file.as_path(), map.line),
+            (PathBuf::from("a b.png").as_path(), 5)
+        );
         assert_eq!((map.scale, map.offset), ([2.0, 3.0], [0.5, 0.0]));
         assert_eq!((plain.colour, plain.map.as_ref()), ([0.5; 3], None));
         assert_eq!(library.unused, ["Ns", "map_Kd -clamp"]);
@@ -212,20 +218,41 @@ mod tests {
         for (text, words) in [
             ("", "it has no material"),
             ("# nothing\n", "it has no material"),
-            ("Kd 1 1 1\nnewmtl a\n", "line 1: \"Kd\" stands before the first newmtl"),
+            (
+                "Kd 1 1 1\nnewmtl a\n",
+                "line 1: \"Kd\" stands before the first newmtl",
+            ),
             ("newmtl\n", "line 1: newmtl without a name"),
-            ("newmtl a\n\nnewmtl a\n", "line 3: material \"a\" stands twice"),
+            (
+                "newmtl a\n\nnewmtl a\n",
+                "line 3: material \"a\" stands twice",
+            ),
             ("newmtl a\nKd 1 2\n", "line 2: Kd \"1 2\"; allowed"),
             ("newmtl a\nKd x 0 0\n", "line 2: Kd \"x 0 0\"; allowed"),
             ("newmtl a\nKd 0 0 1.5\n", "line 2: Kd \"0 0 1.5\"; allowed"),
             ("newmtl a\nKd nan\n", "line 2: Kd \"nan\"; allowed"),
-            ("newmtl a\nKd spectral a.rfl\n", "line 2: Kd \"spectral a.rfl\"; allowed"),
+            (
+                "newmtl a\nKd spectral a.rfl\n",
+                "line 2: Kd \"spectral a.rfl\"; allowed",
+            ),
             ("newmtl a\nmap_Kd\n", "line 2: map_Kd without a file"),
             ("newmtl a\nmap_Kd -s 2 2\n", "line 2: map_Kd without a file"),
-            ("newmtl a\nmap_Kd -s a.png\n", "line 2: map_Kd -s needs numbers"),
-            ("newmtl a\nmap_Kd -s inf a.png\n", "line 2: map_Kd -s inf; allowed"),
-            ("newmtl a\nmap_Kd -q a.png\n", "line 2: map_Kd has no option \"-q\""),
-            ("\u{89}PNG\r\n\u{1a}\n", "line 1: \"\u{89}PNG\" stands before"),
+            (
+                "newmtl a\nmap_Kd -s a.png\n",
+                "line 2: map_Kd -s needs numbers",
+            ),
+            (
+                "newmtl a\nmap_Kd -s inf a.png\n",
+                "line 2: map_Kd -s inf; allowed",
+            ),
+            (
+                "newmtl a\nmap_Kd -q a.png\n",
+                "line 2: map_Kd has no option \"-q\"",
+            ),
+            (
+                "\u{89}PNG\r\n\u{1a}\n",
+                "line 1: \"\u{89}PNG\" stands before",
+            ),
         ] {
             let problem = read(text.as_bytes()).unwrap_err();
             assert!(problem.contains(words), "{text:?}: {problem}");

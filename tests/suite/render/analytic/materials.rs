@@ -10,9 +10,7 @@ use swell::gpu::adapter::Context;
 use swell::render::{Image, Moment, RenderError, RenderScene, Renderer, SolidParts, Water};
 use swell::scene::look::Look;
 
-use super::support::{
-    Eye, Setup, context, scene, spoiled, uniform_sky, write_sky,
-};
+use super::support::{Eye, Setup, context, scene, spoiled, uniform_sky, write_sky};
 
 const METHODS: [(&str, &str); 2] = [("ssfr", "ssfr/shade"), ("ray", "rays/cast")];
 
@@ -65,9 +63,8 @@ impl Face {
         let mut text = String::from("o face\n");
         for y in [0.0, 1.0] {
             for x in [0.0, 0.5, 1.0] {
-                let p = MIDDLE
-                    + self.right * (2.0 * x - 1.0) * half
-                    + self.up * (2.0 * y - 1.0) * half;
+                let p =
+                    MIDDLE + self.right * (2.0 * x - 1.0) * half + self.up * (2.0 * y - 1.0) * half;
                 text += &format!("v {} {} {}\nvt {x} {y}\n", p.x, p.y, p.z);
             }
         }
@@ -235,7 +232,8 @@ fn a_picture_lies_as_its_coordinates_say() {
 fn a_library_scales_and_colours_its_picture() {
     let face = &FACES[0];
     let scene = of_text(&face.text());
-    let library = "newmtl one\nKd 0.5 0.25 1\nmap_Kd -s 2 1 1 -o 0.25 a.png\nnewmtl two\nKd 0.125 0.5 0.75\n";
+    let library =
+        "newmtl one\nKd 0.5 0.25 1\nmap_Kd -s 2 1 1 -o 0.25 a.png\nnewmtl two\nKd 0.125 0.5 0.75\n";
     let files = [("a.png", png(4, code)), ("a.mtl", library.into())];
     let wanted = |p: DVec3| {
         if p.x > MIDDLE.x {
@@ -253,10 +251,7 @@ fn a_library_scales_and_colours_its_picture() {
             files: &files,
             scene: &scene,
         };
-        let off = worst(
-            &shown.reflectance(&context()),
-            face.places().map(wanted),
-        );
+        let off = worst(&shown.reflectance(&context()), face.places().map(wanted));
         // A texel is half a metre wide along u.
         assert!(off < HALF + 2.0 * PLACES, "{method}: {off}");
         let swapped = library.replace("one", "three").replace("two", "one");
@@ -265,10 +260,7 @@ fn a_library_scales_and_colours_its_picture() {
             files: &files,
             ..shown
         };
-        let off = worst(
-            &control.reflectance(&context()),
-            face.places().map(wanted),
-        );
+        let off = worst(&control.reflectance(&context()), face.places().map(wanted));
         assert!(off > 0.2, "{method}, the control: {off}");
     }
 }
@@ -277,7 +269,10 @@ fn a_library_scales_and_colours_its_picture() {
 fn the_narrowest_name_counts_and_the_looks_own_comes_first() {
     let face = &FACES[0];
     let scene = of_text(&face.text());
-    let files = [("a.mtl", b"newmtl one\nKd 0.5\nnewmtl left\nKd 0.9\n".to_vec())];
+    let files = [(
+        "a.mtl",
+        b"newmtl one\nKd 0.5\nnewmtl left\nKd 0.9\n".to_vec(),
+    )];
     let shown = Shown {
         eye: face.eye(),
         method: "ray",
@@ -386,10 +381,16 @@ fn materials_that_nothing_has_are_refused_with_their_key() {
         assert!(error.contains(words), "{error}");
     }
     let error = fault("materials = \"a.mtl\"", &scene).unwrap();
-    assert!(error.contains("solids.materials") && error.contains("face, left"), "{error}");
+    assert!(
+        error.contains("solids.materials") && error.contains("face, left"),
+        "{error}"
+    );
     let bare = of_text(&face.text().replace("2/2 3/3 6/6 5/5", "2 3 6 5"));
     let error = fault("materials = \"b.mtl\"", &bare).unwrap();
-    assert!(error.contains("b.mtl line 1") && error.contains("(vt)"), "{error}");
+    assert!(
+        error.contains("b.mtl line 1") && error.contains("(vt)"),
+        "{error}"
+    );
     // The control.
     assert_eq!(fault("materials = \"b.mtl\"", &scene), None);
     assert_eq!(fault(&named("one"), &scene), None);
@@ -422,17 +423,43 @@ fn files_that_cannot_be_used_are_refused_with_their_key() {
         Look::parse(&text, &inside("look.toml"))
     };
     let texture = |file: &str| {
-        format!("[[solids.material]]\nname = \"a\"\ntexture = {{ file = \"{file}\", metres = 1.0 }}")
+        format!(
+            "[[solids.material]]\nname = \"a\"\ntexture = {{ file = \"{file}\", metres = 1.0 }}"
+        )
     };
     for (solids, words) in [
-        ("materials = \"none.mtl\"".to_owned(), ["solids.materials", "cannot read"]),
-        ("materials = \"bad.mtl\"".to_owned(), ["solids.materials", "line 2: Kd \"red\""]),
-        ("materials = \"a.png\"".to_owned(), ["solids.materials", "line 1"]),
-        ("materials = \"no.mtl\"".to_owned(), ["no.mtl line 3", "it is no PNG"]),
-        ("materials = \"out.mtl\"".to_owned(), ["solids.materials", "leads out of the folder"]),
-        (texture("none.png"), ["solids.material[0].texture.file", "cannot read"]),
-        (texture("no.png"), ["solids.material[0].texture.file", "it is no PNG"]),
-        (texture("cut.png"), ["solids.material[0].texture.file", "it is no PNG"]),
+        (
+            "materials = \"none.mtl\"".to_owned(),
+            ["solids.materials", "cannot read"],
+        ),
+        (
+            "materials = \"bad.mtl\"".to_owned(),
+            ["solids.materials", "line 2: Kd \"red\""],
+        ),
+        (
+            "materials = \"a.png\"".to_owned(),
+            ["solids.materials", "line 1"],
+        ),
+        (
+            "materials = \"no.mtl\"".to_owned(),
+            ["no.mtl line 3", "it is no PNG"],
+        ),
+        (
+            "materials = \"out.mtl\"".to_owned(),
+            ["solids.materials", "leads out of the folder"],
+        ),
+        (
+            texture("none.png"),
+            ["solids.material[0].texture.file", "cannot read"],
+        ),
+        (
+            texture("no.png"),
+            ["solids.material[0].texture.file", "it is no PNG"],
+        ),
+        (
+            texture("cut.png"),
+            ["solids.material[0].texture.file", "it is no PNG"],
+        ),
         (
             format!("{0}\n{0}", texture("a.png")),
             ["solids.material[1].name", "stands twice"],
