@@ -20,7 +20,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Those of the mesh that [`super::TriangleMesh::from_bytes`] reads from the same bytes.
+    /// Those of the mesh that [`crate::domain::mesh::TriangleMesh::from_bytes`] reads from the same bytes.
     ///
     /// # Errors
     /// As there; and a texture coordinate (`vt`) that is no number, or a corner that names one that is not there.

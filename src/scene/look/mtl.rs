@@ -171,7 +171,7 @@ fn pair(option: &str, rest: &mut &str, default: [f64; 2]) -> Result<[f64; 2], St
         let Ok(number) = next.parse::<f64>() else {
             break;
         };
-        if !(number.abs() <= MOST) {
+        if number.is_nan() || number.abs() > MOST {
             return Err(format!(
                 "map_Kd {option} {next}; allowed are numbers up to {MOST:e}"
             ));
