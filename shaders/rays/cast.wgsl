@@ -3,9 +3,8 @@
 #import "shared/ssfr_band.wgsl"
 #import "shared/rays_light.wgsl"
 #import "shared/ssfr_store.wgsl"
-#ifdef SPRAY
+#ifdef VOLUME
 #import "shared/ssfr_spray_read.wgsl"
-#import "shared/ssfr_spray_light.wgsl"
 #endif
 
 @group(0) @binding(0) var<uniform> camera: Camera;
@@ -22,12 +21,13 @@
 @group(0) @binding(11) var shadow_map: texture_depth_2d;
 @group(0) @binding(12) var shadow_sampler: sampler_comparison;
 @group(0) @binding(13) var<storage, read_write> output: array<vec4f>;
-#ifdef SPRAY
+#ifdef VOLUME
 @group(0) @binding(14) var<storage, read> spray: array<u32>;
-// Depths of what each ray meets first.
-@group(0) @binding(15) var<storage, read> surface: array<f32>;
-@group(0) @binding(16) var<storage, read> solid_depth: array<f32>;
+// Depth of what each ray meets first.
+@group(0) @binding(15) var<storage, read> first_depth: array<f32>;
+@group(0) @binding(16) var<storage, read> cloud_words: array<u32>;
 @group(0) @binding(20) var<uniform> spray_params: SprayParams;
+@group(0) @binding(21) var<uniform> cloud: Cloud;
 #endif
 #ifdef SEA
 @group(0) @binding(17) var<uniform> sea: Sea;
@@ -41,6 +41,22 @@
 @group(0) @binding(25) var solid_texels: texture_2d<f32>;
 #endif
 
+#ifdef VOLUME
+// Radiance over their cover of drops that were splatted before what the eye's ray meets at `end`: how much of the sun comes to them
+// is known from the grid. Where the grid has none, they are seen at `mean`.
+fn drops_before(direction: vec3f, mean: f32, end: f32, optical_depth: f32) -> vec3f {
+    let passed = cloud_along(camera.position, direction, 0.0, min(end, endless()) + cloud.skin, DROPS);
+    var far = mean;
+    var lit = exp(-cloud_sun_depth(camera.position + direction * mean));
+    if passed.cover > 0.0 {
+        far = passed.far / passed.cover;
+        lit = passed.lit / passed.cover;
+    }
+    let light = drops_radiance(camera.position + direction * far, -direction, optical_depth, lit);
+    return hazed(light, far, direction);
+}
+#endif
+
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= camera.picture.x || id.y >= band.rows {
@@ -51,17 +67,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let ray = eye_ray(camera, vec2f(pixel) + 0.5);
     let direction = normalize(world_direction(camera, ray));
     let inside = is_wet(camera.position);
-#ifdef SPRAY
+#ifdef VOLUME
     // What the ray meets first is known; in air it is taken up a little before.
-    let at = pixel.y * camera.size.x + pixel.x;
-    let known = min(surface[at], solid_depth[at]);
+    let known = first_depth[pixel.y * camera.size.x + pixel.x];
     let start = select(max(known * length(ray) - 2.0 * rays.voxel, 0.0), 0.0, inside || known >= FAR);
     var value = radiance_along(camera.position + direction * start, direction, inside, start);
     let mist = spray_at(vec2f(pixel) + 0.5);
-    if mist.cover > 0.0 {
-        let far = mist.depth * length(ray);
-        let light = spray_radiance(camera.position + direction * far, -direction, mist.optical_depth);
-        let white = hazed(light, far, direction);
+    if mist.cover > 0.0 && !inside {
+        let white = drops_before(direction, min(known, mist.depth) * length(ray), known * length(ray), mist.optical_depth);
         value = mix(value, vec4f(white, 1.0), mist.cover);
         dim_parts(1.0 - mist.cover);
         light_part(WHITE, white * mist.cover);

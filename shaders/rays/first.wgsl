@@ -11,6 +11,10 @@
 // Of the water, or FAR, and of what is opaque before it, or FAR.
 @group(0) @binding(6) var<storage, read_write> depth: array<f32>;
 @group(0) @binding(7) var<storage, read_write> solid_depth: array<f32>;
+#ifdef SPRAY
+// Of either.
+@group(0) @binding(10) var<storage, read_write> first_depth: array<f32>;
+#endif
 #ifdef SEA
 @group(0) @binding(8) var<uniform> sea: Sea;
 @group(0) @binding(9) var<storage, read> sea_values: array<vec4f>;
@@ -28,4 +32,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let found = trace(camera.position, direction, is_wet(camera.position), 0.0);
     depth[at] = select(FAR, found.t / along, found.kind == WATER);
     solid_depth[at] = select(FAR, found.t / along, found.kind == OPAQUE);
+#ifdef SPRAY
+    first_depth[at] = select(found.t / along, FAR, found.kind == SKY);
+#endif
 }

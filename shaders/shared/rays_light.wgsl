@@ -6,6 +6,9 @@
 #import "shared/ssfr_facet.wgsl"
 #import "shared/ssfr_lights.wgsl"
 #import "shared/ssfr_holdout.wgsl"
+#ifdef VOLUME
+#import "shared/rays_cloud_light.wgsl"
+#endif
 
 // Rays that wait while another is followed, and rays of one picture ray in all.
 const WAITING: i32 = 8;
@@ -35,7 +38,7 @@ struct Ray {
 // The part of the picture's light that something belongs to which would be `own` on the ray from the eye: what the first surface
 // mirrors is one part, and so is what comes through it, but for what water scatters.
 fn part_of(ray: Ray, own: u32) -> u32 {
-    let is_own = ray.surfaces == 0u || (ray.part == REFRACTION && own == SCATTERING);
+    let is_own = ray.surfaces == 0u || (ray.part == REFRACTION && (own == WHITE || own == SCATTERING));
     return select(ray.part, own, is_own);
 }
 
@@ -130,6 +133,41 @@ fn opaque_radiance(ray: Ray, found: Found) -> vec3f {
     return radiance_of(Surface(p, n, material_of(found.material), found.triangle), -ray.direction, footprint, depth);
 }
 
+#ifdef VOLUME
+// Adds the light that drops, or bubbles, before what a ray meets at `far` send along it; the part of what is behind that they let
+// through. Drops in air before the eye are splatted instead.
+fn veil(ray: Ray, found: Found, far: f32, light: ptr<function, vec3f>) -> f32 {
+    var kept = 1.0;
+    if ray.inside {
+        let passed = cloud_along(ray.origin, ray.direction, 0.0, far, BUBBLES);
+        if passed.cover > 0.0 {
+            let mean = passed.far / passed.cover;
+            let p = ray.origin + ray.direction * mean;
+            let seen = bubbles_radiance(p, -ray.direction, passed.depth, passed.lit / passed.cover);
+            let white = ray.weight * passed.cover * seen * exp(-(shading.absorption + shading.scattering) * mean);
+            let before = ray.weight * passed.cover * scattered(ray.origin, ray.direction, mean);
+            *light += white + before;
+            light_part(part_of(ray, WHITE), white);
+            light_part(part_of(ray, SCATTERING), before);
+            kept = 1.0 - passed.cover;
+        }
+    } else if ray.surfaces > 0u {
+        let skin = select(0.0, cloud.skin, found.kind == WATER);
+        let passed = cloud_along(ray.origin, ray.direction, 0.0, far + skin, DROPS);
+        if passed.cover > 0.0 {
+            let mean = passed.far / passed.cover;
+            let p = ray.origin + ray.direction * mean;
+            let seen = drops_radiance(p, -ray.direction, passed.depth, passed.lit / passed.cover);
+            let white = ray.weight * passed.cover * hazed(seen, mean, ray.direction);
+            *light += white;
+            light_part(part_of(ray, WHITE), white);
+            kept = 1.0 - passed.cover;
+        }
+    }
+    return kept;
+}
+#endif
+
 // Radiance and coverage along a ray from `origin`, in air or water, that has come `travelled` metres from the eye on its way there
 // and met nothing.
 fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32) -> vec4f {
@@ -148,6 +186,9 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32)
         // The way that leads from the eye is whole, wherever it was taken up.
         let far = min(found.t + select(0.0, ray.travelled, ray.surfaces == 0u), 100.0 * endless());
         var weight = ray.weight;
+#ifdef VOLUME
+        weight *= veil(ray, found, far, &light);
+#endif
         if ray.inside {
             let gained = weight * scattered(ray.origin, ray.direction, far);
             light += gained;

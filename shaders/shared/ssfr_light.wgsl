@@ -5,6 +5,9 @@
 #import "shared/materials.wgsl"
 #endif
 #import "shared/ssfr_optics.wgsl"
+#ifdef VOLUME
+#import "shared/rays_cloud.wgsl"
+#endif
 
 struct Shading {
     // To the sun.
@@ -76,8 +79,19 @@ fn sky_irradiance(n: vec3f) -> vec3f {
     );
 }
 
-// 1 in the sun, 0 in the shadow of a solid. `n` keeps a face out of its own shadow.
+// The part of the sunlight that comes to a place. `n` keeps a face out of its own shadow.
 fn sunlit(world: vec3f, n: vec3f) -> f32 {
+    var seen = unshaded(world, n);
+#ifdef VOLUME
+    if seen > 0.0 {
+        seen *= exp(-cloud_sun_depth(world));
+    }
+#endif
+    return seen;
+}
+
+// 1 in the sun, 0 in the shadow of a solid.
+fn unshaded(world: vec3f, n: vec3f) -> f32 {
     let p = (shading.shadow_from_world * vec4f(world + shading.shadow_offset * n, 1.0)).xyz;
     let uv = vec2f(0.5 * p.x + 0.5, 0.5 - 0.5 * p.y);
     if any(uv <= vec2f(0.0)) || any(uv >= vec2f(1.0)) {

@@ -9,6 +9,7 @@ pub mod bounds;
 pub mod bricks;
 pub mod budget;
 pub mod bvh;
+pub mod cloud;
 pub mod eye;
 pub mod flip;
 pub mod frame_range;

@@ -1,8 +1,8 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Fill, Flow, FlowLevel, Material, Narrow, Particle, Path, Rays, Sea, SetNode,
-    Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater, WhitewaterParams,
+    Band, Camera, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Particle, Path, Rays, Sea,
+    SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater, WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
 
@@ -74,6 +74,12 @@ pub(super) const LEVEL_TABLE: Buf<u32> = Buf::new("level_table");
 pub(super) const LEVEL_VALUES: Buf<f32> = Buf::new("level_values");
 /// Metres that sunlight has gone through water, on a coarse lattice.
 pub(super) const SUN_PATHS: Buf<f32> = Buf::new("sun_paths");
+/// Grid of drops and bubbles.
+pub(super) const CLOUD: Buf<Cloud> = Buf::uniform("cloud");
+/// Its table, the lattice of optical depths towards the sun, and its values, brick by brick.
+pub(super) const CLOUD_WORDS: Buf<u32> = Buf::new("cloud_words");
+/// Depth of what each ray meets first, before which drops are splatted.
+pub(super) const FIRST_DEPTH: Buf<f32> = Buf::new("first_depth");
 /// Tree over what is opaque.
 pub(super) const SET_NODES: Buf<SetNode> = Buf::new("set_nodes");
 /// Its triangles, leaf by leaf.

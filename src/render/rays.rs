@@ -65,7 +65,7 @@ pub(super) fn plan_rays(
 }
 
 /// Depths of the first thing that a ray of each pixel of the padded frame meets: of water into the first of [`DEPTHS`], of what is
-/// opaque into the second.
+/// opaque into the second, and where the look draws spray of either into `FIRST_DEPTH` of [`super::buffers`].
 pub(super) fn first(plan: &Plan) -> Command {
     let binds = vec![
         Bind::whole("depth", &DEPTHS[0]),

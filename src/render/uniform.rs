@@ -236,6 +236,18 @@ mirror!(
 );
 
 mirror!(
+    /// `Cloud` of shared/rays_cloud.wgsl.
+    Cloud {
+        corner: [f32; 3],
+        voxel: f32,
+        bricks: [u32; 3],
+        skin: f32,
+        nodes: [u32; 3],
+        pitch: f32,
+    }
+);
+
+mirror!(
     /// `Sea` of shared/sea.wgsl.
     Sea {
         size: [f32; 3],
@@ -281,6 +293,7 @@ pub fn mirrors() -> Vec<Layout> {
         Tile::layout(),
         Band::layout(),
         Rays::layout(),
+        Cloud::layout(),
         Sea::layout(),
         SetNode::layout(),
     ]

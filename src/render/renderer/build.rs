@@ -9,7 +9,9 @@ use super::{
 use crate::{
     render::{
         RenderError, RenderScene,
-        buffers::{CAMERA, DEPTHS, NEXT_CAMERA, SHADING, SOLID_DEPTH},
+        buffers::{
+            CAMERA, CLOUD, CLOUD_WORDS, DEPTHS, FIRST_DEPTH, NEXT_CAMERA, SHADING, SOLID_DEPTH,
+        },
         camera::longest_focal_px,
         frame::{Extent, bands},
         lighting::{plan_light, shading},
@@ -167,6 +169,12 @@ fn plan_ray(
             &[]
         };
         plan_particles(plan, look, particles, moving);
+    }
+    if has_spray {
+        plan.buffer(&CLOUD, 1);
+        plan.buffer(&CLOUD_WORDS, 1);
+        plan.buffer(&FIRST_DEPTH, plan.extent.pixels());
+        plan.define("rays/first", "SPRAY");
     }
     let mut sample = Vec::new();
     let mut before = Vec::new();

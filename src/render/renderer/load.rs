@@ -62,6 +62,10 @@ impl Renderer {
         if let Some(sea) = &mut self.sea {
             sea.take(&packed, &ways);
         }
+        if let Some(cloud) = &mut self.cloud {
+            let water = (&packed[..], &ways[..]);
+            cloud.take(&self.look, &self.scene, self.plan.radius, water, moment.white);
+        }
         let count = packed.len() as u32;
         self.load_spray(frame, moment);
         if !self.program.has(PARTICLES.name()) {

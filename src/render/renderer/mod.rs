@@ -2,6 +2,7 @@
 
 mod aovs;
 mod build;
+mod cloud;
 mod load;
 mod shade;
 mod splats;
@@ -27,6 +28,7 @@ use crate::gpu::{
 };
 use crate::scene::look::Look;
 use build::room;
+use cloud::RayCloud;
 use shade::draws_spray;
 use water::RayWater;
 use whitewater::Whitewater;
@@ -48,6 +50,8 @@ pub struct Renderer {
     capacity: usize,
     /// `None` where the look casts no rays.
     water: Option<RayWater>,
+    /// `None` where rays meet neither spray nor whitewater.
+    cloud: Option<RayCloud>,
     /// `None` where the look has none.
     sea: Option<Sea>,
     /// `None` where the look draws none.
@@ -96,6 +100,7 @@ impl Renderer {
             program,
             capacity: room(0),
             water: RayWater::of(look, scene),
+            cloud: RayCloud::of(look, scene),
             sea: Sea::of(look, scene),
             whitewater: Whitewater::of(look, scene),
             timer: None,
@@ -257,6 +262,12 @@ impl Renderer {
     fn sample(&mut self, camera: &uniform::Camera, aovs: bool) -> Result<(), RenderError> {
         if let Some(water) = &mut self.water {
             let grew = water.stand_at(camera.seconds, &mut self.program, &self.scene)?;
+            if grew {
+                self.record();
+            }
+        }
+        if let Some(cloud) = &mut self.cloud {
+            let grew = cloud.stand_at(camera.seconds, &mut self.program, &self.scene)?;
             if grew {
                 self.record();
             }

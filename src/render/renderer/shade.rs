@@ -6,7 +6,7 @@ use crate::{
         recording::{Bind, Command, Groups},
     },
     render::{
-        buffers::{BANDS, DEPTHS, OWNER, THICKNESS, TRIANGLES, aovs, objects, picture},
+        buffers::{BANDS, OWNER, THICKNESS, TRIANGLES, aovs, objects, picture},
         plan::Plan,
         uniform::Band,
     },
@@ -70,7 +70,8 @@ fn plan_bands(
 /// Says to the pass that shades the picture what the look does with what is opaque, and which parts of the light it asks for.
 fn plan_output(plan: &mut Plan, look: &Look, pass: &'static str) {
     if draws_spray(look) {
-        plan.define(pass, "SPRAY");
+        let volume = pass == "rays/cast";
+        plan.define(pass, if volume { "VOLUME" } else { "SPRAY" });
     }
     if look.spec().output.solids == SolidsOutput::Holdout {
         plan.define(pass, "HOLDOUT");
@@ -169,12 +170,8 @@ pub(super) fn plan_cast(plan: &mut Plan, look: &Look) -> Shade {
     if wants_spray_aovs(look) {
         plan.define("rays/aovs", "SPRAY");
     }
-    let picture = || {
-        let surface = Bind::whole("surface", &DEPTHS[0]);
-        vec![surface, Bind::whole("solid_depth", &DEPTHS[1])]
-    };
     let passes = ["rays/cast", "rays/aovs"];
-    let mut shade = plan_bands(plan, look, passes, [&picture, &Vec::new]);
+    let mut shade = plan_bands(plan, look, passes, [&Vec::new, &Vec::new]);
     let objects = plan_objects(plan, look, "rays/objects", &Vec::new);
     shade.picture.extend(objects);
     shade

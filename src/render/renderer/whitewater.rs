@@ -1,7 +1,10 @@
 //! Whitewater of a frame on its way to the device.
 
 use crate::{
-    domain::{particles::Particles, whitewater::RADIUS},
+    domain::{
+        particles::Particles,
+        whitewater::{KIND, Kind, RADIUS},
+    },
     gpu::{program::Program, recording::spread},
     render::{
         RenderError, RenderScene,
@@ -9,7 +12,7 @@ use crate::{
         lighting::spray_density,
         uniform,
     },
-    scene::look::Look,
+    scene::look::{Look, MethodSpec},
 };
 
 use super::room;
@@ -20,6 +23,8 @@ const FADING: f64 = 2.0;
 /// How a look draws whitewater.
 pub(super) struct Whitewater {
     params: uniform::WhitewaterParams,
+    /// Whether bubbles are splatted too; rays go through them.
+    has_bubbles: bool,
     /// Whitewater that there is room for.
     capacity: usize,
 }
@@ -35,6 +40,7 @@ impl Whitewater {
                 density: (spec.density_per_metre / spray_density(look).max(1e-30)) as f32,
                 fading: (FADING * scene.particle_spacing) as f32,
             },
+            has_bubbles: look.spec().renderer.method == MethodSpec::Ssfr,
             capacity: 1,
         })
     }
@@ -55,6 +61,9 @@ impl Whitewater {
             if !p.iter().chain(v).chain([&radius]).all(|x| x.is_finite()) {
                 return Err(RenderError::NotFinite { index, frame });
             }
+            if !self.has_bubbles && is_bubble(white, index) {
+                continue;
+            }
             packed.push(uniform::Whitewater {
                 position: [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32),
                 radius,
@@ -74,4 +83,10 @@ impl Whitewater {
         program.upload(WHITEWATER, 0, &packed);
         Ok(grew)
     }
+}
+
+/// Whether a particle of a stream is in the water and not before it; what has no kind is spray.
+pub(super) fn is_bubble(white: &Particles, index: usize) -> bool {
+    let kind = white.attributes.get(KIND).and_then(|all| all.get(index));
+    kind.is_some_and(|&number| Kind::of_number(number) == Some(Kind::Bubble))
 }

@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 40] = [
+const VARIANTS: [&[&str]; 43] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -67,11 +67,15 @@ const VARIANTS: [&[&str]; 40] = [
     &["MATERIALS", "PALETTE", "SEA", "SPRAY", "LIGHTS"],
     &["MATERIALS", "SEA", "SPRAY", "OBJECTS"],
     &["MATERIALS", "SEA", "SPRAY", "AOVS", "FORWARD"],
+    &["VOLUME"],
+    &["VOLUME", "LIGHTS", "HOLDOUT"],
+    &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS"],
 ];
 
-/// `neighbor_list` holds lists, so build_neighbors has no form without them.
+/// `neighbor_list` holds lists, so build_neighbors has no form without them; and rays alone go through a volume.
 fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
-    pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST")
+    let has_lists = pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST");
+    has_lists && (pass.starts_with("rays/") || !defines.contains(&"VOLUME"))
 }
 
 #[test]

@@ -15,6 +15,7 @@ mod sea;
 mod spray;
 pub(super) mod support;
 mod surface;
+mod volume;
 mod water;
 
 pub(crate) use support::{context, spoiled};

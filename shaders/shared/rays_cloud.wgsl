@@ -1,0 +1,140 @@
+// Drops and bubbles as a sparse grid of optical density (`Cloud` of domain/cloud.rs), and what a ray meets of them. Needs the bindings
+// `cloud`, `cloud_words` and `shading` of whoever imports it.
+#import "shared/box.wgsl"
+
+struct Cloud {
+    // Least corner, metres from the domain's.
+    corner: vec3f,
+    // Edge length of a voxel, metres.
+    voxel: f32,
+    // Along each axis.
+    bricks: vec3u,
+    // How far behind the water's surface a ray still meets what floats on it, metres.
+    skin: f32,
+    // Of the lattice of optical depths towards the sun, along each axis.
+    nodes: vec3u,
+    // Metres between them.
+    pitch: f32,
+}
+
+// Voxels along a brick's edge, its nodes, and values.
+const CLOUD_EDGE: u32 = 8u;
+const CLOUD_NODES: u32 = 9u;
+const CLOUD_VALUES: u32 = 729u;
+// In the table, of a brick that has drops; twice that of one that has bubbles.
+const HAS_DROPS: u32 = 0x40000000u;
+// Bricks on a ray's way, at most: more than three edges of the largest grid.
+const MOST_BRICKS: i32 = 4096;
+// Optical depth behind which nothing is seen.
+const DEEPEST: f32 = 12.0;
+// What a grid has of each.
+const DROPS: u32 = 0u;
+const BUBBLES: u32 = 1u;
+
+// What a way through drops meets.
+struct Passed {
+    // Optical depth, and what of it hides: 1 − exp(−depth).
+    depth: f32,
+    cover: f32,
+    // Sums over what is met and seen, of the part of the sunlight that comes to it, and of its distance.
+    lit: f32,
+    far: f32,
+}
+
+fn cloud_words_before_values() -> u32 {
+    return cloud.bricks.x * cloud.bricks.y * cloud.bricks.z + cloud.nodes.x * cloud.nodes.y * cloud.nodes.z;
+}
+
+// Of half precision: its bits, shifted to where those of f32 stand, are the number times 2⁻¹¹².
+fn cloud_value(at: u32, kind: u32) -> f32 {
+    let bits = cloud_words[at] >> (16u * kind) & 0x7fffu;
+    return bitcast<f32>(bits << 13u) * 5.192296858534828e33;
+}
+
+// Density in a brick at `q`, in voxels from its corner.
+fn cloud_density(slot: u32, q: vec3f, kind: u32) -> f32 {
+    let low = clamp(floor(q), vec3f(0.0), vec3f(f32(CLOUD_EDGE - 1u)));
+    let part = q - low;
+    let c = vec3u(low);
+    let y = CLOUD_NODES;
+    let z = CLOUD_NODES * CLOUD_NODES;
+    let i = cloud_words_before_values() + (slot - 1u) * CLOUD_VALUES + c.x + y * c.y + z * c.z;
+    let before = vec4f(
+        cloud_value(i, kind), cloud_value(i + y, kind), cloud_value(i + z, kind), cloud_value(i + y + z, kind));
+    let j = i + 1u;
+    let after = vec4f(
+        cloud_value(j, kind), cloud_value(j + y, kind), cloud_value(j + z, kind), cloud_value(j + y + z, kind));
+    let along_x = mix(before, after, part.x);
+    let along_y = mix(along_x.xz, along_x.yw, part.y);
+    return mix(along_y.x, along_y.y, part.z);
+}
+
+fn shade_node(c: vec3u) -> f32 {
+    let table = cloud.bricks.x * cloud.bricks.y * cloud.bricks.z;
+    return bitcast<f32>(cloud_words[table + (c.z * cloud.nodes.y + c.y) * cloud.nodes.x + c.x]);
+}
+
+// Optical depth of drops and bubbles between a place and the sun: trilinear between the lattice's nodes; from beyond the grid, where
+// the way to the sun comes into it.
+fn cloud_sun_depth(p: vec3f) -> f32 {
+    let size = vec3f(cloud.bricks * CLOUD_EDGE) * cloud.voxel;
+    let local = p - cloud.corner;
+    let span = span_of(size, local, shading.sun_direction);
+    let enter = max(span.x, 0.0);
+    var depth = 0.0;
+    if span.y > enter {
+        let last = vec3f(cloud.nodes - 1u);
+        let at = clamp((local + shading.sun_direction * enter) / cloud.pitch, vec3f(0.0), last);
+        let low = min(floor(at), max(last - 1.0, vec3f(0.0)));
+        let part = at - low;
+        let c = vec3u(low);
+        let d = min(c + 1u, cloud.nodes - 1u);
+        let before = vec4f(
+            shade_node(c), shade_node(vec3u(c.x, d.y, c.z)), shade_node(vec3u(c.xy, d.z)), shade_node(vec3u(c.x, d.yz)));
+        let after = vec4f(
+            shade_node(vec3u(d.x, c.yz)), shade_node(vec3u(d.xy, c.z)), shade_node(vec3u(d.x, c.y, d.z)), shade_node(d));
+        let along_x = mix(before, after, part.x);
+        let along_y = mix(along_x.xz, along_x.yw, part.y);
+        depth = mix(along_y.x, along_y.y, part.z);
+    }
+    return depth;
+}
+
+// What of one kind a ray meets between two distances: brick by brick, a voxel or a little less a step in those that hold some.
+fn cloud_along(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32, kind: u32) -> Passed {
+    let edge = f32(CLOUD_EDGE) * cloud.voxel;
+    let start = origin - cloud.corner;
+    let span = span_of(vec3f(cloud.bricks) * edge, start, direction);
+    let inverse = safe_inverse(direction);
+    let end = min(span.y, to_t);
+    var t = max(span.x, from_t);
+    var passed = Passed(0.0, 0.0, 0.0, 0.0);
+    for (var i = 0; i < MOST_BRICKS && t < end && passed.depth < DEEPEST; i++) {
+        // Just behind the side through which it comes in.
+        let inner = start + direction * (t + 1e-3 * cloud.voxel);
+        let brick = vec3u(clamp(inner / edge, vec3f(0.0), vec3f(cloud.bricks) - 0.5));
+        let corner = vec3f(brick) * edge;
+        let out = (corner + select(vec3f(0.0), vec3f(edge), direction > vec3f(0.0)) - start) * inverse;
+        let leave = min(max(min(out.x, min(out.y, out.z)), t + 1e-3 * cloud.voxel), end);
+        let word = cloud_words[(brick.z * cloud.bricks.y + brick.y) * cloud.bricks.x + brick.x];
+        if (word & (HAS_DROPS << kind)) != 0u {
+            let slot = word & (HAS_DROPS - 1u);
+            let steps = ceil((leave - t) / cloud.voxel);
+            let step = (leave - t) / steps;
+            for (var k = 0.5; k < steps; k += 1.0) {
+                let at = t + k * step;
+                let place = start + direction * at;
+                let own = cloud_density(slot, (place - corner) / cloud.voxel, kind) * step;
+                if own > 0.0 {
+                    let seen = exp(-passed.depth) * (1.0 - exp(-own));
+                    passed.depth += own;
+                    passed.lit += seen * exp(-cloud_sun_depth(place + cloud.corner));
+                    passed.far += seen * at;
+                }
+            }
+        }
+        t = leave;
+    }
+    passed.cover = 1.0 - exp(-passed.depth);
+    return passed;
+}

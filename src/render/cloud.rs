@@ -1,0 +1,109 @@
+//! Drops and bubbles of a frame as rays go through them: their clouds, and the grid of a moment as the device has it.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+
+use super::{
+    RenderScene,
+    paths::Path,
+    uniform::{self, Particle},
+};
+use crate::{
+    domain::{
+        cloud::{Cloud, Drop, shade::Shade},
+        particles::Particles,
+        whitewater::RADIUS,
+    },
+    scene::look::Look,
+};
+
+/// Radius of a ball with the mean square distance of the drops that are splatted for a particle, in splat radii: drops lie anywhere up
+/// to 1.2 radii from it, at a mean square of 0.48, and have a third of a radius of their own.
+const THROWN: f64 = 0.94;
+/// How far behind the water's surface a ray still meets what floats on it, particle spacings: what the grid smears across it.
+pub(super) const SKIN: f64 = 1.0;
+
+/// Drops of particles that the look whitens, and how they go; without `paths` straight on. `radius` is that of a splat, metres.
+pub(super) fn drops_of(
+    look: &Look,
+    scene: &RenderScene,
+    radius: f64,
+    (particles, paths): (&[Particle], &[Path]),
+) -> Vec<(Drop, Path)> {
+    let Some(spray) = &look.spec().water.spray else {
+        return Vec::new();
+    };
+    let volume = scene.particle_spacing.powi(3);
+    let white = (particles.iter().enumerate()).filter(|(_, particle)| particle.air & 0xffff > 0);
+    white
+        .map(|(index, particle)| {
+            let air = f64::from(particle.air & 0xffff) / 65535.0;
+            let drop = Drop {
+                place: Vec3::from(particle.position).as_dvec3(),
+                radius: THROWN * radius,
+                area: spray.density_per_metre * air * volume,
+                is_bubble: false,
+            };
+            let straight = || Path::straight(particle.velocity.into());
+            (drop, paths.get(index).copied().unwrap_or_else(straight))
+        })
+        .collect()
+}
+
+/// Drops and bubbles of whitewater; `is_bubble` tells them apart by index.
+pub(super) fn white_of(
+    look: &Look,
+    scene: &RenderScene,
+    white: &Particles,
+    is_bubble: impl Fn(usize) -> bool,
+) -> Vec<(Drop, Path)> {
+    let Some(spec) = &look.spec().whitewater else {
+        return Vec::new();
+    };
+    let origin = scene.domain.min;
+    let radii = white.attributes.get(RADIUS).map_or(&[][..], Vec::as_slice);
+    let places = white.position.iter().zip(&white.velocity).zip(radii);
+    (places.enumerate())
+        .map(|(index, ((&place, &velocity), &radius))| {
+            let radius = spec.size * f64::from(radius);
+            let drop = Drop {
+                place: Vec3::from(place).as_dvec3() - origin,
+                radius,
+                area: spec.density_per_metre * 4.0 / 3.0 * PI * radius.powi(3),
+                is_bubble: is_bubble(index),
+            };
+            (drop, Path::straight(velocity.into()))
+        })
+        .collect()
+}
+
+/// The grid of a moment as the device has it: what it is, and its words.
+pub(super) fn grid(
+    drops: &[(Drop, Path)],
+    seconds: f32,
+    scene: &RenderScene,
+    (voxel, sun): (f64, DVec3),
+) -> (uniform::Cloud, Vec<u32>) {
+    let moved: Vec<Drop> = drops
+        .iter()
+        .map(|(drop, path)| Drop {
+            place: drop.place + path.way(seconds),
+            ..*drop
+        })
+        .collect();
+    let cloud = Cloud::new(&moved, scene.domain.size(), voxel);
+    let shade = Shade::new(&cloud, sun);
+    let about = uniform::Cloud {
+        corner: cloud.corner.as_vec3().to_array(),
+        voxel: voxel as f32,
+        bricks: cloud.bricks,
+        skin: (SKIN * scene.particle_spacing) as f32,
+        nodes: shade.nodes,
+        pitch: shade.pitch as f32,
+    };
+    let mut words = cloud.table;
+    words.extend(shade.depths.iter().map(|depth| depth.to_bits()));
+    words.extend_from_slice(&cloud.values);
+    (about, words)
+}

@@ -1,0 +1,87 @@
+//! Drops and bubbles that rays go through, on their way to the device.
+
+use glam::DVec3;
+
+use super::{room, shade::draws_spray, whitewater::is_bubble};
+use crate::{
+    domain::{cloud::Drop, particles::Particles},
+    gpu::program::Program,
+    render::{
+        RenderError, RenderScene,
+        buffers::{CLOUD, CLOUD_WORDS},
+        cloud::{drops_of, grid, white_of},
+        paths::Path,
+        rays::voxel,
+        uniform::Particle,
+    },
+    scene::look::{Look, MethodSpec},
+};
+
+/// A frame's drops and bubbles, and the grid of them that the device holds.
+pub(super) struct RayCloud {
+    /// Where they are and how they go.
+    drops: Vec<(Drop, Path)>,
+    /// Seconds from the frame at which the grid on the device stands; `None` before there is one of this frame.
+    seconds: Option<f32>,
+    /// Words that there is room for.
+    capacity: usize,
+    /// Edge length of a voxel, metres.
+    voxel: f64,
+    /// To it.
+    sun: DVec3,
+}
+
+impl RayCloud {
+    /// `None` where the look casts no rays, or draws neither spray nor whitewater.
+    pub(super) fn of(look: &Look, scene: &RenderScene) -> Option<Self> {
+        let is_drawn = look.spec().renderer.method == MethodSpec::Ray && draws_spray(look);
+        is_drawn.then(|| Self {
+            drops: Vec::new(),
+            seconds: None,
+            capacity: 1,
+            voxel: voxel(look, scene),
+            sun: look.sun_direction(),
+        })
+    }
+
+    /// Takes a frame's particles, of whose splats `radius` is the radius in metres, and its whitewater; without `paths` they go straight on.
+    pub(super) fn take(
+        &mut self,
+        look: &Look,
+        scene: &RenderScene,
+        radius: f64,
+        water: (&[Particle], &[Path]),
+        white: &Particles,
+    ) {
+        self.drops = drops_of(look, scene, radius, water);
+        let of_white = white_of(look, scene, white, |index| is_bubble(white, index));
+        self.drops.extend(of_white);
+        self.seconds = None;
+    }
+
+    /// Has the device hold the grid of so many seconds from the frame; whether a buffer is a new one.
+    pub(super) fn stand_at(
+        &mut self,
+        seconds: f32,
+        program: &mut Program,
+        scene: &RenderScene,
+    ) -> Result<bool, RenderError> {
+        if self.seconds == Some(seconds) {
+            return Ok(false);
+        }
+        let (about, words) = grid(&self.drops, seconds, scene, (self.voxel, self.sun));
+        let grew = words.len() > self.capacity;
+        if grew {
+            self.capacity = room(words.len());
+            let most = program.context.limits.max_storage_buffer_binding_size / 4;
+            if self.capacity as u64 > most {
+                self.capacity = words.len();
+            }
+            program.refit(&[CLOUD_WORDS.sized(self.capacity)], &[])?;
+        }
+        program.upload(CLOUD, 0, &[about]);
+        program.upload(CLOUD_WORDS, 0, &words);
+        self.seconds = Some(seconds);
+        Ok(grew)
+    }
+}
