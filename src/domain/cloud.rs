@@ -120,9 +120,7 @@ impl Cloud {
     /// the domain than it is long is left out.
     pub fn new(drops: &[Drop], size: DVec3, voxel: f64) -> Self {
         let is_near = |drop: &&Drop| {
-            drop.area > 0.0
-                && drop.place.cmpgt(-size).all()
-                && drop.place.cmplt(2.0 * size).all()
+            drop.area > 0.0 && drop.place.cmpgt(-size).all() && drop.place.cmplt(2.0 * size).all()
         };
         let near: Vec<Drop> = drops.iter().filter(is_near).copied().collect();
         let edge = voxel * f64::from(EDGE);
@@ -130,9 +128,9 @@ impl Cloud {
         let low = near
             .iter()
             .fold(DVec3::INFINITY, |low, it| low.min(it.place - reach(it)));
-        let high = near
-            .iter()
-            .fold(DVec3::NEG_INFINITY, |high, it| high.max(it.place + reach(it)));
+        let high = near.iter().fold(DVec3::NEG_INFINITY, |high, it| {
+            high.max(it.place + reach(it))
+        });
         if near.is_empty() {
             return Self {
                 corner: DVec3::ZERO,
@@ -168,8 +166,9 @@ impl Cloud {
                 let row = move |y: u32, z: u32| (z.min(nz - 1) * ny + y.min(ny - 1)) * nx;
                 zs.flat_map(move |z| {
                     let xs = xs.clone();
-                    ys.clone()
-                        .flat_map(move |y| xs.clone().map(move |x| (row(y, z) + x.min(nx - 1), index)))
+                    ys.clone().flat_map(move |y| {
+                        xs.clone().map(move |x| (row(y, z) + x.min(nx - 1), index))
+                    })
                 })
             })
             .collect();
@@ -183,7 +182,9 @@ impl Cloud {
         for (group, values) in groups.iter().zip(filled) {
             self.values.extend(values);
             let slot = (self.values.len() / VALUES) as u32;
-            let kinds = group.iter().map(|&(_, of)| usize::from(spreads[of as usize].is_bubble));
+            let kinds = group
+                .iter()
+                .map(|&(_, of)| usize::from(spreads[of as usize].is_bubble));
             let has = kinds.fold(0, |bits, kind| bits | HAS[kind]);
             self.table[group[0].0 as usize] = slot | has;
         }
@@ -206,13 +207,16 @@ impl Cloud {
                     let row = ((z - first[2]) * NODES + y - first[1]) * NODES;
                     for x in xs.clone() {
                         let weight = spread.weight([x, y, z]) as f32;
-                        sums[(row + x - first[0]) as usize][usize::from(spread.is_bubble)] += weight;
+                        sums[(row + x - first[0]) as usize][usize::from(spread.is_bubble)] +=
+                            weight;
                     }
                 }
             }
         }
         let bits = |x: f32| u32::from(f16::from_f32(x).to_bits());
-        sums.iter().map(|[a, b]| bits(*a) | bits(*b) << 16).collect()
+        sums.iter()
+            .map(|[a, b]| bits(*a) | bits(*b) << 16)
+            .collect()
     }
 
     /// Extent of the grid, metres.

@@ -70,7 +70,10 @@ fn a_drop_has_the_spread_of_its_ball() {
     }
     // Of a ball 3/5 r²; trilinear filtering adds a quarter of a voxel's square a axis.
     let expected = 0.6 * radius * radius + 3.0 * 0.25 * VOXEL * VOXEL;
-    assert!((square / expected - 1.0).abs() < 0.02, "{square} {expected}");
+    assert!(
+        (square / expected - 1.0).abs() < 0.02,
+        "{square} {expected}"
+    );
 }
 
 /// A level layer of drops, as even as the kernels make it.
@@ -98,11 +101,17 @@ fn a_slab_shades_as_deep_as_it_is() {
         let [nx, ny, nz] = shade.nodes.map(|n| n as usize);
         let found = f64::from(shade.depths[(nz / 2 * ny) * nx + nx / 4]);
         // The lowest plane of the middle is far from the sides: kernels and half precision are what is left.
-        assert!((found * sin / depth - 1.0).abs() < 0.01, "{degrees}°: {found}");
+        assert!(
+            (found * sin / depth - 1.0).abs() < 0.01,
+            "{degrees}°: {found}"
+        );
         let off = Shade::new(&cloud, DVec3::new(cos, 1.1 * sin, 0.0).normalize());
         let off = f64::from(off.depths[(nz / 2 * ny) * nx + nx / 4]);
         let is_steep = degrees == 90.0;
-        assert!(is_steep || (off * sin / depth - 1.0).abs() > 0.01, "the control: {off}");
+        assert!(
+            is_steep || (off * sin / depth - 1.0).abs() > 0.01,
+            "the control: {off}"
+        );
     }
 }
 
@@ -119,6 +128,9 @@ fn nothing_makes_an_empty_brick_and_order_does_not_matter() {
         ..far[0]
     });
     assert_eq!(Cloud::new(&far, SIZE, VOXEL), near);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
     assert_eq!(pool.install(|| Cloud::new(&far, SIZE, VOXEL)), near);
 }

@@ -64,7 +64,13 @@ impl Renderer {
         }
         if let Some(cloud) = &mut self.cloud {
             let water = (&packed[..], &ways[..]);
-            cloud.take(&self.look, &self.scene, self.plan.radius, water, moment.white);
+            cloud.take(
+                &self.look,
+                &self.scene,
+                self.plan.radius,
+                water,
+                moment.white,
+            );
         }
         let count = packed.len() as u32;
         self.load_spray(frame, moment);
