@@ -1,12 +1,13 @@
 """Runs in Blender on a .blend that tools/blender/import_swell.py saved: what stands there, against the cache. See tools/lib/blender-import.
 
 What is expected is read by numpy from the frame files, and turned here by the words of docs/interchange.md: (x, y, z) becomes (x, -z, y).
-With a second argument one thing is expected wrongly, and the run has to fail: `axes`, `handed`, `frame` or `velocity`.
+The second argument is `tank` or `exported`, the .blend's name. With a third one thing is expected wrongly, and the run has to fail: `axes`, `handed`, `frame` or `velocity`.
 """
 
 import sys
 from pathlib import Path
 
+import bmesh
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -16,7 +17,8 @@ TOLERANCE = 2.0**-21
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]])
 
 room = Path(sys.argv[sys.argv.index("--") + 1])
-spoiled = (sys.argv[sys.argv.index("--") + 2 :] or [""])[0]
+scene_name = sys.argv[sys.argv.index("--") + 2]
+spoiled = (sys.argv[sys.argv.index("--") + 3 :] or [""])[0]
 failures = []
 
 
@@ -168,11 +170,40 @@ def check_solid():
     check(len(found) == 8 and apart <= 1e-6, f"the solid is off by {apart}")
 
 
+def check_exported(number, cache):
+    """Meshes of `swell export`: they stand about the particles, hold their volume, and are not mirrored, which would make it negative."""
+    [mesh] = [mesh for mesh in seen("MESH", "tank mesh.") if len(mesh.data.vertices) > 0]
+    check(mesh.name == f"tank mesh.{number:04}", f"frame {number}: {mesh.name} is seen")
+    water = rows(cache / f"frames/tank.{number + (spoiled == 'frame'):04}.ply")
+    position = turn(*(water[axis] for axis in "xyz"))
+    vertices = np.empty(3 * len(mesh.data.vertices), dtype=np.float32)
+    mesh.data.vertices.foreach_get("co", vertices)
+    vertices = vertices.reshape(-1, 3)
+    # Particles are half a spacing of 0.1 m within the surface, and the kernels a little off that.
+    off = np.abs([vertices.min(axis=0) - position.min(axis=0) + 0.05, vertices.max(axis=0) - position.max(axis=0) - 0.05]).max()
+    check(off < 0.05, f"frame {number}: the mesh is off the particles' box by {off} m")
+    shape = bmesh.new()
+    shape.from_mesh(mesh.data)
+    volume = shape.calc_volume(signed=True) / (len(water) * 0.1**3)
+    shape.free()
+    check(abs(volume - 1.0) < 0.05, f"frame {number}: the mesh holds {volume} of the particles' volume")
+    # Of water that falls together, mesh and particles have about the same mean velocity.
+    velocity = values(mesh.data, "velocity", "vector", 3).mean(axis=0)
+    mean = turn(*(water[axis] for axis in ("vx", "vy", "vz"))).mean(axis=0) * (2.0 if spoiled == "velocity" else 1.0)
+    check(np.abs(velocity - mean).max() < 0.25 * np.abs(mean).max(), f"frame {number}: velocities {velocity} of the mesh, {mean} of the particles")
+
+
 def main():
     cache = room / "cache"
     if not bpy.data.filepath:
         # Blender as a module of Python opens no file by itself.
-        bpy.ops.wm.open_mainfile(filepath=str(room / "tank.blend"))
+        bpy.ops.wm.open_mainfile(filepath=str(room / f"{scene_name}.blend"))
+    if scene_name == "exported":
+        for number in (2, 3, 4, 5, 3):
+            bpy.context.scene.frame_set(number)
+            check_exported(number, cache)
+        print(f"blender import: {len(failures)} faults")
+        return
     scene = bpy.context.scene
     check(abs(scene.render.fps / scene.render.fps_base - 24.0) < 1e-6, f"{scene.render.fps}/{scene.render.fps_base} frames a second")
     check((scene.frame_start, scene.frame_end) == (2, 5), f"scene frames {scene.frame_start} to {scene.frame_end}")
