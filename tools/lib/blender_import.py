@@ -7,9 +7,10 @@ The second argument is `tank` or `exported`, the .blend's name. With a third one
 import sys
 from pathlib import Path
 
-import bmesh
 import bpy
 import numpy as np
+# As modules of Python both stand behind bpy.
+import bmesh
 from mathutils import Vector
 
 # Half of the last of a float's 24 bits, of coordinates below 4 m and speeds below 16 m/s.
