@@ -1,6 +1,7 @@
 // Nearest sphere surface at each pixel, or with ELLIPSOIDS that of ellipsoids. One workgroup a particle: its threads share the pixels.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
+#import "shared/ssfr_lanes.wgsl"
 #import "shared/ssfr_moved.wgsl"
 #ifdef ELLIPSOIDS
 #import "shared/ssfr_ellipsoid.wgsl"
@@ -18,7 +19,7 @@
 @group(0) @binding(5) var<storage, read> shapes: array<Shape>;
 #endif
 
-@compute @workgroup_size(32)
+@compute @workgroup_size(LANES)
 fn main(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
@@ -45,7 +46,7 @@ fn main(
 #endif
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
-    for (var i = lane; i < count; i += 32u) {
+    for (var i = lane; i < count; i += LANES) {
         let row = row_of(i, width);
         let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let at = pixel.y * camera.size.x + pixel.x;

@@ -1,6 +1,7 @@
 // Which particle's sphere, or with ELLIPSOIDS whose ellipsoid, is the nearest at each pixel: the least index among those at the nearest depth.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
+#import "shared/ssfr_lanes.wgsl"
 #ifdef ELLIPSOIDS
 #import "shared/ssfr_ellipsoid.wgsl"
 #endif
@@ -13,7 +14,7 @@
 @group(0) @binding(4) var<storage, read> shapes: array<Shape>;
 #endif
 
-@compute @workgroup_size(32)
+@compute @workgroup_size(LANES)
 fn main(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
@@ -38,7 +39,7 @@ fn main(
 #endif
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
-    for (var i = lane; i < count; i += 32u) {
+    for (var i = lane; i < count; i += LANES) {
         let row = row_of(i, width);
         let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let at = pixel.y * camera.size.x + pixel.x;

@@ -1,6 +1,7 @@
 // Aerated water near or before the surface, at half resolution: what whitens it.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
+#import "shared/ssfr_lanes.wgsl"
 #import "shared/ssfr_moved.wgsl"
 #import "shared/ssfr_spray_add.wgsl"
 
@@ -47,7 +48,7 @@ fn offset_of(id: u32, k: u32) -> vec3f {
     return CLOUD * random(id, 3u * k + 2u) * vec3f(across * cos(turn), up, across * sin(turn));
 }
 
-@compute @workgroup_size(32)
+@compute @workgroup_size(LANES)
 fn main(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
@@ -80,7 +81,7 @@ fn main(
     let cubes = m * m * m + m * m * n + 0.6 * m * n * n + n * n * n / 7.0
         - part * part * (6.0 * m * m * n + 12.0 * m * n * n + 6.0 * n * n * n) / 24.0;
     let volume = air / (cubes * f32(count)) * finer * finer * finer;
-    for (var k = lane; k < count; k += 32u) {
+    for (var k = lane; k < count; k += LANES) {
         let q = (f32(k) + 0.5) * part;
         let own = camera.radius * (m + n * q * q) / finer;
         let d = c + offset_of(id, k) * camera.radius;

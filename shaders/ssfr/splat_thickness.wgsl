@@ -2,6 +2,7 @@
 // scaled so that their sum over a bulk lattice is the length of the way.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
+#import "shared/ssfr_lanes.wgsl"
 #import "shared/ssfr_moved.wgsl"
 
 struct ThicknessParams {
@@ -21,7 +22,7 @@ struct ThicknessParams {
 @group(0) @binding(5) var<storage, read> paths: array<Path>;
 #endif
 
-@compute @workgroup_size(32)
+@compute @workgroup_size(LANES)
 fn main(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
@@ -41,7 +42,7 @@ fn main(
     let bounds = sphere_bounds(camera, c, radius, 0.5, half_size);
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
-    for (var i = lane; i < count; i += 32u) {
+    for (var i = lane; i < count; i += LANES) {
         let row = row_of(i, width);
         let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let hit = hit_sphere(eye_ray(camera, 2.0 * vec2f(pixel) + 1.0), c, radius);

@@ -38,6 +38,8 @@ pub(super) const PARTICLES: Buf<Particle> = Buf::new("particles");
 pub(super) const PATHS: Buf<Path> = Buf::new("paths");
 /// What each of them is splatted as.
 pub(super) const SHAPES: Buf<Shape> = Buf::new("shapes");
+/// Workgroups of a dispatch of one a particle that may be seen; these stand first.
+pub(super) const SEEN_GROUPS: Buf<Workgroups> = Buf::new("seen_groups");
 /// Workgroups of a dispatch of one a particle.
 pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
 /// What a particle adds to thickness.

@@ -13,6 +13,7 @@ mod cloud;
 pub mod colour;
 pub mod cryptomatte;
 mod frame;
+mod hidden;
 pub mod image;
 mod lighting;
 mod materials;

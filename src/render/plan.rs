@@ -23,6 +23,8 @@ pub struct Limits {
     pub texture: u32,
     /// Pixels along a side of what is drawn at once: bands of the picture, tiles of the solids.
     pub tile: u32,
+    /// Whether it runs no more than eight threads in step, as software adapters do.
+    pub is_narrow: bool,
 }
 
 impl Limits {
@@ -33,6 +35,7 @@ impl Limits {
             storage: (limits.max_storage_buffer_binding_size).min(limits.max_buffer_size),
             texture: limits.max_texture_dimension_2d,
             tile: limits.max_texture_dimension_2d,
+            is_narrow: context.info.subgroup_min_size <= 8,
         }
     }
 }
@@ -209,6 +212,7 @@ mod tests {
         storage: 1 << 27,
         texture: 8192,
         tile: 64,
+        is_narrow: false,
     };
 
     fn plan(surface: &str, more: &str) -> Plan {

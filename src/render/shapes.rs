@@ -24,30 +24,35 @@ pub(super) const RADIUS: f64 = 0.87;
 /// Least half axis, spacings: half of what a sheet of one layer of particles is thick in the kernels' field.
 const THINNEST: f64 = 0.35;
 
-/// Shapes of particles, relative to the domain's least corner, in their order; those that were thrown clear have that of a lone one.
-/// `radius` is the look's, metres.
-pub(super) fn shapes(particles: &[Particle], scene: &RenderScene, radius: f64) -> Vec<Shape> {
-    let places: Vec<DVec3> = particles
-        .iter()
-        .filter(|particle| particle.tag & 1 == 1)
+/// Shapes of particles, relative to the domain's least corner, in their order; those that were thrown clear have that of a lone one,
+/// and so have all but the first `seen`. `radius` is the look's, metres.
+pub(super) fn shapes(
+    particles: &[Particle],
+    seen: usize,
+    scene: &RenderScene,
+    radius: f64,
+) -> Vec<Shape> {
+    let is_body = |particle: &&Particle| particle.tag & 1 == 1;
+    let places: Vec<DVec3> = (particles.iter().filter(is_body))
         .map(|particle| Vec3::from(particle.position).as_dvec3())
         .collect();
+    let shaped = particles[..seen].iter().filter(is_body).count();
     let spacing = scene.particle_spacing;
-    let kernels = Kernels::of_first(places.len(), &places, scene.domain.size(), spacing);
+    let kernels = Kernels::of_first(shaped, &places, scene.domain.size(), spacing);
     // A ball of d³ over a lone particle's kernel, and the look's radius over that of looks that leave it out.
     let factor = (3.0 / (4.0 * PI)).cbrt() / ALONE * radius / (RADIUS * spacing);
     let thinnest = THINNEST * radius / RADIUS;
     let fitted: Vec<Shape> = (kernels.par_iter())
         .map(|kernel| shape(kernel, factor, thinnest))
         .collect();
-    let mut fitted = fitted.into_iter();
     let ball = (factor * ALONE * spacing) as f32;
     let alone = Shape {
         diagonal: [ball; 3],
         ..Shape::default()
     };
+    let mut fitted = fitted.into_iter();
     let of = |particle: &Particle| match particle.tag & 1 {
-        1 => fitted.next().unwrap_or_default(),
+        1 => fitted.next().unwrap_or(alone),
         _ => alone,
     };
     particles.iter().map(of).collect()
@@ -102,7 +107,7 @@ mod tests {
             wave_makers: Vec::new(),
             waves: None,
         };
-        shapes(&particles, &scene, RADIUS * D)
+        shapes(&particles, particles.len(), &scene, RADIUS * D)
     }
 
     /// A lone particle is a ball of its volume, one of a calm surface lies flat in it, one within the water is round.

@@ -4,6 +4,7 @@ use super::{
     shade::{plan_cast, plan_shade, wants_spray_aovs},
     splats::{
         plan_body, plan_owner, plan_owner_before_rays, plan_particles, plan_shapes, plan_spray,
+        plan_threads,
     },
 };
 use crate::{
@@ -106,6 +107,7 @@ impl Plan {
             MethodSpec::Ssfr => plan_ssfr(&mut plan, look, scene, (&set, particles), limits),
             MethodSpec::Ray => plan_ray(&mut plan, look, scene, (&set, particles)),
         }
+        plan_threads(&mut plan, limits);
         plan.end_fills();
         Ok(plan)
     }

@@ -10,8 +10,9 @@ use crate::{
     render::{
         Moment, RenderError,
         aeration::{self, CLEAR},
-        buffers::{PARTICLE_GROUPS, PARTICLES, PATHS, SHAPES, SPRAY_PARAMS},
+        buffers::{PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES, SPRAY_PARAMS},
         camera::pose,
+        hidden::hidden,
         lighting::spray_density,
         paths::{Path, paths},
         shapes::shapes,
@@ -78,13 +79,15 @@ impl Renderer {
             let ahead = Vec::new();
             return Ok(Loaded { count, ahead });
         }
-        self.sort(frame, &mut packed, &mut ways);
+        let seen = self.sort(frame, &mut packed, &mut ways);
         self.reserve(packed.len())?;
-        let groups = spread(&self.program.context, 1, packed.len() as u64);
-        self.program.upload(PARTICLE_GROUPS, 0, &[groups.into()]);
+        for (buffer, threads) in [(PARTICLE_GROUPS, packed.len()), (SEEN_GROUPS, seen)] {
+            let groups = spread(&self.program.context, 1, threads as u64);
+            self.program.upload(buffer, 0, &[groups.into()]);
+        }
         self.program.upload(PARTICLES, 0, &packed);
         if self.program.has(SHAPES.name()) {
-            let shapes = shapes(&packed, &self.scene, self.plan.radius);
+            let shapes = shapes(&packed, seen, &self.scene, self.plan.radius);
             self.program.upload(SHAPES, 0, &shapes);
         }
         if self.program.has(PATHS.name()) {
@@ -125,23 +128,37 @@ impl Renderer {
         Ok(packed)
     }
 
-    /// Front to back, so that splats find what hides them already there.
-    fn sort(&self, frame: u32, packed: &mut Vec<Particle>, ways: &mut Vec<Path>) {
+    /// First those that may be seen, and says how many; front to back, so that splats find what hides them already there.
+    fn sort(&self, frame: u32, packed: &mut Vec<Particle>, ways: &mut Vec<Path>) -> usize {
         let rate = self.scene.frames_per_second;
         let forward = pose(&self.look, frame.into(), rate).forward.as_vec3();
         let depth = |p: &Particle| Vec3::from(p.position).dot(forward);
-        let mut order: Vec<(f32, u32, u32)> = (packed.par_iter().zip(0u32..packed.len() as u32))
-            .map(|(particle, index)| (depth(particle), particle.tag, index))
+        // Rays may begin under water, where what the water hides from above is seen.
+        let hidden = match self.look.spec().renderer.method {
+            MethodSpec::Ssfr => hidden(
+                packed,
+                self.scene.domain.size(),
+                self.scene.particle_spacing,
+            ),
+            MethodSpec::Ray => vec![false; packed.len()],
+        };
+        let mut order: Vec<(bool, f32, u32, u32)> = (0u32..packed.len() as u32)
+            .into_par_iter()
+            .map(|index| {
+                let particle = &packed[index as usize];
+                (hidden[index as usize], depth(particle), particle.tag, index)
+            })
             .collect();
         order.par_sort_unstable_by(|a, b| {
-            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2))
+            (a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).then((a.2, a.3).cmp(&(b.2, b.3)))
         });
-        let sorted = order.iter().map(|&(_, _, index)| packed[index as usize]);
+        let sorted = order.iter().map(|&(_, _, _, index)| packed[index as usize]);
         *packed = sorted.collect();
         if !ways.is_empty() {
-            let sorted = order.iter().map(|&(_, _, index)| ways[index as usize]);
+            let sorted = order.iter().map(|&(_, _, _, index)| ways[index as usize]);
             *ways = sorted.collect();
         }
+        order.partition_point(|&(is_hidden, ..)| !is_hidden)
     }
 
     /// Makes room for so many particles.

@@ -8,19 +8,43 @@ use crate::{
     },
     render::{
         buffers::{
-            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, PATHS, SHAPES, SPRAY, SPRAY_PARAMS,
-            THICKNESS, THICKNESS_PARAMS, WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS,
+            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES, SPRAY,
+            SPRAY_PARAMS, THICKNESS, THICKNESS_PARAMS, WHITEWATER, WHITEWATER_GROUPS,
+            WHITEWATER_PARAMS,
         },
         frame::FAR,
-        plan::Plan,
+        plan::{Limits, Plan},
         uniform::Thickness,
     },
     scene::look::Look,
 };
 
+/// Passes with a workgroup a particle.
+const OVER_PARTICLES: [&str; 5] = [
+    "ssfr/splat_depth",
+    "ssfr/splat_owner",
+    "ssfr/splat_thickness",
+    "ssfr/splat_spray",
+    "ssfr/splat_spray_aovs",
+];
+
+/// Tells them how many threads share a particle.
+pub(super) fn plan_threads(plan: &mut Plan, limits: &Limits) {
+    if limits.is_narrow {
+        for pass in OVER_PARTICLES {
+            plan.define(pass, "NARROW");
+        }
+    }
+}
+
 /// A pass over particles.
 fn over_particles(pass: &'static str, binds: Vec<Bind>) -> Command {
     Command::in_groups(pass, Groups::at(&PARTICLE_GROUPS, 0), binds)
+}
+
+/// A pass over those that may be seen.
+fn over_seen(pass: &'static str, binds: Vec<Bind>) -> Command {
+    Command::in_groups(pass, Groups::at(&SEEN_GROUPS, 0), binds)
 }
 
 /// Plans `particles` particles. Where the shutter is open `moving` passes, which draw samples, take them along their paths.
@@ -32,6 +56,7 @@ pub(super) fn plan_particles(
 ) {
     plan.buffer(&PARTICLES, particles);
     plan.buffer(&PARTICLE_GROUPS, 1);
+    plan.buffer(&SEEN_GROUPS, 1);
     if look.spec().image.shutter > 0.0 && !moving.is_empty() {
         plan.buffer(&PATHS, particles);
         for pass in moving {
@@ -66,7 +91,7 @@ pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
     vec![
         plan.fill(&DEPTHS[0], FAR.to_bits(), pixels),
         Command::clear(&THICKNESS),
-        over_particles("ssfr/splat_depth", Vec::new()),
+        over_seen("ssfr/splat_depth", Vec::new()),
         over_particles("ssfr/splat_thickness", vec![params]),
     ]
 }
@@ -77,7 +102,7 @@ pub(super) fn plan_owner(plan: &mut Plan) -> Vec<Command> {
     plan.buffer(&OWNER, pixels);
     vec![
         plan.fill(&OWNER, u32::MAX, pixels),
-        over_particles("ssfr/splat_owner", Vec::new()),
+        over_seen("ssfr/splat_owner", Vec::new()),
     ]
 }
 
@@ -87,7 +112,7 @@ pub(super) fn plan_owner_before_rays(plan: &mut Plan) -> Vec<Command> {
     let opaque = Bind::whole("solid_depth", &DEPTHS[1]);
     let depth = vec![
         plan.fill(&DEPTHS[0], FAR.to_bits(), pixels),
-        over_particles("ssfr/splat_depth", vec![opaque]),
+        over_seen("ssfr/splat_depth", vec![opaque]),
     ];
     [depth, plan_owner(plan)].concat()
 }

@@ -52,6 +52,7 @@ const COMMON_LIMITS: Limits = Limits {
     storage: 128 << 20,
     texture: 8192,
     tile: 8192,
+    is_narrow: false,
 };
 
 /// Plans what `look` needs to render `subject`, without allocating or compiling anything.

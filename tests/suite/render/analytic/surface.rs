@@ -292,3 +292,54 @@ fn motion_is_blurred_over_the_shutters_part_of_a_frame() {
         assert!(error(shutter).abs() > 6e-3, "{length}");
     }
 }
+
+/// A block of water of 24 × 14 × 24 particles a quarter of a metre apart, without those that are more than `shell` layers in.
+fn hollow(shell: i32) -> Particles {
+    let [nx, ny, nz] = [24, 14, 24];
+    let mut seed = 11u32;
+    let mut random = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(seed >> 8) / 16_777_216.0 - 0.5
+    };
+    let mut water = Particles::default();
+    for k in 0..nx * ny * nz {
+        let cell = [k % nx, k / nx % ny, k / (nx * ny)];
+        let place = cell.map(|c| 0.25 * (f64::from(c) + 0.5 + 0.4 * random()));
+        let layer = |axis: usize, n: i32| cell[axis].min(n - 1 - cell[axis]);
+        if layer(0, nx).min(layer(1, ny)).min(layer(2, nz)) < shell {
+            let at = DVec3::from(place) + DVec3::new(2.0, 1.0, 2.0);
+            water.position.push(at.as_vec3().to_array());
+            water.velocity.push([0.0; 3]);
+            water.id.push(k as u32);
+        }
+    }
+    water
+}
+
+/// Particles that others hide are not splatted, and no pixel tells: a block and one whose middle is empty, where a
+/// particle's shape depends on neighbours within three layers.
+#[test]
+fn particles_that_others_hide_are_in_no_pixel() {
+    let eye = Eye::new([9.5, 8.0, 9.0], [5.0, 3.5, 5.0], 60.0);
+    let setup = Setup {
+        surface: String::new(),
+        ..Setup::new(eye)
+    };
+    let mut scene = scene(0.25, 1.0);
+    scene.particle_spacing = 0.25;
+    let depths = |shell: i32| {
+        let image = draw(&context(), &setup, &uniform_sky, &scene, &hollow(shell), 1);
+        image.aovs.z.unwrap().to_vec()
+    };
+    let whole = depths(12);
+    // The block's upper face is 4.5 m up; the ray through the middle meets it 3.5 of 4.5 m down.
+    let middle = f64::from(whole[32 * 64 + 32]);
+    let along = (eye.target - eye.position).length() * 3.5 / 4.5;
+    assert!(
+        (middle - along).abs() < 2.0 * scene.particle_spacing,
+        "{middle}, {along}"
+    );
+    assert_eq!(whole, depths(6));
+    // The control: with a shell of one layer the shapes of its particles are others.
+    assert_ne!(whole, depths(1));
+}
