@@ -41,6 +41,10 @@
 @group(0) @binding(25) var solid_texels: texture_2d<f32>;
 #endif
 
+#ifdef CAUSTICS
+@group(0) @binding(30) var<uniform> caustics: Caustics;
+#endif
+
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= camera.picture.x || id.y >= band.rows {

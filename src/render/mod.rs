@@ -9,6 +9,7 @@
 mod aeration;
 mod buffers;
 mod camera;
+mod caustics;
 pub mod colour;
 pub mod cryptomatte;
 mod frame;

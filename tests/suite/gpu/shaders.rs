@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 40] = [
+const VARIANTS: [&[&str]; 42] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -67,6 +67,8 @@ const VARIANTS: [&[&str]; 40] = [
     &["MATERIALS", "PALETTE", "SEA", "SPRAY", "LIGHTS"],
     &["MATERIALS", "SEA", "SPRAY", "OBJECTS"],
     &["MATERIALS", "SEA", "SPRAY", "AOVS", "FORWARD"],
+    &["CAUSTICS", "LIGHTS"],
+    &["CAUSTICS", "SEA", "PALETTE", "SPRAY", "LIGHTS"],
 ];
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them.
