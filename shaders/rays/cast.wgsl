@@ -56,6 +56,9 @@ fn drops_before(direction: vec3f, mean: f32, end: f32, optical_depth: f32) -> ve
     return hazed(light, far, direction);
 }
 #endif
+#ifdef CAUSTICS
+@group(0) @binding(30) var<uniform> caustics: Caustics;
+#endif
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {

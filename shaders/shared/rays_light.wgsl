@@ -9,6 +9,9 @@
 #ifdef VOLUME
 #import "shared/rays_cloud_light.wgsl"
 #endif
+#ifdef CAUSTICS
+#import "shared/caustics_light.wgsl"
+#endif
 
 // Rays that wait while another is followed, and rays of one picture ray in all.
 const WAITING: i32 = 8;
@@ -124,13 +127,51 @@ fn split_at(ray: Ray, found: Found) -> Split {
         facet.variance + found.variance);
 }
 
+#ifdef CAUSTICS
+// What sunlight that came through the water puts on something opaque in it, but for what water takes.
+fn sun_under_water(p: vec3f, n: vec3f, footprint: f32) -> vec3f {
+    let part = caustic_part(p);
+    var sun = 0.0;
+    if part > 0.0 {
+        // The map has light over level ground.
+        let level = max(dot(n, caustics.sun), 0.0) / caustics.sun.y;
+        sun = part * shading.sun_direction.y * level * caustic_at(p, n, footprint);
+#ifdef VOLUME
+        sun *= exp(-cloud_sun_depth(p));
+#endif
+    }
+    if part < 1.0 {
+        sun += (1.0 - part) * max(dot(n, shading.sun_direction), 0.0) * sunlit(p, n);
+    }
+    return shading.sun_irradiance * sun;
+}
+#endif
+
+struct Opaque {
+    light: vec3f,
+    // The part of it that is sunlight which the map of caustics has.
+    caustics: vec3f,
+}
+
 // Radiance of something opaque, in the light that the water above it lets through.
-fn opaque_radiance(ray: Ray, found: Found) -> vec3f {
+fn opaque_radiance(ray: Ray, found: Found) -> Opaque {
     let p = ray.origin + ray.direction * found.t;
     let n = select(found.normal, -found.normal, dot(found.normal, ray.direction) > 0.0);
     let depth = water_above(p) / shading.sun_path;
     let footprint = (ray.travelled + found.t) / camera.focal;
-    return radiance_of(Surface(p, n, material_of(found.material), found.triangle), -ray.direction, footprint, depth);
+    let at = Surface(p, n, material_of(found.material), found.triangle);
+#ifdef CAUSTICS
+    if ray.inside {
+        let sun = sun_under_water(p, n, footprint);
+        let light = radiance_under(at, -ray.direction, footprint, depth, sun);
+        var dark = light;
+#ifdef LIGHTS
+        dark = radiance_under(at, -ray.direction, footprint, depth, vec3f(0.0));
+#endif
+        return Opaque(light, light - dark);
+    }
+#endif
+    return Opaque(radiance_of(at, -ray.direction, footprint, depth), vec3f(0.0));
 }
 
 #ifdef VOLUME
@@ -215,9 +256,14 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32)
             continue;
         }
         if found.kind == OPAQUE {
-            let seen = weight * opaque_radiance(ray, found);
+            let opaque_one = opaque_radiance(ray, found);
+            let seen = weight * opaque_one.light;
             light += seen;
             light_part(part_of(ray, SOLIDS), seen);
+#ifdef CAUSTICS
+            light_part(part_of(ray, SOLIDS), -weight * opaque_one.caustics);
+            light_part(CAUSTICS, weight * opaque_one.caustics);
+#endif
             continue;
         }
         let split = split_at(ray, found);

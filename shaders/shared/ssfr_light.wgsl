@@ -160,9 +160,14 @@ fn facade(at: Surface, footprint: f32) -> Facade {
 // Radiance that leaves an opaque surface towards the viewer; `view` points to the viewer, `footprint` is
 // the size of a pixel there. `depth` metres of water stand above it.
 fn radiance_of(at: Surface, view: vec3f, footprint: f32, depth: f32) -> vec3f {
-    let through = exp(-(shading.absorption + shading.scattering) * depth * shading.sun_path);
     let sun = shading.sun_irradiance * max(dot(at.normal, shading.sun_direction), 0.0)
         * sunlit(at.position, at.normal);
+    return radiance_under(at, view, footprint, depth, sun);
+}
+
+// The same under sunlight that puts `sun` on the surface, but for what water takes of it.
+fn radiance_under(at: Surface, view: vec3f, footprint: f32, depth: f32, sun: vec3f) -> vec3f {
+    let through = exp(-(shading.absorption + shading.scattering) * depth * shading.sun_path);
     // Faces low between other things see less of the sky: a stand-in for its occlusion.
     let open = select(1.0, mix(0.45, 1.0, smoothstep(0.0, 0.1 * shading.extent, at.position.y)), at.material != 2u);
     let light = (sun + sky_irradiance(at.normal) * open) * through / PI;

@@ -8,7 +8,8 @@ const SUN: u32 = 3u;
 const SKYLIGHT: u32 = 4u;
 const WHITE: u32 = 5u;
 const SOLIDS: u32 = 6u;
-const LIGHT_PARTS: u32 = 7u;
+const CAUSTICS: u32 = 7u;
+const LIGHT_PARTS: u32 = 8u;
 
 #ifdef LIGHTS
 var<private> light_parts: array<vec3f, LIGHT_PARTS>;

@@ -140,6 +140,18 @@ impl LevelSet {
         }
     }
 
+    /// Height below which all water lies, metres: the upper side of the highest brick with any, within the box.
+    pub fn top(&self) -> f64 {
+        let [nx, ny] = [self.bricks[0] as usize, self.bricks[1] as usize];
+        let wet = self
+            .table
+            .iter()
+            .enumerate()
+            .filter(|(_, slot)| **slot != EMPTY);
+        let layers = wet.map(|(brick, _)| brick / nx % ny + 1).max().unwrap_or(0);
+        (layers as f64 * self.voxel * f64::from(EDGE)).min(self.size.y)
+    }
+
     /// What the table says of the brick at `p`.
     pub fn slot(&self, p: DVec3) -> u32 {
         self.brick_at(p).0

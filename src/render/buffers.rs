@@ -1,7 +1,7 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Particle, Path, Rays, Sea,
+    Band, Camera, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Particle, Path, Rays, Sea,
     SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater, WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
@@ -67,6 +67,15 @@ pub(super) const FLOW: Buf<Flow> = Buf::uniform("flow");
 pub(super) const FLOW_LEVELS: Windows<FlowLevel> = Windows::new("level", "flow_levels");
 /// Settings of the narrow-range filter, of each axis.
 pub(super) const NARROW_RANGE: Windows<Narrow> = Windows::new("params", "narrow_range");
+
+/// Where the map of bent sunlight lies, and the rays that it is made from.
+pub(super) const CAUSTICS: Buf<Caustics> = Buf::uniform("caustics");
+/// Where each of them comes into the water: normal, and distance.
+pub(super) const SUN_RAYS: Buf<[f32; 4]> = Buf::new("sun_rays");
+/// Where each of them lands in the map, with its light and layer.
+pub(super) const SUN_HITS: Buf<[f32; 4]> = Buf::new("sun_hits");
+/// Sums of the light in each texel, in fixed point.
+pub(super) const LIGHT_SUMS: Buf<u32> = Buf::new("light_sums");
 
 /// Box, bricks and set of the rays.
 pub(super) const RAYS: Buf<Rays> = Buf::uniform("rays");

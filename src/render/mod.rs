@@ -9,6 +9,7 @@
 mod aeration;
 mod buffers;
 mod camera;
+mod caustics;
 mod cloud;
 pub mod colour;
 pub mod cryptomatte;

@@ -45,6 +45,8 @@ impl Limits {
 pub struct Runs {
     /// Before the first frame.
     pub once: usize,
+    /// For each state of the water that a frame is drawn with: once a frame, or with an open shutter once a sample.
+    pub water: usize,
     /// For each sample of a frame.
     pub sample: usize,
     /// For the channels beside a frame's picture.
@@ -61,6 +63,8 @@ pub struct Plan {
     pub(super) samplers: Vec<SamplerSpec>,
     /// Before the first frame.
     pub(super) once: Vec<Command>,
+    /// For each state of the water that a frame is drawn with.
+    pub(super) water: Vec<Command>,
     /// For each sample of a frame.
     pub(super) sample: Vec<Command>,
     /// For the channels beside the picture; nothing where the look asks for none.
@@ -89,6 +93,7 @@ impl Plan {
             }
         };
         add(&self.once, |runs| &mut runs.once);
+        add(&self.water, |runs| &mut runs.water);
         add(&self.sample, |runs| &mut runs.sample);
         add(&self.aovs, |runs| &mut runs.aovs);
         passes
@@ -103,7 +108,8 @@ impl Plan {
 
     /// Builds it on a device, with what does not change from frame to frame.
     pub(super) fn program(&self, context: &Context) -> Result<Program, RenderError> {
-        let commands = || [&self.once, &self.sample, &self.aovs].into_iter().flatten();
+        let all = [&self.once, &self.water, &self.sample, &self.aovs];
+        let commands = || all.into_iter().flatten();
         let mut rasters: BTreeMap<&'static str, RasterSpec> = BTreeMap::new();
         let mut passes: BTreeMap<&'static str, PassSpec> = BTreeMap::new();
         for command in commands() {
@@ -245,7 +251,8 @@ mod tests {
     /// Names of buffers, textures and samplers that commands use.
     fn used(plan: &Plan) -> BTreeSet<String> {
         let mut used = BTreeSet::new();
-        for command in [&plan.once, &plan.sample, &plan.aovs].into_iter().flatten() {
+        let all = [&plan.once, &plan.water, &plan.sample, &plan.aovs];
+        for command in all.into_iter().flatten() {
             let binds = match command {
                 Command::Dispatch { binds, groups, .. } => {
                     if let Groups::Indirect { buffer, .. } = groups {
@@ -326,7 +333,13 @@ mod tests {
             assert_eq!(used(&plan), planned(&plan), "rays {more}");
             sizes.insert(plan.bytes());
         }
-        assert_eq!(sizes.len(), 15, "each look takes what it needs: {sizes:?}");
+        const CAUSTICS: &str = "[water]\ncaustics = { resolution = 64 }\n";
+        for more in [CAUSTICS, &format!("{CAUSTICS}{SEA}")] {
+            let plan = plan("curvature_flow", &format!("{RAYS}{more}"));
+            assert_eq!(used(&plan), planned(&plan), "rays {more}");
+            sizes.insert(plan.bytes());
+        }
+        assert_eq!(sizes.len(), 17, "each look takes what it needs: {sizes:?}");
         // Paths are there where the shutter is open, and motion of spray where a channel shows it.
         let motion_alone = "[output]\nformats = [\"exr\"]\naovs = [\"forward\"]\n";
         let white = "[whitewater]\n";

@@ -29,12 +29,14 @@ const QUAYS: u32 = 0b11_0000;
 /// frame that has more makes room for them.
 const PARTICLES_A_BRICK: usize = 24;
 
-/// Plans the level set of `particles` particles, the light in it, and the tree over what is opaque.
+/// Plans the level set of `particles` particles, the light in it with room for `behind` values behind it, and the tree over what is
+/// opaque.
 pub(super) fn plan_rays(
     plan: &mut Plan,
     look: &Look,
     scene: &RenderScene,
     (set, particles): (&Set<'_>, usize),
+    behind: usize,
 ) {
     let size = scene.domain.size();
     let voxel = voxel(look, scene);
@@ -57,7 +59,7 @@ pub(super) fn plan_rays(
     let finer = (look.spec().surface.voxels_per_spacing / VOXELS).powi(2);
     let bricks = (finer * (particles / PARTICLES_A_BRICK) as f64).ceil();
     plan.buffer(&LEVEL_VALUES, (bricks as usize).max(1) * VALUES);
-    plan.buffer(&SUN_PATHS, count(nodes));
+    plan.buffer(&SUN_PATHS, count(nodes) + behind);
     let (boxes, mut sorted) = tree(set.triangles);
     sorted.extend(set.places);
     plan.values(&SET_NODES, &boxes);

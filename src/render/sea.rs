@@ -85,6 +85,8 @@ pub(super) struct Sea {
     places: Vec<(Vec3, Path)>,
     /// Seconds from the frame, and since frame 0, at which the device holds it.
     stands: Option<[f32; 2]>,
+    /// Its greatest height as it stands there, metres.
+    highest: f64,
 }
 
 impl Sea {
@@ -100,6 +102,7 @@ impl Sea {
             waves,
             places: Vec::new(),
             stands: None,
+            highest: 0.0,
         })
     }
 
@@ -127,8 +130,15 @@ impl Sea {
             .map(|(p, path)| p.as_dvec3() + path.way(camera.seconds))
             .collect();
         let edges = Edges::new(&moved, scene.domain.size(), scene.particle_spacing);
-        program.upload(SEA, 0, &[self.uniform(&edges, scene)]);
+        let uniform = self.uniform(&edges, scene);
+        self.highest = uniform.high.into();
+        program.upload(SEA, 0, &[uniform]);
         program.upload(SEA_VALUES, 0, &self.values(&edges, camera.clock.into()));
+    }
+
+    /// Its greatest height as the device holds it, metres.
+    pub(super) fn highest(&self) -> f64 {
+        self.highest
     }
 
     fn uniform(&self, edges: &Edges, scene: &RenderScene) -> uniform::Sea {

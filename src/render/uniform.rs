@@ -263,6 +263,30 @@ mirror!(
 );
 
 mirror!(
+    /// `Caustics` of shared/caustics.wgsl.
+    Caustics {
+        towards: [f32; 3],
+        index: f32,
+        sun: [f32; 3],
+        texel: f32,
+        corner: [f32; 2],
+        size: [u32; 2],
+        first: [f32; 2],
+        rays: [u32; 2],
+        spacing: f32,
+        top: f32,
+        width: f32,
+        fade: f32,
+        ripple: [f32; 2],
+        through: f32,
+        start: u32,
+        step: [f32; 2],
+        pad0: f32,
+        pad1: f32,
+    }
+);
+
+mirror!(
     /// `SetNode` of shared/rays_set.wgsl.
     SetNode {
         min: [f32; 3],
@@ -295,6 +319,7 @@ pub fn mirrors() -> Vec<Layout> {
         Rays::layout(),
         Cloud::layout(),
         Sea::layout(),
+        Caustics::layout(),
         SetNode::layout(),
     ]
 }

@@ -21,11 +21,11 @@ pub(super) use keys::KEYS;
 use keys::{MOST_SAMPLES, MOST_VOXELS};
 pub use materials::{Material, Materials, Picture, Texture};
 pub use spec::{
-    AovSpec, BasinSpec, CameraSpec, ColourSpaceSpec, CurveSpec, FilterSpec, FormatSpec, ImageSpec,
-    KeyframeSpec, LensSpec, LightSpec, LookSpec, MaterialSpec, MethodSpec, OutputSpec,
-    RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput, SplatSpec, SpraySpec,
-    SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec, WaterSpec, WaveMakersSpec,
-    WhitewaterLook, WindowsSpec,
+    AovSpec, BasinSpec, CameraSpec, CausticsSpec, ColourSpaceSpec, CurveSpec, FilterSpec,
+    FormatSpec, ImageSpec, KeyframeSpec, LensSpec, LightSpec, LookSpec, MaterialSpec, MethodSpec,
+    OutputSpec, RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput, SplatSpec,
+    SpraySpec, SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec, WaterSpec,
+    WaveMakersSpec, WhitewaterLook, WindowsSpec,
 };
 
 /// Pixels of a picture, counted from the upper left one of the look's image.
@@ -130,6 +130,7 @@ impl Look {
         check_shutter(&doc, &spec.image)?;
         check_output(&doc, &spec.output)?;
         check_sea(&doc, &spec)?;
+        check_caustics(&doc, &spec)?;
         let panorama = match &spec.sky {
             SkySpec::Panorama { file: name, .. } => Some(panorama(&doc, file, name)?),
             SkySpec::HosekWilkie { .. } => None,
@@ -244,6 +245,7 @@ impl Look {
         self.changed(|spec| {
             spec.renderer.method = method;
             spec.water.spray = None;
+            spec.water.caustics = None;
             spec.whitewater = None;
             spec.camera.lens = None;
             (spec.image.samples, spec.image.shutter) = (1, 0.0);
@@ -253,11 +255,15 @@ impl Look {
         })
     }
 
-    /// The look for pictures of the water alone by `method`: spray as the look has it, no whitewater, nothing beside the picture.
+    /// The look for pictures of the water alone by `method`: spray as the look has it, no whitewater, nothing beside the picture;
+    /// caustics by rays alone.
     #[must_use]
     pub fn of_water(&self, method: MethodSpec) -> Self {
         self.changed(|spec| {
             spec.renderer.method = method;
+            if method == MethodSpec::Ssfr {
+                spec.water.caustics = None;
+            }
             spec.whitewater = None;
             spec.output.aovs = Vec::new();
             plain(spec);
@@ -333,7 +339,7 @@ fn plain(spec: &mut LookSpec) {
 
 /// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
 /// that it had before there was such a key.
-const NEWER: [&str; 16] = [
+const NEWER: [&str; 17] = [
     "whitewater: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
     "overscan: 0, ",
@@ -349,6 +355,7 @@ const NEWER: [&str; 16] = [
     ", shutter_curve: Box, shutter_ramps: None",
     "wave_makers: None, sea: None, ",
     ", materials: None, material: []",
+    ", caustics: None",
     // Quay walls stood at these sides before others could be chosen.
     ", sides: [Wall { axis: 2, is_max: false }, Wall { axis: 2, is_max: true }], colour: None",
 ];
@@ -561,6 +568,14 @@ fn check_sea(doc: &Document<'_>, spec: &LookSpec) -> Result<(), SceneError> {
         return Err(doc.fault_of("sea.waves.shortest_period_s", problem));
     }
     Ok(())
+}
+
+fn check_caustics(doc: &Document<'_>, spec: &LookSpec) -> Result<(), SceneError> {
+    if spec.water.caustics.is_none() || spec.renderer.method == MethodSpec::Ray {
+        return Ok(());
+    }
+    let message = "splats have no rays from the sun: set [renderer] method = \"ray\"";
+    Err(doc.fault_of_plain("water.caustics", message))
 }
 
 #[cfg(test)]

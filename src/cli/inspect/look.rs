@@ -88,13 +88,13 @@ fn show_plan(
     }
     writeln!(
         out,
-        "\npass                          once  each sample  for AOVs"
+        "\npass                          once  each water  each sample  for AOVs"
     )?;
     for (pass, runs) in &planned.passes {
         writeln!(
             out,
-            "{pass:28}  {:>4}  {:>11}  {:>8}",
-            runs.once, runs.sample, runs.aovs
+            "{pass:28}  {:>4}  {:>10}  {:>11}  {:>8}",
+            runs.once, runs.water, runs.sample, runs.aovs
         )?;
     }
     writeln!(

@@ -14,6 +14,7 @@ use crate::{
             CAMERA, CLOUD, CLOUD_WORDS, DEPTHS, FIRST_DEPTH, NEXT_CAMERA, SHADING, SOLID_DEPTH,
         },
         camera::longest_focal_px,
+        caustics::{map_values, plan_caustics},
         frame::{Extent, bands},
         lighting::{plan_light, shading},
         materials::plan_materials,
@@ -91,7 +92,14 @@ impl Plan {
         plan.values(&SHADING, &[light]);
         let shaded = match spec.renderer.method {
             MethodSpec::Ssfr => &["ssfr/shade", "ssfr/shade_aovs", "ssfr/shade_objects"][..],
-            MethodSpec::Ray => &["rays/cast", "rays/aovs", "rays/first", "rays/objects"],
+            MethodSpec::Ray => &[
+                "rays/cast",
+                "rays/aovs",
+                "rays/first",
+                "rays/objects",
+                "rays/caustics_enter",
+                "rays/caustics_follow",
+            ],
         };
         plan_palette(&mut plan, &palette, shaded);
         let painting = match spec.renderer.method {
@@ -155,7 +163,10 @@ fn plan_ray(
     scene: &RenderScene,
     (set, particles): (&Set<'_>, usize),
 ) {
-    plan_rays(plan, look, scene, (set, particles));
+    // The map of caustics stands behind the lattice of light: a pass has no room for a buffer more.
+    let behind = map_values(look, scene);
+    plan_rays(plan, look, scene, (set, particles), behind);
+    plan.water = plan_caustics(plan, look, scene);
     let has_drops = look.spec().water.spray.is_some();
     let has_spray = has_drops || look.spec().whitewater.is_some();
     let has_owner = look.wants(AovSpec::Forward);

@@ -60,6 +60,9 @@ impl Renderer {
         if let Some(water) = &mut self.water {
             water.take(&packed, &ways);
         }
+        if let Some(caustics) = &mut self.caustics {
+            caustics.forget();
+        }
         if let Some(sea) = &mut self.sea {
             sea.take(&packed, &ways);
         }

@@ -14,6 +14,7 @@ use glam::DVec3;
 
 use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLES, objects, picture};
 use super::camera::{Setting, camera, eye};
+use super::caustics::{Caustics, above};
 use super::cryptomatte::{Covers, unique};
 use super::image::{Image, View};
 use super::plan::{Limits, Plan};
@@ -44,6 +45,8 @@ pub struct Renderer {
     program: Program,
     /// Until the first frame.
     once: Option<Recording>,
+    /// What follows from the water alone.
+    light: Recording,
     sample: Recording,
     aovs: Recording,
     /// Particles that there is room for.
@@ -52,6 +55,8 @@ pub struct Renderer {
     water: Option<RayWater>,
     /// `None` where rays meet neither spray nor whitewater.
     cloud: Option<RayCloud>,
+    /// `None` where the look has none.
+    caustics: Option<Caustics>,
     /// `None` where the look has none.
     sea: Option<Sea>,
     /// `None` where the look draws none.
@@ -94,6 +99,7 @@ impl Renderer {
             look: look.clone(),
             scene: scene.clone(),
             once: Some(record(&plan.once)),
+            light: record(&plan.water),
             sample: record(&plan.sample),
             aovs: record(&plan.aovs),
             plan,
@@ -101,6 +107,7 @@ impl Renderer {
             capacity: room(0),
             water: RayWater::of(look, scene),
             cloud: RayCloud::of(look, scene),
+            caustics: Caustics::of(look, scene),
             sea: Sea::of(look, scene),
             whitewater: Whitewater::of(look, scene),
             timer: None,
@@ -246,6 +253,7 @@ impl Renderer {
 
     /// Binds every command to the buffers as they are now.
     fn record(&mut self) {
+        self.light = Recording::new(&self.program, &self.plan.water);
         self.sample = Recording::new(&self.program, &self.plan.sample);
         self.aovs = Recording::new(&self.program, &self.plan.aovs);
     }
@@ -254,6 +262,19 @@ impl Renderer {
     fn draw_once(&mut self) -> Result<(), RenderError> {
         if let Some(once) = self.once.take() {
             once.run(&self.program, self.timer.as_mut())?;
+        }
+        Ok(())
+    }
+
+    /// Follows the sun's rays through a sample's water, where these are not the last sample's.
+    fn light(&mut self, camera: &uniform::Camera) -> Result<(), RenderError> {
+        let (Some(caustics), Some(water)) = (&mut self.caustics, &self.water) else {
+            return Ok(());
+        };
+        let sea = self.sea.as_ref().map_or(0.0, Sea::highest);
+        let top = above(water.top().max(sea), &self.look, &self.scene);
+        if caustics.stand_at(camera, top, &self.program) {
+            self.light.run(&self.program, self.timer.as_mut())?;
         }
         Ok(())
     }
@@ -276,6 +297,9 @@ impl Renderer {
             sea.stand_at(camera, &mut self.program, &self.scene);
         }
         self.program.upload(CAMERA, 0, &[*camera]);
+        if !aovs {
+            self.light(camera)?;
+        }
         let recording = if aovs { &self.aovs } else { &self.sample };
         recording.run(&self.program, self.timer.as_mut())?;
         self.program.context.wait()?;

@@ -26,6 +26,8 @@ pub(super) struct RayWater {
     /// Edge length of a voxel, metres.
     voxel: f64,
     sun: DVec3,
+    /// Height below which the water on the device lies, metres.
+    top: f64,
 }
 
 impl RayWater {
@@ -37,6 +39,7 @@ impl RayWater {
             capacity: 0,
             voxel: voxel(look, scene),
             sun: sun_in_water(look),
+            top: 0.0,
         })
     }
 
@@ -67,6 +70,12 @@ impl RayWater {
         program.upload(LEVEL_VALUES, 0, &level.values);
         program.upload(SUN_PATHS, 0, &light.paths);
         self.seconds = Some(seconds);
+        self.top = level.top();
         Ok(grew)
+    }
+
+    /// Height below which the water on the device lies, metres.
+    pub(super) fn top(&self) -> f64 {
+        self.top
     }
 }

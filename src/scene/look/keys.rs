@@ -237,6 +237,21 @@ const WATER: &[Key] = &[
     Key::table("spray", SPRAY)
         .absent()
         .about("White water where particles are thrown clear or fast"),
+    Key::table("caustics", CAUSTICS)
+        .absent()
+        .also(", with `method = \"ray\"`")
+        .about("Sunlight that the water's waves bend and bundle on what lies below; straight on where left out"),
+];
+
+const CAUSTICS: &[Key] = &[
+    Key::whole("resolution", 16..=8192)
+        .unit("texels")
+        .default("1024")
+        .about("along the longer side of the ground that the map of light covers: the domain's, with the sea's band"),
+    Key::number("smoothing_width_m", 0.0..=100.0)
+        .unit("metres")
+        .computed(|| "1.5 particle spacings".to_owned())
+        .about("standard deviation with which the surface's normals are smoothed for it: particles leave bumps, which would bundle light too"),
 ];
 
 const SPRAY: &[Key] = &[
@@ -462,6 +477,7 @@ const LIGHTS: &[&str] = &[
     "sky",
     "spray",
     "solids",
+    "caustics",
 ];
 
 const OUTPUT: &[Key] = &[

@@ -209,6 +209,18 @@ pub struct WaterSpec {
     pub scattering_per_metre: [f64; 3],
     /// White water where particles are thrown clear or fast; none unless named.
     pub spray: Option<SpraySpec>,
+    /// Sunlight that waves bend onto what lies below; straight on unless named.
+    pub caustics: Option<CausticsSpec>,
+}
+
+/// The map of sunlight that comes through the water.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CausticsSpec {
+    /// Texels along the longer side of the ground that it covers.
+    pub resolution: u32,
+    /// Standard deviation with which the surface's normals are smoothed for it, metres; 1.5 particle spacings where left out.
+    pub smoothing_width_m: Option<f64>,
 }
 
 /// How a stream of whitewater is drawn.
@@ -487,11 +499,13 @@ pub enum LightSpec {
     Spray,
     /// What is opaque and seen directly.
     Solids,
+    /// Sunlight that came through water onto something opaque in it, of a look with caustics.
+    Caustics,
 }
 
 impl LightSpec {
     /// All of them, in the order of the shaders' `light_parts`, with the names of their layers.
-    pub const NAMED: [(&'static str, Self); 7] = [
+    pub const NAMED: [(&'static str, Self); 8] = [
         ("reflection", Self::Reflection),
         ("refraction", Self::Refraction),
         ("scattering", Self::Scattering),
@@ -499,6 +513,7 @@ impl LightSpec {
         ("sky", Self::Sky),
         ("spray", Self::Spray),
         ("solids", Self::Solids),
+        ("caustics", Self::Caustics),
     ];
 }
 

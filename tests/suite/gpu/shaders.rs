@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 43] = [
+const VARIANTS: [&[&str]; 45] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -70,6 +70,8 @@ const VARIANTS: [&[&str]; 43] = [
     &["VOLUME"],
     &["VOLUME", "LIGHTS", "HOLDOUT"],
     &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS"],
+    &["CAUSTICS", "LIGHTS"],
+    &["CAUSTICS", "SEA", "PALETTE", "SPRAY", "LIGHTS"],
 ];
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them; and rays alone go through a volume.

@@ -43,6 +43,10 @@ impl Setup<'_> {
                 "[water]\n",
                 "[water]\nscattering_per_metre = [0.1, 0.3, 0.3]\n",
             );
+        let text = match *method {
+            "ray" => text.replace("[water]\n", "[water]\ncaustics = { resolution = 64 }\n"),
+            _ => text,
+        };
         let text = format!(
             "{text}[renderer]\nmethod = \"{method}\"\n[output]\nformats = [\"exr\"]\n{output}\n"
         );

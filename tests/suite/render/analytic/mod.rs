@@ -4,6 +4,7 @@
 //! dispersion of deep water), never by a helper of the renderer. Most waters are a single ball, so large or so near to
 //! the lens that its surface, its normal and its thickness are those of a sphere.
 
+mod caustics;
 mod geometry;
 mod lens;
 mod light;

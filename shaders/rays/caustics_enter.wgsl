@@ -1,0 +1,37 @@
+// Where rays from the sun, a lattice of them over a level plane, first meet the water.
+#import "shared/camera.wgsl"
+#import "shared/caustics_sides.wgsl"
+#import "shared/caustics.wgsl"
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<uniform> rays: Rays;
+@group(0) @binding(2) var<uniform> caustics: Caustics;
+@group(0) @binding(3) var<storage, read> level_table: array<u32>;
+@group(0) @binding(4) var<storage, read> level_values: array<f32>;
+@group(0) @binding(5) var<storage, read> set_nodes: array<SetNode>;
+@group(0) @binding(6) var<storage, read> set_triangles: array<Triangle>;
+// Normal, none of it at a side of the box, and the distance just after the surface; FAR where there is none.
+@group(0) @binding(7) var<storage, read_write> sun_rays: array<vec4f>;
+#ifdef SEA
+@group(0) @binding(8) var<uniform> sea: Sea;
+@group(0) @binding(9) var<storage, read> sea_values: array<vec4f>;
+#endif
+
+@compute @workgroup_size(16, 4)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= caustics.rays) {
+        return;
+    }
+    let at = caustics.first + caustics.step * vec2f(id.xy);
+    let origin = vec3f(at.x, caustics.top, at.y);
+    var entry = vec4f(0.0, 1.0, 0.0, FAR);
+    if opaque_along(origin, caustics.towards).kind != OPAQUE {
+        // Waves of the sea that a ray's width cannot hold are left out.
+        let found = trace(origin, -caustics.towards, false, caustics.spacing * camera.focal);
+        if found.kind == WATER {
+            let p = origin - caustics.towards * found.after;
+            entry = vec4f(select(found.normal, vec3f(0.0), is_cut(found, p)), found.after);
+        }
+    }
+    sun_rays[id.y * caustics.rays.x + id.x] = entry;
+}

@@ -1,0 +1,153 @@
+// From where the sun's rays meet the water to what is opaque below it.
+#import "shared/camera.wgsl"
+#import "shared/ssfr_ripple.wgsl"
+#import "shared/caustics_sides.wgsl"
+#import "shared/caustics_layer.wgsl"
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<uniform> rays: Rays;
+@group(0) @binding(2) var<uniform> caustics: Caustics;
+@group(0) @binding(3) var<storage, read> level_table: array<u32>;
+@group(0) @binding(4) var<storage, read> level_values: array<f32>;
+@group(0) @binding(5) var<storage, read> set_nodes: array<SetNode>;
+@group(0) @binding(6) var<storage, read> set_triangles: array<Triangle>;
+@group(0) @binding(7) var<storage, read> sun_rays: array<vec4f>;
+// Place in the map, part of the light that flat water would bring (0 = lost), layer.
+@group(0) @binding(8) var<storage, read_write> sun_hits: array<vec4f>;
+#ifdef SEA
+@group(0) @binding(9) var<uniform> sea: Sea;
+@group(0) @binding(10) var<storage, read> sea_values: array<vec4f>;
+#endif
+
+// Surfaces on a ray's way, at most.
+const MOST_SURFACES: i32 = 8;
+// Places on either side at which a normal is smoothed, and how many lie within a standard deviation.
+const SIDE: i32 = 6;
+const FINENESS: f32 = 2.5;
+
+fn place_of(at: vec2i, t: f32) -> vec3f {
+    let start = caustics.first + caustics.step * vec2f(at);
+    return vec3f(start.x, caustics.top, start.y) - caustics.towards * t;
+}
+
+// The mean of normals about a ray's, Gaussian in the rays' plane. What lies off the ray's own tangent plane by more than the width, or
+// is turned from it by more than 60°, is another surface.
+fn smooth_normal(at: vec2i, own: vec4f) -> vec3f {
+    let step = max(i32(round(caustics.width / (FINENESS * caustics.spacing))), 1);
+    let scale = caustics.spacing / max(caustics.width, 1e-6);
+    let p = place_of(at, own.w);
+    // A width of less than half a ray's spacing smooths nothing.
+    let side = select(SIDE, 0, scale > 2.0);
+    var sum = own.xyz;
+    for (var j = -side; j <= side; j++) {
+        for (var i = -side; i <= side; i++) {
+            let other = at + step * vec2i(i, j);
+            if (i == 0 && j == 0) || any(other < vec2i(0)) || any(other >= vec2i(caustics.rays)) {
+                continue;
+            }
+            let entry = sun_rays[u32(other.y) * caustics.rays.x + u32(other.x)];
+            if entry.w >= FAR {
+                continue;
+            }
+            let off = dot(place_of(other, entry.w) - p, own.xyz);
+            let far = f32(step) * scale * length(vec2f(f32(i), f32(j)));
+            let is_same = abs(off) < caustics.width && dot(entry.xyz, own.xyz) > 0.5;
+            sum += select(0.0, exp(-0.5 * far * far), is_same) * entry.xyz;
+        }
+    }
+    return normalize(sum);
+}
+
+// Ripples ride on what faces up, as in ssfr_facet.
+fn rippled(p: vec3f, n: vec3f) -> vec3f {
+    let ripple = ripple_at(p.xz, camera.clock, caustics.ripple.x, caustics.ripple.y, caustics.spacing);
+    let rides = smoothstep(0.2, 0.8, n.y);
+    return normalize(n - vec3f(ripple.slope.x, 0.0, ripple.slope.y) * rides);
+}
+
+struct Bent {
+    direction: vec3f,
+    // 0 where all is thrown back.
+    part: f32,
+}
+
+// Snell and Fresnel; `normal` is on the side where the ray comes from, and `level` that of the surface as it is met again.
+fn bent_at(direction: vec3f, normal: vec3f, level: vec3f, index: f32) -> Bent {
+    // No facet that is met faces away.
+    let n = normalize(normal - direction * max(0.03 + dot(normal, direction), 0.0) * 1.5);
+    let refracted = refract(direction, n, 1.0 / index);
+    if dot(refracted, refracted) < 0.25 {
+        return Bent(reflect(direction, n), 0.0);
+    }
+    let sinks = max(0.005 + dot(refracted, level), 0.0);
+    let facing = clamp(-dot(direction, n), 0.0, 1.0);
+    return Bent(normalize(refracted - level * sinks), 1.0 - fresnel(facing, index));
+}
+
+// Where a ray that meets a side of the box at `p` would come through it if the water went on there, level from the height at which it
+// stands at the side: of x and z, those of the sun's ways in air and in water differ. Below the floor where it does not.
+fn through_side(p: vec3f) -> vec3f {
+    let surface = crossing(p, vec3f(0.0, 1.0, 0.0), 0.0, rays.size.y - p.y, true);
+    let sides = min(p.xz, rays.size.xz - p.xz);
+    let in_air = caustics.towards.xz / caustics.towards.y;
+    let in_water = caustics.sun.xz / caustics.sun.y;
+    let ways = select(vec2f(in_air.y, in_water.y), vec2f(in_air.x, in_water.x), sides.x < sides.y);
+    let under = min(surface.before, rays.size.y) * ways.x / ways.y;
+    let out = p.xz + in_air * surface.before - in_water * under;
+    return select(vec3f(0.0, -1.0, 0.0), vec3f(out.x, p.y + surface.before - under, out.y), surface.after < FAR);
+}
+
+@compute @workgroup_size(16, 4)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= caustics.rays) {
+        return;
+    }
+    let at = id.y * caustics.rays.x + id.x;
+    let entry = sun_rays[at];
+    var hit = vec4f(0.0);
+    var is_open = entry.w < FAR;
+    var origin = vec3f(0.0);
+    var direction = -caustics.towards;
+    var weight = 0.0;
+    var inside = true;
+    if is_open && all(entry.xyz == vec3f(0.0)) {
+        origin = through_side(place_of(vec2i(id.xy), entry.w));
+        direction = -caustics.sun;
+        weight = 1.0;
+        is_open = is_wet(origin);
+    } else if is_open {
+        origin = place_of(vec2i(id.xy), entry.w);
+        let normal = rippled(origin, smooth_normal(vec2i(id.xy), entry));
+        let bent = bent_at(direction, normal, entry.xyz, caustics.index);
+        direction = bent.direction;
+        weight = bent.part / caustics.through;
+    }
+    for (var k = 0; k < MOST_SURFACES && is_open; k++) {
+        let found = trace(origin, direction, inside, caustics.spacing * camera.focal);
+        if found.kind != WATER {
+            is_open = false;
+            if found.kind == OPAQUE && inside {
+                let p = origin + direction * found.t;
+                let n = select(found.normal, -found.normal, dot(found.normal, direction) > 0.0);
+                hit = vec4f(caustic_place(p), weight, f32(caustic_layer(p, n)));
+            }
+            continue;
+        }
+        // Light goes on through the box's sides, as it comes in.
+        if is_cut(found, origin + direction * found.t) {
+            is_open = false;
+            continue;
+        }
+        let normal = select(found.normal, -found.normal, inside);
+        let index = select(caustics.index, 1.0 / caustics.index, inside);
+        let bent = bent_at(direction, normal, normal, index);
+        let is_mirrored = bent.part <= 0.0;
+        origin += direction * select(found.after, found.before, is_mirrored);
+        direction = bent.direction;
+        if !is_mirrored {
+            weight *= bent.part;
+            inside = !inside;
+        }
+    }
+    sun_hits[at] = hit;
+}
