@@ -251,7 +251,7 @@ mod tests {
             ),
             (
                 "\u{89}PNG\r\n\u{1a}\n",
-                "line 1: \"\u{89}PNG\" stands before",
+                "line 1: \"\\u{89}PNG\" stands before",
             ),
         ] {
             let problem = read(text.as_bytes()).unwrap_err();
