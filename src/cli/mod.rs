@@ -53,7 +53,7 @@ enum Command {
     /// Render a particle cache with a look into an image sequence.
     Render(render::RenderArgs),
     /// Export a cache for other programs: meshes, USD shots, tables of particles, grids.
-    Export(export::ExportArgs),
+    Export(Box<export::ExportArgs>),
     /// Bake, render and measure what a study compares, and write one page about it.
     Study(study::StudyArgs),
     /// Make spray, foam and bubbles from a finished bake, as a stream beside it.

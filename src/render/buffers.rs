@@ -1,8 +1,9 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Particle, Path, Rays, Sea,
-    SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater, WhitewaterParams,
+    Band, Camera, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Particle, Path, Rays,
+    Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater,
+    WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
 

@@ -217,6 +217,6 @@ mod tests {
         let straight = (0.333f64 / 2.333).powi(2);
         assert!((reflectance(1.0, 1.333) - straight).abs() < 1e-15);
         assert!((reflectance(0.0, 1.333) - 1.0).abs() < 1e-15);
-        assert_eq!(reflectance(0.3, 1.0), 0.0);
+        assert!(reflectance(0.3, 1.0) < 1e-15);
     }
 }

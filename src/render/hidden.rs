@@ -54,8 +54,11 @@ impl Cells {
         count.map_or(cell[1] < 0, |count| count >= FULL)
     }
 
-    /// Whether a cell and the 26 about it are full.
+    /// Whether a cell of the domain and the 26 about it are full.
     fn is_deep(&self, [x, y, z]: [i64; 3]) -> bool {
+        if self.index([x, y, z]).is_none() {
+            return false;
+        }
         let mut around = (-1..=1).flat_map(|dz| (-1..=1).map(move |dy| (dy, dz)));
         around.all(|(dy, dz)| (-1..=1).all(|dx| self.is_full([x + dx, y + dy, z + dz])))
     }

@@ -85,8 +85,10 @@ impl Renderer {
         let seen = self.sort(frame, &mut packed, &mut ways);
         self.reserve(packed.len())?;
         for (buffer, threads) in [(PARTICLE_GROUPS, packed.len()), (SEEN_GROUPS, seen)] {
-            let groups = spread(&self.program.context, 1, threads as u64);
-            self.program.upload(buffer, 0, &[groups.into()]);
+            if self.program.has(buffer.name()) {
+                let groups = spread(&self.program.context, 1, threads as u64);
+                self.program.upload(buffer, 0, &[groups.into()]);
+            }
         }
         self.program.upload(PARTICLES, 0, &packed);
         if self.program.has(SHAPES.name()) {

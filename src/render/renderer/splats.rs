@@ -56,7 +56,6 @@ pub(super) fn plan_particles(
 ) {
     plan.buffer(&PARTICLES, particles);
     plan.buffer(&PARTICLE_GROUPS, 1);
-    plan.buffer(&SEEN_GROUPS, 1);
     if look.spec().image.shutter > 0.0 && !moving.is_empty() {
         plan.buffer(&PATHS, particles);
         for pass in moving {
@@ -87,6 +86,7 @@ pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
     };
     plan.values(&THICKNESS_PARAMS, &[scale]);
     plan.buffer(&THICKNESS, pixels / 4);
+    plan.buffer(&SEEN_GROUPS, 1);
     let params = Bind::whole("params", &THICKNESS_PARAMS);
     vec![
         plan.fill(&DEPTHS[0], FAR.to_bits(), pixels),
@@ -98,23 +98,26 @@ pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
 
 /// Plans whose sphere is the nearest, while the depth is still that of the spheres.
 pub(super) fn plan_owner(plan: &mut Plan) -> Vec<Command> {
-    let pixels = plan.extent.pixels();
-    plan.buffer(&OWNER, pixels);
+    let owner = over_seen("ssfr/splat_owner", Vec::new());
+    vec![plan_owners(plan), owner]
+}
+
+/// Plans the nearest spheres before the opaque depths of rays, and whose they are: of all particles, since the eye may be among them.
+pub(super) fn plan_owner_before_rays(plan: &mut Plan) -> Vec<Command> {
+    let opaque = Bind::whole("solid_depth", &DEPTHS[1]);
     vec![
-        plan.fill(&OWNER, u32::MAX, pixels),
-        over_seen("ssfr/splat_owner", Vec::new()),
+        plan.fill(&DEPTHS[0], FAR.to_bits(), plan.extent.pixels()),
+        over_particles("ssfr/splat_depth", vec![opaque]),
+        plan_owners(plan),
+        over_particles("ssfr/splat_owner", Vec::new()),
     ]
 }
 
-/// Plans the nearest spheres before the opaque depths of rays, and whose they are.
-pub(super) fn plan_owner_before_rays(plan: &mut Plan) -> Vec<Command> {
+/// Plans the owner of each pixel, and gives what says that there is none.
+fn plan_owners(plan: &mut Plan) -> Command {
     let pixels = plan.extent.pixels();
-    let opaque = Bind::whole("solid_depth", &DEPTHS[1]);
-    let depth = vec![
-        plan.fill(&DEPTHS[0], FAR.to_bits(), pixels),
-        over_seen("ssfr/splat_depth", vec![opaque]),
-    ];
-    [depth, plan_owner(plan)].concat()
+    plan.buffer(&OWNER, pixels);
+    plan.fill(&OWNER, u32::MAX, pixels)
 }
 
 /// Words of a half-resolution cell of spray: length and depth, and for the channels beside the picture velocity.
