@@ -88,7 +88,7 @@ fn light_beside(
     scene: &RenderScene,
     water: &Particles,
 ) -> Vec<f64> {
-    let picture = |caustics: &str| {
+    let picture = |context: &Context, caustics: &str| {
         let clear = format!("index = {INDEX:?}\nabsorption_per_metre = [0.0, 0.0, 0.0]\n");
         let setup = Setup {
             method: "ray",
@@ -101,8 +101,9 @@ fn light_beside(
         draw(context, &setup, &black_sky, scene, water, 1).beauty
     };
     let (with, without) = (
-        picture(&format!("caustics = {{ {caustics} }}\n")),
-        picture(""),
+        picture(context, &format!("caustics = {{ {caustics} }}\n")),
+        // What a fault is put into is seen beside a picture without it.
+        picture(&super::context(), ""),
     );
     let pairs = with.iter().zip(&without);
     pairs
@@ -294,8 +295,8 @@ fn still_water_has_the_light_that_it_has_without_caustics() {
         ),
         (
             "rays/cast",
-            "/ caustics.sun.y;\n        sun = part",
-            ";\n        sun = part",
+            "max(dot(n, caustics.sun), 0.0) / caustics.sun.y",
+            "max(dot(n, caustics.sun), 0.0)",
         ),
     ] {
         let error = flat_error(&spoiled(pass, from, to), 45.0, "");
