@@ -165,11 +165,11 @@ impl Shown<'_> {
         Look::parse(&text, &folder.join("look.toml")).unwrap()
     }
 
-    fn image(&self, context: &Context) -> Result<Image, (RenderError, Look)> {
+    fn image(&self, context: &Context) -> Result<Image, Box<(RenderError, Look)>> {
         let folder = tempfile::tempdir().unwrap();
         let look = self.look(folder.path());
-        let mut renderer =
-            Renderer::new(context, &look, self.scene).map_err(|error| (error, look.clone()))?;
+        let mut renderer = Renderer::new(context, &look, self.scene)
+            .map_err(|error| Box::new((error, look.clone())))?;
         let (water, white) = (Water::new(Particles::default()), Particles::default());
         Ok(renderer
             .render_moment(1, &Moment::alone(&water, &white))
@@ -366,7 +366,7 @@ fn materials_that_nothing_has_are_refused_with_their_key() {
             files: &files,
             scene,
         };
-        let (error, look) = shown.image(&context()).err()?;
+        let (error, look) = *shown.image(&context()).err()?;
         let RenderError::Material { index, problem } = error else {
             panic!("{error}");
         };
