@@ -10,6 +10,8 @@ import numpy as np
 from plyfile import PlyData
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdValidation
 
+from pier import PIER
+
 SCENE = """
 [shot]
 name = "pool-1"
@@ -31,12 +33,6 @@ method = "pbf"
 [solver.pbf]
 particle_spacing = 0.1
 """
-
-PIER = (
-    "v 1.3 0.0 0.3\nv 1.7 0.0 0.3\nv 1.7 0.8 0.3\nv 1.3 0.8 0.3\n"
-    "v 1.3 0.0 0.7\nv 1.7 0.0 0.7\nv 1.7 0.8 0.7\nv 1.3 0.8 0.7\n"
-    "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n"
-)
 
 EYE, TARGET = np.array([-2.0, 1.8, 2.2]), np.array([1.0, 0.5, 0.5])
 FOCAL_MM, FILM_MM, WIDTH, HEIGHT = 30.0, 36.0, 96, 54

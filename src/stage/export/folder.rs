@@ -12,12 +12,14 @@
 //! those of its record. A lock dies with its process.
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs::{self, File},
     io::{self, Write as _},
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
+
+use crate::stage::locked::{is_at, is_had, open};
 
 /// Folder of records and drafts.
 const ROOM: &str = ".swell-export";
@@ -181,13 +183,9 @@ impl Wanted {
         fs::create_dir_all(&room).map_err(at(&room))?;
         let lock = self.beside(".lock");
         loop {
-            let mut options = File::options();
-            options.read(true).write(true).create(true).truncate(false);
-            let file = options.open(&lock).map_err(at(&lock))?;
-            match file.try_lock() {
-                Ok(()) => {}
-                Err(TryLockError::WouldBlock) => return Ok(None),
-                Err(TryLockError::Error(source)) => return Err(at(&lock)(source)),
+            let file = open(&lock).map_err(at(&lock))?;
+            if !is_had(file.try_lock()).map_err(at(&lock))? {
+                return Ok(None);
             }
             // Its last holder may have taken it away meanwhile.
             if is_at(&file, &lock) {
@@ -243,20 +241,6 @@ fn hash(file: &Path) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(File::open(file)?)?;
     Ok(hasher.finalize().to_hex().to_string())
-}
-
-/// Whether an open file is the one of this name.
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt as _;
-    let identity = |meta: io::Result<fs::Metadata>| meta.map(|m| (m.dev(), m.ino())).ok();
-    identity(file.metadata()) == identity(path.metadata())
-}
-
-/// Elsewhere an open file cannot be taken away.
-#[cfg(not(unix))]
-fn is_at(_: &File, _: &Path) -> bool {
-    true
 }
 
 #[cfg(test)]

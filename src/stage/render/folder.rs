@@ -14,14 +14,17 @@
 
 use std::{
     collections::BTreeSet,
-    fs::{self, File, TryLockError},
+    fs::{self, File},
     io::{self, Read as _, Seek as _, Write as _},
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
-use crate::render::{Attributes, image::read_header};
+use crate::{
+    render::{Attributes, image::read_header},
+    stage::locked::{is_at, is_had, open},
+};
 
 /// Whose pictures they are; its lock is held while a process comes or goes.
 const RECORD: &str = "render.json";
@@ -128,22 +131,6 @@ fn at(file: &Path) -> impl FnOnce(io::Error) -> FolderError + use<> {
     move |source| FolderError::File { file, source }
 }
 
-/// Opens a file of ours, which is made where it is missing.
-fn open(file: &Path) -> Result<File, FolderError> {
-    let mut options = File::options();
-    options.read(true).write(true).create(true).truncate(false);
-    options.open(file).map_err(at(file))
-}
-
-/// Whether a lock was had, by what trying gave.
-fn is_had(file: &Path, tried: Result<(), TryLockError>) -> Result<bool, FolderError> {
-    match tried {
-        Ok(()) => Ok(true),
-        Err(TryLockError::WouldBlock) => Ok(false),
-        Err(TryLockError::Error(source)) => Err(at(file)(source)),
-    }
-}
-
 /// A process's place in a folder, held while it is at work there.
 #[derive(Debug)]
 pub(super) struct Folder {
@@ -186,12 +173,12 @@ impl Folder {
             }
         }
         let file = room.join(WORK);
-        let work = open(&file)?;
+        let work = open(&file).map_err(at(&file))?;
         let tried = match wanted.overwrite {
             true => work.try_lock(),
             false => work.try_lock_shared(),
         };
-        if !is_had(&file, tried)? {
+        if !is_had(tried).map_err(at(&file))? {
             return Err(in_use("with --overwrite"));
         }
         Ok(Self {
@@ -207,8 +194,9 @@ impl Folder {
     /// [`FolderError::File`].
     pub(super) fn claim(&self, frame: &str) -> Result<Option<File>, FolderError> {
         let file = self.path.join(ROOM).join(format!("{frame}.lock"));
-        let claim = open(&file)?;
-        Ok(is_had(&file, claim.try_lock())?.then_some(claim))
+        let claim = open(&file).map_err(at(&file))?;
+        let is_ours = is_had(claim.try_lock()).map_err(at(&file))?;
+        Ok(is_ours.then_some(claim))
     }
 
     /// Where the picture of a claimed frame is written.
@@ -260,7 +248,7 @@ impl Gate {
         let path = folder.join(RECORD);
         loop {
             fs::create_dir_all(folder).map_err(at(folder))?;
-            let file = open(&path)?;
+            let file = open(&path).map_err(at(&path))?;
             file.lock().map_err(at(&path))?;
             // Another process may have taken it away, having rendered nothing.
             if is_at(&file, &path) {
@@ -293,27 +281,13 @@ impl Gate {
     }
 }
 
-/// Whether an open file is the one of this name.
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt as _;
-    let identity = |meta: io::Result<fs::Metadata>| meta.map(|m| (m.dev(), m.ino())).ok();
-    identity(file.metadata()) == identity(path.metadata())
-}
-
-/// Elsewhere none is taken away.
-#[cfg(not(unix))]
-fn is_at(_: &File, _: &Path) -> bool {
-    true
-}
-
 /// Whether no process is at work; asked with the gate closed.
 fn is_deserted(room: &Path) -> Result<bool, FolderError> {
     let file = room.join(WORK);
     match File::options().read(true).write(true).open(&file) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(true),
         Err(error) => Err(at(&file)(error)),
-        Ok(work) => is_had(&file, work.try_lock()),
+        Ok(work) => is_had(work.try_lock()).map_err(at(&file)),
     }
 }
 

@@ -1,3 +1,5 @@
+use std::fs::TryLockError;
+
 use super::*;
 use crate::{
     render::{Image, image::write_png_with_attributes},

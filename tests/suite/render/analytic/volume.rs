@@ -302,6 +302,8 @@ fn spread(context: &Context, speed: f64, shutter: f64) -> [f64; 2] {
         shutter,
         water: "absorption_per_metre = [0.0, 0.0, 0.0]\n[whitewater]\ndensity_per_metre = 1.0\n"
             .to_owned(),
+        // Four voxels and more in a radius: a ball on the grid is as wide wherever it lies between nodes.
+        surface: "voxels_per_spacing = 4.0\n".to_owned(),
         sun: [0.0, 90.0, 0.0],
         ..Setup::new(eye)
     };
@@ -331,10 +333,14 @@ fn moving_bubbles_are_drawn_along_their_way() {
     // Eight instants, evenly over a shutter of a frame: (1 − 1/64) / 12 of the way's square, 1.2 m below the eye.
     let way = 50.0 / 1.2 * speed * shutter / 24.0;
     let wider = |found: [f64; 2]| (found[1] - still[1]) / (way * way * (1.0 - 1.0 / 64.0) / 12.0);
-    // Perspective: of a ball as wide as a fifth of its distance the nearer parts go farther through the picture, and weigh more; its
-    // picture is wider beside the middle. Both are second moments over squared distances, a tenth in all.
-    assert!((wider(moving) - 1.0).abs() < 0.15, "{}", wider(moving));
-    // The control: a fifth faster.
-    let faster = spread(&context(), 1.2 * speed, shutter);
-    assert!((wider(faster) - 1.0).abs() > 0.15, "{}", wider(faster));
+    // A nearer part goes farther through the picture, by 1 / z, and fills more of it, by 1 / z²: the mean of 1 / z⁴ over that of 1 / z² is
+    // to second order 1 + 7 times the variance of z over z². A ball is as deep as it is wide: that variance is the still picture's over
+    // the square of the focal length.
+    let expected = 1.0 + 7.0 * still[1] / 50f64.powi(2);
+    // What is left is the longer way through a ball beside the middle, two parts of a hundred by quadrature, and as much for the grid.
+    let off = |found| (wider(found) / expected - 1.0).abs();
+    assert!(off(moving) < 0.04, "{}", off(moving));
+    // The control: a twentieth faster, a tenth in the square.
+    let faster = spread(&context(), 1.05 * speed, shutter);
+    assert!(off(faster) > 0.04, "{}", off(faster));
 }
