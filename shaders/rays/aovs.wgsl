@@ -41,7 +41,7 @@ fn water_along(start: vec3f, direction: vec3f) -> f32 {
     var inside = is_wet(origin);
     var sum = 0.0;
     for (var k = 0; k < MOST_SURFACES; k++) {
-        let found = trace(origin, direction, inside, length(origin - start));
+        let found = trace(origin, direction, inside, length(origin - start), FAR);
         if found.kind == SKY {
             break;
         }
@@ -68,7 +68,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let along = length(ray);
     let direction = world_direction(camera, ray) / along;
     let through = water_along(camera.position, direction);
-    let found = trace(camera.position, direction, is_wet(camera.position), 0.0);
+    let found = trace(camera.position, direction, is_wet(camera.position), 0.0, FAR);
     let over = spray_over(vec2i(pixel), ray);
     if found.kind == SKY {
         let motion = motion_to(sky_in_next(direction), vec2i(pixel));

@@ -74,16 +74,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // What the ray meets first is known; in air it is taken up a little before.
     let known = first_depth[pixel.y * camera.size.x + pixel.x];
     let start = select(max(known * length(ray) - 2.0 * rays.voxel, 0.0), 0.0, inside || known >= FAR);
-    var value = radiance_along(camera.position + direction * start, direction, inside, start);
+    let reach = select(known * length(ray) - start + 2.0 * rays.voxel, 0.0, known >= FAR);
+    var value = radiance_along(camera.position + direction * start, direction, inside, start, reach);
     let mist = spray_at(vec2f(pixel) + 0.5);
     if mist.cover > 0.0 && !inside {
         let white = drops_before(direction, min(known, mist.depth) * length(ray), known * length(ray), mist.optical_depth);
         value = mix(value, vec4f(white, 1.0), mist.cover);
         dim_parts(1.0 - mist.cover);
-        light_part(WHITE, white * mist.cover);
+        white_parts(vec2f(pixel) + 0.5, white, mist.cover);
     }
 #else
-    let value = radiance_along(camera.position, direction, inside, 0.0);
+    let value = radiance_along(camera.position, direction, inside, 0.0, FAR);
 #endif
     store_light(out, value, camera.weight, camera.sample_index == 0u);
 }

@@ -25,9 +25,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let at = caustics.first + caustics.step * vec2f(id.xy);
     let origin = vec3f(at.x, caustics.top, at.y);
     var entry = vec4f(0.0, 1.0, 0.0, FAR);
-    if opaque_along(origin, caustics.towards).kind != OPAQUE {
+    if opaque_along(origin, caustics.towards, FAR).kind != OPAQUE {
         // Waves of the sea that a ray's width cannot hold are left out.
-        let found = trace(origin, -caustics.towards, false, caustics.spacing * camera.focal);
+        let found = trace(origin, -caustics.towards, false, caustics.spacing * camera.focal, FAR);
         if found.kind == WATER {
             let p = origin - caustics.towards * found.after;
             entry = vec4f(select(found.normal, vec3f(0.0), is_cut(found, p)), found.after);

@@ -123,7 +123,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         weight = bent.part / caustics.through;
     }
     for (var k = 0; k < MOST_SURFACES && is_open; k++) {
-        let found = trace(origin, direction, inside, caustics.spacing * camera.focal);
+        let found = trace(origin, direction, inside, caustics.spacing * camera.focal, FAR);
         if found.kind != WATER {
             is_open = false;
             if found.kind == OPAQUE && inside {

@@ -29,7 +29,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let ray = eye_ray(camera, vec2f(id.xy) + 0.5);
     let along = length(ray);
     let direction = world_direction(camera, ray) / along;
-    let found = trace(camera.position, direction, is_wet(camera.position), 0.0);
+    let found = trace(camera.position, direction, is_wet(camera.position), 0.0, FAR);
     depth[at] = select(FAR, found.t / along, found.kind == WATER);
     solid_depth[at] = select(FAR, found.t / along, found.kind == OPAQUE);
 #ifdef SPRAY

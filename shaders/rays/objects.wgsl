@@ -31,7 +31,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let pixel = vec2u(id.x, id.y + band.row) + camera.margin;
     let direction = normalize(world_direction(camera, eye_ray(camera, vec2f(pixel) + 0.5)));
-    let found = trace(camera.position, direction, is_wet(camera.position), 0.0);
+    let found = trace(camera.position, direction, is_wet(camera.position), 0.0, FAR);
     var object = found.material;
     if found.kind == WATER {
         object = 0u;

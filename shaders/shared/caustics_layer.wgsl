@@ -7,5 +7,5 @@
 fn caustic_layer(p: vec3f, n: vec3f) -> u32 {
     // Off its face by what two ways to one place may differ.
     let start = p + 4e-3 * rays.voxel * n;
-    return select(0u, 1u, opaque_along(start, caustics.sun).kind == OPAQUE);
+    return select(0u, 1u, opaque_along(start, caustics.sun, FAR).kind == OPAQUE);
 }

@@ -41,7 +41,7 @@ struct Ray {
 // The part of the picture's light that something belongs to which would be `own` on the ray from the eye: what the first surface
 // mirrors is one part, and so is what comes through it, but for what water scatters.
 fn part_of(ray: Ray, own: u32) -> u32 {
-    let is_own = ray.surfaces == 0u || (ray.part == REFRACTION && (own == WHITE || own == SCATTERING));
+    let is_own = ray.surfaces == 0u || (ray.part == REFRACTION && (own == WHITE || own == FOAM_LIGHT || own == SCATTERING));
     return select(ray.part, own, is_own);
 }
 
@@ -188,7 +188,7 @@ fn veil(ray: Ray, found: Found, far: f32, light: ptr<function, vec3f>) -> f32 {
             let white = ray.weight * passed.cover * seen * exp(-(shading.absorption + shading.scattering) * mean);
             let before = ray.weight * passed.cover * scattered(ray.origin, ray.direction, mean);
             *light += white + before;
-            light_part(part_of(ray, WHITE), white);
+            light_part(part_of(ray, FOAM_LIGHT), white);
             light_part(part_of(ray, SCATTERING), before);
             kept = 1.0 - passed.cover;
         }
@@ -210,8 +210,9 @@ fn veil(ray: Ray, found: Found, far: f32, light: ptr<function, vec3f>) -> f32 {
 #endif
 
 // Radiance and coverage along a ray from `origin`, in air or water, that has come `travelled` metres from the eye on its way there
-// and met nothing.
-fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32) -> vec4f {
+// and met nothing. It meets something before `known`, or nothing at all where that is 0.
+fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32, known: f32) -> vec4f {
+    var reach = known;
     var waiting: array<Ray, WAITING>;
     var held = 1;
     waiting[0] = Ray(origin, inside, direction, vec3f(1.0), travelled, 0u, SKYLIGHT);
@@ -220,7 +221,14 @@ fn radiance_along(origin: vec3f, direction: vec3f, inside: bool, travelled: f32)
     for (var k = 0; k < MOST_RAYS && held > 0; k++) {
         held -= 1;
         let ray = waiting[held];
-        let found = trace(ray.origin, ray.direction, ray.inside, ray.travelled);
+        let found = trace(
+            ray.origin, ray.direction, ray.inside, ray.travelled, select(FAR, reach, ray.surfaces == 0u));
+        if ray.surfaces == 0u && found.kind == SKY && reach > 0.0 && reach < FAR {
+            // A sheet thinner than a step was passed over: the ray is followed as others are.
+            reach = FAR;
+            held = 1;
+            continue;
+        }
         if HOLDS_OUT && ray.surfaces == 0u && !ray.inside && found.kind == OPAQUE {
             return vec4f(0.0);
         }

@@ -3,14 +3,18 @@
 #import "shared/camera.wgsl"
 #import "shared/ssfr_solid.wgsl"
 
+// Two boxes and what is in them. An axis has a word for each, in steps of `rays.set_step` from `rays.set_low`: the least corner in its
+// lower half, the greatest in its upper one, both rounded outwards. An empty box has its corners the wrong way round.
 struct SetNode {
-    min: vec3f,
-    // First triangle of a leaf, or the right child of an inner node, whose left one follows it.
-    first_or_right: u32,
-    max: vec3f,
-    // Triangles of a leaf; 0 is an inner node.
-    count: u32,
+    left: vec3u,
+    // A node, or triangles: the number of the first, and above LEAF_SHIFT how many, which is 0 for a node.
+    left_child: u32,
+    right: vec3u,
+    right_child: u32,
 }
+
+const LEAF_SHIFT: u32 = 28u;
+const NO_CHILD: u32 = 0xffffffffu;
 
 const SKY: u32 = 0u;
 const WATER: u32 = 1u;
@@ -57,52 +61,79 @@ fn triangle_distance(triangle: Triangle, origin: vec3f, direction: vec3f) -> f32
     return t;
 }
 
-fn box_distance(node: SetNode, origin: vec3f, inverse: vec3f, nearest: f32) -> f32 {
-    let a = (node.min - origin) * inverse;
-    let b = (node.max - origin) * inverse;
+// Where a ray comes into a box, in the steps of the tree; FAR where it does not before `nearest`. Flat boxes, and those that a ray only
+// touches, count.
+fn box_distance(sides: vec3u, origin: vec3f, inverse: vec3f, nearest: f32) -> f32 {
+    let a = (vec3f(sides & vec3u(0xffffu)) - origin) * inverse;
+    let b = (vec3f(sides >> vec3u(16u)) - origin) * inverse;
     let low = min(a, b);
     let high = max(a, b);
     let enter = max(max(low.x, max(low.y, low.z)), 0.0);
     let leave = min(high.x, min(high.y, high.z));
-    // Flat boxes, and those that a ray only touches, count.
     return select(FAR, enter, enter <= leave * 1.00001 + 1e-6 && enter < nearest);
 }
 
-fn opaque_along(origin: vec3f, direction: vec3f) -> Found {
+// The last of the children that wait whose box is nearer than `nearest`: child, and distance of its box.
+fn next_of(waiting: ptr<function, array<vec2u, 32>>, held: ptr<function, i32>, nearest: f32) -> u32 {
+    var at = NO_CHILD;
+    while at == NO_CHILD && *held > 0 {
+        *held -= 1;
+        let next = (*waiting)[*held];
+        at = select(NO_CHILD, next.x, bitcast<f32>(next.y) < nearest);
+    }
+    return at;
+}
+
+// What a ray meets first before `reach`: the ground, or a triangle. Each lane walks down to triangles before any lane tests them, nearer
+// boxes first (Aila and Laine 2009).
+fn opaque_along(origin: vec3f, direction: vec3f, reach: f32) -> Found {
+    var nearest = reach;
+    var triangle = NO_TRIANGLE;
     var found = met(SKY, FAR, vec3f(0.0), 3u);
-    if direction.y < -1e-6 && origin.y > 0.0 {
-        found = met(OPAQUE, -origin.y / direction.y, vec3f(0.0, 1.0, 0.0), 2u);
+    if direction.y < -1e-6 && origin.y > 0.0 && -origin.y / direction.y < reach {
+        nearest = -origin.y / direction.y;
+        found = met(OPAQUE, nearest, vec3f(0.0, 1.0, 0.0), 2u);
     }
     if rays.triangles == 0u {
         return found;
     }
-    let inverse = 1.0 / select(direction, vec3f(1e-9), abs(direction) < vec3f(1e-9));
+    let from_low = (origin - rays.set_low) / rays.set_step;
+    let inverse = rays.set_step / select(direction, vec3f(1e-9), abs(direction) < vec3f(1e-9));
     // Median splits keep the tree's depth below 32.
-    var stack: array<u32, 32>;
-    var held = 1;
-    stack[0] = 0u;
-    while held > 0 {
-        held -= 1;
-        let at = stack[held];
-        let node = set_nodes[at];
-        if box_distance(node, origin, inverse, found.t) >= FAR {
-            continue;
-        }
-        if node.count == 0u {
-            stack[held] = node.first_or_right;
-            stack[held + 1] = at + 1u;
-            held += 2;
-            continue;
-        }
-        for (var k = node.first_or_right; k < node.first_or_right + node.count; k++) {
-            let triangle = set_triangles[k];
-            let t = triangle_distance(triangle, origin, direction);
-            if t < found.t {
-                let normal = normalize(cross(triangle.b - triangle.a, triangle.c - triangle.a));
-                found = met(OPAQUE, t, normal, triangle.material);
-                found.triangle = k;
+    var waiting: array<vec2u, 32>;
+    var held = 0;
+    var at = 0u;
+    while at != NO_CHILD {
+        while at >> LEAF_SHIFT == 0u {
+            let node = set_nodes[at];
+            let left = box_distance(node.left, from_low, inverse, nearest);
+            let right = box_distance(node.right, from_low, inverse, nearest);
+            let goes_left = left <= right;
+            let far = max(left, right);
+            if far < FAR {
+                waiting[held] = vec2u(select(node.left_child, node.right_child, goes_left), bitcast<u32>(far));
+                held += 1;
+            }
+            at = select(node.right_child, node.left_child, goes_left);
+            if min(left, right) >= FAR {
+                at = next_of(&waiting, &held, nearest);
             }
         }
+        let count = select(at >> LEAF_SHIFT, 0u, at == NO_CHILD);
+        let first = at & ((1u << LEAF_SHIFT) - 1u);
+        for (var k = first; k < first + count; k++) {
+            let t = triangle_distance(set_triangles[k], origin, direction);
+            if t < nearest {
+                nearest = t;
+                triangle = k;
+            }
+        }
+        at = next_of(&waiting, &held, nearest);
+    }
+    if triangle != NO_TRIANGLE {
+        let one = set_triangles[triangle];
+        found = met(OPAQUE, nearest, normalize(cross(one.b - one.a, one.c - one.a)), one.material);
+        found.triangle = triangle;
     }
     return found;
 }

@@ -60,9 +60,10 @@ fn beyond(origin: vec3f, direction: vec3f, from_t: f32, inside: bool, travelled:
 }
 #endif
 
-// `inside` says whether the ray begins in the water, and `travelled` how many metres the eye is before its origin.
-fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32) -> Found {
-    let opaque_one = opaque_along(origin, direction);
+// `inside` says whether the ray begins in the water, and `travelled` how many metres the eye is before its origin. Nothing in the box or
+// opaque is looked for from `reach` on.
+fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32, reach: f32) -> Found {
+    let opaque_one = opaque_along(origin, direction, reach);
     let span = box_span(origin, direction);
     let start = max(span.x, 0.0);
     let misses = span.y <= start;
@@ -75,7 +76,7 @@ fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32) -> Found
         }
     }
 #endif
-    if misses || start >= opaque_one.t {
+    if misses || start >= min(opaque_one.t, reach) {
         return opaque_one;
     }
 #ifdef SEA
@@ -87,7 +88,7 @@ fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32) -> Found
         return pane(start, side_normal(side_of(origin + direction * start)));
     }
 #endif
-    let end = min(span.y, opaque_one.t);
+    let end = min(min(span.y, opaque_one.t), reach);
     let surface = crossing(origin, direction, start, end, inside);
     if surface.after < FAR {
         let p = origin + direction * surface.after;
@@ -96,11 +97,11 @@ fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32) -> Found
             WATER, surface.after, surface.before, surface.after, field_normal(p, towards), 0u, 0.0, NO_TRIANGLE);
     }
 #ifdef SEA
-    if span.y < opaque_one.t {
+    if span.y < min(opaque_one.t, reach) {
         return beyond(origin, direction, span.y, inside, travelled, opaque_one);
     }
 #else
-    if inside && span.y < opaque_one.t {
+    if inside && span.y < min(opaque_one.t, reach) {
         return at_side(origin + direction * span.y, span.y);
     }
 #endif

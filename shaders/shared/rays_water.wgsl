@@ -21,6 +21,9 @@ struct Rays {
     pad0: u32,
     pad1: u32,
     pad2: u32,
+    // Of the set's tree: least corner of its lattice, and the lattice's step, metres.
+    set_low: vec3f,
+    set_step: f32,
 }
 
 const EMPTY: u32 = 0u;

@@ -9,7 +9,8 @@ const SKYLIGHT: u32 = 4u;
 const WHITE: u32 = 5u;
 const SOLIDS: u32 = 6u;
 const CAUSTICS: u32 = 7u;
-const LIGHT_PARTS: u32 = 8u;
+const FOAM_LIGHT: u32 = 8u;
+const LIGHT_PARTS: u32 = 9u;
 
 #ifdef LIGHTS
 var<private> light_parts: array<vec3f, LIGHT_PARTS>;

@@ -1,5 +1,5 @@
 // What splats sum up of spray and whitewater, at half resolution: planes of one word a cell, optical length first, then that times
-// depth, and with MOTION times each axis of velocity.
+// depth, and with MOTION times each axis of velocity; with FOAM, without MOTION, that of foam and bubbles alone.
 #import "shared/ssfr_splat.wgsl"
 
 struct SprayParams {

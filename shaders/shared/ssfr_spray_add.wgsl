@@ -27,3 +27,12 @@ fn add_spray(pixel: vec2u, amount: f32, z: f32, velocity: vec3f) {
     atomicAdd(&spray[at + 4u * plane], words.z);
 #endif
 }
+
+#ifdef FOAM
+// What of `amount` is foam, in a plane of its own.
+fn add_foam(pixel: vec2u, amount: f32) {
+    let half_size = camera.size / 2u;
+    let plane = half_size.x * half_size.y;
+    atomicAdd(&spray[pixel.y * half_size.x + pixel.x + 2u * plane], u32(amount * SPRAY_SCALE + 0.5));
+}
+#endif

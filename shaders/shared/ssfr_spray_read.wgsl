@@ -2,6 +2,7 @@
 // `spray_params` and `spray` of whoever imports it.
 #import "shared/ssfr_spray.wgsl"
 #import "shared/ssfr_half.wgsl"
+#import "shared/ssfr_lights.wgsl"
 
 struct Spray {
     optical_depth: f32,
@@ -46,4 +47,16 @@ fn spray_velocity(position: vec2f) -> vec3f {
     let sum = vec3f(
         spray_signed(tap, 2u * plane), spray_signed(tap, 3u * plane), spray_signed(tap, 4u * plane));
     return sum / spray_mean(tap, 0u) * spray_params.speed;
+}
+
+// Adds the light of what was splatted at a position, which covers so much of it, to its parts.
+fn white_parts(position: vec2f, light: vec3f, cover: f32) {
+#ifdef FOAM
+    let tap = half_tap(position);
+    let foam = clamp(spray_mean(tap, 2u * spray_plane()) / max(spray_mean(tap, 0u), 1.0 / SPRAY_SCALE), 0.0, 1.0);
+    light_part(FOAM_LIGHT, light * (cover * foam));
+    light_part(WHITE, light * (cover * (1.0 - foam)));
+#else
+    light_part(WHITE, light * cover);
+#endif
 }

@@ -448,7 +448,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         colour = mix(colour, white, mist.cover);
         alpha = mix(alpha, 1.0, mist.cover);
         dim_parts(1.0 - mist.cover);
-        light_part(WHITE, white * mist.cover);
+        white_parts(vec2f(pixel) + 0.5, white, mist.cover);
     }
 #endif
     store_light(out, vec4f(colour, alpha), camera.weight, camera.sample_index == 0u);

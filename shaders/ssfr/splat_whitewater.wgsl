@@ -8,7 +8,8 @@ struct Whitewater {
     position: vec3f,
     radius: f32,
     velocity: vec3f,
-    pad: f32,
+    // 1 of foam and bubbles, 0 of spray.
+    foam: f32,
 }
 
 struct WhitewaterParams {
@@ -63,6 +64,9 @@ fn main(
             let under = max(c.z - surface[at], 0.0);
             let amount = chord * weight * seen * exp(-under / whitewater_params.fading);
             add_spray(pixel, amount, c.z, one.velocity);
+#ifdef FOAM
+            add_foam(pixel, amount * one.foam);
+#endif
         }
     }
 }

@@ -2,10 +2,10 @@
 
 use super::RenderScene;
 use super::plan::Plan;
-use super::sky::Sky;
+use super::sky::{Sky, extinction};
 use super::uniform;
 use crate::gpu::texture::{SamplerSpec, TextureSpec};
-use crate::scene::look::Look;
+use crate::scene::look::{Look, LookSpec, SkySpec};
 
 /// How far off its face a point is whose shadow is looked up, over the domain's longer side on the ground: about three texels of the
 /// shadow map, which holds a little more than the domain.
@@ -37,7 +37,7 @@ pub(super) fn shading(
         ground_colour: colour(spec.ground.colour),
         ground_variation: spec.ground.variation as f32,
         solid_colour: colour(spec.solids.colour),
-        haze: spec.ground.haze_m as f32,
+        haze: haze(spec) as f32,
         ripple: ripple.map_or([0.0; 2], |r| [r.wavelength_m as f32, r.slope as f32]),
         windows: windows.map_or([0.0; 2], |w| [w.storey_m as f32, w.bay_m as f32]),
         window_lit: windows.map_or(0.0, |w| w.lit as f32),
@@ -51,6 +51,18 @@ pub(super) fn shading(
         pad1: 0.0,
         irradiance: sky.irradiance,
         shadow_from_world,
+    }
+}
+
+/// Metres of air after which 63 % of the contrast are gone.
+fn haze(spec: &LookSpec) -> f64 {
+    match spec.sky {
+        SkySpec::HosekWilkie {
+            turbidity,
+            haze: true,
+            ..
+        } => 1.0 / extinction(turbidity),
+        _ => spec.ground.haze_m,
     }
 }
 

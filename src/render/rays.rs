@@ -8,15 +8,12 @@ use super::{
     paths::Path,
     plan::Plan,
     set::Set,
-    uniform::{Rays, SetNode, Triangle},
+    tree::{Tree, tree},
+    uniform::Rays,
 };
 use crate::{
-    domain::{
-        bvh::Bvh,
-        level_set::{
-            LevelSet, VALUES, VOXELS, bricks_over, kernels::Kernels, sunlight::nodes_over,
-        },
-        mesh::TriangleMesh,
+    domain::level_set::{
+        LevelSet, VALUES, VOXELS, bricks_over, kernels::Kernels, sunlight::nodes_over,
     },
     gpu::recording::{Bind, Command, Groups},
     scene::look::Look,
@@ -42,7 +39,15 @@ pub(super) fn plan_rays(
     let voxel = voxel(look, scene);
     let bricks = bricks_over(size, voxel);
     let (nodes, pitch) = nodes_over(size, voxel);
+    let Tree {
+        low,
+        step,
+        nodes: boxes,
+        mut sorted,
+    } = tree(set.triangles);
     let rays = Rays {
+        set_low: low,
+        set_step: step,
         size: size.as_vec3().to_array(),
         voxel: voxel as f32,
         bricks,
@@ -60,7 +65,6 @@ pub(super) fn plan_rays(
     let bricks = (finer * (particles / PARTICLES_A_BRICK) as f64).ceil();
     plan.buffer(&LEVEL_VALUES, (bricks as usize).max(1) * VALUES);
     plan.buffer(&SUN_PATHS, count(nodes) + behind);
-    let (boxes, mut sorted) = tree(set.triangles);
     sorted.extend(set.places);
     plan.values(&SET_NODES, &boxes);
     plan.values(&SET_TRIANGLES, &sorted);
@@ -74,32 +78,6 @@ pub(super) fn first(plan: &Plan) -> Command {
         Bind::whole("solid_depth", &DEPTHS[1]),
     ];
     Command::in_groups("rays/first", Groups::Pixels(plan.extent.size), binds)
-}
-
-/// Nodes of a tree over triangles, and the triangles in its order; one of each that nothing meets where there are none.
-fn tree(triangles: &[Triangle]) -> (Vec<SetNode>, Vec<Triangle>) {
-    if triangles.is_empty() {
-        return (vec![SetNode::default()], vec![Triangle::default()]);
-    }
-    let corners = triangles.iter().flat_map(|it| [it.a, it.b, it.c]);
-    let mesh = TriangleMesh {
-        vertices: corners.map(|p| Vec3::from(p).as_dvec3()).collect(),
-        triangles: (0..triangles.len() as u32)
-            .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
-            .collect(),
-    };
-    let tree = Bvh::new(&mesh);
-    let corner = |p: DVec3| p.as_vec3().to_array();
-    let nodes = tree
-        .boxes()
-        .map(|([min, max], first_or_right, count)| SetNode {
-            min: corner(min),
-            first_or_right,
-            max: corner(max),
-            count,
-        });
-    let sorted = tree.entries().iter().map(|&k| triangles[k as usize]);
-    (nodes.collect(), sorted.collect())
 }
 
 /// Edge length of a voxel, metres.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::scene::look::{CurveSpec, ImageSpec};
+use crate::scene::look::{CurveSpec, ImageSpec, LookSpec};
 
 /// Where in the pixel, in the shutter and on the lens a sample lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ impl Sample {
 
 /// How far a shutter is open over its time: steadily more for the first share of it, wholly, and steadily less for the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Curve {
+enum Curve {
     /// Wholly, all the time.
     Box,
     /// With shares in which it opens and closes.
@@ -37,7 +37,7 @@ pub(super) enum Curve {
 }
 
 impl Curve {
-    pub(super) fn of(image: &ImageSpec) -> Self {
+    fn of(image: &ImageSpec) -> Self {
         match (image.shutter_curve, image.shutter_ramps) {
             (CurveSpec::Box, _) => Self::Box,
             (CurveSpec::Triangle, _) => Self::Ramps([0.5; 2]),
@@ -63,9 +63,16 @@ impl Curve {
     }
 }
 
+/// The samples of a look's frame.
+pub(super) fn samples_of(spec: &LookSpec) -> Vec<Sample> {
+    let image = &spec.image;
+    let has_lens = spec.camera.lens.is_some();
+    samples(image.samples, image.shutter, Curve::of(image), has_lens)
+}
+
 /// The samples of one frame: Halton points over the pixel, instants with equal shares of the shutter's light between them, and where
 /// there is a lens points of a spiral over its aperture.
-pub(super) fn samples(count: u32, shutter: f64, curve: Curve, has_lens: bool) -> Vec<Sample> {
+fn samples(count: u32, shutter: f64, curve: Curve, has_lens: bool) -> Vec<Sample> {
     let points = pixel_points(count);
     let apertures = match has_lens {
         true => aperture_points(count, &points),

@@ -48,18 +48,34 @@ fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
+/// Optical depth of the air from the ground to the zenith at a wavelength in micrometres, but for ozone: that of molecules and that of
+/// aerosols (Preetham, Shirley and Smits 1999, appendix A.1).
+fn depths(micrometres: f64, turbidity: f64) -> [f64; 2] {
+    let beta = 0.04608 * turbidity - 0.04586;
+    let rayleigh = 0.008735 * micrometres.powf(-4.08);
+    [rayleigh, beta * micrometres.powf(-1.3)]
+}
+
 /// Part of the sunlight that the air lets through at 650, 550 and 450 nm: Rayleigh, aerosol and ozone, as
 /// Preetham, Shirley and Smits 1999 give them (appendix A.1).
 fn transmittance(elevation: f64, turbidity: f64) -> DVec3 {
     let zenith = PI / 2.0 - elevation;
     let mass = 1.0 / (zenith.cos() + 0.15 * (93.885 - zenith.to_degrees()).powf(-1.253));
-    let beta = 0.04608 * turbidity - 0.04586;
     let at = |micrometres: f64, ozone: f64| {
-        let rayleigh = 0.008735 * micrometres.powf(-4.08);
-        let aerosol = beta * micrometres.powf(-1.3);
+        let [rayleigh, aerosol] = depths(micrometres, turbidity);
         (-(rayleigh + aerosol + 0.35 * ozone) * mass).exp()
     };
     DVec3::new(at(0.65, 0.062), at(0.55, 0.085), at(0.45, 0.003))
+}
+
+/// How fast molecules and aerosols become fewer with height, 1/m (Preetham, Shirley and Smits 1999, section 4).
+const DECAY: [f64; 2] = [0.1136e-3, 0.8333e-3];
+
+/// Extinction of the air at the ground at 550 nm, 1/m: the same depths as those of the sunlight, of layers that become thinner with
+/// height as [`DECAY`] says.
+pub(super) fn extinction(turbidity: f64) -> f64 {
+    let layers = depths(0.55, turbidity).into_iter().zip(DECAY);
+    layers.map(|(depth, decay)| depth * decay).sum()
 }
 
 fn state(elevation: f64, turbidity: f64, albedo: [f64; 3]) -> Result<SkyState, RenderError> {
@@ -182,7 +198,9 @@ impl Sky {
         let sun_irradiance =
             transmittance(elevation, turbidity) * (outside_air * spec.sun.intensity);
         let (size, texels, disc) = match &spec.sky {
-            SkySpec::HosekWilkie { turbidity, albedo } => {
+            SkySpec::HosekWilkie {
+                turbidity, albedo, ..
+            } => {
                 let size = [512, 256];
                 let state = state(elevation, *turbidity, *albedo)?;
                 let mut texels = image(size, |d| {
@@ -353,5 +371,22 @@ mod tests {
         let reds: Vec<f64> = texels[..8].iter().map(|c| c.x).collect();
         assert_eq!(reds, [0.0, 0.0, 8.0, 8.0, 0.0, 0.0, 0.0, 0.0]);
         assert!(panorama(b"not an EXR", 8, 0.0, 1.0).is_err());
+    }
+
+    #[test]
+    fn air_is_as_clear_as_its_turbidity() {
+        // Rayleigh extinction at sea level at 550 nm, 1/m: Bucholtz 1995, table 2. Both models' fits are good to some percent.
+        let molecules = 1.149e-5;
+        assert!(
+            (extinction(1.0) / molecules - 1.0).abs() < 0.05,
+            "{}",
+            extinction(1.0)
+        );
+        // Contrast of 2 % is left after 3.912 lengths (Koschmieder 1924): about 20 km on a clear day, some km in haze.
+        let seen_km = |turbidity| 3.912e-3 / extinction(turbidity);
+        assert!((15.0..30.0).contains(&seen_km(3.0)), "{}", seen_km(3.0));
+        assert!((3.0..8.0).contains(&seen_km(10.0)), "{}", seen_km(10.0));
+        // The control: without aerosols a hazy day is as clear as any.
+        assert!(3.912e-3 / molecules > 300.0);
     }
 }

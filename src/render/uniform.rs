@@ -187,7 +187,7 @@ mirror!(
         position: [f32; 3],
         radius: f32,
         velocity: [f32; 3],
-        pad: f32,
+        foam: f32,
     }
 );
 
@@ -232,6 +232,8 @@ mirror!(
         pad0: u32,
         pad1: u32,
         pad2: u32,
+        set_low: [f32; 3],
+        set_step: f32,
     }
 );
 
@@ -289,10 +291,10 @@ mirror!(
 mirror!(
     /// `SetNode` of shared/rays_set.wgsl.
     SetNode {
-        min: [f32; 3],
-        first_or_right: u32,
-        max: [f32; 3],
-        count: u32,
+        left: [u32; 3],
+        left_child: u32,
+        right: [u32; 3],
+        right_child: u32,
     }
 );
 

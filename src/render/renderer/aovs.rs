@@ -2,32 +2,125 @@
 
 use super::Renderer;
 use crate::{
-    render::{RenderError, buffers::aovs, frame::FAR, image::Aovs},
-    scene::look::AovSpec,
+    render::{
+        RenderError,
+        buffers::{NEXT_CAMERA, PARTICLES, aovs},
+        camera::{Setting, camera},
+        frame::FAR,
+        image::Aovs,
+        samples::{Sample, samples_of},
+        uniform::Particle,
+    },
+    scene::look::{AovFilterSpec, AovSpec},
 };
 
+/// What a pixel has of each channel: Z, N, P, forward, thickness.
+const VALUES: usize = 10;
+/// The last of them, which is 0 where nothing is met; the others are then of nothing.
+const THICKNESS: usize = 9;
+
+/// Sums over samples.
+struct Means {
+    /// Of weights, of all samples.
+    all: f64,
+    /// Of each pixel, of the weights of the samples that met something.
+    met: Vec<f64>,
+    sums: Vec<[f64; VALUES]>,
+}
+
+impl Means {
+    fn new(pixels: usize) -> Self {
+        Self {
+            all: 0.0,
+            met: vec![0.0; pixels],
+            sums: vec![[0.0; VALUES]; pixels],
+        }
+    }
+
+    fn add(&mut self, values: &[[f32; VALUES]], weight: f64) {
+        self.all += weight;
+        for ((sum, met), v) in self.sums.iter_mut().zip(&mut self.met).zip(values) {
+            sum[THICKNESS] += weight * f64::from(v[THICKNESS]);
+            if is_seen(v) {
+                *met += weight;
+                for (sum, value) in sum[..THICKNESS].iter_mut().zip(v) {
+                    *sum += weight * f64::from(*value);
+                }
+            }
+        }
+    }
+
+    /// Means: of the thickness over all samples, of the rest over those that met something. What `still` says stands where none did.
+    fn over(self, still: &[[f32; VALUES]]) -> Vec<[f32; VALUES]> {
+        let pixels = self.sums.iter().zip(&self.met).zip(still);
+        pixels
+            .map(|((sum, &met), nothing)| {
+                let mut mean = match met > 0.0 {
+                    true => sum.map(|value| (value / met) as f32),
+                    false => *nothing,
+                };
+                mean[THICKNESS] = (sum[THICKNESS] / self.all) as f32;
+                mean
+            })
+            .collect()
+    }
+}
+
+fn is_seen(v: &[f32; VALUES]) -> bool {
+    v[0] < 0.1 * FAR
+}
+
 impl Renderer {
-    pub(super) fn read_aovs(&self) -> Result<Aovs, RenderError> {
-        let values: Vec<[f32; 10]> = self.read_bands(aovs, 1)?;
+    /// Draws the channels of a frame; `ahead` is the particles with the velocities that lead to the next frame, where these are known.
+    pub(super) fn draw_aovs(
+        &mut self,
+        frame: u32,
+        setting: &Setting,
+        ahead: &[Particle],
+    ) -> Result<Aovs, RenderError> {
+        if !ahead.is_empty() {
+            self.program.upload(PARTICLES, 0, ahead);
+        }
+        let filter = self.look.spec().output.aov_filter;
+        let samples = match filter {
+            AovFilterSpec::Centre => vec![Sample::STILL],
+            AovFilterSpec::Beauty => samples_of(self.look.spec()),
+        };
+        let mut means = Means::new(self.plan.extent.shaded());
+        let mut last = Vec::new();
+        for sample in samples {
+            let next = camera(&self.look, setting, f64::from(frame) + 1.0, sample, 0);
+            self.program.upload(NEXT_CAMERA, 0, &[next]);
+            let camera = camera(&self.look, setting, frame.into(), sample, 0);
+            self.sample(&camera, true)?;
+            last = self.read_bands(aovs, 1)?;
+            if filter == AovFilterSpec::Beauty {
+                means.add(&last, sample.weight);
+            }
+        }
+        Ok(self.named(&match filter {
+            AovFilterSpec::Centre => last,
+            AovFilterSpec::Beauty => means.over(&last),
+        }))
+    }
+
+    /// The channels that the look asks for.
+    fn named(&self, values: &[[f32; VALUES]]) -> Aovs {
         let origin = self.scene.origin + self.scene.domain.min;
-        let seen = |v: &[f32; 10]| v[0] < 0.1 * FAR;
+        let place = |v: &[f32; VALUES]| {
+            if !is_seen(v) {
+                return [0.0; 3];
+            }
+            [0, 1, 2].map(|axis| (f64::from(v[4 + axis]) + origin[axis]) as f32)
+        };
         let wants = |aov| self.look.wants(aov);
-        Ok(Aovs {
+        Aovs {
             z: wants(AovSpec::Z).then(|| values.iter().map(|v| v[0]).collect()),
             n: wants(AovSpec::N).then(|| values.iter().map(|v| [v[1], v[2], v[3]]).collect()),
-            p: wants(AovSpec::P).then(|| {
-                values
-                    .iter()
-                    .map(|v| {
-                        if !seen(v) {
-                            return [0.0; 3];
-                        }
-                        [0, 1, 2].map(|axis| (f64::from(v[4 + axis]) + origin[axis]) as f32)
-                    })
-                    .collect()
-            }),
+            p: wants(AovSpec::P).then(|| values.iter().map(place).collect()),
             forward: wants(AovSpec::Forward).then(|| values.iter().map(|v| [v[7], v[8]]).collect()),
-            thickness: wants(AovSpec::Thickness).then(|| values.iter().map(|v| v[9]).collect()),
-        })
+            thickness: wants(AovSpec::Thickness)
+                .then(|| values.iter().map(|v| v[THICKNESS]).collect()),
+        }
     }
 }

@@ -12,13 +12,13 @@ mod whitewater;
 use bytemuck::Pod;
 use glam::DVec3;
 
-use super::buffers::{CAMERA, NEXT_CAMERA, PARTICLES, objects, picture};
+use super::buffers::{CAMERA, objects, picture};
 use super::camera::{Setting, camera, eye};
 use super::caustics::{Caustics, above};
 use super::cryptomatte::{Covers, unique};
 use super::image::{Image, View};
 use super::plan::{Limits, Plan};
-use super::samples::{Curve, Sample, samples};
+use super::samples::samples_of;
 use super::{Moment, RenderError, RenderScene, Water, sea::Sea, uniform};
 use crate::domain::particles::Particles;
 use crate::gpu::{
@@ -185,10 +185,7 @@ impl Renderer {
         self.draw_once()?;
         let wants_objects = self.look.spec().output.cryptomatte;
         let mut covers = wants_objects.then(|| Covers::new(self.plan.extent.shaded()));
-        let spec = self.look.spec();
-        let (image, has_lens) = (&spec.image, spec.camera.lens.is_some());
-        let samples = samples(image.samples, image.shutter, Curve::of(image), has_lens);
-        for (index, sample) in (0u32..).zip(samples) {
+        for (index, sample) in (0u32..).zip(samples_of(self.look.spec())) {
             let camera = camera(&self.look, &setting, frame.into(), sample, index);
             self.sample(&camera, false)?;
             if let Some(covers) = &mut covers {
@@ -201,16 +198,7 @@ impl Renderer {
         image.view = Some(View::of(&eye, rate));
         image.exr_space = self.look.spec().output.colour_space;
         if !self.plan.aovs.is_empty() {
-            // Depths and normals have no mean: they are taken at pixel centres, at the frame's instant, by a pinhole.
-            let next = f64::from(frame) + 1.0;
-            let next = camera(&self.look, &setting, next, Sample::STILL, 0);
-            self.program.upload(NEXT_CAMERA, 0, &[next]);
-            if !loaded.ahead.is_empty() {
-                self.program.upload(PARTICLES, 0, &loaded.ahead);
-            }
-            let camera = camera(&self.look, &setting, frame.into(), Sample::STILL, 0);
-            self.sample(&camera, true)?;
-            image.aovs = self.read_aovs()?;
+            image.aovs = self.draw_aovs(frame, &setting, &loaded.ahead)?;
         }
         image.matte = covers.map(|covers| {
             let spec = self.look.spec();

@@ -81,6 +81,9 @@ fn plan_output(plan: &mut Plan, look: &Look, pass: &'static str) {
         return;
     }
     plan.define(pass, "LIGHTS");
+    if tells_foam(look) {
+        plan.define(pass, "FOAM");
+    }
     let parts = LightSpec::NAMED.iter().enumerate();
     let written: u32 = parts
         .filter(|(_, (_, light))| lights.contains(light))
@@ -121,6 +124,13 @@ pub(super) fn plan_objects(
         ));
     }
     commands
+}
+
+/// Whether foam is told from spray: where there are layers for them, and a stream that has both.
+pub(super) fn tells_foam(look: &Look) -> bool {
+    let mut lights = look.lights().into_iter();
+    let is_layer = lights.any(|light| matches!(light, LightSpec::Spray | LightSpec::Foam));
+    is_layer && look.spec().whitewater.is_some()
 }
 
 pub(super) fn draws_spray(look: &Look) -> bool {

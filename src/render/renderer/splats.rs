@@ -1,6 +1,6 @@
 //! What splats particles into the frame.
 
-use super::shade::{draws_spray, wants_spray_aovs};
+use super::shade::{draws_spray, tells_foam, wants_spray_aovs};
 use crate::{
     gpu::{
         buffer::Buf,
@@ -120,8 +120,10 @@ fn plan_owners(plan: &mut Plan) -> Command {
     plan.fill(&OWNER, u32::MAX, pixels)
 }
 
-/// Words of a half-resolution cell of spray: length and depth, and for the channels beside the picture velocity.
+/// Words of a half-resolution cell of spray: length and depth; length of foam, where that is told; and for the channels beside the
+/// picture velocity.
 const PLANES: usize = 2;
+const PLANES_WITH_FOAM: usize = 3;
 const PLANES_WITH_MOTION: usize = 5;
 
 /// What splats spray, for a sample and for the channels beside the picture.
@@ -144,7 +146,14 @@ pub(super) fn plan_spray(
         return Spray::default();
     }
     let has_aovs = wants_spray_aovs(look);
-    let planes = if has_aovs { PLANES_WITH_MOTION } else { PLANES };
+    let planes = match (has_aovs, tells_foam(look)) {
+        (true, _) => PLANES_WITH_MOTION,
+        (false, true) => PLANES_WITH_FOAM,
+        (false, false) => PLANES,
+    };
+    if tells_foam(look) {
+        plan.define("ssfr/splat_whitewater", "FOAM");
+    }
     plan.buffer(&SPRAY, planes * plan.extent.pixels() / 4);
     plan.buffer(&SPRAY_PARAMS, 1);
     let spec = look.spec();

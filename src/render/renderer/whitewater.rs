@@ -68,7 +68,7 @@ impl Whitewater {
                 position: [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32),
                 radius,
                 velocity: *v,
-                pad: 0.0,
+                foam: if is_foam(white, index) { 1.0 } else { 0.0 },
             });
         }
         let grew = packed.len() > self.capacity;
@@ -85,8 +85,17 @@ impl Whitewater {
     }
 }
 
+fn kind(white: &Particles, index: usize) -> Option<Kind> {
+    let kind = white.attributes.get(KIND).and_then(|all| all.get(index));
+    kind.and_then(|&number| Kind::of_number(number))
+}
+
+/// Whether a particle of a stream is foam or a bubble; what has no kind is spray.
+fn is_foam(white: &Particles, index: usize) -> bool {
+    matches!(kind(white, index), Some(Kind::Foam | Kind::Bubble))
+}
+
 /// Whether a particle of a stream is in the water and not before it; what has no kind is spray.
 pub(super) fn is_bubble(white: &Particles, index: usize) -> bool {
-    let kind = white.attributes.get(KIND).and_then(|all| all.get(index));
-    kind.is_some_and(|&number| Kind::of_number(number) == Some(Kind::Bubble))
+    kind(white, index) == Some(Kind::Bubble)
 }

@@ -1,0 +1,230 @@
+//! The tree over what is opaque, packed for rays on the device: both boxes of a node in eight words, on a lattice of sixteen bits an axis.
+
+use glam::{DVec3, Vec3};
+
+use super::uniform::{SetNode, Triangle};
+use crate::domain::{bvh::Bvh, mesh::TriangleMesh};
+
+/// Bit from which on a child says how many triangles it is, as in `shared/rays_set.wgsl`.
+const LEAF_SHIFT: u32 = 28;
+/// Steps of the lattice along the longest axis. The rest of 2¹⁶ is room for rounding outwards.
+const STEPS: f64 = 65528.0;
+/// Steps by which a box is larger than rounding outwards asks for: a ray's place in steps is off by 2⁻²⁴ × 2¹⁶.
+const MARGIN: f64 = 1.0;
+/// A box that no ray meets.
+const EMPTY: [u32; 3] = [0xffff; 3];
+
+/// A tree over triangles.
+pub(super) struct Tree {
+    /// Least corner of the lattice, metres.
+    pub(super) low: [f32; 3],
+    /// Its step, metres.
+    pub(super) step: f32,
+    /// Never empty.
+    pub(super) nodes: Vec<SetNode>,
+    /// The triangles in the order of the tree's leaves; one that nothing meets where there are none.
+    pub(super) sorted: Vec<Triangle>,
+}
+
+/// Builds the tree over triangles.
+pub(super) fn tree(triangles: &[Triangle]) -> Tree {
+    if triangles.is_empty() {
+        return Tree {
+            low: [0.0; 3],
+            step: 1.0,
+            nodes: vec![SetNode::default()],
+            sorted: vec![Triangle::default()],
+        };
+    }
+    let corners = triangles.iter().flat_map(|it| [it.a, it.b, it.c]);
+    let mesh = TriangleMesh {
+        vertices: corners.map(|p| Vec3::from(p).as_dvec3()).collect(),
+        triangles: (0..triangles.len() as u32)
+            .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
+            .collect(),
+    };
+    let tree = Bvh::new(&mesh);
+    let boxes: Vec<_> = tree.boxes().collect();
+    let lattice = Lattice::over(boxes[0].0);
+    Tree {
+        low: lattice.low.to_array(),
+        step: lattice.step,
+        nodes: pairs(&boxes, &lattice),
+        sorted: (tree.entries().iter())
+            .map(|&k| triangles[k as usize])
+            .collect(),
+    }
+}
+
+/// Least and greatest corner; first entry of a leaf or right child of an inner node, whose left one follows it; entries of a leaf, or 0.
+type Node = ([DVec3; 2], u32, u32);
+
+/// A node for each inner one of the tree, in its order; one where the tree is a single leaf.
+fn pairs(boxes: &[Node], lattice: &Lattice) -> Vec<SetNode> {
+    if boxes[0].2 > 0 {
+        let only = SetNode {
+            left: lattice.sides(boxes[0].0),
+            left_child: leaf(&boxes[0]),
+            right: EMPTY,
+            right_child: 0,
+        };
+        return vec![only];
+    }
+    // Inner nodes before each node.
+    let numbers: Vec<u32> = (boxes.iter())
+        .scan(0, |inner, node| {
+            let before = *inner;
+            *inner += u32::from(node.2 == 0);
+            Some(before)
+        })
+        .collect();
+    let child = |at: usize| match boxes[at].2 {
+        0 => numbers[at],
+        _ => leaf(&boxes[at]),
+    };
+    let inner = (boxes.iter().enumerate()).filter(|(_, node)| node.2 == 0);
+    inner
+        .map(|(at, node)| {
+            let (left, right) = (at + 1, node.1 as usize);
+            SetNode {
+                left: lattice.sides(boxes[left].0),
+                left_child: child(left),
+                right: lattice.sides(boxes[right].0),
+                right_child: child(right),
+            }
+        })
+        .collect()
+}
+
+fn leaf(&(_, first, count): &Node) -> u32 {
+    first | count << LEAF_SHIFT
+}
+
+/// What boxes are rounded to.
+struct Lattice {
+    low: Vec3,
+    step: f32,
+}
+
+impl Lattice {
+    fn over([min, max]: [DVec3; 2]) -> Self {
+        // No finer than f32 tells places apart there.
+        let reach = min.abs().max(max.abs()).max_element();
+        let finest = 2.0 * f64::from(f32::EPSILON) * reach;
+        let step = ((max - min).max_element() / STEPS).max(finest) as f32;
+        let step = step.max(f32::MIN_POSITIVE);
+        Self {
+            low: (min - 3.0 * f64::from(step)).as_vec3(),
+            step,
+        }
+    }
+
+    /// A word an axis: least side below, greatest above.
+    fn sides(&self, [min, max]: [DVec3; 2]) -> [u32; 3] {
+        let at = |p: DVec3| (p - self.low.as_dvec3()) / f64::from(self.step);
+        let low = (at(min).floor() - MARGIN).clamp(DVec3::ZERO, DVec3::splat(65535.0));
+        let high = (at(max).ceil() + MARGIN).clamp(DVec3::ZERO, DVec3::splat(65535.0));
+        [0, 1, 2].map(|axis| low[axis] as u32 | (high[axis] as u32) << 16)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row of small triangles, and one far away.
+    fn row(count: usize) -> Vec<Triangle> {
+        let corner = |k: usize, x: f32, y: f32| [7.0 * k as f32 + x, y, 0.3 * k as f32];
+        (0..count)
+            .map(|k| Triangle {
+                a: corner(k, 0.0, 0.0),
+                b: corner(k, 0.4, 0.1),
+                c: corner(k, 0.0, 0.9),
+                ..Triangle::default()
+            })
+            .collect()
+    }
+
+    fn decoded(tree: &Tree, sides: [u32; 3]) -> [DVec3; 2] {
+        let place =
+            |word: fn(u32) -> u32| {
+                DVec3::from_array([0, 1, 2].map(|k| {
+                    f64::from(tree.low[k]) + f64::from(word(sides[k])) * f64::from(tree.step)
+                }))
+            };
+        [place(|word| word & 0xffff), place(|word| word >> 16)]
+    }
+
+    /// Every triangle is in one leaf, and in each box on the way there; no box is larger than its triangles by more than the margins.
+    fn holds(tree: &Tree, at: u32, within: &[[DVec3; 2]], seen: &mut Vec<u32>) {
+        let node = &tree.nodes[at as usize];
+        for (sides, child) in [(node.left, node.left_child), (node.right, node.right_child)] {
+            if sides == EMPTY {
+                continue;
+            }
+            let ways = [within, &[decoded(tree, sides)]].concat();
+            let count = child >> LEAF_SHIFT;
+            if count == 0 {
+                holds(tree, child, &ways, seen);
+                continue;
+            }
+            let first = child & ((1 << LEAF_SHIFT) - 1);
+            for k in first..first + count {
+                seen.push(k);
+                let triangle = &tree.sorted[k as usize];
+                for p in [triangle.a, triangle.b, triangle.c] {
+                    let p = Vec3::from(p).as_dvec3();
+                    for [low, high] in &ways {
+                        assert!(
+                            p.cmpge(*low).all() && p.cmple(*high).all(),
+                            "{p} in {low} to {high}"
+                        );
+                    }
+                }
+            }
+            let corners = (first..first + count).flat_map(|k| {
+                let it = &tree.sorted[k as usize];
+                [it.a, it.b, it.c].map(|p| Vec3::from(p).as_dvec3())
+            });
+            let (min, max) = corners
+                .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| {
+                    (min.min(p), max.max(p))
+                });
+            let [low, high] = ways[ways.len() - 1];
+            let most = (2.0 + MARGIN) * f64::from(tree.step);
+            assert!((min - low).max_element() <= most && (high - max).max_element() <= most);
+        }
+    }
+
+    #[test]
+    fn every_triangle_is_in_the_boxes_on_the_way_to_it() {
+        for count in [1, 2, 4, 5, 9, 100] {
+            let tree = tree(&row(count));
+            let mut seen = Vec::new();
+            holds(&tree, 0, &[], &mut seen);
+            seen.sort_unstable();
+            assert!(
+                seen.iter().copied().eq(0..count as u32),
+                "{count}: {seen:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_set_without_triangles_has_a_node_and_a_triangle_for_the_bindings() {
+        let tree = tree(&[]);
+        assert_eq!((tree.nodes.len(), tree.sorted.len()), (1, 1));
+    }
+
+    #[test]
+    fn a_point_far_from_the_origin_has_a_box() {
+        let at = Triangle {
+            a: [1e4; 3],
+            b: [1e4; 3],
+            c: [1e4; 3],
+            ..Triangle::default()
+        };
+        let tree = tree(&[at]);
+        holds(&tree, 0, &[], &mut Vec::new());
+    }
+}
