@@ -21,10 +21,10 @@ pub(super) use keys::KEYS;
 use keys::{MOST_SAMPLES, MOST_VOXELS};
 pub use materials::{Material, Materials, Picture, Texture};
 pub use spec::{
-    AovSpec, BasinSpec, CameraSpec, CausticsSpec, ColourSpaceSpec, CurveSpec, FilterSpec,
-    FormatSpec, ImageSpec, KeyframeSpec, LensSpec, LightSpec, LookSpec, MaterialSpec, MethodSpec,
-    OutputSpec, RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput, SplatSpec,
-    SpraySpec, SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec, WaterSpec,
+    AovFilterSpec, AovSpec, BasinSpec, CameraSpec, CausticsSpec, ColourSpaceSpec, CurveSpec,
+    FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LensSpec, LightSpec, LookSpec, MaterialSpec,
+    MethodSpec, OutputSpec, RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput,
+    SplatSpec, SpraySpec, SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec, WaterSpec,
     WaveMakersSpec, WhitewaterLook, WindowsSpec,
 };
 
@@ -339,11 +339,13 @@ fn plain(spec: &mut LookSpec) {
 
 /// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
 /// that it had before there was such a key.
-const NEWER: [&str; 17] = [
+const NEWER: [&str; 19] = [
     "whitewater: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
     "overscan: 0, ",
     "crop: None, ",
+    "aov_filter: Centre, ",
+    ", haze: false",
     "colour_space: Rec709, ",
     "solids: Draw, ",
     "lights: [], ",

@@ -306,6 +306,10 @@ const SKY: &[Key] = &[
         .only("model", CLEAR)
         .default("[0.15, 0.15, 0.15]")
         .about("reflectance of the land around, red, green, blue"),
+    Key::flag("haze")
+        .only("model", CLEAR)
+        .default("false")
+        .about("whether air takes the contrast as this turbidity says, in place of ground.haze_m: 63 % within 5.6 km at 3"),
     Key::text("file", "an EXR file, relative to the look file")
         .only("model", PANORAMA)
         .about("scene-linear picture"),
@@ -478,6 +482,7 @@ const LIGHTS: &[&str] = &[
     "spray",
     "solids",
     "caustics",
+    "foam",
 ];
 
 const OUTPUT: &[Key] = &[
@@ -491,6 +496,12 @@ const OUTPUT: &[Key] = &[
         .about(
             "depth along the axis, m; normal; position, m; motion to the next frame, pixels, u to the right, v upward; water \
              along the line of sight, m",
+        ),
+    Key::choice("aov_filter", &["centre", "beauty"])
+        .default("\"centre\"")
+        .about(
+            "what of a pixel the channels show: its centre at the frame's instant, or the mean of the picture's samples; Z, N, P and \
+             forward over those that meet something",
         ),
     Key::choice("colour_space", &["rec709", "acescg"])
         .default("\"rec709\"")

@@ -267,6 +267,8 @@ pub enum SkySpec {
         turbidity: f64,
         /// Reflectance of the land around, red, green, blue.
         albedo: [f64; 3],
+        /// Whether the air near the ground is as clear as the turbidity says, whatever the ground's haze is.
+        haze: bool,
     },
     /// A latitude-longitude panorama, scene-linear.
     Panorama {
@@ -287,7 +289,7 @@ pub struct GroundSpec {
     pub colour: [f64; 3],
     /// How uneven that is, 0 to 1.
     pub variation: f64,
-    /// Distance after which air has taken 63 % of the contrast, metres.
+    /// Distance after which air has taken 63 % of the contrast, metres; without effect where the sky's own haze is drawn.
     pub haze_m: f64,
 }
 
@@ -495,17 +497,19 @@ pub enum LightSpec {
     Sun,
     /// The sky, and the light of the air before something.
     Sky,
-    /// White water.
+    /// White water in the air.
     Spray,
     /// What is opaque and seen directly.
     Solids,
     /// Sunlight that came through water onto something opaque in it, of a look with caustics.
     Caustics,
+    /// Foam and bubbles of a stream of whitewater.
+    Foam,
 }
 
 impl LightSpec {
     /// All of them, in the order of the shaders' `light_parts`, with the names of their layers.
-    pub const NAMED: [(&'static str, Self); 8] = [
+    pub const NAMED: [(&'static str, Self); 9] = [
         ("reflection", Self::Reflection),
         ("refraction", Self::Refraction),
         ("scattering", Self::Scattering),
@@ -514,7 +518,18 @@ impl LightSpec {
         ("spray", Self::Spray),
         ("solids", Self::Solids),
         ("caustics", Self::Caustics),
+        ("foam", Self::Foam),
     ];
+}
+
+/// What of a pixel the channels beside the picture show.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum AovFilterSpec {
+    /// Its centre, at the frame's instant, through a pinhole.
+    Centre,
+    /// The mean over the picture's samples: over the pixel, the shutter and the lens.
+    Beauty,
 }
 
 /// What is written.
@@ -525,6 +540,8 @@ pub struct OutputSpec {
     pub formats: Vec<FormatSpec>,
     /// In the EXR.
     pub aovs: Vec<AovSpec>,
+    /// What of a pixel they show.
+    pub aov_filter: AovFilterSpec,
     /// Of the EXR's light.
     pub colour_space: ColourSpaceSpec,
     /// What becomes of ground, solids and walls.

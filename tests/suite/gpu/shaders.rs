@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 45] = [
+const VARIANTS: [&[&str]; 48] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -70,6 +70,9 @@ const VARIANTS: [&[&str]; 45] = [
     &["VOLUME"],
     &["VOLUME", "LIGHTS", "HOLDOUT"],
     &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS"],
+    &["FOAM"],
+    &["LIGHTS", "SPRAY", "FOAM"],
+    &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS", "FOAM"],
     &["CAUSTICS", "LIGHTS"],
     &["CAUSTICS", "SEA", "PALETTE", "SPRAY", "LIGHTS"],
 ];

@@ -9,7 +9,10 @@ mod windows;
 use std::path::Path;
 
 use swell::{
-    domain::particles::Particles,
+    domain::{
+        particles::Particles,
+        whitewater::{KIND, Kind, RADIUS},
+    },
     gpu::adapter::Context,
     render::{Image, RenderScene, Renderer},
     scene::look::Look,
@@ -62,5 +65,24 @@ impl Setup<'_> {
 fn draw(context: &Context, look: &Look, scene: &RenderScene, water: &Particles) -> Image {
     let mut renderer = Renderer::new(context, look, scene).unwrap();
     renderer.name_solids(&["tower".to_owned(), "shed".to_owned()]);
-    renderer.render(3, water).unwrap()
+    renderer.render_with(3, water, &white()).unwrap()
+}
+
+/// Whitewater of each kind, drops over the water, foam on it and bubbles under it; a look without whitewater does not draw it.
+fn white() -> Particles {
+    let mut white = Particles::default();
+    let mut kinds = Vec::new();
+    for (kind, y) in [(Kind::Spray, 1.1), (Kind::Foam, 0.62), (Kind::Bubble, 0.55)] {
+        for i in 0..40u16 {
+            let (x, z) = (f32::from(i % 8), f32::from(i / 8));
+            white.position.push([1.0 + 0.2 * x, y, 1.0 + 0.3 * z]);
+            white.velocity.push([1.0, 0.0, 0.0]);
+            white.id.push(white.id.len() as u32);
+            kinds.push(kind.number());
+        }
+    }
+    let radii = vec![0.06; kinds.len()];
+    white.attributes.insert(KIND.to_owned(), kinds);
+    white.attributes.insert(RADIUS.to_owned(), radii);
+    white
 }

@@ -5,6 +5,7 @@
 //! the lens that its surface, its normal and its thickness are those of a sphere.
 
 mod caustics;
+mod filtered;
 mod geometry;
 mod lens;
 mod light;

@@ -2,15 +2,22 @@
 
 use half::f16;
 use swell::{
+    domain::{
+        particles::Particles,
+        whitewater::{KIND, Kind, RADIUS},
+    },
     gpu::adapter::Context,
     render::{Image, Renderer},
     scene::look::LightSpec,
 };
 
 use super::super::analytic::support::{context, spoiled};
-use super::{METHODS, Setup, harbour};
+use super::{METHODS, Setup, harbour, white};
 
-const ALL: &str = "lights = [\"solids\", \"reflection\", \"refraction\", \"scattering\", \"sun\", \"sky\", \"spray\", \"caustics\"]";
+const ALL: &str = "lights = [\"solids\", \"reflection\", \"refraction\", \"scattering\", \"sun\", \"sky\", \"spray\", \"caustics\", \"foam\"]\n[whitewater]\ndensity_per_metre = 6.0\n";
+
+/// What stands behind the layers there.
+const WHITE: &str = "[whitewater]\ndensity_per_metre = 6.0\n";
 
 fn setup<'a>(method: &'a str, output: &'a str) -> Setup<'a> {
     Setup {
@@ -47,6 +54,17 @@ fn off(image: &Image) -> f64 {
     worst
 }
 
+/// Largest difference of two pictures' light, in half steps of half floats.
+fn apart(a: &Image, b: &Image) -> f64 {
+    let pixels = a.beauty.iter().flatten().zip(b.beauty.iter().flatten());
+    pixels
+        .map(|(&a, &b)| {
+            let (a, b) = (f64::from(a), f64::from(b));
+            (a - b).abs() / (a.abs().max(b.abs()) / 2048.0 + 2f64.powi(-25))
+        })
+        .fold(0.0, f64::max)
+}
+
 #[test]
 fn all_lights_add_up_to_the_picture() {
     let drawn = |context: &Context, method| setup(method, ALL).draw(context);
@@ -67,20 +85,24 @@ fn all_lights_add_up_to_the_picture() {
             let least = part.iter().flatten().fold(0.0f32, |least, &x| least.min(x));
             assert!(least > -1e-6, "{method}: {light:?} takes {least}");
         }
-        // Nothing of the picture depends on them.
-        let plain = setup(method, "").draw(&context());
-        assert!(
-            plain.beauty == image.beauty,
-            "{method}: other pictures with layers"
-        );
+        // Nothing of the picture depends on them, but for f32 roundings that a compiler orders otherwise where it computes more: less
+        // than what the file's half floats round.
+        let plain = setup(method, WHITE).draw(&context());
+        let apart = self::apart(&plain, &image);
+        assert!(apart < 1.0, "{method}: other pictures with layers: {apart}");
+        let bare = setup(method, "").draw(&context());
+        let apart = self::apart(&bare, &image);
+        assert!(apart > 100.0, "{method}, the control: {apart}");
         // Controls: each light that is left out, or dimmed alone, is missed.
         let edits = match method {
             "ssfr" => [
+                ("light_part(FOAM_LIGHT, light * (cover * foam));", ""),
                 ("light_part(SUN, sun);", ""),
                 ("dim_parts(1.0 - mist.cover);", ""),
                 ("light_part(SOLIDS, colour - air);", ""),
             ],
             _ => [
+                ("light_part(FOAM_LIGHT, light * (cover * foam));", ""),
                 ("light_part(CAUSTICS, weight * opaque_one.caustics);", ""),
                 ("dim_parts(1.0 - mist.cover);", ""),
                 ("light_part(part_of(ray, SOLIDS), seen);", ""),
@@ -97,7 +119,8 @@ fn all_lights_add_up_to_the_picture() {
 fn a_layer_is_the_same_whatever_others_there_are() {
     for method in METHODS {
         let all = setup(method, ALL).draw(&context());
-        let some = setup(method, "lights = [\"spray\", \"reflection\"]").draw(&context());
+        let some = format!("lights = [\"spray\", \"reflection\"]\n{WHITE}");
+        let some = setup(method, &some).draw(&context());
         let find = |image: &Image, light| {
             let found = image.lights.iter().find(|(it, _)| *it == light);
             found.map(|(_, part)| part.clone())
@@ -128,4 +151,55 @@ fn layers_of_a_frame_in_bands_are_those_of_one_drawn_whole() {
     let (whole, bands) = (draw(8192), draw(32));
     assert!(whole == bands);
     assert!(whole.lights[0].1 != whole.lights[1].1, "the control");
+}
+
+/// Of a stream of one kind alone, that kind's layer has what the picture gained; the other has the look's own spray.
+#[test]
+fn foam_and_bubbles_have_a_layer_of_their_own() {
+    for method in METHODS {
+        let (scene, water) = harbour();
+        let look = setup(method, ALL).look();
+        let draw = |kinds: &[Kind]| {
+            let all = white();
+            let kept: Vec<usize> = (0..all.len())
+                .filter(|&i| {
+                    kinds
+                        .iter()
+                        .any(|kind| kind.number() == all.attributes[KIND][i])
+                })
+                .collect();
+            let mut white = Particles::default();
+            for &i in &kept {
+                white.position.push(all.position[i]);
+                white.velocity.push(all.velocity[i]);
+                white.id.push(all.id[i]);
+            }
+            for name in [KIND, RADIUS] {
+                let values = kept.iter().map(|&i| all.attributes[name][i]).collect();
+                white.attributes.insert(name.to_owned(), values);
+            }
+            let mut renderer = Renderer::new(&context(), &look, &scene).unwrap();
+            renderer.render_with(3, &water, &white).unwrap()
+        };
+        let layer = |image: &Image, light| {
+            let found = image.lights.iter().find(|(it, _)| *it == light).unwrap();
+            found.1.iter().flatten().map(|&x| f64::from(x)).sum::<f64>()
+        };
+        let none = draw(&[]);
+        assert_eq!(layer(&none, LightSpec::Foam), 0.0, "{method}");
+        let drops = draw(&[Kind::Spray]);
+        assert_eq!(layer(&drops, LightSpec::Foam), 0.0, "{method}");
+        assert!(
+            layer(&drops, LightSpec::Spray) > 1.1 * layer(&none, LightSpec::Spray),
+            "{method}"
+        );
+        let foam = draw(&[Kind::Foam]);
+        let gained = layer(&foam, LightSpec::Foam);
+        assert!(
+            gained > 10.0 * (layer(&foam, LightSpec::Spray) - layer(&none, LightSpec::Spray)).abs(),
+            "{method}: {gained}"
+        );
+        let bubbles = draw(&[Kind::Bubble]);
+        assert!(layer(&bubbles, LightSpec::Foam) > 0.0, "{method}");
+    }
 }
