@@ -36,7 +36,7 @@ DATA = {"", "toml", "text", "json", "obj", "csv", "wgsl", "rust", "diff"}
 A_COMMAND = re.compile(r"(\$ )?(swell|target/release/swell|tools/\S+|cargo|pip|python3?|blender|openjd|git) \S")
 FENCE = re.compile(r"^( *)(`{3,}|~{3,})([^`]*)$")
 MARK = re.compile(r"^ *<!-- *(run|not run|file at start|file|more of)\b *:? *(.*?) *-->$")
-LIMIT_S = 120
+LIMIT_S = 300
 # Files of the tree that pages name, made small enough for seconds: text to be replaced, and what by.
 LOOK = [(r"(?m)^width = \d+", "width = 160"), (r"(?m)^height = \d+", "height = 90"), (r"(?m)^samples = \d+", "samples = 1")]
 SMALL = {
