@@ -21,10 +21,10 @@ const MOST_DROPS: u32 = 4096u;
 // The least of them, and what is added to it for the largest, in splat radii.
 const LEAST_SIZE: f32 = 0.14;
 const SIZES: f32 = 0.36;
-// How far from the particle they are, in splat radii.
-const CLOUD: f32 = 1.2;
+// How far from the particle they are at most, in splat radii: about a spacing, so that clouds of neighbours run into each other.
+const CLOUD: f32 = 1.6;
 // Radius in pixels above which a drop is many smaller ones.
-const LARGEST: f32 = 2.5;
+const LARGEST: f32 = 1.0;
 
 // A number in 0..1 that belongs to a particle and a channel.
 fn random(index: u32, channel: u32) -> f32 {
@@ -40,12 +40,12 @@ fn soft_chord(ray: vec3f, c: vec3f, radius: f32) -> f32 {
     return chord * chord * chord / (4.0 * radius * radius) * (5.0 / 3.0);
 }
 
-// Where the k-th drop of a particle is, from it, in splat radii: anywhere about it, and denser near.
+// Where the k-th drop of a particle is, from it, in splat radii: evenly in a ball.
 fn offset_of(id: u32, k: u32) -> vec3f {
     let up = 2.0 * random(id, 3u * k) - 1.0;
     let turn = 2.0 * 3.14159265 * random(id, 3u * k + 1u);
     let across = sqrt(max(1.0 - up * up, 0.0));
-    return CLOUD * random(id, 3u * k + 2u) * vec3f(across * cos(turn), up, across * sin(turn));
+    return CLOUD * pow(random(id, 3u * k + 2u), 1.0 / 3.0) * vec3f(across * cos(turn), up, across * sin(turn));
 }
 
 @compute @workgroup_size(LANES)

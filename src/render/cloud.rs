@@ -18,9 +18,9 @@ use crate::{
     scene::look::Look,
 };
 
-/// Radius of a ball with the mean square distance of the drops that are splatted for a particle, in splat radii: drops lie anywhere up
-/// to 1.2 radii from it, at a mean square of 0.48, and have a third of a radius of their own.
-const THROWN: f64 = 0.94;
+/// Radius of a ball with the mean square distance of the drops that are splatted for a particle, in splat radii: drops lie evenly within
+/// 1.6 radii from it, and have up to a third of a radius of their own.
+const THROWN: f64 = 1.63;
 /// How far behind the water's surface a ray still meets what floats on it, particle spacings: what the grid smears across it.
 pub(super) const SKIN: f64 = 1.0;
 
