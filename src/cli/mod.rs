@@ -14,6 +14,7 @@ mod progress;
 mod render;
 mod study;
 pub mod verify;
+mod view;
 mod whitewater;
 
 use std::{
@@ -66,6 +67,8 @@ enum Command {
     Diff(diff::DiffArgs),
     /// Print the keys of scenes, looks, studies, tolerance and whitewater files, with what each allows and its default.
     Keys(keys::KeysArgs),
+    /// Look at rendered pictures: a contact sheet, a movie, a page that plays them.
+    View(Box<view::ViewArgs>),
     /// Check every checksum of a cache.
     Verify(verify::VerifyArgs),
 }
@@ -182,6 +185,7 @@ fn run(command: Command) -> u8 {
             keys::run(&args);
             Ok(0)
         }
+        Command::View(args) => view::run(&args),
         Command::Whitewater(args) => whitewater::run(&args),
         Command::Verify(args) => verify::run(&args).map(|()| 0).map_err(Failure::from),
     };

@@ -16,6 +16,7 @@ pub mod render;
 pub mod replay;
 pub mod time;
 pub mod verify;
+pub mod view;
 mod watch;
 pub mod whitewater;
 

@@ -3,8 +3,10 @@
 //! Pure functions from particles to numbers, and from numbers to text; `experiment` runs what is measured and writes the
 //! files. [`comparison`] sets two solvers side by side; [`stability`] measures what is hard on a solver, [`waves`] what theory and
 //! experiments know the answer to; a sweep finds the
-//! [`knee`] and, for the paper's Table 1, the [`convergence_point`]. [`measure`], [`chart`] and [`page`] serve every kind.
+//! [`knee`] and, for the paper's Table 1, the [`convergence_point`]. [`measure`], [`chart`] and [`page`] serve every kind. What is looked at frame by
+//! frame has a [`player`], a [`sheet`] and an [`apng`].
 
+pub mod apng;
 pub mod chart;
 pub mod comparison;
 pub mod convergence_point;
@@ -12,7 +14,10 @@ pub mod knee;
 pub mod measure;
 pub mod page;
 pub mod picture;
+pub mod player;
 pub mod raster;
+pub mod rgb;
+pub mod sheet;
 pub mod stability;
 pub mod waves;
 

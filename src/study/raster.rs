@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use resvg::{tiny_skia, usvg};
 
+use super::rgb::Rgb;
+
 /// Pixels a unit of the drawing.
 const SCALE: f32 = 2.0;
 
@@ -23,6 +25,26 @@ pub enum RasterError {
 /// # Errors
 /// [`RasterError`].
 pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
+    let picture = drawn(svg, SCALE)?;
+    picture
+        .encode_png()
+        .map_err(|error| RasterError::Png(error.to_string()))
+}
+
+/// The pixels of `svg`, one a unit, in the same fonts; over black where it has no ground.
+///
+/// # Errors
+/// [`RasterError`].
+pub fn rgb(svg: &str) -> Result<Rgb, RasterError> {
+    let picture = drawn(svg, 1.0)?;
+    let pixels = picture.pixels().iter();
+    Ok(Rgb {
+        size: [picture.width(), picture.height()].map(|side| side as usize),
+        pixels: pixels.map(|p| [p.red(), p.green(), p.blue()]).collect(),
+    })
+}
+
+fn drawn(svg: &str, scale: f32) -> Result<tiny_skia::Pixmap, RasterError> {
     let mut fonts = usvg::fontdb::Database::new();
     fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
     let family = fonts
@@ -42,15 +64,13 @@ pub fn png(svg: &str) -> Result<Vec<u8>, RasterError> {
     let size = tree
         .size()
         .to_int_size()
-        .scale_by(SCALE)
+        .scale_by(scale)
         .ok_or_else(|| RasterError::Png("its size".into()))?;
     let mut picture = tiny_skia::Pixmap::new(size.width(), size.height())
         .ok_or_else(|| RasterError::Png(format!("{} × {}", size.width(), size.height())))?;
-    let scale = tiny_skia::Transform::from_scale(SCALE, SCALE);
+    let scale = tiny_skia::Transform::from_scale(scale, scale);
     resvg::render(&tree, scale, &mut picture.as_mut());
-    picture
-        .encode_png()
-        .map_err(|error| RasterError::Png(error.to_string()))
+    Ok(picture)
 }
 
 #[cfg(test)]

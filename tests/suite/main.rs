@@ -32,6 +32,7 @@ mod cli {
     mod shaders;
     #[cfg(target_os = "linux")]
     mod terminal;
+    mod view;
 }
 mod compare {
     mod diff;

@@ -30,6 +30,11 @@ impl Axis {
         }
     }
 
+    /// First and last value of a linear axis.
+    pub(super) fn ends(&self) -> [f64; 2] {
+        self.ends
+    }
+
     /// The part of the way from the first end to the second; beyond 0 to 1 a value has no place.
     pub(super) fn part(&self, value: f64) -> f64 {
         let place = if self.is_log { value.log10() } else { value };

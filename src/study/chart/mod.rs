@@ -156,18 +156,29 @@ impl Chart {
         self.named().map(place).collect()
     }
 
-    /// A picture of its own, also within HTML.
-    pub fn to_svg(&self) -> String {
-        let ([width, height], [left, right, bottom]) = (self.size(), MARGIN);
-        let legend = self.legend();
-        let top = ROW + legend.last().map_or(2.0 * ROW, |place| place[1]);
+    fn x_axis(&self) -> Axis {
+        let ([width, _], [left, right, _]) = (self.size(), MARGIN);
         let bars = |dot: &Dot| dot.bar.unwrap_or([dot.at; 2]);
         // A linear axis is as long as its series, gaps as well.
         let gaps = self.named().flat_map(|series| &series.points);
         let gaps = gaps.filter(|_| !self.is_log).map(|dot| dot.at);
         let costs = self.dots().flat_map(|(_, dot, _)| bars(dot));
         let costs = costs.chain(self.dots().map(|(_, dot, _)| dot.at));
-        let x = Axis::new(self.is_log, false, costs.chain(gaps), [left, width - right]);
+        Axis::new(self.is_log, false, costs.chain(gaps), [left, width - right])
+    }
+
+    /// Where its linear x axis begins and ends: the values there, and the places in parts of the drawing's width.
+    pub fn across(&self) -> [[f64; 2]; 2] {
+        let axis = self.x_axis();
+        [axis.ends(), axis.paper.map(|at| at / self.size()[0])]
+    }
+
+    /// A picture of its own, also within HTML.
+    pub fn to_svg(&self) -> String {
+        let ([width, height], bottom) = (self.size(), MARGIN[2]);
+        let legend = self.legend();
+        let top = ROW + legend.last().map_or(2.0 * ROW, |place| place[1]);
+        let x = self.x_axis();
         let values: Vec<f64> = self.dots().map(|(_, _, value)| value).collect();
         let most = values.iter().fold(0.0f64, |a, v| a.max(v.abs()));
         // What is far beyond the curves would flatten them.
@@ -404,6 +415,14 @@ mod tests {
         assert!(svg.contains("height &amp; &lt;more&gt;") && svg.contains("impact"));
         assert!(svg.contains(">mark<") && !svg.contains(">far<"), "{svg}");
         assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn a_cursor_finds_the_axis() {
+        let [values, places] =
+            chart(vec![(2.0, Some(1.0)), (3.0, None), (6.0, Some(4.0))]).across();
+        assert_eq!(values, [2.0, 6.0]);
+        assert_eq!(places, [70.0 / 560.0, 536.0 / 560.0]);
     }
 
     #[test]

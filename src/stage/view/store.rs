@@ -1,0 +1,220 @@
+//! Where a page has its pictures: within it, or beside it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use base64::{Engine as _, engine::general_purpose::STANDARD};
+
+use super::ViewError;
+use crate::study::player::MARK;
+
+/// Where pictures of a page stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Placing {
+    /// Within the page where they are not more than [`MOST`] bytes, else beside it.
+    #[default]
+    Auto,
+    /// Within it, whatever their size.
+    Within,
+    /// In a folder beside it.
+    Beside,
+}
+
+/// Bytes of pictures that a page holds where nobody asks for more. A page is read whole before its first picture is seen, and
+/// text of three times as much begins to be slow.
+pub const MOST: u64 = 64_000_000;
+
+/// The page's file, and its folder of pictures.
+const PAGE: &str = "index.html";
+const FOLDER: &str = "pictures";
+
+/// Pictures of a page that is being made; what is there of them goes where it is dropped before its end.
+pub(super) struct Store {
+    directory: PathBuf,
+    placing: Placing,
+    most: u64,
+    /// Names and bytes of those that are to stand within.
+    kept: Vec<(String, Vec<u8>)>,
+    bytes: u64,
+    is_beside: bool,
+    names: Vec<String>,
+}
+
+impl Store {
+    /// Refuses a page that is none of ours.
+    pub(super) fn begin(directory: &Path, placing: Placing, most: u64) -> Result<Self, ViewError> {
+        let page = directory.join(PAGE);
+        let is_ours = match fs::read(&page) {
+            Ok(text) => text
+                .windows(MARK.len())
+                .take(4096)
+                .any(|part| part == MARK.as_bytes()),
+            Err(_) => !directory.join(FOLDER).exists() && !page.exists(),
+        };
+        if !is_ours {
+            return Err(ViewError::Asked(format!(
+                "{} holds a page or pictures that are not from swell view: choose another -o",
+                directory.display()
+            )));
+        }
+        let store = Self {
+            directory: directory.to_owned(),
+            placing,
+            most,
+            kept: Vec::new(),
+            bytes: 0,
+            is_beside: false,
+            names: Vec::new(),
+        };
+        store.clear()?;
+        Ok(store)
+    }
+
+    fn part(&self) -> PathBuf {
+        self.directory.join(format!("{FOLDER}.part"))
+    }
+
+    fn clear(&self) -> Result<(), ViewError> {
+        let part = self.part();
+        match part.exists() {
+            true => fs::remove_dir_all(&part).map_err(ViewError::at(&part)),
+            false => Ok(()),
+        }
+    }
+
+    /// Takes the next picture, a PNG, of this name.
+    pub(super) fn push(&mut self, name: String, png: Vec<u8>) -> Result<(), ViewError> {
+        self.bytes += png.len() as u64;
+        self.kept.push((name, png));
+        let is_beside = match self.placing {
+            Placing::Auto => self.bytes > self.most,
+            placing => placing == Placing::Beside,
+        };
+        if is_beside {
+            self.is_beside = true;
+            let folder = self.part();
+            fs::create_dir_all(&folder).map_err(ViewError::at(&folder))?;
+            for (name, png) in std::mem::take(&mut self.kept) {
+                let file = folder.join(&name);
+                fs::write(&file, png).map_err(ViewError::at(&file))?;
+                self.names.push(name);
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes of pictures so far, and whether they stand beside the page.
+    pub(super) fn told(&self) -> (u64, bool) {
+        (self.bytes, self.is_beside)
+    }
+
+    /// The pictures' addresses in the order in which they came.
+    pub(super) fn addresses(&self) -> Vec<String> {
+        let beside = self
+            .names
+            .iter()
+            .map(|name| format!("{FOLDER}/{}", in_address(name)));
+        let within = self.kept.iter();
+        let within =
+            within.map(|(_, png)| format!("data:image/png;base64,{}", STANDARD.encode(png)));
+        beside.chain(within).collect()
+    }
+
+    /// Writes the page over them, which holds [`Self::addresses`]; gives its file and its bytes.
+    pub(super) fn finish(self, html: &str) -> Result<(PathBuf, u64), ViewError> {
+        let folder = self.directory.join(FOLDER);
+        if folder.exists() {
+            fs::remove_dir_all(&folder).map_err(ViewError::at(&folder))?;
+        }
+        if self.is_beside {
+            fs::rename(self.part(), &folder).map_err(ViewError::at(&folder))?;
+        }
+        let page = self.directory.join(PAGE);
+        write(&page, html.as_bytes())?;
+        Ok((page, html.len() as u64))
+    }
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        let _ = self.clear();
+    }
+}
+
+/// Writes beside the file and renames, so that a file that is there is whole.
+pub(super) fn write(file: &Path, bytes: &[u8]) -> Result<(), ViewError> {
+    let mut name = file.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let part = file.with_file_name(name);
+    fs::write(&part, bytes).map_err(ViewError::at(&part))?;
+    fs::rename(&part, file).map_err(ViewError::at(file))
+}
+
+/// A file's name within an address: what has a meaning there is written as its bytes.
+fn in_address(name: &str) -> String {
+    let byte = |b: u8| match b {
+        b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'.' | b'_' | b'-' => char::from(b).to_string(),
+        _ => format!("%{b:02X}"),
+    };
+    name.bytes().map(byte).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn filled(folder: &Path, placing: Placing, most: u64) -> Store {
+        let mut store = Store::begin(folder, placing, most).unwrap();
+        for k in 0..4u8 {
+            store.push(format!("a.{k} %.png"), vec![k; 10]).unwrap();
+        }
+        store
+    }
+
+    #[test]
+    fn pictures_stand_beside_a_page_that_would_hold_too_much() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = filled(folder.path(), Placing::Auto, 40);
+        assert_eq!(store.told(), (40, false));
+        assert_eq!(
+            store.addresses()[1],
+            "data:image/png;base64,AQEBAQEBAQEBAQ=="
+        );
+        store.finish(MARK).unwrap();
+        assert!(!folder.path().join(FOLDER).exists());
+
+        let store = filled(folder.path(), Placing::Auto, 39);
+        assert_eq!(store.told(), (40, true));
+        assert_eq!(store.addresses()[3], "pictures/a.3%20%25.png");
+        store.finish(MARK).unwrap();
+        assert_eq!(
+            fs::read(folder.path().join("pictures/a.3 %.png")).unwrap(),
+            [3; 10]
+        );
+
+        // One that breaks off leaves what was there; one that holds all takes it away.
+        drop(filled(folder.path(), Placing::Beside, 0));
+        assert!(
+            folder.path().join("pictures/a.0 %.png").exists()
+                && !folder.path().join("pictures.part").exists()
+        );
+        filled(folder.path(), Placing::Within, 0)
+            .finish(MARK)
+            .unwrap();
+        assert!(!folder.path().join(FOLDER).exists());
+    }
+
+    #[test]
+    fn a_page_of_something_else_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(PAGE), "a study").unwrap();
+        assert!(Store::begin(folder.path(), Placing::Auto, 1).is_err());
+        fs::write(folder.path().join(PAGE), format!("<head>{MARK}")).unwrap();
+        assert!(Store::begin(folder.path(), Placing::Auto, 1).is_ok());
+        fs::remove_file(folder.path().join(PAGE)).unwrap();
+        fs::create_dir(folder.path().join(FOLDER)).unwrap();
+        assert!(Store::begin(folder.path(), Placing::Auto, 1).is_err());
+    }
+}

@@ -1,0 +1,111 @@
+//! Frames to look at, wherever their pictures come from.
+
+use std::{
+    collections::BTreeMap,
+    fmt,
+    path::{Path, PathBuf},
+};
+
+use super::{ViewError, pictures};
+use crate::{render::Attributes, scene::look::ViewSpec, study::rgb::Rgb};
+
+/// What a picture is told by.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Label {
+    /// The frame's number.
+    Frame(u32),
+    /// The file's name without its ending, where no picture of the folder has a number.
+    Name(String),
+}
+
+impl fmt::Display for Label {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Frame(frame) => write!(f, "{frame}"),
+            Self::Name(name) => f.write_str(name),
+        }
+    }
+}
+
+impl Label {
+    /// For a sheet.
+    pub(super) fn words(&self) -> String {
+        match self {
+            Self::Frame(frame) => format!("frame {frame}"),
+            Self::Name(name) => name.clone(),
+        }
+    }
+}
+
+/// Pictures of one render or one cache.
+pub(super) struct Strip {
+    /// As it was named.
+    pub(super) path: PathBuf,
+    /// What all of it is, in words that a page can show; may be empty.
+    pub(super) note: String,
+    /// In order; at least one.
+    pub(super) labels: Vec<Label>,
+    /// Pixels of each.
+    pub(super) size: [usize; 2],
+    /// Where the pictures or the cache say it.
+    pub(super) frames_per_second: Option<f64>,
+    pub(super) source: Source,
+}
+
+/// Where pictures come from.
+pub(super) enum Source {
+    /// Files, and how light becomes a picture.
+    Files(BTreeMap<Label, PathBuf>, Box<ViewSpec>),
+}
+
+impl Strip {
+    /// A short name: that of the folder.
+    pub(super) fn name(&self) -> String {
+        name_of(&self.path)
+    }
+
+    pub(super) fn has(&self, label: &Label) -> bool {
+        self.labels.binary_search(label).is_ok()
+    }
+
+    /// The picture of one of its labels.
+    pub(super) fn picture(&self, label: &Label) -> Result<Rgb, ViewError> {
+        match &self.source {
+            Source::Files(files, view) => {
+                let file = files.get(label).ok_or_else(|| self.lacks(label))?;
+                let picture = pictures::read(file, view)?;
+                if picture.size == self.size {
+                    return Ok(picture);
+                }
+                Err(ViewError::Asked(format!(
+                    "{} has changed meanwhile",
+                    file.display()
+                )))
+            }
+        }
+    }
+
+    /// Where the first picture of these says that it comes from.
+    pub(super) fn attributes(&self, label: &Label) -> Option<Attributes> {
+        match &self.source {
+            Source::Files(files, _) => pictures::attributes(files.get(label)?),
+        }
+    }
+
+    pub(super) fn lacks(&self, label: &Label) -> ViewError {
+        let path = self.path.display();
+        ViewError::Asked(match label {
+            Label::Frame(frame) => format!("{path} has no picture of frame {frame}"),
+            Label::Name(name) => format!("{path} has no picture {name}"),
+        })
+    }
+}
+
+/// The last part of a path, also of `.` and `..`.
+fn name_of(path: &Path) -> String {
+    let last = |path: &Path| Some(path.file_name()?.to_string_lossy().into_owned());
+    let real = || path.canonicalize().ok().and_then(|real| last(&real));
+    last(path)
+        .or_else(real)
+        .unwrap_or_else(|| "view".to_owned())
+}
