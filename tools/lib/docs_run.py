@@ -329,8 +329,8 @@ def main() -> int:
     try:
         pages = [blocks_of(name, (ROOT / name).read_text(), arguments.as_written is not None) for name in names]
         every = [block for blocks in pages for block in blocks]
-        if not any(block.mark == "run" for block in every):
-            raise Fault(f"nothing is run in {', '.join(names)}")
+        if not arguments.pages and not any(block.mark == "run" for block in every):
+            raise Fault("nothing is run in all of the documentation")
         if arguments.list:
             for block in every:
                 if block.mark:
