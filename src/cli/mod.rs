@@ -67,7 +67,7 @@ enum Command {
     Diff(diff::DiffArgs),
     /// Print the keys of scenes, looks, studies, tolerance and whitewater files, with what each allows and its default.
     Keys(keys::KeysArgs),
-    /// Look at rendered pictures: a contact sheet, a movie, a page that plays them.
+    /// Look at a cache, rendered pictures or a study: a contact sheet, a movie, a page that plays the frames.
     View(Box<view::ViewArgs>),
     /// Check every checksum of a cache.
     Verify(verify::VerifyArgs),

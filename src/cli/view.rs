@@ -1,4 +1,4 @@
-//! `swell view IMAGES`
+//! `swell view CACHE|IMAGES|STUDY`
 
 use std::{
     cell::OnceCell,
@@ -12,7 +12,7 @@ use serde_json::json;
 use crate::{
     domain::frame_range::FrameRange,
     scene::look::Look,
-    stage::view::{Event, Placing, Request, SHEET, view},
+    stage::view::{Aspect, Event, Placing, Request, SHEET, view},
 };
 
 use super::{
@@ -25,8 +25,8 @@ use super::{
 
 #[derive(Args, Debug)]
 pub(super) struct ViewArgs {
-    /// Folder of rendered pictures; two of them are held against each other.
-    #[arg(required = true, num_args = 1..=2, value_name = "IMAGES")]
+    /// Cache directory, folder of rendered pictures, or folder of a study; two caches or renders are held against each other.
+    #[arg(required = true, num_args = 1..=2, value_name = "CACHE|IMAGES|STUDY")]
     subjects: Vec<PathBuf>,
     /// Where contact sheet and page go; views/NAME where left out.
     #[arg(short, long, value_name = "DIR")]
@@ -52,7 +52,10 @@ pub(super) struct ViewArgs {
     /// Where the page has its pictures.
     #[arg(long, value_enum, default_value_t, value_name = "WHERE")]
     pictures: Pictures,
-    /// Cache whose times, probes and ledger are drawn below the pictures.
+    /// From where the particles of a cache are looked at.
+    #[arg(long, value_enum, default_value_t, value_name = "WHERE")]
+    from: Sight,
+    /// Cache whose times, probes and ledger are drawn below the pictures; a cache that is looked at has its own.
     #[arg(long, value_name = "CACHE")]
     curves: Option<PathBuf>,
     /// Look through whose [view] EXR files are shown.
@@ -83,6 +86,17 @@ enum Pictures {
     Beside,
 }
 
+#[derive(ValueEnum, Clone, Copy, Debug, Default)]
+enum Sight {
+    /// Along -z: x goes right, y up.
+    #[default]
+    Side,
+    /// From above: x goes right, -z up.
+    Top,
+    /// From above a corner.
+    Corner,
+}
+
 fn rate(text: &str) -> Result<f64, String> {
     let allowed = 0.1..=240.0;
     let found = text.parse().ok().filter(|x| allowed.contains(x));
@@ -111,6 +125,11 @@ pub(super) fn run(args: &ViewArgs) -> Result<u8, Failure> {
         width: args.width.map(|width| width as usize),
         frames_per_second: args.fps,
         look,
+        aspect: match args.from {
+            Sight::Side => Aspect::Side,
+            Sight::Top => Aspect::Top,
+            Sight::Corner => Aspect::Corner,
+        },
         curves: args.curves.clone(),
         ffmpeg: args.ffmpeg.clone(),
     };

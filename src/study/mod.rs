@@ -15,6 +15,7 @@ pub mod measure;
 pub mod page;
 pub mod picture;
 pub mod player;
+pub mod points;
 pub mod raster;
 pub mod rgb;
 pub mod sheet;

@@ -1,6 +1,6 @@
 //! What a cache knows of its frames: their times, what probes saw, what the ledger says of the solve.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use super::{
     ViewError, reader,
@@ -18,25 +18,34 @@ use crate::{
 pub(super) struct Curves {
     pub(super) charts: Vec<Chart>,
     pub(super) frames_per_second: Option<f64>,
-    cache: Option<CacheReader>,
+    /// The first one has the times.
+    caches: Vec<CacheReader>,
 }
 
 impl Curves {
-    pub(super) fn of(cache: Option<&Path>) -> Result<Self, ViewError> {
-        let Some(path) = cache else {
-            return Ok(Self::default());
-        };
-        let cache = reader(path)?;
-        let manifest = cache.manifest();
-        let records = manifest.probes.iter().enumerate();
-        let probes = records
-            .map(|(index, record)| probes::chart(&manifest.shot, record, index, cache.entries()));
+    /// Of these caches, which have names where there are two: curves of one quantity share a chart.
+    pub(super) fn of(named: &[(String, PathBuf)]) -> Result<Self, ViewError> {
+        let open = |(_, path): &(String, PathBuf)| reader(path);
+        let caches: Vec<CacheReader> = named.iter().map(open).collect::<Result<_, _>>()?;
+        let mut charts: Vec<Chart> = Vec::new();
+        for ((name, _), cache) in named.iter().zip(&caches) {
+            for chart in of_cache(cache) {
+                let chart = match named.len() {
+                    1 => chart,
+                    _ => of_two(name, chart),
+                };
+                match charts.iter_mut().find(|known| known.title == chart.title) {
+                    Some(known) => known.series.extend(chart.series),
+                    None => charts.push(chart),
+                }
+            }
+        }
         Ok(Self {
-            charts: probes
-                .chain(of_ledger(&manifest.shot, cache.entries()))
-                .collect(),
-            frames_per_second: Some(manifest.frames_per_second),
-            cache: Some(cache),
+            charts,
+            frames_per_second: caches
+                .first()
+                .map(|cache| cache.manifest().frames_per_second),
+            caches,
         })
     }
 
@@ -45,12 +54,12 @@ impl Curves {
         let Label::Frame(frame) = label else {
             return None;
         };
-        Some(self.cache.as_ref()?.entry(*frame).ok()?.clock.time)
+        Some(self.caches.first()?.entry(*frame).ok()?.clock.time)
     }
 
     /// A sentence where pictures say that they are of another cache; those that say nothing are believed.
     pub(super) fn stranger(&self, strip: &Strip, labels: &[Label]) -> Option<String> {
-        let cache = self.cache.as_ref()?;
+        let cache = self.caches.first()?;
         let Some(label @ Label::Frame(frame)) = labels.first() else {
             return None;
         };
@@ -65,6 +74,25 @@ impl Curves {
             cache.dir().display()
         ))
     }
+}
+
+/// Every chart of a cache: its probes', and its ledger's.
+fn of_cache(cache: &CacheReader) -> Vec<Chart> {
+    let shot = &cache.manifest().shot;
+    let records = cache.manifest().probes.iter().enumerate();
+    let probes = records.map(|(index, record)| probes::chart(shot, record, index, cache.entries()));
+    probes.chain(of_ledger(shot, cache.entries())).collect()
+}
+
+/// A chart that says whose its curves are in their names, and no longer in its title.
+fn of_two(name: &str, mut chart: Chart) -> Chart {
+    if let Some((_, title)) = chart.title.split_once(": ") {
+        chart.title = title.to_owned();
+    }
+    for series in &mut chart.series {
+        series.name = format!("{name} {}", series.name);
+    }
+    chart
 }
 
 /// Curves of a quantity of the solver's reports, with their name.

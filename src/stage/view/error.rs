@@ -2,7 +2,10 @@
 
 use std::{io, path::PathBuf};
 
-use crate::{cache::CacheError, render::RenderError, stage::Blame, study::raster::RasterError};
+use crate::{
+    cache::CacheError, render::RenderError, scene::SceneError, stage::Blame,
+    study::raster::RasterError,
+};
 
 /// Why there is nothing to look at.
 #[derive(Debug, thiserror::Error)]
@@ -19,6 +22,12 @@ pub enum ViewError {
     /// A cache.
     #[error(transparent)]
     Cache(#[from] CacheError),
+    /// The scene in a cache.
+    #[error("the cache's scene: {0}")]
+    Scene(#[from] SceneError),
+    /// A study that has no page.
+    #[error("{} is not there: the study is not finished; `swell study` goes on with it", .0.display())]
+    Unfinished(PathBuf),
     /// The contact sheet.
     #[error(transparent)]
     Sheet(#[from] RasterError),
@@ -87,6 +96,8 @@ impl From<&ViewError> for Blame {
             ViewError::Missing(_)
             | ViewError::Picture(_)
             | ViewError::Cache(_)
+            | ViewError::Scene(_)
+            | ViewError::Unfinished(_)
             | ViewError::Sheet(_)
             | ViewError::File { .. }
             | ViewError::Encode { .. }

@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 
 use super::{
     ViewError,
-    strip::{Label, Source, Strip},
+    strip::{Label, Source, Strip, name_of},
 };
 use crate::{
     render::{
@@ -89,6 +89,7 @@ pub(super) fn open(folder: &Path, view: Option<&ViewSpec>) -> Result<Option<Stri
     };
     Ok(Some(Strip {
         path: folder.to_owned(),
+        title: name_of(folder),
         note: note.to_owned(),
         labels: files.keys().cloned().collect(),
         size: head.size,

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{ViewError, pictures};
+use super::{ViewError, particles::Balls, pictures};
 use crate::{render::Attributes, scene::look::ViewSpec, study::rgb::Rgb};
 
 /// What a picture is told by.
@@ -41,6 +41,8 @@ impl Label {
 pub(super) struct Strip {
     /// As it was named.
     pub(super) path: PathBuf,
+    /// A short name.
+    pub(super) title: String,
     /// What all of it is, in words that a page can show; may be empty.
     pub(super) note: String,
     /// In order; at least one.
@@ -56,12 +58,17 @@ pub(super) struct Strip {
 pub(super) enum Source {
     /// Files, and how light becomes a picture.
     Files(BTreeMap<Label, PathBuf>, Box<ViewSpec>),
+    /// A cache's particles.
+    Cache(Box<Balls>),
 }
 
 impl Strip {
-    /// A short name: that of the folder.
-    pub(super) fn name(&self) -> String {
-        name_of(&self.path)
+    /// What is to be said of all of it.
+    pub(super) fn said(&self) -> String {
+        match &self.source {
+            Source::Files(..) => self.note.clone(),
+            Source::Cache(balls) => balls.note(),
+        }
     }
 
     pub(super) fn has(&self, label: &Label) -> bool {
@@ -82,6 +89,10 @@ impl Strip {
                     file.display()
                 )))
             }
+            Source::Cache(balls) => match label {
+                Label::Frame(frame) => balls.draw(*frame),
+                Label::Name(_) => Err(self.lacks(label)),
+            },
         }
     }
 
@@ -89,11 +100,15 @@ impl Strip {
     pub(super) fn attributes(&self, label: &Label) -> Option<Attributes> {
         match &self.source {
             Source::Files(files, _) => pictures::attributes(files.get(label)?),
+            Source::Cache(_) => None,
         }
     }
 
     pub(super) fn lacks(&self, label: &Label) -> ViewError {
         let path = self.path.display();
+        if let (Source::Cache(balls), Label::Frame(frame)) = (&self.source, label) {
+            return balls.lacks(*frame);
+        }
         ViewError::Asked(match label {
             Label::Frame(frame) => format!("{path} has no picture of frame {frame}"),
             Label::Name(name) => format!("{path} has no picture {name}"),
@@ -102,7 +117,7 @@ impl Strip {
 }
 
 /// The last part of a path, also of `.` and `..`.
-fn name_of(path: &Path) -> String {
+pub(super) fn name_of(path: &Path) -> String {
     let last = |path: &Path| Some(path.file_name()?.to_string_lossy().into_owned());
     let real = || path.canonicalize().ok().and_then(|real| last(&real));
     last(path)

@@ -325,6 +325,149 @@ fn curves_of_a_cache_stand_below_its_pictures() {
     );
 }
 
+/// Pixels of a picture that are nearer to white than to the ground.
+fn bright(picture: &Rgb) -> usize {
+    picture
+        .pixels
+        .iter()
+        .filter(|p| p.iter().all(|&x| x > 130))
+        .count()
+}
+
+#[test]
+fn a_cache_shows_its_particles() {
+    let job = Job::of(&[]);
+    write_cache(&job.path("cache"), &Made::watched());
+    let said = job.expect(0, "view cache");
+    assert_has(
+        &said,
+        &[
+            "5 frames of 960 × 720",
+            "coloured by speed",
+            "no render",
+            "views/small-pbf/sheet.png",
+        ],
+    );
+    let page = job.path("views/small-pbf/index.html");
+    let data = data(&page);
+    assert_eq!(data["labels"], serde_json::json!(["0", "1", "2", "3", "4"]));
+    assert_eq!(data["rate"], 60.0);
+    assert_eq!(
+        fs::read_to_string(&page)
+            .unwrap()
+            .matches("<figure")
+            .count(),
+        5
+    );
+    // The block slides along x with 1 m/s, the fastest colour: 16.7 mm a frame. 2 m of the domain and margins of 3 % are as high as
+    // wide; the picture is cut to three quarters, so that 720 − 57.6 rows are 2 m.
+    let frames = &shown(&page)[0];
+    let middle = |picture: &Rgb| {
+        let white = picture
+            .pixels
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| p[0] > 130);
+        let places: Vec<f64> = white.map(|(k, _)| (k % 960) as f64).collect();
+        places.iter().sum::<f64>() / places.len() as f64
+    };
+    let moved = middle(&frames[4]) - middle(&frames[0]);
+    let hold = 4.0 / 60.0 * (720.0 - 57.6) / 2.0;
+    assert!((moved - hold).abs() < 1.0, "{moved} {hold}");
+    // 0.8 m by 1 m of balls without gaps from the side, each darker to its rim.
+    let area = bright(&frames[0]) as f64 / (331.2 * 331.2);
+    assert!((0.5..0.85).contains(&area), "{area}");
+    // From above they are 0.8 m by 1 m too, and the domain is 2 m by 1 m.
+    job.expect(0, "view cache --from top --frames 2 --player -o top");
+    let top = &shown(&job.path("top/index.html"))[0][0];
+    assert_eq!(top.size, [960, 509]);
+    job.expect(
+        0,
+        "view cache --from corner --movie corner.apng --frames 1-3",
+    );
+    let said = job.expect(4, "view cache --frames 3-9");
+    assert!(said.contains("frames 0 to 4, not 5"), "{said}");
+}
+
+#[test]
+fn two_caches_share_place_colours_and_charts() {
+    let job = Job::of(&[]);
+    write_cache(&job.path("a"), &Made::watched());
+    let fast = |_: u32, water: &mut swell::domain::particles::Particles| {
+        water.velocity.fill([4.0, 0.0, 0.0]);
+    };
+    write_cache(
+        &job.path("b"),
+        &Made {
+            spoil: &fast,
+            last: 3,
+            ..Made::watched()
+        },
+    );
+    let said = job.expect(0, "view a b --player -o both");
+    assert_has(
+        &said,
+        &["4 frames of", "1 of the 5 frames of a", "white (4.0 m/s"],
+    );
+    let page = job.path("both/index.html");
+    let frames = shown(&page);
+    // A quarter of the greatest speed is blue; alone it is white.
+    assert!(bright(&frames[0][0]) == 0 && bright(&frames[1][0]) > 10_000);
+    job.expect(0, "view a --player -o alone");
+    assert!(
+        bright(&shown(&job.path("alone/index.html"))[0][0]) > 10_000,
+        "the control"
+    );
+    let text = fs::read_to_string(&page).unwrap();
+    assert_eq!(text.matches("<figure").count(), 5);
+    assert_has(&text, &["a kinetic", "b kinetic"]);
+}
+
+#[test]
+fn a_damaged_cache_is_not_shown() {
+    let job = Job::of(&[]);
+    write_cache(&job.path("cache"), &Made::default());
+    let file = job.path("cache/frames/small.0002.ply");
+    let mut bytes = fs::read(&file).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    fs::write(&file, bytes).unwrap();
+    let said = job.expect(4, "view cache");
+    assert!(said.contains("small.0002.ply is damaged"), "{said}");
+    job.expect(0, "view cache --frames 3-4");
+}
+
+#[test]
+fn a_study_has_its_page_and_a_sheet() {
+    let job = Job::of(&[]);
+    fs::create_dir_all(job.path("studies/x/curves")).unwrap();
+    fs::write(job.path("studies/x/results.csv"), "a,b\n").unwrap();
+    let said = job.expect(4, "view studies/x");
+    assert!(said.contains("the study is not finished"), "{said}");
+    fs::write(job.path("studies/x/index.html"), "its page").unwrap();
+    let said = job.expect(0, "view studies/x");
+    assert_has(
+        &said,
+        &["has no pictures", "the study's page: studies/x/index.html"],
+    );
+    assert!(!job.path("views").exists());
+    for (name, size) in [("one", [64, 36]), ("two", [700, 50])] {
+        let png = picture(size, 9, 200).to_png("a test").unwrap();
+        fs::write(job.path(&format!("studies/x/curves/{name}.png")), png).unwrap();
+    }
+    job.expect(0, "view studies/x");
+    let sheet = decoded(&fs::read(job.path("views/x/sheet.png")).unwrap());
+    assert_eq!(sheet.size[0], 16 + 2 * (320 + 16));
+    let theirs = sheet.pixels.iter().filter(|p| p[0] == 45 && p[2] == 200);
+    assert_eq!(theirs.count(), 64 * 36 + 320 * 23);
+    assert_eq!(
+        fs::read_to_string(job.path("studies/x/index.html")).unwrap(),
+        "its page"
+    );
+    let said = job.expect(2, "view studies/x --movie x.apng");
+    assert!(said.contains("a page and no frames"), "{said}");
+}
+
 #[test]
 fn faults_are_one_clear_line() {
     let job = made();

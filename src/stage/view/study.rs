@@ -1,0 +1,139 @@
+//! A study that is finished has a page of its own; its pictures get a contact sheet.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use rayon::prelude::*;
+
+use super::{
+    Event, Outcome, Request, ViewError, check_place, pictures,
+    reel::{COLUMNS, SOFTWARE, THUMB, check_sheet},
+    store::write,
+    strip::name_of,
+};
+use crate::{
+    scene::look::ViewSpec,
+    study::{
+        rgb::Rgb,
+        sheet::{Cell, sheet},
+    },
+};
+
+/// What a study leaves.
+const RESULTS: [&str; 2] = ["results.csv", "results.jsonl"];
+/// Its page, and the folders of what is seen on it.
+const PAGE: &str = "index.html";
+const FOLDERS: [&str; 2] = ["pictures", "curves"];
+
+/// Whether a folder is that of a study.
+pub(super) fn is_one(folder: &Path) -> bool {
+    RESULTS.iter().any(|name| folder.join(name).is_file())
+}
+
+/// Its page, and a sheet of its pictures where one is asked for and there are any.
+pub(super) fn view(
+    request: &Request,
+    folder: &Path,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Outcome, ViewError> {
+    let page = folder.join(PAGE);
+    if !page.is_file() {
+        return Err(ViewError::Unfinished(page));
+    }
+    let asked = [
+        (request.movie.is_some(), "--movie"),
+        (request.frames.is_some(), "--frames"),
+        (request.curves.is_some(), "--curves"),
+    ];
+    if let Some((_, flag)) = asked.iter().find(|(is_asked, _)| *is_asked) {
+        return Err(ViewError::Asked(format!(
+            "{flag}: {} is a study, which has a page and no frames",
+            folder.display()
+        )));
+    }
+    let mut outcome = Outcome::default();
+    if let Some(most) = request.sheet {
+        let default = || Path::new("views").join(name_of(folder));
+        let directory = request.directory.clone().unwrap_or_else(default);
+        let bytes = sheet_of(folder, &directory, most, tell)?;
+        outcome
+            .files
+            .extend(bytes.map(|bytes| ("contact sheet", directory.join("sheet.png"), bytes)));
+    }
+    let bytes = fs::metadata(&page).map_err(ViewError::at(&page))?.len();
+    outcome
+        .files
+        .push(("the study's page", page.clone(), bytes));
+    outcome.page = Some(page);
+    Ok(outcome)
+}
+
+/// Bytes of the sheet; `None` where the study has no pictures.
+fn sheet_of(
+    folder: &Path,
+    directory: &Path,
+    most: usize,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Option<u64>, ViewError> {
+    let mut files = Vec::new();
+    for name in FOLDERS {
+        pictures_in(&folder.join(name), &mut files)?;
+    }
+    let all = files.len();
+    files.truncate(most);
+    if files.is_empty() {
+        tell(Event::Note(format!(
+            "{} has no pictures for a sheet",
+            folder.display()
+        )));
+        return Ok(None);
+    }
+    let file = directory.join("sheet.png");
+    check_place(directory)?;
+    check_sheet(&file)?;
+    let cell = |path: &PathBuf| -> Result<Cell, ViewError> {
+        let picture = pictures::read(path, &ViewSpec::default())?;
+        let name = path.strip_prefix(folder).unwrap_or(path).with_extension("");
+        Ok(Cell {
+            label: name.display().to_string(),
+            picture: picture.resized(Rgb::within(picture.size, THUMB)),
+        })
+    };
+    let cells: Vec<Cell> = files.par_iter().map(cell).collect::<Result<_, _>>()?;
+    let note = match cells.len() {
+        some if some < all => format!("{some} of {all} pictures of the study."),
+        all => format!("{all} pictures of the study."),
+    };
+    let png = sheet(&name_of(folder), &note, &cells, COLUMNS)?.to_png(SOFTWARE);
+    let png = png.map_err(|source| ViewError::Encode {
+        file: file.clone(),
+        source,
+    })?;
+    fs::create_dir_all(directory).map_err(ViewError::at(directory))?;
+    write(&file, &png)?;
+    Ok(Some(png.len() as u64))
+}
+
+/// PNG files of a folder and of those in it, by name; nothing where it is not there.
+fn pictures_in(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ViewError> {
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    let entries = fs::read_dir(folder).map_err(ViewError::at(folder))?;
+    let paths = entries.map(|entry| entry.map(|entry| entry.path()));
+    let mut paths: Vec<PathBuf> = paths
+        .collect::<Result<_, _>>()
+        .map_err(ViewError::at(folder))?;
+    paths.sort();
+    for path in paths {
+        let ending = path.extension().and_then(|ending| ending.to_str());
+        if path.is_dir() {
+            pictures_in(&path, files)?;
+        } else if ending.is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
