@@ -193,7 +193,7 @@ def main():
         web.call("Page.navigate", url=pathlib.Path(page).resolve().as_uri())
         web.until("document.readyState === 'complete' && document.body.dataset.shown !== undefined", "the first picture")
         labels = web.js("data.labels")
-        name = sorted(os.listdir(folders[0]))[0].split(".")[0]
+        name = sorted(pathlib.Path(folders[0]).glob("*.png"))[0].name.split(".")[0]
 
         def wanted(folder, label):
             if wrong:
