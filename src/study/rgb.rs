@@ -109,8 +109,8 @@ impl Cover {
         let mut sum = [0.0; 3];
         for (k, weight) in self.weights.iter().enumerate() {
             let value = at(self.first + k);
-            for channel in 0..3 {
-                sum[channel] += weight * value[channel];
+            for (total, part) in sum.iter_mut().zip(value) {
+                *total += weight * part;
             }
         }
         sum
