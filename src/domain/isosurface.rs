@@ -5,6 +5,7 @@
 //! keys, so that bricks are gone through at the same time and the mesh is the same for any number of threads.
 
 mod cell;
+pub mod sparse;
 
 use glam::DVec3;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! Meshes from OBJ, PLY and STL files.
+//! Meshes from OBJ, PLY and STL files, and from OpenVDB level sets.
 //!
 //! Every reader works on bytes already in memory, and nothing is allocated from a count that a
 //! header merely promises: counts are first held against the bytes that are there.
@@ -7,6 +7,7 @@ mod obj;
 pub mod parts;
 mod ply;
 mod stl;
+mod vdb;
 
 use std::{
     borrow::Cow,
@@ -44,7 +45,7 @@ pub enum MeshError {
         file: PathBuf,
     },
     /// An extension that names no format.
-    #[error("mesh {file}: unknown extension; allowed are .obj, .ply and .stl")]
+    #[error("mesh {file}: unknown extension; allowed are .obj, .ply, .stl and .vdb")]
     UnknownFormat {
         /// Which file.
         file: PathBuf,
@@ -68,6 +69,8 @@ pub enum MeshFormat {
     Ply,
     /// STL, ASCII or binary.
     Stl,
+    /// A level set of OpenVDB, negative inside: the surface where it is 0.
+    Vdb,
 }
 
 impl MeshFormat {
@@ -83,6 +86,7 @@ impl MeshFormat {
             Some("obj") => Ok(Self::Obj),
             Some("ply") => Ok(Self::Ply),
             Some("stl") => Ok(Self::Stl),
+            Some("vdb") => Ok(Self::Vdb),
             _ => Err(MeshError::UnknownFormat {
                 file: path.to_owned(),
             }),
@@ -155,6 +159,7 @@ fn welded(bytes: &[u8], format: MeshFormat, file: &Path) -> Result<Welded, MeshE
         MeshFormat::Obj => obj::read(bytes),
         MeshFormat::Ply => ply::read(bytes),
         MeshFormat::Stl => stl::read(bytes),
+        MeshFormat::Vdb => vdb::read(bytes),
     };
     raw.and_then(weld).map_err(|detail| MeshError::Malformed {
         file: file.to_owned(),

@@ -41,6 +41,7 @@ mod compare {
 mod docs;
 mod domain {
     mod circles;
+    mod level_set_file;
     mod signed_distance;
 }
 mod experiment {

@@ -150,7 +150,7 @@ const SCALE: Key = Key::scale("scale", 1e-6..=1e6)
 const WATER_MESH: &[Key] = &[
     Key::text(
         "file",
-        "a closed .obj, .ply or .stl within the domain, relative to the scene file",
+        "a closed .obj, .ply or .stl, or a level set in a .vdb, within the domain, relative to the scene file",
     )
     .by_hash()
     .about("the mesh; open ones are taken with a warning where an inside can be told"),
@@ -172,7 +172,7 @@ const PARTICLES: &[Key] = &[
 const SOLID: &[Key] = &[
     Key::text(
         "mesh",
-        "a closed .obj, .ply or .stl that reaches into the domain, relative to the scene file",
+        "a closed .obj, .ply or .stl, or a level set in a .vdb, that reaches into the domain, relative to the scene file",
     )
     .by_hash()
     .about("the mesh; open ones are taken with a warning where an inside can be told"),

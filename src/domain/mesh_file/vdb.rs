@@ -1,0 +1,105 @@
+//! OpenVDB level sets, by vdb-rs: the surface where one is 0, in the grid's own world.
+
+use std::{
+    io::Cursor,
+    panic::{self, AssertUnwindSafe},
+};
+
+use glam::DVec3;
+use vdb_rs::{Grid, Map, MetadataValue, VdbLevel, VdbReader};
+
+use super::Raw;
+use crate::domain::isosurface::sparse::{Band, around};
+
+/// The level set that is read where a file has several: Houdini, Blender and swell call it so.
+const USUAL: &str = "surface";
+
+/// Maps of a grid that vdb-rs ends the program for.
+const OTHER_MAPS: [&str; 6] = [
+    "AffineMap",
+    "UnitaryMap",
+    "NonlinearFrustumMap",
+    "TranslationMap",
+    "UniformTranslationMap",
+    "PerspectiveMap",
+];
+
+/// How a file begins.
+const MAGIC: [u8; 8] = *b" BDV\0\0\0\0";
+
+/// Vertices in metres, and triangles.
+pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
+    if !bytes.starts_with(&MAGIC) {
+        return Err("no OpenVDB file".into());
+    }
+    // The name of a map stands in the file by itself, after its length.
+    for map in OTHER_MAPS {
+        let named = [&(map.len() as u32).to_le_bytes()[..], map.as_bytes()].concat();
+        if bytes.windows(named.len()).any(|part| part == named) {
+            return Err(format!(
+                "a grid has the transform {map}; what is read is scale and translation along the axes"
+            ));
+        }
+    }
+    let grid = unless_it_panics(|| grid(bytes))
+        .ok_or("damaged, or of a kind that vdb-rs does not read")??;
+    let (scale, origin) = match &grid.transform {
+        Map::UniformScaleMap { scale_values, .. } => (scale_values.to_array(), [0.0; 3]),
+        Map::ScaleTranslateMap {
+            translation,
+            scale_values,
+            ..
+        } => (scale_values.to_array(), translation.to_array()),
+    };
+    let mut band = Band::new();
+    for (at, value, level) in grid.iter() {
+        // Tiles are wholly inside or outside: no surface is in them.
+        if matches!(level, VdbLevel::Voxel) {
+            band.insert(at.to_array().map(|c| c as i32), value);
+        }
+    }
+    if let Some(value) = band.values().find(|value| !value.is_finite()) {
+        return Err(format!("a value of the level set is {value}"));
+    }
+    let mesh = around(&band);
+    let (scale, origin) = (DVec3::from_array(scale), DVec3::from_array(origin));
+    let places = mesh.vertices.iter().map(|&v| origin + scale * v);
+    let triangles = mesh.triangles.iter().map(|t| t.map(u64::from));
+    Ok((places.collect(), triangles.collect()))
+}
+
+/// What `read` gives; `None`, and no word on standard error, where it panics: vdb-rs asserts what a file should be.
+fn unless_it_panics<T>(read: impl FnOnce() -> T) -> Option<T> {
+    let told = panic::take_hook();
+    panic::set_hook(Box::new(|_| {}));
+    let found = panic::catch_unwind(AssertUnwindSafe(read));
+    panic::set_hook(told);
+    found.ok()
+}
+
+/// The file's level set.
+fn grid(bytes: &[u8]) -> Result<Grid<f32>, String> {
+    let fail = |error: vdb_rs::ParseError| error.to_string();
+    let mut reader = VdbReader::new(Cursor::new(bytes)).map_err(fail)?;
+    let mut all: Vec<String> = reader.grid_descriptors.keys().cloned().collect();
+    all.sort_unstable();
+    let is_level_set = |name: &&String| {
+        let grid = &reader.grid_descriptors[*name];
+        let class = grid.meta_data.0.get("class");
+        grid.grid_type.starts_with("Tree_float_5_4_3")
+            && class == Some(&MetadataValue::String("level set".to_owned()))
+    };
+    let level_sets: Vec<String> = all.iter().filter(is_level_set).cloned().collect();
+    let name = match &level_sets[..] {
+        [] => return Err(format!("no level set among its grids ({})", all.join(", "))),
+        [only] => only.clone(),
+        several if several.iter().any(|name| name == USUAL) => USUAL.to_owned(),
+        several => {
+            return Err(format!(
+                "several level sets ({}), and none is called {USUAL:?}",
+                several.join(", ")
+            ));
+        }
+    };
+    reader.read_grid::<f32>(&name).map_err(fail)
+}

@@ -1,0 +1,113 @@
+//! Level sets of OpenVDB as meshes. The files in `files/` were written by OpenVDB 10.0.1 itself (`createLevelSetSphere` of its Python module: radius 0.4 m
+//! about (1.0, 0.5, 0.5), voxels of 0.05 m, Blosc), the sheared one with another transform.
+
+use std::{f64::consts::PI, path::Path};
+
+use glam::DVec3;
+use swell::domain::{
+    mesh::TriangleMesh,
+    mesh_file::{MeshError, MeshFormat},
+};
+
+use crate::support::job::Job;
+
+const SPHERE: &[u8] = include_bytes!("files/sphere.vdb");
+const SHEARED: &[u8] = include_bytes!("files/sheared.vdb");
+const NONE: &[u8] = include_bytes!("files/no-level-set.vdb");
+
+const RADIUS: f64 = 0.4;
+const CENTRE: DVec3 = DVec3::new(1.0, 0.5, 0.5);
+const VOXEL: f64 = 0.05;
+
+fn read(bytes: &[u8]) -> Result<TriangleMesh, MeshError> {
+    TriangleMesh::from_bytes(bytes, MeshFormat::Vdb, Path::new("a.vdb"))
+}
+
+/// Farthest vertex from the sphere, metres.
+fn off(mesh: &TriangleMesh, centre: DVec3) -> f64 {
+    let off = mesh
+        .vertices
+        .iter()
+        .map(|v| ((*v - centre).length() - RADIUS).abs());
+    off.fold(0.0, f64::max)
+}
+
+#[test]
+fn a_level_set_of_openvdb_is_the_mesh_around_its_inside() {
+    let mesh = read(SPHERE).unwrap();
+    assert!(mesh.open_edges().is_empty());
+    // Distances are linear along an edge but for 1/r: their chord is off by at most an eighth of its square over the radius.
+    let chord = VOXEL * VOXEL / (8.0 * RADIUS);
+    assert!(off(&mesh, CENTRE) < chord, "{}", off(&mesh, CENTRE));
+    // Triangles between vertices on the sphere lie inside of it by a diagonal's chord at most, 3 · (√3 voxel)² / 8 r² of the volume.
+    let ratio = mesh.signed_volume() / (4.0 / 3.0 * PI * RADIUS.powi(3));
+    let bound = 9.0 * VOXEL * VOXEL / (8.0 * RADIUS * RADIUS);
+    assert!((ratio - 1.0).abs() < bound, "{ratio}");
+    // The control: half a voxel to the side is seen.
+    let moved = off(&mesh, CENTRE + DVec3::X * 0.5 * VOXEL);
+    assert!(moved > 5.0 * chord, "{moved}");
+}
+
+#[test]
+fn what_is_no_level_set_is_refused() {
+    let told = |bytes: &[u8]| read(bytes).unwrap_err().to_string();
+    let none = told(NONE);
+    assert!(
+        none.contains("no level set") && none.contains("density, v"),
+        "{none}"
+    );
+    assert!(told(SHEARED).contains("AffineMap"));
+    // The sphere is the first of its grids, and takes nearly all of the file.
+    for end in [0, 7, 40, 300, SPHERE.len() / 2] {
+        let said = told(&SPHERE[..end]);
+        assert!(said.contains("a.vdb"), "{end}: {said}");
+    }
+    let mut spoilt = SPHERE.to_vec();
+    spoilt[0] = b'X';
+    assert!(told(&spoilt).contains("no OpenVDB file"));
+}
+
+#[test]
+fn water_and_solids_are_taken_from_a_level_set() {
+    let job = Job::of(&[]);
+    std::fs::write(job.path("ball.vdb"), SPHERE).unwrap();
+    std::fs::write(job.path("none.vdb"), NONE).unwrap();
+    let scene = |lines: &str| {
+        format!(
+            "[shot]\nname = \"ball\"\nframes = 2\nframes_per_second = 24\n[domain]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 1.0, 1.0]\n\
+             {lines}[solver]\nmethod = \"pbf\"\n[solver.pbf]\nparticle_spacing = 0.05\n"
+        )
+    };
+    let water = "[[water.mesh]]\nfile = \"ball.vdb\"\n";
+    let block = "[[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [2.0, 0.5, 1.0]\n";
+    let solid = format!("{block}[[solid]]\nmesh = \"ball.vdb\"\n");
+    for (name, lines) in [("water", water), ("block", block), ("solid", &solid)] {
+        std::fs::write(job.path(&format!("{name}.toml")), scene(lines)).unwrap();
+    }
+    let none = scene("[[water.mesh]]\nfile = \"none.vdb\"\n");
+    std::fs::write(job.path("none.toml"), none).unwrap();
+    let particles = |name: &str| {
+        let said = job.expect(
+            0,
+            &format!("bake {name}.toml --device cpu --frames 1-1 -o {name}"),
+        );
+        let count = said.split(" particles").next().unwrap();
+        let count = count.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap();
+        count.parse::<f64>().unwrap()
+    };
+    let volume = 4.0 / 3.0 * PI * RADIUS.powi(3);
+    let spacing = 0.05f64.powi(3);
+    // Particles near the surface are in or out by half a spacing.
+    let layer = 4.0 * PI * RADIUS.powi(2) * 0.025;
+    let water = particles("water") * spacing;
+    assert!((water - volume).abs() < layer, "{water} {volume}");
+    // Half of the ball stands in the water.
+    let displaced = (particles("block") - particles("solid")) * spacing;
+    assert!((displaced - 0.5 * volume).abs() < layer, "{displaced}");
+    assert!(displaced > 0.2 * volume, "the control");
+    let said = job.expect(2, "bake none.toml --device cpu -o none");
+    assert!(
+        said.contains("water.mesh") && said.contains("no level set"),
+        "{said}"
+    );
+}
