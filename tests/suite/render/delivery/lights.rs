@@ -88,11 +88,11 @@ fn all_lights_add_up_to_the_picture() {
         // Nothing of the picture depends on them, but for f32 roundings that a compiler orders otherwise where it computes more: less
         // than what the file's half floats round.
         let plain = setup(method, WHITE).draw(&context());
-        let apart = self::apart(&plain, &image);
-        assert!(apart < 1.0, "{method}: other pictures with layers: {apart}");
+        let changed = apart(&plain, &image);
+        assert!(changed < 1.0, "{method}: other pictures with layers: {changed}");
         let bare = setup(method, "").draw(&context());
-        let apart = self::apart(&bare, &image);
-        assert!(apart > 100.0, "{method}, the control: {apart}");
+        let control = apart(&bare, &image);
+        assert!(control > 100.0, "{method}, the control: {control}");
         // Controls: each light that is left out, or dimmed alone, is missed.
         let edits = match method {
             "ssfr" => [
