@@ -89,7 +89,10 @@ fn all_lights_add_up_to_the_picture() {
         // than what the file's half floats round.
         let plain = setup(method, WHITE).draw(&context());
         let changed = apart(&plain, &image);
-        assert!(changed < 1.0, "{method}: other pictures with layers: {changed}");
+        assert!(
+            changed < 1.0,
+            "{method}: other pictures with layers: {changed}"
+        );
         let bare = setup(method, "").draw(&context());
         let control = apart(&bare, &image);
         assert!(control > 100.0, "{method}, the control: {control}");
