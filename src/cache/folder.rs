@@ -33,7 +33,10 @@ pub(super) fn make_streams(dir: &Path, manifest: &Manifest) -> Result<(), CacheE
 
 /// Refuses a directory with anything in it but a creation of ours that was cut short: our lock, no
 /// manifest, and one frame at most.
-pub(super) fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
+///
+/// # Errors
+/// [`CacheError::Exists`], [`CacheError::Occupied`], [`CacheError::Io`].
+pub fn refuse_occupied(dir: &Path) -> Result<(), CacheError> {
     if manifest::exists(dir) {
         return Err(CacheError::Exists {
             dir: dir.to_owned(),

@@ -46,7 +46,7 @@ mod writer;
 
 pub use disk::directory_hash;
 pub use error::CacheError;
-pub use folder::around;
+pub use folder::{around, refuse_occupied};
 pub use grids::GridRecord;
 pub use ledger::{Clock, Entry, Files, Rows};
 pub use manifest::{Manifest, Parent, exists};

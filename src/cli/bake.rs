@@ -1,9 +1,6 @@
 //! `swell bake SCENE`
 
-use std::{
-    cell::OnceCell,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use clap::{
     Args,
@@ -15,25 +12,26 @@ use crate::{
     domain::{frame_range::FrameRange, solver::StepReport},
     scene::{Method, Reach, Scene, SceneError},
     stage::{
-        bake::{Event, Request, bake},
+        bake::{Event, Request, bake, expected},
         branch::BranchPoint,
     },
 };
 
 use super::{
     DeviceArgs, Failure, count,
+    dry_run::DryRun,
     interrupt::{self, Interrupt},
     lint::DenyArgs,
     output,
-    progress::{Mode, Progress},
-    size,
+    progress::{Mode, Progress, Status},
+    set_variable, size,
 };
 
 #[derive(Args, Debug)]
 pub(super) struct BakeArgs {
     /// Scene file (TOML).
     scene: PathBuf,
-    /// Cache directory; cache/SHOT/SOLVER where left out.
+    /// Cache directory; SHOT/SOLVER in the folder that SWELL_CACHE names, or in cache/, where left out.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Which solver, pbf or flip: short for --set solver.method=SOLVER.
@@ -60,12 +58,15 @@ pub(super) struct BakeArgs {
     deny: DenyArgs,
     #[command(flatten)]
     device: DeviceArgs,
+    /// Say what would be made, how large and where, and make nothing. No device is opened.
+    #[arg(long)]
+    dry_run: bool,
     /// Time each pass and print a table; passes then run one by one.
     #[arg(long)]
     time_passes: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
-    progress: Mode,
+    pub(super) progress: Mode,
 }
 
 /// A solver by its name.
@@ -113,12 +114,13 @@ fn load_lengthened(args: &BakeArgs) -> Result<Scene, SceneError> {
     }
 }
 
-pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
+pub(super) fn run(args: &BakeArgs, progress: &Progress) -> Result<u8, Failure> {
     let device = args.device.read()?;
     let scene = load_lengthened(args)?;
     args.deny.check(&args.scene, &scene)?;
     let method = scene.solver.method.name();
-    let default = || PathBuf::from("cache").join(&scene.shot.name).join(method);
+    let root = || set_variable("SWELL_CACHE").map_or_else(|| PathBuf::from("cache"), PathBuf::from);
+    let default = || root().join(&scene.shot.name).join(method);
     let request = Request {
         directory: args.output.clone().unwrap_or_else(default),
         scene,
@@ -128,16 +130,14 @@ pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
         device,
         time_passes: args.time_passes,
     };
+    if args.dry_run {
+        return dry_run(&request, progress);
+    }
     let interrupt = Interrupt::install_or_warn();
-    let progress = OnceCell::new();
     let outcome = bake(&request, interrupt.flag(), &mut |event| {
-        tell(args.progress, &progress, event)
-    });
-    let progress = progress
-        .into_inner()
-        .unwrap_or_else(|| Progress::new(args.progress, 0));
+        tell(progress, event)
+    })?;
     progress.finish();
-    let outcome = outcome?;
     let end = if outcome.interrupted {
         "ended by a signal after"
     } else {
@@ -147,7 +147,7 @@ pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
         let (text, event) = warned(warning);
         progress.say(&text, event);
     }
-    progress.say(
+    progress.conclude(
         &format!(
             "{end} frame {} of {} in {} ({}, {} written now, waited {:.1} s for the disk)",
             outcome.last_frame,
@@ -158,17 +158,11 @@ pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
             outcome.waited
         ),
         json!({
-            "event": "end", "last_frame": outcome.last_frame, "frames": outcome.frames, "bytes": outcome.bytes,
+            "last_frame": outcome.last_frame, "frames": outcome.frames,
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
-    output::print_pass_times(&outcome.passes);
-    if !outcome.shares.is_empty() {
-        output::print(&format!(
-            "\n{}",
-            output::shares(&outcome.shares, Some(outcome.frames))
-        ));
-    }
+    output::pass_times(progress, &outcome.passes, &outcome.shares, outcome.frames);
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
     } else {
@@ -176,7 +170,26 @@ pub(super) fn run(args: &BakeArgs) -> Result<u8, Failure> {
     })
 }
 
-pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
+fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
+    let found = expected(request)?;
+    for warning in &found.warnings {
+        let (text, event) = warned(warning);
+        progress.say(&text, event);
+    }
+    let told = DryRun {
+        frames: (found.first..=found.last).collect(),
+        standing: found.standing as usize,
+        bytes: Some(found.bytes),
+        place: output::path(&request.directory),
+    };
+    let particles = count(found.particles as u64, "particle");
+    let words = format!(", with {particles} at the start");
+    let more = json!({ "particles": found.particles, "removed": found.removed });
+    told.tell(progress, &words, more);
+    Ok(0)
+}
+
+pub(super) fn tell(progress: &Progress, event: Event) {
     match event {
         Event::Ready {
             device,
@@ -192,7 +205,7 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             warnings,
         } => {
             let frames = u64::from((last + 1).saturating_sub(first));
-            let progress = progress.get_or_init(|| Progress::new(mode, frames));
+            progress.begin(frames);
             if particles == 0 {
                 progress.say(
                     "warning: the scene holds no water",
@@ -240,6 +253,7 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
                 json!({
                     "event": "ready", "solver": solver, "device": device, "particles": particles, "removed": removed,
                     "boundary_samples": boundary_samples, "bytes": bytes.map(|(all, _)| all), "list_bytes": bytes.map(|(_, lists)| lists), "first": first, "last": last,
+                    "frames": frames,
                 }),
             );
         }
@@ -248,16 +262,16 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             report,
             seconds,
         } => {
-            if let Some(progress) = progress.get() {
-                for (text, event) in warnings(frame, &report) {
-                    progress.say(&text, event);
-                }
-                progress.frame(
-                    &line(frame, &report, seconds),
-                    json!({ "event": "frame", "frame": frame, "seconds": seconds, "report": report }),
-                );
+            for (text, event) in warnings(frame, &report) {
+                progress.say(&text, event);
             }
+            progress.frame(
+                &line(frame, &report, seconds),
+                Status::Done,
+                json!({ "event": "frame", "frame": frame, "seconds": seconds, "report": report }),
+            );
         }
+        Event::Written { bytes } => progress.wrote(bytes),
     }
 }
 

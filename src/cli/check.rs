@@ -1,6 +1,6 @@
 //! `swell check CACHE|SCENE`
 
-use std::{cell::OnceCell, collections::BTreeMap, fmt::Write as _, path::PathBuf};
+use std::{collections::BTreeMap, fmt::Write as _, path::PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -19,7 +19,7 @@ use super::{
     check_render::SurfaceArgs,
     interrupt::{self, Interrupt},
     is_cache, output,
-    progress::{Mode, Progress},
+    progress::{Mode, Progress, Status},
 };
 
 #[derive(Args, Debug)]
@@ -53,7 +53,7 @@ pub(super) struct CheckArgs {
     gpu: GpuArgs,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
-    progress: Mode,
+    pub(super) progress: Mode,
 }
 
 /// What an option is for, where it is for the other kind of source.
@@ -67,7 +67,7 @@ pub(super) struct Misplaced {
 }
 
 /// What a failed bake left, computed again: the line that the bake ended with, or that it now goes well.
-fn run_failed(args: &CheckArgs) -> Result<u8, Failure> {
+fn run_failed(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> {
     let has_solver = args.solver.is_some() || !args.set.is_empty();
     if args.frames.is_some() || args.substep.is_some() || has_solver {
         let error = Misplaced {
@@ -83,7 +83,11 @@ fn run_failed(args: &CheckArgs) -> Result<u8, Failure> {
     }
     let Replayed { frame, failure } = replay_failed(&args.source, &args.gpu.read()?)?;
     let Some(failure) = failure else {
-        output::print(&format!("frame {frame} keeps its budgets now\n"));
+        let text = format!("frame {frame} keeps its budgets now");
+        match progress.is_json() {
+            true => progress.conclude(&text, json!({ "frame": frame })),
+            false => output::print(&format!("{text}\n")),
+        }
         return Ok(0);
     };
     Err(Failure {
@@ -92,12 +96,12 @@ fn run_failed(args: &CheckArgs) -> Result<u8, Failure> {
     })
 }
 
-pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
+pub(super) fn run(args: &CheckArgs, progress: &Progress) -> Result<u8, Failure> {
     if is_failed(&args.source) {
-        return run_failed(args);
+        return run_failed(args, progress);
     }
     if let Some(look) = args.surface.look() {
-        return run_render(args, look);
+        return run_render(args, look, progress);
     }
     let request = Request {
         source: source(args)?,
@@ -105,21 +109,20 @@ pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
         gpu: args.gpu.read()?,
     };
     let interrupt = Interrupt::install_or_warn();
-    let progress = OnceCell::new();
     let outcome = check(&request, interrupt.flag(), &mut |event| {
-        tell(args.progress, &progress, &event);
-    });
-    if let Some(progress) = progress.get() {
-        progress.finish();
-    }
-    let outcome = outcome?;
-    if args.json {
+        tell(progress, &event);
+    })?;
+    progress.finish();
+    if progress.is_json() {
+        progress.result(to_json(&outcome));
+    } else if args.json {
         output::print(&format!("{}\n", to_json(&outcome)));
     } else {
         let table = show(&outcome.table);
         let substeps = show_substeps(&outcome);
         output::print(&format!("{substeps}{table}{}\n", verdict(&outcome)));
     }
+    progress.tell_end(json!({ "interrupted": outcome.interrupted }));
     Ok(if outcome.interrupted {
         interrupt::EXIT_CODE as u8
     } else {
@@ -128,7 +131,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<u8, Failure> {
 }
 
 /// Of pictures of a cache.
-fn run_render(args: &CheckArgs, look: &PathBuf) -> Result<u8, Failure> {
+fn run_render(args: &CheckArgs, look: &PathBuf, progress: &Progress) -> Result<u8, Failure> {
     let has_step = args.substep.is_some() || args.solver.is_some() || !args.set.is_empty();
     let source_file = args.source.clone();
     let misplaced = match (has_step, is_cache(&args.source)) {
@@ -158,7 +161,7 @@ fn run_render(args: &CheckArgs, look: &PathBuf) -> Result<u8, Failure> {
         &args.surface,
         args.frames.clone(),
         &args.gpu,
-        args.json,
+        (args.json, progress),
     )
 }
 
@@ -190,7 +193,7 @@ fn source(args: &CheckArgs) -> Result<Source, Failure> {
     Ok(Source::Cache(args.source.clone(), args.frames.clone()))
 }
 
-fn tell(mode: Mode, progress: &OnceCell<Progress>, event: &Event<'_>) {
+fn tell(progress: &Progress, event: &Event<'_>) {
     match event {
         Event::Ready {
             device,
@@ -199,7 +202,7 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: &Event<'_>) {
             frames,
             warnings,
         } => {
-            let progress = progress.get_or_init(|| Progress::new(mode, *frames as u64));
+            progress.begin(*frames as u64);
             for warning in warnings {
                 let (text, event) = bake::warned(warning);
                 progress.say(&text, event);
@@ -216,9 +219,6 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: &Event<'_>) {
             checked,
             seconds,
         } => {
-            let Some(progress) = progress.get() else {
-                return;
-            };
             let rows = &checked.table.rows;
             let over = rows.iter().filter(|row| !row.is_within()).count();
             let substep = checked
@@ -230,6 +230,7 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: &Event<'_>) {
                     substep.unwrap_or_default(),
                     rows.len()
                 ),
+                Status::Done,
                 json!({
                     "event": "frame", "frame": frame, "substep": checked.substep, "seconds": seconds, "rows": rows.len(),
                     "over": over,

@@ -8,13 +8,14 @@ use serde_json::json;
 use crate::{
     domain::frame_range::FrameRange,
     scene::look::Look,
-    stage::render::surfaces::{DEPTH, NORMAL, Outcome, Request, check_render},
+    stage::render::surfaces::{DEPTH, Event, NORMAL, Outcome, Request, check_render},
 };
 
 use super::{
     Failure, GpuArgs, count,
     interrupt::{self, Interrupt},
     output,
+    progress::{Progress, Status},
 };
 
 #[derive(Args, Debug)]
@@ -47,7 +48,7 @@ pub(super) fn run(
     surface: &SurfaceArgs,
     frames: Option<FrameRange>,
     gpu: &GpuArgs,
-    json: bool,
+    (json, progress): (bool, &Progress),
 ) -> Result<u8, Failure> {
     let request = Request {
         cache,
@@ -58,16 +59,41 @@ pub(super) fn run(
         gpu: gpu.read()?,
     };
     let interrupt = Interrupt::install_or_warn();
-    let outcome = check_render(&request, interrupt.flag())?;
+    let outcome = check_render(&request, interrupt.flag(), &mut |event| {
+        tell(progress, event);
+    })?;
+    progress.finish();
     let is_within = outcome.rows.iter().all(|row| row.is_within());
-    output::print(&match json {
-        true => format!("{}\n", to_json(&outcome, is_within)),
-        false => show(&outcome, is_within),
-    });
+    match (progress.is_json(), json) {
+        (true, _) => progress.result(to_json(&outcome, is_within)),
+        (_, true) => output::print(&format!("{}\n", to_json(&outcome, is_within))),
+        (_, false) => output::print(&show(&outcome, is_within)),
+    }
+    progress.tell_end(json!({ "interrupted": outcome.interrupted }));
     Ok(match outcome.interrupted {
         true => interrupt::EXIT_CODE as u8,
         false => u8::from(!is_within),
     })
+}
+
+fn tell(progress: &Progress, event: Event) {
+    match event {
+        Event::Ready { device, frames } => {
+            progress.begin(frames as u64);
+            progress.say(
+                &format!(
+                    "{} on {device} against rays in f64",
+                    count(frames as u64, "frame")
+                ),
+                json!({ "event": "ready", "device": device, "frames": frames }),
+            );
+        }
+        Event::Frame { frame, seconds } => progress.frame(
+            &format!("frame {frame:4}  {seconds:.2} s"),
+            Status::Done,
+            json!({ "event": "frame", "frame": frame, "seconds": seconds }),
+        ),
+    }
 }
 
 fn to_json(outcome: &Outcome, is_within: bool) -> serde_json::Value {

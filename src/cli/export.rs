@@ -1,20 +1,23 @@
 //! `swell export CACHE`
 
-use std::{cell::OnceCell, path::PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use crate::{
-    domain::frame_range::FrameRange,
+    domain::{chunk::Chunk, frame_range::FrameRange},
     scene::look::Look,
-    stage::export::{Chunk, Event, Pattern, Request, Target, UsdWater, VOXELS, export},
+    stage::export::{Event, Pattern, Request, Target, UsdWater, VOXELS, expected, export},
 };
 
 use super::{
     Failure, bake, count,
+    dry_run::DryRun,
+    failed::{failed_in_all, frame_failed, refuse_failed},
     interrupt::{self, Interrupt},
-    progress::{Mode, Progress},
+    output,
+    progress::{Mode, Progress, Status},
     size,
 };
 
@@ -73,9 +76,15 @@ pub(super) struct ExportArgs {
     /// Export files again that stand there, also those of another cache, and files that are none of swell's.
     #[arg(long)]
     overwrite: bool,
+    /// Where frames of the cache are damaged, export the others; exit code 4 in the end.
+    #[arg(long)]
+    keep_going: bool,
+    /// Say what would be made, how large and where, and make nothing.
+    #[arg(long)]
+    dry_run: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
-    progress: Mode,
+    pub(super) progress: Mode,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug, Default)]
@@ -110,7 +119,7 @@ impl ExportArgs {
     }
 }
 
-pub(super) fn run(args: &ExportArgs) -> Result<u8, Failure> {
+pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure> {
     let look = match &args.look {
         Some(look) => Some(Look::load_within(look, bake::reach(args.allow_outside))?),
         None => None,
@@ -125,24 +134,23 @@ pub(super) fn run(args: &ExportArgs) -> Result<u8, Failure> {
         look,
         python: args.python.clone(),
         overwrite: args.overwrite,
+        keep_going: args.keep_going,
     };
+    if args.dry_run {
+        return dry_run(&request, progress);
+    }
     let interrupt = Interrupt::install_or_warn();
-    let progress = OnceCell::new();
     let outcome = export(&request, interrupt.flag(), &mut |event| {
-        tell(args.progress, &progress, event);
-    });
-    let progress = progress
-        .into_inner()
-        .unwrap_or_else(|| Progress::new(args.progress, 0));
+        tell(progress, event);
+    })?;
     progress.finish();
-    let outcome = outcome?;
     let elsewhere = match outcome.elsewhere {
         0 => String::new(),
         many => format!(", {many} being made by other processes"),
     };
-    progress.say(
+    progress.conclude(
         &format!(
-            "{} {} made ({}), {} stood there already{elsewhere}",
+            "{} {} made ({}), {} stood there already{elsewhere}{}",
             if outcome.interrupted {
                 "ended by a signal:"
             } else {
@@ -151,23 +159,57 @@ pub(super) fn run(args: &ExportArgs) -> Result<u8, Failure> {
             count(outcome.made as u64, "file"),
             size(outcome.bytes),
             outcome.standing,
+            failed_in_all(&outcome.failed),
         ),
         json!({
-            "event": "end", "made": outcome.made, "bytes": outcome.bytes, "standing": outcome.standing,
-            "elsewhere": outcome.elsewhere, "interrupted": outcome.interrupted,
+            "made": outcome.made, "standing": outcome.standing,
+            "elsewhere": outcome.elsewhere, "failed": outcome.failed, "interrupted": outcome.interrupted,
         }),
     );
-    Ok(if outcome.interrupted {
-        interrupt::EXIT_CODE as u8
-    } else {
-        0
-    })
+    if outcome.interrupted {
+        return Ok(interrupt::EXIT_CODE as u8);
+    }
+    refuse_failed(&outcome.failed)
 }
 
-fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
+fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
+    let found = expected(request)?;
+    let is_made = |frame: &u32| !found.standing.contains(frame);
+    let told = DryRun {
+        frames: found.frames.iter().copied().filter(is_made).collect(),
+        standing: found.standing.len(),
+        bytes: found.bytes,
+        place: places(request).join(", "),
+    };
+    let words = format!(", {}", count(found.files as u64, "file"));
+    told.tell(progress, &words, json!({ "files": found.files }));
+    Ok(0)
+}
+
+/// Folders that files go to, each once.
+fn places(request: &Request) -> Vec<String> {
+    let file = |target: &Target| match target {
+        Target::Mesh(files)
+        | Target::Npy(files)
+        | Target::Csv(files)
+        | Target::Bgeo(files)
+        | Target::Vdb(files) => files.file(0),
+        Target::Usd(file, _) => file.clone(),
+    };
+    let folder = |file: PathBuf| match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => output::path(folder),
+        _ => ".".to_owned(),
+    };
+    let mut places: Vec<String> = request.targets.iter().map(file).map(folder).collect();
+    places.sort();
+    places.dedup();
+    places
+}
+
+fn tell(progress: &Progress, event: Event) {
     match event {
         Event::Ready { frames, files } => {
-            let progress = progress.get_or_init(|| Progress::new(mode, frames as u64));
+            progress.begin(frames as u64);
             progress.say(
                 &format!(
                     "{}, {} each",
@@ -178,12 +220,10 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             );
         }
         Event::Warning(text) => {
-            if let Some(progress) = progress.get() {
-                progress.say(
-                    &format!("warning: {text}"),
-                    json!({ "event": "warning", "what": "volume", "text": text }),
-                );
-            }
+            progress.say(
+                &format!("warning: {text}"),
+                json!({ "event": "warning", "what": "volume", "text": text }),
+            );
         }
         Event::Frame {
             frame,
@@ -192,22 +232,25 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             seconds,
             volume,
         } => {
-            let Some(progress) = progress.get() else {
-                return;
-            };
             let held = volume.map_or_else(String::new, |volume| {
                 format!(", {:.2} % of the particles' volume", 100.0 * volume)
             });
-            let text = match made {
-                0 => "stands there".to_owned(),
-                _ => format!("{} in {seconds:.2} s{held}", size(bytes)),
+            let (text, status) = match made {
+                0 => ("stands there".to_owned(), Status::Skipped),
+                _ => (
+                    format!("{} in {seconds:.2} s{held}", size(bytes)),
+                    Status::Done,
+                ),
             };
+            progress.wrote(bytes);
             progress.frame(
                 &format!("frame {frame:4}  {text}"),
+                status,
                 json!({
                     "event": "frame", "frame": frame, "made": made, "bytes": bytes, "seconds": seconds, "volume": volume,
                 }),
             );
         }
+        Event::Failed { frame, error } => frame_failed(progress, frame, &*error),
     }
 }

@@ -1,5 +1,6 @@
 //! `swell inspect SCENE|LOOK|CACHE|--adapters`
 
+mod json;
 mod look;
 
 use std::{
@@ -20,7 +21,9 @@ use crate::{
     },
 };
 
-use super::{Failure, bake, check::Misplaced, is_cache, lint::DenyArgs, output, size};
+use super::{
+    Failure, bake, check::Misplaced, is_cache, lint::DenyArgs, named_adapter, output, size,
+};
 
 #[derive(Args, Debug)]
 #[command(
@@ -52,11 +55,14 @@ pub(super) struct InspectArgs {
     /// frames of a shot may take more substeps.
     #[arg(long, value_name = "FRAMES", requires = "subject", value_parser = clap::value_parser!(u32).range(1..=1000))]
     time: Option<u32>,
-    /// Plan for the limits of this adapter.
+    /// Plan for the limits of this adapter; SWELL_ADAPTER in the environment where left out.
     #[arg(long, value_name = "NAME", requires = "subject")]
     adapter: Option<String>,
     #[command(flatten)]
     deny: DenyArgs,
+    /// Print one JSON object.
+    #[arg(long, conflicts_with = "plot")]
+    json: bool,
 }
 
 pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
@@ -73,6 +79,9 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     {
         return Err(misplaced("--time", "scenes", "a look", subject));
     }
+    if args.json {
+        return json::run(args);
+    }
     let plotted = match (&args.plot, &args.subject) {
         (Some(folder), Some(directory)) => plot(directory, folder)?,
         _ => Vec::new(),
@@ -83,17 +92,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         }
     }
     match &args.subject {
-        Some(directory) if is_failed(directory) => {
-            let shown = directory.display();
-            let what = format!(
-                "{shown} is the frame that a bake broke off at, which no cache lists: `swell check {shown}` computes \
-                 it again"
-            );
-            return Err(Failure {
-                code: 2,
-                error: what.into(),
-            });
-        }
+        Some(directory) if is_failed(directory) => return Err(broken_off(directory)),
         Some(directory) if is_cache(directory) => {
             refuse_scene_options(args, directory)?;
             let (manifest, entries) = cache(directory)?;
@@ -107,12 +106,13 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
             let scene = bake::load(file, &args.set, args.solver, args.allow_outside)?;
             args.deny.check(file, &scene)?;
             refuse_frames_beyond(args, file, scene.shot.frames)?;
-            let planned = plan(&scene, args.adapter.as_deref())?;
+            let adapter = named_adapter(args.adapter.as_ref());
+            let planned = plan(&scene, adapter.as_deref())?;
             let _ = show_plan(&mut text, &scene, &planned);
             misfit = planned.misfit;
             match args.time {
                 Some(frames) if misfit.is_none() => {
-                    let timed = time(&scene, args.adapter.as_deref(), frames)?;
+                    let timed = time(&scene, adapter.as_deref(), frames)?;
                     let _ = show_time(&mut text, &timed);
                 }
                 _ => {
@@ -128,6 +128,18 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     }
     output::print(&text);
     misfit.map_or(Ok(0), |misfit| Err(misfit.into()))
+}
+
+/// A frame that failed has no plan and no ledger.
+fn broken_off(directory: &Path) -> Failure {
+    let shown = directory.display();
+    let what = format!(
+        "{shown} is the frame that a bake broke off at, which no cache lists: `swell check {shown}` computes it again"
+    );
+    Failure {
+        code: 2,
+        error: what.into(),
+    }
 }
 
 /// A scene moves as it says until its shot's end; the first frame warms the device up.

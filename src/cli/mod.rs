@@ -4,14 +4,18 @@ mod bake;
 mod check;
 mod check_render;
 mod diff;
+mod dry_run;
 mod export;
+mod failed;
 mod inspect;
 pub mod interrupt;
 mod keys;
 mod lint;
+mod log;
 mod output;
 mod progress;
 mod render;
+mod shell;
 mod study;
 pub mod verify;
 mod view;
@@ -19,6 +23,7 @@ mod whitewater;
 
 use std::{
     error::Error,
+    ffi::OsString,
     io::{self, Write as _},
     path::{Path, PathBuf},
     process::ExitCode,
@@ -26,6 +31,7 @@ use std::{
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use self::progress::{Mode, Progress};
 use crate::stage::{
     Blame,
     device::{Device, Gpu, Shaders},
@@ -39,10 +45,26 @@ const AFTER: &str = "Exit codes: 0 done; 1 a comparison is out of tolerance; 2 u
     written, standard output included (a closed pipe, as of `| head`, is no fault); 5 the numbers failed, last good frame kept; \
     130 ended by a signal, resumable.";
 
+/// Version, and what this program was built from and for.
+const BUILD: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\ncommit: ",
+    env!("SWELL_COMMIT"),
+    "\ntarget: ",
+    env!("SWELL_TARGET"),
+    "\nprofile: ",
+    env!("SWELL_PROFILE"),
+    "\nfeatures: ",
+    env!("SWELL_FEATURES"),
+);
+
 /// Offline, film-quality fluid pipeline for ocean-wave shots.
 #[derive(Parser, Debug)]
-#[command(name = "swell", version, after_help = AFTER)]
+#[command(name = "swell", version, long_version = BUILD, after_help = AFTER)]
 struct Cli {
+    /// Write what goes to standard error, and progress, also behind what this file holds, each line with its time.
+    #[arg(long, global = true, value_name = "FILE")]
+    log: Option<PathBuf>,
     #[command(subcommand)]
     command: Command,
 }
@@ -71,6 +93,10 @@ enum Command {
     View(Box<view::ViewArgs>),
     /// Check every checksum of a cache.
     Verify(verify::VerifyArgs),
+    /// Print a script that completes commands and options in a shell.
+    Completions(shell::CompletionsArgs),
+    /// Write a man page for the program and for each command into a folder.
+    Man(shell::ManArgs),
 }
 
 /// An error with the exit code that it ends the program with.
@@ -101,7 +127,8 @@ where
 /// Adapter and shaders of a command.
 #[derive(Args, Debug)]
 struct GpuArgs {
-    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`).
+    /// Number of the adapter, or a part of its name that is not digits alone (see `swell inspect --adapters`). SWELL_ADAPTER in the
+    /// environment where left out.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Read all shaders from this folder, an edited copy of the folder shaders/ of swell's source. What is made with them is
@@ -114,10 +141,27 @@ impl GpuArgs {
     fn read(&self) -> Result<Gpu, Failure> {
         let shaders = self.shaders.as_deref().map(Shaders::read).transpose()?;
         Ok(Gpu {
-            adapter: self.adapter.clone(),
+            adapter: named_adapter(self.adapter.as_ref()),
             shaders: shaders.unwrap_or_default(),
         })
     }
+}
+
+/// The adapter of `--adapter`; where that is left out the one that the environment names, which other options know nothing of: it is
+/// of no account on the CPU, and for what has no adapter.
+fn named_adapter(flag: Option<&String>) -> Option<String> {
+    flag.cloned().or_else(|| {
+        Some(
+            set_variable("SWELL_ADAPTER")?
+                .to_string_lossy()
+                .into_owned(),
+        )
+    })
+}
+
+/// An environment variable that is set, and to something.
+fn set_variable(name: &str) -> Option<OsString> {
+    std::env::var_os(name).filter(|value| !value.is_empty())
 }
 
 /// Device of a command that needs no adapter.
@@ -156,7 +200,7 @@ impl DeviceArgs {
 /// Parses the command line, runs the command, prints what went wrong with all its causes.
 pub fn main() -> ExitCode {
     let code = match Cli::try_parse() {
-        Ok(cli) => run(cli.command),
+        Ok(cli) => start(cli),
         Err(told) => tell(&told),
     };
     output::exit_code(code)
@@ -169,30 +213,95 @@ fn tell(told: &clap::Error) -> u8 {
         false => "standard output",
     };
     output::note(stream, told.print().and_then(|()| io::stdout().flush()));
-    told.exit_code() as u8
+    let code = told.exit_code() as u8;
+    if told.use_stderr() {
+        let text = told.to_string();
+        let lines = text.lines().map(str::trim).take_while(|it| !it.is_empty());
+        let message = lines.collect::<Vec<_>>().join(" ");
+        let message = message.strip_prefix("error: ").unwrap_or(&message);
+        progress::unread(&arguments(), message, code);
+    }
+    code
 }
 
-fn run(command: Command) -> u8 {
-    let result = match command {
-        Command::Bake(args) => bake::run(&args),
-        Command::Render(args) => render::run(&args),
-        Command::Export(args) => export::run(&args),
-        Command::Study(args) => study::run(&args),
-        Command::Check(args) => check::run(&args),
+/// As they stand on the command line, without the program.
+fn arguments() -> Vec<String> {
+    let words = std::env::args_os().skip(1);
+    words.map(|it| it.to_string_lossy().into_owned()).collect()
+}
+
+/// Opens the log, runs the command, and tells its end.
+fn start(cli: Cli) -> u8 {
+    let progress = Progress::new(cli.command.progress());
+    let opened = match &cli.log {
+        Some(file) => open_log(file),
+        None => Ok(()),
+    };
+    let code = opened.and_then(|()| run(cli.command, &progress));
+    let code = code.unwrap_or_else(|failure| {
+        progress.fail(&chain(failure.error.as_ref()), failure.code);
+        failure.code
+    });
+    let code = output::code(code);
+    output::log(&format!("exit code {code}"));
+    progress.end(code);
+    code
+}
+
+fn open_log(file: &Path) -> Result<(), Failure> {
+    log::open(file).map_err(|error| Failure {
+        code: 4,
+        error: format!("--log {}: {error}", file.display()).into(),
+    })?;
+    output::log(&format!("swell {}", arguments().join(" ")));
+    let before = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        before(panic);
+        output::log(&panic.to_string());
+    }));
+    Ok(())
+}
+
+impl Command {
+    /// How it tells progress.
+    fn progress(&self) -> Mode {
+        match self {
+            Self::Bake(args) => args.progress,
+            Self::Render(args) => args.progress,
+            Self::Export(args) => args.progress,
+            Self::Study(args) => args.progress,
+            Self::Whitewater(args) => args.progress,
+            Self::Check(args) => args.progress,
+            Self::View(args) => args.progress,
+            Self::Inspect(_)
+            | Self::Diff(_)
+            | Self::Keys(_)
+            | Self::Verify(_)
+            | Self::Completions(_)
+            | Self::Man(_) => Mode::None,
+        }
+    }
+}
+
+fn run(command: Command, progress: &Progress) -> Result<u8, Failure> {
+    match command {
+        Command::Bake(args) => bake::run(&args, progress),
+        Command::Render(args) => render::run(&args, progress),
+        Command::Export(args) => export::run(&args, progress),
+        Command::Study(args) => study::run(&args, progress),
+        Command::Check(args) => check::run(&args, progress),
         Command::Inspect(args) => inspect::run(&args),
         Command::Diff(args) => diff::run(&args),
         Command::Keys(args) => {
             keys::run(&args);
             Ok(0)
         }
-        Command::View(args) => view::run(&args),
-        Command::Whitewater(args) => whitewater::run(&args),
+        Command::View(args) => view::run(&args, progress),
+        Command::Whitewater(args) => whitewater::run(&args, progress),
         Command::Verify(args) => verify::run(&args).map(|()| 0).map_err(Failure::from),
-    };
-    result.unwrap_or_else(|failure| {
-        output::say(&format!("swell: {}", chain(failure.error.as_ref())));
-        failure.code
-    })
+        Command::Completions(args) => Ok(shell::completions(&args)),
+        Command::Man(args) => shell::man(&args),
+    }
 }
 
 /// Whether a path that may be a cache or a scene is a cache: a folder, or missing and not named like a scene.

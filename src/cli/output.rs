@@ -2,30 +2,88 @@
 //!
 //! A write that fails never ends the work that is under way. It is remembered, as by `close_stdout` of GNU coreutils, and at
 //! the end the exit code says it: [`exit_code`]. A closed pipe (`swell inspect CACHE | head`) is no failure: its reader has
-//! what it wanted, what is left is dropped, and the exit code is that of the result.
+//! what it wanted, what is left is dropped, and the exit code is that of the result; but for events, which are promised whole.
 
 use std::{
     io::{self, ErrorKind, Write},
     path::Path,
     process::ExitCode,
-    sync::{Mutex, PoisonError},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
+use serde_json::{Value, json};
+
+use super::{log, progress::Progress};
 use crate::stage::time::Share;
 
 /// The exit code where a file cannot be written; standard output is one.
 const CANNOT_WRITE: u8 = 4;
 
+const STDOUT: &str = "standard output";
+const STDERR: &str = "standard error";
+
 /// The first write that failed: which stream, and the system's words.
 static FAILED: Mutex<Option<(&str, io::Error)>> = Mutex::new(None);
+/// Whether an event could not be written.
+static IS_SHORT: AtomicBool = AtomicBool::new(false);
+
+/// Writes an event to standard output, a line. A stream of events is whole or short: behind one that could not be written comes
+/// none, and a closed pipe is a fault as any other, for whoever asked for events has not got them.
+pub(super) fn event(event: &Value) {
+    if IS_SHORT.load(Ordering::Relaxed) {
+        return;
+    }
+    let written = put(&mut io::stdout().lock(), &format!("{event}\n"));
+    if let Err(error) = written {
+        IS_SHORT.store(true, Ordering::Relaxed);
+        remember(STDOUT, error);
+    }
+}
 
 /// Writes to standard output what a command is asked for.
 pub(super) fn print(text: &str) {
-    note("standard output", put(&mut io::stdout().lock(), text));
+    note(STDOUT, put(&mut io::stdout().lock(), text));
 }
 
-/// Prints a line a pass: milliseconds each, runs, seconds in all.
-pub(super) fn print_pass_times(passes: &[(&'static str, f64, u64)]) {
+/// Tells what passes took: a line each with milliseconds, runs, seconds in all, and behind them what each part took of so many frames.
+pub(super) fn pass_times(
+    progress: &Progress,
+    passes: &[(&'static str, f64, u64)],
+    parts: &[Share],
+    frames: u32,
+) {
+    if passes.is_empty() {
+        return;
+    }
+    if progress.is_json() {
+        return progress.tell(json!({
+            "event": "passes", "passes": passes.iter().map(pass_json).collect::<Vec<_>>(), "parts": parts_json(parts),
+        }));
+    }
+    print_pass_times(passes);
+    if !parts.is_empty() {
+        print(&format!("\n{}", shares(parts, Some(frames))));
+    }
+}
+
+fn pass_json((pass, seconds, runs): &(&'static str, f64, u64)) -> Value {
+    json!({ "pass": pass, "seconds": seconds, "runs": runs })
+}
+
+/// What passes and buffers are there for, for programs.
+pub(super) fn parts_json(parts: &[Share]) -> Vec<Value> {
+    let part = |part: &Share| {
+        json!({
+            "part": part.owner, "passes": part.passes, "bytes": part.bytes, "seconds": part.seconds,
+        })
+    };
+    parts.iter().map(part).collect()
+}
+
+fn print_pass_times(passes: &[(&'static str, f64, u64)]) {
     for (pass, seconds, runs) in passes {
         let each = 1e3 * seconds / *runs as f64;
         print(&format!(
@@ -58,21 +116,28 @@ pub(super) fn shares(shares: &[Share], frames: Option<u32>) -> String {
 
 /// Writes a line to standard error: progress, and what a user has to know.
 pub(super) fn say(line: &str) {
-    note(
-        "standard error",
-        put(&mut io::stderr().lock(), &format!("{line}\n")),
-    );
+    note(STDERR, put(&mut io::stderr().lock(), &format!("{line}\n")));
+    log(line);
+}
+
+/// Writes lines to the file of `--log` alone.
+pub(super) fn log(text: &str) {
+    if let Err(error) = log::write(text) {
+        remember("the log", error);
+    }
 }
 
 /// Remembers how a write to a stream went that was made elsewhere.
 pub(super) fn note(stream: &'static str, written: io::Result<()>) {
     match written {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            let mut failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner);
-            failed.get_or_insert((stream, error));
-        }
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => remember(stream, error),
         _ => {}
     }
+}
+
+fn remember(stream: &'static str, error: io::Error) {
+    let mut failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner);
+    failed.get_or_insert((stream, error));
 }
 
 fn put(out: &mut impl Write, text: &str) -> io::Result<()> {
@@ -80,8 +145,17 @@ fn put(out: &mut impl Write, text: &str) -> io::Result<()> {
     out.flush()
 }
 
-/// Exit code of the process whose work ended with `code`: 4 in place of 0 and 1 where something could not be written. A
-/// code of a graver fault stays.
+/// What the exit code is where work ended with `code`: 4 in place of 0 and 1 where something could not be written. A code of a
+/// graver fault stays.
+pub(super) fn code(code: u8) -> u8 {
+    let failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner);
+    match failed.is_some() && code <= 1 {
+        true => CANNOT_WRITE,
+        false => code,
+    }
+}
+
+/// Exit code of the process whose work ended with `code`, as [`code`]; says what could not be written.
 pub(super) fn exit_code(code: u8) -> ExitCode {
     let failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner).take();
     let Some((stream, error)) = failed else {

@@ -1,10 +1,17 @@
 //! Progress: a bar on a terminal, plain lines otherwise, JSON lines for farms.
+//!
+//! What farms read is described in `docs/commands.md`: the last line of a command is its `end`, also where it failed.
 
-use std::io::IsTerminal as _;
+use std::{
+    cell::RefCell,
+    collections::VecDeque,
+    io::IsTerminal as _,
+    time::{Duration, Instant},
+};
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::Value;
+use serde_json::{Map, Value, json};
 
 use super::output;
 
@@ -22,71 +29,304 @@ pub(super) enum Mode {
     None,
 }
 
-impl Mode {
-    /// This mode without a bar, for lines between jobs.
-    pub(super) fn lines(self) -> Self {
+/// What became of a frame, or of a point of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Status {
+    /// It was made now.
+    Done,
+    /// It stood there, or another process made it.
+    Skipped,
+    /// It could not be made.
+    Failed,
+}
+
+impl Status {
+    fn name(self) -> &'static str {
         match self {
-            Self::Auto => Self::Plain,
-            other => other,
+            Self::Done => "done",
+            Self::Skipped => "skipped",
+            Self::Failed => "failed",
         }
     }
 }
 
-/// A job's progress over frames.
+/// Frames that the time left is reckoned from: the last ones, as frames of a shot grow slower with the water in motion.
+const RECENT: usize = 8;
+
+/// Frames of one job: how many there are, and how far it has come.
+struct Job {
+    frames: u64,
+    seen: u64,
+    /// When the last of them ended, or the job began.
+    before: Instant,
+    /// What the last ones took that were made.
+    recent: VecDeque<Duration>,
+}
+
+impl Job {
+    fn new(frames: u64) -> Self {
+        Self {
+            frames,
+            seen: 0,
+            before: Instant::now(),
+            recent: VecDeque::new(),
+        }
+    }
+
+    fn add(&mut self, status: Status, now: Instant) {
+        self.seen += 1;
+        if status == Status::Done {
+            self.recent.push_back(now - self.before);
+            if self.recent.len() > RECENT {
+                self.recent.pop_front();
+            }
+        }
+        self.before = now;
+    }
+
+    /// Seconds that the frames left would take, each as long as the last ones; `None` where none was made yet.
+    fn seconds_left(&self) -> Option<f64> {
+        let left = self.frames.saturating_sub(self.seen);
+        let took: Duration = self.recent.iter().sum();
+        match (left, self.recent.len()) {
+            (0, _) => Some(0.0),
+            (_, 0) => None,
+            (left, many) => {
+                let seconds = took.as_secs_f64() / many as f64 * left as f64;
+                Some((10.0 * seconds).round() / 10.0)
+            }
+        }
+    }
+}
+
+/// What a command has done in all.
+struct State {
+    bar: Option<ProgressBar>,
+    job: Job,
+    is_begun: bool,
+    done: u64,
+    skipped: u64,
+    failed: u64,
+    /// `None` where nothing is known of it.
+    bytes: Option<u64>,
+    /// What the command itself says at its end.
+    end: Map<String, Value>,
+}
+
+/// A command's progress, over the frames of one job or of several in turn.
 pub(super) struct Progress {
     mode: Mode,
-    bar: Option<ProgressBar>,
+    begun: Instant,
+    state: RefCell<State>,
 }
 
 impl Progress {
-    pub(super) fn new(mode: Mode, frames: u64) -> Self {
+    pub(super) fn new(mode: Mode) -> Self {
         let mode = match mode {
             Mode::Auto if !std::io::stderr().is_terminal() => Mode::Plain,
             other => other,
         };
-        let bar = (mode == Mode::Auto).then(|| {
+        Self {
+            mode,
+            begun: Instant::now(),
+            state: RefCell::new(State {
+                bar: None,
+                job: Job::new(0),
+                is_begun: false,
+                done: 0,
+                skipped: 0,
+                failed: 0,
+                bytes: None,
+                end: Map::new(),
+            }),
+        }
+    }
+
+    /// Whether what is told goes to a program.
+    pub(super) fn is_json(&self) -> bool {
+        self.mode == Mode::Json
+    }
+
+    /// A job of so many frames begins.
+    pub(super) fn begin(&self, frames: u64) {
+        self.finish();
+        let mut state = self.state.borrow_mut();
+        state.job = Job::new(frames);
+        state.is_begun = true;
+        state.bar = (self.mode == Mode::Auto).then(|| {
             let style =
                 ProgressStyle::with_template("{bar:40} {pos}/{len} [{elapsed} < {eta}] {msg}")
                     .unwrap_or_else(|_| ProgressStyle::default_bar());
             ProgressBar::new(frames).with_style(style)
         });
-        Self { mode, bar }
+    }
+
+    /// [`Self::begin`], unless a job has begun.
+    pub(super) fn begin_once(&self, frames: u64) {
+        if !self.state.borrow().is_begun {
+            self.begin(frames);
+        }
     }
 
     /// A line that is no frame; `event` is what farms read.
     pub(super) fn say(&self, text: &str, event: Value) {
         match self.mode {
-            Mode::Json => output::print(&format!("{event}\n")),
+            Mode::Json => output::event(&event),
             Mode::None => {}
-            _ => match &self.bar {
+            _ => match &self.state.borrow().bar {
                 Some(bar) => bar.println(text),
-                None => output::say(text),
+                None => return output::say(text),
             },
         }
+        output::log(text);
     }
 
-    /// A frame is done.
-    pub(super) fn frame(&self, text: &str, event: Value) {
-        match &self.bar {
-            Some(bar) => {
+    /// What only farms read.
+    pub(super) fn tell(&self, event: Value) {
+        if self.is_json() {
+            output::event(&event);
+        }
+    }
+
+    /// A frame is done with. Farms also read which one of how many it was, and how long the others may take.
+    pub(super) fn frame(&self, text: &str, status: Status, event: Value) {
+        let event = self.count(status, event);
+        let bar = self.state.borrow().bar.clone();
+        let Some(bar) = bar else {
+            return self.say(text, event);
+        };
+        match status {
+            Status::Failed => self.say(text, event),
+            _ => {
                 bar.set_message(text.to_owned());
-                bar.inc(1);
+                output::log(text);
             }
-            None => self.say(text, event),
+        }
+        bar.inc(1);
+    }
+
+    fn count(&self, status: Status, mut event: Value) -> Value {
+        let mut state = self.state.borrow_mut();
+        let state = &mut *state;
+        state.job.add(status, Instant::now());
+        *match status {
+            Status::Done => &mut state.done,
+            Status::Skipped => &mut state.skipped,
+            Status::Failed => &mut state.failed,
+        } += 1;
+        if let Some(event) = event.as_object_mut() {
+            let counted = [
+                ("status", json!(status.name())),
+                ("number", json!(state.job.seen)),
+                ("count", json!(state.job.frames)),
+                ("seconds_left", json!(state.job.seconds_left())),
+            ];
+            for (key, value) in counted {
+                // A study numbers its points itself.
+                event.entry(key).or_insert(value);
+            }
+        }
+        event
+    }
+
+    /// So many bytes were written.
+    pub(super) fn wrote(&self, bytes: u64) {
+        let mut state = self.state.borrow_mut();
+        state.bytes = Some(state.bytes.unwrap_or(0) + bytes);
+    }
+
+    /// What a command was asked for, to farms: the object that its `--json` prints.
+    pub(super) fn result(&self, mut object: Value) {
+        object["event"] = json!("result");
+        self.tell(object);
+    }
+
+    /// What a command has to say of its end to farms, which [`Self::end`] does.
+    pub(super) fn tell_end(&self, event: Value) {
+        if let Value::Object(event) = event {
+            self.state.borrow_mut().end.extend(event);
         }
     }
 
-    /// [`Self::frame`] with a line that stays.
-    pub(super) fn frame_to_keep(&self, text: &str, event: Value) {
-        self.say(text, event);
-        if let Some(bar) = &self.bar {
-            bar.inc(1);
+    /// [`Self::tell_end`], and the line that the command ends with.
+    pub(super) fn conclude(&self, text: &str, event: Value) {
+        self.tell_end(event);
+        match self.mode {
+            Mode::Json | Mode::None => output::log(text),
+            _ => output::say(text),
         }
     }
 
+    /// Takes the bar away.
     pub(super) fn finish(&self) {
-        if let Some(bar) = &self.bar {
+        if let Some(bar) = self.state.borrow_mut().bar.take() {
             bar.finish_and_clear();
         }
+    }
+
+    /// What went wrong, in whatever mode.
+    pub(super) fn fail(&self, message: &str, code: u8) {
+        self.finish();
+        output::say(&format!("swell: {message}"));
+        self.tell(failed(message, code));
+    }
+
+    /// The last event. Nothing is told behind it.
+    pub(super) fn end(&self, code: u8) {
+        self.finish();
+        let mut state = self.state.borrow_mut();
+        let mut end = std::mem::take(&mut state.end);
+        let totals = json!({
+            "event": "end", "exit_code": code, "frames_done": state.done, "frames_skipped": state.skipped,
+            "frames_failed": state.failed, "bytes": state.bytes, "seconds": self.begun.elapsed().as_secs_f64(),
+        });
+        if let Value::Object(totals) = totals {
+            end.extend(totals);
+        }
+        end.entry("interrupted").or_insert(json!(false));
+        self.tell(Value::Object(end));
+    }
+}
+
+/// The event of a fault that ends a command.
+fn failed(message: &str, code: u8) -> Value {
+    json!({ "event": "error", "message": message, "exit_code": code })
+}
+
+/// Tells farms of a command line that cannot be read, where it asks for JSON.
+pub(super) fn unread(arguments: &[String], message: &str, code: u8) {
+    let asks = |pair: &[String]| pair[0] == "--progress" && pair[1] == "json";
+    if arguments.windows(2).any(asks) || arguments.iter().any(|it| it == "--progress=json") {
+        let progress = Progress::new(Mode::Json);
+        progress.tell(failed(message, code));
+        progress.end(code);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_that_of_the_last_frames() {
+        let begin = Instant::now();
+        let mut job = Job::new(24);
+        job.before = begin;
+        assert_eq!(job.seconds_left(), None);
+        // Frames that stood there tell nothing.
+        job.add(Status::Skipped, begin);
+        job.add(Status::Failed, begin);
+        assert_eq!(job.seconds_left(), None);
+        let mut now = begin;
+        for k in 0..12 {
+            now += Duration::from_secs(if k < 4 { 100 } else { 2 });
+            job.add(Status::Done, now);
+        }
+        // The eight last ones took 2 s each, and ten are left.
+        assert_eq!(job.seconds_left(), Some(20.0));
+        for _ in 0..10 {
+            job.add(Status::Skipped, now);
+        }
+        assert_eq!(job.seconds_left(), Some(0.0));
     }
 }

@@ -1,21 +1,23 @@
 //! `swell render CACHE --look LOOK`
 
-use std::{cell::OnceCell, path::PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
 
 use crate::{
-    domain::frame_range::FrameRange,
+    domain::{chunk::Chunk, frame_range::FrameRange},
     scene::look::Look,
-    stage::render::{Event, Request, render},
+    stage::render::{Event, Request, expected, render},
 };
 
 use super::{
     Failure, GpuArgs, bake, count,
+    dry_run::DryRun,
+    failed::{failed_in_all, frame_failed, refuse_failed},
     interrupt::{self, Interrupt},
     output,
-    progress::{Mode, Progress},
+    progress::{Mode, Progress, Status},
 };
 
 #[derive(Args, Debug)]
@@ -31,6 +33,9 @@ pub(super) struct RenderArgs {
     /// Frames to render, such as 1-240x2; all that are cached where left out.
     #[arg(long, value_name = "RANGE")]
     frames: Option<FrameRange>,
+    /// Share of the frames, such as 1/4 for the first of four: several processes may fill one folder.
+    #[arg(long, value_name = "I/N")]
+    chunk: Option<Chunk>,
     #[command(flatten)]
     gpu: GpuArgs,
     /// Take a panorama or a camera that lies outside of the look's folder.
@@ -39,15 +44,21 @@ pub(super) struct RenderArgs {
     /// Render frames again that stand there, also those of another cache or look.
     #[arg(long)]
     overwrite: bool,
+    /// Where frames of the cache are damaged, render the others; exit code 4 in the end.
+    #[arg(long)]
+    keep_going: bool,
+    /// Say what would be made, how large and where, and make nothing. No device is opened.
+    #[arg(long)]
+    dry_run: bool,
     /// Time each pass and print a table; passes then run one by one.
     #[arg(long)]
     time_passes: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
-    progress: Mode,
+    pub(super) progress: Mode,
 }
 
-pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
+pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure> {
     let look = Look::load_within(&args.look, bake::reach(args.allow_outside))?;
     let directory = match &args.output {
         Some(directory) => directory.clone(),
@@ -62,23 +73,23 @@ pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
         look,
         directory,
         frames: args.frames.clone(),
+        chunk: args.chunk,
         gpu: args.gpu.read()?,
         overwrite: args.overwrite,
+        keep_going: args.keep_going,
         time_passes: args.time_passes,
     };
+    if args.dry_run {
+        return dry_run(&request, progress);
+    }
     let interrupt = Interrupt::install_or_warn();
-    let progress = OnceCell::new();
     let outcome = render(&request, interrupt.flag(), &mut |event| {
-        tell(args.progress, &progress, event)
-    });
-    let progress = progress
-        .into_inner()
-        .unwrap_or_else(|| Progress::new(args.progress, 0));
+        tell(progress, event)
+    })?;
     progress.finish();
-    let outcome = outcome?;
-    progress.say(
+    progress.conclude(
         &format!(
-            "{} {} rendered, {} stood there already, in {}",
+            "{} {} rendered, {} stood there already{}, in {}",
             if outcome.interrupted {
                 "ended by a signal:"
             } else {
@@ -86,22 +97,36 @@ pub(super) fn run(args: &RenderArgs) -> Result<u8, Failure> {
             },
             count(outcome.rendered.into(), "frame"),
             outcome.skipped,
+            failed_in_all(&outcome.failed),
             request.directory.display()
         ),
         json!({
-            "event": "end", "rendered": outcome.rendered, "skipped": outcome.skipped,
+            "rendered": outcome.rendered, "skipped": outcome.skipped, "failed": outcome.failed,
             "interrupted": outcome.interrupted, "directory": output::path(&request.directory),
         }),
     );
-    output::print_pass_times(&outcome.passes);
-    Ok(if outcome.interrupted {
-        interrupt::EXIT_CODE as u8
-    } else {
-        0
-    })
+    output::pass_times(progress, &outcome.passes, &[], outcome.rendered);
+    if outcome.interrupted {
+        return Ok(interrupt::EXIT_CODE as u8);
+    }
+    refuse_failed(&outcome.failed)
 }
 
-pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
+fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
+    let found = expected(request)?;
+    let bytes = found.bytes();
+    let is_made = |frame: &u32| !found.standing.contains(frame);
+    let told = DryRun {
+        frames: found.frames.iter().copied().filter(is_made).collect(),
+        standing: found.standing.len(),
+        bytes,
+        place: output::path(&request.directory),
+    };
+    told.tell(progress, "", json!({}));
+    Ok(0)
+}
+
+pub(super) fn tell(progress: &Progress, event: Event) {
     match event {
         Event::Ready {
             device,
@@ -110,7 +135,7 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             left_out,
             warnings,
         } => {
-            let progress = progress.get_or_init(|| Progress::new(mode, frames as u64));
+            progress.begin(frames as u64);
             let [width, height] = size;
             let others = match left_out {
                 0 => String::new(),
@@ -130,33 +155,32 @@ pub(super) fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
                 );
             }
         }
-        Event::Waiting { frames } => {
-            if let Some(progress) = progress.get() {
-                progress.say(
-                    &format!(
-                        "waiting for {} that other processes render",
-                        count(frames as u64, "frame")
-                    ),
-                    json!({ "event": "waiting", "frames": frames }),
-                );
-            }
-        }
+        Event::Waiting { frames } => progress.say(
+            &format!(
+                "waiting for {} that other processes render",
+                count(frames as u64, "frame")
+            ),
+            json!({ "event": "waiting", "frames": frames }),
+        ),
         Event::Frame {
             frame,
             seconds,
             skipped,
+            bytes,
         } => {
-            if let Some(progress) = progress.get() {
-                let text = if skipped {
-                    "stands there".into()
-                } else {
-                    format!("{seconds:.2} s")
-                };
-                progress.frame(
-                    &format!("frame {frame:4}  {text}"),
-                    json!({ "event": "frame", "frame": frame, "seconds": seconds, "skipped": skipped }),
-                );
-            }
+            let (text, status) = match skipped {
+                true => ("stands there".into(), Status::Skipped),
+                false => (format!("{seconds:.2} s"), Status::Done),
+            };
+            progress.wrote(bytes);
+            progress.frame(
+                &format!("frame {frame:4}  {text}"),
+                status,
+                json!({
+                    "event": "frame", "frame": frame, "seconds": seconds, "skipped": skipped, "bytes": bytes,
+                }),
+            );
         }
+        Event::Failed { frame, error } => frame_failed(progress, frame, &*error),
     }
 }

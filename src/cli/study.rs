@@ -1,6 +1,6 @@
 //! `swell study STUDY`
 
-use std::{cell::OnceCell, path::PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
@@ -14,7 +14,7 @@ use super::{
     Failure, GpuArgs, OUT_OF_TOLERANCE, bake,
     interrupt::{self, Interrupt},
     output,
-    progress::{Mode, Progress},
+    progress::{Mode, Progress, Status},
     render,
 };
 
@@ -32,10 +32,10 @@ pub(super) struct StudyArgs {
     allow_outside: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
-    progress: Mode,
+    pub(super) progress: Mode,
 }
 
-pub(super) fn run(args: &StudyArgs) -> Result<u8, Failure> {
+pub(super) fn run(args: &StudyArgs, progress: &Progress) -> Result<u8, Failure> {
     let name = args.study.file_stem().unwrap_or_default();
     let default = || PathBuf::from("studies").join(name);
     let directory = args.output.clone().unwrap_or_else(default);
@@ -51,52 +51,39 @@ pub(super) fn run(args: &StudyArgs) -> Result<u8, Failure> {
         gpu: args.gpu.read()?,
     };
     let interrupt = Interrupt::install_or_warn();
-    let say = |text: &str, event| Progress::new(args.progress.lines(), 0).say(text, event);
-    let mut progress = OnceCell::new();
-    let outcome = study(&request, interrupt.flag(), &mut |event| {
-        let is_new = match &event {
-            Event::Bake(event) => matches!(**event, crate::stage::bake::Event::Ready { .. }),
-            Event::Render(event) => matches!(event, crate::stage::render::Event::Ready { .. }),
-            _ => false,
-        };
-        if is_new && let Some(before) = progress.take() {
-            Progress::finish(&before);
+    let outcome = study(&request, interrupt.flag(), &mut |event| match event {
+        Event::Solver(name) => progress.say(
+            &format!("solver {name}"),
+            json!({ "event": "solver", "solver": name }),
+        ),
+        Event::Warning(warning) => {
+            let (text, event) = bake::warned(&warning);
+            progress.say(&text, event);
         }
-        match event {
-            Event::Solver(name) => say(
-                &format!("solver {name}"),
-                json!({ "event": "solver", "solver": name }),
-            ),
-            Event::Warning(warning) => {
-                let (text, event) = bake::warned(&warning);
-                say(&text, event);
-            }
-            Event::Bake(event) => bake::tell(args.progress, &progress, *event),
-            Event::Render(event) => render::tell(args.progress, &progress, event),
-            Event::Point(event) => {
-                let bar = progress.get_or_init(|| Progress::new(args.progress, event.count as u64));
-                let (text, json) = point(&event);
-                match event.status {
-                    PointStatus::Failed(_) => bar.frame_to_keep(&text, json),
-                    PointStatus::Stands | PointStatus::Done(..) => bar.frame(&text, json),
-                }
-            }
+        Event::Bake(event) => bake::tell(progress, *event),
+        Event::Render(event) => render::tell(progress, event),
+        Event::Point(event) => {
+            progress.begin_once(event.count as u64);
+            let (text, json) = point(&event);
+            let status = match event.status {
+                PointStatus::Failed(_) => Status::Failed,
+                PointStatus::Stands => Status::Skipped,
+                PointStatus::Done(..) => Status::Done,
+            };
+            progress.frame(&text, status, json);
         }
-    });
-    if let Some(progress) = progress.take() {
-        progress.finish();
-    }
-    let outcome = outcome?;
+    })?;
+    progress.finish();
     let Some(page) = outcome.page else {
-        say(
+        progress.conclude(
             "ended by a signal; the same command goes on",
-            json!({ "event": "end", "interrupted": true }),
+            json!({ "interrupted": true }),
         );
         return Ok(interrupt::EXIT_CODE as u8);
     };
-    say(
+    progress.conclude(
         &format!("{}\npage: {}", outcome.findings.join("\n"), page.display()),
-        json!({ "event": "end", "page": output::path(&page), "findings": outcome.findings, "missed": outcome.missed, "interrupted": false }),
+        json!({ "page": output::path(&page), "findings": outcome.findings, "missed": outcome.missed, "interrupted": false }),
     );
     Ok(match outcome.missed[..] {
         [] => 0,

@@ -1,7 +1,6 @@
 //! `swell view CACHE|IMAGES|STUDY`
 
 use std::{
-    cell::OnceCell,
     path::{Path, PathBuf},
     process::{Command, Stdio},
 };
@@ -19,7 +18,7 @@ use super::{
     Failure, bake, count,
     interrupt::{self, Interrupt},
     output,
-    progress::{Mode, Progress},
+    progress::{Mode, Progress, Status},
     size,
 };
 
@@ -72,7 +71,7 @@ pub(super) struct ViewArgs {
     open: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
-    progress: Mode,
+    pub(super) progress: Mode,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug, Default)]
@@ -103,7 +102,7 @@ fn rate(text: &str) -> Result<f64, String> {
     found.ok_or_else(|| "write a number from 0.1 to 240".to_owned())
 }
 
-pub(super) fn run(args: &ViewArgs) -> Result<u8, Failure> {
+pub(super) fn run(args: &ViewArgs, progress: &Progress) -> Result<u8, Failure> {
     let look = match &args.look {
         Some(look) => Some(Look::load_within(look, bake::reach(args.allow_outside))?),
         None => None,
@@ -134,29 +133,25 @@ pub(super) fn run(args: &ViewArgs) -> Result<u8, Failure> {
         ffmpeg: args.ffmpeg.clone(),
     };
     let interrupt = Interrupt::install_or_warn();
-    let progress = OnceCell::new();
     let outcome = view(&request, interrupt.flag(), &mut |event| {
-        tell(args.progress, &progress, event);
-    });
-    let progress = progress
-        .into_inner()
-        .unwrap_or_else(|| Progress::new(args.progress, 0));
+        tell(progress, event);
+    })?;
     progress.finish();
-    let outcome = outcome?;
     if outcome.interrupted {
-        progress.say(
+        progress.conclude(
             "ended by a signal: nothing was made",
-            json!({ "event": "end", "interrupted": true }),
+            json!({ "interrupted": true }),
         );
         return Ok(interrupt::EXIT_CODE as u8);
     }
     for (what, file, bytes) in &outcome.files {
+        progress.wrote(*bytes);
         progress.say(
             &format!("{what}: {} ({})", file.display(), size(*bytes)),
             json!({ "event": "made", "what": what, "file": output::path(file), "bytes": bytes }),
         );
     }
-    progress.say("done", json!({ "event": "end", "interrupted": false }));
+    progress.conclude("done", json!({ "interrupted": false }));
     if args.open
         && let Some(page) = &outcome.page
     {
@@ -188,30 +183,25 @@ fn open(page: &Path) {
     ));
 }
 
-fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
-    let lines = || Progress::new(mode.lines(), 0);
-    let say = |text: &str, event| match progress.get() {
-        Some(progress) => progress.say(text, event),
-        None => lines().say(text, event),
-    };
+fn tell(progress: &Progress, event: Event) {
     match event {
         Event::Ready { frames, size } => {
-            let progress = progress.get_or_init(|| Progress::new(mode, frames as u64));
+            progress.begin(frames as u64);
             let [width, height] = size;
             progress.say(
                 &format!("{} of {width} × {height}", count(frames as u64, "frame")),
                 json!({ "event": "ready", "frames": frames, "width": width, "height": height }),
             );
         }
-        Event::Note(text) => say(&text, json!({ "event": "note", "text": text })),
-        Event::Warning(text) => say(
+        Event::Note(text) => progress.say(&text, json!({ "event": "note", "text": text })),
+        Event::Warning(text) => progress.say(
             &format!("warning: {text}"),
             json!({ "event": "warning", "what": "view", "text": text }),
         ),
-        Event::Frame(label) => {
-            if let Some(progress) = progress.get() {
-                progress.frame(&label, json!({ "event": "frame", "frame": label }));
-            }
-        }
+        Event::Frame(label) => progress.frame(
+            &label,
+            Status::Done,
+            json!({ "event": "frame", "frame": label }),
+        ),
     }
 }

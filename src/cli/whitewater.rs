@@ -1,6 +1,6 @@
 //! `swell whitewater CACHE`
 
-use std::{cell::OnceCell, path::PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
@@ -8,14 +8,15 @@ use serde_json::json;
 use crate::{
     domain::whitewater::Kind,
     scene::whitewater::WhitewaterSettings,
-    stage::whitewater::{Event, Request, whitewater},
+    stage::whitewater::{Event, Request, expected, whitewater},
 };
 
 use super::{
     DeviceArgs, Failure, count,
+    dry_run::DryRun,
     interrupt::{self, Interrupt},
     output,
-    progress::{Mode, Progress},
+    progress::{Mode, Progress, Status},
     size,
 };
 
@@ -38,12 +39,15 @@ pub(super) struct WhitewaterArgs {
     overwrite: bool,
     #[command(flatten)]
     device: DeviceArgs,
+    /// Say what would be made, how large and where, and make nothing. No device is opened.
+    #[arg(long)]
+    dry_run: bool,
     /// Time each pass and print a table; passes then run one by one.
     #[arg(long)]
     time_passes: bool,
     /// How to tell progress.
     #[arg(long, value_enum, default_value_t)]
-    progress: Mode,
+    pub(super) progress: Mode,
 }
 
 impl WhitewaterArgs {
@@ -76,7 +80,7 @@ impl WhitewaterArgs {
     }
 }
 
-pub(super) fn run(args: &WhitewaterArgs) -> Result<u8, Failure> {
+pub(super) fn run(args: &WhitewaterArgs, progress: &Progress) -> Result<u8, Failure> {
     let settings = match &args.settings {
         Some(file) => WhitewaterSettings::load(file)?,
         None => WhitewaterSettings::parse("", &PathBuf::from("no settings file"))?,
@@ -90,21 +94,19 @@ pub(super) fn run(args: &WhitewaterArgs) -> Result<u8, Failure> {
         device: args.device.read()?,
         time_passes: args.time_passes,
     };
+    if args.dry_run {
+        return dry_run(&request, progress);
+    }
     let interrupt = Interrupt::install_or_warn();
-    let progress = OnceCell::new();
     let outcome = whitewater(&request, interrupt.flag(), &mut |event| {
-        tell(args.progress, &progress, event)
-    });
-    let progress = progress
-        .into_inner()
-        .unwrap_or_else(|| Progress::new(args.progress, 0));
+        tell(progress, event)
+    })?;
     progress.finish();
-    let outcome = outcome?;
     let end = match outcome.interrupted {
         true => "ended by a signal after",
         false => "done:",
     };
-    progress.say(
+    progress.conclude(
         &format!(
             "{end} frame {} in {} ({}, {} written now)",
             outcome.last_frame,
@@ -113,18 +115,30 @@ pub(super) fn run(args: &WhitewaterArgs) -> Result<u8, Failure> {
             size(outcome.bytes),
         ),
         json!({
-            "event": "end", "last_frame": outcome.last_frame, "frames": outcome.frames, "bytes": outcome.bytes,
+            "last_frame": outcome.last_frame, "frames": outcome.frames,
             "interrupted": outcome.interrupted, "directory": output::path(&outcome.directory),
         }),
     );
-    output::print_pass_times(&outcome.passes);
+    output::pass_times(progress, &outcome.passes, &[], outcome.frames);
     Ok(match outcome.interrupted {
         true => interrupt::EXIT_CODE as u8,
         false => 0,
     })
 }
 
-fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
+fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
+    let found = expected(request)?;
+    let told = DryRun {
+        frames: (found.first..=found.last).collect(),
+        standing: found.standing as usize,
+        bytes: found.bytes,
+        place: output::path(&found.directory),
+    };
+    told.tell(progress, "", json!({}));
+    Ok(0)
+}
+
+fn tell(progress: &Progress, event: Event) {
     match event {
         Event::Ready {
             device,
@@ -136,7 +150,7 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             last,
         } => {
             let frames = u64::from((last + 1).saturating_sub(first));
-            let progress = progress.get_or_init(|| Progress::new(mode, frames));
+            progress.begin(frames);
             let [air, crest, energy] = [
                 thresholds.trapped_air,
                 thresholds.wave_crest,
@@ -157,6 +171,7 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
                 json!({
                     "event": "ready", "device": device.to_string(), "water": water, "directory": output::path(&directory),
                     "thresholds": thresholds, "calibrated_on": calibrated_on, "first": first, "last": last,
+                    "frames": frames,
                 }),
             );
         }
@@ -166,20 +181,20 @@ fn tell(mode: Mode, progress: &OnceCell<Progress>, event: Event) {
             born,
             seconds,
         } => {
-            if let Some(progress) = progress.get() {
-                let kinds = Kind::ALL.into_iter().zip(census);
-                let words: Vec<String> = kinds
-                    .map(|(kind, many)| format!("{many} {}", kind.name()))
-                    .collect();
-                let [spray, foam, bubbles] = census;
-                progress.frame(
-                    &format!("frame {frame:4}  {}, {born} new, {seconds:.2} s", words.join(", ")),
-                    json!({
-                        "event": "frame", "frame": frame, "spray": spray, "foam": foam, "bubbles": bubbles, "born": born,
-                        "seconds": seconds,
-                    }),
-                );
-            }
+            let kinds = Kind::ALL.into_iter().zip(census);
+            let words: Vec<String> = kinds
+                .map(|(kind, many)| format!("{many} {}", kind.name()))
+                .collect();
+            let [spray, foam, bubbles] = census;
+            progress.frame(
+                &format!("frame {frame:4}  {}, {born} new, {seconds:.2} s", words.join(", ")),
+                Status::Done,
+                json!({
+                    "event": "frame", "frame": frame, "spray": spray, "foam": foam, "bubbles": bubbles, "born": born,
+                    "seconds": seconds,
+                }),
+            );
         }
+        Event::Written { bytes } => progress.wrote(bytes),
     }
 }

@@ -9,6 +9,7 @@ pub mod bounds;
 pub mod bricks;
 pub mod budget;
 pub mod bvh;
+pub mod chunk;
 pub mod cloud;
 pub mod eye;
 pub mod flip;

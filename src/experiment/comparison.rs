@@ -92,8 +92,10 @@ fn bake_and_render(
         look: comparison.look.clone(),
         directory: picture_directory(request, scene),
         frames: Some(comparison.pictures.clone()),
+        chunk: None,
         gpu: request.gpu.clone(),
         overwrite: false,
+        keep_going: false,
         time_passes: false,
     };
     let mut tell = |event| (bench.tell)(Event::Render(event));

@@ -1,5 +1,7 @@
 //! `bake`: a scene to a particle cache.
 
+mod expected;
+
 use std::{fs, path::PathBuf, sync::atomic::AtomicBool, time::Instant};
 
 use serde_json::{Value, json};
@@ -26,6 +28,8 @@ use super::{
     replay::{self, Failure, ReplayError},
     time::Share,
 };
+
+pub use self::expected::{Expected, expected, shot_bytes};
 
 /// What to bake, and where to.
 #[derive(Clone, Debug)]
@@ -82,6 +86,11 @@ pub enum Event {
         report: StepReport,
         /// Wall clock for it.
         seconds: f64,
+    },
+    /// The frames computed now are on the disk; also told where the next one failed.
+    Written {
+        /// Bytes of them.
+        bytes: u64,
     },
 }
 
@@ -285,6 +294,9 @@ pub fn bake(
     };
     // What was computed before a failure is kept.
     let summary = writer.finish()?;
+    tell(Event::Written {
+        bytes: summary.bytes,
+    });
     let (passes, shares) = match request.time_passes {
         true => (drive.timings(), drive.shares()),
         false => Default::default(),

@@ -6,6 +6,7 @@
 
 mod asked;
 mod error;
+mod expected;
 mod folder;
 mod pattern;
 mod shot;
@@ -14,7 +15,10 @@ mod usdc;
 use std::{
     cell::OnceCell,
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Instant,
 };
 
@@ -23,6 +27,7 @@ use glam::DVec3;
 use crate::{
     cache::{self, CacheError, CacheReader, GridRecord, frame::Stamp, vdb},
     domain::{
+        chunk::{Chunk, share},
         frame_range::FrameRange,
         particles::Particles,
         sparse_grid::Precision,
@@ -42,8 +47,9 @@ use self::usdc::Python;
 
 pub use self::{
     error::ExportError,
+    expected::{Expected, expected},
     folder::FolderError,
-    pattern::{Chunk, ChunkError, Pattern, PatternError},
+    pattern::{Pattern, PatternError},
     usdc::UsdcError,
 };
 
@@ -98,6 +104,8 @@ pub struct Request {
     pub python: String,
     /// Whether files that stand there are made again, whosever they are.
     pub overwrite: bool,
+    /// Whether the other frames are exported where one of the cache is damaged.
+    pub keep_going: bool,
 }
 
 /// What an export has to tell while it runs.
@@ -125,6 +133,13 @@ pub enum Event {
         /// Volume within its mesh over the particles', where one was made.
         volume: Option<f64>,
     },
+    /// A frame could not be exported, and the others are.
+    Failed {
+        /// Its number.
+        frame: u32,
+        /// Why.
+        error: Arc<ExportError>,
+    },
 }
 
 /// How an export ended.
@@ -138,6 +153,8 @@ pub struct Outcome {
     pub standing: usize,
     /// Files that other processes were making.
     pub elsewhere: usize,
+    /// Frames that could not be exported.
+    pub failed: Vec<u32>,
     /// Whether a signal ended it.
     pub interrupted: bool,
 }
@@ -153,24 +170,9 @@ pub fn export(
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, ExportError> {
     let job = Job::new(request)?;
-    let share: Vec<u32> = match request.chunk {
-        Some(chunk) => chunk.of(&job.frames).to_vec(),
-        None => job.frames.clone(),
-    };
+    let share = share(&job.frames, request.chunk).to_vec();
     let shots = job.shots()?;
-    let files = |frame: u32| {
-        let targets = request.targets.iter();
-        let of = |target| Ok((target, job.wanted(target, frame)?));
-        targets.map(of).collect::<Result<Vec<_>, CacheError>>()
-    };
-    for &frame in &share {
-        for (_, wanted) in files(frame)? {
-            job.check(&wanted)?;
-        }
-    }
-    for (wanted, _) in &shots {
-        job.check(wanted)?;
-    }
+    job.check_all(&share, &shots)?;
     tell(Event::Ready {
         frames: share.len(),
         files: request.targets.len(),
@@ -179,7 +181,7 @@ pub fn export(
     for (wanted, bytes) in shots {
         job.make(&wanted, &mut outcome, || Ok(bytes))?;
     }
-    for frame in share {
+    'frames: for frame in share {
         if stop.load(Ordering::Relaxed) {
             outcome.interrupted = true;
             break;
@@ -187,8 +189,16 @@ pub fn export(
         let begun = Instant::now();
         let before = (outcome.made, outcome.bytes);
         let content = Content::new(&job, frame);
-        for (target, wanted) in files(frame)? {
-            job.make(&wanted, &mut outcome, || job.bytes(target, &content))?;
+        for (target, wanted) in job.files(frame)? {
+            match job.make(&wanted, &mut outcome, || job.bytes(target, &content)) {
+                Err(error) if request.keep_going && error.is_of_frame() => {
+                    outcome.failed.push(frame);
+                    let error = Arc::new(error);
+                    tell(Event::Failed { frame, error });
+                    continue 'frames;
+                }
+                made => made?,
+            }
         }
         let volume = content.mesh.get().map(|mesh| mesh.volume);
         if let Some(warning) = volume.and_then(|volume| warning(frame, volume)) {
@@ -289,12 +299,7 @@ impl<'a> Job<'a> {
             None => None,
         };
         let source = stream.as_ref().unwrap_or(&cache);
-        let frames: Vec<u32> = match &request.frames {
-            Some(frames) => frames.iter().collect(),
-            None => (source.first_frame() + 1..=source.last_frame())
-                .filter(|&frame| source.has_particles(frame))
-                .collect(),
-        };
+        let frames = super::frames_of(source, request.frames.as_ref());
         for &frame in &frames {
             source.kept(frame)?;
             if stream.is_some() && !is_of(source.entry(frame)?, &cache) {
@@ -372,6 +377,24 @@ impl<'a> Job<'a> {
             source: self.source().frame_hash(frame)?.to_owned(),
             follows: false,
         })
+    }
+
+    /// The files of a frame, each with what it is.
+    fn files(&self, frame: u32) -> Result<Vec<(&'a Target, Wanted)>, CacheError> {
+        let targets = self.request.targets.iter();
+        let of = |target| Ok((target, self.wanted(target, frame)?));
+        targets.map(of).collect()
+    }
+
+    /// Refuses what stands there and is of something else.
+    fn check_all(&self, share: &[u32], shots: &[(Wanted, Vec<u8>)]) -> Result<(), ExportError> {
+        for &frame in share {
+            for (_, wanted) in self.files(frame)? {
+                self.check(&wanted)?;
+            }
+        }
+        let mut shots = shots.iter();
+        shots.try_for_each(|(wanted, _)| self.check(wanted))
     }
 
     fn check(&self, wanted: &Wanted) -> Result<(), ExportError> {

@@ -6,13 +6,13 @@ use std::{
 };
 
 use crate::{
-    cache::{CacheError, CacheReader},
+    cache::{CacheError, CacheReader, stream::Stream},
     domain::signed_distance::SignedDistanceError,
     gpu::{
         adapter::{Context, GpuError, enumerate},
         program::check_sizes,
     },
-    scene::Scene,
+    scene::{Scene, SceneError},
     solve::plan::{DeviceLimits, LIST_BUDGET, Plan, device_limits},
 };
 
@@ -168,6 +168,110 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
 pub fn cache(directory: &Path) -> Result<(Manifest, Vec<Entry>), CacheError> {
     let reader = CacheReader::open(directory)?;
     Ok((reader.manifest().clone(), reader.entries().to_vec()))
+}
+
+/// What a cache takes.
+#[derive(Debug)]
+pub struct CacheSizes {
+    /// Of all its files.
+    pub bytes: u64,
+    /// Each kind of file that it keeps of frames: name, bytes.
+    pub streams: Vec<(&'static str, u64)>,
+    /// Its streams of whitewater: name, last frame, bytes, which are among the cache's.
+    pub whitewater: Vec<(String, u32, u64)>,
+    /// What its solver takes on a device with common limits, as planned for its start; `None` of a stream of whitewater.
+    pub device_bytes: Option<u64>,
+    /// Wall clock of its frames as they were baked, where that is known, seconds.
+    pub seconds: Vec<f64>,
+}
+
+/// Why a cache's sizes are not known.
+#[derive(Debug, thiserror::Error)]
+pub enum SizesError {
+    /// The cache.
+    #[error(transparent)]
+    Cache(#[from] CacheError),
+    /// The scene in it.
+    #[error("the cache's scene: {0}")]
+    Scene(#[from] SceneError),
+    /// Its solids.
+    #[error(transparent)]
+    Solid(#[from] SignedDistanceError),
+    /// A folder that cannot be read.
+    #[error("cannot read {}", folder.display())]
+    Read {
+        /// Which.
+        folder: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+impl From<&SizesError> for Blame {
+    fn from(_: &SizesError) -> Self {
+        Self::Files
+    }
+}
+
+/// What a cache takes on the disk and on a device.
+///
+/// # Errors
+/// [`SizesError`].
+pub fn sizes(directory: &Path) -> Result<CacheSizes, SizesError> {
+    let reader = CacheReader::open(directory)?;
+    let device_bytes = match reader.manifest().is_whitewater() {
+        true => None,
+        false => {
+            let scene = super::baked_scene(&reader, directory)?;
+            let start = Start::of_cache::<SizesError>(&scene, &reader)?;
+            Some(start.shown_plan(&scene, COMMON_LIMITS).bytes().0)
+        }
+    };
+    let mut streams = Vec::new();
+    for stream in Stream::all(reader.manifest()) {
+        streams.push((stream.name, folder_bytes(&directory.join(stream.folder))?));
+    }
+    let mut whitewater = Vec::new();
+    for folder in super::whitewater::streams(directory) {
+        let stream = CacheReader::open(&folder)?;
+        let name = folder.file_name().unwrap_or_default();
+        let bytes = folder_bytes(&folder)?;
+        whitewater.push((
+            name.to_string_lossy().into_owned(),
+            stream.last_frame(),
+            bytes,
+        ));
+    }
+    Ok(CacheSizes {
+        bytes: folder_bytes(directory)?,
+        streams,
+        whitewater,
+        device_bytes,
+        seconds: reader.seconds()?.into_values().collect(),
+    })
+}
+
+/// Bytes of all files below a folder; 0 where there is none.
+fn folder_bytes(folder: &Path) -> Result<u64, SizesError> {
+    let fault = |source| SizesError::Read {
+        folder: folder.to_owned(),
+        source,
+    };
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
+        other => other.map_err(fault)?,
+    };
+    let mut bytes = 0;
+    for entry in entries {
+        let entry = entry.map_err(fault)?;
+        // Links are not followed.
+        let meta = entry.metadata().map_err(fault)?;
+        bytes += match meta.is_dir() {
+            true => folder_bytes(&entry.path())?,
+            false => meta.len(),
+        };
+    }
+    Ok(bytes)
 }
 
 /// Why a cache's probes could not be drawn.

@@ -24,7 +24,7 @@ use std::path::Path;
 
 use crate::{
     cache::{CacheError, CacheReader},
-    domain::signed_distance::SignedDistanceError,
+    domain::{frame_range::FrameRange, signed_distance::SignedDistanceError},
     gpu::{adapter::GpuError, shader::ShadersError},
     reference::ReferenceError,
     scene::{Scene, SceneError, look::LookError, study::StudyFileError},
@@ -35,6 +35,16 @@ use crate::{
 fn baked_scene(cache: &CacheReader, directory: &Path) -> Result<Scene, SceneError> {
     let file = directory.join("scene.toml");
     Scene::recorded(cache.scene_toml(), &file, directory)
+}
+
+/// The frames that are asked for of a cache; where none are, all behind its first whose particles it has.
+fn frames_of(cache: &CacheReader, asked: Option<&FrameRange>) -> Vec<u32> {
+    match asked {
+        Some(frames) => frames.iter().collect(),
+        None => (cache.first_frame() + 1..=cache.last_frame())
+            .filter(|&frame| cache.has_particles(frame))
+            .collect(),
+    }
 }
 
 /// Where the fault of an error lies; what a caller does about it depends on this alone.

@@ -2,8 +2,10 @@
 //!
 //! Several processes may render one look of one cache into one folder: each frame is rendered by one of them.
 
+mod expected;
 mod folder;
 pub mod gallery;
+mod pictures;
 mod plan;
 mod set;
 pub mod surfaces;
@@ -11,7 +13,7 @@ mod whitewater;
 
 use std::{
     collections::BTreeMap,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -20,16 +22,16 @@ use std::{
 };
 
 use crate::{
-    cache::{self, CacheError, CacheReader, Manifest},
+    cache::{self, CacheError, CacheReader},
     domain::{
-        frame_range::FrameRange, mesh_file::MeshError, particles::Particles,
+        chunk::{Chunk, share},
+        frame_range::FrameRange,
+        mesh_file::MeshError,
+        particles::Particles,
         signed_distance::SignedDistanceError,
     },
     gpu::adapter::{Context, GpuError, Needs},
-    render::{
-        Attributes, Image, Moment, REACH, RenderError, Renderer, Water, frames_around,
-        image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
-    },
+    render::{Image, Moment, REACH, RenderError, Renderer, Water, frames_around},
     scene::{
         Scene, SceneError,
         look::{FormatSpec, Look, LookError},
@@ -37,6 +39,9 @@ use crate::{
 };
 
 use self::folder::{Folder, Owner, Wanted};
+use self::pictures::{
+    attributes, baked_note, is_current, name, others, pictures, whole_attributes, write,
+};
 use self::set::{render_scene, solid_names};
 use self::whitewater::Whitewater;
 use super::{
@@ -45,7 +50,9 @@ use super::{
 };
 
 pub use self::{
+    expected::{Expected, expected},
     folder::FolderError,
+    pictures::picture_name,
     plan::{LookPlan, Subject, plan},
     whitewater::StreamError,
 };
@@ -64,10 +71,14 @@ pub struct Request {
     pub directory: PathBuf,
     /// Frames wanted; all whose particles are cached where `None`.
     pub frames: Option<FrameRange>,
+    /// This process's share of them; all where `None`.
+    pub chunk: Option<Chunk>,
     /// What to render on.
     pub gpu: Gpu,
     /// Whether frames that stand there already are made again, also those of another look or cache.
     pub overwrite: bool,
+    /// Whether the other frames are rendered where one of the cache is damaged.
+    pub keep_going: bool,
     /// Whether passes are timed, which runs them one by one.
     pub time_passes: bool,
 }
@@ -96,6 +107,15 @@ pub enum Event {
         seconds: f64,
         /// Whether it stood there, or another process rendered it meanwhile.
         skipped: bool,
+        /// Of its pictures written now.
+        bytes: u64,
+    },
+    /// A frame could not be rendered, and the others are.
+    Failed {
+        /// Its number.
+        frame: u32,
+        /// Why.
+        error: Arc<RenderJobError>,
     },
     /// All other frames are done, and these are being rendered by other processes.
     Waiting {
@@ -111,6 +131,8 @@ pub struct Outcome {
     pub rendered: u32,
     /// Frames that stood there, or that another process rendered meanwhile.
     pub skipped: u32,
+    /// Frames that could not be rendered.
+    pub failed: Vec<u32>,
     /// Whether a signal ended it.
     pub interrupted: bool,
     /// Pass, seconds, runs, by name, of the frames rendered now; nothing unless that was asked for.
@@ -163,6 +185,18 @@ pub enum RenderJobError {
     },
 }
 
+impl RenderJobError {
+    /// Whether it is a fault of the frame that was read, so that others may do well.
+    fn is_of_frame(&self) -> bool {
+        matches!(
+            self,
+            Self::Cache(_)
+                | Self::Whitewater(StreamError::Cache(_))
+                | Self::Render(RenderError::NotFinite { .. })
+        )
+    }
+}
+
 impl From<&RenderJobError> for Blame {
     fn from(error: &RenderJobError) -> Self {
         match error {
@@ -202,39 +236,12 @@ pub fn render(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, RenderJobError> {
-    let cache = CacheReader::open(&request.cache)?;
-    if let Some(cache) = cache::around(&request.directory) {
-        return Err(RenderJobError::IntoCache {
-            directory: request.directory.clone(),
-            cache,
-        });
-    }
-    let frames: Vec<u32> = match &request.frames {
-        Some(frames) => frames.iter().collect(),
-        None => (cache.first_frame() + 1..=cache.last_frame())
-            .filter(|&frame| cache.has_particles(frame))
-            .collect(),
-    };
-    for &frame in &frames {
-        cache.kept(frame)?;
-    }
-    let baked = cache.last_frame() - cache.first_frame();
-    let left_out = match &request.frames {
-        Some(_) => 0,
-        None => baked as usize - frames.len(),
-    };
-    if cache.manifest().is_whitewater() {
-        return Err(RenderJobError::IsWhitewater(request.cache.clone()));
-    }
-    let whitewater = match &request.look.spec().whitewater {
-        Some(look) => Some(Whitewater::open(
-            &request.cache,
-            &look.stream,
-            &cache,
-            &frames,
-        )?),
-        None => None,
-    };
+    let Asked {
+        cache,
+        whitewater,
+        frames,
+        left_out,
+    } = Asked::open(request)?;
     let scene = super::baked_scene(&cache, &request.cache)?;
     let context = request.gpu.open(Needs::default())?;
     let folder = enter(request, &cache, &frames)?;
@@ -267,6 +274,55 @@ pub fn render(
     Ok(outcome)
 }
 
+/// What is asked for, found to be there.
+struct Asked {
+    cache: CacheReader,
+    whitewater: Option<Whitewater>,
+    /// This process's share.
+    frames: Vec<u32>,
+    left_out: usize,
+}
+
+impl Asked {
+    fn open(request: &Request) -> Result<Self, RenderJobError> {
+        let cache = CacheReader::open(&request.cache)?;
+        if let Some(cache) = cache::around(&request.directory) {
+            return Err(RenderJobError::IntoCache {
+                directory: request.directory.clone(),
+                cache,
+            });
+        }
+        let all = super::frames_of(&cache, request.frames.as_ref());
+        for &frame in &all {
+            cache.kept(frame)?;
+        }
+        let baked = cache.last_frame() - cache.first_frame();
+        let left_out = match &request.frames {
+            Some(_) => 0,
+            None => baked as usize - all.len(),
+        };
+        let frames = share(&all, request.chunk).to_vec();
+        if cache.manifest().is_whitewater() {
+            return Err(RenderJobError::IsWhitewater(request.cache.clone()));
+        }
+        let whitewater = match &request.look.spec().whitewater {
+            Some(look) => Some(Whitewater::open(
+                &request.cache,
+                &look.stream,
+                &cache,
+                &frames,
+            )?),
+            None => None,
+        };
+        Ok(Self {
+            cache,
+            whitewater,
+            frames,
+            left_out,
+        })
+    }
+}
+
 /// A renderer's fault; that of a panorama, of a material or of the method at its place in the look.
 fn told(error: RenderError, look: &Look) -> RenderJobError {
     let fault = match &error {
@@ -280,12 +336,24 @@ fn told(error: RenderError, look: &Look) -> RenderJobError {
 
 /// Takes this process's place in the output folder.
 fn enter(request: &Request, cache: &CacheReader, frames: &[u32]) -> Result<Folder, RenderJobError> {
+    let of_frame = |frame| cache.frame_hash(frame).ok().map(str::to_owned);
+    let wanted = wanted(request, cache, frames, &of_frame)?;
+    Ok(Folder::enter(&request.directory, &wanted)?)
+}
+
+/// What is to be done in the output folder; `of_frame` gives a frame's hash.
+fn wanted<'a>(
+    request: &Request,
+    cache: &CacheReader,
+    frames: &[u32],
+    of_frame: &'a dyn Fn(u32) -> Option<String>,
+) -> Result<Wanted<'a>, RenderJobError> {
     let first = attributes(cache, request, cache.first_frame())?;
     let mut names = Vec::new();
     for &frame in frames {
         names.extend(pictures(cache, &request.look, frame));
     }
-    let wanted = Wanted {
+    Ok(Wanted {
         owner: Owner {
             cache: cache.entry(cache.first_frame())?.chain.clone(),
             software: first.software,
@@ -295,14 +363,14 @@ fn enter(request: &Request, cache: &CacheReader, frames: &[u32]) -> Result<Folde
         },
         names: names.into_iter().map(|(name, _)| name).collect(),
         overwrite: request.overwrite,
-        frame_hash: &|frame| cache.frame_hash(frame).ok().map(str::to_owned),
-    };
-    Ok(Folder::enter(&request.directory, &wanted)?)
+        frame_hash: of_frame,
+    })
 }
 
 /// What became of a frame.
 enum Done {
-    Rendered,
+    /// With so many bytes of pictures.
+    Rendered(u64),
     Stands,
     /// Another process is at it.
     Elsewhere,
@@ -342,13 +410,20 @@ impl Job<'_> {
                     return Ok(outcome);
                 }
                 let begin = Instant::now();
-                let (seconds, skipped) = match self.frame(frame)? {
-                    Done::Rendered => (begin.elapsed().as_secs_f64(), false),
-                    Done::Stands => (0.0, true),
-                    Done::Elsewhere => {
+                let (seconds, skipped, bytes) = match self.frame(frame) {
+                    Ok(Done::Rendered(bytes)) => (begin.elapsed().as_secs_f64(), false, bytes),
+                    Ok(Done::Stands) => (0.0, true, 0),
+                    Ok(Done::Elsewhere) => {
                         elsewhere.push(frame);
                         continue;
                     }
+                    Err(error) if self.request.keep_going && error.is_of_frame() => {
+                        outcome.failed.push(frame);
+                        let error = Arc::new(error);
+                        tell(Event::Failed { frame, error });
+                        continue;
+                    }
+                    Err(error) => return Err(error),
                 };
                 outcome.rendered += u32::from(!skipped);
                 outcome.skipped += u32::from(skipped);
@@ -356,6 +431,7 @@ impl Job<'_> {
                     frame,
                     seconds,
                     skipped,
+                    bytes,
                 });
             }
             if elsewhere.len() == frames.len() {
@@ -374,11 +450,7 @@ impl Job<'_> {
 
     fn frame(&mut self, frame: u32) -> Result<Done, RenderJobError> {
         let request = self.request;
-        let mut attributes = attributes(&self.cache, request, frame)?;
-        attributes.cache_hash += &self.around(frame)?;
-        if let Some(stream) = &self.whitewater {
-            attributes.cache_hash += &format!(" {}", stream.frame_hash(frame)?);
-        }
+        let attributes = whole_attributes(&self.cache, request, self.whitewater.as_ref(), frame)?;
         let pictures = pictures(&self.cache, &request.look, frame);
         let stands = || {
             let is_there = |(name, format): &(String, FormatSpec)| {
@@ -398,12 +470,13 @@ impl Job<'_> {
             return Ok(Done::Stands);
         }
         let picture = self.draw(frame)?;
+        let mut bytes = 0;
         for (name, format) in &pictures {
             let draft = self.folder.draft(name);
             write(&draft, *format, &picture, &attributes, &request.look)?;
-            self.folder.publish(name)?;
+            bytes += self.folder.publish(name)?;
         }
-        Ok(Done::Rendered)
+        Ok(Done::Rendered(bytes))
     }
 
     /// A frame's particles, read once in a row of frames.
@@ -414,23 +487,6 @@ impl Job<'_> {
         let water = Arc::new(Water::new(self.cache.read(frame)?));
         self.near.insert(frame, water.clone());
         Ok(water)
-    }
-
-    /// What a picture's header says of the frames around its own that it is drawn from: a hash of theirs, so that it is drawn again when
-    /// the cache has come to have more of them. Nothing where the look takes none.
-    fn around(&self, frame: u32) -> Result<String, CacheError> {
-        let reach = frames_around(&self.request.look);
-        if reach == 0 {
-            return Ok(String::new());
-        }
-        let mut hasher = blake3::Hasher::new();
-        for (side, other) in others(frame) {
-            if other.abs_diff(frame) <= reach && self.cache.has_particles(other) {
-                let hash = self.cache.frame_hash(other)?;
-                hasher.update(format!("{side} {hash}\n").as_bytes());
-            }
-        }
-        Ok(format!(" around {}", hasher.finalize().to_hex()))
     }
 
     fn draw(&mut self, frame: u32) -> Result<Image, RenderJobError> {
@@ -479,94 +535,5 @@ impl Job<'_> {
         let stands = self.scene.moving_solids.is_empty() && !draws_plates;
         self.kept = stands.then_some(renderer);
         Ok(picture)
-    }
-}
-
-/// Frames about a frame, in the order of [`Moment::around`]: with their places there.
-fn others(frame: u32) -> impl Iterator<Item = (usize, u32)> {
-    let reach = i64::from(REACH);
-    let offsets = (-reach..=reach).filter(|&offset| offset != 0);
-    let frames = offsets.map(move |offset| u32::try_from(i64::from(frame) + offset).ok());
-    let placed = frames.enumerate();
-    placed.filter_map(|(side, frame)| Some((side, frame?)))
-}
-
-fn attributes(
-    cache: &CacheReader,
-    request: &Request,
-    frame: u32,
-) -> Result<Attributes, CacheError> {
-    let manifest = cache.manifest();
-    Ok(Attributes {
-        frame,
-        shot: manifest.shot.clone(),
-        software: format!(
-            "{} {}{}{}",
-            env!("CARGO_PKG_NAME"),
-            env!("CARGO_PKG_VERSION"),
-            shaders_note(request.gpu.shaders.edited()),
-            baked_note(manifest)
-        ),
-        scene_hash: manifest.scene_hash.clone(),
-        cache_hash: cache.frame_hash(frame)?.to_owned(),
-        look_hash: request.look.hash(),
-    })
-}
-
-/// What is said of a cache behind a program: nothing where the program's own shaders baked it.
-fn baked_note(manifest: &Manifest) -> String {
-    let note = shaders_note(manifest.edited_shaders());
-    match note.is_empty() {
-        true => note,
-        false => format!(", of a cache baked{note}"),
-    }
-}
-
-/// `SHOT.0001`, with as many digits as the last cached frame needs, at least four.
-fn name(shot: &str, frame: u32, last_frame: u32) -> String {
-    let digits = last_frame.to_string().len().max(4);
-    format!("{shot}.{frame:0digits$}")
-}
-
-fn ending(format: FormatSpec) -> &'static str {
-    match format {
-        FormatSpec::Png => "png",
-        FormatSpec::Exr => "exr",
-    }
-}
-
-/// Names of a frame's pictures, and in which format each.
-fn pictures(cache: &CacheReader, look: &Look, frame: u32) -> Vec<(String, FormatSpec)> {
-    let name = name(&cache.manifest().shot, frame, cache.last_frame());
-    let formats = look.spec().output.formats.iter();
-    formats
-        .map(|&format| (format!("{name}.{}", ending(format)), format))
-        .collect()
-}
-
-/// Name of the PNG of a frame of a cache.
-pub fn picture_name(cache: &CacheReader, frame: u32) -> String {
-    let name = name(&cache.manifest().shot, frame, cache.last_frame());
-    format!("{name}.{}", ending(FormatSpec::Png))
-}
-
-fn is_current(file: &Path, format: FormatSpec, attributes: &Attributes) -> bool {
-    let found = match format {
-        FormatSpec::Png => read_png_attributes(file),
-        FormatSpec::Exr => read_exr_attributes(file),
-    };
-    found.is_ok_and(|found| found == *attributes)
-}
-
-fn write(
-    file: &Path,
-    format: FormatSpec,
-    image: &Image,
-    attributes: &Attributes,
-    look: &Look,
-) -> Result<(), RenderError> {
-    match format {
-        FormatSpec::Png => write_png_with_attributes(file, image, &look.spec().view, attributes),
-        FormatSpec::Exr => write_exr(file, image, attributes),
     }
 }

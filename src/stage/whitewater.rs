@@ -5,6 +5,7 @@
 
 mod checked;
 mod engine;
+mod expected;
 mod water;
 
 use std::{
@@ -39,7 +40,10 @@ use super::{
 
 use self::{engine::Engine, water::Water};
 
-pub use self::checked::Stream;
+pub use self::{
+    checked::Stream,
+    expected::{Expected, expected},
+};
 
 /// Folder of the streams in a cache.
 const FOLDER: &str = "whitewater";
@@ -97,6 +101,11 @@ pub enum Event {
         born: usize,
         /// Wall clock for it.
         seconds: f64,
+    },
+    /// The frames computed now are on the disk; also told where the next one failed.
+    Written {
+        /// Bytes of them.
+        bytes: u64,
     },
 }
 
@@ -220,6 +229,15 @@ pub fn directory(cache: &Path, name: &str) -> PathBuf {
     cache.join(FOLDER).join(name)
 }
 
+/// Folders of all streams of a cache, by name.
+pub fn streams(cache: &Path) -> Vec<PathBuf> {
+    let found = fs::read_dir(cache.join(FOLDER)).into_iter().flatten();
+    let folders = found.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut streams: Vec<_> = folders.filter(|it| cache::exists(it)).collect();
+    streams.sort();
+    streams
+}
+
 /// Makes a stream, or goes on with the one that stands there; `tell` hears of progress, and `stop` ends it after the current
 /// frame.
 ///
@@ -230,18 +248,7 @@ pub fn whitewater(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(Event),
 ) -> Result<Outcome, WhitewaterError> {
-    let cache = CacheReader::open(&request.cache)?;
-    if cache.manifest().is_whitewater() {
-        return Err(WhitewaterError::IsWhitewater(request.cache.clone()));
-    }
-    let last = request.last.unwrap_or(cache.last_frame());
-    if !(cache.first_frame()..=cache.last_frame()).contains(&last) {
-        return Err(WhitewaterError::NoFrame {
-            asked: last,
-            first: cache.first_frame(),
-            last: cache.last_frame(),
-        });
-    }
+    let (cache, last) = asked(request)?;
     let directory = directory(&request.cache, &request.name);
     let scene = super::baked_scene(&cache, &request.cache)?.of_whitewater();
     let mut water = Water::of(&cache, scene.period());
@@ -292,12 +299,16 @@ pub fn whitewater(
             }),
             Err(error) => {
                 // What was computed before is kept.
-                stream.writer.finish()?;
+                let bytes = stream.writer.finish()?.bytes;
+                tell(Event::Written { bytes });
                 return Err(error);
             }
         }
     }
     let summary = stream.writer.finish()?;
+    tell(Event::Written {
+        bytes: summary.bytes,
+    });
     Ok(Outcome {
         last_frame: summary.last_frame,
         frames: summary.frames,
@@ -306,6 +317,23 @@ pub fn whitewater(
         interrupted,
         passes: engine.times(),
     })
+}
+
+/// The bake, and the last frame that is asked for.
+fn asked(request: &Request) -> Result<(CacheReader, u32), WhitewaterError> {
+    let cache = CacheReader::open(&request.cache)?;
+    if cache.manifest().is_whitewater() {
+        return Err(WhitewaterError::IsWhitewater(request.cache.clone()));
+    }
+    let last = request.last.unwrap_or(cache.last_frame());
+    if !(cache.first_frame()..=cache.last_frame()).contains(&last) {
+        return Err(WhitewaterError::NoFrame {
+            asked: last,
+            first: cache.first_frame(),
+            last: cache.last_frame(),
+        });
+    }
+    Ok((cache, last))
 }
 
 /// A frame of a stream from the one before.
@@ -473,12 +501,7 @@ fn standing(
         return Ok(None);
     }
     let stream = CacheReader::open(directory)?;
-    let how = if stream.manifest().scene_hash == manifest.scene_hash {
-        None
-    } else {
-        Some("with other settings, or from another bake")
-    };
-    match (how, request.overwrite) {
+    match (other(&stream, &manifest.scene_hash), request.overwrite) {
         (None, false) => Ok(Some(stream)),
         (_, true) => {
             fs::remove_dir_all(directory).map_err(|source| WhitewaterError::Remove {
@@ -492,6 +515,12 @@ fn standing(
             how,
         }),
     }
+}
+
+/// How a stream was made, where it is not the one of this hash.
+fn other(stream: &CacheReader, hash: &str) -> Option<&'static str> {
+    let is_other = stream.manifest().scene_hash != hash;
+    is_other.then_some("with other settings, or from another bake")
 }
 
 /// The settings that a stream was made with.
@@ -538,6 +567,13 @@ fn settle(
     Ok((settings, calibrated))
 }
 
+/// Of all that a stream's bytes depend on but the device: settings and bake.
+fn hash(cache: &CacheReader, request: &Request) -> Result<String, CacheError> {
+    let first = &cache.entry(cache.first_frame())?.chain;
+    let hash = blake3::hash(format!("{} {first}", request.settings.hash()).as_bytes());
+    Ok(hash.to_hex().to_string())
+}
+
 /// Of the stream: the bake's own, but for what was made and by what.
 fn manifest(
     cache: &CacheReader,
@@ -545,14 +581,12 @@ fn manifest(
     identity: &Identity,
 ) -> Result<Manifest, WhitewaterError> {
     let baked = cache.manifest();
-    let first = &cache.entry(cache.first_frame())?.chain;
-    let hash = blake3::hash(format!("{} {first}", request.settings.hash()).as_bytes());
     Ok(Manifest {
         format_version: Manifest::FORMAT_VERSION,
         program: env!("CARGO_PKG_NAME").into(),
         program_version: env!("CARGO_PKG_VERSION").into(),
         shaders: identity.shaders.clone(),
-        scene_hash: hash.to_hex().to_string(),
+        scene_hash: hash(cache, request)?,
         solver: Manifest::WHITEWATER.to_owned(),
         device: identity.name.clone(),
         driver: identity.driver.clone(),

@@ -26,13 +26,17 @@ mod cache {
 }
 mod check;
 mod cli {
+    mod expected;
     mod export;
+    mod farm;
     mod inspect;
     mod pipeline;
     mod shaders;
+    mod shell;
     #[cfg(target_os = "linux")]
     mod terminal;
     mod view;
+    mod workers;
 }
 mod compare {
     mod diff;

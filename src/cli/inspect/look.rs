@@ -8,7 +8,7 @@ use std::{
 
 use super::{InspectArgs, misplaced};
 use crate::{
-    cli::{Failure, bake, count, is_cache, size},
+    cli::{Failure, bake, count, is_cache, named_adapter, size},
     scene::look::Look,
     stage::render::{LookPlan, Subject, plan},
 };
@@ -27,6 +27,17 @@ pub(super) fn is_look(file: &Path) -> bool {
 
 /// Prints the plan of the look in `file`.
 pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<LookPlan, Failure> {
+    let (look, subject, planned) = planned(args, file)?;
+    // Writing to a String cannot fail.
+    let _ = show_plan(out, &look, &subject, &planned, file);
+    Ok(planned)
+}
+
+/// The look in `file`, what it is planned for, and its plan.
+pub(super) fn planned(
+    args: &InspectArgs,
+    file: &Path,
+) -> Result<(Look, Subject, LookPlan), Failure> {
     let look = Look::load_within(file, bake::reach(args.allow_outside))?;
     let has_scene_options = !args.set.is_empty() || args.solver.is_some();
     let subject = match &args.scene {
@@ -41,10 +52,9 @@ pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<
             return Err(misplaced("--set or --solver", "scenes", is, file));
         }
     };
-    let planned = plan(&look, &subject, args.adapter.as_deref())?;
-    // Writing to a String cannot fail.
-    let _ = show_plan(out, &look, &subject, &planned, file);
-    Ok(planned)
+    let adapter = named_adapter(args.adapter.as_ref());
+    let planned = plan(&look, &subject, adapter.as_deref())?;
+    Ok((look, subject, planned))
 }
 
 fn show_plan(

@@ -67,6 +67,13 @@ pub enum ExportError {
     },
 }
 
+impl ExportError {
+    /// Whether it is a fault of the frame that was read, so that others may do well.
+    pub(super) fn is_of_frame(&self) -> bool {
+        matches!(self, Self::Cache(_) | Self::Vdb { .. })
+    }
+}
+
 impl From<&ExportError> for Blame {
     fn from(error: &ExportError) -> Self {
         match error {

@@ -188,6 +188,17 @@ impl Folder {
         })
     }
 
+    /// Refuses what [`Self::enter`] would refuse of what stands in a folder, without touching it; whether it is in use is not looked at.
+    ///
+    /// # Errors
+    /// [`FolderError`].
+    pub(super) fn look(path: &Path, wanted: &Wanted<'_>) -> Result<(), FolderError> {
+        let record = fs::read_to_string(path.join(RECORD)).unwrap_or_default();
+        let owner: Option<Owner> = serde_json::from_str(&record).ok();
+        let is_ours = owner.as_ref() == Some(&wanted.owner);
+        check_standing(path, wanted, wanted.overwrite || is_ours)
+    }
+
     /// Takes a frame, `small.0001`, for this process until the file is dropped; `None` while another has it.
     ///
     /// # Errors
@@ -204,13 +215,15 @@ impl Folder {
         self.path.join(ROOM).join(name)
     }
 
-    /// Gives a whole picture its name in the folder.
+    /// Gives a whole picture its name in the folder; tells its bytes.
     ///
     /// # Errors
     /// [`FolderError::File`].
-    pub(super) fn publish(&self, name: &str) -> Result<(), FolderError> {
-        let file = self.path.join(name);
-        fs::rename(self.draft(name), &file).map_err(at(&file))
+    pub(super) fn publish(&self, name: &str) -> Result<u64, FolderError> {
+        let (draft, file) = (self.draft(name), self.path.join(name));
+        let bytes = fs::metadata(&draft).map_err(at(&draft))?.len();
+        fs::rename(draft, &file).map_err(at(&file))?;
+        Ok(bytes)
     }
 }
 

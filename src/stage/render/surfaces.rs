@@ -84,6 +84,25 @@ impl Row {
     }
 }
 
+/// What a check has to tell while it runs.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The device is open.
+    Ready {
+        /// Adapter name.
+        device: String,
+        /// Frames wanted.
+        frames: usize,
+    },
+    /// A frame was checked.
+    Frame {
+        /// Its number.
+        frame: u32,
+        /// Wall clock for all of it.
+        seconds: f64,
+    },
+}
+
 /// What a check found.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
@@ -103,11 +122,16 @@ pub struct Outcome {
     pub interrupted: bool,
 }
 
-/// Renders frames by both methods and holds their depths and normals against rays in f64.
+/// Renders frames by both methods and holds their depths and normals against rays in f64; `tell` hears of progress, and `stop` ends it
+/// after the current frame.
 ///
 /// # Errors
 /// The cache, its scene, the device, a frame that cannot be rendered, and that no frame shows water.
-pub fn check_render(request: &Request, stop: &AtomicBool) -> Result<Outcome, RenderJobError> {
+pub fn check_render(
+    request: &Request,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Event),
+) -> Result<Outcome, RenderJobError> {
     let cache = CacheReader::open(&request.cache)?;
     let scene = baked_scene(&cache, &request.cache)?;
     let frames: Vec<u32> = match &request.frames {
@@ -121,6 +145,10 @@ pub fn check_render(request: &Request, stop: &AtomicBool) -> Result<Outcome, Ren
         }
     }
     let context = request.gpu.open(Needs::default())?;
+    tell(Event::Ready {
+        device: context.info.name.clone(),
+        frames: frames.len(),
+    });
     let mut surfaces = METHODS.map(|_| (Surfaces::default(), 0.0));
     let mut pictures = Pictures::new(request);
     let mut outcome = Outcome {
@@ -133,6 +161,7 @@ pub fn check_render(request: &Request, stop: &AtomicBool) -> Result<Outcome, Ren
             outcome.interrupted = true;
             break;
         }
+        let whole = Instant::now();
         let water = cache.read(frame)?;
         let set = render_scene(&scene, &request.look, frame, &water)?;
         let begun = Instant::now();
@@ -162,6 +191,10 @@ pub fn check_render(request: &Request, stop: &AtomicBool) -> Result<Outcome, Ren
         };
         pictures.take(&set, frame, &eye)?;
         outcome.frames.push(frame);
+        tell(Event::Frame {
+            frame,
+            seconds: whole.elapsed().as_secs_f64(),
+        });
     }
     let count = outcome.frames.len().max(1) as f64;
     outcome.truth_seconds /= count;

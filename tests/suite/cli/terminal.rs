@@ -186,15 +186,19 @@ fn a_closed_pipe_is_no_fault() {
         (0, "diff cache/small/pbf cache/small/pbf --json"),
         // The result is the exit code, whoever reads.
         (1, "diff cache/small/pbf other"),
-        (
-            0,
-            "bake small.toml -o json --device cpu --frames 1-2 --progress json",
-        ),
-        (0, "study refusal.toml -o s --progress json"),
     ] {
         let (found, said) = closed(command);
         assert_eq!(found, Some(code), "{command}: {said}");
         assert!(!said.contains("cannot write"), "{said}");
+    }
+    // Events are promised whole.
+    for command in [
+        "bake small.toml -o json --device cpu --frames 1-2 --progress json",
+        "study refusal.toml -o s --progress json",
+    ] {
+        let (found, said) = closed(command);
+        assert_eq!(found, Some(4), "{command}: {said}");
+        assert_has(&said, &["cannot write to standard output: Broken pipe"]);
     }
     assert_has(&job.expect(0, "verify json"), &["ok: 2 frames"]);
 }

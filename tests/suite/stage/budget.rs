@@ -75,6 +75,7 @@ impl Baked {
                 removed, particles, ..
             } => (self.removed, self.particles) = (removed, particles),
             Event::Frame { report, .. } => self.reports.push(report),
+            Event::Written { .. } => {}
         });
         self.error = ended.err();
     }

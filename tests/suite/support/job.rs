@@ -141,9 +141,12 @@ impl Job {
         said
     }
 
-    /// The same with `--json`.
+    /// The same with `--json`; what standard output holds, and nothing but that, is the object.
     pub fn json(&self, code: i32, words: &str) -> serde_json::Value {
-        serde_json::from_str(&self.expect(code, &format!("{words} --json"))).unwrap()
+        let output = self.run(&format!("{words} --json"));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "swell {words}: {said}");
+        serde_json::from_slice(&output.stdout).unwrap()
     }
 
     pub fn hash(&self, cache: &str) -> String {

@@ -1,6 +1,7 @@
 //! Scenes, waters, caches and folders that tests of several rooms begin from.
 
 pub mod cache;
+pub mod events;
 pub mod flip;
 pub mod job;
 pub mod made_cache;

@@ -1,0 +1,51 @@
+//! `--dry-run`: what a command would make.
+
+use serde_json::{Value, json};
+
+use super::{count, output, progress::Progress, size};
+
+/// What all commands say of it.
+pub(super) struct DryRun {
+    /// Frames to be made, by number.
+    pub(super) frames: Vec<u32>,
+    /// Frames that stand there.
+    pub(super) standing: usize,
+    /// Expected on the disk; `None` where nothing is known of it.
+    pub(super) bytes: Option<u64>,
+    /// Where to.
+    pub(super) place: String,
+}
+
+impl DryRun {
+    /// Tells it, with `more` that this command knows: words behind the line, and keys for programs.
+    pub(super) fn tell(&self, progress: &Progress, words: &str, mut more: Value) {
+        let frames = self.frames.len();
+        let bytes = match self.bytes {
+            Some(bytes) => format!("about {}", size(bytes)),
+            None => "nothing is known of their bytes".to_owned(),
+        };
+        let span = match self.frames[..] {
+            [] => String::new(),
+            [frame] => format!(" ({frame})"),
+            [first, .., last] => format!(" ({first} to {last})"),
+        };
+        let text = format!(
+            "would make {}{span}, {bytes}; {} stand there; in {}{words}\n",
+            count(frames as u64, "frame"),
+            self.standing,
+            self.place,
+        );
+        let known = json!({
+            "event": "dry_run", "frames": frames, "numbers": self.frames, "skipped": self.standing, "bytes": self.bytes,
+            "place": self.place,
+        });
+        if let (Value::Object(more), Value::Object(known)) = (&mut more, known) {
+            more.extend(known);
+        }
+        match progress.is_json() {
+            true => progress.tell(more),
+            false => output::print(&text),
+        }
+        output::log(text.trim_end());
+    }
+}

@@ -1,0 +1,47 @@
+//! `--keep-going`: frames that failed while others went on.
+
+use std::error::Error;
+
+use serde_json::json;
+
+use super::{
+    Failure, chain, count,
+    progress::{Progress, Status},
+};
+use crate::domain::frame_range::ranges;
+
+/// Tells of a frame that failed.
+pub(super) fn frame_failed(progress: &Progress, frame: u32, error: &dyn Error) {
+    let message = chain(error);
+    progress.frame(
+        &format!("frame {frame:4}  failed: {message}"),
+        Status::Failed,
+        json!({ "event": "frame", "frame": frame, "message": message }),
+    );
+}
+
+/// Behind what was done, in a command's last line.
+pub(super) fn failed_in_all(frames: &[u32]) -> String {
+    match frames.len() {
+        0 => String::new(),
+        many => format!(", {many} failed"),
+    }
+}
+
+/// The end of a command that went on: a fault of files, where frames failed.
+pub(super) fn refuse_failed(frames: &[u32]) -> Result<u8, Failure> {
+    let mut numbers = frames.to_vec();
+    numbers.sort_unstable();
+    match numbers.len() {
+        0 => Ok(0),
+        many => Err(Failure {
+            code: 4,
+            error: format!(
+                "{} failed: {}",
+                count(many as u64, "frame"),
+                ranges(&numbers)
+            )
+            .into(),
+        }),
+    }
+}

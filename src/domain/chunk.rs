@@ -1,0 +1,78 @@
+//! Shares of a range of frames, as `--chunk 1/4` asks for them.
+
+use std::str::FromStr;
+
+/// Share `index` of `count` of a range, from 1 on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chunk {
+    index: u32,
+    count: u32,
+}
+
+/// A text that is no share.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ChunkError {
+    /// Not two numbers.
+    #[error("`{0}` is no share: write 1/4 for the first of four")]
+    Form(String),
+    /// No such one.
+    #[error("there is no share {index} of {count}: the shares are 1/{count} to {count}/{count}")]
+    Beyond {
+        /// Asked for.
+        index: u32,
+        /// Of so many.
+        count: u32,
+    },
+}
+
+/// The frames of a share; all where none was asked for.
+pub fn share(frames: &[u32], chunk: Option<Chunk>) -> &[u32] {
+    chunk.map_or(frames, |chunk| chunk.of(frames))
+}
+
+impl Chunk {
+    /// Its frames: as many in a row as in the other shares, or one more.
+    pub fn of(self, frames: &[u32]) -> &[u32] {
+        let end =
+            |share: u32| (frames.len() as u64 * u64::from(share) / u64::from(self.count)) as usize;
+        &frames[end(self.index - 1)..end(self.index)]
+    }
+}
+
+impl FromStr for Chunk {
+    type Err = ChunkError;
+
+    fn from_str(text: &str) -> Result<Self, ChunkError> {
+        let (index, count) = text
+            .split_once('/')
+            .and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)))
+            .ok_or_else(|| ChunkError::Form(text.to_owned()))?;
+        match (1..=count).contains(&index) {
+            true => Ok(Self { index, count }),
+            false if count == 0 => Err(ChunkError::Form(text.to_owned())),
+            false => Err(ChunkError::Beyond { index, count }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_disjoint_and_make_up_all() {
+        let frames: Vec<u32> = (1..=10).collect();
+        for count in [1, 3, 10, 12] {
+            let share = |index: u32| format!("{index}/{count}").parse::<Chunk>().unwrap();
+            let all: Vec<u32> = (1..=count)
+                .flat_map(|k| share(k).of(&frames).to_vec())
+                .collect();
+            assert_eq!(all, frames);
+        }
+        assert_eq!(super::share(&frames, None), frames);
+        assert_eq!(super::share(&frames, "2/5".parse().ok()), [3, 4]);
+        for text in ["0/4", "5/4", "1", "a/b", "1/0", "-1/4"] {
+            assert!(text.parse::<Chunk>().is_err(), "{text}");
+        }
+    }
+}

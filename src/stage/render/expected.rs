@@ -1,0 +1,72 @@
+//! `render --dry-run`: what a render would make, without a device, and with nothing written.
+
+use std::fs;
+
+use super::{
+    Asked, RenderJobError, Request,
+    folder::Folder,
+    pictures::{is_current, pictures, whole_attributes},
+    wanted,
+};
+
+/// What a render would make.
+#[derive(Clone, Debug, Default)]
+pub struct Expected {
+    /// Frames of this process's share.
+    pub frames: Vec<u32>,
+    /// Those of them whose pictures stand there.
+    pub standing: Vec<u32>,
+    /// Bytes that the pictures of one frame take, as those that stand there do on the mean; `None` where none does.
+    pub frame_bytes: Option<u64>,
+}
+
+impl Expected {
+    /// Bytes of the pictures that are to be made.
+    pub fn bytes(&self) -> Option<u64> {
+        let made = self.frames.len() - self.standing.len();
+        match made {
+            0 => Some(0),
+            made => Some(self.frame_bytes? * made as u64),
+        }
+    }
+}
+
+/// Looks at what stands there, as a render would, and renders nothing.
+///
+/// # Errors
+/// Those of [`render`](super::render) that need no device.
+pub fn expected(request: &Request) -> Result<Expected, RenderJobError> {
+    let Asked {
+        cache,
+        whitewater,
+        frames,
+        ..
+    } = Asked::open(request)?;
+    let of_frame = |frame| cache.frame_hash(frame).ok().map(str::to_owned);
+    Folder::look(
+        &request.directory,
+        &wanted(request, &cache, &frames, &of_frame)?,
+    )?;
+    let mut found = Expected::default();
+    let mut bytes = 0;
+    for &frame in &frames {
+        let attributes = whole_attributes(&cache, request, whitewater.as_ref(), frame)?;
+        let mut stands = true;
+        let mut size = 0;
+        for (name, format) in pictures(&cache, &request.look, frame) {
+            let file = request.directory.join(name);
+            stands &= is_current(&file, format, &attributes);
+            size += fs::metadata(&file).map_or(0, |meta| meta.len());
+        }
+        if stands {
+            found.standing.push(frame);
+            bytes += size;
+        }
+    }
+    found.frames = frames;
+    found.frame_bytes = bytes.checked_div(found.standing.len() as u64);
+    if request.overwrite {
+        found.standing.clear();
+    }
+    Ok(found)
+}

@@ -1,0 +1,136 @@
+//! The pictures of a frame: their names, what their headers say, whether they stand there.
+
+use std::path::Path;
+
+use super::{Request, whitewater::Whitewater};
+use crate::{
+    cache::{CacheError, CacheReader, Manifest},
+    render::{
+        Attributes, Image, REACH, RenderError, frames_around,
+        image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
+    },
+    scene::look::{FormatSpec, Look},
+    stage::device::shaders_note,
+};
+
+/// All of it: what stands in the header of a frame's pictures.
+pub(super) fn whole_attributes(
+    cache: &CacheReader,
+    request: &Request,
+    whitewater: Option<&Whitewater>,
+    frame: u32,
+) -> Result<Attributes, CacheError> {
+    let mut attributes = attributes(cache, request, frame)?;
+    attributes.cache_hash += &around(cache, &request.look, frame)?;
+    if let Some(stream) = whitewater {
+        attributes.cache_hash += &format!(" {}", stream.frame_hash(frame)?);
+    }
+    Ok(attributes)
+}
+
+/// What a picture's header says of the frames around its own that it is drawn from: a hash of theirs, so that it is drawn again when
+/// the cache has come to have more of them. Nothing where the look takes none.
+fn around(cache: &CacheReader, look: &Look, frame: u32) -> Result<String, CacheError> {
+    let reach = frames_around(look);
+    if reach == 0 {
+        return Ok(String::new());
+    }
+    let mut hasher = blake3::Hasher::new();
+    for (side, other) in others(frame) {
+        if other.abs_diff(frame) <= reach && cache.has_particles(other) {
+            let hash = cache.frame_hash(other)?;
+            hasher.update(format!("{side} {hash}\n").as_bytes());
+        }
+    }
+    Ok(format!(" around {}", hasher.finalize().to_hex()))
+}
+
+/// Frames about a frame, in the order of [`Moment::around`]: with their places there.
+pub(super) fn others(frame: u32) -> impl Iterator<Item = (usize, u32)> {
+    let reach = i64::from(REACH);
+    let offsets = (-reach..=reach).filter(|&offset| offset != 0);
+    let frames = offsets.map(move |offset| u32::try_from(i64::from(frame) + offset).ok());
+    let placed = frames.enumerate();
+    placed.filter_map(|(side, frame)| Some((side, frame?)))
+}
+
+/// What stands in the header of a frame's pictures, but for what else it is drawn from.
+pub(super) fn attributes(
+    cache: &CacheReader,
+    request: &Request,
+    frame: u32,
+) -> Result<Attributes, CacheError> {
+    let manifest = cache.manifest();
+    Ok(Attributes {
+        frame,
+        shot: manifest.shot.clone(),
+        software: format!(
+            "{} {}{}{}",
+            env!("CARGO_PKG_NAME"),
+            env!("CARGO_PKG_VERSION"),
+            shaders_note(request.gpu.shaders.edited()),
+            baked_note(manifest)
+        ),
+        scene_hash: manifest.scene_hash.clone(),
+        cache_hash: cache.frame_hash(frame)?.to_owned(),
+        look_hash: request.look.hash(),
+    })
+}
+
+/// What is said of a cache behind a program: nothing where the program's own shaders baked it.
+pub(super) fn baked_note(manifest: &Manifest) -> String {
+    let note = shaders_note(manifest.edited_shaders());
+    match note.is_empty() {
+        true => note,
+        false => format!(", of a cache baked{note}"),
+    }
+}
+
+/// `SHOT.0001`, with as many digits as the last cached frame needs, at least four.
+pub(super) fn name(shot: &str, frame: u32, last_frame: u32) -> String {
+    let digits = last_frame.to_string().len().max(4);
+    format!("{shot}.{frame:0digits$}")
+}
+
+fn ending(format: FormatSpec) -> &'static str {
+    match format {
+        FormatSpec::Png => "png",
+        FormatSpec::Exr => "exr",
+    }
+}
+
+/// Names of a frame's pictures, and in which format each.
+pub(super) fn pictures(cache: &CacheReader, look: &Look, frame: u32) -> Vec<(String, FormatSpec)> {
+    let name = name(&cache.manifest().shot, frame, cache.last_frame());
+    let formats = look.spec().output.formats.iter();
+    formats
+        .map(|&format| (format!("{name}.{}", ending(format)), format))
+        .collect()
+}
+
+/// Name of the PNG of a frame of a cache.
+pub fn picture_name(cache: &CacheReader, frame: u32) -> String {
+    let name = name(&cache.manifest().shot, frame, cache.last_frame());
+    format!("{name}.{}", ending(FormatSpec::Png))
+}
+
+pub(super) fn is_current(file: &Path, format: FormatSpec, attributes: &Attributes) -> bool {
+    let found = match format {
+        FormatSpec::Png => read_png_attributes(file),
+        FormatSpec::Exr => read_exr_attributes(file),
+    };
+    found.is_ok_and(|found| found == *attributes)
+}
+
+pub(super) fn write(
+    file: &Path,
+    format: FormatSpec,
+    image: &Image,
+    attributes: &Attributes,
+    look: &Look,
+) -> Result<(), RenderError> {
+    match format {
+        FormatSpec::Png => write_png_with_attributes(file, image, &look.spec().view, attributes),
+        FormatSpec::Exr => write_exr(file, image, attributes),
+    }
+}
