@@ -69,8 +69,8 @@ mod tests {
                 .collect();
             assert_eq!(all, frames);
         }
-        assert_eq!(super::share(&frames, None), frames);
-        assert_eq!(super::share(&frames, "2/5".parse().ok()), [3, 4]);
+        assert_eq!(share(&frames, None), frames);
+        assert_eq!(share(&frames, "2/5".parse().ok()), [3, 4]);
         for text in ["0/4", "5/4", "1", "a/b", "1/0", "-1/4"] {
             assert!(text.parse::<Chunk>().is_err(), "{text}");
         }

@@ -102,7 +102,7 @@ fn a_folder_becomes_a_sheet_and_a_page() {
     let page = job.path("views/day/index.html");
     let frames = shown(&page);
     let wanted: Vec<Rgb> = (1..=12).map(|k| picture([64, 36], k, 3)).collect();
-    assert_eq!(frames, [wanted.clone()]);
+    assert_eq!(frames, std::slice::from_ref(&wanted));
     assert_ne!(frames[0][3], wanted[4], "the control");
     assert_eq!(data(&page)["labels"][11], "12");
     assert_eq!(data(&page)["rate"], 24.0);
