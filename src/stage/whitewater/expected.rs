@@ -23,7 +23,7 @@ pub struct Expected {
 /// Looks at the bake and at the stream that stands there, as a job would.
 ///
 /// # Errors
-/// Those of [`whitewater`](super::whitewater) that need no device.
+/// Those of [`whitewater`](super::whitewater()) that need no device.
 pub fn expected(request: &Request) -> Result<Expected, WhitewaterError> {
     let (cache, last) = asked(request)?;
     let directory = super::directory(&request.cache, &request.name);
