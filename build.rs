@@ -1,6 +1,7 @@
 //! What `swell --version` says of the build: commit, target, profile, features.
 //!
-//! Runs again where the sources or the commit have changed, and not otherwise.
+//! Runs again where the sources have changed, and not otherwise: a commit of pages alone compiles nothing anew. What is said is what was so
+//! when the program was compiled.
 
 use std::{
     env,
@@ -13,10 +14,8 @@ const SOURCES: [&str; 5] = ["build.rs", "Cargo.toml", "Cargo.lock", "src", "shad
 
 fn main() {
     let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));
-    let watched = SOURCES.map(|name| root.join(name)).into_iter();
-    // A path that is not there would have every build run this again.
-    for path in watched.chain(heads(&root)).filter(|path| path.exists()) {
-        println!("cargo::rerun-if-changed={}", path.display());
+    for name in SOURCES {
+        println!("cargo::rerun-if-changed={name}");
     }
     let features: Vec<String> = env::vars()
         .filter_map(|(name, _)| Some(name.strip_prefix("CARGO_FEATURE_")?.to_lowercase()))
@@ -36,9 +35,11 @@ fn main() {
     }
 }
 
-/// The commit of a tree, and whether its sources were edited since; in words that there is none to be known.
+/// The last commit of a tree that changed its sources, and whether they were edited since; in words that there is none to be known.
 pub fn commit(root: &Path) -> String {
-    let Some(commit) = git(root, &["rev-parse", "HEAD"]).filter(|_| is_own(root)) else {
+    let log = ["log", "-1", "--format=%H", "--"];
+    let commit = git(root, &[&log[..], &SOURCES].concat());
+    let Some(commit) = commit.filter(|it| !it.is_empty() && is_own(root)) else {
         return "unknown (built from a tree without git)".to_owned();
     };
     let status = ["--no-optional-locks", "status", "--porcelain", "--"];
@@ -55,20 +56,6 @@ fn is_own(root: &Path) -> bool {
     let top = git(root, &["rev-parse", "--show-toplevel"]).map(PathBuf::from);
     let same = |top: PathBuf| Some(top.canonicalize().ok()? == root.canonicalize().ok()?);
     top.and_then(same) == Some(true)
-}
-
-/// Files that change with the commit.
-pub fn heads(root: &Path) -> Vec<PathBuf> {
-    if !is_own(root) {
-        return Vec::new();
-    }
-    let branch = git(root, &["symbolic-ref", "--quiet", "HEAD"]);
-    let names = ["HEAD", "logs/HEAD", "packed-refs"].map(str::to_owned);
-    let paths = names.into_iter().chain(branch).filter_map(|name| {
-        let path = git(root, &["rev-parse", "--git-path", &name])?;
-        Some(root.join(path))
-    });
-    paths.collect()
 }
 
 /// What git says; `None` where there is no git, or it says that something is wrong.

@@ -98,3 +98,28 @@ pub(super) fn plan_light(plan: &mut Plan, sky: &Sky) {
         compare: Some(wgpu::CompareFunction::LessEqual),
     });
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn air_is_the_grounds_or_the_skys() {
+        let of = |line: &str| {
+            let text = format!(
+                "[camera]\nfocal_length_mm = 35.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 1.0, 0.0]\n[image]\nwidth = 64\n\
+                 height = 36\n[sky]\nmodel = \"hosek_wilkie\"\nturbidity = 5.0\n{line}\n\
+                 [ground]\nhaze_m = 700.0\n"
+            );
+            let look = Look::parse(&text, Path::new("t.toml")).unwrap();
+            haze(look.spec())
+        };
+        assert_eq!(of(""), 700.0);
+        assert_eq!(of("haze = false"), 700.0);
+        assert_eq!(of("haze = true"), 1.0 / extinction(5.0));
+    }
+}

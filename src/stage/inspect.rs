@@ -16,7 +16,7 @@ use crate::{
     solve::plan::{DeviceLimits, LIST_BUDGET, Plan, device_limits},
 };
 
-use super::{Blame, device::needs, prepare::Start, probes};
+use super::{Blame, device::needs, prepare::Start, probes, whitewater};
 
 pub use crate::cache::{
     Entry, Manifest,
@@ -231,12 +231,12 @@ pub fn sizes(directory: &Path) -> Result<CacheSizes, SizesError> {
     for stream in Stream::all(reader.manifest()) {
         streams.push((stream.name, folder_bytes(&directory.join(stream.folder))?));
     }
-    let mut whitewater = Vec::new();
-    for folder in super::whitewater::streams(directory) {
+    let mut of_whitewater = Vec::new();
+    for folder in whitewater_folders(directory)? {
         let stream = CacheReader::open(&folder)?;
         let name = folder.file_name().unwrap_or_default();
         let bytes = folder_bytes(&folder)?;
-        whitewater.push((
+        of_whitewater.push((
             name.to_string_lossy().into_owned(),
             stream.last_frame(),
             bytes,
@@ -245,18 +245,38 @@ pub fn sizes(directory: &Path) -> Result<CacheSizes, SizesError> {
     Ok(CacheSizes {
         bytes: folder_bytes(directory)?,
         streams,
-        whitewater,
+        whitewater: of_whitewater,
         device_bytes,
         seconds: reader.seconds()?.into_values().collect(),
     })
 }
 
-/// Bytes of all files below a folder; 0 where there is none.
-fn folder_bytes(folder: &Path) -> Result<u64, SizesError> {
-    let fault = |source| SizesError::Read {
+/// Folders of a cache's streams of whitewater, by name.
+fn whitewater_folders(cache: &Path) -> Result<Vec<PathBuf>, SizesError> {
+    let folder = cache.join(whitewater::FOLDER);
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    let paths = fs::read_dir(&folder).and_then(|found| {
+        let paths = found.map(|entry| Ok(entry?.path()));
+        paths.collect::<io::Result<Vec<_>>>()
+    });
+    let mut streams = paths.map_err(|source| unread(&folder, source))?;
+    streams.retain(|it| crate::cache::exists(it));
+    streams.sort();
+    Ok(streams)
+}
+
+fn unread(folder: &Path, source: io::Error) -> SizesError {
+    SizesError::Read {
         folder: folder.to_owned(),
         source,
-    };
+    }
+}
+
+/// Bytes of all files below a folder; 0 where there is none.
+fn folder_bytes(folder: &Path) -> Result<u64, SizesError> {
+    let fault = |source| unread(folder, source);
     let entries = match fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
         other => other.map_err(fault)?,

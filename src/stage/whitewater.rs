@@ -46,7 +46,7 @@ pub use self::{
 };
 
 /// Folder of the streams in a cache.
-const FOLDER: &str = "whitewater";
+pub(super) const FOLDER: &str = "whitewater";
 /// The settings that a stream was made with, all of them, among its assets.
 const SETTINGS: &str = "whitewater.toml";
 /// Frames that a shot's thresholds are calibrated on, at most.
@@ -227,15 +227,6 @@ pub fn is_of(frame: &Entry, cache: &CacheReader) -> bool {
 /// Folder of a stream of a cache.
 pub fn directory(cache: &Path, name: &str) -> PathBuf {
     cache.join(FOLDER).join(name)
-}
-
-/// Folders of all streams of a cache, by name.
-pub fn streams(cache: &Path) -> Vec<PathBuf> {
-    let found = fs::read_dir(cache.join(FOLDER)).into_iter().flatten();
-    let folders = found.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut streams: Vec<_> = folders.filter(|it| cache::exists(it)).collect();
-    streams.sort();
-    streams
 }
 
 /// Makes a stream, or goes on with the one that stands there; `tell` hears of progress, and `stop` ends it after the current

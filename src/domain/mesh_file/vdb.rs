@@ -1,8 +1,11 @@
 //! OpenVDB level sets, by vdb-rs: the surface where one is 0, in the grid's own world.
 
 use std::{
+    any::Any,
+    cell::Cell,
     io::Cursor,
     panic::{self, AssertUnwindSafe},
+    sync::Once,
 };
 
 use glam::DVec3;
@@ -14,17 +17,7 @@ use crate::domain::isosurface::sparse::{Band, around};
 /// The level set that is read where a file has several: Houdini, Blender and swell call it so.
 const USUAL: &str = "surface";
 
-/// Maps of a grid that vdb-rs ends the program for.
-const OTHER_MAPS: [&str; 6] = [
-    "AffineMap",
-    "UnitaryMap",
-    "NonlinearFrustumMap",
-    "TranslationMap",
-    "UniformTranslationMap",
-    "PerspectiveMap",
-];
-
-/// How a file begins.
+/// How a file begins; vdb-rs does not look.
 const MAGIC: [u8; 8] = *b" BDV\0\0\0\0";
 
 /// Vertices in metres, and triangles.
@@ -32,17 +25,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     if !bytes.starts_with(&MAGIC) {
         return Err("no OpenVDB file".into());
     }
-    // The name of a map stands in the file by itself, after its length.
-    for map in OTHER_MAPS {
-        let named = [&(map.len() as u32).to_le_bytes()[..], map.as_bytes()].concat();
-        if bytes.windows(named.len()).any(|part| part == named) {
-            return Err(format!(
-                "a grid has the transform {map}; what is read is scale and translation along the axes"
-            ));
-        }
-    }
-    let grid = unless_it_panics(|| grid(bytes))
-        .ok_or("damaged, or of a kind that vdb-rs does not read")??;
+    let grid = caught(|| grid(bytes))
+        .map_err(|panic| format!("damaged, or of a kind that vdb-rs does not read: {panic}"))??;
     let (scale, origin) = match &grid.transform {
         Map::UniformScaleMap { scale_values, .. } => (scale_values.to_array(), [0.0; 3]),
         Map::ScaleTranslateMap {
@@ -68,13 +52,32 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     Ok((places.collect(), triangles.collect()))
 }
 
-/// What `read` gives; `None`, and no word on standard error, where it panics: vdb-rs asserts what a file should be.
-fn unless_it_panics<T>(read: impl FnOnce() -> T) -> Option<T> {
-    let told = panic::take_hook();
-    panic::set_hook(Box::new(|_| {}));
+thread_local! {
+    /// Whether a panic of this thread is an answer, and nothing to tell of.
+    static IS_ASKING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What `read` gives, or the words of its panic, of which nothing else tells: vdb-rs asserts what a file should be.
+fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let told = panic::take_hook();
+        panic::set_hook(Box::new(move |panic| {
+            if !IS_ASKING.get() {
+                told(panic);
+            }
+        }));
+    });
+    IS_ASKING.set(true);
     let found = panic::catch_unwind(AssertUnwindSafe(read));
-    panic::set_hook(told);
-    found.ok()
+    IS_ASKING.set(false);
+    found.map_err(|panic| words(panic.as_ref()))
+}
+
+fn words(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    text.unwrap_or("it says no more").to_owned()
 }
 
 /// The file's level set.

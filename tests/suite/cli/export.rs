@@ -257,10 +257,7 @@ fn shares_fill_one_folder_as_one_export_does() {
 #[test]
 fn faults_are_one_clear_line() {
     let job = made();
-    let clear = |code: i32, words: &str, part: &str| {
-        let said = job.expect(code, words);
-        assert!(said.contains(part), "{words}: {said}");
-    };
+    let clear = |code, words: &str, part: &str| job.expect_clear(code, words, part);
     clear(2, "export cache", "nothing to export");
     clear(
         2,

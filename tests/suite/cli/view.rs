@@ -471,14 +471,7 @@ fn a_study_has_its_page_and_a_sheet() {
 #[test]
 fn faults_are_one_clear_line() {
     let job = made();
-    let clear = |code: i32, words: &str, part: &str| {
-        let said = job.expect(code, words);
-        assert!(said.contains(part), "{words}: {said}");
-        let lines = said
-            .lines()
-            .filter(|line| line.starts_with("swell: ") || line.starts_with("error: "));
-        assert_eq!(lines.count(), 1, "{said}");
-    };
+    let clear = |code, words: &str, part: &str| job.expect_clear(code, words, part);
     fs::create_dir_all(job.path("empty")).unwrap();
     clear(2, "view empty", "nothing to see in empty");
     clear(4, "view gone", "gone is not there");

@@ -2,7 +2,6 @@
 //! for. SWELL_ROUNDS sets how often three processes share a range; in every second round one of them is killed.
 
 use std::{
-    collections::BTreeMap,
     fs,
     io::{BufRead, BufReader},
     path::Path,
@@ -10,6 +9,7 @@ use std::{
     time::Duration,
 };
 
+use crate::support::events::pictures;
 use crate::support::job::{Job, LOOK, assert_has};
 use crate::support::made_cache::{Made, SCENE, write_cache};
 
@@ -27,20 +27,6 @@ fn job(last: u32) -> Job {
     };
     write_cache(&job.path("cache"), &made);
     job
-}
-
-/// Files of a folder with their bytes, but for the record of whose they are.
-fn pictures(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut files = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        assert!(path.is_file(), "{name} is left");
-        if name != "render.json" {
-            files.insert(name, fs::read(path).unwrap());
-        }
-    }
-    files
 }
 
 fn spawn(job: &Job, words: &str) -> Child {

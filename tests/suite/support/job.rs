@@ -141,6 +141,14 @@ impl Job {
         said
     }
 
+    /// As [`Self::expect`], of a fault that is told in one line, which has this part.
+    pub fn expect_clear(&self, code: i32, words: &str, part: &str) {
+        let said = self.expect(code, words);
+        assert!(said.contains(part), "{words}: {said}");
+        let is_fault = |line: &&str| line.starts_with("swell: ") || line.starts_with("error: ");
+        assert_eq!(said.lines().filter(is_fault).count(), 1, "{said}");
+    }
+
     /// The same with `--json`; what standard output holds, and nothing but that, is the object.
     pub fn json(&self, code: i32, words: &str) -> serde_json::Value {
         let output = self.run(&format!("{words} --json"));

@@ -11,7 +11,9 @@ use swell::render::{Image, Moment, RenderError, RenderScene, Water};
 
 use super::geometry::box_mesh;
 use super::rays;
-use super::support::{Eye, Setup, ball, context, draw_moment, kernel, scene, spoiled, uniform_sky};
+use super::support::{
+    Eye, Setup, ball, context, draw, draw_moment, kernel, scene, spoiled, uniform_sky,
+};
 
 fn black_sky(_: DVec3, _: DVec2) -> [f64; 3] {
     [0.0; 3]
@@ -369,4 +371,71 @@ fn splats_refuse_an_eye_under_water() {
     assert!(is_refused("ssfr", rays::LEVEL - 0.5) && is_refused("ssfr", rays::LEVEL - 0.07));
     assert!(!is_refused("ssfr", rays::LEVEL + 0.07));
     assert!(!is_refused("ray", rays::LEVEL - 0.5));
+}
+
+/// Radius of a particle's splat, metres, and the spacing: a particle is half a splat's volume.
+const SPLAT: f64 = 0.2;
+const SPACING: f64 = 0.25;
+
+/// Of a particle that flies alone, in the mean over particles of twelve ids: mean square distance of its spray from it along an axis of the
+/// picture, m², and the integral of its optical depth over the area, m².
+fn drops(context: &Context) -> [f64; 2] {
+    const DENSITY: f64 = 0.05;
+    let eye = eye();
+    let setup = Setup {
+        surface: format!("smoothing_width_m = 0.0\nradius_m = {SPLAT:?}\n"),
+        water: format!("spray = {{ density_per_metre = {DENSITY:?}, speed_m_per_s = 3.0 }}\n"),
+        background: false,
+        solids: [0.0; 3],
+        ..Setup::new(eye)
+    };
+    let set = RenderScene {
+        particle_spacing: SPACING,
+        ..scene(1.0, 1.0)
+    };
+    let (mut all, mut squares) = (0.0, 0.0);
+    for id in 0..12 {
+        let mut water = ball(eye.position + AWAY * eye.forward(), DVec3::ZERO);
+        water.id = vec![7 * id];
+        let image = draw(context, &setup, &black_sky, &set, &water, 1);
+        for (i, pixel) in image.beauty.iter().enumerate() {
+            // A cover of 1 − exp(−τ).
+            let depth = -(1.0 - f64::from(pixel[3])).ln();
+            let [x, y] = [i % 64, i / 64].map(|at| at as f64 + 0.5 - 32.0);
+            all += depth;
+            squares += depth * 0.5 * (x * x + y * y);
+        }
+    }
+    let pixel = AWAY / eye.focal;
+    [
+        squares / all * pixel * pixel,
+        all / 12.0 / DENSITY * pixel * pixel,
+    ]
+}
+
+#[test]
+fn drops_of_a_particle_fill_a_ball_evenly_and_hold_its_air() {
+    let [square, volume] = drops(&context());
+    // R² / 5 of a ball of 1.6 radii; a drop of 1.4 pixels, whose profile is (1 − q²)^1.5, adds a seventh of its radius squared, and so much
+    // as a cell of two pixels adds that is read linearly, a sixth of its square.
+    let pixel = AWAY / 300.0;
+    let own = (1.4 * 1.4 / 7.0 + 2.0 * 2.0 / 6.0) * pixel * pixel;
+    let wanted = (1.6 * SPLAT).powi(2) / 5.0 + own;
+    // 12 × 180 drops, whose squares along an axis vary by 1.07 of their mean: three standard deviations of the mean over both axes.
+    let bound = 3.0 * 1.07 / (2.0 * 12.0 * 180.0f64).sqrt();
+    assert!((square / wanted - 1.0).abs() < bound, "{square} {wanted}");
+    // Three twentieths of a thrown particle are drops; each is sampled by few cells.
+    let air = 0.15 * SPACING.powi(3);
+    assert!((volume / air - 1.0).abs() < 0.02, "{volume} {air}");
+    // The controls: drops that are denser near the particle, and smaller ones that are no more opaque for it.
+    let pass = "ssfr/splat_spray";
+    let (from, to) = (
+        "pow(random(id, 3u * k + 2u), 1.0 / 3.0)",
+        "random(id, 3u * k + 2u)",
+    );
+    let control = drops(&spoiled(pass, from, to))[0] / wanted - 1.0;
+    assert!(control < -5.0 * bound, "{control}");
+    let (from, to) = ("* finer * finer * finer;", "* finer * finer;");
+    let control = drops(&spoiled(pass, from, to))[1] / air - 1.0;
+    assert!(control < -0.1, "{control}");
 }
