@@ -62,7 +62,7 @@ const BUILD: &str = concat!(
 #[derive(Parser, Debug)]
 #[command(name = "swell", version, long_version = BUILD, after_help = AFTER)]
 struct Cli {
-    /// Write what goes to standard error, and progress, also behind what this file holds, each line with its time.
+    /// Add what goes to standard error, and progress, to the end of this file too, each line with its time.
     #[arg(long, global = true, value_name = "FILE")]
     log: Option<PathBuf>,
     #[command(subcommand)]
