@@ -4,7 +4,7 @@
 #import "shared/ssfr_solid.wgsl"
 
 // Two boxes and what is in them. An axis has a word for each, in steps of `rays.set_step` from `rays.set_low`: the least corner in its
-// lower half, the greatest in its upper one, both rounded outwards. An empty box has its corners the wrong way round.
+// lower half, the greatest in its upper one, both rounded outwards.
 struct SetNode {
     left: vec3u,
     // A node, or triangles: the number of the first, and above LEAF_SHIFT how many, which is 0 for a node.

@@ -11,8 +11,6 @@ const LEAF_SHIFT: u32 = 28;
 const STEPS: f64 = 65528.0;
 /// Steps by which a box is larger than rounding outwards asks for: a ray's place in steps is off by 2⁻²⁴ × 2¹⁶.
 const MARGIN: f64 = 1.0;
-/// A box that no ray meets.
-const EMPTY: [u32; 3] = [0xffff; 3];
 
 /// A tree over triangles.
 pub(super) struct Tree {
@@ -59,16 +57,16 @@ pub(super) fn tree(triangles: &[Triangle]) -> Tree {
 /// Least and greatest corner; first entry of a leaf or right child of an inner node, whose left one follows it; entries of a leaf, or 0.
 type Node = ([DVec3; 2], u32, u32);
 
-/// A node for each inner one of the tree, in its order; one where the tree is a single leaf.
+/// A node for each inner one of the tree, in its order; where the tree is a single leaf, one that has it on either side.
 fn pairs(boxes: &[Node], lattice: &Lattice) -> Vec<SetNode> {
     if boxes[0].2 > 0 {
-        let only = SetNode {
-            left: lattice.sides(boxes[0].0),
-            left_child: leaf(&boxes[0]),
-            right: EMPTY,
-            right_child: 0,
-        };
-        return vec![only];
+        let (sides, child) = (lattice.sides(boxes[0].0), leaf(&boxes[0]));
+        return vec![SetNode {
+            left: sides,
+            left_child: child,
+            right: sides,
+            right_child: child,
+        }];
     }
     // Inner nodes before each node.
     let numbers: Vec<u32> = (boxes.iter())
@@ -159,12 +157,10 @@ mod tests {
     fn holds(tree: &Tree, at: u32, within: &[[DVec3; 2]], seen: &mut Vec<u32>) {
         let node = &tree.nodes[at as usize];
         for (sides, child) in [(node.left, node.left_child), (node.right, node.right_child)] {
-            if sides == EMPTY {
-                continue;
-            }
             let ways = [within, &[decoded(tree, sides)]].concat();
             let count = child >> LEAF_SHIFT;
             if count == 0 {
+                assert!(child > at, "{at} leads back to {child}");
                 holds(tree, child, &ways, seen);
                 continue;
             }
@@ -203,6 +199,7 @@ mod tests {
             let mut seen = Vec::new();
             holds(&tree, 0, &[], &mut seen);
             seen.sort_unstable();
+            seen.dedup();
             assert!(
                 seen.iter().copied().eq(0..count as u32),
                 "{count}: {seen:?}"
