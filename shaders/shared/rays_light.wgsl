@@ -52,7 +52,7 @@ fn water_above(p: vec3f) -> f32 {
         return select(0.0, max(sea.level - p.y, 0.0) * shading.sun_path, is_sea(p.xz));
     }
 #endif
-    return sun_path_at(p);
+    return sun_path_at(p, shading.sun_direction);
 }
 
 fn strongest(weight: vec3f) -> f32 {

@@ -2,8 +2,27 @@
 // whoever imports it.
 #import "shared/rays_water.wgsl"
 
-// Metres that sunlight has gone through water on its way to `p`: trilinear between the lattice's nodes.
-fn sun_path_at(p: vec3f) -> f32 {
+// Metres that light which came from `towards` has gone through water on its way to `p`; beyond the box as where it left the box.
+fn sun_path_at(p: vec3f, towards: vec3f) -> f32 {
+    let off = abs(p - clamp(p, vec3f(0.0), rays.size));
+    if max(off.x, max(off.y, off.z)) <= 0.5 * rays.voxel {
+        return sun_path_within(p);
+    }
+    // A direction without a part along an axis meets that axis's sides nowhere.
+    let along = select(towards, vec3f(1e-6), abs(towards) < vec3f(1e-6));
+    let low = -p / along;
+    let high = (rays.size - p) / along;
+    let first = min(low, high);
+    let last = max(low, high);
+    let start = max(max(first.x, max(first.y, first.z)), 0.0);
+    if start > min(last.x, min(last.y, last.z)) {
+        return 0.0;
+    }
+    return sun_path_within(p + along * start);
+}
+
+// The same within the box: trilinear between the lattice's nodes.
+fn sun_path_within(p: vec3f) -> f32 {
     let last = vec3f(rays.nodes - 1u);
     let at = clamp(p / rays.pitch, vec3f(0.0), last);
     let low = min(floor(at), max(last - 1.0, vec3f(0.0)));

@@ -90,6 +90,11 @@ fn trace(origin: vec3f, direction: vec3f, inside: bool, travelled: f32, reach: f
 #endif
     let end = min(min(span.y, opaque_one.t), reach);
     let surface = crossing(origin, direction, start, end, inside);
+    // Particles keep off solids, and so does their surface: water has no second side where it lies against one.
+    let gap = (opaque_one.t - surface.after) * abs(dot(opaque_one.normal, direction));
+    if inside && surface.after < FAR && opaque_one.kind == OPAQUE && gap < rays.gap {
+        return opaque_one;
+    }
     if surface.after < FAR {
         let p = origin + direction * surface.after;
         let towards = select(-direction, direction, inside);

@@ -18,9 +18,10 @@ struct Rays {
     pitch: f32,
     // Sides of the box at which a wall stands: bit 2 × axis, plus 1 for the greater end.
     walls: u32,
+    // Width of what is taken for water between it and something opaque, metres.
+    gap: f32,
     pad0: u32,
     pad1: u32,
-    pad2: u32,
     // Of the set's tree: least corner of its lattice, and the lattice's step, metres.
     set_low: vec3f,
     set_step: f32,

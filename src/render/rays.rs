@@ -22,6 +22,10 @@ use crate::{
 /// Sides of the box at which the look's quay walls stand: those along z.
 const QUAYS: u32 = 0b11_0000;
 
+/// Width in spacings of what is taken for water between it and something opaque: a particle that rests on a solid stands half a
+/// spacing off it.
+const GAP: f64 = 0.5;
+
 /// Particles for each brick that is planned for, of two voxels a spacing. The quickstart has one for 83 of them at its start and for 27 in its splash; a
 /// frame that has more makes room for them.
 const PARTICLES_A_BRICK: usize = 24;
@@ -54,6 +58,7 @@ pub(super) fn plan_rays(
         triangles: set.triangles.len() as u32,
         nodes,
         pitch: pitch as f32,
+        gap: (GAP * scene.particle_spacing) as f32,
         walls: look.spec().basin.as_ref().map_or(0, |_| QUAYS),
         ..Rays::default()
     };

@@ -229,9 +229,9 @@ mirror!(
         nodes: [u32; 3],
         pitch: f32,
         walls: u32,
+        gap: f32,
         pad0: u32,
         pad1: u32,
-        pad2: u32,
         set_low: [f32; 3],
         set_step: f32,
     }

@@ -105,6 +105,31 @@ fn pool_error(context: &Context, theta: f64, scattering: [f64; 3]) -> f64 {
     worst
 }
 
+/// White ground a long way behind a pool, as the sun sees it, has all of its light: the sun's way through the box leads over the water.
+#[test]
+fn the_pools_shadow_ends_where_light_comes_over_it() {
+    let eye = Eye::new([40.0, 6.0, 5.0], [34.0, 0.0, 5.0], 300.0);
+    let setup = Setup {
+        water: format!(
+            "index = {INDEX:?}\nabsorption_per_metre = {ABSORPTION:?}\nscattering_per_metre = {CLEAR:?}\n"
+        ),
+        sun: [180.0, 45.0, 0.0],
+        ..by_rays(eye)
+    };
+    let darkest = |context: &Context| {
+        let image = draw(context, &setup, &uniform_sky, &pool_scene(), &water(), 1);
+        (image.beauty.iter()).fold(f32::MAX, |least, pixel| least.min(pixel[2]))
+    };
+    let found = darkest(&context());
+    assert!((found - 1.0).abs() < 0.01, "{found}");
+    let control = darkest(&spoiled(
+        "rays/cast",
+        "<= 0.5 * rays.voxel",
+        "<= 1e9 * rays.voxel",
+    ));
+    assert!(control < 0.7, "{control}");
+}
+
 /// Absorption and refraction within 1 %.
 #[test]
 fn a_pool_over_a_white_floor_is_as_snell_fresnel_and_beer_say() {
@@ -342,6 +367,41 @@ fn an_edge_under_water_is_seen_where_snell_puts_it() {
     );
     let control = edge_error(&spoiled("rays/cast", from, to));
     assert!(control > 0.5, "{control} pixels");
+}
+
+/// Particles end 0.4 spacings before a wall that stands in the pool, as they do at solids: an eye under water sees the wall, and no
+/// sheet of air that mirrors.
+#[test]
+fn water_lies_against_a_wall_that_its_particles_keep_off() {
+    let wall = 6.1;
+    let (min, max) = (DVec3::new(wall, 0.0, 0.0), DVec3::new(7.0, 4.0, SIDE));
+    let scene = RenderScene {
+        solids: vec![box_mesh(Bounds { min, max })],
+        ..pool_scene()
+    };
+    let all = water();
+    let kept: Vec<[f32; 3]> = (all.position.into_iter()).filter(|p| p[0] < 6.0).collect();
+    let before = Particles {
+        velocity: vec![[0.0; 3]; kept.len()],
+        id: (0..kept.len() as u32).collect(),
+        position: kept,
+        ..Particles::default()
+    };
+    // 60° from the wall's normal: beyond 48.6° water under air mirrors.
+    let eye = Eye::new(
+        [4.0, 1.0, 3.0],
+        [wall, 1.0, 3.0 + 2.1 * 3.0f64.sqrt()],
+        300.0,
+    );
+    let off = |context: &Context| {
+        let image = draw(context, &by_rays(eye), &uniform_sky, &scene, &before, 1);
+        let p = image.aovs.p.as_ref().unwrap();
+        (p.iter()).fold(0.0f64, |most, p| most.max((f64::from(p[0]) - wall).abs()))
+    };
+    // The plane of the wall in f32, ten metres from the origin.
+    assert!(off(&context()) < 1e-5, "{}", off(&context()));
+    let control = off(&spoiled("rays/aovs", "gap < rays.gap", "gap < 0.0"));
+    assert!(control > 0.05, "{control}");
 }
 
 /// Channels of a pool that flows at 3 m/s: depth, normal, place and motion of its level surface, and the water on the straight line
