@@ -1,4 +1,4 @@
-//! A frame of a cache: what is read could be written.
+//! A frame of a cache, plain or compressed: what is read could be written.
 #![no_main]
 
 use std::path::Path;
@@ -7,7 +7,10 @@ use libfuzzer_sys::fuzz_target;
 use swell::cache::frame;
 
 fuzz_target!(|bytes: &[u8]| {
-    if let Ok(particles) = frame::decode(bytes, Path::new("frame")) {
+    let plain = frame::decode(bytes, Path::new("frame")).ok();
+    let packed = frame::planes::decode(bytes, Path::new("frame")).ok();
+    let planes = frame::planes::read(bytes).ok();
+    for particles in [plain, packed, planes].into_iter().flatten() {
         frame::check(&particles).expect("what was read fits a frame");
     }
 });

@@ -130,7 +130,7 @@ pub(super) fn clear_leftovers(
         let folder = dir.join(stream.folder);
         for name in disk::names(&folder)? {
             let is_behind = frame_of(&name).is_some_and(|frame| {
-                let file = stream.frame_file(&manifest.shot, frame);
+                let file = stream.frame_file(manifest, frame);
                 let is_ours = stream.is_by_frame() && Path::new(&file).ends_with(&name);
                 let stays = stream.name != PARTICLES || manifest.has_particles(frame, last);
                 is_ours && (frame > last || !stays)
@@ -145,8 +145,8 @@ pub(super) fn clear_leftovers(
     Ok(())
 }
 
-/// The number in `NAME.0001.EXTENSION`.
+/// The number in `NAME.0001.EXTENSION`, compressed or not.
 fn frame_of(name: &str) -> Option<u32> {
-    let (stem, _) = name.rsplit_once('.')?;
+    let (stem, _) = name.strip_suffix(".zst").unwrap_or(name).rsplit_once('.')?;
     stem.rsplit_once('.')?.1.parse().ok()
 }

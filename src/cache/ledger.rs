@@ -173,7 +173,7 @@ impl Entry {
         }
         let announced = |stream: &&Stream| stream.is_by_frame() && stream.is_in(manifest);
         for stream in STREAMS.iter().filter(announced) {
-            let expected = stream.frame_file(&manifest.shot, frame);
+            let expected = stream.frame_file(manifest, frame);
             if self.file(stream.name).map(|record| &record.file) != Some(&expected) {
                 return Some(format!("its {} are not {expected}", stream.name));
             }

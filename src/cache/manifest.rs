@@ -12,7 +12,7 @@ use super::frame::Stamp;
 use super::grids::GridRecord;
 use super::probes::ProbeRecord;
 use super::record::{FileRecord, is_file_stem, is_relative};
-use crate::domain::keep::Keep;
+use crate::domain::keep::{Compression, Keep};
 
 /// File name of the manifest.
 pub(super) const FILE: &str = "manifest.json";
@@ -69,6 +69,9 @@ pub struct Manifest {
     /// Of which frames the particles stay; absent where those of all do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keep: Option<Keep>,
+    /// How frames are compressed; absent where they are plain PLY.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compression: Option<Compression>,
     /// Probes, which measure each frame; absent where the scene has no probe.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub probes: Vec<ProbeRecord>,
@@ -125,7 +128,7 @@ fn is_zero(origin: &[f64; 3]) -> bool {
 
 /// Fields that a resumed bake must have in common with the cache, the most telling first. The scene's hash
 /// comes last: it differs where any of the fields above it that a scene sets does.
-const COMPARED: [&str; 15] = [
+const COMPARED: [&str; 16] = [
     "program",
     "program_version",
     "shaders",
@@ -140,6 +143,7 @@ const COMPARED: [&str; 15] = [
     "attributes",
     "grids",
     "keep",
+    "compression",
     "scene_hash",
 ];
 

@@ -15,6 +15,7 @@ use super::record::FileRecord;
 use super::stream::{self, OF_PARTICLES};
 use super::tables;
 use super::vdb::{self, Grids};
+use crate::domain::keep::Compression;
 use crate::domain::particles::Particles;
 
 /// An open cache: its manifest, its ledger, its scene and the scene's files, all checked; the frames are checked as they
@@ -328,7 +329,7 @@ impl CacheReader {
             .filter_map(|record| self.problem(record))
             .collect();
         if !frames.is_empty() && self.gone_on(newest).is_some() {
-            let file = OF_PARTICLES.frame_file(&self.manifest.shot, newest);
+            let file = OF_PARTICLES.frame_file(&self.manifest, newest);
             frames.retain(|problem| problem.file != self.dir.join(&file));
         }
         problems.extend(frames);
@@ -396,7 +397,10 @@ pub(super) fn read_frame(
     let record = particles_record(dir, entry)?;
     let path = dir.join(&record.file);
     let bytes = record.read(dir)?;
-    let mut particles = frame::decode(&bytes, &path)?;
+    let mut particles = match manifest.compression {
+        Some(Compression::Zstd) => frame::planes::decode(&bytes, &path)?,
+        None => frame::decode(&bytes, &path)?,
+    };
     particles.walls = entry.clock.walls;
     if particles.len() as u64 != entry.particles {
         return Err(CacheError::damaged(

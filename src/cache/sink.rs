@@ -95,7 +95,7 @@ impl Sink {
         let mut files = Files::new();
         for stream in Stream::all(manifest) {
             if let Layout::FileAFrame(encode) = stream.layout {
-                let file = stream.frame_file(&manifest.shot, clock.frame);
+                let file = stream.frame_file(manifest, clock.frame);
                 let written = disk::write_whole(&self.dir.join(&file), |out| {
                     encode(out, manifest, &stamp, particles)
                 })?;
@@ -129,7 +129,7 @@ impl Sink {
         let manifest = &self.manifest;
         match newest.checked_sub(1) {
             Some(before) if !manifest.keeps(before) => {
-                let file = OF_PARTICLES.frame_file(&manifest.shot, before);
+                let file = OF_PARTICLES.frame_file(manifest, before);
                 disk::remove(&self.dir.join(file))
             }
             _ => Ok(()),

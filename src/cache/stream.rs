@@ -3,11 +3,12 @@
 
 use std::io::{self, Write};
 
-use super::frame::{self, Stamp, Written};
+use super::frame::{self, Stamp, Written, planes};
 use super::grids::GridRecord;
 use super::manifest::Manifest;
 use super::probes::ProbeRecord;
 use super::vdb;
+use crate::domain::keep::Compression;
 use crate::domain::particles::Particles;
 
 /// Name of the stream that every cache has: a frame's particles, from which a bake goes on.
@@ -27,9 +28,7 @@ pub static STREAMS: [Stream; 3] = [
         folder: "frames",
         extension: "ply",
         content: Content::Particles,
-        layout: Layout::FileAFrame(|mut out, _, stamp, particles| {
-            frame::encode(&mut out, stamp, particles)
-        }),
+        layout: Layout::FileAFrame(encode_particles),
         part: "field",
         parts: |_| vec!["position", "velocity"],
     },
@@ -123,9 +122,15 @@ impl Stream {
         lone.map(|name| format!("{} {name}", self.part)).collect()
     }
 
-    /// Path of a frame's file from the cache's folder, with `/`: `frames/wave-city.0001.ply`.
-    pub fn frame_file(&self, shot: &str, frame: u32) -> String {
-        format!("{}/{shot}.{frame:04}.{}", self.folder, self.extension)
+    /// Path of a frame's file from the cache's folder, with `/`: `frames/wave-city.0001.ply`, `….ply.zst` where this
+    /// manifest has frames compressed.
+    pub fn frame_file(&self, manifest: &Manifest, frame: u32) -> String {
+        let packed = match (self.content, manifest.compression) {
+            (Content::Particles, Some(Compression::Zstd)) => ".zst",
+            _ => "",
+        };
+        let (folder, shot, extension) = (self.folder, &manifest.shot, self.extension);
+        format!("{folder}/{shot}.{frame:04}.{extension}{packed}")
     }
 
     /// Path of a table's file from the cache's folder, with `/`: `probes/gauge.csv`.
@@ -139,6 +144,18 @@ impl Stream {
             Layout::FileAFrame(_) => &[],
             Layout::RowAFrame(tables) => tables(manifest),
         }
+    }
+}
+
+fn encode_particles(
+    mut out: &mut dyn Write,
+    manifest: &Manifest,
+    stamp: &Stamp<'_>,
+    particles: &Particles,
+) -> io::Result<Written> {
+    match manifest.compression {
+        Some(Compression::Zstd) => planes::encode(&mut out, stamp, particles),
+        None => frame::encode(&mut out, stamp, particles),
     }
 }
 
@@ -161,6 +178,8 @@ fn encode_grids(
 mod tests {
     use std::collections::BTreeSet;
 
+    use serde_json::{Value, json};
+
     use super::*;
 
     /// Two streams in one folder would clear each other's files on resume.
@@ -181,8 +200,9 @@ mod tests {
 
     #[test]
     fn names_of_files_are_those_that_scenes_and_scripts_know() {
+        let plain = manifest("wave-city", json!(null));
         let files = STREAMS.each_ref().map(|stream| match stream.layout {
-            Layout::FileAFrame(_) => stream.frame_file("wave-city", 7),
+            Layout::FileAFrame(_) => stream.frame_file(&plain, 7),
             Layout::RowAFrame(_) => stream.table_file("gauge"),
         });
         assert_eq!(
@@ -193,14 +213,26 @@ mod tests {
                 "probes/gauge.csv"
             ]
         );
-        let wide = [1, 9999, 10_000].map(|frame| STREAMS[0].frame_file("a", frame));
+        let packed = manifest("a", json!("zstd"));
+        let wide = [1, 9999, 10_000].map(|frame| STREAMS[0].frame_file(&packed, frame));
         assert_eq!(
             wide,
             [
-                "frames/a.0001.ply",
-                "frames/a.9999.ply",
-                "frames/a.10000.ply"
+                "frames/a.0001.ply.zst",
+                "frames/a.9999.ply.zst",
+                "frames/a.10000.ply.zst"
             ]
         );
+        assert_eq!(STREAMS[1].frame_file(&packed, 1), "grids/a.0001.vdb");
+    }
+
+    fn manifest(shot: &str, compression: Value) -> Manifest {
+        serde_json::from_value(json!({
+            "format_version": Manifest::FORMAT_VERSION, "program": "swell", "program_version": "0", "shot": shot,
+            "scene_hash": "", "solver": "pbf", "device": "", "driver": "", "backend": "", "frames_per_second": 24.0,
+            "particle_spacing": 0.1, "rest_density": 1000.0, "attributes": [], "start_particles": 0, "files": [],
+            "compression": compression,
+        }))
+        .unwrap()
     }
 }

@@ -332,6 +332,9 @@ fn show_cache(out: &mut String, manifest: &Manifest, entries: &[Entry]) -> fmt::
             "keeps particles: \"{keep}\", and the first and newest frame's"
         )?;
     }
+    if manifest.compression.is_some() {
+        writeln!(out, "frames compressed by Zstandard")?;
+    }
     if manifest.origin != [0.0; 3] {
         writeln!(out, "solved about the origin {:?} m", manifest.origin)?;
     }

@@ -1,8 +1,16 @@
-//! Of which frames a bake keeps the particles.
+//! Of which frames a bake keeps the particles, and how.
 
 use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
+
+/// How frames are compressed, without loss.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Compression {
+    /// Zstandard (RFC 8878), of the bytes of all particles' rows by their place in the row.
+    Zstd,
+}
 
 /// Frames whose particles stay on the disk. A cache also has those of its first frame, and of its newest, with which a bake
 /// goes on; the newest one's go once the next frame is whole on the disk.

@@ -97,7 +97,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         Some(table) => Some(grids::build(doc, table, &domain, &solver)?),
         None => None,
     };
-    let keep = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
+    let kept = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
     let moves = |solid: &MeshSpec| solid.direction.is_some() && solid.motion.is_some();
     let is_moving: Vec<bool> = spec.solid.iter().map(moves).collect();
     let around = probe::Around {
@@ -134,7 +134,8 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         drains,
         solver,
         grids,
-        keep,
+        keep: kept.map(|it| it.particles),
+        compression: kept.and_then(|it| it.compression),
         probes,
         budget,
         effects: spec.effects,

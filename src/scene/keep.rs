@@ -1,19 +1,61 @@
-//! `[keep]`: what of a bake stays on the disk.
+//! `[keep]`: what of a bake stays on the disk, and how.
 
 use serde::Deserialize;
 
 use super::{document::Document, error::SceneError};
-use crate::domain::keep::Keep;
+use crate::domain::keep::{Compression, Keep};
+
+/// Names of `compression`.
+pub(super) const COMPRESSIONS: [&str; 2] = ["none", "zstd"];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct KeepSpec {
+    #[serde(default = "all")]
     particles: String,
+    #[serde(default)]
+    compression: CompressionSpec,
+}
+
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum CompressionSpec {
+    #[default]
+    None,
+    Zstd,
+}
+
+fn all() -> String {
+    Keep::All.to_string()
+}
+
+/// The table, checked.
+#[derive(Clone, Copy)]
+pub(super) struct Kept {
+    pub(super) particles: Keep,
+    pub(super) compression: Option<Compression>,
 }
 
 /// Builds the table.
-pub(super) fn build(doc: &Document<'_>, spec: &KeepSpec) -> Result<Keep, SceneError> {
+pub(super) fn build(doc: &Document<'_>, spec: &KeepSpec) -> Result<Kept, SceneError> {
     let text = &spec.particles;
-    text.parse()
-        .map_err(|error| doc.fault_of("keep.particles", format!("{text:?}: {error}")))
+    let particles = text
+        .parse()
+        .map_err(|error| doc.fault_of("keep.particles", format!("{text:?}: {error}")))?;
+    let compression = match spec.compression {
+        CompressionSpec::None => None,
+        CompressionSpec::Zstd => Some(Compression::Zstd),
+    };
+    Ok(Kept {
+        particles,
+        compression,
+    })
+}
+
+/// What a scene writes for `compression`.
+pub(super) fn name(compression: Option<Compression>) -> &'static str {
+    match compression {
+        None => "none",
+        Some(Compression::Zstd) => "zstd",
+    }
 }

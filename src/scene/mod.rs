@@ -50,7 +50,7 @@ use crate::domain::{
     answer::Answers,
     bounds::Bounds,
     holes::Holes,
-    keep::Keep,
+    keep::{Compression, Keep},
     mesh::TriangleMesh,
     motion::Motion,
     sources::{Drain, Emitter},
@@ -98,6 +98,8 @@ pub struct Scene {
     pub grids: Option<grids::Grids>,
     /// Of which frames the particles stay on the disk; all where the scene does not say it.
     pub keep: Option<Keep>,
+    /// How frames are compressed; `None` leaves them plain PLY.
+    pub compression: Option<Compression>,
     /// What is measured at each frame; most scenes have none.
     pub probes: Vec<probe::Probe>,
     /// What the bake is held to.

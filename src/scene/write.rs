@@ -9,6 +9,7 @@ use toml::{Table, Value};
 use super::{
     Budget, Iteration, Pbf, PlacedMesh, Scene, Stop,
     axis::Axis,
+    keep,
     key::{Key, Kind},
     keys,
     probe::{Probe, ProbeKind},
@@ -131,11 +132,12 @@ impl Scene {
         if let Some(grids) = &self.grids {
             scene.insert("grids".to_owned(), value(grids));
         }
-        if let Some(keep) = &self.keep {
-            scene.insert(
-                "keep".to_owned(),
-                Value::Table(table([("particles", value(keep))])),
-            );
+        if let Some(particles) = &self.keep {
+            let kept = table([
+                ("particles", value(particles)),
+                ("compression", value(&keep::name(self.compression))),
+            ]);
+            scene.insert("keep".to_owned(), Value::Table(kept));
         }
         let probes = self.probes.iter().map(|it| probe(it, self));
         insert_tables(&mut scene, "probe", probes);

@@ -485,6 +485,7 @@ fn open_cache(
         attributes: start.particles.attributes.keys().cloned().collect(),
         grids: scene.grids.map(|grids| grid_record(scene, &grids)),
         keep: scene.keep.filter(|keep| *keep != Keep::All),
+        compression: scene.compression,
         probes: probes::records(scene),
         parent: parent.clone(),
         warnings: scene.warnings(),

@@ -9,6 +9,7 @@ use super::super::{
     budget,
     build::{CHEBYSHEV_RELAXATION, RELAXATION},
     flip::{self, Preconditioner, Surface, Transfer},
+    keep,
     key::{Interval, Key, words},
     no_slip,
     probe::{self, ProbeKind},
@@ -435,13 +436,21 @@ const GRIDS: &[Key] = &[
         .about("how values are kept"),
 ];
 
-const KEEP: &[Key] = &[Key::text(
-    "particles",
-    "\"all\", \"every N\" with N from 1 to 1000000, or \"none\"",
-)
-.about(
-    "frames whose particles stay; the first and the newest are always there, so that a bake can go on",
-)];
+const KEEP: &[Key] = &[
+    Key::text(
+        "particles",
+        "\"all\", \"every N\" with N from 1 to 1000000, or \"none\"",
+    )
+    .default("\"all\"")
+    .about(
+        "frames whose particles stay; the first and the newest are always there, so that a bake can go on",
+    ),
+    Key::choice("compression", &keep::COMPRESSIONS)
+        .default("\"none\"")
+        .about(
+            "of frames, without loss: zstd makes .ply.zst, which swell and its Python package read, and nothing else",
+        ),
+];
 
 const PROBES: [&str; 8] = ProbeKind::NAMES;
 

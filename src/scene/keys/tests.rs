@@ -80,7 +80,7 @@ fn plain(path: &str, value: &Value) -> Value {
 #[test]
 fn what_is_left_out_is_the_default_of_the_table() {
     let chebyshev = load(&["solver.pbf.iteration=chebyshev"]).written(&|_, _| "a.obj".to_owned());
-    let written = load(&[]).written(&|_, _| "a.obj".to_owned());
+    let written = load(&["keep={}"]).written(&|_, _| "a.obj".to_owned());
     let zone = "effects.generation_zone={walls=[\"-x\"],length=1.0,waves={kind=\"sea\",significant_height=0.1,peak_period=3.0,depth=1.0}}";
     let drag = "effects.drag={drop_radius=0.001}";
     let sea = load(&[SEA, "wave_maker.0.wall=+x", zone, drag]).written(&|_, _| "a.obj".to_owned());

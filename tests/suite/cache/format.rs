@@ -408,7 +408,7 @@ fn every_stream_of_the_table_is_verified_and_resumed() {
             let refused = CacheWriter::resume(d, &manifest_of_all_streams());
             assert_eq!(damaged_file(refused), path);
             fs::write(&path, sound).unwrap();
-            let of_3 = d.join(stream.frame_file("tank", 3));
+            let of_3 = d.join(stream.frame_file(&manifest_of_all_streams(), 3));
             fs::write(of_3, "a frame without a line").unwrap();
         }
         fs::write(folder.join("half.tmp"), "half").unwrap();

@@ -259,3 +259,34 @@ fn a_keep_that_nothing_could_go_on_from_is_named_with_its_line() {
         fs::remove_dir_all(job.path("cache")).unwrap();
     }
 }
+
+/// The program: compressed frames are the plain ones, to every command, and to a bake that goes on from one.
+#[test]
+fn compressed_frames_are_the_plain_ones() {
+    let job = Job::new();
+    let bake = "bake small.toml --device cpu --frames 1-4 -o";
+    job.expect(0, &format!("{bake} plain"));
+    job.edit(
+        "small.toml",
+        "[effects]",
+        "[keep]\ncompression = \"zstd\"\n\n[effects]",
+    );
+    job.expect(0, &format!("{bake} packed"));
+    job.expect(0, "bake small.toml --device cpu --frames 1-2 -o parts");
+    job.expect(0, &format!("{bake} parts --resume"));
+    assert_eq!(job.hash("parts"), job.hash("packed"));
+    job.expect(0, "verify packed");
+    job.expect(0, "diff plain packed");
+    let said = job.expect(0, "inspect packed");
+    assert_has(&said, &["frames compressed by Zstandard"]);
+
+    let file = |cache: &str, end: &str| job.path(cache).join(format!("frames/small.0004.{end}"));
+    let size = |path: PathBuf| fs::metadata(path).unwrap().len();
+    assert!(size(file("packed", "ply.zst")) < size(file("plain", "ply")));
+    fs::copy(
+        job.path("packed/frames/small.0003.ply.zst"),
+        file("packed", "ply.zst"),
+    )
+    .unwrap();
+    job.expect(4, "verify packed");
+}

@@ -276,6 +276,7 @@ fn manifest(grids: Option<GridRecord>) -> Manifest {
         attributes: Vec::new(),
         grids,
         keep: None,
+        compression: None,
         probes: Vec::new(),
         parent: None,
         warnings: Vec::new(),

@@ -34,6 +34,7 @@ pub fn manifest() -> Manifest {
         origin: [0.0; 3],
         grids: None,
         keep: None,
+        compression: None,
         probes: probes(),
         parent: None,
         warnings: Vec::new(),

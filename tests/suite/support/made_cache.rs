@@ -145,6 +145,7 @@ pub fn write_cache(path: &Path, made: &Made<'_>) {
         rest_density: 1000.0,
         origin: [0.0; 3],
         keep: None,
+        compression: None,
         grids: made.grids.clone(),
         probes: made.probes.clone(),
         attributes: Vec::new(),

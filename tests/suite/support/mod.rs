@@ -79,6 +79,7 @@ pub fn scene(size: [f64; 3]) -> Scene {
         },
         grids: None,
         keep: None,
+        compression: None,
         probes: Vec::new(),
         budget: Budget::default(),
         effects: Effects::default(),

@@ -89,7 +89,8 @@ def swell_bin() -> Swell:
 
 @pytest.fixture(scope="session")
 def baked(swell_bin: Swell, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Caches: `pbf` with a stream of whitewater, `flip` with APIC's rows, `kept` with every fourth frame, `far` from the origin."""
+    """Caches: `pbf` with a stream of whitewater, `flip` with APIC's rows, `kept` with every fourth frame, `far` from the origin, `packed` by
+    Zstandard."""
     room = tmp_path_factory.mktemp("baked")
 
     def bake(name: str, *arguments: object, x: float = 0.0, more: str = "") -> None:
@@ -103,6 +104,7 @@ def baked(swell_bin: Swell, tmp_path_factory: pytest.TempPathFactory) -> Path:
     bake("flip", "--solver", "flip")
     bake("kept", more='[keep]\nparticles = "every 4"')
     bake("far", x=8192.0)
+    bake("packed", more='[keep]\ncompression = "zstd"')
     swell_bin("whitewater", room / "pbf", "--progress", "none")
     swell_bin("bake", room / "pbf.toml", "--from", f"{room / 'pbf'}:3", "-o", room / "branch", "--progress", "none")
     return room

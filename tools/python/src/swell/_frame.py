@@ -1,7 +1,8 @@
-"""A frame: a binary PLY file, mapped into memory."""
+"""A frame: a binary PLY file, mapped into memory; compressed ones are unpacked."""
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,13 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._errors import Damaged
+from ._errors import CacheError, Damaged
 from ._files import Content, FileRecord
 from ._ledger import Record
 
 _HEADER_LIMIT = 1 << 16
 _SCALARS = {"float": "<f4", "double": "<f8", "uint": "<u4"}
 _FIXED = ["x", "y", "z", "vx", "vy", "vz", "id"]
+_PACKED = ".zst"
+_PLANES = "comment planes "
 
 
 class Frame:
@@ -35,7 +38,9 @@ class Frame:
         content = file.map(folder)
         if check:
             file.check_digest(folder, content)
-        self._rows = _parse(content, self.path)
+        if file.file.endswith(_PACKED):
+            content = _decompress(content, self.path)
+        self._rows = _parse(content, self.path, file.file.endswith(_PACKED))
         if len(self._rows) != record.particles:
             raise Damaged(self.path, f"{len(self._rows)} particles, and the ledger has {record.particles}")
         if list(self.attributes) != attributes:
@@ -105,7 +110,34 @@ class Frame:
         self._file.check(self._folder)
 
 
-def _parse(content: Content, path: Path) -> NDArray[np.void]:
+def _decompress(content: Content, path: Path) -> bytes:
+    """Zstandard by Python's own module (3.14), or by the package zstandard."""
+    try:
+        module = importlib.import_module("compression.zstd")
+        unpack, fault = module.decompress, module.ZstdError
+    except ImportError:
+        try:
+            module = importlib.import_module("zstandard")
+        except ImportError as error:
+            raise CacheError(path, "it is compressed, which takes Python 3.14 or the package zstandard: pip install swell[zstd]") from error
+        unpack, fault = module.ZstdDecompressor().decompress, module.ZstdError
+    try:
+        return bytes(unpack(content))
+    except fault as error:
+        raise Damaged(path, f"Zstandard: {error}") from error
+
+
+def _rows_of_planes(body: memoryview, size: int, block: int) -> bytes:
+    """Rows of `size` bytes from blocks of byte planes, `block` rows each but the last."""
+    rows = np.empty((len(body) // size, size), dtype=np.uint8)
+    for first in range(0, len(rows), block):
+        part = rows[first : first + block]
+        start = first * size
+        part[:] = np.frombuffer(body, np.uint8, part.size, start).reshape(size, len(part)).T
+    return rows.tobytes()
+
+
+def _parse(content: Content, path: Path, is_packed: bool) -> NDArray[np.void]:
     head = content[:_HEADER_LIMIT]
     end = head.find(b"end_header\n")
     if not head.startswith(b"ply\n") or end < 0:
@@ -114,6 +146,9 @@ def _parse(content: Content, path: Path) -> NDArray[np.void]:
     lines = head[:end].decode("ascii", "replace").splitlines()
     if lines[1:2] != ["format binary_little_endian 1.0"]:
         raise Damaged(path, "not binary little-endian PLY 1.0")
+    planes = [line.removeprefix(_PLANES) for line in lines if line.startswith(_PLANES)]
+    if [block.isdecimal() and int(block) > 0 for block in planes] != [True] * is_packed:
+        raise Damaged(path, "its PLY header is not one of swell's")
     words = [line.split(" ") for line in lines[2:] if not line.startswith("comment ")]
     try:
         [element, *properties] = words
@@ -126,6 +161,8 @@ def _parse(content: Content, path: Path) -> NDArray[np.void]:
     dtype = _row(kinds)
     if len(content) - start != count * dtype.itemsize:
         raise Damaged(path, f"its header promises {count} particles of {dtype.itemsize} bytes, and {len(content) - start} bytes follow")
+    if is_packed:
+        content, start = _rows_of_planes(memoryview(content)[start:], dtype.itemsize, int(planes[0])), 0
     return np.frombuffer(content, dtype=dtype, count=count, offset=start)
 
 

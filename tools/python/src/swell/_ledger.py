@@ -133,7 +133,8 @@ def _parse_line(path: Path, number: int, line: bytes, manifest: dict[str, Any]) 
     frame = first_frame(manifest) + number - 1
     if record.frame != frame or record.clock.get("frame") != frame:
         raise Damaged(path, f"line {number}: it is not frame {frame}")
-    expected = f"frames/{manifest['shot']}.{frame:04}.ply"
+    packed = ".zst" if manifest.get("compression") == "zstd" else ""
+    expected = f"frames/{manifest['shot']}.{frame:04}.ply{packed}"
     if PARTICLES not in record.files or record.files[PARTICLES].file != expected:
         raise Damaged(path, f"line {number}: its particles are not {expected}")
     if len(record.rows.get(PROBES, [])) != len(manifest.get("probes", [])):
