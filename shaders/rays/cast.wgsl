@@ -70,6 +70,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let ray = eye_ray(camera, vec2f(pixel) + 0.5);
     let direction = normalize(world_direction(camera, ray));
     let inside = is_wet(camera.position);
+    own_place = hash2(vec2i(vec2f(pixel) - camera.corner) + vec2i(7919 * i32(camera.sample_index), 0));
 #ifdef VOLUME
     // What the ray meets first is known; in air it is taken up a little before.
     let known = first_depth[pixel.y * camera.size.x + pixel.x];

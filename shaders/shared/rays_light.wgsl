@@ -25,6 +25,10 @@ const LEAST_LATER_BRANCH: f32 = 0.1;
 // Parts of a way through water in which it scatters.
 const PARTS: i32 = 4;
 
+// Where in a part the sun is looked for, from 0 to 1: a pixel's and a sample's own, so that the edge of a shadow in water is spread over
+// the part and not seen once for each.
+var<private> own_place: f32;
+
 struct Ray {
     origin: vec3f,
     inside: bool,
@@ -84,7 +88,7 @@ fn scattered(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
         let part = f32(k) / f32(PARTS);
         let end = length * part * part;
         let after = water_above(origin + direction * end);
-        let seen = sunlit(origin + direction * 0.5 * (start + end), up);
+        let seen = sunlit(origin + direction * mix(start, end, own_place), up);
         light += sun * seen * gathered(extinction, start, end, before, after);
         light += sky * gathered(extinction, start, end, before / shading.sun_path, after / shading.sun_path);
         start = end;

@@ -404,6 +404,52 @@ fn water_lies_against_a_wall_that_its_particles_keep_off() {
     assert!(control > 0.05, "{control}");
 }
 
+/// A slab over milky water, in the sun alone: seen along its shadow the water darkens from column to column, without a step at each place
+/// where the way through it is looked at.
+#[test]
+fn a_shadow_in_water_has_no_edge_but_its_own() {
+    let (min, max) = (DVec3::new(4.0, 4.0, 5.0), DVec3::new(8.0, 4.2, 10.0));
+    let scene = RenderScene {
+        solids: vec![box_mesh(Bounds { min, max })],
+        ..pool_scene()
+    };
+    let eye = Eye::new([1.0, 1.0, 4.0], [9.0, 1.0, 6.0], 120.0);
+    let setup = Setup {
+        water: format!(
+            "index = {INDEX:?}\nabsorption_per_metre = [0.02, 0.02, 0.02]\nscattering_per_metre = [0.1, 0.1, 0.1]\n"
+        ),
+        sun: [0.0, 90.0, 1.0],
+        samples: 4,
+        ground: [0.0; 3],
+        solids: [0.0; 3],
+        ..by_rays(eye)
+    };
+    let steepest = |context: &Context| {
+        let image = draw(context, &setup, &|_, _| [0.0; 3], &scene, &water(), 1);
+        // Of the middle rows, whose rays meet neither the floor nor the surface before the pool's side.
+        let columns: Vec<f64> = (0..64)
+            .map(|x| {
+                (24..40)
+                    .map(|y| f64::from(image.beauty[64 * y + x][0]))
+                    .sum()
+            })
+            .collect();
+        let steps = columns.windows(2).map(|w| (w[1] - w[0]).abs());
+        let span = columns.iter().fold(0.0, |most: f64, c| most.max(*c))
+            - columns.iter().fold(f64::MAX, |least, c| least.min(*c));
+        steps.fold(0.0, f64::max) / span
+    };
+    let found = steepest(&context());
+    let control = steepest(&spoiled(
+        "rays/cast",
+        "mix(start, end, own_place)",
+        "0.5 * (start + end)",
+    ));
+    // The longest of the four parts is 7/16 of the way, and one step where it is looked at in one place; 64 looks a column in each part
+    // leave 1/8 of that, and the shadow's own edge is as steep.
+    assert!(found < 0.3 && control > 7.0 / 16.0, "{found}, {control}");
+}
+
 /// Channels of a pool that flows at 3 m/s: depth, normal, place and motion of its level surface, and the water on the straight line
 /// down to the floor, in shares of what they have to be.
 fn channel_error(context: &Context) -> f64 {
