@@ -1,10 +1,10 @@
 //! Time per output frame and per pass of FLIP in a collapsing dam.
 //!
-//! `tools/bench flip [--adapter NAME | --device cpu] [--frames N] [--box XxYxZ] [--set "KEY = VALUE"] [--twice]`; the
+//! `tools/bench flip [--adapter NAME | --device cpu] [--frames N] [--box XxYxZ] [--set "KEY = VALUE"] [--twice] [--json]`; the
 //! CPU has the f64 reference, of which the passes' times are wall clock. The box has
 //! 128×77×64 cells of 0.1 m where left out, and 36×49×64 of them hold 903 168 particles, already under way. Frames
 //! are a sixtieth of a second. The first two warm up; medians of the rest. `--set` adds to `[solver.flip]`, and
-//! `--twice` doubles the height of the box twice, and compares.
+//! `--twice` doubles the height of the box twice, and compares. `--json` prints one line, for programs, and leaves the passes out.
 #![allow(missing_docs, reason = "a program")]
 
 use std::{path::Path, time::Instant};
@@ -30,6 +30,7 @@ struct Options {
     cells: [f64; 3],
     settings: String,
     is_twice: bool,
+    is_json: bool,
 }
 
 fn options() -> Result<Options, String> {
@@ -40,6 +41,7 @@ fn options() -> Result<Options, String> {
         cells: [128.0, 77.0, 64.0],
         settings: String::new(),
         is_twice: false,
+        is_json: false,
     };
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
@@ -55,6 +57,7 @@ fn options() -> Result<Options, String> {
             }
             "--box" => options.cells = cells(&value()?)?,
             "--set" => options.settings += &format!("{}\n", value()?),
+            "--json" => options.is_json = true,
             "--twice" => options.is_twice = true,
             // Cargo's own.
             "--bench" => {}
@@ -178,10 +181,40 @@ fn measure_passes(context: &Context, options: &Options) -> Result<(), Box<dyn st
     Ok(())
 }
 
+/// Times each frame, and prints one line of JSON.
+fn print_line<S: Solver>(
+    mut solver: S,
+    device: &str,
+    start: &Start,
+    frames: usize,
+) -> Result<(), Box<dyn std::error::Error>>
+where
+    S::Error: std::error::Error + 'static,
+{
+    solver.load(0, &start.particles)?;
+    let (mut seconds, mut substeps) = (Vec::new(), 0);
+    for frame in 0..frames + WARM_UP {
+        let begin = Instant::now();
+        let (_, report) = solver.advance()?;
+        if frame >= WARM_UP {
+            seconds.push(begin.elapsed().as_secs_f64());
+            substeps += report.substeps;
+        }
+    }
+    let line = serde_json::json!({
+        "device": device, "particles": start.particles.len(), "seconds": seconds, "substeps": substeps,
+    });
+    println!("{line}");
+    Ok(())
+}
+
 /// Of the f64 reference: µs a particle and substep, and where they go.
 fn measure_reference(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
     let (scene, start) = dam(options, 1.0)?;
     let mut solver = Reference::new(&scene, &start.boundary);
+    if options.is_json {
+        return print_line(solver, "CPU f64 reference", &start, options.frames);
+    }
     solver.load(0, &start.particles)?;
     let (mut substeps, mut iterations) = (0, 0);
     let begin = Instant::now();
@@ -222,10 +255,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return measure_reference(&options);
     }
     let context = Context::open(options.adapter.as_deref())?;
-    println!(
-        "{} ({} {})",
-        context.info.name, context.info.driver, context.info.driver_info
-    );
+    let info = &context.info;
+    let device = format!("{} ({} {})", info.name, info.driver, info.driver_info);
+    if options.is_json {
+        let (scene, start) = dam(&options, 1.0)?;
+        let plan = start.plan(&scene, device_limits(&context));
+        let solver = Flip::new(&context, &scene, plan, &start.boundary, false)?;
+        return print_line(solver, &device, &start, options.frames);
+    }
+    println!("{device}");
     let heights: &[f64] = if options.is_twice {
         &[1.0, 4.0]
     } else {

@@ -1,7 +1,8 @@
 //! Time per pass and per particle-step, and bytes per particle, of PBF in a collapsing dam.
 //!
-//! `tools/bench pbf [--device cpu] [--adapter NAME] [--frames N] [--alone] [COUNT ...]`; `cpu` is the f64 reference; counts are
-//! 60 000, 250 000 and 1 000 000 where left out. A step is all in: projection on the grid (`--alone`: without), sort, neighbour lists,
+//! `tools/bench pbf [--device cpu] [--adapter NAME] [--frames N] [--rate HZ] [--alone] [--json] [COUNT ...]`; `cpu` is the f64
+//! reference; counts are 60 000, 250 000 and 1 000 000 where left out. With `--rate` a frame is one step of 1/HZ s. `--json` prints
+//! a line for each count, for programs, and leaves the passes out. A step is all in: projection on the grid (`--alone`: without), sort, neighbour lists,
 //! 4 red/black iterations, and the frame's share of measuring density and reading the state back. h = 2d, no effects, no solids. The first two frames warm up; medians of
 //! the rest.
 #![allow(missing_docs, reason = "a program")]
@@ -13,7 +14,7 @@ use swell::{
     scene::Scene,
     solve::plan::Plan,
     stage::{
-        device::{Device, Opened},
+        device::{Built, Device, Opened},
         prepare::Start,
     },
 };
@@ -23,7 +24,10 @@ const WARM_UP: usize = 2;
 struct Options {
     device: Device,
     frames: usize,
+    /// Steps a second, a frame each; as many substeps of a thirtieth as the flow asks for where left out.
+    rate: Option<f64>,
     has_projection: bool,
+    is_json: bool,
     counts: Vec<usize>,
 }
 
@@ -31,7 +35,9 @@ fn options() -> Result<Options, String> {
     let mut options = Options {
         device: Device::Gpu(None.into()),
         frames: 8,
+        rate: None,
         has_projection: true,
+        is_json: false,
         counts: Vec::new(),
     };
     let mut words = std::env::args().skip(1);
@@ -47,6 +53,8 @@ fn options() -> Result<Options, String> {
             "--frames" => {
                 options.frames = value()?.parse().map_err(|_| "--frames wants a number")?
             }
+            "--rate" => options.rate = Some(value()?.parse().map_err(|_| "--rate wants a number")?),
+            "--json" => options.is_json = true,
             "--alone" => options.has_projection = false,
             // Cargo's own.
             "--bench" => {}
@@ -64,14 +72,17 @@ fn options() -> Result<Options, String> {
 
 /// A dam of about `count` particles, twice as long as wide and high, with as much room before it, already under
 /// way, so that a frame takes the substeps of a shot.
-fn dam(count: usize, has_projection: bool) -> Result<(Scene, Start), Box<dyn std::error::Error>> {
+fn dam(count: usize, options: &Options) -> Result<(Scene, Start), Box<dyn std::error::Error>> {
     let edge = (count as f64 / 2.0).cbrt().round() * 0.1;
+    let has_projection = options.has_projection;
+    // One substep: no displacement is then too long for a step of the rate, and a second one would be an error.
+    let (rate, cfl, substeps) = options.rate.map_or((30.0, 0.5, 64), |rate| (rate, 5.0, 1));
     let text = format!(
-        "[shot]\nname = \"bench\"\nframes = 1\nframes_per_second = 30\n\
+        "[shot]\nname = \"bench\"\nframes = 1\nframes_per_second = {rate:?}\n\
          [domain]\nmin = [0.0, 0.0, 0.0]\nmax = [{}, {}, {edge}]\n\
          [[water.block]]\nmin = [0.0, 0.0, 0.0]\nmax = [{}, {edge}, {edge}]\n\
          [solver]\nmethod = \"pbf\"\n\
-         [solver.pbf]\nparticle_spacing = 0.1\niterations = 4\ncfl = 0.5\nmax_substeps = 64\n\
+         [solver.pbf]\nparticle_spacing = 0.1\niterations = 4\ncfl = {cfl:?}\nmax_substeps = {substeps}\n\
          grid_projection = {has_projection}\n",
         4.0 * edge,
         2.0 * edge,
@@ -88,60 +99,101 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
+/// What frames took after the warm-up.
+struct Timed {
+    /// Of a step, a frame each.
+    seconds: Vec<f64>,
+    substeps: u32,
+    searched: u64,
+}
+
+fn time_frames(
+    built: &mut Built,
+    start: &Start,
+    frames: usize,
+) -> Result<Timed, Box<dyn std::error::Error>> {
+    let mut timed = Timed {
+        seconds: Vec::new(),
+        substeps: 0,
+        searched: 0,
+    };
+    built.solver.load(0, &start.particles)?;
+    for frame in 0..frames + WARM_UP {
+        let begin = Instant::now();
+        let (_, report) = built.solver.advance()?;
+        if frame >= WARM_UP {
+            let seconds = begin.elapsed().as_secs_f64();
+            timed.seconds.push(seconds / f64::from(report.substeps));
+            timed.searched += report.searched;
+            timed.substeps += report.substeps;
+        }
+    }
+    Ok(timed)
+}
+
 fn measure(
     opened: &Opened,
     options: &Options,
     count: usize,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let (scene, start) = dam(count, options.has_projection)?;
-    let particles = &start.particles;
-    let n = particles.len() as f64;
+    let (scene, start) = dam(count, options)?;
+    let n = start.particles.len();
     let mut built = opened.build(&scene, &start, false)?;
-    let solver = &mut built.solver;
-    println!("\n{} particles", particles.len());
-    if let Some((all, lists)) = built.plan.as_ref().map(Plan::bytes) {
+    let timed = time_frames(&mut built, &start, options.frames)?;
+    if options.is_json {
+        let line = serde_json::json!({
+            "device": opened.identity().to_string(), "particles": n, "seconds": timed.seconds, "substeps": timed.substeps,
+        });
+        println!("{line}");
+        return Ok(());
+    }
+    print_steps(built.plan.as_ref(), &timed, n as f64);
+    print_passes(opened, options, &scene, &start)
+}
+
+fn print_steps(plan: Option<&Plan>, timed: &Timed, n: f64) {
+    println!("\n{n} particles");
+    if let Some((all, lists)) = plan.map(Plan::bytes) {
         println!(
             "{:.0} bytes each, and {:.0} for neighbour lists",
             (all - lists) as f64 / n,
             lists as f64 / n
         );
     }
-    let mut steps_timed = 0;
-    solver.load(0, particles)?;
-    let mut times = Vec::new();
-    let mut searched = 0;
-    for frame in 0..options.frames + WARM_UP {
-        let begin = Instant::now();
-        let (_, report) = solver.advance()?;
-        if frame >= WARM_UP {
-            times.push(begin.elapsed().as_secs_f64() / f64::from(report.substeps));
-            searched += report.searched;
-            steps_timed += report.substeps;
-        }
-    }
-    let (least, most) = times
+    let (least, most) = timed
+        .seconds
         .iter()
         .fold((f64::MAX, 0.0f64), |(a, b), &t| (a.min(t), b.max(t)));
+    let middle = median(timed.seconds.clone());
     println!(
         "step {:.2} ms ({:.2} to {:.2} over {} frames): {:.3} µs a particle-step",
-        1e3 * median(times.clone()),
+        1e3 * middle,
         1e3 * least,
         1e3 * most,
-        times.len(),
-        1e6 * median(times) / n
+        timed.seconds.len(),
+        1e6 * middle / n
     );
-    if built.plan.is_some() {
-        let overflowed = searched as f64 / (n * f64::from(steps_timed));
+    if plan.is_some() {
+        let overflowed = timed.searched as f64 / (n * f64::from(timed.substeps));
         println!("{overflowed:.2e} of lists overflowed");
     }
-    let mut solver = opened.build(&scene, &start, true)?.solver;
-    solver.load(0, particles)?;
+}
+
+fn print_passes(
+    opened: &Opened,
+    options: &Options,
+    scene: &Scene,
+    start: &Start,
+) -> Result<(), Box<dyn std::error::Error>> {
+    let mut solver = opened.build(scene, start, true)?.solver;
+    solver.load(0, &start.particles)?;
     let mut steps = 0;
     for _ in 0..options.frames + WARM_UP {
         steps += solver.advance()?.1.substeps;
     }
     let mut rows = solver.timings();
     rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let n = start.particles.len() as f64;
     for (pass, seconds, runs) in &rows {
         let each = 1e3 * seconds / *runs as f64;
         println!(
@@ -158,7 +210,9 @@ fn measure(
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = options()?;
     let opened = options.device.open(Needs::default())?;
-    println!("{}", opened.identity());
+    if !options.is_json {
+        println!("{}", opened.identity());
+    }
     for &count in &options.counts {
         measure(&opened, &options, count)?;
     }

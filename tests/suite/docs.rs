@@ -1,6 +1,6 @@
 //! What documents promise of the tree: paths that are there, files that can be read in one sitting.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, process::Command};
 
 /// Paths between backticks that begin in one of the tree's folders. `NAME` and other words in capitals stand for any.
 fn paths(text: &str) -> impl Iterator<Item = &str> {
@@ -76,4 +76,45 @@ fn no_source_file_is_too_long() {
     assert!(long.is_empty(), "over {LONGEST} lines: {long:#?}");
     assert!(!is_too_long(&"x\n".repeat(LONGEST)));
     assert!(is_too_long(&"x\n".repeat(LONGEST + 1)));
+}
+
+/// Where a tool writes a table: its mark, and an end behind it.
+fn has_place(page: &str, tool: &str) -> bool {
+    let mut parts = page.split(&format!("<!-- {tool} -->\n"));
+    let behind = parts.nth(1);
+    behind.is_some_and(|text| text.contains("<!-- end -->\n")) && parts.next().is_none()
+}
+
+#[test]
+fn the_peers_tables_have_their_place() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = fs::read_to_string(root.join("docs/performance.md")).unwrap();
+    assert!(has_place(&page, "tools/bench peers"));
+    assert!(!has_place(&page, "tools/bench others"));
+    let cut = page.replace("<!-- end -->", "");
+    assert!(!has_place(&cut, "tools/bench peers"));
+    assert!(!has_place(&page.repeat(2), "tools/bench peers"));
+}
+
+#[test]
+fn an_unknown_peer_is_usage() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let run = |words: &[&str]| {
+        let mut command = Command::new(root.join("tools/bench"));
+        command.arg("peers").args(words).output().unwrap()
+    };
+    let output = run(&["--only", "houdini"]);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    for name in ["houdini", "splishsplash", "mantaflow"] {
+        assert!(told.contains(name), "{told}");
+    }
+    // A known one is not what is complained of.
+    let output = run(&["--only", "mantaflow", "--rounds", "0"]);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(
+        told.contains("--rounds") && !told.contains("invalid choice"),
+        "{told}"
+    );
 }
