@@ -24,6 +24,24 @@ pub(super) fn temporary(path: &Path) -> PathBuf {
     name.into()
 }
 
+/// Bytes that a user may still write where `path` is or will be; `None` where the system does not tell.
+pub fn free_bytes(path: &Path) -> Option<u64> {
+    let whole = std::path::absolute(path).ok()?;
+    let there = whole.ancestors().find(|folder| folder.exists())?;
+    free_at(there)
+}
+
+#[cfg(unix)]
+fn free_at(folder: &Path) -> Option<u64> {
+    let told = rustix::fs::statvfs(folder).ok()?;
+    told.f_bavail.checked_mul(told.f_frsize)
+}
+
+#[cfg(not(unix))]
+fn free_at(_: &Path) -> Option<u64> {
+    None
+}
+
 /// Writes `path` through a temporary file: flushed to the disk before it takes its name, and the name
 /// flushed too.
 ///

@@ -44,7 +44,7 @@ pub mod vdb;
 mod window;
 mod writer;
 
-pub use disk::directory_hash;
+pub use disk::{directory_hash, free_bytes};
 pub use error::CacheError;
 pub use folder::{around, refuse_occupied};
 pub use grids::GridRecord;

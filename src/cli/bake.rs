@@ -12,7 +12,7 @@ use crate::{
     domain::{frame_range::FrameRange, solver::StepReport},
     scene::{Method, Reach, Scene, SceneError},
     stage::{
-        bake::{Event, Request, bake, expected},
+        bake::{Event, Request, Room, bake, expected},
         branch::BranchPoint,
     },
 };
@@ -176,17 +176,32 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
         let (text, event) = warned(warning);
         progress.say(&text, event);
     }
+    warn_of_room(progress, found.room);
     let told = DryRun {
         frames: (found.first..=found.last).collect(),
         standing: found.standing as usize,
-        bytes: Some(found.bytes),
+        bytes: Some(found.room.bytes),
         place: output::path(&request.directory),
     };
     let particles = count(found.particles as u64, "particle");
     let words = format!(", with {particles} at the start");
-    let more = json!({ "particles": found.particles, "removed": found.removed });
+    let more = json!({ "particles": found.particles, "removed": found.removed, "disk_free": found.room.free });
     told.tell(progress, &words, more);
     Ok(0)
+}
+
+/// That the disk cannot hold the frames, where it cannot.
+fn warn_of_room(progress: &Progress, room: Room) {
+    if let Some(free) = room.short_of() {
+        progress.say(
+            &format!(
+                "warning: the disk has {} free, and the frames will take about {}; a bake ends where it is full, and --resume goes on",
+                size(free),
+                size(room.bytes)
+            ),
+            json!({ "event": "warning", "what": "disk", "free": free, "bytes": room.bytes }),
+        );
+    }
 }
 
 pub(super) fn tell(progress: &Progress, event: Event) {
@@ -198,6 +213,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             boundary_samples,
             solver,
             bytes,
+            room,
             first,
             last,
             parent,
@@ -216,10 +232,12 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 let (text, event) = warned(warning);
                 progress.say(&text, event);
             }
+            warn_of_room(progress, room);
             let span = if first > last {
                 "nothing left to bake".into()
             } else {
-                format!("frames {first} to {last}")
+                let disk = size(room.bytes);
+                format!("frames {first} to {last}, about {disk} on the disk")
             };
             let memory = bytes.map_or(String::new(), |bytes| match bytes {
                 (all, 0) => format!(", {} on the device", size(all)),
@@ -253,7 +271,7 @@ pub(super) fn tell(progress: &Progress, event: Event) {
                 json!({
                     "event": "ready", "solver": solver, "device": device, "particles": particles, "removed": removed,
                     "boundary_samples": boundary_samples, "bytes": bytes.map(|(all, _)| all), "list_bytes": bytes.map(|(_, lists)| lists), "first": first, "last": last,
-                    "frames": frames,
+                    "frames": frames, "disk_bytes": room.bytes, "disk_free": room.free,
                 }),
             );
         }

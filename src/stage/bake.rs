@@ -29,7 +29,7 @@ use super::{
     time::Share,
 };
 
-pub use self::expected::{Expected, expected, shot_bytes};
+pub use self::expected::{Expected, Room, expected, shot_bytes};
 
 /// What to bake, and where to.
 #[derive(Clone, Debug)]
@@ -67,6 +67,8 @@ pub enum Event {
         solver: &'static str,
         /// GPU memory in all and for neighbour lists; `None` on the CPU.
         bytes: Option<(u64, u64)>,
+        /// What the frames will take on the disk, and what it has.
+        room: Room,
         /// First frame that will be computed.
         first: u32,
         /// Last one.
@@ -243,6 +245,7 @@ pub fn bake(
         boundary_samples: start.boundary.samples.len(),
         solver: scene.solver.method.name(),
         bytes: drive.bytes(),
+        room: Room::of(request, &start.particles, first, last)?,
         first,
         last,
         parent,

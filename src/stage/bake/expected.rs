@@ -6,11 +6,40 @@ use super::{
     BakeError, Beginning, Request, beginning, check_count, check_first, grid_record, last_frame,
 };
 use crate::{
-    cache::{CacheError, CacheReader, Parent, frame, refuse_occupied, vdb},
+    cache::{self, CacheError, CacheReader, Parent, frame, refuse_occupied, vdb},
     domain::{keep::Keep, particles::Particles},
     scene::{self, Scene},
     stage::prepare::Start,
 };
+
+/// What frames that are not there yet will take on the disk, against what it has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// Of the frames that will be computed and kept, each as large as the start's: more where emitters add water.
+    pub bytes: u64,
+    /// That the disk has; `None` where the system does not tell.
+    pub free: Option<u64>,
+}
+
+impl Room {
+    /// Of frames after a start, in a cache in this folder.
+    pub(super) fn of(
+        request: &Request,
+        start: &Particles,
+        first: u32,
+        last: u32,
+    ) -> Result<Self, CacheError> {
+        Ok(Self {
+            bytes: bytes_of(&request.scene, start, first, last)?,
+            free: cache::free_bytes(&request.directory),
+        })
+    }
+
+    /// What is free, where that is less than the frames will take.
+    pub fn short_of(self) -> Option<u64> {
+        self.free.filter(|&free| free < self.bytes)
+    }
+}
 
 /// What a bake would make.
 #[derive(Clone, Debug)]
@@ -25,8 +54,8 @@ pub struct Expected {
     pub particles: usize,
     /// Left out because a solid is there.
     pub removed: usize,
-    /// Bytes of the frames that would be computed and kept, each as large as the start's.
-    pub bytes: u64,
+    /// What the frames would take on the disk, and what it has.
+    pub room: Room,
     /// Where a new bake begins from a frame of another cache, that frame.
     pub parent: Option<Parent>,
     /// What a user has to know, a sentence each.
@@ -48,7 +77,7 @@ pub fn expected(request: &Request) -> Result<Expected, BakeError> {
     } = beginning(request, last)?;
     check_count(scene, &start, parent.as_ref(), last)?;
     let directory = &request.directory;
-    let stands = request.resume && crate::cache::exists(directory);
+    let stands = request.resume && cache::exists(directory);
     let (first, standing) = if stands {
         let cached = CacheReader::open(directory)?;
         let text = scene.to_toml(&scene::asset_path);
@@ -65,14 +94,14 @@ pub fn expected(request: &Request) -> Result<Expected, BakeError> {
         (clock.frame + 1, 0)
     };
     check_first(request, first)?;
-    let bytes = bytes_of(scene, &start.particles, first, last)?;
+    let room = Room::of(request, &start.particles, first, last)?;
     Ok(Expected {
         first,
         last,
         standing,
         particles: start.particles.len(),
         removed: start.removed,
-        bytes,
+        room,
         parent,
         warnings: [scene.warnings(), notes].concat(),
     })

@@ -373,3 +373,36 @@ fn a_second_writer_is_refused_and_the_lock_of_a_dead_one_is_taken_over() {
     );
     assert_eq!(job.hash("cache"), job.hash("alone"));
 }
+
+/// Before the first frame, by a bake as by its dry run.
+#[test]
+fn a_disk_that_cannot_hold_the_frames_is_a_warning() {
+    const NAME: &str = "a_disk_that_cannot_hold_the_frames_is_a_warning";
+    const WARNING: &str = "warning: the disk has";
+    let job = Job::new();
+    let Some(disk) = Tmpfs::mount(65536, NAME) else {
+        return;
+    };
+    let bake = format!("{BAKE} -o {}", disk.path().join("cache").display());
+    let said = job.expect(0, &format!("{bake} --dry-run"));
+    assert!(said.contains(WARNING), "{said}");
+    let said = job.expect(4, &bake);
+    let at = |words| said.find(words).unwrap();
+    assert!(at(WARNING) < at("on the disk"), "{said}");
+    assert!(at("on the disk") < at("No space left"), "{said}");
+    // Negative control: with space there is none, and what was told is what the frames then take.
+    disk.remount("size=64m");
+    let said = job.expect(0, &format!("{bake} --resume --progress json"));
+    assert!(!said.contains("\"what\":\"disk\""), "{said}");
+    let ready = said.lines().find(|line| line.contains("\"ready\""));
+    let ready: serde_json::Value = serde_json::from_str(ready.unwrap()).unwrap();
+    let [told, free] = ["disk_bytes", "disk_free"].map(|key| ready[key].as_u64().unwrap());
+    assert!(told < free && free <= 64 << 20, "{ready}");
+    let first = ready["first"].as_u64().unwrap();
+    let taken: u64 = (first..=8)
+        .map(|frame| format!("cache/frames/small.{frame:04}.ply"))
+        .map(|file| disk.path().join(file).metadata().unwrap().len())
+        .sum();
+    // A frame's header holds its number and time, a few digits more or less.
+    assert!(told.abs_diff(taken) < 64 * 8, "{told} {taken}");
+}
