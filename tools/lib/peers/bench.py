@@ -242,7 +242,7 @@ def machine(peers: dict[str, Peer], device: str, rounds: int) -> str:
     models = [line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")] if info.exists() else []
     cpu = models[0] if models else os.uname().machine
     told = [f"{PEERS[p.name]}: {p.missing or p.version}" for p in peers.values()]
-    swell = ran([TARGET / "release/swell", "--version"]).stdout.splitlines()[0]
+    swell = " ".join(word.strip() for word in ran([TARGET / "release/swell", "--version"]).stdout.splitlines()[:2])
     day = time.strftime("%Y-%m-%d")
     words = f"Made by `tools/bench peers` on {day}: {swell}; {'; '.join(told)}. {os.cpu_count()} cores of {cpu}; swell's GPU is {device}."
     busy = f"Load of the machine at the end: {os.getloadavg()[1]:.0f}."
