@@ -80,7 +80,8 @@ fn no_source_file_is_too_long() {
 
 /// Where a tool writes a table: its mark, and an end behind it.
 fn has_place(page: &str, tool: &str) -> bool {
-    let mut parts = page.split(&format!("<!-- {tool} -->\n"));
+    let mark = format!("<!-- {tool} -->\n");
+    let mut parts = page.split(&mark);
     let behind = parts.nth(1);
     behind.is_some_and(|text| text.contains("<!-- end -->\n")) && parts.next().is_none()
 }

@@ -45,7 +45,7 @@ class Speed:
     name: str
     words: str
     unit: str
-    # What a particle's (1) or a frame's (0) seconds are multiplied by for the unit.
+    # Whether the unit is of a particle; of a frame otherwise.
     is_each: bool
     water: tuple[int, int, int]
     box: tuple[int, int, int]
