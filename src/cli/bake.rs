@@ -190,14 +190,24 @@ fn dry_run(request: &Request, progress: &Progress) -> Result<u8, Failure> {
     Ok(0)
 }
 
+/// What the frames will take on the disk.
+fn taken(room: Room) -> String {
+    let compressed = if room.is_compressed {
+        " before compression"
+    } else {
+        ""
+    };
+    format!("about {}{compressed}", size(room.bytes))
+}
+
 /// That the disk cannot hold the frames, where it cannot.
 fn warn_of_room(progress: &Progress, room: Room) {
     if let Some(free) = room.short_of() {
         progress.say(
             &format!(
-                "warning: the disk has {} free, and the frames will take about {}; a bake ends where it is full, and --resume goes on",
+                "warning: the disk has {} free, and the frames will take {}; a bake ends where it is full, and --resume goes on",
                 size(free),
-                size(room.bytes)
+                taken(room)
             ),
             json!({ "event": "warning", "what": "disk", "free": free, "bytes": room.bytes }),
         );
@@ -236,8 +246,8 @@ pub(super) fn tell(progress: &Progress, event: Event) {
             let span = if first > last {
                 "nothing left to bake".into()
             } else {
-                let disk = size(room.bytes);
-                format!("frames {first} to {last}, about {disk} on the disk")
+                let disk = taken(room);
+                format!("frames {first} to {last}, {disk} on the disk")
             };
             let memory = bytes.map_or(String::new(), |bytes| match bytes {
                 (all, 0) => format!(", {} on the device", size(all)),

@@ -17,6 +17,8 @@ use crate::{
 pub struct Room {
     /// Of the frames that will be computed and kept, each as large as the start's: more where emitters add water.
     pub bytes: u64,
+    /// Whether they are compressed, and `bytes` is what they would take if they were not.
+    pub is_compressed: bool,
     /// That the disk has; `None` where the system does not tell.
     pub free: Option<u64>,
 }
@@ -31,6 +33,7 @@ impl Room {
     ) -> Result<Self, CacheError> {
         Ok(Self {
             bytes: bytes_of(&request.scene, start, first, last)?,
+            is_compressed: request.scene.compression.is_some(),
             free: cache::free_bytes(&request.directory),
         })
     }
