@@ -1,5 +1,7 @@
 //! How much of a neighbourhood a particle has.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 /// Distances, in spacings, over which a neighbour stops counting: half of it is left at two.
@@ -28,41 +30,47 @@ pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
         .par_iter()
         .map(|&(_, index)| positions[index as usize])
         .collect();
-    let found: Vec<(u32, f32)> = order
-        .par_iter()
-        .enumerate()
-        .map(|(place, &([cx, cy, cz], index))| {
-            let p = sorted[place];
-            let mut sum = 0.0;
-            'columns: for dx in -1..=1 {
-                for dy in -1..=1 {
-                    let first = [cx + dx, cy + dy, cz - 1];
-                    let after = [cx + dx, cy + dy, cz + 2];
-                    let start = order.partition_point(|&(key, _)| key < first);
-                    for (q, entry) in sorted[start..].iter().zip(&order[start..]) {
-                        if entry.0 >= after {
-                            break;
-                        }
-                        let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-                        let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                        if square < reach * reach && entry.1 != index {
-                            sum += 1.0 - smoothstep(near, reach, square.sqrt());
-                        }
-                        if sum >= ENOUGH {
-                            sum = ENOUGH;
-                            break 'columns;
-                        }
+    let weight = |place: usize, columns: &[Range<usize>; 9]| {
+        let p = sorted[place];
+        let mut sum = 0.0;
+        for column in columns {
+            for other in column.clone() {
+                let q = sorted[other];
+                let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+                let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                if square < reach * reach && other != place {
+                    sum += 1.0 - smoothstep(near, reach, square.sqrt());
+                    if sum >= ENOUGH {
+                        return ENOUGH;
                     }
                 }
             }
-            (index, sum)
+        }
+        sum
+    };
+    // A cell's particles have the same columns about them.
+    let found: Vec<f32> = order
+        .par_chunk_by(|a, b| a.0 == b.0)
+        .flat_map_iter(|cell| {
+            let columns = columns(&order, cell[0].0);
+            let first = order.partition_point(|&(key, _)| key < cell[0].0);
+            (first..first + cell.len()).map(move |place| weight(place, &columns))
         })
         .collect();
     let mut weights = vec![0.0; positions.len()];
-    for (index, weight) in found {
-        weights[index as usize] = weight;
+    for ((_, index), weight) in order.iter().zip(found) {
+        weights[*index as usize] = weight;
     }
     weights
+}
+
+/// Where in `order` the particles of the nine columns of three cells about a cell stand.
+fn columns(order: &[([i32; 3], u32)], [x, y, z]: [i32; 3]) -> [Range<usize>; 9] {
+    std::array::from_fn(|k| {
+        let [x, y] = [x - 1 + k as i32 / 3, y - 1 + k as i32 % 3];
+        let from = |z: i32| order.partition_point(|&(key, _)| key < [x, y, z]);
+        from(z - 1)..from(z + 2)
+    })
 }
 
 #[cfg(test)]
