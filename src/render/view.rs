@@ -2,6 +2,8 @@
 
 mod aces;
 
+use std::sync::LazyLock;
+
 use glam::{DMat3, DVec3};
 
 use crate::scene::look::{TransformSpec, ViewSpec};
@@ -20,24 +22,57 @@ pub fn srgb_encode(linear: f64) -> f64 {
 ///
 /// Exposure, then the look's tone curve, then contrast about middle grey and saturation, then sRGB's encoding.
 pub fn apply(view: &ViewSpec, colour: [f32; 3]) -> [f64; 3] {
-    let scene = DVec3::from(colour.map(f64::from)).max(DVec3::ZERO) * view.exposure_stops.exp2();
-    let mut display = match view.transform {
-        TransformSpec::Agx => agx(scene),
-        TransformSpec::Aces => aces::aces(scene),
-        TransformSpec::Srgb => scene.min(DVec3::ONE),
-    };
-    const GREY: f64 = 0.18;
-    if view.contrast != 1.0 {
-        let power = |x: f64| GREY * (x / GREY).powf(view.contrast);
-        display = DVec3::from_array(display.to_array().map(power));
-    }
-    let grey = DVec3::splat(display.dot(DVec3::new(0.2126, 0.7152, 0.0722)));
-    display = grey + (display - grey) * view.saturation;
-    display.to_array().map(srgb_encode)
+    display(view, colour).to_array().map(srgb_encode)
 }
 
-/// Sobotka's AgX base view as display-linear Rec. 709, by Wrensch's polynomial for its curve (2023): the primaries are drawn together, light is taken to log2 over 16.5
-/// stops about middle grey, bent, and the primaries are spread again.
+/// As [`apply`], in whole 255ths.
+pub fn apply_bytes(view: &ViewSpec, colour: [f32; 3]) -> [u8; 3] {
+    let least = &*LEAST;
+    (display(view, colour).to_array()).map(|x| least.partition_point(|&least| least <= x) as u8)
+}
+
+/// The least linear value that sRGB's encoding rounds to 1, to 2, and so on to 255, in 255ths: a search among them instead of a power.
+static LEAST: LazyLock<[f64; 255]> = LazyLock::new(|| {
+    let least = |byte: usize| {
+        let reaches = |x: f64| (srgb_encode(x) * 255.0).round() >= byte as f64;
+        // Positive numbers are in the order of their bits.
+        let (mut below, mut from) = (0.0f64.to_bits(), 1.0f64.to_bits());
+        while below + 1 < from {
+            let middle = below + (from - below) / 2;
+            match reaches(f64::from_bits(middle)) {
+                true => from = middle,
+                false => below = middle,
+            }
+        }
+        f64::from_bits(from)
+    };
+    std::array::from_fn(|index| least(index + 1))
+});
+
+/// Display-linear Rec. 709; values beyond 0 and 1 are clipped by the encoding.
+fn display(view: &ViewSpec, colour: [f32; 3]) -> DVec3 {
+    let scene = DVec3::from(colour.map(f64::from)).max(DVec3::ZERO) * view.exposure_stops.exp2();
+    let (shown, power) = match view.transform {
+        TransformSpec::Agx => (agx(scene), AGX_POWER),
+        TransformSpec::Aces => (aces::aces(scene), 1.0),
+        TransformSpec::Srgb => (scene.min(DVec3::ONE), 1.0),
+    };
+    // GREY (x / GREY)^contrast, of x that are a power themselves.
+    const GREY: f64 = 0.18;
+    let display = match power * view.contrast {
+        1.0 => shown,
+        power => shown.powf(power) * GREY.powf(1.0 - view.contrast),
+    };
+    let grey = DVec3::splat(display.dot(DVec3::new(0.2126, 0.7152, 0.0722)));
+    grey + (display - grey) * view.saturation
+}
+
+/// What AgX's values are to the power of, so that they are linear.
+const AGX_POWER: f64 = 2.2;
+
+/// Sobotka's AgX base view of Rec. 709, 0 to 1, still to be taken to the power of [`AGX_POWER`], by Wrensch's polynomial for its curve
+/// (2023): the primaries are drawn together, light is taken to log2 over 16.5 stops about middle grey, bent, and the primaries are spread
+/// again.
 fn agx(scene: DVec3) -> DVec3 {
     let inset = DMat3::from_cols_array(&[
         0.842_479_062_253_094,
@@ -67,10 +102,7 @@ fn agx(scene: DVec3) -> DVec3 {
         let log = (x.max(1e-10).log2().clamp(LEAST, MOST) - LEAST) / (MOST - LEAST);
         curve(log)
     });
-    (outset * DVec3::from_array(bent))
-        .to_array()
-        .map(|x| x.max(0.0).powf(2.2).min(1.0))
-        .into()
+    (outset * DVec3::from_array(bent)).clamp(DVec3::ZERO, DVec3::ONE)
 }
 
 fn curve(x: f64) -> f64 {
@@ -189,6 +221,38 @@ mod tests {
             ..ViewSpec::default()
         };
         assert_eq!(grey(&up, 0.1), grey(&view, 0.2));
+    }
+
+    #[test]
+    fn bytes_are_encoded_values_rounded() {
+        let view = |transform| ViewSpec {
+            transform,
+            contrast: 1.2,
+            saturation: 1.25,
+            ..ViewSpec::default()
+        };
+        let mut seen = [false; 256];
+        for transform in [TransformSpec::Agx, TransformSpec::Srgb] {
+            let view = view(transform);
+            for step in 0..20_000u32 {
+                let x = (f64::from(step) / 1000.0 - 15.0).exp2() as f32;
+                let colour = [x, 0.7 * x, 2.0 * x];
+                let found = apply_bytes(&view, colour);
+                let expected = apply(&view, colour).map(|x| (x * 255.0).round() as u8);
+                assert_eq!(found, expected, "{colour:?}");
+                seen[usize::from(found[0])] = true;
+            }
+        }
+        assert!(seen.iter().all(|seen| *seen));
+        // Where the encoding goes over from one byte to the next, to the last bit; a number that is none is black.
+        for (byte, least) in (1u8..).zip(*LEAST) {
+            let of = |x: f64| (srgb_encode(x) * 255.0).round() as u8;
+            assert_eq!([of(least), of(least.next_down())], [byte, byte - 1]);
+        }
+        assert_eq!(
+            apply_bytes(&view(TransformSpec::Srgb), [f32::NAN; 3]),
+            [0; 3]
+        );
     }
 
     #[test]

@@ -47,11 +47,9 @@ fn write(
         .par_iter()
         .flat_map_iter(|&[r, g, b, a]| {
             let clear = if a > 0.0 { 1.0 / a } else { 0.0 };
-            let [r, g, b] = view::apply(view, [r * clear, g * clear, b * clear]);
-            [r, g, b, f64::from(a).clamp(0.0, 1.0)]
-                .into_iter()
-                .take(depth)
-                .map(|x| (x * 255.0).round() as u8)
+            let [r, g, b] = view::apply_bytes(view, [r * clear, g * clear, b * clear]);
+            let alpha = (f64::from(a).clamp(0.0, 1.0) * 255.0).round() as u8;
+            [r, g, b, alpha].into_iter().take(depth)
         })
         .collect();
     let mut bytes = Vec::new();
