@@ -10,6 +10,7 @@ mod plan;
 mod set;
 pub mod surfaces;
 mod whitewater;
+mod writing;
 
 use std::{
     collections::BTreeMap,
@@ -40,10 +41,11 @@ use crate::{
 
 use self::folder::{Folder, Owner, Wanted};
 use self::pictures::{
-    attributes, baked_note, is_current, name, others, pictures, whole_attributes, write,
+    attributes, baked_note, is_current, name, others, pictures, whole_attributes,
 };
 use self::set::{render_scene, solid_names};
 use self::whitewater::Whitewater;
+use self::writing::{Drawn, Writing};
 use super::{
     Blame,
     device::{Gpu, shaders_note},
@@ -260,7 +262,8 @@ pub fn render(
     });
     let mut job = Job {
         request,
-        folder,
+        folder: Arc::new(folder),
+        writing: None,
         cache,
         whitewater,
         scene,
@@ -369,8 +372,8 @@ fn wanted<'a>(
 
 /// What became of a frame.
 enum Done {
-    /// With so many bytes of pictures.
-    Rendered(u64),
+    /// Its pictures are to be written.
+    Drawn(Box<Drawn>),
     Stands,
     /// Another process is at it.
     Elsewhere,
@@ -379,7 +382,9 @@ enum Done {
 /// A render under way.
 struct Job<'a> {
     request: &'a Request,
-    folder: Folder,
+    folder: Arc<Folder>,
+    /// The frame that was drawn last, while its pictures are encoded and written: meanwhile the next one is drawn.
+    writing: Option<Writing>,
     cache: CacheReader,
     /// Of the stream that the look draws.
     whitewater: Option<Whitewater>,
@@ -396,43 +401,54 @@ struct Job<'a> {
 impl Job<'_> {
     fn run(
         &mut self,
-        mut frames: Vec<u32>,
+        frames: Vec<u32>,
         stop: &AtomicBool,
         tell: &mut dyn FnMut(Event),
     ) -> Result<Outcome, RenderJobError> {
         let mut outcome = Outcome::default();
+        let drawn = self.draw_all(frames, stop, (&mut outcome, tell));
+        // However it ended, what was drawn before is kept.
+        let written = self.end_writing(&mut outcome, tell);
+        drawn.and(written).map(|()| outcome)
+    }
+
+    fn draw_all(
+        &mut self,
+        mut frames: Vec<u32>,
+        stop: &AtomicBool,
+        (outcome, tell): (&mut Outcome, &mut dyn FnMut(Event)),
+    ) -> Result<(), RenderJobError> {
         let mut is_told = false;
         while !frames.is_empty() {
             let mut elsewhere = Vec::new();
             for &frame in &frames {
                 if stop.load(Ordering::Relaxed) {
                     outcome.interrupted = true;
-                    return Ok(outcome);
+                    return Ok(());
                 }
-                let begin = Instant::now();
-                let (seconds, skipped, bytes) = match self.frame(frame) {
-                    Ok(Done::Rendered(bytes)) => (begin.elapsed().as_secs_f64(), false, bytes),
-                    Ok(Done::Stands) => (0.0, true, 0),
-                    Ok(Done::Elsewhere) => {
-                        elsewhere.push(frame);
-                        continue;
+                let done = self.frame(frame);
+                self.end_writing(outcome, tell)?;
+                match done {
+                    Ok(Done::Drawn(drawn)) => {
+                        self.writing = Some(Writing::begin(*drawn, &self.folder, self.request));
                     }
+                    Ok(Done::Stands) => {
+                        outcome.skipped += 1;
+                        tell(Event::Frame {
+                            frame,
+                            seconds: 0.0,
+                            skipped: true,
+                            bytes: 0,
+                        });
+                    }
+                    Ok(Done::Elsewhere) => elsewhere.push(frame),
                     Err(error) if self.request.keep_going && error.is_of_frame() => {
                         outcome.failed.push(frame);
                         let error = Arc::new(error);
                         tell(Event::Failed { frame, error });
-                        continue;
                     }
                     Err(error) => return Err(error),
-                };
-                outcome.rendered += u32::from(!skipped);
-                outcome.skipped += u32::from(skipped);
-                tell(Event::Frame {
-                    frame,
-                    seconds,
-                    skipped,
-                    bytes,
-                });
+                }
             }
             if elsewhere.len() == frames.len() {
                 if !is_told {
@@ -445,10 +461,30 @@ impl Job<'_> {
             }
             frames = elsewhere;
         }
-        Ok(outcome)
+        Ok(())
+    }
+
+    /// Waits for the pictures that are being written, and tells of them.
+    fn end_writing(
+        &mut self,
+        outcome: &mut Outcome,
+        tell: &mut dyn FnMut(Event),
+    ) -> Result<(), RenderJobError> {
+        if let Some(writing) = self.writing.take() {
+            let (frame, seconds, bytes) = writing.end()?;
+            outcome.rendered += 1;
+            tell(Event::Frame {
+                frame,
+                seconds,
+                skipped: false,
+                bytes,
+            });
+        }
+        Ok(())
     }
 
     fn frame(&mut self, frame: u32) -> Result<Done, RenderJobError> {
+        let begin = Instant::now();
         let request = self.request;
         let attributes = whole_attributes(&self.cache, request, self.whitewater.as_ref(), frame)?;
         let pictures = pictures(&self.cache, &request.look, frame);
@@ -462,21 +498,22 @@ impl Job<'_> {
             return Ok(Done::Stands);
         }
         let number = name(&attributes.shot, frame, self.cache.last_frame());
-        let Some(_claim) = self.folder.claim(&number)? else {
+        let Some(claim) = self.folder.claim(&number)? else {
             return Ok(Done::Elsewhere);
         };
         // Another process may have come to its end with it between the two.
         if stands() {
             return Ok(Done::Stands);
         }
-        let picture = self.draw(frame)?;
-        let mut bytes = 0;
-        for (name, format) in &pictures {
-            let draft = self.folder.draft(name);
-            write(&draft, *format, &picture, &attributes, &request.look)?;
-            bytes += self.folder.publish(name)?;
-        }
-        Ok(Done::Rendered(bytes))
+        let image = self.draw(frame)?;
+        Ok(Done::Drawn(Box::new(Drawn {
+            frame,
+            begin,
+            image,
+            pictures,
+            attributes,
+            claim,
+        })))
     }
 
     /// A frame's particles, read once in a row of frames.
@@ -491,11 +528,13 @@ impl Job<'_> {
 
     fn draw(&mut self, frame: u32) -> Result<Image, RenderJobError> {
         let look = &self.request.look;
-        let water = self.cache.read(frame)?;
+        let reach = frames_around(look);
+        self.near.retain(|&other, _| other.abs_diff(frame) <= reach);
+        let water = self.water(frame)?;
         let mut renderer = match self.kept.take() {
             Some(renderer) => renderer,
             None => {
-                let set = render_scene(&self.scene, look, frame, &water)?;
+                let set = render_scene(&self.scene, look, frame, &water.particles)?;
                 Renderer::new(&self.context, look, &set).map_err(|error| told(error, look))?
             }
         };
@@ -507,9 +546,6 @@ impl Job<'_> {
             Some(stream) => stream.read(frame)?,
             None => Particles::default(),
         };
-        let reach = frames_around(look);
-        self.near.retain(|&other, _| other.abs_diff(frame) <= reach);
-        let water = self.water(frame)?;
         let mut found = [const { None }; 2 * REACH as usize];
         for (side, other) in others(frame) {
             if other.abs_diff(frame) <= reach && self.cache.has_particles(other) {

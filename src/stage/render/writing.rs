@@ -1,0 +1,62 @@
+//! A frame's pictures on their way to the disk, beside the next frame's drawing.
+
+use std::{
+    fs::File,
+    sync::Arc,
+    thread::{JoinHandle, spawn},
+    time::Instant,
+};
+
+use super::{RenderJobError, Request, folder::Folder, pictures::write};
+use crate::{
+    render::{Attributes, Image},
+    scene::look::FormatSpec,
+};
+
+/// A frame that is drawn and not yet written.
+pub(super) struct Drawn {
+    pub(super) frame: u32,
+    /// When work on it began.
+    pub(super) begin: Instant,
+    pub(super) image: Image,
+    /// Names of its pictures, and in which format each.
+    pub(super) pictures: Vec<(String, FormatSpec)>,
+    pub(super) attributes: Attributes,
+    /// Keeps other processes from it.
+    pub(super) claim: File,
+}
+
+/// A frame whose pictures are being written.
+pub(super) struct Writing {
+    frame: u32,
+    /// Gives seconds since work on the frame began, and bytes.
+    thread: JoinHandle<Result<(f64, u64), RenderJobError>>,
+}
+
+impl Writing {
+    pub(super) fn begin(drawn: Drawn, folder: &Arc<Folder>, request: &Request) -> Self {
+        let (folder, look) = (folder.clone(), request.look.clone());
+        let frame = drawn.frame;
+        let thread = spawn(move || {
+            let mut bytes = 0;
+            for (name, format) in &drawn.pictures {
+                let draft = folder.draft(name);
+                write(&draft, *format, &drawn.image, &drawn.attributes, &look)?;
+                bytes += folder.publish(name)?;
+            }
+            drop(drawn.claim);
+            Ok((drawn.begin.elapsed().as_secs_f64(), bytes))
+        });
+        Self { frame, thread }
+    }
+
+    /// Waits until they are on the disk: which frame, seconds that it took in all, and bytes.
+    ///
+    /// # Errors
+    /// [`RenderJobError::Render`] or [`RenderJobError::Folder`] where a picture cannot be written.
+    pub(super) fn end(self) -> Result<(u32, f64, u64), RenderJobError> {
+        let written = self.thread.join();
+        let (seconds, bytes) = written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        Ok((self.frame, seconds, bytes))
+    }
+}
