@@ -1,50 +1,50 @@
-// z −= dt H on one level, H the mean curvature of the depth image.
+// z −= dt H on one level, H the mean curvature of the depth image, in the tiles of a list.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_flow.wgsl"
+#import "shared/ssfr_tiles.wgsl"
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<uniform> params: FlowParams;
 @group(0) @binding(2) var<uniform> level: FlowLevel;
 @group(0) @binding(3) var<storage, read> source: array<f32>;
 @group(0) @binding(4) var<storage, read_write> smoothed: array<f32>;
+@group(0) @binding(5) var<storage, read> tiles: array<u32>;
 
 // Tangent of the steepest slope that counts as one.
 const STEEPEST: f32 = 1.0;
 
+// A thread has two by two cells: of the sixteen depths that they and their neighbours are, one alone would read nine.
 
-@compute @workgroup_size(16, 4)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= level.size.x || id.y >= level.size.y {
-        return;
-    }
-    let at = id.y * level.size.x + id.x;
-    let z = source[at];
-    smoothed[at] = z;
+fn depth_at(cell: vec2i) -> f32 {
+    let size = vec2i(level.size);
+    let held = clamp(cell, vec2i(0), size - 1);
+    let z = source[u32(held.y * size.x + held.x)];
+    return select(FAR, z, all(held == cell));
+}
+
+// A row of four depths, from a cell on.
+fn row_at(cell: vec2i) -> vec4f {
+    return vec4f(
+        depth_at(cell), depth_at(cell + vec2i(1, 0)), depth_at(cell + vec2i(2, 0)), depth_at(cell + vec2i(3, 0)));
+}
+
+// A depth after the step, from the rows above it, its own and below, of which it is the middle.
+fn stepped(above_row: vec3f, row: vec3f, below_row: vec3f) -> f32 {
+    let z = row.y;
     if z >= FAR {
-        return;
+        return z;
     }
     let share = clamp(level_share(params, z, camera.focal, level.level).steps - f32(level.index), 0.0, 1.0);
     if share <= 0.0 {
-        return;
+        return z;
     }
-    let x = i32(id.x);
-    let y = i32(id.y);
     // C_x = 2 / (W F_x) = 1 / focal length in cells; cells are square.
     let c = f32(1u << level.level) / camera.focal;
     let cell = c * z;
-    let row = level.size.x;
-    let at_left = x == 0;
-    let at_right = id.x + 1u == level.size.x;
-    let at_top = y == 0;
-    let at_bottom = id.y + 1u == level.size.y;
-    var left = source[select(at - 1u, at, at_left)];
-    var right = source[select(at + 1u, at, at_right)];
-    var above = source[select(at - row, at, at_top)];
-    var below = source[select(at + row, at, at_bottom)];
-    left = select(left, FAR, at_left);
-    right = select(right, FAR, at_right);
-    above = select(above, FAR, at_top);
-    below = select(below, FAR, at_bottom);
+    var left = row.x;
+    var right = row.z;
+    var above = above_row.y;
+    var below = below_row.y;
     let no_left = is_edge(params, z, left, cell);
     let no_right = is_edge(params, z, right, cell);
     let no_above = is_edge(params, z, above, cell);
@@ -62,11 +62,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let wyy = 1.0 / below - 2.0 * w + 1.0 / above;
     var wxy = 0.0;
     if !(no_left || no_right || no_above || no_below) {
-        // None of the four sides is past the frame.
-        let nw = source[at - row - 1u];
-        let ne = source[at - row + 1u];
-        let sw = source[at + row - 1u];
-        let se = source[at + row + 1u];
+        let nw = above_row.x;
+        let ne = above_row.z;
+        let sw = below_row.x;
+        let se = below_row.z;
         if max(max(nw, ne), max(sw, se)) < FAR {
             wxy = 0.25 * (1.0 / se - 1.0 / sw - 1.0 / ne + 1.0 / nw);
         }
@@ -83,5 +82,39 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // their face-on values, and with them the stability limit.
     let h_slant = z * bend / (2.0 * c * (1.0 + s2.x + s2.y));
     let dt = params.fraction * 0.5 * z * c * share;
-    smoothed[at] = max(z - dt * h_slant, 0.25 * z);
+    return max(z - dt * h_slant, 0.25 * z);
+}
+
+@compute @workgroup_size(16, 4)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) thread: vec3u,
+) {
+    let place = group.x + group.y * groups.x;
+    if place >= tiles[0] {
+        return;
+    }
+    let id = cells_of_tile(tiles[2u + place], thread);
+    if any(id >= level.size) {
+        return;
+    }
+    let first = vec2i(id);
+    let row_a = row_at(first + vec2i(-1, -1));
+    let row_b = row_at(first + vec2i(-1, 0));
+    let row_c = row_at(first + vec2i(-1, 1));
+    let row_d = row_at(first + vec2i(-1, 2));
+    let at = id.y * level.size.x + id.x;
+    let has_right = id.x + 1u < level.size.x;
+    let has_below = id.y + 1u < level.size.y;
+    smoothed[at] = stepped(row_a.xyz, row_b.xyz, row_c.xyz);
+    if has_right {
+        smoothed[at + 1u] = stepped(row_a.yzw, row_b.yzw, row_c.yzw);
+    }
+    if has_below {
+        smoothed[at + level.size.x] = stepped(row_b.xyz, row_c.xyz, row_d.xyz);
+    }
+    if has_right && has_below {
+        smoothed[at + level.size.x + 1u] = stepped(row_b.yzw, row_c.yzw, row_d.yzw);
+    }
 }

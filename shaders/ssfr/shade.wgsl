@@ -2,6 +2,9 @@
 // that stand beside the picture instead; with OBJECTS, what is seen first.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
+#ifdef LISTED
+#import "shared/ssfr_tiles.wgsl"
+#endif
 #import "shared/ssfr_half.wgsl"
 #import "shared/ssfr_solid.wgsl"
 #import "shared/ssfr_optics.wgsl"
@@ -48,6 +51,9 @@
 #else
 @group(0) @binding(11) var<storage, read_write> output: array<vec4f>;
 #endif
+#endif
+#ifdef LISTED
+@group(0) @binding(23) var<storage, read> tiles: array<u32>;
 #endif
 #ifdef SPRAY
 @group(0) @binding(15) var<storage, read> spray: array<u32>;
@@ -186,7 +192,8 @@ struct March {
 }
 
 // Walks a ray over the depth image of the solids. A hit lies just behind that surface, a few spacings or steps at
-// most; things nearer to the viewer than `nearest` stand before the water and are no hit.
+// most; things nearer to the viewer than `nearest` stand before the water and are no hit. The hit is refined after the walk and not
+// where it is found: adapters that run both sides of a branch would refine at each step.
 fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, nearest: f32) -> March {
     var last = 0.0;
     // First step of a geometric row of `steps` steps that ends at `reach`.
@@ -194,6 +201,7 @@ fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, n
     if growth > 1.0 {
         step = reach * (growth - 1.0) / (pow(growth, f32(steps)) - 1.0);
     }
+    var next = FAR;
     for (var i = 0; i < steps; i++) {
         let t = last + step;
         let q = origin + direction * t;
@@ -206,15 +214,20 @@ fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, n
         }
         let z = solid_depth[u32(pixel.y) * camera.size.x + u32(pixel.x)];
         if z < q.z && z > nearest && q.z - z < 3.5 * shading.spacing + 1.5 * step {
-            return refine(origin, direction, last, t);
+            next = t;
+            break;
         }
         last = t;
         step *= growth;
     }
-    return March(FAR, 0u, vec3f(0.0));
+    return refine(origin, direction, last, next);
 }
 
+// What a ray meets between two distances; nothing where the second is FAR.
 fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32) -> March {
+    if to_t >= FAR {
+        return March(FAR, 0u, vec3f(0.0));
+    }
     var low = from_t;
     var high = to_t;
     for (var i = 0; i < 5; i++) {
@@ -264,8 +277,8 @@ struct Through {
     scattered: vec3f,
 }
 
-// `seen` metres of water lie on the straight line of sight.
-fn transmitted(water: Water, seen: f32, straight: Behind) -> Through {
+// `seen` metres of water lie on the straight line of sight, and behind them the light of `backdrop`.
+fn transmitted(water: Water, seen: f32, backdrop: vec3f) -> Through {
     let n = shading.index;
     let ci = clamp(dot(water.normal, water.view), 0.0, 1.0);
     let ct = sqrt(max(1.0 - (1.0 - ci * ci) / (n * n), 0.0));
@@ -289,7 +302,7 @@ fn transmitted(water: Water, seen: f32, straight: Behind) -> Through {
     let way = mix(path, min(reach, endless()), filled);
     var light = vec3f(0.0);
     if filled < 1.0 {
-        light += behind_radiance(straight, -water.view) * (1.0 - filled);
+        light += backdrop * (1.0 - filled);
     }
     if filled > 0.0 {
         let depth = max(water.position.y - found.position.y, 0.0);
@@ -303,7 +316,7 @@ fn transmitted(water: Water, seen: f32, straight: Behind) -> Through {
 // Water `z` metres along the optical axis, whose normal is `smooth_normal` but for ripples; `lost` is the mean square slope of waves that
 // a pixel there cannot hold.
 fn shade_water(
-    z: f32, ray: vec3f, view: vec3f, smooth_normal: vec3f, lost: f32, seen: f32, straight: Behind,
+    z: f32, ray: vec3f, view: vec3f, smooth_normal: vec3f, lost: f32, seen: f32, backdrop: vec3f,
 ) -> vec3f {
     let eye = ray * z;
     let position = world_from_eye(camera, eye);
@@ -318,7 +331,7 @@ fn shade_water(
     let sun = shading.sun_irradiance * sunlit(position, vec3f(0.0, 1.0, 0.0))
         * glitter(normal, view, shading.sun_direction, water.slope_variance, shading.index);
     let mirror = reflectance * mirrored(water);
-    let through = transmitted(water, seen, straight);
+    let through = transmitted(water, seen, backdrop);
     light_part(REFLECTION, mirror);
     light_part(REFRACTION, (1.0 - reflectance) * through.seen);
     light_part(SCATTERING, (1.0 - reflectance) * through.scattered);
@@ -341,7 +354,27 @@ fn behind_parts(found: Behind, direction: vec3f, colour: vec3f) {
 }
 
 @compute @workgroup_size(16, 4)
+#ifdef LISTED
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) thread: vec3u,
+) {
+    let place = group.x + group.y * groups.x;
+#ifdef DRY
+    if place >= tiles[1] {
+        return;
+    }
+    let id = pixel_of_tile(tiles[1u + tiles[0] + tiles[1] - place], thread);
+#else
+    if place >= tiles[0] {
+        return;
+    }
+    let id = pixel_of_tile(tiles[2u + place], thread);
+#endif
+#else
 fn main(@builtin(global_invocation_id) id: vec3u) {
+#endif
     if id.x >= camera.picture.x || id.y >= band.rows {
         return;
     }
@@ -352,9 +385,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let direction = normalize(world_direction(camera, ray));
     let view = -direction;
     let straight = behind(pixel, ray, direction);
+#ifdef DRY
+    let z = FAR;
+    let wet = false;
+    var through = 0.0;
+#else
     let z = surface[at];
     let wet = z < straight.depth && z < 0.1 * FAR;
     var through = thickness_at(vec2f(pixel) + 0.5);
+#endif
 #ifdef SEA
     let open = sea_from_eye(direction, min(straight.far, select(FAR, z * length(ray), wet)));
     through += sea_behind(direction);
@@ -410,6 +449,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     output[out] = vec2u(object, bitcast<u32>(cover));
 #else
+    // Whatever stands here: an adapter that runs both sides of a branch would come by it twice, through water and without.
+    let backdrop = behind_radiance(straight, direction);
     var colour: vec3f;
     var alpha = 1.0;
     var depth = z;
@@ -428,13 +469,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         normal = select(normal, open.normal, beside);
 #endif
         let far = depth * length(ray);
-        colour = hazed(shade_water(depth, ray, view, normal, lost, through, straight), far, direction);
+        colour = hazed(shade_water(depth, ray, view, normal, lost, through, backdrop), far, direction);
         dim_parts(exp(-far / shading.haze));
         light_part(SKYLIGHT, hazed(vec3f(0.0), far, direction));
     } else if HOLDS_OUT && straight.depth < 0.1 * FAR {
         alpha = 0.0;
     } else {
-        colour = behind_radiance(straight, direction);
+        colour = backdrop;
         behind_parts(straight, direction, colour);
         if straight.depth >= 0.1 * FAR {
             alpha = shading.background;

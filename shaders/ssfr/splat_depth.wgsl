@@ -1,4 +1,4 @@
-// Nearest sphere surface at each pixel, or with ELLIPSOIDS that of ellipsoids. One workgroup a particle: its threads share the pixels.
+// Nearest sphere surface at each pixel, or with ELLIPSOIDS that of ellipsoids. A row of threads a particle, which share the pixels.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
@@ -19,13 +19,13 @@
 @group(0) @binding(5) var<storage, read> shapes: array<Shape>;
 #endif
 
-@compute @workgroup_size(LANES)
+@compute @workgroup_size(LANES, ROWS)
 fn main(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) lane: u32,
+    @builtin(local_invocation_id) thread: vec3u,
 ) {
-    let index = group.x + group.y * groups.x;
+    let index = row_of_group(group, groups, thread);
     if index >= camera.particle_count {
         return;
     }
@@ -46,7 +46,7 @@ fn main(
 #endif
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
-    for (var i = lane; i < count; i += LANES) {
+    for (var i = thread.x; i < count; i += LANES) {
         let row = row_of(i, width);
         let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let at = pixel.y * camera.size.x + pixel.x;

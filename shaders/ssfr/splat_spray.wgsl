@@ -11,6 +11,8 @@
 @group(0) @binding(3) var<storage, read> solid_depth: array<f32>;
 @group(0) @binding(4) var<storage, read> surface: array<f32>;
 @group(0) @binding(5) var<storage, read_write> spray: array<atomic<u32>>;
+// How many particles hold air, and which.
+@group(0) @binding(7) var<storage, read> aired: array<u32>;
 #ifdef PATHS
 @group(0) @binding(6) var<storage, read> paths: array<Path>;
 #endif
@@ -48,21 +50,19 @@ fn offset_of(id: u32, k: u32) -> vec3f {
     return CLOUD * pow(random(id, 3u * k + 2u), 1.0 / 3.0) * vec3f(across * cos(turn), up, across * sin(turn));
 }
 
-@compute @workgroup_size(LANES)
+@compute @workgroup_size(LANES, ROWS)
 fn main(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) lane: u32,
+    @builtin(local_invocation_id) thread: vec3u,
 ) {
-    let index = group.x + group.y * groups.x;
-    if index >= camera.particle_count {
+    let place = row_of_group(group, groups, thread);
+    if place >= aired[0] {
         return;
     }
+    let index = aired[1u + place];
     let particle = particles[index];
     let air = air_of(particle);
-    if air <= 0.0 {
-        return;
-    }
     // The particle stands for a cloud of drops, wider than the ball that the solver carries.
     let id = particle.tag >> 1u;
     let half_size = camera.size / 2u;
@@ -81,7 +81,7 @@ fn main(
     let cubes = m * m * m + m * m * n + 0.6 * m * n * n + n * n * n / 7.0
         - part * part * (6.0 * m * m * n + 12.0 * m * n * n + 6.0 * n * n * n) / 24.0;
     let volume = air / (cubes * f32(count)) * finer * finer * finer;
-    for (var k = lane; k < count; k += LANES) {
+    for (var k = thread.x; k < count; k += LANES) {
         let q = (f32(k) + 0.5) * part;
         let own = camera.radius * (m + n * q * q) / finer;
         let d = c + offset_of(id, k) * camera.radius;

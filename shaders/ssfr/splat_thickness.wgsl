@@ -22,13 +22,13 @@ struct ThicknessParams {
 @group(0) @binding(5) var<storage, read> paths: array<Path>;
 #endif
 
-@compute @workgroup_size(LANES)
+@compute @workgroup_size(LANES, ROWS)
 fn main(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) lane: u32,
+    @builtin(local_invocation_id) thread: vec3u,
 ) {
-    let index = group.x + group.y * groups.x;
+    let index = row_of_group(group, groups, thread);
     if index >= camera.particle_count {
         return;
     }
@@ -42,7 +42,7 @@ fn main(
     let bounds = sphere_bounds(camera, c, radius, 0.5, half_size);
     let width = u32(max(bounds.z - bounds.x + 1, 0));
     let count = width * u32(max(bounds.w - bounds.y + 1, 0));
-    for (var i = lane; i < count; i += LANES) {
+    for (var i = thread.x; i < count; i += LANES) {
         let row = row_of(i, width);
         let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
         let hit = hit_sphere(eye_ray(camera, 2.0 * vec2f(pixel) + 1.0), c, radius);

@@ -105,9 +105,9 @@ pub struct Context {
 /// A text of one pass, imports pasted, that is replaced before it compiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Spoil {
-    /// Pass name.
+    /// Pass name. Where a pass `NAME_dry` does some of the work of pass `NAME`, it gets the same fault.
     pub pass: &'static str,
-    /// Has to occur.
+    /// Has to occur in it.
     pub from: &'static str,
     /// Stands there instead.
     pub to: &'static str,

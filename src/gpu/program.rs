@@ -303,8 +303,12 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
 fn source(context: &Context, name: &str, defines: &[&str]) -> Result<Composed, GpuError> {
     let composed = context.shaders.compose_with_places(name, defines);
     let mut source = composed.map_err(|error| context.shaders.blamed(error))?;
-    if let Some(spoil) = context.spoil.filter(|spoil| spoil.pass == name) {
-        source.text = spoiled(&source.text, &spoil)?;
+    if let Some(spoil) = context.spoil {
+        if spoil.pass == name {
+            source.text = spoiled(&source.text, &spoil)?;
+        } else if name.strip_suffix("_dry") == Some(spoil.pass) {
+            source.text = source.text.replace(spoil.from, spoil.to);
+        }
     }
     Ok(source)
 }

@@ -39,9 +39,13 @@ pub(super) const PARTICLES: Buf<Particle> = Buf::new("particles");
 pub(super) const PATHS: Buf<Path> = Buf::new("paths");
 /// What each of them is splatted as.
 pub(super) const SHAPES: Buf<Shape> = Buf::new("shapes");
-/// Workgroups of a dispatch of one a particle that may be seen; these stand first.
+/// How many particles hold air, and which: those that spray is splatted of.
+pub(super) const AIRED: Buf<u32> = Buf::new("aired");
+/// Workgroups of a dispatch over those that hold air.
+pub(super) const AIRED_GROUPS: Buf<Workgroups> = Buf::new("aired_groups");
+/// Workgroups of a dispatch over particles that may be seen; these stand first.
 pub(super) const SEEN_GROUPS: Buf<Workgroups> = Buf::new("seen_groups");
-/// Workgroups of a dispatch of one a particle.
+/// Workgroups of a dispatch over all particles.
 pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
 /// What a particle adds to thickness.
 pub(super) const THICKNESS_PARAMS: Buf<Thickness> = Buf::uniform("thickness_params");
@@ -101,6 +105,16 @@ pub(super) const SET_TRIANGLES: Buf<Triangle> = Buf::new("set_triangles");
 pub(super) const BANDS: Windows<Band> = Windows::new("band", "bands");
 /// Word and count of each fill.
 pub(super) const FILLS: Windows<Fill> = Windows::new("params", "fills");
+
+/// Tiles of a part of the frame, by whether there is water in them.
+pub(super) fn tiles(part: &str) -> Buf<u32> {
+    Buf::named(format!("tiles.{part}"))
+}
+
+/// Workgroups of dispatches over those with water, and over the others.
+pub(super) fn tile_groups(part: &str) -> Buf<Workgroups> {
+    Buf::named(format!("tile_groups.{part}"))
+}
 
 /// A band of the picture: linear radiance and coverage, and behind them, for each pixel, the parts of the light that are asked for.
 pub(super) fn picture(band: usize) -> Buf<[f32; 4]> {

@@ -31,6 +31,7 @@ mod set;
 mod shapes;
 mod sky;
 mod surface;
+mod tiles;
 mod tree;
 #[expect(unreachable_pub, reason = "mirrors are declared public")]
 mod uniform;

@@ -1,8 +1,10 @@
 //! From splat depth to a smooth surface.
 
 use super::buffers::{DEPTHS, FLOW, FLOW_LEVELS, NARROW_RANGE};
+use super::frame::FAR;
 use super::plan::Plan;
-use super::uniform::{Flow, FlowLevel, Narrow};
+use super::tiles::{FLOW_TILE, Tiles, every_tile};
+use super::uniform::{Flow, FlowLevel, Narrow, TileGrid};
 use crate::gpu::{
     buffer::Buf,
     recording::{Bind, Command, Groups},
@@ -68,36 +70,84 @@ pub(super) struct Smoothing {
     pub(super) surface: Buf<f32>,
 }
 
-/// Depths of a level of the pyramid: what restriction left, and two buffers to work in.
+/// Levels of which those tiles are listed that have water: a quarter and a sixteenth as many cells are on each further one.
+const LISTED: usize = 2;
+
+/// Depths of a level of the pyramid: what restriction left, and two buffers to work in; and the tiles in which the flow runs.
 struct Level {
     size: [u32; 2],
     original: Buf<f32>,
     work: [Buf<f32>; 2],
+    tiles: (Groups, Bind),
+}
+
+/// What lists the tiles with water of the finer levels: before restriction what stands in the others, which no step writes to, and after
+/// it the lists.
+#[derive(Default)]
+struct Lists {
+    before: Vec<Command>,
+    after: Vec<Command>,
 }
 
 impl Level {
-    fn all(plan: &mut Plan, count: u32, size: [u32; 2]) -> Vec<Self> {
-        let [depth, other] = DEPTHS;
-        let mut levels = vec![Self {
-            size,
-            original: depth.clone(),
-            work: [other, depth],
-        }];
-        for index in 1..count as usize {
-            let size = levels[index - 1].size.map(|side| side.div_ceil(2));
-            let buffers =
-                ["", ".a", ".b"].map(|part| Buf::named(format!("coarse_depth.{index}{part}")));
-            for buffer in &buffers {
-                plan.buffer(buffer, size[0] as usize * size[1] as usize);
-            }
-            let [original, first, second] = buffers;
+    fn all(plan: &mut Plan, count: u32, size: [u32; 2]) -> (Vec<Self>, Lists) {
+        let mut lists = Lists::default();
+        let mut levels: Vec<Self> = Vec::new();
+        for index in 0..count as usize {
+            let size = levels
+                .last()
+                .map_or(size, |finer| finer.size.map(|side| side.div_ceil(2)));
+            let (original, work) = Self::buffers(plan, index, size);
+            let tiles = match index < LISTED {
+                true => lists.add(plan, index, size, (&original, &work)),
+                false => every_tile(plan, &format!("flow.{index}"), size),
+            };
             levels.push(Self {
                 size,
                 original,
-                work: [first, second],
+                work,
+                tiles,
             });
         }
-        levels
+        (levels, lists)
+    }
+
+    fn buffers(plan: &mut Plan, index: usize, size: [u32; 2]) -> (Buf<f32>, [Buf<f32>; 2]) {
+        let [depth, other] = DEPTHS;
+        if index == 0 {
+            return (depth.clone(), [other, depth]);
+        }
+        let buffers =
+            ["", ".a", ".b"].map(|part| Buf::named(format!("coarse_depth.{index}{part}")));
+        for buffer in &buffers {
+            plan.buffer(buffer, size[0] as usize * size[1] as usize);
+        }
+        let [original, first, second] = buffers;
+        (original, [first, second])
+    }
+}
+
+impl Lists {
+    fn add(
+        &mut self,
+        plan: &mut Plan,
+        index: usize,
+        size: [u32; 2],
+        (original, work): (&Buf<f32>, &[Buf<f32>; 2]),
+    ) -> (Groups, Bind) {
+        for buffer in work.iter().filter(|work| work.name() != original.name()) {
+            let cells = size[0] as usize * size[1] as usize;
+            self.before.push(plan.fill(buffer, FAR.to_bits(), cells));
+        }
+        let grid = TileGrid {
+            size,
+            tile: FLOW_TILE,
+            stride: size[0],
+            ..TileGrid::default()
+        };
+        let (tiles, commands) = Tiles::plan(plan, &format!("flow.{index}"), grid, original);
+        self.after.extend(commands);
+        (tiles.wet(), tiles.bind())
     }
 }
 
@@ -122,11 +172,11 @@ pub(super) fn curvature_flow(
         pad1: 0,
     };
     plan.values(&FLOW, &[params]);
-    let levels = Level::all(plan, settings.levels, size);
+    let (levels, lists) = Level::all(plan, settings.levels, size);
+    let mut commands = lists.before;
     let mut windows = Vec::new();
-    let mut commands = Vec::new();
-    // A pass over the cells of level `over`, told of step `index` of level `at`.
-    let mut run = |pass, over: usize, (at, index): (usize, u32), mut binds: Vec<Bind>| {
+    // A pass that is told of step `index` of level `at`.
+    let mut command = |pass, groups: Groups, (at, index): (usize, u32), mut binds: Vec<Bind>| {
         binds.push(Bind::whole("params", &FLOW));
         binds.push(FLOW_LEVELS.bind(windows.len()));
         windows.push(FlowLevel {
@@ -134,8 +184,7 @@ pub(super) fn curvature_flow(
             level: at as u32,
             index,
         });
-        let groups = Groups::Pixels(levels[over].size);
-        commands.push(Command::in_groups(pass, groups, binds));
+        Command::in_groups(pass, groups, binds)
     };
     let top = levels.len() - 1;
     for (l, pair) in levels.windows(2).enumerate() {
@@ -143,12 +192,15 @@ pub(super) fn curvature_flow(
             Bind::whole("fine", &pair[0].original),
             Bind::whole("coarse", &pair[1].original),
         ];
-        run("ssfr/flow_restrict", l + 1, (l, 0), binds);
+        let groups = Groups::Pixels(pair[1].size);
+        commands.push(command("ssfr/flow_restrict", groups, (l, 0), binds));
     }
+    commands.extend(lists.after);
     let mut surface: Option<&Buf<f32>> = None;
     for (l, level) in levels.iter().enumerate().rev() {
         let mut source = &level.original;
         let mut into = level.work.iter().cycle();
+        let (groups, tiles) = &level.tiles;
         if let Some(after) = surface {
             let corrected = &level.work[0];
             let binds = vec![
@@ -156,8 +208,9 @@ pub(super) fn curvature_flow(
                 Bind::whole("coarse_after", after),
                 Bind::whole("fine", source),
                 Bind::whole("corrected", corrected),
+                tiles.clone(),
             ];
-            run("ssfr/flow_prolong", l, (l, 0), binds);
+            commands.push(command("ssfr/flow_prolong", groups.clone(), (l, 0), binds));
             source = corrected;
             into.next();
         }
@@ -166,8 +219,10 @@ pub(super) fn curvature_flow(
             false => settings.steps,
         };
         for (index, into) in (0..count).zip(into) {
-            let binds = vec![Bind::whole("source", source), Bind::whole("smoothed", into)];
-            run("ssfr/curvature_flow", l, (l, index), binds);
+            let depths = [Bind::whole("source", source), Bind::whole("smoothed", into)];
+            let binds = [&depths[..], std::slice::from_ref(tiles)].concat();
+            let step = command("ssfr/curvature_flow", groups.clone(), (l, index), binds);
+            commands.push(step);
             source = into;
         }
         surface = Some(source);

@@ -54,6 +54,7 @@ fn run_before(
     plan.values(&SOLID_DEPTH, solid);
     let smoothing = plan_smoothing(&mut plan);
     plan.sample = smoothing.commands;
+    plan.end_fills();
     let program = plan.program(&Context::open(None).unwrap()).unwrap();
     let recording = Recording::new(&program, &plan.sample);
     recording.run(&program, None).unwrap();

@@ -105,6 +105,17 @@ mirror!(
 );
 
 mirror!(
+    /// `TileGrid` of ssfr/list_tiles.wgsl.
+    TileGrid {
+        corner: [u32; 2],
+        size: [u32; 2],
+        tile: [u32; 2],
+        stride: u32,
+        pad0: u32,
+    }
+);
+
+mirror!(
     /// `FlowParams` of shared/ssfr_flow.wgsl.
     Flow as "FlowParams" {
         width: f32,
@@ -309,6 +320,7 @@ pub fn mirrors() -> Vec<Layout> {
         Shading::layout(),
         Flow::layout(),
         FlowLevel::layout(),
+        TileGrid::layout(),
         Narrow::layout(),
         Fill::layout(),
         Triangle::layout(),

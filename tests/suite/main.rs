@@ -69,6 +69,7 @@ mod render {
     mod delivery;
     mod flicker;
     mod folder;
+    mod listed;
     mod outlines;
     mod pictures;
     mod scaled;

@@ -91,7 +91,12 @@ impl Plan {
         let light = shading(look, scene, &sky, matrix.to_cols_array_2d());
         plan.values(&SHADING, &[light]);
         let shaded = match spec.renderer.method {
-            MethodSpec::Ssfr => &["ssfr/shade", "ssfr/shade_aovs", "ssfr/shade_objects"][..],
+            MethodSpec::Ssfr => &[
+                "ssfr/shade",
+                "ssfr/shade_dry",
+                "ssfr/shade_aovs",
+                "ssfr/shade_objects",
+            ][..],
             MethodSpec::Ray => &[
                 "rays/cast",
                 "rays/aovs",

@@ -3,14 +3,22 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Renderer, build::room, shade::draws_spray, splats::filled};
+use super::{
+    Renderer,
+    build::room,
+    shade::draws_spray,
+    splats::{ROWS, filled},
+};
 use crate::{
     domain::{level_set::kernels::Kernels, particles::Particles},
     gpu::recording::spread,
     render::{
         Moment, RenderError,
         aeration::{self, CLEAR},
-        buffers::{PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES, SPRAY_PARAMS},
+        buffers::{
+            AIRED, AIRED_GROUPS, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES,
+            SPRAY_PARAMS,
+        },
         camera::pose,
         hidden::hidden,
         lighting::spray_density,
@@ -84,9 +92,14 @@ impl Renderer {
         }
         let seen = self.sort(frame, &mut packed, &mut ways);
         self.reserve(packed.len())?;
-        for (buffer, threads) in [(PARTICLE_GROUPS, packed.len()), (SEEN_GROUPS, seen)] {
+        let aired = self.load_aired(&packed);
+        for (buffer, particles) in [
+            (PARTICLE_GROUPS, packed.len()),
+            (SEEN_GROUPS, seen),
+            (AIRED_GROUPS, aired),
+        ] {
             if self.program.has(buffer.name()) {
-                let groups = spread(&self.program.context, 1, threads as u64);
+                let groups = spread(&self.program.context, ROWS, particles as u64);
                 self.program.upload(buffer, 0, &[groups.into()]);
             }
         }
@@ -108,6 +121,19 @@ impl Renderer {
             ahead = packed;
         }
         Ok(Loaded { count, ahead })
+    }
+
+    /// Tells the device which particles hold air, few of all, and says how many do.
+    fn load_aired(&self, packed: &[Particle]) -> usize {
+        if !self.program.has(AIRED.name()) {
+            return 0;
+        }
+        let aired = (0u32..).zip(packed).filter(|(_, it)| it.air & 0xffff > 0);
+        let mut words = vec![0];
+        words.extend(aired.map(|(index, _)| index));
+        words[0] = words.len() as u32 - 1;
+        self.program.upload(AIRED, 0, &words);
+        words.len() - 1
     }
 
     fn frame_seconds(&self) -> f32 {
@@ -173,6 +199,9 @@ impl Renderer {
         }
         let capacity = room(particles);
         let mut grown = vec![PARTICLES.sized(capacity)];
+        if self.program.has(AIRED.name()) {
+            grown.push(AIRED.sized(1 + capacity));
+        }
         if self.program.has(SHAPES.name()) {
             grown.push(SHAPES.sized(capacity));
         }

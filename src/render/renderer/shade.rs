@@ -8,10 +8,14 @@ use crate::{
     render::{
         buffers::{BANDS, OWNER, THICKNESS, TRIANGLES, aovs, objects, picture},
         plan::Plan,
-        uniform::Band,
+        tiles::{TILE, Tiles},
+        uniform::{Band, TileGrid},
     },
     scene::look::{AovSpec, LightSpec, Look, SolidsOutput},
 };
+
+/// What draws the pixels of tiles without water.
+const DRY: &str = "ssfr/shade_dry";
 
 /// Shading, band by band.
 pub(super) struct Shade {
@@ -146,6 +150,7 @@ pub(super) fn wants_spray_aovs(look: &Look) -> bool {
 /// Plans the shading of what was splatted; `surface` is where the smoothed depth stands.
 pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
     plan_output(plan, look, "ssfr/shade");
+    plan_output(plan, look, DRY);
     plan.define("ssfr/shade_aovs", "AOVS");
     if wants_spray_aovs(look) {
         plan.define("ssfr/shade_aovs", "SPRAY");
@@ -162,6 +167,9 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
     };
     let passes = ["ssfr/shade", "ssfr/shade_aovs"];
     let mut shade = plan_bands(plan, look, passes, [&binds, &binds]);
+    if look.spec().sea.is_none() {
+        shade.picture = by_tiles(plan, surface, shade.picture);
+    }
     let seen = || {
         let triangles = Bind::whole("set_triangles", &TRIANGLES);
         vec![Bind::whole("surface", surface), triangles]
@@ -169,6 +177,38 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
     let objects = plan_objects(plan, look, "ssfr/shade_objects", &seen);
     shade.picture.extend(objects);
     shade
+}
+
+/// The shading of the picture by a pass over tiles with water and one over the others, of a band each. With a sea there may be water
+/// anywhere.
+fn by_tiles(plan: &mut Plan, surface: &Buf<f32>, picture: Vec<Command>) -> Vec<Command> {
+    plan.define("ssfr/shade", "LISTED");
+    plan.define(DRY, "LISTED");
+    plan.define(DRY, "DRY");
+    let mut commands = Vec::new();
+    let mut row = 0;
+    for (band, shade) in picture.into_iter().enumerate() {
+        let Command::Dispatch { pass, binds, .. } = shade else {
+            continue;
+        };
+        let [left, top] = plan.extent.margin;
+        let size = [plan.extent.picture[0], plan.bands[band]];
+        let corner = [left, top + row];
+        row += size[1];
+        let grid = TileGrid {
+            corner,
+            size,
+            tile: TILE,
+            stride: plan.extent.size[0],
+            ..TileGrid::default()
+        };
+        let (tiles, lists) = Tiles::plan(plan, &format!("shade.{band}"), grid, surface);
+        let binds = [binds, vec![tiles.bind()]].concat();
+        commands.extend(lists);
+        commands.push(Command::in_groups(pass, tiles.wet(), binds.clone()));
+        commands.push(Command::in_groups(DRY, tiles.dry(), binds));
+    }
+    commands
 }
 
 /// Plans the casting of rays.

@@ -8,9 +8,9 @@ use crate::{
     },
     render::{
         buffers::{
-            DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES, SPRAY,
-            SPRAY_PARAMS, THICKNESS, THICKNESS_PARAMS, WHITEWATER, WHITEWATER_GROUPS,
-            WHITEWATER_PARAMS,
+            AIRED, AIRED_GROUPS, DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS,
+            SHAPES, SPRAY, SPRAY_PARAMS, THICKNESS, THICKNESS_PARAMS, WHITEWATER,
+            WHITEWATER_GROUPS, WHITEWATER_PARAMS,
         },
         frame::FAR,
         plan::{Limits, Plan},
@@ -19,7 +19,10 @@ use crate::{
     scene::look::Look,
 };
 
-/// Passes with a workgroup a particle.
+/// Particles of a workgroup: `ROWS` of shared/ssfr_lanes.wgsl.
+pub(super) const ROWS: u32 = 8;
+
+/// Passes that share a particle's pixels among threads.
 const OVER_PARTICLES: [&str; 5] = [
     "ssfr/splat_depth",
     "ssfr/splat_owner",
@@ -47,6 +50,11 @@ fn over_seen(pass: &'static str, binds: Vec<Bind>) -> Command {
     Command::in_groups(pass, Groups::at(&SEEN_GROUPS, 0), binds)
 }
 
+/// A pass over those that hold air.
+fn over_aired(pass: &'static str, binds: Vec<Bind>) -> Command {
+    Command::in_groups(pass, Groups::at(&AIRED_GROUPS, 0), binds)
+}
+
 /// Plans `particles` particles. Where the shutter is open `moving` passes, which draw samples, take them along their paths.
 pub(super) fn plan_particles(
     plan: &mut Plan,
@@ -55,7 +63,10 @@ pub(super) fn plan_particles(
     moving: &[&'static str],
 ) {
     plan.buffer(&PARTICLES, particles);
-    plan.buffer(&PARTICLE_GROUPS, 1);
+    if look.spec().water.spray.is_some() {
+        plan.buffer(&AIRED, 1 + particles);
+        plan.buffer(&AIRED_GROUPS, 1);
+    }
     if look.spec().image.shutter > 0.0 && !moving.is_empty() {
         plan.buffer(&PATHS, particles);
         for pass in moving {
@@ -87,6 +98,7 @@ pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
     plan.values(&THICKNESS_PARAMS, &[scale]);
     plan.buffer(&THICKNESS, pixels / 4);
     plan.buffer(&SEEN_GROUPS, 1);
+    plan.buffer(&PARTICLE_GROUPS, 1);
     let params = Bind::whole("params", &THICKNESS_PARAMS);
     vec![
         plan.fill(&DEPTHS[0], FAR.to_bits(), pixels),
@@ -104,6 +116,7 @@ pub(super) fn plan_owner(plan: &mut Plan) -> Vec<Command> {
 
 /// Plans the nearest spheres before the opaque depths of rays, and whose they are: of all particles, since the eye may be among them.
 pub(super) fn plan_owner_before_rays(plan: &mut Plan) -> Vec<Command> {
+    plan.buffer(&PARTICLE_GROUPS, 1);
     let opaque = Bind::whole("solid_depth", &DEPTHS[1]);
     vec![
         plan.fill(&DEPTHS[0], FAR.to_bits(), plan.extent.pixels()),
@@ -170,7 +183,7 @@ pub(super) fn plan_spray(
         };
         let mut commands = vec![Command::clear(&SPRAY)];
         if has_drops {
-            commands.push(over_particles(drops, before()));
+            commands.push(over_aired(drops, before()));
         }
         if has_white {
             let groups = Groups::at(&WHITEWATER_GROUPS, 0);
@@ -188,4 +201,23 @@ pub(super) fn plan_spray(
         }
     }
     Spray { sample, aovs }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+    use super::*;
+    use crate::gpu::{reflect::reflect, shader::compose};
+
+    /// What is dispatched is what the shaders take a workgroup for.
+    #[test]
+    fn workgroups_hold_as_many_particles_as_the_shaders_say() {
+        for pass in OVER_PARTICLES {
+            for (lanes, defines) in [(32, &[][..]), (8, &["NARROW"])] {
+                let size = reflect(pass, &compose(pass, defines).unwrap()).unwrap();
+                assert_eq!(size.workgroup_size, [lanes, ROWS, 1], "{pass}");
+            }
+        }
+    }
 }

@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 48] = [
+const VARIANTS: [&[&str]; 52] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -75,6 +75,10 @@ const VARIANTS: [&[&str]; 48] = [
     &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS", "FOAM"],
     &["CAUSTICS", "LIGHTS"],
     &["CAUSTICS", "SEA", "PALETTE", "SPRAY", "LIGHTS"],
+    &["LISTED"],
+    &["LISTED", "DRY"],
+    &["LISTED", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
+    &["LISTED", "DRY", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
 ];
 
 /// `neighbor_list` holds lists, so build_neighbors has no form without them; and rays alone go through a volume.
@@ -102,7 +106,7 @@ fn every_pass_validates_in_every_variant() {
             let is_drawing = pass.starts_with("ssfr/") || pass.starts_with("rays/");
             let is_known = match (is_drawing, reflection.stage) {
                 (true, Stage::Raster { .. }) => true,
-                (true, Stage::Compute) => [[64, 1, 1], [32, 1, 1], [16, 4, 1]].contains(&size),
+                (true, Stage::Compute) => [[64, 1, 1], [32, 8, 1], [16, 4, 1]].contains(&size),
                 (false, stage) => {
                     stage == Stage::Compute && [[64, 1, 1], [256, 1, 1]].contains(&size)
                 }

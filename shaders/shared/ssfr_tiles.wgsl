@@ -1,0 +1,24 @@
+// Lists of a picture's tiles: those in which there is water, and the others. Adapters that run both sides of a branch would do for each
+// pixel what water costs; a pass over one of the lists does it where there is some.
+//
+// Words of a list: how many tiles have water; how many have none; then those that have, and those that have none, from the last to the first;
+// each as its column in the lower 16 bits and its row in the upper ones.
+
+// Pixels of a tile of the picture, a thread each of a workgroup of the passes over lists; and cells of one of the flow, a thread for two
+// by two.
+const TILE: vec2u = vec2u(16u, 4u);
+const FLOW_TILE: vec2u = vec2u(32u, 8u);
+
+fn column_and_row(word: u32) -> vec2u {
+    return vec2u(word & 0xffffu, word >> 16u);
+}
+
+// The picture's pixel that a thread stands for, in the tile of that word.
+fn pixel_of_tile(word: u32, thread: vec3u) -> vec2u {
+    return column_and_row(word) * TILE + thread.xy;
+}
+
+// The first of the flow's cells that a thread has.
+fn cells_of_tile(word: u32, thread: vec3u) -> vec2u {
+    return column_and_row(word) * FLOW_TILE + 2u * thread.xy;
+}

@@ -1,0 +1,2 @@
+// Pixels of tiles without water: as for the picture, with DRY.
+#import "ssfr/shade.wgsl"

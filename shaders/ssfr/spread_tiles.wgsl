@@ -1,0 +1,17 @@
+// Workgroups of the dispatches over a list of tiles: one each for those with water, and for those without.
+
+@group(0) @binding(0) var<storage, read> tiles: array<u32>;
+@group(0) @binding(1) var<storage, read_write> tile_groups: array<vec4u>;
+
+// Of a dispatch along an axis: what every adapter allows.
+const MOST_GROUPS: u32 = 65535u;
+
+@compute @workgroup_size(64)
+fn main(@builtin(local_invocation_index) which: u32) {
+    if which >= 2u {
+        return;
+    }
+    let count = tiles[which];
+    let rows = (count + MOST_GROUPS - 1u) / MOST_GROUPS;
+    tile_groups[which] = vec4u((count + max(rows, 1u) - 1u) / max(rows, 1u), rows, 1u, 0u);
+}

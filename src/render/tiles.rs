@@ -1,0 +1,128 @@
+//! Lists of a picture's tiles: those in which there is water, and the others, so that what only water needs is done where there is some.
+
+use super::{
+    buffers::{tile_groups, tiles},
+    plan::Plan,
+    uniform::TileGrid,
+};
+use crate::gpu::{
+    buffer::{Buf, Windows, Workgroups},
+    recording::{Bind, Command, Groups},
+};
+
+/// Threads of a workgroup of the passes over lists; a workgroup has a tile.
+const WORKGROUP: [u32; 2] = [16, 4];
+/// Pixels of a tile of the picture: a thread each.
+pub(super) const TILE: [u32; 2] = WORKGROUP;
+/// Cells of a tile of the curvature flow: a thread for two by two.
+pub(super) const FLOW_TILE: [u32; 2] = [2 * WORKGROUP[0], 2 * WORKGROUP[1]];
+
+/// A list, and the workgroups of dispatches over it.
+pub(super) struct Tiles {
+    list: Buf<u32>,
+    groups: Buf<Workgroups>,
+}
+
+impl Tiles {
+    /// Plans the list of a part of the frame, and gives what makes it from the depths of water in `source`.
+    pub(super) fn plan(
+        plan: &mut Plan,
+        name: &str,
+        grid: TileGrid,
+        source: &Buf<f32>,
+    ) -> (Self, Vec<Command>) {
+        let count = count(grid.size, grid.tile);
+        let made = Self {
+            list: tiles(name),
+            groups: tile_groups(name),
+        };
+        plan.buffer(&made.list, 2 + count);
+        plan.buffer(&made.groups, 2);
+        let grids = Windows::named("grid", format!("tile_grid.{name}"));
+        plan.windows(&grids, &[grid]);
+        let list = vec![grids.bind(0), Bind::whole("source", source), made.bind()];
+        let spread = vec![made.bind(), Bind::whole("tile_groups", &made.groups)];
+        let commands = vec![
+            Command::clear(&made.list),
+            Command::with("ssfr/list_tiles", count, list),
+            Command::with("ssfr/spread_tiles", 1, spread),
+        ];
+        (made, commands)
+    }
+
+    /// Binds a pass to the list.
+    pub(super) fn bind(&self) -> Bind {
+        Bind::whole("tiles", &self.list)
+    }
+
+    /// Of a pass over the tiles with water.
+    pub(super) fn wet(&self) -> Groups {
+        Groups::at(&self.groups, 0)
+    }
+
+    /// Of a pass over those without.
+    pub(super) fn dry(&self) -> Groups {
+        Groups::at(&self.groups, 1)
+    }
+}
+
+/// Plans a list of all tiles of the flow over `size` cells, as if there were water in each, and gives the workgroups and the binding of a
+/// pass over it.
+pub(super) fn every_tile(plan: &mut Plan, name: &str, size: [u32; 2]) -> (Groups, Bind) {
+    let [across, down] = counts(size, FLOW_TILE);
+    let mut words = vec![across * down, 0];
+    words.extend((0..down).flat_map(|y| (0..across).map(move |x| x | y << 16)));
+    let list = tiles(name);
+    plan.values(&list, &words);
+    // A workgroup a tile: as many columns of threads as that takes.
+    let columns = u64::from(WORKGROUP[0]) * u64::from(words[0]);
+    (Groups::Threads(columns), Bind::whole("tiles", &list))
+}
+
+fn counts(size: [u32; 2], tile: [u32; 2]) -> [u32; 2] {
+    [0, 1].map(|axis| size[axis].div_ceil(tile[axis]))
+}
+
+fn count(size: [u32; 2], tile: [u32; 2]) -> usize {
+    counts(size, tile)
+        .map(|side| side as usize)
+        .iter()
+        .product()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+    use super::*;
+    use crate::gpu::{reflect::reflect, shader::compose};
+
+    #[test]
+    fn a_workgroup_is_what_a_tile_is_for() {
+        let passes = [
+            ("ssfr/curvature_flow", &[][..]),
+            ("ssfr/flow_prolong", &[]),
+            ("ssfr/shade", &["LISTED"]),
+            ("ssfr/shade_dry", &["LISTED", "DRY"]),
+        ];
+        for (pass, defines) in passes {
+            let found = reflect(pass, &compose(pass, defines).unwrap()).unwrap();
+            assert_eq!(
+                found.workgroup_size,
+                [WORKGROUP[0], WORKGROUP[1], 1],
+                "{pass}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_tile_is_listed_once() {
+        let mut plan = Plan::default();
+        let (groups, _) = every_tile(&mut plan, "all", [80, 17]);
+        assert_eq!(groups, Groups::Threads(16 * 9));
+        let words: &[u32] = bytemuck::cast_slice(&plan.contents[0].1);
+        let tiles = [0, 1, 2].map(|y| [0, 1, 2].map(|x| x | y << 16));
+        assert_eq!(words[..2], [9, 0]);
+        assert_eq!(words[2..], *tiles.as_flattened());
+    }
+}

@@ -1,0 +1,91 @@
+//! Tiles with water and those without are drawn by passes of their own, which is not to be seen.
+
+use std::path::Path;
+
+use swell::{
+    domain::particles::Particles, gpu::adapter::Context, render::Renderer, scene::look::Look,
+};
+
+use super::{
+    analytic::{context, spoiled},
+    scenes::{city_scene, city_water},
+};
+
+const LOOK: &str = "[camera]
+focal_length_mm = 27.0
+film_back_mm = [36.0, 19.92]
+position = [7.2, 5.6, -1.7]
+target = [17.6, 1.7, 8.4]
+[image]
+width = 150
+height = 83
+samples = 2
+[water]
+spray = { density_per_metre = 9.0, speed_m_per_s = 2.0 }
+[sun]
+azimuth_degrees = 112.0
+elevation_degrees = 34.0
+[sky]
+model = \"hosek_wilkie\"
+";
+
+/// Pictures of several waters by one renderer, the last one.
+fn last(context: &Context, waters: &[&Particles]) -> Vec<[f32; 4]> {
+    let look = Look::parse(LOOK, Path::new("listed.toml")).unwrap();
+    let mut renderer = Renderer::new(context, &look, &city_scene()).unwrap();
+    let pictures = waters
+        .iter()
+        .map(|water| renderer.render(9, water).unwrap());
+    pictures.last().unwrap().beauty
+}
+
+/// The part of the pixels of which a channel differs by more than rounding: both passes have one formula, and compilers may order the
+/// steps of two programs differently. A few hundred of them, each half of 2⁻²⁴ off.
+fn apart(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
+    const ROUNDING: f32 = 200.0 * 6e-8;
+    let differs = |(a, b): &(&[f32; 4], &[f32; 4])| {
+        let mut channels = a.iter().zip(*b);
+        channels.any(|(a, b)| (a - b).abs() > ROUNDING * (1.0 + a.abs()))
+    };
+    a.iter().zip(b).filter(differs).count() as f64 / a.len() as f64
+}
+
+const LISTED: &str = "if nearest < FAR {";
+
+#[test]
+fn lists_of_tiles_do_not_change_the_picture() {
+    let water = city_water();
+    let picture = last(&context(), &[&water]);
+    let everywhere = spoiled("ssfr/list_tiles", LISTED, "if true {");
+    assert_eq!(apart(&picture, &last(&everywhere, &[&water])), 0.0);
+    // The control: without lists of water there is none, where a quarter of the picture shows some.
+    let nowhere = spoiled("ssfr/list_tiles", LISTED, "if false {");
+    let found = apart(&picture, &last(&nowhere, &[&water]));
+    assert!(found > 0.1, "{found}");
+}
+
+/// What stood in a tile that has no water any more is gone.
+#[test]
+fn a_frame_leaves_nothing_to_the_next() {
+    let water = city_water();
+    let mut less = water.clone();
+    let kept: Vec<bool> = water.position.iter().map(|p| p[2] < 5.0).collect();
+    let keeps = |index: usize| kept[index];
+    let filtered = |all: &[[f32; 3]]| -> Vec<[f32; 3]> {
+        let of = |(index, value): (usize, &[f32; 3])| keeps(index).then_some(*value);
+        all.iter().enumerate().filter_map(of).collect()
+    };
+    less.position = filtered(&water.position);
+    less.velocity = filtered(&water.velocity);
+    less.id = (0..less.position.len() as u32).collect();
+    let alone = last(&context(), &[&less]);
+    assert_eq!(last(&context(), &[&water, &less]), alone);
+    // The controls: the first frame is another picture, and a tile that is not cleared is seen.
+    assert!(apart(&last(&context(), &[&water]), &alone) > 0.05);
+    let uncleared = spoiled(
+        "ssfr/fill",
+        "words[at] = params.word;",
+        "words[at] = select(params.word, words[at], words[at] != 0u);",
+    );
+    assert_ne!(last(&uncleared, &[&water, &less]), alone);
+}
