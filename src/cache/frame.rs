@@ -257,6 +257,14 @@ pub fn decode(bytes: &[u8], file: &Path) -> Result<Particles, CacheError> {
     parse(bytes).map_err(|what| CacheError::damaged(file, what))
 }
 
+/// The comments of a frame's header, in their order.
+pub fn comments(bytes: &[u8]) -> Vec<String> {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEADER_LIMIT)]);
+    let lines = head.lines().take_while(|line| *line != "end_header");
+    let comments = lines.filter_map(|line| line.strip_prefix("comment "));
+    comments.map(str::to_owned).collect()
+}
+
 fn parse(bytes: &[u8]) -> Result<Particles, String> {
     let head = read_head(&bytes[..bytes.len().min(HEADER_LIMIT)])?;
     if head.planes {

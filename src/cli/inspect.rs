@@ -1,7 +1,9 @@
-//! `swell inspect SCENE|LOOK|CACHE|--adapters`
+//! `swell inspect SCENE|LOOK|STUDY|CACHE|FILE|--adapters`
 
+mod file;
 mod json;
 mod look;
+mod study;
 
 use std::{
     fmt::{self, Write},
@@ -27,10 +29,10 @@ use super::{
 
 #[derive(Args, Debug)]
 #[command(
-    override_usage = "swell inspect [OPTIONS] <SCENE|LOOK|CACHE>\n       swell inspect --adapters"
+    override_usage = "swell inspect [OPTIONS] <SCENE|LOOK|STUDY|CACHE|FILE>\n       swell inspect --adapters"
 )]
 pub(super) struct InspectArgs {
-    /// A scene file, a look file or a cache directory.
+    /// A scene, look or study file, a cache directory, or a file: a frame or mesh (.ply, .obj, .stl), a .vdb, a picture (.png, .exr).
     #[arg(required_unless_present = "adapters")]
     subject: Option<PathBuf>,
     /// List this machine's adapters with the limits that matter here.
@@ -93,8 +95,10 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     }
     match &args.subject {
         Some(directory) if is_failed(directory) => return Err(broken_off(directory)),
+        Some(subject) if file::is_file(subject) => file::show(&mut text, args, subject)?,
+        Some(subject) if study::is_study(subject) => study::show(&mut text, args, subject)?,
         Some(directory) if is_cache(directory) => {
-            refuse_scene_options(args, directory)?;
+            refuse_options(args, CACHE, directory)?;
             let (manifest, entries) = cache(directory)?;
             let _ = show_cache(&mut text, &manifest, &entries);
             let _ = show_probes(&mut text, &manifest, &entries);
@@ -160,11 +164,13 @@ fn refuse_frames_beyond(args: &InspectArgs, file: &Path, frames: u32) -> Result<
     }
 }
 
-/// A cache says itself what it was baked with, and on what.
-fn refuse_scene_options(args: &InspectArgs, directory: &Path) -> Result<(), Failure> {
-    let is = "a cache: it says what it was baked with";
+/// What is told of a cache where an option of scenes is given: it says itself what it was baked with, and on what.
+const CACHE: &str = "a cache: it says what it was baked with";
+
+/// Refuses options of scenes for what is none.
+fn refuse_options(args: &InspectArgs, is: &'static str, file: &Path) -> Result<(), Failure> {
     if args.time.is_some() {
-        return Err(misplaced("--time", "scenes", is, directory));
+        return Err(misplaced("--time", "scenes", is, file));
     }
     if args.set.is_empty() && args.solver.is_none() && args.adapter.is_none() {
         return Ok(());
@@ -173,7 +179,7 @@ fn refuse_scene_options(args: &InspectArgs, directory: &Path) -> Result<(), Fail
         "--set, --solver or --adapter",
         "scenes",
         is,
-        directory,
+        file,
     ))
 }
 

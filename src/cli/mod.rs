@@ -83,7 +83,7 @@ enum Command {
     Whitewater(whitewater::WhitewaterArgs),
     /// Hold a step on the GPU against the f64 reference, pass by pass.
     Check(check::CheckArgs),
-    /// Show a scene's plan, a look's plan, a cache's frames, or this machine's adapters.
+    /// Show a scene's plan, a look's plan, what a study runs, a cache's frames, what a file is, or this machine's adapters.
     Inspect(inspect::InspectArgs),
     /// Compare two caches, a cache and a baseline, or two renders: where they part, and by how much.
     Diff(diff::DiffArgs),

@@ -7,7 +7,7 @@ mod obj;
 pub mod parts;
 mod ply;
 mod stl;
-mod vdb;
+pub mod vdb;
 
 use std::{
     borrow::Cow,

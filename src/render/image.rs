@@ -15,7 +15,7 @@ use crate::scene::look::{ColourSpaceSpec, LightSpec, Window};
 
 pub use exr_file::{read_exr_attributes, write_exr};
 pub use pixels::{Pixels, read_exr, read_png, write_rgb_png};
-pub use png_file::{read_png_attributes, write_png, write_png_with_attributes};
+pub use png_file::{png_header, read_png_attributes, write_png, write_png_with_attributes};
 
 /// A picture and the channels beside it; rows from the top.
 #[derive(Clone, Debug, Default, PartialEq)]

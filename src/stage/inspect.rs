@@ -1,4 +1,7 @@
-//! `inspect`: adapters, a scene's plan, a cache's frames.
+//! `inspect`: adapters, a scene's plan, a cache's frames, what a study runs, what a file is.
+
+pub mod file;
+pub mod study;
 
 use std::{
     fs, io,

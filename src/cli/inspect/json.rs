@@ -4,7 +4,9 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-use super::{InspectArgs, broken_off, look, refuse_frames_beyond, refuse_scene_options};
+use super::{
+    CACHE, InspectArgs, broken_off, file, look, refuse_frames_beyond, refuse_options, study,
+};
 use crate::{
     cli::{Failure, bake, is_cache, named_adapter, output},
     scene::Scene,
@@ -20,8 +22,10 @@ use crate::{
 pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     let (mut object, misfit) = match &args.subject {
         Some(directory) if is_failed(directory) => return Err(broken_off(directory)),
+        Some(subject) if file::is_file(subject) => (file::object(args, subject)?, None),
+        Some(subject) if study::is_study(subject) => (study::object(args, subject)?, None),
         Some(directory) if is_cache(directory) => {
-            refuse_scene_options(args, directory)?;
+            refuse_options(args, CACHE, directory)?;
             (of_cache(directory)?, None)
         }
         Some(file) if look::is_look(file) => of_look(args, file)?,
@@ -128,6 +132,10 @@ fn of_look(args: &InspectArgs, file: &Path) -> Result<(Value, Option<Failure>), 
         "width": image.width,
         "height": image.height,
         "samples": image.samples,
+        "renderer": look::method(&look),
+        "camera": look::camera(&look),
+        "formats": look::formats(&look),
+        "aovs": look::aovs(&look),
         "particles": planned.particles,
         "warnings": look.lints(),
         "adapter": planned.adapter,

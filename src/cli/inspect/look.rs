@@ -9,7 +9,7 @@ use std::{
 use super::{InspectArgs, misplaced};
 use crate::{
     cli::{Failure, bake, count, is_cache, named_adapter, size},
-    scene::look::Look,
+    scene::look::{AovSpec, FormatSpec, Look, MethodSpec},
     stage::render::{LookPlan, Subject, plan},
 };
 
@@ -23,6 +23,51 @@ pub(super) fn is_look(file: &Path) -> bool {
         .lines()
         .map(|line| line.split('#').next().unwrap_or(""));
     lines.any(|line| TABLES.contains(&line.trim()))
+}
+
+/// How water is drawn.
+pub(super) fn method(look: &Look) -> &'static str {
+    match look.spec().renderer.method {
+        MethodSpec::Ssfr => "ssfr",
+        MethodSpec::Ray => "ray",
+    }
+}
+
+/// The camera in words.
+pub(super) fn camera(look: &Look) -> String {
+    let camera = &look.spec().camera;
+    let lens = match &camera.lens {
+        Some(lens) => format!("f/{}", lens.f_stop),
+        None => "a pinhole".to_owned(),
+    };
+    let moves = match (&camera.file, camera.keyframes.len() as u64) {
+        (Some(file), _) => return format!("from {}, {lens}", file.display()),
+        (None, 0) => "still".to_owned(),
+        (None, keyframes) => count(keyframes, "keyframe"),
+    };
+    format!("of {} mm, {lens}, {moves}", camera.focal_length_mm)
+}
+
+/// Files of a picture.
+pub(super) fn formats(look: &Look) -> Vec<&'static str> {
+    let formats = look.spec().output.formats.iter();
+    let name = |format: &FormatSpec| match format {
+        FormatSpec::Png => "png",
+        FormatSpec::Exr => "exr",
+    };
+    formats.map(name).collect()
+}
+
+/// Channels beside the picture.
+pub(super) fn aovs(look: &Look) -> Vec<&'static str> {
+    let name = |aov: &AovSpec| match aov {
+        AovSpec::Z => "Z",
+        AovSpec::N => "N",
+        AovSpec::P => "P",
+        AovSpec::Forward => "forward",
+        AovSpec::Thickness => "thickness",
+    };
+    look.spec().output.aovs.iter().map(name).collect()
 }
 
 /// Prints the plan of the look in `file`.
@@ -72,6 +117,13 @@ fn show_plan(
         image.width,
         image.height,
         count(image.samples.into(), "sample")
+    )?;
+    writeln!(out, "camera {}", camera(look))?;
+    writeln!(
+        out,
+        "renderer {}, writes {}",
+        method(look),
+        [formats(look), aovs(look)].concat().join(", ")
     )?;
     for warning in look.lints() {
         writeln!(out, "warning: {warning}")?;

@@ -80,6 +80,81 @@ fn words(panic: &(dyn Any + Send)) -> String {
     text.unwrap_or("it says no more").to_owned()
 }
 
+/// A grid of an OpenVDB file.
+#[derive(Clone, Debug)]
+pub struct GridFile {
+    /// Such as `surface`.
+    pub name: String,
+    /// As OpenVDB calls it, such as `Tree_float_5_4_3`.
+    pub kind: String,
+    /// `level set`, `staggered`, `fog volume`; empty where it has none.
+    pub class: String,
+    /// Active voxels as its metadata says; `None` where they do not.
+    pub voxels: Option<u64>,
+    /// Least and greatest active voxel as its metadata says.
+    pub extent: Option<[[i32; 3]; 2]>,
+    /// Edges of a voxel, in the grid's own unit; `None` of grids that hold no single floats.
+    pub voxel_size: Option<[f64; 3]>,
+}
+
+/// What grids a file has, by name; grids of floats are read, so that a torn one is found.
+///
+/// # Errors
+/// What is wrong, in words.
+pub fn grids(bytes: &[u8]) -> Result<Vec<GridFile>, String> {
+    if !bytes.starts_with(&MAGIC) {
+        return Err("no OpenVDB file".into());
+    }
+    caught(|| all_grids(bytes))
+        .map_err(|panic| format!("damaged, or of a kind that vdb-rs does not read: {panic}"))?
+}
+
+fn all_grids(bytes: &[u8]) -> Result<Vec<GridFile>, String> {
+    let fail = |error: vdb_rs::ParseError| error.to_string();
+    let mut reader = VdbReader::new(Cursor::new(bytes)).map_err(fail)?;
+    let mut descriptors: Vec<_> = reader.grid_descriptors.values().cloned().collect();
+    descriptors.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+    let mut grids = Vec::new();
+    for found in descriptors {
+        let of = |key: &str| found.meta_data.0.get(key);
+        let corner = |key| match of(key) {
+            Some(MetadataValue::Vec3i(corner)) => Some(corner.to_array()),
+            _ => None,
+        };
+        let voxel_size = match found.grid_type.starts_with("Tree_float_5_4_3") {
+            true => Some(scale_of(
+                &reader.read_grid::<f32>(&found.name).map_err(fail)?,
+            )),
+            false => None,
+        };
+        grids.push(GridFile {
+            class: match of("class") {
+                Some(MetadataValue::String(class)) => class.clone(),
+                _ => String::new(),
+            },
+            voxels: match of("file_voxel_count") {
+                Some(MetadataValue::I64(count)) => u64::try_from(*count).ok(),
+                _ => None,
+            },
+            extent: corner("file_bbox_min")
+                .zip(corner("file_bbox_max"))
+                .map(|(min, max)| [min, max]),
+            voxel_size,
+            kind: found.grid_type,
+            name: found.name,
+        });
+    }
+    Ok(grids)
+}
+
+fn scale_of(grid: &Grid<f32>) -> [f64; 3] {
+    match &grid.transform {
+        Map::UniformScaleMap { scale_values, .. } | Map::ScaleTranslateMap { scale_values, .. } => {
+            scale_values.to_array()
+        }
+    }
+}
+
 /// The file's level set.
 fn grid(bytes: &[u8]) -> Result<Grid<f32>, String> {
     let fail = |error: vdb_rs::ParseError| error.to_string();

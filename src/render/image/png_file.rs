@@ -100,6 +100,23 @@ pub(super) fn read_png_header(path: &Path) -> Result<Attributes, RenderError> {
     open(path).map(|(_, attributes)| attributes)
 }
 
+/// Width and height, channels as an EXR would name them, and bits of each; of the header alone. A palette's pixels are colours.
+///
+/// # Errors
+/// As [`read_png_header`].
+pub fn png_header(path: &Path) -> Result<([usize; 2], &'static [&'static str], u8), RenderError> {
+    let (reader, _) = open(path)?;
+    let info = reader.info();
+    let channels: &[&str] = match info.color_type {
+        png::ColorType::Grayscale => &["Y"],
+        png::ColorType::GrayscaleAlpha => &["Y", "A"],
+        png::ColorType::Rgb | png::ColorType::Indexed => &["R", "G", "B"],
+        png::ColorType::Rgba => &["R", "G", "B", "A"],
+    };
+    let size = [info.width as usize, info.height as usize];
+    Ok((size, channels, info.bit_depth as u8))
+}
+
 fn open(path: &Path) -> Result<(png::Reader<BufReader<File>>, Attributes), RenderError> {
     let file = File::open(path).map_err(|source| RenderError::Write {
         file: path.to_owned(),

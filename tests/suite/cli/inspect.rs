@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::support::job::Job;
+use crate::support::job::{Job, assert_has};
 
 #[test]
 fn inspect_shows_plan_and_frames() {
@@ -125,4 +125,115 @@ fn inspect_shows_the_passes_that_render_runs() {
         job.expect(2, words);
     }
     job.expect(4, "inspect look.toml --scene missing");
+}
+
+/// What a study runs, and what one file is: as a user reads it and for programs; what is torn says so.
+#[test]
+fn inspect_knows_studies_frames_meshes_grids_and_pictures() {
+    let job = Job::new();
+    job.expect(0, "bake small.toml -o cache --frames 1-1 --device cpu");
+    job.expect(0, "export cache --vdb g.%04d.vdb --mesh m.%04d.ply");
+    job.expect(0, "render cache --look look.toml -o day");
+    let object = |file: &str| job.json(0, &format!("inspect {file} --json"));
+
+    let study = object("study.toml");
+    assert_eq!(
+        (&study["kind"], &study["points"]),
+        (&"study".into(), &2.into())
+    );
+    assert_eq!(study["study"], "solver_comparison");
+    assert_has(
+        &job.expect(0, "inspect study.toml"),
+        &["pbf", "flip", "frames 1-6, pictures 3-6x3"],
+    );
+
+    let frame = object("cache/frames/small.0001.ply");
+    let listed = object("cache");
+    assert_eq!(frame["kind"], "frame");
+    assert_eq!(frame["particles"], listed["frames"][1]["particles"]);
+    // Within the domain, from one side's wave maker on.
+    let corner = |end: &str| frame["bounds"][end].as_array().unwrap().clone();
+    for (axis, [low, high]) in [[-1.0, 1.0], [0.5, 2.5], [0.25, 1.25]]
+        .into_iter()
+        .enumerate()
+    {
+        let (min, max) = (
+            corner("min")[axis].as_f64().unwrap(),
+            corner("max")[axis].as_f64().unwrap(),
+        );
+        assert!(low < min && min < max && max < high, "{frame}");
+    }
+    assert_has(
+        &job.expect(0, "inspect cache/frames/small.0001.ply"),
+        &["a frame of", "shot small", "frame 1", "velocity, id"],
+    );
+
+    let mesh = object("m.0001.ply");
+    assert_eq!(
+        (&mesh["kind"], &mesh["open_edges"]),
+        (&"mesh".into(), &0.into())
+    );
+    let solid = object("box.obj");
+    assert_eq!(
+        (&solid["triangles"], &solid["vertices"]),
+        (&12.into(), &8.into())
+    );
+    assert_eq!(solid["bounds"]["max"], serde_json::json!([0.7, 1.0, 0.9]));
+
+    let grids = object("g.0001.vdb");
+    let surface = grids["grids"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|it| it["grid"] == "surface");
+    let surface = surface.expect("a surface");
+    assert_eq!(surface["class"], "level set");
+    assert!(surface["voxels"].as_u64().unwrap() > 100, "{grids}");
+    assert!(surface["voxel_size"][0].as_f64().unwrap() > 0.0, "{grids}");
+
+    let look = object("look.toml");
+    assert_eq!(
+        (&look["renderer"], &look["formats"]),
+        (&"ssfr".into(), &serde_json::json!(["png", "exr"]))
+    );
+    for (file, channels) in [("day/small.0001.png", 3), ("day/small.0001.exr", 5)] {
+        let picture = object(file);
+        assert_eq!(
+            (&picture["kind"], &picture["width"], &picture["height"]),
+            (&"picture".into(), &64.into(), &36.into())
+        );
+        assert_eq!(
+            (&picture["frame"], &picture["shot"]),
+            (&1.into(), &"small".into())
+        );
+        assert_eq!(picture["scene"], listed["scene"]);
+        assert_eq!(
+            picture["channels"].as_array().unwrap().len(),
+            channels,
+            "{picture}"
+        );
+    }
+
+    for file in [
+        "cache/frames/small.0001.ply",
+        "g.0001.vdb",
+        "m.0001.ply",
+        "day/small.0001.png",
+        "day/small.0001.exr",
+    ] {
+        job.expect(2, &format!("inspect {file} --solver flip"));
+        let path = job.path(file);
+        let bytes = fs::read(&path).unwrap();
+        fs::write(&path, &bytes[..bytes.len() - bytes.len() / 3]).unwrap();
+        let said = job.expect(4, &format!("inspect {file}"));
+        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+        assert_has(&said, &[file.rsplit('/').next().unwrap()]);
+    }
+    job.expect(4, "inspect missing.ply");
+    job.expect(2, "inspect study.toml --time 1");
+    job.edit("study.toml", "pbf", "sph");
+    assert_has(
+        &job.expect(2, "inspect study.toml"),
+        &["study.toml", "solvers"],
+    );
 }

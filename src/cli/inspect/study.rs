@@ -1,0 +1,78 @@
+//! `swell inspect STUDY`
+
+use std::{
+    fmt::{self, Write},
+    fs,
+    path::Path,
+};
+
+use serde_json::{Value, json};
+
+use super::{InspectArgs, refuse_options};
+use crate::{
+    cli::{Failure, bake, count},
+    scene::study::Study,
+    stage::inspect::study::Outline,
+};
+
+/// Whether a file is a study: it says of what `kind`, before its first table. What cannot be read is none.
+pub(super) fn is_study(file: &Path) -> bool {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    let lines = text.lines().map(str::trim_start);
+    lines
+        .take_while(|line| !line.starts_with('['))
+        .any(|line| match line.strip_prefix("kind") {
+            Some(rest) => rest.trim_start().starts_with('='),
+            None => false,
+        })
+}
+
+fn outline(args: &InspectArgs, file: &Path) -> Result<Outline, Failure> {
+    refuse_options(args, "a study: its scenes are named in it", file)?;
+    let study = Study::load_within(file, bake::reach(args.allow_outside))?;
+    Ok(Outline::of(&study))
+}
+
+/// Prints what the study in `file` runs.
+pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<(), Failure> {
+    let outline = outline(args, file)?;
+    // Writing to a String cannot fail.
+    let _ = show_outline(out, &outline, file);
+    Ok(())
+}
+
+fn show_outline(out: &mut String, outline: &Outline, file: &Path) -> fmt::Result {
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    writeln!(
+        out,
+        "{name}: study of kind {}, {}, {}",
+        outline.kind,
+        count(outline.parts.len() as u64, "part"),
+        count(outline.points() as u64, "point")
+    )?;
+    for warning in &outline.warnings {
+        writeln!(out, "warning: {warning}")?;
+    }
+    for part in &outline.parts {
+        writeln!(out, "\n{} ({})", part.name, part.key)?;
+        for point in &part.points {
+            writeln!(out, "   {point}")?;
+        }
+    }
+    Ok(())
+}
+
+/// The same for programs.
+pub(super) fn object(args: &InspectArgs, file: &Path) -> Result<Value, Failure> {
+    let outline = outline(args, file)?;
+    let parts = outline.parts.iter();
+    let parts =
+        parts.map(|part| json!({ "name": part.name, "key": part.key, "points": part.points }));
+    Ok(json!({
+        "kind": "study",
+        "study": outline.kind,
+        "points": outline.points(),
+        "parts": parts.collect::<Vec<_>>(),
+        "warnings": outline.warnings,
+    }))
+}

@@ -1,0 +1,131 @@
+//! What a study will run.
+
+use crate::scene::study::{
+    RunsOn, Study,
+    stability::{Case, Held, Limit, Stability},
+    sweep::Sweep,
+};
+
+/// A study in the order of its file.
+#[derive(Debug)]
+pub struct Outline {
+    /// As the file's `kind` names it.
+    pub kind: &'static str,
+    /// Its curves, cases or benchmarks.
+    pub parts: Vec<Part>,
+    /// What a user has to know of its scenes.
+    pub warnings: Vec<String>,
+}
+
+/// A curve, a case, a benchmark or a solver.
+#[derive(Debug)]
+pub struct Part {
+    /// As page and legend have it.
+    pub name: String,
+    /// What changes from point to point, or what the part is.
+    pub key: String,
+    /// What is run, in order.
+    pub points: Vec<String>,
+}
+
+impl Outline {
+    /// Of a study that was read.
+    pub fn of(study: &Study) -> Self {
+        let (kind, parts) = match study {
+            Study::SolverComparison(it) => {
+                let part = |scene: &crate::scene::Scene| Part {
+                    name: scene.solver.method.name().to_owned(),
+                    key: format!("frames {}, pictures {}", it.frames, it.pictures),
+                    points: vec![scene.shot.name.clone()],
+                };
+                ("solver_comparison", it.scenes.iter().map(part).collect())
+            }
+            Study::Sweep(it) => ("sweep", swept(it)),
+            Study::Stability(it) => ("stability", held(it)),
+            Study::Surface(it) => {
+                let part = |line: &crate::scene::study::surface::Line| Part {
+                    name: line.name.clone(),
+                    key: line.key.clone(),
+                    points: line.points.iter().map(|it| it.label.clone()).collect(),
+                };
+                ("surface", it.lines.iter().map(part).collect())
+            }
+            Study::Validation(it) => {
+                let part = |benchmark: &crate::scene::study::validation::Benchmark| Part {
+                    name: benchmark.name.clone(),
+                    key: format!("gates: {}", benchmark.gates.len()),
+                    points: (benchmark.runs.iter())
+                        .map(|run| on(&run.name(), run.device))
+                        .collect(),
+                };
+                ("validation", it.benchmarks.iter().map(part).collect())
+            }
+        };
+        Self {
+            kind,
+            parts,
+            warnings: study.warnings(),
+        }
+    }
+
+    /// Of all parts.
+    pub fn points(&self) -> usize {
+        self.parts.iter().map(|part| part.points.len()).sum()
+    }
+}
+
+/// What runs on the reference says so.
+fn on(name: &str, device: RunsOn) -> String {
+    match device {
+        RunsOn::Gpu => name.to_owned(),
+        RunsOn::Cpu => format!("{name} on {}", device.name()),
+    }
+}
+
+fn swept(sweep: &Sweep) -> Vec<Part> {
+    let part = |line: &crate::scene::study::sweep::Line| Part {
+        name: line.name.clone(),
+        key: line.key.clone(),
+        points: (line.points.iter())
+            .map(|point| on(&point.label, point.device))
+            .collect(),
+    };
+    sweep.lines.iter().map(part).collect()
+}
+
+fn held(stability: &Stability) -> Vec<Part> {
+    let case = |case: &Case| {
+        let (key, points) = match &case.held {
+            Held::Test(command) => ("a test".to_owned(), vec![command.clone()]),
+            Held::Runs(trials) => (
+                "runs".to_owned(),
+                (trials.iter())
+                    .map(|it| on(it.scene.solver.method.name(), it.device))
+                    .collect(),
+            ),
+            Held::Refusal { attempts, .. } => (
+                "refusals".to_owned(),
+                (attempts.iter())
+                    .map(|it| on(it.method.name(), it.device))
+                    .collect(),
+            ),
+        };
+        Part {
+            name: format!("{} {}", case.number, case.name),
+            key,
+            points,
+        }
+    };
+    let limit = |limit: &Limit| Part {
+        name: limit.name.clone(),
+        key: format!(
+            "limit between {} and {} {}",
+            limit.passes, limit.fails, limit.unit
+        ),
+        points: (limit.searches.iter())
+            .map(|it| it.method.name().to_owned())
+            .collect(),
+    };
+    let cases = stability.cases.iter().map(case);
+    cases.chain(stability.limits.iter().map(limit)).collect()
+}
