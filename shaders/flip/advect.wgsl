@@ -128,9 +128,10 @@ fn main(
     for (var k = 0u; k < select(0u, steps, is_near); k++) {
         x += way / f32(steps);
         for (var solid = 0u; solid < solid_grids.count; solid++) {
-            look_at_solid(solid, params.time_step * f32(k + 1u) / f32(steps));
+            look_at_solid(solid, f32(k + 1u) / f32(steps));
             x = leave_solids(x);
-            v = solid_velocity + stopped(v - solid_velocity, solid_push);
+            let pushing = solid_velocity_at(x);
+            v = pushing + stopped(v - pushing, solid_push);
         }
     }
     let free = x;
@@ -138,7 +139,7 @@ fn main(
     let rounds = select(0u, CORNER_ROUNDS, is_near && any(x != clamp(x, low, high)));
     for (var k = 0u; k < rounds; k++) {
         for (var solid = 0u; solid < solid_grids.count; solid++) {
-            look_at_solid(solid, params.time_step);
+            look_at_solid(solid, 1.0);
             x = leave_solids(clamp(x, low, high));
         }
     }

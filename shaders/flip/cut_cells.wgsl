@@ -56,8 +56,10 @@ fn main(
             let found = corner_distances(cell);
             let is_nearer_low = lower_sums(found) < lower_sums(corners);
             let is_nearer_high = upper_sums(found) < upper_sums(corners);
-            lower_velocity = select(lower_velocity, solid_velocity, is_nearer_low);
-            upper_velocity = select(upper_velocity, solid_velocity, is_nearer_high);
+            // A component does not change along its own axis: that at the middle is that at both faces.
+            let pushing = solid_velocity_at((cell + 0.5) * params.cell_size);
+            lower_velocity = select(lower_velocity, pushing, is_nearer_low);
+            upper_velocity = select(upper_velocity, pushing, is_nearer_high);
             corners = Corners(min(corners.near, found.near), min(corners.far, found.far));
             is_cut = true;
         }

@@ -11,6 +11,12 @@
 #import "shared/finite.wgsl"
 #ifdef WALL_WORK
 #import "shared/wall_work.wgsl"
+#ifdef MOVING_SOLIDS
+@group(0) @binding(14) var<storage, read> sample_velocity: array<vec4f>;
+
+// Σ over samples of the slope towards each times its velocity.
+var<private> sample_rate: f32;
+#endif
 #endif
 
 @group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
@@ -48,6 +54,13 @@ fn visit(i: u32, j: u32) {
     scale -= artificial_pressure * w * w * w * w;
 #endif
     delta += d * (inverse_r * scale * weight(other.w) * s * s);
+#ifdef WALL_WORK
+#ifdef MOVING_SOLIDS
+    let sample = select(0u, j - fluid_count, other.w > 0.0);
+    let slope = select(0.0, inverse_r * other.w * s * s, other.w > 0.0);
+    sample_rate += slope * dot(d, sample_velocity[sample].xyz);
+#endif
+#endif
     coincident = select(coincident, j, r2 * inverse_h * inverse_h < 1e-12);
 }
 
@@ -75,6 +88,11 @@ fn main(
 #endif
     delta = vec3f(0.0);
     coincident = i;
+#ifdef WALL_WORK
+#ifdef MOVING_SOLIDS
+    sample_rate = 0.0;
+#endif
+#endif
     for_each_neighbor(current.xyz, i);
     if coincident != i {
         delta += pair_direction(i, coincident) * 2.0 * own_lambda;
@@ -89,7 +107,11 @@ fn main(
     }
 #ifdef WALL_WORK
     let kept = min(1.0, params.max_correction / max(length(delta), 1e-30));
-    var work = kept * params.relaxation * own_lambda * wall_rate(current.xyz);
+    var rate = wall_rate(current.xyz);
+#ifdef MOVING_SOLIDS
+    rate -= params.gradient_scale * sample_rate;
+#endif
+    var work = kept * params.relaxation * own_lambda * rate;
 #endif
     delta = bounded(delta);
 #ifdef CHEBYSHEV
@@ -105,6 +127,6 @@ fn main(
 #endif
     predicted[phase.write + i] = vec4f(confine(current.xyz + delta), current.w);
 #ifdef WALL_WORK
-    wall_work[i] += work + work_of_push(wall_push);
+    wall_work[i] += work + work_of_pushes();
 #endif
 }

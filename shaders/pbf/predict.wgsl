@@ -22,8 +22,15 @@ fn stopped(v: vec3f, free: vec3f) -> vec3f {
     var left = v;
     var y = free;
 #ifdef SOLIDS
-    left -= solid_push * (min(dot(left, solid_push), 0.0) / max(dot(solid_push, solid_push), 1e-30));
-    y += solid_push;
+#ifdef MOVING_SOLIDS
+    let push = solids_push;
+    let against = left - pushing_velocity;
+#else
+    let push = solid_push;
+    let against = left;
+#endif
+    left -= push * (min(dot(against, push), 0.0) / max(dot(push, push), 1e-30));
+    y += push;
 #endif
     left = select(left, max(left, params.wall_velocity_min), y < params.wall_min + params.contact_distance);
     return select(left, min(left, params.wall_velocity_max), y > params.wall_max - params.contact_distance);
@@ -48,7 +55,7 @@ fn main(
     let free = position[thread].xyz + params.time_step * v;
     let x = confine(free);
 #ifdef WALL_WORK
-    wall_work[params.particle_count + thread] = work_of_push(wall_push);
+    wall_work[params.particle_count + thread] = work_of_pushes();
 #endif
 #ifdef PERIODIC
     predicted[params.particle_count + thread] = vec4f(wrapped_place(x), 0.0);

@@ -1,7 +1,7 @@
 // Keeps a position inside the box, off the walls and out of the solids.
 #ifdef SOLIDS
 struct SolidGrid {
-    // Of the signed-distance grid, relative to the domain's least corner.
+    // Of the signed-distance grid, relative to the domain's least corner, or to a moving solid's point of rest.
     origin: vec3f,
     spacing: f32,
     dims: vec3u,
@@ -12,6 +12,14 @@ struct SolidGrid {
 #import "shared/moving_solids.wgsl"
 #else
 @group(0) @binding(7) var<uniform> solid_grid: SolidGrid;
+
+fn from_first_node(x: vec3f) -> vec3f {
+    return x - solid_grid.origin;
+}
+
+fn to_world(way: vec3f) -> vec3f {
+    return way;
+}
 #endif
 @group(0) @binding(8) var<storage, read> solid_distance: array<f32>;
 
@@ -32,7 +40,7 @@ var<private> solid_push: vec3f;
 // distance. Outside the grid no solid is near.
 fn leave_solids(x: vec3f) -> vec3f {
     solid_push = vec3f(0.0);
-    let p = (x - solid_grid.origin) / solid_grid.spacing;
+    let p = from_first_node(x) / solid_grid.spacing;
     let last = vec3f(solid_grid.dims - 1u);
     if any(p < vec3f(0.0)) || any(p >= last) {
         return x;
@@ -67,7 +75,7 @@ fn leave_solids(x: vec3f) -> vec3f {
     if steepness < 1e-6 * solid_grid.spacing {
         return x;
     }
-    solid_push = gradient / steepness * (params.contact_distance - distance);
+    solid_push = to_world(gradient / steepness) * (params.contact_distance - distance);
     return x + solid_push;
 }
 #endif
@@ -77,10 +85,39 @@ fn leave_solids(x: vec3f) -> vec3f {
 var<private> wall_push: vec3f;
 
 #endif
+#ifdef MOVING_SOLIDS
+// What the solids last added to a position in all, the velocity of the last of them that did, and the sum of what each
+// added times its velocity.
+var<private> solids_push: vec3f;
+var<private> pushing_velocity: vec3f;
+var<private> solids_work: f32;
+
+// Out of each solid, one after the other, as they stand at the substep's end.
+fn leave_all_solids(x: vec3f) -> vec3f {
+    var y = x;
+    solids_push = vec3f(0.0);
+    pushing_velocity = vec3f(0.0);
+    solids_work = 0.0;
+    for (var k = 0u; k < solid_grids.count; k++) {
+        look_at_solid(k, 1.0);
+        y = leave_solids(y);
+        let velocity = solid_velocity_at(y);
+        solids_push += solid_push;
+        solids_work += dot(solid_push, velocity);
+        pushing_velocity = select(pushing_velocity, velocity, any(solid_push != vec3f(0.0)));
+    }
+    return y;
+}
+
+#endif
 fn confine(x: vec3f) -> vec3f {
     var y = x;
 #ifdef SOLIDS
+#ifdef MOVING_SOLIDS
+    y = leave_all_solids(y);
+#else
     y = leave_solids(y);
+#endif
 #endif
     let kept = clamp(y, params.wall_min + params.contact_distance, params.wall_max - params.contact_distance);
 #ifdef WALL_WORK

@@ -3,7 +3,7 @@
 
 // Where the node before x is farther off than this nothing of a cell can be cut: no interpolation is needed.
 fn solid_distance_at(x: vec3f) -> f32 {
-    let p = clamp((x - solid_grid.origin) / solid_grid.spacing, vec3f(0.0), vec3f(solid_grid.dims - 1u) - 1e-3);
+    let p = clamp(from_first_node(x) / solid_grid.spacing, vec3f(0.0), vec3f(solid_grid.dims - 1u) - 1e-3);
     let node = vec3u(p);
     let t = p - vec3f(node);
     let low = mix(
@@ -21,7 +21,7 @@ fn solid_distance_at(x: vec3f) -> f32 {
 
 // Nearest node's distance, for a first look; far away outside the grid.
 fn solid_distance_near(x: vec3f) -> f32 {
-    let p = (x - solid_grid.origin) / solid_grid.spacing;
+    let p = from_first_node(x) / solid_grid.spacing;
     let is_outside = any(p < vec3f(-1.0)) || any(p > vec3f(solid_grid.dims));
     let node = vec3u(clamp(p + 0.5, vec3f(0.0), vec3f(solid_grid.dims - 1u)));
     return select(solid_node(node), 1e15, is_outside);
@@ -29,8 +29,8 @@ fn solid_distance_near(x: vec3f) -> f32 {
 
 // For a first look: the nearest node's distance, or from beyond the grid the way there, since the solids lie within it.
 fn solid_distance_bound(x: vec3f) -> f32 {
-    let last = solid_grid.origin + solid_grid.spacing * vec3f(solid_grid.dims - 1u);
-    let way = distance(x, clamp(x, solid_grid.origin, last));
+    let place = from_first_node(x);
+    let way = distance(place, clamp(place, vec3f(0.0), solid_grid.spacing * vec3f(solid_grid.dims - 1u)));
     return select(solid_distance_near(x), way, way > 0.0);
 }
 

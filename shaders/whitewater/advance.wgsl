@@ -70,16 +70,7 @@ fn water_at(x: vec3f) -> Water {
 
 // A place that can be: off walls, out of solids, in the domain.
 fn allowed(x: vec3f) -> vec3f {
-#ifdef MOVING_SOLIDS
-    var y = x;
-    for (var k = 0u; k < solid_grids.count; k++) {
-        look_at_solid(k, 0.0);
-        y = leave_solids(y);
-    }
-    y = clamp(y, params.wall_min + params.contact_distance, params.wall_max - params.contact_distance);
-#else
     let y = confine(x);
-#endif
 #ifdef PERIODIC
     return wrapped_place(y);
 #else

@@ -11,4 +11,13 @@ pub struct Boundary {
     pub distance: Option<SignedDistance>,
     /// Distance to each moving solid, where it stood at the start.
     pub moving: Vec<SignedDistance>,
+    /// Samples over the surface of each moving solid, where it stood at the start; none where the solver takes no samples.
+    pub moving_samples: Vec<Vec<BoundarySample>>,
+}
+
+impl Boundary {
+    /// Samples on all solids.
+    pub fn sample_count(&self) -> usize {
+        self.samples.len() + self.moving_samples.iter().map(Vec::len).sum::<usize>()
+    }
 }

@@ -28,6 +28,7 @@ pub mod particles;
 pub mod pbf;
 pub mod period;
 pub mod poisson;
+pub mod pose;
 pub mod probe;
 pub mod relaxation;
 pub mod sampling;

@@ -4,9 +4,11 @@
 
 use std::collections::BTreeSet;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
-use super::{boundary::Boundary, bounds::Bounds, bricks::EDGE, signed_distance::SignedDistance};
+use super::{
+    boundary::Boundary, bounds::Bounds, bricks::EDGE, pose::Pose, signed_distance::SignedDistance,
+};
 
 /// Nearer than this to a cell's face, in cells, a wall counts as on it.
 const ON_FACE: f64 = 1e-3;
@@ -48,24 +50,22 @@ impl Surface {
         }
     }
 
-    /// Bricks that it touches where it has come `way`.
-    fn bricks(&self, way: DVec3, dims: [u32; 3]) -> impl Iterator<Item = usize> {
+    /// Bricks that it touches where it stands so; `pose` is in cells from the domain's least corner.
+    fn bricks(&self, pose: Pose, dims: [u32; 3]) -> impl Iterator<Item = usize> {
+        let edge = f64::from(EDGE);
         let last = DVec3::from_array(dims.map(|n| f64::from(n) - 1.0));
+        let turn = DMat3::from_quat(pose.turn);
+        let half = 0.5 * (turn.x_axis.abs() + turn.y_axis.abs() + turn.z_axis.abs());
         self.boxes.iter().flat_map(move |corner| {
-            let low = (self.origin + way + corner) / f64::from(EDGE);
-            let from = low.floor().clamp(DVec3::ZERO, last);
-            let to = (low + 1.0).floor().clamp(DVec3::ZERO, last);
-            let is_within = (low + 1.0).cmpge(DVec3::ZERO).all() && low.cmple(last + 1.0).all();
-            (0..8usize).filter(move |_| is_within).map(move |k| {
-                let at = |axis: usize| {
-                    if k >> axis & 1 == 0 {
-                        from[axis]
-                    } else {
-                        to[axis]
-                    }
-                };
-                (at(2) as usize * dims[1] as usize + at(1) as usize) * dims[0] as usize
-                    + at(0) as usize
+            let middle = pose.place(self.origin + corner + 0.5 * edge) / edge;
+            let (low, high) = (middle - half, middle + half);
+            let from = low.floor().clamp(DVec3::ZERO, last).as_uvec3();
+            let to = high.floor().clamp(DVec3::ZERO, last).as_uvec3();
+            let is_within = high.cmpge(DVec3::ZERO).all() && low.cmple(last + 1.0).all();
+            let rows = move |z: u32| (from.y..=to.y).map(move |y| (z, y));
+            let rows = (from.z..=to.z).filter(move |_| is_within).flat_map(rows);
+            rows.flat_map(move |(z, y)| {
+                (from.x..=to.x).map(move |x| ((z * dims[1] + y) * dims[0] + x) as usize)
             })
         })
     }
@@ -87,20 +87,20 @@ impl Shores {
         Self { periodic, ..self }
     }
 
-    /// Marks what lies beside bricks that hold particles: bricks that solids cut, which have come `ways` since the start,
-    /// and layers of cells that the walls at `cut` cut, where these are the first or the last of a brick. `is_wet` is one
+    /// Marks what lies beside bricks that hold particles: bricks that solids cut, which stand at `poses`, in cells from the
+    /// domain's least corner, and layers of cells that the walls at `cut` cut, where these are the first or the last of a brick. `is_wet` is one
     /// flag a brick, `dims` bricks along each axis, x fastest; lengths are in cells.
     pub fn mark(
         &self,
         is_wet: &mut [bool],
         dims: [u32; 3],
         cut: &Bounds,
-        ways: impl Iterator<Item = DVec3>,
+        poses: impl Iterator<Item = Pose>,
     ) {
-        let at_rest = self.at_rest.iter().map(|surface| (surface, DVec3::ZERO));
+        let at_rest = self.at_rest.iter().map(|surface| (surface, Pose::START));
         let with_water = is_wet.to_vec();
-        for (surface, way) in at_rest.chain(self.moving.iter().zip(ways)) {
-            for brick in surface.bricks(way, dims) {
+        for (surface, pose) in at_rest.chain(self.moving.iter().zip(poses)) {
+            for brick in surface.bricks(pose, dims) {
                 is_wet[brick] |= has_water_about(&with_water, dims, self.periodic, brick);
             }
         }
@@ -162,7 +162,11 @@ mod tests {
         for &brick in wet {
             is_wet[index(brick)] = true;
         }
-        shores.mark(&mut is_wet, DIMS, &cut, [way].into_iter());
+        let pose = Pose {
+            centre: way,
+            ..Pose::START
+        };
+        shores.mark(&mut is_wet, DIMS, &cut, [pose].into_iter());
         (0..24).filter(|&k| is_wet[k]).collect()
     }
 

@@ -104,6 +104,13 @@ impl SignedDistance {
         })
     }
 
+    /// From `x` to the grid's farthest corner, metres.
+    pub fn reach(&self, x: DVec3) -> f64 {
+        let last = DVec3::from_array(self.dims.map(|n| (n - 1) as f64));
+        let (low, high) = (self.origin - x, self.origin + self.spacing * last - x);
+        low.abs().max(high.abs()).length()
+    }
+
     /// The union of several solids; `None` for none.
     ///
     /// # Errors

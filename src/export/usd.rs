@@ -5,11 +5,12 @@
 
 mod text;
 
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3};
 
 use super::Source;
 use crate::domain::{
-    bounds::Bounds, eye::Eye, mesh::TriangleMesh, particles::Particles, water_mesh::WaterMesh,
+    bounds::Bounds, eye::Eye, mesh::TriangleMesh, particles::Particles, pose::Pose,
+    water_mesh::WaterMesh,
 };
 
 use text::{Text, name, quoted};
@@ -48,8 +49,8 @@ pub struct Solid {
     pub name: String,
     /// Metres, about the scene's zero.
     pub mesh: TriangleMesh,
-    /// Where it has come to at each frame, metres; empty for one that stands.
-    pub way: Vec<(u32, DVec3)>,
+    /// Where it stands at each frame; empty for one that never moves.
+    pub way: Vec<(u32, Pose)>,
 }
 
 /// A wall of the domain that makes waves.
@@ -292,17 +293,37 @@ fn put_solids(text: &mut Text, solids: &[Solid]) {
         };
         text.open(&format!("def Mesh {}", quoted(&single)));
         put_mesh(text, &solid.mesh.vertices, &solid.mesh.triangles);
-        if !solid.way.is_empty() {
-            let samples = solid.way.iter();
-            let samples: Vec<_> = samples
-                .map(|(frame, way)| (*frame, text::triple(*way)))
-                .collect();
-            text.samples("double3 xformOp:translate", &samples);
-            text.line("uniform token[] xformOpOrder = [\"xformOp:translate\"]");
-        }
+        put_way(text, &solid.way);
         text.close();
     }
     text.close();
+}
+
+/// How a solid moves. One that turns does so about its point of rest, so that it stays on its arc between frames.
+fn put_way(text: &mut Text, way: &[(u32, Pose)]) {
+    let Some((_, first)) = way.first() else {
+        return;
+    };
+    let sampled = |of: &dyn Fn(&Pose) -> String| -> Vec<_> {
+        way.iter().map(|(frame, pose)| (*frame, of(pose))).collect()
+    };
+    let turns = way.iter().any(|(_, pose)| pose.turn != DQuat::IDENTITY);
+    if !turns {
+        let samples = sampled(&|pose| text::triple(pose.place(DVec3::ZERO)));
+        text.samples("double3 xformOp:translate", &samples);
+        text.line("uniform token[] xformOpOrder = [\"xformOp:translate\"]");
+        return;
+    }
+    let samples = sampled(&|pose| text::triple(pose.centre));
+    text.samples("double3 xformOp:translate", &samples);
+    let samples =
+        sampled(&|Pose { turn, .. }| format!("({}, {}, {}, {})", turn.w, turn.x, turn.y, turn.z));
+    text.samples("quatd xformOp:orient", &samples);
+    let rest = text::triple(DVec3::ZERO - first.rest);
+    text.line(&format!("double3 xformOp:translate:rest = {rest}"));
+    text.line(
+        "uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:orient\", \"xformOp:translate:rest\"]",
+    );
 }
 
 fn put_wave_makers(text: &mut Text, makers: &[WaveMaker]) {

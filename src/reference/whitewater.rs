@@ -10,7 +10,6 @@ use crate::{
         bounds::Bounds,
         budget::Breach,
         particles::Particles,
-        signed_distance::SignedDistance,
         whitewater::{
             AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, Kind, OUTWARD, Potentials, SURFACE, Settings,
         },
@@ -33,8 +32,6 @@ pub struct Water {
     pub velocity: Vec<DVec3>,
     /// Of each its place in the water that was handed in. Shape (particles).
     pub order: Vec<usize>,
-    /// Solids that move, as they stand now.
-    pub movers: Vec<SignedDistance>,
     starts: Vec<usize>,
     sample_starts: Vec<usize>,
 }
@@ -86,7 +83,8 @@ struct Found {
 impl Water {
     /// Of the water of `scene`, which is [`Scene::of_whitewater`] of what was baked, at `time`, seconds.
     pub fn new(scene: &Scene, boundary: &Boundary, water: &Particles, time: f64) -> Self {
-        let model = Model::new(scene, boundary);
+        let mut model = Model::new(scene, boundary);
+        model.stand(scene, time, 0.0);
         let origin = scene.domain.min;
         let wide = |v: &[f32; 3]| Vec3::from_array(*v).as_dvec3();
         // The device has them in 32 bits about the same corner.
@@ -94,17 +92,11 @@ impl Water {
         let places: Vec<DVec3> = water.position.iter().map(local).collect();
         let order = model.cells.order(&places, &water.id);
         let points: Vec<DVec3> = order.iter().map(|&k| places[k]).collect();
-        let moved = scene.moving_solids.iter().zip(&boundary.moving);
-        let movers = moved.map(|(solid, grid)| SignedDistance {
-            origin: grid.origin - origin + solid.displacement(time),
-            ..grid.clone()
-        });
         Self {
             starts: model.cells.starts(&points),
             sample_starts: model.cells.starts(&model.samples),
             velocity: order.iter().map(|&k| wide(&water.velocity[k])).collect(),
             walls: scene.walls_after(water, time),
-            movers: movers.collect(),
             model,
             points,
             order,
@@ -211,28 +203,15 @@ impl Water {
 
     /// Off walls, out of solids, in the domain.
     fn allowed(&self, x: DVec3) -> DVec3 {
-        let kept = self.model.confine(x + self.push(x), &self.walls);
-        self.model.period().wrap(kept)
-    }
-
-    /// What solids that move add to a place.
-    fn push(&self, x: DVec3) -> DVec3 {
-        let contact = self.model.contact_distance();
-        let mut y = x;
-        for solid in &self.movers {
-            let distance = solid.sample(y);
-            if distance < contact {
-                y += solid.gradient(y).normalize_or_zero() * (contact - distance);
-            }
-        }
-        y - x
+        self.model.period().wrap(self.model.confine(x, &self.walls))
     }
 
     /// Whether a solid pushes at a place, or may by rounding.
     fn is_touched(&self, x: DVec3) -> bool {
         let reach = 1.001 * self.model.contact_distance();
-        let solids = self.movers.iter().chain(&self.model.distance);
-        solids.into_iter().any(|solid| solid.sample(x) < reach)
+        let movers = self.model.movers.iter().map(|it| it.solid.sample(x));
+        let still = self.model.distance.iter().map(|solid| solid.sample(x));
+        movers.chain(still).any(|distance| distance < reach)
     }
 
     /// Takes a whitewater particle over `seconds` to this water's frame, under `gravity`, m/s² (whitewater/advance).

@@ -219,7 +219,9 @@ impl SolidPainter<'_, '_> {
         corners: [DVec3; 3],
     ) -> u32 {
         let [a, b, c] = corners;
-        let normal = (b - a).cross(c - a);
+        let pose = self.solid.pose.moved(-self.painter.scene.domain.min);
+        // As it stood at the start.
+        let normal = pose.turn.conjugate() * (b - a).cross(c - a);
         let size = normal.abs();
         let axis = match () {
             () if size.y >= size.x && size.y >= size.z => 1,
@@ -239,7 +241,8 @@ impl SolidPainter<'_, '_> {
         // In the world, so that meshes that touch go on in one another; what moves takes its picture along.
         let corner = scene.origin + scene.domain.min;
         let starts = gradients.map(|it| it.dot(corner));
-        let place = self.record(lie(gradients, starts, self.solid.moved));
+        let gradients = gradients.map(|it| pose.turn * it);
+        let place = self.record(lie(gradients, starts, pose.place(DVec3::ZERO)));
         self.along.insert((index, axis, is_low), place);
         place
     }

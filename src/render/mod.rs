@@ -42,7 +42,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use crate::domain::{
-    bounds::Bounds, mesh::TriangleMesh, mesh_file::parts::Parts, open_waves::OpenWaves,
+    bounds::Bounds, mesh::TriangleMesh, mesh_file::parts::Parts, open_waves::OpenWaves, pose::Pose,
 };
 use crate::gpu::adapter::GpuError;
 use crate::scene::Wall;
@@ -77,14 +77,14 @@ pub struct RenderScene {
 }
 
 /// What materials are told by.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct SolidParts {
     /// The name of the mesh's file without the ending.
     pub name: String,
     /// Of its triangles.
     pub parts: Parts,
-    /// From where it stood at the start, metres.
-    pub moved: DVec3,
+    /// Where it stands.
+    pub pose: Pose,
 }
 
 impl RenderScene {

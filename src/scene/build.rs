@@ -64,9 +64,8 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         spacing: lattice.spacing,
         shot: &shot,
     };
-    let (solids, moving_solids) = solids(doc, &spec.solid, &around, &solver)?;
-    let moves = |spec: &MeshSpec| spec.motion.is_some();
-    let moving = (0..spec.solid.len()).filter(|&k| moves(&spec.solid[k]));
+    let (solids, moving_solids) = solids(doc, &spec.solid, &around)?;
+    let moving = (0..spec.solid.len()).filter(|&k| spec.solid[k].moves());
     let moving: Vec<usize> = moving.collect();
     periodic::check_solids(doc, periodic, &moving_solids, |k| moving[k])?;
     let wave_makers = wave_maker::build_all(doc, &spec.wave_maker, &around)?;
@@ -98,8 +97,7 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         None => None,
     };
     let kept = (spec.keep.as_ref().map(|table| keep::build(doc, table))).transpose()?;
-    let moves = |solid: &MeshSpec| solid.direction.is_some() && solid.motion.is_some();
-    let is_moving: Vec<bool> = spec.solid.iter().map(moves).collect();
+    let is_moving: Vec<bool> = spec.solid.iter().map(MeshSpec::moves).collect();
     let around = probe::Around {
         domain: &domain,
         periodic,
@@ -110,12 +108,14 @@ pub(super) fn scene(doc: &Document<'_>, base_dir: &Path, spec: SceneSpec) -> Res
         is_moving: &is_moving,
     };
     let probes = probe::build_all(doc, &spec.probe, &around)?;
-    let motions = (wave_makers.iter().map(|maker| &maker.motion))
-        .chain(moving_solids.iter().map(|solid| &solid.motion));
     let duration = shot.duration();
+    let speeds = (wave_makers
+        .iter()
+        .map(|maker| maker.motion.peak_speed(0.0, duration)))
+    .chain((moving_solids.iter()).map(|solid| solid.peak_speed(0.0, duration)));
     let scales = budget::Scales {
         fall: (2.0 * water.gravity.length() * domain.size().length()).sqrt(),
-        push: (motions.map(|motion| motion.peak_speed(0.0, duration))).fold(0.0, f64::max),
+        push: speeds.fold(0.0, f64::max),
         wind: spec.effects.push().speed + spec.effects.frees(projection::grain(&water, &solver)),
         spacing: lattice.spacing,
     };
@@ -149,26 +149,26 @@ fn solids(
     doc: &Document<'_>,
     specs: &[MeshSpec],
     around: &wave_maker::Surroundings<'_>,
-    solver: &super::Solver,
 ) -> Result<(Vec<PlacedMesh>, Vec<MovingSolid>)> {
     let (mut solids, mut moving) = (Vec::new(), Vec::new());
     for (index, spec) in specs.iter().enumerate() {
         let path = format!("solid[{index}]");
-        let (Some(direction), Some(motion)) = (spec.direction, &spec.motion) else {
+        if !spec.moves() {
             solids.push(static_solid(doc, &path, spec, around)?);
             continue;
+        }
+        let key = if spec.motion.is_some() {
+            "motion"
+        } else {
+            "turn"
         };
-        let place = format!("{path}.motion");
-        moving_solid::check_method(doc, &place, solver.method)?;
+        let place = format!("{path}.{key}");
         if moving.len() == MAX_MOVING_SOLIDS {
             let problem = format!("at most {MAX_MOVING_SOLIDS} solids can move");
             return Err(doc.fault_of_plain(&place, problem));
         }
         let placed = placed_mesh(doc, around.base_dir, &path, "mesh", spec)?;
-        let direction = DVec3::from_array(direction);
-        moving.push(moving_solid::build(
-            doc, &path, placed, direction, motion, around,
-        )?);
+        moving.push(moving_solid::build(doc, &path, placed, spec, around)?);
     }
     Ok((solids, moving))
 }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::{Scene, Wall, probe::Bearer};
 use crate::domain::{
     mesh::TriangleMesh,
+    pose::Pose,
     probe::{Patch, patches},
 };
 
@@ -13,11 +14,11 @@ impl Scene {
     /// faces a wall of the domain less than half a cell away bears nothing: no water comes between.
     pub fn patches(&self, bearer: Bearer, time: f64) -> Vec<Patch> {
         let edge = self.solver.flip().cell_size;
-        let (mesh, way) = match bearer {
-            Bearer::Solid(index) => (&self.solids[index].mesh, DVec3::ZERO),
+        let (mesh, pose) = match bearer {
+            Bearer::Solid(index) => (&self.solids[index].mesh, Pose::START),
             Bearer::MovingSolid(index) => {
                 let solid = &self.moving_solids[index];
-                (&solid.placed.mesh, solid.displacement(time))
+                (&solid.placed.mesh, solid.pose(time))
             }
             Bearer::Wall(wall) => return patches(&self.face(wall, time), edge),
         };
@@ -27,7 +28,7 @@ impl Scene {
         };
         let all = patches(mesh, edge)
             .into_iter()
-            .map(|patch| patch.moved(way));
+            .map(|patch| patch.posed(&pose));
         all.filter(meets_water).collect()
     }
 

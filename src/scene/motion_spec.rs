@@ -66,6 +66,25 @@ pub(super) enum MotionSpec {
     },
 }
 
+/// A turn with the keys of its kind.
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum TurnSpec {
+    ConstantVelocity {
+        degrees_per_second: f64,
+        until: Option<f64>,
+    },
+    Sine {
+        swing_degrees: f64,
+        period: f64,
+        ramp: Option<f64>,
+    },
+    Table {
+        file: Option<String>,
+        points: Option<Vec<[f64; 2]>>,
+    },
+}
+
 /// Fastest that a motion may be, m/s: as fast as a velocity may be.
 const MAX_SPEED: f64 = 1e5;
 

@@ -1,16 +1,23 @@
-//! Solids that move: a mesh along a direction.
+//! Solids that move: a mesh along a direction, about an axis, or both.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 use super::{
-    Method, PlacedMesh, Scene, Shot,
+    PlacedMesh, Scene, Shot,
     document::Document,
     error::SceneError,
-    motion_spec::MotionSpec,
-    wave_maker,
+    motion_spec::{MotionSpec, TurnSpec, check_speed},
+    spec::MeshSpec,
+    wave_maker::{self, ANGLES},
     words::{extent, shown},
 };
-use crate::domain::{bounds::Bounds, motion::Motion};
+use crate::domain::{
+    boundary::Boundary,
+    bounds::Bounds,
+    mesh::TriangleMesh,
+    motion::Motion,
+    pose::{Passage, Pose},
+};
 
 /// Most of them in a scene: what a pass looks at, one after the other.
 pub const MAX_MOVING_SOLIDS: usize = 7;
@@ -20,43 +27,144 @@ const LEAST_DIRECTION: f64 = 1e-6;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
-/// A solid that is carried along a line, without turning.
+/// A solid that is carried along a line, or turns, or both.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovingSolid {
     /// Where it stands at the start.
     pub placed: PlacedMesh,
+    /// Along a line; `None` of one that turns in place.
+    pub slide: Option<Slide>,
+    /// About an axis, which is carried along.
+    pub turn: Option<Turn>,
+}
+
+/// A way along a line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slide {
     /// As the scene says it; its length does not count.
     pub direction: DVec3,
     /// How far along `direction` it has come, metres.
     pub motion: Motion,
 }
 
+/// A turn about an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Turn {
+    /// A point on the axis at the start, metres about the scene's origin.
+    pub pivot: DVec3,
+    /// As the scene says it; its length does not count.
+    pub axis: DVec3,
+    /// How far it has turned, counter-clockwise as seen against `axis`, degrees.
+    pub motion: Motion,
+    /// From the pivot to the solid's farthest point, metres.
+    pub reach: f64,
+}
+
+impl Turn {
+    /// Of a solid that stands as `mesh` at the start.
+    pub fn new(pivot: DVec3, axis: DVec3, motion: Motion, mesh: &TriangleMesh) -> Self {
+        let away = mesh.vertices.iter().map(|x| x.distance(pivot));
+        Self {
+            pivot,
+            axis,
+            motion,
+            reach: away.fold(0.0, f64::max),
+        }
+    }
+}
+
 impl MovingSolid {
-    /// From where it stood at the start to where it stands at time `t`, seconds; metres.
-    pub fn displacement(&self, t: f64) -> DVec3 {
-        self.motion.displacement(t) * self.direction.normalize()
+    /// Where it stands at time `t`, seconds.
+    pub fn pose(&self, t: f64) -> Pose {
+        let way = self.slide.as_ref().map_or(DVec3::ZERO, |slide| {
+            slide.motion.displacement(t) * slide.direction.normalize()
+        });
+        let (rest, turn) = match &self.turn {
+            None => (DVec3::ZERO, DQuat::IDENTITY),
+            Some(turn) => {
+                let angle = turn.motion.displacement(t).to_radians();
+                let axis = turn.axis.normalize();
+                (turn.pivot, DQuat::from_axis_angle(axis, angle))
+            }
+        };
+        Pose {
+            rest,
+            centre: rest + way,
+            turn,
+        }
+    }
+
+    /// From where it stands at `start` to where it stands `length` seconds later.
+    pub fn passage(&self, start: f64, length: f64) -> Passage {
+        Passage::between(self.pose(start), self.pose(start + length), length)
+    }
+
+    /// What took it within `step` seconds to where it stands at `time`; with a step of 0 it rests there.
+    pub fn passage_to(&self, time: f64, step: f64) -> Passage {
+        match step {
+            0.0 => Passage::resting(self.pose(time)),
+            step => self.passage(time - step, step),
+        }
+    }
+
+    /// An upper bound on the speed of its points within `[t0, t1]`, m/s.
+    pub fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
+        let slide = self.slide.as_ref();
+        let slide = slide.map_or(0.0, |slide| slide.motion.peak_speed(t0, t1));
+        let turn = self.turn.as_ref().map_or(0.0, |turn| {
+            turn.reach * turn.motion.peak_speed(t0, t1).to_radians()
+        });
+        slide + turn
     }
 }
 
 impl Scene {
     /// An upper bound on the speed of walls and solids within `[t0, t1]`, m/s.
     pub fn peak_boundary_speed(&self, t0: f64, t1: f64) -> f64 {
-        let makers = self.wave_makers.iter().map(|maker| &maker.motion);
-        let motions = makers.chain(self.moving_solids.iter().map(|solid| &solid.motion));
-        motions
-            .map(|motion| motion.peak_speed(t0, t1))
-            .fold(0.0, f64::max)
+        let makers = self.wave_makers.iter();
+        let makers = makers.map(|maker| maker.motion.peak_speed(t0, t1));
+        let solids = self.moving_solids.iter();
+        let solids = solids.map(|solid| solid.peak_speed(t0, t1));
+        makers.chain(solids).fold(0.0, f64::max)
     }
 }
 
-/// Refuses the moving solid whose motion stands at `place` where the chosen solver has none.
-pub(super) fn check_method(doc: &Document<'_>, place: &str, method: Method) -> Result<()> {
-    match method {
-        Method::Flip => Ok(()),
-        Method::Pbf => {
-            let problem = "solver pbf has no moving solids yet; choose solver.method = \"flip\"";
-            Err(doc.fault_of_plain(place, problem))
+/// A sample on a solid at one moment.
+#[derive(Clone, Copy, Debug)]
+pub struct SolidSample {
+    /// From the domain's least corner, metres; within the domain along periodic axes.
+    pub position: DVec3,
+    /// Area of the surface that it stands for, m².
+    pub area: f64,
+    /// m/s.
+    pub velocity: DVec3,
+}
+
+impl Scene {
+    /// Samples on the solids of `boundary` as they stand at `time`, those that move with what took them there within
+    /// `step` seconds; with a step of 0 they rest. Those of solids at rest come first.
+    pub fn solid_samples(&self, boundary: &Boundary, time: f64, step: f64) -> Vec<SolidSample> {
+        let least = self.domain.min;
+        let still = boundary.samples.iter().map(|sample| SolidSample {
+            position: sample.position - least,
+            area: sample.area,
+            velocity: DVec3::ZERO,
+        });
+        let mut all: Vec<_> = still.collect();
+        let period = self.period();
+        for (solid, samples) in self.moving_solids.iter().zip(&boundary.moving_samples) {
+            let passage = solid.passage_to(time, step);
+            let pose = passage.at(1.0);
+            all.extend(samples.iter().map(|sample| {
+                let x = pose.place(sample.position);
+                SolidSample {
+                    position: period.wrap(x - least),
+                    area: sample.area,
+                    velocity: passage.velocity_at(x, pose.centre),
+                }
+            }));
         }
+        all
     }
 }
 
@@ -65,34 +173,104 @@ pub(super) fn build(
     doc: &Document<'_>,
     path: &str,
     placed: PlacedMesh,
-    direction: DVec3,
-    motion: &MotionSpec,
+    spec: &MeshSpec,
     around: &wave_maker::Surroundings<'_>,
 ) -> Result<MovingSolid> {
-    let place = format!("{path}.motion");
+    let at = |key: &str| format!("{path}.{key}");
+    let direction = |key: &str, of: [f64; 3]| {
+        let found = DVec3::from_array(of);
+        match found.length() < LEAST_DIRECTION {
+            true => Err(doc.fault_of(&at(key), "no direction")),
+            false => Ok(found),
+        }
+    };
+    let motion = |key: &str, spec: &MotionSpec| {
+        wave_maker::motion(doc, &at(key), around.base_dir, spec, around.gravity)
+    };
+    let slide = match (spec.direction, &spec.motion) {
+        (Some(way), Some(moves)) => {
+            let motion = motion("motion", moves)?;
+            let direction = direction("direction", way)?;
+            Some(Slide { direction, motion })
+        }
+        _ => None,
+    };
+    let turn = match (spec.pivot, spec.axis, &spec.turn) {
+        (Some(pivot), Some(axis), Some(turns)) => {
+            let motion = turn_motion(doc, &at("turn"), around, turns)?;
+            let pivot = DVec3::from_array(pivot);
+            Some(Turn::new(
+                pivot,
+                direction("axis", axis)?,
+                motion,
+                &placed.mesh,
+            ))
+        }
+        _ => None,
+    };
     let solid = MovingSolid {
         placed,
-        direction,
-        motion: wave_maker::motion(doc, &place, around.base_dir, motion, around.gravity)?,
+        slide,
+        turn,
     };
-    if solid.direction.length() < LEAST_DIRECTION {
-        return Err(doc.fault_of(&format!("{path}.direction"), "no direction"));
-    }
-    check_way(doc, &solid, &place, around.domain, around.shot)?;
+    check_way(doc, &solid, path, around.domain, around.shot)?;
     Ok(solid)
 }
 
+/// A motion in degrees.
+fn turn_motion(
+    doc: &Document<'_>,
+    place: &str,
+    around: &wave_maker::Surroundings<'_>,
+    spec: &TurnSpec,
+) -> Result<Motion> {
+    match *spec {
+        TurnSpec::ConstantVelocity {
+            degrees_per_second,
+            until,
+        } => Ok(Motion::ConstantVelocity {
+            velocity: degrees_per_second,
+            until,
+        }),
+        TurnSpec::Sine {
+            swing_degrees,
+            period,
+            ramp,
+        } => Ok(Motion::Sine {
+            stroke: swing_degrees,
+            period,
+            ramp: ramp.unwrap_or(period),
+        }),
+        TurnSpec::Table {
+            ref file,
+            ref points,
+        } => wave_maker::table(doc, place, around.base_dir, (file, points), ANGLES),
+    }
+}
+
 /// It must come into the domain at some time, and stay within reason: a motion that carries it away for
-/// ten domains is a slip of the keyboard.
+/// ten domains, or whose points are faster than anything, is a slip of the keyboard.
 fn check_way(
     doc: &Document<'_>,
     solid: &MovingSolid,
-    place: &str,
+    path: &str,
     domain: &Bounds,
     shot: &Shot,
 ) -> Result<()> {
     const FAR: f64 = 10.0;
-    let farthest = solid.motion.peak_displacement(shot.duration());
+    let key = if solid.slide.is_some() {
+        "motion"
+    } else {
+        "turn"
+    };
+    let place = format!("{path}.{key}");
+    let (farthest, direction) = match &solid.slide {
+        Some(slide) => (
+            slide.motion.peak_displacement(shot.duration()),
+            slide.direction.normalize(),
+        ),
+        None => (0.0, DVec3::ZERO),
+    };
     let size = domain.size().max_element();
     if farthest > FAR * size {
         let problem = format!(
@@ -101,10 +279,23 @@ fn check_way(
             shown(farthest),
             shown(size)
         );
-        return Err(doc.fault_of(place, problem));
+        return Err(doc.fault_of(&place, problem));
     }
-    let way = farthest * solid.direction.normalize();
-    let swept = solid.placed.mesh.bounds().map(|b| Bounds {
+    let speed = solid.peak_speed(0.0, shot.duration());
+    check_speed(speed).map_err(|problem| doc.fault_of_plain(&place, problem))?;
+    let around = match &solid.turn {
+        // Wherever it turns to.
+        Some(turn) => Some(
+            Bounds {
+                min: turn.pivot,
+                max: turn.pivot,
+            }
+            .grown(turn.reach),
+        ),
+        None => solid.placed.mesh.bounds(),
+    };
+    let way = farthest * direction;
+    let swept = around.map(|b| Bounds {
         min: b.min.min(b.min + way),
         max: b.max.max(b.max + way),
     });
@@ -116,5 +307,5 @@ fn check_way(
         extent(swept),
         extent(Some(*domain))
     );
-    Err(doc.fault_of(place, problem))
+    Err(doc.fault_of(&place, problem))
 }

@@ -53,6 +53,9 @@ impl Scene {
         let placed = self.water.meshes.iter_mut().chain(&mut self.solids);
         let moving = self.moving_solids.iter_mut().map(|solid| &mut solid.placed);
         placed.chain(moving).for_each(|mesh| carry(mesh, way));
+        for turn in self.moving_solids.iter_mut().flat_map(|it| &mut it.turn) {
+            turn.pivot += way;
+        }
         self.carry_sources(way, &carry);
         for probe in &mut self.probes {
             match &mut probe.kind {

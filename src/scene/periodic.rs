@@ -136,7 +136,8 @@ pub(super) fn check_makers(
     Err(doc.fault_of_plain(&format!("wave_maker[{index}].wall"), problem))
 }
 
-/// Refuses solids that move along a periodic axis: they would have to come in again at the other end.
+/// Refuses solids that move along a periodic axis, for they would have to come in again at the other end, and those that
+/// turn about another one, for their images beyond the ends would not stay where they are.
 pub(super) fn check_solids(
     doc: &Document<'_>,
     periodic: [bool; 3],
@@ -144,10 +145,20 @@ pub(super) fn check_solids(
     index_of: impl Fn(usize) -> usize,
 ) -> Result<(), SceneError> {
     for axis in Axis::of(periodic) {
-        let moves = |solid: &MovingSolid| solid.direction.normalize()[axis as usize].abs() > ACROSS;
-        if let Some(found) = solids.iter().position(moves) {
-            let problem = format!("the solid moves along {}, which {KEY} names", axis.name());
-            let path = format!("solid[{}].direction", index_of(found));
+        for (found, solid) in solids.iter().enumerate() {
+            let slide = solid.slide.as_ref();
+            let slides =
+                slide.is_some_and(|it| it.direction.normalize()[axis as usize].abs() > ACROSS);
+            let turn = solid.turn.as_ref();
+            let leans =
+                turn.is_some_and(|it| it.axis.normalize()[axis as usize].abs() < 1.0 - ACROSS);
+            let (key, does) = match (slides, leans) {
+                (true, _) => ("direction", "moves along"),
+                (_, true) => ("axis", "turns about another axis than"),
+                _ => continue,
+            };
+            let problem = format!("the solid {does} {}, which {KEY} names", axis.name());
+            let path = format!("solid[{}].{key}", index_of(found));
             return Err(doc.fault_of_plain(&path, problem));
         }
     }

@@ -4,8 +4,14 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use super::{
-    Effects, Iteration, Method, Shot, Wall, axis::Axis, budget::BudgetSpec, flip::Flip,
-    grids::GridsSpec, keep::KeepSpec, motion_spec::MotionSpec, probe::ProbeSpec,
+    Effects, Iteration, Method, Shot, Wall,
+    axis::Axis,
+    budget::BudgetSpec,
+    flip::Flip,
+    grids::GridsSpec,
+    keep::KeepSpec,
+    motion_spec::{MotionSpec, TurnSpec},
+    probe::ProbeSpec,
 };
 
 #[derive(Deserialize)]
@@ -70,7 +76,7 @@ pub(super) struct SwarmSpec {
     pub(super) velocity: [f64; 3],
 }
 
-/// A mesh of water or a solid; water says `file` and neither moves nor has a direction.
+/// A mesh of water or a solid; water says `file` and does not move.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MeshSpec {
@@ -82,6 +88,16 @@ pub(super) struct MeshSpec {
     pub(super) scale: ScaleSpec,
     pub(super) direction: Option<[f64; 3]>,
     pub(super) motion: Option<MotionSpec>,
+    pub(super) pivot: Option<[f64; 3]>,
+    pub(super) axis: Option<[f64; 3]>,
+    pub(super) turn: Option<TurnSpec>,
+}
+
+impl MeshSpec {
+    /// Whether it is a solid that moves.
+    pub(super) fn moves(&self) -> bool {
+        self.motion.is_some() || self.turn.is_some()
+    }
 }
 
 #[derive(Clone, Copy, Deserialize)]

@@ -89,7 +89,7 @@ impl Scene {
     }
 
     /// Equal substeps that PBF's CFL number asks of the frame after `frame`: from the fastest particle, `speed` in
-    /// m/s, what gravity and effects add within the frame, and the fastest wave maker.
+    /// m/s, what gravity and effects add within the frame, and the fastest wave maker or solid.
     ///
     /// # Errors
     /// Where they are more than `max_substeps`.
@@ -101,7 +101,9 @@ impl Scene {
             .makers()
             .map(|(maker, answer)| maker.peak_speed(answer, start, start + length));
         let gained = self.water.gravity.length() * length + self.effects.push().gained(length);
-        let speed = wall.fold(speed + gained, f64::max);
+        let solids = self.moving_solids.iter();
+        let solids = solids.map(|solid| solid.peak_speed(start, start + length));
+        let speed = wall.chain(solids).fold(speed + gained, f64::max);
         let wanted = (speed * length / (pbf.cfl * pbf.particle_spacing))
             .max(length / self.effects.longest_step(self.grain()).0)
             .ceil()

@@ -245,31 +245,61 @@ pub(super) fn motion(
         MotionSpec::Table {
             ref file,
             ref points,
-        } => {
-            let file_key = format!("{path}.file");
-            let (points, key) = match file {
-                Some(file) => {
-                    let file = doc.find(base_dir, &file_key, file)?;
-                    let points = read_table(&file).map_err(|problem| {
-                        doc.fault_of(&file_key, format!("{}: {problem}", file.display()))
-                    })?;
-                    (points, file_key)
-                }
-                None => (points.clone().unwrap_or_default(), format!("{path}.points")),
-            };
-            check_points(&points).map_err(|problem| doc.fault_of(&key, problem))?;
-            Ok(Motion::Table { points })
-        }
+        } => table(doc, path, base_dir, (file, points), WAYS),
     }
 }
 
-fn check_points(points: &[[f64; 2]]) -> std::result::Result<(), String> {
+/// What a table of points may hold.
+#[derive(Clone, Copy)]
+pub(super) struct Allowed {
+    /// Of what is moved by.
+    least: f64,
+    /// How fast.
+    check_speed: fn(f64) -> std::result::Result<(), String>,
+}
+
+/// Displacements, metres, of what does not go back behind its start.
+const WAYS: Allowed = Allowed {
+    least: 0.0,
+    check_speed,
+};
+
+/// Angles, degrees; how fast a solid's points are depends on the solid.
+pub(super) const ANGLES: Allowed = Allowed {
+    least: -1e9,
+    check_speed: |_| Ok(()),
+};
+
+/// The motion through the points of the table at `path`, in place or from a file.
+pub(super) fn table(
+    doc: &Document<'_>,
+    path: &str,
+    base_dir: &Path,
+    (file, points): (&Option<String>, &Option<Vec<[f64; 2]>>),
+    allowed: Allowed,
+) -> Result<Motion> {
+    let file_key = format!("{path}.file");
+    let (points, key) = match file {
+        Some(file) => {
+            let file = doc.find(base_dir, &file_key, file)?;
+            let points = read_table(&file).map_err(|problem| {
+                doc.fault_of(&file_key, format!("{}: {problem}", file.display()))
+            })?;
+            (points, file_key)
+        }
+        None => (points.clone().unwrap_or_default(), format!("{path}.points")),
+    };
+    check_points(&points, allowed).map_err(|problem| doc.fault_of(&key, problem))?;
+    Ok(Motion::Table { points })
+}
+
+fn check_points(points: &[[f64; 2]], allowed: Allowed) -> std::result::Result<(), String> {
     if points.len() < 2 {
         return Err(format!("{} points are too few", points.len()));
     }
     for (i, [t, x]) in points.iter().enumerate() {
         // 1e9 keeps sums and products of them finite.
-        if !((0.0..=1e9).contains(t) && (0.0..=1e9).contains(x)) {
+        if !((0.0..=1e9).contains(t) && (allowed.least..=1e9).contains(x)) {
             return Err(format!(
                 "point {i}, {}, is out of range",
                 shown_all(&[*t, *x])
@@ -288,7 +318,7 @@ fn check_points(points: &[[f64; 2]]) -> std::result::Result<(), String> {
                 shown(pair[0][0])
             ));
         }
-        check_speed((pair[1][1] - pair[0][1]).abs() / (pair[1][0] - pair[0][0]))
+        (allowed.check_speed)((pair[1][1] - pair[0][1]).abs() / (pair[1][0] - pair[0][0]))
             .map_err(|problem| format!("up to point {}, {problem}", i + 1))?;
     }
     Ok(())

@@ -97,8 +97,15 @@ impl Scene {
         let still = self.solids.iter().map(placed);
         let moving = self.moving_solids.iter().map(|solid| {
             let mut table = placed(&solid.placed);
-            table.insert("direction".to_owned(), vector(solid.direction));
-            table.insert("motion".to_owned(), motion(&solid.motion));
+            if let Some(slide) = &solid.slide {
+                table.insert("direction".to_owned(), vector(slide.direction));
+                table.insert("motion".to_owned(), motion(&slide.motion));
+            }
+            if let Some(turn) = &solid.turn {
+                table.insert("pivot".to_owned(), vector(turn.pivot + self.origin));
+                table.insert("axis".to_owned(), vector(turn.axis));
+                table.insert("turn".to_owned(), turned(&turn.motion));
+            }
             table
         });
         insert_tables(&mut scene, "solid", still.chain(moving));
@@ -344,6 +351,22 @@ fn regular(waves: &RegularWaves) -> Table {
         ("depth", value(&waves.depth)),
         ("ramp", value(&waves.ramp)),
     ])
+}
+
+/// A motion whose displacement is an angle.
+fn turned(turn: &Motion) -> Value {
+    let Value::Table(mut all) = motion(turn) else {
+        return motion(turn);
+    };
+    for (of_way, of_angle) in [
+        ("velocity", "degrees_per_second"),
+        ("stroke", "swing_degrees"),
+    ] {
+        if let Some(found) = all.remove(of_way) {
+            all.insert(of_angle.to_owned(), found);
+        }
+    }
+    Value::Table(all)
 }
 
 /// Its gravity is the water's.

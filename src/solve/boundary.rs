@@ -2,10 +2,12 @@
 //!
 //! Samples count in the density and push back (Akinci 2012); the distance stops what would tunnel.
 
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3};
 
 use crate::{
-    domain::{boundary::Boundary, signed_distance::SignedDistance, sph::Calibration},
+    domain::{
+        boundary::Boundary, pose::Passage, signed_distance::SignedDistance, sph::Calibration,
+    },
     gpu::program::Program,
     scene::Scene,
 };
@@ -14,7 +16,7 @@ use super::{
     buffers::{SOLID_DISTANCE, SOLID_GRID},
     flip::buffers::SOLID_GRIDS,
     params::{SolidGrid, SolidGrids},
-    pbf::buffers::{BOUNDARY_CELL_START, PREDICTED},
+    pbf::buffers::{BOUNDARY_CELL_START, PREDICTED, SAMPLE_VELOCITY},
     plan::{Counts, Plan},
 };
 
@@ -23,15 +25,14 @@ impl Boundary {
     pub fn counts(&self) -> Counts {
         Counts {
             particles: 0,
-            boundary_samples: self.samples.len(),
+            boundary_samples: self.sample_count(),
             solid_grid: self.distance.as_ref().map_or([0; 3], |grid| grid.dims),
             moving_nodes: self.moving.iter().map(|grid| grid.values.len()).sum(),
             ..Counts::default()
         }
     }
 
-    /// Fills the buffers that the plan has for solids: samples behind both halves of `predicted`, sorted by
-    /// cell; their weights are particles' worth of mass.
+    /// Fills the buffers that the plan has for solids. Those of solids that move are filled anew for each substep.
     pub(super) fn upload(
         &self,
         program: &Program,
@@ -39,25 +40,34 @@ impl Boundary {
         plan: &Plan,
         calibration: &Calibration,
     ) {
-        if self.distance.is_none() {
+        if self.distance.is_none() && self.moving.is_empty() {
             return;
         }
-        let origin = scene.domain.min;
+        self.upload_samples(program, scene, plan, calibration, (0.0, 0.0));
+        self.upload_distance(program, scene);
+    }
+
+    /// Fills in the samples as they stand at a time, moving as what took them there within so many seconds: behind both
+    /// halves of `predicted`, sorted by cell; their weights are particles' worth of mass.
+    pub(super) fn upload_samples(
+        &self,
+        program: &Program,
+        scene: &Scene,
+        plan: &Plan,
+        calibration: &Calibration,
+        (time, step): (f64, f64),
+    ) {
+        let samples = scene.solid_samples(self, time, step);
         let dims = plan.grid_dims.map(|n| n as usize);
         let spacing = scene.particle_spacing();
         let support = calibration.support_radius;
         let edges = scene.period().edges(plan.grid_dims, support);
         let cell = |p: DVec3| {
-            let c = ((p - origin) / edges)
-                .floor()
-                .max(DVec3::ZERO)
-                .as_uvec3()
-                .to_array();
+            let c = (p / edges).floor().max(DVec3::ZERO).as_uvec3().to_array();
             let c: [usize; 3] = std::array::from_fn(|k| (c[k] as usize).min(dims[k] - 1));
             (c[2] * dims[1] + c[1]) * dims[0] + c[0]
         };
-        let mut order: Vec<(usize, usize)> = self
-            .samples
+        let mut order: Vec<(usize, usize)> = samples
             .iter()
             .enumerate()
             .map(|(k, sample)| (cell(sample.position), k))
@@ -73,15 +83,23 @@ impl Boundary {
         let packed: Vec<[f32; 4]> = order
             .iter()
             .map(|&(_, k)| {
-                let sample = &self.samples[k];
-                let x = (sample.position - origin).as_vec3();
+                let sample = &samples[k];
+                let x = sample.position.as_vec3();
                 let weight = calibration.sample_weight * sample.area / (spacing * spacing);
                 [x.x, x.y, x.z, weight as f32]
             })
             .collect();
-        program.upload(PREDICTED, 2 * plan.counts.particles, &packed);
+        if !packed.is_empty() {
+            program.upload(PREDICTED, 2 * plan.counts.particles, &packed);
+        }
         program.upload(BOUNDARY_CELL_START, 0, &start);
-        self.upload_distance(program, scene);
+        if plan.has_sample_velocities() {
+            let velocities: Vec<[f32; 4]> = order
+                .iter()
+                .map(|&(_, k)| four(samples[k].velocity))
+                .collect();
+            program.upload(SAMPLE_VELOCITY, 0, &velocities);
+        }
     }
 
     /// Fills the signed distance that the plan has for solids.
@@ -104,40 +122,76 @@ impl Boundary {
 
 /// Where solids stand that move; nothing in a scene without them.
 pub(super) struct Movers {
-    at_start: SolidGrids,
+    /// All but where they stand.
+    resting: SolidGrids,
+    /// First nodes, metres, in the scene's coordinates: where each stood at the start.
+    origins: Vec<DVec3>,
+    /// From a point of a solid that turns to its grid's farthest corner.
+    reaches: Vec<f64>,
     /// Before the first that moves.
     statics: usize,
 }
 
 impl Movers {
     pub(super) fn of(boundary: &Boundary, scene: &Scene) -> Option<Self> {
-        let mut at_start = SolidGrids::default();
+        let mut resting = SolidGrids::default();
         let mut first = 0;
-        for (slot, grid) in at_start.grids.iter_mut().zip(boundary.grids()) {
-            *slot = solid_grid(grid, scene.domain.min, first);
+        for (slot, grid) in resting.grids.iter_mut().zip(boundary.grids()) {
+            *slot = solid_grid(grid, grid.origin, first);
             first += grid.values.len() as u32;
-            at_start.count += 1;
+            resting.count += 1;
         }
-        (!boundary.moving.is_empty()).then_some(Self {
-            at_start,
-            statics: boundary.grids().count() - boundary.moving.len(),
+        let statics = boundary.grids().count() - boundary.moving.len();
+        let solids = scene.moving_solids.iter().zip(&boundary.moving);
+        (!boundary.moving.is_empty()).then(|| Self {
+            resting,
+            origins: boundary.grids().map(|grid| grid.origin).collect(),
+            reaches: solids
+                .map(|(solid, grid)| grid.reach(solid.pose(0.0).rest))
+                .collect(),
+            statics,
         })
     }
 
     /// As they stand at `start`, with the velocities that take them to where they then stand `length` seconds
     /// later.
     pub(super) fn upload(&self, program: &Program, scene: &Scene, start: f64, length: f64) {
-        let mut grids = self.at_start;
-        for (solid, k) in scene.moving_solids.iter().zip(self.statics..) {
-            let before = solid.displacement(start);
-            let velocity = (solid.displacement(start + length) - before) / length;
-            let origin = Vec3::from_array(grids.grids[k].origin).as_dvec3() + before;
-            grids.grids[k].origin = origin.as_vec3().to_array();
-            grids.velocities[k] = velocity.as_vec3().extend(0.0).to_array();
-            grids.fastest = grids.fastest.max(velocity.length() as f32);
+        let mut grids = self.resting;
+        grids.length = length as f32;
+        let identity = DQuat::IDENTITY.as_quat().to_array();
+        for (k, origin) in self.origins.iter().enumerate() {
+            grids.centres[k] = four(*origin - scene.domain.min);
+            (grids.backs[k], grids.end_backs[k]) = (identity, identity);
+        }
+        let solids = scene.moving_solids.iter().zip(&self.reaches);
+        for ((solid, reach), k) in solids.zip(self.statics..) {
+            let Passage {
+                start: pose,
+                end_turn,
+                velocity,
+                spin,
+                ..
+            } = solid.passage(start, length);
+            // The point of rest of a solid that does not turn may be any: its first node rounds least.
+            let rest = match solid.turn {
+                Some(_) => pose.rest,
+                None => self.origins[k],
+            };
+            grids.grids[k].origin = (self.origins[k] - rest).as_vec3().to_array();
+            grids.centres[k] = four(pose.place(rest) - scene.domain.min);
+            grids.velocities[k] = four(velocity);
+            grids.spins[k] = four(spin);
+            grids.backs[k] = pose.turn.conjugate().as_quat().to_array();
+            grids.end_backs[k] = end_turn.conjugate().as_quat().to_array();
+            let speed = velocity.length() + spin.length() * reach;
+            grids.fastest = grids.fastest.max(speed as f32);
         }
         program.upload(SOLID_GRIDS, 0, &[grids]);
     }
+}
+
+fn four(v: DVec3) -> [f32; 4] {
+    v.as_vec3().extend(0.0).to_array()
 }
 
 fn solid_grid(grid: &SignedDistance, origin: DVec3, first: u32) -> SolidGrid {

@@ -146,7 +146,7 @@ mirror!(
 mirror!(
     /// `SolidGrid` of shared/confine.wgsl.
     SolidGrid {
-        /// Relative to the domain's least corner.
+        /// Relative to the domain's least corner, or to a moving solid's point of rest.
         origin: [f32; 3],
         /// Metres.
         spacing: f32,
@@ -160,16 +160,26 @@ mirror!(
 mirror!(
     /// `SolidGrids` of shared/moving_solids.wgsl.
     SolidGrids {
-        /// At the substep's start; static solids first, as one.
+        /// As they lie at the start, from each solid's point of rest; static solids first, as one.
         grids: [SolidGrid; MAX_MOVING_SOLIDS + 1],
-        /// m/s.
+        /// Points of rest at the substep's start, relative to the domain's least corner.
+        centres: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
+        /// Of the points of rest, m/s.
         velocities: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
+        /// Angular velocities about them, rad/s.
+        spins: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
+        /// Quaternions x, y, z, w that turn back to the start, at the substep's start.
+        backs: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
+        /// At its end.
+        end_backs: [[f32; 4]; MAX_MOVING_SOLIDS + 1],
         /// Grids in use.
         count: u32,
-        /// The greatest speed, m/s.
+        /// The greatest speed of any point, m/s.
         fastest: f32,
+        /// Of the substep, seconds.
+        length: f32,
         /// Unused.
-        padding: [u32; 2],
+        padding: u32,
     }
 );
 

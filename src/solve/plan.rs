@@ -12,7 +12,7 @@ use crate::{
     scene::{Method, Scene},
 };
 
-use super::{effects::Addition, flip, pbf};
+use super::{effects::Addition, flip, pbf, pbf::buffers::SAMPLE_VELOCITY};
 
 pub use super::pbf::plan::{LIST_BUDGET, LIST_CAPACITY, SHARED_CONSTANTS};
 
@@ -274,6 +274,12 @@ impl Plan {
         self.counts.boundary_samples > 0
             || self.counts.solid_grid != [0; 3]
             || self.counts.moving_nodes > 0
+    }
+
+    /// Whether PBF's samples have velocities: where solids move.
+    pub(super) fn has_sample_velocities(&self) -> bool {
+        let is_it = |name: &str| name == SAMPLE_VELOCITY.name();
+        self.buffers.iter().any(|buffer| is_it(&buffer.spec.name))
     }
 
     /// Names and bytes of its buffers.

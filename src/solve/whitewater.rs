@@ -172,9 +172,6 @@ fn set_up(
     let water = plan.counts.particles as u32;
     program.upload(ELEMENT_COUNT, 0, &[[water, 0, 0, 0]]);
     boundary.upload(program, scene, plan, calibration);
-    if boundary.distance.is_none() {
-        boundary.upload_distance(program, scene);
-    }
     Recording::new(program, &survey_commands(plan))
 }
 
@@ -201,7 +198,8 @@ impl Whitewater {
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
         Ok(Self {
             survey: set_up(&program, &plan, scene, boundary, &calibration),
-            boundary: scene.has_sources().then(|| boundary.clone()),
+            boundary: (scene.has_sources() || !boundary.moving.is_empty())
+                .then(|| boundary.clone()),
             movers: Movers::of(boundary, scene),
             timer: is_timed.then(|| Timer::new(context)),
             scene: scene.clone(),
@@ -284,8 +282,11 @@ impl Whitewater {
         // Whitewater falls, whatever the water's own solver does with gravity.
         params.velocity_step = (self.scene.water.gravity * seconds).as_vec3().to_array();
         self.program.upload(PARAMS, 0, &[params]);
-        if let Some(movers) = &self.movers {
-            movers.upload(&self.program, &self.scene, time, seconds);
+        if let (Some(movers), Some(boundary)) = (&self.movers, &self.boundary) {
+            let (program, scene) = (&self.program, &self.scene);
+            movers.upload(program, scene, time - seconds, seconds);
+            let now = (time, seconds);
+            boundary.upload_samples(program, scene, &self.plan, &self.calibration, now);
         }
         self.survey.run(&self.program, self.timer.as_mut())?;
         let (potential, order) = (self.program).download((POTENTIAL.first(n), ORDER.first(n)))?;

@@ -242,7 +242,7 @@ pub fn bake(
         device,
         particles: start.particles.len(),
         removed: start.removed,
-        boundary_samples: start.boundary.samples.len(),
+        boundary_samples: start.boundary.sample_count(),
         solver: scene.solver.method.name(),
         bytes: drive.bytes(),
         room: Room::of(request, &start.particles, first, last)?,

@@ -6,11 +6,13 @@ use std::{
     path::PathBuf,
 };
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use crate::{
     cache::{CacheError, CacheReader, Clock, Parent},
-    domain::{answer::Answers, boundary::Boundary, bounds::Bounds, particles::Particles},
+    domain::{
+        answer::Answers, boundary::Boundary, bounds::Bounds, particles::Particles, pose::Pose,
+    },
     scene::{self, Scene, SceneError},
 };
 
@@ -182,15 +184,15 @@ impl Branch {
     /// A note where solids of the scene cover particles.
     pub fn note_covered(&mut self, scene: &Scene, boundary: &Boundary) {
         let time = self.clock.time;
-        let still = boundary.distance.iter().map(|field| (field, DVec3::ZERO));
+        let still = boundary.distance.iter().map(|field| (field, Pose::START));
         let solids = boundary.moving.iter().zip(&scene.moving_solids);
-        let moving = solids.map(|(field, solid)| (field, solid.displacement(time)));
+        let moving = solids.map(|(field, solid)| (field, solid.pose(time)));
         let fields: Vec<_> = still.chain(moving).collect();
         let is_covered = |x: &&[f32; 3]| {
             let x = Vec3::from_array(**x).as_dvec3();
             fields
                 .iter()
-                .any(|(field, way)| field.sample(x - *way) < 0.0)
+                .any(|(field, pose)| field.sample(pose.back(x)) < 0.0)
         };
         match self.particles.position.iter().filter(is_covered).count() {
             0 => {}

@@ -160,14 +160,20 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &TriangleMesh> {
 fn boundary(scene: &Scene) -> Result<Boundary, SignedDistanceError> {
     let distance = distance(scene, meshes(scene))?;
     let sampled = |mesh| samples(scene, mesh, distance.as_ref());
+    let moving = scene.moving_solids.iter().map(|solid| &solid.placed.mesh);
+    // FLIP meets solids by their distance alone.
+    let (samples, moving_samples) = match scene.solver.method {
+        Method::Pbf => (
+            meshes(scene).flat_map(sampled).collect(),
+            moving.map(|mesh| all_samples(scene, mesh)).collect(),
+        ),
+        Method::Flip => (Vec::new(), Vec::new()),
+    };
     Ok(Boundary {
-        // FLIP meets solids by their distance alone.
-        samples: match scene.solver.method {
-            Method::Pbf => meshes(scene).flat_map(sampled).collect(),
-            Method::Flip => Vec::new(),
-        },
+        samples,
         distance,
         moving: moving_distances(scene)?,
+        moving_samples,
     })
 }
 
@@ -198,6 +204,15 @@ fn samples(
     };
     samples.retain(|sample| !is_image(sample) && !is_within(sample));
     samples
+}
+
+/// Samples on all of a moving mesh's surface: what is outside of the domain now may come in.
+fn all_samples(scene: &Scene, mesh: &TriangleMesh) -> Vec<BoundarySample> {
+    let spacing = scene.particle_spacing();
+    let around = mesh.bounds().map(|bounds| bounds.grown(spacing));
+    around.map_or(Vec::new(), |around| {
+        boundary_samples(mesh, &around, spacing)
+    })
 }
 
 /// Metres that a signed distance reaches beyond the solids: where the domain joins its own end, as far as a particle may

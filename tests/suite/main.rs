@@ -99,6 +99,7 @@ mod solve {
     mod sources;
     mod tension;
     mod thin_water;
+    mod turning_solids;
     mod viscous;
     mod walls;
     mod whitewater;

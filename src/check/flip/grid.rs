@@ -5,12 +5,12 @@ use glam::DVec3;
 use crate::{
     check::{
         engine::{Io, Outcome},
-        pbf::GRID,
+        pbf::{GRID, TURNED},
         table::{each, pair},
     },
     domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance},
     reference::flip::{
-        Model, Room, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
+        Model, Room, Solid, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
         find_change as twin_find_change, find_depth, find_excess as twin_find_excess,
         find_water as twin_find_water, friction_rates, gather_centers as twin_gather_centers,
         gather_faces as twin_gather_faces, is_near_half, let_in as twin_let_in,
@@ -63,7 +63,16 @@ impl FlipState {
             let first = (grid.origin - origin).abs().max_element();
             GRID.of([extent + first, first, grid.spacing])
         };
-        solids.map(of).fold(0.0, f64::max)
+        let placed = solids.map(of).fold(0.0, f64::max);
+        // Beyond its grid no solid is looked at.
+        let solids = self.scene.moving_solids.iter().zip(&self.boundary.moving);
+        let turned = solids.filter(|(solid, _)| solid.turn.is_some());
+        let turned = turned.map(|(solid, grid)| {
+            let pose = solid.pose(self.elements().substep.start);
+            let centre = (pose.centre - origin).length();
+            TURNED.of([placed, grid.reach(pose.rest), centre])
+        });
+        turned.fold(placed, f64::max)
     }
 
     /// The twin's room among solids whose distances are off by `shift` and whose nodes by `place`, metres.
@@ -77,6 +86,7 @@ impl FlipState {
             samples: Vec::new(),
             distance: self.boundary.distance.as_ref().map(moved),
             moving: self.boundary.moving.iter().map(moved).collect(),
+            moving_samples: Vec::new(),
         };
         let model = Model::new(&self.model.scene, &boundary);
         let step = model.step(&self.elements().substep);
@@ -117,7 +127,7 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     };
     let cut = CUT.of([state.place()]);
     let wall = step.wall_velocity.map(|v| v.abs().max_element());
-    let solid = step.solids.iter().map(|s| s.velocity.length());
+    let solid = step.solids.iter().map(Solid::fastest);
     let speed = solid.fold(wall[0].max(wall[1]), f64::max);
     let moved = |of: &dyn Fn(&Room) -> f64| others.iter().map(of).fold(0.0, f64::max);
     io.table.each(&KIND, elements.active(), |e| {
@@ -148,7 +158,13 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             let exact = twin.closed_velocity[e];
             let mut answers = others.iter().chain(&rounded);
             let is_tie = answers.any(|other| other.closed_velocity[e] != exact);
-            (!is_tie).then(|| pair(e, room.closed_velocity[e], exact, [exact.length()]))
+            let at = elements.bricks.cell(e as u32).map(|c| f64::from(c) + 0.5);
+            let x = state.model.cell_size() * DVec3::from_array(at);
+            let far = step.solids.iter().map(|solid| {
+                solid.passage.spin.length() * (x.length() + solid.pose.centre.length())
+            });
+            let far = far.fold(0.0, f64::max);
+            (!is_tie).then(|| pair(e, room.closed_velocity[e], exact, [exact.length(), far]))
         });
     }
     state.room = Some(room);

@@ -10,7 +10,7 @@ use crate::{
     },
     domain::bricks::Bricks,
     reference::flip::{
-        Given, Moved, advect as twin_advect, aim as twin_aim,
+        Given, Moved, Solid, advect as twin_advect, aim as twin_aim,
         grid_to_particle as twin_grid_to_particle, push_apart as twin_push_apart,
     },
     solve::{SolveError, flip::buffers, pressure::buffers as solved},
@@ -226,7 +226,7 @@ pub(super) fn advect(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     });
     // What is left of a velocity that a solid stops has the rounding of the two that were subtracted.
     let among = f64::from(u8::from(!step.solids.is_empty()));
-    let solids = step.solids.iter().map(|s| s.velocity.length());
+    let solids = step.solids.iter().map(Solid::fastest);
     let solids = solids.fold(0.0, f64::max);
     io.table.each(&ADVECTED, 0..n, |i| {
         let v = twin.velocity[i];

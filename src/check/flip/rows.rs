@@ -75,7 +75,8 @@ entries! {
             moved: "what it changes by as solids' distances move by " GRID] 6.0 * cut * speed + (cut + 3.0 * moved), "6 faces";
         VOLUME = "open volume", "": [cut: "" CUT, moved: "what it changes by as solids' distances move by " GRID]
             cut + 3.0 * moved, "";
-        CLOSED = "velocity of closed faces", "m/s": [v: "|v|"] 2.0 * U * v, "a solid's, unless another is nearest", tie TURN;
+        CLOSED = "velocity of closed faces", "m/s": [v: "|v|", far: "the largest of solids' |spin| (|x| + |its point of rest|)"]
+            2.0 * U * v + 6.0 * U * far, "a solid's, unless another is nearest", tie TURN;
     }
     "flip/gather_faces" {
         OLD = "velocity at faces", "m/s": [face: "" OF_FACE] face, "";

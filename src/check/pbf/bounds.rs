@@ -1,17 +1,17 @@
 //! Rounding bounds of one particle's values, from its neighbours and the walls as they are.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 use crate::{
     compare::rounding::{
         DENSITY, GRADIENT_SQUARES, LAMBDA, OTHER_GRADIENTS, OWN_GRADIENT, Sums, U, WALL_DENSITY,
         WALL_GRADIENT, WALL_PLACE,
     },
-    domain::{bounds::FAR, pbf::CONTACT},
+    domain::{bounds::FAR, pbf::CONTACT, pose::Pose},
     reference::pbf::passes::{Inputs, Row},
 };
 
-use super::rows::{DELTA, GRID, PUSHED, REACH, REPULSION};
+use super::rows::{DELTA, GRID, OF_SOLIDS, PUSHED, REACH, REPULSION, TURNED};
 
 /// What the bounds of a pass depend on.
 pub(in crate::check) struct Bounds<'a>(pub(in crate::check) Inputs<'a>);
@@ -22,6 +22,8 @@ pub(in crate::check) struct Confined {
     pub(in crate::check) magnitudes: [f64; 4],
     /// [`PUSHED`]: of what the walls alone added to it, metres.
     pub(in crate::check) push_error: f64,
+    /// [`OF_SOLIDS`]: of the work of solids that move, over m / Δt².
+    pub(in crate::check) work_error: f64,
     /// Whether they pushed, or may have by rounding alone.
     pub(in crate::check) is_touched: bool,
     /// By how much the place errs where it is looked up in the solids' grid, metres.
@@ -128,11 +130,27 @@ impl Bounds<'_> {
         let place = self.wall_place() + U * farthest;
         let mut reach = error;
         let mut is_near = false;
-        if let Some(grid) = &model.distance {
-            let offset = (x - grid.origin).abs().max_element();
+        let still = model.distance.iter().map(|grid| (grid, Pose::START, false));
+        let moving = model.movers.iter();
+        let moving = moving.map(|it| {
+            (
+                &it.solid.grid,
+                it.solid.pose,
+                it.passage.spin != DVec3::ZERO,
+            )
+        });
+        for (grid, pose, turns) in still.chain(moving) {
+            let there = pose.back(x);
+            let offset = (there - grid.origin).abs().max_element();
             let origin = grid.origin.abs().max_element();
-            reach = REACH.of([error, GRID.of([offset, origin, grid.spacing])]);
-            is_near = grid.sample(x) < contact + reach + 0.5 * grid.spacing;
+            let mut place = GRID.of([offset, origin, grid.spacing]);
+            if turns || pose.turn != DQuat::IDENTITY {
+                let centre = pose.centre.length();
+                place = TURNED.of([place, (x - pose.centre).length(), centre]);
+            }
+            let own = REACH.of([error, place]);
+            is_near |= grid.sample(there) < contact + own + 0.5 * grid.spacing;
+            reach = reach.max(own);
         }
         if !is_near {
             let slack = error + place;
@@ -142,23 +160,26 @@ impl Bounds<'_> {
             return Confined {
                 magnitudes: [error, 0.0, if is_touched { place } else { 0.0 }, 0.0],
                 push_error: PUSHED.of([error, 0.0, place, 0.0]),
+                work_error: 0.0,
                 is_touched,
                 reach,
             };
         }
         let (centre, push) = model.confine_by(x, walls);
-        let (mut moved, mut pushed) = (0.0, 0.0);
+        let (mut moved, mut pushed, mut worked) = (0.0, 0.0, 0.0);
         let mut is_touched = centre != x;
         for axis in DVec3::AXES {
-            let (mut most, mut most_pushed) = (0.0f64, 0.0f64);
+            let (mut most, mut most_pushed, mut most_worked) = (0.0f64, 0.0f64, 0.0f64);
             for side in [axis * reach, -axis * reach] {
                 let (found, other) = model.confine_by(x + side, walls);
                 is_touched |= found != x + side;
                 most = most.max(found.distance(centre));
-                most_pushed = most_pushed.max(other.distance(push));
+                most_pushed = most_pushed.max(other.of_walls.distance(push.of_walls));
+                most_worked = most_worked.max((other.work - push.work).abs());
             }
             moved += most;
             pushed += most_pushed;
+            worked += most_worked;
         }
         let magnitudes = match is_touched {
             true => [error, moved, place, x.length()],
@@ -167,6 +188,12 @@ impl Bounds<'_> {
         Confined {
             magnitudes,
             push_error: PUSHED.of([error, pushed, place, x.length()]),
+            work_error: OF_SOLIDS.of([
+                worked,
+                push.work.abs(),
+                push.of_solids.length(),
+                model.fastest_solid(),
+            ]),
             is_touched,
             reach,
         }

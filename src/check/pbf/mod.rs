@@ -8,7 +8,7 @@ mod stop;
 mod whole;
 mod work;
 
-pub(super) use rows::GRID;
+pub(super) use rows::{GRID, TURNED};
 
 use glam::DVec3;
 
@@ -32,7 +32,7 @@ use crate::{
 
 use super::{
     Checked, effects,
-    engine::{Engine, Io, NONE, State, Twin, names, twin, wide},
+    engine::{Engine, Io, NONE, Outcome, State, Twin, names, twin, wide},
     flip::FlipState,
     table::{Table, pair},
 };
@@ -103,8 +103,11 @@ pub fn check(
         Which::Last => substeps,
     };
     let end = f64::from(frame) * length + f64::from(number) * time_step;
+    let mut model = Model::new(scene, boundary);
+    model.stand(scene, end, time_step);
     let mut engine = Engine::new(PbfState {
-        model: Model::new(scene, boundary),
+        model,
+        has_samples: false,
         substep: Substep::new(scene, end, time_step),
         lists: Lists::new(&plan),
         whole: Whole::default(),
@@ -112,7 +115,6 @@ pub fn check(
         scene: scene.clone(),
         plan,
     });
-    engine.state.take_samples(&solver, &mut engine.table)?;
     let mut of_grid = scene.of_projection().map(|grid| {
         let mut state = FlipState::new(&grid, boundary, (frame, particles.len()));
         state.given_substep = Some(projected_substep(end - time_step, time_step));
@@ -135,6 +137,8 @@ pub fn check(
 pub(super) struct PbfState {
     pub(super) scene: Scene,
     model: Model,
+    /// Whether the model's samples are those of the device.
+    has_samples: bool,
     pub(super) substep: Substep,
     plan: Plan,
     lists: Lists,
@@ -171,13 +175,13 @@ impl PbfState {
     }
 
     /// Samples on solids as the device has them are inputs of its passes; here they are outputs of the upload.
-    fn take_samples(&mut self, solver: &Pbf, table: &mut Table) -> Result<(), SolveError> {
+    fn take_samples(&mut self, io: &mut Io<'_>) -> Outcome {
         let (n, samples) = (self.particles(), self.plan.counts.boundary_samples);
-        if samples == 0 {
+        if samples == 0 || std::mem::replace(&mut self.has_samples, true) {
             return Ok(());
         }
-        let all = solver.field(buffers::PREDICTED, 2 * n + samples)?;
-        let (found, model) = (&all[2 * n..], &mut self.model);
+        let all: Vec<[f32; 4]> = io.after.get(buffers::PREDICTED, 2 * n + samples)?;
+        let (found, model, table) = (&all[2 * n..], &mut self.model, &mut *io.table);
         let places = wide(found);
         let weights: Vec<f64> = found.iter().map(|value| f64::from(value[3])).collect();
         table.each(&SAMPLES, 0..samples, |k| {

@@ -23,6 +23,7 @@ use super::{PbfState, State, bounds::Bounds, rows::*};
 
 pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
+    state.take_samples(io)?;
     if state.is_over {
         // A frame's measurement begins with a prediction of no length.
         state.substep.time_step = 0.0;
@@ -90,6 +91,7 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             confined.push_error,
             x.length(),
             work.abs(),
+            confined.work_error,
         ];
         let work = (works.get(n + i)).map(|&found| pair(i, found, work, magnitudes));
         (position, velocity, work)
@@ -239,7 +241,13 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
             let added = twin[i].work;
             let error = WORKED.of([factor, step, confined.push_error, x]);
             let sums = before.abs() + after.abs();
-            let magnitudes = [state.wall_speed(), error, sums, added.abs()];
+            let magnitudes = [
+                state.boundary_speed(),
+                error,
+                sums,
+                added.abs(),
+                confined.work_error,
+            ];
             pair(i, after, before + added, magnitudes)
         });
         Some((moved, work))

@@ -12,11 +12,16 @@ bounds! {
     /// Of a distance grid as the device has it, metres.
     pub(in crate::check) GRID = [offset: "a place's distance to the grid's origin", origin: "|origin|", spacing: "the grid's"]
         U * (7.0 * offset + origin + 48.0 * spacing), "differences and quotients of a place in the grid";
+    pub(in crate::check) TURNED = [grid: "" GRID, radius: "how far places within a turning solid's grid are from its point of rest", centre: "|that point|"]
+        grid + U * (40.0 * radius + centre), "a place is turned back by a quaternion that is a mean of two, normalised";
     pub(super) REACH = [error: "the position's error before walls and solids push", grid: "" GRID] error + grid, "";
     pub(super) PUSHED = [error: "the position's error before walls and solids push",
         pushed: "near solids what the f64 twin's push answers when its input moves along each axis by " REACH,
         place: "by how much f32 misplaces a wall", x: "near solids |x|"]
         pushed.max(error) + (place + U * x), "";
+    pub(super) OF_SOLIDS = [answer: "near solids that move what the f64 twin's work of them answers when its input moves along each \
+        axis by " REACH, work: "|their work|", push: "what they push", speed: "the fastest solid's"]
+        answer + U * (16.0 * work + 60.0 * push * speed), "their velocity where they push has the rounding of that place";
 
     pub(super) PUSH_FREE = [slowed: "16 where the particle is slowed to the cap", speed: "|v| + |g| Δt"]
         U * (3.0 + slowed) * speed, "";
@@ -62,8 +67,8 @@ entries! {
             stopped: "where walls or solids take part of the way " STOPPED, v: "|v|"]
             velocity + stopped + 4.0 * U * v, "3 u of each term";
         PREDICT_WORK = "work of walls", "m²/s":
-            [speed: "the fastest wall's", push: "" PUSHED, x: "|x|", work: "|work|"]
-            3.0 * speed * (push + U * x) + 4.0 * U * work, "walls' speed times what they push";
+            [speed: "the fastest wall's", push: "" PUSHED, x: "|x|", work: "|work|", solids: "" OF_SOLIDS]
+            3.0 * speed * (push + U * x) + 4.0 * U * work + solids, "walls' speed times what they push";
     }
     "pbf/assign_cells" {
         CELL = "cell", "": [] 0.0, "a whole number", tie NEAR_FACE;
@@ -88,9 +93,9 @@ entries! {
             place: "where a wall pushes, by how much f32 misplaces it", x: "where a solid pushes |x|"]
             moved.max(error) + (place + U * x), "walls and solids bend the way", tie ACROSS;
         CARRIED = "lambda carried along", "m²": [] 0.0, "a copy";
-        DELTA_WORK = "work of walls", "m²/s": [speed: "the fastest wall's", error: "" WORKED,
-            sums: "|the sum before| + |the sum after|", added: "|what is added|"]
-            3.0 * speed * error + 2.0 * U * sums + 16.0 * U * added, "walls' speed times what they push", tie ACROSS;
+        DELTA_WORK = "work of walls", "m²/s": [speed: "the fastest wall's or solid's", error: "" WORKED,
+            sums: "|the sum before| + |the sum after|", added: "|what is added|", solids: "" OF_SOLIDS]
+            3.0 * speed * error + 2.0 * U * sums + 16.0 * U * added + solids, "their speed times what they push", tie ACROSS;
     }
     "pbf/boundary_work" {
         WORK = "shares of the work", "m²/s": [sizes: "Σ|w|", before: "|what was there|", after: "|what is there|"]

@@ -63,7 +63,8 @@ impl PbfState {
             return;
         };
         let n = self.particles();
-        let model = Model::new(&self.scene, boundary);
+        let mut model = Model::new(&self.scene, boundary);
+        model.stand(&self.scene, self.substep.time, 0.0);
         // The GPU rounds in each iteration. Moves of the start alone would not do: where the iteration converges it forgets
         // them, and what is left is what the last iterations rounded.
         let solved = |moves: &dyn Fn(u32, usize) -> DVec3| {

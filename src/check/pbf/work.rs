@@ -16,6 +16,11 @@ impl PbfState {
         let velocity = &self.substep.wall_velocity;
         velocity.min.abs().max(velocity.max.abs()).max_element()
     }
+
+    /// The same, or of a solid.
+    pub(super) fn boundary_speed(&self) -> f64 {
+        self.wall_speed().max(self.model.fastest_solid())
+    }
 }
 
 pub(super) fn boundary_work(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::domain::mesh::TriangleMesh;
+use crate::domain::{mesh::TriangleMesh, pose::Pose};
 
 /// A piece of a surface that water may press on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,11 +19,11 @@ impl Patch {
         self.area.normalize_or_zero()
     }
 
-    /// Moved by `way`.
-    pub fn moved(self, way: DVec3) -> Self {
+    /// Of a body that stands so; `self` is where it stood at the start.
+    pub fn posed(self, pose: &Pose) -> Self {
         Self {
-            at: self.at + way,
-            ..self
+            at: pose.place(self.at),
+            area: pose.turn * self.area,
         }
     }
 }

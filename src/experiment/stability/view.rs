@@ -98,7 +98,7 @@ impl<'a> View<'a> {
         let still = boundary.distance.iter().map(|solid| -solid.sample(at));
         let movers = boundary.moving.iter().zip(&self.scene.moving_solids);
         let moving =
-            movers.map(|(distance, solid)| -distance.sample(at - solid.displacement(self.time())));
+            movers.map(|(distance, solid)| -distance.sample(solid.pose(self.time()).back(at)));
         still.chain(moving).fold(f64::NEG_INFINITY, f64::max)
     }
 }

@@ -61,13 +61,27 @@ fn a_root_plays_the_frames_that_it_is_given() {
         },
         way,
     };
+    let slid = |way| Pose {
+        centre: way,
+        ..Pose::START
+    };
+    // Half a turn about z, about a point that stays.
+    let turned = Pose {
+        rest: DVec3::X,
+        centre: DVec3::X,
+        turn: DQuat::from_xyzw(0.0, 0.0, 1.0, 0.0),
+    };
     let root_of = Root {
         shot: shot(),
         kind: Kind::Mesh,
         attributes: Vec::new(),
         layers: vec![(7, "s.0007.usda".to_owned()), (9, "s.0009.usda".to_owned())],
         manifest: "s.manifest.usda".to_owned(),
-        solids: vec![solid(Vec::new()), solid(vec![(7, DVec3::X), (9, DVec3::Y)])],
+        solids: vec![
+            solid(Vec::new()),
+            solid(vec![(7, slid(DVec3::X)), (9, slid(DVec3::Y))]),
+            solid(vec![(7, turned), (9, turned)]),
+        ],
         wave_makers: Vec::new(),
         camera: Vec::new(),
     };
@@ -80,6 +94,9 @@ fn a_root_plays_the_frames_that_it_is_given() {
         "def Mesh \"box\"",
         "def Mesh \"box_2\"",
         "9: (0, 1, 0),",
+        "9: (0, 0, 0, 1),",
+        "double3 xformOp:translate:rest = (-1, 0, 0)",
+        "[\"xformOp:translate\", \"xformOp:orient\", \"xformOp:translate:rest\"]",
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }

@@ -12,6 +12,7 @@ use crate::{
         bricks::{Bricks, EDGE, table_dims},
         flip::{CAP, CONTACT, layers, stored_cells},
         period::Period,
+        pose::{Passage, Pose},
         shores::Shores,
         signed_distance::SignedDistance,
     },
@@ -136,8 +137,8 @@ impl Model {
         let reach = (step.layers as u32).div_ceil(EDGE);
         let mut is_wet = is_wet.to_vec();
         let moving = step.solids.iter().zip(&self.solids).skip(self.at_rest);
-        let ways = moving.map(|(now, start)| (now.origin - start.origin) / self.cell_size());
-        (self.shores).mark(&mut is_wet, table_dims(cells), &step.cut, ways);
+        let poses = moving.map(|(now, _)| now.pose.scaled(1.0 / self.cell_size()));
+        (self.shores).mark(&mut is_wet, table_dims(cells), &step.cut, poses);
         Bricks::periodic(cells, periodic, &is_wet, reach, 1)
     }
 
@@ -165,20 +166,15 @@ impl Model {
     }
 
     fn solids_at(&self, start: f64, length: f64) -> Vec<Solid<'_>> {
-        let moving = self.scene.moving_solids.iter().map(|solid| {
-            let before = solid.displacement(start);
-            (
-                before,
-                (solid.displacement(start + length) - before) / length,
-            )
+        let least = self.scene.domain.min;
+        let moving = (self.scene.moving_solids.iter()).map(|solid| {
+            let [before, after] = [start, start + length].map(|t| solid.pose(t).moved(-least));
+            Passage::between(before, after, length)
         });
-        let ways = std::iter::repeat_n((DVec3::ZERO, DVec3::ZERO), self.at_rest).chain(moving);
-        (self.solids.iter().zip(ways))
-            .map(|(grid, (way, velocity))| Solid {
-                grid,
-                origin: grid.origin + way,
-                velocity,
-            })
+        let passages =
+            std::iter::repeat_n(Passage::resting(Pose::START), self.at_rest).chain(moving);
+        (self.solids.iter().zip(passages))
+            .map(|(grid, passage)| Solid::new(grid, passage))
             .collect()
     }
 }

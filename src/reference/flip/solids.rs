@@ -3,17 +3,20 @@
 use glam::DVec3;
 
 use super::Model;
-use crate::domain::signed_distance::SignedDistance;
+use crate::domain::{
+    pose::{Passage, Pose},
+    signed_distance::SignedDistance,
+};
 
 /// A solid at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct Solid<'a> {
-    /// Its distances, metres.
+    /// Its distances where it stood at the start, metres.
     pub grid: &'a SignedDistance,
-    /// Of the first node, metres.
-    pub origin: DVec3,
-    /// m/s.
-    pub velocity: DVec3,
+    /// How it goes through the substep.
+    pub passage: Passage,
+    /// Where it stands.
+    pub pose: Pose,
 }
 
 /// What of a cell a solid leaves open.
@@ -24,22 +27,46 @@ pub(super) struct Cut {
     pub(super) volume: f64,
 }
 
-impl Solid<'_> {
-    /// As it stands `time` seconds on.
-    pub(super) fn after(self, time: f64) -> Self {
+impl<'a> Solid<'a> {
+    /// At the beginning of a passage.
+    pub(super) fn new(grid: &'a SignedDistance, passage: Passage) -> Self {
         Self {
-            origin: self.origin + time * self.velocity,
+            grid,
+            passage,
+            pose: passage.start,
+        }
+    }
+
+    /// As it stands when `share` of the substep is over.
+    pub(super) fn after(self, share: f64) -> Self {
+        Self {
+            pose: self.passage.at(share),
             ..self
         }
+    }
+
+    /// Of its point at `x`, m/s.
+    pub fn velocity_at(&self, x: DVec3) -> DVec3 {
+        self.passage.velocity_at(x, self.pose.centre)
+    }
+
+    /// An upper bound on the speed of its points within its grid, m/s.
+    pub fn fastest(&self) -> f64 {
+        let spin = self.passage.spin.length();
+        let reach = match spin {
+            0.0 => 0.0,
+            _ => self.grid.reach(self.pose.rest),
+        };
+        self.passage.velocity.length() + spin * reach
     }
 
     fn last(&self) -> DVec3 {
         DVec3::from_array(self.grid.dims.map(|n| (n - 1) as f64))
     }
 
-    /// A place in node spacings.
+    /// A place in node spacings, as the grid lies.
     fn place(&self, x: DVec3) -> DVec3 {
-        (x - self.origin) / self.grid.spacing
+        (self.pose.back(x) - self.grid.origin) / self.grid.spacing
     }
 
     /// Distance at the place of the grid that is nearest to `x`, trilinear.
@@ -61,8 +88,8 @@ impl Solid<'_> {
 
     /// The nearest node's distance, or from beyond the grid the way there: the solid lies within it.
     pub(super) fn bound(&self, x: DVec3) -> f64 {
-        let last = self.origin + self.grid.spacing * self.last();
-        let way = x.distance(x.clamp(self.origin, last));
+        let place = self.place(x);
+        let way = self.grid.spacing * place.distance(place.clamp(DVec3::ZERO, self.last()));
         if way > 0.0 { way } else { self.near(x) }
     }
 
@@ -98,7 +125,7 @@ impl Solid<'_> {
         if gradient.length() < 1e-6 {
             return x;
         }
-        x + gradient.normalize() * (contact - distance)
+        x + self.pose.turn * gradient.normalize() * (contact - distance)
     }
 }
 
@@ -173,7 +200,7 @@ pub(super) fn go(
     velocity: DVec3,
 ) -> (DVec3, DVec3) {
     let contact = model.contact_distance();
-    let fastest = step.solids.iter().map(|s| s.velocity.length());
+    let fastest = step.solids.iter().map(Solid::fastest);
     let most = way.length() + fastest.fold(0.0, f64::max) * step.length;
     let is_near =
         |solid: &Solid<'_>| solid.bound(start) < most + contact + 2.0 * solid.grid.spacing;
@@ -187,9 +214,10 @@ pub(super) fn go(
         x += way / steps as f64;
         for solid in &step.solids {
             let next = x;
-            let time = step.length * k as f64 / steps as f64;
-            x = solid.after(time).leave(next, contact);
-            v = solid.velocity + stopped(v - solid.velocity, x - next);
+            let solid = solid.after(k as f64 / steps as f64);
+            x = solid.leave(next, contact);
+            let pushing = solid.velocity_at(x);
+            v = pushing + stopped(v - pushing, x - next);
         }
     }
     let v = at_walls(model, step, v, x);
@@ -198,7 +226,7 @@ pub(super) fn go(
         // Where a solid and a wall meet, each would push into the other.
         for _ in 0..CORNER_ROUNDS {
             for solid in &step.solids {
-                x = solid.after(step.length).leave(x.clamp(low, high), contact);
+                x = solid.after(1.0).leave(x.clamp(low, high), contact);
             }
         }
     }

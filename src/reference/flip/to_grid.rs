@@ -139,7 +139,9 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
             velocity = [0, 1].map(|side| {
                 let sums = nearest.map_or(DVec3::MAX, |nearest| face_sums(&nearest, side));
                 let is_nearer = face_sums(&found, side).cmplt(sums);
-                DVec3::select(is_nearer, solid.velocity, velocity[side])
+                // A component does not change along its own axis: that at the middle is that at both faces.
+                let pushing = solid.velocity_at((cell + 0.5) * model.cell_size());
+                DVec3::select(is_nearer, pushing, velocity[side])
             });
             nearest = Some(nearest.map_or(found, |nearest| {
                 std::array::from_fn(|k| nearest[k].min(found[k]))

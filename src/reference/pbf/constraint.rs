@@ -165,9 +165,10 @@ pub fn distance_to_converged(
     state: &Particles,
     tolerance: f64,
 ) -> Result<f64, ReferenceError> {
-    let model = Model::new(scene, boundary);
+    let mut model = Model::new(scene, boundary);
     let time = f64::from(frame) * scene.shot.frame_seconds();
     let substep = Substep::new(scene, time, 0.0);
+    model.stand(scene, time, 0.0);
     let position = local(scene, state);
     let solved = converged(&model, &substep, &position, tolerance)?;
     let pairs = position.iter().zip(&solved.position);

@@ -8,6 +8,7 @@ use crate::{
         bounds::Bounds,
         pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
         period::Period,
+        pose::{Passage, Posed},
         signed_distance::SignedDistance,
         sph::{Calibration, half_space_fraction},
     },
@@ -50,14 +51,42 @@ pub struct Model {
     pub size: DVec3,
     /// Cells of edge h over the domain.
     pub cells: Cells,
-    /// Samples on solids, sorted by cell.
+    /// Samples on solids as they stand, sorted by cell.
     pub samples: Vec<DVec3>,
     /// Their weights in particles' worth of mass.
     pub sample_weights: Vec<f64>,
-    /// Distance to the solids; `None` without any.
+    /// Their velocities, m/s.
+    pub sample_velocities: Vec<DVec3>,
+    /// Distance to the solids at rest; `None` without any.
     pub distance: Option<SignedDistance>,
+    /// Solids that move, as they stand.
+    pub movers: Vec<Mover>,
+    /// What they are placed by; `None` where nothing moves.
+    boundary: Option<Boundary>,
     /// Of the scene, m/s², whoever adds it.
     pub scene_gravity: DVec3,
+}
+
+/// A solid that moves.
+#[derive(Clone, Debug)]
+pub struct Mover {
+    /// Its distances as it stands; places are relative to the domain's least corner.
+    pub solid: Posed,
+    /// What took it there.
+    pub passage: Passage,
+}
+
+/// What keeps a position off walls and out of solids.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pushes {
+    /// What solids added to it, metres.
+    pub of_solids: DVec3,
+    /// The velocity of the last solid that did, m/s.
+    pub pushing: DVec3,
+    /// What walls added to it then, metres.
+    pub of_walls: DVec3,
+    /// Work of solids that move, over m / Δt².
+    pub work: f64,
 }
 
 /// A substep's length and walls.
@@ -95,32 +124,65 @@ impl Model {
     /// Of a scene that PBF solves, and its solids in world space.
     pub fn new(scene: &Scene, boundary: &Boundary) -> Self {
         let settings = scene.solver.pbf();
-        let samples = &boundary.samples;
         let calibration = Calibration::new(settings.particle_spacing, settings.support_ratio);
         let (size, support) = (scene.domain.size(), calibration.support_radius);
-        let cells = Cells::periodic(size, support, scene.period());
         let origin = scene.domain.min;
-        let local: Vec<DVec3> = samples.iter().map(|s| s.position - origin).collect();
-        let id: Vec<u32> = (0..local.len() as u32).collect();
-        let order = cells.order(&local, &id);
-        let area = settings.particle_spacing * settings.particle_spacing;
-        Self {
+        let mut model = Self {
             size,
-            sample_weights: order
-                .iter()
-                .map(|&k| calibration.sample_weight * samples[k].area / area)
-                .collect(),
-            samples: order.into_iter().map(|k| local[k]).collect(),
+            samples: Vec::new(),
+            sample_weights: Vec::new(),
+            sample_velocities: Vec::new(),
             distance: boundary.distance.as_ref().map(|distance| SignedDistance {
                 origin: distance.origin - origin,
                 ..distance.clone()
             }),
+            movers: Vec::new(),
+            boundary: (!boundary.moving.is_empty()).then(|| boundary.clone()),
             calibration,
             settings: settings.clone(),
             gravity: scene.predicted_gravity(),
-            cells,
+            cells: Cells::periodic(size, support, scene.period()),
             scene_gravity: scene.water.gravity,
-        }
+        };
+        model.take_samples(scene, boundary, (0.0, 0.0));
+        model.stand(scene, 0.0, 0.0);
+        model
+    }
+
+    fn take_samples(&mut self, scene: &Scene, boundary: &Boundary, (time, step): (f64, f64)) {
+        let samples = scene.solid_samples(boundary, time, step);
+        let local: Vec<DVec3> = samples.iter().map(|s| s.position).collect();
+        let id: Vec<u32> = (0..local.len() as u32).collect();
+        let order = self.cells.order(&local, &id);
+        let area = self.settings.particle_spacing * self.settings.particle_spacing;
+        let weight = |k: &usize| self.calibration.sample_weight * samples[*k].area / area;
+        self.sample_weights = order.iter().map(weight).collect();
+        self.sample_velocities = order.iter().map(|&k| samples[k].velocity).collect();
+        self.samples = order.into_iter().map(|k| local[k]).collect();
+    }
+
+    /// Puts solids that move to where they stand at `time`, moving as what takes them there within `step` seconds.
+    pub fn stand(&mut self, scene: &Scene, time: f64, step: f64) {
+        let Some(boundary) = self.boundary.take() else {
+            return;
+        };
+        self.take_samples(scene, &boundary, (time, step));
+        let origin = scene.domain.min;
+        let solids = scene.moving_solids.iter().zip(&boundary.moving);
+        let movers = solids.map(|(solid, grid)| {
+            let passage = solid.passage_to(time, step);
+            let grid = SignedDistance {
+                origin: grid.origin - origin,
+                ..grid.clone()
+            };
+            let pose = passage.at(1.0).moved(-origin);
+            Mover {
+                solid: Posed { grid, pose },
+                passage,
+            }
+        });
+        self.movers = movers.collect();
+        self.boundary = Some(boundary);
     }
 
     /// Lengths along the axes along which the domain joins its own end.
@@ -149,10 +211,11 @@ impl Model {
         self.confine_by(x, walls).0
     }
 
-    /// The same, and what the walls added to the position.
-    pub fn confine_by(&self, x: DVec3, walls: &Bounds) -> (DVec3, DVec3) {
+    /// The same, and what pushed the position.
+    pub fn confine_by(&self, x: DVec3, walls: &Bounds) -> (DVec3, Pushes) {
         let contact = self.contact_distance();
-        let x = x + self.solid_push(x);
+        let mut pushes = self.solid_pushes(x);
+        let x = x + pushes.of_solids;
         let kept = DVec3::from_array(std::array::from_fn(|axis| {
             let (low, high) = (walls.min[axis] + contact, walls.max[axis] - contact);
             if x[axis] < low {
@@ -163,7 +226,8 @@ impl Model {
                 x[axis]
             }
         }));
-        (kept, kept - x)
+        pushes.of_walls = kept - x;
+        (kept, pushes)
     }
 
     /// Least distance from walls and solids, metres.
@@ -171,15 +235,40 @@ impl Model {
         CONTACT * self.settings.particle_spacing
     }
 
-    /// What solids add to a position, metres.
-    pub(super) fn solid_push(&self, x: DVec3) -> DVec3 {
-        let (Some(distance), contact) = (&self.distance, self.contact_distance()) else {
-            return DVec3::ZERO;
-        };
-        match distance.sample(x) {
-            d if d < contact => distance.gradient(x).normalize_or_zero() * (contact - d),
-            _ => DVec3::ZERO,
+    /// What solids add to a position, one after the other.
+    pub(super) fn solid_pushes(&self, x: DVec3) -> Pushes {
+        let contact = self.contact_distance();
+        let mut pushes = Pushes::default();
+        if let Some(distance) = &self.distance {
+            let d = distance.sample(x);
+            if d < contact {
+                pushes.of_solids = distance.gradient(x).normalize_or_zero() * (contact - d);
+            }
         }
+        for Mover { solid, passage } in &self.movers {
+            let before = x + pushes.of_solids;
+            let d = solid.sample(before);
+            if d < contact {
+                let push = solid.gradient(before).normalize_or_zero() * (contact - d);
+                let velocity = passage.velocity_at(before + push, solid.pose.centre);
+                pushes.of_solids += push;
+                pushes.work += push.dot(velocity);
+                if push != DVec3::ZERO {
+                    pushes.pushing = velocity;
+                }
+            }
+        }
+        pushes
+    }
+
+    /// The largest speed of a solid's point, m/s.
+    pub fn fastest_solid(&self) -> f64 {
+        let speed = |mover: &Mover| {
+            let spin = mover.passage.spin.length();
+            let reach = mover.solid.grid.reach(mover.solid.pose.rest);
+            mover.passage.velocity.length() + spin * reach
+        };
+        self.movers.iter().map(speed).fold(0.0, f64::max)
     }
 
     /// The derivative of the relative density that the walls give at `x`, 1/m; the gradient of

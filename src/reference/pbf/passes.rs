@@ -68,13 +68,13 @@ pub fn predict_and_work(
     let mut v = velocity + model.gravity * step;
     v *= (model.max_displacement() / (step * v.length()).max(1e-30)).min(1.0);
     let free = position + step * v;
-    let (x, push) = model.confine_by(free, &substep.walls);
+    let (x, pushes) = model.confine_by(free, &substep.walls);
     let taken = if step > 0.0 {
         (x - free) / step
     } else {
         DVec3::ZERO
     };
-    let work = substep.work_of_push(push);
+    let work = substep.work_of_push(pushes.of_walls) + pushes.work;
     (model.period().wrap(x), v + taken, work)
 }
 
@@ -90,8 +90,9 @@ pub fn predict_along(
     let step = substep.time_step;
     let v = velocity * (model.max_displacement() / (step * velocity.length()).max(1e-30)).min(1.0);
     let free = position + step * v;
-    let push = model.solid_push(free);
-    let v = v - push * (v.dot(push).min(0.0) / push.length_squared().max(1e-30));
+    let pushes = model.solid_pushes(free);
+    let (push, against) = (pushes.of_solids, v - pushes.pushing);
+    let v = v - push * (against.dot(push).min(0.0) / push.length_squared().max(1e-30));
     let y = free + push;
     let contact = model.contact_distance();
     let walls = (substep.walls.min + contact, substep.walls.max - contact);
@@ -237,7 +238,7 @@ pub fn compute_delta(
         let pairs = pair_corrections(inputs, i, lambda);
         let delta = lambda[i] * wall - model.calibration.gradient_scale * pairs;
         let delta = model.settings.relaxation * delta;
-        let rate = lambda[i] * model.wall_rate(x, inputs.substep);
+        let rate = lambda[i] * (model.wall_rate(x, inputs.substep) + sample_rate(inputs, i));
         let mut work = part(delta) * model.settings.relaxation * rate;
         let mut delta = bounded(delta);
         if let Some(Momentum { factor, before }) = momentum {
@@ -249,8 +250,8 @@ pub fn compute_delta(
             }
         }
         let free = x + delta;
-        let (position, push) = model.confine_by(free, &inputs.substep.walls);
-        work += inputs.substep.work_of_push(push);
+        let (position, pushes) = model.confine_by(free, &inputs.substep.walls);
+        work += inputs.substep.work_of_push(pushes.of_walls) + pushes.work;
         Corrected {
             free,
             position,
@@ -304,6 +305,24 @@ fn pair_corrections(inputs: Inputs<'_>, i: usize, lambda: &[f64]) -> DVec3 {
         Some(j) => sum + pair_direction(i as u32, j) * 2.0 * lambda[i],
         None => sum,
     }
+}
+
+/// The gradient of what each sample on a solid adds to the density times the sample's velocity, 1/s.
+fn sample_rate(inputs: Inputs<'_>, i: usize) -> f64 {
+    let model = inputs.model;
+    if model.movers.is_empty() {
+        return 0.0;
+    }
+    let inverse_h = 1.0 / model.calibration.support_radius;
+    let rate = |&j: &u32| {
+        let d = inputs.between(i, j as usize);
+        let r = d.length();
+        let s = (1.0 - r * inverse_h).max(0.0);
+        let velocity = model.sample_velocities[j as usize - inputs.particles()];
+        inputs.sample_weight(j) * s * s / r.max(1e-15) * d.dot(velocity)
+    };
+    let (_, solid) = inputs.neighbors.of(i);
+    -model.calibration.gradient_scale * solid.iter().map(rate).sum::<f64>()
 }
 
 /// v += (x* − x*_0) / Δt, with x*_0 the prediction before any correction; what is over the displacement cap

@@ -282,6 +282,8 @@ impl Pbf {
         position: &mut Vec<DVec3>,
         velocity: &mut Vec<DVec3>,
     ) -> (u32, u64, f64) {
+        self.model
+            .stand(&self.scene, substep.time, substep.time_step);
         let (model, timings, is_drop) = (&self.model, &mut self.timings, &self.is_drop);
         let by_prediction: Vec<_> = timings.time("pbf/predict", || {
             (position.par_iter().zip(velocity.par_iter()))
@@ -371,6 +373,7 @@ impl Pbf {
     /// Relative densities of the state in its order.
     fn density(&mut self, time: f64) -> Vec<f64> {
         let substep = Substep::new(&self.scene, time, 0.0);
+        self.model.stand(&self.scene, time, 0.0);
         let (model, timings) = (&self.model, &mut self.timings);
         let position = local(&self.scene, &self.state);
         let sorted = Sorted::new(model, &position, &self.state.id, timings);

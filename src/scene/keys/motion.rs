@@ -65,6 +65,39 @@ pub(super) const SOLID_MOTION: &[Key] = &[
     POINTS,
 ];
 
+pub(super) const SOLID_TURN: &[Key] = &[
+    Key::choice("kind", &["constant_velocity", "sine", "table"]).about("kind of motion"),
+    Key::number("degrees_per_second", 1e-9..=1e9)
+        .unit("degrees/s")
+        .only("kind", &["constant_velocity"])
+        .about("steady speed"),
+    UNTIL,
+    Key::number("swing_degrees", 1e-9..=1e9)
+        .unit("degrees")
+        .only("kind", &["sine"])
+        .about(
+            "the whole angle from one end of the way to the other: swing/2 (1 − cos(2π t / period)), times the ramp; the solid stands \
+             at one end at the start",
+        ),
+    CYCLE,
+    RAMP,
+    Key::text(
+        "file",
+        "a CSV of time,angle (seconds, degrees), relative to the scene file",
+    )
+    .absent()
+    .only("kind", &["table"])
+    .about("angles from a file; the written-out scene has them as points"),
+    Key::points(
+        "points",
+        2,
+        "at least two [seconds, degrees], times rising from 0 on, the first angle 0, all up to 1e9",
+    )
+    .only("kind", &["table"])
+    .without(&["file"])
+    .about("angles in place, joined by a monotone cubic"),
+];
+
 /// Motions by a spectrum.
 const SEAS: &[&str] = &["sea", "focused"];
 

@@ -14,7 +14,7 @@ use super::super::{
     no_slip,
     probe::{self, ProbeKind},
 };
-use super::motion::{SOLID_MOTION, WALL_MOTION};
+use super::motion::{SOLID_MOTION, SOLID_TURN, WALL_MOTION};
 use crate::domain::sparse_grid;
 
 pub(in super::super) const KEYS: &[Key] = &[
@@ -185,12 +185,27 @@ const SOLID: &[Key] = &[
         .absent()
         .with("motion")
         .also(", not all 0; their length does not count")
-        .about("where a solid moves; of the solver flip alone"),
+        .about("where a solid moves"),
     Key::inline("motion", SOLID_MOTION)
         .absent()
         .with("direction")
         .also(", that brings the solid into the domain and not ten domains away")
         .about("How far along `direction` the solid has come"),
+    Key::vector("pivot", 3, -1e9..=1e9)
+        .unit("metres")
+        .absent()
+        .with("axis")
+        .about("a point on the axis at the start; a motion along `direction` carries it along"),
+    Key::vector("axis", 3, -1e6..=1e6)
+        .absent()
+        .with("turn")
+        .also(", not all 0; their length does not count")
+        .about("what a solid turns about, counter-clockwise as seen against it"),
+    Key::inline("turn", SOLID_TURN)
+        .absent()
+        .with("pivot")
+        .also(", that brings the solid into the domain, no point of it faster than 100000 m/s")
+        .about("How far about `axis` the solid has turned"),
 ];
 
 const WAVE_MAKER: &[Key] = &[

@@ -35,7 +35,7 @@ use crate::{
         recording::{Recording, Timer},
         sort,
     },
-    scene::{Scene, step::Substep},
+    scene::{Scene, moving_solid::MovingSolid, step::Substep},
 };
 
 use super::{
@@ -196,10 +196,12 @@ impl Flip {
         let size = self.scene.solver.flip().cell_size;
         let cut = step::cut(&self.scene, substep);
         let moving = self.scene.moving_solids.iter();
-        let ways = moving.map(|solid| solid.displacement(substep.start) / size);
+        let least = self.scene.domain.min;
+        let pose = |solid: &MovingSolid| solid.pose(substep.start).moved(-least).scaled(1.0 / size);
+        let poses = moving.map(pose);
         let dims = table_dims(stored_cells(self.plan.grid_dims, self.scene.periodic));
         let mut is_wet = is_wet.to_vec();
-        self.shores.mark(&mut is_wet, dims, &cut, ways);
+        self.shores.mark(&mut is_wet, dims, &cut, poses);
         is_wet
     }
 

@@ -31,6 +31,9 @@ pub const WALL_WORK: Buf<f32> = Buf::new("wall_work");
 /// Where the boundary samples of each cell begin among them, and how many there are in all.
 pub const BOUNDARY_CELL_START: Buf<u32> = Buf::new("boundary_cell_start");
 
+/// Of each boundary sample, and 0, m/s.
+pub const SAMPLE_VELOCITY: Buf<[f32; 4]> = Buf::new("sample_velocity");
+
 /// The lists of a chunk's particles, which [`NEIGHBOR_LIST`] is bound to.
 pub fn list_of(chunk: usize) -> Buf<[u32; 4]> {
     Buf::named(format!("{}.{chunk}", NEIGHBOR_LIST.name()))

@@ -31,7 +31,9 @@ use crate::{
 };
 
 use super::{
-    SolveError, effects,
+    SolveError,
+    boundary::Movers,
+    effects,
     params::{Counters, IterationControl, Params},
     plan::{Counts, Plan, device_limits},
     state::{check_finite, check_ids, is_other_count, look, slots_by_id, take_over, upload},
@@ -54,8 +56,9 @@ pub struct Pbf {
     substep: Recording,
     measure: Recording,
     grid: Option<Grid>,
-    /// Where water enters or leaves: what is uploaded anew for another count of particles.
+    /// Where water enters or leaves, or solids move: what is uploaded anew for another count of particles, or for each substep.
     boundary: Option<Boundary>,
+    movers: Option<Movers>,
     timer: Option<Timer>,
     state: Particles,
     frame: u32,
@@ -143,7 +146,9 @@ impl Pbf {
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
         let [substep, measure] = set_up(&program, &plan, scene, boundary, &calibration);
         Ok(Self {
-            boundary: scene.has_sources().then(|| boundary.clone()),
+            boundary: (scene.has_sources() || !boundary.moving.is_empty())
+                .then(|| boundary.clone()),
+            movers: Movers::of(boundary, scene),
             grid: Grid::of(context, scene, &plan, boundary)?,
             timer: is_timed.then(|| Timer::new(context)),
             program,
@@ -254,6 +259,11 @@ impl Pbf {
             grid.project(&self.program, (time - step, step), run)?;
         }
         self.program.upload(PARAMS, 0, &[self.params(time, step)]);
+        if let (Some(movers), Some(boundary)) = (&self.movers, &self.boundary) {
+            let (program, scene) = (&self.program, &self.scene);
+            movers.upload(program, scene, time - step, step);
+            boundary.upload_samples(program, scene, &self.plan, &self.calibration, (time, step));
+        }
         effects::upload(&self.program, &self.scene, (time, step));
         if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {
             self.program.upload(CONTROL, 0, &[self.control()]);

@@ -11,6 +11,7 @@ use crate::{
 };
 
 use super::{buffers::*, record::Commands};
+use crate::solve::flip::buffers::SOLID_GRIDS;
 
 /// Constants for every pass that declares them.
 pub const SHARED_CONSTANTS: [(&str, f64); 1] = [("LIST_CAPACITY", LIST_CAPACITY as f64)];
@@ -87,6 +88,9 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     let mut conditions = Vec::new();
     if plan.has_solids() {
         conditions.push("SOLIDS");
+    }
+    if plan.counts.moving_nodes > 0 {
+        conditions.push("MOVING_SOLIDS");
     }
     if plan.has_lists {
         conditions.push("NEIGHBOR_LIST");
@@ -170,9 +174,15 @@ fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
         table.add("budget", BOUNDARY_WORK.sized(n.div_ceil(64)));
     }
     if plan.has_solids() {
-        table.add("solids", SOLID_GRID.sized(1));
-        let nodes = plan.counts.solid_grid.iter().product();
+        let nodes = plan.counts.solid_grid.iter().product::<usize>() + plan.counts.moving_nodes;
         table.add("solids", SOLID_DISTANCE.sized(nodes));
+        match plan.counts.moving_nodes {
+            0 => table.add("solids", SOLID_GRID.sized(1)),
+            _ => {
+                table.add("solids", SOLID_GRIDS.sized(1));
+                table.add("budget", SAMPLE_VELOCITY.sized(samples));
+            }
+        }
         table.add("solids", BOUNDARY_CELL_START.sized(cells + 1));
     }
     table

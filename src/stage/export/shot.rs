@@ -141,7 +141,7 @@ impl Job<'_> {
             way: self
                 .frames
                 .iter()
-                .map(|&frame| (frame, solid.displacement(scene.shot.time(frame))))
+                .map(|&frame| (frame, solid.pose(scene.shot.time(frame))))
                 .collect(),
         });
         still.chain(moving).collect()

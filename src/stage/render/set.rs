@@ -1,13 +1,12 @@
 //! What of a scene stands in a picture of a frame.
 
-use glam::{DAffine3, DVec3};
-
 use super::RenderJobError;
 use crate::{
     domain::{
         bounds::Bounds,
         mesh_file::{MeshError, MeshFormat, parts::Parts, read_bytes},
         particles::Particles,
+        pose::Pose,
     },
     render::{RenderScene, SolidParts},
     scene::{PlacedMesh, Scene, Wall, look::Look},
@@ -25,7 +24,7 @@ pub(super) fn render_scene(
 ) -> Result<RenderScene, RenderJobError> {
     let time = f64::from(frame) / scene.shot.frames_per_second;
     let moving = scene.moving_solids.iter().map(|solid| {
-        let way = DAffine3::from_translation(solid.displacement(time));
+        let way = solid.pose(time).affine();
         solid.placed.mesh.transformed(&way)
     });
     let solids = scene.solids.iter().map(|solid| solid.mesh.clone());
@@ -47,10 +46,10 @@ pub(super) fn render_scene(
 
 /// Parts of each solid, read again from its file: a scene keeps the mesh alone.
 fn solid_parts(scene: &Scene, time: f64) -> Result<Vec<SolidParts>, MeshError> {
-    let still = scene.solids.iter().map(|solid| (solid, DVec3::ZERO));
+    let still = scene.solids.iter().map(|solid| (solid, Pose::START));
     let moving = scene.moving_solids.iter();
-    let moving = moving.map(|solid| (&solid.placed, solid.displacement(time)));
-    let parts = still.chain(moving).map(|(placed, moved)| {
+    let moving = moving.map(|solid| (&solid.placed, solid.pose(time)));
+    let parts = still.chain(moving).map(|(placed, pose)| {
         let bytes = read_bytes(&placed.file)?;
         if blake3::hash(&bytes).to_hex().as_str() != placed.file_hash {
             return Err(MeshError::Malformed {
@@ -66,7 +65,7 @@ fn solid_parts(scene: &Scene, time: f64) -> Result<Vec<SolidParts>, MeshError> {
         Ok(SolidParts {
             name: placed.name(),
             parts,
-            moved,
+            pose,
         })
     });
     parts.collect()

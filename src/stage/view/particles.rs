@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::{
     ViewError, reader,
@@ -98,7 +98,7 @@ impl Balls {
         let scene = &self.scene;
         let time = scene.shot.time(frame);
         let moving = scene.moving_solids.iter().map(|solid| {
-            let way = DAffine3::from_translation(solid.displacement(time));
+            let way = solid.pose(time).affine();
             solid.placed.mesh.transformed(&way)
         });
         let still = scene.solids.iter().map(|solid| solid.mesh.clone());

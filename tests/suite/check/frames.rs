@@ -11,7 +11,7 @@ use swell::{
     gpu::adapter::Context,
     scene::{
         Effects, Iteration, Method, PlacedMesh, Placement, Scene, Stop, Wall, WaveMaker,
-        moving_solid::MovingSolid,
+        moving_solid::{MovingSolid, Slide, Turn},
     },
     solve::{SolveError, flip::Flip, pbf::Pbf, plan::device_limits},
     stage::{
@@ -80,7 +80,7 @@ fn sphere(centre: DVec3, radius: f64) -> TriangleMesh {
     }
 }
 
-/// A tank with water in motion and a sphere in it, which may move.
+/// A tank with water in motion and a sphere in it, which may move: along a line and about an axis beside it.
 fn tank(method: Method, speed: f64) -> (Scene, Start) {
     let (mut scene, _) = case(method);
     scene.effects = Effects::default();
@@ -101,12 +101,23 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
     match speed {
         0.0 => scene.solids.push(placed),
         velocity => scene.moving_solids.push(MovingSolid {
+            turn: Some(Turn::new(
+                SPHERE.0 - 0.1 * DVec3::X,
+                DVec3::new(0.3, -0.2, 1.0),
+                Motion::ConstantVelocity {
+                    velocity: 100.0,
+                    until: None,
+                },
+                &placed.mesh,
+            )),
             placed,
-            direction: DVec3::new(0.6, 0.0, 0.8),
-            motion: Motion::ConstantVelocity {
-                velocity,
-                until: None,
-            },
+            slide: Some(Slide {
+                direction: DVec3::new(0.6, 0.0, 0.8),
+                motion: Motion::ConstantVelocity {
+                    velocity,
+                    until: None,
+                },
+            }),
         }),
     }
     let mut start = Start::of(&scene).unwrap();
@@ -119,20 +130,21 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
 /// Centre and radius.
 const SPHERE: (DVec3, f64) = (DVec3::new(0.63, 0.31, 0.57), 0.26);
 
-/// Frames that the sphere's tank is followed over.
+/// Frames that the sphere's tank is followed over; where the sphere moves too, a third of them.
 const FRAMES: u32 = 12;
 
-/// Solves some frames with `solver` and checks the step after each.
+/// Solves so many frames with `solver` and checks the step after each.
 fn follow(
     context: &Context,
     scene: &Scene,
     start: &Start,
     mut solver: impl Solver<Error = SolveError>,
+    frames: u32,
 ) -> (String, Particles) {
     let mut state = start.particles.clone();
     solver.load(0, &state).unwrap();
     let mut faults = String::new();
-    for frame in 0..FRAMES {
+    for frame in 0..frames {
         let table = check_frame(context, scene, start, frame, &state).unwrap();
         if !over(&table).is_empty() {
             let out = lines(&table);
@@ -152,7 +164,7 @@ fn a_sphere_in_a_tank_of_pbf_is_within_tolerance() {
     let (scene, start) = tank(Method::Pbf, 0.0);
     let plan = start.plan(&scene, device_limits(&context));
     let solver = Pbf::new(&context, &scene, plan, &start.boundary, false).unwrap();
-    let (faults, state) = follow(&context, &scene, &start, solver);
+    let (faults, state) = follow(&context, &scene, &start, solver, FRAMES);
     assert!(faults.is_empty(), "{faults}");
     push_is_seen(
         &context,
@@ -164,6 +176,37 @@ fn a_sphere_in_a_tank_of_pbf_is_within_tolerance() {
     );
 }
 
+/// The same where the sphere moves and turns: samples and distance go along, and what they do on the water is counted.
+#[test]
+fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
+    let context = context();
+    let (scene, start) = tank(Method::Pbf, 0.9);
+    let plan = start.plan(&scene, device_limits(&context));
+    let solver = Pbf::new(&context, &scene, plan, &start.boundary, false).unwrap();
+    let frames = FRAMES / 3;
+    let (faults, state) = follow(&context, &scene, &start, solver, frames);
+    assert!(faults.is_empty(), "{faults}");
+    for (pass, from, to) in [
+        (
+            "pbf/predict",
+            "share * solid_grids.length",
+            "0.99 * share * solid_grids.length",
+        ),
+        (
+            "pbf/compute_delta",
+            "rate -= params.gradient_scale",
+            "rate += params.gradient_scale",
+        ),
+        (
+            "pbf/compute_delta",
+            "cross(solid_spin, x - solid_centre)",
+            "cross(x - solid_centre, solid_spin)",
+        ),
+    ] {
+        spoils(&context, &scene, &start, (frames, &state), (pass, from, to));
+    }
+}
+
 /// The same with FLIP, whose particles the sphere pushes on their way; at rest and on its own way.
 #[test]
 fn a_sphere_in_a_tank_of_flip_is_within_tolerance() {
@@ -172,15 +215,43 @@ fn a_sphere_in_a_tank_of_flip_is_within_tolerance() {
         let (scene, start) = tank(Method::Flip, speed);
         let plan = start.plan(&scene, device_limits(&context));
         let solver = Flip::new(&context, &scene, plan, &start.boundary, false).unwrap();
-        let (faults, mut state) = follow(&context, &scene, &start, solver);
+        let (faults, mut state) = follow(&context, &scene, &start, solver, FRAMES);
         assert!(faults.is_empty(), "{faults}");
         // Particles hardly touch it by themselves: one is put into it.
         let time = f64::from(FRAMES) * scene.shot.frame_seconds();
-        let way = speed * time * DVec3::new(0.6, 0.0, 0.8);
-        let within = SPHERE.0 + way + 0.5 * SPHERE.1 * DVec3::Y;
+        let pose = scene.moving_solids.first().map(|solid| solid.pose(time));
+        let centre = pose.map_or(SPHERE.0, |pose| pose.place(SPHERE.0));
+        let within = centre + 0.5 * SPHERE.1 * DVec3::Y;
         state.position[0] = within.as_vec3().to_array();
         push_is_seen(&context, &scene, &start, &state, "flip/advect", "position");
+        if speed > 0.0 {
+            let spin = "cross(solid_spin, x - solid_centre)";
+            spoils(
+                &context,
+                &scene,
+                &start,
+                (FRAMES, &state),
+                ("flip/advect", spin, "vec3f(0.0)"),
+            );
+        }
     }
+}
+
+/// Control: a pass in which something else stands is out of tolerance.
+fn spoils(
+    context: &Context,
+    scene: &Scene,
+    start: &Start,
+    (frame, state): (u32, &Particles),
+    (pass, from, to): (&'static str, &'static str, &'static str),
+) {
+    let Control { spoil, .. } = control(pass, from, to, pass, &[]);
+    let mut spoiled = context.clone();
+    spoiled.spoil = Some(spoil);
+    let table = check_frame(&spoiled, scene, start, frame, state).unwrap();
+    let faults = over(&table);
+    let is_seen = faults.iter().any(|(name, _)| *name == pass);
+    assert!(is_seen, "{to}: {}", lines(&table));
 }
 
 /// Control: a push that is slightly too long is out of tolerance.

@@ -151,6 +151,7 @@ fn case(method: Method) -> (Scene, Start) {
             },
             distance: Some(distance),
             moving: Vec::new(),
+            moving_samples: Vec::new(),
         },
     };
     (scene, start)

@@ -134,7 +134,7 @@ fn inspect_knows_studies_frames_meshes_grids_and_pictures() {
     job.expect(0, "bake small.toml -o cache --frames 1-1 --device cpu");
     job.expect(0, "export cache --vdb g.%04d.vdb --mesh m.%04d.ply");
     job.expect(0, "render cache --look look.toml -o day");
-    let object = |file: &str| job.json(0, &format!("inspect {file} --json"));
+    let object = |file: &str| job.json(0, &format!("inspect {file}"));
 
     let study = object("study.toml");
     assert_eq!(

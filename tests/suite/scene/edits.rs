@@ -78,6 +78,9 @@ translate = [0.3, 0.6, 0.0]
 scale = 0.5
 direction = [1.0, 0.0, 0.0]
 motion = { kind = "sine", stroke = 0.05, period = 4.0, ramp = 1.0 }
+pivot = [0.5, 0.8, 0.3]
+axis = [0.0, 0.0, 1.0]
+turn = { kind = "sine", swing_degrees = 5.0, period = 4.0, ramp = 1.0 }
 "#;
 
 /// Strings that some key takes.
@@ -355,8 +358,9 @@ fn each_edited_key_of_a_flip_bake_is_named_or_allowed() {
         "solver.flip.pressure.tolerance",
         "solid[1].motion.stroke",
         "solid[1].direction[0]",
+        "solid[1].pivot[0]",
+        "solid[1].turn.swing_degrees",
     ];
-    // PBF has no solids that move.
     check(
         "flip",
         &[],

@@ -195,7 +195,7 @@ fn a_moving_box_cuts_cells_where_it_stands_and_pushes_through_its_faces() {
         }
     }
     // Control: a box that stood still would have pushed nothing.
-    scene.moving_solids[0].motion = Motion::ConstantVelocity {
+    scene.moving_solids[0].slide.as_mut().unwrap().motion = Motion::ConstantVelocity {
         velocity: 0.7,
         until: Some(0.25),
     };
@@ -239,7 +239,7 @@ fn nothing_ends_within_a_box_faster_than_the_cfl_limit() {
         let (next, report) = solver.advance().unwrap();
         state = next;
         assert!(report.substeps >= 3, "{}", report.substeps);
-        let by = scene.moving_solids[0].displacement(f64::from(frame) / 100.0);
+        let by = scene.moving_solids[0].pose(f64::from(frame) / 100.0).centre;
         // Particles keep a tenth of their spacing; the trilinear distance is short by less than that at an edge.
         let least = nearest(&state, moved(start, by));
         assert!(least > -0.1 * DX, "frame {frame}: {least}");
@@ -316,7 +316,7 @@ fn a_box_that_dips_into_a_tank_lifts_its_water_by_what_it_displaces() {
     let mut resumed = solver(&context, &scene, &particles);
     resumed.load(20, twentieth).unwrap();
     assert_eq!(&resumed.advance().unwrap().0, next);
-    let end = moved(start, scene.moving_solids[0].displacement(0.8));
+    let end = moved(start, scene.moving_solids[0].pose(0.8).centre);
     assert!((end.min.y - 0.47).abs() < 1e-9);
     assert!(nearest(state, end) > -0.1 * DX);
     // Volume: 2.56 L − 0.36 (L − 0.47) = 2.56 · 0.8.
@@ -406,7 +406,7 @@ const OBJ: &str = "v 1 1 1\nv 2 1 1\nv 1 2 1\nv 2 2 1\nv 1 1 2\nv 2 1 2\nv 1 2 2
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
 
 #[test]
-fn scenes_say_where_solids_go_and_pbf_says_that_it_has_none() {
+fn scenes_say_where_solids_go() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("box.obj"), OBJ).unwrap();
     let parse = |text: &str, set: &[&str]| {
@@ -416,7 +416,7 @@ fn scenes_say_where_solids_go_and_pbf_says_that_it_has_none() {
     let scene = parse(SCENE, &[]).unwrap();
     assert!(scene.solids.is_empty());
     let solid = &scene.moving_solids[0];
-    assert!((solid.displacement(3.0) - DVec3::new(0.0, -0.5, 0.0)).length() < 1e-12);
+    assert!((solid.pose(3.0).centre - DVec3::new(0.0, -0.5, 0.0)).length() < 1e-12);
     assert_eq!(scene.mesh_files().len(), 1);
     let written = scene.to_toml(&|_, _| "box.obj".into());
     assert_eq!(parse(&written, &[]).unwrap(), scene);
@@ -429,12 +429,7 @@ fn scenes_say_where_solids_go_and_pbf_says_that_it_has_none() {
 
     for (set, key, words) in [
         (
-            &["solver.method=pbf"][..],
-            "solid[0].motion",
-            "solver pbf has no moving solids yet",
-        ),
-        (
-            &["solid[0].direction=[0, 0, 0]"],
+            &["solid[0].direction=[0, 0, 0]"][..],
             "solid[0].direction",
             "no direction",
         ),
@@ -465,6 +460,76 @@ fn scenes_say_where_solids_go_and_pbf_says_that_it_has_none() {
         ),
     ] {
         let error = parse(SCENE, set).unwrap_err().to_string();
+        assert!(
+            error.contains(key) && error.contains(words),
+            "{set:?}: {error}"
+        );
+    }
+    // It turns as well, about an axis that goes along, or alone.
+    const TURN: &[&str] = &[
+        "solid[0].pivot=[1.5, 1, 1.5]",
+        "solid[0].axis=[0, 0, -1]",
+        "solid[0].turn={ kind = \"table\", points = [[0, 0], [1, 90], [2, -30]] }",
+    ];
+    let both = parse(SCENE, TURN).unwrap();
+    let solid = &both.moving_solids[0];
+    // After a second, half-way of the ramp, it is half of its stroke's depth down, and what was to the right of the pivot has
+    // come below it.
+    let at = solid.pose(1.0).place(DVec3::new(2.0, 1.0, 1.5));
+    assert!((at - DVec3::new(1.5, 0.25, 1.5)).length() < 1e-12, "{at}");
+    assert!(
+        solid.peak_speed(0.0, 2.0)
+            > both.moving_solids[0]
+                .slide
+                .as_ref()
+                .unwrap()
+                .motion
+                .peak_speed(0.0, 2.0)
+    );
+    let written = both.to_toml(&|_, _| "box.obj".into());
+    assert_eq!(parse(&written, &[]).unwrap(), both);
+    let alone: String = SCENE
+        .lines()
+        .filter(|line| !line.starts_with("direction =") && !line.starts_with("motion ="))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let swing = "solid[0].turn={ kind = \"sine\", swing_degrees = 40, period = 2 }";
+    let swings = parse(&alone, &[TURN[0], TURN[1], swing]).unwrap();
+    let written = swings.to_toml(&|_, _| "box.obj".into());
+    assert!(
+        written.contains("swing_degrees = 40") && !written.contains("stroke"),
+        "{written}"
+    );
+    assert_eq!(parse(&written, &[]).unwrap(), swings);
+    for (set, key, words) in [
+        (&TURN[..2], "solid[0].", "given without turn"),
+        (&[TURN[0], TURN[2]], "solid[0].", "given without axis"),
+        (
+            &[TURN[0], TURN[2], "solid[0].axis=[0, 0, 0]"],
+            "solid[0].axis",
+            "no direction",
+        ),
+        (
+            &[
+                TURN[0],
+                TURN[1],
+                "solid[0].turn={ kind = \"constant_velocity\", degrees_per_second = 1e8 }",
+            ],
+            "solid[0].turn",
+            "it moves at",
+        ),
+        (
+            &[
+                "solid[0].pivot=[90, 1, 1.5]",
+                "solid[0].translate=[88, 0, 0]",
+                TURN[1],
+                swing,
+            ],
+            "solid[0].turn",
+            "never comes into the domain",
+        ),
+    ] {
+        let error = parse(&alone, set).unwrap_err().to_string();
         assert!(
             error.contains(key) && error.contains(words),
             "{set:?}: {error}"

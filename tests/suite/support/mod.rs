@@ -22,7 +22,8 @@ use swell::{
     gpu::adapter::Context,
     scene::{
         Budget, Effects, Iteration, Method, Pbf as Settings, PlacedMesh, Placement, Scene, Shot,
-        Solver as SolverSettings, Stop, Water, moving_solid::MovingSolid,
+        Solver as SolverSettings, Stop, Water,
+        moving_solid::{MovingSolid, Slide, Turn},
     },
     solve::{pbf, plan::*},
 };
@@ -196,14 +197,30 @@ pub fn box_mesh(bounds: Bounds) -> TriangleMesh {
 /// A box that moves.
 pub fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
     MovingSolid {
-        placed: PlacedMesh {
-            file: "box.obj".into(),
-            file_hash: String::new(),
-            placement: Placement::default(),
-            mesh: box_mesh(bounds),
-            holes: Default::default(),
-        },
-        direction,
-        motion,
+        placed: placed(box_mesh(bounds)),
+        slide: Some(Slide { direction, motion }),
+        turn: None,
+    }
+}
+
+/// The same, about an axis through its middle as well, at a steady speed in degrees a second.
+pub fn turning(mut solid: MovingSolid, axis: DVec3, speed: f64) -> MovingSolid {
+    let bounds = solid.placed.mesh.bounds().unwrap();
+    let motion = Motion::ConstantVelocity {
+        velocity: speed,
+        until: None,
+    };
+    let pivot = 0.5 * (bounds.min + bounds.max);
+    solid.turn = Some(Turn::new(pivot, axis, motion, &solid.placed.mesh));
+    solid
+}
+
+pub fn placed(mesh: TriangleMesh) -> PlacedMesh {
+    PlacedMesh {
+        file: "box.obj".into(),
+        file_hash: String::new(),
+        placement: Placement::default(),
+        mesh,
+        holes: Default::default(),
     }
 }

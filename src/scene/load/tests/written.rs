@@ -41,6 +41,9 @@ mesh = "cube.obj"
 translate = [6.0, 0.0, 2.0]
 direction = [1.0, 0.0, 0.0]
 motion = { kind = "KIND" }
+pivot = [6.5, 0.5, 2.5]
+axis = [0.0, 1.0, 0.0]
+turn = { kind = "TURN" }
 [[wave_maker]]
 wall = "+x"
 motion = { kind = "KIND" }
@@ -78,9 +81,14 @@ about = [1.0, 0.0, 0.0]
             "solver.pbf.iterations=4",
         ],
     ];
+    let turns = [
+        "\"sine\", swing_degrees = 10.0, period = 2.0, ramp = 1.0",
+        "\"constant_velocity\", degrees_per_second = 5.0, until = 1.0",
+        "\"table\", points = [[0, 0], [1, -10]]",
+    ];
     let mut written = BTreeSet::new();
-    for (kind, overrides) in kinds.iter().zip(variants) {
-        let text = of_solid.replace("\"KIND\"", kind);
+    for ((kind, turn), overrides) in kinds.iter().zip(turns).zip(variants) {
+        let text = of_solid.replace("\"KIND\"", kind).replace("\"TURN\"", turn);
         let flip = [
             "solver.method=flip",
             "effects.viscosity.xsph=0.02",
@@ -149,9 +157,10 @@ generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", signif
     let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
     // A motion's file is written as the points that were read from it, walls as those that are no-slip.
+    let read = ["motion.file", "turn.file"];
     let missing: Vec<_> = keys::paths(keys::SCENE)
         .into_iter()
-        .filter(|key| !key.ends_with("motion.file") && key != "domain.walls")
+        .filter(|key| !read.iter().any(|file| key.ends_with(file)) && key != "domain.walls")
         .filter(|key| !written.contains(key))
         .collect();
     assert_eq!(missing, [] as [&str; 0]);

@@ -15,8 +15,8 @@ const UNSORTED: [&str; 5] = [
 pub const PBF_WALLS: &[Control] = &[
     control(
         "pbf/predict",
-        "= work_of_push(wall_push);",
-        "= 1.001 * work_of_push(wall_push);",
+        "= work_of_pushes();",
+        "= 1.001 * work_of_pushes();",
         "pbf/predict",
         &["work of walls"],
     ),

@@ -15,7 +15,7 @@ use swell::{
 };
 
 use super::{Control, control, flip::SYSTEM, tension::TENSION};
-use crate::support::{D, lattice, mover, noise};
+use crate::support::{D, lattice, mover, noise, turning};
 
 /// A change of the common case, and what must fail by which fault.
 pub struct Variant {
@@ -57,7 +57,7 @@ fn voxel(scene: &mut Scene, _: &mut Start) {
     flip(scene).surface = Surface::Voxel;
 }
 
-/// A box within the water that moves on, with particles about it.
+/// A box within the water that moves on and turns, with particles about it.
 fn moving_solid(scene: &mut Scene, start: &mut Start) {
     let bounds = Bounds {
         min: DVec3::new(0.33, 0.37, 0.21),
@@ -68,6 +68,7 @@ fn moving_solid(scene: &mut Scene, start: &mut Start) {
         until: None,
     };
     let solid = mover(bounds, DVec3::new(1.0, 0.3, 0.2).normalize(), motion);
+    let solid = turning(solid, DVec3::new(0.2, -0.3, 1.0), 200.0);
     let grid = bounds.grown(4.0 * D);
     let distance = SignedDistance::from_mesh(&solid.placed.mesh, &grid, D).unwrap();
     scene.moving_solids.push(solid);
@@ -212,10 +213,17 @@ pub const VARIANTS: &[Variant] = &[
             ),
             control(
                 "flip/advect",
-                "v = solid_velocity + stopped",
-                "v = -solid_velocity + stopped",
+                "v = pushing + stopped",
+                "v = -pushing + stopped",
                 "flip/advect",
                 &["velocity"],
+            ),
+            control(
+                "flip/cut_cells",
+                "cross(solid_spin, x - solid_centre)",
+                "cross(x - solid_centre, solid_spin)",
+                "flip/cut_cells",
+                &["flux of solids", "velocity of closed faces"],
             ),
         ],
     },
@@ -381,8 +389,8 @@ pub const VARIANTS: &[Variant] = &[
             ),
             control(
                 "flip/advect",
-                "gradient / steepness * (params.contact_distance - distance)",
-                "gradient / steepness * (params.contact_distance - 1.01 * distance)",
+                "to_world(gradient / steepness) * (params.contact_distance - distance)",
+                "to_world(gradient / steepness) * (params.contact_distance - 1.01 * distance)",
                 "flip/advect",
                 &["position"],
             ),

@@ -16,7 +16,7 @@ use swell::{
 
 use crate::support::{
     flip::{DX, block, flip, half_space, position, scene, tank},
-    jitter, mover, noise,
+    jitter, mover, noise, turning,
 };
 
 /// Frames before the substep: walls and solids are under way by then.
@@ -149,11 +149,12 @@ pub fn moving_solid() -> Case {
         until: None,
     };
     let solid = mover(bounds, DVec3::new(1.0, 0.3, 0.2), motion);
-    let now = solid.displacement(f64::from(FRAME) * scene.shot.frame_seconds());
+    let solid = turning(solid, DVec3::new(0.2, -0.3, 1.0), 40.0);
+    let now = solid.pose(f64::from(FRAME) * scene.shot.frame_seconds());
     let grid = bounds.grown(2.0 * DX);
     let distance = SignedDistance::from_mesh(&solid.placed.mesh, &grid, 0.5 * DX).unwrap();
     let particles = kept(&particles, |x| {
-        let x = x - now;
+        let x = now.back(x);
         x.cmplt(bounds.min - 0.02).any() || x.cmpgt(bounds.max + 0.02).any()
     });
     scene.moving_solids.push(solid);

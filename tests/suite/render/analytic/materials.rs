@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use swell::domain::mesh::TriangleMesh;
 use swell::domain::mesh_file::{MeshFormat, parts::Parts};
 use swell::domain::particles::Particles;
+use swell::domain::pose::Pose;
 use swell::gpu::adapter::Context;
 use swell::render::{Image, Moment, RenderError, RenderScene, Renderer, SolidParts, Water};
 use swell::scene::look::Look;
@@ -88,7 +89,7 @@ fn of_text(text: &str) -> RenderScene {
         parts: vec![SolidParts {
             name: "face".to_owned(),
             parts: Parts::from_bytes(bytes, MeshFormat::Obj, file).unwrap(),
-            moved: DVec3::ZERO,
+            pose: Pose::START,
         }],
         ..scene(1.0, 1.0)
     }

@@ -16,6 +16,9 @@ const NUMBERS: &[(&str, &str, bool)] = &[
     ("solid[0].scale", "{}", false),
     ("solid[1].direction", "[1, {}, 0]", true),
     ("solid[1].motion.velocity", "{}", false),
+    ("solid[1].pivot", "[{}, 3, 3]", false),
+    ("solid[1].axis", "[0, {}, 1]", true),
+    ("solid[1].turn.swing_degrees", "{}", false),
     ("wave_maker[0].motion.stroke", "{}", false),
     ("wave_maker[0].motion.period", "{}", false),
     ("wave_maker[0].motion.ramp", "{}", true),
@@ -128,6 +131,7 @@ fn numbered() -> String {
     let more = "[[water.particles]]\nat = [[20.0, 3.0, 3.0]]\nvelocity = [1.0, 0.0, 0.0]\n[[solid]]\nmesh = \"cube.obj\"\n\
         translate = [15.0, 3.0, 3.0]\ndirection = [1.0, 0.0, 0.0]\n\
         motion = { kind = \"constant_velocity\", velocity = 0.1, until = 1.0 }\n\
+        pivot = [15.0, 3.0, 3.0]\naxis = [0.0, 1.0, 0.0]\nturn = { kind = \"sine\", swing_degrees = 9.0, period = 2.0 }\n\
         [[emitter]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nvelocity = [0.001, 0.0, 0.0]\nfrom = 1.0\nuntil = 2.0\n\
         [[drain]]\nmin = [1.0, 2.0, 1.0]\nmax = [2.0, 3.0, 2.0]\nrate = 1.0\nfrom = 1.0\nuntil = 2.0\n";
     let zone = "drag = { drop_radius = 0.001, wind = [1.0, 0, 0] }\nsurface_tension = { coefficient = 0.07 }\nabsorbing_zone = { walls = [\"-y\"], length = 1.0, period = 1.0 }\n";
