@@ -48,8 +48,9 @@ pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
         Some(Lens { radius, focus })
     };
     if let Some(file) = look.camera_file() {
-        let stand = file.at(frame / frames_per_second);
-        let focal_length_mm = file.focal_length_mm(look.film_height_mm());
+        let seconds = frame / frames_per_second;
+        let stand = file.at(seconds);
+        let focal_length_mm = file.focal_length_mm(look.film_height_mm(), seconds);
         let [right, up] = upright(stand.forward, stand.up);
         return Pose {
             position: stand.position,

@@ -157,10 +157,10 @@ fn solids(
             solids.push(static_solid(doc, &path, spec, around)?);
             continue;
         }
-        let key = if spec.motion.is_some() {
-            "motion"
-        } else {
-            "turn"
+        let key = match (&spec.track, &spec.motion) {
+            (Some(_), _) => "track",
+            (None, Some(_)) => "motion",
+            (None, None) => "turn",
         };
         let place = format!("{path}.{key}");
         if moving.len() == MAX_MOVING_SOLIDS {

@@ -7,6 +7,8 @@ mod keys;
 mod lint;
 mod materials;
 mod mtl;
+mod usd_camera;
+mod usda;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -171,7 +173,7 @@ impl Look {
     pub fn longest_focal_length_mm(&self) -> f64 {
         let camera = &self.spec.camera;
         let own = (self.camera_file()).map_or(camera.focal_length_mm, |file| {
-            file.focal_length_mm(self.film_height_mm())
+            file.longest_focal_length_mm(self.film_height_mm())
         });
         let keys = camera.keyframes.iter();
         keys.filter_map(|key| key.focal_length_mm)

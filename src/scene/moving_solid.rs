@@ -7,6 +7,7 @@ use super::{
     document::Document,
     error::SceneError,
     motion_spec::{MotionSpec, TurnSpec, check_speed},
+    solid_track::{self, Track},
     spec::MeshSpec,
     wave_maker::{self, ANGLES},
     words::{extent, shown},
@@ -36,6 +37,8 @@ pub struct MovingSolid {
     pub slide: Option<Slide>,
     /// About an axis, which is carried along.
     pub turn: Option<Turn>,
+    /// As a file has it, in place of both.
+    pub track: Option<Track>,
 }
 
 /// A way along a line.
@@ -74,8 +77,25 @@ impl Turn {
 }
 
 impl MovingSolid {
+    /// The key that says how it moves, the first where there are two.
+    fn key(&self) -> &'static str {
+        match (&self.track, &self.slide) {
+            (Some(_), _) => "track",
+            (None, Some(_)) => "motion",
+            (None, None) => "turn",
+        }
+    }
+
+    /// Whether it may turn.
+    pub fn turns(&self) -> bool {
+        self.turn.is_some() || self.track.is_some()
+    }
+
     /// Where it stands at time `t`, seconds.
     pub fn pose(&self, t: f64) -> Pose {
+        if let Some(track) = &self.track {
+            return track.pose(t);
+        }
         let way = self.slide.as_ref().map_or(DVec3::ZERO, |slide| {
             slide.motion.displacement(t) * slide.direction.normalize()
         });
@@ -109,6 +129,9 @@ impl MovingSolid {
 
     /// An upper bound on the speed of its points within `[t0, t1]`, m/s.
     pub fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
+        if let Some(track) = &self.track {
+            return track.peak_speed(t0, t1);
+        }
         let slide = self.slide.as_ref();
         let slide = slide.map_or(0.0, |slide| slide.motion.peak_speed(t0, t1));
         let turn = self.turn.as_ref().map_or(0.0, |turn| {
@@ -208,10 +231,19 @@ pub(super) fn build(
         }
         _ => None,
     };
+    let track = match &spec.track {
+        Some(track) => {
+            let around = (around.base_dir, around.shot);
+            let (path, mesh) = (at("track"), &placed.mesh);
+            Some(solid_track::build(doc, &path, around, track, mesh)?)
+        }
+        None => None,
+    };
     let solid = MovingSolid {
         placed,
         slide,
         turn,
+        track,
     };
     check_way(doc, &solid, path, around.domain, around.shot)?;
     Ok(solid)
@@ -258,11 +290,7 @@ fn check_way(
     shot: &Shot,
 ) -> Result<()> {
     const FAR: f64 = 10.0;
-    let key = if solid.slide.is_some() {
-        "motion"
-    } else {
-        "turn"
-    };
+    let key = solid.key();
     let place = format!("{path}.{key}");
     let (farthest, direction) = match &solid.slide {
         Some(slide) => (
@@ -283,22 +311,28 @@ fn check_way(
     }
     let speed = solid.peak_speed(0.0, shot.duration());
     check_speed(speed).map_err(|problem| doc.fault_of_plain(&place, problem))?;
-    let around = match &solid.turn {
-        // Wherever it turns to.
-        Some(turn) => Some(
-            Bounds {
-                min: turn.pivot,
-                max: turn.pivot,
-            }
-            .grown(turn.reach),
-        ),
-        None => solid.placed.mesh.bounds(),
+    let ball = |middle: DVec3, reach: f64| {
+        let point = Bounds {
+            min: middle,
+            max: middle,
+        };
+        point.grown(reach)
+    };
+    let joined = |a: Bounds, b: Bounds| Bounds {
+        min: a.min.min(b.min),
+        max: a.max.max(b.max),
     };
     let way = farthest * direction;
-    let swept = around.map(|b| Bounds {
-        min: b.min.min(b.min + way),
-        max: b.max.max(b.max + way),
-    });
+    let swept = match (&solid.track, &solid.turn) {
+        (Some(track), _) => {
+            let (places, reach) = track.places();
+            places.map(|at| ball(at, reach)).reduce(joined)
+        }
+        // Wherever it turns to.
+        (None, Some(turn)) => Some(ball(turn.pivot, turn.reach)),
+        (None, None) => solid.placed.mesh.bounds(),
+    };
+    let swept = swept.map(|b| joined(b, b.moved(way)));
     if swept.is_some_and(|b| b.min.cmplt(domain.max).all() && b.max.cmpgt(domain.min).all()) {
         return Ok(());
     }

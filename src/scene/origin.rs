@@ -56,6 +56,9 @@ impl Scene {
         for turn in self.moving_solids.iter_mut().flat_map(|it| &mut it.turn) {
             turn.pivot += way;
         }
+        for track in self.moving_solids.iter_mut().flat_map(|it| &mut it.track) {
+            track.carry(way);
+        }
         self.carry_sources(way, &carry);
         for probe in &mut self.probes {
             match &mut probe.kind {

@@ -91,12 +91,22 @@ pub(super) struct MeshSpec {
     pub(super) pivot: Option<[f64; 3]>,
     pub(super) axis: Option<[f64; 3]>,
     pub(super) turn: Option<TurnSpec>,
+    pub(super) track: Option<TrackSpec>,
+}
+
+/// Where a solid stands over time.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TrackSpec {
+    pub(super) file: Option<String>,
+    pub(super) node: Option<String>,
+    pub(super) poses: Option<Vec<[f64; 8]>>,
 }
 
 impl MeshSpec {
     /// Whether it is a solid that moves.
     pub(super) fn moves(&self) -> bool {
-        self.motion.is_some() || self.turn.is_some()
+        self.motion.is_some() || self.turn.is_some() || self.track.is_some()
     }
 }
 

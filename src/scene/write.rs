@@ -106,6 +106,11 @@ impl Scene {
                 table.insert("axis".to_owned(), vector(turn.axis));
                 table.insert("turn".to_owned(), turned(&turn.motion));
             }
+            if let Some(track) = &solid.track {
+                let poses = value(&track.written(self.origin));
+                let rows = self::table([("poses", poses)]);
+                table.insert("track".to_owned(), Value::Table(rows));
+            }
             table
         });
         insert_tables(&mut scene, "solid", still.chain(moving));

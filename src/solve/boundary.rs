@@ -173,9 +173,9 @@ impl Movers {
                 ..
             } = solid.passage(start, length);
             // The point of rest of a solid that does not turn may be any: its first node rounds least.
-            let rest = match solid.turn {
-                Some(_) => pose.rest,
-                None => self.origins[k],
+            let rest = match solid.turns() {
+                true => pose.rest,
+                false => self.origins[k],
             };
             grids.grids[k].origin = (self.origins[k] - rest).as_vec3().to_array();
             grids.centres[k] = four(pose.place(rest) - scene.domain.min);

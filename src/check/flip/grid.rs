@@ -66,7 +66,7 @@ impl FlipState {
         let placed = solids.map(of).fold(0.0, f64::max);
         // Beyond its grid no solid is looked at.
         let solids = self.scene.moving_solids.iter().zip(&self.boundary.moving);
-        let turned = solids.filter(|(solid, _)| solid.turn.is_some());
+        let turned = solids.filter(|(solid, _)| solid.turns());
         let turned = turned.map(|(solid, grid)| {
             let pose = solid.pose(self.elements().substep.start);
             let centre = (pose.centre - origin).length();

@@ -206,6 +206,32 @@ const SOLID: &[Key] = &[
         .with("pivot")
         .also(", that brings the solid into the domain, no point of it faster than 100000 m/s")
         .about("How far about `axis` the solid has turned"),
+    Key::inline("track", SOLID_TRACK)
+        .absent()
+        .without(&["motion", "turn"])
+        .also(", that brings the solid into the domain, no point of it faster than 100000 m/s; not with domain.periodic")
+        .about("Where the solid stands over time, from where it stands at the start on"),
+];
+
+const SOLID_TRACK: &[Key] = &[
+    Key::text(
+        "file",
+        "a glTF file (.gltf or .glb), relative to the scene file",
+    )
+    .absent()
+    .about("its node's animation carries the solid; the written-out scene has it as poses"),
+    Key::text("node", "the name of a node in the file")
+        .absent()
+        .with("file")
+        .about("whose motion it is, with that of the nodes above it; left out: the file's only node"),
+    Key::points(
+        "poses",
+        8,
+        "rows of [seconds, x, y, z, qx, qy, qz, qw], times rising from 0 on, places in metres, unit quaternions, the first [0, 0, 0, 1]",
+    )
+    .absent()
+    .without(&["file"])
+    .about("the motion in place: where a point of the solid is, and how the solid is turned about it"),
 ];
 
 const WAVE_MAKER: &[Key] = &[

@@ -1,31 +1,26 @@
-//! A camera from a glTF 2.0 file (Khronos 2021): where its node stands in the file's hierarchy, and how its animations move it.
+//! A camera from a file: of glTF 2.0 (Khronos 2021), where its node stands in the file's hierarchy, and how its animations move it;
+//! or of USD as text.
 //!
 //! glTF is in metres, y up, and a camera looks along its own −z, as a look's world is. What is sampled is translation, rotation and
 //! scale of the camera's node and of every node above it; a camera's own scale turns nothing and is left out.
 
-mod track;
+use glam::{DMat3, DVec3};
+use gltf::{Document, Gltf, Node, camera::Projection};
 
-use std::borrow::Cow;
-
-use glam::{DMat3, DMat4, DQuat, DVec3};
-use gltf::{
-    Document, Gltf, Node,
-    animation::{Property, util::ReadOutputs},
-    camera::Projection,
+use super::{
+    super::gltf_nodes::{Beside, NodeError, Nodes},
+    usd_camera::{UsdCamera, is_usd},
 };
 
-use track::{Track, rotations, track};
-
-/// Keys of an animation, at most: hours of them.
-const MOST_KEYS: usize = 10_000_000;
-/// Nodes from the root to the camera, at most.
-const MOST_NODES: usize = 1000;
 /// Metres from the origin, at most: farther out, f32 positions are coarser than a millimetre.
 const FARTHEST: f64 = 1e5;
 
 /// Why a file gives no camera.
 #[derive(Debug, thiserror::Error)]
 pub enum CameraFileError {
+    /// USD that gives none.
+    #[error("{0}")]
+    Usd(String),
     /// It is no glTF file.
     #[error("no glTF file that can be read: {0}")]
     Gltf(#[from] gltf::Error),
@@ -64,25 +59,9 @@ pub enum CameraFileError {
         /// As the file has it.
         yfov: f32,
     },
-    /// Data that its accessors name and its buffers lack, or of another type.
-    #[error("its animation of {node}: {what}")]
-    Animation {
-        /// The node that is moved.
-        node: String,
-        /// What is wrong.
-        what: String,
-    },
-    /// A buffer that cannot be had.
-    #[error("buffer {index}: {what}")]
-    Buffer {
-        /// Which, from 0.
-        index: usize,
-        /// What is wrong.
-        what: String,
-    },
-    /// Nodes that are their own parents, or too many.
-    #[error("the node of camera {0} hangs under more than {MOST_NODES} nodes, or under itself")]
-    Hierarchy(String),
+    /// What moves it.
+    #[error(transparent)]
+    Node(#[from] NodeError),
     /// A pose that is none.
     #[error("at {seconds} s camera {name} has no place or no direction: {what}")]
     Pose {
@@ -119,57 +98,19 @@ pub struct Stand {
 #[derive(Clone, Debug)]
 pub struct CameraFile {
     name: String,
-    /// Vertical, radians.
-    yfov: f64,
-    aspect_ratio: Option<f64>,
-    /// From the camera's node up to the root.
-    nodes: Vec<Hung>,
+    body: Body,
     hash: blake3::Hash,
 }
 
-/// A node as it hangs under its parent.
 #[derive(Clone, Debug)]
-enum Hung {
-    /// By a matrix, which nothing moves.
-    Still(DMat4),
-    Moved {
-        translation: Track<DVec3>,
-        rotation: Track<DQuat>,
-        scale: Track<DVec3>,
+enum Body {
+    Gltf {
+        /// Vertical, radians.
+        yfov: f64,
+        aspect_ratio: Option<f64>,
+        nodes: Nodes,
     },
-}
-
-impl Hung {
-    fn at(&self, seconds: f64) -> DMat4 {
-        match self {
-            Self::Still(matrix) => *matrix,
-            Self::Moved {
-                translation,
-                rotation,
-                scale,
-            } => DMat4::from_scale_rotation_translation(
-                scale.at(seconds),
-                rotation.at(seconds),
-                translation.at(seconds),
-            ),
-        }
-    }
-
-    fn times(&self) -> impl Iterator<Item = f64> + '_ {
-        let (still, tracks) = match self {
-            Self::Still(_) => (true, [&[][..]; 3]),
-            Self::Moved {
-                translation,
-                rotation,
-                scale,
-            } => (
-                false,
-                [&translation.times[..], &rotation.times, &scale.times],
-            ),
-        };
-        let times = tracks.into_iter().flatten().copied();
-        times.filter(move |_| !still)
-    }
+    Usd(UsdCamera),
 }
 
 impl CameraFile {
@@ -177,11 +118,17 @@ impl CameraFile {
     ///
     /// # Errors
     /// [`CameraFileError`].
-    pub fn read(
-        bytes: &[u8],
-        name: Option<&str>,
-        beside: &dyn Fn(&str) -> std::result::Result<Vec<u8>, String>,
-    ) -> Result<Self> {
+    pub fn read(bytes: &[u8], name: Option<&str>, beside: Beside<'_>) -> Result<Self> {
+        if is_usd(bytes) {
+            let (name, camera) = UsdCamera::read(bytes, name)?;
+            let found = Self {
+                name,
+                body: Body::Usd(camera),
+                hash: blake3::hash(bytes),
+            };
+            found.check()?;
+            return Ok(found);
+        }
         let Gltf { document, blob } = Gltf::from_slice(bytes)?;
         let node = choose(&document, name)?;
         let camera = node.camera().ok_or(CameraFileError::None)?;
@@ -193,20 +140,15 @@ impl CameraFile {
         if !(yfov > 0.0 && yfov < std::f32::consts::PI) {
             return Err(CameraFileError::FieldOfView { name: called, yfov });
         }
-        let mut hasher = blake3::Hasher::new();
-        hasher.update(blake3::hash(bytes).as_bytes());
-        let chain = chain(&document, &node)?;
-        let buffers = buffers(&document, blob, &chain, beside)?;
-        for buffer in buffers.iter().flatten() {
-            hasher.update(blake3::hash(buffer).as_bytes());
-        }
-        let nodes = chain.iter().map(|node| hung(&document, node, &buffers));
+        let nodes = Nodes::read(bytes, (&document, blob), &node, beside)?;
         let found = Self {
             name: called,
-            yfov: yfov.into(),
-            aspect_ratio: lens.aspect_ratio().map(f64::from),
-            nodes: nodes.collect::<Result<_>>()?,
-            hash: hasher.finalize(),
+            hash: nodes.hash(),
+            body: Body::Gltf {
+                yfov: yfov.into(),
+                aspect_ratio: lens.aspect_ratio().map(f64::from),
+                nodes,
+            },
         };
         found.check()?;
         Ok(found)
@@ -219,20 +161,40 @@ impl CameraFile {
 
     /// Width over height, where the file says it.
     pub fn aspect_ratio(&self) -> Option<f64> {
-        self.aspect_ratio
+        match &self.body {
+            Body::Gltf { aspect_ratio, .. } => *aspect_ratio,
+            Body::Usd(camera) => Some(camera.aspect_ratio()),
+        }
     }
 
     /// Of a film of this height: its half over the tangent of half the field of view.
-    pub fn focal_length_mm(&self, film_height_mm: f64) -> f64 {
-        0.5 * film_height_mm / (0.5 * self.yfov).tan()
+    pub fn focal_length_mm(&self, film_height_mm: f64, seconds: f64) -> f64 {
+        match &self.body {
+            Body::Gltf { yfov, .. } => 0.5 * film_height_mm / (0.5 * yfov).tan(),
+            Body::Usd(camera) => film_height_mm / camera.height_ratio(seconds),
+        }
+    }
+
+    /// The longest of the shot, mm.
+    pub fn longest_focal_length_mm(&self, film_height_mm: f64) -> f64 {
+        let at = |seconds| self.focal_length_mm(film_height_mm, seconds);
+        self.times().map(at).fold(at(0.0), f64::max)
+    }
+
+    /// When something has a key, seconds.
+    fn times(&self) -> Box<dyn Iterator<Item = f64> + '_> {
+        match &self.body {
+            Body::Gltf { nodes, .. } => Box::new(nodes.times()),
+            Body::Usd(camera) => Box::new(camera.times()),
+        }
     }
 
     /// Where it stands.
     pub fn at(&self, seconds: f64) -> Stand {
-        let world = self
-            .nodes
-            .iter()
-            .fold(DMat4::IDENTITY, |below, node| node.at(seconds) * below);
+        let world = match &self.body {
+            Body::Gltf { nodes, .. } => nodes.at(seconds),
+            Body::Usd(camera) => camera.at(seconds),
+        };
         let axes = DMat3::from_mat4(world);
         let forward = (-axes.z_axis).normalize();
         let up = axes.y_axis;
@@ -245,8 +207,7 @@ impl CameraFile {
 
     /// At each of its keys, and before and after them.
     fn check(&self) -> Result<()> {
-        let times = self.nodes.iter().flat_map(Hung::times);
-        for seconds in times.chain([0.0]) {
+        for seconds in self.times().chain([0.0]) {
             let stand = self.at(seconds);
             let is_near = stand.position.abs().max_element() <= FARTHEST;
             let what = if !(stand.forward.is_finite() && stand.up.is_finite()) {
@@ -311,220 +272,5 @@ fn choose<'a>(document: &'a Document, name: Option<&str>) -> Result<Node<'a>> {
     })
 }
 
-/// A node and those above it, up to the root.
-fn chain<'a>(document: &'a Document, node: &Node<'a>) -> Result<Vec<Node<'a>>> {
-    let mut parents = vec![None; document.nodes().len()];
-    for parent in document.nodes() {
-        for child in parent.children() {
-            parents[child.index()] = Some(parent.clone());
-        }
-    }
-    let mut chain = vec![node.clone()];
-    while let Some(parent) = &parents[chain[chain.len() - 1].index()] {
-        if chain.len() == MOST_NODES {
-            return Err(CameraFileError::Hierarchy(called(node)));
-        }
-        chain.push(parent.clone());
-    }
-    Ok(chain)
-}
-
-/// Buffers that move nodes of `chain`, by index; `None` of others, which are not read.
-fn buffers<'a>(
-    document: &Document,
-    blob: Option<Vec<u8>>,
-    chain: &[Node<'_>],
-    beside: &dyn Fn(&str) -> std::result::Result<Vec<u8>, String>,
-) -> Result<Vec<Option<Cow<'a, [u8]>>>> {
-    let mut wanted = vec![false; document.buffers().len()];
-    for channel in document.animations().flat_map(|it| it.channels()) {
-        let target = channel.target().node().index();
-        if !chain.iter().any(|node| node.index() == target) {
-            continue;
-        }
-        let sampler = channel.sampler();
-        for accessor in [sampler.input(), sampler.output()] {
-            let sparse = accessor.sparse();
-            let views = [
-                accessor.view(),
-                sparse.as_ref().map(|it| it.indices().view()),
-                sparse.as_ref().map(|it| it.values().view()),
-            ];
-            for view in views.into_iter().flatten() {
-                wanted[view.buffer().index()] = true;
-            }
-        }
-    }
-    let mut blob = blob;
-    let read = document.buffers().zip(wanted).map(|(buffer, is_wanted)| {
-        if !is_wanted {
-            return Ok(None);
-        }
-        let fault = |what: String| CameraFileError::Buffer {
-            index: buffer.index(),
-            what,
-        };
-        let bytes = match buffer.source() {
-            gltf::buffer::Source::Bin => blob
-                .take()
-                .ok_or_else(|| fault("it has no binary chunk".into()))?,
-            gltf::buffer::Source::Uri(uri) => data(uri, beside).map_err(fault)?,
-        };
-        if bytes.len() < buffer.length() {
-            let what = format!("has {} bytes of {}", bytes.len(), buffer.length());
-            return Err(fault(what));
-        }
-        Ok(Some(Cow::Owned(bytes)))
-    });
-    read.collect()
-}
-
-/// What a URI holds in itself, or the file that it names.
-fn data(
-    uri: &str,
-    beside: &dyn Fn(&str) -> std::result::Result<Vec<u8>, String>,
-) -> std::result::Result<Vec<u8>, String> {
-    use base64::Engine as _;
-    let Some(rest) = uri.strip_prefix("data:") else {
-        return beside(&percent_decoded(uri)?);
-    };
-    let (_, text) = rest
-        .split_once(";base64,")
-        .ok_or("its data are not in base 64")?;
-    let engine = base64::engine::general_purpose::STANDARD;
-    engine
-        .decode(text)
-        .map_err(|error| format!("its data are no base 64: {error}"))
-}
-
-fn percent_decoded(uri: &str) -> std::result::Result<String, String> {
-    let mut bytes = Vec::new();
-    let mut rest = uri.as_bytes();
-    while let Some((&first, after)) = rest.split_first() {
-        rest = after;
-        if first != b'%' {
-            bytes.push(first);
-            continue;
-        }
-        let digits = rest.get(..2).and_then(|two| std::str::from_utf8(two).ok());
-        let byte = digits.and_then(|two| u8::from_str_radix(two, 16).ok());
-        bytes.push(byte.ok_or_else(|| format!("{uri} is no URI"))?);
-        rest = &rest[2..];
-    }
-    String::from_utf8(bytes).map_err(|_| format!("{uri} is no text"))
-}
-
-/// A node with what its animations do to it.
-fn hung(document: &Document, node: &Node<'_>, buffers: &[Option<Cow<'_, [u8]>>]) -> Result<Hung> {
-    let channels: Vec<_> = (document.animations())
-        .flat_map(|animation| animation.channels().collect::<Vec<_>>())
-        .filter(|channel| {
-            channel.target().node().index() == node.index()
-                && channel.target().property() != Property::MorphTargetWeights
-        })
-        .collect();
-    let transform = node.transform();
-    if let (gltf::scene::Transform::Matrix { matrix }, true) = (&transform, channels.is_empty()) {
-        return Ok(Hung::Still(DMat4::from_cols_array_2d(
-            &matrix.map(|column| column.map(f64::from)),
-        )));
-    }
-    let (translation, rotation, scale) = transform.decomposed();
-    let (mut translation, mut rotation, mut scale) = (
-        Track::still(vector(translation)),
-        Track::still(turn(rotation)),
-        Track::still(vector(scale)),
-    );
-    let mut seen = Vec::new();
-    for channel in channels {
-        let property = channel.target().property();
-        let fault = |what: String| CameraFileError::Animation {
-            node: called(node),
-            what,
-        };
-        if seen.contains(&property) {
-            return Err(fault(format!(
-                "{property:?} is animated twice; keep one of the animations"
-            )));
-        }
-        seen.push(property);
-        let sampler = channel.sampler();
-        for accessor in [sampler.input(), sampler.output()] {
-            check_accessor(&accessor, buffers).map_err(fault)?;
-        }
-        let reader = channel.reader(|buffer| buffers[buffer.index()].as_deref());
-        let inputs = reader.read_inputs();
-        let times: Vec<f64> = (inputs.ok_or_else(|| fault("its times are not there".into()))?)
-            .map(f64::from)
-            .collect();
-        let outputs = reader.read_outputs();
-        match outputs.ok_or_else(|| fault("its values are not there".into()))? {
-            ReadOutputs::Translations(values) => {
-                translation =
-                    track(times, values.map(vector).collect(), &sampler).map_err(fault)?;
-            }
-            ReadOutputs::Rotations(values) => {
-                rotation = rotations(times, values, &sampler).map_err(fault)?;
-            }
-            ReadOutputs::Scales(values) => {
-                scale = track(times, values.map(vector).collect(), &sampler).map_err(fault)?;
-            }
-            ReadOutputs::MorphTargetWeights(_) => {}
-        }
-    }
-    Ok(Hung::Moved {
-        translation,
-        rotation,
-        scale,
-    })
-}
-
-fn vector(v: [f32; 3]) -> DVec3 {
-    DVec3::from(v.map(f64::from))
-}
-
-fn turn(q: [f32; 4]) -> DQuat {
-    DQuat::from_array(q.map(f64::from)).normalize()
-}
-
-/// What an accessor reads lies in its buffers. The crate takes that for granted where it counts bytes.
-fn check_accessor(
-    accessor: &gltf::Accessor<'_>,
-    buffers: &[Option<Cow<'_, [u8]>>],
-) -> std::result::Result<(), String> {
-    let count = accessor.count();
-    if count == 0 || count > MOST_KEYS {
-        return Err(format!("{count} keys; allowed are 1 to {MOST_KEYS}"));
-    }
-    let sparse = accessor.sparse();
-    if sparse
-        .as_ref()
-        .is_some_and(|it| it.count() == 0 || it.count() > count)
-    {
-        return Err("a sparse accessor without values, or with more than there are".to_owned());
-    }
-    let views = [
-        accessor.view(),
-        sparse.as_ref().map(|it| it.indices().view()),
-        sparse.as_ref().map(|it| it.values().view()),
-    ];
-    for view in views.into_iter().flatten() {
-        let buffer = buffers[view.buffer().index()]
-            .as_deref()
-            .unwrap_or_default();
-        let end = view.offset().checked_add(view.length());
-        if end.is_none_or(|end| end > buffer.len()) {
-            return Err("it reads beyond its buffer".to_owned());
-        }
-        if view.stride().is_some_and(|stride| stride > 252) {
-            return Err("it has a stride of more than 252 bytes".to_owned());
-        }
-    }
-    if accessor.offset() > u32::MAX as usize {
-        return Err("it reads beyond its buffer".to_owned());
-    }
-    Ok(())
-}
-
 #[cfg(test)]
-pub(super) mod tests;
+pub(in crate::scene) mod tests;

@@ -3,8 +3,9 @@
 use super::super::key::{Interval, Key};
 
 pub(in super::super) const KEYS: &[Key] = &[
-    Key::table("camera", CAMERA)
-        .about("Where the picture is taken from: a camera, still, keyframed or from a glTF file"),
+    Key::table("camera", CAMERA).about(
+        "Where the picture is taken from: a camera, still, keyframed or from a file of glTF or USD",
+    ),
     Key::table("image", IMAGE)
         .default("{}")
         .about("Size and sampling"),
@@ -95,12 +96,12 @@ const CAMERA: &[Key] = &[
     Key::table("lens", LENS)
         .absent()
         .about("A thin lens in place of the pinhole: depth of field"),
-    Key::text("file", "a glTF file (.glb, .gltf), relative to the look file")
+    Key::text("file", "a glTF file (.glb, .gltf) or USD as text (.usda), relative to the look file")
         .absent()
         .about(
             "camera from a file, animated, instead of `position`, `target` and `focal_length_mm`; frame k is at k / fps seconds",
         ),
-    Key::text("name", "the name of a camera's node, or of a camera, in `file`")
+    Key::text("name", "the name of a camera's node, or of a camera, in `file`; of USD its path will do too")
         .absent()
         .with("file")
         .about("which of its cameras; may be left out where there is one"),

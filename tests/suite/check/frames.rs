@@ -111,6 +111,7 @@ fn tank(method: Method, speed: f64) -> (Scene, Start) {
                 &placed.mesh,
             )),
             placed,
+            track: None,
             slide: Some(Slide {
                 direction: DVec3::new(0.6, 0.0, 0.8),
                 motion: Motion::ConstantVelocity {

@@ -3,7 +3,11 @@
 use std::{collections::BTreeMap, fs, path::Path};
 
 use glam::DVec3;
-use swell::domain::{mesh::TriangleMesh, mesh_file::MeshFormat};
+use swell::{
+    domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
+    render::eye,
+    scene::look::Look,
+};
 use tempfile::TempDir;
 
 use crate::support::{
@@ -184,6 +188,25 @@ fn a_shot_names_its_layers_and_its_camera() {
     assert!(job.path("s.0003.usda").is_file() && job.path("s.manifest.usda").is_file());
     assert!(!job.path("s.0002.usda").exists());
     // More frames: the root follows, the layers stand.
+    // The shot's camera, read by a look, is the look's own.
+    let text = crate::support::job::LOOK.replace("focal_length_mm = 35.0", "file = \"s.usda\"");
+    let is_of_camera = |line: &&str| !line.starts_with("position") && !line.starts_with("target");
+    let lines: Vec<_> = text.lines().filter(is_of_camera).collect();
+    job.write("again.toml", &lines.join("\n"));
+    let per_second = job.json(0, "inspect cache")["frames_per_second"]
+        .as_f64()
+        .unwrap();
+    for frame in [1.0, 3.0] {
+        let [own, again] = ["look.toml", "again.toml"].map(|file| {
+            let look = Look::load(&job.path(file)).unwrap();
+            eye(&look, DVec3::ZERO, frame, per_second)
+        });
+        assert!((own.position - again.position).length() < 1e-12);
+        assert!((own.forward - again.forward).length() < 1e-12);
+        assert!((own.up - again.up).length() < 1e-12);
+        // The layer has lengths in 32 bits.
+        assert!((own.focal / again.focal - 1.0).abs() < 3e-7);
+    }
     let said = job.expect(0, "export cache --usd s.usda --look look.toml --frames 1-4");
     assert!(
         said.contains("2 stood") || said.contains("3 stood"),

@@ -64,6 +64,7 @@ fn case(spin: f64, angle: f64) -> (Scene, Boundary, Particles) {
         placed: placed(mesh),
         slide: None,
         turn: Some(turn),
+        track: None,
     }];
     let back = DMat2::from_angle(-angle);
     let all = lattice([0.0; 3], [48, 48, 2 * DEEP], [DX / 2.0; 3]);

@@ -200,6 +200,7 @@ pub fn mover(bounds: Bounds, direction: DVec3, motion: Motion) -> MovingSolid {
         placed: placed(box_mesh(bounds)),
         slide: Some(Slide { direction, motion }),
         turn: None,
+        track: None,
     }
 }
 

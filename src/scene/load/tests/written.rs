@@ -44,6 +44,10 @@ motion = { kind = "KIND" }
 pivot = [6.5, 0.5, 2.5]
 axis = [0.0, 1.0, 0.0]
 turn = { kind = "TURN" }
+[[solid]]
+mesh = "cube.obj"
+translate = [8.0, 0.0, 2.0]
+track = { poses = [[0, 8, 0, 2, 0, 0, 0, 1], [1, 8, 1, 2, 0, 1, 0, 0]] }
 [[wave_maker]]
 wall = "+x"
 motion = { kind = "KIND" }
@@ -157,7 +161,7 @@ generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", signif
     let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
     // A motion's file is written as the points that were read from it, walls as those that are no-slip.
-    let read = ["motion.file", "turn.file"];
+    let read = ["motion.file", "turn.file", "track.file", "track.node"];
     let missing: Vec<_> = keys::paths(keys::SCENE)
         .into_iter()
         .filter(|key| !read.iter().any(|file| key.ends_with(file)) && key != "domain.walls")

@@ -54,6 +54,11 @@ impl<T: Blend> Track<T> {
         }
     }
 
+    /// Whether it jumps from key to key.
+    pub(super) fn jumps(&self) -> bool {
+        self.interpolation == Interpolation::Step && self.times.len() > 1
+    }
+
     /// The first value before the first time, the last one after the last (glTF 2.0, appendix C).
     pub(super) fn at(&self, seconds: f64) -> T {
         let is_cubic = self.interpolation == Interpolation::CubicSpline;

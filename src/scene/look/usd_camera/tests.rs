@@ -1,0 +1,232 @@
+//! Layers of others, against the matrices that usd-core 26.11 has of them (ComputeLocalToWorldTransform).
+
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use glam::DVec3;
+
+use super::super::camera_file::{CameraFile, CameraFileError};
+
+/// As Blender 4.5.15 writes a camera under an empty, less what it says of itself.
+const BLENDER: &str = include_str!("blender.usda");
+
+/// By usd-core 26.11: operations of every kind that others write, centimetres, y up.
+const OPERATIONS: &str = r#"#usda 1.0
+(
+    defaultPrim = "a"
+    metersPerUnit = 0.01
+    timeCodesPerSecond = 25
+    upAxis = "Y"
+)
+
+def Xform "a"
+{
+    quatf xformOp:orient = (0.9238795, 0, 0.3826834, 0)
+    float xformOp:rotateY = 30
+    float3 xformOp:scale = (1.5, 1.5, 1.5)
+    double3 xformOp:translate = (100, 20, -30)
+    double3 xformOp:translate:pivot = (5, 6, 7)
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateY", "xformOp:translate:pivot", "xformOp:orient", "!invert!xformOp:translate:pivot", "xformOp:scale"]
+
+    def Xform "b"
+    {
+        float xformOp:rotateX = 5
+        float3 xformOp:rotateZYX = (10, 20, 30)
+        uniform token[] xformOpOrder = ["xformOp:rotateZYX", "xformOp:rotateX"]
+
+        def Camera "cam"
+        {
+            float focalLength = 50
+            float horizontalAperture = 36
+            float verticalAperture = 20.25
+            matrix4d xformOp:transform.timeSamples = {
+                0: ( (1, 0, 0, 0), (0, 0.984807753012208, -0.17364817766693033, 0), (0, 0.17364817766693033, 0.984807753012208, 0), (0, 0, 50, 1) ),
+                10: ( (1, 0, 0, 0), (0, 0.9396926207859084, -0.34202014332566877, 0), (0, 0.34202014332566877, 0.9396926207859084, 0), (10, 20, 50, 1) ),
+            }
+            uniform token[] xformOpOrder = ["xformOp:transform"]
+        }
+    }
+}
+"#;
+
+fn camera(text: &str, name: Option<&str>) -> Result<CameraFile, CameraFileError> {
+    CameraFile::read(text.as_bytes(), name, &|_| {
+        unreachable!("USD names no files here")
+    })
+}
+
+/// Second, third and last row of the matrix at a time code: up, back, place.
+type Row = (f64, [f64; 3], [f64; 3], [f64; 3]);
+
+fn assert_stands(
+    camera: &CameraFile,
+    per_second: f64,
+    rows: &[Row],
+    to_world: impl Fn(DVec3) -> DVec3,
+) {
+    for (code, up, back, place) in rows {
+        let [up, back, place] = [up, back, place].map(|row| to_world(DVec3::from(*row)));
+        let stand = camera.at(code / per_second);
+        // OpenUSD keeps most numbers in 32 bits.
+        assert!(
+            (stand.position - place).length() < 1e-6,
+            "{code}: {}",
+            stand.position
+        );
+        assert!(
+            (stand.forward + back.normalize()).length() < 1e-6,
+            "{code}: {}",
+            stand.forward
+        );
+        let upright = up - up.project_onto(back);
+        assert!(
+            (stand.up - upright.normalize()).length() < 1e-6,
+            "{code}: {}",
+            stand.up
+        );
+    }
+}
+
+#[test]
+fn a_camera_of_blender_stands_where_usd_says() {
+    let camera = camera(BLENDER, None).unwrap();
+    let rows: [Row; 4] = [
+        (
+            0.0,
+            [0.058024062, 0.536472493, 1.92583255],
+            [1.175150032, -1.567788006, 0.401326691],
+            [3.912067407, -5.682172509, 4.517927504],
+        ),
+        (
+            2.5,
+            [0.113200129, 0.54350218, 1.921403561],
+            [1.188694991, -1.564672961, 0.37256233],
+            [4.272478226, -5.625546798, 4.977741366],
+        ),
+        (
+            5.0,
+            [0.226199657, 0.55843811, 1.907087077],
+            [1.212170606, -1.559714245, 0.312943843],
+            [5.010462718, -5.509599309, 5.919264969],
+        ),
+        (
+            7.0,
+            [0.226199657, 0.55843811, 1.907087077],
+            [1.212170606, -1.559714245, 0.312943843],
+            [5.010462718, -5.509599309, 5.919264969],
+        ),
+    ];
+    // Blender's z is up.
+    assert_stands(&camera, 24.0, &rows, |v| DVec3::new(v.x, v.z, -v.y));
+    // A zoom from 36 to 40 mm on a film of 20.25, by the field of view that usd-core has: 31.4173° at first, 30.3640° at 2.5.
+    for (code, focal, yfov) in [
+        (1.0, 36.0, 31.417_274_5),
+        (2.5, 37.3125, 30.364_011_8),
+        (5.0, 40.0, 28.409_271_2f64),
+    ] {
+        let found = camera.focal_length_mm(20.25, code / 24.0);
+        assert!((found - focal).abs() < 1e-4, "{code}: {found}");
+        assert!((found - 10.125 / (0.5 * yfov.to_radians()).tan()).abs() < 1e-4);
+    }
+    assert!((camera.longest_focal_length_mm(20.25) - 40.0).abs() < 1e-4);
+    assert!((camera.aspect_ratio().unwrap() - 16.0 / 9.0).abs() < 1e-6);
+    // Control: the same with y up stands elsewhere.
+    let other = CameraFile::read(
+        BLENDER
+            .replace("upAxis = \"Z\"", "upAxis = \"Y\"")
+            .as_bytes(),
+        None,
+        &|_| unreachable!(),
+    );
+    assert!((other.unwrap().at(0.0).position - camera.at(0.0).position).length() > 1.0);
+}
+
+#[test]
+fn operations_are_those_of_usd() {
+    let found = camera(OPERATIONS, Some("/a/b/cam")).unwrap();
+    let rows: [Row; 3] = [
+        (
+            0.0,
+            [0.149995052, 1.251393361, 0.813336425],
+            [1.492359438, -0.136216092, -0.065639036],
+            [171.956590338, 2.427557978, -33.713736131],
+        ),
+        (
+            5.0,
+            [0.019282923, 1.253714461, 0.81285727],
+            [1.494046476, -0.02653029, 0.00547676],
+            [176.120705732, 18.593626127, -32.111118397],
+        ),
+        (
+            10.0,
+            [-0.111429206, 1.25603556, 0.812378116],
+            [1.495733513, 0.083155513, 0.076592557],
+            [180.284821126, 34.759694275, -30.508500663],
+        ),
+    ];
+    assert_stands(&found, 25.0, &rows, |v| 0.01 * v);
+    // Control: without the inverse of the pivot it stands elsewhere.
+    let other = camera(&OPERATIONS.replace("!invert!", ""), None).unwrap();
+    assert!((other.at(0.0).position - found.at(0.0).position).length() > 1e-2);
+}
+
+#[test]
+fn what_gives_no_camera_says_why() {
+    let two = BLENDER.replace(
+        "def Xform \"plan\"\n    {",
+        "def Xform \"plan\"\n    {\n        def Camera \"second\"\n        {\n        }\n",
+    );
+    assert!(camera(&two, Some("shot_010")).is_ok() && camera(&two, Some("second")).is_ok());
+    let without = OPERATIONS.replace("def Camera", "def Xform");
+    let deep = format!("#usda 1.0\n{}", "def Xform \"a\" {\n".repeat(400));
+    for (text, name, words) in [
+        ("PXR-USDC\0\0", None, "usdcat camera.usdc -o camera.usda"),
+        ("PK\x03\x04", None, "a USD package"),
+        (
+            two.as_str(),
+            None,
+            "2 cameras: /root/plan/second, /root/rig/shot_010/lens",
+        ),
+        (BLENDER, Some("gate"), "no camera is called \"gate\""),
+        (&without, None, "no prim of it is a Camera"),
+        (
+            &OPERATIONS.replace("rotateZYX = (10, 20, 30)", "rotateZYX = (10, 20)"),
+            None,
+            "not 3 numbers",
+        ),
+        (
+            &OPERATIONS.replace("xformOp:rotateX\"", "xformOp:shear\""),
+            None,
+            "not a transform",
+        ),
+        (
+            &OPERATIONS.replace("float focalLength = 50", "float focalLength = 0"),
+            None,
+            "focalLength",
+        ),
+        (
+            &OPERATIONS.replace("upAxis = \"Y\"", "upAxis = \"X\""),
+            None,
+            "neither Y nor Z",
+        ),
+        (
+            &OPERATIONS.replace(
+                "float focalLength",
+                "token projection = \"orthographic\"\nfloat focalLength",
+            ),
+            None,
+            "orthographic",
+        ),
+        (&OPERATIONS[..OPERATIONS.len() - 3], None, "ends too early"),
+        (&deep, None, "prims within prims"),
+        (
+            &OPERATIONS.replace("float focalLength = 50", "float focalLength = 5.0.0"),
+            None,
+            "line 26: \"5.0.0\" is no number",
+        ),
+    ] {
+        let error = camera(text, name).err().map(|error| error.to_string());
+        let error = error.unwrap_or_else(|| panic!("{words}"));
+        assert!(error.contains(words), "{words}: {error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+}

@@ -1,0 +1,252 @@
+//! Poses of a solid over time: an animation of a glTF's node, or as a scene was written out.
+
+use std::path::Path;
+
+use glam::{DMat3, DMat4, DQuat, DVec3};
+use gltf::Gltf;
+
+use super::{
+    Shot,
+    document::Document,
+    error::SceneError,
+    gltf_nodes::{Nodes, named},
+    spec::TrackSpec,
+    words::shown,
+};
+use crate::domain::{mesh::TriangleMesh, pose::Pose};
+
+/// By how much lengths may change before a solid counts as one that changes its size.
+const RIGID: f64 = 1e-3;
+
+/// Names that an error lists.
+const MOST_NAMES: usize = 12;
+
+/// Poses at most: hours of them.
+const MOST_POSES: usize = 1_000_000;
+
+type Result<T> = std::result::Result<T, SceneError>;
+
+/// Where a solid stands at some times: between them it goes straight and turns the shorter way, evenly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    /// Seconds, ascending from 0 on, with where the point of rest is, metres about the scene's origin, and how the solid is
+    /// turned; the first is not.
+    poses: Vec<(f64, DVec3, DQuat)>,
+    /// From the point of rest to the solid's farthest point, metres.
+    reach: f64,
+}
+
+impl Track {
+    /// Through poses that stand as [`Self::poses`] has them; words where they are none.
+    fn new(
+        poses: Vec<(f64, DVec3, DQuat)>,
+        mesh: &TriangleMesh,
+    ) -> std::result::Result<Self, String> {
+        let [(start, rest, _), ..] = poses[..] else {
+            return Err("no poses".to_owned());
+        };
+        if start != 0.0 {
+            return Err(format!("the first pose is at {} s, not at 0", shown(start)));
+        }
+        let is_finite =
+            |(t, x, q): &(f64, DVec3, DQuat)| t.is_finite() && x.is_finite() && q.is_finite();
+        if let Some(k) = poses.iter().position(|pose| !is_finite(pose)) {
+            return Err(format!("pose {k} has a number that is none"));
+        }
+        let unit = |(_, _, q): &(f64, DVec3, DQuat)| (q.length() - 1.0).abs() < 1e-6;
+        if let Some(k) = poses.iter().position(|pose| !unit(pose)) {
+            return Err(format!("the quaternion of pose {k} is no unit one"));
+        }
+        if let Some(k) = poses
+            .windows(2)
+            .position(|pair| pair[1].0 - pair[0].0 < 1e-6)
+        {
+            let (after, before) = (poses[k + 1].0, poses[k].0);
+            return Err(format!(
+                "the time of pose {}, {} s, is not a microsecond after {} s",
+                k + 1,
+                shown(after),
+                shown(before)
+            ));
+        }
+        let away = mesh.vertices.iter().map(|x| x.distance(rest));
+        Ok(Self {
+            reach: away.fold(0.0, f64::max),
+            poses,
+        })
+    }
+
+    /// Where the solid stands at time `t`, seconds.
+    pub fn pose(&self, t: f64) -> Pose {
+        let rest = self.poses[0].1;
+        let next = self.poses.partition_point(|(time, ..)| *time <= t);
+        let (centre, turn) = match (next.checked_sub(1), self.poses.get(next)) {
+            (None, _) => (rest, DQuat::IDENTITY),
+            (Some(last), None) => (self.poses[last].1, self.poses[last].2),
+            (Some(before), Some((after, there, turned))) => {
+                let (time, here, turn) = self.poses[before];
+                let part = (t - time) / (after - time);
+                (here.lerp(*there, part), turn.slerp(*turned, part))
+            }
+        };
+        Pose { rest, centre, turn }
+    }
+
+    /// An upper bound on the speed of its points within `[t0, t1]`, m/s.
+    pub fn peak_speed(&self, t0: f64, t1: f64) -> f64 {
+        let pairs = self.poses.windows(2);
+        let pairs = pairs.filter(|pair| pair[0].0 <= t1 && pair[1].0 >= t0);
+        let speed = |pair: &[(f64, DVec3, DQuat)]| {
+            let angle = pair[0].2.angle_between(pair[1].2);
+            (pair[0].1.distance(pair[1].1) + self.reach * angle) / (pair[1].0 - pair[0].0)
+        };
+        pairs.map(speed).fold(0.0, f64::max)
+    }
+
+    /// Where its point of rest comes, and how far from there the solid reaches.
+    pub(super) fn places(&self) -> (impl Iterator<Item = DVec3> + '_, f64) {
+        (self.poses.iter().map(|(_, centre, _)| *centre), self.reach)
+    }
+
+    /// With another origin of all coordinates.
+    pub(super) fn carry(&mut self, way: DVec3) {
+        for (_, centre, _) in &mut self.poses {
+            *centre += way;
+        }
+    }
+
+    /// Rows of seconds, place and quaternion, about the world's origin.
+    pub(super) fn written(&self, origin: DVec3) -> Vec<[f64; 8]> {
+        let row = |(t, x, q): &(f64, DVec3, DQuat)| {
+            let x = *x + origin;
+            [*t, x.x, x.y, x.z, q.x, q.y, q.z, q.w]
+        };
+        self.poses.iter().map(row).collect()
+    }
+}
+
+/// The track at `path` of a solid that stands as `mesh` at the start.
+pub(super) fn build(
+    doc: &Document<'_>,
+    path: &str,
+    (base_dir, shot): (&Path, &Shot),
+    spec: &TrackSpec,
+    mesh: &TriangleMesh,
+) -> Result<Track> {
+    let at = |key: &str| format!("{path}.{key}");
+    let Some(file) = &spec.file else {
+        let rows = spec.poses.as_deref().unwrap_or_default();
+        let pose = |[t, x, y, z, a, b, c, d]: &[f64; 8]| {
+            (*t, DVec3::new(*x, *y, *z), DQuat::from_xyzw(*a, *b, *c, *d))
+        };
+        let poses = rows.iter().map(pose).collect();
+        return Track::new(poses, mesh).map_err(|problem| doc.fault_of(&at("poses"), problem));
+    };
+    let file_key = at("file");
+    let found = doc.find(base_dir, &file_key, file)?;
+    let fault = |key: &str, problem: String| {
+        doc.fault_of_plain(key, format!("{}: {problem}", found.display()))
+    };
+    let bytes = std::fs::read(&found).map_err(|error| fault(&file_key, error.to_string()))?;
+    let beside = found.parent().unwrap_or(Path::new("."));
+    let read = |name: &str| {
+        let path = doc.reach().find(beside, Path::new(name))?;
+        std::fs::read(&path).map_err(|error| format!("cannot read {}: {error}", path.display()))
+    };
+    let Gltf { document, blob } =
+        Gltf::from_slice(&bytes).map_err(|error| fault(&file_key, error.to_string()))?;
+    let node = choose(&document, spec.node.as_deref()).map_err(|problem| {
+        let key = spec.node.as_ref().map_or(file_key.clone(), |_| at("node"));
+        fault(&key, problem)
+    })?;
+    let nodes = Nodes::read(&bytes, (&document, blob), &node, &read)
+        .map_err(|error| fault(&file_key, error.to_string()))?;
+    let poses = sampled(&nodes, shot).map_err(|problem| {
+        let problem = format!("node {}: {problem}", named(&node));
+        fault(&file_key, problem)
+    })?;
+    Track::new(poses, mesh).map_err(|problem| fault(&file_key, problem))
+}
+
+/// The node of this name, or the only one.
+fn choose<'a>(
+    document: &'a gltf::Document,
+    name: Option<&str>,
+) -> std::result::Result<gltf::Node<'a>, String> {
+    let all: Vec<_> = document.nodes().collect();
+    let names = || {
+        let mut names: Vec<_> = all.iter().take(MOST_NAMES).map(named).collect();
+        if all.len() > MOST_NAMES {
+            names.push("…".to_owned());
+        }
+        names.join(", ")
+    };
+    let Some(name) = name else {
+        return match &all[..] {
+            [only] => Ok(only.clone()),
+            [] => Err("it has no nodes".to_owned()),
+            several => Err(format!(
+                "it has {} nodes: {}; name one as node",
+                several.len(),
+                names()
+            )),
+        };
+    };
+    let found: Vec<_> = all
+        .iter()
+        .filter(|node| node.name() == Some(name))
+        .collect();
+    match found[..] {
+        [only] => Ok(only.clone()),
+        [] => Err(format!("no node is called {name:?}; there are {}", names())),
+        _ => Err(format!(
+            "{} nodes are called {name:?}; give each a name of its own",
+            found.len()
+        )),
+    }
+}
+
+/// A node's poses at its keys and at each frame, from where it stands at the shot's start.
+fn sampled(nodes: &Nodes, shot: &Shot) -> std::result::Result<Vec<(f64, DVec3, DQuat)>, String> {
+    if nodes.jumps() {
+        return Err(
+            "its keys are joined by steps, and a solid cannot jump; make them linear".to_owned(),
+        );
+    }
+    let end = shot.duration();
+    let frames = (0..=shot.frames).map(|frame| shot.time(frame));
+    let keys = nodes.times().filter(|time| (0.0..=end).contains(time));
+    let mut times: Vec<f64> = frames.chain(keys).collect();
+    times.sort_unstable_by(f64::total_cmp);
+    times.dedup_by(|after, before| *after - *before < 1e-6);
+    if times.len() > MOST_POSES {
+        return Err(format!("{} poses; allowed: {MOST_POSES}", times.len()));
+    }
+    let start = nodes.at(0.0);
+    let back = DMat3::from_mat4(start).inverse();
+    let mut before = DQuat::IDENTITY;
+    let mut poses = Vec::new();
+    for time in times {
+        let now: DMat4 = nodes.at(time);
+        let from_start = DMat3::from_mat4(now) * back;
+        let strain = from_start.transpose() * from_start - DMat3::IDENTITY;
+        let most = strain.to_cols_array().map(f64::abs);
+        // What is not finite is no less than anything.
+        if !most.iter().all(|part| *part < RIGID) || from_start.determinant() < 0.0 {
+            return Err(format!(
+                "at {} s it has another size or shape than at the start; a solid keeps them",
+                shown(time)
+            ));
+        }
+        let turn = DQuat::from_mat3(&from_start).normalize();
+        // Of the two quaternions of a turn the one that is nearer to the last.
+        let turn = if turn.dot(before) < 0.0 { -turn } else { turn };
+        before = turn;
+        poses.push((time, now.w_axis.truncate(), turn));
+    }
+    poses[0].2 = DQuat::IDENTITY;
+    Ok(poses)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use std::{f64::consts::FRAC_PI_2, path::Path};
+
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use crate::scene::{Scene, look::camera_file::tests::glb};
+
+const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
+    f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+
+const SCENE: &str = r#"
+[shot]
+name = "door"
+frames = 20
+frames_per_second = 10
+[domain]
+min = [0, 0, 0]
+max = [8, 4, 4]
+[[water.block]]
+min = [0, 0, 0]
+max = [8, 1, 4]
+[[solid]]
+mesh = "cube.obj"
+translate = [3.0, 0.5, 1.0]
+track = { file = "door.glb", node = "door" }
+[solver]
+method = "flip"
+[solver.flip]
+cell_size = 0.25
+"#;
+
+/// A door at (3, 0, 1) that hangs under a cart; the cart goes 2 m along x within two seconds, and the door makes a quarter turn
+/// about y in the second of them.
+fn file(path: &str, interpolation: &str, last: [f32; 4]) -> Vec<u8> {
+    // Times, then translations; times, then rotations.
+    let mut numbers = vec![0.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0, 2.0];
+    let values: Vec<f32> = match path {
+        "rotation" => [[0.0, 0.0, 0.0, 1.0], last].concat(),
+        _ => vec![1.0, 1.0, 1.0, 2.0, 2.0, 2.0],
+    };
+    numbers.extend(&values);
+    let kind = if path == "rotation" { "VEC4" } else { "VEC3" };
+    let view = |at: usize, count: usize| json!({ "buffer": 0, "byteOffset": 4 * at, "byteLength": 4 * count });
+    let of = |view: usize, count: usize, kind: &str| -> Value {
+        let mut accessor =
+            json!({ "bufferView": view, "componentType": 5126, "count": count, "type": kind });
+        if kind == "SCALAR" {
+            let first = [0.0, 1.0][view / 2];
+            accessor["min"] = json!([first]);
+            accessor["max"] = json!([2.0]);
+        }
+        accessor
+    };
+    let document = json!({
+        "asset": { "version": "2.0" },
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [
+            { "name": "cart", "children": [1] },
+            { "name": "door", "translation": [3.0, 0.0, 1.0] },
+        ],
+        "buffers": [{ "byteLength": 4 * numbers.len() }],
+        "bufferViews": [view(0, 2), view(2, 6), view(8, 2), view(10, values.len())],
+        "accessors": [of(0, 2, "SCALAR"), of(1, 2, "VEC3"), of(2, 2, "SCALAR"), of(3, 2, kind)],
+        "animations": [{
+            "samplers": [
+                { "input": 0, "output": 1, "interpolation": "LINEAR" },
+                { "input": 2, "output": 3, "interpolation": interpolation },
+            ],
+            "channels": [
+                { "sampler": 0, "target": { "node": 0, "path": "translation" } },
+                { "sampler": 1, "target": { "node": 1, "path": path } },
+            ],
+        }],
+    });
+    glb(&document, &numbers)
+}
+
+fn load(bytes: &[u8], set: &[&str]) -> Result<Scene, String> {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("cube.obj"), CUBE).unwrap();
+    std::fs::write(dir.path().join("door.glb"), bytes).unwrap();
+    let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
+    let scene = Scene::parse(SCENE, Path::new("s.toml"), dir.path(), &set);
+    let scene = scene.map_err(|error| error.to_string())?;
+    // Written out it has the poses in place, and is the same scene.
+    let written = scene.to_toml(&|_, _| "cube.obj".to_owned());
+    assert!(
+        written.contains("poses = ") && !written.contains("door.glb"),
+        "{written}"
+    );
+    let again = Scene::parse(&written, Path::new("w.toml"), dir.path(), &[]).unwrap();
+    assert_eq!(scene, again);
+    Ok(scene)
+}
+
+/// A quarter turn about y.
+fn quarter() -> [f32; 4] {
+    let (sin, cos) = (std::f32::consts::FRAC_PI_4).sin_cos();
+    [0.0, sin, 0.0, cos]
+}
+
+#[test]
+fn a_solid_goes_as_its_node_does() {
+    let scene = load(&file("rotation", "LINEAR", quarter()), &[]).unwrap();
+    let solid = &scene.moving_solids[0];
+    let corner = DVec3::new(4.0, 0.5, 1.0);
+    for (t, expected) in [
+        (0.0, corner),
+        (0.5, corner + 0.5 * DVec3::X),
+        (1.0, corner + DVec3::X),
+        // The cart is 2 m on, and what was a metre along x from the hinge is a metre along -z.
+        (2.0, DVec3::new(5.0, 0.5, 0.0)),
+        (9.0, DVec3::new(5.0, 0.5, 0.0)),
+    ] {
+        let at = solid.pose(t).place(corner);
+        // f32 of the file.
+        assert!((at - expected).length() < 1e-6, "{t}: {at}");
+    }
+    // 1 m/s, and from a second on a quarter turn a second of the corner that is farthest from the hinge.
+    assert!((solid.peak_speed(0.0, 0.9) - 1.0).abs() < 1e-6);
+    let farthest = DVec3::new(1.0, 1.5, 1.0).length();
+    let most = 1.0 + FRAC_PI_2 * farthest;
+    assert!((solid.peak_speed(1.2, 1.4) / most - 1.0).abs() < 1e-6);
+    // Control: the other way round.
+    let [_, sin, _, cos] = quarter();
+    let other = load(&file("rotation", "LINEAR", [0.0, -sin, 0.0, cos]), &[]).unwrap();
+    let at = other.moving_solids[0].pose(2.0).place(corner);
+    assert!((at - DVec3::new(5.0, 0.5, 2.0)).length() < 1e-6, "{at}");
+}
+
+#[test]
+fn what_is_no_motion_of_a_solid_is_refused() {
+    let turns = file("rotation", "LINEAR", quarter());
+    let node = "solid[0].track={ file = \"door.glb\", node = \"gate\" }";
+    let any = "solid[0].track={ file = \"door.glb\" }";
+    let none = "solid[0].track={ file = \"none.glb\", node = \"door\" }";
+    let both = "solid[0].motion={ kind = \"sine\", stroke = 1, period = 1 }";
+    let late = "solid[0].track={ poses = [[1, 0, 0, 0, 0, 0, 0, 1]] }";
+    let long = "solid[0].track={ poses = [[0, 0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 0, 0, 2]] }";
+    for (bytes, set, words) in [
+        (
+            &turns,
+            &[node][..],
+            "no node is called \"gate\"; there are cart, door",
+        ),
+        (&turns, &[any], "it has 2 nodes: cart, door; name one"),
+        (&turns, &[none], "none.glb"),
+        (
+            &turns,
+            &[both, "solid[0].direction=[1, 0, 0]"],
+            "given together with",
+        ),
+        (&turns, &[late], "the first pose is at 1 s"),
+        (&turns, &[long], "no unit one"),
+        (&turns, &["domain.periodic=[\"z\"]"], "domain.periodic"),
+        (&file("rotation", "STEP", quarter()), &[], "joined by steps"),
+        (
+            &file("scale", "LINEAR", quarter()),
+            &[],
+            "another size or shape",
+        ),
+        (&b"no glTF".to_vec(), &[], "door.glb"),
+    ] {
+        let error = load(bytes, set).unwrap_err();
+        assert!(
+            error.contains(words) && error.contains("solid[0]"),
+            "{set:?}: {error}"
+        );
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+}
