@@ -368,7 +368,7 @@ def import_solids(cache: swell.Cache) -> list[Any]:
     material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.4, 0.34, 0.28, 1.0)
     for index, solid in enumerate(cache.scene.get("solid", [])):
         path = cache.assets[solid["mesh"].removeprefix("assets/")]
-        if "motion" in solid or path.suffix.lower() not in (".obj", ".ply"):
+        if {"motion", "turn", "track"} & solid.keys() or path.suffix.lower() not in (".obj", ".ply"):
             print(f"import_swell: solid {index} ({path.name}) is left out: it moves, or is neither OBJ nor PLY")
             continue
         position, _, corners, sizes = read_mesh(path)

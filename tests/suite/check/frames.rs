@@ -177,34 +177,52 @@ fn a_sphere_in_a_tank_of_pbf_is_within_tolerance() {
     );
 }
 
-/// The same where the sphere moves and turns: samples and distance go along, and what they do on the water is counted.
+/// The same where the sphere moves and turns: samples and distance go along, and what they do on the water is counted; by the
+/// iterations alone, and with velocities that a grid projects.
 #[test]
 fn a_sphere_that_moves_through_pbf_is_within_tolerance() {
     let context = context();
-    let (scene, start) = tank(Method::Pbf, 0.9);
-    let plan = start.plan(&scene, device_limits(&context));
-    let solver = Pbf::new(&context, &scene, plan, &start.boundary, false).unwrap();
-    let frames = FRAMES / 3;
-    let (faults, state) = follow(&context, &scene, &start, solver, frames);
-    assert!(faults.is_empty(), "{faults}");
-    for (pass, from, to) in [
-        (
-            "pbf/predict",
-            "share * solid_grids.length",
-            "0.99 * share * solid_grids.length",
-        ),
-        (
-            "pbf/compute_delta",
-            "rate -= params.gradient_scale",
-            "rate += params.gradient_scale",
-        ),
-        (
-            "pbf/compute_delta",
-            "cross(solid_spin, x - solid_centre)",
-            "cross(x - solid_centre, solid_spin)",
-        ),
-    ] {
-        spoils(&context, &scene, &start, (frames, &state), (pass, from, to));
+    for grid_projection in [true, false] {
+        let (mut scene, start) = tank(Method::Pbf, 0.9);
+        scene.solver.pbf.as_mut().unwrap().grid_projection = grid_projection;
+        let plan = start.plan(&scene, device_limits(&context));
+        let solver = Pbf::new(&context, &scene, plan, &start.boundary, false).unwrap();
+        let frames = if grid_projection { 2 } else { FRAMES / 3 };
+        let (faults, mut state) = follow(&context, &scene, &start, solver, frames);
+        assert!(faults.is_empty(), "{faults}");
+        if grid_projection {
+            // One is put into the sphere, on the side that comes towards it.
+            let time = f64::from(frames) * scene.shot.frame_seconds();
+            let within =
+                scene.moving_solids[0].pose(time).place(SPHERE.0) + 0.5 * SPHERE.1 * DVec3::X;
+            state.position[0] = within.as_vec3().to_array();
+            let place = (
+                "pbf/predict",
+                "share * solid_grids.length",
+                "0.99 * share * solid_grids.length",
+            );
+            spoils(&context, &scene, &start, (frames, &state), place);
+            continue;
+        }
+        for (pass, from, to) in [
+            (
+                "pbf/predict",
+                "share * solid_grids.length",
+                "0.99 * share * solid_grids.length",
+            ),
+            (
+                "pbf/compute_delta",
+                "rate -= params.gradient_scale",
+                "rate += params.gradient_scale",
+            ),
+            (
+                "pbf/compute_delta",
+                "cross(solid_spin, x - solid_centre)",
+                "cross(x - solid_centre, solid_spin)",
+            ),
+        ] {
+            spoils(&context, &scene, &start, (frames, &state), (pass, from, to));
+        }
     }
 }
 
