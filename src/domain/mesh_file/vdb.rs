@@ -121,6 +121,9 @@ fn all_grids(bytes: &[u8]) -> Result<Vec<GridFile>, String> {
             Some(MetadataValue::Vec3i(corner)) => Some(corner.to_array()),
             _ => None,
         };
+        if found.end_pos > bytes.len() as u64 {
+            return Err(format!("torn: grid {} ends beyond the file", found.name));
+        }
         let voxel_size = match found.grid_type.starts_with("Tree_float_5_4_3") {
             true => Some(scale_of(
                 &reader.read_grid::<f32>(&found.name).map_err(fail)?,

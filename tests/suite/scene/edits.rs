@@ -221,9 +221,13 @@ fn expected(key: &str, solver: &str) -> Option<String> {
 }
 
 /// Keys that cannot be edited alone: the hash of a file is of that file, each kind of motion or probe has keys of its own,
-/// and a table of displacements begins at 0.
+/// a table of displacements begins at 0, and a cache's frames are compressed alike: another compression is refused by words
+/// of its own.
 fn is_bound(key: &str) -> bool {
-    key.ends_with(".blake3") || key.ends_with(".kind") || key.ends_with(".points[0][1]")
+    let is_own = |end: &&str| key.ends_with(end);
+    [".blake3", ".kind", ".points[0][1]", "keep.compression"]
+        .iter()
+        .any(is_own)
 }
 
 /// Keys that were refused, that were allowed, and that took no other value.
