@@ -62,6 +62,16 @@ pub fn decode(bytes: &[u8], file: &Path) -> Result<Particles, CacheError> {
     parse(bytes).map_err(|what| CacheError::damaged(file, what))
 }
 
+/// The comments of a frame's header, in their order; as far as the stream can be read.
+pub fn comments(bytes: &[u8]) -> Vec<String> {
+    let mut head = Vec::new();
+    if let Ok(stream) = zstd::Decoder::with_buffer(bytes) {
+        // A torn stream gives what comes before the tear.
+        let _ = stream.take(HEADER_LIMIT as u64).read_to_end(&mut head);
+    }
+    super::comments(&head)
+}
+
 fn parse(mut bytes: &[u8]) -> Result<Particles, String> {
     let stream = zstd::Decoder::with_buffer(&mut bytes).map_err(fault)?;
     let particles = read(stream.single_frame())?;

@@ -103,7 +103,7 @@ pub(super) fn read_png_header(path: &Path) -> Result<Attributes, RenderError> {
 /// Width and height, channels as an EXR would name them, and bits of each; of the header alone. A palette's pixels are colours.
 ///
 /// # Errors
-/// As [`read_png_header`].
+/// As `read_png_header`.
 pub fn png_header(path: &Path) -> Result<([usize; 2], &'static [&'static str], u8), RenderError> {
     let (reader, _) = open(path)?;
     let info = reader.info();

@@ -107,6 +107,9 @@ pub enum FileError {
         /// Why it is no mesh.
         mesh: String,
     },
+    /// A compressed frame.
+    #[error(transparent)]
+    Frame(#[from] CacheError),
     /// No OpenVDB file, or a damaged one.
     #[error("{}: {detail}", file.display())]
     Vdb {
@@ -130,7 +133,7 @@ impl From<&FileError> for Blame {
 }
 
 /// Endings that [`describe`] knows, in lower case.
-const ENDINGS: [&str; 6] = ["ply", "obj", "stl", "vdb", "png", "exr"];
+const ENDINGS: [&str; 7] = ["ply", "zst", "obj", "stl", "vdb", "png", "exr"];
 
 /// The file's ending where `describe` knows it.
 fn ending(file: &Path) -> Option<&'static str> {
@@ -150,6 +153,12 @@ pub fn is_known(file: &Path) -> bool {
 pub fn describe(file: &Path) -> Result<FileContents, FileError> {
     match ending(file) {
         Some("ply") => ply(file),
+        Some("zst") => {
+            let bytes = read(file)?;
+            let particles = frame::planes::decode(&bytes, file)?;
+            let comments = frame::planes::comments(&bytes);
+            Ok(FileContents::Frame(frame_file(&particles, comments)))
+        }
         Some("vdb") => {
             let bytes = read(file)?;
             let grids = vdb::grids(&bytes).map_err(|detail| FileError::Vdb {

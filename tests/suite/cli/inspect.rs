@@ -168,6 +168,15 @@ fn inspect_knows_studies_frames_meshes_grids_and_pictures() {
         &["a frame of", "shot small", "frame 1", "velocity, id"],
     );
 
+    job.expect(
+        0,
+        "bake small.toml -o packed --frames 1-1 --device cpu --set keep={compression=\"zstd\"}",
+    );
+    let mut packed = object("packed/frames/small.0001.ply.zst");
+    let comments = packed["comments"].as_array_mut().unwrap();
+    assert_eq!(comments.pop(), Some("planes 131072".into()));
+    assert_eq!(packed, frame);
+
     let mesh = object("m.0001.ply");
     assert_eq!(
         (&mesh["kind"], &mesh["open_edges"]),
@@ -220,6 +229,7 @@ fn inspect_knows_studies_frames_meshes_grids_and_pictures() {
 
     for file in [
         "cache/frames/small.0001.ply",
+        "packed/frames/small.0001.ply.zst",
         "g.0001.vdb",
         "m.0001.ply",
         "day/small.0001.png",
