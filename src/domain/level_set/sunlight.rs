@@ -20,12 +20,6 @@ pub struct Sunlight {
     pub pitch: f64,
     /// Metres, x fastest.
     pub paths: Vec<f32>,
-    /// Of the box, metres.
-    size: DVec3,
-    /// Edge length of a voxel, metres.
-    voxel: f64,
-    /// Unit vector to where it comes from.
-    towards: DVec3,
 }
 
 /// Nodes along each axis over a box of `size` metres with voxels of `voxel` metres, and metres between them.
@@ -71,32 +65,11 @@ impl Sunlight {
             nodes,
             pitch,
             paths,
-            size: water.size,
-            voxel: water.voxel,
-            towards,
         }
     }
 
-    /// At `p`, metres from the box's least corner; beyond the box as where the light left it on its way to `p`.
+    /// At `p` in the box, metres from its least corner, trilinear between nodes.
     pub fn path(&self, p: DVec3) -> f64 {
-        let off = (p - p.clamp(DVec3::ZERO, self.size)).abs();
-        if off.max_element() <= 0.5 * self.voxel {
-            return self.within(p);
-        }
-        // A direction without a part along an axis meets that axis's sides nowhere.
-        let along = DVec3::from_array(
-            (self.towards.to_array()).map(|x| if x.abs() < 1e-6 { 1e-6 } else { x }),
-        );
-        let (low, high) = (-p / along, (self.size - p) / along);
-        let start = low.min(high).max_element().max(0.0);
-        if start > low.max(high).min_element() {
-            return 0.0;
-        }
-        self.within(p + along * start)
-    }
-
-    /// Within the box: trilinear between nodes.
-    fn within(&self, p: DVec3) -> f64 {
         let nodes = self.nodes.map(|n| n as usize);
         let last = DVec3::from_array(nodes.map(|n| (n - 1) as f64));
         let at = (p / self.pitch).clamp(DVec3::ZERO, last);
