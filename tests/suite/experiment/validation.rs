@@ -92,6 +92,7 @@ macro_rules! benchmarks {
 
 benchmarks! {
     a_piston_makes_the_waves_of_linear_theory: "piston, kh = 1",
+    a_flap_makes_the_waves_of_biesels_theory: "flap, kh = 1.8",
     a_zone_absorbs_the_waves_of_a_piston: "absorbing zone, kh = 2",
     waves_come_in_from_a_zone_as_theory_has_them: "generation zone, kh = 2",
     a_packet_meets_where_and_when_it_was_asked_to: "focused packet",
@@ -121,6 +122,23 @@ fn gravity_that_is_off_by_a_hundredth_fails_a_benchmark() {
         let missed = missed(&context, &benchmark(&text, "column at rest"));
         assert_eq!(missed.len(), 2, "{gravity}: {missed:?}");
     }
+}
+
+/// Negative control: a flap that swings by a third less makes lower waves; a fifth less is told by 0.85 of the height, which the gate still takes.
+#[test]
+fn a_flap_that_swings_less_fails_its_benchmark() {
+    let text = spoiled(
+        "scene = \"../validation/flap.toml\"",
+        "scene = \"../validation/flap.toml\"\nset = [\"solid.0.turn.swing_degrees=3.82\"]",
+    );
+    let missed = missed(
+        &crate::support::context(),
+        &benchmark(&text, "flap, kh = 1.8"),
+    );
+    assert!(
+        missed.iter().any(|it| it.starts_with("height_ratio")),
+        "{missed:?}"
+    );
 }
 
 /// Negative control: a wall in place of the zone turns a wave back, most of it.
