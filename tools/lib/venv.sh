@@ -7,6 +7,6 @@ venv() {
     rm -rf "$1"
     python3 -m venv "$1" || fail "python3 -m venv failed; install Python 3.10 or newer with its venv"
     # shellcheck disable=SC2086
-    "$1/bin/pip" install --quiet --disable-pip-version-check $2 || fail "pip could not install $2"
+    "$1/bin/python" -m pip install --quiet --disable-pip-version-check $2 || fail "pip could not install $2"
     echo "$2" >"$1/wanted"
 }

@@ -54,7 +54,7 @@ def environment(name: str, wanted: str) -> Path:
         say(f"installing {wanted} into {folder.relative_to(ROOT)}")
         shutil.rmtree(folder, ignore_errors=True)
         ran([sys.executable, "-m", "venv", folder])
-        ran([folder / "bin/pip", "install", "--quiet", "--disable-pip-version-check", *wanted.split()])
+        ran([folder / "bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted.split()])
         told.write_text(wanted)
     return folder / "bin/python"
 
