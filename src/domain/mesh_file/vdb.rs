@@ -1,5 +1,7 @@
 //! OpenVDB level sets, by vdb-rs: the surface where one is 0, in the grid's own world.
 
+mod half;
+
 use std::{
     any::Any,
     cell::Cell,
@@ -10,6 +12,8 @@ use std::{
 
 use glam::DVec3;
 use vdb_rs::{Grid, Map, MetadataValue, VdbLevel, VdbReader};
+
+use half::with_lengths;
 
 use super::Raw;
 use crate::domain::isosurface::sparse::{Band, around};
@@ -25,8 +29,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, String> {
     if !bytes.starts_with(&MAGIC) {
         return Err("no OpenVDB file".into());
     }
-    let grid = caught(|| grid(bytes))
-        .map_err(|panic| format!("damaged, or of a kind that vdb-rs does not read: {panic}"))??;
+    let bytes = with_lengths(bytes);
+    let grid = caught(|| grid(&bytes))
+        .map_err(|panic| format!("damaged, or of a kind that vdb-rs does not read: {panic}"))
+        .flatten()?;
     let (scale, origin) = match &grid.transform {
         Map::UniformScaleMap { scale_values, .. } => (scale_values.to_array(), [0.0; 3]),
         Map::ScaleTranslateMap {
@@ -77,7 +83,8 @@ fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
 fn words(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-    text.unwrap_or("it says no more").to_owned()
+    let lines = text.unwrap_or("it says no more").lines();
+    lines.map(str::trim).collect::<Vec<_>>().join(", ")
 }
 
 /// A grid of an OpenVDB file.
@@ -105,7 +112,8 @@ pub fn grids(bytes: &[u8]) -> Result<Vec<GridFile>, String> {
     if !bytes.starts_with(&MAGIC) {
         return Err("no OpenVDB file".into());
     }
-    caught(|| all_grids(bytes))
+    let bytes = with_lengths(bytes);
+    caught(|| all_grids(&bytes))
         .map_err(|panic| format!("damaged, or of a kind that vdb-rs does not read: {panic}"))?
 }
 

@@ -13,6 +13,8 @@ use crate::support::job::Job;
 
 const SPHERE: &[u8] = include_bytes!("files/sphere.vdb");
 const SHEARED: &[u8] = include_bytes!("files/sheared.vdb");
+/// The same by OpenVDB 12.0.0, voxels of 0.1 m, in half precision.
+const HALF: &[u8] = include_bytes!("files/half.vdb");
 const NONE: &[u8] = include_bytes!("files/no-level-set.vdb");
 
 const RADIUS: f64 = 0.4;
@@ -48,6 +50,18 @@ fn a_level_set_of_openvdb_is_the_mesh_around_its_inside() {
     assert!(moved > 5.0 * chord, "{moved}");
 }
 
+/// Values of half precision have 11 bits: they are off by 2⁻¹² of a voxel, and so is the place between two of them.
+#[test]
+fn a_level_set_of_half_precision_is_read() {
+    let mesh = read(HALF).unwrap();
+    assert!(mesh.open_edges().is_empty());
+    let voxel = 2.0 * VOXEL;
+    let most = voxel * voxel / (8.0 * RADIUS) + voxel / 2048.0;
+    assert!(off(&mesh, CENTRE) < most, "{}", off(&mesh, CENTRE));
+    let moved = off(&mesh, CENTRE + DVec3::X * 0.5 * voxel);
+    assert!(moved > 5.0 * most, "{moved}");
+}
+
 #[test]
 fn what_is_no_level_set_is_refused() {
     let told = |bytes: &[u8]| read(bytes).unwrap_err().to_string();
@@ -59,9 +73,11 @@ fn what_is_no_level_set_is_refused() {
     // The panic of vdb-rs is told, once.
     assert!(told(SHEARED).contains("vdb-rs does not read: Not supported AffineMap"));
     // The sphere is the first of its grids, and takes nearly all of the file.
-    for end in [0, 7, 40, 300, SPHERE.len() / 2] {
-        let said = told(&SPHERE[..end]);
-        assert!(said.contains("a.vdb"), "{end}: {said}");
+    for file in [SPHERE, HALF] {
+        for end in [0, 7, 40, 300, file.len() / 2] {
+            let said = told(&file[..end]);
+            assert!(said.contains("a.vdb"), "{end}: {said}");
+        }
     }
     let mut spoilt = SPHERE.to_vec();
     spoilt[0] = b'X';
