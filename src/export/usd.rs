@@ -383,6 +383,14 @@ fn put_camera(text: &mut Text, views: &[View]) {
     }
     let focal = samples(&|view| ((view.eye.focal / width * film) as f32).to_string());
     text.samples("float focalLength", &focal);
+    if views.iter().any(|view| view.eye.axis != [0.0; 2]) {
+        for (axis, name, sign) in [(0, "horizontal", -1.0), (1, "vertical", 1.0)] {
+            // Of the film's middle off the axis, to the right and up.
+            let offset = |view: &View| sign * view.eye.axis[axis] / width * film;
+            let offsets = samples(&|view| (offset(view) as f32).to_string());
+            text.samples(&format!("float {name}ApertureOffset"), &offsets);
+        }
+    }
     text.line(&format!("float horizontalAperture = {}", film as f32));
     text.line(&format!(
         "float verticalAperture = {}",

@@ -134,6 +134,7 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3]],
         };
         let eye = Eye {
+            axis: [0.0; 2],
             position: DVec3::new(1.0, 1.8, 1.0),
             right: DVec3::X,
             up: -DVec3::Z,

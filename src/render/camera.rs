@@ -16,6 +16,8 @@ pub(super) struct Pose {
     pub(super) up: DVec3,
     pub(super) forward: DVec3,
     pub(super) focal_length_mm: f64,
+    /// How far the picture's middle stands off the optical axis, to its right and to its top, in heights of the picture.
+    pub(super) shift: [f64; 2],
     /// `None` of a pinhole.
     pub(super) lens: Option<Lens>,
 }
@@ -42,13 +44,14 @@ struct Keyed {
 /// The camera at a frame number, which may lie between two; frame k of a shot is at k / `frames_per_second` of a file's time.
 pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
     let camera = &look.spec().camera;
-    let lens = |focal_length_mm: f64, focus: f64| {
-        let lens = camera.lens.as_ref()?;
-        let radius = 0.5e-3 * focal_length_mm / lens.f_stop;
+    let seconds = frame / frames_per_second;
+    let lens = |focal_length_mm: f64, of_key: Option<f64>| {
+        let [f_stop, own] = look.lens(seconds)?;
+        let radius = 0.5e-3 * focal_length_mm / f_stop;
+        let focus = of_key.unwrap_or(own);
         Some(Lens { radius, focus })
     };
     if let Some(file) = look.camera_file() {
-        let seconds = frame / frames_per_second;
         let stand = file.at(seconds);
         let focal_length_mm = file.focal_length_mm(look.film_height_mm(), seconds);
         let [right, up] = upright(stand.forward, stand.up);
@@ -58,7 +61,8 @@ pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
             up,
             forward: stand.forward,
             focal_length_mm,
-            lens: lens(focal_length_mm, focus(camera, None)),
+            shift: file.shift(seconds),
+            lens: lens(focal_length_mm, None),
         };
     }
     let keyed = keyed(camera, frame);
@@ -70,7 +74,8 @@ pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
         up,
         forward,
         focal_length_mm: keyed.focal_length_mm,
-        lens: lens(keyed.focal_length_mm, keyed.focus),
+        shift: [0.0; 2],
+        lens: lens(keyed.focal_length_mm, Some(keyed.focus)),
     }
 }
 
@@ -181,19 +186,22 @@ pub fn eye(look: &Look, origin: DVec3, frame: f64, frames_per_second: f64) -> Ey
 
 /// The lens of a look at a frame number: its f-number and the distance that is sharp, metres; `None` of a pinhole.
 pub fn lens(look: &Look, frame: f64, frames_per_second: f64) -> Option<[f64; 2]> {
-    let f_stop = look.spec().camera.lens.as_ref()?.f_stop;
+    let [f_stop, _] = look.lens(frame / frames_per_second)?;
     let lens = pose(look, frame, frames_per_second).lens?;
     Some([f_stop, lens.focus])
 }
 
 fn of_pose(look: &Look, pose: &Pose, origin: DVec3) -> Eye {
     let image = &look.spec().image;
+    let [right, up] = pose.shift.map(|part| part * f64::from(image.height));
     Eye {
         position: pose.position - origin,
         right: pose.right,
         up: pose.up,
         forward: pose.forward,
         focal: focal_px(look, pose.focal_length_mm),
+        // Where the picture's middle is right of the axis, the axis is left of it.
+        axis: [-right, up],
         size: [image.width, image.height],
     }
 }
@@ -229,7 +237,7 @@ pub(super) fn camera(
     let [before, image] = extent.image;
     let centre = [0, 1].map(|axis| {
         let middle = f64::from(before[axis]) + 0.5 * f64::from(image[axis]);
-        (middle - sample.jitter[axis] + shift[axis]) as f32
+        (middle + eye.axis[axis] - sample.jitter[axis] + shift[axis]) as f32
     });
     uniform::Camera {
         position: eye.position.as_vec3().to_array(),

@@ -62,8 +62,9 @@ impl View {
         let columns = [right, up, -forward];
         let camera = columns.map(|axis| axis.extend(-axis.dot(eye.position)));
         let depth = -camera[2];
-        let across = eye.focal / width * camera[0] + 0.5 * depth;
-        let down = 0.5 * depth - eye.focal / height * camera[1];
+        let middle = [0.5 + eye.axis[0] / width, 0.5 + eye.axis[1] / height];
+        let across = eye.focal / width * camera[0] + middle[0] * depth;
+        let down = middle[1] * depth - eye.focal / height * camera[1];
         let rows = |columns: [DVec4; 4]| {
             let matrix = DMat4::from_cols_array_2d(&columns.map(|c| c.to_array()));
             // Columns one after the other, of the transposed matrix, are rows.

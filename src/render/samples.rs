@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::scene::look::{CurveSpec, ImageSpec, LookSpec};
+use crate::scene::look::{CurveSpec, ImageSpec, Look};
 
 /// Where in the pixel, in the shutter and on the lens a sample lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,9 +64,10 @@ impl Curve {
 }
 
 /// The samples of a look's frame.
-pub(super) fn samples_of(spec: &LookSpec) -> Vec<Sample> {
-    let image = &spec.image;
-    let has_lens = spec.camera.lens.is_some();
+pub(super) fn samples_of(look: &Look) -> Vec<Sample> {
+    let image = &look.spec().image;
+    // A file's camera has a lens at all times or at none.
+    let has_lens = look.lens(0.0).is_some();
     samples(image.samples, image.shutter, Curve::of(image), has_lens)
 }
 

@@ -4,11 +4,11 @@ pub mod camera_file;
 pub mod spec;
 
 mod keys;
+mod lens;
 mod lint;
 mod materials;
 mod mtl;
 mod usd_camera;
-mod usda;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -167,17 +167,6 @@ impl Look {
     /// The camera of the file that the look names; `None` where it names none.
     pub fn camera_file(&self) -> Option<&CameraFile> {
         self.camera.as_deref()
-    }
-
-    /// Longest focal length of the shot, mm.
-    pub fn longest_focal_length_mm(&self) -> f64 {
-        let camera = &self.spec.camera;
-        let own = (self.camera_file()).map_or(camera.focal_length_mm, |file| {
-            file.longest_focal_length_mm(self.film_height_mm())
-        });
-        let keys = camera.keyframes.iter();
-        keys.filter_map(|key| key.focal_length_mm)
-            .fold(own, f64::max)
     }
 
     /// Height of the film that the image is on, whose width is `film_back_mm`'s.

@@ -38,6 +38,8 @@ mod settle;
 pub mod solid_track;
 pub mod sources;
 mod spec;
+mod usd_nodes;
+mod usda;
 mod wave_maker;
 pub mod whitewater;
 mod words;

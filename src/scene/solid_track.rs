@@ -1,4 +1,4 @@
-//! Poses of a solid over time: an animation of a glTF's node, or as a scene was written out.
+//! Poses of a solid over time: an animation of a glTF's node, a prim of USD as text that moves, or as a scene was written out.
 
 use std::path::Path;
 
@@ -9,8 +9,10 @@ use super::{
     Shot,
     document::Document,
     error::SceneError,
-    gltf_nodes::{Nodes, named},
+    gltf_nodes::{Beside, Nodes, named},
     spec::TrackSpec,
+    usd_nodes::{self, UsdNodes},
+    usda::Prim,
     words::shown,
 };
 use crate::domain::{mesh::TriangleMesh, pose::Pose};
@@ -153,19 +155,144 @@ pub(super) fn build(
         let path = doc.reach().find(beside, Path::new(name))?;
         std::fs::read(&path).map_err(|error| format!("cannot read {}: {error}", path.display()))
     };
-    let Gltf { document, blob } =
-        Gltf::from_slice(&bytes).map_err(|error| fault(&file_key, error.to_string()))?;
-    let node = choose(&document, spec.node.as_deref()).map_err(|problem| {
-        let key = spec.node.as_ref().map_or(file_key.clone(), |_| at("node"));
+    let (called, moves) = Moves::read(&bytes, spec.node.as_deref(), &read).map_err(|problem| {
+        let (key, problem) = match problem {
+            Problem::Node(problem) if spec.node.is_some() => (at("node"), problem),
+            Problem::Node(problem) | Problem::File(problem) => (file_key.clone(), problem),
+        };
         fault(&key, problem)
     })?;
-    let nodes = Nodes::read(&bytes, (&document, blob), &node, &read)
-        .map_err(|error| fault(&file_key, error.to_string()))?;
-    let poses = sampled(&nodes, shot).map_err(|problem| {
-        let problem = format!("node {}: {problem}", named(&node));
-        fault(&file_key, problem)
-    })?;
+    let poses = sampled(&moves, shot)
+        .map_err(|problem| fault(&file_key, format!("{called}: {problem}")))?;
     Track::new(poses, mesh).map_err(|problem| fault(&file_key, problem))
+}
+
+/// What a file moves.
+enum Moves {
+    Gltf(Nodes),
+    Usd(UsdNodes),
+}
+
+/// What of a file is at fault.
+enum Problem {
+    /// The name of a node.
+    Node(String),
+    File(String),
+}
+
+impl Moves {
+    /// The node or prim of this name, or the only one, and what errors call it.
+    fn read(
+        bytes: &[u8],
+        name: Option<&str>,
+        beside: Beside<'_>,
+    ) -> std::result::Result<(String, Self), Problem> {
+        if usd_nodes::is_usd(bytes) {
+            let layer = usd_nodes::layer(bytes).map_err(Problem::File)?;
+            let all = usd_nodes::chains(&layer, &|_| true);
+            let chain = choose_prim(&all, name).map_err(|problem| {
+                // It may stand where the layer takes prims from.
+                usd_nodes::elsewhere(&layer).map_or(Problem::Node(problem), Problem::File)
+            })?;
+            let nodes = UsdNodes::read(&layer, chain).map_err(Problem::File)?;
+            return Ok((
+                format!("prim {}", usd_nodes::path_of(chain)),
+                Self::Usd(nodes),
+            ));
+        }
+        let Gltf { document, blob } =
+            Gltf::from_slice(bytes).map_err(|error| Problem::File(error.to_string()))?;
+        let node = choose(&document, name).map_err(Problem::Node)?;
+        let nodes = Nodes::read(bytes, (&document, blob), &node, beside)
+            .map_err(|error| Problem::File(error.to_string()))?;
+        Ok((format!("node {}", named(&node)), Self::Gltf(nodes)))
+    }
+
+    /// From what moves to the world, metres with y up.
+    fn at(&self, seconds: f64) -> DMat4 {
+        match self {
+            Self::Gltf(nodes) => nodes.at(seconds),
+            Self::Usd(nodes) => nodes.at(seconds),
+        }
+    }
+
+    /// When something has a key, in no order.
+    fn times(&self) -> Vec<f64> {
+        match self {
+            Self::Gltf(nodes) => nodes.times().collect(),
+            Self::Usd(nodes) => nodes.times([].into_iter()).collect(),
+        }
+    }
+
+    /// Whether something jumps from key to key. USD's numbers are joined by lines.
+    fn jumps(&self) -> bool {
+        match self {
+            Self::Gltf(nodes) => nodes.jumps(),
+            Self::Usd(_) => false,
+        }
+    }
+
+    /// Whether it is rigid at its keys alone: matrices that are joined by lines are none of a turn between them.
+    fn is_of_keys(&self) -> bool {
+        match self {
+            Self::Gltf(_) => false,
+            Self::Usd(nodes) => nodes.has_moving_matrix(),
+        }
+    }
+}
+
+/// The prim of this name or path, or the only one that has a transform. Of prims of one name that hang together the outermost: a mesh stands within
+/// its object, which Blender may call the same.
+fn choose_prim<'a, 'b>(
+    all: &'b [Vec<&'a Prim>],
+    name: Option<&str>,
+) -> std::result::Result<&'b Vec<&'a Prim>, String> {
+    let moving: Vec<_> = all
+        .iter()
+        .filter(|chain| {
+            let prim = chain[chain.len() - 1];
+            prim.attributes.contains_key("xformOpOrder")
+        })
+        .collect();
+    let paths = |of: &[&Vec<&Prim>]| {
+        let mut paths: Vec<_> = (of.iter().take(MOST_NAMES))
+            .map(|chain| usd_nodes::path_of(chain))
+            .collect();
+        if of.len() > MOST_NAMES {
+            paths.push("…".to_owned());
+        }
+        paths.join(", ")
+    };
+    let Some(name) = name else {
+        return match &moving[..] {
+            [only] => Ok(only),
+            [] => Err("no prim of it has a transform".to_owned()),
+            several => Err(format!(
+                "it has {} prims with a transform: {}; name one as node",
+                several.len(),
+                paths(several)
+            )),
+        };
+    };
+    let is_called =
+        |chain: &[&Prim]| chain[chain.len() - 1].name == name || usd_nodes::path_of(chain) == name;
+    let is_within = |chain: &[&Prim]| (1..chain.len()).any(|depth| is_called(&chain[..depth]));
+    let called: Vec<_> = all
+        .iter()
+        .filter(|chain| is_called(chain) && !is_within(chain))
+        .collect();
+    match called[..] {
+        [only] => Ok(only),
+        [] => Err(format!(
+            "no prim is called {name:?}; with a transform there are {}",
+            paths(&moving)
+        )),
+        _ => Err(format!(
+            "{} prims are called {name:?}: {}; name one by its path",
+            called.len(),
+            paths(&called)
+        )),
+    }
 }
 
 /// The node of this name, or the only one.
@@ -206,28 +333,34 @@ fn choose<'a>(
     }
 }
 
-/// A node's poses at its keys and at each frame, from where it stands at the shot's start.
-fn sampled(nodes: &Nodes, shot: &Shot) -> std::result::Result<Vec<(f64, DVec3, DQuat)>, String> {
-    if nodes.jumps() {
+/// Poses at the keys and at each frame, from where it stands at the shot's start.
+fn sampled(moves: &Moves, shot: &Shot) -> std::result::Result<Vec<(f64, DVec3, DQuat)>, String> {
+    if moves.jumps() {
         return Err(
             "its keys are joined by steps, and a solid cannot jump; make them linear".to_owned(),
         );
     }
     let end = shot.duration();
     let frames = (0..=shot.frames).map(|frame| shot.time(frame));
-    let keys = nodes.times().filter(|time| (0.0..=end).contains(time));
+    let (keys, is_of_keys) = (moves.times(), moves.is_of_keys());
+    // With keys alone also the first after the end, to which the last frame is on the way.
+    let last = keys.iter().copied().filter(|time| *time >= end);
+    let last = last.fold(f64::INFINITY, f64::min);
+    let most = if is_of_keys { last } else { end };
+    let keys = keys.into_iter().filter(|time| (0.0..=most).contains(time));
+    let frames = frames.filter(|time| !is_of_keys || *time == 0.0);
     let mut times: Vec<f64> = frames.chain(keys).collect();
     times.sort_unstable_by(f64::total_cmp);
     times.dedup_by(|after, before| *after - *before < 1e-6);
     if times.len() > MOST_POSES {
         return Err(format!("{} poses; allowed: {MOST_POSES}", times.len()));
     }
-    let start = nodes.at(0.0);
+    let start = moves.at(0.0);
     let back = DMat3::from_mat4(start).inverse();
     let mut before = DQuat::IDENTITY;
     let mut poses = Vec::new();
     for time in times {
-        let now: DMat4 = nodes.at(time);
+        let now: DMat4 = moves.at(time);
         let from_start = DMat3::from_mat4(now) * back;
         let strain = from_start.transpose() * from_start - DMat3::IDENTITY;
         let most = strain.to_cols_array().map(f64::abs);

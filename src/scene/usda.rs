@@ -1,8 +1,8 @@
-//! USD's text (usda), as far as a camera needs it: prims, their attributes of numbers and words, the layer's own metadata.
+//! USD's text (usda), as far as what moves needs it: prims, their attributes of numbers and words, the layer's own metadata.
 //!
 //! Values of other kinds, relationships, variants and arrays of points are passed over. Layers that a file names are not read.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Prims within prims, at most.
 const MOST_DEPTH: usize = 256;
@@ -10,9 +10,11 @@ const MOST_DEPTH: usize = 256;
 /// A prim with what is written in it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Prim {
-    /// Such as `Camera`; empty of an `over`.
+    /// Such as `Camera`; empty of an `over`, and of a `class`, which is drawn nowhere.
     pub(super) kind: String,
     pub(super) name: String,
+    /// Keys of its metadata, and `variantSets` where it has one.
+    pub(super) metadata: BTreeSet<String>,
     /// By their names, without types.
     pub(super) attributes: BTreeMap<String, Value>,
     pub(super) children: Vec<Prim>,
@@ -264,8 +266,13 @@ impl Reader<'_> {
                 }
             }
         }
+        if specifier == "class" {
+            prim.kind.clear();
+        }
         if self.tokens.take('(')? {
-            self.metadata(&mut BTreeMap::new())?;
+            let mut metadata = BTreeMap::new();
+            self.metadata(&mut metadata)?;
+            prim.metadata = metadata.into_keys().collect();
         }
         if !self.tokens.take('{')? {
             return Err(self
@@ -278,6 +285,9 @@ impl Reader<'_> {
                 Token::Sign(';') => {}
                 Token::Word(word) if is_specifier(&word) => prim.children.push(self.prim(&word)?),
                 Token::Word(word) if word == "variantSet" || word == "reorder" => {
+                    if word == "variantSet" {
+                        prim.metadata.insert("variantSets".to_owned());
+                    }
                     self.pass_statement()?;
                 }
                 Token::Word(word) => self.property(&word, &mut prim.attributes)?,

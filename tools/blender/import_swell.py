@@ -369,7 +369,7 @@ def import_solids(cache: swell.Cache) -> list[Any]:
     for index, solid in enumerate(cache.scene.get("solid", [])):
         path = cache.assets[solid["mesh"].removeprefix("assets/")]
         if {"motion", "turn", "track"} & solid.keys() or path.suffix.lower() not in (".obj", ".ply"):
-            print(f"import_swell: solid {index} ({path.name}) is left out: it moves, or is neither OBJ nor PLY")
+            print(f"import_swell: solid {index} ({path.name}) is left out: it moves (swell export --usd has it), or is neither OBJ nor PLY")
             continue
         position, _, corners, sizes = read_mesh(path)
         position = position.astype(np.float64) * solid["scale"]

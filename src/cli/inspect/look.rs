@@ -36,8 +36,8 @@ pub(super) fn method(look: &Look) -> &'static str {
 /// The camera in words.
 pub(super) fn camera(look: &Look) -> String {
     let camera = &look.spec().camera;
-    let lens = match &camera.lens {
-        Some(lens) => format!("f/{}", lens.f_stop),
+    let lens = match look.lens(0.0) {
+        Some([f_stop, _]) => format!("f/{f_stop}"),
         None => "a pinhole".to_owned(),
     };
     let moves = match (&camera.file, camera.keyframes.len() as u64) {

@@ -84,7 +84,7 @@ impl Renderer {
         let filter = self.look.spec().output.aov_filter;
         let samples = match filter {
             AovFilterSpec::Centre => vec![Sample::STILL],
-            AovFilterSpec::Beauty => samples_of(self.look.spec()),
+            AovFilterSpec::Beauty => samples_of(&self.look),
         };
         let mut means = Means::new(self.plan.extent.shaded());
         let mut last = Vec::new();

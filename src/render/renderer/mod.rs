@@ -185,7 +185,7 @@ impl Renderer {
         self.draw_once()?;
         let wants_objects = self.look.spec().output.cryptomatte;
         let mut covers = wants_objects.then(|| Covers::new(self.plan.extent.shaded()));
-        for (index, sample) in (0u32..).zip(samples_of(self.look.spec())) {
+        for (index, sample) in (0u32..).zip(samples_of(&self.look)) {
             let camera = camera(&self.look, &setting, frame.into(), sample, index);
             self.sample(&camera, false)?;
             if let Some(covers) = &mut covers {

@@ -216,14 +216,14 @@ const SOLID: &[Key] = &[
 const SOLID_TRACK: &[Key] = &[
     Key::text(
         "file",
-        "a glTF file (.gltf or .glb), relative to the scene file",
+        "a glTF file (.gltf or .glb) or USD as text (.usda), relative to the scene file",
     )
     .absent()
     .about("its node's animation carries the solid; the written-out scene has it as poses"),
-    Key::text("node", "the name of a node in the file")
+    Key::text("node", "the name of a node in the file; of USD its path will do too")
         .absent()
         .with("file")
-        .about("whose motion it is, with that of the nodes above it; left out: the file's only node"),
+        .about("whose motion it is, with that of the nodes above it; left out: the file's only node, or USD's only prim with a transform"),
     Key::points(
         "poses",
         8,

@@ -8,8 +8,11 @@ use glam::{DMat3, DVec3};
 use gltf::{Document, Gltf, Node, camera::Projection};
 
 use super::{
-    super::gltf_nodes::{Beside, NodeError, Nodes},
-    usd_camera::{UsdCamera, is_usd},
+    super::{
+        gltf_nodes::{Beside, NodeError, Nodes},
+        usd_nodes::is_usd,
+    },
+    usd_camera::UsdCamera,
 };
 
 /// Metres from the origin, at most: farther out, f32 positions are coarser than a millimetre.
@@ -110,7 +113,7 @@ enum Body {
         aspect_ratio: Option<f64>,
         nodes: Nodes,
     },
-    Usd(UsdCamera),
+    Usd(Box<UsdCamera>),
 }
 
 impl CameraFile {
@@ -123,7 +126,7 @@ impl CameraFile {
             let (name, camera) = UsdCamera::read(bytes, name)?;
             let found = Self {
                 name,
-                body: Body::Usd(camera),
+                body: Body::Usd(Box::new(camera)),
                 hash: blake3::hash(bytes),
             };
             found.check()?;
@@ -175,6 +178,23 @@ impl CameraFile {
         }
     }
 
+    /// How far the picture's middle stands off the optical axis, to its right and to its top, in heights of the picture.
+    pub fn shift(&self, seconds: f64) -> [f64; 2] {
+        match &self.body {
+            // glTF's perspective cameras have none.
+            Body::Gltf { .. } => [0.0; 2],
+            Body::Usd(camera) => camera.shift(seconds),
+        }
+    }
+
+    /// The f-number and the distance that is sharp, metres; `None` of a pinhole, which all of glTF's are.
+    pub fn lens(&self, seconds: f64) -> Option<[f64; 2]> {
+        match &self.body {
+            Body::Gltf { .. } => None,
+            Body::Usd(camera) => camera.lens(seconds),
+        }
+    }
+
     /// The longest of the shot, mm.
     pub fn longest_focal_length_mm(&self, film_height_mm: f64) -> f64 {
         let at = |seconds| self.focal_length_mm(film_height_mm, seconds);
@@ -182,7 +202,7 @@ impl CameraFile {
     }
 
     /// When something has a key, seconds.
-    fn times(&self) -> Box<dyn Iterator<Item = f64> + '_> {
+    pub(super) fn times(&self) -> Box<dyn Iterator<Item = f64> + '_> {
         match &self.body {
             Body::Gltf { nodes, .. } => Box::new(nodes.times()),
             Body::Usd(camera) => Box::new(camera.times()),

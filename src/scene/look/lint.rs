@@ -11,19 +11,6 @@ impl Look {
         lens.chain(self.lint_library()).collect()
     }
 
-    /// Pixels across the disc that a point at infinity is drawn as, at its widest in the shot; a point at half of the focus
-    /// distance is as wide. `None` of a pinhole.
-    pub fn widest_blur_px(&self) -> Option<f64> {
-        let (camera, image) = (&self.spec.camera, &self.spec.image);
-        let lens = camera.lens.as_ref()?;
-        let focus = (camera.keyframes.iter())
-            .filter_map(|key| key.focus_distance_m)
-            .fold(lens.focus_distance_m, f64::min);
-        let focal = self.longest_focal_length_mm();
-        let pixels = focal / camera.film_back_mm[0] * f64::from(image.width);
-        Some(pixels * 1e-3 * focal / lens.f_stop / focus)
-    }
-
     /// N samples show a point as N ghosts, evenly over its disc: of c pixels across, each has π c² / 4 N pixels of it.
     fn lint_lens(&self) -> Option<String> {
         let blur = self.widest_blur_px()?;

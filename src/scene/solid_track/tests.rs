@@ -77,17 +77,21 @@ fn file(path: &str, interpolation: &str, last: [f32; 4]) -> Vec<u8> {
     glb(&document, &numbers)
 }
 
+/// As Blender 4.5.15 writes a door under a cart, both animated, with z up; the door's mesh is called as its object.
+const BLENDER: &str = include_str!("door.usda");
+
 fn load(bytes: &[u8], set: &[&str]) -> Result<Scene, String> {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("cube.obj"), CUBE).unwrap();
     std::fs::write(dir.path().join("door.glb"), bytes).unwrap();
+    std::fs::write(dir.path().join("door.usda"), bytes).unwrap();
     let set: Vec<_> = set.iter().map(|&s| s.to_owned()).collect();
     let scene = Scene::parse(SCENE, Path::new("s.toml"), dir.path(), &set);
     let scene = scene.map_err(|error| error.to_string())?;
     // Written out it has the poses in place, and is the same scene.
     let written = scene.to_toml(&|_, _| "cube.obj".to_owned());
     assert!(
-        written.contains("poses = ") && !written.contains("door.glb"),
+        written.contains("poses = ") && !written.contains("file = \"door"),
         "{written}"
     );
     let again = Scene::parse(&written, Path::new("w.toml"), dir.path(), &[]).unwrap();
@@ -167,6 +171,113 @@ fn what_is_no_motion_of_a_solid_is_refused() {
         assert!(
             error.contains(words) && error.contains("solid[0]"),
             "{set:?}: {error}"
+        );
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+}
+
+const OF_USD: &str = "solid[0].track={ file = \"door.usda\", node = \"door\" }";
+
+/// Against where Blender has the corner (4, -1, 0.5) of its door, z up.
+#[test]
+fn a_solid_goes_as_a_prim_of_blender_does() {
+    let scene = load(BLENDER.as_bytes(), &[OF_USD]).unwrap();
+    let solid = &scene.moving_solids[0];
+    for (frame, [x, y, z]) in [
+        (0.0, [4.0, -1.0, 0.5]),
+        (1.0, [4.0, -1.0, 0.5]),
+        (7.0, [4.324_646_473, -1.0, 0.468_869_537]),
+        (13.0, [5.028_356_552, -1.0, 0.399_474_412]),
+        (19.0, [5.427_847_862, -0.292_893_231, 0.372_517_794]),
+        (25.0, [5.041_246_891, 0.0, 0.471_459_329]),
+        (40.0, [5.041_246_891, 0.0, 0.471_459_329]),
+    ] {
+        let at = solid.pose(frame / 24.0).place(DVec3::new(4.0, 0.5, 1.0));
+        // f32 of Blender and of the file.
+        let off = (at - DVec3::new(x, z, -y)).length();
+        assert!(off < 2e-6, "{frame}: {at} is {off} m off");
+    }
+    // Control: taken with y up it goes elsewhere.
+    let other = BLENDER.replace("upAxis = \"Z\"", "upAxis = \"Y\"");
+    let other = load(other.as_bytes(), &[OF_USD]).unwrap();
+    let at = |scene: &Scene| {
+        scene.moving_solids[0]
+            .pose(1.0)
+            .place(DVec3::new(4.0, 0.5, 1.0))
+    };
+    assert!((at(&other) - at(&scene)).length() > 0.1);
+}
+
+/// A door whose matrix is given at two codes a quarter turn apart, half a second, in centimetres.
+const MATRICES: &str = "#usda 1.0\n(\n    metersPerUnit = 0.01\n    timeCodesPerSecond = 10\n    upAxis = \"Y\"\n)\ndef Xform \"door\"\n{\n    \
+    matrix4d xformOp:transform.timeSamples = {\n        0: ( (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (300, 0, 100, 1) ),\n        \
+    5: ( (0, 0, -1, 0), (0, 1, 0, 0), (1, 0, 0, 0), (400, 0, 100, 1) ),\n    }\n    \
+    uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}\n";
+
+#[test]
+fn between_matrices_a_solid_turns_and_keeps_its_shape() {
+    let any = "solid[0].track={ file = \"door.usda\" }";
+    let scene = load(MATRICES.as_bytes(), &[any]).unwrap();
+    let corner = DVec3::new(4.0, 0.5, 1.0);
+    let half = 0.5f64.sqrt();
+    for (t, expected) in [
+        (0.0, corner),
+        (0.25, DVec3::new(3.5 + half, 0.5, 1.0 - half)),
+        (0.5, DVec3::new(4.0, 0.5, 0.0)),
+        (2.0, DVec3::new(4.0, 0.5, 0.0)),
+    ] {
+        let at = scene.moving_solids[0].pose(t).place(corner);
+        assert!((at - expected).length() < 1e-9, "{t}: {at}");
+    }
+}
+
+#[test]
+fn what_is_no_motion_in_usd_is_refused() {
+    let gate = "solid[0].track={ file = \"door.usda\", node = \"gate\" }";
+    let any = "solid[0].track={ file = \"door.usda\" }";
+    let twice = BLENDER.replace(
+        "def Xform \"cart\"",
+        "def Xform \"door\"\n    {\n    }\n    def Xform \"cart\"",
+    );
+    let taken = BLENDER.replace(
+        "def Xform \"cart\"",
+        "def Xform \"cart\" (\n    payload = @cart.usdc@\n)",
+    );
+    let larger = MATRICES.replace("(0, 0, -1, 0), (0, 1, 0, 0)", "(0, 0, -1, 0), (0, 2, 0, 0)");
+    for (text, set, words) in [
+        (
+            BLENDER,
+            gate,
+            "no prim is called \"gate\"; with a transform there are /root/cart/door, /root/cart",
+        ),
+        (
+            BLENDER,
+            any,
+            "it has 2 prims with a transform: /root/cart/door, /root/cart; name one",
+        ),
+        (
+            &twice,
+            OF_USD,
+            "2 prims are called \"door\": /root/door, /root/cart/door",
+        ),
+        (
+            &taken,
+            OF_USD,
+            "prim /root/cart takes parts from elsewhere, which are not read (payload)",
+        ),
+        (&taken, gate, "prim /root/cart takes parts from elsewhere"),
+        (
+            &larger,
+            OF_USD,
+            "prim /door: at 0.5 s it has another size or shape",
+        ),
+        ("PXR-USDC\0", OF_USD, "binary USD; write it as text"),
+        ("#usda 1.0\n", any, "no prim of it has a transform"),
+    ] {
+        let error = load(text.as_bytes(), &[set]).unwrap_err();
+        assert!(
+            error.contains(words) && error.contains("solid[0]"),
+            "{words}: {error}"
         );
         assert_eq!(error.lines().count(), 1, "{error}");
     }

@@ -9,6 +9,9 @@ use super::super::camera_file::{CameraFile, CameraFileError};
 /// As Blender 4.5.15 writes a camera under an empty, less what it says of itself.
 const BLENDER: &str = include_str!("blender.usda");
 
+/// As Blender 4.5.15 writes a camera with a lens in focus and a shifted film, both animated.
+const LENS: &str = include_str!("blender_lens.usda");
+
 /// By usd-core 26.11: operations of every kind that others write, centimetres, y up.
 const OPERATIONS: &str = r#"#usda 1.0
 (
@@ -169,6 +172,109 @@ fn operations_are_those_of_usd() {
     assert!((other.at(0.0).position - found.at(0.0).position).length() > 1e-2);
 }
 
+/// Against where Blender has three points in its camera's picture (`world_to_camera_view`), and the lens that it was told.
+#[test]
+fn a_lens_and_a_shift_of_blender_are_read() {
+    let camera = camera(LENS, None).unwrap();
+    let place = |point: [f64; 3], code: f64| {
+        let stand = camera.at(code / 24.0);
+        // Blender's z is up.
+        let away = DVec3::new(point[0], point[2], -point[1]) - stand.position;
+        let right = stand.forward.cross(stand.up);
+        // Heights of the picture.
+        let focal = camera.focal_length_mm(1.0, code / 24.0);
+        let [x, y] = camera.shift(code / 24.0);
+        let part = |axis: DVec3| focal * away.dot(axis) / away.dot(stand.forward);
+        let [across, up] = [part(right) - x, part(stand.up) - y];
+        [0.5 + across * 9.0 / 16.0, 0.5 + up]
+    };
+    for (code, point, at) in [
+        (1.0, [1.0, 0.0, 2.0], [0.574_073_553, 0.893_651_664]),
+        (1.0, [0.3, 0.0, 1.2], [0.434_046_894, 0.618_771_851]),
+        (1.0, [2.0, 1.0, 3.0], [0.759_928_524, 1.214_242_247]),
+        (5.0, [1.0, 0.0, 2.0], [0.474_073_589, 0.893_651_664]),
+        (5.0, [2.0, 1.0, 3.0], [0.659_928_501, 1.214_242_247]),
+    ] {
+        let found = place(point, code);
+        let off = [0, 1].map(|axis| (found[axis] - at[axis]).abs());
+        assert!(off[0] < 1e-5 && off[1] < 1e-5, "{code}: {found:?} {at:?}");
+    }
+    for (code, focus) in [(1.0, 6.5), (3.0, 7.5), (5.0, 8.5)] {
+        let [f_stop, found] = camera.lens(code / 24.0).unwrap();
+        assert!(f_stop == 4.0 && (found - focus).abs() < 1e-6, "{found}");
+    }
+    // Focus is a length of the layer, an f-number is none.
+    let small = LENS.replace("metersPerUnit = 1", "metersPerUnit = 0.01");
+    let small = self::camera(&small, None).unwrap();
+    let [f_stop, focus] = small.lens(1.0 / 24.0).unwrap();
+    assert!(f_stop == 4.0 && (focus - 0.065).abs() < 1e-9, "{focus}");
+    assert_eq!(small.shift(0.0), camera.shift(0.0));
+    // A camera that says nothing of it is a pinhole, in the middle of its film.
+    let plain = self::camera(BLENDER, None).unwrap();
+    assert!(plain.lens(0.0).is_none() && plain.shift(0.0) == [0.0; 2]);
+}
+
+/// What other layers may say of a camera is not read, so that such a file gives none.
+#[test]
+fn a_camera_that_is_written_elsewhere_too_is_refused() {
+    let with = |metadata: &str| {
+        let from = "def Xform \"b\"\n    {";
+        assert!(OPERATIONS.contains(from));
+        OPERATIONS.replace(
+            from,
+            &format!("def Xform \"b\" (\n{metadata}\n    )\n    {{"),
+        )
+    };
+    let sub = OPERATIONS.replace(
+        "upAxis",
+        "subLayers = [\n        @anim.usda@,\n        @set.usda@\n    ]\n    upAxis",
+    );
+    let within = OPERATIONS.replace(
+        "def Camera \"cam\"\n        {",
+        "variantSet \"lens\" = {\n \"wide\" {\n float focalLength = 20\n }\n }\n def Camera \"cam\"\n        {",
+    );
+    let other = OPERATIONS.replace("def Xform \"a\"", "def Xform \"set\" (\n    prepend references = @set.usda@</set>\n)\n{\n}\n\ndef Xform \"a\"");
+    for (text, name, words) in [
+        (&sub, None, "subLayers: anim.usda, set.usda"),
+        (
+            &with("prepend references = @rig.usda@</rig>"),
+            None,
+            "prim /a/b takes parts from elsewhere, which are not read (references)",
+        ),
+        (&with("payload = @rig.usda@"), None, "(payload)"),
+        (&with("prepend inherits = </_class>"), None, "(inherits)"),
+        (&with("specializes = </_class>"), None, "(specializes)"),
+        (
+            &with("prepend variantSets = \"lens\""),
+            None,
+            "(variantSets)",
+        ),
+        (&within, None, "(variantSets)"),
+        // A camera that is not in the text may be where a prim takes parts from.
+        (
+            &other,
+            Some("other"),
+            "prim /set takes parts from elsewhere",
+        ),
+    ] {
+        let error = camera(text, name).unwrap_err().to_string();
+        assert!(
+            error.contains(words) && error.contains("usdcat --flatten"),
+            "{words}: {error}"
+        );
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+    // What other prims take from elsewhere moves no camera; nor is a class one.
+    let class = OPERATIONS.replace(
+        "def Xform \"a\"",
+        "class Camera \"_lens\"\n{\n}\n\ndef Xform \"a\"",
+    );
+    for text in [&other, &class, &with("kind = \"group\"")] {
+        let found = camera(text, None).unwrap();
+        assert_eq!(found.at(0.0), camera(OPERATIONS, None).unwrap().at(0.0));
+    }
+}
+
 #[test]
 fn what_gives_no_camera_says_why() {
     let two = BLENDER.replace(
@@ -179,7 +285,7 @@ fn what_gives_no_camera_says_why() {
     let without = OPERATIONS.replace("def Camera", "def Xform");
     let deep = format!("#usda 1.0\n{}", "def Xform \"a\" {\n".repeat(400));
     for (text, name, words) in [
-        ("PXR-USDC\0\0", None, "usdcat camera.usdc -o camera.usda"),
+        ("PXR-USDC\0\0", None, "usdcat shot.usdc -o shot.usda"),
         ("PK\x03\x04", None, "a USD package"),
         (
             two.as_str(),
@@ -202,6 +308,19 @@ fn what_gives_no_camera_says_why() {
             &OPERATIONS.replace("float focalLength = 50", "float focalLength = 0"),
             None,
             "focalLength",
+        ),
+        (
+            &OPERATIONS.replace("float focalLength", "float fStop = 2.8\nfloat focalLength"),
+            None,
+            "focusDistance of /a/b/cam is no positive number",
+        ),
+        (
+            &OPERATIONS.replace(
+                "float focalLength",
+                "float fStop.timeSamples = { 0: 0, 5: 2.8 }\nfloat focalLength",
+            ),
+            None,
+            "fStop of /a/b/cam is no positive number",
         ),
         (
             &OPERATIONS.replace("upAxis = \"Y\"", "upAxis = \"X\""),

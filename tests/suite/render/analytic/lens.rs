@@ -1,17 +1,20 @@
 //! Depth of field: the disc that a small thing off the focus is drawn as, and cameras from files.
 
 use glam::DVec3;
-use swell::render::Image;
+use swell::{
+    render::{Image, Moment, Renderer, Water},
+    scene::look::Look,
+};
 
-use super::support::{Eye, Setup, ball, context, draw, scene, uniform_sky};
+use super::support::{Eye, FILM, Setup, ball, context, draw, scene, uniform_sky, write_sky};
 
 /// Focal length, pixels, and the aperture's diameter, metres.
 const FOCAL: f64 = 600.0;
 const APERTURE: f64 = 0.1;
 const SAMPLES: u32 = 64;
 
-/// Mean place of a picture's alpha, and the mean of its variances along both axes, pixels.
-fn spread(image: &Image) -> (f64, f64) {
+/// Mean place of a picture's alpha, pixels right and down, and the mean of its variances along both axes.
+fn spread(image: &Image) -> ([f64; 2], f64) {
     let side = image.width as usize;
     let (mut sum, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
     for (i, value) in image.beauty.iter().enumerate() {
@@ -24,7 +27,8 @@ fn spread(image: &Image) -> (f64, f64) {
         }
     }
     let variance = |axis: usize| second[axis] / sum - (first[axis] / sum).powi(2);
-    (first[0] / sum, 0.5 * (variance(0) + variance(1)))
+    let mean = first.map(|of| of / sum);
+    (mean, 0.5 * (variance(0) + variance(1)))
 }
 
 /// Pixels across the disc that a small ball of water at `depth` metres is drawn as, by how much wider its picture is than by a
@@ -54,7 +58,10 @@ fn circle(method: &'static str, depth: f64, focus: f64) -> f64 {
         spread(&draw(&context(), &setup, &uniform_sky, &scene, &water, 1))
     };
     let (blurred, sharp) = (shot(true), shot(false));
-    assert!((blurred.0 - sharp.0).abs() < 0.1, "{blurred:?} {sharp:?}");
+    assert!(
+        (blurred.0[0] - sharp.0[0]).abs() < 0.1,
+        "{blurred:?} {sharp:?}"
+    );
     4.0 * (blurred.1 - sharp.1).max(0.0).sqrt()
 }
 
@@ -86,5 +93,80 @@ fn a_thing_off_the_focus_is_a_disc_of_the_lens() {
         // On the plane: less than a tenth of a pixel squared more than a pinhole's, which is a disc of 1.2 pixels.
         let found = circle(method, 4.0, 4.0);
         assert!(found < 1.2, "{method}: {found}");
+    }
+}
+
+/// The camera of a setup as USD, with a lens, and with the picture's middle so many pixels right of and above the optical axis.
+fn as_usd(eye: &Eye, [f_stop, focus]: [f64; 2], shift: [f64; 2]) -> String {
+    let [right, up, forward] = eye.axes();
+    let row = |v: DVec3| format!("({:?}, {:?}, {:?}, ", v.x, v.y, v.z);
+    // Lengths of the film are in tenths of a metre.
+    let film = FILM / 100.0;
+    let pixel = film / f64::from(eye.size);
+    format!(
+        "#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = \"Y\"\n)\ndef Camera \"eye\"\n{{\n    float focalLength = {:?}\n    \
+         float horizontalAperture = {film:?}\n    float verticalAperture = {film:?}\n    float fStop = {f_stop:?}\n    \
+         float focusDistance = {focus:?}\n    float horizontalApertureOffset = {:?}\n    float verticalApertureOffset = {:?}\n    \
+         matrix4d xformOp:transform = ( {}0), {}0), {}0), {}1) )\n    uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}}\n",
+        eye.focal * pixel,
+        shift[0] * pixel,
+        shift[1] * pixel,
+        row(right),
+        row(up),
+        row(-forward),
+        row(eye.position),
+    )
+}
+
+/// A USD camera draws what the look's own camera draws with the same lens, moved on the film by the offsets of its aperture.
+#[test]
+fn a_lens_and_a_shift_of_the_film_come_from_usd() {
+    let eye = Eye {
+        size: 96,
+        ..Eye::new([5.0, 1.0, 1.0], [5.0, 6.0, 8.0], FOCAL)
+    };
+    let (depth, focus) = (4.0, 6.0);
+    let f_stop = eye.focal_length_mm() * 1e-3 / APERTURE;
+    let mut set = scene(0.005 * depth, 1.0);
+    set.particle_spacing = 0.005 * depth / 0.87;
+    let water = ball(eye.position + depth * eye.forward(), DVec3::ZERO);
+    for method in ["ssfr", "ray"] {
+        let setup = Setup {
+            camera: format!("lens = {{ f_stop = {f_stop:?}, focus_distance_m = {focus:?} }}\n"),
+            // The same ones in both, so that few will do.
+            samples: 16,
+            method,
+            background: false,
+            ..Setup::new(eye)
+        };
+        let (place, width) = spread(&draw(&context(), &setup, &uniform_sky, &set, &water, 1));
+        let by_file = |usd: &str| {
+            let folder = tempfile::tempdir().unwrap();
+            write_sky(&folder.path().join("sky.exr"), &uniform_sky);
+            std::fs::write(folder.path().join("eye.usda"), usd).unwrap();
+            let text = setup.text();
+            let (_, rest) = text.split_once("[image]").unwrap();
+            let text = format!(
+                "[camera]\nfile = \"eye.usda\"\nfilm_back_mm = [{FILM:?}, {FILM:?}]\n[image]{rest}"
+            );
+            let look = Look::parse(&text, &folder.path().join("look.toml")).unwrap();
+            let mut renderer = Renderer::new(&context(), &look, &set).unwrap();
+            let (water, white) = (Water::new(water.clone()), Default::default());
+            let moment = Moment::alone(&water, &white);
+            spread(&renderer.render_moment(1, &moment).unwrap())
+        };
+        // Where the window goes to the right and up, things go to the left and down; a shift by whole pixels moves samples with them.
+        let (moved, same) = by_file(&as_usd(&eye, [f_stop, focus], [11.0, -7.0]));
+        for (axis, way) in [-11.0, -7.0].into_iter().enumerate() {
+            let off = moved[axis] - place[axis] - way;
+            assert!(off.abs() < 0.01, "{method}: {moved:?} {place:?}");
+        }
+        assert!(
+            (same / width - 1.0).abs() < 0.01,
+            "{method}: {same} {width}"
+        );
+        // Control: without its lens the file's camera draws the ball alone, much narrower.
+        let (_, sharp) = by_file(&as_usd(&eye, [0.0, focus], [11.0, -7.0]));
+        assert!(sharp < 0.5 * width, "{method}: {sharp} {width}");
     }
 }

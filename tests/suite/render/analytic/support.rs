@@ -25,7 +25,7 @@ pub(crate) fn spoiled(pass: &'static str, from: &'static str, to: &'static str) 
 }
 
 /// Width of the film, mm.
-const FILM: f64 = 9.0;
+pub(crate) const FILM: f64 = 9.0;
 
 /// A pinhole camera; its picture is square.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +85,7 @@ impl Eye {
     }
 
     /// Right, up and forward, unit length.
-    fn axes(&self) -> [DVec3; 3] {
+    pub(crate) fn axes(&self) -> [DVec3; 3] {
         let forward = (self.target - self.position).normalize();
         let right = forward.cross(self.up).normalize();
         [right, right.cross(forward), forward]

@@ -1,0 +1,43 @@
+//! The lens of a look: its own, or that of the camera's file.
+
+use super::{Look, camera_file::CameraFile};
+
+impl Look {
+    /// The f-number and the distance that is sharp, metres, of the look's own lens as it stands without keyframes, or else of its
+    /// file's camera at a time of the file; `None` of a pinhole.
+    pub fn lens(&self, seconds: f64) -> Option<[f64; 2]> {
+        match &self.spec.camera.lens {
+            Some(own) => Some([own.f_stop, own.focus_distance_m]),
+            None => self.camera_file()?.lens(seconds),
+        }
+    }
+
+    /// Longest focal length of the shot, mm.
+    pub fn longest_focal_length_mm(&self) -> f64 {
+        let camera = &self.spec.camera;
+        let own = (self.camera_file()).map_or(camera.focal_length_mm, |file| {
+            file.longest_focal_length_mm(self.film_height_mm())
+        });
+        let keys = camera.keyframes.iter();
+        keys.filter_map(|key| key.focal_length_mm)
+            .fold(own, f64::max)
+    }
+
+    /// Pixels across the disc that a point at infinity is drawn as, at its widest in the shot; a point at half of the focus
+    /// distance is as wide. `None` of a pinhole.
+    pub fn widest_blur_px(&self) -> Option<f64> {
+        let (camera, image) = (&self.spec.camera, &self.spec.image);
+        let times = self.camera_file().into_iter().flat_map(CameraFile::times);
+        let lenses = times.chain([0.0]).map(|seconds| self.lens(seconds));
+        // Of the lens at its widest and its nearest, which need not be at one time.
+        let [f_stop, own] = lenses
+            .flatten()
+            .reduce(|[f, d], [f_stop, focus]| [f.min(f_stop), d.min(focus)])?;
+        let focus = (camera.keyframes.iter())
+            .filter_map(|key| key.focus_distance_m)
+            .fold(own, f64::min);
+        let focal = self.longest_focal_length_mm();
+        let pixels = focal / camera.film_back_mm[0] * f64::from(image.width);
+        Some(pixels * 1e-3 * focal / f_stop / focus)
+    }
+}
