@@ -52,6 +52,12 @@ samples = 16
 model = "hosek_wilkie"
 """
 
+RIG = f"""
+[camera]
+file = "rig.usda"
+film_back_mm = [{FILM_MM}, 20.25]
+""" + LOOK[LOOK.index("[image]") :]
+
 SPACING = 0.1
 FRAMES = [1, 2, 3]
 
@@ -194,6 +200,49 @@ def check_camera(stage):
         must(np.allclose([found[0], found[1]], wanted, atol=1e-5), f"USD: {point} at {found}, not at {wanted}")
 
 
+def write_rig(path):
+    """A camera of OpenUSD's own, in centimetres with z up: a rig that turns, a lens that is focused, a film that is shifted."""
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    stage.SetTimeCodesPerSecond(24)
+    rig = UsdGeom.Xform.Define(stage, "/rig")
+    rig.AddTranslateOp().Set(Gf.Vec3d(-200, -220, 180))
+    turn = rig.AddRotateZOp()
+    camera = UsdGeom.Camera.Define(stage, "/rig/camera")
+    camera.AddRotateXYZOp().Set(Gf.Vec3f(72, 5, -40))
+    camera.CreateHorizontalApertureAttr(36)
+    camera.CreateVerticalApertureAttr(20.25)
+    camera.CreateFStopAttr(2.8)
+    for frame, value in ((1, 0.0), (3, 1.0)):
+        turn.Set(6 * value, frame)
+        for make, at, way in (
+            (camera.CreateFocalLengthAttr, 30, 5),
+            (camera.CreateFocusDistanceAttr, 350, -80),
+            (camera.CreateHorizontalApertureOffsetAttr, 3, -4.5),
+            (camera.CreateVerticalApertureOffsetAttr, -2, 1.25),
+        ):
+            make().Set(at + way * value, frame)
+    stage.GetRootLayer().Save()
+
+
+def check_rig(theirs, stage):
+    """What swell made of a camera of OpenUSD's, by both frustums, in metres with y up."""
+    rig = UsdGeom.Camera(theirs.GetPrimAtPath("/rig/camera"))
+    ours = UsdGeom.Camera(stage.GetPrimAtPath("/pool_1/camera"))
+    for frame in FRAMES:
+        camera, wanted = ours.GetCamera(frame), rig.GetCamera(frame)
+        must(abs(camera.fStop - wanted.fStop) < 1e-6, "USD camera: its f-number")
+        must(abs(camera.focusDistance - 0.01 * wanted.focusDistance) < 1e-5, f"USD camera: focus {camera.focusDistance}")
+        places = []
+        for of, point in ((camera, Gf.Vec3d(0.6, 0.4, 0.3)), (wanted, Gf.Vec3d(60, -30, 40))):
+            view = of.frustum.ComputeViewMatrix() * of.frustum.ComputeProjectionMatrix()
+            places.append(view.Transform(point)[:2])
+        must(np.allclose(*places, atol=1e-5), f"USD camera: at frame {frame} a point is at {places[0]}, not at {places[1]}")
+    # The control: the shift of another frame is seen.
+    must(not np.allclose(ours.GetCamera(1).frustum.window.min, ours.GetCamera(3).frustum.window.min, atol=1e-2), "the control: no shift")
+
+
 def check_mesh_shot(stage, room):
     """The mesh of a shot against the PLY of its frame."""
     water = UsdGeom.Mesh(stage.GetPrimAtPath("/pool_1/water"))
@@ -225,6 +274,10 @@ def main(swell):
         )
         run("export", "cache", "--mesh", "m.%04d.obj", "--usd", "mesh.usda", "--usd-water", "mesh")
         run("export", "cache", "--usd", "binary.usdc", "--look", "look.toml", "--python", sys.executable)
+        write_rig(room / "rig.usda")
+        (room / "rig.toml").write_text(RIG)
+        run("export", "cache", "--usd", "by_rig.usda", "--look", "rig.toml")
+        check_rig(Usd.Stage.Open(str(room / "rig.usda")), Usd.Stage.Open(str(room / "by_rig.usda")))
         check_tables(room)
         check_meshes(room)
         for name in ("shot.usda", "binary.usdc"):

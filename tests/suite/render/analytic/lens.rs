@@ -153,10 +153,11 @@ fn a_lens_and_a_shift_of_the_film_come_from_usd() {
             let mut renderer = Renderer::new(&context(), &look, &set).unwrap();
             let (water, white) = (Water::new(water.clone()), Default::default());
             let moment = Moment::alone(&water, &white);
-            spread(&renderer.render_moment(1, &moment).unwrap())
+            renderer.render_moment(1, &moment).unwrap()
         };
         // Where the window goes to the right and up, things go to the left and down; a shift by whole pixels moves samples with them.
-        let (moved, same) = by_file(&as_usd(&eye, [f_stop, focus], [11.0, -7.0]));
+        let image = by_file(&as_usd(&eye, [f_stop, focus], [11.0, -7.0]));
+        let (moved, same) = spread(&image);
         for (axis, way) in [-11.0, -7.0].into_iter().enumerate() {
             let off = moved[axis] - place[axis] - way;
             assert!(off.abs() < 0.01, "{method}: {moved:?} {place:?}");
@@ -165,8 +166,21 @@ fn a_lens_and_a_shift_of_the_film_come_from_usd() {
             (same / width - 1.0).abs() < 0.01,
             "{method}: {same} {width}"
         );
+        // The header's matrix has the ball there too: a point as a row.
+        let point = (eye.position + depth * eye.forward())
+            .extend(1.0)
+            .to_array();
+        let matrix = image.view.unwrap().world_to_ndc;
+        let sum = |column: usize| -> f64 {
+            let rows = (0..4).map(|row| point[row] * f64::from(matrix[4 * row + column]));
+            rows.sum()
+        };
+        for (axis, place) in moved.into_iter().enumerate() {
+            let told = sum(axis) / sum(3) * 96.0 - 0.5;
+            assert!((told - place).abs() < 0.1, "{method}: {told} {place}");
+        }
         // Control: without its lens the file's camera draws the ball alone, much narrower.
-        let (_, sharp) = by_file(&as_usd(&eye, [0.0, focus], [11.0, -7.0]));
+        let (_, sharp) = spread(&by_file(&as_usd(&eye, [0.0, focus], [11.0, -7.0])));
         assert!(sharp < 0.5 * width, "{method}: {sharp} {width}");
     }
 }
