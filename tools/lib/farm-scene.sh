@@ -56,6 +56,33 @@ frames_of() {
     echo $((lines > 0 ? lines - 1 : 0))
 }
 
+# baking CACHE: the id of the program that bakes into it.
+baking() { pgrep -f "^$swell bake [^ ]+ -o $1 "; }
+
+# is_held ID: whether a process is stopped, and has no SIGTERM (the 15th, so bit 14) that it has not taken yet.
+is_held() {
+    local status
+    status=$(cat "/proc/$1/status" 2>/dev/null) || return
+    [[ $status == *$'\nState:\tT'* ]] && ! (($(sed -n 's/^ShdPnd:\t/0x/p' <<<"$status") & 1 << 14))
+}
+
+# hold_until_told CACHE COMMAND...: runs what has the bake told to stop. The program is held until it is told, since it could else be done before; Slurm
+# tells it to go on as well.
+hold_until_told() {
+    local program tries=0
+    program=$(baking "$1") && kill -STOP "$program" || { say "FAILED: the bake into $1 was done before it could be told to stop"; exit 1; }
+    # A thread that still runs would take the signal.
+    while grep -q '^State:.[^T]' "/proc/$program/task/"*/status; do sleep 0.01; done
+    shift
+    "$@"
+    while is_held "$program"; do
+        tries=$((tries + 1))
+        [[ $tries -lt 1200 ]] || { kill -KILL "$program"; say "FAILED: the bake was not told to stop"; exit 1; }
+        sleep 0.05
+    done
+    kill -CONT "$program" 2>/dev/null || true
+}
+
 # wait_for_frame CACHE FRAME: until that frame is in the ledger; gives up after a minute.
 wait_for_frame() {
     local tries=0
