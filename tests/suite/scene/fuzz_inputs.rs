@@ -8,7 +8,7 @@ use std::path::Path;
 use proptest::prelude::*;
 use swell::{
     domain::{mesh::TriangleMesh, mesh_file::MeshFormat},
-    scene::{Method, Scene, SceneError, study::Study, tolerance},
+    scene::{Method, Scene, SceneError, look::camera_file::CameraFile, study::Study, tolerance},
 };
 
 use super::faults::{FLIP_FAULTS, KEY_FAULTS, SCENE, SOURCE_FAULTS, VALUE_FAULTS, ZONE_FAULTS};
@@ -16,6 +16,9 @@ use crate::support::mutate::mutate;
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
+
+/// As Blender writes it.
+const CAMERA: &[u8] = include_bytes!("../../../src/scene/look/usd_camera/blender_lens.usda");
 
 /// A folder with one good mesh and some bad ones.
 fn assets() -> tempfile::TempDir {
@@ -385,6 +388,19 @@ proptest! {
         let bytes = mutate(STUDY.as_bytes().to_vec(), &edits);
         let text = String::from_utf8_lossy(&bytes);
         let _ = Study::parse(&text, Path::new("s.toml"), Path::new("/nowhere"));
+    }
+
+    /// One that is read all the same stands somewhere and looks somewhere.
+    #[test]
+    fn no_mutation_makes_the_reader_of_usd_panic(
+        edits in prop::collection::vec(any::<(u16, u8, u8)>(), 1..6),
+    ) {
+        let bytes = mutate(CAMERA.to_vec(), &edits);
+        let beside = |_: &str| Err("nothing is beside it".to_owned());
+        if let Ok(camera) = CameraFile::read(&bytes, None, &beside) {
+            let stand = camera.at(0.1);
+            prop_assert!(stand.position.is_finite() && (stand.forward.length() - 1.0).abs() < 1e-9);
+        }
     }
 
     #[test]

@@ -178,7 +178,10 @@ impl<'a> Walk<'a> {
             from = hole;
         }
         filled.extend_from_slice(&self.bytes[from..]);
-        let moved = |place: usize| place + LENGTH * self.holes.partition_point(|&it| it <= place);
+        // A grid that was not walked through may tell of any place.
+        let moved = |place: usize| {
+            place.saturating_add(LENGTH * self.holes.partition_point(|&it| it <= place))
+        };
         for place in self
             .places
             .iter()
@@ -202,4 +205,30 @@ fn mask_bytes(side: u32) -> usize {
 
 fn ones(mask: &[u8]) -> usize {
     mask.iter().map(|byte| byte.count_ones() as usize).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HALF: &[u8] = include_bytes!("../../../../tests/suite/domain/files/half.vdb");
+
+    /// Each byte spoiled in turn, and the file cut anywhere: it comes to an end, and puts in no more than the file has room for.
+    #[test]
+    fn no_damage_makes_the_walk_panic() {
+        assert_eq!(with_lengths(HALF).len(), HALF.len() + 6 * LENGTH);
+        let head = 1500;
+        let mut spoiled = HALF.to_vec();
+        for at in (0..head).chain((head..HALF.len()).step_by(53)) {
+            for value in [0x00, 0x7f, 0xff] {
+                let whole = spoiled[at];
+                spoiled[at] = value;
+                assert!(with_lengths(&spoiled).len() < 9 * HALF.len());
+                spoiled[at] = whole;
+            }
+        }
+        for end in (0..HALF.len()).step_by(97) {
+            assert!(with_lengths(&HALF[..end]).len() < 9 * HALF.len());
+        }
+    }
 }
