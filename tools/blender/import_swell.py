@@ -22,7 +22,13 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-import numpy as np
+
+try:
+    import numpy as np
+except ImportError:
+    # Blender would go on, and end with 0.
+    print("import_swell: Blender's Python has no numpy (Debian, Ubuntu: apt-get install python3-numpy)", file=sys.stderr)
+    sys.exit(4)
 
 try:
     import swell
