@@ -2,8 +2,8 @@
 //!
 //! Pure functions from particles to numbers, and from numbers to text; `experiment` runs what is measured and writes the
 //! files. [`comparison`] sets two solvers side by side; [`stability`] measures what is hard on a solver, [`waves`] what theory and
-//! experiments know the answer to; a sweep finds the
-//! [`knee`] and, for the paper's Table 1, the [`convergence_point`]. [`measure`], [`chart`] and [`page`] serve every kind. What is looked at frame by
+//! experiments know the answer to; a sweep finds the [`knee`] and, for the paper's Table 1, the [`convergence_point`]; [`tune`] finds
+//! the cheapest settings that hold an error. [`measure`], [`chart`] and [`page`] serve every kind. What is looked at frame by
 //! frame has a [`player`], a [`sheet`] and an [`apng`].
 
 pub mod apng;
@@ -20,6 +20,7 @@ pub mod raster;
 pub mod rgb;
 pub mod sheet;
 pub mod stability;
+pub mod tune;
 pub mod waves;
 
 pub use crate::domain::statistics::{median, percentile};
