@@ -2,6 +2,7 @@
 
 pub mod axis;
 pub mod budget;
+pub mod edit;
 pub mod effects;
 pub mod flip;
 mod force;
