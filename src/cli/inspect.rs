@@ -3,7 +3,7 @@
 mod file;
 mod json;
 mod look;
-mod study;
+pub(super) mod study;
 
 use std::{
     fmt::{self, Write},

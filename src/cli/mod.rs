@@ -17,6 +17,7 @@ mod progress;
 mod render;
 mod shell;
 mod study;
+mod tune;
 pub mod verify;
 mod view;
 mod whitewater;
@@ -79,6 +80,8 @@ enum Command {
     Export(Box<export::ExportArgs>),
     /// Bake, render and measure what a study compares, and write one page about it.
     Study(study::StudyArgs),
+    /// Find the cheapest settings of a scene that hold an error, and write the scene with them.
+    Tune(Box<tune::TuneArgs>),
     /// Make spray, foam and bubbles from a finished bake, as a stream beside it.
     Whitewater(whitewater::WhitewaterArgs),
     /// Hold a step on the GPU against the f64 reference, pass by pass.
@@ -270,6 +273,7 @@ impl Command {
             Self::Render(args) => args.progress,
             Self::Export(args) => args.progress,
             Self::Study(args) => args.progress,
+            Self::Tune(args) => args.progress,
             Self::Whitewater(args) => args.progress,
             Self::Check(args) => args.progress,
             Self::View(args) => args.progress,
@@ -289,6 +293,7 @@ fn run(command: Command, progress: &Progress) -> Result<u8, Failure> {
         Command::Render(args) => render::run(&args, progress),
         Command::Export(args) => export::run(&args, progress),
         Command::Study(args) => study::run(&args, progress),
+        Command::Tune(args) => tune::run(&args, progress),
         Command::Check(args) => check::run(&args, progress),
         Command::Inspect(args) => inspect::run(&args),
         Command::Diff(args) => diff::run(&args),

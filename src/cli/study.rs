@@ -50,8 +50,13 @@ pub(super) fn run(args: &StudyArgs, progress: &Progress) -> Result<u8, Failure> 
         directory,
         gpu: args.gpu.read()?,
     };
+    conduct(&request, progress)
+}
+
+/// Runs a study of whatever kind, and tells of it.
+pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Failure> {
     let interrupt = Interrupt::install_or_warn();
-    let outcome = study(&request, interrupt.flag(), &mut |event| match event {
+    let outcome = study(request, interrupt.flag(), &mut |event| match event {
         Event::Solver(name) => progress.say(
             &format!("solver {name}"),
             json!({ "event": "solver", "solver": name }),

@@ -3,7 +3,7 @@
 //! The `engine` opens devices, runs points and keeps their results; a kind of study is a file or folder beside it: what is
 //! run, what is measured, what is drawn. `sweep` changes one setting at a time, [`stability`] runs scenes that are hard on a
 //! solver against their marks, [`validation`] against theory and experiments, `comparison` bakes and renders a scene with two solvers,
-//! `surface` draws one with one setting of the look changed at a time.
+//! `surface` draws one with one setting of the look changed at a time, `tune` looks for the cheapest settings of a shot.
 //!
 //! A further kind is one file here that implements `engine::Kind`, its parser in [`scene::study`](crate::scene::study), and
 //! a line in [`study`].
@@ -16,6 +16,7 @@ mod report;
 pub mod stability;
 mod surface;
 mod sweep;
+mod tune;
 pub mod validation;
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
@@ -118,6 +119,7 @@ pub fn study(
         Study::Sweep(sweep) => &**sweep,
         Study::Stability(stability) => &**stability,
         Study::Surface(surface) => &**surface,
+        Study::Tune(tune) => &**tune,
         Study::Validation(validation) => &**validation,
     };
     let mut bench = Bench {

@@ -27,7 +27,11 @@ use crate::{
     domain::{frame_range::FrameRange, signed_distance::SignedDistanceError},
     gpu::{adapter::GpuError, shader::ShadersError},
     reference::ReferenceError,
-    scene::{Scene, SceneError, look::LookError, study::StudyFileError},
+    scene::{
+        Scene, SceneError,
+        look::LookError,
+        study::{StudyFileError, tune::TuneError},
+    },
     solve::SolveError,
 };
 
@@ -122,6 +126,12 @@ impl From<&LookError> for Blame {
 
 impl From<&StudyFileError> for Blame {
     fn from(_: &StudyFileError) -> Self {
+        Self::Input
+    }
+}
+
+impl From<&TuneError> for Blame {
+    fn from(_: &TuneError) -> Self {
         Self::Input
     }
 }

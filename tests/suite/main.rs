@@ -51,6 +51,7 @@ mod domain {
 mod experiment {
     mod hard_cases;
     mod study;
+    mod tune;
     mod validation;
 }
 mod gpu {

@@ -35,10 +35,16 @@ fn outline(args: &InspectArgs, file: &Path) -> Result<Outline, Failure> {
 
 /// Prints what the study in `file` runs.
 pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<(), Failure> {
-    let outline = outline(args, file)?;
-    // Writing to a String cannot fail.
-    let _ = show_outline(out, &outline, file);
+    *out += &told(&outline(args, file)?, file);
     Ok(())
+}
+
+/// What runs, in words; `file` is the study's, or the scene's that a command line asks for.
+pub(in crate::cli) fn told(outline: &Outline, file: &Path) -> String {
+    let mut out = String::new();
+    // Writing to a String cannot fail.
+    let _ = show_outline(&mut out, outline, file);
+    out
 }
 
 fn show_outline(out: &mut String, outline: &Outline, file: &Path) -> fmt::Result {
@@ -64,15 +70,18 @@ fn show_outline(out: &mut String, outline: &Outline, file: &Path) -> fmt::Result
 
 /// The same for programs.
 pub(super) fn object(args: &InspectArgs, file: &Path) -> Result<Value, Failure> {
-    let outline = outline(args, file)?;
+    Ok(outline_object(&outline(args, file)?))
+}
+
+pub(in crate::cli) fn outline_object(outline: &Outline) -> Value {
     let parts = outline.parts.iter();
     let parts =
         parts.map(|part| json!({ "name": part.name, "key": part.key, "points": part.points }));
-    Ok(json!({
+    json!({
         "kind": "study",
         "study": outline.kind,
         "points": outline.points(),
         "parts": parts.collect::<Vec<_>>(),
         "warnings": outline.warnings,
-    }))
+    })
 }

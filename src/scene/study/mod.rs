@@ -2,12 +2,13 @@
 //!
 //! One file a kind: [`comparison`] sets two solvers side by side, [`sweep`] runs a scene over and over, with one
 //! setting changed at a time, [`stability`] runs scenes that are hard on a solver, [`validation`] those whose answer is known, [`surface`]
-//! draws one scene's frames with one setting of the look changed at a time.
+//! draws one scene's frames with one setting of the look changed at a time. [`tune`] is what a command line asks for.
 
 pub mod comparison;
 pub mod stability;
 pub mod surface;
 pub mod sweep;
+pub mod tune;
 pub mod validation;
 
 use std::{
@@ -27,6 +28,7 @@ use comparison::SolverComparison;
 use stability::Stability;
 use surface::SurfaceStudy;
 use sweep::Sweep;
+use tune::Tune;
 use validation::Validation;
 
 /// A validated study: every file that it names read.
@@ -40,6 +42,8 @@ pub enum Study {
     Stability(Box<Stability>),
     /// `kind = "surface"`.
     Surface(Box<SurfaceStudy>),
+    /// Of no file: what `swell tune` runs.
+    Tune(Box<Tune>),
     /// `kind = "validation"`.
     Validation(Box<Validation>),
 }
@@ -173,6 +177,7 @@ impl Study {
             }
             Self::Stability(stability) => stability.for_each_scene(of),
             Self::Surface(surface) => of(&surface.scene),
+            Self::Tune(tune) => of(&tune.scene),
             Self::Validation(validation) => {
                 let runs = validation.benchmarks.iter().flat_map(|b| &b.runs);
                 runs.for_each(|run| of(&run.scene));
@@ -275,6 +280,7 @@ mod tests {
                     assert!(surface.points().count() >= 2);
                     surfaces += 1;
                 }
+                Study::Tune(_) => unreachable!("no file has this kind"),
                 Study::Validation(validation) => {
                     let mut benchmarks = validation.benchmarks.iter();
                     assert!(benchmarks.all(|benchmark| !benchmark.gates.is_empty()));

@@ -4,6 +4,7 @@ use crate::scene::study::{
     RunsOn, Study,
     stability::{Case, Held, Limit, Stability},
     sweep::Sweep,
+    tune::Tune,
 };
 
 /// A study in the order of its file.
@@ -50,6 +51,7 @@ impl Outline {
                 };
                 ("surface", it.lines.iter().map(part).collect())
             }
+            Study::Tune(it) => ("tune", tuned(it)),
             Study::Validation(it) => {
                 let part = |benchmark: &crate::scene::study::validation::Benchmark| Part {
                     name: benchmark.name.clone(),
@@ -91,6 +93,23 @@ fn swept(sweep: &Sweep) -> Vec<Part> {
             .collect(),
     };
     sweep.lines.iter().map(part).collect()
+}
+
+/// Runs in their order, by what each is there for.
+fn tuned(tune: &Tune) -> Vec<Part> {
+    let mut parts: Vec<Part> = Vec::new();
+    for (why, twin) in tune.twins() {
+        let point = twin.name();
+        match parts.last_mut() {
+            Some(part) if part.name == why => part.points.push(point),
+            _ => parts.push(Part {
+                name: why.to_owned(),
+                key: format!("frames 1-{}", tune.frames),
+                points: vec![point],
+            }),
+        }
+    }
+    parts
 }
 
 fn held(stability: &Stability) -> Vec<Part> {

@@ -13,11 +13,12 @@ use crate::support::job::{Job, assert_has};
 #[allow(dead_code, reason = "cargo runs the rest")]
 mod build;
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "bake",
     "render",
     "export",
     "study",
+    "tune",
     "view",
     "whitewater",
     "check",

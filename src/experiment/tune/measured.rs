@@ -1,0 +1,227 @@
+//! A twin's run, and how far it is from another.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    domain::probe::run_up,
+    scene::{
+        Scene,
+        study::{
+            RunsOn,
+            tune::{Quantity, Tune, Twin},
+        },
+    },
+    stage::{
+        drive::{Drive, Step},
+        prepare::Start,
+    },
+    study::measure::Gauge,
+};
+
+use super::super::{
+    StudyError,
+    engine::{self, Bench, until_done},
+};
+
+/// Frames that are measured, about.
+const SAMPLES: u32 = 24;
+
+/// What a twin came to.
+pub(super) type Run = engine::Run<Measured>;
+
+/// What is measured beside the time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Measured {
+    /// Summed over the frames.
+    pub(super) substeps: u64,
+    /// Summed over the frames.
+    pub(super) iterations: u64,
+    /// Pressure solves that ended above their tolerance.
+    pub(super) missed: u32,
+    /// Mean of max(0, ρ/ρ0 − 1) over particles and frames.
+    pub(super) density: f64,
+    /// At equally spaced frames.
+    pub(super) samples: Vec<Sample>,
+}
+
+/// What a frame is compared by.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Sample {
+    /// Metres above the still level.
+    crest: f64,
+    /// Metres along the wave's way.
+    front: Option<f64>,
+    /// Metres above the world's y = 0.
+    run_up: Option<f64>,
+    /// Of a mass, m²/s².
+    energy: f64,
+    /// Pa; empty where they are not read.
+    pressures: Vec<Option<f64>>,
+}
+
+impl Sample {
+    fn values(&self, of: Quantity) -> Vec<Option<f64>> {
+        match of {
+            Quantity::Crest => vec![Some(self.crest)],
+            Quantity::Front => vec![self.front],
+            Quantity::RunUp => vec![self.run_up],
+            Quantity::Energy => vec![Some(self.energy)],
+            Quantity::Pressure => self.pressures.clone(),
+            Quantity::Density => Vec::new(),
+        }
+    }
+}
+
+impl Measured {
+    fn values(&self, of: Quantity) -> impl Iterator<Item = Option<f64>> {
+        self.samples.iter().flat_map(move |s| s.values(of))
+    }
+
+    /// What 100 % of a quantity are: its greatest value, and rest density for the density.
+    pub(super) fn whole(&self, of: Quantity) -> Option<f64> {
+        match of {
+            Quantity::Density => Some(1.0),
+            _ => self.values(of).flatten().map(f64::abs).reduce(f64::max),
+        }
+    }
+
+    /// How far off a run is: the mean, over the frames in which both tell it, of what it differs by from another; the density
+    /// error is itself the difference from rest. `None` where it cannot be told in half of those in which the other tells it.
+    pub(super) fn off(&self, of: Quantity, from: &Self) -> Option<f64> {
+        if of == Quantity::Density {
+            return Some(self.density);
+        }
+        let pairs = self.values(of).zip(from.values(of));
+        let (sum, count) = pairs
+            .filter_map(|(a, b)| Some((a? - b?).abs()))
+            .fold((0.0, 0.0), |(sum, count), off| (sum + off, count + 1.0));
+        let told = from.values(of).flatten().count();
+        (told > 0 && 2.0 * count >= told as f64).then(|| sum / count)
+    }
+}
+
+/// Frames from one that is measured to the next.
+pub(super) fn stride(frames: u32) -> u32 {
+    (frames / SAMPLES).max(1)
+}
+
+/// Runs a twin as often as is asked, each time from the scene's start, after one frame that is not counted: it makes the
+/// device's programs ready.
+pub(super) fn measure(
+    bench: &Bench<'_>,
+    tune: &Tune,
+    twin: &Twin,
+    gauge: &Gauge,
+) -> Result<Run, StudyError> {
+    let scene = &twin.scene;
+    let start = Start::of(scene)?;
+    let mut drive = Drive::new(bench.devices.of(RunsOn::Gpu), scene, &start, false)?;
+    if tune.has_pressure() {
+        drive = drive.with_pressures();
+    }
+    drive.advance()?;
+    let mut run = Run {
+        particles: start.particles.len(),
+        frames: tune.frames,
+        ..Run::default()
+    };
+    for repeat in 0..tune.request.repeats {
+        drive.load(0, &start.particles)?;
+        let mut seconds = 0.0;
+        until_done(&mut drive, tune.frames, bench.stop, |step| {
+            seconds += step.seconds;
+            // The same steps again: only their time is new.
+            if repeat == 0 {
+                run.measured.look(scene, gauge, tune.frames, step);
+            }
+            Ok(())
+        })?;
+        run.seconds.push(seconds);
+    }
+    run.measured.density /= f64::from(tune.frames);
+    Ok(run)
+}
+
+impl Measured {
+    fn look(&mut self, scene: &Scene, gauge: &Gauge, frames: u32, step: Step) {
+        self.substeps += u64::from(step.report.substeps);
+        self.iterations += step.report.iterations;
+        self.density += step.report.density_error_mean;
+        self.missed += step.report.projection.map_or(0, |p| p.missed);
+        if step.frame.is_multiple_of(stride(frames)) {
+            self.samples.push(sample(scene, gauge, step));
+        }
+    }
+}
+
+fn sample(scene: &Scene, gauge: &Gauge, step: Step) -> Sample {
+    let (particles, spacing) = (&step.particles, scene.particle_spacing());
+    // A density of one and masses of the lattice: energies over the volume are those of a mass.
+    let gravity: DVec3 = scene.water.gravity;
+    let sums = gauge.aggregates(particles, spacing, 1.0, gravity);
+    let volume = particles.len().max(1) as f64 * spacing.powi(3);
+    Sample {
+        crest: sums.crest_height,
+        front: sums.front,
+        run_up: run_up(particles, spacing, 1.0),
+        energy: (sums.kinetic_energy + sums.potential_energy) / volume,
+        pressures: step.pressures,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(crest: [f64; 2], front: [Option<f64>; 2], pressures: [[Option<f64>; 2]; 2]) -> Measured {
+        let sample = |k: usize| Sample {
+            crest: crest[k],
+            front: front[k],
+            pressures: pressures[k].to_vec(),
+            ..Sample::default()
+        };
+        Measured {
+            density: crest[0] / 100.0,
+            samples: vec![sample(0), sample(1)],
+            ..Measured::default()
+        }
+    }
+
+    #[test]
+    fn runs_are_as_far_apart_as_by_hand() {
+        let none = [[None; 2]; 2];
+        let probes = [[Some(100.0), None], [Some(50.0), Some(20.0)]];
+        let other = [[Some(110.0), Some(7.0)], [Some(70.0), Some(26.0)]];
+        let a = run([1.0, 2.0], [Some(3.0), None], probes);
+        let b = run([1.5, 1.9], [Some(2.0), Some(9.0)], other);
+        let close = |value: Option<f64>, expected: f64| {
+            assert!((value.expect("told") - expected).abs() < 1e-12, "{value:?}");
+        };
+        close(a.off(Quantity::Crest, &b), 0.3);
+        close(a.off(Quantity::Front, &b), 1.0);
+        let three = run(
+            [1.0; 2],
+            [Some(1.0); 2],
+            [[Some(1.0), Some(1.0)], [Some(1.0), None]],
+        );
+        let one = run(
+            [1.0; 2],
+            [None, Some(1.0)],
+            [[Some(1.0), None], [None, None]],
+        );
+        close(one.off(Quantity::Front, &three), 0.0);
+        assert_eq!(one.off(Quantity::Pressure, &three), None, "one of three");
+        // 10, 20 and 6; where one probe reads nothing the others count.
+        close(a.off(Quantity::Pressure, &b), 12.0);
+        close(a.off(Quantity::Density, &b), 0.01);
+        close(b.whole(Quantity::Front), 9.0);
+        close(b.whole(Quantity::Pressure), 110.0);
+        close(b.whole(Quantity::Density), 1.0);
+        let dry = run([1.0, 2.0], [None, None], none);
+        assert_eq!(dry.off(Quantity::Front, &b), None);
+        assert_eq!(dry.whole(Quantity::Front), None);
+        assert_eq!(a.off(Quantity::Crest, &a), Some(0.0));
+        assert_eq!((stride(7), stride(120)), (1, 5));
+    }
+}

@@ -1,0 +1,364 @@
+//! The cheapest settings of a shot that hold an error: twins are run, laws are fitted, what they propose is run as well, and
+//! the cheapest run that holds is written as a scene.
+
+mod measured;
+mod model;
+mod report;
+mod words;
+mod write;
+
+use std::borrow::Cow;
+
+use crate::{
+    gpu::adapter::Needs,
+    scene::{
+        physics_hash,
+        study::{
+            RunsOn,
+            tune::{Bound, Knob, Limit, Setting, Tune, Twin},
+        },
+    },
+    stage::{gauge, prepare::Start},
+    study::{
+        measure::Gauge,
+        tune::{Candidate, Choice, Limits, Proposal, choose},
+    },
+};
+
+use super::{
+    PointStatus, StudyError,
+    engine::{Bench, Kind, Ledger, needs_of},
+    report::Report,
+};
+use measured::{Measured, Run, measure};
+use model::Fitted;
+
+/// Proposals that are run at most: each corrects the laws by what the one before came to.
+const PROPOSALS: usize = 4;
+
+/// Part of the cheapest time so far that a proposal has to stay below to be worth a run.
+const CHEAPER: f64 = 0.95;
+
+/// What a run is there for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    /// The scene's own settings at another spacing.
+    Spacing,
+    /// What no settings hold.
+    Shaken,
+    /// The coarsest with the reference's other settings.
+    Fine,
+    /// Value of a setting.
+    Knob(usize, usize),
+    /// What the others are held against.
+    Reference,
+    /// What the laws proposed.
+    Proposal,
+}
+
+impl Role {
+    /// Whether its settings may be chosen.
+    fn is_candidate(self) -> bool {
+        !matches!(self, Self::Shaken | Self::Reference)
+    }
+}
+
+/// A run and what it was run for.
+struct Trial<'a> {
+    role: Role,
+    why: &'static str,
+    twin: Cow<'a, Twin>,
+    run: Run,
+    /// What the laws said of it, where they were asked before.
+    predicted: Option<Proposal>,
+}
+
+/// What all runs came to.
+struct Results<'a> {
+    tune: &'a Tune,
+    trials: Vec<Trial<'a>>,
+    /// The shot's runs whose laws are told; `None` where too few came to their end.
+    fitted: Option<Fitted<'a>>,
+    /// In each quantity's own unit.
+    limits: Limits,
+    /// Which trial is chosen.
+    choice: Option<(usize, bool)>,
+}
+
+impl Kind for Tune {
+    fn needs(&self) -> Option<Needs> {
+        needs_of(self.twins().map(|(_, twin)| (&twin.scene, RunsOn::Gpu)))
+    }
+
+    fn count(&self) -> usize {
+        self.twins().count()
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
+        write::check_target(self)?;
+        let mut lab = Lab {
+            tune: self,
+            gauge: gauge_of(self)?,
+            ledger: Ledger::open(&bench.request.directory)?,
+        };
+        let trials = lab.known(bench)?;
+        let limits = limits(self, reference(&trials)?)?;
+        let mut results = Results {
+            tune: self,
+            fitted: Fitted::of(self, &trials),
+            trials,
+            limits,
+            choice: None,
+        };
+        lab.propose(bench, &mut results)?;
+        results.choose();
+        let written = write::write(&results, &bench.request.command)?;
+        Ok(report::draw(&results, bench, written))
+    }
+}
+
+/// The reference's measures.
+fn reference<'t>(trials: &'t [Trial<'_>]) -> Result<&'t Measured, StudyError> {
+    let mut found = trials.iter().filter(|t| t.role == Role::Reference);
+    match found.next() {
+        Some(Trial {
+            run:
+                Run {
+                    ended: None,
+                    measured,
+                    ..
+                },
+            ..
+        }) => Ok(measured),
+        Some(Trial { twin, run, .. }) => Err(StudyError::Point(format!(
+            "the run that the others are held against ({}) fails: {}; a greater --reference is a coarser one",
+            twin.name(),
+            run.ended.as_deref().unwrap_or_default()
+        ))),
+        None => Err(StudyError::Stopped),
+    }
+}
+
+/// What is allowed, in each quantity's own unit.
+fn limits(tune: &Tune, reference: &Measured) -> Result<Limits, StudyError> {
+    let of = |limit: &Limit| match limit.bound {
+        Bound::Absolute(value) => Ok(value),
+        Bound::Part(part) => reference
+            .whole(limit.quantity)
+            .filter(|whole| *whole > 0.0)
+            .map(|whole| part * whole)
+            .ok_or_else(|| untold(limit.quantity.name())),
+    };
+    Ok(Limits {
+        errors: tune
+            .request
+            .limits
+            .iter()
+            .map(of)
+            .collect::<Result<_, _>>()?,
+        seconds: tune.most_seconds(),
+    })
+}
+
+fn untold(name: &str) -> StudyError {
+    StudyError::Point(format!(
+        "--error {name}: none of the frames that are measured has one"
+    ))
+}
+
+/// One gauge for all runs; its cubes are those of the coarsest lattice.
+fn gauge_of(tune: &Tune) -> Result<Gauge, StudyError> {
+    let scene = &tune.reference.scene;
+    let spacings = tune.twins().map(|(_, twin)| twin.scene.particle_spacing());
+    let coarsest = spacings.fold(0.0, f64::max);
+    let start = Start::of(scene)?.particles.position;
+    let spacing = scene.particle_spacing();
+    Ok(gauge::gauge(scene, coarsest, &start, spacing))
+}
+
+/// What the runs share.
+struct Lab<'a> {
+    tune: &'a Tune,
+    gauge: Gauge,
+    ledger: Ledger<Measured>,
+}
+
+impl<'a> Lab<'a> {
+    /// Runs all that is known before the first, the coarsest first: what it cannot tell no run will.
+    fn known(&mut self, bench: &mut Bench<'_>) -> Result<Vec<Trial<'a>>, StudyError> {
+        let tune = self.tune;
+        let mut roles = vec![Role::Spacing; tune.ladder.len()];
+        roles.extend([Role::Shaken, Role::Fine]);
+        for (k, knob) in tune.knobs.iter().enumerate() {
+            roles.extend((0..knob.others.len()).map(|value| Role::Knob(k, value)));
+        }
+        roles.push(Role::Reference);
+        let mut trials = Vec::new();
+        for (role, (why, twin)) in roles.into_iter().zip(tune.twins()) {
+            let run = self.run(bench, why, twin)?;
+            if let (true, None) = (trials.is_empty(), &run.ended) {
+                self.check_told(&run.measured)?;
+            }
+            trials.push(Trial {
+                role,
+                why,
+                twin: Cow::Borrowed(twin),
+                run,
+                predicted: None,
+            });
+        }
+        Ok(trials)
+    }
+
+    fn check_told(&self, coarsest: &Measured) -> Result<(), StudyError> {
+        for limit in &self.tune.request.limits {
+            if coarsest.whole(limit.quantity).is_none() {
+                return Err(untold(limit.quantity.name()));
+            }
+        }
+        Ok(())
+    }
+
+    fn run(&mut self, bench: &mut Bench<'_>, why: &str, twin: &Twin) -> Result<Run, StudyError> {
+        let tune = self.tune;
+        let measured = format!(
+            "tune {} {:?} {:?}",
+            tune.request.repeats,
+            self.gauge,
+            tune.has_pressure().then(|| twin.scene.pressure_points()),
+        );
+        let runs = [(&twin.scene, RunsOn::Gpu)];
+        let hash = bench.devices.hash(&runs, tune.frames, &measured);
+        let name = format!("{why}: {}", twin.name());
+        let gauge = &self.gauge;
+        let (run, stood) = bench.point(&mut self.ledger, &name, hash, || {
+            measure(bench, tune, twin, gauge)
+        })?;
+        let status = match &run.ended {
+            _ if stood => PointStatus::Stands,
+            Some(message) => PointStatus::Failed(message.clone()),
+            None => PointStatus::Done(1e3 * run.per_frame()[1], Vec::new()),
+        };
+        bench.told(name, status);
+        Ok(run)
+    }
+
+    /// Runs what the laws call cheapest for as long as that is cheaper than any run that holds.
+    fn propose(
+        &mut self,
+        bench: &mut Bench<'_>,
+        results: &mut Results<'a>,
+    ) -> Result<(), StudyError> {
+        for _ in 0..PROPOSALS {
+            let Some(proposal) = results.proposal() else {
+                break;
+            };
+            let Some(fitted) = &results.fitted else {
+                break;
+            };
+            let settings = fitted.settings(&proposal.values);
+            let twin = self.tune.twin(proposal.spacing, &settings)?;
+            let hash = physics_hash(&twin.scene);
+            let mut known = results.trials.iter();
+            if known.any(|trial| physics_hash(&trial.twin.scene) == hash) {
+                break;
+            }
+            bench.count += 1;
+            let run = self.run(bench, "proposal", &twin)?;
+            results.take(twin, run, proposal);
+        }
+        Ok(())
+    }
+}
+
+impl<'a> Results<'a> {
+    /// The reference was there when these were made.
+    fn reference(&self) -> &Measured {
+        let mut all = self.trials.iter().filter(|t| t.role == Role::Reference);
+        let found = all.next().map(|trial| &trial.run.measured);
+        found.expect("a run that the others are held against")
+    }
+
+    /// Errors of a run in the order of the limits; `None` where it did not come to its end.
+    fn errors(&self, run: &Run) -> Vec<Option<f64>> {
+        let reference = self.reference();
+        let limits = self.tune.request.limits.iter();
+        let off = limits.map(|limit| run.measured.off(limit.quantity, reference));
+        off.map(|off| off.filter(|_| run.ended.is_none())).collect()
+    }
+
+    fn candidate(&self, trial: &Trial<'_>) -> Candidate {
+        Candidate {
+            seconds: trial.run.per_frame()[1],
+            errors: self.errors(&trial.run),
+        }
+    }
+
+    /// Trials that may be chosen, by their places.
+    fn candidates(&self) -> Vec<(usize, Candidate)> {
+        let trials = self.trials.iter().enumerate();
+        let may = trials.filter(|(_, t)| t.role.is_candidate() && t.run.ended.is_none());
+        may.map(|(k, trial)| (k, self.candidate(trial))).collect()
+    }
+
+    fn choose(&mut self) {
+        let (places, runs): (Vec<_>, Vec<_>) = self.candidates().into_iter().unzip();
+        self.choice = choose(&runs, &self.limits).map(|choice| match choice {
+            Choice::Holds(k) => (places[k], true),
+            Choice::Nearest(k) => (places[k], false),
+        });
+    }
+
+    /// What the laws call cheapest, where that is worth a run.
+    fn proposal(&self) -> Option<Proposal> {
+        let proposal = self.fitted.as_ref()?.model.propose(&self.limits)?;
+        let runs = self.candidates().into_iter().map(|(_, run)| run);
+        let holding = runs.filter(|run| run.excess(&self.limits) <= 1.0);
+        let cheapest = holding.map(|run| run.seconds).reduce(f64::min);
+        let is_worth = cheapest.is_none_or(|least| proposal.seconds < CHEAPER * least);
+        is_worth.then_some(proposal)
+    }
+
+    /// Takes over a proposal's run, and corrects the laws by it.
+    fn take(&mut self, twin: Twin, run: Run, predicted: Proposal) {
+        let errors = self.errors(&run);
+        if let Some(fitted) = &mut self.fitted {
+            fitted.correct(&errors, run.per_frame()[1], &predicted);
+        }
+        self.trials.push(Trial {
+            role: Role::Proposal,
+            why: "proposal",
+            twin: Cow::Owned(twin),
+            run,
+            predicted: Some(predicted),
+        });
+    }
+
+    /// What the laws say of a trial: before it was run where they were asked, else of what they were fitted to.
+    fn predicted(&self, trial: &Trial<'_>) -> Option<Proposal> {
+        if let Some(predicted) = &trial.predicted {
+            return Some(predicted.clone());
+        }
+        let fitted = self.fitted.as_ref()?;
+        let values = fitted.values(trial.role)?;
+        Some(fitted.first.predict(trial.twin.spacing(), &values))
+    }
+
+    /// Settings of a trial, each with the scene's own value, in the order of the page.
+    fn settings(&self, trial: &Trial<'_>) -> Vec<(Setting, String)> {
+        let tune = self.tune;
+        let own_spacing = tune.own_spacing();
+        let first = trial.twin.set[0].clone();
+        let of = |knob: &Knob| {
+            let mut set = trial.twin.set.iter();
+            let found = set.find(|setting| setting.key == knob.key).cloned();
+            let own = Setting {
+                key: knob.key,
+                value: knob.own.clone(),
+            };
+            (found.unwrap_or(own), knob.own.clone())
+        };
+        let knobs = tune.knobs.iter().map(of);
+        [(first, own_spacing)].into_iter().chain(knobs).collect()
+    }
+}

@@ -1,0 +1,183 @@
+//! Laws fitted to the twins of a shot.
+
+use crate::{
+    scene::study::tune::{Knob, Quantity, Setting, Tune},
+    study::tune::{Effect, Law, Model, Proposal},
+};
+
+use super::{Role, Trial, measured::Run};
+
+/// What was fitted, and which settings its values stand for.
+pub(super) struct Fitted<'a> {
+    /// As the twins told it.
+    pub(super) first: Model,
+    /// Corrected by the proposals that were run.
+    pub(super) model: Model,
+    /// Of each setting of the model its values: the scene's own, which sets nothing, then those that came to their end, each
+    /// with its place among the setting's others.
+    choices: Choices<'a>,
+}
+
+impl<'a> Fitted<'a> {
+    /// `None` where fewer than two spacings came to their end.
+    pub(super) fn of(tune: &'a Tune, trials: &[Trial<'_>]) -> Option<Self> {
+        let run = |role: Role| {
+            let mut found = trials.iter().filter(|t| t.role == role);
+            found.next().map(|t| &t.run).filter(|r| r.ended.is_none())
+        };
+        let reference = run(Role::Reference)?;
+        let ladder: Vec<(f64, &Run)> = trials
+            .iter()
+            .filter(|t| t.role == Role::Spacing && t.run.ended.is_none())
+            .map(|t| (t.twin.spacing(), &t.run))
+            .collect();
+        let [(coarsest, _), .., (finest, _)] = ladder[..] else {
+            return None;
+        };
+        let law = |of: Quantity| {
+            let pairs = ladder.iter();
+            let pairs =
+                pairs.map(|(d, run)| Some((*d, run.measured.off(of, &reference.measured)?)));
+            law(
+                of,
+                tune.reference.spacing(),
+                &pairs.flatten().collect::<Vec<_>>(),
+            )
+        };
+        let limits = tune.request.limits.iter();
+        let times: Vec<_> = ladder
+            .iter()
+            .map(|(d, run)| (*d, run.per_frame()[1]))
+            .collect();
+        let own = run(Role::Spacing).filter(|_| coarsest == tune.ladder[0].spacing());
+        let shaken = run(Role::Shaken);
+        let (settings, choices) = match (own, run(Role::Fine), shaken) {
+            (Some(own), Some(fine), Some(shaken)) => effects(tune, [own, fine, shaken], run),
+            _ => (Vec::new(), Vec::new()),
+        };
+        let model = Model {
+            errors: limits.map(|limit| law(limit.quantity)).collect(),
+            time: Law::plain(&times)?,
+            settings,
+            spacings: tune.spacings([finest, coarsest]),
+        };
+        Some(Self {
+            first: model.clone(),
+            model,
+            choices,
+        })
+    }
+
+    /// What the values of a proposal lay over the scene.
+    pub(super) fn settings(&self, values: &[usize]) -> Vec<Setting> {
+        let chosen = self.choices.iter().zip(values).map(|(of, &k)| of[k]);
+        let set = chosen.flatten().flat_map(|(_, set)| set);
+        set.cloned().collect()
+    }
+
+    /// The values of a trial; `None` of one that the laws do not speak of.
+    pub(super) fn values(&self, role: Role) -> Option<Vec<usize>> {
+        let mut values = vec![0; self.choices.len()];
+        match role {
+            Role::Spacing => {}
+            Role::Knob(k, value) => {
+                let is_it = |of: &Option<Chosen<'_>>| of.is_some_and(|it| it.0 == value);
+                values[k] = self.choices.get(k)?.iter().position(is_it)?;
+            }
+            _ => return None,
+        }
+        Some(values)
+    }
+
+    /// Corrects the laws by what a proposal came to.
+    pub(super) fn correct(&mut self, errors: &[Option<f64>], seconds: f64, before: &Proposal) {
+        let pairs = errors.iter().zip(&before.errors);
+        for (law, (measured, predicted)) in self.model.errors.iter_mut().zip(pairs) {
+            // What failed is taken as far off.
+            let ratio = measured.map_or(f64::INFINITY, |measured| measured / predicted);
+            if ratio.is_finite() || measured.is_none() {
+                *law = law.corrected(ratio);
+            }
+        }
+        if seconds > 0.0 {
+            self.model.time = self.model.time.corrected(seconds / before.seconds);
+        }
+    }
+}
+
+/// Of an error by spacing. Where no law is to be seen, as where it is 0 throughout, the largest that was measured.
+fn law(of: Quantity, reference: f64, pairs: &[(f64, f64)]) -> Law {
+    let law = match of {
+        Quantity::Density => Law::plain(pairs),
+        _ => Law::against(reference, pairs),
+    };
+    law.unwrap_or(Law {
+        order: 0.0,
+        factor: pairs.iter().map(|pair| pair.1).fold(0.0, f64::max),
+        reference: 0.0,
+        scatter: 0.0,
+    })
+}
+
+/// A value that is not the scene's own: its place among the setting's others, and what it lays over the scene.
+type Chosen<'a> = (usize, &'a [Setting]);
+
+/// Of each setting its values; `None` is the scene's own.
+type Choices<'a> = Vec<Vec<Option<Chosen<'a>>>>;
+
+/// What a run differs by from one with a millionth more gravity: no two bakes are nearer to each other.
+pub(super) fn floor(of: Quantity, own: &Run, shaken: &Run) -> Option<f64> {
+    match of {
+        Quantity::Density => Some((own.measured.density - shaken.measured.density).abs()),
+        _ => own.measured.off(of, &shaken.measured),
+    }
+}
+
+/// What each value of each setting does on the coarsest grid: time over that of the scene's own, and how much farther it is
+/// from the run with finer settings on the same grid. What is no more than a millionth of gravity does is no effect.
+fn effects<'a, 't>(
+    tune: &'a Tune,
+    [own, fine, shaken]: [&Run; 3],
+    run: impl Fn(Role) -> Option<&'t Run>,
+) -> (Vec<Vec<Effect>>, Choices<'a>) {
+    let limits = &tune.request.limits;
+    let off = |run: &Run, of: Quantity| run.measured.off(of, &fine.measured);
+    let effect = |other: &Run| {
+        let errors = limits.iter().map(|limit| {
+            let of = limit.quantity;
+            // What cannot be told on this grid is no gain and no loss.
+            let added = off(other, of)? - off(own, of)?;
+            Some(added).filter(|added| added.abs() > floor(of, own, shaken).unwrap_or(0.0))
+        });
+        Effect {
+            time: other.per_frame()[1] / own.per_frame()[1],
+            errors: errors.map(Option::unwrap_or_default).collect(),
+        }
+    };
+    let of = |(k, knob): (usize, &'a Knob)| {
+        let mut effects = vec![Effect::none(limits.len())];
+        let mut choices = vec![None];
+        for (value, (set, _)) in knob.others.iter().enumerate() {
+            if let Some(other) = run(Role::Knob(k, value)) {
+                effects.push(effect(other));
+                choices.push(Some((value, &set[..])));
+            }
+        }
+        (effects, choices)
+    };
+    tune.knobs.iter().enumerate().map(of).unzip()
+}
+
+impl Fitted<'_> {
+    /// The values of a setting beside the scene's own, as TOML has them, with what they do.
+    pub(super) fn effects(&self, knob: usize) -> Vec<(&str, &Effect)> {
+        let Some((choices, effects)) = self.choices.get(knob).zip(self.first.settings.get(knob))
+        else {
+            return Vec::new();
+        };
+        let pairs = choices.iter().zip(effects);
+        pairs
+            .filter_map(|(choice, effect)| Some((choice.as_ref()?.1[0].value.as_str(), effect)))
+            .collect()
+    }
+}

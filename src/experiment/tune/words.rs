@@ -1,0 +1,297 @@
+//! Numbers and settings of a tuned shot, in words.
+
+use crate::{
+    scene::study::tune::{Bound, Limit, Quantity},
+    study::tune::Law,
+};
+
+use super::{super::sweep::digits::significant, Results, Trial, model::floor};
+
+impl Results<'_> {
+    /// An error in the unit of its limit: `1.7 %` or `0.043 m`.
+    pub(super) fn told(&self, limit: &Limit, value: f64) -> String {
+        match limit.bound {
+            Bound::Part(_) => format!("{} %", significant(self.in_unit(limit, value))),
+            Bound::Absolute(_) => {
+                let unit = limit.quantity.unit().unwrap_or_default();
+                format!("{} {unit}", significant(value))
+            }
+        }
+    }
+
+    /// The number of that: per cent of the reference's greatest value, or the quantity's own unit.
+    pub(super) fn in_unit(&self, limit: &Limit, value: f64) -> f64 {
+        match limit.bound {
+            Bound::Part(_) => {
+                let whole = self.reference().whole(limit.quantity).unwrap_or(1.0);
+                100.0 * value / whole
+            }
+            Bound::Absolute(_) => value,
+        }
+    }
+
+    /// Whole and frame: `0.31 s a frame, 22 s for the shot's 72`.
+    pub(super) fn time(&self, trial: &Trial<'_>) -> String {
+        let seconds = trial.run.per_frame()[1];
+        let frames = self.tune.scene.shot.frames;
+        let shot = seconds * f64::from(frames);
+        format!(
+            "{} s a frame, {} s for the shot's {frames}",
+            significant(seconds),
+            significant(shot)
+        )
+    }
+
+    /// Each error of a trial beside its limit and what the laws say of it.
+    pub(super) fn off(&self, trial: &Trial<'_>) -> String {
+        let predicted = self.predicted(trial);
+        let errors = self.errors(&trial.run);
+        let limits = self.tune.request.limits.iter().enumerate();
+        let of = |(k, limit): (usize, &Limit)| {
+            let name = limit.quantity.name();
+            let off = match errors[k] {
+                Some(off) => format!("{name} {} off", self.told(limit, off)),
+                None => format!("{name} not to be told"),
+            };
+            let laws = match &predicted {
+                Some(predicted) => {
+                    format!(", the laws say {}", self.told(limit, predicted.errors[k]))
+                }
+                None => String::new(),
+            };
+            format!("{off} (limit {limit}{laws})")
+        };
+        limits.map(of).collect::<Vec<_>>().join("; ")
+    }
+
+    /// All limits, the time's too.
+    pub(super) fn limits_in_words(&self) -> String {
+        let request = &self.tune.request;
+        let limits = request.limits.iter().map(Limit::to_string);
+        let shot = request.seconds.map(|s| format!("{s} s for the shot"));
+        let frame = request.per_frame.map(|s| format!("{s} s a frame"));
+        limits
+            .chain(shot)
+            .chain(frame)
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
+
+    /// The page's first sentence.
+    pub(super) fn answer(&self) -> String {
+        let Some((place, holds)) = self.choice else {
+            return "No run came to its end.".into();
+        };
+        let trial = &self.trials[place];
+        let runs = self.candidates().len();
+        let (name, time, off) = (trial.twin.name(), self.time(trial), self.off(trial));
+        match holds {
+            true => format!("{name}: {time}; {off}: the cheapest of {runs} runs that holds."),
+            false => format!(
+                "None of {runs} runs holds {}. The nearest is {name}: {time}; {off}.",
+                self.limits_in_words()
+            ),
+        }
+    }
+
+    /// What the chosen settings save against the scene as it stands, where that was run.
+    pub(super) fn against_own(&self) -> Option<String> {
+        let chosen = &self.trials[self.choice?.0];
+        let own = self.tune.own_spacing();
+        let mut ladder = self
+            .trials
+            .iter()
+            .filter(|t| t.role == super::Role::Spacing);
+        let own = ladder.find(|t| t.twin.set[0].value == own && t.run.ended.is_none())?;
+        let ratio = chosen.run.per_frame()[1] / own.run.per_frame()[1];
+        Some(format!(
+            "The scene as it stands: {}; {}. The chosen settings take {} of its time.",
+            self.time(own),
+            self.off(own),
+            significant(ratio)
+        ))
+    }
+
+    /// Where the choice is at the sweep's end, that more may be gained.
+    pub(super) fn at_the_end(&self) -> Option<String> {
+        let (place, true) = self.choice? else {
+            return None;
+        };
+        let is_coarsest = self.trials[place].twin.spacing() >= self.tune.ladder[0].spacing();
+        is_coarsest.then(|| {
+            "It is the coarsest that was run: a greater --reference looks at coarser ones."
+                .to_owned()
+        })
+    }
+
+    /// What no run of this can promise.
+    pub(super) fn not_promised(&self) -> Vec<String> {
+        let mut texts: Vec<String> = self.floors();
+        texts.push(PROMISED.into());
+        texts.push(format!(
+            "{} No run here knows what all of them share, nor what the model leaves out.",
+            self.reference_in_words()
+        ));
+        let (frames, all) = (self.tune.frames, self.tune.scene.shot.frames);
+        if frames < all {
+            texts.push(format!(
+                "Frames 1 to {frames} of {all} were run: of the others nothing is known, and their time is taken to be the same."
+            ));
+        }
+        texts
+    }
+
+    /// What a millionth of gravity changes, by limit; the sentence says where that is more than what is allowed.
+    pub(super) fn floors(&self) -> Vec<String> {
+        let run = |role| {
+            let mut found = self.trials.iter().filter(move |t| t.role == role);
+            found.next().filter(|t| t.run.ended.is_none())
+        };
+        let (Some(own), Some(shaken)) = (run(super::Role::Spacing), run(super::Role::Shaken))
+        else {
+            return Vec::new();
+        };
+        let limits = self.tune.request.limits.iter().zip(&self.limits.errors);
+        let of = |(limit, allowed): (&Limit, &f64)| {
+            let floor = floor(limit.quantity, &own.run, &shaken.run)?;
+            let name = limit.quantity.name();
+            let what = format!(
+                "{name}: a millionth more gravity changes it by {} at {}",
+                self.told(limit, floor),
+                own.twin.name()
+            );
+            Some(if floor > *allowed {
+                format!("{what}, more than {limit}: no settings can promise that.")
+            } else {
+                format!("{what}.")
+            })
+        };
+        limits.filter_map(of).collect()
+    }
+
+    /// What the others are held against, and what it is off by itself.
+    pub(super) fn reference_in_words(&self) -> String {
+        let mut words = format!("Errors are told against {}.", self.tune.reference.name());
+        let Some(fitted) = &self.fitted else {
+            return words;
+        };
+        let limits = self.tune.request.limits.iter().zip(&fitted.first.errors);
+        let has_reference = |(limit, _): &(&Limit, &Law)| limit.quantity != Quantity::Density;
+        let (seen, unseen): (Vec<_>, Vec<_>) = limits
+            .filter(has_reference)
+            .partition(|(_, law)| law.is_seen());
+        let seen: Vec<_> = (seen.iter())
+            .map(|(limit, law)| {
+                let own = self.told(limit, law.of_reference());
+                format!("{} {own}", limit.quantity.name())
+            })
+            .collect();
+        if !seen.is_empty() {
+            words += &format!(" By the laws it is itself off by {}.", seen.join(", "));
+        }
+        let unseen: Vec<_> = unseen.iter().map(|(l, _)| l.quantity.name()).collect();
+        if !unseen.is_empty() {
+            words += &format!(
+                " How far it is itself off in {} is not known: no order of convergence is seen.",
+                unseen.join(" and ")
+            );
+        }
+        words
+    }
+
+    /// A row for each law.
+    pub(super) fn laws(&self) -> Vec<Vec<String>> {
+        let titles = [
+            "of",
+            "goes as spacing to the power",
+            "scatter",
+            "the reference's own",
+        ];
+        let mut rows = vec![titles.map(str::to_owned).to_vec()];
+        let Some(fitted) = &self.fitted else {
+            return rows;
+        };
+        let row = |name: String, law: &Law, own: String| {
+            let scatter = format!("{} %", significant(100.0 * (law.scatter.exp() - 1.0)));
+            let order = match law.is_seen() || law.reference == 0.0 {
+                true => format!("{:.2}", law.order),
+                false => format!("{:.2}, which is none", law.order),
+            };
+            vec![name, order, scatter, own]
+        };
+        let limits = self.tune.request.limits.iter().zip(&fitted.first.errors);
+        rows.extend(limits.map(|(limit, law)| {
+            let own = match law.reference > 0.0 && law.is_seen() {
+                true => self.told(limit, law.of_reference()),
+                false => String::new(),
+            };
+            row(limit.quantity.title().to_owned(), law, own)
+        }));
+        let time = &fitted.first.time;
+        rows.push(row("time of a frame".into(), time, String::new()));
+        rows
+    }
+
+    /// Why a setting of the chosen run is as it is.
+    pub(super) fn reason(&self, trial: &Trial<'_>, key: &str, value: &str, own: &str) -> String {
+        let Some(knob) = self.tune.knobs.iter().position(|knob| knob.key == key) else {
+            let law = self.fitted.as_ref().map_or(String::new(), |fitted| {
+                let limits = self.tune.request.limits.iter().zip(&fitted.first.errors);
+                let seen = limits.filter(|(_, law)| law.is_seen());
+                let orders = seen.map(|(limit, law)| {
+                    format!(
+                        "{} error goes as its power {:.1}",
+                        limit.quantity.name(),
+                        law.order
+                    )
+                });
+                let time = format!("time as {:.1}", fitted.first.time.order);
+                let all: Vec<_> = orders.chain([time]).collect();
+                format!("; {}", all.join(", "))
+            });
+            return format!("tune: was {own}; {}{law}", self.off(trial));
+        };
+        let tried: Vec<String> = self.effects_in_words(knob, value);
+        let was = match value == own {
+            true => "as it was".to_owned(),
+            false => format!("was {own}"),
+        };
+        let at = self.tune.ladder[0].spacing();
+        match tried.is_empty() {
+            true => format!("tune: {was}; nothing else was tried"),
+            false => format!("tune: {was}; on twins of {at} m: {}", tried.join("; ")),
+        }
+    }
+
+    /// What the values of a setting do beside the scene's own, the chosen one first.
+    fn effects_in_words(&self, knob: usize, chosen: &str) -> Vec<String> {
+        let Some(effects) = self.fitted.as_ref().map(|fitted| fitted.effects(knob)) else {
+            return Vec::new();
+        };
+        let limits = &self.tune.request.limits;
+        let mut words: Vec<(bool, String)> = effects
+            .into_iter()
+            .map(|(value, effect)| {
+                let errors = limits.iter().zip(&effect.errors).map(|(limit, added)| {
+                    let sign = if *added < 0.0 { "-" } else { "+" };
+                    format!(
+                        "{} {sign}{}",
+                        limit.quantity.name(),
+                        self.told(limit, added.abs())
+                    )
+                });
+                let errors = errors.collect::<Vec<_>>().join(", ");
+                let time = significant(effect.time);
+                (
+                    value != chosen,
+                    format!("{value} takes {time} of the time ({errors})"),
+                )
+            })
+            .collect();
+        words.sort_by_key(|(is_other, _)| *is_other);
+        words.into_iter().map(|(_, words)| words).collect()
+    }
+}
+
+const PROMISED: &str = "After the water has met a wall, a solid or itself particles are chaotic: what is held are such sums \
+    and medians, as a mean over the frames that were measured. The shape of a splash, a drop, one frame's crest are not.";

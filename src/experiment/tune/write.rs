@@ -1,0 +1,110 @@
+//! The scene with its settings, and the reason beside each.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use crate::scene::{
+    Scene,
+    edit::{Setting, with_settings},
+    physics_hash,
+    study::tune::Tune,
+};
+
+use super::{super::StudyError, Results, Trial};
+
+/// How a scene begins that may be written over.
+const MARK: &str = "# Tuned by swell from ";
+
+fn fault(file: &Path, source: io::Error) -> StudyError {
+    StudyError::File {
+        file: file.to_owned(),
+        source,
+    }
+}
+
+/// Before anything is run: no file of another is written over.
+pub(super) fn check_target(tune: &Tune) -> Result<(), StudyError> {
+    let file = &tune.request.target;
+    match fs::read_to_string(file) {
+        Ok(text) if text.starts_with(MARK) => Ok(()),
+        Ok(_) => {
+            let what = "it is no scene that swell tune wrote: choose another --write";
+            Err(fault(file, io::Error::other(what)))
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(fault(file, error)),
+    }
+}
+
+/// Writes the chosen run's scene; `None` where no run holds, and nothing is written.
+pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathBuf>, StudyError> {
+    let Some((place, true)) = results.choice else {
+        return Ok(None);
+    };
+    let (tune, trial) = (results.tune, &results.trials[place]);
+    let file = &tune.request.target;
+    let unfit = |what: String| StudyError::Point(format!("{}: {what}", file.display()));
+    let text = with_settings(&tune.text, &settings(results, trial)).map_err(unfit)?;
+    fs::write(file, header(results, trial, command) + &text).map_err(|e| fault(file, e))?;
+    // What was promised is what was run: read back, it is that scene.
+    let read = Scene::load_within(file, &[], tune.request.reach);
+    match read {
+        Ok(scene) if physics_hash(&scene) == physics_hash(&trial.twin.scene) => {
+            Ok(Some(file.clone()))
+        }
+        Ok(_) | Err(_) => {
+            fs::remove_file(file).map_err(|e| fault(file, e))?;
+            let why = read.err().map_or(String::new(), |e| format!(": {e}"));
+            Err(unfit(format!(
+                "these settings cannot be written into the scene{why}; run it with {}",
+                trial.twin.name()
+            )))
+        }
+    }
+}
+
+/// Lines above the scene's own.
+fn header(results: &Results<'_>, trial: &Trial<'_>, command: &str) -> String {
+    let scene = results.tune.request.scene.file_name().unwrap_or_default();
+    let mut lines = vec![
+        format!("{}: {command}", scene.to_string_lossy()),
+        format!("# {}.", results.off(trial)),
+        format!("# {}.", results.time(trial)),
+    ];
+    let told = results.not_promised();
+    lines.extend(told.iter().map(|text| format!("# {text}")));
+    format!("{MARK}{}\n\n", lines.join("\n"))
+}
+
+fn settings(results: &Results<'_>, trial: &Trial<'_>) -> Vec<Setting> {
+    let tune = results.tune;
+    let solver = tune.request.solver.map(|method| Setting {
+        key: "solver.method".into(),
+        value: format!("{:?}", method.name()),
+        reason: "tune: --solver".into(),
+    });
+    let chosen = results
+        .settings(trial)
+        .into_iter()
+        .map(|(setting, own)| Setting {
+            reason: results.reason(trial, setting.key, &setting.value, &own),
+            key: setting.key.into(),
+            value: setting.value,
+        });
+    let chosen: Vec<Setting> = chosen.collect();
+    let is_new = |key: &str| chosen.iter().all(|it| it.key != key);
+    let set = trial.twin.set.iter().filter(|it| is_new(it.key));
+    let with_others = set.map(|it| Setting {
+        key: it.key.into(),
+        value: it.value.clone(),
+        reason: "tune: as the settings beside it ask".into(),
+    });
+    let with_others: Vec<Setting> = with_others.collect();
+    solver
+        .into_iter()
+        .chain(chosen)
+        .chain(with_others)
+        .collect()
+}
