@@ -32,7 +32,8 @@ use super::{
     override_usage = "swell inspect [OPTIONS] <SCENE|LOOK|STUDY|CACHE|FILE>\n       swell inspect --adapters"
 )]
 pub(super) struct InspectArgs {
-    /// A scene, look or study file, a cache directory, or a file: a frame or mesh (.ply, .obj, .stl), a .vdb, a picture (.png, .exr).
+    /// A scene, look or study file, a cache directory, or a file: a frame or mesh (.ply, .obj, .stl), a .vdb, a picture (.png, .exr), a
+    /// .usda, .glb or .gltf with cameras or animations.
     #[arg(required_unless_present = "adapters")]
     subject: Option<PathBuf>,
     /// List this machine's adapters with the limits that matter here.

@@ -16,6 +16,7 @@ pub mod moving_solid;
 pub mod no_slip;
 pub mod periodic;
 pub mod probe;
+pub mod rig;
 pub mod step;
 pub mod study;
 pub mod tolerance;

@@ -1,4 +1,4 @@
-//! `swell inspect FILE`: a frame, a mesh, a VDB, a picture.
+//! `swell inspect FILE`: a frame, a mesh, a VDB, a picture, a USD or a glTF.
 
 use std::{
     fmt::{self, Write},
@@ -12,11 +12,11 @@ use crate::{
     cli::{Failure, count},
     domain::bounds::Bounds,
     stage::inspect::file::{
-        FileContents, FrameFile, GridFile, MeshFile, PictureFile, describe, is_known,
+        FileContents, FrameFile, GridFile, MeshFile, PictureFile, Rig, describe, is_known,
     },
 };
 
-/// Whether a name is that of a frame, mesh, VDB or picture.
+/// Whether a name is that of a frame, mesh, VDB, picture, USD or glTF.
 pub(super) fn is_file(file: &Path) -> bool {
     is_known(file)
 }
@@ -35,6 +35,7 @@ pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<
         FileContents::Mesh(it) => show_mesh(out, &name, &it),
         FileContents::Grids(it) => show_grids(out, &name, &it),
         FileContents::Picture(it) => show_picture(out, &name, &it),
+        FileContents::Rig(it) => show_rig(out, &name, &it),
     };
     Ok(())
 }
@@ -109,6 +110,25 @@ fn show_grids(out: &mut String, name: &str, grids: &[GridFile]) -> fmt::Result {
     Ok(())
 }
 
+fn show_rig(out: &mut String, name: &str, rig: &Rig) -> fmt::Result {
+    writeln!(
+        out,
+        "{name}: {}, {}",
+        if rig.format == "usd" { "USD" } else { "glTF" },
+        count(rig.cameras.len() as u64, "camera"),
+    )?;
+    for camera in &rig.cameras {
+        writeln!(out, "camera    {camera}")?;
+    }
+    for moving in &rig.moving {
+        writeln!(out, "animated  {moving}")?;
+    }
+    match &rig.elsewhere {
+        Some(warning) => writeln!(out, "warning: {warning}"),
+        None => Ok(()),
+    }
+}
+
 fn show_picture(out: &mut String, name: &str, picture: &PictureFile) -> fmt::Result {
     let ([width, height], (data, corner)) = (picture.size, picture.data);
     writeln!(
@@ -168,6 +188,10 @@ pub(super) fn object(args: &InspectArgs, file: &Path) -> Result<Value, Failure> 
             json!({ "kind": "vdb", "grids": grids.collect::<Vec<_>>() })
         }
         FileContents::Picture(it) => picture_json(&it),
+        FileContents::Rig(it) => json!({
+            "kind": it.format, "cameras": it.cameras, "animated": it.moving,
+            "warnings": it.elsewhere.iter().collect::<Vec<_>>(),
+        }),
     })
 }
 

@@ -1,4 +1,4 @@
-//! What one file is: a frame of particles, a mesh, a VDB, a picture.
+//! What one file is: a frame of particles, a mesh, a VDB, a picture, a USD or a glTF.
 
 use std::{
     fs, io,
@@ -26,7 +26,7 @@ use crate::{
     stage::Blame,
 };
 
-pub use crate::domain::mesh_file::vdb::GridFile;
+pub use crate::{domain::mesh_file::vdb::GridFile, scene::rig::Rig};
 
 /// A file that `inspect` knows by its ending.
 #[derive(Debug)]
@@ -39,6 +39,8 @@ pub enum FileContents {
     Grids(Vec<GridFile>),
     /// A PNG or an EXR.
     Picture(PictureFile),
+    /// Cameras and animations of USD or glTF.
+    Rig(Rig),
 }
 
 /// Particles of one frame.
@@ -110,9 +112,9 @@ pub enum FileError {
     /// A compressed frame.
     #[error(transparent)]
     Frame(#[from] CacheError),
-    /// No OpenVDB file, or a damaged one.
+    /// A VDB, USD or glTF that is none, is damaged, or is not read.
     #[error("{}: {detail}", file.display())]
-    Vdb {
+    Other {
         /// Which.
         file: PathBuf,
         /// What is wrong.
@@ -133,7 +135,9 @@ impl From<&FileError> for Blame {
 }
 
 /// Endings that [`describe`] knows, in lower case.
-const ENDINGS: [&str; 7] = ["ply", "zst", "obj", "stl", "vdb", "png", "exr"];
+const ENDINGS: [&str; 13] = [
+    "ply", "zst", "obj", "stl", "vdb", "png", "exr", "usd", "usda", "usdc", "usdz", "glb", "gltf",
+];
 
 /// The file's ending where `describe` knows it.
 fn ending(file: &Path) -> Option<&'static str> {
@@ -161,11 +165,18 @@ pub fn describe(file: &Path) -> Result<FileContents, FileError> {
         }
         Some("vdb") => {
             let bytes = read(file)?;
-            let grids = vdb::grids(&bytes).map_err(|detail| FileError::Vdb {
+            let grids = vdb::grids(&bytes).map_err(|detail| FileError::Other {
                 file: file.to_owned(),
                 detail,
             })?;
             Ok(FileContents::Grids(grids))
+        }
+        Some("usd" | "usda" | "usdc" | "usdz" | "glb" | "gltf") => {
+            let rig = Rig::read(&read(file)?).map_err(|detail| FileError::Other {
+                file: file.to_owned(),
+                detail,
+            })?;
+            Ok(FileContents::Rig(rig))
         }
         Some("png") => Ok(FileContents::Picture(png(file)?)),
         Some("exr") => Ok(FileContents::Picture(exr(file)?)),

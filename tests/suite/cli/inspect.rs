@@ -251,3 +251,54 @@ fn inspect_knows_studies_frames_meshes_grids_and_pictures() {
         &["study.toml", "solvers"],
     );
 }
+
+/// Names that a look and a scene take of USD and glTF; what is not read is told of.
+#[test]
+fn inspect_names_cameras_and_what_moves() {
+    let job = Job::of(&[]);
+    let write = |name: &str, text: &str| fs::write(job.path(name), text).unwrap();
+    let door = include_str!("../../../src/scene/solid_track/door.usda");
+    let lens = include_str!("../../../src/scene/look/usd_camera/blender_lens.usda");
+    write("door.usda", door);
+    write("lens.usda", lens);
+    let taken = "def Xform \"set\" (\n    references = @set.usda@\n)\n{\n}\n";
+    write("taken.usda", &format!("{lens}\n{taken}"));
+    write(
+        "eye.gltf",
+        "{\"asset\":{\"version\":\"2.0\"},\"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":0.5,\"znear\":0.1}}],\
+         \"nodes\":[{\"name\":\"shot\",\"camera\":0},{\"name\":\"set\"}]}",
+    );
+    let object = |file: &str| job.json(0, &format!("inspect {file}"));
+    let list = |of: &[&str]| serde_json::json!(of);
+    let found = object("door.usda");
+    assert_eq!(found["kind"], "usd");
+    assert_eq!(found["cameras"], list(&[]));
+    assert_eq!(found["animated"], list(&["/root/cart/door", "/root/cart"]));
+    let found = object("lens.usda");
+    assert_eq!(found["cameras"], list(&["/root/shot_020/lens"]));
+    assert_eq!(found["animated"], list(&[]));
+    assert_eq!(found["warnings"], list(&[]));
+    let found = object("eye.gltf");
+    assert_eq!(found["kind"], "gltf");
+    assert_eq!(found["cameras"], list(&["shot"]));
+    let said = job.expect(0, "inspect taken.usda");
+    assert_has(
+        &said,
+        &[
+            "USD, 1 camera",
+            "/root/shot_020/lens",
+            "warning: prim /set takes parts from elsewhere",
+        ],
+    );
+    write("torn.usda", &door[..door.len() / 2]);
+    for (file, words) in [
+        ("torn.usda", "ends too early"),
+        ("none.glb", "cannot read none.glb"),
+    ] {
+        let said = job.expect(4, &format!("inspect {file}"));
+        assert!(
+            said.contains(words) && said.trim_end().lines().count() == 1,
+            "{said}"
+        );
+    }
+}

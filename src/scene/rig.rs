@@ -1,0 +1,73 @@
+//! What of a file of USD or glTF a look or a scene can take: its cameras, and what is animated.
+
+use gltf::{Gltf, animation::Property};
+
+use super::{
+    gltf_nodes::named,
+    usd_nodes::{chains, elsewhere, is_usd, layer, path_of},
+    usda::{Prim, Value},
+};
+
+/// What a file has, by the names that `camera.name` and `track.node` take.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rig {
+    /// `usd` or `gltf`.
+    pub format: &'static str,
+    /// In the file's order; of USD those within a prim before it.
+    pub cameras: Vec<String>,
+    /// Nodes or prims, cameras among them, of which a transform of their own is animated.
+    pub moving: Vec<String>,
+    /// That a prim takes parts from elsewhere, which are not read; a sentence.
+    pub elsewhere: Option<String>,
+}
+
+impl Rig {
+    /// Of the bytes of a file.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn read(bytes: &[u8]) -> Result<Self, String> {
+        if is_usd(bytes) {
+            let layer = layer(bytes)?;
+            let paths = |is_wanted: &dyn Fn(&Prim) -> bool| {
+                let found = chains(&layer, is_wanted);
+                found.iter().map(|chain| path_of(chain)).collect()
+            };
+            return Ok(Self {
+                format: "usd",
+                cameras: paths(&|prim| prim.kind == "Camera"),
+                moving: paths(&moves),
+                elsewhere: elsewhere(&layer),
+            });
+        }
+        let Gltf { document, .. } = Gltf::from_slice(bytes).map_err(|error| error.to_string())?;
+        let is_target = |index: usize| {
+            let mut channels = document.animations().flat_map(|it| it.channels());
+            channels.any(|channel| {
+                let target = channel.target();
+                target.node().index() == index && target.property() != Property::MorphTargetWeights
+            })
+        };
+        let nodes = || document.nodes();
+        let cameras = nodes().filter(|node| node.camera().is_some());
+        let moving = nodes().filter(|node| is_target(node.index()));
+        Ok(Self {
+            format: "gltf",
+            cameras: cameras.map(|node| named(&node)).collect(),
+            moving: moving.map(|node| named(&node)).collect(),
+            elsewhere: None,
+        })
+    }
+}
+
+/// Whether one of the prim's operations has values at several times.
+fn moves(prim: &Prim) -> bool {
+    let Some(Value::Words(order)) = prim.attributes.get("xformOpOrder") else {
+        return false;
+    };
+    order.iter().any(|listed| {
+        let name = listed.strip_prefix("!invert!").unwrap_or(listed);
+        let value = prim.attributes.get(name);
+        matches!(value, Some(Value::Samples(samples)) if samples.len() > 1)
+    })
+}
