@@ -181,3 +181,101 @@ impl Fitted<'_> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{borrow::Cow, path::Path};
+
+    use crate::scene::{
+        Reach,
+        study::tune::{TuneRequest, Twin},
+    };
+
+    use super::{super::measured::Measured, *};
+
+    fn tune() -> Tune {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+        let request = TuneRequest {
+            scene: folder.join("dam-break.toml"),
+            solver: None,
+            limits: vec!["density=1%".parse().expect("a limit")],
+            per_frame: None,
+            seconds: None,
+            frames: None,
+            reference: 0.8,
+            repeats: 1,
+            target: folder.join("tuned.toml"),
+            reach: Reach::Folder,
+        };
+        Tune::load(request).expect("a shot")
+    }
+
+    fn trial(role: Role, twin: &Twin, density: f64, seconds: f64) -> Trial<'_> {
+        let measured = Measured {
+            density,
+            ..Measured::default()
+        };
+        Trial {
+            role,
+            why: "",
+            twin: Cow::Borrowed(twin),
+            run: Run {
+                frames: 1,
+                seconds: vec![seconds],
+                measured,
+                ..Run::default()
+            },
+            predicted: None,
+        }
+    }
+
+    /// Density errors of d / 10, times of 1e-5 d⁻⁴; a millionth of gravity does 1e-4. CFL 2 adds twice that, CFL ½ takes half
+    /// of it, which is none.
+    fn trials(tune: &Tune) -> Vec<Trial<'_>> {
+        let of = |twin: &Twin| (0.1 * twin.spacing(), 1e-5 * twin.spacing().powi(-4));
+        let mut trials: Vec<_> = tune
+            .ladder
+            .iter()
+            .map(|twin| trial(Role::Spacing, twin, of(twin).0, of(twin).1))
+            .collect();
+        let (density, seconds) = of(&tune.ladder[0]);
+        let at = |role, twin, added, times| trial(role, twin, density + added, times * seconds);
+        trials.push(at(Role::Shaken, &tune.shaken, 1e-4, 1.0));
+        trials.push(at(Role::Fine, &tune.fine, -1e-3, 4.0));
+        let cfl = &tune.knobs[0].others;
+        trials.push(at(Role::Knob(0, 0), &cfl[0].1, 2e-4, 0.5));
+        trials.push(at(Role::Knob(0, 1), &cfl[1].1, -5e-5, 2.0));
+        trials.push(trial(Role::Reference, &tune.reference, 0.0, 9.0));
+        trials
+    }
+
+    #[test]
+    fn laws_and_effects_are_those_that_were_put_in() {
+        let tune = tune();
+        let mut trials = trials(&tune);
+        let fitted = Fitted::of(&tune, &trials).expect("four spacings");
+        let [law] = fitted.model.errors[..] else {
+            panic!("one limit")
+        };
+        assert!((law.order - 1.0).abs() < 1e-9 && (law.factor - 0.1).abs() < 1e-9);
+        assert!((fitted.model.time.order + 4.0).abs() < 1e-9);
+        let effects = fitted.effects(0);
+        let [(double, fast), (half, slow)] = effects[..] else {
+            panic!("{effects:?}")
+        };
+        assert_eq!((double, half), ("2", "0.5"));
+        assert!((fast.errors[0] - 2e-4).abs() < 1e-12 && (fast.time - 0.5).abs() < 1e-12);
+        assert_eq!(slow.errors[0], 0.0, "no more than what gravity does");
+        // The other settings had no run that came to its end: they keep the scene's own value.
+        assert_eq!(fitted.settings(&[1, 0, 0]), tune.knobs[0].others[0].0);
+        assert!(fitted.effects(1).is_empty() && fitted.settings(&[0, 0, 0]).is_empty());
+        assert_eq!(fitted.values(Role::Knob(0, 1)), Some(vec![2, 0, 0]));
+        assert_eq!(fitted.values(Role::Knob(1, 0)), None);
+        // Controls: a smaller millionth lets the effect be seen; without a reference nothing is fitted.
+        trials[4].run.measured.density -= 9e-5;
+        let fitted = Fitted::of(&tune, &trials).expect("four spacings");
+        assert!((fitted.effects(0)[1].1.errors[0] + 5e-5).abs() < 1e-12);
+        trials.pop();
+        assert!(Fitted::of(&tune, &trials).is_none());
+    }
+}

@@ -105,13 +105,17 @@ impl Results<'_> {
         let knobs = format!("settings but the spacing at {} m", tune.ladder[0].spacing());
         Chart {
             title: format!("{}: {}", tune.scene.shot.name, limit.quantity.title()),
-            subtitle: format!("on {device}; {knobs}; the ring is what was chosen"),
+            subtitle: format!("on {device}; {knobs}"),
             x_label: "time a frame, ms".into(),
             y_label: format!("{} {against}, {unit}", limit.quantity.title()),
             is_log: true,
             series,
             marks: vec![Mark::Level(allowed, format!("limit {limit}"))],
             notes: self.failures(),
+            ring: match self.choice {
+                Some((_, true)) => "chosen",
+                _ => "nearest",
+            },
             ..Chart::default()
         }
     }

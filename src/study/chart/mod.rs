@@ -62,6 +62,8 @@ pub struct Chart {
     pub marks: Vec<Mark>,
     /// What has no place on the axes, each in a line below.
     pub notes: Vec<String>,
+    /// What a point with a ring is called; a knee where empty.
+    pub ring: &'static str,
 }
 
 /// Okabe and Ito (2008): told apart by everyone.
@@ -115,6 +117,13 @@ impl Svg {
 }
 
 impl Chart {
+    fn ring_name(&self) -> &'static str {
+        match self.ring {
+            "" => "knee",
+            name => name,
+        }
+    }
+
     fn size(&self) -> [f64; 2] {
         match self.is_log {
             true => [680.0, 440.0],
@@ -341,7 +350,7 @@ impl Chart {
         for (index, dot, value) in labelled {
             let at = [x.at(dot.at), y.at(value)];
             let (text, least) = match dot.is_knee {
-                true => (format!("knee: {}", dot.label), RING + 5.0),
+                true => (format!("{}: {}", self.ring_name(), dot.label), RING + 5.0),
                 false => (dot.label.clone(), 7.0),
             };
             // A label without a free place is left to the table.
@@ -477,6 +486,8 @@ mod tests {
         let rings = |chart: &Chart| chart.to_svg().matches("r=\"7.5\"").count();
         assert_eq!(rings(&chart), 1);
         assert!(chart.to_svg().contains(">knee: n=2<"));
+        chart.ring = "chosen";
+        assert!(chart.to_svg().contains(">chosen: n=2<") && !chart.to_svg().contains("knee"));
         chart.series[0].points[2].is_knee = false;
         assert_eq!(rings(&chart), 0);
         assert!(!chart.to_svg().contains("knee"));
