@@ -27,6 +27,9 @@ use super::super::{
 /// Frames that are measured, about.
 const SAMPLES: u32 = 24;
 
+/// Runs of a twin at the coarsest spacing, at least: it takes little, and times of settings are told by it.
+const COARSE_REPEATS: u32 = 3;
+
 /// What a twin came to.
 pub(super) type Run = engine::Run<Measured>;
 
@@ -101,12 +104,20 @@ impl Measured {
     }
 }
 
+/// Runs of a twin.
+pub(super) fn repeats(tune: &Tune, twin: &Twin) -> u32 {
+    match twin.spacing() >= tune.ladder[0].spacing() {
+        true => tune.request.repeats.max(COARSE_REPEATS),
+        false => tune.request.repeats,
+    }
+}
+
 /// Frames from one that is measured to the next.
 pub(super) fn stride(frames: u32) -> u32 {
     (frames / SAMPLES).max(1)
 }
 
-/// Runs a twin as often as is asked, each time from the scene's start, after one frame that is not counted: it makes the
+/// Runs a twin as often as its time needs, each time from the scene's start, after one frame that is not counted: it makes the
 /// device's programs ready.
 pub(super) fn measure(
     bench: &Bench<'_>,
@@ -126,7 +137,7 @@ pub(super) fn measure(
         frames: tune.frames,
         ..Run::default()
     };
-    for repeat in 0..tune.request.repeats {
+    for repeat in 0..repeats(tune, twin) {
         drive.load(0, &start.particles)?;
         let mut seconds = 0.0;
         until_done(&mut drive, tune.frames, bench.stop, |step| {

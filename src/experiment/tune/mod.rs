@@ -30,7 +30,7 @@ use super::{
     engine::{Bench, Kind, Ledger, needs_of},
     report::Report,
 };
-use measured::{Measured, Run, measure};
+use measured::{Measured, Run, measure, repeats};
 use model::Fitted;
 
 /// Proposals that are run at most: each corrects the laws by what the one before came to.
@@ -223,7 +223,7 @@ impl<'a> Lab<'a> {
         let tune = self.tune;
         let measured = format!(
             "tune {} {:?} {:?}",
-            tune.request.repeats,
+            repeats(tune, twin),
             self.gauge,
             tune.has_pressure().then(|| twin.scene.pressure_points()),
         );

@@ -191,8 +191,8 @@ impl Results<'_> {
         parts.push(Part::Text(self.units()));
         let mut run = what_was_run(bench.request);
         run.push(Part::Text(format!(
-            "On {device}, by {} {}. Times are wall clock, in the program, without files: the median of {} of each twin, after one \
-             frame that does not count.",
+            "On {device}, by {} {}. Times are wall clock, in the program, without files: the median of {} of each twin, of \
+             three at least at the coarsest spacing, after one frame that does not count.",
             env!("CARGO_PKG_NAME"),
             env!("CARGO_PKG_VERSION"),
             self.tune.request.repeats
