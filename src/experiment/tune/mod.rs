@@ -81,6 +81,8 @@ struct Results<'a> {
     fitted: Option<Fitted<'a>>,
     /// In each quantity's own unit.
     limits: Limits,
+    /// Edge of the cubes in which crests and fronts are measured, metres.
+    resolution: f64,
     /// Which trial is chosen.
     choice: Option<(usize, bool)>,
 }
@@ -108,6 +110,7 @@ impl Kind for Tune {
             fitted: Fitted::of(self, &trials),
             trials,
             limits,
+            resolution: lab.gauge.resolution(),
             choice: None,
         };
         lab.propose(bench, &mut results)?;

@@ -127,6 +127,13 @@ impl Results<'_> {
     /// What no run of this can promise.
     pub(super) fn not_promised(&self) -> Vec<String> {
         let mut texts: Vec<String> = self.floors();
+        let mut limits = self.tune.request.limits.iter();
+        if limits.any(|it| matches!(it.quantity, Quantity::Crest | Quantity::Front)) {
+            texts.push(format!(
+                "Crest and front are measured in cubes of {} m: lower waves ask for run_up or energy.",
+                significant(self.resolution)
+            ));
+        }
         texts.push(PROMISED.into());
         texts.push(format!(
             "{} No run here knows what all of them share, nor what the model leaves out.",
