@@ -110,12 +110,15 @@ impl Kernels {
     /// Fits kernels to particles at `positions`, metres from the least corner of a box of `size` whose sides are mirrors;
     /// `spacing` lies between neighbours at rest, metres.
     pub fn fit(positions: &[DVec3], size: DVec3, spacing: f64) -> Self {
-        let calibration = Calibration::new(spacing);
         let fitted = Self::of_first(positions.len(), positions, size, spacing);
-        let ellipsoids = mirrored(&fitted, size, SUPPORT * spacing, &Ellipsoid::mirrored);
+        Self::of_fitted(&fitted, size, spacing)
+    }
+
+    /// These kernels, which [`Self::of_first`] fitted, and those that stand in the mirrors of the box's sides.
+    pub fn of_fitted(fitted: &[Ellipsoid], size: DVec3, spacing: f64) -> Self {
         Self {
-            ellipsoids,
-            level: calibration.level,
+            ellipsoids: mirrored(fitted, size, SUPPORT * spacing, &Ellipsoid::mirrored),
+            level: Calibration::new(spacing).level,
         }
     }
 
@@ -159,6 +162,18 @@ impl Field<'_> {
         self.grid
             .for_each_near(x, |k| sum += ellipsoids[k].value(x));
         sum / self.kernels.level - 1.0
+    }
+
+    /// [`Self::value`] and [`Self::gradient`] at once.
+    pub fn value_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
+        let (mut sum, mut slope) = (0.0, DVec3::ZERO);
+        let ellipsoids = &self.kernels.ellipsoids;
+        self.grid.for_each_near(x, |k| {
+            sum += ellipsoids[k].value(x);
+            slope += ellipsoids[k].gradient(x);
+        });
+        let level = self.kernels.level;
+        (sum / level - 1.0, slope / level)
     }
 
     /// ∇ at `x`, 1/m.
