@@ -18,8 +18,8 @@ use crate::{
     scene::look::Look,
 };
 
-/// Radius of a ball with the mean square distance of the drops that are splatted for a particle, in splat radii: drops lie evenly within
-/// 1.6 radii from it, and have up to a third of a radius of their own.
+/// Radius of a ball with the mean square distance of what is splatted for a particle, in splat radii: 1.6 of its mist and of the middles
+/// of its drops, which have up to a third of a radius of their own.
 const THROWN: f64 = 1.63;
 /// How far behind the water's surface a ray still meets what floats on it, particle spacings: what the grid smears across it.
 pub(super) const SKIN: f64 = 1.0;

@@ -414,27 +414,26 @@ fn drops(context: &Context) -> [f64; 2] {
 }
 
 #[test]
-fn drops_of_a_particle_fill_a_ball_evenly_and_hold_its_air() {
+fn spray_of_a_particle_is_as_wide_as_its_ball_by_rays_and_holds_its_air() {
     let [square, volume] = drops(&context());
-    // R² / 5 of a ball of 1.6 radii; a drop of 1.4 pixels, whose profile is (1 − q²)^1.5, adds a seventh of its radius squared, and so much
-    // as a cell of two pixels adds that is read linearly, a sixth of its square.
+    // R² / 5 of a ball of 1.6 radii, of which rays know; a drop of 1.4 pixels, whose profile is (1 − q²)^1.5, adds a seventh of its
+    // radius squared for its two fifths of the volume, and as much as a cell of two pixels adds that is read linearly, a sixth of its
+    // square.
     let pixel = AWAY / 300.0;
-    let own = (1.4 * 1.4 / 7.0 + 2.0 * 2.0 / 6.0) * pixel * pixel;
+    let own = (0.4 * 1.4 * 1.4 / 7.0 + 2.0 * 2.0 / 6.0) * pixel * pixel;
     let wanted = (1.6 * SPLAT).powi(2) / 5.0 + own;
-    // 12 × 180 drops, whose squares along an axis vary by 1.07 of their mean: three standard deviations of the mean over both axes.
-    let bound = 3.0 * 1.07 / (2.0 * 12.0 * 180.0f64).sqrt();
+    // What a thread of 1.2 adds to the mean over both axes of the picture goes with 1 − z², where z is evenly in −1..1: its standard
+    // deviation is 1.2² · 0.149. Its bend and four puffs off it add a tenth to that. Three of them, of the mean of twelve threads.
+    let bound = 3.0 * 1.1 * 1.44 * 0.149 / 12f64.sqrt();
     assert!((square / wanted - 1.0).abs() < bound, "{square} {wanted}");
     // Three twentieths of a thrown particle are drops; each is sampled by few cells.
     let air = 0.15 * SPACING.powi(3);
     assert!((volume / air - 1.0).abs() < 0.02, "{volume} {air}");
-    // The controls: drops that are denser near the particle, and smaller ones that are no more opaque for it.
+    // The controls: threads twice as long, and smaller drops that are no more opaque for it.
     let pass = "ssfr/splat_spray";
-    let (from, to) = (
-        "pow(random(id, 3u * k + 2u), 1.0 / 3.0)",
-        "random(id, 3u * k + 2u)",
-    );
+    let (from, to) = ("const LENGTH: f32 = 1.2;", "const LENGTH: f32 = 2.4;");
     let control = drops(&spoiled(pass, from, to))[0] / wanted - 1.0;
-    assert!(control < -5.0 * bound, "{control}");
+    assert!(control > 5.0 * bound, "{control}");
     let (from, to) = ("* finer * finer * finer;", "* finer * finer;");
     let control = drops(&spoiled(pass, from, to))[1] / air - 1.0;
     assert!(control < -0.1, "{control}");

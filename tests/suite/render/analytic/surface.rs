@@ -146,9 +146,9 @@ const AWAY: f64 = 50.0;
 
 /// A lone particle of spray before an empty sky, with an optical density per metre.
 fn spray(context: &Context, density: f64, id: u32) -> (Image, Eye) {
-    // 45 cm of the drop's surroundings: its cloud is 37 wide.
+    // 75 cm of the drop's surroundings: few threads are longer than 50.
     let eye = Eye {
-        size: 192,
+        size: 320,
         ..Eye::new(
             [5.0, 2.0, 5.0],
             [5.0 + 0.8 * AWAY, 2.0 + 0.6 * AWAY, 5.0],
@@ -199,8 +199,9 @@ fn spray_hides_one_less_exp_of_its_optical_depth() {
     let (area, grey) = spray_sums(&context());
     // A particle of spray stands for 15 % of a particle's water.
     let error = |density: f64| area / (f64::from(CLOUDS) * density * 0.15 * 0.115f64.powi(3)) - 1.0;
-    // A particle is some 360 drops here, up to 12 cm nearer or farther than 50 m, which is twice that of an area, and of either sign.
-    // Their radii are 0.7 to 1.25 cells of the sums, which are a twentieth off for a drop and so 0.001 for all of them.
+    // A particle is four puffs and some 360 drops here, 6 cm nearer or farther than 50 m, which is twice that of an area, and of either
+    // sign: 4e-4 for all puffs. Radii of drops are 0.7 to 1.25 cells of the sums, which are a twentieth off for a drop and so 0.001 for
+    // all of them.
     assert!(error(DENSITY).abs() < 5e-3, "{}", error(DENSITY));
     assert!(grey < 1e-4, "{grey}");
     for density in [0.99 * DENSITY, 1.01 * DENSITY] {
