@@ -191,10 +191,10 @@ struct March {
     eye: vec3f,
 }
 
-// Walks a ray over the depth image of the solids. A hit lies just behind that surface, a few spacings or steps at
-// most; things nearer to the viewer than `nearest` stand before the water and are no hit. The hit is refined after the walk and not
-// where it is found: adapters that run both sides of a branch would refine at each step.
-fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, nearest: f32) -> March {
+// Walks a ray over the depth image of the solids. A hit lies just behind that surface, a few spacings or 1.5 steps, of which each goes
+// `deep` times as far behind it, at most; things nearer to the viewer than `nearest` stand before the water and are no hit. The hit is
+// refined after the walk and not where it is found: adapters that run both sides of a branch would refine at each step.
+fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, deep: f32, nearest: f32) -> March {
     var last = 0.0;
     // First step of a geometric row of `steps` steps that ends at `reach`.
     var step = reach / f32(steps);
@@ -213,7 +213,8 @@ fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, n
             break;
         }
         let z = solid_depth[u32(pixel.y) * camera.size.x + u32(pixel.x)];
-        if z < q.z && z > nearest && q.z - z < 3.5 * shading.spacing + 1.5 * step {
+        let slack = 1.5 * step;
+        if z < q.z && z > nearest - (deep - 1.0) * slack && q.z - z < 3.5 * shading.spacing + deep * slack {
             next = t;
             break;
         }
@@ -261,7 +262,7 @@ fn mirrored(water: Water) -> vec3f {
     r = normalize(vec3f(r.x, max(r.y, 0.01), r.z));
     let eye_r = vec3f(dot(r, camera.right), dot(r, camera.up), dot(r, camera.forward));
     let start = water.eye + 0.3 * shading.spacing * eye_r;
-    let hit = march(start, eye_r, 0.56 * shading.extent, 14, 1.25, 0.0);
+    let hit = march(start, eye_r, 0.56 * shading.extent, 14, 1.25, 1.0, 0.0);
     if hit.distance < FAR {
         let found = solid_surface(hit.at, hit.eye, -r);
         return radiance_of(found, -r, hit.eye.z / camera.focal, 0.0);
@@ -291,7 +292,9 @@ fn transmitted(water: Water, seen: f32, backdrop: vec3f) -> Through {
     var found = Surface(floor_point, vec3f(0.0, 1.0, 0.0), 2u, NO_TRIANGLE);
     let eye_t = vec3f(dot(t, camera.right), dot(t, camera.up), dot(t, camera.forward));
     let far = min(reach, 1.4 * seen + 1.8 * shading.spacing);
-    let hit = march(water.eye, eye_t, far, 8, 1.0, water.eye.z - 0.6 * shading.spacing);
+    // Below a level ground a step that goes down steeply is as much farther from it along a flat line of sight as that is flatter.
+    let deep = max(t.y / min(-water.view.y, -0.02), 1.0);
+    let hit = march(water.eye, eye_t, far, 8, 1.0, deep, water.eye.z - 0.6 * shading.spacing);
     if hit.distance < reach {
         reach = hit.distance;
         found = solid_surface(hit.at, hit.eye, -t);

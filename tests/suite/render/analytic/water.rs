@@ -8,6 +8,7 @@ use swell::gpu::adapter::Context;
 use swell::render::{Image, RenderScene};
 
 use super::geometry::box_mesh;
+use super::rays;
 use super::support::{
     Eye, RAMP_ERROR, Setup, ball, context, draw, kernel, luminance, ramp_sky, scene, sky_place,
     spoiled, uniform_sky, wide,
@@ -405,6 +406,53 @@ fn a_plate_under_water_is_seen_where_snell_puts_it() {
     for index in [1.0, 1.25 * INDEX] {
         assert!(faults(index).0 > 60, "{index}: {}", faults(index).0);
     }
+}
+
+/// Pixels of a pool half a metre deep over a white shelf that show what is below the shelf, and pixels of the pool; seen from this many
+/// degrees above its surface, and of the picture's upper half: lower ones show what the picture does not reach down to.
+fn dark_pixels(context: &Context, elevation: f64) -> [usize; 2] {
+    let (sin, cos) = elevation.to_radians().sin_cos();
+    let target = DVec3::new(5.0, rays::LEVEL, 5.0);
+    let eye = Eye::new(
+        (target + 6.0 * DVec3::new(-cos, sin, 0.0)).to_array(),
+        target.to_array(),
+        256.0,
+    );
+    let setup = Setup {
+        water: "absorption_per_metre = [0.0, 0.0, 0.0]\n".to_owned(),
+        ..Setup::new(eye)
+    };
+    let shelf = Bounds {
+        min: DVec3::ZERO,
+        max: DVec3::new(14.0, rays::LEVEL - 0.5, 10.0),
+    };
+    let scene = RenderScene {
+        solids: vec![box_mesh(shelf)],
+        ..rays::pool_scene()
+    };
+    let image = draw(context, &setup, &uniform_sky, &scene, &rays::water(), 1);
+    let (place, thickness) = (
+        image.aovs.p.as_ref().unwrap(),
+        image.aovs.thickness.as_ref().unwrap(),
+    );
+    let is_wet = |i: &usize| f64::from(place[*i][0]) < rays::SIDE && thickness[*i] > 0.5;
+    let wet = || (0..32 * 64).filter(is_wet);
+    // Before a white shelf and a white sky all is white; the ground is black.
+    let dark = wet().filter(|&i| image.beauty[i][1] < 0.8);
+    [dark.count(), wet().count()]
+}
+
+/// Along a flat line of sight a step down goes far behind the shelf: that is no gap between it and what stands before it.
+#[test]
+fn shallow_water_seen_flat_shows_its_floor() {
+    for elevation in [6.0, 9.0, 14.0] {
+        let [dark, wet] = dark_pixels(&context(), elevation);
+        assert!(wet > 700 && dark == 0, "{elevation}: {dark} of {wet}");
+    }
+    let to = "let deep = 1.0;";
+    let from = "let deep = max(t.y / min(-water.view.y, -0.02), 1.0);";
+    let [dark, wet] = dark_pixels(&spoiled("ssfr/shade", from, to), 9.0);
+    assert!(10 * dark > wet, "{dark} of {wet}");
 }
 
 #[test]
