@@ -1,11 +1,6 @@
 //! Settings written into the text of a scene, which keeps its comments and its order.
 
-use std::ops::Range;
-
-use toml::{
-    Spanned,
-    de::{DeTable, DeValue},
-};
+use toml_edit::{DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
 
 /// A key and what it is set to.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,131 +13,74 @@ pub struct Setting {
     pub reason: String,
 }
 
-/// A change of the text: what stands in a range becomes another text.
-struct Edit {
-    at: Range<usize>,
-    text: String,
-    /// Whether it is a comment above a key that was there.
-    is_above: bool,
-}
-
 /// The text of a scene with settings. A key that stands there keeps its place, and the comment behind it; one that does not
-/// comes first in its table, which is made at the end of the text where there is none.
+/// comes last in its table, which is made at the end of the text where there is none.
 ///
 /// # Errors
-/// In words: a text that is no TOML, or a key that leads through what is no table.
+/// In words: a text or a value that is no TOML, or a key that leads through what is no table.
 pub fn with_settings(text: &str, settings: &[Setting]) -> Result<String, String> {
-    let root = DeTable::parse(text).map_err(|error| error.message().to_owned())?;
-    let mut edits = Vec::new();
+    let unread = |error: TomlError| error.message().to_owned();
+    let mut document: DocumentMut = text.parse().map_err(unread)?;
     for setting in settings {
-        edits.extend(edits_for(text, root.get_ref(), setting)?);
+        let value = setting.value.parse().map_err(unread)?;
+        set(document.as_table_mut(), &setting.key, value)?;
+        explain(document.as_table_mut(), setting);
     }
-    // From the end on, so that places before it stay; of two at one place the first comes first, and new keys before what stands
-    // above a key that was there.
-    edits.reverse();
-    edits.sort_by_key(|edit| std::cmp::Reverse((edit.at.start, edit.is_above)));
-    let mut out = text.to_owned();
-    for edit in edits {
-        out.replace_range(edit.at, &edit.text);
-    }
-    Ok(out)
+    Ok(document.to_string())
 }
 
-fn edits_for(text: &str, root: &DeTable<'_>, setting: &Setting) -> Result<Vec<Edit>, String> {
-    let Setting { key, value, reason } = setting;
-    let parts: Vec<&str> = key.split('.').collect();
-    let mut table = root;
-    // The innermost table that is open to another key, and what the key is called in it.
-    let mut place = None;
+/// Sets a key, in tables that are made where they are missing.
+fn set(root: &mut Table, key: &str, mut value: Value) -> Result<(), String> {
+    let mut parts: Vec<&str> = key.split('.').collect();
+    let last = parts.pop().expect("a key has a part");
+    let mut table: &mut dyn TableLike = root;
+    let mut is_inline = false;
     for (depth, part) in parts.iter().enumerate() {
-        let Some(found) = table.get(*part) else {
-            break;
-        };
-        let rest = parts[depth + 1..].join(".");
-        if rest.is_empty() {
-            let line = line_start(text, found.span().start);
-            let indent: String = text[line..].chars().take_while(|c| *c == ' ').collect();
-            return Ok(vec![
-                above(line, format!("{indent}# {reason}\n")),
-                Edit {
-                    at: found.span(),
-                    text: value.clone(),
-                    is_above: false,
-                },
-            ]);
-        }
-        let DeValue::Table(inner) = found.get_ref() else {
-            return Err(format!("{} is no table", parts[..=depth].join(".")));
-        };
-        if let Some(at) = opening(text, found, &parts[..=depth]) {
-            place = Some((at, rest));
-        }
-        table = inner;
+        let item = table.entry(part).or_insert_with(|| made(is_inline));
+        is_inline = item.is_inline_table();
+        let inner = item.as_table_like_mut();
+        table = inner.ok_or_else(|| format!("{} is no table", parts[..=depth].join(".")))?;
     }
-    Ok(match place {
-        Some((Opening::Header(at), rest)) => {
-            vec![insertion(at, format!("# {reason}\n{rest} = {value}\n"))]
+    if let Some(old) = table.get_mut(last).and_then(Item::as_value_mut) {
+        *value.decor_mut() = old.decor().clone();
+        *old = value;
+    } else {
+        table.insert(last, Item::Value(value));
+        if is_inline {
+            table.fmt();
         }
-        Some((Opening::Brace { at, is_empty }, rest)) => {
-            let line = line_start(text, at);
-            let comma = if is_empty { " " } else { "," };
-            vec![
-                above(line, format!("# {reason}\n")),
-                insertion(at, format!(" {rest} = {value}{comma}")),
-            ]
+    }
+    Ok(())
+}
+
+/// An empty table; without a header of its own while only further tables are in it.
+fn made(is_inline: bool) -> Item {
+    if is_inline {
+        return Item::Value(InlineTable::new().into());
+    }
+    let mut table = Table::new();
+    table.set_implicit(true);
+    Item::Table(table)
+}
+
+/// Writes the reason on a line above the key, or above that of the inline table which holds it.
+fn explain(root: &mut Table, setting: &Setting) {
+    let mut table = root;
+    for part in setting.key.split('.') {
+        if table.get(part).is_some_and(Item::is_table) {
+            let inner = table.get_mut(part).and_then(Item::as_table_mut);
+            table = inner.expect("a table");
+            continue;
         }
-        None => {
-            let (name, last) = parts.split_at(parts.len() - 1);
-            let break_ = if text.ends_with('\n') { "" } else { "\n" };
-            let table = format!("{break_}\n[{}]\n# {reason}\n", name.join("."));
-            vec![insertion(
-                text.len(),
-                format!("{table}{} = {value}\n", last.concat()),
-            )]
-        }
-    })
-}
-
-/// Where another key may stand in a table.
-enum Opening {
-    /// On the line after its header.
-    Header(usize),
-    /// Behind its brace.
-    Brace { at: usize, is_empty: bool },
-}
-
-/// `None` of a table that only the names of other tables or of keys speak of.
-fn opening(text: &str, table: &Spanned<DeValue<'_>>, path: &[&str]) -> Option<Opening> {
-    let (start, rest) = (table.span().start, text.get(table.span().start..)?);
-    if let Some(inside) = rest.strip_prefix('{') {
-        return Some(Opening::Brace {
-            at: start + 1,
-            is_empty: inside.trim_start().starts_with('}'),
-        });
+        let mut key = table.key_mut(part).expect("a key that was set");
+        let decor = key.leaf_decor_mut();
+        let before = decor.prefix().and_then(RawString::as_str);
+        let before = before.unwrap_or_default();
+        // What stands before a key ends with its indent.
+        let indent = before.rfind('\n').map_or(before, |end| &before[end + 1..]);
+        decor.set_prefix(format!("{before}# {}\n{indent}", setting.reason));
+        break;
     }
-    let line = rest.lines().next()?;
-    let name = line.strip_prefix('[')?.split(']').next()?;
-    let is_own = name.split('.').map(str::trim).eq(path.iter().copied());
-    is_own.then_some(Opening::Header(start + line.len() + 1))
-}
-
-fn insertion(at: usize, text: String) -> Edit {
-    Edit {
-        at: at..at,
-        text,
-        is_above: false,
-    }
-}
-
-fn above(at: usize, text: String) -> Edit {
-    Edit {
-        is_above: true,
-        ..insertion(at, text)
-    }
-}
-
-fn line_start(text: &str, at: usize) -> usize {
-    text[..at].rfind('\n').map_or(0, |end| end + 1)
 }
 
 #[cfg(test)]
@@ -212,8 +150,8 @@ pressure = { tolerance = 1e-3 }
         ];
         let written = with_settings(SCENE, &settings).expect("written");
         for piece in [
-            "[solver.pbf]      # of PBF\n# why 8\niterations = 8\n# why 0.5\ncfl = 0.5\n  # why 0.25\n  particle_spacing = 0.25",
-            "# why \"ipp\"\npressure = { preconditioner = \"ipp\", tolerance = 1e-5 }\n",
+            "[solver.pbf]      # of PBF\n  # why 0.25\n  particle_spacing = 0.25            # d\n# why 8\niterations = 8\n# why 0.5\ncfl = 0.5\n",
+            "# why \"ipp\"\npressure = { tolerance = 1e-5, preconditioner = \"ipp\" }\n",
             "\n[effects.viscosity]\n# why 0.1\nxsph = 0.1\n",
         ] {
             assert!(written.contains(piece), "{written}");

@@ -59,7 +59,11 @@ impl Scene {
         Self::parse(text, file, base_dir, &younger(text)?)
     }
 
-    fn parse_within(
+    /// [`Self::parse`] where paths may lead as far as `reach` says.
+    ///
+    /// # Errors
+    /// Those of [`Self::load`].
+    pub(crate) fn parse_within(
         text: &str,
         file: &Path,
         base_dir: &Path,

@@ -47,22 +47,20 @@ pub(super) fn write(results: &Results<'_>, command: &str) -> Result<Option<PathB
     let file = &tune.request.target;
     let unfit = |what: String| StudyError::Point(format!("{}: {what}", file.display()));
     let text = with_settings(&tune.text, &settings(results, trial)).map_err(unfit)?;
-    fs::write(file, header(results, trial, command) + &text).map_err(|e| fault(file, e))?;
-    // What was promised is what was run: read back, it is that scene.
-    let read = Scene::load_within(file, &[], tune.request.reach);
-    match read {
-        Ok(scene) if physics_hash(&scene) == physics_hash(&trial.twin.scene) => {
-            Ok(Some(file.clone()))
-        }
-        Ok(_) | Err(_) => {
-            fs::remove_file(file).map_err(|e| fault(file, e))?;
-            let why = read.err().map_or(String::new(), |e| format!(": {e}"));
-            Err(unfit(format!(
-                "these settings cannot be written into the scene{why}; run it with {}",
-                trial.twin.name()
-            )))
-        }
+    let text = header(results, trial, command) + &text;
+    // What was promised is what was run: read again, it is that scene.
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let read = Scene::parse_within(&text, file, folder, &[], tune.request.reach);
+    let is_it = |scene: &Scene| physics_hash(scene) == physics_hash(&trial.twin.scene);
+    if !read.as_ref().is_ok_and(is_it) {
+        let why = read.err().map_or(String::new(), |e| format!(": {e}"));
+        return Err(unfit(format!(
+            "these settings cannot be written into the scene{why}; run it with {}",
+            trial.twin.name()
+        )));
     }
+    fs::write(file, text).map_err(|e| fault(file, e))?;
+    Ok(Some(file.clone()))
 }
 
 /// Lines above the scene's own.

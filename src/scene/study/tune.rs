@@ -552,4 +552,4 @@ fn others(method: Method) -> impl Iterator<Item = &'static str> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

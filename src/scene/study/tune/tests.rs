@@ -1,6 +1,7 @@
 use super::*;
 
-fn request(scene: &str, limits: &[&str]) -> TuneRequest {
+/// Of a shipped scene.
+pub(crate) fn request(scene: &str, limits: &[&str]) -> TuneRequest {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     TuneRequest {
         scene: folder.join(scene),
