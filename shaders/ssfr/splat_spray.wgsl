@@ -18,8 +18,8 @@
 #endif
 
 // A particle stands for torn water: puffs of mist strung on a bent thread, and drops about it that are seen one by one.
-// Puffs, the radius of each in splat radii, and their part of the volume. By eye: without mist clouds are speckled and flicker as they
-// move, without drops they are smoke.
+// Puffs, the radius of each in splat radii, and their part of the volume. By eye: without mist clouds are speckled, without drops
+// they are smoke.
 const PUFFS: u32 = 4u;
 const PUFF: f32 = 1.1;
 const MIST: f32 = 0.6;
