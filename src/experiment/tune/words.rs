@@ -23,8 +23,8 @@ impl Results<'_> {
     pub(super) fn in_unit(&self, limit: &Limit, value: f64) -> f64 {
         match limit.bound {
             Bound::Part(_) => {
-                let whole = self.reference().whole(limit.quantity).unwrap_or(1.0);
-                100.0 * value / whole
+                let whole = self.reference().whole(limit.quantity);
+                100.0 * value / whole.expect("limits in per cent are refused without it")
             }
             Bound::Absolute(_) => value,
         }
