@@ -10,6 +10,10 @@
 @group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
 @group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
 @group(0) @binding(5) var<storage, read_write> carried: array<f32>;
+#ifdef PLACES
+#import "shared/place.wgsl"
+@group(0) @binding(7) var<storage, read> place: array<u32>;
+#endif
 // The fourth is 1 where it is a drop.
 @group(0) @binding(6) var<storage, read> velocity: array<vec4f>;
 
@@ -17,6 +21,17 @@
 const SHARE = 0.25;
 // Of the distance that is kept, at most so much in a substep.
 const MOST = 0.25;
+
+// From j to x, or to its image that is nearer.
+fn way_from(j: u32, x: vec3f) -> vec3f {
+    let way = x - sorted_position[j].xyz;
+#ifdef PERIODIC
+    let size = vec3f(params.cells) * params.cell_size;
+    return select(way, way - size * round(way / size), is_periodic());
+#else
+    return way;
+#endif
+}
 
 @compute @workgroup_size(64)
 fn main(
@@ -43,22 +58,37 @@ fn main(
     push = select(push, vec3f(0.0), velocity[i].w > 0.0);
 #ifdef PERIODIC
     push = select(push, vec3f(0.0), is_periodic());
-    let size = vec3f(params.cells) * params.cell_size;
+#endif
+#ifdef PLACES
+    let own_place = place[i];
+    let reach = apart * params.inverse_cell_size * STEPS + UNSURE;
 #endif
     for (var k = 0u; k < 8u; k++) {
         let element = element_at(side * vec3i(vec3u(k & 1u, (k >> 1u) & 1u, k >> 2u)));
         let is_wet = element >= CELLS && element < params.wet_cells + CELLS;
         let end = select(0u, cell_start[element + 1u], is_wet);
-        for (var j = select(0u, cell_start[element], is_wet); j < end; j++) {
-            var way = x - sorted_position[j].xyz;
-#ifdef PERIODIC
-            way = select(way, way - size * round(way / size), is_periodic());
+        for (var base = select(0u, cell_start[element], is_wet); base < end; base += 32u) {
+            // Found first, as bits: llvmpipe runs what a branch holds for every candidate.
+            let stop = min(base + 32u, end);
+            var found = 0u;
+            var bit = 1u;
+            for (var j = base; j < stop; j++) {
+#ifdef PLACES
+                let is_near = square_between(own_place, place[j]) < reach * reach;
+#else
+                let way = way_from(j, x);
+                let is_near = dot(way, way) < apart * apart;
 #endif
-            let square = dot(way, way);
-            for (var once = 0; once < select(0, 1, square < apart * apart && j != i); once++) {
+                found |= select(0u, bit, is_near && j != i);
+                bit <<= 1u;
+            }
+            for (; found != 0u; found &= found - 1u) {
+                let j = base + firstTrailingBit(found);
+                let way = way_from(j, x);
+                let square = dot(way, way);
                 let distance = sqrt(square);
                 let direction = select(way / max(distance, 1e-20), pair_direction(own, sorted_id[j]), square == 0.0);
-                push += (apart - distance) * direction;
+                push += max(apart - distance, 0.0) * direction;
             }
         }
     }

@@ -9,6 +9,10 @@
 @group(0) @binding(5) var<storage, read_write> sorted_position: array<vec4f>;
 @group(0) @binding(6) var<storage, read_write> sorted_velocity: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> sorted_id: array<u32>;
+#ifdef PLACES
+#import "shared/place.wgsl"
+@group(0) @binding(12) var<storage, read_write> place: array<u32>;
+#endif
 #ifdef APIC
 @group(0) @binding(10) var<storage, read> affine: array<f32>;
 @group(0) @binding(11) var<storage, read_write> sorted_affine: array<f32>;
@@ -25,7 +29,11 @@ fn main(
         return;
     }
     let source = order[i];
-    sorted_position[i] = position[source];
+    let x = position[source];
+    sorted_position[i] = x;
+#ifdef PLACES
+    place[i] = place_word(x.xyz * params.inverse_cell_size);
+#endif
     sorted_velocity[i] = velocity[source];
     sorted_id[i] = id[source];
 #ifdef APIC

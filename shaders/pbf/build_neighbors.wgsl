@@ -1,10 +1,17 @@
-// Lists who is within h at the predicted positions, once a substep. A particle with more neighbours
-// than a list holds keeps its true count, and every pass then searches for it instead.
+// Lists who is within h at the predicted positions, once a substep, and with words for places some who are a little farther,
+// whose kernels are 0 until they come near. A particle with more than a list holds keeps its true count, and every
+// pass then searches for it instead.
 #import "shared/thread.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/neighbor_list.wgsl"
 #import "shared/counters.wgsl"
+#ifdef PLACES
+#import "shared/place.wgsl"
+// h, and what words leave unsure.
+const REACH = STEPS + UNSURE;
+@group(0) @binding(11) var<storage, read> place: array<u32>;
+#endif
 
 @group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
@@ -42,6 +49,9 @@ fn main(
     let i = phase_particle(thread);
     let xi = predicted[i].xyz;
     let h2 = params.support_radius * params.support_radius;
+#ifdef PLACES
+    let own = place[i];
+#endif
     let fluid_end = params.particle_count;
     let dims = vec3i(params.grid_dims);
     let centre = cell_coordinate(xi);
@@ -64,12 +74,28 @@ fn main(
             let last = u32(row + high.x) + 1u;
 #endif
             let end = cell_start[last];
+#ifdef PLACES
+            // Found first, as bits, and then listed: llvmpipe runs what a branch holds for every candidate.
+            for (var base = cell_start[first]; base < end; base += 32u) {
+                let stop = min(base + 32u, end);
+                var found = 0u;
+                var bit = 1u;
+                for (var j = base; j < stop; j++) {
+                    found |= select(0u, bit, square_between(own, place[j]) < REACH * REACH && j != i);
+                    bit <<= 1u;
+                }
+                for (; found != 0u; found &= found - 1u) {
+                    append(base + firstTrailingBit(found));
+                }
+            }
+#else
             for (var j = cell_start[first]; j < end; j++) {
                 let d = between(xi, predicted[j].xyz);
                 if dot(d, d) < h2 && j != i {
                     append(j);
                 }
             }
+#endif
 #ifdef SOLIDS
             let boundary_end = boundary_cell_start[last];
             for (var b = boundary_cell_start[first]; b < boundary_end; b++) {

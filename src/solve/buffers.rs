@@ -12,6 +12,8 @@ pub const POSITION: Buf<[f32; 4]> = Buf::new("position");
 pub const VELOCITY: Buf<[f32; 4]> = Buf::new("velocity");
 /// Id of each particle, in sorted order.
 pub const SORTED_ID: Buf<u32> = Buf::new("sorted_id");
+/// A word for the place of each particle, in sorted order, in steps of 1/256 of h or of a cell (shared/place.wgsl).
+pub const PLACE: Buf<u32> = Buf::new("place");
 /// Of each particle, and 0, in sorted order.
 pub const SORTED_VELOCITY: Buf<[f32; 4]> = Buf::new("sorted_velocity");
 /// Density over the rest density: of each particle in sorted order (PBF), or of each cell, 0 without water (FLIP).

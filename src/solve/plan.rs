@@ -199,6 +199,12 @@ impl Plan {
         }
     }
 
+    /// Whether words tell places: their steps do not come round where a domain does, and what their products err by is
+    /// stated for so many cells from the origin (shared/place.wgsl).
+    pub fn has_places(&self, scene: &Scene) -> bool {
+        !scene.is_periodic() && self.grid_dims.iter().all(|&cells| cells <= 4000)
+    }
+
     /// One whose buffers and passes are yet to come.
     pub(super) fn bare(counts: Counts, grid_dims: [u32; 3]) -> Self {
         Self {

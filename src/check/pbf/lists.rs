@@ -20,6 +20,7 @@ use crate::{
 
 use super::{
     PbfState, State,
+    places::{SKIN, are_near},
     rows::{NEAR_H, NEIGHBORS},
 };
 
@@ -34,6 +35,8 @@ pub(super) struct Lists {
     all: Option<Arc<Neighbors>>,
     /// Where the device's cells begin.
     start: Vec<u32>,
+    /// Words for places, as they should be; empty where lists are made without.
+    pub(super) words: Vec<u32>,
 }
 
 impl Lists {
@@ -44,6 +47,7 @@ impl Lists {
             is_searched: vec![!plan.has_lists; n],
             all: None,
             start: Vec::new(),
+            words: Vec::new(),
         }
     }
 }
@@ -85,6 +89,30 @@ impl PbfState {
                 members.extend(group.iter().map(|&j| order[j as usize] as u32));
                 members.len() as u32
             })
+        })
+    }
+
+    /// Whether lists are made from words for places.
+    pub(super) fn has_words(&self) -> bool {
+        self.plan.has_lists && self.plan.has_places(&self.scene)
+    }
+
+    /// Whom lists should have, in f64 but for the words where they are made from those.
+    pub(super) fn listed(&self, points: &[DVec3]) -> Neighbors {
+        if self.lists.words.is_empty() {
+            return self.search(points);
+        }
+        let (n, words) = (self.particles(), &self.lists.words);
+        let h = self.model.calibration.support_radius;
+        let near = self.search_within(points, h * (1.0 + SKIN));
+        Neighbors::listed(n, |i, members| {
+            let is_listed = |&j: &u32| match words.get(j as usize) {
+                Some(&word) => are_near(words[i], word),
+                None => points[i].distance_squared(points[j as usize]) < h * h,
+            };
+            let mut all: Vec<u32> = near.all(i).filter(is_listed).collect();
+            all.sort_unstable();
+            split(&all, n, members)
         })
     }
 
@@ -176,18 +204,26 @@ pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let h = state.model.calibration.support_radius;
     let shell = NEAR_H.of([]);
     let (inner, outer) = (h * h * (1.0 - shell), h * h * (1.0 + shell));
-    let near = state.search_within(&points, h * (1.0 + shell));
+    // Words tell particles from particles exactly; samples on solids have none.
+    let words = match state.has_words() {
+        true => io.before.get(buffers::PLACE, n)?,
+        false => Vec::new(),
+    };
+    let skin = if words.is_empty() { shell } else { SKIN };
+    let near = state.search_within(&points, h * (1.0 + skin));
+    let period = state.model.period();
     let one = |local: usize| {
         let i = first + local;
-        let period = state.model.period();
-        let r2 = |&j: &u32| {
-            period
-                .shortest(points[i] - points[j as usize])
-                .length_squared()
+        let r2 = |j: u32| {
+            let way = period.shortest(points[i] - points[j as usize]);
+            way.length_squared()
         };
         let near: Vec<u32> = near.all(i).collect();
-        let sure = near.iter().filter(|j| r2(j) < inner).count();
-        let possible = near.iter().filter(|j| r2(j) < outer).count();
+        let by_words = |j: u32| Some(are_near(*words.get(i)?, *words.get(j as usize)?));
+        let is_sure = |&&j: &&u32| r2(j) < inner || by_words(j) == Some(true);
+        let is_possible = |&&j: &&u32| by_words(j).unwrap_or(r2(j) < outer);
+        let sure = near.iter().filter(is_sure).count();
+        let possible = near.iter().filter(is_possible).count();
         let held = counts[i] as usize;
         let all = if held <= capacity {
             members(local)
@@ -197,15 +233,15 @@ pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
         let wrong = if held > capacity {
             sure.saturating_sub(held) + held.saturating_sub(possible)
         } else {
-            let within = |j: &&u32| near.contains(j) && r2(j) < outer;
+            let within = |j: &&u32| near.contains(j) && is_possible(j);
             let twice = all.windows(2).filter(|pair| pair[0] == pair[1]).count();
             let right = all.iter().filter(within).count() - twice;
             let missed = (near.iter())
-                .filter(|j| r2(j) < inner && all.binary_search(j).is_err())
+                .filter(|j| is_sure(j) && all.binary_search(j).is_err())
                 .count();
             missed + all.len() - right + held.abs_diff(all.len())
         };
-        (wrong, possible - sure, all)
+        (wrong, possible.saturating_sub(sure), all)
     };
     let found: Vec<_> = (0..count).into_par_iter().map(one).collect();
     let wrong =

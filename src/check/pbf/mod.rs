@@ -3,6 +3,7 @@
 pub(super) mod bounds;
 mod lists;
 mod passes;
+mod places;
 mod rows;
 mod stop;
 mod whole;

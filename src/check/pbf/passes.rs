@@ -19,7 +19,7 @@ use crate::{
     solve::{params::Phase, pbf::buffers},
 };
 
-use super::{PbfState, State, bounds::Bounds, rows::*};
+use super::{PbfState, State, bounds::Bounds, places::word, rows::*};
 
 pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
@@ -146,6 +146,14 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         &io.after.get(buffers::SORTED_ID, n)?,
         &expected,
     );
+    if state.has_words() {
+        let inverse = (1.0 / state.model.calibration.support_radius) as f32;
+        let places = io.after.get(buffers::PREDICTED, n)?;
+        state.lists.words = places.iter().map(|&x| word(x, inverse)).collect();
+        let found = io.after.get(buffers::PLACE, n)?;
+        io.table
+            .add_exact(&REORDER_PLACE, &found, &state.lists.words);
+    }
     Ok(())
 }
 
@@ -159,7 +167,7 @@ pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let (points, mut twin) = state.stored(io, &phase)?;
     let neighbors = state.visited(io, &points)?;
     if !state.whole.has_start() {
-        let near = state.search(&points);
+        let near = state.listed(&points);
         state.whole.start(&points, n, near);
     }
     let inputs = state.inputs(&points, &neighbors);

@@ -79,6 +79,7 @@ entries! {
         REORDER_POSITION = "position", "m": [] 0.0, "a copy";
         REORDER_VELOCITY = "velocity", "m/s": [] 0.0, "a copy";
         REORDER_ID = "id", "": [] 0.0, "a copy";
+        REORDER_PLACE = "place in a word", "": [] 0.0, "whole numbers of products that are rounded alike";
     }
     "pbf/build_neighbors" {
         NEIGHBORS = "wrong members of a list", "": [] 0.0, "none is wrong", tie NEAR_H;

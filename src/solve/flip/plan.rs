@@ -101,9 +101,15 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
         ("CORRECTION", flip.density_correction),
         ("PUSHED", pushes(plan, scene)),
         ("PERIODIC", scene.is_periodic()),
+        ("PLACES", has_places(plan, scene)),
     ];
     let holding = all.into_iter().filter(|(_, holds)| *holds);
     holding.map(|(define, _)| define).collect()
+}
+
+/// Whether particles are pushed apart by [`PLACE`].
+fn has_places(plan: &Plan, scene: &Scene) -> bool {
+    pushes(plan, scene) && plan.has_places(scene)
 }
 
 fn buffers(plan: &Plan, scene: &Scene) -> Table {
@@ -125,6 +131,9 @@ fn particles(plan: &Plan, scene: &Scene, table: &mut Table) {
     table.extend("flip", [ID.sized(n), SORTED_ID.sized(n)]);
     let carried = if pushes(plan, scene) { 6 } else { 3 };
     table.watch("flip", CARRIED.sized(carried * n));
+    if has_places(plan, scene) {
+        table.add("flip", PLACE.sized(n));
+    }
     let slopes = flip.attributes().len();
     if slopes > 0 {
         table.watch("flip", AFFINE.sized(slopes * n));

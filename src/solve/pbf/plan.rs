@@ -83,6 +83,11 @@ fn choose_lists(plan: &mut Plan, limits: DeviceLimits) {
         .collect();
 }
 
+/// Whether lists are made from [`PLACE`].
+fn has_places(plan: &Plan, scene: &Scene) -> bool {
+    plan.has_lists && plan.has_places(scene)
+}
+
 /// Conditions that hold for the whole plan; a pass that does not ask ignores them.
 fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     let mut conditions = Vec::new();
@@ -97,6 +102,9 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     }
     if scene.is_periodic() {
         conditions.push("PERIODIC");
+    }
+    if has_places(plan, scene) {
+        conditions.push("PLACES");
     }
     conditions
 }
@@ -147,6 +155,9 @@ fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
             table.add("lists", list_of(index).sized(fours));
         }
         table.add("lists", NEIGHBOR_COUNT.sized(n));
+        if has_places(plan, scene) {
+            table.add("lists", PLACE.sized(n));
+        }
     }
     table.add("sort", CELL_START.sized(cells + 1));
     table.extend("sort", sort::scan_buffers(&CELL_START, cells));

@@ -14,12 +14,14 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 52] = [
+const VARIANTS: [&[&str]; 54] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
+    &["NEIGHBOR_LIST", "PLACES"],
     &[
         "NEIGHBOR_LIST",
+        "PLACES",
         "SOLIDS",
         "DENSITY",
         "ADAPTIVE",
@@ -28,6 +30,7 @@ const VARIANTS: [&[&str]; 52] = [
     &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
     &["NEIGHBOR_LIST", "SOLIDS", "PRESSURE"],
     &["CORRECTION", "GHOST_FLUID"],
+    &["CORRECTION", "GHOST_FLUID", "PUSHED", "PLACES"],
     &["SOLIDS", "CORRECTION", "GHOST_FLUID", "APIC"],
     &["SOLIDS", "MOVING_SOLIDS", "CORRECTION", "GHOST_FLUID"],
     &["GHOST_FLUID", "DIAGONAL"],

@@ -140,8 +140,37 @@ pub const PBF: &[Control] = &[
     ),
     control(
         "pbf/build_neighbors",
-        "dot(d, d) < h2 && j != i",
-        "dot(d, d) < 0.999 * h2 && j != i",
+        "square_between(own, place[j]) < REACH",
+        "square_between(own, place[j]) < 0.97 * REACH",
+        "pbf/build_neighbors",
+        &["wrong members of a list"],
+    ),
+    control(
+        "pbf/build_neighbors",
+        "square_between(own, place[j]) < REACH",
+        "square_between(own, place[j]) < 1.03 * REACH",
+        "pbf/build_neighbors",
+        &["wrong members of a list"],
+    ),
+    control(
+        "pbf/reorder",
+        "place_word(x.xyz *",
+        "place_word((x.xyz + 0.01 * params.support_radius * f32(thread & 1u)) *",
+        "pbf/reorder",
+        &["place in a word"],
+    )
+    .and(&["pbf/build_neighbors"]),
+    control(
+        "pbf/build_neighbors",
+        "const UNSURE = 2.0;",
+        "const UNSURE = 0.0;",
+        "pbf/build_neighbors",
+        &["wrong members of a list"],
+    ),
+    control(
+        "pbf/build_neighbors",
+        "(a >> 20u) - (b >> 20u)",
+        "(a >> 21u) - (b >> 21u)",
         "pbf/build_neighbors",
         &["wrong members of a list"],
     ),
@@ -260,8 +289,8 @@ pub const PBF: &[Control] = &[
     ),
     control(
         "pbf/build_neighbors",
-        "dot(d, d) < h2 && j != i",
-        "dot(d, d) < 0.9 * h2 && j != i",
+        "square_between(own, place[j]) < REACH",
+        "square_between(own, place[j]) < 0.85 * REACH",
         "whole solve",
         &[
             "corrections, RMS error",
