@@ -375,7 +375,7 @@ def import_solids(cache: swell.Cache) -> list[Any]:
     for index, solid in enumerate(cache.scene.get("solid", [])):
         path = cache.assets[solid["mesh"].removeprefix("assets/")]
         if {"motion", "turn", "track"} & solid.keys() or path.suffix.lower() not in (".obj", ".ply"):
-            print(f"import_swell: solid {index} ({path.name}) is left out: it moves (swell export --usd has it), or is neither OBJ nor PLY")
+            print(f"import_swell: solid {index} ({path.name}) is left out: it moves (see --shot), or is neither OBJ nor PLY")
             continue
         position, _, corners, sizes = read_mesh(path)
         position = position.astype(np.float64) * solid["scale"]
@@ -386,6 +386,74 @@ def import_solids(cache: swell.Cache) -> list[Any]:
         mesh.materials.append(material)
         thing = bpy.data.objects.new(mesh.name, mesh)
         into.objects.link(thing)
+        made.append(thing)
+    return made
+
+
+def usd_prims(path: Path) -> dict[str, dict[str, Any]]:
+    """Prims of a layer that `swell export --usd` wrote as text, by path. Attributes are text, and where they have samples, text by frame."""
+    lines = iter(path.read_text(encoding="utf-8").splitlines())
+    if next(lines, "") != "#usda 1.0":
+        raise ImportFault(f"{path} is no USD as text; swell export --usd writes it to a .usda")
+    prims: dict[str, dict[str, Any]] = {}
+    named, inside = "", []
+    for line in map(str.strip, lines):
+        prim = re.match(r'(?:def|over)(?: \w+)? "(.*)"', line)
+        attribute = re.match(r"(?:uniform )?[\w\[\]]+ ([\w:]+)(\.timeSamples)? = (.*)", line)
+        if prim:
+            named = prim[1]
+        elif line == "{":
+            inside.append(named)
+            prims["/".join(inside)] = {}
+        elif line == "}":
+            inside.pop()
+        elif attribute and attribute[2]:
+            samples = iter(lambda: next(lines).strip().rstrip(","), "}")
+            prims["/".join(inside)][attribute[1]] = {int(frame): value for frame, _, value in (each.partition(": ") for each in samples)}
+        elif attribute:
+            prims["/".join(inside)][attribute[1]] = attribute[3]
+        if line == "(" or line.endswith(" ("):
+            # Metadata: which layers are played when, and how attributes are interpolated.
+            metadata = iter(lambda: next(lines).strip(), ")")
+            layers = [re.findall(r"@\./(.*?)@", each) for each in metadata if each.startswith("asset[] assetPaths")]
+            prims.setdefault("", {"layers": []})["layers"] += [name for found in layers for name in found]
+    return prims
+
+
+def numbers(text: str) -> np.ndarray:
+    """All numbers of a value of USD."""
+    return np.array(re.findall(r"[-+.\w]+", text), dtype=np.float64)
+
+
+def import_shot(path: Path, offset: int = 0) -> list[Any]:
+    """The solids and wave makers of a shot of `swell export --usd`, as they move, with a key a frame; for a Blender that reads no USD."""
+    layers = {"": usd_prims(path)}
+    layers |= {name: usd_prims(path.parent / name) for name in layers[""][""]["layers"]}
+    into = collection("moving")
+    bpy.context.preferences.edit.keyframe_new_interpolation_type = "LINEAR"
+    made = []
+    for prim, own in layers[""].items():
+        shot, *way = prim.split("/")
+        if len(way) != 2 or way[0] not in ("solids", "wave_makers"):
+            continue
+        rest = numbers(own.get("xformOp:translate:rest", "(0, 0, 0)"))
+        corners, sizes = (numbers(own[key]).astype(np.int32) for key in ("faceVertexIndices", "faceVertexCounts"))
+        mesh = polygon_mesh(way[1], numbers(own["points"]).reshape(-1, 3) + rest, corners, sizes)
+        thing = bpy.data.objects.new(mesh.name, mesh)
+        into.objects.link(thing)
+        thing.rotation_mode = "QUATERNION"
+        origin = numbers(layers[""][shot].get("xformOp:translate", "(0, 0, 0)"))
+        thing.location = swell.z_up(origin[None])[0]
+        # A wave maker's places stand in the layers of the frames.
+        for layer in layers.values():
+            attributes = layer.get(prim, {})
+            for frame, value in dict(attributes.get("xformOp:translate") or {}).items():
+                thing.location = swell.z_up((numbers(value) + origin)[None])[0]
+                thing.keyframe_insert("location", frame=frame + offset)
+            for frame, value in dict(attributes.get("xformOp:orient") or {}).items():
+                w, x, y, z = numbers(value)
+                thing.rotation_quaternion = (w, x, -z, y)
+                thing.keyframe_insert("rotation_quaternion", frame=frame + offset)
         made.append(thing)
     return made
 
@@ -420,6 +488,7 @@ def arguments(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--grids", action="store_true", help="the OpenVDB files of the cache, as one volume")
     parser.add_argument("--meshes", type=Path, metavar="FOLDER", help="a sequence of PLY or OBJ files")
     parser.add_argument("--solids", action="store_true", help="the scene's solids that stand still")
+    parser.add_argument("--shot", type=Path, metavar="FILE.usda", help="all solids and wave makers as they move, from swell export --usd FILE.usda")
     parser.add_argument("--offset", type=int, default=0, help="scene frame less frame of the cache")
     parser.add_argument("--add", action="store_true", help="keep what the start-up file has; left out: the scene begins empty")
     parser.add_argument("--save", type=Path, metavar="FILE.blend")
@@ -448,6 +517,8 @@ def main(words: Sequence[str]) -> None:
         import_meshes(asked.meshes, asked.frames, f"{cache.shot} mesh", asked.offset, top_speed(cache, frames))
     if asked.solids:
         import_solids(cache)
+    if asked.shot is not None:
+        import_shot(asked.shot, asked.offset)
     set_scene(cache, asked.frames or frames, asked.offset)
     if asked.save is not None:
         bpy.ops.wm.save_as_mainfile(filepath=str(asked.save.resolve()))

@@ -171,6 +171,22 @@ def check_solid():
     check(len(found) == 8 and apart <= 1e-6, f"the solid is off by {apart}")
 
 
+def check_moving(number):
+    """A box that turns by 20 degrees a frame about z through a pivot, and a wall that goes 0.005 m a frame: solids come with a key a frame."""
+    time = number + (spoiled == "frame")
+    angle = np.radians(20.0 * time)
+    corners = np.array([[x, y, z] for x in (0.9, 1.1) for y in (1.2, 1.5) for z in (0.2, 0.6)]) - [1.0, 1.2, 0.3]
+    about = np.stack([np.cos(angle) * corners[:, 0] - np.sin(angle) * corners[:, 1], np.sin(angle) * corners[:, 0] + np.cos(angle) * corners[:, 1], corners[:, 2]], axis=1)
+    wall = np.array([[0.005 * time, y, z] for y in (0.0, 2.0) for z in (0.0, 1.0)])
+    for name, expected in (("box_2", about + [1.0, 1.2, 0.3]), ("wall_minus_x", wall)):
+        [thing] = seen("MESH", name)
+        found = np.array([thing.matrix_world @ vertex.co for vertex in thing.data.vertices])
+        apart = np.abs(found[:, None, :] - turn(*expected.T)[None, :, :]).max(axis=2)
+        # Floats of a float's turn.
+        off = max(apart.min(axis=0).max(), apart.min(axis=1).max())
+        check(off <= 4 * TOLERANCE, f"frame {number}: {name} is off by {off}")
+
+
 def check_exported(number, cache):
     """Meshes of `swell export`: they stand about the particles, hold their volume, and are not mirrored, which would make it negative."""
     [mesh] = [mesh for mesh in seen("MESH", "tank mesh.") if len(mesh.data.vertices) > 0]
@@ -217,7 +233,9 @@ def main():
         check_grids(number, cache)
         check_mesh(number, "tank mesh")
         check_solid()
-    check(counted >= 8, f"{counted} clouds were looked at")
+        check_moving(number)
+    # Water at five turns of the loop, whitewater at two at least: it begins with frame 4.
+    check(counted >= 7, f"{counted} clouds were looked at")
     for number in (1, 6):
         scene.frame_set(number)
         check(not seen_clouds("tank", ()), f"frame {number}: points are seen")
