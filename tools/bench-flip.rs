@@ -234,10 +234,16 @@ fn measure_reference(options: &Options) -> Result<(), Box<dyn std::error::Error>
     Ok(())
 }
 
-fn print_passes(mut rows: Vec<(&'static str, f64, u64)>, frames: usize) {
-    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+fn print_passes(mut rows: Vec<PassTime>, frames: usize) {
+    rows.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
     println!("\npasses, by their time a frame:");
-    for (pass, seconds, runs) in &rows {
+    for PassTime {
+        pass,
+        seconds,
+        runs,
+        ..
+    } in &rows
+    {
         println!(
             "   {pass:28} {:8.2} ms   {:7.3} ms × {runs}",
             1e3 * seconds / frames as f64,

@@ -17,7 +17,10 @@ use std::{
 use serde_json::{Value, json};
 
 use super::{log, progress::Progress};
-use crate::stage::time::Share;
+use crate::{
+    domain::solver::PassTime,
+    stage::{device::PassTimes, time::Share},
+};
 
 /// The exit code where a file cannot be written; standard output is one.
 const CANNOT_WRITE: u8 = 4;
@@ -48,29 +51,31 @@ pub(super) fn print(text: &str) {
     note(STDOUT, put(&mut io::stdout().lock(), text));
 }
 
-/// Tells what passes took: a line each with milliseconds, runs, seconds in all, and behind them what each part took of so many frames.
-pub(super) fn pass_times(
-    progress: &Progress,
-    passes: &[(&'static str, f64, u64)],
-    parts: &[Share],
-    frames: u32,
-) {
+/// Tells what passes took: a line each with milliseconds, runs, seconds in all, bytes a second that they moved at least and which part of the
+/// adapter's that is; behind them what each part took of so many frames.
+pub(super) fn pass_times(progress: &Progress, times: &PassTimes, parts: &[Share], frames: u32) {
+    let PassTimes { passes, bandwidth } = times;
     if passes.is_empty() {
         return;
     }
     if progress.is_json() {
         return progress.tell(json!({
             "event": "passes", "passes": passes.iter().map(pass_json).collect::<Vec<_>>(), "parts": parts_json(parts),
+            "bandwidth": bandwidth,
         }));
     }
-    print_pass_times(passes);
+    print_pass_times(passes, *bandwidth);
+    let runs: u64 = passes.iter().map(|time| time.runs).sum();
+    let each = runs as f64 / f64::from(frames.max(1));
+    print(&format!("{runs} runs of passes, {each:.0} a frame\n"));
     if !parts.is_empty() {
         print(&format!("\n{}", shares(parts, Some(frames))));
     }
 }
 
-fn pass_json((pass, seconds, runs): &(&'static str, f64, u64)) -> Value {
-    json!({ "pass": pass, "seconds": seconds, "runs": runs })
+fn pass_json(time: &PassTime) -> Value {
+    let bytes = (time.bytes > 0).then_some(time.bytes);
+    json!({ "pass": time.pass, "seconds": time.seconds, "runs": time.runs, "bytes": bytes })
 }
 
 /// What passes and buffers are there for, for programs.
@@ -83,11 +88,30 @@ pub(super) fn parts_json(parts: &[Share]) -> Vec<Value> {
     parts.iter().map(part).collect()
 }
 
-fn print_pass_times(passes: &[(&'static str, f64, u64)]) {
-    for (pass, seconds, runs) in passes {
+fn print_pass_times(passes: &[PassTime], bandwidth: Option<f64>) {
+    for time in passes {
+        let PassTime {
+            pass,
+            seconds,
+            runs,
+            bytes,
+        } = time;
         let each = 1e3 * seconds / *runs as f64;
+        let rate = *bytes as f64 / seconds;
+        let moved = match bandwidth {
+            Some(all) if *bytes > 0 => {
+                format!("  {:7.2} GB/s, {:3.0} %", 1e-9 * rate, 100.0 * rate / all)
+            }
+            _ => String::new(),
+        };
         print(&format!(
-            "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s\n"
+            "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s{moved}\n"
+        ));
+    }
+    if let Some(all) = bandwidth {
+        print(&format!(
+            "per cent are of {:.2} GB/s, at which a pass copies a buffer here; a pass is taken to move what it binds once\n",
+            1e-9 * all
         ));
     }
 }

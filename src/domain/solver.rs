@@ -124,6 +124,32 @@ impl Watch for Nobody {
     fn look(&mut self, _: Span, _: Seen) {}
 }
 
+/// What a pass took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PassTime {
+    /// Its name.
+    pub pass: &'static str,
+    /// Of all runs, seconds.
+    pub seconds: f64,
+    /// How often it ran.
+    pub runs: u64,
+    /// Bytes that all runs moved if each of what they bind is read and written once, as far as it is read and written at all; 0 where that
+    /// is not known.
+    pub bytes: u64,
+}
+
+impl PassTime {
+    /// Of a pass: seconds, runs and bytes of all runs.
+    pub fn new(pass: &'static str, seconds: f64, runs: u64, bytes: u64) -> Self {
+        Self {
+            pass,
+            seconds,
+            runs,
+            bytes,
+        }
+    }
+}
+
 /// A solver that advances a particle state frame by frame.
 ///
 /// All that it needs for the next frame is in the state that it hands back.
@@ -161,6 +187,6 @@ pub trait Solver {
     /// The device.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, Self::Error>;
 
-    /// Seconds and runs by pass since the solver was built, where it measures them.
-    fn timings(&self) -> Vec<(&'static str, f64, u64)>;
+    /// What passes took since the solver was built, where it measures them.
+    fn timings(&self) -> Vec<PassTime>;
 }

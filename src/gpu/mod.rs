@@ -1,6 +1,7 @@
 //! Everything that touches the device and knows nothing of fluids.
 
 pub mod adapter;
+pub mod bandwidth;
 pub mod buffer;
 mod edited;
 pub mod program;

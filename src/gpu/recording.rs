@@ -137,6 +137,8 @@ pub(super) enum Recorded {
         binds: Vec<Bind>,
         group: BindGroup,
         size: Size,
+        /// What it moves at least where all of its bindings are used: [`moved`].
+        bytes: u64,
     },
     Draw(Drawn),
     Clear(String),
@@ -262,6 +264,14 @@ pub(super) fn encode(steps: &[Recorded], program: &Program, encoder: &mut Comman
 }
 
 impl Recorded {
+    /// What of the device's memory it moves at least; 0 where that is not known.
+    pub(super) fn bytes(&self) -> u64 {
+        match self {
+            Self::Dispatch { bytes, .. } => *bytes,
+            _ => 0,
+        }
+    }
+
     pub(super) fn pass(&self) -> Option<&'static str> {
         match self {
             Self::Dispatch { pass, .. } => Some(pass),
@@ -299,6 +309,7 @@ fn record(program: &Program, command: &Command) -> Option<Recorded> {
                 binds: binds.clone(),
                 group: bind(program, name, &pass.layout, &pass.bindings, binds),
                 size,
+                bytes: moved(program, &pass.bindings, binds),
             })
         }
     }
@@ -310,6 +321,22 @@ pub fn spread(context: &Context, workgroup_size: u32, threads: u64) -> [u32; 3] 
     let most = u64::from(context.limits.max_compute_workgroups_per_dimension);
     let rows = groups.div_ceil(most).max(1);
     [groups.div_ceil(rows) as u32, rows as u32, 1]
+}
+
+/// Bytes that pass over the device's memory if each buffer that is bound, or its window, is read once where the pass reads it and written
+/// once where it writes it.
+fn moved(program: &Program, bindings: &[Binding], binds: &[Bind]) -> u64 {
+    let bytes = |binding: &Binding| {
+        let bind = binds.iter().find(|bind| bind.variable == binding.name);
+        let name = bind.map_or(binding.name.as_str(), |bind| &bind.buffer);
+        let window = bind.and_then(|bind| bind.window);
+        let length = window.map_or_else(|| program.buffer(name).size(), |(_, length)| length);
+        length * (u64::from(binding.is_read) + u64::from(binding.is_written))
+    };
+    let storage = bindings
+        .iter()
+        .filter(|binding| binding.access.is_storage());
+    storage.map(bytes).sum()
 }
 
 /// The bind group of pass `name`.

@@ -6,6 +6,7 @@ use std::error::Error as _;
 
 use naga::{
     AddressSpace, ImageClass, ImageDimension, ScalarKind, ShaderStage, StorageAccess, TypeInner,
+    valid::GlobalUse,
 };
 
 use super::{adapter::GpuError, buffer::Scalar};
@@ -57,6 +58,10 @@ pub struct Binding {
     pub index: u32,
     /// Uniform or storage.
     pub access: Access,
+    /// Whether the shader reads it.
+    pub is_read: bool,
+    /// Whether the shader writes it.
+    pub is_written: bool,
     /// What it is an array of, behind its head where it has one; what it is where it is no array.
     pub element: ElementType,
 }
@@ -234,7 +239,7 @@ pub(super) fn reflect_at(
         naga::valid::ValidationFlags::all(),
         naga::valid::Capabilities::default() | naga::valid::Capabilities::FLOAT64,
     );
-    validator.validate(&module).map_err(|error| {
+    let info = validator.validate(&module).map_err(|error| {
         let mut causes = Vec::new();
         let mut next = error.as_inner().source();
         while let Some(cause) = next {
@@ -248,8 +253,13 @@ pub(super) fn reflect_at(
         let count = module.entry_points.len();
         fault(format!("{count} entry points, which are no pass"))
     })?;
+    let entries = 0..module.entry_points.len();
+    let uses = |variable: naga::Handle<naga::GlobalVariable>, how: GlobalUse| {
+        let mut entries = entries.clone();
+        entries.any(|entry| info.get_entry_point(entry)[variable].intersects(how))
+    };
     let mut bindings = Vec::new();
-    for (_, variable) in module.global_variables.iter() {
+    for (handle, variable) in module.global_variables.iter() {
         let Some(place) = variable.binding else {
             continue;
         };
@@ -266,6 +276,8 @@ pub(super) fn reflect_at(
             name,
             index: place.binding,
             access,
+            is_read: uses(handle, GlobalUse::READ | GlobalUse::ATOMIC),
+            is_written: uses(handle, GlobalUse::WRITE | GlobalUse::ATOMIC),
             element: element_of(&module, variable.ty),
         });
     }

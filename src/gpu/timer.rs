@@ -13,8 +13,15 @@ use super::{
 /// Time per pass, summed over runs.
 pub struct Timer {
     clock: Clock,
-    /// Seconds and runs by pass name.
-    pub total: BTreeMap<&'static str, (f64, u64)>,
+    total: BTreeMap<&'static str, Total>,
+}
+
+/// Of all runs of a pass.
+#[derive(Clone, Copy, Default)]
+struct Total {
+    seconds: f64,
+    runs: u64,
+    bytes: u64,
 }
 
 enum Clock {
@@ -49,19 +56,23 @@ impl Timer {
         }
     }
 
-    /// Pass, seconds, runs, by name.
-    pub fn times(&self) -> Vec<(&'static str, f64, u64)> {
+    /// What `made` makes of each pass, by name: of its seconds, its runs, and the bytes that its runs move if each buffer that it binds is
+    /// read and written once, as far as it reads and writes it; 0 bytes of raster passes.
+    pub fn times<T>(&self, made: impl Fn(&'static str, f64, u64, u64) -> T) -> Vec<T> {
         let total = self.total.iter();
         total
-            .map(|(&pass, &(seconds, runs))| (pass, seconds, runs))
+            .map(|(pass, of)| made(pass, of.seconds, of.runs, of.bytes))
             .collect()
     }
 
     pub(super) fn run(&mut self, recording: &Recording, program: &Program) -> Result<(), GpuError> {
-        let mut add = |pass: &'static str, seconds: f64| {
-            let entry = self.total.entry(pass).or_default();
-            entry.0 += seconds;
-            entry.1 += 1;
+        let mut add = |step: &Recorded, seconds: f64| {
+            if let Some(pass) = step.pass() {
+                let total = self.total.entry(pass).or_default();
+                total.seconds += seconds;
+                total.runs += 1;
+                total.bytes += step.bytes();
+            }
         };
         match &self.clock {
             Clock::Device(queries) => recording
@@ -79,7 +90,7 @@ impl Timer {
 fn run_alone(
     step: &Recorded,
     program: &Program,
-    add: &mut impl FnMut(&'static str, f64),
+    add: &mut impl FnMut(&Recorded, f64),
 ) -> Result<(), GpuError> {
     let context = &program.context;
     let mut encoder = context.device.create_command_encoder(&Default::default());
@@ -87,9 +98,7 @@ fn run_alone(
     let begin = Instant::now();
     context.queue.submit([encoder.finish()]);
     context.wait()?;
-    if let Some(pass) = step.pass() {
-        add(pass, begin.elapsed().as_secs_f64());
-    }
+    add(step, begin.elapsed().as_secs_f64());
     Ok(())
 }
 
@@ -121,17 +130,17 @@ impl Queries {
         &self,
         steps: &[Recorded],
         program: &Program,
-        add: &mut impl FnMut(&'static str, f64),
+        add: &mut impl FnMut(&Recorded, f64),
     ) -> Result<(), GpuError> {
         let context = &program.context;
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        let mut names = Vec::new();
+        let mut timed = Vec::new();
         for step in steps {
-            if self.encode(step, program, &mut encoder, 2 * names.len() as u32) {
-                names.extend(step.pass());
+            if self.encode(step, program, &mut encoder, 2 * timed.len() as u32) {
+                timed.push(step);
             }
         }
-        let count = 2 * names.len();
+        let count = 2 * timed.len();
         encoder.resolve_query_set(&self.set, 0..count as u32, &self.resolved, 0);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.staging, 0, 8 * count as u64);
         context.queue.submit([encoder.finish()]);
@@ -143,9 +152,9 @@ impl Queries {
                 .get_mapped_range(..)
                 .map_err(|error| GpuError::Lost(error.to_string()))?;
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&view[..8 * count]);
-            for (name, pair) in names.iter().zip(ticks.chunks_exact(2)) {
+            for (step, pair) in timed.iter().zip(ticks.chunks_exact(2)) {
                 let elapsed = pair[1].saturating_sub(pair[0]) as f64;
-                add(name, elapsed * self.seconds_per_tick);
+                add(step, elapsed * self.seconds_per_tick);
             }
         }
         self.staging.unmap();

@@ -13,7 +13,7 @@ pub mod whitewater;
 
 use std::{collections::BTreeMap, time::Instant};
 
-use crate::domain::budget::Breach;
+use crate::domain::{budget::Breach, solver::PassTime};
 
 /// What stops the reference.
 #[derive(Debug, thiserror::Error)]
@@ -53,10 +53,10 @@ impl Timings {
         result
     }
 
-    /// Seconds and runs by pass.
-    pub fn rows(&self) -> Vec<(&'static str, f64, u64)> {
+    /// By pass.
+    pub fn rows(&self) -> Vec<PassTime> {
         let rows = self.0.iter();
-        rows.map(|(&pass, &(seconds, runs))| (pass, seconds, runs))
+        rows.map(|(&pass, &(seconds, runs))| PassTime::new(pass, seconds, runs, 0))
             .collect()
     }
 }

@@ -4,6 +4,7 @@
 //! buffers once, and a test holds those declared against those that the commands bind.
 
 use crate::{
+    domain::solver::PassTime,
     gpu::{
         adapter::Context,
         program::{BufferSpec, PassSpec},
@@ -232,8 +233,8 @@ impl Plan {
         (sum(false) + of_projection, sum(true))
     }
 
-    /// What there is for each owner, in the order of its first buffer; `times` are seconds and runs by pass, as a solver tells them.
-    pub fn shares(&self, times: &[(&'static str, f64, u64)]) -> Vec<Share> {
+    /// What there is for each owner, in the order of its first buffer; `times` of passes are as a solver tells them.
+    pub fn shares(&self, times: &[PassTime]) -> Vec<Share> {
         let mut shares: Vec<Share> = Vec::new();
         let mut add = |owner, passes, bytes, seconds| match shares
             .iter_mut()
@@ -258,10 +259,10 @@ impl Plan {
             }
             for PlannedPass { spec, owner } in &part.passes {
                 // A pass of two parts is timed as one.
-                let of_pass = times.iter().filter(|(name, ..)| *name == spec.name);
+                let of_pass = times.iter().filter(|time| time.pass == spec.name);
                 let seconds = match timed.contains(&spec.name) {
                     true => 0.0,
-                    false => of_pass.map(|(_, seconds, _)| seconds).sum(),
+                    false => of_pass.map(|time| time.seconds).sum(),
                 };
                 timed.push(spec.name);
                 add(owner, 1, 0, seconds);

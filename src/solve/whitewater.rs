@@ -8,6 +8,7 @@ use crate::{
         boundary::Boundary,
         budget::Breach,
         particles::Particles,
+        solver::PassTime,
         sph::Calibration,
         whitewater::{
             AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE, Settings,
@@ -238,9 +239,10 @@ impl Whitewater {
         self.program.names()
     }
 
-    /// Pass, seconds, runs, by name; nothing unless timed.
-    pub fn times(&self) -> Vec<(&'static str, f64, u64)> {
-        self.timer.as_ref().map(Timer::times).unwrap_or_default()
+    /// What passes took, by name; nothing unless timed.
+    pub fn times(&self) -> Vec<PassTime> {
+        let timer = self.timer.as_ref();
+        timer.map_or_else(Vec::new, |timer| timer.times(PassTime::new))
     }
 
     /// A buffer's first `count` values.

@@ -21,7 +21,7 @@ use crate::{
 use super::{
     Blame,
     branch::{Branch, BranchError, BranchPoint},
-    device::{Device, Identity, Opened, SolverError, needs},
+    device::{Device, Identity, Opened, PassTimes, SolverError, needs},
     drive::{Drive, End, Step},
     prepare::Start,
     probes,
@@ -112,7 +112,7 @@ pub struct Outcome {
     /// What a user has to know of the frames computed now, a sentence each.
     pub warnings: Vec<String>,
     /// Seconds and runs by pass, where measured.
-    pub passes: Vec<(&'static str, f64, u64)>,
+    pub passes: PassTimes,
     /// The same by what they are there for, with bytes.
     pub shares: Vec<Share>,
 }
@@ -304,8 +304,8 @@ pub fn bake(
         true => (drive.timings(), drive.shares()),
         false => Default::default(),
     };
+    drop(drive);
     if let Some(error) = broken {
-        drop(drive);
         return Err(self::end(request, &opened, &start, error));
     }
     Ok(Outcome {
@@ -315,7 +315,10 @@ pub fn bake(
         waited: summary.waiting.as_secs_f64(),
         interrupted: end == End::Stopped,
         warnings: [looked.warnings(scene), held.warnings()].concat(),
-        passes,
+        passes: match request.time_passes {
+            true => opened.pass_times(passes)?,
+            false => PassTimes::default(),
+        },
         shares,
     })
 }

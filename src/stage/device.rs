@@ -11,9 +11,12 @@ use crate::{
     domain::{
         budget::Breach,
         particles::Particles,
-        solver::{Solver, StepReport, Watch},
+        solver::{PassTime, Solver, StepReport, Watch},
     },
-    gpu::adapter::{Context, GpuError, Needs},
+    gpu::{
+        adapter::{Context, GpuError, Needs},
+        bandwidth,
+    },
     reference::{self, ReferenceError},
     scene::{Method, Scene, flip::Precision},
     solve::{
@@ -75,6 +78,28 @@ pub enum Opened {
     Gpu(Box<Context>),
     /// This machine's processors.
     Cpu,
+}
+
+/// What passes took, and what the device's memory gives.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PassTimes {
+    /// By name; empty unless timed.
+    pub passes: Vec<PassTime>,
+    /// Bytes a second that a copying pass reaches ([`bandwidth::measure`]); only of an adapter whose passes were timed.
+    pub bandwidth: Option<f64>,
+}
+
+impl PassTimes {
+    /// Of passes that were timed on an adapter: measures its bandwidth.
+    ///
+    /// # Errors
+    /// Those of [`bandwidth::measure`].
+    pub fn on(context: &Context, passes: Vec<PassTime>) -> Result<Self, GpuError> {
+        Ok(Self {
+            passes,
+            bandwidth: Some(bandwidth::measure(context)?),
+        })
+    }
 }
 
 /// A device as the manifest has it.
@@ -194,6 +219,20 @@ impl Opened {
         }
     }
 
+    /// What passes took on it.
+    ///
+    /// # Errors
+    /// Those of [`PassTimes::on`].
+    pub fn pass_times(&self, passes: Vec<PassTime>) -> Result<PassTimes, GpuError> {
+        match self {
+            Self::Gpu(context) => PassTimes::on(context, passes),
+            Self::Cpu => Ok(PassTimes {
+                passes,
+                bandwidth: None,
+            }),
+        }
+    }
+
     /// The scene's solver on it, with what the scene's plan names and no more.
     ///
     /// # Errors
@@ -252,7 +291,7 @@ where
         Ok(self.0.pressures(points)?)
     }
 
-    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+    fn timings(&self) -> Vec<PassTime> {
         self.0.timings()
     }
 }

@@ -14,7 +14,7 @@ use crate::{
         answer::Answers,
         particles::Particles,
         signed_distance::SignedDistance,
-        solver::{Solver, StepReport},
+        solver::{PassTime, Solver, StepReport},
         sources::{Exchange, Sources},
     },
     scene::Scene,
@@ -268,8 +268,8 @@ impl<'a> Drive<'a> {
         plan.map_or(Vec::new(), |plan| plan.shares(&self.timings()))
     }
 
-    /// Seconds and runs by pass, where measured.
-    pub fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+    /// What passes took, where measured.
+    pub fn timings(&self) -> Vec<PassTime> {
         self.solver.timings()
     }
 }

@@ -30,6 +30,7 @@ use crate::{
         mesh_file::MeshError,
         particles::Particles,
         signed_distance::SignedDistanceError,
+        solver::PassTime,
     },
     gpu::adapter::{Context, GpuError, Needs},
     render::{Image, Moment, REACH, RenderError, Renderer, Water, frames_around},
@@ -48,7 +49,7 @@ use self::whitewater::Whitewater;
 use self::writing::{Drawn, Writing};
 use super::{
     Blame,
-    device::{Gpu, shaders_note},
+    device::{Gpu, PassTimes, shaders_note},
 };
 
 pub use self::{
@@ -138,7 +139,7 @@ pub struct Outcome {
     /// Whether a signal ended it.
     pub interrupted: bool,
     /// Pass, seconds, runs, by name, of the frames rendered now; nothing unless that was asked for.
-    pub passes: Vec<(&'static str, f64, u64)>,
+    pub passes: PassTimes,
 }
 
 /// Why a render failed.
@@ -273,7 +274,10 @@ pub fn render(
         times: BTreeMap::new(),
     };
     let mut outcome = job.run(frames, stop, tell)?;
-    outcome.passes = job.times.into_values().collect();
+    if request.time_passes {
+        let times = std::mem::take(&mut job.times);
+        outcome.passes = PassTimes::on(&job.context, times.into_values().collect())?;
+    }
     Ok(outcome)
 }
 
@@ -395,7 +399,7 @@ struct Job<'a> {
     /// Of the frame before, where it can draw another.
     kept: Option<Renderer>,
     /// What passes took so far.
-    times: BTreeMap<&'static str, (&'static str, f64, u64)>,
+    times: BTreeMap<&'static str, PassTime>,
 }
 
 impl Job<'_> {
@@ -560,10 +564,12 @@ impl Job<'_> {
         let picture = renderer
             .render_moment(frame, &moment)
             .map_err(|error| told(error, look))?;
-        for (name, seconds, runs) in renderer.times() {
-            let total = self.times.entry(name).or_insert((name, 0.0, 0));
-            total.1 += seconds;
-            total.2 += runs;
+        for time in renderer.times() {
+            let none = PassTime::new(time.pass, 0.0, 0, 0);
+            let total = self.times.entry(time.pass).or_insert(none);
+            total.seconds += time.seconds;
+            total.runs += time.runs;
+            total.bytes += time.bytes;
         }
         // Solids that move are drawn where they stand at the frame's time, not blurred over its shutter:
         // a renderer draws its solids once.

@@ -34,7 +34,7 @@ use crate::{
 
 use super::{
     Blame,
-    device::{Device, Identity, SolverError},
+    device::{Device, Identity, PassTimes, SolverError},
     prepare::Start,
 };
 
@@ -123,7 +123,7 @@ pub struct Outcome {
     /// Whether a signal ended it.
     pub interrupted: bool,
     /// Pass, seconds, runs, by name; nothing unless that was asked for.
-    pub passes: Vec<(&'static str, f64, u64)>,
+    pub passes: PassTimes,
 }
 
 /// Why whitewater could not be made.
@@ -306,7 +306,10 @@ pub fn whitewater(
         bytes: summary.bytes,
         directory,
         interrupted,
-        passes: engine.times(),
+        passes: match request.time_passes {
+            true => opened.pass_times(engine.times())?,
+            false => PassTimes::default(),
+        },
     })
 }
 

@@ -55,6 +55,7 @@ mod experiment {
     mod validation;
 }
 mod gpu {
+    mod bandwidth;
     mod device_faults;
     mod raster;
     mod shaders;

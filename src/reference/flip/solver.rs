@@ -19,7 +19,7 @@ use crate::{
         gauge::Gauge,
         particles::Particles,
         poisson::FLUID,
-        solver::{Projection, Seen, Solver, Span, StepReport, Watch},
+        solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
     },
     reference::{ReferenceError, Timings},
     scene::{
@@ -559,7 +559,7 @@ impl Solver for Flip {
         Ok(points.iter().map(|at| gauge.at(local(at))).collect())
     }
 
-    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+    fn timings(&self) -> Vec<PassTime> {
         self.timings.rows()
     }
 }

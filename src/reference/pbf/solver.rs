@@ -14,7 +14,7 @@ use crate::{
         particles::Particles,
         pbf::chebyshev_factors,
         probe::fitted,
-        solver::{Projection, Seen, Solver, Span, StepReport, Watch},
+        solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
     },
     reference::{
         ReferenceError, Timings,
@@ -475,7 +475,7 @@ impl Solver for Pbf {
         Ok(points.iter().map(pressure).collect())
     }
 
-    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
+    fn timings(&self) -> Vec<PassTime> {
         self.timings.rows()
     }
 }

@@ -20,7 +20,7 @@ use super::image::{Image, View};
 use super::plan::{Limits, Plan};
 use super::samples::samples_of;
 use super::{Moment, RenderError, RenderScene, Water, sea::Sea, uniform};
-use crate::domain::particles::Particles;
+use crate::domain::{particles::Particles, solver::PassTime};
 use crate::gpu::{
     adapter::Context,
     buffer::Buf,
@@ -132,9 +132,10 @@ impl Renderer {
         self.timer = Some(Timer::new(&self.program.context));
     }
 
-    /// Pass, seconds and runs since [`Self::time_passes`], by name.
-    pub fn times(&self) -> Vec<(&'static str, f64, u64)> {
-        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
+    /// What passes took since [`Self::time_passes`], by name.
+    pub fn times(&self) -> Vec<PassTime> {
+        let timer = self.timer.as_ref();
+        timer.map_or_else(Vec::new, |timer| timer.times(PassTime::new))
     }
 
     /// Renders one frame; the same frame, particles, look and adapter give the same bytes.

@@ -25,7 +25,7 @@ use crate::{
         particles::Particles,
         poisson::FLUID,
         shores::Shores,
-        solver::{Solver, StepReport, Watch},
+        solver::{PassTime, Solver, StepReport, Watch},
         substep::Which,
     },
     gpu::{
@@ -525,8 +525,9 @@ impl Solver for Flip {
         self.pressures_at(points)
     }
 
-    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
-        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
+    fn timings(&self) -> Vec<PassTime> {
+        let timer = self.timer.as_ref();
+        timer.map_or_else(Vec::new, |timer| timer.times(PassTime::new))
     }
 }
 

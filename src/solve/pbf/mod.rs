@@ -16,7 +16,7 @@ use crate::{
         pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
         period::Period,
         probe::fitted,
-        solver::{Seen, Solver, Span as Substep, StepReport, Wanted, Watch},
+        solver::{PassTime, Seen, Solver, Span as Substep, StepReport, Wanted, Watch},
         sph::Calibration,
         substep::Which,
     },
@@ -462,8 +462,9 @@ impl Solver for Pbf {
             .collect())
     }
 
-    fn timings(&self) -> Vec<(&'static str, f64, u64)> {
-        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
+    fn timings(&self) -> Vec<PassTime> {
+        let timer = self.timer.as_ref();
+        timer.map_or_else(Vec::new, |timer| timer.times(PassTime::new))
     }
 }
 

@@ -4,6 +4,7 @@ use crate::{
     domain::{
         boundary::Boundary,
         particles::Particles,
+        solver::PassTime,
         whitewater::{Potentials, Settings},
     },
     reference,
@@ -67,8 +68,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Pass, seconds, runs; nothing on the CPU, or unless timed.
-    pub(super) fn times(&self) -> Vec<(&'static str, f64, u64)> {
+    /// What passes took; nothing on the CPU, or unless timed.
+    pub(super) fn times(&self) -> Vec<PassTime> {
         match self {
             Self::Gpu(engine) => engine.times(),
             Self::Cpu(_) => Vec::new(),

@@ -45,8 +45,11 @@ fn events_end_with_the_totals_of_each_command() {
     assert_counted(&told, 3);
     assert_eq!(totals(&told), [2, 1, 0]);
     assert_eq!(named(&told, "frame")[0]["status"], "skipped");
-    let passes = named(&told, "passes")[0]["passes"].as_array().unwrap();
-    assert!(passes.iter().any(|pass| pass["pass"] == "ssfr/shade_aovs"));
+    let event = &named(&told, "passes")[0];
+    let passes = event["passes"].as_array().unwrap();
+    let shade = passes.iter().find(|pass| pass["pass"] == "ssfr/shade_aovs");
+    assert!(shade.unwrap()["bytes"].as_u64().unwrap() > 0);
+    assert!(event["bandwidth"].as_f64().unwrap() > 0.0);
     let told = events(&job, 0, &format!("{render} --overwrite"));
     let record = fs::metadata(job.path("day/render.json")).unwrap().len();
     assert_eq!(

@@ -1,0 +1,82 @@
+//! What a pass moves, and what the device's memory gives.
+
+use swell::gpu::{
+    adapter::Context,
+    bandwidth,
+    buffer::Buf,
+    program::Program,
+    recording::{Bind, Command, Recording, Timer},
+    reflect::reflect,
+    shader,
+    sort::plain_pass,
+};
+
+const PASS: &str = "measure/copy";
+const COPIED: Buf<[f32; 4]> = Buf::new("copied");
+const COPY: Buf<[f32; 4]> = Buf::new("copy");
+const COUNT: usize = 1 << 12;
+
+/// Bytes and runs that a timer tells of the copying pass, run twice with these bindings.
+fn told(binds: &[Bind], count: usize) -> (u64, u64) {
+    let context = Context::open(None).unwrap();
+    let buffers = [COPIED.sized(COUNT), COPY.sized(COUNT)];
+    let program = Program::new(&context, &buffers, &[plain_pass(PASS)], &[]).unwrap();
+    let values: Vec<[f32; 4]> = (0..COUNT).map(|k| [k as f32; 4]).collect();
+    program.upload(COPIED, 0, &values);
+    let recording = Recording::new(&program, &[Command::with(PASS, count, binds.to_vec())]);
+    let mut timer = Timer::new(&context);
+    for _ in 0..2 {
+        recording.run(&program, Some(&mut timer)).unwrap();
+    }
+    assert_eq!(program.read(COPY, count).unwrap(), values[..count]);
+    let times = timer.times(|pass, seconds, runs, bytes| {
+        assert_eq!(pass, PASS);
+        assert!(seconds > 0.0);
+        (bytes, runs)
+    });
+    times[0]
+}
+
+#[test]
+fn a_copy_moves_each_byte_twice() {
+    let bytes = (size_of::<[f32; 4]>() * COUNT) as u64;
+    assert_eq!(told(&[], COUNT), (2 * 2 * bytes, 2));
+    // A window of a quarter counts as that.
+    let window = |buffer: &Buf<[f32; 4]>| Bind {
+        window: Some((0, bytes / 4)),
+        ..Bind::whole(
+            if buffer.name() == "copy" {
+                "copy"
+            } else {
+                "copied"
+            },
+            buffer,
+        )
+    };
+    let quarter = [window(&COPIED), window(&COPY)];
+    assert_eq!(told(&quarter, COUNT / 4), (2 * 2 * bytes / 4, 2));
+}
+
+/// What is declared `read_write` and only written is not counted as read.
+#[test]
+fn what_a_shader_reads_and_writes_is_seen() {
+    let uses = |name: &str, variable: &str| {
+        let text = shader::compose(name, &[]).unwrap();
+        let bindings = reflect(name, &text).unwrap().bindings;
+        let binding = bindings.iter().find(|binding| binding.name == variable);
+        binding.map(|binding| (binding.is_read, binding.is_written))
+    };
+    assert_eq!(uses(PASS, "copied"), Some((true, false)));
+    assert_eq!(uses(PASS, "copy"), Some((false, true)));
+    assert_eq!(uses("sort/scan_blocks", "values"), Some((true, true)));
+    assert_eq!(uses("sort/scan_blocks", "block_sums"), Some((false, true)));
+    // Counted up by atomics.
+    assert_eq!(uses("pbf/assign_cells", "cell_start"), Some((true, true)));
+}
+
+/// Between a slow card's bus and ten times what any device of today gives.
+#[test]
+fn a_device_has_a_bandwidth() {
+    let rate = bandwidth::measure(&Context::open(None).unwrap()).unwrap();
+    assert!((1e7..1e14).contains(&rate), "{rate} bytes a second");
+}
