@@ -10,7 +10,7 @@
 use std::{path::Path, time::Instant};
 
 use swell::{
-    domain::solver::Solver,
+    domain::solver::{PassTime, Solver},
     gpu::adapter::Context,
     reference::flip::Flip as Reference,
     scene::Scene,

@@ -10,6 +10,7 @@
 use std::{path::Path, time::Instant};
 
 use swell::{
+    domain::solver::PassTime,
     gpu::adapter::Needs,
     scene::Scene,
     solve::plan::Plan,
@@ -192,9 +193,15 @@ fn print_passes(
         steps += solver.advance()?.1.substeps;
     }
     let mut rows = solver.timings();
-    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+    rows.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
     let n = start.particles.len() as f64;
-    for (pass, seconds, runs) in &rows {
+    for PassTime {
+        pass,
+        seconds,
+        runs,
+        ..
+    } in &rows
+    {
         let each = 1e3 * seconds / *runs as f64;
         println!(
             "   {pass:24} {each:9.3} ms × {runs:5}  {:7.3} µs a particle-step",
