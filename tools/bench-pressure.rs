@@ -79,9 +79,9 @@ fn main() {
                     let mut timer = Timer::new(&context);
                     rig.set_rhs(&b);
                     rig.project(Some(&mut timer));
-                    for (name, (seconds, runs)) in &timer.total {
+                    timer.times(|name, seconds, runs, _| {
                         println!("      {name:<28} {:>8.3} ms  {runs:>4} runs", 1e3 * seconds);
-                    }
+                    });
                 }
             }
             if only.as_ref().is_none_or(|only| only == "reference") {

@@ -277,9 +277,9 @@ fn what_ran_is_what_the_look_calls_for() {
             .collect();
         let times = renderer.times().into_iter();
         let timed: Vec<_> = times
-            .map(|(name, seconds, runs)| {
-                assert!(seconds > 0.0, "{name}");
-                (name, runs as usize)
+            .map(|time| {
+                assert!(time.seconds > 0.0, "{}", time.pass);
+                (time.pass, time.runs as usize)
             })
             .collect();
         assert_eq!(timed, planned);
@@ -576,8 +576,12 @@ fn pictures() {
         println!("{stem}: frame {:.3} s", started.elapsed().as_secs_f64());
         renderer.time_passes();
         renderer.render(120, &water).unwrap();
-        for (name, seconds, _) in renderer.times() {
-            println!("  {name:24} {:8.1} ms a frame", 1000.0 * seconds);
+        for time in renderer.times() {
+            println!(
+                "  {:24} {:8.1} ms a frame",
+                time.pass,
+                1000.0 * time.seconds
+            );
         }
         let file = Path::new(&folder).join(format!("{stem}.png"));
         write_png(&file, &image, &look.spec().view).unwrap();
