@@ -67,7 +67,14 @@ pub(super) fn pass_times(progress: &Progress, times: &PassTimes, parts: &[Share]
     print_pass_times(passes, *bandwidth);
     let runs: u64 = passes.iter().map(|time| time.runs).sum();
     let each = runs as f64 / f64::from(frames.max(1));
-    print(&format!("{runs} runs of passes, {each:.0} a frame\n"));
+    print(&format!("\n{runs} runs of passes, {each:.0} a frame"));
+    if let Some(all) = bandwidth {
+        print(&format!(
+            "; per cent are of {:.2} GB/s, at which a pass copies a buffer here, and a pass is taken to move what it binds once",
+            1e-9 * all
+        ));
+    }
+    print("\n");
     if !parts.is_empty() {
         print(&format!("\n{}", shares(parts, Some(frames))));
     }
@@ -106,12 +113,6 @@ fn print_pass_times(passes: &[PassTime], bandwidth: Option<f64>) {
         };
         print(&format!(
             "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s{moved}\n"
-        ));
-    }
-    if let Some(all) = bandwidth {
-        print(&format!(
-            "per cent are of {:.2} GB/s, at which a pass copies a buffer here; a pass is taken to move what it binds once\n",
-            1e-9 * all
         ));
     }
 }
