@@ -30,7 +30,7 @@ use std::{
     process::ExitCode,
 };
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum, error::ErrorKind};
 
 use self::progress::{Mode, Progress};
 use crate::stage::{
@@ -211,19 +211,25 @@ pub fn main() -> ExitCode {
 
 /// Prints what clap has to tell: help, the version, or what is wrong with the arguments.
 fn tell(told: &clap::Error) -> u8 {
-    let stream = match told.use_stderr() {
-        true => "standard error",
-        false => "standard output",
-    };
-    output::note(stream, told.print().and_then(|()| io::stdout().flush()));
     let code = told.exit_code() as u8;
-    if told.use_stderr() {
-        let text = told.to_string();
-        let lines = text.lines().map(str::trim).take_while(|it| !it.is_empty());
-        let message = lines.collect::<Vec<_>>().join(" ");
-        let message = message.strip_prefix("error: ").unwrap_or(&message);
-        progress::unread(&arguments(), message, code);
+    if !told.use_stderr() {
+        let shown = told.print().and_then(|()| io::stdout().flush());
+        output::note("standard output", shown);
+        return code;
     }
+    let text = told.to_string();
+    let lines = text.lines().map(str::trim).take_while(|it| !it.is_empty());
+    let message = lines.collect::<Vec<_>>().join(" ");
+    let shown = match told.kind() {
+        // All there is to say of a value is that line: how the command is written was right.
+        ErrorKind::InvalidValue | ErrorKind::ValueValidation | ErrorKind::ArgumentConflict => {
+            writeln!(io::stderr(), "{message}")
+        }
+        _ => told.print(),
+    };
+    output::note("standard error", shown);
+    let message = message.strip_prefix("error: ").unwrap_or(&message);
+    progress::unread(&arguments(), message, code);
     code
 }
 

@@ -62,6 +62,21 @@ pub enum GpuError {
         /// Adapter name.
         adapter: String,
     },
+    /// A pass binds more buffers than the adapter does.
+    #[error(
+        "pass {pass} binds {needed} storage buffers, and {adapter} allows {allowed} (max_storage_buffers_per_shader_stage); use \
+         another adapter or a newer driver (of llvmpipe Mesa 22.3), or bake with --device cpu"
+    )]
+    TooManyBuffers {
+        /// Its name.
+        pass: String,
+        /// Buffers of the pass.
+        needed: u32,
+        /// Buffers that the adapter binds.
+        allowed: u32,
+        /// Adapter name.
+        adapter: String,
+    },
     /// A buffer is larger than the adapter binds.
     #[error(
         "buffer `{buffer}` needs {needed} bytes, and {adapter} allows {allowed} ({limit}); make the scene or the picture smaller or coarser"

@@ -376,7 +376,7 @@ pub(super) fn checked<T>(
 /// Composes and reflects the shader of pass `name`, of a program with these buffers.
 ///
 /// # Errors
-/// [`GpuError::Shader`]; [`GpuError::NoF64`].
+/// [`GpuError::Shader`]; [`GpuError::NoF64`]; [`GpuError::TooManyBuffers`].
 pub(super) fn shader(
     context: &Context,
     name: &str,
@@ -396,6 +396,17 @@ pub(super) fn shader(
     }
     if reflection.has_f64 && !context.has_f64 {
         return Err(GpuError::NoF64 {
+            adapter: context.info.name.clone(),
+        });
+    }
+    let is_storage = |binding: &&Binding| binding.access.is_storage();
+    let needed = reflection.bindings.iter().filter(is_storage).count() as u32;
+    let allowed = context.limits.max_storage_buffers_per_shader_stage;
+    if needed > allowed {
+        return Err(GpuError::TooManyBuffers {
+            pass: name.to_owned(),
+            needed,
+            allowed,
             adapter: context.info.name.clone(),
         });
     }

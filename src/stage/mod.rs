@@ -73,6 +73,7 @@ impl From<&GpuError> for Blame {
             | GpuError::EditedShader { .. } => Self::Input,
             GpuError::NoAdapter
             | GpuError::Open { .. }
+            | GpuError::TooManyBuffers { .. }
             | GpuError::Lost(_)
             | GpuError::Shader { .. } => Self::Device,
         }

@@ -26,6 +26,7 @@ mod cache {
 }
 mod check;
 mod cli {
+    mod bad_input;
     mod expected;
     mod export;
     mod farm;

@@ -25,7 +25,7 @@ pub enum CameraFileError {
     #[error("{0}")]
     Usd(String),
     /// It is no glTF file.
-    #[error("no glTF file that can be read: {0}")]
+    #[error("neither USD as text, which begins with #usda, nor glTF that can be read: {0}")]
     Gltf(#[from] gltf::Error),
     /// It has none.
     #[error("no node of it has a camera")]

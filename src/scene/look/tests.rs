@@ -568,7 +568,7 @@ fn a_camera_from_a_file() {
     std::fs::write(&file, &one[..one.len() / 2]).unwrap();
     let (key, message) = told(&text);
     assert_eq!(key, "camera.file");
-    assert!(message.contains("no glTF file"), "{message}");
+    assert!(message.contains("neither USD"), "{message}");
 }
 
 #[test]

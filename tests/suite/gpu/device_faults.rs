@@ -189,6 +189,28 @@ fn limits_above_the_adapters_own_do_not_open() {
     assert!(matches!(raised, Err(GpuError::Open { .. })));
 }
 
+/// As llvmpipe of Mesa 20.3 has it, whose limit is told before the first frame and not by a validation error of a shader.
+#[test]
+fn an_adapter_that_binds_few_buffers_is_refused_by_figures() {
+    let job = Job::new();
+    let opened = |most: u32| {
+        Context::open_lowered(None, Needs::default(), |limits| {
+            limits.max_storage_buffers_per_shader_stage = most;
+        })
+        .unwrap()
+    };
+    let error = run(&request(&job, "pbf", "few", &opened(3))).unwrap_err();
+    let said = error.to_string();
+    assert!(
+        said.contains("storage buffers") && said.contains("allows 3 (max_storage_buffers"),
+        "{said}"
+    );
+    assert!(!said.contains('\n'), "{said}");
+    assert_eq!(Blame::from(&error), Blame::Device, "exit code 3");
+    // The control: as many as any pass of ours binds (`gpu::shaders`) are enough.
+    run(&request(&job, "pbf", "enough", &opened(10))).unwrap();
+}
+
 /// Destroys the device once the second frame is computed.
 fn lose(request: &Request, context: &Context) -> BakeError {
     let stop = AtomicBool::new(false);
