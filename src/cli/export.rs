@@ -73,7 +73,7 @@ pub(super) struct ExportArgs {
     /// Python with usd-core, which names that end in .usdc need.
     #[arg(long, value_name = "PROGRAM", default_value = "python3")]
     python: String,
-    /// Export files again that stand there, also those of another cache, and files that are none of swell's.
+    /// Export files again that exist, also those of another cache, and files that are none of swell's.
     #[arg(long)]
     overwrite: bool,
     /// Where frames of the cache are damaged, export the others; exit code 4 in the end.

@@ -41,7 +41,7 @@ pub(super) struct RenderArgs {
     /// Take a panorama or a camera that lies outside of the look's folder.
     #[arg(long)]
     allow_outside: bool,
-    /// Render frames again that stand there, also those of another cache or look.
+    /// Render frames again that exist, also those of another cache or look.
     #[arg(long)]
     overwrite: bool,
     /// Where frames of the cache are damaged, render the others; exit code 4 in the end.

@@ -27,8 +27,8 @@ pub(super) struct WhitewaterArgs {
     /// Settings file (TOML); what it leaves out has defaults or is calibrated on the shot.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Name of the stream, which goes to CACHE/whitewater/NAME; the settings file's own where left out, or `default`. A stream
-    /// that stands there is gone on with.
+    /// Name of the stream, which goes to CACHE/whitewater/NAME; the settings file's own where left out, or `default`. An
+    /// existing stream is resumed.
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// Last frame to make; the bake's last where left out.
