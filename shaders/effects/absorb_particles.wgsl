@@ -4,5 +4,5 @@
 
 fn lead(i: u32, place: vec3f, is_drop: bool) {
     let kept = 1.0 - select(led(place, params.time_step), 0.0, is_drop);
-    velocity[i] = vec4f(kept * velocity[i].xyz, velocity[i].w);
+    velocity[i] = packed(kept * three(velocity[i]));
 }

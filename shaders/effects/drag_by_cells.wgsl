@@ -1,5 +1,6 @@
 // Air slows water that flies: the more, the fewer particles there are in the 27 cells about its own, walls and solids left out. What the grid is then given has the velocity that air left.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/drag.wgsl"
@@ -9,7 +10,7 @@
 
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> cell_kind: array<u32>;
-@group(0) @binding(4) var<storage, read_write> sorted_velocity: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> sorted_velocity: array<Vector>;
 
 const SOLID = 2u;
 
@@ -56,9 +57,9 @@ fn main(
         share = share_about(element);
     }
     for (var i = first; i < end; i++) {
-        let before = sorted_velocity[i];
+        let before = three(sorted_velocity[i]);
         // What gravity adds follows on the grid.
-        let after = blown(before.xyz, params.velocity_step, share, params.time_step) - params.velocity_step;
-        sorted_velocity[i] = vec4f(select(before.xyz, after, is_exposed(share)), before.w);
+        let after = blown(before, params.velocity_step, share, params.time_step) - params.velocity_step;
+        sorted_velocity[i] = packed(select(before, after, is_exposed(share)));
     }
 }

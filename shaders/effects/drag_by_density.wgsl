@@ -1,5 +1,7 @@
 // Air slows water that flies: the more, the less water there is about it, by the density at its place.
 #import "shared/thread.wgsl"
+#import "shared/predicted.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/neighbors.wgsl"
@@ -10,27 +12,14 @@ override GRAVITY_X: f32;
 override GRAVITY_Y: f32;
 override GRAVITY_Z: f32;
 
-#ifdef SOLIDS
-// Samples on solids stand behind the particles.
-@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
-#endif
-@group(0) @binding(10) var<storage, read> position: array<vec4f>;
-@group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
+@group(0) @binding(10) var<storage, read> position: array<Vector>;
+@group(0) @binding(11) var<storage, read_write> velocity: array<Vector>;
 
 var<private> own_position: vec3f;
 var<private> kernel_sum: f32;
 
 fn visit(i: u32, j: u32) {
-    var other = vec4f(0.0);
-    if j < fluid_count {
-        other = vec4f(position[j].xyz, 0.0);
-    } else {
-#ifdef SOLIDS
-        other = predicted[j + fluid_count];
-#else
-        return;
-#endif
-    }
+    let other = predicted_at(j);
     let d = between(own_position, other.xyz);
     let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
     kernel_sum += weight(other.w) * p * p * p;
@@ -47,7 +36,7 @@ fn main(
         return;
     }
     let i = phase_particle(thread);
-    own_position = position[i].xyz;
+    own_position = three(position[i]);
     kernel_sum = 0.0;
     begin_phase();
     for_each_neighbor(own_position, i);
@@ -56,7 +45,7 @@ fn main(
     let share = others / (1.0 - params.density_scale);
     // What gravity added in this step is in it already.
     let fall = params.time_step * vec3f(GRAVITY_X, GRAVITY_Y, GRAVITY_Z);
-    let before = velocity[i];
-    let after = blown(before.xyz - fall, fall, share, params.time_step);
-    velocity[i] = vec4f(select(before.xyz, after, is_exposed(share)), before.w);
+    let before = three(velocity[i]);
+    let after = blown(before - fall, fall, share, params.time_step);
+    velocity[i] = packed(select(before, after, is_exposed(share)));
 }

@@ -5,7 +5,7 @@
 fn lead(i: u32, place: vec3f, is_drop: bool) {
     let part = led(place, params.time_step);
     if part > 0.0 && !is_drop {
-        let v = velocity[i].xyz;
-        velocity[i] = vec4f(v + part * (wave_velocity(place) - v), velocity[i].w);
+        let v = three(velocity[i]);
+        velocity[i] = packed(v + part * (wave_velocity(place) - v));
     }
 }

@@ -1,19 +1,21 @@
 // a = ε Δx (N × ω), N = η/|η|, η = ∇|ω| (Fedkiw et al. 2001), at faces between two cells of water.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 
 override STRENGTH: f32;
 
 @group(0) @binding(2) var<storage, read> cell_kind: array<u32>;
-@group(0) @binding(3) var<storage, read> vorticity: array<vec4f>;
+@group(0) @binding(3) var<storage, read> vorticity: array<Vector>;
+@group(0) @binding(6) var<storage, read> vorticity_length: array<f32>;
 @group(0) @binding(4) var<storage, read> face_open: array<f32>;
 @group(0) @binding(5) var<storage, read_write> face_velocity: array<f32>;
 
 const FLUID = 1u;
 
 fn magnitude(offset: vec3i) -> f32 {
-    return vorticity[element_at(offset)].w;
+    return vorticity_length[element_at(offset)];
 }
 
 // Twice the mean over the face's two cells of |ω|'s central difference along `axis`, which lies in the face.
@@ -23,18 +25,19 @@ fn slope_along(normal: vec3i, axis: vec3i) -> f32 {
 
 // N × ω at the lower face along `normal`, 1/s.
 fn confinement(normal: vec3i) -> vec3f {
-    let own = vorticity[element_at(vec3i(0))];
-    let before = vorticity[element_at(-normal)];
-    let across = 2.0 * (own.w - before.w);
+    let own = element_at(vec3i(0));
+    let before = element_at(-normal);
+    let lengths = vec2f(vorticity_length[own], vorticity_length[before]);
+    let across = 2.0 * (lengths.x - lengths.y);
     let slope = vec3f(
         select(slope_along(normal, vec3i(1, 0, 0)), across, normal.x == 1),
         select(slope_along(normal, vec3i(0, 1, 0)), across, normal.y == 1),
         select(slope_along(normal, vec3i(0, 0, 1)), across, normal.z == 1),
     );
-    let omega = 0.5 * (own.xyz + before.xyz);
+    let omega = 0.5 * (three(vorticity[own]) + three(vorticity[before]));
     let steepness = length(slope);
     // Below the rounding of |ω| the direction is noise.
-    let is_clear = steepness > 1e-5 * (own.w + before.w);
+    let is_clear = steepness > 1e-5 * (lengths.x + lengths.y);
     return select(vec3f(0.0), cross(slope / max(steepness, 1e-30), omega), is_clear);
 }
 

@@ -1,13 +1,15 @@
 // Vorticity at cell centres, ω = ∇ × u by differences of the mean velocities of the cells beside, in cells of water;
 // one-sided where there is none.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 
 @group(0) @binding(2) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(3) var<storage, read> face_velocity: array<f32>;
 // x, y, z and the magnitude.
-@group(0) @binding(4) var<storage, read_write> vorticity: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> vorticity: array<Vector>;
+@group(0) @binding(5) var<storage, read_write> vorticity_length: array<f32>;
 
 const FLUID = 1u;
 
@@ -54,5 +56,6 @@ fn main(
         let by_z = slope(vec3i(0, 0, 1));
         curl = vec3f(by_y.z - by_z.y, by_z.x - by_x.z, by_x.y - by_y.x);
     }
-    vorticity[element] = vec4f(curl, length(curl));
+    vorticity[element] = packed(curl);
+    vorticity_length[element] = length(curl);
 }

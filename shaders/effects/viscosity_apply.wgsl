@@ -1,10 +1,11 @@
 // Adds what viscosity_gather found, once every particle has read the old velocities.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/pbf_params.wgsl"
 
-@group(0) @binding(10) var<storage, read> viscosity_change: array<vec4f>;
-@group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
+@group(0) @binding(10) var<storage, read> viscosity_change: array<Vector>;
+@group(0) @binding(11) var<storage, read_write> velocity: array<Vector>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -17,5 +18,5 @@ fn main(
         return;
     }
     let i = phase_particle(thread);
-    velocity[i] += viscosity_change[i];
+    velocity[i] = packed(three(velocity[i]) + three(viscosity_change[i]));
 }

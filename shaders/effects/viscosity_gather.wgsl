@@ -1,14 +1,16 @@
 // c Σ_j m/ρ (v_j − v_i) W: the mean velocity of the neighbours relative to one's own, by poly6.
 #import "shared/thread.wgsl"
+#import "shared/predicted.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/neighbors.wgsl"
 
 override XSPH: f32;
 
-@group(0) @binding(10) var<storage, read> position: array<vec4f>;
-@group(0) @binding(11) var<storage, read> velocity: array<vec4f>;
-@group(0) @binding(12) var<storage, read_write> viscosity_change: array<vec4f>;
+@group(0) @binding(10) var<storage, read> position: array<Vector>;
+@group(0) @binding(11) var<storage, read> velocity: array<Vector>;
+@group(0) @binding(12) var<storage, read_write> viscosity_change: array<Vector>;
 
 var<private> own_position: vec3f;
 var<private> own_velocity: vec3f;
@@ -18,9 +20,9 @@ fn visit(i: u32, j: u32) {
     if j >= fluid_count {
         return;
     }
-    let d = between(own_position, position[j].xyz);
+    let d = between(own_position, predicted_at(j).xyz);
     let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
-    change += (velocity[j].xyz - own_velocity) * (p * p * p);
+    change += (three(velocity[j]) - own_velocity) * (p * p * p);
 }
 
 @compute @workgroup_size(64)
@@ -34,10 +36,10 @@ fn main(
         return;
     }
     let i = phase_particle(thread);
-    own_velocity = velocity[i].xyz;
+    own_velocity = three(velocity[i]);
     change = vec3f(0.0);
-    own_position = position[i].xyz;
+    own_position = three(position[i]);
     begin_phase();
     for_each_neighbor(own_position, i);
-    viscosity_change[i] = vec4f(XSPH * params.density_scale * change, 0.0);
+    viscosity_change[i] = packed(XSPH * params.density_scale * change);
 }

@@ -1,14 +1,17 @@
 // a = ε h (N × ω), N = η/|η|, η = ∇|ω| by differences, so that uniform vorticity has none.
 #import "shared/thread.wgsl"
+#import "shared/predicted.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/neighbors.wgsl"
 
 override STRENGTH: f32;
 
-@group(0) @binding(10) var<storage, read> position: array<vec4f>;
-@group(0) @binding(11) var<storage, read> vorticity: array<vec4f>;
-@group(0) @binding(12) var<storage, read_write> velocity: array<vec4f>;
+@group(0) @binding(10) var<storage, read> position: array<Vector>;
+@group(0) @binding(11) var<storage, read> vorticity: array<Vector>;
+@group(0) @binding(13) var<storage, read> vorticity_length: array<f32>;
+@group(0) @binding(12) var<storage, read_write> velocity: array<Vector>;
 
 var<private> own_position: vec3f;
 var<private> own_strength: f32;
@@ -18,10 +21,10 @@ fn visit(i: u32, j: u32) {
     if j >= fluid_count {
         return;
     }
-    let d = between(own_position, position[j].xyz);
+    let d = between(own_position, predicted_at(j).xyz);
     let r = length(d);
     let s = max(1.0 - r * inverse_h, 0.0);
-    slope -= d * ((vorticity[j].w - own_strength) * params.gradient_scale * s * s / max(r, 1e-15));
+    slope -= d * ((vorticity_length[j] - own_strength) * params.gradient_scale * s * s / max(r, 1e-15));
 }
 
 @compute @workgroup_size(64)
@@ -35,17 +38,16 @@ fn main(
         return;
     }
     let i = phase_particle(thread);
-    let own = vorticity[i];
-    own_strength = own.w;
+    own_strength = vorticity_length[i];
     slope = vec3f(0.0);
-    own_position = position[i].xyz;
+    own_position = three(position[i]);
     begin_phase();
     for_each_neighbor(own_position, i);
     let steepness = length(slope);
     // Below rounding of |ω| over h the direction is noise.
-    if steepness * params.support_radius < 1e-5 * own.w || own.w == 0.0 {
+    if steepness * params.support_radius < 1e-5 * own_strength || own_strength == 0.0 {
         return;
     }
-    let force = cross(slope / steepness, own.xyz);
-    velocity[i] += vec4f(params.time_step * STRENGTH * params.support_radius * force, 0.0);
+    let force = cross(slope / steepness, three(vorticity[i]));
+    velocity[i] = packed(three(velocity[i]) + params.time_step * STRENGTH * params.support_radius * force);
 }

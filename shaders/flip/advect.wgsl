@@ -2,10 +2,10 @@
 // and by the density correction's displacement; they are kept out of solids and walls, and lose what velocity they
 // have into them. One that would move farther than the cap is slowed and counted.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/counters.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_slots.wgsl"
-#import "shared/flip_carried.wgsl"
 #import "shared/finite.wgsl"
 #ifdef SOLIDS
 #import "shared/flip_solid.wgsl"
@@ -15,11 +15,15 @@
 #endif
 
 @group(0) @binding(2) var<storage, read> face_velocity: array<f32>;
-@group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
 @group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
-@group(0) @binding(5) var<storage, read> carried: array<f32>;
-@group(0) @binding(6) var<storage, read_write> position: array<vec4f>;
-@group(0) @binding(9) var<storage, read_write> velocity: array<vec4f>;
+@group(0) @binding(5) var<storage, read> carried: array<Vector>;
+#ifdef CORRECTION
+@group(0) @binding(12) var<storage, read> pushed: array<Vector>;
+#endif
+@group(0) @binding(13) var<storage, read> is_drop: array<u32>;
+@group(0) @binding(6) var<storage, read_write> position: array<Vector>;
+@group(0) @binding(9) var<storage, read_write> velocity: array<Vector>;
 @group(0) @binding(10) var<storage, read_write> id: array<u32>;
 // Of particles slowed, and of what is not finite, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
@@ -93,15 +97,13 @@ fn main(
     if i >= params.particle_count {
         return;
     }
-    let start = sorted_position[i].xyz;
-    let first = CARRIED * i;
-    let here = vec3f(carried[first], carried[first + 1u], carried[first + 2u]);
+    let start = three(sorted_position[i]);
+    let here = three(carried[i]);
     // A drop goes on as it flies: on its way there are no faces of its own, and those about it may be other water's.
-    let is_drop = velocity[i].w > 0.0;
-    let between = select(velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop);
+    let between = select(velocity_at(start + 0.5 * params.time_step * here, here), here, is_drop[i] > 0u);
     var way = params.time_step * between;
 #ifdef CORRECTION
-    way += vec3f(carried[first + 3u], carried[first + 4u], carried[first + 5u]);
+    way += three(pushed[i]);
 #endif
     if !is_finite(start + way) {
         atomicAdd(&counters.not_finite, 1u);
@@ -113,7 +115,7 @@ fn main(
     }
     let low = params.wall_min + params.contact_distance;
     let high = params.wall_max - params.contact_distance;
-    var v = velocity[i].xyz;
+    var v = three(velocity[i]);
 #ifdef MOVING_SOLIDS
     // In steps of at most half a node spacing as the fastest solid sees them, so that nothing thin is stepped over.
     let most = length(way) + solid_grids.fastest * params.time_step;
@@ -171,7 +173,7 @@ fn main(
 #ifdef PERIODIC
     x = wrapped_place(x, vec3f(params.cells) * params.cell_size);
 #endif
-    position[i] = vec4f(x, 1.0);
-    velocity[i] = vec4f(v, 0.0);
+    position[i] = packed(x);
+    velocity[i] = packed(v);
     id[i] = sorted_id[i];
 }

@@ -2,13 +2,14 @@
 // from its own place: whoever predicts with the particle's velocity alone then goes with the flow, and what single
 // particles do beside it parts no neighbours. Drops fly as they are. All are displaced by what pushes them apart.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
-#import "shared/flip_carried.wgsl"
 
-@group(0) @binding(1) var<storage, read_write> sorted_position: array<vec4f>;
-@group(0) @binding(2) var<storage, read> carried: array<f32>;
-// The fourth is 1 where it is a drop.
-@group(0) @binding(3) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(1) var<storage, read_write> sorted_position: array<Vector>;
+@group(0) @binding(2) var<storage, read> carried: array<Vector>;
+@group(0) @binding(4) var<storage, read> pushed: array<Vector>;
+@group(0) @binding(5) var<storage, read> is_drop: array<u32>;
+@group(0) @binding(3) var<storage, read> velocity: array<Vector>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -20,9 +21,6 @@ fn main(
     if i >= params.particle_count {
         return;
     }
-    let first = CARRIED * i;
-    let flow = vec3f(carried[first], carried[first + 1u], carried[first + 2u]);
-    let beside = select(flow - velocity[i].xyz, vec3f(0.0), velocity[i].w > 0.0);
-    let pushed = vec3f(carried[first + 3u], carried[first + 4u], carried[first + 5u]);
-    sorted_position[i] = vec4f(sorted_position[i].xyz + params.time_step * beside + pushed, 1.0);
+    let beside = select(three(carried[i]) - three(velocity[i]), vec3f(0.0), is_drop[i] > 0u);
+    sorted_position[i] = packed(three(sorted_position[i]) + params.time_step * beside + three(pushed[i]));
 }

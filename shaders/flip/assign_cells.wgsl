@@ -1,9 +1,10 @@
 // Each particle's cell element, and a slot in it.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/bricks.wgsl"
 #import "shared/flip_params.wgsl"
 
-@group(0) @binding(1) var<storage, read> position: array<vec4f>;
+@group(0) @binding(1) var<storage, read> position: array<Vector>;
 @group(0) @binding(2) var<storage, read> brick_slot: array<u32>;
 @group(0) @binding(3) var<storage, read_write> cell_start: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> cell_of: array<u32>;
@@ -19,7 +20,7 @@ fn main(
     if i >= params.particle_count {
         return;
     }
-    let cell = cell_of_place(position[i].xyz * params.inverse_cell_size);
+    let cell = cell_of_place(three(position[i]) * params.inverse_cell_size);
     let element = brick_slot[table_index(cell)] * CELLS + local_index(cell & vec3u(7u));
     cell_of[i] = element;
     slot_in_cell[i] = atomicAdd(&cell_start[element], 1u);

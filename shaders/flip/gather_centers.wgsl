@@ -6,6 +6,8 @@
 #import "shared/flip_walls.wgsl"
 
 @group(0) @binding(2) var<storage, read> partial_weight: array<f32>;
+// As flip/spread_centers has it.
+@group(0) @binding(4) var<storage, read> partial_momentum: array<f32>;
 @group(0) @binding(3) var<storage, read_write> density: array<f32>;
 #ifdef SOLIDS
 @group(0) @binding(9) var<storage, read> open_volume: array<f32>;
@@ -23,6 +25,14 @@ const LEAST_ROOM = 0.02;
 // Mean of a hat over the cell of its centre, and over the ones beside it.
 const OWN_SHARE = 0.75;
 const OTHER_SHARE = 0.125;
+
+#ifdef SOLIDS
+// Of the hat that stands in the k-th of 27 cells, x fastest.
+fn share_of(k: i32) -> f32 {
+    let share = select(vec3f(OTHER_SHARE), vec3f(OWN_SHARE), vec3i(k % 3, k / 3 % 3, k / 9) == vec3i(1));
+    return share.x * share.y * share.z;
+}
+#endif
 
 @compute @workgroup_size(64)
 fn main(
@@ -42,19 +52,21 @@ fn main(
     let holds_water = (slots_near - 1u < vec4u(last_wet)) | (slots_far - 1u < vec4u(last_wet));
     var sum = 0.0;
     var room = 0.0;
-    for (var z = -1; z <= select(-2, 1, any(holds_water)); z++) {
-        for (var y = -1; y <= 1; y++) {
-            for (var x = -1; x <= 1; x++) {
-                let found = element_at(vec3i(x, y, z));
-                let source = select(0u, found, found < wet_end);
-                let plane = u32(9 * (1 - z) + 3 * (1 - y) + 1 - x);
-                sum += partial_weight[plane * stride + source];
+    for (var k = 0; k < select(0, 9, any(holds_water)); k++) {
+        let found = element_at(vec3i(k % 3, k / 3, 0) - 1);
+        let source = select(0u, found, found < wet_end);
+        sum += partial_momentum[u32(8 - k) * stride + source];
 #ifdef SOLIDS
-                let share = select(vec3f(OTHER_SHARE), vec3f(OWN_SHARE), vec3i(x, y, z) == vec3i(0));
-                room += share.x * share.y * share.z * open_volume[found];
+        room += share_of(k) * open_volume[found];
 #endif
-            }
-        }
+    }
+    for (var k = 9; k < select(9, 27, any(holds_water)); k++) {
+        let found = element_at(vec3i(k % 3, k / 3 % 3, k / 9) - 1);
+        let source = select(0u, found, found < wet_end);
+        sum += partial_weight[u32(26 - k) * stride + source];
+#ifdef SOLIDS
+        room += share_of(k) * open_volume[found];
+#endif
     }
     // What the walls leave of the hats, exactly; meshes take their part of it cell by cell.
     let cell = vec3f(own_cell(element));

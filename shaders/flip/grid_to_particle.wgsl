@@ -2,17 +2,17 @@
 // slope (APIC, Jiang et al. 2015). A cell's particles share its 18 faces, which are read once. What lies beyond the
 // domain's faces along b and c is what lies before them, so that water slides along walls.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
-#import "shared/flip_carried.wgsl"
 #ifdef PERIODIC
 #import "shared/flip_periodic.wgsl"
 #endif
 
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
-@group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
-// Four floats a particle; the fourth is 1 where it is a drop, far from all water that has a pressure.
+// Three floats a particle, as `sorted_velocity`, `carried` and `pushed` have.
 @group(0) @binding(5) var<storage, read_write> velocity: array<f32>;
 @group(0) @binding(9) var<storage, read> sorted_velocity: array<f32>;
 #ifdef APIC
@@ -22,6 +22,11 @@
 #endif
 @group(0) @binding(12) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(10) var<storage, read_write> carried: array<f32>;
+// 1 where it is a drop, far from all water that has a pressure.
+@group(0) @binding(14) var<storage, read_write> is_drop: array<u32>;
+#ifdef PUSHED
+@group(0) @binding(13) var<storage, read_write> pushed: array<f32>;
+#endif
 #ifdef CORRECTION
 @group(0) @binding(11) var<storage, read> face_displacement: array<f32>;
 #endif
@@ -123,14 +128,14 @@ fn center_hats(f: f32) -> vec3f {
 
 // `f` is the place in the cell, along a, b and c. A drop falls freely: about it nothing is projected, and closed faces, which
 // have the wall's velocity, would stop it a cell away from the wall, or hold it under a ceiling.
-fn give(i: u32, axis: u32, f: vec3f, faces: Component, is_drop: bool) {
+fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool) {
     let a = vec2f(1.0 - f.x, f.x);
     let b = center_hats(f.y);
     let c = center_hats(f.z);
-    let k = 4u * i + axis;
+    let k = 3u * i + axis;
     let falling = sorted_velocity[k] + params.velocity_step[axis];
-    let u = select(value_at(faces.speeds, a, b, c), falling, is_drop);
-    carried[CARRIED * i + axis] = u;
+    let u = select(value_at(faces.speeds, a, b, c), falling, falls);
+    carried[k] = u;
 #ifdef APIC
     velocity[k] = u;
     // Slopes of the hats, 1 over a cell.
@@ -143,13 +148,13 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, is_drop: bool) {
     affine[row + (axis + 2u) % 3u] = scale * value_at(faces.speeds, a, b, of_c);
 #else
     let advanced = sorted_velocity[k] + value_at(faces.change, a, b, c);
-    velocity[k] = select(advanced + params.pic_blend * (u - advanced), falling, is_drop);
+    velocity[k] = select(advanced + params.pic_blend * (u - advanced), falling, falls);
 #endif
 #ifdef CORRECTION
-    carried[CARRIED * i + 3u + axis] = value_at(faces.shift, a, b, c);
+    pushed[k] = value_at(faces.shift, a, b, c);
 #else
 #ifdef PUSHED
-    carried[CARRIED * i + 3u + axis] = 0.0;
+    pushed[k] = 0.0;
 #endif
 #endif
 }
@@ -171,12 +176,12 @@ fn main(
     var of_y: Component;
     var of_z: Component;
     var corner = vec3f(0.0);
-    var drop = 0.0;
+    var falls = false;
     // Entered only by cells with particles.
     for (var once = 0; once < select(0, 1, end > first); once++) {
         open_neighborhood(element);
         for (var once = 0; once < select(0, 1, cell_kind[element] != FLUID); once++) {
-            drop = select(0.0, 1.0, is_dry());
+            falls = is_dry();
         }
         let cell = own_cell(element);
         corner = vec3f(cell);
@@ -194,10 +199,10 @@ fn main(
         of_z = read_component(2u, Steps(z, x * to_before, x * to_after, y * to_before, y * to_after));
     }
     for (var i = first; i < end; i++) {
-        let f = sorted_position[i].xyz * params.inverse_cell_size - corner;
-        give(i, 0u, f, of_x, drop > 0.0);
-        give(i, 1u, f.yzx, of_y, drop > 0.0);
-        give(i, 2u, f.zxy, of_z, drop > 0.0);
-        velocity[4u * i + 3u] = drop;
+        let f = three(sorted_position[i]) * params.inverse_cell_size - corner;
+        give(i, 0u, f, of_x, falls);
+        give(i, 1u, f.yzx, of_y, falls);
+        give(i, 2u, f.zxy, of_z, falls);
+        is_drop[i] = u32(falls);
     }
 }

@@ -2,20 +2,19 @@
 // pair lacks, shared between the two (the weak springs of Ando and Tsuruno 2011, without their velocity). The density
 // correction knows cells alone: within one, particles may gather at the surface, at walls, or on one spot.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/flip_slots.wgsl"
-#import "shared/flip_carried.wgsl"
 #import "shared/hash.wgsl"
 
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
-@group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
 @group(0) @binding(4) var<storage, read> sorted_id: array<u32>;
-@group(0) @binding(5) var<storage, read_write> carried: array<f32>;
+@group(0) @binding(5) var<storage, read_write> pushed: array<Vector>;
+@group(0) @binding(6) var<storage, read> is_drop: array<u32>;
 #ifdef PLACES
 #import "shared/place.wgsl"
 @group(0) @binding(7) var<storage, read> place: array<u32>;
 #endif
-// The fourth is 1 where it is a drop.
-@group(0) @binding(6) var<storage, read> velocity: array<vec4f>;
 
 // Of what a pair lacks, for each of the two.
 const SHARE = 0.25;
@@ -24,7 +23,7 @@ const MOST = 0.25;
 
 // From j to x, or to its image that is nearer.
 fn way_from(j: u32, x: vec3f) -> vec3f {
-    let way = x - sorted_position[j].xyz;
+    let way = x - three(sorted_position[j]);
 #ifdef PERIODIC
     let size = vec3f(params.cells) * params.cell_size;
     return select(way, way - size * round(way / size), is_periodic());
@@ -43,7 +42,7 @@ fn main(
     if i >= params.particle_count {
         return;
     }
-    let x = sorted_position[i].xyz;
+    let x = three(sorted_position[i]);
     let p = clamp(x * params.inverse_cell_size, vec3f(0.0), vec3f(params.cells));
     let cell = vec3i(cell_of_place(p));
     find_slots(cell);
@@ -55,7 +54,7 @@ fn main(
     var push = max(of_walls - 2.0 * (x - params.wall_min), vec3f(0.0))
         - max(of_walls - 2.0 * (params.wall_max - x), vec3f(0.0));
     // A drop lies at a wall as near as it may: lifted off it, it would fall again in each step.
-    push = select(push, vec3f(0.0), velocity[i].w > 0.0);
+    push = select(push, vec3f(0.0), is_drop[i] > 0u);
 #ifdef PERIODIC
     push = select(push, vec3f(0.0), is_periodic());
 #endif
@@ -94,7 +93,5 @@ fn main(
     }
     push *= SHARE;
     push *= min(1.0, MOST * apart / max(length(push), 1e-20));
-    carried[CARRIED * i + 3u] += push.x;
-    carried[CARRIED * i + 4u] += push.y;
-    carried[CARRIED * i + 5u] += push.z;
+    pushed[i] = packed(three(pushed[i]) + push);
 }

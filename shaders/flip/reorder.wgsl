@@ -1,13 +1,14 @@
 // Re-lays particles in the order of their cells (Hoetzlein 2014).
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
 
 @group(0) @binding(1) var<storage, read> order: array<u32>;
-@group(0) @binding(2) var<storage, read> position: array<vec4f>;
-@group(0) @binding(3) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(2) var<storage, read> position: array<Vector>;
+@group(0) @binding(3) var<storage, read> velocity: array<Vector>;
 @group(0) @binding(4) var<storage, read> id: array<u32>;
-@group(0) @binding(5) var<storage, read_write> sorted_position: array<vec4f>;
-@group(0) @binding(6) var<storage, read_write> sorted_velocity: array<vec4f>;
+@group(0) @binding(5) var<storage, read_write> sorted_position: array<Vector>;
+@group(0) @binding(6) var<storage, read_write> sorted_velocity: array<Vector>;
 @group(0) @binding(9) var<storage, read_write> sorted_id: array<u32>;
 #ifdef PLACES
 #import "shared/place.wgsl"
@@ -32,7 +33,7 @@ fn main(
     let x = position[source];
     sorted_position[i] = x;
 #ifdef PLACES
-    place[i] = place_word(x.xyz * params.inverse_cell_size);
+    place[i] = place_word(three(x) * params.inverse_cell_size);
 #endif
     sorted_velocity[i] = velocity[source];
     sorted_id[i] = id[source];

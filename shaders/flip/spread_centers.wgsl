@@ -3,19 +3,30 @@
 // that keep off it, and the correction would thin the water. PBF's projection has none: it only asks which cells are water,
 // and with images a film of one particle on the floor would be, which flies up where it runs into a house.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/bricks.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_axis.wgsl"
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
-@group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
+@group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
+// For the centres in the layers before and of a cell.
 @group(0) @binding(4) var<storage, read_write> partial_weight: array<f32>;
+// For those in the layer after it: the faces have been given their momentum, and its room is free.
+@group(0) @binding(5) var<storage, read_write> partial_momentum: array<f32>;
 
 fn store(plane: u32, element: u32, weight: vec3f) {
     let first = plane * params.partial_stride + element;
     for (var k = 0u; k < 3u; k++) {
         partial_weight[first + k * params.partial_stride] = weight[k];
+    }
+}
+
+fn store_after(plane: u32, element: u32, weight: vec3f) {
+    let first = plane * params.partial_stride + element;
+    for (var k = 0u; k < 3u; k++) {
+        partial_momentum[first + k * params.partial_stride] = weight[k];
     }
 }
 
@@ -60,7 +71,7 @@ fn main(
     var own = mat3x3f();
     var after = mat3x3f();
     for (var i = first; i < end; i++) {
-        let f = sorted_position[i].xyz * scale - corner;
+        let f = three(sorted_position[i]) * scale - corner;
         let layer = outer(mirrored_weights(f.x, low.x, high.x), mirrored_weights(f.y, low.y, high.y));
         let z = mirrored_weights(f.z, low.z, high.z);
         before += layer * z.x;
@@ -73,7 +84,7 @@ fn main(
     store(9u, element, own[0]);
     store(12u, element, own[1]);
     store(15u, element, own[2]);
-    store(18u, element, after[0]);
-    store(21u, element, after[1]);
-    store(24u, element, after[2]);
+    store_after(0u, element, after[0]);
+    store_after(3u, element, after[1]);
+    store_after(6u, element, after[2]);
 }

@@ -1,14 +1,15 @@
 // Particle-to-grid, first half: what the particles of each cell give to the 2 x 3 x 3 faces about it. Every particle
 // is read once; flip/gather_faces adds up what a face was given (Zhu and Bridson 2005; APIC: Jiang et al. 2015).
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/bricks.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_axis.wgsl"
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
-@group(0) @binding(3) var<storage, read> sorted_position: array<vec4f>;
-// Four floats a particle.
+@group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
+// Three floats a particle.
 @group(0) @binding(4) var<storage, read> sorted_velocity: array<f32>;
 @group(0) @binding(5) var<storage, read_write> partial_momentum: array<f32>;
 @group(0) @binding(6) var<storage, read_write> partial_weight: array<f32>;
@@ -47,8 +48,8 @@ fn main(
     var lower_weight = mat3x3f();
     var upper_weight = mat3x3f();
     for (var i = first; i < end; i++) {
-        let f = turned(sorted_position[i].xyz * scale - corner);
-        let v = sorted_velocity[4u * i + component];
+        let f = turned(three(sorted_position[i]) * scale - corner);
+        let v = sorted_velocity[3u * i + component];
         let a = face_weights(f.x);
         let b = center_weights(f.y);
         let c = center_weights(f.z);

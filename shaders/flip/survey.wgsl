@@ -1,11 +1,12 @@
 // What the host needs to choose a step and lay out bricks: which bricks hold water, the largest speed, and whether
 // anything is not finite. Bits of floats that are not negative order as the floats do.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/finite.wgsl"
 #import "shared/flip_params.wgsl"
 
-@group(0) @binding(1) var<storage, read> position: array<vec4f>;
-@group(0) @binding(2) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(1) var<storage, read> position: array<Vector>;
+@group(0) @binding(2) var<storage, read> velocity: array<Vector>;
 
 // `SurveyHead` of solve/params.rs.
 struct SurveyHead {
@@ -37,8 +38,8 @@ fn main(
     var not_finite = 0u;
     var last = 0xffffffffu;
     for (var i = first; i < end; i++) {
-        let x = position[i].xyz;
-        let v = velocity[i].xyz;
+        let x = three(position[i]);
+        let v = three(velocity[i]);
         not_finite += u32(!is_finite(x) || !is_finite(v));
         fastest = max(fastest, dot(v, v));
         let cell = cell_of_place(x * params.inverse_cell_size);

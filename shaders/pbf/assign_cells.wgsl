@@ -1,8 +1,9 @@
 // Cell of each predicted position, and a slot in it.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
 
-@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
+@group(0) @binding(1) var<storage, read> corrected: array<Vector>;
 @group(0) @binding(2) var<storage, read_write> cell_start: array<atomic<u32>>;
 @group(0) @binding(10) var<storage, read_write> cell_of: array<u32>;
 @group(0) @binding(11) var<storage, read_write> slot_in_cell: array<u32>;
@@ -17,7 +18,7 @@ fn main(
     if thread >= params.particle_count {
         return;
     }
-    let cell = cell_index(cell_coordinate(predicted[params.particle_count + thread].xyz));
+    let cell = cell_index(cell_coordinate(three(corrected[thread])));
     cell_of[thread] = cell;
     slot_in_cell[thread] = atomicAdd(&cell_start[cell], 1u);
 }

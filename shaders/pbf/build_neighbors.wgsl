@@ -2,6 +2,7 @@
 // whose kernels are 0 until they come near. A particle with more than a list holds keeps its true count, and every
 // pass then searches for it instead.
 #import "shared/thread.wgsl"
+#import "shared/predicted.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/neighbor_list.wgsl"
@@ -13,7 +14,6 @@ const REACH = STEPS + UNSURE;
 @group(0) @binding(11) var<storage, read> place: array<u32>;
 #endif
 
-@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 #ifdef SOLIDS
 @group(0) @binding(3) var<storage, read> boundary_cell_start: array<u32>;
@@ -47,7 +47,7 @@ fn main(
         return;
     }
     let i = phase_particle(thread);
-    let xi = predicted[i].xyz;
+    let xi = predicted_at(i).xyz;
     let h2 = params.support_radius * params.support_radius;
 #ifdef PLACES
     let own = place[i];
@@ -90,7 +90,7 @@ fn main(
             }
 #else
             for (var j = cell_start[first]; j < end; j++) {
-                let d = between(xi, predicted[j].xyz);
+                let d = between(xi, predicted_at(j).xyz);
                 if dot(d, d) < h2 && j != i {
                     append(j);
                 }
@@ -99,7 +99,7 @@ fn main(
 #ifdef SOLIDS
             let boundary_end = boundary_cell_start[last];
             for (var b = boundary_cell_start[first]; b < boundary_end; b++) {
-                let d = between(xi, predicted[2u * fluid_end + b].xyz);
+                let d = between(xi, predicted_at(fluid_end + b).xyz);
                 if dot(d, d) < h2 {
                     append(fluid_end + b);
                 }

@@ -1,6 +1,8 @@
 // Δx_i = Σ_j (λ_i + λ_j + s_corr) ∇W / ρ0 (Macklin and Müller 2013, eq. 14), bounded: physical masses
 // with the formula verbatim blow up.
 #import "shared/thread.wgsl"
+#import "shared/predicted.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/counters.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
@@ -12,14 +14,15 @@
 #ifdef WALL_WORK
 #import "shared/wall_work.wgsl"
 #ifdef MOVING_SOLIDS
-@group(0) @binding(14) var<storage, read> sample_velocity: array<vec4f>;
+@group(0) @binding(14) var<storage, read> sample_velocity: array<Vector>;
 
 // Σ over samples of the slope towards each times its velocity.
 var<private> sample_rate: f32;
 #endif
 #endif
 
-@group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
+// Read by others from the exchange on that follows.
+@group(0) @binding(10) var<storage, read_write> corrected: array<Vector>;
 // Of what is not finite, which clamping would hide.
 @group(0) @binding(11) var<storage, read_write> counters: Counters;
 #ifdef PRESSURE
@@ -42,7 +45,7 @@ var<private> artificial_pressure: f32;
 #endif
 
 fn visit(i: u32, j: u32) {
-    let other = predicted[stored_index(j)];
+    let other = predicted_at(j);
     let d = between(own_position, other.xyz);
     let r2 = dot(d, d);
     let inverse_r = inverseSqrt(max(r2, 1e-30));
@@ -58,7 +61,7 @@ fn visit(i: u32, j: u32) {
 #ifdef MOVING_SOLIDS
     let sample = select(0u, j - fluid_count, other.w > 0.0);
     let slope = select(0.0, inverse_r * other.w * s * s, other.w > 0.0);
-    sample_rate += slope * dot(d, sample_velocity[sample].xyz);
+    sample_rate += slope * dot(d, three(sample_velocity[sample]));
 #endif
 #endif
     coincident = select(coincident, j, r2 * inverse_h * inverse_h < 1e-12);
@@ -80,7 +83,7 @@ fn main(
     }
     let i = phase_particle(thread);
     begin_phase();
-    let current = predicted[stored_index(i)];
+    let current = predicted_at(i);
     own_position = current.xyz;
     own_lambda = current.w;
 #ifdef ARTIFICIAL_PRESSURE
@@ -93,21 +96,21 @@ fn main(
     sample_rate = 0.0;
 #endif
 #endif
-    for_each_neighbor(current.xyz, i);
+    for_each_neighbor(own_position, i);
     if coincident != i {
         delta += pair_direction(i, coincident) * 2.0 * own_lambda;
     }
-    delta = -params.gradient_scale * delta + own_lambda * wall_term(current.xyz).gradient;
+    delta = -params.gradient_scale * delta + own_lambda * wall_term(own_position).gradient;
     delta *= params.relaxation;
 #ifdef PRESSURE
     lambda_sum[i] += own_lambda;
 #endif
-    if !is_finite(current.xyz + delta) {
+    if !is_finite(own_position + delta) {
         atomicAdd(&counters.not_finite, 1u);
     }
 #ifdef WALL_WORK
     let kept = min(1.0, params.max_correction / max(length(delta), 1e-30));
-    var rate = wall_rate(current.xyz);
+    var rate = wall_rate(own_position);
 #ifdef MOVING_SOLIDS
     rate -= params.gradient_scale * sample_rate;
 #endif
@@ -116,7 +119,7 @@ fn main(
     delta = bounded(delta);
 #ifdef CHEBYSHEV
     // Wang 2015, eq. 9. What is overwritten here is this particle's position of one iteration before.
-    let last = current.xyz - predicted[phase.write + i].xyz;
+    let last = own_position - three(corrected[i]);
     if dot(delta, last) > 0.0 {
         delta = bounded(phase.acceleration * delta + (phase.acceleration - 1.0) * last);
 #ifdef WALL_WORK
@@ -125,7 +128,7 @@ fn main(
 #endif
     }
 #endif
-    predicted[phase.write + i] = vec4f(confine(current.xyz + delta), current.w);
+    corrected[i] = packed(confine(own_position + delta));
 #ifdef WALL_WORK
     wall_work[i] += work + work_of_pushes();
 #endif

@@ -1,16 +1,28 @@
 // λ_i = −max(C_i, 0) / (Σ_k |∇_k C_i|² + ε) (Macklin and Müller 2013, eq. 11). Only compression is
 // corrected: pulling a free surface together makes the water clump.
 #import "shared/thread.wgsl"
+#import "shared/predicted_written.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/neighbors.wgsl"
 #import "shared/walls.wgsl"
 
-// λ goes into w. Others read this particle's w meanwhile, but only its sign, which λ ≤ 0 does not change.
-@group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
 #ifdef DENSITY
 @group(0) @binding(11) var<storage, read_write> density: array<f32>;
 #endif
+
+// λ goes into w. Others read this particle's w meanwhile, but only its sign, which λ ≤ 0 does not change.
+fn set_lambda(i: u32, lambda: f32) {
+#ifdef PAGED
+    if i < PAGE {
+        predicted[i].w = lambda;
+    } else {
+        predicted_high[i - PAGE].w = lambda;
+    }
+#else
+    predicted[i].w = lambda;
+#endif
+}
 
 var<private> own_position: vec3f;
 var<private> kernel_sum: f32;
@@ -18,7 +30,7 @@ var<private> gradient_sum: vec3f;
 var<private> gradient_squares: f32;
 
 fn visit(i: u32, j: u32) {
-    let other = predicted[stored_index(j)];
+    let other = predicted_at(j);
     let d = between(own_position, other.xyz);
     let r2 = dot(d, d);
     let p = max(1.0 - r2 * inverse_h * inverse_h, 0.0);
@@ -48,8 +60,7 @@ fn main(
     }
     let i = phase_particle(thread);
     begin_phase();
-    let slot = stored_index(i);
-    let xi = predicted[slot].xyz;
+    let xi = predicted_at(i).xyz;
     own_position = xi;
     kernel_sum = 1.0;
     gradient_sum = vec3f(0.0);
@@ -59,7 +70,8 @@ fn main(
     let relative_density = params.density_scale * kernel_sum + wall.density;
     let own = wall.gradient - params.gradient_scale * gradient_sum;
     let squares = dot(own, own) + params.gradient_scale * params.gradient_scale * gradient_squares;
-    predicted[slot].w = -max(relative_density - 1.0, 0.0) / (squares + params.regularization);
+    let lambda = -max(relative_density - 1.0, 0.0) / (squares + params.regularization);
+    set_lambda(i, lambda);
 #ifdef DENSITY
     density[i] = relative_density;
 #endif

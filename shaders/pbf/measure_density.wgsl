@@ -1,19 +1,19 @@
 // Relative density at the positions as they were just sorted, by a full search: the number that the
 // frame's report states, free of what the lists may have missed.
 #import "shared/thread.wgsl"
+#import "shared/predicted.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/search.wgsl"
 #import "shared/walls.wgsl"
 
-@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
 @group(0) @binding(10) var<storage, read_write> density: array<f32>;
 
 var<private> own_position: vec3f;
 var<private> kernel_sum: f32;
 
 fn visit(i: u32, j: u32) {
-    let other = predicted[stored_index(j)];
+    let other = predicted_at(j);
     let d = between(own_position, other.xyz);
     let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
     kernel_sum += weight(other.w) * p * p * p;
@@ -30,7 +30,7 @@ fn main(
         return;
     }
     begin_phase();
-    let xi = predicted[thread].xyz;
+    let xi = predicted_at(thread).xyz;
     own_position = xi;
     kernel_sum = 1.0;
     search_neighbors(xi, thread);

@@ -1,7 +1,8 @@
-// Explicit step of the external forces (Macklin and Müller 2013, algorithm 1, lines 1–4), into the
-// second half of `predicted`; the sort moves it to the first. What walls and solids take of the way is taken
+// Explicit step of the external forces (Macklin and Müller 2013, algorithm 1, lines 1–4), into
+// `corrected`; the sort takes it to `predicted`. What walls and solids take of the way is taken
 // from the velocity.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/counters.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/confine.wgsl"
@@ -10,11 +11,14 @@
 #import "shared/wall_work.wgsl"
 #endif
 
-@group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
-@group(0) @binding(10) var<storage, read> position: array<vec4f>;
-@group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
+@group(0) @binding(1) var<storage, read_write> corrected: array<Vector>;
+@group(0) @binding(10) var<storage, read> position: array<Vector>;
+@group(0) @binding(11) var<storage, read_write> velocity: array<Vector>;
 // Of what is not finite, which clamping would hide.
 @group(0) @binding(12) var<storage, read_write> counters: Counters;
+#ifdef PROJECTED
+@group(0) @binding(14) var<storage, read> is_drop: array<u32>;
+#endif
 
 #ifdef PROJECTED
 // After confine(free).
@@ -47,27 +51,27 @@ fn main(
     if thread >= params.particle_count {
         return;
     }
-    var v = velocity[thread].xyz + params.velocity_step;
-    if !is_finite(v) || !is_finite(position[thread].xyz) {
+    let start = three(position[thread]);
+    var v = three(velocity[thread]) + params.velocity_step;
+    if !is_finite(v) || !is_finite(start) {
         atomicAdd(&counters.not_finite, 1u);
     }
     v *= min(1.0, params.max_displacement / max(params.time_step * length(v), 1e-30));
-    let free = position[thread].xyz + params.time_step * v;
+    let free = start + params.time_step * v;
     let x = confine(free);
 #ifdef WALL_WORK
     wall_work[params.particle_count + thread] = work_of_pushes();
 #endif
 #ifdef PERIODIC
-    predicted[params.particle_count + thread] = vec4f(wrapped_place(x), 0.0);
+    corrected[thread] = packed(wrapped_place(x));
 #else
-    predicted[params.particle_count + thread] = vec4f(x, 0.0);
+    corrected[thread] = packed(x);
 #endif
     let taken = (x - free) * params.inverse_time_step;
 #ifdef PROJECTED
     // The grid's flow took water here, not its own velocity, which loses what it has into walls and solids and no more.
-    let is_drop = velocity[thread].w > 0.0;
-    velocity[thread] = vec4f(select(stopped(v, free), v + taken, is_drop), velocity[thread].w);
+    velocity[thread] = packed(select(stopped(v, free), v + taken, is_drop[thread] > 0u));
 #else
-    velocity[thread] = vec4f(v + taken, 0.0);
+    velocity[thread] = packed(v + taken);
 #endif
 }

@@ -1,19 +1,25 @@
 // Re-lays what the iteration reads in sorted order (Hoetzlein 2014).
 #import "shared/thread.wgsl"
+#import "shared/predicted_written.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
 #ifdef PLACES
 #import "shared/place.wgsl"
 #endif
 
-@group(0) @binding(1) var<storage, read_write> predicted: array<vec4f>;
+@group(0) @binding(2) var<storage, read> corrected: array<Vector>;
 @group(0) @binding(10) var<storage, read> order: array<u32>;
-@group(0) @binding(11) var<storage, read> velocity: array<vec4f>;
+@group(0) @binding(11) var<storage, read> velocity: array<Vector>;
 @group(0) @binding(12) var<storage, read> id: array<u32>;
-@group(0) @binding(13) var<storage, read_write> start_position: array<vec4f>;
-@group(0) @binding(14) var<storage, read_write> sorted_velocity: array<vec4f>;
+@group(0) @binding(13) var<storage, read_write> start_position: array<Vector>;
+@group(0) @binding(14) var<storage, read_write> sorted_velocity: array<Vector>;
 @group(0) @binding(15) var<storage, read_write> sorted_id: array<u32>;
 #ifdef PLACES
 @group(0) @binding(3) var<storage, read_write> place: array<u32>;
+#endif
+#ifdef PROJECTED
+@group(0) @binding(16) var<storage, read> is_drop: array<u32>;
+@group(0) @binding(17) var<storage, read_write> sorted_is_drop: array<u32>;
 #endif
 
 @compute @workgroup_size(64)
@@ -27,12 +33,15 @@ fn main(
         return;
     }
     let source = order[thread];
-    let x = predicted[params.particle_count + source];
-    predicted[thread] = x;
+    let x = corrected[source];
+    set_predicted(thread, vec4f(three(x), 0.0));
     start_position[thread] = x;
     sorted_velocity[thread] = velocity[source];
     sorted_id[thread] = id[source];
 #ifdef PLACES
-    place[thread] = place_word(x.xyz * params.inverse_support_radius);
+    place[thread] = place_word(three(x) * params.inverse_support_radius);
+#endif
+#ifdef PROJECTED
+    sorted_is_drop[thread] = is_drop[source];
 #endif
 }

@@ -2,21 +2,21 @@
 // algorithm 1, lines 20–23) without its cancellation, which costs a free particle at 90 m 0.4 mm/s a step in
 // f32. A particle faster than the cap is slowed and counted, and its position follows.
 #import "shared/thread.wgsl"
+#import "shared/predicted_written.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
-#import "shared/phase.wgsl"
 #import "shared/counters.wgsl"
-#import "shared/iteration_control.wgsl"
 
-@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
-@group(0) @binding(10) var<storage, read> start_position: array<vec4f>;
+@group(0) @binding(10) var<storage, read> start_position: array<Vector>;
 @group(0) @binding(11) var<storage, read> sorted_id: array<u32>;
-@group(0) @binding(17) var<storage, read> sorted_velocity: array<vec4f>;
-@group(0) @binding(12) var<storage, read_write> position: array<vec4f>;
-@group(0) @binding(13) var<storage, read_write> velocity: array<vec4f>;
+@group(0) @binding(17) var<storage, read> sorted_velocity: array<Vector>;
+@group(0) @binding(12) var<storage, read_write> position: array<Vector>;
+@group(0) @binding(13) var<storage, read_write> velocity: array<Vector>;
 @group(0) @binding(14) var<storage, read_write> id: array<u32>;
 @group(0) @binding(15) var<storage, read_write> counters: Counters;
-#ifdef ADAPTIVE
-@group(0) @binding(16) var<storage, read> control: IterationControl;
+#ifdef PROJECTED
+@group(0) @binding(16) var<storage, read> sorted_is_drop: array<u32>;
+@group(0) @binding(18) var<storage, read_write> is_drop: array<u32>;
 #endif
 
 @compute @workgroup_size(64)
@@ -29,20 +29,15 @@ fn main(
     if thread >= params.particle_count {
         return;
     }
-#ifdef ADAPTIVE
-    let source = thread + select(0u, params.particle_count, (control.iterations & 1u) == 1u);
-#else
-    let source = thread + phase.read_even;
-#endif
-    var x = predicted[source].xyz;
-    let came = sorted_velocity[thread];
-    var v = (x - start_position[thread].xyz) * params.inverse_time_step;
+    var x = predicted_at(thread).xyz;
+    var v = (x - three(start_position[thread])) * params.inverse_time_step;
 #ifdef PROJECTED
     // Water goes with the grid's flow and not with its own velocity: what it is corrected by in each step would add up
     // in a velocity that never moves it. Drops fly with theirs.
-    v *= came.w;
+    v *= f32(sorted_is_drop[thread]);
+    is_drop[thread] = sorted_is_drop[thread];
 #endif
-    v += came.xyz;
+    v += three(sorted_velocity[thread]);
     let distance = length(v) * params.time_step;
     if distance > params.max_displacement {
         let excess = v * (1.0 - params.max_displacement / distance);
@@ -53,7 +48,9 @@ fn main(
 #ifdef PERIODIC
     x = wrapped_place(x);
 #endif
-    position[thread] = vec4f(x, 1.0);
-    velocity[thread] = vec4f(v, came.w);
+    position[thread] = packed(x);
+    // What effects read neighbours' places from.
+    set_predicted(thread, vec4f(x, 0.0));
+    velocity[thread] = packed(v);
     id[thread] = sorted_id[thread];
 }

@@ -1,12 +1,16 @@
 // A pass over the particles in a zone. What imports it says by `lead` what is done to one at a place. Drops, which a projection on a
 // grid tells from water, fall as they do elsewhere.
 #import "shared/thread.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/phase.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/zone.wgsl"
 
-@group(0) @binding(10) var<storage, read> position: array<vec4f>;
-@group(0) @binding(11) var<storage, read_write> velocity: array<vec4f>;
+@group(0) @binding(10) var<storage, read> position: array<Vector>;
+@group(0) @binding(11) var<storage, read_write> velocity: array<Vector>;
+#ifdef PROJECTED
+@group(0) @binding(12) var<storage, read> is_drop: array<u32>;
+#endif
 
 @compute @workgroup_size(64)
 fn main(
@@ -19,5 +23,9 @@ fn main(
         return;
     }
     let i = phase_particle(thread);
-    lead(i, position[i].xyz, velocity[i].w > 0.0);
+#ifdef PROJECTED
+    lead(i, three(position[i]), is_drop[i] > 0u);
+#else
+    lead(i, three(position[i]), false);
+#endif
 }

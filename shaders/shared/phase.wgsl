@@ -1,4 +1,4 @@
-// Which particles a dispatch handles, and in which half of `predicted` their neighbours stand.
+// Which particles a dispatch handles.
 // Colour = parity of the sorted index: the other colour is always close by, and a dispatch over one
 // colour is dense.
 struct Phase {
@@ -8,36 +8,22 @@ struct Phase {
     count: u32,
     stride: u32,
     colour: u32,
-    read_even: u32,
-    read_odd: u32,
-    write: u32,
     // Of the Chebyshev semi-iteration; 1 is the plain one.
     acceleration: f32,
 }
 @group(0) @binding(6) var<uniform> phase: Phase;
 
 // Copies of uniforms that inner loops read: llvmpipe does not hoist uniform loads out of a loop.
-var<private> even_half: u32;
-var<private> odd_half: u32;
 var<private> fluid_count: u32;
 var<private> inverse_h: f32;
 
 fn begin_phase() {
-    even_half = phase.read_even;
-    odd_half = phase.read_odd;
     fluid_count = params.particle_count;
     inverse_h = params.inverse_support_radius;
 }
 
 fn phase_particle(thread: u32) -> u32 {
     return phase.first + thread * phase.stride + phase.colour;
-}
-
-// Where j stands in `predicted`. Boundary samples follow both halves; their index counts on from the
-// particles'.
-fn stored_index(j: u32) -> u32 {
-    let half = select(even_half, odd_half, (j & 1u) == 1u);
-    return j + select(half, fluid_count, j >= fluid_count);
 }
 
 // w of `predicted`: λ ≤ 0 of a particle, or the weight > 0 of a boundary sample in particles' worth.

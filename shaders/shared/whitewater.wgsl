@@ -1,4 +1,4 @@
-// What sums over water have in common: where a neighbour stands, and the share of a place that is water. Copies of uniforms that
+// What sums over water have in common: the share of a place that is water. Copies of uniforms that
 // inner loops read: llvmpipe does not hoist uniform loads out of a loop.
 var<private> fluid_count: u32;
 var<private> inverse_h: f32;
@@ -6,11 +6,6 @@ var<private> inverse_h: f32;
 fn begin_water() {
     fluid_count = params.particle_count;
     inverse_h = params.inverse_support_radius;
-}
-
-// Boundary samples follow both halves of `predicted`; their index counts on from the particles'.
-fn place_of(j: u32) -> u32 {
-    return j + select(0u, fluid_count, j >= fluid_count);
 }
 
 // Of what walls and solids leave free, the part that is water: 1 deep inside, also in a corner; nothing in dry air beside a wall.

@@ -2,6 +2,7 @@
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
+#import "shared/ssfr_page.wgsl"
 #import "shared/ssfr_moved.wgsl"
 #ifdef ELLIPSOIDS
 #import "shared/ssfr_ellipsoid.wgsl"
@@ -26,7 +27,7 @@ fn main(
     @builtin(local_invocation_id) thread: vec3u,
 ) {
     let index = row_of_group(group, groups, thread);
-    if index >= camera.particle_count {
+    if index >= page.count {
         return;
     }
     let particle = particles[index];

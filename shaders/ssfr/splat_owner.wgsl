@@ -2,6 +2,7 @@
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
+#import "shared/ssfr_page.wgsl"
 #ifdef ELLIPSOIDS
 #import "shared/ssfr_ellipsoid.wgsl"
 #endif
@@ -21,7 +22,7 @@ fn main(
     @builtin(local_invocation_id) thread: vec3u,
 ) {
     let index = row_of_group(group, groups, thread);
-    if index >= camera.particle_count {
+    if index >= page.count {
         return;
     }
     let particle = particles[index];
@@ -50,7 +51,7 @@ fn main(
 #endif
         // Two shaders may round one formula differently, so equality is asked within a few ulp.
         if hit < FAR && hit <= depth[at] * 1.000001 {
-            atomicMin(&owner[at], index);
+            atomicMin(&owner[at], page.first + index);
         }
     }
 }

@@ -2,6 +2,7 @@
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
+#import "shared/ssfr_page.wgsl"
 #import "shared/ssfr_moved.wgsl"
 #import "shared/ssfr_spray_add.wgsl"
 
@@ -89,10 +90,10 @@ fn main(
     @builtin(local_invocation_id) thread: vec3u,
 ) {
     let place = row_of_group(group, groups, thread);
-    if place >= aired[0] {
+    if place >= page.aired_count {
         return;
     }
-    let index = aired[1u + place];
+    let index = aired[page.aired_first + place] - page.first;
     let particle = particles[index];
     let air = air_of(particle);
     let id = particle.tag >> 1u;

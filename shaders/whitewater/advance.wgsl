@@ -1,6 +1,8 @@
 // Takes each whitewater particle from the frame before to this one, by the water of this one: spray flies and lands, foam is
 // carried, bubbles rise (Ihmsen et al. 2012, section 3.2).
 #import "shared/thread.wgsl"
+#import "shared/predicted.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/search.wgsl"
 #import "shared/walls.wgsl"
@@ -8,8 +10,7 @@
 #import "shared/whitewater.wgsl"
 #import "shared/air.wgsl"
 
-@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
-@group(0) @binding(12) var<storage, read> sorted_velocity: array<vec4f>;
+@group(0) @binding(12) var<storage, read> sorted_velocity: array<Vector>;
 // Place and kind.
 @group(0) @binding(13) var<storage, read_write> white_position: array<vec4f>;
 // Velocity; then also the share of water about it.
@@ -44,7 +45,7 @@ var<private> solid_sum: f32;
 var<private> velocity_sum: vec3f;
 
 fn visit(i: u32, j: u32) {
-    let other = predicted[place_of(j)];
+    let other = predicted_at(j);
     let d = between(looked_at, other.xyz);
     let p = max(1.0 - dot(d, d) * inverse_h * inverse_h, 0.0);
     let w = p * p * p;
@@ -55,7 +56,7 @@ fn visit(i: u32, j: u32) {
     }
 #endif
     kernel_sum += w;
-    velocity_sum += w * sorted_velocity[j].xyz;
+    velocity_sum += w * three(sorted_velocity[j]);
 }
 
 fn water_at(x: vec3f) -> Water {

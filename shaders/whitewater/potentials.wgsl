@@ -1,14 +1,15 @@
 // What at each water particle makes whitewater (Ihmsen et al. 2012, eqs. 2 to 7): air that is trapped where water meets water, the
 // crest of a wave that moves outward, and the energy that both need. W = 1 − r/h.
 #import "shared/thread.wgsl"
+#import "shared/predicted.wgsl"
+#import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/search.wgsl"
 #import "shared/whitewater.wgsl"
 
-@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
 @group(0) @binding(10) var<storage, read> share: array<f32>;
 @group(0) @binding(11) var<storage, read> surface: array<vec4f>;
-@group(0) @binding(12) var<storage, read> sorted_velocity: array<vec4f>;
+@group(0) @binding(12) var<storage, read> sorted_velocity: array<Vector>;
 // Trapped air, wave crest, energy, share of water.
 @group(0) @binding(13) var<storage, read_write> potential: array<vec4f>;
 
@@ -28,11 +29,11 @@ fn visit(i: u32, j: u32) {
         return;
     }
 #endif
-    let d = between(own_position, predicted[j].xyz);
+    let d = between(own_position, predicted_at(j).xyz);
     let r2 = dot(d, d);
     let inverse_r = inverseSqrt(max(r2, 1e-30));
     let w = max(1.0 - r2 * inverse_r * inverse_h, 0.0);
-    let against = own_velocity - sorted_velocity[j].xyz;
+    let against = own_velocity - three(sorted_velocity[j]);
     trapped_air += (length(against) - dot(against, d) * inverse_r) * w;
     // Where the surface bends away from its neighbours: they lie behind the normal's plane.
     let other = surface[j];
@@ -51,8 +52,8 @@ fn main(
         return;
     }
     begin_water();
-    own_position = predicted[i].xyz;
-    own_velocity = sorted_velocity[i].xyz;
+    own_position = predicted_at(i).xyz;
+    own_velocity = three(sorted_velocity[i]);
     own_surface = surface[i];
     trapped_air = 0.0;
     wave_crest = 0.0;

@@ -1,12 +1,12 @@
 // How full of water the place of each water particle is, and which way its surface faces there: away from where the density
 // grows.
 #import "shared/thread.wgsl"
+#import "shared/predicted.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/search.wgsl"
 #import "shared/walls.wgsl"
 #import "shared/whitewater.wgsl"
 
-@group(0) @binding(1) var<storage, read> predicted: array<vec4f>;
 @group(0) @binding(10) var<storage, read_write> share: array<f32>;
 // The outward normal, and in w how surely there is a surface, 0 to 1.
 @group(0) @binding(11) var<storage, read_write> surface: array<vec4f>;
@@ -21,7 +21,7 @@ var<private> solid_sum: f32;
 var<private> gradient_sum: vec3f;
 
 fn visit(i: u32, j: u32) {
-    let other = predicted[place_of(j)];
+    let other = predicted_at(j);
     let d = between(own_position, other.xyz);
     let r2 = dot(d, d);
     let p = max(1.0 - r2 * inverse_h * inverse_h, 0.0);
@@ -52,7 +52,7 @@ fn main(
         return;
     }
     begin_water();
-    own_position = predicted[i].xyz;
+    own_position = predicted_at(i).xyz;
     kernel_sum = 1.0;
     solid_sum = 0.0;
     gradient_sum = vec3f(0.0);

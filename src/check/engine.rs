@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use bytemuck::Pod;
-use glam::{DVec3, Vec4};
+use glam::{DVec3, Vec3};
 
 use crate::{
     gpu::{
@@ -127,10 +127,10 @@ impl View<'_> {
         }
     }
 
-    /// Vectors, of which the fourth component is left out.
+    /// Vectors.
     pub(super) fn vectors(
         &self,
-        variable: Buf<[f32; 4]>,
+        variable: Buf<[f32; 3]>,
         count: usize,
     ) -> Result<Vec<DVec3>, SolveError> {
         Ok(wide(&self.get(variable, count)?))
@@ -174,9 +174,9 @@ impl View<'_> {
     }
 }
 
-/// First three components, in f64.
-pub(super) fn wide(values: &[[f32; 4]]) -> Vec<DVec3> {
-    let wide = |value: &[f32; 4]| Vec4::from_array(*value).as_dvec4().truncate();
+/// Vectors in f64.
+pub(super) fn wide(values: &[[f32; 3]]) -> Vec<DVec3> {
+    let wide = |value: &[f32; 3]| Vec3::from_array(*value).as_dvec3();
     values.iter().map(wide).collect()
 }
 

@@ -16,7 +16,8 @@ use crate::{
     scene::{Method, Scene},
     stage::{
         inspect::{
-            Adapter, Entry, Manifest, PARTICLES, PROBES, ScenePlan, adapters, cache, plan, plot,
+            Adapter, Entry, LIST_BUDGET, MOST_NODES, Manifest, PARTICLES, PROBES, ScenePlan,
+            adapters, cache, plan, plot,
         },
         replay::is_failed,
         time::{Timed, time},
@@ -289,6 +290,34 @@ fn show_plan(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Resul
     match lists {
         0 => writeln!(out)?,
         lists => writeln!(out, ", and {:.0} for neighbour lists", each(lists))?,
+    }
+    show_arrangement(out, scene, planned)?;
+    Ok(())
+}
+
+/// What bindings, or what lists may take, made of the plan.
+fn show_arrangement(out: &mut String, scene: &Scene, planned: &ScenePlan) -> fmt::Result {
+    let plan = &planned.plan;
+    match (scene.solver.method, plan.has_lists, plan.chunks.len()) {
+        (Method::Pbf, false, _) => writeln!(
+            out,
+            "no neighbour lists: they would take more than {}; each pass searches the cells",
+            size(LIST_BUDGET)
+        )?,
+        (Method::Pbf, true, chunks @ 2..) => writeln!(
+            out,
+            "neighbour lists in {chunks} bindings: each pass goes out in as many dispatches"
+        )?,
+        _ => {}
+    }
+    if let Some(page) = plan.page {
+        writeln!(out, "places in two bindings, {page} in the first")?;
+    }
+    if let Some(spacing) = planned.coarse_solids {
+        writeln!(
+            out,
+            "signed distance of solids every {spacing:.4} m, coarser than the water, with at most {MOST_NODES} nodes"
+        )?;
     }
     Ok(())
 }

@@ -199,11 +199,32 @@ impl SignedDistance {
     }
 }
 
+/// The least distance between nodes, metres, not below `spacing`, at which so many nodes cover `bounds`.
+pub fn fitting_spacing(bounds: &Bounds, spacing: f64, most: usize) -> f64 {
+    let nodes = |spacing: f64| {
+        let counts = node_counts(bounds, spacing);
+        counts.x * counts.y * counts.z
+    };
+    let mut fitting = spacing;
+    // Counts are whole numbers, so that the cube root may fall short of it by some.
+    while spacing > 0.0 && nodes(fitting) > most as f64 {
+        fitting *= (nodes(fitting) / most as f64).cbrt().max(1.001);
+    }
+    fitting
+}
+
+fn node_counts(bounds: &Bounds, spacing: f64) -> DVec3 {
+    // A box that is a whole number of spacings up to round-off gets no further node.
+    (bounds.size() / spacing - DVec3::splat(1e-6))
+        .ceil()
+        .max(DVec3::ONE)
+        + DVec3::ONE
+}
+
 /// Nodes needed to cover `bounds`.
 fn grid_dims(bounds: &Bounds, spacing: f64) -> Result<[usize; 3], SignedDistanceError> {
     let size = bounds.size();
-    // A box that is a whole number of spacings up to round-off gets no further node.
-    let counts = (size / spacing - DVec3::splat(1e-6)).ceil().max(DVec3::ONE) + DVec3::ONE;
+    let counts = node_counts(bounds, spacing);
     let nodes = counts.x * counts.y * counts.z;
     let is_sound = spacing > 0.0 && size.cmpge(DVec3::ZERO).all() && nodes <= MAX_NODES as f64;
     if !is_sound {
@@ -223,6 +244,26 @@ mod tests {
 
     fn around(mesh: &TriangleMesh, margin: f64) -> Bounds {
         mesh.bounds().expect("not empty").grown(margin)
+    }
+
+    #[test]
+    fn a_grid_is_as_fine_as_its_nodes_allow() {
+        let bounds = around(&cube(), 0.5);
+        assert_eq!(fitting_spacing(&bounds, 0.1, 1 << 20), 0.1);
+        for most in [30, 1000, 5000] {
+            let spacing = fitting_spacing(&bounds, 0.01, most);
+            let nodes = |spacing| {
+                grid_dims(&bounds, spacing)
+                    .expect("few")
+                    .into_iter()
+                    .product::<usize>()
+            };
+            assert!(nodes(spacing) <= most && spacing > 0.01, "{most}");
+            // Control: a node more along each axis would be too many.
+            let along = grid_dims(&bounds, spacing).expect("few");
+            let finer: usize = along.iter().map(|n| n + 1).product();
+            assert!(finer > most, "{most}");
+        }
     }
 
     fn nodes(field: &SignedDistance) -> impl Iterator<Item = (DVec3, f64)> {

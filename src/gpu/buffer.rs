@@ -4,7 +4,7 @@
 //! element's size or its element's type a second time:
 //!
 //! ```text
-//! pub const VELOCITY: Buf<[f32; 4]> = Buf::new("velocity");
+//! pub const VELOCITY: Buf<[f32; 3]> = Buf::new("velocity");
 //! program.upload(VELOCITY, 0, &velocities);
 //! let (velocity, id) = program.download((VELOCITY.first(n), ID.first(n)))?;
 //! ```
@@ -217,6 +217,7 @@ impl<T: Element> Buf<T> {
             name: self.name.clone().into_owned(),
             bytes: self.offset + (count * size_of::<T>()) as u64,
             is_uniform: self.is_uniform,
+            is_windowed: false,
             element: Held {
                 bytes: size_of::<T>() as u32,
                 scalar: T::SCALAR,
@@ -286,6 +287,7 @@ impl<T: Element> Windows<T> {
             name: self.name.clone().into_owned(),
             bytes: (count * STRIDE) as u64,
             is_uniform: true,
+            is_windowed: false,
             element: Held {
                 bytes: size_of::<T>() as u32,
                 scalar: T::SCALAR,

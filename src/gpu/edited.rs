@@ -123,6 +123,7 @@ mod tests {
             name: name.to_owned(),
             bytes: 64,
             is_uniform,
+            is_windowed: false,
             element: Held {
                 bytes: 16,
                 scalar: Scalar::F32,

@@ -22,8 +22,20 @@ pub struct BufferSpec {
     pub bytes: u64,
     /// Whether passes bind it as a uniform.
     pub is_uniform: bool,
+    /// Whether passes bind a part of it at a time: then it may be larger than a binding.
+    pub is_windowed: bool,
     /// What it holds.
     pub element: Held,
+}
+
+impl BufferSpec {
+    /// The same, of which passes bind a part at a time.
+    pub fn windowed(self) -> Self {
+        Self {
+            is_windowed: true,
+            ..self
+        }
+    }
 }
 
 /// A pass to be.
@@ -262,8 +274,9 @@ fn check_size(context: &Context, spec: &BufferSpec) -> Result<(), GpuError> {
             "max_storage_buffer_binding_size",
         )
     };
-    // Phase slots are bound one at a time, so only the whole buffer counts there.
-    let binding = if spec.is_uniform { u64::MAX } else { binding };
+    // Windows are bound one at a time, so only the whole buffer counts there.
+    let is_windowed = spec.is_uniform || spec.is_windowed;
+    let binding = if is_windowed { u64::MAX } else { binding };
     let (allowed, limit) = if binding < limits.max_buffer_size {
         (binding, binding_name)
     } else {

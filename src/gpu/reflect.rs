@@ -133,10 +133,17 @@ fn is_unsized(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
     matches!(&module.types[ty].inner, TypeInner::Array { size: of, .. } if *of == size)
 }
 
+/// The struct of shared/vector.wgsl, which stands for three numbers of its first member's kind.
+const VECTOR: &str = "Vector";
+
 fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
-    let inner = &module.types[ty].inner;
+    let naga::Type { name, inner } = &module.types[ty];
+    let is_vector = name.as_deref() == Some(VECTOR);
     let kind = match inner {
         TypeInner::Atomic(scalar) => Some(*scalar),
+        TypeInner::Struct { members, .. } if is_vector => {
+            (members.first()).and_then(|member| module.types[member.ty].inner.scalar())
+        }
         _ => inner.scalar(),
     };
     ElementType {
@@ -148,7 +155,7 @@ fn element(module: &naga::Module, ty: naga::Handle<naga::Type>) -> ElementType {
             _ => Scalar::Mixed,
         },
         name: match inner {
-            TypeInner::Struct { .. } => module.types[ty].name.clone(),
+            TypeInner::Struct { .. } if !is_vector => name.clone(),
             _ => None,
         },
         head: 0,

@@ -1,8 +1,8 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Particle, Path, Rays,
-    Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater,
+    Band, Camera, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Page, Particle, Path,
+    Rays, Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater,
     WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
@@ -27,6 +27,8 @@ pub(super) const SHADOW_FROM_WORLD: Buf<[[f32; 4]; 4]> = Buf::uniform("shadow_fr
 /// What is opaque.
 pub(super) const TRIANGLES: Buf<Triangle> = Buf::new("triangles");
 /// Corner and size of each tile in which solids are drawn.
+/// Which particles each dispatch over them sees.
+pub(super) const PAGES: Windows<Page> = Windows::new("page", "pages");
 pub(super) const TILES: Windows<Tile> = Windows::new("tile", "tiles");
 /// Depth of the solids, of each pixel of the padded frame.
 pub(super) const SOLID_DEPTH: Buf<f32> = Buf::new("solid_depth");

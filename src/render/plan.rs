@@ -13,6 +13,7 @@ use crate::gpu::{
     recording::{Bind, Command},
     texture::{SamplerSpec, TextureSpec},
 };
+use crate::scene::look::Look;
 
 /// What of the device decides how a frame is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,6 +148,12 @@ impl Plan {
         self.buffers.push(buffer.sized(count));
     }
 
+    /// Buffers that hold `count` values for particles, which passes bind a page at a time; all of it where the look has channels
+    /// beside the picture, whose motion is any particle's.
+    pub(super) fn per_particle<T: Element>(&mut self, buffer: &Buf<T>, count: usize, look: &Look) {
+        self.buffers.push(per_particle(buffer, count, look));
+    }
+
     /// A buffer of these values.
     pub(super) fn values<T: Element>(&mut self, buffer: &Buf<T>, values: &[T]) {
         self.buffer(buffer, values.len());
@@ -190,6 +197,15 @@ impl Plan {
         if !fills.is_empty() {
             self.windows(&FILLS, &fills);
         }
+    }
+}
+
+/// As [`Plan::per_particle`] has it.
+pub(super) fn per_particle<T: Element>(buffer: &Buf<T>, count: usize, look: &Look) -> BufferSpec {
+    let spec = buffer.sized(count);
+    match look.spec().output.aovs.is_empty() {
+        true => spec.windowed(),
+        false => spec,
     }
 }
 

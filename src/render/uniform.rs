@@ -41,6 +41,16 @@ mirror!(
 );
 
 mirror!(
+    /// `Page` of shared/ssfr_page.wgsl.
+    Page {
+        first: u32,
+        count: u32,
+        aired_first: u32,
+        aired_count: u32,
+    }
+);
+
+mirror!(
     /// `Path` of shared/ssfr_moved.wgsl.
     Path {
         before_square: [f32; 3],

@@ -16,7 +16,10 @@ use super::{
     buffers::{SOLID_DISTANCE, SOLID_GRID},
     flip::buffers::SOLID_GRIDS,
     params::{SolidGrid, SolidGrids},
-    pbf::buffers::{BOUNDARY_CELL_START, PREDICTED, SAMPLE_VELOCITY},
+    pbf::{
+        buffers::{BOUNDARY_CELL_START, SAMPLE_VELOCITY},
+        upload_places,
+    },
     plan::{Counts, Plan},
 };
 
@@ -47,8 +50,8 @@ impl Boundary {
         self.upload_distance(program, scene);
     }
 
-    /// Fills in the samples as they stand at a time, moving as what took them there within so many seconds: behind both
-    /// halves of `predicted`, sorted by cell; their weights are particles' worth of mass.
+    /// Fills in the samples as they stand at a time, moving as what took them there within so many seconds: behind the
+    /// particles of `predicted`, sorted by cell; their weights are particles' worth of mass.
     pub(super) fn upload_samples(
         &self,
         program: &Program,
@@ -80,23 +83,20 @@ impl Boundary {
         for k in 1..start.len() {
             start[k] += start[k - 1];
         }
-        let packed: Vec<[f32; 4]> = order
-            .iter()
-            .map(|&(_, k)| {
-                let sample = &samples[k];
-                let x = sample.position.as_vec3();
-                let weight = calibration.sample_weight * sample.area / (spacing * spacing);
-                [x.x, x.y, x.z, weight as f32]
-            })
-            .collect();
-        if !packed.is_empty() {
-            program.upload(PREDICTED, 2 * plan.counts.particles, &packed);
+        if !order.is_empty() {
+            let weight = |area: f64| calibration.sample_weight * area / (spacing * spacing);
+            let place = |&(_, k): &(usize, usize)| {
+                let [x, y, z] = three(samples[k].position);
+                [x, y, z, weight(samples[k].area) as f32]
+            };
+            let places: Vec<[f32; 4]> = order.iter().map(place).collect();
+            upload_places(program, plan.page, plan.counts.particles, &places);
         }
         program.upload(BOUNDARY_CELL_START, 0, &start);
         if plan.has_sample_velocities() {
-            let velocities: Vec<[f32; 4]> = order
+            let velocities: Vec<[f32; 3]> = order
                 .iter()
-                .map(|&(_, k)| four(samples[k].velocity))
+                .map(|&(_, k)| three(samples[k].velocity))
                 .collect();
             program.upload(SAMPLE_VELOCITY, 0, &velocities);
         }
@@ -188,6 +188,10 @@ impl Movers {
         }
         program.upload(SOLID_GRIDS, 0, &[grids]);
     }
+}
+
+fn three(v: DVec3) -> [f32; 3] {
+    v.as_vec3().to_array()
 }
 
 fn four(v: DVec3) -> [f32; 4] {

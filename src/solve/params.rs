@@ -132,12 +132,6 @@ mirror!(
         stride: u32,
         /// 0 or 1.
         colour: u32,
-        /// Where even particles stand in `predicted`.
-        read_even: u32,
-        /// Where odd particles stand.
-        read_odd: u32,
-        /// Where corrections are written.
-        write: u32,
         /// Factor of the Chebyshev semi-iteration; 1 is the plain one.
         acceleration: f32,
     }

@@ -15,7 +15,7 @@ use crate::{
 
 use super::{effects::Addition, flip, pbf, pbf::buffers::SAMPLE_VELOCITY};
 
-pub use super::pbf::plan::{LIST_BUDGET, LIST_CAPACITY, SHARED_CONSTANTS};
+pub use super::pbf::plan::{LIST_BUDGET, LIST_CAPACITY, shared_constants};
 
 /// What of the device decides the arrangement, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,6 +173,8 @@ pub struct Plan {
     pub chunks: Vec<Chunk>,
     /// Whether neighbours are listed once a substep; of PBF alone.
     pub has_lists: bool,
+    /// How many of the places of `predicted` one binding holds, where it does not hold them all; of PBF alone.
+    pub page: Option<usize>,
     /// Whether FLIP moves particles; not where PBF takes its velocities alone.
     pub moves: bool,
     /// Of the grid on which PBF's velocities are projected, where they are.
@@ -213,6 +215,7 @@ impl Plan {
             grid_dims,
             chunks: Vec::new(),
             has_lists: false,
+            page: None,
             moves: true,
             projection: None,
             buffers: Vec::new(),

@@ -1,6 +1,6 @@
 //! A particle state on its way to the device and back, and what is reported of it.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use crate::{
     domain::{
@@ -37,16 +37,11 @@ pub(super) fn upload(program: &Program, scene: &Scene, state: &Particles) {
     let origin = scene.domain.min;
     let local = |p: &[f32; 3]| {
         let x = (Vec3::from_array(*p).as_dvec3() - origin).as_vec3();
-        [x.x, x.y, x.z, 1.0]
+        x.to_array()
     };
-    let position: Vec<[f32; 4]> = state.position.iter().map(local).collect();
-    let velocity: Vec<[f32; 4]> = state
-        .velocity
-        .iter()
-        .map(|v| [v[0], v[1], v[2], 0.0])
-        .collect();
+    let position: Vec<[f32; 3]> = state.position.iter().map(local).collect();
     program.upload(POSITION, 0, &position);
-    program.upload(VELOCITY, 0, &velocity);
+    program.upload(VELOCITY, 0, &state.velocity);
     program.upload(ID, 0, &state.id);
 }
 
@@ -56,17 +51,15 @@ pub(super) fn take_over(
     scene: &Scene,
     slot_of: &impl Fn(u32) -> usize,
     id: &[u32],
-    position: &[[f32; 4]],
-    velocity: &[[f32; 4]],
+    position: &[[f32; 3]],
+    velocity: &[[f32; 3]],
 ) {
     let origin = scene.domain.min;
     for (k, &id) in id.iter().enumerate() {
         let slot = slot_of(id);
-        let [x, y, z, _] = position[k];
-        let world = origin + DVec3::new(f64::from(x), f64::from(y), f64::from(z));
+        let world = origin + Vec3::from_array(position[k]).as_dvec3();
         state.position[slot] = world.as_vec3().to_array();
-        let [x, y, z, _] = velocity[k];
-        state.velocity[slot] = [x, y, z];
+        state.velocity[slot] = velocity[k];
     }
 }
 

@@ -86,18 +86,12 @@ fn plan(scene: &Scene, boundary: &Boundary, water: usize, white: usize) -> Plan 
     table.extend("sort", keys.map(|buffer| buffer.sized(water)));
     table.add("sort", ELEMENT_COUNT.sized(1));
     table.add("whitewater", PARAMS.sized(1));
-    table.add(
-        "whitewater",
-        PREDICTED.sized(2 * water + counts.boundary_samples),
-    );
-    let vectors = [
-        VELOCITY,
-        START_POSITION,
-        SORTED_VELOCITY,
-        SURFACE_AT,
-        POTENTIAL,
-    ];
+    let with_samples = water + counts.boundary_samples;
+    table.add("whitewater", PREDICTED.sized(with_samples));
+    let vectors = [CORRECTED, VELOCITY, START_POSITION, SORTED_VELOCITY];
     table.extend("whitewater", vectors.map(|buffer| buffer.sized(water)));
+    let fours = [SURFACE_AT, POTENTIAL];
+    table.extend("whitewater", fours.map(|buffer| buffer.sized(water)));
     table.extend(
         "whitewater",
         [ID.sized(water), SORTED_ID.sized(water), SHARE.sized(water)],
@@ -273,12 +267,9 @@ impl Whitewater {
             self.resize(n)?;
         }
         self.scene.take_answers(water);
-        let vectors = |of: &[[f32; 3]]| -> Vec<[f32; 4]> {
-            of.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()
-        };
         let local = local(&self.scene, &water.position);
-        self.program.upload(PREDICTED, n, &vectors(&local));
-        self.program.upload(VELOCITY, 0, &vectors(&water.velocity));
+        self.program.upload(CORRECTED, 0, &local);
+        self.program.upload(VELOCITY, 0, &water.velocity);
         self.program.upload(ID, 0, &water.id);
         let mut params = params(&self.scene, &self.calibration, &self.plan, time, seconds);
         // Whitewater falls, whatever the water's own solver does with gravity.

@@ -16,10 +16,13 @@ use crate::{
         program::check_sizes,
     },
     scene::{Scene, SceneError},
-    solve::plan::{DeviceLimits, LIST_BUDGET, Plan, device_limits},
+    solve::plan::{DeviceLimits, Plan, device_limits},
 };
 
 use super::{Blame, device::needs, prepare::Start, probes, whitewater};
+
+pub use super::prepare::MOST_NODES;
+pub use crate::solve::plan::LIST_BUDGET;
 
 pub use crate::cache::{
     Entry, Manifest,
@@ -98,6 +101,9 @@ pub struct ScenePlan {
     pub plan: Plan,
     /// Left out of the water because a solid is there.
     pub removed: usize,
+    /// Metres between the nodes of the solids' signed distance, where it is coarser than the water so as not to have more than
+    /// [`MOST_NODES`].
+    pub coarse_solids: Option<f64>,
     /// The adapter whose limits were used; `None` where the machine has none.
     pub adapter: Option<String>,
     /// Why that adapter could not bake it.
@@ -156,7 +162,10 @@ pub fn plan(scene: &Scene, adapter: Option<&str>) -> Result<ScenePlan, PlanError
             parts.find_map(|part| check_sizes(context, &part.buffer_specs()).err())
         })
         .or(lacks);
+    let distance = start.boundary.distance.as_ref();
+    let spacing = distance.map(|distance| distance.spacing);
     Ok(ScenePlan {
+        coarse_solids: spacing.filter(|&spacing| spacing > scene.particle_spacing()),
         plan,
         misfit,
         removed: start.removed,

@@ -12,7 +12,7 @@ use crate::{
         particles::Particles,
         pbf,
         sampling::{BoundarySample, boundary_samples, fill_water},
-        signed_distance::{SignedDistance, SignedDistanceError},
+        signed_distance::{SignedDistance, SignedDistanceError, fitting_spacing},
         sources::Sources,
     },
     scene::{Method, Scene},
@@ -25,6 +25,10 @@ use crate::{
 /// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
 /// that a substep crosses.
 const MARGIN: f64 = 4.0;
+
+/// Nodes of the grid of solids that do not move: as many values as a binding of 128 MiB holds, which every adapter has. Where that
+/// does for less than one a particle spacing, they stand farther apart, whatever the adapter.
+pub const MOST_NODES: usize = 1 << 25;
 
 /// A scene's start.
 #[derive(Clone, Debug)]
@@ -240,7 +244,8 @@ fn distance<'a>(
     match solid_bounds(scene, &meshes) {
         Some(bounds) => {
             let meshes = meshes.iter().map(AsRef::as_ref);
-            SignedDistance::from_meshes(meshes, &bounds, scene.particle_spacing())
+            let spacing = fitting_spacing(&bounds, scene.particle_spacing(), MOST_NODES);
+            SignedDistance::from_meshes(meshes, &bounds, spacing)
         }
         None => Ok(None),
     }

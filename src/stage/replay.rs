@@ -296,7 +296,7 @@ impl Finder<'_> {
         for buffer in [VELOCITY, SORTED_VELOCITY] {
             if traced.writes(buffer.name()) {
                 let velocity = traced.read(buffer.clone(), self.state.len())?;
-                let speed = |v: &[f32; 4]| vector(v).length();
+                let speed = |v: &[f32; 3]| vector(v).length();
                 if velocity.iter().any(|v| speed(v) > limit) {
                     return Ok(Some(buffer.name().to_owned()));
                 }
@@ -308,7 +308,7 @@ impl Finder<'_> {
     /// World positions as they stand, metres.
     fn positions(&self, traced: &Traced<'_>) -> Result<Vec<[f32; 3]>, SolveError> {
         let local = traced.read(POSITION, self.state.len())?;
-        let world = |x: &[f32; 4]| (self.scene.domain.min + vector(x)).as_vec3().to_array();
+        let world = |x: &[f32; 3]| (self.scene.domain.min + vector(x)).as_vec3().to_array();
         Ok(local.iter().map(world).collect())
     }
 
@@ -317,7 +317,7 @@ impl Finder<'_> {
         let velocity = traced.read(VELOCITY, self.state.len())?;
         let state = Particles {
             position: self.positions(traced)?,
-            velocity: velocity.iter().map(|v| [v[0], v[1], v[2]]).collect(),
+            velocity: velocity,
             ..Particles::default()
         };
         let report = self.scene.report(&state, [].into_iter());
@@ -330,8 +330,8 @@ fn is_measured(pass: &str) -> bool {
     matches!(pass, "pbf/measure_density" | "flip/find_water")
 }
 
-fn vector(v: &[f32; 4]) -> DVec3 {
-    Vec3::new(v[0], v[1], v[2]).as_dvec3()
+fn vector(v: &[f32; 3]) -> DVec3 {
+    Vec3::from_array(*v).as_dvec3()
 }
 
 /// Writes `failed/` into the cache that a failed bake left, and says where in the frame it went wrong.

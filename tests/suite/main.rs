@@ -74,6 +74,7 @@ mod render {
     mod folder;
     mod listed;
     mod outlines;
+    mod paged;
     mod pictures;
     mod scaled;
     mod scenes;

@@ -20,7 +20,7 @@ use crate::{
         flip::{grid_confinement, grid_curl},
         pbf::effects::vorticity_confinement::{vorticity_curl, vorticity_force},
     },
-    solve::{effects::vorticity_confinement::VORTICITY, flip, pbf},
+    solve::{effects::vorticity_confinement::{VORTICITY, VORTICITY_LENGTH}, flip, pbf},
 };
 
 bounds! {
@@ -84,7 +84,7 @@ fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let inputs = state.inputs(&points, &neighbors);
     let twin = vorticity_curl(inputs, &velocity);
     let scale = 2.0 * inputs.model.calibration.gradient_scale;
-    let found = io.after.get(VORTICITY, n)?;
+    let lengths = io.after.scalars(VORTICITY_LENGTH, n)?;
     let vectors = io.after.vectors(VORTICITY, n)?;
     let errors = each(0..n, |i| {
         let sums = Bounds(inputs).sums(i, relative_speed(&velocity, i));
@@ -94,7 +94,7 @@ fn curl(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         .each(&CURL, 0..n, |i| pair(i, vectors[i], twin[i], [errors[i]]));
     io.table.each(&LENGTH, 0..n, |i| {
         let exact = twin[i].length();
-        pair(i, found[i][3], exact, [errors[i], exact])
+        pair(i, lengths[i], exact, [errors[i], exact])
     });
     Ok(())
 }
@@ -159,7 +159,7 @@ fn slope(bounds: &Bounds<'_>, strength: &[f64], i: usize) -> f64 {
 fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let elements = state.elements();
     let velocity = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
-    let found = io.after.get(VORTICITY, elements.cells)?;
+    let lengths = io.after.scalars(VORTICITY_LENGTH, elements.cells)?;
     let vectors = io.after.vectors(VORTICITY, elements.cells)?;
     let twin = grid_curl(&state.model, &elements.bricks, state.room(), &velocity);
     let size = state.model.cell_size();
@@ -175,7 +175,7 @@ fn curl_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     });
     io.table.each(&GRID_LENGTH, elements.active(), |e| {
         let exact = twin[e].length();
-        pair(e, found[e][3], exact, [error(e), exact])
+        pair(e, lengths[e], exact, [error(e), exact])
     });
     Ok(())
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     check::{
-        engine::{Io, Outcome, State, wide},
+        engine::{Io, Outcome, State},
         flip::FlipState,
         pbf::PbfState,
         table::{Entry, pair},
@@ -44,9 +44,8 @@ pub(super) fn particles<const N: usize>(
 ) -> Outcome {
     let n = state.particles();
     let places = io.before.vectors(pbf::buffers::POSITION, n)?;
-    let before = io.before.get(pbf::buffers::VELOCITY, n)?;
-    let velocity = wide(&before);
-    let is_drop: Vec<bool> = before.iter().map(|v| v[3] > 0.0).collect();
+    let velocity = io.before.vectors(pbf::buffers::VELOCITY, n)?;
+    let is_drop = state.drops(&io.before)?;
     let step = (state.scene.domain.size(), state.substep.time_step);
     let twin = led_particles(zone, step, (&places, &is_drop), &velocity, wanted);
     let found = io.after.vectors(pbf::buffers::VELOCITY, n)?;

@@ -120,22 +120,16 @@ pub(super) fn aim(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 /// What the device gave each particle; which of them are drops follows from its kinds of cells.
 fn given(state: &FlipState, io: &Io<'_>, is_drop: Vec<bool>) -> Result<Given, SolveError> {
     let is_pushed = state.model.settings().density_correction || state.given_substep.is_some();
-    let width = if is_pushed { 6 } else { 3 };
-    let values = io.after.scalars(buffers::CARRIED, width * state.n)?;
-    let at = |first: usize| -> Vec<DVec3> {
-        let rows = values.chunks_exact(width);
-        rows.map(|row| {
-            row.get(first..first + 3)
-                .map_or(DVec3::ZERO, DVec3::from_slice)
-        })
-        .collect()
+    let displacement = match is_pushed {
+        true => io.after.vectors(buffers::PUSHED, state.n)?,
+        false => vec![DVec3::ZERO; state.n],
     };
     let cloud = state.unsorted(&io.after)?;
     Ok(Given {
         velocity: cloud.velocity,
         affine: cloud.affine,
-        carried: at(0),
-        displacement: at(3),
+        carried: io.after.vectors(buffers::CARRIED, state.n)?,
+        displacement,
         is_drop,
     })
 }

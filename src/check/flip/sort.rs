@@ -22,7 +22,7 @@ impl FlipState {
     fn cloud(
         &self,
         view: &View<'_>,
-        [position, velocity]: [Buf<[f32; 4]>; 2],
+        [position, velocity]: [Buf<[f32; 3]>; 2],
         id: Buf<u32>,
         affine: Buf<f32>,
     ) -> Result<Cloud, SolveError> {

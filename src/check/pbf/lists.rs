@@ -178,7 +178,7 @@ impl PbfState {
 pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let phase = io.before.window(&buffers::PHASES)?;
-    let (points, _) = state.stored(io, &phase)?;
+    let (points, _) = state.stored(io)?;
     let (first, count) = (phase.first as usize, phase.count as usize);
     let capacity = LIST_CAPACITY as usize;
     let words = count.next_multiple_of(STRIDE) * capacity;

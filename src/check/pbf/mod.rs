@@ -24,7 +24,7 @@ use crate::{
     solve::{
         SolveError,
         flip::buffers::BRICKS,
-        params::{IterationControl, Phase},
+        params::IterationControl,
         pbf::{Pbf, buffers},
         plan::Plan,
         trace::{Span, TraceFrame},
@@ -33,7 +33,7 @@ use crate::{
 
 use super::{
     Checked, effects,
-    engine::{Engine, Io, NONE, Outcome, State, Twin, names, twin, wide},
+    engine::{Engine, Io, NONE, Outcome, State, Twin, View, names, twin, wide},
     flip::FlipState,
     table::{Table, pair},
 };
@@ -45,21 +45,28 @@ use whole::Whole;
 const TWINS: &[Twin<PbfState>] = &[
     twin("pbf/predict", || names![buffers::VELOCITY], passes::predict),
     twin("pbf/assign_cells", NONE, passes::assign_cells),
-    twin(
-        "pbf/reorder",
-        || names![buffers::PREDICTED],
-        passes::reorder,
-    ),
+    twin("pbf/reorder", NONE, passes::reorder),
     twin("pbf/build_neighbors", NONE, lists::build_neighbors),
     twin(
         "pbf/compute_lambda",
-        || names![buffers::PREDICTED],
+        || names![buffers::PREDICTED, buffers::PREDICTED_HIGH],
         passes::compute_lambda,
     ),
     twin(
         "pbf/compute_delta",
-        || names![buffers::PREDICTED, buffers::WALL_WORK],
+        || names![buffers::CORRECTED, buffers::WALL_WORK],
         passes::compute_delta,
+    ),
+    twin(
+        "pbf/exchange",
+        || {
+            names![
+                buffers::PREDICTED,
+                buffers::PREDICTED_HIGH,
+                buffers::CORRECTED
+            ]
+        },
+        passes::exchange,
     ),
     twin("pbf/sum_error", NONE, stop::sum_error),
     twin(
@@ -69,7 +76,13 @@ const TWINS: &[Twin<PbfState>] = &[
     ),
     twin(
         "pbf/update_velocity",
-        || names![buffers::COUNTERS],
+        || {
+            names![
+                buffers::PREDICTED,
+                buffers::PREDICTED_HIGH,
+                buffers::COUNTERS
+            ]
+        },
         passes::update_velocity,
     ),
     twin("pbf/measure_density", NONE, passes::measure_density),
@@ -181,10 +194,9 @@ impl PbfState {
         if samples == 0 || std::mem::replace(&mut self.has_samples, true) {
             return Ok(());
         }
-        let all: Vec<[f32; 4]> = io.after.get(buffers::PREDICTED, 2 * n + samples)?;
-        let (found, model, table) = (&all[2 * n..], &mut self.model, &mut *io.table);
-        let places = wide(found);
-        let weights: Vec<f64> = found.iter().map(|value| f64::from(value[3])).collect();
+        let (places, weights) = self.places(&io.after, n + samples)?;
+        let (places, weights) = (places[n..].to_vec(), weights[n..].to_vec());
+        let (model, table) = (&mut self.model, &mut *io.table);
         table.each(&SAMPLES, 0..samples, |k| {
             let at = model.samples[k];
             pair(k, places[k], at, [at.length()])
@@ -205,16 +217,36 @@ impl PbfState {
         }
     }
 
-    /// The positions that a phase reads, then the samples; and the λ beside them.
-    fn stored(&self, io: &Io<'_>, phase: &Phase) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
+    /// The positions that a pass reads, then the samples; and the λ beside them.
+    fn stored(&self, io: &Io<'_>) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
         let n = self.particles();
-        let predicted = io.before.get(buffers::PREDICTED, 2 * n)?;
-        let half = |j: usize| predicted[j + [phase.read_even, phase.read_odd][j % 2] as usize];
-        let read: Vec<[f32; 4]> = (0..n).map(half).collect();
-        let mut points = wide(&read);
+        let (mut points, lambda) = self.places(&io.before, n)?;
         points.extend(&self.model.samples);
-        let lambda = read.iter().map(|value| f64::from(value[3])).collect();
         Ok((points, lambda))
+    }
+
+    /// The first `count` places, and what stands in their w.
+    fn places(&self, view: &View<'_>, count: usize) -> Result<(Vec<DVec3>, Vec<f64>), SolveError> {
+        let low = self.plan.page.unwrap_or(count).min(count);
+        let mut all = view.get(buffers::PREDICTED, low)?;
+        if low < count {
+            all.extend(view.get(buffers::PREDICTED_HIGH, count - low)?);
+        }
+        let places = all.iter().map(|&[x, y, z, _]| wide(&[[x, y, z]])[0]);
+        Ok((
+            places.collect(),
+            all.iter().map(|value| f64::from(value[3])).collect(),
+        ))
+    }
+
+    /// Which particles the grid took for drops, in storage order.
+    pub(super) fn drops(&self, view: &View<'_>) -> Result<Vec<bool>, SolveError> {
+        let n = self.particles();
+        if !self.model.settings.grid_projection {
+            return Ok(vec![false; n]);
+        }
+        let flags = view.get(buffers::IS_DROP, n)?;
+        Ok(flags.into_iter().map(|flag| flag > 0).collect())
     }
 
     /// Positions with the samples behind them, as effects see them.

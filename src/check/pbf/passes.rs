@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     check::{
-        engine::{Io, Outcome, wide},
+        engine::{Io, Outcome},
         sort::{check_cells, check_slots},
         table::{each, pair},
     },
@@ -30,10 +30,10 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         state.substep.wall_velocity = Default::default();
     }
     let x = io.before.vectors(buffers::POSITION, n)?;
-    let came: Vec<[f32; 4]> = io.before.get(buffers::VELOCITY, n)?;
-    let v = wide(&came);
-    let goes_along = |i: usize| state.model.settings.grid_projection && came[i][3] == 0.0;
-    let predicted = io.after.vectors(buffers::PREDICTED, 2 * n)?;
+    let v = io.before.vectors(buffers::VELOCITY, n)?;
+    let is_drop = state.drops(&io.before)?;
+    let goes_along = |i: usize| state.model.settings.grid_projection && !is_drop[i];
+    let predicted = io.after.vectors(buffers::CORRECTED, n)?;
     let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     let works = match state.scene.has_movers() {
         true => io.after.get(buffers::WALL_WORK, 2 * n)?,
@@ -64,7 +64,7 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         };
         let (at, then, work) = predict(model, &state.substep, x, v);
         // Rounding may take one of the two to the other end of a period.
-        let found = (model.period()).image_by_rounding(predicted[n + i], at);
+        let found = (model.period()).image_by_rounding(predicted[i], at);
         let [error, moved, place, pushed] = confined.magnitudes;
         // What is stopped at once where it touches has another velocity a rounding beside it.
         let answer = |(axis, side): (usize, f64)| {
@@ -110,7 +110,7 @@ pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
 pub(super) fn assign_cells(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let cells = &state.model.cells;
-    let points = &io.before.vectors(buffers::PREDICTED, 2 * n)?[n..];
+    let points = io.before.vectors(buffers::CORRECTED, n)?;
     let exact: Vec<u32> = points.iter().map(|&x| cells.index(x) as u32).collect();
     let cell_of = io.after.get(buffers::CELL_OF, n)?;
     let places: Vec<DVec3> = points.iter().map(|&x| x / cells.edge).collect();
@@ -126,14 +126,14 @@ pub(super) fn assign_cells(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
 pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
     let order = io.before.get(buffers::ORDER, n)?;
-    let predicted = io.before.vectors(buffers::PREDICTED, 2 * n)?;
+    let predicted = io.before.vectors(buffers::CORRECTED, n)?;
     let velocity = io.before.vectors(buffers::VELOCITY, n)?;
     let ids = io.before.get(buffers::ID, n)?;
     let at = |i: usize| order[i] as usize;
-    for buffer in [buffers::PREDICTED, buffers::START_POSITION] {
-        let found = io.after.vectors(buffer, n)?;
+    let places = state.places(&io.after, n)?.0;
+    for found in [places, io.after.vectors(buffers::START_POSITION, n)?] {
         io.table.each(&REORDER_POSITION, 0..n, |i| {
-            pair(i, found[i], predicted[n + at(i)], [])
+            pair(i, found[i], predicted[at(i)], [])
         });
     }
     let found = io.after.vectors(buffers::SORTED_VELOCITY, n)?;
@@ -148,11 +148,17 @@ pub(super) fn reorder(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     );
     if state.has_words() {
         let inverse = (1.0 / state.model.calibration.support_radius) as f32;
-        let places = io.after.get(buffers::PREDICTED, n)?;
-        state.lists.words = places.iter().map(|&x| word(x, inverse)).collect();
+        let places = io.before.get(buffers::CORRECTED, n)?;
+        state.lists.words = (0..n).map(|i| word(places[at(i)], inverse)).collect();
         let found = io.after.get(buffers::PLACE, n)?;
         io.table
             .add_exact(&REORDER_PLACE, &found, &state.lists.words);
+    }
+    if state.model.settings.grid_projection {
+        let drops = io.before.get(buffers::IS_DROP, n)?;
+        let expected: Vec<u32> = (0..n).map(|i| drops[at(i)]).collect();
+        let found = io.after.get(buffers::SORTED_IS_DROP, n)?;
+        io.table.add_exact(&REORDER_DROP, &found, &expected);
     }
     Ok(())
 }
@@ -164,7 +170,7 @@ pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     }
     let n = state.particles();
     let phase = io.before.window(&buffers::PHASES)?;
-    let (points, mut twin) = state.stored(io, &phase)?;
+    let (points, mut twin) = state.stored(io)?;
     let neighbors = state.visited(io, &points)?;
     if !state.whole.has_start() {
         let near = state.listed(&points);
@@ -174,13 +180,12 @@ pub(super) fn compute_lambda(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let mut dense = vec![0.0; n];
     passes::compute_lambda(inputs, Colour::All, &mut twin, &mut dense);
     let bounds = Bounds(inputs);
-    let after = io.after.get(buffers::PREDICTED, 2 * n)?;
+    let found = state.places(&io.after, n)?.1;
     let handled = handled(&phase);
     io.table.each(&OF_LAMBDA, 0..handled.len(), |k| {
         let i = handled[k];
-        let stored = i + [phase.read_even, phase.read_odd][i % 2] as usize;
         let error = bounds.lambda(i, &passes::row(inputs, i), twin[i]);
-        pair(i, after[stored][3], twin[i], [error])
+        pair(i, found[i], twin[i], [error])
     });
     if control.is_some() {
         let density = io.after.get(buffers::DENSITY, n)?;
@@ -198,10 +203,9 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     }
     let n = state.particles();
     let phase = io.before.window(&buffers::PHASES)?;
-    let (points, lambda) = state.stored(io, &phase)?;
+    let (points, lambda) = state.stored(io)?;
     let neighbors = state.visited(io, &points)?;
-    let write = phase.write as usize;
-    let before = &io.before.vectors(buffers::PREDICTED, 2 * n)?[write..write + n];
+    let before = &io.before.vectors(buffers::CORRECTED, n)?;
     let factor = f64::from(phase.acceleration);
     let is_chebyshev = state.scene.solver.pbf().iteration == Iteration::Chebyshev;
     let momentum = is_chebyshev.then_some(Momentum { factor, before });
@@ -211,8 +215,7 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         Some(_) => passes::compute_delta(inputs, Colour::All, momentum, &lambda),
         None => plain.clone(),
     };
-    let after = io.after.get(buffers::PREDICTED, 2 * n)?;
-    let moved = io.after.vectors(buffers::PREDICTED, 2 * n)?;
+    let moved = io.after.vectors(buffers::CORRECTED, n)?;
     let works = match state.scene.has_movers() {
         true => Some([
             io.before.get(buffers::WALL_WORK, n)?,
@@ -243,7 +246,7 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         let x = points[i].length();
         let error = CORRECTED.of([MOMENTUM.of([factor, step, last.length()]), x]);
         let confined = bounds.confine(to, error);
-        let moved = pair(i, moved[write + i], twin[i].position, confined.magnitudes);
+        let moved = pair(i, moved[i], twin[i].position, confined.magnitudes);
         let work = works.as_ref().map(|[before, after]| {
             let [before, after] = [before, after].map(|work| f64::from(work[i]));
             let added = twin[i].work;
@@ -266,10 +269,6 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
         &OF_DELTA,
         all.iter().map(|pairs| pairs.map(|pairs| pairs.0)),
     );
-    io.table.each(&CARRIED, 0..handled.len(), |k| {
-        let i = handled[k];
-        pair(i, after[write + i][3], lambda[i], [])
-    });
     if works.is_some() {
         let works = all.iter().map(|pairs| pairs.and_then(|pairs| pairs.1));
         io.table.add(&DELTA_WORK, works);
@@ -277,26 +276,51 @@ pub(super) fn compute_delta(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     Ok(())
 }
 
+pub(super) fn exchange(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
+    if (state.control(io)?).is_some_and(|control| control.is_done == 1) {
+        return Ok(());
+    }
+    let n = state.particles();
+    let handled = handled(&io.before.window(&buffers::PHASES)?);
+    let (before, came) = state.places(&io.before, n)?;
+    let (after, left) = state.places(&io.after, n)?;
+    let corrected = io.before.vectors(buffers::CORRECTED, n)?;
+    io.table.each(&TAKEN_OVER, 0..handled.len(), |k| {
+        let i = handled[k];
+        pair(i, after[i], corrected[i], [])
+    });
+    io.table.each(&CARRIED, 0..handled.len(), |k| {
+        let i = handled[k];
+        pair(i, left[i], came[i], [])
+    });
+    if state.scene.solver.pbf().iteration == Iteration::Chebyshev {
+        let kept = io.after.vectors(buffers::CORRECTED, n)?;
+        io.table.each(&KEPT, 0..handled.len(), |k| {
+            let i = handled[k];
+            pair(i, kept[i], before[i], [])
+        });
+    }
+    Ok(())
+}
+
 pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let phase = io.before.window(&buffers::PHASES)?;
-    let source = match state.control(io)? {
-        Some(control) => n * (control.iterations % 2) as usize,
-        None => phase.read_even as usize,
-    };
-    let ends = io.before.vectors(buffers::PREDICTED, 2 * n)?[source..source + n].to_vec();
+    let ends = state.places(&io.before, n)?.0;
     let starts = io.before.vectors(buffers::START_POSITION, n)?;
-    let came: Vec<[f32; 4]> = io.before.get(buffers::SORTED_VELOCITY, n)?;
-    let velocities = wide(&came);
+    let velocities = io.before.vectors(buffers::SORTED_VELOCITY, n)?;
+    let drops = match state.model.settings.grid_projection {
+        true => io.before.get(buffers::SORTED_IS_DROP, n)?,
+        false => Vec::new(),
+    };
     let position = io.after.vectors(buffers::POSITION, n)?;
     let velocity = io.after.vectors(buffers::VELOCITY, n)?;
     let (model, substep) = (&state.model, &state.substep);
     let (cap, step) = (model.max_displacement(), substep.time_step);
     let one = |i: usize| {
         let (end, v) = (ends[i], velocities[i]);
-        let start = match model.settings.grid_projection && came[i][3] == 0.0 {
-            true => end,
-            false => starts[i],
+        let start = match drops.get(i) {
+            Some(0) => end,
+            _ => starts[i],
         };
         let (x, then, is_capped) = passes::update_velocity(model, substep, end, start, v);
         let way = (end - start).length() / step;
@@ -326,9 +350,18 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let counted = f64::from(after.capped) - f64::from(before.capped);
     io.table
         .add(&CAPPED, [pair(0, counted, count(0), [count(1)])]);
+    let places = state.places(&io.after, n)?.0;
+    let positions = io.after.vectors(buffers::POSITION, n)?;
+    io.table.each(&UPDATE_PLACE, 0..n, |i| {
+        pair(i, places[i], positions[i], [])
+    });
     let ids = io.before.get(buffers::SORTED_ID, n)?;
     io.table
         .add_exact(&UPDATE_ID, &io.after.get(buffers::ID, n)?, &ids);
+    if !drops.is_empty() {
+        let found = io.after.get(buffers::IS_DROP, n)?;
+        io.table.add_exact(&UPDATE_DROP, &found, &drops);
+    }
     state.whole.end(ends);
     state.is_over = true;
     Ok(())
@@ -336,7 +369,7 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
 
 pub(super) fn measure_density(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
-    let mut points = io.before.vectors(buffers::PREDICTED, n)?;
+    let mut points = state.places(&io.before, n)?.0;
     points.extend(&state.model.samples);
     let neighbors = state.search(&points);
     let inputs = state.inputs(&points, &neighbors);

@@ -80,6 +80,7 @@ entries! {
         REORDER_VELOCITY = "velocity", "m/s": [] 0.0, "a copy";
         REORDER_ID = "id", "": [] 0.0, "a copy";
         REORDER_PLACE = "place in a word", "": [] 0.0, "whole numbers of products that are rounded alike";
+        REORDER_DROP = "drop", "": [] 0.0, "a copy";
     }
     "pbf/build_neighbors" {
         NEIGHBORS = "wrong members of a list", "": [] 0.0, "none is wrong", tie NEAR_H;
@@ -93,10 +94,14 @@ entries! {
             moved: "near solids what the f64 twin answers when its input moves along each axis by " REACH,
             place: "where a wall pushes, by how much f32 misplaces it", x: "where a solid pushes |x|"]
             moved.max(error) + (place + U * x), "walls and solids bend the way", tie ACROSS;
-        CARRIED = "lambda carried along", "m²": [] 0.0, "a copy";
         DELTA_WORK = "work of walls", "m²/s": [speed: "the fastest wall's or solid's", error: "" WORKED,
             sums: "|the sum before| + |the sum after|", added: "|what is added|", solids: "" OF_SOLIDS]
             3.0 * speed * error + 2.0 * U * sums + 16.0 * U * added + solids, "their speed times what they push", tie ACROSS;
+    }
+    "pbf/exchange" {
+        TAKEN_OVER = "position", "m": [] 0.0, "what was corrected";
+        CARRIED = "lambda carried along", "m²": [] 0.0, "a copy";
+        KEPT = "position before", "m": [] 0.0, "a copy";
     }
     "pbf/boundary_work" {
         WORK = "shares of the work", "m²/s": [sizes: "Σ|w|", before: "|what was there|", after: "|what is there|"]
@@ -113,7 +118,9 @@ entries! {
             step: "of such a particle Δt, else 0", velocity: "" UPDATED] U * x + step * velocity, "a copy where none is slowed or carried";
         UPDATE_VELOCITY = "velocity", "m/s": [velocity: "" UPDATED] velocity, "one sum and a quotient";
         CAPPED = "particles slowed", "": [near: "particles as near to the cap as " NEAR_CAP] near, "a count";
+        UPDATE_PLACE = "position for neighbours", "m": [] 0.0, "a copy";
         UPDATE_ID = "id", "": [] 0.0, "a copy";
+        UPDATE_DROP = "drop", "": [] 0.0, "a copy";
     }
     "pbf/measure_density" {
         MEASURED = "relative density", "": [error: "" DENSITY] error, "";

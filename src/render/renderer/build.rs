@@ -144,7 +144,7 @@ fn plan_ssfr(
     }
     plan_particles(plan, look, particles, &moving);
     if look.spec().surface.splat == SplatSpec::Ellipsoid {
-        plan_shapes(plan, particles);
+        plan_shapes(plan, look, particles);
     }
     let body = plan_body(plan, scene.particle_spacing);
     let owner = match look.wants(AovSpec::Forward) {

@@ -7,24 +7,25 @@ use super::{
     Renderer,
     build::room,
     shade::draws_spray,
-    splats::{ROWS, filled},
+    splats::{Pages, ROWS, filled},
 };
 use crate::{
     domain::{level_set::kernels::Kernels, particles::Particles},
-    gpu::recording::spread,
+    gpu::{buffer::Workgroups, recording::spread},
     render::{
         Moment, RenderError,
         aeration::{self, CLEAR},
         buffers::{
-            AIRED, AIRED_GROUPS, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES,
+            AIRED, AIRED_GROUPS, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES,
             SPRAY_PARAMS,
         },
         camera::pose,
         hidden::hidden,
         lighting::spray_density,
         paths::{Path, paths},
+        plan::per_particle,
         shapes::shapes,
-        uniform::{Particle, SprayParams},
+        uniform::{Page, Particle, SprayParams},
     },
     scene::look::{AovSpec, MethodSpec},
 };
@@ -93,14 +94,17 @@ impl Renderer {
         let seen = self.sort(frame, &mut packed, &mut ways);
         self.reserve(packed.len())?;
         let aired = self.load_aired(&packed);
-        for (buffer, particles) in [
-            (PARTICLE_GROUPS, packed.len()),
-            (SEEN_GROUPS, seen),
+        let pages = self.pages();
+        let aired = self.load_pages(pages, packed.len(), &aired);
+        for (buffer, shares) in [
+            (PARTICLE_GROUPS, pages.shares(packed.len()).collect()),
+            (SEEN_GROUPS, pages.shares(seen).collect()),
             (AIRED_GROUPS, aired),
         ] {
             if self.program.has(buffer.name()) {
-                let groups = spread(&self.program.context, ROWS, particles as u64);
-                self.program.upload(buffer, 0, &[groups.into()]);
+                let groups = |share: &usize| spread(&self.program.context, ROWS, *share as u64);
+                let groups: Vec<Workgroups> = shares.iter().map(|n| groups(n).into()).collect();
+                self.program.upload(buffer, 0, &groups);
             }
         }
         self.program.upload(PARTICLES, 0, &packed);
@@ -123,17 +127,37 @@ impl Renderer {
         Ok(Loaded { count, ahead })
     }
 
-    /// Tells the device which particles hold air, few of all, and says how many do.
-    fn load_aired(&self, packed: &[Particle]) -> usize {
+    /// Tells the device which particles hold air, few of all, and gives their indices, ascending.
+    fn load_aired(&self, packed: &[Particle]) -> Vec<u32> {
         if !self.program.has(AIRED.name()) {
-            return 0;
+            return Vec::new();
         }
         let aired = (0u32..).zip(packed).filter(|(_, it)| it.air & 0xffff > 0);
-        let mut words = vec![0];
-        words.extend(aired.map(|(index, _)| index));
-        words[0] = words.len() as u32 - 1;
-        self.program.upload(AIRED, 0, &words);
-        words.len() - 1
+        let aired: Vec<u32> = aired.map(|(index, _)| index).collect();
+        self.program.upload(AIRED, 0, &aired);
+        aired
+    }
+
+    /// Tells the device which particles each dispatch sees, and gives how many of each page hold air.
+    fn load_pages(&self, pages: Pages, particles: usize, aired: &[u32]) -> Vec<usize> {
+        let counts: Vec<usize> = pages.shares(particles).collect();
+        let mut windows = Vec::new();
+        for (k, &count) in counts.iter().enumerate() {
+            let first = k * pages.page;
+            let before = |end: usize| aired.partition_point(|&index| (index as usize) < end);
+            let aired = before(first)..before(first + count);
+            windows.push(Page {
+                first: first as u32,
+                count: count as u32,
+                aired_first: aired.start as u32,
+                aired_count: aired.len() as u32,
+            });
+        }
+        self.program.upload_windows(&PAGES, &windows);
+        windows
+            .iter()
+            .map(|page| page.aired_count as usize)
+            .collect()
     }
 
     fn frame_seconds(&self) -> f32 {
@@ -198,16 +222,21 @@ impl Renderer {
             return Ok(());
         }
         let capacity = room(particles);
-        let mut grown = vec![PARTICLES.sized(capacity)];
-        if self.program.has(AIRED.name()) {
-            grown.push(AIRED.sized(1 + capacity));
-        }
-        if self.program.has(SHAPES.name()) {
-            grown.push(SHAPES.sized(capacity));
-        }
-        if self.program.has(PATHS.name()) {
-            grown.push(PATHS.sized(capacity));
-        }
+        let look = &self.look;
+        let pages = Pages {
+            capacity,
+            ..self.pages()
+        };
+        let mut grown = vec![
+            per_particle(&PARTICLES, capacity, look),
+            PAGES.sized(pages.count()),
+            AIRED.sized(capacity),
+            per_particle(&SHAPES, capacity, look),
+            per_particle(&PATHS, capacity, look),
+        ];
+        let groups = [PARTICLE_GROUPS, SEEN_GROUPS, AIRED_GROUPS];
+        grown.extend(groups.map(|groups| groups.sized(pages.count())));
+        grown.retain(|spec| self.program.has(&spec.name));
         self.program.refit(&grown, &[])?;
         self.capacity = capacity;
         self.record();

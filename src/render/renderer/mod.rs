@@ -25,12 +25,13 @@ use crate::gpu::{
     adapter::Context,
     buffer::Buf,
     program::Program,
-    recording::{Recording, Timer},
+    recording::{Command, Recording, Timer},
 };
 use crate::scene::look::Look;
 use build::room;
 use cloud::RayCloud;
 use shade::draws_spray;
+use splats::Pages;
 use water::RayWater;
 use whitewater::Whitewater;
 
@@ -242,9 +243,16 @@ impl Renderer {
 
     /// Binds every command to the buffers as they are now.
     fn record(&mut self) {
-        self.light = Recording::new(&self.program, &self.plan.water);
-        self.sample = Recording::new(&self.program, &self.plan.sample);
-        self.aovs = Recording::new(&self.program, &self.plan.aovs);
+        let pages = self.pages();
+        let record = |commands: &[Command]| Recording::new(&self.program, &pages.spread(commands));
+        self.light = record(&self.plan.water);
+        self.sample = record(&self.plan.sample);
+        self.aovs = record(&self.plan.aovs);
+    }
+
+    /// How its particles are shared out among dispatches.
+    fn pages(&self) -> Pages {
+        Pages::new(self.capacity, Limits::of(&self.program.context).storage)
     }
 
     /// Draws what does not change from frame to frame.

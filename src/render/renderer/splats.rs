@@ -3,21 +3,24 @@
 use super::shade::{draws_spray, tells_foam, wants_spray_aovs};
 use crate::{
     gpu::{
-        buffer::Buf,
+        buffer::{Buf, Workgroups},
         recording::{Bind, Command, Groups},
     },
     render::{
         buffers::{
-            AIRED, AIRED_GROUPS, DEPTHS, OWNER, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS,
-            SHAPES, SPRAY, SPRAY_PARAMS, THICKNESS, THICKNESS_PARAMS, WHITEWATER,
+            AIRED, AIRED_GROUPS, DEPTHS, OWNER, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS,
+            SEEN_GROUPS, SHAPES, SPRAY, SPRAY_PARAMS, THICKNESS, THICKNESS_PARAMS, WHITEWATER,
             WHITEWATER_GROUPS, WHITEWATER_PARAMS,
         },
         frame::FAR,
         plan::{Limits, Plan},
-        uniform::Thickness,
+        uniform::{Page, Particle, Path, Shape, Thickness},
     },
     scene::look::Look,
 };
+
+/// Particles of which every per-particle array begins at a multiple of 256 bytes.
+const STEP: usize = 8;
 
 /// Particles of a workgroup: `ROWS` of shared/ssfr_lanes.wgsl.
 pub(super) const ROWS: u32 = 8;
@@ -40,19 +43,101 @@ pub(super) fn plan_threads(plan: &mut Plan, limits: &Limits) {
     }
 }
 
+/// A pass over the first page of particles; [`Pages::spread`] makes it one over all.
+fn over_page(pass: &'static str, groups: &Buf<Workgroups>, mut binds: Vec<Bind>) -> Command {
+    binds.push(PAGES.bind(0));
+    Command::in_groups(pass, Groups::at(groups, 0), binds)
+}
+
 /// A pass over particles.
 fn over_particles(pass: &'static str, binds: Vec<Bind>) -> Command {
-    Command::in_groups(pass, Groups::at(&PARTICLE_GROUPS, 0), binds)
+    over_page(pass, &PARTICLE_GROUPS, binds)
 }
 
 /// A pass over those that may be seen.
 fn over_seen(pass: &'static str, binds: Vec<Bind>) -> Command {
-    Command::in_groups(pass, Groups::at(&SEEN_GROUPS, 0), binds)
+    over_page(pass, &SEEN_GROUPS, binds)
 }
 
 /// A pass over those that hold air.
 fn over_aired(pass: &'static str, binds: Vec<Bind>) -> Command {
-    Command::in_groups(pass, Groups::at(&AIRED_GROUPS, 0), binds)
+    over_page(pass, &AIRED_GROUPS, binds)
+}
+
+/// How particles are shared out among dispatches: as many to each as a binding holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Pages {
+    /// Particles of a page.
+    pub(super) page: usize,
+    /// Particles that buffers hold.
+    pub(super) capacity: usize,
+}
+
+impl Pages {
+    /// For buffers of `capacity` particles, of which one binding holds `storage` bytes.
+    pub(super) fn new(capacity: usize, storage: u64) -> Self {
+        let most = usize::try_from(storage).unwrap_or(usize::MAX) / size_of::<Path>();
+        // A power of two: windows begin at multiples of what adapters ask for.
+        let page = 1 << most.max(STEP).ilog2();
+        Self { page, capacity }
+    }
+
+    /// How many there are.
+    pub(super) fn count(self) -> usize {
+        self.capacity.div_ceil(self.page).max(1)
+    }
+
+    /// How many of the first `particles` are in each.
+    pub(super) fn shares(self, particles: usize) -> impl Iterator<Item = usize> {
+        (0..self.count()).map(move |k| particles.saturating_sub(k * self.page).min(self.page))
+    }
+
+    /// The same commands with a dispatch for each page in place of one for the first.
+    pub(super) fn spread(self, commands: &[Command]) -> Vec<Command> {
+        let of_page = |command: &Command, k: usize| match command {
+            Command::Dispatch {
+                pass,
+                binds,
+                groups: Groups::Indirect { buffer, offset },
+            } if OVER_PARTICLES.contains(pass) => {
+                let own = binds
+                    .iter()
+                    .filter(|bind| bind.variable != PAGES.variable());
+                let mut binds: Vec<Bind> = own.cloned().collect();
+                binds.extend(self.windows(k));
+                let offset = offset + (k * size_of::<Workgroups>()) as u64;
+                let buffer = buffer.clone();
+                Some(Command::in_groups(
+                    pass,
+                    Groups::Indirect { buffer, offset },
+                    binds,
+                ))
+            }
+            _ => (k == 0).then(|| command.clone()),
+        };
+        let pages = 0..self.count();
+        commands
+            .iter()
+            .flat_map(|command| pages.clone().filter_map(move |k| of_page(command, k)))
+            .collect()
+    }
+
+    /// What a dispatch over page `k` binds.
+    fn windows(self, k: usize) -> [Bind; 4] {
+        let first = k * self.page;
+        let count = self.page.min(self.capacity - first);
+        let window = |name: &'static str, bytes: usize| Bind {
+            variable: name,
+            buffer: name.to_owned(),
+            window: (self.count() > 1).then_some(((first * bytes) as u64, (count * bytes) as u64)),
+        };
+        [
+            PAGES.bind(k),
+            window("particles", size_of::<Particle>()),
+            window("shapes", size_of::<Shape>()),
+            window("paths", size_of::<Path>()),
+        ]
+    }
 }
 
 /// Plans `particles` particles. Where the shutter is open `moving` passes, which draw samples, take them along their paths.
@@ -62,13 +147,14 @@ pub(super) fn plan_particles(
     particles: usize,
     moving: &[&'static str],
 ) {
-    plan.buffer(&PARTICLES, particles);
+    plan.per_particle(&PARTICLES, particles, look);
+    plan.windows(&PAGES, &[Page::default()]);
     if look.spec().water.spray.is_some() {
-        plan.buffer(&AIRED, 1 + particles);
+        plan.buffer(&AIRED, particles);
         plan.buffer(&AIRED_GROUPS, 1);
     }
     if look.spec().image.shutter > 0.0 && !moving.is_empty() {
-        plan.buffer(&PATHS, particles);
+        plan.per_particle(&PATHS, particles, look);
         for pass in moving {
             plan.define(pass, "PATHS");
         }
@@ -76,8 +162,8 @@ pub(super) fn plan_particles(
 }
 
 /// Plans a shape of its own for each of `particles` particles.
-pub(super) fn plan_shapes(plan: &mut Plan, particles: usize) {
-    plan.buffer(&SHAPES, particles);
+pub(super) fn plan_shapes(plan: &mut Plan, look: &Look, particles: usize) {
+    plan.per_particle(&SHAPES, particles, look);
     for pass in ["ssfr/splat_depth", "ssfr/splat_owner"] {
         plan.define(pass, "ELLIPSOIDS");
     }

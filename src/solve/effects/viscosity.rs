@@ -13,8 +13,8 @@ use crate::{
 
 use super::{Addition, Between, OnDevice, Turns, pass};
 
-/// What XSPH changes each particle's velocity by, and 0, in sorted order, m/s.
-pub const CHANGE: Buf<[f32; 4]> = Buf::new("viscosity_change");
+/// What XSPH changes each particle's velocity by, in sorted order, m/s.
+pub const CHANGE: Buf<[f32; 3]> = Buf::new("viscosity_change");
 
 /// Cells: what the solve knows of them, as shared/viscous_word.wgsl has it.
 pub const WORD: Buf<u32> = Buf::new("viscous_word");

@@ -9,8 +9,10 @@ use super::{Addition, OnDevice, pass};
 
 impl OnDevice for Settings {}
 
-/// Curl of the velocity and its length: of each particle in sorted order (PBF), or of each cell (FLIP), 1/s.
-pub const VORTICITY: Buf<[f32; 4]> = Buf::new("vorticity");
+/// Curl of the velocity: of each particle in sorted order (PBF), or of each cell (FLIP), 1/s.
+pub const VORTICITY: Buf<[f32; 3]> = Buf::new("vorticity");
+/// Its length.
+pub const VORTICITY_LENGTH: Buf<f32> = Buf::new("vorticity_length");
 
 pub(super) fn pbf(settings: &Settings, _: &Scene, particles: usize) -> Addition {
     confinement(
@@ -34,7 +36,7 @@ fn confinement([curl, force]: [&'static str; 2], settings: &Settings, count: usi
             pass(curl, &[]),
             pass(force, &[("STRENGTH", settings.strength)]),
         ],
-        buffers: vec![VORTICITY.sized(count)],
+        buffers: vec![VORTICITY.sized(count), VORTICITY_LENGTH.sized(count)],
         ..Addition::default()
     }
 }

@@ -29,18 +29,21 @@ pub const BRICKS: Buf<Brick> = Buf::new("bricks");
 pub const BRICK_SLOT: Buf<u32> = Buf::new("brick_slot");
 
 /// Position of each particle, in sorted order.
-pub const SORTED_POSITION: Buf<[f32; 4]> = Buf::new("sorted_position");
+pub const SORTED_POSITION: Buf<[f32; 3]> = Buf::new("sorted_position");
 /// Nine slopes a particle, in storage order, 1/s; with APIC alone.
 pub const AFFINE: Buf<f32> = Buf::new("affine");
 /// The same in sorted order.
 pub const SORTED_AFFINE: Buf<f32> = Buf::new("sorted_affine");
-/// Velocity that moves each particle, and its displacement by the density correction and by
-/// what pushes it apart from others: three or six floats.
-pub const CARRIED: Buf<f32> = Buf::new("carried");
+/// Velocity that moves each particle, in sorted order, m/s.
+pub const CARRIED: Buf<[f32; 3]> = Buf::new("carried");
+/// Displacement of each particle by the density correction and by what pushes it apart from others, in sorted order, metres;
+/// with one of them alone.
+pub const PUSHED: Buf<[f32; 3]> = Buf::new("pushed");
 
 /// Sums over a cell's particles for the 18 faces that they reach, in planes of cells with water.
 pub const PARTIAL_MOMENTUM: Buf<f32> = Buf::new("partial_momentum");
-/// The same of weights, for faces and for the 27 centres that they reach.
+/// The same of weights; then of weights for 18 of the 27 centres that they reach, of which the other nine stand in
+/// [`PARTIAL_MOMENTUM`].
 pub const PARTIAL_WEIGHT: Buf<f32> = Buf::new("partial_weight");
 /// Planes, m/s; a face that is closed holds the solid's velocity.
 pub const FACE_VELOCITY: Buf<f32> = Buf::new("face_velocity");

@@ -25,9 +25,6 @@ use super::{
 /// Faces about a cell that its particles reach, of one component.
 const FACES: usize = 18;
 
-/// Cell centres that they reach.
-const CENTERS: usize = 27;
-
 /// Lays out FLIP with its projection for `scene`; `moves` says whether it moves particles.
 pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan {
     let flip = scene.solver.flip();
@@ -129,8 +126,11 @@ fn particles(plan: &Plan, scene: &Scene, table: &mut Table) {
     let vectors = [POSITION, VELOCITY, SORTED_POSITION, SORTED_VELOCITY];
     table.extend("flip", vectors.map(|buffer| buffer.sized(n)));
     table.extend("flip", [ID.sized(n), SORTED_ID.sized(n)]);
-    let carried = if pushes(plan, scene) { 6 } else { 3 };
-    table.watch("flip", CARRIED.sized(carried * n));
+    table.add("flip", IS_DROP.sized(n));
+    table.watch("flip", CARRIED.sized(n));
+    if pushes(plan, scene) {
+        table.watch("flip", PUSHED.sized(n));
+    }
     if has_places(plan, scene) {
         table.add("flip", PLACE.sized(n));
     }
@@ -159,7 +159,7 @@ fn bricks(plan: &Plan, scene: &Scene, table: &mut Table) {
     table.add("sort", CELL_START.sized(wet + 1));
     table.extend("sort", sort::scan_buffers(&CELL_START, wet));
     table.add("flip", PARTIAL_MOMENTUM.sized(FACES * wet));
-    table.add("flip", PARTIAL_WEIGHT.sized(CENTERS * wet));
+    table.add("flip", PARTIAL_WEIGHT.sized(FACES * wet));
     for planes in [FACE_VELOCITY, FACE_CHANGE, FACE_OPEN] {
         table.watch("flip", planes.sized(3 * all));
     }

@@ -46,6 +46,7 @@ impl Flip {
         program.copy(&POSITION, own, &SORTED_POSITION, n);
         program.copy(&VELOCITY, own, &VELOCITY, n);
         program.copy(&ID, own, &SORTED_ID, n);
+        program.copy(&IS_DROP, own, &IS_DROP, n);
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Red/black (Ribas and Pedrini) corrects one colour from everyone's latest positions, then the other, which
 //! sees the corrected first. λ of a colour is computed just before it moves, so an iteration does the work of
-//! one Jacobi iteration in four dispatches of half the size. Measured on a column of 16 × 20 × 16 particles
+//! one Jacobi iteration in four dispatches of half the size, and two that take the corrections over. Measured on a column of 16 × 20 × 16 particles
 //! compressed by 3 % (h = 2d, llvmpipe), mean and max density error in % after 4, 16 and 64 iterations
 //! (test `red_black_leaves_less_error_than_jacobi`; the schedules that lost are not in the tree):
 //!
@@ -14,7 +14,7 @@
 //! | red/black, λ of all before each colour, half as dear again (lost) | 1.46 / 3.8 | 0.87 / 4.6 | 0.36 / 1.9 |
 //!
 //! The Chebyshev semi-iteration (Wang 2015) goes on from a Jacobi iteration, under-relaxed by 0.7, in the direction of the
-//! last step: 1.01 / 4.3 after 4 and 0.59 / 2.8 after 16 on the same column, two dispatches an iteration to red/black's four
+//! last step: 1.01 / 4.3 after 4 and 0.59 / 2.8 after 16 on the same column, three dispatches an iteration to red/black's six
 //! (test `chebyshev_leaves_less_error_than_red_black`). A particle whose correction opposes its last step starts afresh.
 //! Without that it does still better on the column (0.65 / 3.4 and 0.31 / 1.2), but in moving water it flings particles off
 //! the surface: 60 m/s in wave-city after 10 frames.
@@ -34,6 +34,9 @@ use crate::{
 };
 
 use super::buffers::{CONTROL, PHASES, list_of};
+
+/// Takes over what was corrected.
+const EXCHANGE: &str = "pbf/exchange";
 
 /// Which particles a dispatch handles.
 #[derive(Clone, Copy)]
@@ -77,10 +80,7 @@ impl<'a> Builder<'a> {
         PHASES.bind(slot)
     }
 
-    /// Offsets of the two halves of `predicted`: `moved` says which colours stand in the other half already.
-    fn phase(&self, chunk: Chunk, who: Who, half: usize, red_moved: bool) -> Phase {
-        let n = self.plan.counts.particles;
-        let (here, there) = if half == 0 { (0, n) } else { (n, 0) };
+    fn phase(&self, chunk: Chunk, who: Who) -> Phase {
         let (stride, colour) = match who {
             Who::All => (1, 0),
             Who::Red => (2, 0),
@@ -91,26 +91,15 @@ impl<'a> Builder<'a> {
             count: ((chunk.count - colour).div_ceil(stride)) as u32,
             stride: stride as u32,
             colour: colour as u32,
-            read_even: if red_moved { there } else { here } as u32,
-            read_odd: here as u32,
-            write: there as u32,
             acceleration: self.acceleration,
         }
     }
 
-    fn pass(
-        &mut self,
-        pass: &'static str,
-        who: Who,
-        half: usize,
-        red_moved: bool,
-        out: &mut Vec<Command>,
-        indirect: bool,
-    ) {
+    fn pass(&mut self, pass: &'static str, who: Who, out: &mut Vec<Command>, indirect: bool) {
         for (index, &chunk) in self.plan.chunks.iter().enumerate() {
-            let phase = self.phase(chunk, who, half, red_moved);
+            let phase = self.phase(chunk, who);
             let mut binds = vec![self.bind_phase(phase)];
-            if self.plan.has_lists {
+            if self.plan.has_lists && pass != EXCHANGE {
                 binds.push(Bind::whole("neighbor_list", &list_of(index)));
             }
             let groups = match (indirect, who) {
@@ -126,20 +115,26 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// A pass over all particles that stand in the first half, such as one of an effect.
-    pub(super) fn over_all(&mut self, pass: &'static str, out: &mut Vec<Command>) {
-        self.pass(pass, Who::All, 0, false, out, false);
+    /// Corrections of particles from the places of all, taken over once all are known.
+    fn correct(&mut self, who: Who, out: &mut Vec<Command>, indirect: bool) {
+        self.pass("pbf/compute_delta", who, out, indirect);
+        self.pass(EXCHANGE, who, out, indirect);
     }
 
-    /// Density by a full search over all particles, sorted into the first half.
+    /// A pass over all particles, such as one of an effect.
+    pub(super) fn over_all(&mut self, pass: &'static str, out: &mut Vec<Command>) {
+        self.pass(pass, Who::All, out, false);
+    }
+
+    /// Density by a full search over all particles, as they were sorted.
     pub(super) fn measure(&mut self, out: &mut Vec<Command>) {
         let count = self.plan.counts.particles;
-        let phase = self.phase(Chunk { first: 0, count }, Who::All, 0, false);
+        let phase = self.phase(Chunk { first: 0, count }, Who::All);
         let bind = self.bind_phase(phase);
         out.push(Command::with("pbf/measure_density", count, vec![bind]));
     }
 
-    /// All iterations; the last command leaves the result in the half that `finish` binds.
+    /// All iterations.
     pub(super) fn iterations(&mut self, pbf: &Pbf, out: &mut Vec<Command>) {
         let count = pbf.stop.most_iterations();
         let adaptive = matches!(pbf.stop, Stop::DensityError { .. });
@@ -150,46 +145,30 @@ impl<'a> Builder<'a> {
             Iteration::Jacobi | Iteration::RedBlack => Vec::new(),
         };
         for k in 0..count {
-            let half = (k % 2) as usize;
             let is_first = k == 0;
             // Black λ of the iteration before still hold for red's correction: only the first needs all.
             let lambda = match pbf.iteration {
                 Iteration::RedBlack if !is_first => Who::Red,
                 _ => Who::All,
             };
-            self.pass("pbf/compute_lambda", lambda, half, false, out, adaptive);
+            self.pass("pbf/compute_lambda", lambda, out, adaptive);
             if adaptive {
                 out.push(Command::over("pbf/sum_error", self.plan.counts.particles));
                 out.push(Command::over("pbf/decide", 256));
             }
             match pbf.iteration {
-                Iteration::Jacobi => {
-                    self.pass("pbf/compute_delta", Who::All, half, false, out, adaptive)
-                }
+                Iteration::Jacobi => self.correct(Who::All, out, adaptive),
                 Iteration::Chebyshev => {
                     self.acceleration = factors[k as usize] as f32;
-                    self.pass("pbf/compute_delta", Who::All, half, false, out, adaptive);
+                    self.correct(Who::All, out, adaptive);
                     self.acceleration = 1.0;
                 }
                 Iteration::RedBlack => {
-                    self.pass("pbf/compute_delta", Who::Red, half, false, out, adaptive);
-                    self.pass("pbf/compute_lambda", Who::Black, half, true, out, adaptive);
-                    self.pass("pbf/compute_delta", Who::Black, half, true, out, adaptive);
+                    self.correct(Who::Red, out, adaptive);
+                    self.pass("pbf/compute_lambda", Who::Black, out, adaptive);
+                    self.correct(Who::Black, out, adaptive);
                 }
             }
         }
-    }
-
-    /// Velocities and positions from wherever the last of a fixed number of iterations left them.
-    pub(super) fn finish(&mut self, pbf: &Pbf, out: &mut Vec<Command>) {
-        let n = self.plan.counts.particles;
-        let half = match pbf.stop {
-            Stop::Iterations(count) => count % 2,
-            Stop::DensityError { .. } => 0,
-        };
-        let everything = Chunk { first: 0, count: n };
-        let phase = self.phase(everything, Who::All, half as usize, false);
-        let bind = self.bind_phase(phase);
-        out.push(Command::with("pbf/update_velocity", n, vec![bind]));
     }
 }

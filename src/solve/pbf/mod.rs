@@ -6,7 +6,7 @@ pub(super) mod plan;
 mod projection;
 pub(super) mod record;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::{
     domain::{
@@ -40,7 +40,7 @@ use super::{
     trace::{Begun, Observe, Run, Span, TraceFrame, Traced, trace},
 };
 use buffers::*;
-use plan::{SHARED_CONSTANTS, cell_count};
+use plan::{cell_count, places, shared_constants};
 use projection::Grid;
 use record::Commands;
 
@@ -108,6 +108,23 @@ pub(super) fn params(
     }
 }
 
+/// Fills in places from the `first` on, on either side of a page's end.
+pub(super) fn upload_places(
+    program: &Program,
+    page: Option<usize>,
+    first: usize,
+    places: &[[f32; 4]],
+) {
+    let page = page.unwrap_or(usize::MAX);
+    let (low, high) = places.split_at(page.saturating_sub(first).min(places.len()));
+    if !low.is_empty() {
+        program.upload(PREDICTED, first, low);
+    }
+    if !high.is_empty() {
+        program.upload(PREDICTED_HIGH, first.max(page) - page, high);
+    }
+}
+
 /// Uploads what does not change from substep to substep; the recordings of a substep and of a frame's end.
 fn set_up(
     program: &Program,
@@ -122,8 +139,7 @@ fn set_up(
     program.upload_windows(&PHASES, &commands.phases);
     sort::upload_lengths(program, &CELL_START, cell_count(plan));
     program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
-    let last = 2 * particles + plan.counts.boundary_samples;
-    program.upload(PREDICTED, last, &[NOBODY]);
+    upload_places(program, plan.page, places(plan) - 1, &[NOBODY]);
     boundary.upload(program, scene, plan, calibration);
     [&commands.substep, &commands.measure].map(|commands| Recording::new(program, commands))
 }
@@ -141,7 +157,7 @@ impl Pbf {
         is_timed: bool,
     ) -> Result<Self, SolveError> {
         let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
-        let program = Program::new(context, &buffers, &passes, &SHARED_CONSTANTS)?;
+        let program = Program::new(context, &buffers, &passes, &shared_constants(&plan))?;
         let pbf = scene.solver.pbf();
         let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
         let [substep, measure] = set_up(&program, &plan, scene, boundary, &calibration);
@@ -204,12 +220,12 @@ impl Pbf {
         let limits = device_limits(&self.program.context);
         let plan = plan::plan(&self.scene, counts, limits);
         let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
-        if plan.has_lists == self.plan.has_lists {
+        if (plan.has_lists, plan.page) == (self.plan.has_lists, self.plan.page) {
             self.program.refit(&buffers, &passes)?;
         } else {
             // Their conditions are others.
             let context = self.program.context.clone();
-            self.program = Program::new(&context, &buffers, &passes, &SHARED_CONSTANTS)?;
+            self.program = Program::new(&context, &buffers, &passes, &shared_constants(&plan))?;
         }
         self.plan = plan;
         let boundary = self.boundary.as_ref();
@@ -321,8 +337,8 @@ impl Pbf {
         let scale = self.calibration.pressure_scale(density, relaxation, step);
         let particles = position.iter().zip(&lambda);
         Ok(particles
-            .map(|([x, y, z, _], lambda)| {
-                let x = DVec3::new(f64::from(*x), f64::from(*y), f64::from(*z));
+            .map(|(x, lambda)| {
+                let x = Vec3::from_array(*x).as_dvec3();
                 (x, scale * f64::from(*lambda))
             })
             .collect())

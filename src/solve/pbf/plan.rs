@@ -2,7 +2,11 @@
 
 use crate::{
     domain::sph::Calibration,
-    gpu::{program::PassSpec, recording::Command, sort},
+    gpu::{
+        program::{BufferSpec, PassSpec},
+        recording::Command,
+        sort,
+    },
     scene::{Iteration, Scene, Stop},
     solve::{
         effects, flip,
@@ -14,7 +18,11 @@ use super::{buffers::*, record::Commands};
 use crate::solve::flip::buffers::SOLID_GRIDS;
 
 /// Constants for every pass that declares them.
-pub const SHARED_CONSTANTS: [(&str, f64); 1] = [("LIST_CAPACITY", LIST_CAPACITY as f64)];
+pub fn shared_constants(plan: &Plan) -> Vec<(&'static str, f64)> {
+    let mut constants = vec![("LIST_CAPACITY", f64::from(LIST_CAPACITY))];
+    constants.extend(plan.page.map(|page| ("PAGE", page as f64)));
+    constants
+}
 
 /// Neighbours that a list holds; a particle with more is searched for, and the report counts it. At rest
 /// h = 2d has 32; in the dam of `tools/bench pbf` no list of 48 overflowed.
@@ -38,6 +46,7 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits
     plan.projection =
         (scene.of_projection()).map(|grid| Box::new(flip::plan::plan(&grid, counts, false)));
     choose_lists(&mut plan, limits);
+    plan.page = page(places(&plan), limits);
     let effects = effects::of_pbf(scene, counts.particles);
     let commands = Commands::new(&plan, scene, &effects);
     let mut table = buffers(&plan, scene, commands.phases.len());
@@ -60,6 +69,28 @@ pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
     let effects = effects::of_pbf(scene, plan.counts.particles);
     let commands = Commands::new(plan, scene, &effects);
     [commands.substep, commands.measure].concat()
+}
+
+/// Entries of [`PREDICTED`].
+pub(super) fn places(plan: &Plan) -> usize {
+    plan.counts.particles + plan.counts.boundary_samples + 1
+}
+
+/// How many of so many places one binding holds, where it does not hold them all.
+fn page(places: usize, limits: DeviceLimits) -> Option<usize> {
+    let page = limits.binding.min(limits.buffer) / PREDICTED.sized(1).bytes;
+    let page = usize::try_from(page).unwrap_or(usize::MAX);
+    (places > page).then_some(page)
+}
+
+/// [`PREDICTED`] for so many places, and what stands behind a page.
+fn place_buffers(places: usize, page: Option<usize>) -> Vec<BufferSpec> {
+    let low = page.unwrap_or(places);
+    let mut specs = vec![PREDICTED.sized(low)];
+    if places > low {
+        specs.push(PREDICTED_HIGH.sized(places - low));
+    }
+    specs
 }
 
 fn choose_lists(plan: &mut Plan, limits: DeviceLimits) {
@@ -106,6 +137,12 @@ fn conditions(plan: &Plan, scene: &Scene) -> Vec<&'static str> {
     if has_places(plan, scene) {
         conditions.push("PLACES");
     }
+    if scene.solver.pbf().grid_projection {
+        conditions.push("PROJECTED");
+    }
+    if plan.page.is_some() {
+        conditions.push("PAGED");
+    }
     conditions
 }
 
@@ -114,20 +151,14 @@ fn own(name: &'static str, scene: &Scene) -> PassSpec {
     let pbf = scene.solver.pbf();
     let is_adaptive = matches!(pbf.stop, Stop::DensityError { .. });
     let all: &[(&str, bool)] = match name {
-        "pbf/predict" => &[
-            ("WALL_WORK", scene.has_movers()),
-            ("PROJECTED", pbf.grid_projection),
-        ],
+        "pbf/predict" => &[("WALL_WORK", scene.has_movers())],
         "pbf/compute_lambda" => &[("DENSITY", is_adaptive)],
+        "pbf/exchange" => &[("CHEBYSHEV", pbf.iteration == Iteration::Chebyshev)],
         "pbf/compute_delta" => &[
             ("ARTIFICIAL_PRESSURE", pbf.artificial_pressure > 0.0),
             ("CHEBYSHEV", pbf.iteration == Iteration::Chebyshev),
             ("PRESSURE", scene.reads_multipliers()),
             ("WALL_WORK", scene.has_movers()),
-        ],
-        "pbf/update_velocity" => &[
-            ("ADAPTIVE", is_adaptive),
-            ("PROJECTED", pbf.grid_projection),
         ],
         _ => &[],
     };
@@ -168,10 +199,19 @@ fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
     table.add("pbf", PARAMS.sized(1));
     table.add("pbf", PHASES.sized(phases));
     let samples = plan.counts.boundary_samples;
-    table.add("pbf", PREDICTED.sized(2 * n + samples + 1));
-    let vectors = [POSITION, VELOCITY, START_POSITION, SORTED_VELOCITY];
+    table.extend("pbf", place_buffers(places(plan), plan.page));
+    let vectors = [
+        CORRECTED,
+        POSITION,
+        VELOCITY,
+        START_POSITION,
+        SORTED_VELOCITY,
+    ];
     table.extend("pbf", vectors.map(|buffer| buffer.sized(n)));
     table.extend("pbf", [ID.sized(n), SORTED_ID.sized(n), DENSITY.sized(n)]);
+    if scene.solver.pbf().grid_projection {
+        table.extend("pbf", [IS_DROP.sized(n), SORTED_IS_DROP.sized(n)]);
+    }
     table.add("pbf", COUNTERS.sized(1));
     if let Stop::DensityError { .. } = scene.solver.pbf().stop {
         table.add("pbf", CONTROL.sized(1));

@@ -62,7 +62,7 @@ fn substep(
         builder.over_all("pbf/build_neighbors", &mut commands);
     }
     builder.iterations(pbf, &mut commands);
-    builder.finish(pbf, &mut commands);
+    commands.push(Command::over("pbf/update_velocity", plan.counts.particles));
     if scene.has_movers() {
         commands.push(Command::over("pbf/boundary_work", plan.counts.particles));
     }

@@ -406,7 +406,9 @@ fn pbf_lists_in_chunks_and_none() {
         binding: 30_000,
         ..limits
     };
+    // Without lists, and with places in two bindings.
     let none = DeviceLimits {
+        binding: 3_000,
         list_budget: 0,
         ..limits
     };
@@ -416,6 +418,7 @@ fn pbf_lists_in_chunks_and_none() {
     {
         let plan = start.plan(&scene, limits);
         assert_eq!((plan.chunks.len(), plan.has_lists), (chunks, has_lists));
+        assert_eq!(plan.page.is_some(), !has_lists);
         let checked = |context: &Context| pbf_table(context, &scene, &start, limits);
         all += &faults(&context, &checked, controls).1;
     }

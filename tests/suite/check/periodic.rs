@@ -105,8 +105,8 @@ fn flip_is_within_tolerance_across_joints_and_fails_where_it_should() {
 const PBF: &[Control] = &[
     control(
         "pbf/predict",
-        "vec4f(wrapped_place(x), 0.0)",
-        "vec4f(x, 0.0)",
+        "packed(wrapped_place(x))",
+        "packed(x)",
         "pbf/predict",
         &["predicted position"],
     ),

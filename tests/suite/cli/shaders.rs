@@ -45,8 +45,8 @@ fn comment(job: &Job, folder: &str) {
 fn overshoot(job: &Job, folder: &str) {
     job.edit(
         &format!("{folder}/pbf/predict.wgsl"),
-        "let free = position[thread].xyz + params.time_step * v;",
-        "let free = position[thread].xyz + 1.01 * params.time_step * v;",
+        "let free = start + params.time_step * v;",
+        "let free = start + 1.01 * params.time_step * v;",
     );
 }
 

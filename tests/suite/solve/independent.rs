@@ -103,12 +103,10 @@ fn passes_are_given_the_papers_constants() {
         }
         // Of a solid's samples: weights for the area of their faces, so that a sheet of them makes up for the lattice.
         let n = boundary.samples.len();
-        let packed = solver
-            .field(pbf::buffers::PREDICTED, 2 * particles.len() + n)
+        let values = solver
+            .field(pbf::buffers::PREDICTED, particles.len() + n)
             .unwrap();
-        let weights = packed[2 * particles.len()..]
-            .iter()
-            .map(|s| f64::from(s[3]));
+        let weights = values[particles.len()..].iter().map(|s| f64::from(s[3]));
         let area = 2.0 * (2.0 * 4.0 + 4.0 * 2.0 + 2.0 * 2.0);
         let plane = 315.0 / 256.0 * (1.0 - (0.5 / ratio).powi(2)).powi(4) / paper.h;
         let weight = paper.deficit * d * d / (paper.volume * plane);

@@ -250,7 +250,7 @@ fn same_bytes_twice_and_from_any_frame() {
     assert!(last != states[11]);
 }
 
-/// Lists in several bindings give the same bytes; no lists at all the same water but for what a list, made
+/// Lists and places in several bindings give the same bytes; no lists at all the same water but for what a list, made
 /// once a substep, cannot see: neighbours that come within h during the iteration, of weight (δ/h)².
 #[test]
 fn chunked_lists_and_no_lists() {
@@ -281,6 +281,17 @@ fn chunked_lists_and_no_lists() {
         true,
     );
     assert!(chunked == whole);
+    // Places in two bindings as well, of which the first ends in the midst of the water.
+    let paged = DeviceLimits {
+        binding: 100_000,
+        ..limits
+    };
+    let counts = Counts {
+        particles: particles.len(),
+        ..Counts::default()
+    };
+    assert_eq!(Plan::new(&scene, counts, paged).page, Some(6250));
+    assert!(with(paged, 16, true) == whole);
     let searched = with(
         DeviceLimits {
             list_budget: 0,

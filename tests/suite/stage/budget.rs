@@ -204,8 +204,8 @@ fn energy_rises_by_the_work_of_the_walls_alone() {
             },
             Spoil {
                 pass: "pbf/update_velocity",
-                from: "velocity[thread] = vec4f(v, came.w);",
-                to: "velocity[thread] = vec4f(1.3 * v, 0.0);",
+                from: "velocity[thread] = packed(v);",
+                to: "velocity[thread] = packed(1.3 * v);",
             },
         ),
         (
@@ -364,8 +364,8 @@ fn nothing_leaves_the_domain_and_a_ledger_that_does_not_close_ends_the_bake() {
             SOLVERS[0],
             spoil(
                 "pbf/update_velocity",
-                "position[thread] = vec4f(x, 1.0);",
-                "position[thread] = vec4f(x + 10.0, 1.0);",
+                "position[thread] = packed(x);",
+                "position[thread] = packed(x + 10.0);",
             ),
             spoil(
                 "pbf/update_velocity",
@@ -377,8 +377,8 @@ fn nothing_leaves_the_domain_and_a_ledger_that_does_not_close_ends_the_bake() {
             SOLVERS[1],
             spoil(
                 "flip/advect",
-                "position[i] = vec4f(x, 1.0);",
-                "position[i] = vec4f(x + 10.0, 1.0);",
+                "position[i] = packed(x);",
+                "position[i] = packed(x + 10.0);",
             ),
             spoil(
                 "flip/advect",

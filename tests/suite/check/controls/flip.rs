@@ -55,7 +55,7 @@ pub const FLIP: &[Control] = &[
     control(
         "flip/reorder",
         "= velocity[source]",
-        "= -velocity[source]",
+        "= packed(-three(velocity[source]))",
         "flip/reorder",
         &["velocity"],
     ),
@@ -350,8 +350,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "effects/grid_curl",
-        "vec4f(curl, length(curl))",
-        "vec4f(curl, 1.001 * length(curl))",
+        "= length(curl)",
+        "= 1.001 * length(curl)",
         "effects/grid_curl",
         &["its length"],
     )
@@ -438,8 +438,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/grid_to_particle",
-        "carried[CARRIED * i + axis] = u;",
-        "carried[CARRIED * i + axis] = 1.001 * u;",
+        "carried[k] = u;",
+        "carried[k] = 1.001 * u;",
         "flip/grid_to_particle",
         &["velocity of the grid"],
     ),
@@ -452,8 +452,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/advect",
-        "velocity[i] = vec4f(v, 0.0)",
-        "velocity[i] = vec4f(v * 1.00001, 0.0)",
+        "velocity[i] = packed(v)",
+        "velocity[i] = packed(v * 1.00001)",
         "flip/advect",
         &["velocity"],
     ),

@@ -106,33 +106,37 @@ fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_pbf() {
     for spoil in [
         spoil(
             "pbf/predict",
-            "vec4f(x, 0.0);",
-            concat!("vec4f(x + ", nan!("thread"), ", 0.0);"),
+            "packed(x);",
+            concat!("packed(x + ", nan!("thread"), ");"),
         ),
         spoil(
             "pbf/reorder",
             "start_position[thread] = x;",
-            concat!("start_position[thread] = x * ", nan!("thread"), ";"),
+            concat!(
+                "start_position[thread] = packed(three(x) * ",
+                nan!("thread"),
+                ");"
+            ),
         ),
         spoil(
             "pbf/compute_lambda",
-            "slot].w = -max(",
-            concat!("slot].w = ", nan!("slot"), " - max("),
+            "let lambda = -max(",
+            concat!("let lambda = ", nan!("i"), " - max("),
         ),
         spoil(
             "pbf/compute_delta",
-            "delta), current.w)",
-            concat!("delta) + ", nan!("i"), ", current.w)"),
+            "delta));",
+            concat!("delta) + ", nan!("i"), ");"),
         ),
         spoil(
             "pbf/update_velocity",
-            "velocity[thread] = vec4f(v, came.w);",
-            concat!("velocity[thread] = vec4f(v * ", nan!("thread"), ", 0.0);"),
+            "velocity[thread] = packed(v);",
+            concat!("velocity[thread] = packed(v * ", nan!("thread"), ");"),
         ),
         spoil(
             "effects/viscosity_apply",
-            "+= viscosity_change[i]",
-            concat!("+= viscosity_change[i] * ", nan!("i")),
+            "+ three(viscosity_change[i])",
+            concat!("+ three(viscosity_change[i]) * ", nan!("i")),
         ),
         spoil(
             "pbf/measure_density",
@@ -181,16 +185,16 @@ fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_flip() {
         ),
         spoil(
             "flip/grid_to_particle",
-            "carried[CARRIED * i + axis] = u;",
-            concat!("carried[CARRIED * i + axis] = u * ", nan!("i"), ";"),
+            "carried[k] = u;",
+            concat!("carried[k] = u * ", nan!("i"), ";"),
         ),
         spoil(
             "flip/advect",
-            "position[i] = vec4f(x, 1.0);",
+            "position[i] = packed(x);",
             concat!(
-                "position[i] = vec4f(clamp(x, low, high) * ",
+                "position[i] = packed(clamp(x, low, high) * ",
                 nan!("i"),
-                ", 1.0);"
+                ");"
             ),
         ),
     ] {

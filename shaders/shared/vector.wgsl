@@ -1,0 +1,14 @@
+// A vector of three words, as arrays hold one a particle: an array of vec3f has sixteen bytes a vector.
+struct Vector {
+    x: f32,
+    y: f32,
+    z: f32,
+}
+
+fn three(v: Vector) -> vec3f {
+    return vec3f(v.x, v.y, v.z);
+}
+
+fn packed(v: vec3f) -> Vector {
+    return Vector(v.x, v.y, v.z);
+}
