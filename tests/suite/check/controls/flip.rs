@@ -272,8 +272,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/reorder",
-        "place_word(x.xyz *",
-        "place_word((x.xyz + 0.1 * params.cell_size * f32(i & 1u)) *",
+        "place_word(three(x) *",
+        "place_word((three(x) + 0.1 * params.cell_size * f32(i & 1u)) *",
         "flip/push_apart",
         &["displacement"],
     ),

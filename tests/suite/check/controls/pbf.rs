@@ -154,8 +154,8 @@ pub const PBF: &[Control] = &[
     ),
     control(
         "pbf/reorder",
-        "place_word(x.xyz *",
-        "place_word((x.xyz + 0.01 * params.support_radius * f32(thread & 1u)) *",
+        "place_word(three(x) *",
+        "place_word((three(x) + 0.01 * params.support_radius * f32(thread & 1u)) *",
         "pbf/reorder",
         &["place in a word"],
     )
