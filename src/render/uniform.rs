@@ -325,6 +325,7 @@ pub fn mirrors() -> Vec<Layout> {
         Camera::layout(),
         Particle::layout(),
         Path::layout(),
+        Page::layout(),
         SprayParams::layout(),
         Shape::layout(),
         Shading::layout(),
