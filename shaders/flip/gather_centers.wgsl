@@ -5,9 +5,10 @@
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_walls.wgsl"
 
-@group(0) @binding(2) var<storage, read> partial_weight: array<f32>;
-// As flip/spread_centers has it.
-@group(0) @binding(4) var<storage, read> partial_momentum: array<f32>;
+// As flip/spread_centers has them.
+@group(0) @binding(2) var<storage, read> weight_before: array<f32>;
+@group(0) @binding(4) var<storage, read> weight_after: array<f32>;
+@group(0) @binding(5) var<storage, read> momentum_before: array<f32>;
 @group(0) @binding(3) var<storage, read_write> density: array<f32>;
 #ifdef SOLIDS
 @group(0) @binding(9) var<storage, read> open_volume: array<f32>;
@@ -27,10 +28,10 @@ const OWN_SHARE = 0.75;
 const OTHER_SHARE = 0.125;
 
 #ifdef SOLIDS
-// Of the hat that stands in the k-th of 27 cells, x fastest.
-fn share_of(k: i32) -> f32 {
-    let share = select(vec3f(OTHER_SHARE), vec3f(OWN_SHARE), vec3i(k % 3, k / 3 % 3, k / 9) == vec3i(1));
-    return share.x * share.y * share.z;
+// Of the hat that stands in the k-th cell of a layer, x fastest; `of_layer` is the layer's.
+fn share_of(k: i32, of_layer: f32) -> f32 {
+    let share = select(vec2f(OTHER_SHARE), vec2f(OWN_SHARE), vec2i(k % 3, k / 3) == vec2i(1));
+    return share.x * share.y * of_layer;
 }
 #endif
 
@@ -52,20 +53,26 @@ fn main(
     let holds_water = (slots_near - 1u < vec4u(last_wet)) | (slots_far - 1u < vec4u(last_wet));
     var sum = 0.0;
     var room = 0.0;
+    // Layer by layer: what lies before gave to the layer after its own.
     for (var k = 0; k < select(0, 9, any(holds_water)); k++) {
         let found = element_at(vec3i(k % 3, k / 3, 0) - 1);
-        let source = select(0u, found, found < wet_end);
-        sum += partial_momentum[u32(8 - k) * stride + source];
+        sum += momentum_before[u32(8 - k) * stride + select(0u, found, found < wet_end)];
 #ifdef SOLIDS
-        room += share_of(k) * open_volume[found];
+        room += share_of(k, OTHER_SHARE) * open_volume[found];
 #endif
     }
-    for (var k = 9; k < select(9, 27, any(holds_water)); k++) {
-        let found = element_at(vec3i(k % 3, k / 3 % 3, k / 9) - 1);
-        let source = select(0u, found, found < wet_end);
-        sum += partial_weight[u32(26 - k) * stride + source];
+    for (var k = 0; k < select(0, 9, any(holds_water)); k++) {
+        let found = element_at(vec3i(k % 3, k / 3, 1) - 1);
+        sum += weight_after[u32(8 - k) * stride + select(0u, found, found < wet_end)];
 #ifdef SOLIDS
-        room += share_of(k) * open_volume[found];
+        room += share_of(k, OWN_SHARE) * open_volume[found];
+#endif
+    }
+    for (var k = 0; k < select(0, 9, any(holds_water)); k++) {
+        let found = element_at(vec3i(k % 3, k / 3, 2) - 1);
+        sum += weight_before[u32(8 - k) * stride + select(0u, found, found < wet_end)];
+#ifdef SOLIDS
+        room += share_of(k, OTHER_SHARE) * open_volume[found];
 #endif
     }
     // What the walls leave of the hats, exactly; meshes take their part of it cell by cell.

@@ -8,8 +8,10 @@
 #import "shared/finite.wgsl"
 #import "shared/counters.wgsl"
 
-@group(0) @binding(2) var<storage, read> partial_momentum: array<f32>;
-@group(0) @binding(3) var<storage, read> partial_weight: array<f32>;
+@group(0) @binding(2) var<storage, read> momentum_before: array<f32>;
+@group(0) @binding(12) var<storage, read> momentum_after: array<f32>;
+@group(0) @binding(3) var<storage, read> weight_before: array<f32>;
+@group(0) @binding(13) var<storage, read> weight_after: array<f32>;
 @group(0) @binding(4) var<storage, read> face_open: array<f32>;
 @group(0) @binding(5) var<storage, read_write> face_velocity: array<f32>;
 // The old velocity here, its change from flip/find_change on.
@@ -47,14 +49,16 @@ fn main(
     // A loop that no lane enters costs nothing, where a branch would: dry bricks' cells far from water.
     for (var c = -1; c <= select(-2, 1, any(holds_water)); c++) {
         for (var b = -1; b <= 1; b++) {
-            for (var a = 0; a <= 1; a++) {
-                let found = element_at(b * to_b + c * to_c - a * to_a);
-                // Partial sums of slot 0 stay zero.
-                let source = select(0u, found, found < wet_end);
-                let plane = u32(9 * a + 3 * (1 - c) + 1 - b);
-                momentum += partial_momentum[plane * stride + source];
-                weight += partial_weight[plane * stride + source];
-            }
+            // Partial sums of slot 0 stay zero.
+            let own = element_at(b * to_b + c * to_c);
+            let before = element_at(b * to_b + c * to_c - to_a);
+            let plane = u32(3 * (1 - c) + 1 - b) * stride;
+            let of_own = plane + select(0u, own, own < wet_end);
+            let of_before = plane + select(0u, before, before < wet_end);
+            momentum += momentum_before[of_own];
+            weight += weight_before[of_own];
+            momentum += momentum_after[of_before];
+            weight += weight_after[of_before];
         }
     }
     if !is_finite(vec3f(momentum, weight, 0.0)) {

@@ -11,22 +11,18 @@
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var<storage, read> cell_start: array<u32>;
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
-// For the centres in the layers before and of a cell.
-@group(0) @binding(4) var<storage, read_write> partial_weight: array<f32>;
-// For those in the layer after it: the faces have been given their momentum, and its room is free.
-@group(0) @binding(5) var<storage, read_write> partial_momentum: array<f32>;
+// For the nine centres in the layer before the cell, in its own, and in the one after it: the faces have been given what they were
+// to get, and the room for it is free.
+@group(0) @binding(4) var<storage, read_write> weight_before: array<f32>;
+@group(0) @binding(5) var<storage, read_write> weight_after: array<f32>;
+@group(0) @binding(6) var<storage, read_write> momentum_before: array<f32>;
 
-fn store(plane: u32, element: u32, weight: vec3f) {
+fn store(plane: u32, element: u32, before: vec3f, own: vec3f, after: vec3f) {
     let first = plane * params.partial_stride + element;
     for (var k = 0u; k < 3u; k++) {
-        partial_weight[first + k * params.partial_stride] = weight[k];
-    }
-}
-
-fn store_after(plane: u32, element: u32, weight: vec3f) {
-    let first = plane * params.partial_stride + element;
-    for (var k = 0u; k < 3u; k++) {
-        partial_momentum[first + k * params.partial_stride] = weight[k];
+        weight_before[first + k * params.partial_stride] = before[k];
+        weight_after[first + k * params.partial_stride] = own[k];
+        momentum_before[first + k * params.partial_stride] = after[k];
     }
 }
 
@@ -78,13 +74,7 @@ fn main(
         own += layer * z.y;
         after += layer * z.z;
     }
-    store(0u, element, before[0]);
-    store(3u, element, before[1]);
-    store(6u, element, before[2]);
-    store(9u, element, own[0]);
-    store(12u, element, own[1]);
-    store(15u, element, own[2]);
-    store_after(0u, element, after[0]);
-    store_after(3u, element, after[1]);
-    store_after(6u, element, after[2]);
+    store(0u, element, before[0], own[0], after[0]);
+    store(3u, element, before[1], own[1], after[1]);
+    store(6u, element, before[2], own[2], after[2]);
 }

@@ -11,17 +11,28 @@
 @group(0) @binding(3) var<storage, read> sorted_position: array<Vector>;
 // Three floats a particle.
 @group(0) @binding(4) var<storage, read> sorted_velocity: array<f32>;
-@group(0) @binding(5) var<storage, read_write> partial_momentum: array<f32>;
-@group(0) @binding(6) var<storage, read_write> partial_weight: array<f32>;
+// For the nine faces before the cell, and for those after it.
+@group(0) @binding(5) var<storage, read_write> momentum_before: array<f32>;
+@group(0) @binding(10) var<storage, read_write> momentum_after: array<f32>;
+@group(0) @binding(6) var<storage, read_write> weight_before: array<f32>;
+@group(0) @binding(11) var<storage, read_write> weight_after: array<f32>;
 #ifdef APIC
 @group(0) @binding(9) var<storage, read> sorted_affine: array<f32>;
 #endif
 
-fn store(plane: u32, element: u32, momentum: vec3f, weight: vec3f) {
+fn store_before(plane: u32, element: u32, momentum: vec3f, weight: vec3f) {
     let first = plane * params.partial_stride + element;
     for (var k = 0u; k < 3u; k++) {
-        partial_momentum[first + k * params.partial_stride] = momentum[k];
-        partial_weight[first + k * params.partial_stride] = weight[k];
+        momentum_before[first + k * params.partial_stride] = momentum[k];
+        weight_before[first + k * params.partial_stride] = weight[k];
+    }
+}
+
+fn store_after(plane: u32, element: u32, momentum: vec3f, weight: vec3f) {
+    let first = plane * params.partial_stride + element;
+    for (var k = 0u; k < 3u; k++) {
+        momentum_after[first + k * params.partial_stride] = momentum[k];
+        weight_after[first + k * params.partial_stride] = weight[k];
     }
 }
 
@@ -68,10 +79,10 @@ fn main(
         upper_momentum += both * (a.y * v);
 #endif
     }
-    store(0u, element, lower_momentum[0], lower_weight[0]);
-    store(3u, element, lower_momentum[1], lower_weight[1]);
-    store(6u, element, lower_momentum[2], lower_weight[2]);
-    store(9u, element, upper_momentum[0], upper_weight[0]);
-    store(12u, element, upper_momentum[1], upper_weight[1]);
-    store(15u, element, upper_momentum[2], upper_weight[2]);
+    store_before(0u, element, lower_momentum[0], lower_weight[0]);
+    store_before(3u, element, lower_momentum[1], lower_weight[1]);
+    store_before(6u, element, lower_momentum[2], lower_weight[2]);
+    store_after(0u, element, upper_momentum[0], upper_weight[0]);
+    store_after(3u, element, upper_momentum[1], upper_weight[1]);
+    store_after(6u, element, upper_momentum[2], upper_weight[2]);
 }

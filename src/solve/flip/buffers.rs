@@ -40,11 +40,15 @@ pub const CARRIED: Buf<[f32; 3]> = Buf::new("carried");
 /// with one of them alone.
 pub const PUSHED: Buf<[f32; 3]> = Buf::new("pushed");
 
-/// Sums over a cell's particles for the 18 faces that they reach, in planes of cells with water.
-pub const PARTIAL_MOMENTUM: Buf<f32> = Buf::new("partial_momentum");
-/// The same of weights; then of weights for 18 of the 27 centres that they reach, of which the other nine stand in
-/// [`PARTIAL_MOMENTUM`].
-pub const PARTIAL_WEIGHT: Buf<f32> = Buf::new("partial_weight");
+/// Sums over a cell's particles for the 18 faces of one component that they reach, in planes of cells with water: momentum for the
+/// nine before the cell and the nine after it, and the same of weights. Then weights for the 27 centres that they reach: in the first
+/// of these for the layer after the cell, in the last two for the one before it and its own.
+pub const PARTIAL_SUMS: [Buf<f32>; 4] = [
+    Buf::new("momentum_before"),
+    Buf::new("momentum_after"),
+    Buf::new("weight_before"),
+    Buf::new("weight_after"),
+];
 /// Planes, m/s; a face that is closed holds the solid's velocity.
 pub const FACE_VELOCITY: Buf<f32> = Buf::new("face_velocity");
 /// Planes: the velocity before forces and projection, then what these changed, m/s.

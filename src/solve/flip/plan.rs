@@ -22,8 +22,8 @@ use super::{
     record::{Commands, FIRST_LAYER, WALL_FRICTION},
 };
 
-/// Faces about a cell that its particles reach, of one component.
-const FACES: usize = 18;
+/// Faces on one side of a cell that its particles reach, of one component.
+const FACES: usize = 9;
 
 /// Lays out FLIP with its projection for `scene`; `moves` says whether it moves particles.
 pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan {
@@ -158,8 +158,7 @@ fn bricks(plan: &Plan, scene: &Scene, table: &mut Table) {
     table.add("flip", BRICKS.sized(slots));
     table.add("sort", CELL_START.sized(wet + 1));
     table.extend("sort", sort::scan_buffers(&CELL_START, wet));
-    table.add("flip", PARTIAL_MOMENTUM.sized(FACES * wet));
-    table.add("flip", PARTIAL_WEIGHT.sized(FACES * wet));
+    table.extend("flip", PARTIAL_SUMS.map(|sums| sums.sized(FACES * wet)));
     for planes in [FACE_VELOCITY, FACE_CHANGE, FACE_OPEN] {
         table.watch("flip", planes.sized(3 * all));
     }
