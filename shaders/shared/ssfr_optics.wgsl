@@ -45,11 +45,3 @@ fn lobe(g: f32, cosine: f32) -> f32 {
 fn drop_phase(cosine: f32) -> f32 {
     return mix(lobe(AHEAD, cosine), lobe(BACK, cosine), BACKWARD);
 }
-
-// The same of a white ball in the light of a distant sun, which shades itself: Lambert 1760. `cosine` is that between the ways to
-// the sun and to the eye.
-fn ball_phase(cosine: f32) -> f32 {
-    let c = clamp(cosine, -1.0, 1.0);
-    let angle = acos(c);
-    return 2.0 / (3.0 * PI * PI) * (sqrt(max(1.0 - c * c, 0.0)) + (PI - angle) * c);
-}

@@ -19,6 +19,7 @@
 #endif
 #ifdef SPRAY
 #import "shared/ssfr_spray_read.wgsl"
+#import "shared/ssfr_spray_front.wgsl"
 #import "shared/ssfr_spray_light.wgsl"
 #endif
 #ifdef SEA
@@ -179,6 +180,25 @@ fn behind_radiance(found: Behind, direction: vec3f) -> vec3f {
     return (sky_radiance(direction) + disc_radiance(direction)) * shading.background;
 }
 
+#ifndef DRY
+// The pixel at which the line of sight through a sheet of water meets what stands behind it. A thin prism turns light by n − 1 times its
+// angle (Born and Wolf, Principles of Optics, 4.7.2); that angle is the slope of the thickness, in the mean over two spacings, since balls
+// for particles have slopes of their own. Where what is met there stands before the sheet, it looks straight on.
+fn through_sheet(pixel: vec2i, z: f32, straight: Behind) -> vec2i {
+    let p = vec2f(pixel) + 0.5;
+    let h = max(shading.spacing * camera.focal / z, 2.0);
+    let a = thickness_at(p + vec2f(h, h));
+    let b = thickness_at(p + vec2f(h, -h));
+    let c = thickness_at(p + vec2f(-h, h));
+    let d = thickness_at(p - vec2f(h, h));
+    let slope = vec2f(a + b - c - d, a + c - b - d) * camera.focal / (4.0 * h * z);
+    let steep = max(length(slope), 1e-6);
+    let turn = tan((shading.index - 1.0) * atan(steep)) * (1.0 - z / straight.depth);
+    let bent = clamp(vec2i(floor(p + slope / steep * turn * camera.focal)), vec2i(0), vec2i(camera.size) - 1);
+    return select(bent, pixel, solid_depth[u32(bent.y) * camera.size.x + u32(bent.x)] < z);
+}
+#endif
+
 // The padded pixel that a place in eye space is seen at.
 fn pixel_of(eye: vec3f) -> vec2i {
     return vec2i(floor(project(camera, eye))) + vec2i(camera.corner);
@@ -256,6 +276,33 @@ struct Water {
     slope_variance: f32,
 }
 
+// That water scatters which lets `clear` of what is behind it through.
+fn body_light(position: vec3f, normal: vec3f, clear: vec3f) -> vec3f {
+    return diffuse_light(position, normal) * deep_albedo() * (1.0 - clear);
+}
+
+// Light of a solid that a mirrored ray meets, through the water and spray that stand before it from `nearest` on, as the picture has them.
+fn behind_splash(light: vec3f, found: Surface, way: vec3f, hit: March, nearest: f32) -> vec3f {
+#ifdef DRY
+    return light;
+#else
+    let place = vec2f(vec2u(hit.at % camera.size.x, hit.at / camera.size.x)) + 0.5;
+    let z = surface[hit.at];
+    let seen = select(0.0, thickness_at(place), z > nearest && z < hit.eye.z);
+    let clear = exp(-(shading.absorption + shading.scattering) * seen);
+    var colour = light * clear + body_light(found.position, found.normal, clear);
+#ifdef SPRAY
+    let mist = spray_at(place);
+    if mist.cover > 0.0 && mist.depth > nearest && mist.depth < hit.eye.z {
+        let facing = world_direction(camera, spray_normal(place, mist.depth));
+        let position = world_from_eye(camera, hit.eye * (mist.depth / hit.eye.z));
+        colour = mix(colour, spray_radiance(position, -way, facing, mist.optical_depth), mist.cover);
+    }
+#endif
+    return colour;
+#endif
+}
+
 fn mirrored(water: Water) -> vec3f {
     var r = reflect(-water.view, water.normal);
     // A mirrored ray that dips into the water would hit its next wave; it is bent up to the horizon.
@@ -265,7 +312,8 @@ fn mirrored(water: Water) -> vec3f {
     let hit = march(start, eye_r, 0.56 * shading.extent, 14, 1.25, 1.0, 0.0);
     if hit.distance < FAR {
         let found = solid_surface(hit.at, hit.eye, -r);
-        return radiance_of(found, -r, hit.eye.z / camera.focal, 0.0);
+        let light = radiance_of(found, -r, hit.eye.z / camera.focal, 0.0);
+        return behind_splash(light, found, r, hit, water.eye.z);
     }
     return sky_radiance(r);
 }
@@ -313,7 +361,7 @@ fn transmitted(water: Water, seen: f32, backdrop: vec3f) -> Through {
     }
     let extinction = shading.absorption + shading.scattering;
     let clear = exp(-extinction * way);
-    return Through(light * clear, diffuse_light(water.position, water.normal) * deep_albedo() * (1.0 - clear));
+    return Through(light * clear, body_light(water.position, water.normal, clear));
 }
 
 // Water `z` metres along the optical axis, whose normal is `smooth_normal` but for ripples; `lost` is the mean square slope of waves that
@@ -452,8 +500,18 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     output[out] = vec2u(object, bitcast<u32>(cover));
 #else
+    var met = straight;
+    var way = direction;
+#ifndef DRY
+    if wet {
+        let bent = through_sheet(pixel, z, straight);
+        let bent_ray = eye_ray(camera, vec2f(bent) + 0.5);
+        way = normalize(world_direction(camera, bent_ray));
+        met = behind(bent, bent_ray, way);
+    }
+#endif
     // Whatever stands here: an adapter that runs both sides of a branch would come by it twice, through water and without.
-    let backdrop = behind_radiance(straight, direction);
+    let backdrop = behind_radiance(met, way);
     var colour: vec3f;
     var alpha = 1.0;
     var depth = z;
@@ -487,7 +545,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 #ifdef SPRAY
     if mist.cover > 0.0 {
         let far = mist.depth * length(ray);
-        let light = spray_radiance(camera.position + direction * far, view, mist.optical_depth);
+        let facing = world_direction(camera, spray_normal(vec2f(pixel) + 0.5, mist.depth));
+        let light = spray_radiance(camera.position + direction * far, view, facing, mist.optical_depth);
         let white = hazed(light, far, direction);
         colour = mix(colour, white, mist.cover);
         alpha = mix(alpha, 1.0, mist.cover);

@@ -4,9 +4,11 @@
 //! their mean weight says how much of the particle is spray, without a step, and which side of the threshold it was on in five frames
 //! says whether it belongs to the body, so that none changes there and back from frame to frame to frame.
 
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
+    RenderScene,
     moment::{Ids, Moment, REACH},
     neighbors::smoothstep,
     uniform::Particle,
@@ -26,38 +28,103 @@ const WHITE: f32 = 0.5;
 /// Frames before, at and after: of numbers that go to and fro from frame to frame, nothing is left.
 const OVER_TIME: [f32; 2 * REACH as usize + 1] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
 
-/// A particle's neighbours over the frames around it.
+/// How far a particle's acceleration is from gravity's, over that, where it flies and where it does not: at rest it is 1.
+const FLIGHT: [f32; 2] = [0.5, 1.0];
+
+/// A particle over the frames around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Standing {
-    /// Mean weight.
+    /// Mean weight of its neighbours.
     pub(super) weight: f32,
     /// Whether it belongs to the body.
     pub(super) is_body: bool,
+    /// Part of it that flies: that nothing but gravity moves.
+    pub(super) flight: f32,
+}
+
+/// What water falls by, and how high it would stand at rest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fall {
+    /// m/s².
+    gravity: Vec3,
+    /// Of the water's surface at rest, −g·x from the domain's least corner, m²/s².
+    level: f32,
+    seconds: f32,
+    spacing: f32,
+}
+
+impl Fall {
+    /// Of `particles` in a scene's domain, as a box that is filled to one height against gravity; solids in it take no room.
+    pub(super) fn of(scene: &RenderScene, particles: usize) -> Self {
+        let size = scene.domain.size();
+        let down = scene.gravity;
+        let filled = particles as f64 * scene.particle_spacing.powi(3) / size.element_product();
+        let lowest = (-down * size).min(DVec3::ZERO).element_sum();
+        let level = lowest + (down * size).abs().element_sum() * filled.min(1.0);
+        Self {
+            gravity: down.as_vec3(),
+            level: level as f32,
+            seconds: (1.0 / scene.frames_per_second) as f32,
+            spacing: scene.particle_spacing as f32,
+        }
+    }
+
+    /// Part of a particle that flies, by its velocities at both ends of so many frames.
+    fn flight(&self, [before, after]: [[f32; 3]; 2], frames: usize) -> f32 {
+        let pull = self.gravity.length();
+        if frames == 0 || pull == 0.0 {
+            return 0.0;
+        }
+        let acceleration =
+            (Vec3::from(after) - Vec3::from(before)) / (self.seconds * frames as f32);
+        1.0 - smoothstep(
+            FLIGHT[0],
+            FLIGHT[1],
+            (acceleration - self.gravity).length() / pull,
+        )
+    }
+
+    /// Speed with which water that flies passes the height at which it would be at rest (Torricelli); below it and at rest its own.
+    fn speed(&self, particle: &Particle, flight: f32) -> f32 {
+        let above = -self.gravity.dot(particle.position.into()) - self.level;
+        let own = Vec3::from(particle.velocity).length_squared();
+        (own + 2.0 * flight * above.max(0.0)).sqrt()
+    }
 }
 
 /// Of each particle of a frame. Where a frame is missing, or a particle is not in it, the next one towards the frame itself stands for
 /// it.
-pub(super) fn standing(moment: &Moment<'_>, spacing: f32) -> Vec<Standing> {
-    let own = moment.water.weights(spacing);
+pub(super) fn standing(moment: &Moment<'_>, fall: &Fall) -> Vec<Standing> {
+    let own = moment.water.weights(fall.spacing);
     let ids = Ids::of(&moment.water.particles);
     let around = moment.around.map(|water| {
         let water = water?;
-        Some((Ids::of(&water.particles), water.weights(spacing)))
+        let particles = &water.particles;
+        Some((
+            Ids::of(particles),
+            water.weights(fall.spacing),
+            &particles.velocity,
+        ))
     });
     (0..own.len())
         .into_par_iter()
         .map(|index| {
             let id = ids.id(index);
-            let in_frame = |k: usize| {
-                let (ids, weights) = around[k].as_ref()?;
-                Some(weights[ids.find(id)?])
+            let here = (own[index], moment.water.particles.velocity[index], 0);
+            let or = |k: usize, near: (f32, [f32; 3], usize)| {
+                let found = around[k].as_ref().and_then(|(ids, weights, velocities)| {
+                    let place = ids.find(id)?;
+                    Some((weights[place], velocities[place], near.2 + 1))
+                });
+                found.unwrap_or(near)
             };
-            let here = own[index];
-            let before = in_frame(1).unwrap_or(here);
-            let after = in_frame(2).unwrap_or(here);
-            let first = in_frame(0).unwrap_or(before);
-            let last = in_frame(3).unwrap_or(after);
-            over_time([first, before, here, after, last])
+            let [before, after] = [or(1, here), or(2, here)];
+            let [first, last] = [or(0, before), or(3, after)];
+            let weights = [first, before, here, after, last].map(|it| it.0);
+            Standing {
+                flight: fall.flight([first.1, last.1], first.2 + last.2),
+                ..over_time(weights)
+            }
         })
         .collect()
 }
@@ -74,17 +141,26 @@ fn over_time(weights: [f32; 5]) -> Standing {
         .zip(OVER_TIME)
         .map(|(w, part)| w * part)
         .sum();
-    Standing { weight, is_body }
+    Standing {
+        weight,
+        is_body,
+        flight: 0.0,
+    }
 }
 
 /// Gives particles their air, the radius of what of them belongs to the surface, and tag bit 0: cleared for those that were thrown
-/// clear. Air at the surface grows from the look's speed to twice that.
-pub(super) fn classify(particles: &mut [Particle], standing: &[Standing], look: &SpraySpec) {
+/// clear. Air at the surface grows from the look's speed to twice that. Water that flies counts as fast as it was thrown: it was torn then,
+/// and slows down as it rises without its air.
+pub(super) fn classify(
+    particles: &mut [Particle],
+    standing: &[Standing],
+    look: &SpraySpec,
+    fall: &Fall,
+) {
     let onset = look.speed_m_per_s as f32;
     (particles.par_iter_mut().zip(standing)).for_each(|(particle, standing)| {
         let weight = standing.weight;
-        let [x, y, z] = particle.velocity;
-        let speed = (x * x + y * y + z * z).sqrt();
+        let speed = fall.speed(particle, standing.flight);
         let open = 1.0 - smoothstep(SPRAY_BELOW, SURFACE_BELOW, weight);
         // A film at rest has as few neighbours as a shred in flight: without speed, none of them whitens.
         let shred = 1.0 - smoothstep(SPRAY_BELOW, 2.0 * SPRAY_BELOW, weight);
@@ -204,6 +280,7 @@ mod tests {
             density_per_metre: 1.0,
             speed_m_per_s: 3.0,
         };
+        let fall = still(0.1);
         let water = Water::new(Particles {
             position: particles.iter().map(|p| p.position).collect(),
             velocity: particles.iter().map(|p| p.velocity).collect(),
@@ -211,8 +288,8 @@ mod tests {
             ..Particles::default()
         });
         let white = Particles::default();
-        let standing = standing(&Moment::alone(&water, &white), 0.1);
-        classify(&mut particles, &standing, &look);
+        let standing = standing(&Moment::alone(&water, &white), &fall);
+        classify(&mut particles, &standing, &look, &fall);
         let drop = particles[1000];
         assert_eq!((drop.tag, drop.air >> 16), (0, 0));
         assert!((air(&drop) - THROWN).abs() < 1e-4);
@@ -224,7 +301,92 @@ mod tests {
         for particle in &mut particles {
             particle.velocity = [6.0, 0.0, 0.0];
         }
-        classify(&mut particles, &standing, &look);
+        classify(&mut particles, &standing, &look, &fall);
         assert!(air(&particles[55]) > 0.01);
+    }
+
+    fn still(spacing: f32) -> Fall {
+        Fall {
+            gravity: Vec3::new(0.0, -10.0, 0.0),
+            level: 10.0,
+            seconds: 0.05,
+            spacing,
+        }
+    }
+
+    /// Air of a shred of water, 3 m high, whose velocity has changed by so much a second over the frames around it, where all of
+    /// them are there and where none is.
+    fn air_of_a_shred(velocity: [f32; 3], acceleration: [f32; 3]) -> [f32; 2] {
+        let fall = still(0.1);
+        let position: Vec<[f32; 3]> = (0..27)
+            .map(|i| [i % 3, i / 3 % 3, i / 9].map(|x| x as f32 * 0.1))
+            .map(|[x, y, z]| [x, y + 3.0, z])
+            .collect();
+        let at_frame = |k: f32| {
+            let v = [0, 1, 2].map(|axis| velocity[axis] + k * fall.seconds * acceleration[axis]);
+            Water::new(Particles {
+                position: position.clone(),
+                velocity: vec![v; position.len()],
+                id: (0..position.len() as u32).collect(),
+                ..Particles::default()
+            })
+        };
+        let frames = [-2.0, -1.0, 0.0, 1.0, 2.0].map(at_frame);
+        let [first, before, water, after, last] = &frames;
+        let white = Particles::default();
+        let alone = Moment::alone(water, &white);
+        let around = Moment {
+            around: [first, before, after, last].map(Some),
+            ..alone
+        };
+        let look = SpraySpec {
+            density_per_metre: 1.0,
+            speed_m_per_s: 3.0,
+        };
+        [around, alone].map(|moment| {
+            let mut packed: Vec<_> = position.iter().map(|&p| at(p, 0.0)).collect();
+            for particle in &mut packed {
+                particle.velocity = velocity;
+            }
+            classify(&mut packed, &standing(&moment, &fall), &look, &fall);
+            packed.iter().map(air).sum::<f32>() / packed.len() as f32
+        })
+    }
+
+    /// Thrown water is white at the top of its flight too, where it hardly moves; a film that rests as high is clear.
+    #[test]
+    fn water_keeps_its_air_as_it_flies() {
+        let flying = [0.0, -10.0, 0.0];
+        let [top, unknown] = air_of_a_shred([0.0; 3], flying);
+        let [resting, _] = air_of_a_shred([0.0; 3], [0.0; 3]);
+        assert_eq!(resting, unknown);
+        assert!(top > resting + 0.03, "{top} {resting}");
+        // As white as where it was thrown from, 2 m below, at √(2 · 10 · 2) m/s.
+        let speed = still(0.1).speed(&at([0.0, 3.0, 0.0], 0.0), 1.0);
+        assert!((speed - 40f32.sqrt()).abs() < 1e-5, "{speed}");
+    }
+
+    /// The level is the height of a box that water fills to it, whichever way it falls.
+    #[test]
+    fn water_rests_where_its_box_is_filled_to() {
+        let scene = |gravity: DVec3| RenderScene {
+            origin: DVec3::ZERO,
+            domain: crate::domain::bounds::Bounds {
+                min: DVec3::new(-1.0, 2.0, 0.0),
+                max: DVec3::new(3.0, 4.0, 5.0),
+            },
+            solids: Vec::new(),
+            parts: Vec::new(),
+            particle_spacing: 0.5,
+            frames_per_second: 24.0,
+            gravity,
+            wave_makers: Vec::new(),
+            waves: None,
+        };
+        // 80 of 0.125 m³ fill a quarter of 40 m³: half a metre of 2, 1 m of 4.
+        let level = |gravity| Fall::of(&scene(gravity), 80).level;
+        assert!((level(DVec3::new(0.0, -10.0, 0.0)) - 5.0).abs() < 1e-5);
+        assert!((level(DVec3::new(10.0, 0.0, 0.0)) + 30.0).abs() < 1e-5);
+        assert_eq!(level(DVec3::ZERO), 0.0);
     }
 }

@@ -70,6 +70,8 @@ pub struct RenderScene {
     pub particle_spacing: f64,
     /// Frames a second, which turns the shutter and velocities into metres.
     pub frames_per_second: f64,
+    /// m/s².
+    pub gravity: DVec3,
     /// Walls that make waves, and how far inward of the domain's side each stands, metres.
     pub wave_makers: Vec<(Wall, f64)>,
     /// Waves that come in from the sea.

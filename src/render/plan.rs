@@ -258,6 +258,7 @@ mod tests {
             parts: Vec::new(),
             particle_spacing: 0.1,
             frames_per_second: 24.0,
+            gravity: DVec3::ZERO,
             wave_makers: Vec::new(),
             waves: None,
         };

@@ -135,6 +135,7 @@ mod tests {
             parts: Vec::new(),
             particle_spacing: D,
             frames_per_second: 24.0,
+            gravity: DVec3::ZERO,
             wave_makers: Vec::new(),
             waves: None,
         };

@@ -14,7 +14,7 @@ use crate::{
     gpu::{buffer::Workgroups, recording::spread},
     render::{
         Moment, RenderError,
-        aeration::{self, CLEAR},
+        aeration::{self, CLEAR, Fall},
         buffers::{
             AIRED, AIRED_GROUPS, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES,
             SPRAY_PARAMS,
@@ -51,10 +51,10 @@ impl Renderer {
     pub(super) fn load(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Loaded, RenderError> {
         let water = &moment.water.particles;
         let mut packed = self.pack(frame, water)?;
-        let spacing = self.scene.particle_spacing as f32;
         if let Some(spray) = &self.look.spec().water.spray {
-            let standing = aeration::standing(moment, spacing);
-            aeration::classify(&mut packed, &standing, spray);
+            let fall = Fall::of(&self.scene, packed.len());
+            let standing = aeration::standing(moment, &fall);
+            aeration::classify(&mut packed, &standing, spray, &fall);
         }
         let spec = self.look.spec();
         if spec.renderer.method == MethodSpec::Ssfr && self.is_under_water(frame, &packed) {

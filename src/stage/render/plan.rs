@@ -125,6 +125,7 @@ fn empty() -> RenderScene {
         parts: Vec::new(),
         particle_spacing: 1.0,
         frames_per_second: 1.0,
+        gravity: DVec3::ZERO,
         wave_makers: Vec::new(),
         waves: None,
     }

@@ -39,6 +39,7 @@ pub(super) fn render_scene(
         parts,
         particle_spacing: scene.particle_spacing(),
         frames_per_second: scene.shot.frames_per_second,
+        gravity: scene.water.gravity,
         wave_makers: plates(scene, &scene.walls_after(state, time)),
         waves: scene.effects.waves(scene.water.gravity),
     })

@@ -58,6 +58,7 @@ fn tank(spacing: f64) -> RenderScene {
         parts: Vec::new(),
         particle_spacing: spacing,
         frames_per_second: 24.0,
+        gravity: DVec3::new(0.0, -9.81, 0.0),
         wave_makers: Vec::new(),
         waves: None,
     }

@@ -96,6 +96,7 @@ pub(crate) fn city_scene() -> RenderScene {
         parts: Vec::new(),
         particle_spacing: 0.17,
         frames_per_second: 60.0,
+        gravity: DVec3::new(0.0, -9.81, 0.0),
         wave_makers: Vec::new(),
         waves: None,
     }

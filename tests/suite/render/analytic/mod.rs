@@ -14,6 +14,8 @@ mod motion;
 mod rays;
 mod ripples;
 mod sea;
+mod sheets;
+mod splash;
 mod spray;
 pub(super) mod support;
 mod surface;

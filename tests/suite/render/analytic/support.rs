@@ -293,6 +293,7 @@ pub(crate) fn scene(radius: f64, filled: f64) -> RenderScene {
         parts: Vec::new(),
         particle_spacing: radius * (filled * 4.0 / 3.0 * std::f64::consts::PI).cbrt(),
         frames_per_second: 24.0,
+        gravity: DVec3::new(0.0, -9.81, 0.0),
         wave_makers: Vec::new(),
         waves: None,
     }

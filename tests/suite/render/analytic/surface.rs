@@ -216,8 +216,8 @@ fn spray_hides_one_less_exp_of_its_optical_depth() {
     assert!(more / area > 1.01, "{more} {area}");
     let dimmer = spoiled(
         "ssfr/shade",
-        "mix(around, sky_irradiance(view), 1.0 - exp(-optical_depth)) / PI",
-        "mix(around, 1.01 * sky_irradiance(view), 1.0 - exp(-optical_depth)) / PI",
+        "mix(around, sky_irradiance(facing), 1.0 - exp(-optical_depth)) / PI",
+        "mix(around, 1.01 * sky_irradiance(facing), 1.0 - exp(-optical_depth)) / PI",
     );
     let (_, control) = spray_sums(&dimmer);
     assert!(control > 1e-3, "{control}");

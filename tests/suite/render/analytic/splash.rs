@@ -1,0 +1,73 @@
+//! What water mirrors of solids that spray stands before.
+
+use glam::DVec3;
+use swell::domain::bounds::Bounds;
+use swell::domain::whitewater::RADIUS as SIZE;
+use swell::gpu::adapter::Context;
+use swell::render::{Moment, RenderScene, Water};
+
+use super::geometry::box_mesh;
+use super::support::{ball, context, draw_moment, scene, spoiled, uniform_sky};
+use super::water::{BLACK, INDEX, RADIUS, eye_at, meetings, setup_at};
+
+const LEVEL: f64 = 2.0;
+/// The near side of a black wall, metres, and a cloud that touches it.
+const WALL: f64 = 7.0;
+const CLOUD: DVec3 = DVec3::new(WALL - 0.4, LEVEL + 0.8, 5.0);
+const CLOUD_RADIUS: f64 = 0.4;
+
+/// What black water mirrors of a cloud before a black wall under a white sky, in the mean over where it is to be seen; and of the wall
+/// beside it.
+fn mirrored(context: &Context) -> [f64; 2] {
+    let mut setup = setup_at(70.0, LEVEL, BLACK.to_owned());
+    setup.eye = eye_at(70.0, LEVEL, 256.0);
+    setup.solids = [0.0; 3];
+    setup.water += "[whitewater]\ndensity_per_metre = 40.0\n";
+    let wall = Bounds {
+        min: DVec3::new(WALL, 0.0, -5.0),
+        max: DVec3::new(WALL + 1.0, 9.0, 15.0),
+    };
+    let scene = RenderScene {
+        solids: vec![box_mesh(wall)],
+        // The walk after what is mirrored goes in steps of spacings.
+        particle_spacing: 0.1,
+        ..scene(RADIUS, 1.0)
+    };
+    let mut white = ball(CLOUD, DVec3::ZERO);
+    let radius = vec![CLOUD_RADIUS as f32];
+    white.attributes.insert(SIZE.to_owned(), radius);
+    let water = Water::new(ball(DVec3::new(5.0, LEVEL - RADIUS, 5.0), DVec3::ZERO));
+    let moment = Moment::alone(&water, &white);
+    let image = draw_moment(context, &setup, &uniform_sky, &scene, &moment, 1).unwrap();
+    let [mut cloud, mut bare] = [const { Vec::new() }; 2];
+    for (i, at) in meetings(&image, &setup.eye).iter().enumerate() {
+        let is_water = (at.position.y - LEVEL).abs() < 0.1 && at.position.x < CLOUD.x - 0.5;
+        if !is_water || at.along.y >= 0.0 {
+            continue;
+        }
+        let way = at.reflected();
+        let off = (CLOUD - at.position).cross(way).length();
+        let on_wall = at.position + way * ((WALL - at.position.x) / way.x);
+        let found = f64::from(image.beauty[i][1]) / at.reflectance(INDEX);
+        // Half of the cloud: the picture has it a little aside of where the mirrored ray passes it.
+        if off < 0.5 * CLOUD_RADIUS {
+            cloud.push(found);
+        } else if off > 2.0 * CLOUD_RADIUS && on_wall.y < 8.0 {
+            bare.push(found);
+        }
+    }
+    [cloud, bare].map(|values| {
+        assert!(values.len() >= 4, "{}", values.len());
+        values.iter().sum::<f64>() / values.len() as f64
+    })
+}
+
+#[test]
+fn what_spray_hides_is_not_mirrored() {
+    let [cloud, bare] = mirrored(&context());
+    assert!(cloud > 0.7, "{cloud}");
+    assert!(bare < 0.1, "{bare}");
+    let spoiled = spoiled("ssfr/shade", "mist.depth > nearest", "mist.depth < nearest");
+    let [cloud, _] = mirrored(&spoiled);
+    assert!(cloud < 0.1, "the control: {cloud}");
+}
