@@ -14,9 +14,9 @@ use super::{
     uniform::{Material, Triangle},
 };
 use crate::{
-    domain::mesh_file::parts::Places,
+    domain::{mesh_file::parts::Places, pose::Pose},
     gpu::texture::TextureSpec,
-    scene::look::{Look, Materials, Picture, Texture},
+    scene::look::{Look, Material as LookMaterial, Materials, Picture, Texture},
 };
 
 /// Materials that solids of a picture have, at most: a uniform of common size has room for so many.
@@ -47,6 +47,9 @@ pub(super) struct Painter<'a> {
     painted: Painted,
 }
 
+/// A material, an axis along which a face looks, and whether the other way.
+pub(super) type Side = (usize, usize, bool);
+
 /// Paints the triangles of a solid.
 pub(super) struct SolidPainter<'p, 'a> {
     painter: &'p mut Painter<'a>,
@@ -54,7 +57,7 @@ pub(super) struct SolidPainter<'p, 'a> {
     /// For each part of the mesh the look's material.
     of: Vec<Option<usize>>,
     /// Records of pictures laid on along axes, by material and side.
-    along: HashMap<(usize, usize, bool), u32>,
+    along: HashMap<Side, u32>,
 }
 
 impl<'a> Painter<'a> {
@@ -105,13 +108,14 @@ impl<'a> Painter<'a> {
     fn find<'n>(&mut self, names: impl Iterator<Item = &'n String>) -> Option<usize> {
         let mut found = None;
         for name in names {
-            let same = self.look.list.iter().position(|it| it.name == *name);
+            let mut list = self.look.list.iter();
+            let same = list.position(|it| it.name.as_ref() == Some(name));
             if let Some(index) = same {
                 self.is_named[index] = true;
                 found = found.or(same);
             }
         }
-        found
+        found.or(self.look.solids)
     }
 
     fn number(&mut self, index: usize) -> Result<u32, RenderError> {
@@ -137,6 +141,62 @@ impl<'a> Painter<'a> {
         Ok(number)
     }
 
+    /// Material and records of a face of the look's walls that looks along `axis`; `None` of one colour. `along` has the records of before.
+    pub(super) fn paint_wall(
+        &mut self,
+        corners: [DVec3; 3],
+        along: &mut HashMap<Side, u32>,
+    ) -> Result<Option<[u32; 2]>, RenderError> {
+        let Some(index) = self.look.basin else {
+            return Ok(None);
+        };
+        let paint = self.number(index)?;
+        let place = self.lay_along(index, corners, Pose::START, along);
+        Ok(Some([paint, place]))
+    }
+
+    /// The record of a material whose picture is laid on along axes, on a face of something that stands at a pose.
+    fn lay_along(
+        &mut self,
+        index: usize,
+        [a, b, c]: [DVec3; 3],
+        pose: Pose,
+        along: &mut HashMap<Side, u32>,
+    ) -> u32 {
+        let pose = pose.moved(-self.scene.domain.min);
+        // As it stood at the start.
+        let normal = pose.turn.conjugate() * (b - a).cross(c - a);
+        let size = normal.abs();
+        let axis = match () {
+            () if size.y >= size.x && size.y >= size.z => 1,
+            () if size.x >= size.z => 0,
+            () => 2,
+        };
+        let is_low = normal[axis] < 0.0;
+        if let Some(&place) = along.get(&(index, axis, is_low)) {
+            return place;
+        }
+        let texture = self.look.list[index].texture.as_ref();
+        let texture = texture.expect("only a texture is laid on");
+        let metres = texture.metres.expect("with the metres that it covers");
+        let [width, height] = self.look.pictures[texture.picture].size.map(f64::from);
+        let (right, up) = sides(axis, is_low);
+        let gradients = [right / metres, -up / (metres * height / width)];
+        // In the world, so that meshes that touch go on in one another; what moves takes its picture along.
+        let corner = self.scene.origin + self.scene.domain.min;
+        let starts = gradients.map(|it| it.dot(corner));
+        let gradients = gradients.map(|it| pose.turn * it);
+        let place = self.record(lie(gradients, starts, pose.place(DVec3::ZERO)));
+        along.insert((index, axis, is_low), place);
+        place
+    }
+
+    fn record(&mut self, lie: Triangle) -> u32 {
+        let places = &mut self.painted.places;
+        places.push(lie);
+        places.len() as u32 - 1
+    }
+
     /// What was painted. A name of the look's own that no part has is a fault, and so is a library of which none has one; not where
     /// there are no solids.
     pub(super) fn end(self) -> Result<Painted, RenderError> {
@@ -144,7 +204,8 @@ impl<'a> Painter<'a> {
             return Ok(self.painted);
         }
         let list = || self.look.list.iter().zip(&self.is_named).enumerate();
-        let unnamed = list().find(|(_, (it, named))| it.is_own && !**named);
+        let own = |it: &LookMaterial| it.is_own && it.name.is_some();
+        let unnamed = list().find(|(_, (it, named))| own(it) && !**named);
         let mut library = list().filter(|(_, (it, _))| !it.is_own).peekable();
         let first = library.peek().map(|(index, _)| *index);
         let is_idle = library.all(|(_, (_, named))| !named);
@@ -165,7 +226,7 @@ impl<'a> Painter<'a> {
                 index,
                 problem: format!(
                     "no part of the scene's solids is called {:?}; there are: {}",
-                    material.name,
+                    material.name.as_deref().unwrap_or_default(),
                     names()
                 ),
             });
@@ -194,7 +255,10 @@ impl SolidPainter<'_, '_> {
             return Ok([paint, 0]);
         };
         let place = match texture.metres {
-            Some(metres) => self.lay_along(index, texture, metres, corners),
+            Some(_) => {
+                let pose = self.solid.pose;
+                (self.painter).lay_along(index, corners, pose, &mut self.along)
+            }
             None => {
                 let places = self.solid.parts.places.get(k).copied().flatten();
                 let places = places.ok_or_else(|| RenderError::Material {
@@ -205,52 +269,11 @@ impl SolidPainter<'_, '_> {
                         self.solid.name
                     ),
                 })?;
-                self.record(lie_by(places, texture, corners))
+                let lie = lie_by(places, texture, corners);
+                self.painter.record(lie)
             }
         };
         Ok([paint, place])
-    }
-
-    fn lay_along(
-        &mut self,
-        index: usize,
-        texture: &Texture,
-        metres: f64,
-        corners: [DVec3; 3],
-    ) -> u32 {
-        let [a, b, c] = corners;
-        let pose = self.solid.pose.moved(-self.painter.scene.domain.min);
-        // As it stood at the start.
-        let normal = pose.turn.conjugate() * (b - a).cross(c - a);
-        let size = normal.abs();
-        let axis = match () {
-            () if size.y >= size.x && size.y >= size.z => 1,
-            () if size.x >= size.z => 0,
-            () => 2,
-        };
-        let is_low = normal[axis] < 0.0;
-        if let Some(&place) = self.along.get(&(index, axis, is_low)) {
-            return place;
-        }
-        let scene = self.painter.scene;
-        let [width, height] = self.painter.look.pictures[texture.picture]
-            .size
-            .map(f64::from);
-        let (right, up) = sides(axis, is_low);
-        let gradients = [right / metres, -up / (metres * height / width)];
-        // In the world, so that meshes that touch go on in one another; what moves takes its picture along.
-        let corner = scene.origin + scene.domain.min;
-        let starts = gradients.map(|it| it.dot(corner));
-        let gradients = gradients.map(|it| pose.turn * it);
-        let place = self.record(lie(gradients, starts, pose.place(DVec3::ZERO)));
-        self.along.insert((index, axis, is_low), place);
-        place
-    }
-
-    fn record(&mut self, lie: Triangle) -> u32 {
-        let places = &mut self.painter.painted.places;
-        places.push(lie);
-        places.len() as u32 - 1
     }
 }
 

@@ -1,5 +1,7 @@
 //! What is opaque: the scene's solids and wave makers, and the look's quay walls, as triangles with materials.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use super::{
@@ -45,8 +47,15 @@ impl Opaque {
                 Some(colour) => opaque.material(colour, false)?,
                 None => WALL,
             };
+            let mut along = HashMap::new();
             for [low, high] in quays(basin, size, GAP * scene.particle_spacing) {
-                opaque.add_box(low, high, material);
+                for corners in box_triangles(low, high) {
+                    let paint = match &mut painter {
+                        Some(painter) => painter.paint_wall(corners, &mut along)?,
+                        None => None,
+                    };
+                    opaque.push(corners, material, paint.unwrap_or_default());
+                }
             }
         }
         if let Some(plates) = &look.spec().wave_makers {

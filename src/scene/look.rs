@@ -330,7 +330,7 @@ fn plain(spec: &mut LookSpec) {
 
 /// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
 /// that it had before there was such a key.
-const NEWER: [&str; 19] = [
+const NEWER: [&str; 20] = [
     "whitewater: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
     "overscan: 0, ",
@@ -349,6 +349,7 @@ const NEWER: [&str; 19] = [
     "wave_makers: None, sea: None, ",
     ", materials: None, material: []",
     ", caustics: None",
+    ", laid: None",
     // Quay walls stood at these sides before others could be chosen.
     ", sides: [Wall { axis: 2, is_max: false }, Wall { axis: 2, is_max: true }], colour: None",
 ];
@@ -360,8 +361,12 @@ fn canonical(spec: &LookSpec) -> String {
     if let SkySpec::Panorama { file, .. } = &mut canonical.sky {
         *file = Path::new("").to_owned();
     }
-    let textures = canonical.solids.material.iter_mut();
-    let textures = textures.filter_map(|it| it.texture.as_mut().map(|texture| &mut texture.file));
+    let own = canonical.solids.material.iter_mut();
+    let own = own.filter_map(|it| it.texture.as_mut());
+    let basin = canonical.basin.iter_mut();
+    let laid = basin.filter_map(|it| it.laid.as_mut());
+    let textures = own.chain(&mut canonical.solids.laid).chain(laid);
+    let textures = textures.map(|texture| &mut texture.file);
     let files = canonical
         .camera
         .file

@@ -349,7 +349,20 @@ const BASIN: &[Key] = &[
     Key::choices("sides", SIDES)
         .default("[\"-z\", \"+z\"]")
         .about("at which walls stand"),
-    COLOUR.computed(|| "1.1 times the ground's".to_owned()),
+    COLOUR.computed(|| "1.1 times the ground's, white under a texture".to_owned()),
+    LAID,
+];
+
+/// A texture of what has no coordinates for one.
+const LAID: Key = Key::table("texture", LAID_TEXTURE)
+    .absent()
+    .about("A picture on what of them has no material, multiplied by `colour`");
+
+const LAID_TEXTURE: &[Key] = &[
+    Key::text("file", "a PNG file, relative to the look file").about("sRGB picture, repeated"),
+    Key::number("metres", SIZE)
+        .unit("metres")
+        .about("what one picture covers, laid on along the axis that a face looks along most"),
 ];
 
 const SIDES: &[&str] = &["-x", "+x", "-z", "+z"];
@@ -418,6 +431,7 @@ const SOLIDS: &[Key] = &[
         .about("colours (Kd) and textures (map_Kd) of the meshes' parts, by the names of their materials (usemtl), groups or objects"),
     Key::tables("material", MATERIAL)
         .about("Materials of parts of the scene's meshes, before those of `materials`"),
+    LAID,
 ];
 
 const MATERIAL: &[Key] = &[

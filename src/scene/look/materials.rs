@@ -9,7 +9,7 @@ use std::{
 use super::{
     Look, LookError,
     mtl::{self, Entry},
-    spec::{LookSpec, MaterialSpec},
+    spec::{LookSpec, MaterialSpec, TextureSpec},
 };
 use crate::scene::{Fault, document::Document, error::SceneError};
 
@@ -27,6 +27,10 @@ const MOST_TEXELS: u64 = 24_000_000;
 pub struct Materials {
     /// Those of `[[solids.material]]`, then those of the library.
     pub list: Vec<Material>,
+    /// Number in `list` of what solids without a material have; `None` of one colour.
+    pub solids: Option<usize>,
+    /// The same of the walls of `[basin]`.
+    pub basin: Option<usize>,
     /// Each once, whichever materials use it.
     pub pictures: Vec<Picture>,
     /// BLAKE3 of the library, where there is one.
@@ -38,8 +42,8 @@ pub struct Materials {
 /// How a part of a solid looks.
 #[derive(Clone, Debug)]
 pub struct Material {
-    /// Of the parts, or of the mesh file without its ending.
-    pub name: String,
+    /// Of the parts, or of the mesh file without its ending; `None` of what lies on all that has no other.
+    pub name: Option<String>,
     /// Reflectance, linear red, green, blue; the texture's is multiplied by it.
     pub colour: [f64; 3],
     /// `None` of one colour.
@@ -129,7 +133,10 @@ impl Materials {
         file: &Path,
     ) -> Result<Option<Arc<Self>>, SceneError> {
         let solids = &spec.solids;
-        if solids.materials.is_none() && solids.material.is_empty() {
+        let walls = spec.basin.as_ref();
+        let on_walls = walls.and_then(|it| Some((it.laid.as_ref()?, it.colour)));
+        let is_named = solids.materials.is_some() || !solids.material.is_empty();
+        if !is_named && solids.laid.is_none() && on_walls.is_none() {
             return Ok(None);
         }
         let folder = file.parent().unwrap_or(Path::new("."));
@@ -140,7 +147,7 @@ impl Materials {
         };
         for (index, material) in solids.material.iter().enumerate() {
             let key = format!("solids.material[{index}]");
-            let is_same = |it: &Material| it.name == material.name;
+            let is_same = |it: &Material| it.name.as_ref() == Some(&material.name);
             if reader.all.list.iter().any(is_same) {
                 let problem = format!("{:?} stands twice", material.name);
                 return Err(doc.fault_of(&format!("{key}.name"), problem));
@@ -149,6 +156,13 @@ impl Materials {
         }
         if let Some(name) = &solids.materials {
             reader.library(name)?;
+        }
+        if let Some(texture) = &solids.laid {
+            reader.all.solids = Some(reader.laid("solids", texture, solids.colour, true)?);
+        }
+        if let Some((texture, colour)) = on_walls {
+            let colour = colour.unwrap_or([1.0; 3]);
+            reader.all.basin = Some(reader.laid("basin", texture, colour, false)?);
         }
         Ok(Some(Arc::new(reader.all)))
     }
@@ -168,19 +182,13 @@ impl Reader<'_, '_> {
         material: &MaterialSpec,
         solids: [f64; 3],
     ) -> Result<(), SceneError> {
-        let mut texture = None;
-        if let Some(spec) = &material.texture {
-            let key = format!("{key}.texture.file");
-            texture = Some(Texture {
-                picture: self.picture(&key, &spec.file, "")?,
-                metres: spec.metres,
-                scale: [1.0; 2],
-                offset: [0.0; 2],
-            });
-        }
+        let texture = match &material.texture {
+            Some(spec) => Some(self.texture(key, spec)?),
+            None => None,
+        };
         let default = if texture.is_some() { [1.0; 3] } else { solids };
         self.all.list.push(Material {
-            name: material.name.clone(),
+            name: Some(material.name.clone()),
             colour: material.colour.unwrap_or(default),
             texture,
             windows: material.windows,
@@ -188,6 +196,35 @@ impl Reader<'_, '_> {
             place: self.doc.place_of(&format!("{key}.name")),
         });
         Ok(())
+    }
+
+    fn texture(&mut self, key: &str, spec: &TextureSpec) -> Result<Texture, SceneError> {
+        Ok(Texture {
+            picture: self.picture(&format!("{key}.texture.file"), &spec.file, "")?,
+            metres: spec.metres,
+            scale: [1.0; 2],
+            offset: [0.0; 2],
+        })
+    }
+
+    /// What lies on all of a table that has no other material.
+    fn laid(
+        &mut self,
+        key: &str,
+        spec: &TextureSpec,
+        colour: [f64; 3],
+        windows: bool,
+    ) -> Result<usize, SceneError> {
+        let texture = Some(self.texture(key, spec)?);
+        self.all.list.push(Material {
+            name: None,
+            colour,
+            texture,
+            windows,
+            is_own: true,
+            place: self.doc.place_of(&format!("{key}.texture")),
+        });
+        Ok(self.all.list.len() - 1)
     }
 
     /// Those of a library whose names are not yet taken.
@@ -221,7 +258,7 @@ impl Reader<'_, '_> {
         let mut place = self.doc.place_of(LIBRARY);
         place.message = format!("{} line {}", library.display(), entry.line);
         self.all.list.push(Material {
-            name: entry.name,
+            name: Some(entry.name),
             colour: entry.colour,
             texture,
             windows: true,

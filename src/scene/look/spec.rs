@@ -303,8 +303,11 @@ pub struct BasinSpec {
     pub thickness_m: f64,
     /// Where they stand.
     pub sides: Vec<Wall>,
-    /// Reflectance, linear red, green, blue; 1.1 times the ground's where left out.
+    /// Reflectance, linear red, green, blue; 1.1 times the ground's where left out, white under a texture.
     pub colour: Option<[f64; 3]>,
+    /// A picture on them, laid on along axes.
+    #[serde(rename = "texture")]
+    pub laid: Option<TextureSpec>,
 }
 
 /// The scene's wave makers, as plates.
@@ -364,6 +367,9 @@ pub struct SolidsSpec {
     /// Materials of the look's own.
     #[serde(default)]
     pub material: Vec<MaterialSpec>,
+    /// A picture on what has no material, laid on along axes.
+    #[serde(rename = "texture")]
+    pub laid: Option<TextureSpec>,
 }
 
 /// How a part of a solid looks.

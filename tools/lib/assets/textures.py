@@ -99,13 +99,14 @@ def sand():
 
 
 def plaster():
-    """A rendered wall, a little uneven, with run marks."""
-    body, fine, run = layers(100, 3, 4), layers(110, 32, 3), noise(120, 48, 2)
+    """A rendered wall that has weathered: patches of other tones, run marks, a little unevenness."""
+    patch, body, fine, run = layers(130, 4, 3), layers(100, 6, 4), layers(110, 32, 3), noise(120, 48, 2)
 
     def value(x, y):
-        return 0.38 + 0.30 * body(x, y) + 0.14 * fine(x, y) + 0.12 * run(x, y)
+        tone = 1.5 * (patch(x, y) - 0.5) + 0.7 * (body(x, y) - 0.5) + 0.22 * (run(x, y) - 0.5)
+        return 0.5 + 0.8 * tone + 0.16 * (fine(x, y) - 0.5)
 
-    return picture(value), ((120, 112, 102), (206, 196, 180), (236, 228, 214))
+    return picture(value), ((98, 88, 76), (196, 184, 166), (240, 232, 218))
 
 
 def to_png(rows, colours):

@@ -294,11 +294,18 @@ fn a_picture_is_laid_on_along_axes() {
     for face in &FACES {
         let scene = of_text(&face.text());
         let place = |p: DVec3| DVec2::new(p.dot(face.right), p.dot(face.up)) / WIDTH;
-        for (method, pass) in METHODS {
+        let named =
+            "[[solids.material]]\nname = \"face\"\ntexture = { file = \"a.png\", metres = 4.0 }";
+        // On all that has no material.
+        let on_all = "texture = { file = \"a.png\", metres = 4.0 }";
+        for ((method, pass), solids) in METHODS
+            .into_iter()
+            .flat_map(|it| [(it, named), (it, on_all)])
+        {
             let shown = Shown {
                 eye: face.eye(),
                 method,
-                solids: "[[solids.material]]\nname = \"face\"\ntexture = { file = \"a.png\", metres = 4.0 }",
+                solids,
                 files: &files,
                 scene: &scene,
             };
@@ -311,6 +318,53 @@ fn a_picture_is_laid_on_along_axes() {
             let off = error(&spoiled(pass, MIRRORED.0, MIRRORED.1));
             assert!(off > 0.5, "{method}, the control: {off}");
         }
+    }
+}
+
+/// A wall of the basin has its picture as a solid has, times its colour.
+#[test]
+fn a_picture_is_laid_on_walls() {
+    let files = [("a.png", png(4, code))];
+    let scene = scene(1.0, 1.0);
+    let eye = Eye::new([5.0, 5.0, 4.0], [5.0, 5.0, 0.0], 64.0);
+    // The wall stands a little outside of the domain's side.
+    let far = 4.0 + 0.006 * scene.particle_spacing;
+    let all = |half: f64| {
+        let places = (0..64 * 64).map(|i| {
+            let direction = eye.direction(i);
+            eye.position + direction * (far / -direction.z)
+        });
+        let colours: Vec<_> = places
+            .map(|p| expected(DVec2::new(p.x, p.y) / 4.0).map(|c| half * c))
+            .collect();
+        colours.into_iter()
+    };
+    for (method, pass) in METHODS {
+        let picture = |lines: &str, context: &Context| {
+            let solids = format!("[basin]\nheight_m = 10.0\nsides = [\"-z\"]\n{lines}");
+            let shown = Shown {
+                eye,
+                method,
+                solids: &solids,
+                files: &files,
+                scene: &scene,
+            };
+            shown.image(context).unwrap().beauty
+        };
+        let white = picture("colour = [1.0, 1.0, 1.0]", &context());
+        let found = |context: &Context| {
+            let lines = "colour = [0.5, 0.5, 0.5]\ntexture = { file = \"a.png\", metres = 4.0 }";
+            let own = picture(lines, context);
+            let pairs = own.iter().zip(&white);
+            let part = |(a, b): (&[f32; 4], &[f32; 4])| {
+                [0, 1, 2].map(|c: usize| f64::from(a[c]) / f64::from(b[c]))
+            };
+            pairs.map(part).collect::<Vec<_>>()
+        };
+        let off = worst(&found(&context()), all(0.5));
+        assert!(off < HALF + PLACES, "{method}: {off}");
+        let off = worst(&found(&spoiled(pass, MIRRORED.0, MIRRORED.1)), all(0.5));
+        assert!(off > 0.2, "{method}, the control: {off}");
     }
 }
 
