@@ -317,7 +317,7 @@ impl Finder<'_> {
         let velocity = traced.read(VELOCITY, self.state.len())?;
         let state = Particles {
             position: self.positions(traced)?,
-            velocity: velocity,
+            velocity,
             ..Particles::default()
         };
         let report = self.scene.report(&state, [].into_iter());

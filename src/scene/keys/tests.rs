@@ -255,7 +255,18 @@ fn hashes_of_what_ships_are_those_of_the_caches_that_there_are() {
         let scene = Scene::load(&scenes.join(name).with_extension("toml"), &set).expect(name);
         assert_eq!(physics_hash(&scene), hash, "{name} {method}");
     }
-    // Of the looks as they were, before their spray was made denser: keys that came since are left out where they are as if they were not.
+    // Of the looks as they were, before their spray was made denser and walls and houses had textures: keys that came since are left out where
+    // they are as if they were not.
+    let bare = |text: &str| {
+        let is_new = |line: &&str| {
+            line.starts_with("texture = ") || line.starts_with("colour = [0.85, 0.83, 0.80]")
+        };
+        let kept: Vec<&str> = text.lines().filter(|line| !is_new(line)).collect();
+        let white = "[solids]\ncolour = [1.0, 1.0, 1.0]";
+        let text = kept.join("\n");
+        assert!(text.contains(white));
+        text.replace(white, "[solids]\ncolour = [0.62, 0.57, 0.50]")
+    };
     for (name, density, hash) in [
         (
             "day",
@@ -273,7 +284,7 @@ fn hashes_of_what_ships_are_those_of_the_caches_that_there_are() {
         let [from, to] = [density, "9.0"].map(|density| format!("density_per_metre = {density}"));
         assert!(text.contains(&from), "{name}");
         let hash_of = |text: &str| look::Look::parse(text, &file).expect(name).hash();
-        assert_eq!(hash_of(&text.replace(&from, &to)), hash, "{name}");
+        assert_eq!(hash_of(&bare(&text).replace(&from, &to)), hash, "{name}");
         assert_ne!(hash_of(&text), hash, "{name}, the control");
     }
 }

@@ -47,8 +47,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/reorder",
-        "= position[source]",
-        "= position[source] * 1.000001",
+        "sorted_position[i] = x",
+        "sorted_position[i] = packed(1.000001 * three(x))",
         "flip/reorder",
         &["position"],
     ),

@@ -215,7 +215,9 @@ pub const PBF: &[Control] = &[
         "vec4f(1.000001 * x, 0.0)",
         "pbf/update_velocity",
         &["position for neighbours"],
-    ),
+    )
+    // It reads neighbours' places there, and its own particle's where the cache has it.
+    .and(&["effects/viscosity_gather"]),
     control(
         "pbf/update_velocity",
         "* params.inverse_time_step;",
@@ -260,8 +262,8 @@ pub const PBF: &[Control] = &[
     ),
     control(
         "effects/viscosity_apply",
-        "+=",
-        "-=",
+        "+ three(viscosity_change[i])",
+        "- three(viscosity_change[i])",
         "effects/viscosity_apply",
         &["velocity"],
     ),
