@@ -12,7 +12,8 @@ use crate::{
         boundary::Boundary,
         budget::Breach,
         particles::Particles,
-        pbf::chebyshev_factors,
+        pbf::{LISTED, chebyshev_factors},
+        period::Period,
         probe::fitted,
         solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
     },
@@ -68,7 +69,11 @@ impl Sorted {
                 points: &points,
                 particles: order.len(),
             };
-            Neighbors::search(&crowd, model.calibration.support_radius)
+            let reach = match model.period() == Period::default() {
+                true => LISTED,
+                false => 1.0,
+            };
+            Neighbors::search(&crowd, reach * model.calibration.support_radius)
         });
         Self {
             lambda_sum: vec![0.0; order.len()],
