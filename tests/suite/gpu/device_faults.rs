@@ -140,6 +140,52 @@ fn small_bindings_split_the_lists_and_give_the_same_bytes() {
     assert_eq!(job.hash("whole"), job.hash("small"));
 }
 
+/// Places that no binding holds whole stand in two, and vectors of particles, which take three quarters of a place, in one.
+#[test]
+fn places_in_two_bindings_give_the_same_bytes() {
+    let job = Job::new();
+    let alone = |cache: &str, context: &Context| {
+        let mut request = request(&job, "pbf", cache, context);
+        let set = [
+            "solver.method=pbf",
+            "solver.pbf.particle_spacing=0.025",
+            "shot.frames=2",
+        ];
+        request.scene = Scene::load(&job.path("small.toml"), &set.map(str::to_owned)).unwrap();
+        request.scene.solver.pbf.as_mut().unwrap().grid_projection = false;
+        request
+    };
+    let whole = Context::open(None).unwrap();
+    let request = alone("whole", &whole);
+    let start = swell::stage::prepare::Start::of(&request.scene).unwrap();
+    run(&request).unwrap();
+    let binding = (14 * start.particles.len() as u64).next_multiple_of(256);
+    let small = Context::open_lowered(None, Needs::default(), |limits| {
+        limits.max_storage_buffer_binding_size = binding;
+    })
+    .unwrap();
+    let page = |context: &Context| {
+        let plan = start.plan(&request.scene, swell::solve::plan::device_limits(context));
+        assert!(plan.has_lists);
+        plan.page
+    };
+    assert_eq!(page(&whole), None);
+    assert_eq!(page(&small), Some((binding / 16) as usize));
+    run(&alone("small", &small)).unwrap();
+    assert_eq!(job.hash("whole"), job.hash("small"));
+    // Negative control: places behind the page that are read one beside.
+    let mut spoiled = small.clone();
+    spoiled.spoil = Some(Spoil {
+        pass: "pbf/compute_delta",
+        from: "predicted_high[j - PAGE]",
+        to: "predicted_high[(j - PAGE) ^ 1u]",
+    });
+    let result = run(&alone("spoiled", &spoiled));
+    if result.is_ok() {
+        assert_ne!(job.hash("whole"), job.hash("spoiled"), "the control");
+    }
+}
+
 /// What cannot be split is refused with the figures, and nothing is written.
 #[test]
 fn what_no_buffer_holds_is_refused_before_the_bake() {

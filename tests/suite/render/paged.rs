@@ -8,13 +8,13 @@ use swell::{
 
 use super::pictures::{OBLIQUE, harbour};
 
-/// Bytes of the largest binding: 1024 particles, whose ways take 64 bytes each.
-const BINDING: u64 = 65_536;
+/// Bytes of the largest binding: 1536 particles, whose ways take 64 bytes each, and the picture's depths.
+const BINDING: u64 = 98_304;
 
 fn picture(context: &Context) -> Image {
     let look = Look::parse(OBLIQUE, std::path::Path::new("paged.toml")).unwrap();
     let (scene, water) = harbour();
-    assert!(water.len() > 2 * 1024, "{}", water.len());
+    assert!(water.len() > 1536, "{}", water.len());
     let mut renderer = Renderer::new(context, &look, &scene).unwrap();
     renderer.render(3, &water).unwrap()
 }

@@ -318,7 +318,7 @@ fn a_plan_that_parts_from_its_commands_is_seen() {
         "cell_kind holds",
     );
     said(
-        &of("position", |row| row.spec.element.bytes = 12),
+        &of("position", |row| row.spec.element.bytes = 16),
         "position holds",
     );
     said(
@@ -355,7 +355,9 @@ fn what_is_watched_is_written() {
     let is_watchable = |plan: &Plan, row: &PlannedBuffer| {
         let mut bindings = reflections(plan).into_values().flat_map(|r| r.bindings);
         let is_written = bindings.any(|b| b.name == row.spec.name && b.access == Access::ReadWrite);
-        is_written && (row.spec.element.scalar, row.spec.element.bytes) == (Scalar::F32, 4)
+        // Numbers, or vectors of three.
+        let element = &row.spec.element;
+        is_written && element.scalar == Scalar::F32 && [4, 12].contains(&element.bytes)
     };
     let mut watched = BTreeSet::new();
     for case in cases() {

@@ -249,15 +249,24 @@ fn a_scene_that_does_not_name_it_has_none_of_it() {
     let (with, bare) = (plan(&scene), plan(&without(&scene)));
     assert!(bare.projection.is_none());
     assert!(with.projection.is_some());
+    // Beside the projection's own: which particles it took for drops, before and after a sort.
+    let flags = |plan: &Plan| -> u64 {
+        let names = ["is_drop", "sorted_is_drop"];
+        let found = plan
+            .buffers
+            .iter()
+            .filter(|row| names.contains(&row.spec.name.as_str()));
+        found.map(|row| row.spec.bytes).sum()
+    };
     assert_eq!(
-        bare.bytes().0,
-        Plan {
-            projection: None,
-            ..with.clone()
-        }
-        .bytes()
-        .0
+        (flags(&bare), flags(&with)),
+        (0, 2 * 4 * particles.len() as u64)
     );
+    let alone = Plan {
+        projection: None,
+        ..with.clone()
+    };
+    assert_eq!(bare.bytes().0, alone.bytes().0 - flags(&with));
     let passes = |plan: &Plan| plan.parts().map(|part| part.passes.len()).sum::<usize>();
     assert!(passes(&with) > passes(&bare) + 20);
     let ran = on_gpu(&without(&scene), &particles).recorded_passes();

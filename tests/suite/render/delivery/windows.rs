@@ -67,8 +67,9 @@ fn pixels_of_a_crop_are_those_of_the_whole_picture() {
     }
 }
 
-/// With rays every bit; with splats, wherever neither smoothing nor a mirrored ray nor what is seen through a sheet reaches past the
-/// frame's margin: here nothing is smoothed, nothing that is opaque is mirrored, and sheets do not bend.
+/// With rays every bit; with splats, wherever neither smoothing, a mirrored ray, what is seen through a sheet nor the way that spray
+/// faces reaches past the frame's margin: here nothing is
+/// smoothed, nothing that is opaque is mirrored, sheets do not bend, and spray has no sides.
 #[test]
 fn pixels_within_overscan_are_those_of_the_plain_picture() {
     for method in METHODS {
@@ -94,7 +95,8 @@ fn pixels_within_overscan_are_those_of_the_plain_picture() {
             }
             let mut context = context();
             if method == "ssfr" {
-                context = spoiled("ssfr/shade", "p + slope", "p + 0.0 * slope");
+                let slopes = "* camera.focal / (4.0 * h * z)";
+                context = spoiled("ssfr/shade", slopes, "* 0.0 / (4.0 * h * z)");
             }
             super::draw(&context, &text, &scene, &water)
         };
