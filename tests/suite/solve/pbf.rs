@@ -458,7 +458,7 @@ fn only_what_the_scene_calls_for() {
         ["effects/viscosity_apply", "effects/viscosity_gather"]
     );
     assert_eq!(added(&names(&viscous).1, &buffers), ["viscosity_change"]);
-    assert_eq!(viscous.bytes().0 - bare.bytes().0, 16 * 125);
+    assert_eq!(viscous.bytes().0 - bare.bytes().0, 12 * 125);
 
     scene.effects.vorticity_confinement =
         Some(effects::vorticity_confinement::Settings { strength: 1.0 });
