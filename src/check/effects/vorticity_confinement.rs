@@ -20,7 +20,10 @@ use crate::{
         flip::{grid_confinement, grid_curl},
         pbf::effects::vorticity_confinement::{vorticity_curl, vorticity_force},
     },
-    solve::{effects::vorticity_confinement::{VORTICITY, VORTICITY_LENGTH}, flip, pbf},
+    solve::{
+        effects::vorticity_confinement::{VORTICITY, VORTICITY_LENGTH},
+        flip, pbf,
+    },
 };
 
 bounds! {
