@@ -25,7 +25,7 @@ use super::{
 };
 
 /// Particles of a list block, as in shared/neighbor_list.wgsl.
-const STRIDE: usize = 128;
+const STRIDE: usize = 512;
 
 /// The lists of a substep, chunk by chunk.
 pub(super) struct Lists {
@@ -188,7 +188,8 @@ pub(super) fn build_neighbors(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let counts = io.after.get(buffers::NEIGHBOR_COUNT, n)?;
     let member = |local: usize, k: usize| {
         let lane = local % STRIDE;
-        let base = local / STRIDE * STRIDE * (capacity / 4) + (lane >> 1) + ((lane & 1) << 6);
+        let base =
+            local / STRIDE * STRIDE * (capacity / 4) + (lane >> 1) + (lane & 1) * (STRIDE / 2);
         list[4 * (base + k / 4 * STRIDE) + k % 4]
     };
     // Words of four whose last holds its entries first.

@@ -32,7 +32,7 @@ pub const LIST_CAPACITY: u32 = 48;
 pub const LIST_BUDGET: u64 = 4 << 30;
 
 /// Particles of a list block: lists are chunked in these.
-const LIST_BLOCK: usize = 128;
+const LIST_BLOCK: usize = 512;
 
 /// Fours of neighbours that a list holds.
 const LIST_FOURS: usize = LIST_CAPACITY as usize / 4;

@@ -402,10 +402,14 @@ fn pbf_lists_in_chunks_and_none() {
     let (mut scene, start) = case(Method::Pbf);
     scene.effects = Effects::default();
     let limits = device_limits(&context);
+    // A block of 512 lists takes 98 304 bytes.
     let chunked = DeviceLimits {
-        binding: 30_000,
+        binding: 110_000,
         ..limits
     };
+    let mut many = start.clone();
+    many.particles = lattice([-0.01, 0.2, -0.01], [16, 5, 14], [0.9 * D; 3]);
+    jitter(&mut many.particles, 0.02 * D);
     // Without lists, and with places in two bindings.
     let none = DeviceLimits {
         binding: 3_000,
@@ -413,13 +417,14 @@ fn pbf_lists_in_chunks_and_none() {
         ..limits
     };
     let mut all = String::new();
-    for (limits, chunks, has_lists, controls) in
-        [(chunked, 3, true, CHUNKED), (none, 1, false, SEARCHED)]
-    {
+    for (limits, start, chunks, has_lists, controls) in [
+        (chunked, &many, 3, true, CHUNKED),
+        (none, &start, 1, false, SEARCHED),
+    ] {
         let plan = start.plan(&scene, limits);
         assert_eq!((plan.chunks.len(), plan.has_lists), (chunks, has_lists));
         assert_eq!(plan.page.is_some(), !has_lists);
-        let checked = |context: &Context| pbf_table(context, &scene, &start, limits);
+        let checked = |context: &Context| pbf_table(context, &scene, start, limits);
         all += &faults(&context, &checked, controls).1;
     }
     assert!(all.is_empty(), "{all}");
