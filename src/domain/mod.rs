@@ -27,6 +27,7 @@ pub mod open_waves;
 pub mod particles;
 pub mod pbf;
 pub mod period;
+pub mod places;
 pub mod poisson;
 pub mod pose;
 pub mod probe;

@@ -33,10 +33,6 @@ pub fn chebyshev_factors(spectral_radius: f64) -> impl Iterator<Item = f64> {
     .map(|(_, omega)| omega)
 }
 
-/// How far lists of neighbours reach, over h: as far as the GPU's, which are made of places in steps of h/256 where no side of the domain
-/// is joined to its opposite (shared/place.wgsl). Who is listed beyond h counts where corrections bring him within it.
-pub const LISTED: f64 = 258.0 / 256.0;
-
 #[cfg(test)]
 mod tests {
     use super::*;

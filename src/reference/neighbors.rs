@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::domain::period::Period;
+use crate::domain::{period::Period, places};
 
 /// Particles whose neighbours one task lists.
 const BLOCK: usize = 512;
@@ -148,7 +148,8 @@ impl Neighbors {
                     let run = starts[cells.start]..starts[cells.end];
                     let first = first + run.start;
                     if period == Period::default() {
-                        append_near(x, radius, &points[run], first, i, members);
+                        let is_near = |y: &DVec3| x.distance_squared(*y) < radius * radius;
+                        append_near(&points[run], first, i, members, is_near);
                     } else {
                         let near = |x: DVec3| period.shortest(x).length_squared() < radius * radius;
                         let found = run
@@ -163,6 +164,39 @@ impl Neighbors {
                 }
                 members.len() as u32
             })
+        })
+    }
+
+    /// Whom PBF's lists have (pbf/build_neighbors): particles by words for places, where these tell them, of which some are a little farther
+    /// than `h` and count once they come within it; samples on solids nearer than `h`.
+    pub fn listed_within(crowd: &Crowd<'_>, h: f64) -> Self {
+        let cells = &crowd.cells;
+        if !places::are_told(cells.dims.into_iter(), cells.period != Period::default()) {
+            return Self::search(crowd, h);
+        }
+        let (fluid, solid) = crowd.points.split_at(crowd.particles);
+        let (of_fluid, of_solid) = (cells.starts(fluid), cells.starts(solid));
+        let inverse = (1.0 / h) as f32;
+        let words: Vec<u32> = fluid
+            .par_iter()
+            .map(|x| places::word(x.as_vec3().to_array(), inverse))
+            .collect();
+        Self::listed(crowd.particles, |i, members| {
+            let (x, own) = (crowd.points[i], words[i]);
+            for cells in cells.runs(x) {
+                let run = of_fluid[cells.start]..of_fluid[cells.end];
+                let first = run.start;
+                let is_near = |&word: &u32| places::are_near(own, word);
+                append_near(&words[run], first, i, members, is_near);
+            }
+            let middle = members.len() as u32;
+            for cells in cells.runs(x) {
+                let run = of_solid[cells.start]..of_solid[cells.end];
+                let first = crowd.particles + run.start;
+                let is_near = |y: &DVec3| x.distance_squared(*y) < h * h;
+                append_near(&solid[run], first, i, members, is_near);
+            }
+            [middle, members.len() as u32]
         })
     }
 
@@ -228,24 +262,23 @@ impl Neighbors {
     }
 }
 
-/// Appends which of a run of points, the first of them `first`, are near `x`, which is point `own`.
+/// Appends which of a run of points, the first of them `first`, are near point `own`.
 ///
-/// Without a branch on the distance: six of seven candidates are too far, at no time that can be foretold.
+/// Without a branch on that: six of seven candidates are too far, at no time that can be foretold.
 #[inline]
-fn append_near(
-    x: DVec3,
-    radius: f64,
-    run: &[DVec3],
+fn append_near<T>(
+    run: &[T],
     first: usize,
     own: usize,
     members: &mut Vec<u32>,
+    is_near: impl Fn(&T) -> bool,
 ) {
     let begin = members.len();
     members.resize(begin + run.len(), 0);
     let mut end = begin;
-    for (j, &other) in (first..).zip(run) {
+    for (j, other) in (first..).zip(run) {
         members[end] = j as u32;
-        end += usize::from((x.distance_squared(other) < radius * radius) & (j != own));
+        end += usize::from(is_near(other) & (j != own));
     }
     members.truncate(end);
 }

@@ -4,7 +4,7 @@
 //! buffers once, and a test holds those declared against those that the commands bind.
 
 use crate::{
-    domain::solver::PassTime,
+    domain::{places, solver::PassTime},
     gpu::{
         adapter::Context,
         program::{BufferSpec, PassSpec},
@@ -202,10 +202,10 @@ impl Plan {
         }
     }
 
-    /// Whether words tell places: their steps do not come round where a domain does, and what their products err by is
-    /// stated for so many cells from the origin (shared/place.wgsl).
+    /// Whether words tell places (shared/place.wgsl).
     pub fn has_places(&self, scene: &Scene) -> bool {
-        !scene.is_periodic() && self.grid_dims.iter().all(|&cells| cells <= 4000)
+        let dims = self.grid_dims.iter().map(|&cells| cells as usize);
+        places::are_told(dims, scene.is_periodic())
     }
 
     /// One whose buffers and passes are yet to come.

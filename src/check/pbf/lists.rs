@@ -10,6 +10,7 @@ use crate::{
         engine::{Io, Outcome},
         table::pair,
     },
+    domain::places::{SKIN, are_near},
     reference::neighbors::{Crowd, Neighbors},
     solve::{
         SolveError,
@@ -20,7 +21,6 @@ use crate::{
 
 use super::{
     PbfState, State,
-    places::{SKIN, are_near},
     rows::{NEAR_H, NEIGHBORS},
 };
 

@@ -3,7 +3,6 @@
 pub(super) mod bounds;
 mod lists;
 mod passes;
-mod places;
 mod rows;
 mod stop;
 mod whole;

@@ -8,6 +8,7 @@ use crate::{
         sort::{check_cells, check_slots},
         table::{each, pair},
     },
+    domain::places::word,
     reference::{
         neighbors::Neighbors,
         pbf::{
@@ -19,7 +20,7 @@ use crate::{
     solve::{params::Phase, pbf::buffers},
 };
 
-use super::{PbfState, State, bounds::Bounds, places::word, rows::*};
+use super::{PbfState, State, bounds::Bounds, rows::*};
 
 pub(super) fn predict(state: &mut PbfState, io: &mut Io<'_>) -> Outcome {
     let n = state.particles();
@@ -350,11 +351,13 @@ pub(super) fn update_velocity(state: &mut PbfState, io: &mut Io<'_>) -> Outcome 
     let counted = f64::from(after.capped) - f64::from(before.capped);
     io.table
         .add(&CAPPED, [pair(0, counted, count(0), [count(1)])]);
-    let places = state.places(&io.after, n)?.0;
-    let positions = io.after.vectors(buffers::POSITION, n)?;
-    io.table.each(&UPDATE_PLACE, 0..n, |i| {
-        pair(i, places[i], positions[i], [])
-    });
+    if state.scene.effects.look_at_neighbors() {
+        let places = state.places(&io.after, n)?.0;
+        let positions = io.after.vectors(buffers::POSITION, n)?;
+        io.table.each(&UPDATE_PLACE, 0..n, |i| {
+            pair(i, places[i], positions[i], [])
+        });
+    }
     let ids = io.before.get(buffers::SORTED_ID, n)?;
     io.table
         .add_exact(&UPDATE_ID, &io.after.get(buffers::ID, n)?, &ids);

@@ -12,8 +12,7 @@ use crate::{
         boundary::Boundary,
         budget::Breach,
         particles::Particles,
-        pbf::{LISTED, chebyshev_factors},
-        period::Period,
+        pbf::chebyshev_factors,
         probe::fitted,
         solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
     },
@@ -69,11 +68,7 @@ impl Sorted {
                 points: &points,
                 particles: order.len(),
             };
-            let reach = match model.period() == Period::default() {
-                true => LISTED,
-                false => 1.0,
-            };
-            Neighbors::search(&crowd, reach * model.calibration.support_radius)
+            Neighbors::listed_within(&crowd, model.calibration.support_radius)
         });
         Self {
             lambda_sum: vec![0.0; order.len()],

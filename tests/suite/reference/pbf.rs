@@ -127,17 +127,8 @@ const KINDS: [&str; 6] = [
 /// The GPU rounds positions once a pass, by half a unit in their last place; its sums of some 33 terms lie below
 /// that, for corrections are a hundredth of positions. Each pass's error then parts the solutions by no more
 /// than the same error at the start does.
-///
-/// Velocities may part by twice that: lists reach up to 1.5 % past h on the device and 0.8 % here, so that effects, which read them last, see
-/// who came within h from between the two on one side alone. Measured 1.55 times; the controls are off by a hundred times.
 fn tolerance(sensitivity: [f64; 4], passes: usize) -> [f64; 4] {
-    let rounding = sensitivity.map(|gap| gap * passes as f64);
-    [
-        rounding[0],
-        rounding[1],
-        2.0 * rounding[2],
-        2.0 * rounding[3],
-    ]
+    sensitivity.map(|gap| gap * passes as f64)
 }
 
 fn is_within(gap: [f64; 4], tolerance: [f64; 4]) -> bool {
