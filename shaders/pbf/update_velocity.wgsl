@@ -2,7 +2,11 @@
 // algorithm 1, lines 20–23) without its cancellation, which costs a free particle at 90 m 0.4 mm/s a step in
 // f32. A particle faster than the cap is slowed and counted, and its position follows.
 #import "shared/thread.wgsl"
+#ifdef NEIGHBOR_EFFECTS
 #import "shared/predicted_written.wgsl"
+#else
+#import "shared/predicted.wgsl"
+#endif
 #import "shared/vector.wgsl"
 #import "shared/pbf_params.wgsl"
 #import "shared/counters.wgsl"
@@ -49,8 +53,10 @@ fn main(
     x = wrapped_place(x);
 #endif
     position[thread] = packed(x);
-    // What effects read neighbours' places from.
+#ifdef NEIGHBOR_EFFECTS
+    // What they read neighbours' places from.
     set_predicted(thread, vec4f(x, 0.0));
+#endif
     velocity[thread] = packed(v);
     id[thread] = sorted_id[thread];
 }

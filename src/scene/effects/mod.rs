@@ -152,6 +152,12 @@ macro_rules! effects {
         }
 
         impl Effects {
+            /// Whether one looks at PBF's neighbours, at the places that the velocity update leaves.
+            pub fn look_at_neighbors(&self) -> bool {
+                let xsph = self.viscosity.as_ref().and_then(|it| it.xsph);
+                xsph.is_some() || self.vorticity_confinement.is_some() || self.drag.is_some()
+            }
+
             /// Keys of all effects.
             pub const NAMES: &[&str] = &[$(stringify!($name)),+];
 

@@ -153,6 +153,7 @@ fn own(name: &'static str, scene: &Scene) -> PassSpec {
     let all: &[(&str, bool)] = match name {
         "pbf/predict" => &[("WALL_WORK", scene.has_movers())],
         "pbf/compute_lambda" => &[("DENSITY", is_adaptive)],
+        "pbf/update_velocity" => &[("NEIGHBOR_EFFECTS", scene.effects.look_at_neighbors())],
         "pbf/exchange" => &[("CHEBYSHEV", pbf.iteration == Iteration::Chebyshev)],
         "pbf/compute_delta" => &[
             ("ARTIFICIAL_PRESSURE", pbf.artificial_pressure > 0.0),

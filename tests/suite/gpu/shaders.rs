@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 58] = [
+const VARIANTS: [&[&str]; 60] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -31,6 +31,8 @@ const VARIANTS: [&[&str]; 58] = [
     &["NEIGHBOR_LIST", "SOLIDS", "PRESSURE"],
     &["PROJECTED", "SOLIDS"],
     &["PAGED"],
+    &["NEIGHBOR_EFFECTS"],
+    &["NEIGHBOR_EFFECTS", "PAGED", "PROJECTED"],
     &["PAGED", "PROJECTED", "NEIGHBOR_LIST", "PLACES", "SOLIDS"],
     &["PAGED", "CHEBYSHEV", "NEIGHBOR_LIST"],
     &["CORRECTION", "PUSHED", "GHOST_FLUID"],

@@ -18,7 +18,7 @@ use swell::{
     scene::{
         Iteration, Method, Scene, Stop, Wall, WaveMaker,
         effects::{
-            absorbing_zone, drag, generation_zone, surface_tension, viscosity,
+            Effects, absorbing_zone, drag, generation_zone, surface_tension, viscosity,
             vorticity_confinement,
         },
         flip::{Precision, Preconditioner, Surface, Transfer},
@@ -202,6 +202,43 @@ fn reflections(plan: &Plan) -> BTreeMap<&'static str, Reflection> {
             (spec.name, reflect(spec.name, &text).unwrap())
         })
         .collect()
+}
+
+/// Places are written anew after the velocity update where an effect reads neighbours there, and nowhere else.
+#[test]
+fn places_are_kept_for_effects_that_read_them_alone() {
+    let all = with_effects(pbf(|_| {})).effects;
+    let mut seen = [0; 2];
+    for keep in std::iter::once("none").chain(Effects::NAMES.iter().copied()) {
+        let mut scene = pbf(|_| {});
+        let of = |name: &str| name == keep;
+        scene.effects = Effects {
+            viscosity: all.viscosity.clone().filter(|_| of("viscosity")),
+            vorticity_confinement: (all.vorticity_confinement.clone())
+                .filter(|_| of("vorticity_confinement")),
+            drag: all.drag.clone().filter(|_| of("drag")),
+            absorbing_zone: all.absorbing_zone.clone().filter(|_| of("absorbing_zone")),
+            generation_zone: all
+                .generation_zone
+                .clone()
+                .filter(|_| of("generation_zone")),
+            surface_tension: all
+                .surface_tension
+                .clone()
+                .filter(|_| of("surface_tension")),
+        };
+        let shaders = reflections(&Case::new(scene).plan());
+        let binding = |pass: &str| {
+            let bindings = &shaders[pass].bindings;
+            bindings.iter().find(|binding| binding.name == "predicted")
+        };
+        let effects = shaders.keys().filter(|pass| pass.starts_with("effects/"));
+        let is_read = effects.clone().any(|pass| binding(pass).is_some());
+        let is_written = binding("pbf/update_velocity").unwrap().is_written;
+        assert_eq!(is_read, is_written, "{keep}");
+        seen[usize::from(is_read)] += 1;
+    }
+    assert!(seen[0] >= 3 && seen[1] == 3, "{seen:?}");
 }
 
 /// Where plan, commands and shaders part: in passes and buffers, which have to be those that commands name and bind, no
