@@ -17,6 +17,9 @@
 #import "shared/ssfr_store.wgsl"
 #endif
 #endif
+#ifndef DRY
+#import "shared/ssfr_slope.wgsl"
+#endif
 #ifdef SPRAY
 #import "shared/ssfr_spray_read.wgsl"
 #import "shared/ssfr_spray_front.wgsl"
@@ -182,19 +185,20 @@ fn behind_radiance(found: Behind, direction: vec3f) -> vec3f {
 
 #ifndef DRY
 // The pixel at which the line of sight through a sheet of water meets what stands behind it. A thin prism turns light by n − 1 times its
-// angle (Born and Wolf, Principles of Optics, 4.7.2); that angle is the slope of the thickness, in the mean over two spacings, since balls
-// for particles have slopes of their own. Where what is met there stands before the sheet, it looks straight on.
+// angle (Born and Wolf, Principles of Optics, 4.7.2); that angle is the slope of the thickness. Where what is met there stands before the
+// sheet, it looks straight on.
 fn through_sheet(pixel: vec2i, z: f32, straight: Behind) -> vec2i {
     let p = vec2f(pixel) + 0.5;
-    let h = max(shading.spacing * camera.focal / z, 2.0);
+    let h = spacing_in_pixels(z);
     let a = thickness_at(p + vec2f(h, h));
     let b = thickness_at(p + vec2f(h, -h));
     let c = thickness_at(p + vec2f(-h, h));
     let d = thickness_at(p - vec2f(h, h));
-    let slope = vec2f(a + b - c - d, a + c - b - d) * camera.focal / (4.0 * h * z);
+    let slope = slope_between(a, b, c, d, h, z);
     let steep = max(length(slope), 1e-6);
     let turn = tan((shading.index - 1.0) * atan(steep)) * (1.0 - z / straight.depth);
-    let bent = clamp(vec2i(floor(p + slope / steep * turn * camera.focal)), vec2i(0), vec2i(camera.size) - 1);
+    let aside = vec2i(floor(0.5 + slope / steep * turn * camera.focal));
+    let bent = clamp(pixel + aside, vec2i(0), vec2i(camera.size) - 1);
     return select(bent, pixel, solid_depth[u32(bent.y) * camera.size.x + u32(bent.x)] < z);
 }
 #endif

@@ -100,8 +100,8 @@ fn a_sheet_turns_light_as_a_prism() {
     };
     assert_eq!(share(&context()), 0.0);
     // The controls: straight on, the other way, a quarter more.
-    for to in ["p + 0.0 * slope", "p - slope", "p + 1.25 * slope"] {
-        let wrong = share(&spoiled("ssfr/shade", "p + slope", to));
+    for to in ["0.5 + 0.0 * slope", "0.5 - slope", "0.5 + 1.25 * slope"] {
+        let wrong = share(&spoiled("ssfr/shade", "0.5 + slope", to));
         assert!(wrong > 0.5, "{to}: {wrong}");
     }
 }

@@ -7,7 +7,7 @@ use swell::render::{
 };
 use swell::scene::look::ViewSpec;
 
-use super::super::analytic::support::{context, spoiled};
+use super::super::analytic::support::context;
 use super::super::pictures::attributes;
 use super::{METHODS, Setup};
 
@@ -67,9 +67,8 @@ fn pixels_of_a_crop_are_those_of_the_whole_picture() {
     }
 }
 
-/// With rays every bit; with splats, wherever neither smoothing, a mirrored ray, what is seen through a sheet nor the way that spray
-/// faces reaches past the frame's margin: here nothing is
-/// smoothed, nothing that is opaque is mirrored, sheets do not bend, and spray has no sides.
+/// With rays every bit; with splats, wherever neither smoothing, a mirrored ray nor what is seen through a sheet reaches past the frame's
+/// margin: here nothing is smoothed, nothing that is opaque is mirrored, and no sheet bends as far.
 #[test]
 fn pixels_within_overscan_are_those_of_the_plain_picture() {
     for method in METHODS {
@@ -93,12 +92,7 @@ fn pixels_within_overscan_are_those_of_the_plain_picture() {
                 text =
                     swell::scene::look::Look::parse(&bare, std::path::Path::new("t.toml")).unwrap();
             }
-            let mut context = context();
-            if method == "ssfr" {
-                let slopes = "* camera.focal / (4.0 * h * z)";
-                context = spoiled("ssfr/shade", slopes, "* 0.0 / (4.0 * h * z)");
-            }
-            super::draw(&context, &text, &scene, &water)
+            super::draw(&context(), &text, &scene, &water)
         };
         let plain = draw("");
         // No multiple of what the frame is padded by.
