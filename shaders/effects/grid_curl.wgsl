@@ -7,7 +7,6 @@
 
 @group(0) @binding(2) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(3) var<storage, read> face_velocity: array<f32>;
-// x, y, z and the magnitude.
 @group(0) @binding(4) var<storage, read_write> vorticity: array<Vector>;
 @group(0) @binding(5) var<storage, read_write> vorticity_length: array<f32>;
 
