@@ -5,6 +5,7 @@
 mod expected;
 mod folder;
 pub mod gallery;
+mod near;
 mod pictures;
 mod plan;
 mod set;
@@ -33,7 +34,7 @@ use crate::{
         solver::PassTime,
     },
     gpu::adapter::{Context, GpuError, Needs},
-    render::{Image, Moment, REACH, RenderError, Renderer, Water, frames_around},
+    render::{Image, RenderError, Renderer},
     scene::{
         Scene, SceneError,
         look::{FormatSpec, Look, LookError},
@@ -41,9 +42,8 @@ use crate::{
 };
 
 use self::folder::{Folder, Owner, Wanted};
-use self::pictures::{
-    attributes, baked_note, is_current, name, others, pictures, whole_attributes,
-};
+use self::near::Near;
+use self::pictures::{attributes, baked_note, is_current, name, pictures, whole_attributes};
 use self::set::{render_scene, solid_names};
 use self::whitewater::Whitewater;
 use self::writing::{Drawn, Writing};
@@ -269,7 +269,7 @@ pub fn render(
         whitewater,
         scene,
         context,
-        near: BTreeMap::new(),
+        near: Near::default(),
         kept: None,
         times: BTreeMap::new(),
     };
@@ -395,7 +395,7 @@ struct Job<'a> {
     scene: Scene,
     context: Context,
     /// Frames about the last one that was drawn, so that each is read once in a row of them.
-    near: BTreeMap<u32, Arc<Water>>,
+    near: Near,
     /// Of the frame before, where it can draw another.
     kept: Option<Renderer>,
     /// What passes took so far.
@@ -520,25 +520,13 @@ impl Job<'_> {
         })))
     }
 
-    /// A frame's particles, read once in a row of frames.
-    fn water(&mut self, frame: u32) -> Result<Arc<Water>, CacheError> {
-        if let Some(water) = self.near.get(&frame) {
-            return Ok(water.clone());
-        }
-        let water = Arc::new(Water::new(self.cache.read(frame)?));
-        self.near.insert(frame, water.clone());
-        Ok(water)
-    }
-
     fn draw(&mut self, frame: u32) -> Result<Image, RenderJobError> {
         let look = &self.request.look;
-        let reach = frames_around(look);
-        self.near.retain(|&other, _| other.abs_diff(frame) <= reach);
-        let water = self.water(frame)?;
+        let around = self.near.around(&self.cache, look, frame)?;
         let mut renderer = match self.kept.take() {
             Some(renderer) => renderer,
             None => {
-                let set = render_scene(&self.scene, look, frame, &water.particles)?;
+                let set = render_scene(&self.scene, look, frame, &around.water.particles)?;
                 Renderer::new(&self.context, look, &set).map_err(|error| told(error, look))?
             }
         };
@@ -550,19 +538,8 @@ impl Job<'_> {
             Some(stream) => stream.read(frame)?,
             None => Particles::default(),
         };
-        let mut found = [const { None }; 2 * REACH as usize];
-        for (side, other) in others(frame) {
-            if other.abs_diff(frame) <= reach && self.cache.has_particles(other) {
-                found[side] = Some(self.water(other)?);
-            }
-        }
-        let moment = Moment {
-            water: &water,
-            around: found.each_ref().map(Option::as_deref),
-            white: &white,
-        };
         let picture = renderer
-            .render_moment(frame, &moment)
+            .render_moment(frame, &around.moment(&white))
             .map_err(|error| told(error, look))?;
         for time in renderer.times() {
             let none = PassTime::new(time.pass, 0.0, 0, 0);

@@ -41,6 +41,10 @@ impl Effect for Settings {
             .about("velocity of the air"),
     ];
 
+    fn looks_at_neighbors(&self) -> bool {
+        true
+    }
+
     fn lint(&self, Grain { spacing, .. }: Grain) -> Option<String> {
         let worth = 4.0 / 3.0 * PI * (self.drop_radius / spacing).powi(3);
         (worth > 1.0).then(|| {

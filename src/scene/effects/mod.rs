@@ -49,6 +49,11 @@ pub(super) trait Effect {
         false
     }
 
+    /// Whether it looks at PBF's neighbours, at the places that the velocity update leaves.
+    fn looks_at_neighbors(&self) -> bool {
+        false
+    }
+
     /// Part of the velocity that a frame of FLIP takes from the grid for it.
     fn blend(&self) -> f64 {
         0.0
@@ -152,12 +157,6 @@ macro_rules! effects {
         }
 
         impl Effects {
-            /// Whether one looks at PBF's neighbours, at the places that the velocity update leaves.
-            pub fn look_at_neighbors(&self) -> bool {
-                let xsph = self.viscosity.as_ref().and_then(|it| it.xsph);
-                xsph.is_some() || self.vorticity_confinement.is_some() || self.drag.is_some()
-            }
-
             /// Keys of all effects.
             pub const NAMES: &[&str] = &[$(stringify!($name)),+];
 
@@ -177,6 +176,11 @@ macro_rules! effects {
             /// Whether one is solved between two projections.
             pub fn act_between_projections(&self) -> bool {
                 false$(|| self.$name.as_ref().is_some_and(Effect::acts_between_projections))+
+            }
+
+            /// Whether one looks at PBF's neighbours, at the places that the velocity update leaves.
+            pub fn look_at_neighbors(&self) -> bool {
+                false$(|| self.$name.as_ref().is_some_and(Effect::looks_at_neighbors))+
             }
 
             /// Part of the velocity that a frame of FLIP takes from the grid, of each of the named effects.

@@ -139,6 +139,10 @@ impl Effect for Settings {
         self.coefficient.map(|_| self.clone())
     }
 
+    fn looks_at_neighbors(&self) -> bool {
+        self.xsph.is_some()
+    }
+
     fn acts_between_projections(&self) -> bool {
         self.coefficient.is_some()
     }

@@ -21,4 +21,8 @@ impl Effect for Settings {
         Key::number("strength", 1e-6..=100.0)
             .about("ε, metres per second squared for each 1/s of vorticity and metre of support radius (PBF) or cell (FLIP)"),
     ];
+
+    fn looks_at_neighbors(&self) -> bool {
+        true
+    }
 }

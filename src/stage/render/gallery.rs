@@ -5,7 +5,9 @@ use std::{path::Path, time::Instant};
 use glam::DVec3;
 
 use super::{
-    RenderJobError, render_scene,
+    RenderJobError,
+    near::{Around, Near},
+    render_scene,
     surfaces::{FINER, Set, truth},
     told,
 };
@@ -38,7 +40,7 @@ pub struct Gallery<'a> {
 struct Framed {
     number: u32,
     set: RenderScene,
-    water: Particles,
+    around: Around,
     eye: Eye,
     seen: Vec<Seen>,
     /// `None` where no picture is scored.
@@ -86,7 +88,10 @@ impl<'a> Gallery<'a> {
 
     /// Particles of all frames.
     pub fn particles(&self) -> usize {
-        self.frames.iter().map(|frame| frame.water.len()).sum()
+        self.frames
+            .iter()
+            .map(|frame| frame.particles().len())
+            .sum()
     }
 
     /// Draws the frames `repeats` times, after one that is not counted: it makes the device's programs ready.
@@ -101,13 +106,15 @@ impl<'a> Gallery<'a> {
         };
         let mut surfaces = Surfaces::default();
         let mut scores = Vec::new();
+        let white = Particles::default();
         for frame in &self.frames {
             let picture = look.of_water(look.spec().renderer.method);
             let mut renderer = frame.renderer(self.context, &picture)?;
-            let image = renderer.render(frame.number, &frame.water)?;
+            let moment = frame.around.moment(&white);
+            let image = renderer.render_moment(frame.number, &moment)?;
             for seconds in &mut drawn.seconds {
                 let begun = Instant::now();
-                renderer.render(frame.number, &frame.water)?;
+                renderer.render(frame.number, frame.particles())?;
                 *seconds += begun.elapsed().as_secs_f64();
             }
             if let Some(truth) = &frame.picture {
@@ -115,7 +122,7 @@ impl<'a> Gallery<'a> {
             }
             let surface = look.of_surface(look.spec().renderer.method);
             let mut renderer = frame.renderer(self.context, &surface)?;
-            let image = renderer.render(frame.number, &frame.water)?;
+            let image = renderer.render(frame.number, frame.particles())?;
             surfaces.add(&image, &frame.seen, &frame.eye, frame.set.particle_spacing);
         }
         drawn.surface = surfaces.summary();
@@ -131,12 +138,13 @@ impl Framed {
         look: &Look,
         number: u32,
     ) -> Result<Self, RenderJobError> {
-        let water = cache.read(number)?;
-        let set = render_scene(scene, look, number, &water)?;
-        let (seen, _) = truth(look, &set, number, &water)?;
+        let around = Near::default().around(cache, look, number)?;
+        let water = &around.water.particles;
+        let set = render_scene(scene, look, number, water)?;
+        let (seen, _) = truth(look, &set, number, water)?;
         Ok(Self {
             number,
-            water,
+            around,
             eye: eye(look, DVec3::ZERO, number.into(), set.frames_per_second),
             seen,
             picture: None,
@@ -161,6 +169,10 @@ impl Framed {
             picture: Some(set.draw(&finer, self.number)?),
             ..self
         })
+    }
+
+    fn particles(&self) -> &Particles {
+        &self.around.water.particles
     }
 
     fn renderer(&self, context: &Context, look: &Look) -> Result<Renderer, RenderJobError> {

@@ -26,7 +26,7 @@ use crate::{
     scene::look::{Look, MethodSpec},
 };
 
-use super::{RenderJobError, render_scene, told};
+use super::{RenderJobError, near::Near, render_scene, told};
 use crate::{
     scene::Scene,
     stage::{baked_scene, device::Gpu},
@@ -240,13 +240,13 @@ pub(super) struct Set<'a> {
 }
 
 impl Set<'_> {
-    /// The picture of a frame with a look, as a screen shows it.
+    /// The picture of a frame with a look, as a screen shows it: drawn from what [`super::render`] draws it from.
     pub(super) fn draw(&self, look: &Look, frame: u32) -> Result<Picture, RenderJobError> {
-        let water = self.cache.read(frame)?;
-        let set = render_scene(self.scene, look, frame, &water)?;
+        let around = Near::default().around(self.cache, look, frame)?;
+        let set = render_scene(self.scene, look, frame, &around.water.particles)?;
         let mut renderer =
             Renderer::new(self.context, look, &set).map_err(|error| told(error, look))?;
-        let image = renderer.render(frame, &water)?;
+        let image = renderer.render_moment(frame, &around.moment(&Particles::default()))?;
         Ok(shown(&image, &look.spec().view))
     }
 }

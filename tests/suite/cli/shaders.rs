@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use swell::render::image::read_png_attributes;
 
-use crate::support::job::{Job, assert_has};
+use crate::support::job::{Job, LOOK, assert_has};
 
 /// A job with a copy of the shipped shaders in each of `folders`.
 fn job(folders: &[&str]) -> Job {
@@ -235,6 +235,29 @@ fn outlines_colour_and_flicker_of_pictures_are_told() {
     assert_has(&job.expect(2, "check cache --flicker"), &["--render"]);
     // The last frame has none after it.
     assert_has(&job.expect(4, &format!("{asked} --frames 3")), &["4"]);
+}
+
+/// Pictures that are checked are drawn from the frames that rendered ones are drawn from: one more in the cache changes what is spray,
+/// and nothing where there is none.
+#[test]
+fn checked_pictures_are_drawn_from_the_frames_around_them() {
+    let job = job(&[]);
+    let spray = "[water]\nspray = { density_per_metre = 24.0, speed_m_per_s = 0.1 }\n\n[output]";
+    job.write("spray.toml", &LOOK.replace("[output]", spray));
+    let measured = |frames: &str| {
+        job.expect(0, &format!("bake small.toml --frames {frames} -o cache"));
+        ["look.toml", "spray.toml"].map(|look| {
+            let check = format!("check cache --render --flicker --frames 2 --look {look}");
+            let found = job.json(0, &check);
+            [0, 1].map(|row| found["rows"][row]["flicker"].as_f64().unwrap())
+        })
+    };
+    let [before, after] = ["1-3", "1-4"].map(measured);
+    assert_eq!(before[0], after[0], "no spray");
+    assert!(
+        before[1][0] != after[1][0] && before[1][1] != after[1][1],
+        "{before:?} {after:?}"
+    );
 }
 
 #[test]

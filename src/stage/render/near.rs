@@ -1,0 +1,66 @@
+//! The particles that a frame's picture is drawn from: its own, and those of the frames around it.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::pictures::others;
+use crate::{
+    cache::{CacheError, CacheReader},
+    domain::particles::Particles,
+    render::{Moment, REACH, Water, frames_around},
+    scene::look::Look,
+};
+
+/// Frames that were read last: in a row of frames each is read once.
+#[derive(Default)]
+pub(super) struct Near(BTreeMap<u32, Arc<Water>>);
+
+/// A frame with those around it.
+pub(super) struct Around {
+    pub(super) water: Arc<Water>,
+    /// In the order of [`Moment::around`]; `None` where the cache has none, or the look takes none.
+    others: [Option<Arc<Water>>; 2 * REACH as usize],
+}
+
+impl Near {
+    /// A frame with as many around it as pictures with `look` are drawn from.
+    pub(super) fn around(
+        &mut self,
+        cache: &CacheReader,
+        look: &Look,
+        frame: u32,
+    ) -> Result<Around, CacheError> {
+        let reach = frames_around(look);
+        self.0.retain(|&other, _| other.abs_diff(frame) <= reach);
+        let water = self.read(cache, frame)?;
+        let mut found = [const { None }; 2 * REACH as usize];
+        for (side, other) in others(frame) {
+            if other.abs_diff(frame) <= reach && cache.has_particles(other) {
+                found[side] = Some(self.read(cache, other)?);
+            }
+        }
+        Ok(Around {
+            water,
+            others: found,
+        })
+    }
+
+    fn read(&mut self, cache: &CacheReader, frame: u32) -> Result<Arc<Water>, CacheError> {
+        if let Some(water) = self.0.get(&frame) {
+            return Ok(water.clone());
+        }
+        let water = Arc::new(Water::new(cache.read(frame)?));
+        self.0.insert(frame, water.clone());
+        Ok(water)
+    }
+}
+
+impl Around {
+    /// What a picture is made from, with the frame's whitewater.
+    pub(super) fn moment<'a>(&'a self, white: &'a Particles) -> Moment<'a> {
+        Moment {
+            water: &self.water,
+            around: self.others.each_ref().map(Option::as_deref),
+            white,
+        }
+    }
+}
