@@ -245,9 +245,12 @@ fn checked_pictures_are_drawn_from_the_frames_around_them() {
     let spray = "[water]\nspray = { density_per_metre = 24.0, speed_m_per_s = 0.1 }\n\n[output]";
     job.write("spray.toml", &LOOK.replace("[output]", spray));
     let measured = |frames: &str| {
-        job.expect(0, &format!("bake small.toml --frames {frames} -o cache"));
+        job.expect(
+            0,
+            &format!("bake small.toml --frames {frames} -o of-{frames}"),
+        );
         ["look.toml", "spray.toml"].map(|look| {
-            let check = format!("check cache --render --flicker --frames 2 --look {look}");
+            let check = format!("check of-{frames} --render --flicker --frames 2 --look {look}");
             let found = job.json(0, &check);
             [0, 1].map(|row| found["rows"][row]["flicker"].as_f64().unwrap())
         })
