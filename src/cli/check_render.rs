@@ -201,12 +201,13 @@ fn pictures(text: &mut String, outcome: &Outcome) {
                 row.method
             );
         }
-        if let Some(flicker) = row.flicker {
+        if let (Some(flicker), Some(residual)) = (row.flicker, row.residual) {
             let _ = writeln!(
                 text,
-                "{:6} flicker beyond finer rays: {:.3} % of white",
+                "{:6} flicker beyond finer rays: {:.3} % of white; off the mean of their neighbours by {:.3} %",
                 row.method,
-                100.0 * flicker
+                100.0 * flicker,
+                100.0 * residual
             );
         }
     }

@@ -74,6 +74,8 @@ pub struct Row {
     pub score: Option<f64>,
     /// What flickers beyond the truth, in parts of white, mean over the frames; `None` where not asked for.
     pub flicker: Option<f64>,
+    /// What of its pictures is not the mean of their neighbours, likewise: what flickers, and what moves unevenly.
+    pub residual: Option<f64>,
 }
 
 impl Row {
@@ -212,6 +214,7 @@ pub fn check_render(
             seconds: seconds / count,
             score: mean(&pictures.scores),
             flicker: mean(&pictures.flickers),
+            residual: mean(&pictures.residuals),
         });
     }
     Ok(outcome)
@@ -256,6 +259,7 @@ impl Set<'_> {
 struct Pictured {
     scores: Vec<f64>,
     flickers: Vec<f64>,
+    residuals: Vec<f64>,
 }
 
 /// Pictures of all methods and of the truth.
@@ -311,6 +315,7 @@ impl<'a> Pictures<'a> {
             }
             if let (Some(residual), Some(moved)) = (residual(&all), &moved) {
                 found.flickers.push(residual.beyond(moved));
+                found.residuals.push(residual.strength());
             }
         }
         Ok(())

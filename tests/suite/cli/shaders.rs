@@ -221,6 +221,9 @@ fn outlines_colour_and_flicker_of_pictures_are_told() {
         "{flashing}"
     );
     assert_eq!(of(&flashing, 1, "flicker"), of(&found, 1, "flicker"));
+    // A picture that flashes is off the mean of its neighbours by that, whatever the truth does.
+    assert!(of(&flashing, 0, "residual") > 3.0 * of(&found, 0, "residual"));
+    assert_eq!(of(&flashing, 1, "residual"), of(&found, 1, "residual"));
     let said = job.expect(0, &asked);
     assert_has(
         &said,
