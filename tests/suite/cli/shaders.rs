@@ -253,9 +253,9 @@ fn checked_pictures_are_drawn_from_the_frames_around_them() {
             &format!("bake small.toml --frames {frames} -o of-{frames}"),
         );
         ["look.toml", "spray.toml"].map(|look| {
-            let check = format!("check of-{frames} --render --flicker --frames 2 --look {look}");
+            let check = format!("check of-{frames} --render --colour --frames 2 --look {look}");
             let found = job.json(0, &check);
-            [0, 1].map(|row| found["rows"][row]["flicker"].as_f64().unwrap())
+            [0, 1].map(|row| found["rows"][row]["score"].as_f64().unwrap())
         })
     };
     let [before, after] = ["1-3", "1-4"].map(measured);
