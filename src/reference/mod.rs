@@ -5,6 +5,7 @@
 
 pub mod flip;
 mod hash;
+mod lanes;
 pub mod neighbors;
 pub mod pbf;
 pub mod poisson;

@@ -3,8 +3,10 @@
 use std::ops::Range;
 
 use glam::DVec3;
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
+use super::lanes::widely;
 use crate::domain::{period::Period, places};
 
 /// Particles whose neighbours one task lists.
@@ -39,10 +41,10 @@ impl Cells {
 
     /// The cell of a point; outside the box the nearest, or that of its image.
     pub fn coordinate(&self, x: DVec3) -> [usize; 3] {
-        let cell = (x / self.edge).floor().to_array();
+        let cell = (x / self.edge).to_array();
         std::array::from_fn(|axis| match self.joins(axis) {
-            true => cell[axis].rem_euclid(self.dims[axis] as f64) as usize,
-            // A cast saturates: what is below 0 becomes 0.
+            true => cell[axis].floor().rem_euclid(self.dims[axis] as f64) as usize,
+            // A cast rounds towards 0, and saturates: what is below 0 becomes 0.
             false => (cell[axis] as usize).min(self.dims[axis] - 1),
         })
     }
@@ -53,23 +55,33 @@ impl Cells {
     }
 
     /// The cells about that of a point, it among them, as runs of their places.
-    pub fn runs(&self, x: DVec3) -> impl Iterator<Item = Range<usize>> + use<> {
+    #[inline]
+    pub fn runs(&self, x: DVec3) -> Runs {
         let ([cx, cy, cz], [nx, ny, nz]) = (self.coordinate(x), self.dims);
         let beside = |axis: usize, at: usize, count: usize| match self.joins(axis) {
-            true => [at + count - 1, at, at + 1].map(|k| k % count..k % count + 1),
+            true => [at + count - 1, at, at + 1].map(|k| [k % count, k % count + 1]),
             // One run, and two that are empty.
-            false => [at.saturating_sub(1)..(at + 2).min(count), 0..0, 0..0],
+            false => [[at.saturating_sub(1), (at + 2).min(count)], [0; 2], [0; 2]],
         };
         let [along, rows, layers] = [(0, cx, nx), (1, cy, ny), (2, cz, nz)]
             .map(|(axis, at, count)| beside(axis, at, count));
-        layers.into_iter().flatten().flat_map(move |z| {
-            let (rows, along) = (rows.clone(), along.clone());
-            rows.into_iter().flatten().flat_map(move |y| {
-                let row = (z * ny + y) * nx;
-                let found = along.clone().into_iter().filter(|run| !run.is_empty());
-                found.map(move |run| row + run.start..row + run.end)
-            })
-        })
+        let mut runs = Runs {
+            ends: [[0; 2]; 27],
+            count: 0,
+        };
+        for [low, high] in layers {
+            for z in low..high {
+                for [low, high] in rows {
+                    for row in (z * ny + low..z * ny + high).map(|row| row * nx) {
+                        for [begin, end] in along {
+                            runs.ends[runs.count % 27] = [row + begin, row + end];
+                            runs.count += usize::from(begin < end);
+                        }
+                    }
+                }
+            }
+        }
+        runs
     }
 
     /// Its place in x-fastest order.
@@ -84,26 +96,58 @@ impl Cells {
 
     /// First point of each cell, and one past the last, for points that are sorted by cell.
     pub fn starts(&self, sorted: &[DVec3]) -> Vec<usize> {
+        self.starts_of(&self.indices(sorted))
+    }
+
+    /// The order that sorts points by cell, and within a cell by `id`.
+    pub fn order(&self, points: &[DVec3], id: &[u32]) -> Vec<usize> {
+        let cells = self.indices(points);
+        let mut next = self.starts_of(&cells);
+        let mut order = vec![0; points.len()];
+        for (k, &cell) in cells.iter().enumerate() {
+            order[next[cell]] = k;
+            next[cell] += 1;
+        }
+        let mut rest = &mut order[..];
+        let mut first = 0;
+        for end in next {
+            let (cell, others) = rest.split_at_mut(end - first);
+            cell.sort_unstable_by_key(|&k| id[k]);
+            (rest, first) = (others, end);
+        }
+        order
+    }
+
+    fn indices(&self, points: &[DVec3]) -> Vec<usize> {
+        points.par_iter().map(|&x| self.index(x)).collect()
+    }
+
+    fn starts_of(&self, cells: &[usize]) -> Vec<usize> {
         let mut start = vec![0; self.count() + 1];
-        for &x in sorted {
-            start[self.index(x) + 1] += 1;
+        for cell in cells {
+            start[cell + 1] += 1;
         }
         for k in 1..start.len() {
             start[k] += start[k - 1];
         }
         start
     }
+}
 
-    /// The order that sorts points by cell, and within a cell by `id`.
-    pub fn order(&self, points: &[DVec3], id: &[u32]) -> Vec<usize> {
-        let mut keyed: Vec<(usize, u32, usize)> = points
-            .par_iter()
-            .zip(id)
-            .enumerate()
-            .map(|(k, (&x, &id))| (self.index(x), id, k))
-            .collect();
-        keyed.par_sort_unstable();
-        keyed.into_iter().map(|(_, _, k)| k).collect()
+/// Up to 27 runs of cells, each by its first and the one past its last.
+#[derive(Clone, Copy, Debug)]
+pub struct Runs {
+    ends: [[usize; 2]; 27],
+    count: usize,
+}
+
+impl Runs {
+    /// In ascending order but for those across a joint.
+    #[inline(always)]
+    pub fn iter(&self) -> impl Iterator<Item = Range<usize>> + use<'_> {
+        self.ends[..self.count]
+            .iter()
+            .map(|&[begin, end]| begin..end)
     }
 }
 
@@ -144,7 +188,7 @@ impl Neighbors {
             let x = crowd.points[i];
             groups.each_ref().map(|(first, points, starts)| {
                 let begin = members.len();
-                for cells in crowd.cells.runs(x) {
+                for cells in crowd.cells.runs(x).iter() {
                     let run = starts[cells.start]..starts[cells.end];
                     let first = first + run.start;
                     if period == Period::default() {
@@ -177,20 +221,23 @@ impl Neighbors {
         let (fluid, solid) = crowd.points.split_at(crowd.particles);
         let (of_fluid, of_solid) = (cells.starts(fluid), cells.starts(solid));
         let inverse = (1.0 / h) as f32;
-        let words: Vec<u32> = fluid
+        let mut words: Vec<u32> = fluid
             .par_iter()
             .map(|x| places::word(x.as_vec3().to_array(), inverse))
             .collect();
+        words.extend([0; AT_ONCE]);
         Self::listed(crowd.particles, |i, members| {
-            let (x, own) = (crowd.points[i], words[i]);
-            for cells in cells.runs(x) {
-                let run = of_fluid[cells.start]..of_fluid[cells.end];
-                let first = run.start;
-                let is_near = |&word: &u32| places::are_near(own, word);
-                append_near(&words[run], first, i, members, is_near);
-            }
+            let x = crowd.points[i];
+            let runs = cells.runs(x);
+            widely(NearByWords {
+                runs: &runs,
+                starts: &of_fluid,
+                words: &words,
+                own: i,
+                members,
+            });
             let middle = members.len() as u32;
-            for cells in cells.runs(x) {
+            for cells in runs.iter().filter(|_| !solid.is_empty()) {
                 let run = of_solid[cells.start]..of_solid[cells.end];
                 let first = crowd.particles + run.start;
                 let is_near = |y: &DVec3| x.distance_squared(*y) < h * h;
@@ -283,6 +330,75 @@ fn append_near<T>(
     members.truncate(end);
 }
 
+/// Appends whom words tell to be near a particle.
+struct NearByWords<'a> {
+    runs: &'a Runs,
+    /// First particle of each cell.
+    starts: &'a [usize],
+    /// Of the particles, and [`AT_ONCE`] more that mean nothing.
+    words: &'a [u32],
+    /// The particle.
+    own: usize,
+    members: &'a mut Vec<u32>,
+}
+
+/// Words that are compared at once, and who is held before he is appended.
+const AT_ONCE: usize = 8;
+const HELD: usize = 128;
+
+/// The numbers of a byte's bits that are set, in front; what follows means nothing.
+const BITS: [[u8; AT_ONCE]; 1 << AT_ONCE] = {
+    let mut bits = [[0; AT_ONCE]; 1 << AT_ONCE];
+    let mut byte = 0;
+    while byte < bits.len() {
+        let (mut bit, mut count) = (0, 0);
+        while bit < AT_ONCE {
+            if byte >> bit & 1 == 1 {
+                bits[byte][count] = bit as u8;
+                count += 1;
+            }
+            bit += 1;
+        }
+        byte += 1;
+    }
+    bits
+};
+
+impl WithSimd for NearByWords<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let word = self.words[self.own];
+        let (mut held, mut count) = ([0; HELD], 0);
+        for &[begin, end] in &self.runs.ends[..self.runs.count] {
+            let (mut first, end) = (self.starts[begin], self.starts[end]);
+            while first < end {
+                if count > HELD - AT_ONCE {
+                    self.members.extend_from_slice(&held[..count]);
+                    count = 0;
+                }
+                let mut near = 0;
+                for (k, &other) in self.words[first..first + AT_ONCE].iter().enumerate() {
+                    near |= usize::from(places::are_near(word, other)) << k;
+                }
+                // Neither itself, nor words behind the run's end.
+                let itself = self.own.wrapping_sub(first);
+                near &= !(usize::from(itself < AT_ONCE) << (itself % AT_ONCE));
+                near &= (1 << (end - first).min(AT_ONCE)) - 1;
+                // Without a branch: six of seven are too far, at no time that can be foretold.
+                let room = held[count..count + AT_ONCE].iter_mut();
+                for (room, &bit) in room.zip(&BITS[near]) {
+                    *room = first as u32 + u32::from(bit);
+                }
+                count += near.count_ones() as usize;
+                first += AT_ONCE;
+            }
+        }
+        self.members.extend_from_slice(&held[..count]);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -355,16 +471,72 @@ mod tests {
         }
     }
 
-    fn check(size: DVec3, fluid: Vec<DVec3>, solid: Vec<DVec3>) {
-        let cells = Cells::new(size, 0.21);
-        let sorted = |points: Vec<DVec3>| {
+    /// Points of either kind in the order of their cells.
+    fn crowded(cells: Cells, fluid: &[DVec3], solid: &[DVec3]) -> Vec<DVec3> {
+        let sorted = |points: &[DVec3]| {
             let id: Vec<u32> = (0..points.len() as u32).collect();
-            let order = cells.order(&points, &id).into_iter();
+            let order = cells.order(points, &id).into_iter();
             order.map(|k| points[k]).collect::<Vec<_>>()
         };
+        [sorted(fluid), sorted(solid)].concat()
+    }
+
+    /// By words are found those whom words of every pair tell, of those who are as near as lists can reach; one cloud is so dense
+    /// that runs of cells are longer than what is held at once.
+    #[test]
+    fn words_find_whom_every_pair_of_them_tells() {
+        let (size, h) = (DVec3::new(2.3, 0.9, 1.4), 0.2);
+        let cells = Cells::new(size, h);
+        for scale in [1.0, 0.3] {
+            let cloud = |count| halton(count, size * scale);
+            let points = crowded(cells, &cloud(1500), &cloud(90));
+            let crowd = Crowd {
+                cells,
+                points: &points,
+                particles: 1500,
+            };
+            let inverse = (1.0 / h) as f32;
+            let word = |i: usize| places::word(points[i].as_vec3().to_array(), inverse);
+            let (found, near) = (
+                Neighbors::listed_within(&crowd, h),
+                Neighbors::naive(&crowd, h),
+            );
+            let reach = Neighbors::naive(&crowd, h * (1.0 + places::SKIN) + 1e-6);
+            let (mut most, mut beyond) = (0, 0);
+            for i in 0..crowd.particles {
+                let is_told = |j: &&u32| places::are_near(word(i), word(**j as usize));
+                let told: Vec<u32> = reach.fluid(i).iter().filter(is_told).copied().collect();
+                assert_eq!(found.of(i), (&told[..], near.of(i).1), "particle {i}");
+                most = most.max(told.len());
+                beyond += told.len() - near.fluid(i).len();
+            }
+            assert!(scale == 1.0 || most > 2 * HELD, "{most}");
+            // Lists are not those of distances: the comparison can fail.
+            assert!(beyond > 0);
+        }
+    }
+
+    /// In cells, and in a cell by their numbers, however these lie.
+    #[test]
+    fn order_is_that_of_cells_and_numbers() {
+        let size = DVec3::new(2.3, 0.9, 1.4);
+        let cells = Cells::new(size, 0.2);
+        let points = halton(1500, size);
+        let id: Vec<u32> = (0..1500).map(|k| k * 7919 % 1500).collect();
+        let order = cells.order(&points, &id);
+        let key = |&k: &usize| (cells.index(points[k]), id[k]);
+        assert!(order.is_sorted_by_key(key));
+        let mut all = order.clone();
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..1500));
+        // By places alone numbers do not ascend.
+        assert!(!(0..1500).collect::<Vec<usize>>().is_sorted_by_key(key));
+    }
+
+    fn check(size: DVec3, fluid: Vec<DVec3>, solid: Vec<DVec3>) {
+        let cells = Cells::new(size, 0.21);
         let particles = fluid.len();
-        let mut points = sorted(fluid);
-        points.extend(sorted(solid));
+        let points = crowded(cells, &fluid, &solid);
         let crowd = Crowd {
             cells,
             points: &points,

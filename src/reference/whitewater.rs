@@ -106,7 +106,7 @@ impl Water {
     /// Calls `visit` with each water particle and each sample on a solid in the cells about `x`, and the way from it to `x`.
     pub fn about(&self, x: DVec3, mut visit: impl FnMut(Neighbor, DVec3)) {
         let period = self.model.period();
-        for cells in self.model.cells.runs(x) {
+        for cells in self.model.cells.runs(x).iter() {
             for j in self.starts[cells.start]..self.starts[cells.end] {
                 visit(Neighbor::Water(j), period.shortest(x - self.points[j]));
             }

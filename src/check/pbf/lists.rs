@@ -157,7 +157,7 @@ impl PbfState {
                 return split(&lists.members[i], n, members);
             }
             let mut near = Vec::new();
-            for run in cells.runs(points[i]) {
+            for run in cells.runs(points[i]).iter() {
                 let fluid = start[run.start] as usize..start[run.end] as usize;
                 let solid = n + solid_start[run.start]..n + solid_start[run.end];
                 let r2 = |j: usize| {

@@ -7,6 +7,7 @@
 pub mod constraint;
 pub mod effects;
 mod model;
+mod pairs;
 pub mod passes;
 mod solver;
 

@@ -5,8 +5,11 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Colour, Model, Substep};
-use crate::reference::{hash::pair_direction, neighbors::Neighbors};
+use super::{
+    Colour, Model, Substep,
+    pairs::{CorrectionSum, RowSums},
+};
+use crate::reference::{hash::pair_direction, lanes::widely, neighbors::Neighbors};
 
 /// Particles of a task; fewer are not worth the handing out.
 const GRAIN: usize = 256;
@@ -103,26 +106,10 @@ pub fn predict_along(
 
 /// Relative density ρ/ρ0 of each particle, shape (particles) (pbf/measure_density).
 pub fn measure_density(inputs: Inputs<'_>) -> Vec<f64> {
-    let model = inputs.model;
-    let inverse_h2 = model.calibration.support_radius.powi(-2);
-    let one = |i: usize| {
-        let x = inputs.points[i];
-        let kernel = |&j: &u32| {
-            let q2 = inputs.between(i, j as usize).length_squared() * inverse_h2;
-            (1.0 - q2).max(0.0).powi(3)
-        };
-        let (fluid, solid) = inputs.neighbors.of(i);
-        let mut sum = 1.0 + fluid.iter().map(kernel).sum::<f64>();
-        for j in solid {
-            sum += inputs.sample_weight(*j) * kernel(j);
-        }
-        let (wall, _) = model.wall_term(x, &inputs.substep.walls);
-        model.calibration.density_scale * sum + wall
-    };
     (0..inputs.particles())
         .into_par_iter()
         .with_min_len(GRAIN)
-        .map(one)
+        .map(|i| row(inputs, i).density)
         .collect()
 }
 
@@ -157,38 +144,16 @@ pub struct Row {
 /// The constraint of particle `i`.
 #[inline]
 pub fn row(inputs: Inputs<'_>, i: usize) -> Row {
-    let calibration = &inputs.model.calibration;
-    let inverse_h = 1.0 / calibration.support_radius;
-    let x = inputs.points[i];
-    let (mut kernel, mut gradient, mut squares) = (1.0, DVec3::ZERO, 0.0);
-    // Poly6, and spiky's slope beside the difference over r.
-    let pair = |j: u32| {
-        let d = inputs.between(i, j as usize);
-        let r2 = d.length_squared();
-        let r = r2.sqrt();
-        let p = (1.0 - r2 * inverse_h * inverse_h).max(0.0);
-        let s = (1.0 - r * inverse_h).max(0.0);
-        (p * p * p, s * s, d * (s * s / r.max(1e-15)))
-    };
-    let (fluid, solid) = inputs.neighbors.of(i);
-    for &j in fluid {
-        let (w, slope, along) = pair(j);
-        kernel += w;
-        gradient += along;
-        squares += slope * slope;
-    }
-    // A solid's samples do not move: they have no gradient of their own.
-    for &j in solid {
-        let (w, _, along) = pair(j);
-        let weight = inputs.sample_weight(j);
-        kernel += weight * w;
-        gradient += weight * along;
-    }
+    let (kernel, gradient, squares) = widely(RowSums {
+        inputs,
+        particle: i,
+    });
+    let (calibration, x) = (&inputs.model.calibration, inputs.points[i]);
     let scale = calibration.gradient_scale;
     let (wall, wall_gradient) = inputs.model.wall_term(x, &inputs.substep.walls);
     let own = wall_gradient - scale * gradient;
     Row {
-        density: calibration.density_scale * kernel + wall,
+        density: calibration.density_scale * (1.0 + kernel) + wall,
         own,
         squares: own.length_squared() + scale * scale * squares,
     }
@@ -268,43 +233,24 @@ pub fn compute_delta(
 /// Σ_j (λ_i + λ_j + s_corr) m_j (1 − q)² over the unit vector from j, m².
 #[inline]
 fn pair_corrections(inputs: Inputs<'_>, i: usize, lambda: &[f64]) -> DVec3 {
-    /// W at Δq = 0.2 h over W(0).
-    const REFERENCE_KERNEL: f64 = 0.884_736;
     let Model {
         calibration,
         settings,
         ..
     } = inputs.model;
-    let inverse_h = 1.0 / calibration.support_radius;
-    let artificial = settings.artificial_pressure / calibration.bulk_gradient_squares;
-    let mut coincident = None;
-    let mut pair = |j: u32, scale: f64| {
-        let d = inputs.between(i, j as usize);
-        let r2 = d.length_squared();
-        let r = r2.sqrt();
-        let s = (1.0 - r * inverse_h).max(0.0);
-        let mut scale = scale;
-        if artificial > 0.0 {
-            let p = (1.0 - r2 * inverse_h * inverse_h).max(0.0);
-            scale -= artificial * (p.powi(3) / REFERENCE_KERNEL).powi(4);
-        }
-        if r * inverse_h < 1e-6 {
-            coincident = Some(j);
-        }
-        d * (scale * s * s / r.max(1e-15))
-    };
-    let mut sum = DVec3::ZERO;
-    let (fluid, solid) = inputs.neighbors.of(i);
-    for &j in fluid {
-        sum += pair(j, lambda[i] + lambda[j as usize]);
+    let (sum, nearest) = widely(CorrectionSum {
+        inputs,
+        particle: i,
+        lambda,
+        artificial: settings.artificial_pressure / calibration.bulk_gradient_squares,
+    });
+    let is_coincident = |r: f64| r / calibration.support_radius < 1e-6;
+    if !is_coincident(nearest) {
+        return sum;
     }
-    for &j in solid {
-        sum += inputs.sample_weight(j) * pair(j, lambda[i]);
-    }
-    match coincident {
-        Some(j) => sum + pair_direction(i as u32, j) * 2.0 * lambda[i],
-        None => sum,
-    }
+    let on_the_spot = |j: &u32| is_coincident(inputs.between(i, *j as usize).length());
+    let last = inputs.neighbors.all(i).filter(on_the_spot).last();
+    last.map_or(sum, |j| sum + pair_direction(i as u32, j) * 2.0 * lambda[i])
 }
 
 /// The gradient of what each sample on a solid adds to the density times the sample's velocity, 1/s.

@@ -352,8 +352,9 @@ const MAY_IMPORT: [(&str, &[&str]); 14] = [
 ];
 
 /// Crates that only some rooms name.
-const CRATES: [(&str, &[&str]); 3] = [
+const CRATES: [(&str, &[&str]); 4] = [
     ("faer", &["reference"]),
+    ("pulp", &["reference"]),
     ("wgpu", &["gpu", "solve", "render"]),
     ("clap", &["cli", "main"]),
 ];
