@@ -6,12 +6,13 @@ use clap::Args;
 use serde_json::json;
 
 use crate::{
-    experiment::{Event, PointEvent, PointStatus, Request, study},
+    domain::chunk::Chunk,
+    experiment::{Event, PointEvent, PointStatus, Request, Share, study},
     scene::study::Study,
 };
 
 use super::{
-    Failure, GpuArgs, OUT_OF_TOLERANCE, bake,
+    Failure, GpuArgs, OUT_OF_TOLERANCE, bake, count,
     interrupt::{self, Interrupt},
     output,
     progress::{Mode, Progress, Status},
@@ -25,6 +26,10 @@ pub(super) struct StudyArgs {
     /// Where caches, pictures, table and page go; studies/NAME where left out. Existing results are resumed.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Run share I of N of the points alone, such as 1/4, into a file of its own in the folder. The command without it takes over what
+    /// shares have run, runs what is missing, and writes table and page.
+    #[arg(long, value_name = "I/N")]
+    chunk: Option<Chunk>,
     #[command(flatten)]
     gpu: GpuArgs,
     /// Take meshes, tables and panoramas that lie outside of the folders of the scene and the look.
@@ -48,6 +53,7 @@ pub(super) fn run(args: &StudyArgs, progress: &Progress) -> Result<u8, Failure> 
             directory.display()
         ),
         directory,
+        chunk: args.chunk,
         gpu: args.gpu.read()?,
     };
     conduct(&request, progress)
@@ -77,8 +83,16 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
             };
             progress.frame(&text, status, json);
         }
+        Event::Joined { file, points } => progress.say(
+            &format!("{} taken over from {file}", count(points as u64, "point")),
+            json!({ "event": "joined", "ledger": file, "points": points }),
+        ),
     })?;
     progress.finish();
+    if let (Some(share), Some(chunk)) = (outcome.share, request.chunk) {
+        tell_share(progress, request, chunk, share);
+        return Ok(0);
+    }
     let Some(page) = outcome.page else {
         progress.conclude(
             "ended by a signal; the same command goes on",
@@ -94,6 +108,22 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
         [] => 0,
         _ => OUT_OF_TOLERANCE,
     })
+}
+
+/// What a share came to, and who ends the study.
+fn tell_share(progress: &Progress, request: &Request, chunk: Chunk, share: Share) {
+    let Share { ran, stood, left } = share;
+    progress.conclude(
+        &format!(
+            "done: {} of share {chunk} run, {stood} stood there already; left of the whole study: {left}; table and page are made by: {}",
+            count(ran as u64, "point"),
+            request.command
+        ),
+        json!({
+            "chunk": chunk.to_string(), "ran": ran, "stood": stood, "left": left, "directory": output::path(&request.directory),
+            "interrupted": false,
+        }),
+    );
 }
 
 /// A point's line, and the same for farms.

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::{
-    domain::frame_range::FrameRange,
+    domain::{chunk::Chunk, frame_range::FrameRange},
     experiment::Request,
     scene::{
         Method,
@@ -56,6 +56,10 @@ pub(super) struct TuneArgs {
     /// Where table, curves and page go; studies/NAME-tune where left out. Existing results are resumed.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Run share I of N of the runs alone that are known before the first, such as 1/4, into a file of its own in the folder. The
+    /// command without it takes them over.
+    #[arg(long, value_name = "I/N")]
+    chunk: Option<Chunk>,
     #[command(flatten)]
     gpu: GpuArgs,
     /// Take meshes and tables that lie outside of the scene's folder.
@@ -81,6 +85,7 @@ pub(super) fn run(args: &TuneArgs, progress: &Progress) -> Result<u8, Failure> {
         directory: args.output.clone().unwrap_or_else(default),
         command: command(args),
         study: Study::Tune(Box::new(tune)),
+        chunk: args.chunk,
         gpu: args.gpu.read()?,
         name,
     };

@@ -1,6 +1,6 @@
-//! Shares of a range of frames, as `--chunk 1/4` asks for them.
+//! Shares of a range of frames, or of the points of a study, as `--chunk 1/4` asks for them.
 
-use std::str::FromStr;
+use std::{fmt, str::FromStr};
 
 /// Share `index` of `count` of a range, from 1 on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +36,25 @@ impl Chunk {
         let end =
             |share: u32| (frames.len() as u64 * u64::from(share) / u64::from(self.count)) as usize;
         &frames[end(self.index - 1)..end(self.index)]
+    }
+
+    /// Which of some points are of the share: they are dealt one by one, the cheap ones first, so that each share gets cheap
+    /// and dear ones. `places` has each point's place in its own line, from cheap to dear.
+    pub fn deal(self, places: &[usize]) -> Vec<bool> {
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by_key(|&point| places[point]);
+        let mut is_its = vec![false; places.len()];
+        let of_share = order.iter().skip(self.index as usize - 1);
+        for &point in of_share.step_by(self.count as usize) {
+            is_its[point] = true;
+        }
+        is_its
+    }
+}
+
+impl fmt::Display for Chunk {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
     }
 }
 
@@ -73,6 +92,28 @@ mod tests {
         assert_eq!(share(&frames, "2/5".parse().ok()), [3, 4]);
         for text in ["0/4", "5/4", "1", "a/b", "1/0", "-1/4"] {
             assert!(text.parse::<Chunk>().is_err(), "{text}");
+        }
+    }
+
+    /// Three lines of four values each: every share has one of each value where there are three shares, and nobody has two
+    /// of the dearest where there are four.
+    #[test]
+    fn points_are_dealt_so_that_each_share_has_cheap_and_dear_ones() {
+        let places: Vec<usize> = (0..3).flat_map(|_| 0..4).collect();
+        let dealt = |text: &str| text.parse::<Chunk>().unwrap().deal(&places);
+        for count in [1, 3, 4, 5, 12, 13] {
+            let all: Vec<_> = (1..=count)
+                .map(|k| dealt(&format!("{k}/{count}")))
+                .collect();
+            for point in 0..places.len() {
+                assert_eq!(all.iter().filter(|share| share[point]).count(), 1);
+            }
+            let dearest = |share: &Vec<bool>| [3, 7, 11].iter().filter(|&&k| share[k]).count();
+            let most = all.iter().map(dearest).max().unwrap();
+            assert_eq!(most, if count == 1 { 3 } else { 1 }, "{count}");
+            let sizes = all.iter().map(|s| s.iter().filter(|&&is| is).count());
+            let (least, most) = (sizes.clone().min().unwrap(), sizes.max().unwrap());
+            assert!(most - least <= 1, "{count}");
         }
     }
 }

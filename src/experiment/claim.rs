@@ -1,10 +1,19 @@
 //! Which study a folder of results belongs to: pages and lines of two studies in one folder would mix.
 
-use std::{fs, io, path::Path};
+use std::{
+    fs,
+    io::{self, Read as _, Write as _},
+    path::Path,
+};
 
 use serde::{Deserialize, Serialize};
 
-use super::StudyError;
+use crate::stage::locked;
+
+use super::{
+    StudyError,
+    ledger::{is_ledger, names},
+};
 
 /// Names the study, beside its results.
 pub(super) const FILE: &str = "study.json";
@@ -15,7 +24,8 @@ struct Claim {
     study: String,
 }
 
-/// Takes an empty folder, or one with results that name no study, for the study `name`.
+/// Takes an empty folder, or one with results that name no study, for the study `name`. Any number of processes may do so at
+/// once: the file is locked while it is read and written.
 ///
 /// # Errors
 /// [`StudyError::OtherStudy`]; a file that cannot be read or written.
@@ -25,34 +35,33 @@ pub(super) fn take(directory: &Path, name: &str) -> Result<(), StudyError> {
         file: file.clone(),
         source,
     };
-    match fs::read(&file) {
-        Ok(text) => {
-            let claim: Claim = serde_json::from_slice(&text)
-                .map_err(|error| fault(io::Error::other(error.to_string())))?;
-            if claim.study == name {
-                return Ok(());
-            }
-            Err(StudyError::OtherStudy {
-                directory: directory.to_owned(),
-                found: claim.study,
-                name: name.to_owned(),
-            })
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            fs::create_dir_all(directory).map_err(fault)?;
-            let is_used = fs::read_dir(directory).map_err(fault)?.next().is_some();
-            if is_used && !directory.join("results.jsonl").exists() {
-                // Whoever opens the results says what is off.
-                return Ok(());
-            }
-            let claim = Claim {
-                study: name.to_owned(),
-            };
-            let text = serde_json::to_string(&claim).map_err(|error| fault(error.into()))?;
-            fs::write(&file, text + "\n").map_err(fault)
-        }
-        Err(error) => Err(fault(error)),
+    fs::create_dir_all(directory).map_err(fault)?;
+    let names = names(directory).map_err(fault)?;
+    if !names.is_empty() && !names.iter().any(|name| name == FILE || is_ledger(name)) {
+        // Whoever opens the results says what is off.
+        return Ok(());
     }
+    let mut record = locked::open(&file).map_err(fault)?;
+    record.lock().map_err(fault)?;
+    let mut text = String::new();
+    record.read_to_string(&mut text).map_err(fault)?;
+    if text.is_empty() {
+        let claim = Claim {
+            study: name.to_owned(),
+        };
+        let text = serde_json::to_string(&claim).map_err(|error| fault(error.into()))?;
+        return record.write_all((text + "\n").as_bytes()).map_err(fault);
+    }
+    let claim: Claim =
+        serde_json::from_str(&text).map_err(|error| fault(io::Error::other(error.to_string())))?;
+    if claim.study == name {
+        return Ok(());
+    }
+    Err(StudyError::OtherStudy {
+        directory: directory.to_owned(),
+        found: claim.study,
+        name: name.to_owned(),
+    })
 }
 
 #[cfg(test)]

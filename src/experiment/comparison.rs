@@ -39,9 +39,14 @@ impl Kind for SolverComparison {
         self.scenes.len()
     }
 
-    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
+    /// Two bakes, which are shared out as bakes are.
+    fn places(&self) -> Option<Vec<usize>> {
+        None
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
         for scene in &self.scenes {
-            (bench.tell)(Event::Solver(scene.solver.method.name()));
+            bench.tell(Event::Solver(scene.solver.method.name()));
             bake_and_render(self, bench, scene)?;
         }
         let request = bench.request;
@@ -56,13 +61,13 @@ impl Kind for SolverComparison {
         ];
         let impact = Impact::of(&courses, obstacle(scene, &gauge));
         let findings = comparison::findings(&courses, impact);
-        Ok(Report {
+        Ok(Some(Report {
             answer: comparison::summary(&findings),
             parts: parts(request, self, &caches, &courses, &findings, impact)?,
             table: comparison::table(&courses),
             findings: findings.into_iter().map(|found| found.text).collect(),
             ..Report::default()
-        })
+        }))
     }
 }
 
@@ -83,7 +88,7 @@ fn bake_and_render(
         device: Device::Gpu(request.gpu.clone()),
         time_passes: false,
     };
-    let mut tell = |event| (bench.tell)(Event::Bake(Box::new(event)));
+    let mut tell = |event| bench.tell(Event::Bake(Box::new(event)));
     if bake::bake(&bake, stop, &mut tell)?.interrupted {
         return Err(StudyError::Stopped);
     }
@@ -98,7 +103,7 @@ fn bake_and_render(
         keep_going: false,
         time_passes: false,
     };
-    let mut tell = |event| (bench.tell)(Event::Render(event));
+    let mut tell = |event| bench.tell(Event::Render(event));
     match render::render(&render, stop, &mut tell)?.interrupted {
         true => Err(StudyError::Stopped),
         false => Ok(()),

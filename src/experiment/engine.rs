@@ -2,10 +2,8 @@
 //! was interrupted goes on where it stopped.
 
 use std::{
-    collections::BTreeMap,
-    fs::{self, File, OpenOptions},
-    io::Write,
-    path::{Path, PathBuf},
+    cell::{Cell, RefCell},
+    fs,
     sync::{
         OnceLock,
         atomic::{AtomicBool, Ordering},
@@ -16,6 +14,7 @@ use std::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
+    domain::chunk::Chunk,
     gpu::adapter::{GpuError, Needs},
     scene::{Method, Scene, physics_hash, study::RunsOn},
     stage::{
@@ -25,7 +24,11 @@ use crate::{
     study::median,
 };
 
-use super::{Event, PointEvent, PointStatus, Request, StudyError, claim, report::Report};
+use super::{
+    Event, PointEvent, PointStatus, Request, StudyError,
+    ledger::{Key, Ledger, Line, Reader},
+    report::Report,
+};
 
 /// Changes whenever what a line of results holds does.
 const FORM: &str = "swell study 3";
@@ -38,11 +41,15 @@ pub(super) trait Kind {
     /// Points that it tells of.
     fn count(&self) -> usize;
 
-    /// Runs, measures and draws.
+    /// Of each point that a share may run, in the order of [`Bench::is_next_ours`]: its place in its line, from cheap to
+    /// dear. `None` where points stand on one cache, so that there are no shares.
+    fn places(&self) -> Option<Vec<usize>>;
+
+    /// Runs, measures and draws; `None` where only a share was run, or looked for.
     ///
     /// # Errors
     /// [`StudyError`]; [`StudyError::Stopped`] where a signal came.
-    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError>;
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError>;
 }
 
 /// What scenes ask of an adapter, each with what it runs on.
@@ -87,9 +94,9 @@ impl Devices {
         }
     }
 
-    /// A hash of all that a point's results depend on: each run's physics, device and when it gives up; frames, how it is
-    /// measured, and the program.
-    pub(super) fn hash(&self, runs: &[(&Scene, RunsOn)], frames: u32, measured: &str) -> String {
+    /// What a point is known by. The hash is of all that its results depend on: each run's physics, device and when it gives
+    /// up; frames, how it is measured, and the program.
+    pub(super) fn key(&self, runs: &[(&Scene, RunsOn)], frames: u32, measured: &str) -> Key {
         let of = |(scene, device): &(&Scene, RunsOn)| {
             let solver = &scene.solver;
             let most = match solver.method {
@@ -105,7 +112,15 @@ impl Devices {
         let study = format!("{FORM} {} {frames} {measured}", program());
         let text: Vec<String> = [study].into_iter().chain(runs.iter().map(of)).collect();
         let hash = blake3::hash(text.join("\n").as_bytes());
-        hash.to_hex().to_string()
+        let devices = runs.iter().map(|(_, device)| self.of(*device).identity());
+        let mut devices: Vec<String> = devices.map(|identity| identity.to_string()).collect();
+        devices.sort();
+        devices.dedup();
+        Key {
+            hash: hash.to_hex().to_string(),
+            program: program().to_owned(),
+            devices,
+        }
     }
 }
 
@@ -149,21 +164,86 @@ impl<M> Run<M> {
     }
 }
 
+/// What is run of a study.
+pub(super) enum Work {
+    /// All of it.
+    Whole,
+    /// A share, with which points are its.
+    Share(Chunk, Vec<bool>),
+    /// Nothing: points that no ledger has are counted.
+    Look,
+}
+
 /// What a kind of study has at hand while it runs.
 pub(super) struct Bench<'a> {
     pub(super) request: &'a Request,
     pub(super) devices: &'a Devices,
     pub(super) stop: &'a AtomicBool,
-    pub(super) tell: &'a mut dyn FnMut(Event),
+    tell: RefCell<&'a mut dyn FnMut(Event)>,
+    work: Work,
     pub(super) count: usize,
-    pub(super) number: usize,
+    /// Points that were told of.
+    number: usize,
+    /// Points of the study, a share's or not, that were come to.
+    dealt: usize,
+    /// Points of a share that were run, of those that stood there, and of what is left.
+    pub(super) ran: Cell<usize>,
+    pub(super) stood: Cell<usize>,
+    pub(super) left: Cell<usize>,
 }
 
-impl Bench<'_> {
+impl<'a> Bench<'a> {
+    pub(super) fn new(
+        request: &'a Request,
+        devices: &'a Devices,
+        stop: &'a AtomicBool,
+        tell: &'a mut dyn FnMut(Event),
+        (work, count): (Work, usize),
+    ) -> Self {
+        let count = match &work {
+            Work::Share(_, is_ours) => is_ours.iter().filter(|&&is| is).count(),
+            Work::Whole | Work::Look => count,
+        };
+        Self {
+            request,
+            devices,
+            stop,
+            tell: RefCell::new(tell),
+            work,
+            count,
+            number: 0,
+            dealt: 0,
+            ran: Cell::default(),
+            stood: Cell::default(),
+            left: Cell::default(),
+        }
+    }
+
+    pub(super) fn tell(&self, event: Event) {
+        (self.tell.borrow_mut())(event);
+    }
+
+    /// Whether there is nothing to draw, since others run what is not of the share.
+    pub(super) fn is_part(&self) -> bool {
+        !matches!(self.work, Work::Whole)
+    }
+
+    /// Whether the next of [`Kind::places`] is to be run, or looked for.
+    pub(super) fn is_next_ours(&mut self) -> bool {
+        self.dealt += 1;
+        match &self.work {
+            Work::Share(_, is_ours) => is_ours[self.dealt - 1],
+            Work::Whole | Work::Look => true,
+        }
+    }
+
     /// Tells what became of the next point.
     pub(super) fn told(&mut self, name: String, status: PointStatus) {
+        if matches!(self.work, Work::Look) {
+            return;
+        }
         self.number += 1;
-        (self.tell)(Event::Point(PointEvent {
+        self.tell(Event::Point(PointEvent {
             number: self.number,
             count: self.count,
             name,
@@ -171,16 +251,38 @@ impl Bench<'_> {
         }));
     }
 
-    /// A point's results and whether they stood in the ledger; they are measured where they did not.
+    fn reader(&self) -> Reader {
+        match self.work {
+            Work::Whole => Reader::Whole,
+            Work::Share(chunk, _) => Reader::Share(chunk),
+            Work::Look => Reader::Look,
+        }
+    }
+
+    /// Results that stand in the study's folder.
+    pub(super) fn ledger<M: Serialize + DeserializeOwned>(&self) -> Result<Ledger<M>, StudyError> {
+        let warn = &mut |text| self.tell(Event::Warning(text));
+        Ledger::open(&self.request.directory, self.reader(), warn)
+    }
+
+    /// A point's results and whether they stood in a ledger; they are measured where they did not. `None` of a point that is
+    /// only looked for, and of which there are none.
     pub(super) fn point<M: Clone + Default + Serialize>(
         &self,
         ledger: &mut Ledger<M>,
         name: &str,
-        hash: String,
+        key: Key,
         measure: impl FnOnce() -> Result<Run<M>, StudyError>,
-    ) -> Result<(Run<M>, bool), StudyError> {
-        if let Some(run) = ledger.runs.get(&hash) {
-            return Ok((run.clone(), true));
+    ) -> Result<Option<(Run<M>, bool)>, StudyError> {
+        let add = |to: &Cell<usize>| to.set(to.get() + 1);
+        let warn = &mut |text| self.tell(Event::Warning(text));
+        if let Some(run) = ledger.find(name, &key, self.reader(), warn)? {
+            add(&self.stood);
+            return Ok(Some((run, true)));
+        }
+        if matches!(self.work, Work::Look) {
+            add(&self.left);
+            return Ok(None);
         }
         if self.stop.load(Ordering::Relaxed) {
             return Err(StudyError::Stopped);
@@ -194,8 +296,20 @@ impl Bench<'_> {
             Ok(run) => run,
         };
         let name = name.to_owned();
-        let run = ledger.append(Line { hash, name, run })?;
-        Ok((run.clone(), false))
+        let run = ledger.append(Line { key, name, run })?;
+        add(&self.ran);
+        Ok(Some((run.clone(), false)))
+    }
+
+    /// At the end of all points: which ledgers of shares they were taken from.
+    pub(super) fn joined<M: Clone + Serialize>(&self, ledger: &Ledger<M>) {
+        let (taken, unknown) = ledger.joined();
+        for (file, points) in taken {
+            self.tell(Event::Joined { file, points });
+        }
+        for text in unknown {
+            self.tell(Event::Warning(text));
+        }
     }
 }
 
@@ -209,144 +323,5 @@ pub(super) fn until_done(
     match drive.run(last, stop, observe)? {
         End::Done => Ok(()),
         End::Stopped => Err(StudyError::Stopped),
-    }
-}
-
-/// A finished point as the file holds it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Line<M> {
-    /// [`Devices::hash`].
-    hash: String,
-    /// For a reader of the file.
-    name: String,
-    run: Run<M>,
-}
-
-/// `results.jsonl`, one line a finished point, open for more.
-pub(super) struct Ledger<M> {
-    path: PathBuf,
-    file: File,
-    /// By their hashes.
-    runs: BTreeMap<String, Run<M>>,
-}
-
-impl<M: Serialize + DeserializeOwned> Ledger<M> {
-    /// Opens the directory's results, or begins them; a torn last line is cut off. A directory that holds anything but
-    /// a study's results is refused, and so is one that another process writes to.
-    pub(super) fn open(directory: &Path) -> Result<Self, StudyError> {
-        let path = directory.join("results.jsonl");
-        let fault = |source| StudyError::File {
-            file: path.clone(),
-            source,
-        };
-        fs::create_dir_all(directory).map_err(fault)?;
-        let is_other = |entry: std::io::Result<fs::DirEntry>| {
-            entry.is_ok_and(|entry| entry.file_name() != claim::FILE)
-        };
-        let is_used = fs::read_dir(directory).map_err(fault)?.any(is_other);
-        if is_used && !path.exists() {
-            return Err(StudyError::File {
-                file: directory.to_owned(),
-                source: std::io::Error::other("it holds what is no study's: choose another -o"),
-            });
-        }
-        let text = match fs::read(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
-            Err(error) => return Err(fault(error)),
-        };
-        let whole = text.iter().rposition(|&byte| byte == b'\n');
-        let whole = whole.map_or(0, |end| end + 1);
-        let mut runs = BTreeMap::new();
-        let lines = text[..whole].split_inclusive(|&byte| byte == b'\n');
-        for (index, line) in lines.enumerate() {
-            let line: Line<M> =
-                serde_json::from_slice(line).map_err(|error| StudyError::Ledger {
-                    file: path.clone(),
-                    line: index + 1,
-                    what: in_line(&error),
-                })?;
-            runs.insert(line.hash, line.run);
-        }
-        let file = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&path)
-            .map_err(fault)?;
-        let busy = |_| std::io::Error::other("another study writes here");
-        file.try_lock().map_err(busy).map_err(fault)?;
-        file.set_len(whole as u64).map_err(fault)?;
-        Ok(Self { path, file, runs })
-    }
-}
-
-impl<M: Serialize> Ledger<M> {
-    /// Adds a line; it is on the disk when this returns.
-    fn append(&mut self, line: Line<M>) -> Result<&Run<M>, StudyError> {
-        // Finite numbers, strings and lists alone: nothing that JSON cannot hold.
-        let text = serde_json::to_string(&line).map_err(std::io::Error::other);
-        let written = text.and_then(|text| {
-            self.file.write_all(format!("{text}\n").as_bytes())?;
-            self.file.sync_data()
-        });
-        written.map_err(|source| StudyError::File {
-            file: self.path.clone(),
-            source,
-        })?;
-        Ok(self.runs.entry(line.hash).or_insert(line.run))
-    }
-}
-
-/// What is wrong with a line, without the number that it has as a text of its own.
-fn in_line(error: &serde_json::Error) -> String {
-    let text = error.to_string();
-    match text.rsplit_once(" at line 1 column ") {
-        Some((what, _)) => what.to_owned(),
-        None => text,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_torn_line_is_cut_off_and_a_spoiled_one_is_named() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let line = |hash: &str| Line {
-            hash: hash.into(),
-            name: "jacobi, k = 4".into(),
-            run: Run {
-                ended: Some(format!("too fast: {hash}")),
-                measured: vec![0.1f64],
-                ..Run::default()
-            },
-        };
-        let open = || Ledger::<Vec<f64>>::open(folder.path());
-        let mut ledger = open().expect("new");
-        ledger.append(line("a")).expect("written");
-        ledger.append(line("b")).expect("written");
-        let path = folder.path().join("results.jsonl");
-        let text = fs::read_to_string(&path).expect("text");
-        fs::write(&path, &text[..text.len() - 9]).expect("written");
-        assert!(open().is_err(), "two at once");
-        drop(ledger);
-        let mut ledger = open().expect("torn");
-        assert_eq!(ledger.runs.get("a"), Some(&line("a").run));
-        assert_eq!(ledger.runs.get("b"), None);
-        ledger.append(line("b")).expect("written");
-        assert_eq!(fs::read_to_string(&path).expect("text"), text);
-        drop(ledger);
-        fs::write(&path, format!("{text}{{}}\n")).expect("written");
-        let error = open().err().expect("spoiled").to_string();
-        assert!(error.contains("results.jsonl:3: missing field"), "{error}");
-        assert!(!error.contains("line 1"), "{error}");
-        let bytes = [text.as_bytes(), b"{\"hash\":\"\xff\"}\n"].concat();
-        fs::write(&path, bytes).expect("written");
-        let error = open().err().expect("no UTF-8").to_string();
-        assert!(
-            error.contains("results.jsonl:3: invalid unicode"),
-            "{error}"
-        );
     }
 }

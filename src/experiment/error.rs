@@ -64,6 +64,11 @@ pub enum StudyError {
         /// What is off.
         what: String,
     },
+    /// A share of a study that has none.
+    #[error(
+        "a study of kind {0} has no shares: its points stand on one cache; run it without --chunk"
+    )]
+    NoShares(&'static str),
     /// Results of another study stand in the folder.
     #[error(
         "{} holds results of the study {found}, not of {name}; left untouched: choose another -o",
@@ -109,7 +114,7 @@ impl From<&StudyError> for Blame {
             StudyError::Solid(error) => error.into(),
             StudyError::Gpu(error) => error.into(),
             StudyError::Solve(error) => error.into(),
-            StudyError::Point(_) => Self::Input,
+            StudyError::Point(_) | StudyError::NoShares(_) => Self::Input,
             StudyError::Stopped
             | StudyError::OtherStudy { .. }
             | StudyError::File { .. }

@@ -12,6 +12,7 @@ mod claim;
 mod comparison;
 mod engine;
 mod error;
+mod ledger;
 mod report;
 pub mod stability;
 mod surface;
@@ -22,12 +23,13 @@ pub mod validation;
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use crate::{
+    domain::chunk::Chunk,
     gpu::adapter,
     scene::study::Study,
-    stage::{bake, device::Gpu, render},
+    stage::{bake, device::Gpu, inspect::study::Outline, render},
 };
 
-use engine::{Bench, Kind};
+use engine::{Bench, Kind, Work};
 
 pub use engine::{Devices, Run};
 pub use error::StudyError;
@@ -41,6 +43,9 @@ pub struct Request {
     pub study: Study,
     /// Caches, pictures, table and page go in here.
     pub directory: PathBuf,
+    /// Share of the points that is run, without table and page; the whole study where there is none, with what shares have
+    /// run already.
+    pub chunk: Option<Chunk>,
     /// Adapter and shaders of what runs on a GPU.
     pub gpu: Gpu,
     /// As typed, for the page.
@@ -60,6 +65,13 @@ pub enum Event {
     Render(render::Event),
     /// A point of a sweep.
     Point(PointEvent),
+    /// Points were taken over from the ledger of a share.
+    Joined {
+        /// Its name in the study's folder.
+        file: String,
+        /// How many.
+        points: usize,
+    },
 }
 
 /// Where a sweep stands.
@@ -89,15 +101,28 @@ pub enum PointStatus {
 /// How a study ended.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Its page; `None` where a signal ended it before.
+    /// Its page; `None` where a signal ended it before, and of a share.
     pub page: Option<PathBuf>,
+    /// What a share came to; `None` where a signal ended it before, and of a whole study.
+    pub share: Option<Share>,
     /// What was found, in words.
     pub findings: Vec<String>,
     /// Marks that are missed and not known to be; only of a study that has marks.
     pub missed: Vec<String>,
 }
 
-/// Runs a study; `tell` hears of progress, and `stop` ends it after the current frame of a bake, a render or a point, which
+/// What a share of a study came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// Points that were run.
+    pub ran: usize,
+    /// Points of the share that stood in a ledger.
+    pub stood: usize,
+    /// Points of the study that no ledger of the folder has when the share is done.
+    pub left: usize,
+}
+
+/// Runs a study, or a share of it; `tell` hears of progress, and `stop` ends it after the current frame of a bake, a render or a point, which
 /// is then run anew. Results that stand in the directory already are kept.
 ///
 /// # Errors
@@ -122,18 +147,32 @@ pub fn study(
         Study::Tune(tune) => &**tune,
         Study::Validation(validation) => &**validation,
     };
-    let mut bench = Bench {
-        request,
-        devices: &Devices::open(&request.gpu, kind.needs())?,
-        stop,
-        tell,
-        count: kind.count(),
-        number: 0,
+    let work = match request.chunk {
+        None => Work::Whole,
+        Some(chunk) => {
+            let places = kind.places();
+            let places = places.ok_or(StudyError::NoShares(Outline::of(&request.study).kind))?;
+            Work::Share(chunk, chunk.deal(&places))
+        }
     };
+    let devices = Devices::open(&request.gpu, kind.needs())?;
     claim::take(&request.directory, &request.name)?;
-    match kind.run(&mut bench) {
-        Ok(report) => report.write(request),
-        Err(StudyError::Stopped) => Ok(Outcome::default()),
-        Err(error) => Err(error),
+    let mut bench = Bench::new(request, &devices, stop, tell, (work, kind.count()));
+    let report = match kind.run(&mut bench) {
+        Err(StudyError::Stopped) => return Ok(Outcome::default()),
+        report => report?,
+    };
+    if let Some(report) = report {
+        return report.write(request);
     }
+    let (ran, stood) = (bench.ran.get(), bench.stood.get());
+    // Once more over all points, which runs none of them: others have worked meanwhile.
+    let mut look = Bench::new(request, &devices, stop, tell, (Work::Look, kind.count()));
+    kind.run(&mut look)?;
+    let left = look.left.get();
+    let share = Some(Share { ran, stood, left });
+    Ok(Outcome {
+        share,
+        ..Outcome::default()
+    })
 }

@@ -55,6 +55,7 @@ impl Report {
         write(&page, page::html(&request.name, &parts))?;
         Ok(Outcome {
             page: Some(page),
+            share: None,
             findings: self.findings,
             missed: self.missed,
         })

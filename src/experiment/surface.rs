@@ -23,7 +23,8 @@ use crate::{
 
 use super::{
     Event, PointStatus, Request, StudyError,
-    engine::{self, Bench, Kind, Ledger},
+    engine::{self, Bench, Kind},
+    ledger::Key,
     report::Report,
 };
 
@@ -62,8 +63,13 @@ impl Kind for SurfaceStudy {
         self.points().count()
     }
 
-    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
-        let mut ledger = Ledger::open(&bench.request.directory)?;
+    /// All draw frames of one cache.
+    fn places(&self) -> Option<Vec<usize>> {
+        None
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
+        let mut ledger = bench.ledger()?;
         baked(self, bench)?;
         let mut room = Room {
             study: self,
@@ -75,15 +81,16 @@ impl Kind for SurfaceStudy {
             let mut of_line = Vec::new();
             for point in &line.points {
                 let name = format!("{}, {} = {}", line.name, line.key, point.label);
-                let hash = room.hash(bench, point);
+                let key = room.key(bench, point);
                 let measure = || room.measure(bench, point);
-                let (run, stood) = bench.point(&mut ledger, &name, hash, measure)?;
-                bench.told(name, status(&self.errors, &run, stood));
-                of_line.push(run);
+                if let Some((run, stood)) = bench.point(&mut ledger, &name, key, measure)? {
+                    bench.told(name, status(&self.errors, &run, stood));
+                    of_line.push(run);
+                }
             }
             runs.push(of_line);
         }
-        Ok(report::draw(self, bench, &runs))
+        Ok(Some(report::draw(self, bench, &runs)))
     }
 }
 
@@ -115,7 +122,7 @@ fn baked(study: &SurfaceStudy, bench: &mut Bench<'_>) -> Result<(), StudyError> 
         device: Device::Gpu(bench.request.gpu.clone()),
         time_passes: false,
     };
-    let mut tell = |event| (bench.tell)(Event::Bake(Box::new(event)));
+    let mut tell = |event| bench.tell(Event::Bake(Box::new(event)));
     match bake::bake(&request, bench.stop, &mut tell)?.interrupted {
         true => Err(StudyError::Stopped),
         false => Ok(()),
@@ -142,7 +149,7 @@ struct Room<'s, 'b> {
 }
 
 impl<'b> Room<'_, 'b> {
-    fn hash(&self, bench: &Bench<'_>, point: &Point) -> String {
+    fn key(&self, bench: &Bench<'_>, point: &Point) -> Key {
         let study = self.study;
         let scene = [(&study.scene, RunsOn::Gpu)];
         let measured = format!(
@@ -153,7 +160,7 @@ impl<'b> Room<'_, 'b> {
             study.look.hash(),
             point.look.hash(),
         );
-        bench.devices.hash(&scene, study.frames.last(), &measured)
+        bench.devices.key(&scene, study.frames.last(), &measured)
     }
 
     fn is_scored(&self) -> bool {

@@ -7,14 +7,14 @@ use std::{
 };
 
 /// Opens a lock file, which is made where it is missing.
-pub(super) fn open(file: &Path) -> io::Result<File> {
+pub(crate) fn open(file: &Path) -> io::Result<File> {
     let mut options = File::options();
     options.read(true).write(true).create(true).truncate(false);
     options.open(file)
 }
 
 /// Whether a lock was had, by what trying gave.
-pub(super) fn is_had(tried: Result<(), TryLockError>) -> io::Result<bool> {
+pub(crate) fn is_had(tried: Result<(), TryLockError>) -> io::Result<bool> {
     match tried {
         Ok(()) => Ok(true),
         Err(TryLockError::WouldBlock) => Ok(false),

@@ -9,7 +9,7 @@ pub mod drive;
 pub mod export;
 pub mod gauge;
 pub mod inspect;
-mod locked;
+pub(crate) mod locked;
 pub mod prepare;
 mod probes;
 pub mod render;

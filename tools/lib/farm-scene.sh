@@ -44,9 +44,57 @@ bake_unbroken() {
     "$swell" render "$room/unbroken-cache" --look "$room/look.toml" -o "$room/unbroken-pictures" --progress none
 }
 
+# export_unbroken: meshes and a USD shot of the same, in unbroken-export.
+export_unbroken() {
+    "$swell" export "$room/unbroken-cache" --mesh "$room/unbroken-export/m.%04d.ply" --usd "$room/unbroken-export/shot.usda" --progress none
+}
+
 # is_unbroken FOLDER: every file of the room's FOLDER has the bytes of unbroken-FOLDER, and there is no other; wall clocks aside.
 is_unbroken() {
     diff -r --brief --exclude=timings.jsonl --exclude=lock "$room/unbroken-$1" "$room/$1"
+}
+
+# study_unbroken: a sweep over the shot in study.toml, and what it is without a farm, in unbroken-study.
+study_unbroken() {
+    cat >"$room/study.toml" <<'END'
+kind = "sweep"
+scene = "tank.toml"
+key = "solver.pbf.iterations"
+values = [2, 4, 8]
+steps = 24
+errors = ["density_error_mean", "density_error_max"]
+[[method]]
+name = "jacobi"
+set = ["solver.pbf.iteration=jacobi"]
+[[method]]
+name = "red_black"
+END
+    "$swell" study "$room/study.toml" -o "$room/unbroken-study" --progress none
+}
+
+# results_of FOLDER: a study's own ledger without wall clocks.
+results_of() { sed 's/"seconds":\[[^]]*\]//' "$1/results.jsonl"; }
+
+# is_unbroken_study FOLDER: the room's FOLDER has the points of unbroken-study, in their order and nothing else, and the same files beside ledgers of shares.
+is_unbroken_study() {
+    diff <(results_of "$room/unbroken-study") <(results_of "$room/$1") >&2 &&
+        diff <(cd "$room/unbroken-study" && find . -type f | sort) <(cd "$room/$1" && find . -type f ! -name 'results.*-of-*.jsonl' | sort) >&2
+}
+
+# points_of FOLDER: points that shares have run there.
+points_of() { cat "$1"/results.*-of-*.jsonl 2>/dev/null | wc -l; }
+
+# studying FOLDER: ids of the programs that run a study there.
+studying() { pgrep -f "^$swell study [^ ]+ -o $1 "; }
+
+# wait_for_point FOLDER: until a share has run a point; gives up after a minute.
+wait_for_point() {
+    local tries=0
+    until [[ $(points_of "$1") -ge 1 ]]; do
+        tries=$((tries + 1))
+        [[ $tries -lt 1200 ]] || { say "FAILED: no point of $1 was run"; exit 1; }
+        sleep 0.05
+    done
 }
 
 # frames_of CACHE: whole lines of its ledger less the start's.

@@ -3,10 +3,7 @@
 use crate::scene::study::stability::{Limit, Search, Trial};
 
 use super::{
-    super::{
-        PointStatus, StudyError,
-        engine::{Bench, Ledger},
-    },
+    super::{PointStatus, StudyError, engine::Bench, ledger::Ledger},
     Measured, Run, Verdict, point, report,
 };
 
@@ -21,13 +18,14 @@ pub(super) struct Found {
     pub(super) tries: usize,
 }
 
-/// Both ends first, and then the middle by ratio of a value that passes and one that fails, until they are near.
+/// Both ends first, and then the middle by ratio of a value that passes and one that fails, until they are near. `None` where
+/// the runs are only looked for, and one is not there.
 pub(super) fn find(
     bench: &mut Bench<'_>,
     ledger: &mut Ledger<Vec<Measured>>,
     limit: &Limit,
     search: &Search,
-) -> Result<Found, StudyError> {
+) -> Result<Option<Found>, StudyError> {
     let title = format!("{}, {}", limit.name, search.method.name());
     let mut found = Found::default();
     let mut next = Some(limit.passes);
@@ -36,7 +34,10 @@ pub(super) fn find(
             // Beyond what a scene can say.
             Err(error) => Some(error.to_string()),
             Ok(trial) => {
-                let (run, _) = point(bench, ledger, &format!("{title} = {value}"), &trial)?;
+                let name = format!("{title} = {value}");
+                let Some((run, _)) = point(bench, ledger, &name, &trial)? else {
+                    return Ok(None);
+                };
                 missed(&run, &trial)
             }
         };
@@ -49,7 +50,7 @@ pub(super) fn find(
     }
     let name = format!("{title}: {}", found.words(&limit.unit));
     bench.told(name, PointStatus::Done(0.0, Vec::new()));
-    Ok(found)
+    Ok(Some(found))
 }
 
 /// The first mark that a run misses, in words.

@@ -20,7 +20,8 @@ use crate::{
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, Ledger, needs_of},
+    engine::{Bench, Kind, needs_of},
+    ledger::Ledger,
     report::Report,
 };
 use report::Results;
@@ -57,8 +58,21 @@ impl Kind for Stability {
         cases.chain(limits).sum()
     }
 
-    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
-        let mut ledger = Ledger::open(&bench.request.directory)?;
+    /// Trials, and then searches for limits, which take many runs each. What is to be refused is tried with the whole.
+    fn places(&self) -> Option<Vec<usize>> {
+        let trials = |held: &Held| match held {
+            Held::Runs(trials) => trials.len(),
+            Held::Test(_) | Held::Refusal { .. } => 0,
+        };
+        let trials: usize = self.cases.iter().map(|case| trials(&case.held)).sum();
+        let searches = self.limits.iter().map(|limit| limit.searches.len()).sum();
+        let mut places = vec![0; trials];
+        places.extend(vec![1; searches]);
+        Some(places)
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
+        let mut ledger = bench.ledger()?;
         let mut runs = Vec::new();
         for case in &self.cases {
             let title = format!("{} {}", case.number, case.name);
@@ -67,13 +81,18 @@ impl Kind for Stability {
                 Held::Test(_) => {}
                 Held::Runs(trials) => {
                     for trial in trials {
+                        if !bench.is_next_ours() {
+                            continue;
+                        }
                         let method = trial.scene.solver.method.name();
                         let name = format!("{title}, {method}, {}", trial.device.name());
-                        let (run, stood) = point(bench, &mut ledger, &name, trial)?;
-                        bench.told(name, run.status(trial, stood));
-                        of_case.push(run);
+                        if let Some((run, stood)) = point(bench, &mut ledger, &name, trial)? {
+                            bench.told(name, run.status(trial, stood));
+                            of_case.push(run);
+                        }
                     }
                 }
+                Held::Refusal { .. } if bench.is_part() => {}
                 Held::Refusal { attempts, .. } => {
                     for attempt in attempts {
                         let (method, device) = (attempt.method.name(), attempt.device.name());
@@ -92,20 +111,24 @@ impl Kind for Stability {
         let mut limits = Vec::new();
         for limit in &self.limits {
             for search in &limit.searches {
-                limits.push((
-                    limit,
-                    search,
-                    limit::find(bench, &mut ledger, limit, search)?,
-                ));
+                if !bench.is_next_ours() {
+                    continue;
+                }
+                let found = limit::find(bench, &mut ledger, limit, search)?;
+                limits.extend(found.map(|found| (limit, search, found)));
             }
         }
+        if bench.is_part() {
+            return Ok(None);
+        }
+        bench.joined(&ledger);
         let results = Results {
             stability: self,
             devices: bench.devices,
             runs,
             limits,
         };
-        Ok(results.draw(bench.request))
+        Ok(Some(results.draw(bench.request)))
     }
 }
 
@@ -118,13 +141,13 @@ fn scenes(trial: &Trial) -> impl Iterator<Item = (&Scene, RunsOn)> {
     [(&trial.scene, trial.device)].into_iter().chain(others)
 }
 
-/// A trial's results, and whether they stood in the ledger.
+/// A trial's results, and whether they stood in a ledger; `None` where they are only looked for.
 fn point(
     bench: &Bench<'_>,
     ledger: &mut Ledger<Vec<Measured>>,
     name: &str,
     trial: &Trial,
-) -> Result<(Run, bool), StudyError> {
+) -> Result<Option<(Run, bool)>, StudyError> {
     let mut measured = String::new();
     for other in &trial.others {
         measured += &format!("{} {} ", other.scale, other.shift);
@@ -136,7 +159,7 @@ fn point(
         measured += &format!("{of:?} {side} {after} {since:?} {region:?} ");
     }
     let runs: Vec<_> = scenes(trial).collect();
-    let hash = bench.devices.hash(&runs, trial.frames, &measured);
+    let key = bench.devices.key(&runs, trial.frames, &measured);
     let measure = || run_trial(bench.devices, trial, bench.stop);
-    bench.point(ledger, name, hash, measure)
+    bench.point(ledger, name, key, measure)
 }

@@ -9,14 +9,15 @@ mod words;
 
 use crate::{
     gpu::adapter::Needs,
-    scene::study::sweep::{ErrorMeasure, Measure, Point, Sweep},
+    scene::study::sweep::{ErrorMeasure, Line, Measure, Point, Sweep},
     stage::{gauge, prepare::Start},
     study::measure::Gauge,
 };
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, Ledger, needs_of},
+    engine::{Bench, Kind, needs_of},
+    ledger::Key,
     report::Report,
 };
 use measured::{Run, error};
@@ -31,17 +32,25 @@ impl Kind for Sweep {
         self.points().count() + self.lines.iter().flat_map(|line| &line.coarser).count()
     }
 
-    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
+    fn places(&self) -> Option<Vec<usize>> {
+        let of_line = |line: &Line| 0..line.points.iter().chain(&line.coarser).count();
+        Some(self.lines.iter().flat_map(of_line).collect())
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
         let mut lab = Lab {
             sweep: self,
             gauge: gauge_of(self)?,
             projections: self.state.as_ref().map(Projections::new),
         };
-        let mut ledger = Ledger::open(&bench.request.directory)?;
+        let mut ledger = bench.ledger()?;
         let mut runs = Vec::new();
         for line in &self.lines {
             let mut of_line = Vec::new();
             for point in line.points.iter().chain(&line.coarser) {
+                if !bench.is_next_ours() {
+                    continue;
+                }
                 let coarser = line.coarser.as_ref();
                 let is_coarser = coarser.is_some_and(|coarser| std::ptr::eq(coarser, point));
                 let finest = line.points.last().filter(|_| is_coarser);
@@ -49,15 +58,20 @@ impl Kind for Sweep {
                     true => format!("{}, coarser: {}", line.name, point.label),
                     false => format!("{}, {} = {}", line.name, line.key, point.label),
                 };
-                let hash = lab.hash(bench, point, finest);
+                let key = lab.key(bench, point, finest);
                 let measure = || lab.measure(bench, point, finest);
-                let (run, stood) = bench.point(&mut ledger, &name, hash, measure)?;
-                bench.told(name, status(&self.errors, &run, stood));
-                of_line.push(run);
+                if let Some((run, stood)) = bench.point(&mut ledger, &name, key, measure)? {
+                    bench.told(name, status(&self.errors, &run, stood));
+                    of_line.push(run);
+                }
             }
             runs.push(of_line);
         }
-        Ok(report::draw(self, bench, &runs))
+        if bench.is_part() {
+            return Ok(None);
+        }
+        bench.joined(&ledger);
+        Ok(Some(report::draw(self, bench, &runs)))
     }
 }
 
@@ -96,7 +110,7 @@ impl Lab<'_> {
         }
     }
 
-    fn hash(&self, bench: &Bench<'_>, point: &Point, finest: Option<&Point>) -> String {
+    fn key(&self, bench: &Bench<'_>, point: &Point, finest: Option<&Point>) -> Key {
         let points = [point].into_iter().chain(&self.sweep.state).chain(finest);
         let runs: Vec<_> = points.map(|point| (&point.scene, point.device)).collect();
         let repeats = self.sweep.repeats;
@@ -107,7 +121,7 @@ impl Lab<'_> {
             self.gauge,
             is_weighed.then(|| point.scene.pressure_points()),
         );
-        bench.devices.hash(&runs, point.frames, &measured)
+        bench.devices.key(&runs, point.frames, &measured)
     }
 }
 

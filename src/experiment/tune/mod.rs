@@ -27,7 +27,8 @@ use crate::{
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, Ledger, needs_of},
+    engine::{Bench, Kind, needs_of},
+    ledger::Ledger,
     report::Report,
 };
 use measured::{Measured, Run, measure, repeats};
@@ -96,14 +97,22 @@ impl Kind for Tune {
         self.twins().count()
     }
 
-    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
+    /// What is known before the first run, the coarsest first; what is proposed is run with the whole.
+    fn places(&self) -> Option<Vec<usize>> {
+        Some((0..self.twins().count()).collect())
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
         write::check_target(self)?;
         let mut lab = Lab {
             tune: self,
             gauge: gauge_of(self)?,
-            ledger: Ledger::open(&bench.request.directory)?,
+            ledger: bench.ledger()?,
         };
         let trials = lab.known(bench)?;
+        if bench.is_part() {
+            return Ok(None);
+        }
         let limits = limits(self, reference(&trials)?)?;
         let mut results = Results {
             tune: self,
@@ -114,9 +123,10 @@ impl Kind for Tune {
             choice: None,
         };
         lab.propose(bench, &mut results)?;
+        bench.joined(&lab.ledger);
         results.choose();
         let written = write::write(&results, &bench.request.command)?;
-        Ok(report::draw(&results, bench, written))
+        Ok(Some(report::draw(&results, bench, written)))
     }
 }
 
@@ -198,7 +208,12 @@ impl<'a> Lab<'a> {
         roles.push(Role::Reference);
         let mut trials = Vec::new();
         for (role, (why, twin)) in roles.into_iter().zip(tune.twins()) {
-            let run = self.run(bench, why, twin)?;
+            if !bench.is_next_ours() {
+                continue;
+            }
+            let Some(run) = self.run(bench, why, twin)? else {
+                continue;
+            };
             if let (true, None) = (trials.is_empty(), &run.ended) {
                 self.check_told(&run.measured)?;
             }
@@ -222,7 +237,13 @@ impl<'a> Lab<'a> {
         Ok(())
     }
 
-    fn run(&mut self, bench: &mut Bench<'_>, why: &str, twin: &Twin) -> Result<Run, StudyError> {
+    /// `None` of what is only looked for, and is not there.
+    fn run(
+        &mut self,
+        bench: &mut Bench<'_>,
+        why: &str,
+        twin: &Twin,
+    ) -> Result<Option<Run>, StudyError> {
         let tune = self.tune;
         let measured = format!(
             "tune {} {:?} {:?}",
@@ -231,19 +252,20 @@ impl<'a> Lab<'a> {
             tune.has_pressure().then(|| twin.scene.pressure_points()),
         );
         let runs = [(&twin.scene, RunsOn::Gpu)];
-        let hash = bench.devices.hash(&runs, tune.frames, &measured);
+        let key = bench.devices.key(&runs, tune.frames, &measured);
         let name = format!("{why}: {}", twin.name());
         let gauge = &self.gauge;
-        let (run, stood) = bench.point(&mut self.ledger, &name, hash, || {
-            measure(bench, tune, twin, gauge)
-        })?;
+        let measure = || measure(bench, tune, twin, gauge);
+        let Some((run, stood)) = bench.point(&mut self.ledger, &name, key, measure)? else {
+            return Ok(None);
+        };
         let status = match &run.ended {
             _ if stood => PointStatus::Stands,
             Some(message) => PointStatus::Failed(message.clone()),
             None => PointStatus::Done(1e3 * run.per_frame()[1], Vec::new()),
         };
         bench.told(name, status);
-        Ok(run)
+        Ok(Some(run))
     }
 
     /// Runs what the laws call cheapest for as long as that is cheaper than any run that holds.
@@ -267,8 +289,9 @@ impl<'a> Lab<'a> {
                 break;
             }
             bench.count += 1;
-            let run = self.run(bench, "proposal", &twin)?;
-            results.take(twin, run, proposal);
+            if let Some(run) = self.run(bench, "proposal", &twin)? {
+                results.take(twin, run, proposal);
+            }
         }
         Ok(())
     }

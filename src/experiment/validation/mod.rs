@@ -18,7 +18,7 @@ use crate::{
 
 use super::{
     Devices, PointStatus, StudyError,
-    engine::{Bench, Kind, Ledger, needs_of, until_done},
+    engine::{Bench, Kind, needs_of, until_done},
     report::Report,
 };
 use record::Record;
@@ -50,30 +50,47 @@ impl Kind for Validation {
             .sum()
     }
 
-    fn run(&self, bench: &mut Bench<'_>) -> Result<Report, StudyError> {
-        let mut ledger = Ledger::open(&bench.request.directory)?;
+    fn places(&self) -> Option<Vec<usize>> {
+        let of_benchmark = |benchmark: &Benchmark| 0..benchmark.runs.len();
+        Some(self.benchmarks.iter().flat_map(of_benchmark).collect())
+    }
+
+    fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {
+        let mut ledger = bench.ledger()?;
         let mut results = Vec::new();
         for benchmark in &self.benchmarks {
             let mut runs = Vec::new();
             for trial in &benchmark.runs {
+                if !bench.is_next_ours() {
+                    continue;
+                }
                 let name = format!("{}, {}", benchmark.name, trial.name());
                 let measured = format!(
                     "{:?} {:?} {:?}",
                     benchmark.measure, benchmark.scale, benchmark.points
                 );
                 let scenes = [(&trial.scene, trial.device)];
-                let hash = bench
+                let key = bench
                     .devices
-                    .hash(&scenes, trial.scene.shot.frames, &measured);
+                    .key(&scenes, trial.scene.shot.frames, &measured);
                 let measure = || run_benchmark(bench.devices, benchmark, trial, bench.stop);
-                let (run, stood) = bench.point(&mut ledger, &name, hash, measure)?;
-                bench.told(name, status(&run, stood));
-                runs.push(run);
+                if let Some((run, stood)) = bench.point(&mut ledger, &name, key, measure)? {
+                    bench.told(name, status(&run, stood));
+                    runs.push(run);
+                }
             }
-            let judged = judge(benchmark, &runs);
-            results.push((benchmark, runs, judged));
+            results.push((benchmark, runs));
         }
-        Ok(report::draw(self, bench, &results))
+        if bench.is_part() {
+            return Ok(None);
+        }
+        bench.joined(&ledger);
+        let judged = |(benchmark, runs): (_, Vec<Run>)| {
+            let judged = judge(benchmark, &runs);
+            (benchmark, runs, judged)
+        };
+        let results: Vec<_> = results.into_iter().map(judged).collect();
+        Ok(Some(report::draw(self, bench, &results)))
     }
 }
 

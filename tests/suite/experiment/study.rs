@@ -3,6 +3,7 @@
 mod command;
 mod faults;
 mod settings;
+mod shares;
 mod stability;
 mod surfaces;
 mod sweeps;
@@ -95,6 +96,7 @@ impl Job {
             name: "tiny-study".into(),
             study,
             directory: self.folder.path().join("out"),
+            chunk: None,
             gpu: Gpu::default(),
             command: "swell study s.toml".into(),
         };

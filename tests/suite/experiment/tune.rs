@@ -7,7 +7,10 @@ use swell::{
     study::measure::Gauge,
 };
 
-use crate::support::job::{Job, assert_has};
+use crate::support::{
+    events::{events, named},
+    job::{Job, assert_has},
+};
 
 const SCENE: &str = r#"
 # A small dam.
@@ -183,6 +186,29 @@ fn the_cheapest_settings_that_hold_are_written_and_hold_when_they_are_baked() {
         &hurried,
         &["holds energy 4 %, front 6 %, 0.000001 s a frame"],
     );
+}
+
+/// Runs that are known before the first are shared out; laws, proposals and the scene are made by the command that joins.
+#[test]
+fn shares_of_a_tuning_are_joined() {
+    let job = Job::of(&[("tiny.toml", SCENE)]);
+    let tune = "tune tiny.toml -o out --frames 1-4 --error energy=50%";
+    let mut done = 0;
+    for k in 1..=2 {
+        let told = events(&job, 0, &format!("{tune} --chunk {k}/2"));
+        done += named(&told, "point").len();
+        assert_eq!(told.last().unwrap()["left"], 13 - done);
+        assert!(!job.path("tiny.tuned.toml").exists());
+    }
+    assert_eq!(done, 13);
+    let told = events(&job, 0, tune);
+    let points = named(&told, "point");
+    let stand = points
+        .iter()
+        .filter(|point| point["status"] == "stands there");
+    assert_eq!(stand.count(), 13);
+    assert_eq!(named(&told, "joined").len(), 2);
+    assert!(job.path("tiny.tuned.toml").exists());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::{Job, stands};
 
 /// Falling water: the marks are its speed, one that holds and one that does not.
-const FALL: &str = r#"
+pub(super) const FALL: &str = r#"
 kind = "stability"
 about = ["Why <this> is hard."]
 [[case]]

@@ -1,0 +1,255 @@
+//! Shares of a study, and the command that joins them.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::{BufRead as _, BufReader, Write as _},
+    process::{Command, Stdio},
+    thread,
+};
+
+use serde_json::Value;
+
+use super::{ITERATIONS, SCENE, stability::FALL};
+use crate::support::{
+    events::{events, named, totals},
+    job::{Job, assert_has},
+};
+
+/// Three points a line, one run each.
+fn sweep() -> String {
+    let text = ITERATIONS.replace("[1, 4]", "[1, 4, 8]");
+    text.replace("repeats = 2", "repeats = 1")
+}
+
+fn job(study: &str) -> Job {
+    Job::of(&[("tiny.toml", SCENE), ("s.toml", study)])
+}
+
+/// All that a study leaves, by name.
+fn pages(job: &Job) -> BTreeMap<String, Vec<u8>> {
+    let files = ["out", "out/curves"].map(|folder| fs::read_dir(job.path(folder)).unwrap());
+    let files = files
+        .into_iter()
+        .flatten()
+        .map(|entry| entry.unwrap().path());
+    let is_left = |name: &str| name == "results.jsonl" || !name.ends_with(".jsonl");
+    let read = |path: std::path::PathBuf| {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        (path.is_file() && is_left(&name)).then(|| (name, fs::read(&path).unwrap()))
+    };
+    files.filter_map(read).collect()
+}
+
+/// Lines of the study's own ledger, without wall clocks.
+fn lines(job: &Job) -> Vec<Value> {
+    let text = fs::read_to_string(job.path("out/results.jsonl")).unwrap();
+    let line = |line: &str| {
+        let mut line: Value = serde_json::from_str(line).unwrap();
+        line["run"]["seconds"].take();
+        line
+    };
+    text.lines().map(line).collect()
+}
+
+fn statuses(told: &[Value]) -> Vec<&str> {
+    let points = named(told, "point").into_iter();
+    points
+        .map(|point| point["status"].as_str().unwrap())
+        .collect()
+}
+
+fn share(k: u32, of: u32) -> String {
+    format!("study s.toml -o out --chunk {k}/{of}")
+}
+
+#[test]
+fn shares_that_are_joined_are_the_study_that_one_process_ran() {
+    let text = sweep();
+    let whole = job(&text);
+    whole.expect(0, "study s.toml -o out");
+
+    // All at once into a folder that is not there yet.
+    let shared = job(&text);
+    thread::scope(|scope| {
+        for k in 1..=3 {
+            let shared = &shared;
+            scope.spawn(move || {
+                let told = events(shared, 0, &share(k, 3));
+                assert_eq!(totals(&told), [2, 0, 0]);
+                let end = told.last().unwrap();
+                assert_eq!((&end["ran"], &end["stood"]), (&2.into(), &0.into()));
+                assert!(end["left"].as_u64().unwrap() <= 4, "{end}");
+            });
+        }
+    });
+    assert!(!shared.path("out/index.html").exists());
+    // What stands is counted when all are done; it is run by no other cut into shares.
+    let told = events(&shared, 0, &share(4, 5));
+    assert_eq!(
+        (statuses(&told), &told.last().unwrap()["left"]),
+        (vec!["stands there"], &0.into())
+    );
+    let told = events(&shared, 0, "study s.toml -o out");
+    assert_eq!(statuses(&told), ["stands there"; 6]);
+    let joined: Vec<_> = (named(&told, "joined").iter())
+        .map(|event| {
+            (
+                event["ledger"].as_str().unwrap(),
+                event["points"].as_u64().unwrap(),
+            )
+        })
+        .collect();
+    let ledgers = [1, 2, 3].map(|k| format!("results.{k}-of-3.jsonl"));
+    assert_eq!(joined, ledgers.each_ref().map(|name| (&**name, 2)));
+    assert_eq!(lines(&shared), lines(&whole));
+    // Taken over once.
+    let told = events(&shared, 0, "study s.toml -o out");
+    assert!(named(&told, "joined").is_empty());
+
+    // With the same times, all of it has the same bytes: the lines of the one run as shares would have written them.
+    let dealt = job(&text);
+    fs::create_dir(dealt.path("out")).unwrap();
+    let text = fs::read_to_string(whole.path("out/results.jsonl")).unwrap();
+    for (k, name) in ledgers.iter().enumerate() {
+        let own: String = text
+            .split_inclusive('\n')
+            .rev()
+            .skip(k)
+            .step_by(3)
+            .collect();
+        dealt.write(&format!("out/{name}"), &own);
+    }
+    let told = events(&dealt, 0, "study s.toml -o out");
+    assert_eq!(statuses(&told), ["stands there"; 6]);
+    assert_eq!(pages(&dealt), pages(&whole));
+    // The control: times are in it.
+    assert_ne!(pages(&shared)["results.csv"], pages(&whole)["results.csv"]);
+}
+
+#[test]
+fn what_no_share_has_is_run_and_what_does_not_fit_is_named() {
+    let shared = job(&sweep());
+    for k in [1, 3] {
+        shared.expect(0, &share(k, 3));
+    }
+    let second = share(2, 3);
+    let copy = shared.path("other-build");
+    let program = fs::read(env!("CARGO_BIN_EXE_swell")).unwrap();
+    fs::copy(env!("CARGO_BIN_EXE_swell"), &copy).unwrap();
+    fs::write(&copy, [&program[..], b"\0"].concat()).unwrap();
+    let mut other = Command::new(&copy);
+    let other = other
+        .current_dir(shared.folder.path())
+        .args(second.split(' '));
+    assert!(other.output().unwrap().status.success());
+    fs::remove_file(&copy).unwrap();
+
+    // A worker is at work; a second one of its share, and who joins, are told.
+    let ledger = fs::OpenOptions::new()
+        .append(true)
+        .open(shared.path("out/results.2-of-3.jsonl"));
+    let mut ledger = ledger.unwrap();
+    ledger.lock().unwrap();
+    shared.expect_clear(
+        4,
+        &second,
+        "results.2-of-3.jsonl: another study writes here",
+    );
+    shared.expect_clear(
+        4,
+        "study s.toml -o out",
+        "results.2-of-3.jsonl: a worker of this share",
+    );
+    ledger.write_all(b"{\"hash\":").unwrap();
+    drop(ledger);
+
+    let told = events(&shared, 0, "study s.toml -o out");
+    // Dealt from the coarse end: 1 of both, 4 of both, 8 of both.
+    let (run, stands) = ("done", "stands there");
+    assert_eq!(statuses(&told), [stands, stands, run, run, stands, stands]);
+    let warnings: Vec<_> = (named(&told, "warning").iter())
+        .map(|event| event["text"].as_str().unwrap())
+        .collect();
+    assert!(
+        warnings[0].contains("results.2-of-3.jsonl ends within a line"),
+        "{warnings:?}"
+    );
+    let of_builds = warnings
+        .iter()
+        .filter(|text| text.contains("is of another build of the program"));
+    assert_eq!((of_builds.count(), warnings.len()), (2, 3), "{warnings:?}");
+
+    // A scene that changed: nothing of it stands, and each line is named.
+    shared.edit("tiny.toml", "[0.6, 0.6, 0.6]", "[0.6, 0.5, 0.6]");
+    let said = shared.expect(0, "study s.toml -o out");
+    assert_eq!(
+        said.matches("is of another scene, or of other settings")
+            .count(),
+        4,
+        "{said}"
+    );
+    assert_eq!(said.matches("  done").count(), 6, "{said}");
+
+    // A line that is spoiled.
+    let file = shared.path("out/results.1-of-3.jsonl");
+    let text = fs::read_to_string(&file).unwrap();
+    fs::write(&file, text.replacen("\"name\"", "\"nome\"", 1)).unwrap();
+    shared.expect_clear(
+        4,
+        "study s.toml -o out",
+        "results.1-of-3.jsonl:1: missing field `name`",
+    );
+    fs::write(&file, text).unwrap();
+    shared.expect(0, "study s.toml -o out");
+}
+
+#[test]
+fn a_share_that_is_killed_goes_on() {
+    let values: Vec<String> = (1..=16).map(|k| k.to_string()).collect();
+    let text = sweep().replace("[1, 4, 8]", &format!("[{}]", values.join(", ")));
+    let shared = job(&text);
+    let mut command = shared.command(&format!("{} --progress json", share(2, 2)));
+    let mut worker = command.stdout(Stdio::piped()).spawn().unwrap();
+    let mut told = BufReader::new(worker.stdout.take().unwrap()).lines();
+    assert!(told.next().unwrap().unwrap().contains("\"number\":1"));
+    worker.kill().unwrap();
+    assert!(!worker.wait().unwrap().success());
+    let path = shared.path("out/results.2-of-2.jsonl");
+    let mut text = fs::read_to_string(&path).unwrap();
+    let whole = text.matches('\n').count();
+    assert!((1..16).contains(&whole), "{whole} of 16 were done");
+    // As a host that went down may leave it.
+    text.push_str("{\"hash\":\"12");
+    fs::write(&path, text).unwrap();
+    let told = events(&shared, 0, &share(2, 2));
+    assert_eq!(totals(&told), [16 - whole as u64, whole as u64, 0]);
+    assert_eq!(told.last().unwrap()["left"], 16);
+}
+
+#[test]
+fn other_kinds_have_shares_or_say_that_they_have_none() {
+    let shared = job(FALL);
+    for k in 1..=2 {
+        events(&shared, 0, &share(k, 2));
+    }
+    let told = events(&shared, 0, &share(1, 2));
+    assert_eq!(told.last().unwrap()["left"], 0, "limits as well");
+    let told = events(&shared, 0, "study s.toml -o out");
+    assert_eq!((named(&told, "joined").len(), lines(&shared).len()), (2, 4));
+    let whole = job(FALL);
+    whole.expect(0, "study s.toml -o out");
+    assert_eq!(lines(&shared), lines(&whole));
+
+    // More shares than points: some are empty.
+    let told = events(&shared, 0, &share(9, 9));
+    assert!(named(&told, "point").is_empty());
+    shared.expect_clear(2, &share(10, 9), "there is no share 10 of 9");
+    let job = Job::new();
+    let said = job.expect(2, "study study.toml -o out --chunk 1/2");
+    assert_has(
+        &said,
+        &["of kind solver_comparison has no shares", "without --chunk"],
+    );
+    assert!(!job.path("out").exists());
+}
