@@ -41,10 +41,10 @@ struct Keyed {
     focus: f64,
 }
 
-/// The camera at a frame number, which may lie between two; frame k of a shot is at k / `frames_per_second` of a file's time.
+/// The camera at a frame number, which may lie between two.
 pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
     let camera = &look.spec().camera;
-    let seconds = frame / frames_per_second;
+    let seconds = look.camera_seconds(frame, frames_per_second);
     let lens = |focal_length_mm: f64, of_key: Option<f64>| {
         let [f_stop, own] = look.lens(seconds)?;
         let radius = 0.5e-3 * focal_length_mm / f_stop;
@@ -186,7 +186,7 @@ pub fn eye(look: &Look, origin: DVec3, frame: f64, frames_per_second: f64) -> Ey
 
 /// The lens of a look at a frame number: its f-number and the distance that is sharp, metres; `None` of a pinhole.
 pub fn lens(look: &Look, frame: f64, frames_per_second: f64) -> Option<[f64; 2]> {
-    let [f_stop, _] = look.lens(frame / frames_per_second)?;
+    let [f_stop, _] = look.lens(look.camera_seconds(frame, frames_per_second))?;
     let lens = pose(look, frame, frames_per_second).lens?;
     Some([f_stop, lens.focus])
 }
@@ -275,6 +275,86 @@ mod tests {
             "{camera}\n[image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n"
         );
         Look::parse(&text, Path::new("look.toml")).unwrap()
+    }
+
+    /// A shot that is counted from 1001, against what usd-core 26.11 has at time code 1001 + (frame − 1) · 24 / rate: place, direction,
+    /// focal length. Of glTF a frame is one of the shot's rate.
+    #[test]
+    fn a_camera_s_file_begins_at_its_own_frame() {
+        let folder = tempfile::tempdir().unwrap();
+        let plate = include_str!("../scene/look/usd_camera/plate.usda");
+        std::fs::write(folder.path().join("plate.usda"), plate).unwrap();
+        let look = |start: &str| {
+            let text = format!(
+                "[camera]\nfile = \"plate.usda\"\n{start}\n[image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n"
+            );
+            Look::parse(&text, &folder.path().join("look.toml")).unwrap()
+        };
+        let begun = look("start = 1001");
+        let rows = [
+            (24.0, 1.0, [0.0, 3.0, 8.0], [0.0, 0.0, -1.0], 35.0),
+            (
+                24.0,
+                3.5,
+                [1.25, 3.0, 7.75],
+                [-0.054514502, 0.0, -0.998512979],
+                36.5625,
+            ),
+            (
+                24.0,
+                61.0,
+                [-2.0, 3.0, 5.6],
+                [-0.5, 0.0, -0.866025404],
+                50.0,
+            ),
+            (
+                60.0,
+                3.5,
+                [0.5, 3.0, 7.9],
+                [-0.021814885, 0.0, -0.999762027],
+                35.625,
+            ),
+            (
+                60.0,
+                20.0,
+                [3.8, 3.0, 7.24],
+                [-0.165047606, 0.0, -0.986285602],
+                39.75,
+            ),
+        ];
+        for (rate, frame, place, forward, focal) in rows {
+            let pose = pose(&begun, frame, rate);
+            // OpenUSD keeps angles and lengths in 32 bits.
+            assert!(
+                (pose.position - DVec3::from(place)).length() < 1e-6,
+                "{frame}"
+            );
+            assert!(
+                (pose.forward - DVec3::from(forward)).length() < 1e-6,
+                "{frame}"
+            );
+            assert!((pose.focal_length_mm - focal).abs() < 1e-5, "{frame}");
+        }
+        let said = |look: &Look, frames, rate| look.lint_camera(frames, rate);
+        assert_eq!(said(&begun, [1, 24], 24.0), None);
+        assert_eq!(said(&begun, [1, 1], 24.0), None);
+        assert_eq!(said(&begun, [20, 72], 24.0), None);
+        // The controls: without it the camera stands at its first key, and after its last; both are said.
+        let plain = look("");
+        assert_eq!(pose(&plain, 20.0, 24.0).position, DVec3::new(0.0, 3.0, 8.0));
+        let text = said(&plain, [1, 24], 24.0).unwrap();
+        assert!(
+            text.contains("over frames 1001 to 1025 of its file"),
+            "{text}"
+        );
+        assert!(text.contains("camera.start = 1001"), "{text}");
+        assert!(
+            said(&begun, [30, 40], 24.0)
+                .unwrap()
+                .contains("frames 1030 to 1040")
+        );
+        assert_eq!(said(&plain, [1001, 1010], 24.0), None);
+        assert_ne!(begun.hash(), plain.hash());
     }
 
     #[test]

@@ -200,6 +200,19 @@ impl Look {
         self.hash.clone()
     }
 
+    /// The time of the camera's file at a frame number, which may lie between two, seconds: frame 1 is at `camera.start`, or else
+    /// frame 0 at 0.
+    pub fn camera_seconds(&self, frame: f64, frames_per_second: f64) -> f64 {
+        let start = self.camera_file().zip(self.spec.camera.start);
+        match start {
+            None => frame / frames_per_second,
+            Some((file, start)) => {
+                let rate = file.rate().unwrap_or(frames_per_second);
+                start / rate + (frame - 1.0) / frames_per_second
+            }
+        }
+    }
+
     /// Which pixels are rendered.
     pub fn window(&self) -> Window {
         let image = &self.spec.image;
@@ -276,7 +289,7 @@ impl Look {
     #[must_use]
     pub fn standing(&self, position: DVec3, target: DVec3, focal_length_mm: f64) -> Self {
         let mut look = self.changed(|spec| {
-            (spec.camera.file, spec.camera.name) = (None, None);
+            (spec.camera.file, spec.camera.name, spec.camera.start) = (None, None, None);
             spec.camera.position = Some(position.to_array());
             spec.camera.target = Some(target.to_array());
             spec.camera.focal_length_mm = focal_length_mm;
@@ -330,7 +343,7 @@ fn plain(spec: &mut LookSpec) {
 
 /// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
 /// that it had before there was such a key.
-const NEWER: [&str; 20] = [
+const NEWER: [&str; 21] = [
     "whitewater: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
     "overscan: 0, ",
@@ -343,6 +356,7 @@ const NEWER: [&str; 20] = [
     "cryptomatte: false, ",
     "voxels_per_spacing: 2.0, ",
     "splat: Ellipsoid, ",
+    "start: None, ",
     "lens: None, file: None, name: None, ",
     ", focus_distance_m: None",
     ", shutter_curve: Box, shutter_ramps: None",

@@ -61,6 +61,11 @@ impl UsdNodes {
         seconds * self.codes_per_second
     }
 
+    /// Time codes a second.
+    pub(super) fn codes_per_second(&self) -> f64 {
+        self.codes_per_second
+    }
+
     /// Metres that the layer's unit of length has.
     pub(super) fn metres_per_unit(&self) -> f64 {
         self.metres_per_unit

@@ -249,6 +249,11 @@ pub fn render(
     let context = request.gpu.open(Needs::default())?;
     let folder = enter(request, &cache, &frames)?;
     let image = &request.look.spec().image;
+    let ends = frames.first().zip(frames.last());
+    let still = ends.and_then(|(&first, &last)| {
+        let rate = cache.manifest().frames_per_second;
+        request.look.lint_camera([first, last], rate)
+    });
     tell(Event::Ready {
         device: format!(
             "{}{}{}",
@@ -259,7 +264,7 @@ pub fn render(
         size: [image.width, image.height],
         frames: frames.len(),
         left_out,
-        warnings: request.look.lints(),
+        warnings: request.look.lints().into_iter().chain(still).collect(),
     });
     let mut job = Job {
         request,

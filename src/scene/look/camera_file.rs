@@ -201,6 +201,14 @@ impl CameraFile {
         self.times().map(at).fold(at(0.0), f64::max)
     }
 
+    /// Frames a second of the file's own count; `None` where it counts seconds alone.
+    pub(super) fn rate(&self) -> Option<f64> {
+        match &self.body {
+            Body::Gltf { .. } => None,
+            Body::Usd(camera) => Some(camera.codes_per_second()),
+        }
+    }
+
     /// When something has a key, seconds.
     pub(super) fn times(&self) -> Box<dyn Iterator<Item = f64> + '_> {
         match &self.body {

@@ -105,6 +105,10 @@ const CAMERA: &[Key] = &[
         .absent()
         .with("file")
         .about("which of its cameras; may be left out where there is one"),
+    Key::number("start", -1e6..=1e6)
+        .absent()
+        .with("file")
+        .about("the file's frame that is frame 1 of the shot, such as 1001: of USD a time code, of glTF a frame of the shot's rate"),
     Key::tables("keyframe", KEYFRAME)
         .without(&["file"])
         .about("Poses at frames, in ascending order, instead of position and target"),

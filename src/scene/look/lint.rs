@@ -2,13 +2,37 @@
 
 use std::f64::consts::PI;
 
-use super::Look;
+use super::{super::words::shown, Look};
+
+/// Seconds by which times that are meant to be one may differ.
+const ROUNDING: f64 = 1e-6;
 
 impl Look {
     /// What of the look is allowed and hardly meant, a sentence each, with its key first and the number that it was judged by.
     pub fn lints(&self) -> Vec<String> {
         let lens = self.lint_lens().into_iter();
         lens.chain(self.lint_library()).collect()
+    }
+
+    /// Whether a camera from a file, which moves, stands still over all of these frames, first and last: its keys lie elsewhere, as
+    /// those of a shot that is counted from 1001.
+    pub fn lint_camera(&self, [first, last]: [u32; 2], frames_per_second: f64) -> Option<String> {
+        let file = self.camera_file()?;
+        let ends = file.times().map(|seconds| [seconds; 2]);
+        let ends = ends.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
+        let [from, to] =
+            [first, last].map(|k| self.camera_seconds(f64::from(k), frames_per_second));
+        let is_elsewhere =
+            ends[1] > ends[0] && (ends[0] > to + ROUNDING || ends[1] < from - ROUNDING);
+        let rate = file.rate().unwrap_or(frames_per_second);
+        let [begin, end, from, to] =
+            [ends[0], ends[1], from, to].map(|seconds| shown((seconds * rate * 1e3).round() / 1e3));
+        is_elsewhere.then(|| {
+            format!(
+                "camera.start: the camera moves over frames {begin} to {end} of its file, and stands still over frames {from} to {to}, \
+                 which are drawn; camera.start = {begin} makes the first of its frames frame 1"
+            )
+        })
     }
 
     /// N samples show a point as N ghosts, evenly over its disc: of c pixels across, each has π c² / 4 N pixels of it.

@@ -64,6 +64,8 @@ pub struct CameraSpec {
     pub file: Option<PathBuf>,
     /// Of the camera in it.
     pub name: Option<String>,
+    /// Frame of the file that is frame 1 of the shot; frame 0 is the file's time 0 where left out.
+    pub start: Option<f64>,
     /// Poses at frames, in ascending order.
     #[serde(default, rename = "keyframe")]
     pub keyframes: Vec<KeyframeSpec>,

@@ -88,6 +88,11 @@ impl UsdCamera {
         self.nodes.at(seconds)
     }
 
+    /// Time codes a second.
+    pub(super) fn codes_per_second(&self) -> f64 {
+        self.nodes.codes_per_second()
+    }
+
     /// When something has a sample, seconds.
     pub(super) fn times(&self) -> impl Iterator<Item = f64> + '_ {
         let lens = self.lens.iter().flatten();
