@@ -115,9 +115,8 @@ fn tell_share(progress: &Progress, request: &Request, chunk: Chunk, share: Share
     let Share { ran, stood, left } = share;
     progress.conclude(
         &format!(
-            "done: {} of share {chunk} run, {stood} stood there already; left of the whole study: {left}; table and page are made by: {}",
-            count(ran as u64, "point"),
-            request.command
+            "done: {} of share {chunk} run, {stood} stood there already; left of the whole study: {left}; the same command without --chunk joins the shares and makes table and page",
+            count(ran as u64, "point")
         ),
         json!({
             "chunk": chunk.to_string(), "ran": ran, "stood": stood, "left": left, "directory": output::path(&request.directory),

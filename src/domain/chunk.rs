@@ -39,17 +39,29 @@ impl Chunk {
     }
 
     /// Which of some points are of the share: they are dealt one by one, the cheap ones first, so that each share gets cheap
-    /// and dear ones. `places` has each point's place in its own line, from cheap to dear.
+    /// and dear ones. `places` has each point's place in its own line, from cheap to dear. Wherever a line would come to the same
+    /// shares again, the dealing goes on from the next share, so that none has one line alone.
     pub fn deal(self, places: &[usize]) -> Vec<bool> {
         let mut order: Vec<usize> = (0..places.len()).collect();
         order.sort_by_key(|&point| places[point]);
+        let (share, shares) = (self.index as usize - 1, self.count as usize);
         let mut is_its = vec![false; places.len()];
-        let of_share = order.iter().skip(self.index as usize - 1);
-        for &point in of_share.step_by(self.count as usize) {
-            is_its[point] = true;
+        let (mut dealt, mut shift) = (0, 0);
+        for of_place in order.chunk_by(|&a, &b| places[a] == places[b]) {
+            for &point in of_place {
+                is_its[point] = (dealt + shift) % shares == share;
+                dealt += 1;
+            }
+            // A multiple of the number of shares: each has got as many so far.
+            shift += usize::from(dealt % lcm(of_place.len(), shares) == 0);
         }
         is_its
     }
+}
+
+/// The least common multiple of two numbers, neither of them 0.
+fn lcm(a: usize, b: usize) -> usize {
+    (a..).step_by(a).find(|it| it % b == 0).unwrap_or(a)
 }
 
 impl fmt::Display for Chunk {
@@ -114,6 +126,28 @@ mod tests {
             let sizes = all.iter().map(|s| s.iter().filter(|&&is| is).count());
             let (least, most) = (sizes.clone().min().unwrap(), sizes.max().unwrap());
             assert!(most - least <= 1, "{count}");
+        }
+    }
+
+    /// Lines of two to four methods by six values: of no line has a share more than its part and one, whatever the numbers.
+    #[test]
+    fn no_share_has_one_line_alone() {
+        let values = 6;
+        for lines in 2..=4 {
+            let places: Vec<usize> = (0..lines).flat_map(|_| 0..values).collect();
+            for count in 2..=6 {
+                for k in 1..=count {
+                    let share: Chunk = format!("{k}/{count}").parse().unwrap();
+                    let dealt = share.deal(&places);
+                    for line in dealt.chunks(values) {
+                        let its = line.iter().filter(|&&is| is).count();
+                        assert!(
+                            its <= values.div_ceil(count) + 1,
+                            "{lines} {share} {dealt:?}"
+                        );
+                    }
+                }
+            }
         }
     }
 }

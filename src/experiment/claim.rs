@@ -41,19 +41,13 @@ pub(super) fn take(directory: &Path, name: &str) -> Result<(), StudyError> {
         // Whoever opens the results says what is off.
         return Ok(());
     }
-    let mut record = locked::open(&file).map_err(fault)?;
-    record.lock().map_err(fault)?;
-    let mut text = String::new();
-    record.read_to_string(&mut text).map_err(fault)?;
-    if text.is_empty() {
-        let claim = Claim {
-            study: name.to_owned(),
-        };
-        let text = serde_json::to_string(&claim).map_err(|error| fault(error.into()))?;
-        return record.write_all((text + "\n").as_bytes()).map_err(fault);
-    }
-    let claim: Claim =
-        serde_json::from_str(&text).map_err(|error| fault(io::Error::other(error.to_string())))?;
+    // One that is written is only read: it may be another user's.
+    let written = fs::read(&file).ok();
+    let written = written.and_then(|text| serde_json::from_slice(&text).ok());
+    let claim: Claim = match written {
+        Some(claim) => claim,
+        None => write(&file, name).map_err(fault)?,
+    };
     if claim.study == name {
         return Ok(());
     }
@@ -62,6 +56,22 @@ pub(super) fn take(directory: &Path, name: &str) -> Result<(), StudyError> {
         found: claim.study,
         name: name.to_owned(),
     })
+}
+
+/// Writes whose the folder is, or finds that another process just did.
+fn write(file: &Path, name: &str) -> io::Result<Claim> {
+    let mut record = locked::open(file)?;
+    record.lock()?;
+    let mut text = String::new();
+    record.read_to_string(&mut text)?;
+    if !text.is_empty() {
+        return serde_json::from_str(&text).map_err(|error| io::Error::other(error.to_string()));
+    }
+    let claim = Claim {
+        study: name.to_owned(),
+    };
+    record.write_all((serde_json::to_string(&claim)? + "\n").as_bytes())?;
+    Ok(claim)
 }
 
 #[cfg(test)]

@@ -13,7 +13,10 @@ use std::{
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::{domain::chunk::Chunk, stage::locked::is_had};
+use crate::{
+    domain::chunk::Chunk,
+    stage::locked::{is_at, is_had},
+};
 
 use super::{StudyError, claim, engine::Run};
 
@@ -133,13 +136,14 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
             .filter(|name| is_ledger(name) && *name != own)
         {
             let other = directory.join(&name);
-            if is_strict {
+            // The study waits for all shares; a share for the study, which runs what is missing.
+            if is_strict || name == FILE && reader != Reader::Look {
                 refuse_busy(&other)?;
             }
             let read = read(&other, is_strict)?;
             if is_strict && read.is_torn {
                 warn(format!(
-                    "{} ends within a line: what wrote there was killed; that point is run again",
+                    "{} ends within a line, which is not taken: what wrote there was killed",
                     other.display()
                 ));
             }
@@ -220,6 +224,10 @@ impl<M: Clone + Serialize> Ledger<M> {
             file.sync_data()
         });
         written.map_err(fault(&self.path))?;
+        if !is_at(file, &self.path) {
+            let what = "it was taken away while its worker ran: what was run since is lost";
+            return Err(fault(&self.path)(io::Error::other(what)));
+        }
         Ok(self.runs.entry(line.key.hash).or_insert(line.run))
     }
 
@@ -264,7 +272,7 @@ fn locked(path: &Path) -> Result<File, StudyError> {
     let file = file.map_err(fault(path))?;
     match is_had(file.try_lock()).map_err(fault(path))? {
         true => Ok(file),
-        false => Err(fault(path)(io::Error::other("another study writes here"))),
+        false => Err(fault(path)(io::Error::other("another process writes here"))),
     }
 }
 
@@ -274,7 +282,7 @@ fn refuse_busy(path: &Path) -> Result<(), StudyError> {
     match is_had(file.try_lock_shared()).map_err(fault(path))? {
         true => Ok(()),
         false => Err(fault(path)(io::Error::other(
-            "a worker of this share writes here: wait for it",
+            "a worker writes here: wait for it",
         ))),
     }
 }
@@ -291,7 +299,7 @@ fn read<M: DeserializeOwned>(path: &Path, is_strict: bool) -> Result<Read<M>, St
     let mut lines = Vec::new();
     let texts = text[..whole].split_inclusive(|&byte| byte == b'\n');
     for (index, line) in texts.enumerate() {
-        match serde_json::from_slice(line) {
+        match serde_json::from_slice(line.trim_ascii_end()) {
             Ok(line) => lines.push(line),
             Err(_) if !is_strict => {}
             Err(error) => {

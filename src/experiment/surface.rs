@@ -17,7 +17,7 @@ use crate::{
     stage::{
         bake,
         device::{Device, Opened},
-        render::gallery::{Gallery, Summary},
+        render::gallery::{Gallery, REACH, Summary},
     },
 };
 
@@ -110,9 +110,9 @@ fn cache(request: &Request) -> PathBuf {
     request.directory.join("cache")
 }
 
-/// Bakes the scene as far as its last frame that is drawn; what stands there is resumed.
+/// Bakes the scene as far as pictures of its last frame that is drawn look ahead; what stands there is resumed.
 fn baked(study: &SurfaceStudy, bench: &mut Bench<'_>) -> Result<(), StudyError> {
-    let last = study.frames.last();
+    let last = (study.frames.last() + REACH).min(study.scene.shot.frames);
     let request = bake::Request {
         scene: study.scene.clone(),
         directory: cache(bench.request),

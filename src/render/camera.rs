@@ -278,7 +278,7 @@ mod tests {
     }
 
     /// A shot that is counted from 1001, against what usd-core 26.11 has at time code 1001 + (frame − 1) · 24 / rate: place, direction,
-    /// focal length. Of glTF a frame is one of the shot's rate.
+    /// focal length.
     #[test]
     fn a_camera_s_file_begins_at_its_own_frame() {
         let folder = tempfile::tempdir().unwrap();

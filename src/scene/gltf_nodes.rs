@@ -94,6 +94,11 @@ impl Nodes {
         self.nodes.iter().flat_map(Hung::times)
     }
 
+    /// The same of what moves.
+    pub(in crate::scene) fn times_moved(&self) -> impl Iterator<Item = f64> + '_ {
+        self.nodes.iter().flat_map(Hung::times_moved)
+    }
+
     /// Whether something jumps from key to key.
     pub(in crate::scene) fn jumps(&self) -> bool {
         self.nodes.iter().any(Hung::jumps)
@@ -137,6 +142,22 @@ impl Hung {
                 scale,
             } => translation.jumps() || rotation.jumps() || scale.jumps(),
         }
+    }
+
+    fn times_moved(&self) -> impl Iterator<Item = f64> + '_ {
+        let tracks = match self {
+            Self::Still(_) => [&[][..]; 3],
+            Self::Moved {
+                translation,
+                rotation,
+                scale,
+            } => [
+                translation.times_moved(),
+                rotation.times_moved(),
+                scale.times_moved(),
+            ],
+        };
+        tracks.into_iter().flatten().copied()
     }
 
     fn times(&self) -> impl Iterator<Item = f64> + '_ {

@@ -96,10 +96,26 @@ impl UsdNodes {
         &'a self,
         beside: impl Iterator<Item = &'a Curve> + 'a,
     ) -> impl Iterator<Item = f64> + 'a {
-        let operations = self.steps.iter().flatten().map(|it| &it.curve);
-        let curves = operations.chain(beside);
-        let codes = curves.flat_map(|curve| curve.samples.iter().map(|(code, _)| *code));
+        let codes = self.curves(beside).flat_map(Curve::codes);
         codes.map(|code| code / self.codes_per_second)
+    }
+
+    /// The same of those that move.
+    pub(super) fn times_moved<'a>(
+        &'a self,
+        beside: impl Iterator<Item = &'a Curve> + 'a,
+    ) -> impl Iterator<Item = f64> + 'a {
+        let moved = self.curves(beside).filter(|curve| curve.moves());
+        let codes = moved.flat_map(Curve::codes);
+        codes.map(|code| code / self.codes_per_second)
+    }
+
+    fn curves<'a>(
+        &'a self,
+        beside: impl Iterator<Item = &'a Curve> + 'a,
+    ) -> impl Iterator<Item = &'a Curve> + 'a {
+        let operations = self.steps.iter().flatten().map(|it| &it.curve);
+        operations.chain(beside)
     }
 }
 
@@ -270,6 +286,15 @@ pub(super) struct Curve {
 }
 
 impl Curve {
+    fn codes(&self) -> impl Iterator<Item = f64> + '_ {
+        self.samples.iter().map(|(code, _)| *code)
+    }
+
+    /// Whether its samples differ.
+    fn moves(&self) -> bool {
+        self.samples.iter().any(|(_, it)| *it != self.samples[0].1)
+    }
+
     /// At a time code.
     pub(super) fn at(&self, code: f64) -> Vec<f64> {
         let next = self.samples.partition_point(|(time, _)| *time <= code);

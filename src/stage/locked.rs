@@ -24,7 +24,7 @@ pub(crate) fn is_had(tried: Result<(), TryLockError>) -> io::Result<bool> {
 
 /// Whether an open file is the one of this name: its last holder may have taken it away.
 #[cfg(unix)]
-pub(super) fn is_at(file: &File, path: &Path) -> bool {
+pub(crate) fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
     let identity = |meta: io::Result<std::fs::Metadata>| meta.map(|m| (m.dev(), m.ino())).ok();
     identity(file.metadata()) == identity(path.metadata())
@@ -32,6 +32,6 @@ pub(super) fn is_at(file: &File, path: &Path) -> bool {
 
 /// Elsewhere an open file cannot be taken away.
 #[cfg(not(unix))]
-pub(super) fn is_at(_: &File, _: &Path) -> bool {
+pub(crate) fn is_at(_: &File, _: &Path) -> bool {
     true
 }

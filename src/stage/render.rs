@@ -243,17 +243,15 @@ pub fn render(
         cache,
         whitewater,
         frames,
+        ends,
         left_out,
     } = Asked::open(request)?;
     let scene = super::baked_scene(&cache, &request.cache)?;
     let context = request.gpu.open(Needs::default())?;
     let folder = enter(request, &cache, &frames)?;
     let image = &request.look.spec().image;
-    let ends = frames.first().zip(frames.last());
-    let still = ends.and_then(|(&first, &last)| {
-        let rate = cache.manifest().frames_per_second;
-        request.look.lint_camera([first, last], rate)
-    });
+    let rate = cache.manifest().frames_per_second;
+    let still = ends.and_then(|ends| request.look.lint_camera(ends, rate));
     tell(Event::Ready {
         device: format!(
             "{}{}{}",
@@ -292,6 +290,8 @@ struct Asked {
     whitewater: Option<Whitewater>,
     /// This process's share.
     frames: Vec<u32>,
+    /// The first and the last of all shares' frames.
+    ends: Option<[u32; 2]>,
     left_out: usize,
 }
 
@@ -330,6 +330,7 @@ impl Asked {
             cache,
             whitewater,
             frames,
+            ends: all.first().zip(all.last()).map(|(&a, &b)| [a, b]),
             left_out,
         })
     }

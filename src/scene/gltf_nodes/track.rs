@@ -45,6 +45,16 @@ impl Blend for DQuat {
     }
 }
 
+impl<T: Blend + PartialEq> Track<T> {
+    /// When it has a key, seconds; nothing where its values are all one.
+    pub(super) fn times_moved(&self) -> &[f64] {
+        match self.values.iter().any(|value| *value != self.values[0]) {
+            true => &self.times,
+            false => &[],
+        }
+    }
+}
+
 impl<T: Blend> Track<T> {
     pub(super) fn still(value: T) -> Self {
         Self {

@@ -209,6 +209,16 @@ impl CameraFile {
         }
     }
 
+    /// When the first and the last key of what moves are, seconds; `None` where nothing does.
+    pub(super) fn moves(&self) -> Option<[f64; 2]> {
+        let times: Box<dyn Iterator<Item = f64> + '_> = match &self.body {
+            Body::Gltf { nodes, .. } => Box::new(nodes.times_moved()),
+            Body::Usd(camera) => Box::new(camera.times_moved()),
+        };
+        let ends = times.map(|seconds| [seconds; 2]);
+        ends.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
+    }
+
     /// When something has a key, seconds.
     pub(super) fn times(&self) -> Box<dyn Iterator<Item = f64> + '_> {
         match &self.body {

@@ -18,21 +18,24 @@ impl Look {
     /// those of a shot that is counted from 1001.
     pub fn lint_camera(&self, [first, last]: [u32; 2], frames_per_second: f64) -> Option<String> {
         let file = self.camera_file()?;
-        let ends = file.times().map(|seconds| [seconds; 2]);
-        let ends = ends.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
+        let [begins, ends] = file.moves()?;
         let [from, to] =
             [first, last].map(|k| self.camera_seconds(f64::from(k), frames_per_second));
-        let is_elsewhere =
-            ends[1] > ends[0] && (ends[0] > to + ROUNDING || ends[1] < from - ROUNDING);
+        if begins <= to + ROUNDING && ends >= from - ROUNDING {
+            return None;
+        }
         let rate = file.rate().unwrap_or(frames_per_second);
         let [begin, end, from, to] =
-            [ends[0], ends[1], from, to].map(|seconds| shown((seconds * rate * 1e3).round() / 1e3));
-        is_elsewhere.then(|| {
-            format!(
-                "camera.start: the camera moves over frames {begin} to {end} of its file, and stands still over frames {from} to {to}, \
-                 which are drawn; camera.start = {begin} makes the first of its frames frame 1"
-            )
-        })
+            [begins, ends, from, to].map(|seconds| shown((seconds * rate * 1e3).round() / 1e3));
+        let start = self.spec.camera.start.map_or(String::new(), shown);
+        let remedy = match start == begin {
+            true => String::new(),
+            false => format!("; camera.start = {begin} makes the first of its frames frame 1"),
+        };
+        Some(format!(
+            "camera.start: the camera moves over frames {begin} to {end} of its file, and stands still over frames {from} to {to}, \
+             which are drawn{remedy}"
+        ))
     }
 
     /// N samples show a point as N ghosts, evenly over its disc: of c pixels across, each has π c² / 4 N pixels of it.

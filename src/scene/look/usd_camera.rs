@@ -95,10 +95,18 @@ impl UsdCamera {
 
     /// When something has a sample, seconds.
     pub(super) fn times(&self) -> impl Iterator<Item = f64> + '_ {
+        self.nodes.times(self.optics())
+    }
+
+    /// The same of what moves.
+    pub(super) fn times_moved(&self) -> impl Iterator<Item = f64> + '_ {
+        self.nodes.times_moved(self.optics())
+    }
+
+    fn optics(&self) -> impl Iterator<Item = &Curve> {
         let lens = self.lens.iter().flatten();
         let film = self.aperture.iter().chain(&self.offset);
-        self.nodes
-            .times([&self.focal_length].into_iter().chain(film).chain(lens))
+        [&self.focal_length].into_iter().chain(film).chain(lens)
     }
 
     /// Height of the film over the focal length: twice the tangent of half the vertical field of view.

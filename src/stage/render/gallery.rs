@@ -29,7 +29,7 @@ use crate::{
     stage::baked_scene,
 };
 
-pub use crate::check::render::Summary;
+pub use crate::{check::render::Summary, render::REACH};
 
 /// Frames of a cache, and what rays in f64 and, where pictures are scored, finer rays see with one look.
 pub struct Gallery<'a> {
@@ -113,8 +113,9 @@ impl<'a> Gallery<'a> {
             let moment = frame.around.moment(&white);
             let image = renderer.render_moment(frame.number, &moment)?;
             for seconds in &mut drawn.seconds {
+                let around = frame.around.anew();
                 let begun = Instant::now();
-                renderer.render(frame.number, frame.particles())?;
+                renderer.render_moment(frame.number, &around.moment(&white))?;
                 *seconds += begun.elapsed().as_secs_f64();
             }
             if let Some(truth) = &frame.picture {

@@ -55,6 +55,14 @@ impl Near {
 }
 
 impl Around {
+    /// The same with nothing found out yet about the frame's own water: in a row of frames that is done once a frame.
+    pub(super) fn anew(&self) -> Self {
+        Self {
+            water: Arc::new(Water::new(self.water.particles.clone())),
+            others: self.others.clone(),
+        }
+    }
+
     /// What a picture is made from, with the frame's whitewater.
     pub(super) fn moment<'a>(&'a self, white: &'a Particles) -> Moment<'a> {
         Moment {

@@ -169,6 +169,19 @@ fn animations_are_joined_as_the_standard_says() {
     assert!(near(forward, DVec3::new(-sin, 0.0, -cos)), "{forward}");
 }
 
+/// What stands still has no part in when a camera moves: nodes without an animation, and keys of one value.
+#[test]
+fn a_camera_moves_where_its_keys_differ() {
+    let nodes = json!([{ "camera": 0, "translation": [9.0, 9.0, 9.0] }]);
+    let moves = |rows: &[Row<'_>]| read(&animated(&nodes, 1.0, rows)).unwrap().moves();
+    let one: Row<'_> = (0, "scale", "LINEAR", &[0.0, 9.0], &[1.0; 6]);
+    let values = [0.0, 0.0, 0.0, 4.0, 2.0, 0.0];
+    let two: Row<'_> = (0, "translation", "LINEAR", &[2.0, 3.0], &values);
+    assert_eq!(moves(&[]), None);
+    assert_eq!(moves(&[one]), None);
+    assert_eq!(moves(&[one, two]), Some([2.0, 3.0]));
+}
+
 /// Each with the words that tell it apart.
 #[test]
 fn what_is_no_camera_is_told() {

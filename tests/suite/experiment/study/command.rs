@@ -75,7 +75,7 @@ fn the_command_tells_each_point() {
     let output = run("plain");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(4), "{said}");
-    assert!(said.contains("another study writes here"), "{said}");
+    assert!(said.contains("another process writes here"), "{said}");
     results.unlock().unwrap();
     assert!(run("plain").status.success());
     fs::remove_file(job.folder.path().join("out/results.jsonl")).unwrap();

@@ -154,12 +154,12 @@ fn what_no_share_has_is_run_and_what_does_not_fit_is_named() {
     shared.expect_clear(
         4,
         &second,
-        "results.2-of-3.jsonl: another study writes here",
+        "results.2-of-3.jsonl: another process writes here",
     );
     shared.expect_clear(
         4,
         "study s.toml -o out",
-        "results.2-of-3.jsonl: a worker of this share",
+        "results.2-of-3.jsonl: a worker writes here",
     );
     ledger.write_all(b"{\"hash\":").unwrap();
     drop(ledger);
