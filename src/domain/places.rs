@@ -14,7 +14,7 @@ pub fn are_told(mut dims: impl Iterator<Item = usize>, is_periodic: bool) -> boo
     !is_periodic && dims.all(|cells| cells <= MOST_CELLS)
 }
 
-/// How far beyond h, over h, whoever is listed can be: within [`REACH`], and a step of each place along three axes with what
+/// How far beyond h, over h, whoever is listed can be: within 258 steps of h/256, and a step of each place along three axes with what
 /// their products err by.
 pub const SKIN: f64 = (REACH as f64 + 1.949) / STEPS as f64 - 1.0;
 
