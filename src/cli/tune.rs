@@ -56,8 +56,8 @@ pub(super) struct TuneArgs {
     /// Where table, curves and page go; studies/NAME-tune where left out. Existing results are resumed.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Run share I of N of the runs alone that are known before the first, such as 1/4, into a file of its own in the folder. The
-    /// command without it takes them over.
+    /// Of the first runs, before anything is proposed, run share I of N alone, such as 1/4, into a file of its own in the folder. The
+    /// same command without this option takes them over, proposes and runs the rest.
     #[arg(long, value_name = "I/N")]
     chunk: Option<Chunk>,
     #[command(flatten)]

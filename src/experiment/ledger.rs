@@ -1,8 +1,8 @@
 //! Results that are kept, a line a finished point: `results.jsonl`, and for each share of a study (`--chunk 1/4`) a file of its
 //! own beside it, `results.1-of-4.jsonl`, so that no two machines write one file.
 //!
-//! Whoever runs points finds those of all ledgers of the folder. The study without a share takes them over into its own, and
-//! says of each line that it does not take why.
+//! A point that stands in any ledger of the folder is not run again. The study without a share copies the others' lines into its own
+//! ledger, and says why it leaves one out.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -20,7 +20,7 @@ use crate::{
 
 use super::{StudyError, claim, engine::Run};
 
-/// The study's own; what shares have has their names in the place of the dot.
+/// The study's own; `file_of` has those of shares.
 const FILE: &str = "results.jsonl";
 
 /// What a point is known by.
@@ -49,9 +49,9 @@ pub(super) struct Line<M> {
 /// Who opens the ledgers of a folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reader {
-    /// The study itself: no share may be at work, and what a line's fault is it says.
+    /// The study itself: no share may be at work, and it says what is wrong with a line.
     Whole,
-    /// A share: others may be at work.
+    /// A share: other shares may be at work.
     Share(Chunk),
     /// Who only counts what is there.
     Look,
@@ -239,7 +239,7 @@ impl<M: Clone + Serialize> Ledger<M> {
             let mut lines = other.lines.iter();
             let line = lines.find(|line| !self.asked.contains(&line.name))?;
             Some(format!(
-                "{}: `{}` is no point of this study; it is left out, with any other such line",
+                "{}: `{}` is no point of this study: it and other such lines are left out",
                 other.file, line.name
             ))
         };
