@@ -12,11 +12,8 @@ use crate::stage::locked;
 
 use super::{
     StudyError,
-    ledger::{is_ledger, names},
+    ledger::{CLAIM, is_ledger, names},
 };
-
-/// Names the study, beside its results.
-pub(super) const FILE: &str = "study.json";
 
 #[derive(Serialize, Deserialize)]
 struct Claim {
@@ -30,14 +27,14 @@ struct Claim {
 /// # Errors
 /// [`StudyError::OtherStudy`]; a file that cannot be read or written.
 pub(super) fn take(directory: &Path, name: &str) -> Result<(), StudyError> {
-    let file = directory.join(FILE);
+    let file = directory.join(CLAIM);
     let fault = |source| StudyError::File {
         file: file.clone(),
         source,
     };
     fs::create_dir_all(directory).map_err(fault)?;
     let names = names(directory).map_err(fault)?;
-    if !names.is_empty() && !names.iter().any(|name| name == FILE || is_ledger(name)) {
+    if !names.is_empty() && !names.iter().any(|name| name == CLAIM || is_ledger(name)) {
         // Whoever opens the results says what is off.
         return Ok(());
     }
@@ -91,7 +88,7 @@ mod tests {
             "{said}"
         );
         // Results of a program that named no study are gone on with.
-        fs::remove_file(directory.join(FILE)).expect("there");
+        fs::remove_file(directory.join(CLAIM)).expect("there");
         fs::write(directory.join("results.jsonl"), "").expect("written");
         take(&directory, "dt").expect("older results");
         take(&directory, "resolution").expect_err("taken now");
@@ -100,6 +97,6 @@ mod tests {
         fs::create_dir(&other).expect("new");
         fs::write(other.join("notes.txt"), "mine").expect("written");
         take(&other, "dt").expect("left to others");
-        assert!(!other.join(FILE).exists());
+        assert!(!other.join(CLAIM).exists());
     }
 }

@@ -18,7 +18,10 @@ use crate::{
     stage::locked::{is_at, is_had},
 };
 
-use super::{StudyError, claim, engine::Run};
+use super::{StudyError, run::Run};
+
+/// Names the study, beside its results (`claim`).
+pub(super) const CLAIM: &str = "study.json";
 
 /// The study's own; `file_of` has those of shares.
 const FILE: &str = "results.jsonl";
@@ -118,7 +121,7 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
         let path = directory.join(&own);
         fs::create_dir_all(directory).map_err(fault(&path))?;
         let names = names(directory).map_err(fault(&path))?;
-        let is_used = names.iter().any(|name| name != claim::FILE);
+        let is_used = names.iter().any(|name| name != CLAIM);
         if is_used && !names.iter().any(|name| is_ledger(name)) {
             let what = "it holds what is no study's: choose another -o";
             return Err(fault(directory)(io::Error::other(what)));

@@ -14,6 +14,7 @@ mod engine;
 mod error;
 mod ledger;
 mod report;
+mod run;
 pub mod stability;
 mod surface;
 mod sweep;
@@ -31,8 +32,9 @@ use crate::{
 
 use engine::{Bench, Kind, Work};
 
-pub use engine::{Devices, Run};
+pub use engine::Devices;
 pub use error::StudyError;
+pub use run::Run;
 
 /// What to study, and where to.
 #[derive(Clone, Debug)]

@@ -23,13 +23,13 @@ use crate::{
 
 use super::{
     Event, PointStatus, Request, StudyError,
-    engine::{self, Bench, Kind},
+    engine::{Bench, Kind},
     ledger::Key,
     report::Report,
 };
 
 /// What a point came to.
-type Run = engine::Run<Measured>;
+type Run = super::run::Run<Measured>;
 
 /// What is measured beside the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -21,7 +21,7 @@ use crate::{
 
 use super::super::{
     StudyError,
-    engine::{self, Bench, until_done},
+    engine::{Bench, until_done},
 };
 
 /// Frames that are measured, about.
@@ -31,7 +31,7 @@ const SAMPLES: u32 = 24;
 const COARSE_REPEATS: u32 = 3;
 
 /// What a twin came to.
-pub(super) type Run = engine::Run<Measured>;
+pub(super) type Run = super::super::run::Run<Measured>;
 
 /// What is measured beside the time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
