@@ -342,7 +342,7 @@ struct NearByWords<'a> {
     members: &'a mut Vec<u32>,
 }
 
-/// Words that are compared at once, and who is held before he is appended.
+/// How many words are compared at once, and how many neighbours are collected before they are appended to the list.
 const AT_ONCE: usize = 8;
 const HELD: usize = 128;
 
