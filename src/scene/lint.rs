@@ -48,7 +48,7 @@ pub(super) struct Made {
 impl Scene {
     /// What of the scene is allowed and hardly meant, a sentence each, with its key first and the number that it was judged by.
     pub fn lints(&self) -> Vec<String> {
-        let mut lints = Vec::new();
+        let mut lints = self.lint_tracks();
         let level = self.still_depth();
         let made: Vec<(Option<Wall>, Made)> = (self.wave_makers.iter().enumerate())
             .filter_map(|(k, maker)| Some((Some(maker.wall), made_by(k, maker, self, level)?)))

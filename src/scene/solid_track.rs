@@ -6,7 +6,7 @@ use glam::{DMat3, DMat4, DQuat, DVec3};
 use gltf::Gltf;
 
 use super::{
-    Shot,
+    Scene, Shot,
     document::Document,
     error::SceneError,
     gltf_nodes::{Beside, Nodes, named},
@@ -23,6 +23,9 @@ const RIGID: f64 = 1e-3;
 /// Names that an error lists.
 const MOST_NAMES: usize = 12;
 
+/// Seconds by which times that are meant to be one may differ.
+const APART: f64 = 1e-6;
+
 /// Poses at most: hours of them.
 const MOST_POSES: usize = 1_000_000;
 
@@ -36,6 +39,17 @@ pub struct Track {
     poses: Vec<(f64, DVec3, DQuat)>,
     /// From the point of rest to the solid's farthest point, metres.
     reach: f64,
+    /// Of a file that moves the solid before or after the shot alone.
+    missed: Option<Missed>,
+}
+
+/// When a file moves what stands still over the whole shot, in the file's frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Missed {
+    /// Its first key and its last.
+    moves: [f64; 2],
+    /// The shot's frame 0 and its last.
+    shot: [f64; 2],
 }
 
 impl Track {
@@ -61,7 +75,7 @@ impl Track {
         }
         if let Some(k) = poses
             .windows(2)
-            .position(|pair| pair[1].0 - pair[0].0 < 1e-6)
+            .position(|pair| pair[1].0 - pair[0].0 < APART)
         {
             let (after, before) = (poses[k + 1].0, poses[k].0);
             return Err(format!(
@@ -75,6 +89,7 @@ impl Track {
         Ok(Self {
             reach: away.fold(0.0, f64::max),
             poses,
+            missed: None,
         })
     }
 
@@ -162,9 +177,43 @@ pub(super) fn build(
         };
         fault(&key, problem)
     })?;
-    let poses = sampled(&moves, shot)
+    let rate = moves.rate().unwrap_or(shot.frames_per_second);
+    let begin = spec.start.map_or(0.0, |start| start / rate - shot.time(1));
+    let poses = sampled(&moves, begin, shot)
         .map_err(|problem| fault(&file_key, format!("{called}: {problem}")))?;
-    Track::new(poses, mesh).map_err(|problem| fault(&file_key, problem))
+    let track = Track::new(poses, mesh).map_err(|problem| fault(&file_key, problem))?;
+    Ok(Track {
+        missed: missed(&moves.times_moved(), [begin, begin + shot.duration()], rate),
+        ..track
+    })
+}
+
+/// Of keys and a shot in the file's seconds: both in its frames, where no key is within the shot and it does not lie between two.
+fn missed(moved: &[f64], shot: [f64; 2], rate: f64) -> Option<Missed> {
+    let first = moved.iter().copied().reduce(f64::min)?;
+    let last = moved.iter().copied().reduce(f64::max)?;
+    let is_beside = first > shot[1] - APART || last < shot[0] + APART;
+    let frame = |seconds: f64| (1e3 * seconds * rate).round() / 1e3;
+    is_beside.then(|| Missed {
+        moves: [first, last].map(frame),
+        shot: shot.map(frame),
+    })
+}
+
+impl Scene {
+    /// Solids that a file moves before or after the shot alone.
+    pub(super) fn lint_tracks(&self) -> Vec<String> {
+        let solids = self.moving_solids.iter();
+        let tracks = solids.filter_map(|it| it.track.as_ref()?.missed);
+        let told = tracks.map(|Missed { moves, shot }| {
+            let ([begin, end], [from, to]) = (moves.map(shown), shot.map(shown));
+            format!(
+                "solid.track.start: the file moves a solid over frames {begin} to {end}, and the shot has frames {from} to {to} of it, so that \
+                 the solid stands still; start = {begin} makes the first of its frames frame 1"
+            )
+        });
+        told.collect()
+    }
 }
 
 /// What a file moves.
@@ -221,6 +270,22 @@ impl Moves {
         match self {
             Self::Gltf(nodes) => nodes.times().collect(),
             Self::Usd(nodes) => nodes.times([].into_iter()).collect(),
+        }
+    }
+
+    /// The same of what moves.
+    fn times_moved(&self) -> Vec<f64> {
+        match self {
+            Self::Gltf(nodes) => nodes.times_moved().collect(),
+            Self::Usd(nodes) => nodes.times_moved([].into_iter()).collect(),
+        }
+    }
+
+    /// Frames a second of the file's own count; `None` where it counts seconds alone.
+    fn rate(&self) -> Option<f64> {
+        match self {
+            Self::Gltf(_) => None,
+            Self::Usd(nodes) => Some(nodes.codes_per_second()),
         }
     }
 
@@ -333,8 +398,12 @@ fn choose<'a>(
     }
 }
 
-/// Poses at the keys and at each frame, from where it stands at the shot's start.
-fn sampled(moves: &Moves, shot: &Shot) -> std::result::Result<Vec<(f64, DVec3, DQuat)>, String> {
+/// Poses at the keys and at each frame, from where it stands at the shot's start, which is at `begin` in the file, seconds.
+fn sampled(
+    moves: &Moves,
+    begin: f64,
+    shot: &Shot,
+) -> std::result::Result<Vec<(f64, DVec3, DQuat)>, String> {
     if moves.jumps() {
         return Err(
             "its keys are joined by steps, and a solid cannot jump; make them linear".to_owned(),
@@ -342,7 +411,8 @@ fn sampled(moves: &Moves, shot: &Shot) -> std::result::Result<Vec<(f64, DVec3, D
     }
     let end = shot.duration();
     let frames = (0..=shot.frames).map(|frame| shot.time(frame));
-    let (keys, is_of_keys) = (moves.times(), moves.is_of_keys());
+    let is_of_keys = moves.is_of_keys();
+    let keys: Vec<f64> = moves.times().iter().map(|time| time - begin).collect();
     // With keys alone also the first after the end, to which the last frame is on the way.
     let last = keys.iter().copied().filter(|time| *time >= end);
     let last = last.fold(f64::INFINITY, f64::min);
@@ -351,16 +421,16 @@ fn sampled(moves: &Moves, shot: &Shot) -> std::result::Result<Vec<(f64, DVec3, D
     let frames = frames.filter(|time| !is_of_keys || *time == 0.0);
     let mut times: Vec<f64> = frames.chain(keys).collect();
     times.sort_unstable_by(f64::total_cmp);
-    times.dedup_by(|after, before| *after - *before < 1e-6);
+    times.dedup_by(|after, before| *after - *before < APART);
     if times.len() > MOST_POSES {
         return Err(format!("{} poses; allowed: {MOST_POSES}", times.len()));
     }
-    let start = moves.at(0.0);
+    let start = moves.at(begin);
     let back = DMat3::from_mat4(start).inverse();
     let mut before = DQuat::IDENTITY;
     let mut poses = Vec::new();
     for time in times {
-        let now: DMat4 = moves.at(time);
+        let now: DMat4 = moves.at(begin + time);
         let from_start = DMat3::from_mat4(now) * back;
         let strain = from_start.transpose() * from_start - DMat3::IDENTITY;
         let most = strain.to_cols_array().map(f64::abs);

@@ -100,6 +100,7 @@ pub(super) struct MeshSpec {
 pub(super) struct TrackSpec {
     pub(super) file: Option<String>,
     pub(super) node: Option<String>,
+    pub(super) start: Option<f64>,
     pub(super) poses: Option<Vec<[f64; 8]>>,
 }
 

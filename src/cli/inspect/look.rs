@@ -41,7 +41,13 @@ pub(super) fn camera(look: &Look) -> String {
         None => "a pinhole".to_owned(),
     };
     let moves = match (&camera.file, camera.keyframes.len() as u64) {
-        (Some(file), _) => return format!("from {}, {lens}", file.display()),
+        (Some(file), _) => {
+            let start = camera
+                .start
+                .map(|start| format!(", whose frame {start} is frame 1"));
+            let start = start.unwrap_or_default();
+            return format!("from {}{start}, {lens}", file.display());
+        }
         (None, 0) => "still".to_owned(),
         (None, keyframes) => count(keyframes, "keyframe"),
     };

@@ -194,3 +194,28 @@ pub(super) const WALL_MOTION: &[Key] = &[
     FILE,
     POINTS,
 ];
+
+pub(super) const SOLID_TRACK: &[Key] = &[
+    Key::text(
+        "file",
+        "a glTF file (.gltf or .glb) or USD as text (.usda), relative to the scene file",
+    )
+    .absent()
+    .about("its node's animation carries the solid; the written-out scene has it as poses"),
+    Key::text("node", "the name of a node in the file; of USD its path will do too")
+        .absent()
+        .with("file")
+        .about("whose motion it is, with that of the nodes above it; left out: the file's only node, or USD's only prim with a transform"),
+    Key::number("start", -1e6..=1e6)
+        .absent()
+        .with("file")
+        .about("the file's frame that is frame 1 of the shot, such as 1001: of USD a time code, of glTF a frame of the shot's rate"),
+    Key::points(
+        "poses",
+        8,
+        "rows of [seconds, x, y, z, qx, qy, qz, qw], times rising from 0 on, places in metres, unit quaternions, the first [0, 0, 0, 1]",
+    )
+    .absent()
+    .without(&["file"])
+    .about("the motion in place: where a point of the solid is, and how the solid is turned about it"),
+];

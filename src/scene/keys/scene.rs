@@ -14,7 +14,7 @@ use super::super::{
     no_slip,
     probe::{self, ProbeKind},
 };
-use super::motion::{SOLID_MOTION, SOLID_TURN, WALL_MOTION};
+use super::motion::{SOLID_MOTION, SOLID_TRACK, SOLID_TURN, WALL_MOTION};
 use crate::domain::sparse_grid;
 
 pub(in super::super) const KEYS: &[Key] = &[
@@ -211,27 +211,6 @@ const SOLID: &[Key] = &[
         .without(&["motion", "turn"])
         .also(", that brings the solid into the domain, no point of it faster than 100000 m/s; not with domain.periodic")
         .about("Where the solid stands over time, from where it stands at the start on"),
-];
-
-const SOLID_TRACK: &[Key] = &[
-    Key::text(
-        "file",
-        "a glTF file (.gltf or .glb) or USD as text (.usda), relative to the scene file",
-    )
-    .absent()
-    .about("its node's animation carries the solid; the written-out scene has it as poses"),
-    Key::text("node", "the name of a node in the file; of USD its path will do too")
-        .absent()
-        .with("file")
-        .about("whose motion it is, with that of the nodes above it; left out: the file's only node, or USD's only prim with a transform"),
-    Key::points(
-        "poses",
-        8,
-        "rows of [seconds, x, y, z, qx, qy, qz, qw], times rising from 0 on, places in metres, unit quaternions, the first [0, 0, 0, 1]",
-    )
-    .absent()
-    .without(&["file"])
-    .about("the motion in place: where a point of the solid is, and how the solid is turned about it"),
 ];
 
 const WAVE_MAKER: &[Key] = &[

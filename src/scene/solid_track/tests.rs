@@ -231,6 +231,68 @@ fn between_matrices_a_solid_turns_and_keeps_its_shape() {
     }
 }
 
+/// The same door counted from 1001, and one whose time is counted in frames of the shot.
+#[test]
+fn a_solid_s_file_begins_at_its_own_frame() {
+    let later = MATRICES.replace("        0: (", "        1001: (");
+    let later = later.replace("    5: (", "    1006: (");
+    let of = |more: &str| format!("solid[0].track={{ file = \"door.usda\"{more} }}");
+    let corner = DVec3::new(4.0, 0.5, 1.0);
+    let half = 0.5f64.sqrt();
+    let at = |scene: &Scene, t: f64| scene.moving_solids[0].pose(t).place(corner);
+    // Time codes are those of the file, whatever the shot's rate: frame 1 is at 1001.
+    for (rate, first) in [("10", 0.1), ("20", 0.05)] {
+        let rate = format!("shot.frames_per_second={rate}");
+        let scene = load(later.as_bytes(), &[&of(", start = 1001"), &rate]).unwrap();
+        for (t, expected) in [
+            (0.0, corner),
+            (first, corner),
+            (first + 0.25, DVec3::new(3.5 + half, 0.5, 1.0 - half)),
+            (first + 0.5, DVec3::new(4.0, 0.5, 0.0)),
+        ] {
+            let off = (at(&scene, t) - expected).length();
+            assert!(off < 1e-9, "{rate}, {t}: {off}");
+        }
+        assert!(scene.lints().is_empty(), "{:?}", scene.lints());
+    }
+    // Frame 10 is at 1 s of the glTF: the shot begins a tenth before, with the hinge at x = 3.9.
+    let door = "solid[0].track={ file = \"door.glb\", node = \"door\", start = 10 }";
+    let scene = load(&file("rotation", "LINEAR", quarter()), &[door]).unwrap();
+    for (t, expected) in [
+        (0.1, DVec3::new(4.1, 0.5, 1.0)),
+        (1.1, DVec3::new(5.0, 0.5, 0.9)),
+    ] {
+        // f32 of the file.
+        let off = (at(&scene, t) - expected).length();
+        assert!(off < 1e-6, "{t}: {off}");
+    }
+    // The controls: without it the solid stands still, before its first key or, begun too late, after its last; both are said.
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("cube.obj"), CUBE).unwrap();
+    std::fs::write(dir.path().join("door.usda"), later).unwrap();
+    for (more, frames) in [("", "0 to 20"), (", start = 1007", "1006 to 1026")] {
+        let scene = Scene::parse(SCENE, Path::new("s.toml"), dir.path(), &[of(more)]).unwrap();
+        assert!(
+            [0.5, 2.0]
+                .iter()
+                .all(|&t| (at(&scene, t) - corner).length() < 1e-9),
+            "{more}"
+        );
+        let lints = scene.lints();
+        let [lint] = &lints[..] else {
+            panic!("{lints:?}")
+        };
+        for part in [
+            "solid.track.start: ",
+            "over frames 1001 to 1006",
+            &format!("frames {frames} of it"),
+            "start = 1001",
+        ] {
+            assert!(lint.contains(part), "{part}: {lint}");
+        }
+    }
+}
+
 #[test]
 fn what_is_no_motion_in_usd_is_refused() {
     let gate = "solid[0].track={ file = \"door.usda\", node = \"gate\" }";

@@ -290,6 +290,28 @@ fn inspect_names_cameras_and_what_moves() {
             "warning: prim /set takes parts from elsewhere",
         ],
     );
+    // A look says from where in such a file its camera is taken.
+    let plate = include_str!("../../../src/scene/look/usd_camera/plate.usda");
+    write("plate.usda", plate);
+    for (start, words) in [
+        (
+            "start = 1001",
+            "camera from plate.usda, whose frame 1001 is frame 1, a pinhole",
+        ),
+        ("", "camera from plate.usda, a pinhole"),
+    ] {
+        let camera = format!("[camera]\nfile = \"plate.usda\"\n{start}\n");
+        let rest = "[image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n";
+        write("plate.toml", &(camera + rest));
+        assert_has(&job.expect(0, "inspect plate.toml"), &[words]);
+        assert_eq!(
+            format!(
+                "camera {}",
+                object("plate.toml")["camera"].as_str().unwrap()
+            ),
+            words
+        );
+    }
     write("torn.usda", &door[..door.len() / 2]);
     for (file, words) in [
         ("torn.usda", "ends too early"),

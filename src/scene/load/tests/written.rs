@@ -161,7 +161,13 @@ generation_zone = { walls = ["+x"], length = 1.0, waves = { kind = "sea", signif
     let toml = scene.to_toml(&|_, _| "a.obj".to_owned());
     collect_keys("", &toml::from_str(&toml).expect("TOML"), &mut written);
     // A motion's file is written as the points that were read from it, walls as those that are no-slip.
-    let read = ["motion.file", "turn.file", "track.file", "track.node"];
+    let read = [
+        "motion.file",
+        "turn.file",
+        "track.file",
+        "track.node",
+        "track.start",
+    ];
     let missing: Vec<_> = keys::paths(keys::SCENE)
         .into_iter()
         .filter(|key| !read.iter().any(|file| key.ends_with(file)) && key != "domain.walls")
