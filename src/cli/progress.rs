@@ -161,10 +161,15 @@ impl Progress {
         });
     }
 
-    /// [`Self::begin`], unless a job has begun.
-    pub(super) fn begin_once(&self, frames: u64) {
+    /// A job has so many frames: it begins where none has, else it has come to have more or fewer.
+    pub(super) fn set_frames(&self, frames: u64) {
         if !self.state.borrow().is_begun {
-            self.begin(frames);
+            return self.begin(frames);
+        }
+        let mut state = self.state.borrow_mut();
+        state.job.frames = frames;
+        if let Some(bar) = &state.bar {
+            bar.set_length(frames);
         }
     }
 

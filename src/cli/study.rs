@@ -74,7 +74,7 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
         Event::Bake(event) => bake::tell(progress, *event),
         Event::Render(event) => render::tell(progress, event),
         Event::Point(event) => {
-            progress.begin_once(event.count as u64);
+            progress.set_frames(event.count as u64);
             let (text, json) = point(&event);
             let status = match event.status {
                 PointStatus::Failed(_) => Status::Failed,
@@ -83,9 +83,16 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
             };
             progress.frame(&text, status, json);
         }
-        Event::Joined { file, points } => progress.say(
-            &format!("{} taken over from {file}", count(points as u64, "point")),
-            json!({ "event": "joined", "ledger": file, "points": points }),
+        Event::Joined {
+            share,
+            file,
+            points,
+        } => progress.say(
+            &format!(
+                "{} run by share {share} ({file})",
+                count(points as u64, "point")
+            ),
+            json!({ "event": "joined", "ledger": file, "share": share, "points": points }),
         ),
     })?;
     progress.finish();
@@ -112,10 +119,17 @@ pub(super) fn conduct(request: &Request, progress: &Progress) -> Result<u8, Fail
 
 /// What a share came to, and who ends the study.
 fn tell_share(progress: &Progress, request: &Request, chunk: Chunk, share: Share) {
-    let Share { ran, stood, left } = share;
+    let Share {
+        ran, stood, left, ..
+    } = share;
+    let most = if share.is_left_at_most {
+        "at most "
+    } else {
+        ""
+    };
     progress.conclude(
         &format!(
-            "done: {} of share {chunk} run, {stood} stood there already; left of the whole study: {left}; the same command without --chunk joins the shares and makes table and page",
+            "done: {} of share {chunk} run, {stood} stood there already; left of the whole study: {most}{left}; the same command without --chunk joins the shares and makes table and page",
             count(ran as u64, "point")
         ),
         json!({

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::{
     domain::{chunk::Chunk, frame_range::FrameRange},
-    experiment::Request,
+    experiment::{Request, dealt},
     scene::{
         Method,
         study::{
@@ -76,8 +76,7 @@ pub(super) struct TuneArgs {
 pub(super) fn run(args: &TuneArgs, progress: &Progress) -> Result<u8, Failure> {
     let tune = Tune::load(request(args)?)?;
     if args.dry_run {
-        tell_runs(&tune, args, progress);
-        return Ok(0);
+        return tell_runs(tune, args, progress);
     }
     let name = format!("{}-tune", stem(&args.scene));
     let default = || PathBuf::from("studies").join(&name);
@@ -145,23 +144,41 @@ fn command(args: &TuneArgs) -> String {
     add("frames", args.frames.as_ref().map(FrameRange::to_string));
     add("reference", Some(args.reference.to_string()));
     add("repeats", Some(args.repeats.to_string()));
+    let path = |path: &PathBuf| path.display().to_string();
+    add("write", args.write.as_ref().map(path));
+    add("output", args.output.as_ref().map(path));
     words.join(" ")
 }
 
-/// `--dry-run`: the runs that are known before the first.
-fn tell_runs(tune: &Tune, args: &TuneArgs, progress: &Progress) {
-    let outline = Outline::of(&Study::Tune(Box::new(tune.clone())));
+/// `--dry-run`: the runs that are known before the first, or a share of them.
+fn tell_runs(tune: Tune, args: &TuneArgs, progress: &Progress) -> Result<u8, Failure> {
+    let untried = tune.untried.clone();
+    let study = Study::Tune(Box::new(tune));
+    let mut outline = Outline::of(&study);
+    if let Some(chunk) = args.chunk {
+        outline.keep(&dealt(&study, chunk)?);
+    }
     let text = inspect::study::told(&outline, &args.scene);
-    let untried = tune.untried.join("\n   ");
-    let text = format!("{text}\nand what the laws of these propose\n\nnot tried\n   {untried}\n");
+    let after = match args.chunk {
+        None => "and what the laws of these propose".to_owned(),
+        Some(chunk) => format!(
+            "that is share {chunk}; the command without --chunk joins the shares, and runs what the laws of all propose"
+        ),
+    };
+    let text = format!(
+        "{text}\n{after}\n\nnot tried\n   {}\n",
+        untried.join("\n   ")
+    );
     match progress.is_json() {
         true => {
             let mut event: Value = inspect::study::outline_object(&outline);
             event["event"] = json!("dry_run");
-            event["untried"] = json!(tune.untried);
+            event["untried"] = json!(untried);
+            event["chunk"] = json!(args.chunk.map(|chunk| chunk.to_string()));
             progress.tell(event);
         }
         false => output::print(&text),
     }
     output::log(text.trim_end());
+    Ok(0)
 }

@@ -52,16 +52,11 @@ impl Chunk {
                 is_its[point] = (dealt + shift) % shares == share;
                 dealt += 1;
             }
-            // A multiple of the number of shares: each has got as many so far.
-            shift += usize::from(dealt % lcm(of_place.len(), shares) == 0);
+            // Each share has got as many so far.
+            shift += usize::from(dealt % shares == 0);
         }
         is_its
     }
-}
-
-/// The least common multiple of two numbers, neither of them 0.
-fn lcm(a: usize, b: usize) -> usize {
-    (a..).step_by(a).find(|it| it % b == 0).unwrap_or(a)
 }
 
 impl fmt::Display for Chunk {

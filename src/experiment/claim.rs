@@ -6,27 +6,19 @@ use std::{
     path::Path,
 };
 
-use serde::{Deserialize, Serialize};
-
-use crate::stage::locked;
-
-use super::{
-    StudyError,
-    ledger::{CLAIM, is_ledger, names},
+use crate::{
+    stage::locked,
+    study::folder::{CLAIM, Claim, is_ledger},
 };
 
-#[derive(Serialize, Deserialize)]
-struct Claim {
-    /// Of the study, as its file is called.
-    study: String,
-}
+use super::{StudyError, ledger::names};
 
-/// Takes an empty folder, or one with results that name no study, for the study `name`. Any number of processes may do so at
-/// once: the file is locked while it is read and written.
+/// Takes an empty folder, or one with results that name no study, for the study `name`, which `command` runs whole. Any number of
+/// processes may do so at once: the file is locked while it is read and written.
 ///
 /// # Errors
 /// [`StudyError::OtherStudy`]; a file that cannot be read or written.
-pub(super) fn take(directory: &Path, name: &str) -> Result<(), StudyError> {
+pub(super) fn take(directory: &Path, name: &str, command: &str) -> Result<(), StudyError> {
     let file = directory.join(CLAIM);
     let fault = |source| StudyError::File {
         file: file.clone(),
@@ -43,7 +35,7 @@ pub(super) fn take(directory: &Path, name: &str) -> Result<(), StudyError> {
     let written = written.and_then(|text| serde_json::from_slice(&text).ok());
     let claim: Claim = match written {
         Some(claim) => claim,
-        None => write(&file, name).map_err(fault)?,
+        None => write(&file, name, command).map_err(fault)?,
     };
     if claim.study == name {
         return Ok(());
@@ -56,16 +48,21 @@ pub(super) fn take(directory: &Path, name: &str) -> Result<(), StudyError> {
 }
 
 /// Writes whose the folder is, or finds that another process just did.
-fn write(file: &Path, name: &str) -> io::Result<Claim> {
+fn write(file: &Path, name: &str, command: &str) -> io::Result<Claim> {
     let mut record = locked::open(file)?;
     record.lock()?;
     let mut text = String::new();
     record.read_to_string(&mut text)?;
     if !text.is_empty() {
-        return serde_json::from_str(&text).map_err(|error| io::Error::other(error.to_string()));
+        return serde_json::from_str(&text).map_err(|error| {
+            io::Error::other(format!(
+                "{error}: it was cut off or changed; remove it where the folder holds results of {name}, or choose another -o"
+            ))
+        });
     }
     let claim = Claim {
         study: name.to_owned(),
+        command: Some(command.to_owned()),
     };
     record.write_all((serde_json::to_string(&claim)? + "\n").as_bytes())?;
     Ok(claim)
@@ -79,12 +76,29 @@ mod tests {
     fn a_folder_is_one_study_s() {
         let folder = tempfile::tempdir().expect("a folder");
         let directory = folder.path().join("new");
+        let take =
+            |directory: &Path, name: &str| take(directory, name, &format!("swell study {name}"));
         take(&directory, "dt").expect("new");
         take(&directory, "dt").expect("its own");
         let error = take(&directory, "resolution").expect_err("another's");
         let said = error.to_string();
         assert!(
             said.contains("the study dt, not of resolution") && said.contains("-o"),
+            "{said}"
+        );
+        let claim = |directory: &Path| -> Claim {
+            let text = fs::read_to_string(directory.join(CLAIM)).expect("there");
+            serde_json::from_str(&text).expect("whole")
+        };
+        assert_eq!(claim(&directory).command.as_deref(), Some("swell study dt"));
+        // One that was cut off names what mends it.
+        fs::write(directory.join(CLAIM), "{\"study\":\"d").expect("written");
+        let error = take(&directory, "dt").expect_err("cut off");
+        let said = std::error::Error::source(&error)
+            .expect("a cause")
+            .to_string();
+        assert!(
+            said.contains("remove it where the folder holds results of dt"),
             "{said}"
         );
         // Results of a program that named no study are gone on with.

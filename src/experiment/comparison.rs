@@ -25,7 +25,7 @@ use crate::{
 
 use super::{
     Event, Request, StudyError,
-    engine::{Bench, Kind},
+    engine::{Bench, Kind, Place},
     report::{Report, what_was_run},
 };
 
@@ -40,7 +40,7 @@ impl Kind for SolverComparison {
     }
 
     /// Two bakes, which are shared out as bakes are.
-    fn places(&self) -> Option<Vec<usize>> {
+    fn places(&self) -> Option<Vec<Place>> {
         None
     }
 

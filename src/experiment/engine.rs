@@ -21,6 +21,7 @@ use crate::{
         device::{Gpu, Opened, needs},
         drive::{Drive, End, Step},
     },
+    study::folder::ledger_of,
 };
 
 use super::{
@@ -41,15 +42,31 @@ pub(super) trait Kind {
     /// Points that it tells of.
     fn count(&self) -> usize;
 
-    /// Of each point that a share may run, in the order of [`Bench::is_next_ours`]: its place in its line, from cheap to
-    /// dear. `None` where points stand on one cache, so that there are no shares.
-    fn places(&self) -> Option<Vec<usize>>;
+    /// What a share may run, in the order of [`Bench::is_next_ours`]. `None` where points stand on one cache, so that there are
+    /// no shares.
+    fn places(&self) -> Option<Vec<Place>>;
 
     /// Runs, measures and draws; `None` where only a share was run, or looked for.
     ///
     /// # Errors
     /// [`StudyError`]; [`StudyError::Stopped`] where a signal came.
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError>;
+}
+
+/// Where a point, or a search that takes several, stands among those that shares are dealt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    /// In its line, from cheap to dear.
+    pub(super) rank: usize,
+    /// Points that it takes at most.
+    pub(super) points: usize,
+}
+
+impl Place {
+    /// Of one point.
+    pub(super) fn of(rank: usize) -> Self {
+        Self { rank, points: 1 }
+    }
 }
 
 /// What scenes ask of an adapter, each with what it runs on.
@@ -159,10 +176,14 @@ pub(super) struct Bench<'a> {
     number: usize,
     /// Points of the study, a share's or not, that were come to.
     dealt: usize,
-    /// Points of a share that were run, of those that stood there, and of what is left.
+    /// Points that were run, those that stood there, and what is left.
     pub(super) ran: Cell<usize>,
     pub(super) stood: Cell<usize>,
     pub(super) left: Cell<usize>,
+    /// Whether what is left may come to less.
+    pub(super) is_left_at_most: Cell<bool>,
+    /// Shares that ran points, with how many; known at the end of a whole study.
+    shares: RefCell<Vec<(String, usize)>>,
 }
 
 impl<'a> Bench<'a> {
@@ -173,10 +194,6 @@ impl<'a> Bench<'a> {
         tell: &'a mut dyn FnMut(Event),
         (work, count): (Work, usize),
     ) -> Self {
-        let count = match &work {
-            Work::Share(_, is_ours) => is_ours.iter().filter(|&&is| is).count(),
-            Work::Whole | Work::Look => count,
-        };
         Self {
             request,
             devices,
@@ -189,6 +206,8 @@ impl<'a> Bench<'a> {
             ran: Cell::default(),
             stood: Cell::default(),
             left: Cell::default(),
+            is_left_at_most: Cell::default(),
+            shares: RefCell::default(),
         }
     }
 
@@ -268,21 +287,58 @@ impl<'a> Bench<'a> {
             },
             Ok(run) => run,
         };
+        let share = match self.work {
+            Work::Share(chunk, _) => Some(chunk.to_string()),
+            Work::Whole | Work::Look => None,
+        };
         let name = name.to_owned();
-        let run = ledger.append(Line { key, name, run })?;
+        let run = ledger.append(Line {
+            key,
+            name,
+            share,
+            run,
+        })?;
         add(&self.ran);
         Ok(Some((run.clone(), false)))
     }
 
-    /// At the end of all points: which ledgers of shares they were taken from.
+    /// At the end of all points: which shares ran some of them.
     pub(super) fn joined<M: Clone + Serialize>(&self, ledger: &Ledger<M>) {
-        let (taken, unknown) = ledger.joined();
-        for (file, points) in taken {
-            self.tell(Event::Joined { file, points });
+        let (shares, unknown) = ledger.joined();
+        for (share, points) in &shares {
+            let file = ledger_of(share.parse().ok());
+            let (share, points) = (share.clone(), *points);
+            self.tell(Event::Joined {
+                share,
+                file,
+                points,
+            });
         }
         for text in unknown {
             self.tell(Event::Warning(text));
         }
+        *self.shares.borrow_mut() = shares;
+    }
+
+    /// What a page says of points that shares ran; `None` where none did.
+    pub(super) fn told_of_shares(&self) -> Option<String> {
+        let shares = self.shares.borrow();
+        let theirs: usize = shares.iter().map(|(_, points)| points).sum();
+        if theirs == 0 {
+            return None;
+        }
+        let all = self.ran.get() + self.stood.get();
+        let each = shares
+            .iter()
+            .map(|(share, points)| format!("share {share} ran {points}"));
+        let own =
+            (all > theirs).then(|| format!("the command that joined them ran {}", all - theirs));
+        let told: Vec<String> = each.chain(own).collect();
+        Some(format!(
+            "Of {all} points, {} (results.jsonl names each point's share). Shares may have run on several machines: compare \
+             the times of two of them only where these machines are alike and did nothing else meanwhile.",
+            told.join(", ")
+        ))
     }
 }
 

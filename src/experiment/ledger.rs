@@ -2,7 +2,7 @@
 //! own beside it, `results.1-of-4.jsonl`, so that no two machines write one file.
 //!
 //! A point that stands in any ledger of the folder is not run again. The study without a share copies the others' lines into its own
-//! ledger, and says why it leaves one out.
+//! ledger, with the share that ran each, and says why it leaves one out.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -16,15 +16,10 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use crate::{
     domain::chunk::Chunk,
     stage::locked::{is_at, is_had},
+    study::folder::{CLAIM, LEDGER, is_ledger, ledger_of},
 };
 
 use super::{StudyError, run::Run};
-
-/// Names the study, beside its results (`claim`).
-pub(super) const CLAIM: &str = "study.json";
-
-/// The study's own; `file_of` has those of shares.
-const FILE: &str = "results.jsonl";
 
 /// What a point is known by.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -46,6 +41,9 @@ pub(super) struct Line<M> {
     pub(super) key: Key,
     /// Of the point, as it is told.
     pub(super) name: String,
+    /// The share of the study that ran it, such as `1/4`; `None` of the whole study.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) share: Option<String>,
     pub(super) run: Run<M>,
 }
 
@@ -66,19 +64,19 @@ pub(super) struct Ledger<M> {
     /// `None` for who only looks.
     file: Option<File>,
     /// Its own, by their hashes.
-    runs: BTreeMap<String, Run<M>>,
+    lines: BTreeMap<String, Line<M>>,
     /// Of the folder's other ledgers, in the order of their names.
     others: Vec<Other<M>>,
     /// Names of points that were asked for.
     asked: BTreeSet<String>,
+    /// Hashes of points that were found, by the shares that ran them.
+    of_shares: BTreeMap<String, BTreeSet<String>>,
 }
 
 /// Another ledger of the folder.
 struct Other<M> {
     file: String,
     lines: Vec<Line<M>>,
-    /// Lines that were taken from it.
-    taken: usize,
 }
 
 /// A file's lines.
@@ -87,22 +85,6 @@ struct Read<M> {
     /// Bytes of whole lines.
     whole: usize,
     is_torn: bool,
-}
-
-/// Name of the ledger of a share.
-pub(super) fn file_of(chunk: Option<Chunk>) -> String {
-    chunk.map_or(FILE.to_owned(), |chunk| {
-        let name = chunk.to_string().replace('/', "-of-");
-        format!("results.{name}.jsonl")
-    })
-}
-
-/// Whether a file of this name is a ledger.
-pub(super) fn is_ledger(name: &str) -> bool {
-    let share = name.strip_prefix("results.");
-    let share = share.and_then(|rest| rest.strip_suffix(".jsonl"));
-    let is_share = |share: &str| share.replace("-of-", "/").parse::<Chunk>().is_ok();
-    name == FILE || share.is_some_and(is_share)
 }
 
 impl<M: Serialize + DeserializeOwned> Ledger<M> {
@@ -114,9 +96,9 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
         warn: &mut dyn FnMut(String),
     ) -> Result<Self, StudyError> {
         let (own, file) = match reader {
-            Reader::Whole => (file_of(None), true),
-            Reader::Share(chunk) => (file_of(Some(chunk)), true),
-            Reader::Look => (file_of(None), false),
+            Reader::Whole => (ledger_of(None), true),
+            Reader::Share(chunk) => (ledger_of(Some(chunk)), true),
+            Reader::Look => (ledger_of(None), false),
         };
         let path = directory.join(&own);
         fs::create_dir_all(directory).map_err(fault(&path))?;
@@ -140,7 +122,7 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
         {
             let other = directory.join(&name);
             // The study waits for all shares; a share for the study, which runs what is missing.
-            if is_strict || name == FILE && reader != Reader::Look {
+            if is_strict || name == LEDGER && reader != Reader::Look {
                 refuse_busy(&other)?;
             }
             let read = read(&other, is_strict)?;
@@ -153,16 +135,16 @@ impl<M: Serialize + DeserializeOwned> Ledger<M> {
             others.push(Other {
                 file: name,
                 lines: read.lines,
-                taken: 0,
             });
         }
-        let runs = standing.lines.into_iter();
+        let lines = standing.lines.into_iter();
         Ok(Self {
             path,
             file,
-            runs: runs.map(|line| (line.key.hash, line.run)).collect(),
+            lines: lines.map(|line| (line.key.hash.clone(), line)).collect(),
             others,
             asked: BTreeSet::new(),
+            of_shares: BTreeMap::new(),
         })
     }
 }
@@ -177,17 +159,17 @@ impl<M: Clone + Serialize> Ledger<M> {
         warn: &mut dyn FnMut(String),
     ) -> Result<Option<Run<M>>, StudyError> {
         self.asked.insert(name.to_owned());
-        if let Some(run) = self.runs.get(&key.hash) {
-            return Ok(Some(run.clone()));
+        let mut others = self.others.iter().flat_map(|other| &other.lines);
+        let (found, is_own) = match self.lines.get(&key.hash) {
+            Some(line) => (Some(line.clone()), true),
+            None => (others.find(|it| it.key.hash == key.hash).cloned(), false),
+        };
+        if let Some(share) = found.as_ref().and_then(|line| line.share.clone()) {
+            let of_share = self.of_shares.entry(share).or_default();
+            of_share.insert(key.hash.clone());
         }
-        let has = |other: &Other<M>| other.lines.iter().position(|l| l.key.hash == key.hash);
-        let found = self.others.iter_mut().find_map(|other| {
-            let line = other.lines[has(other)?].clone();
-            other.taken += 1;
-            Some(line)
-        });
         match (found, reader) {
-            (Some(line), Reader::Whole) => Ok(Some(self.append(line)?.clone())),
+            (Some(line), Reader::Whole) if !is_own => Ok(Some(self.append(line)?.clone())),
             (Some(line), _) => Ok(Some(line.run)),
             (None, Reader::Whole) => {
                 self.others_differ(name, key, warn);
@@ -231,13 +213,15 @@ impl<M: Clone + Serialize> Ledger<M> {
             let what = "it was taken away while its worker ran: what was run since is lost";
             return Err(fault(&self.path)(io::Error::other(what)));
         }
-        Ok(self.runs.entry(line.key.hash).or_insert(line.run))
+        let hash = line.key.hash.clone();
+        Ok(&self.lines.entry(hash).or_insert(line).run)
     }
 
-    /// Ledgers of shares that points were taken from, with how many, and what is said of lines that nobody asked for.
+    /// Shares that ran points of the study, whenever these were taken over, with how many, and what is said of lines that nobody
+    /// asked for.
     pub(super) fn joined(&self) -> (Vec<(String, usize)>, Vec<String>) {
-        let taken = self.others.iter().filter(|other| other.taken > 0);
-        let taken = taken.map(|other| (other.file.clone(), other.taken));
+        let shares = self.of_shares.iter();
+        let shares = shares.map(|(share, hashes)| (share.clone(), hashes.len()));
         let unknown = |other: &Other<M>| {
             let mut lines = other.lines.iter();
             let line = lines.find(|line| !self.asked.contains(&line.name))?;
@@ -247,7 +231,7 @@ impl<M: Clone + Serialize> Ledger<M> {
             ))
         };
         (
-            taken.collect(),
+            shares.collect(),
             self.others.iter().filter_map(unknown).collect(),
         )
     }
@@ -342,11 +326,19 @@ mod tests {
                 devices: vec!["a card".into()],
             },
             name: format!("jacobi, k = {hash}"),
+            share: None,
             run: Run {
                 ended: Some(format!("too fast: {hash}")),
                 measured: vec![0.1f64],
                 ..Run::default()
             },
+        }
+    }
+
+    fn line_of(share: &str, hash: &str) -> Line<Vec<f64>> {
+        Line {
+            share: Some(share.to_owned()),
+            ..line(hash)
         }
     }
 
@@ -363,8 +355,8 @@ mod tests {
         assert!(open().is_err(), "two at once");
         drop(ledger);
         let mut ledger = open().expect("torn");
-        assert_eq!(ledger.runs.get("a"), Some(&line("a").run));
-        assert_eq!(ledger.runs.get("b"), None);
+        assert_eq!(ledger.lines.get("a"), Some(&line("a")));
+        assert_eq!(ledger.lines.get("b"), None);
         ledger.append(line("b")).expect("written");
         assert_eq!(fs::read_to_string(&path).expect("text"), text);
         drop(ledger);
@@ -391,10 +383,10 @@ mod tests {
         let share = |text: &str| Reader::Share(text.parse().expect("a share"));
         let mut said = Vec::new();
         let mut first = open(share("1/2"), &mut said).expect("new");
-        first.append(line("a")).expect("written");
+        first.append(line_of("1/2", "a")).expect("written");
         let mut second = open(share("2/2"), &mut said).expect("beside the first");
         assert!(open(share("2/2"), &mut said).is_err(), "twice");
-        second.append(line("b")).expect("written");
+        second.append(line_of("2/2", "b")).expect("written");
         let error = open(Reader::Whole, &mut said).err().expect("at work");
         assert!(
             error.to_string().contains("results.1-of-2.jsonl"),
@@ -440,15 +432,38 @@ mod tests {
             let said = said.pop().expect("said");
             assert!(said.contains(why) && said.contains("k = b"), "{said}");
         }
-        let own = fs::read_to_string(folder.path().join(FILE)).expect("text");
+        let own = fs::read_to_string(folder.path().join(LEDGER)).expect("text");
         assert_eq!(own.lines().count(), 1, "taken over once: {own}");
-        let (taken, unknown) = ledger.joined();
-        assert_eq!(taken, [("results.1-of-2.jsonl".to_owned(), 1)]);
+        let (shares, unknown) = ledger.joined();
+        assert_eq!(shares, [("1/2".to_owned(), 1)]);
         assert!(unknown.is_empty(), "{unknown:?}");
         drop(ledger);
         let ledger = open(Reader::Whole, &mut said).expect("free");
-        let (_, unknown) = ledger.joined();
+        let (shares, unknown) = ledger.joined();
+        assert!(shares.is_empty(), "none was asked for: {shares:?}");
         assert!(unknown.len() == 2 && unknown[1].contains("`jacobi, k = b` is no point"));
+        // Whoever joins again, as after a signal, is told once more: also where the share's file is gone.
+        drop(ledger);
+        fs::remove_file(folder.path().join("results.1-of-2.jsonl")).expect("there");
+        let mut ledger = open(Reader::Whole, &mut said).expect("free");
+        let mut find = |of: &Line<Vec<f64>>| {
+            let found = ledger.find(&of.name, &of.key, Reader::Whole, &mut |_| ());
+            found.expect("readable")
+        };
+        assert_eq!(find(&line("a")), Some(line("a").run));
+        assert_eq!(find(&line("b")), Some(line("b").run));
+        let shares = ledger.joined().0;
+        let each = ["1/2", "2/2"].map(|share| (share.to_owned(), 1));
+        assert_eq!(shares, each);
+        // A point of the whole study is no share's.
+        let own = Line {
+            name: "own".to_owned(),
+            ..line("d")
+        };
+        ledger.append(own.clone()).expect("written");
+        let found = ledger.find(&own.name, &own.key, Reader::Whole, &mut |_| ());
+        assert!(found.expect("readable").is_some());
+        assert_eq!(ledger.joined().0, each);
 
         // A spoiled line of a share stops the study that would take it over, and no other share.
         drop(ledger);
@@ -460,13 +475,5 @@ mod tests {
         let b = line("b");
         let found = first.find(&b.name, &b.key, share("1/2"), &mut |_| ());
         assert_eq!(found.expect("readable"), Some(b.run));
-        for (name, is) in [
-            ("results.jsonl", true),
-            ("results.12-of-12.jsonl", true),
-            ("results.3-of-2.jsonl", false),
-            ("results.csv", false),
-        ] {
-            assert_eq!(is_ledger(name), is, "{name}");
-        }
     }
 }

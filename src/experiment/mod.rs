@@ -67,9 +67,11 @@ pub enum Event {
     Render(render::Event),
     /// A point of a sweep.
     Point(PointEvent),
-    /// Points were taken over from the ledger of a share.
+    /// A share ran points of the whole study, which were taken over now or before.
     Joined {
-        /// Its name in the study's folder.
+        /// Such as `1/4`.
+        share: String,
+        /// Its ledger in the study's folder.
         file: String,
         /// How many.
         points: usize,
@@ -122,6 +124,30 @@ pub struct Share {
     pub stood: usize,
     /// Points of the study that no ledger of the folder has when the share is done.
     pub left: usize,
+    /// Whether these may come to less: a search for a limit ends when it has found it.
+    pub is_left_at_most: bool,
+}
+
+fn kind_of(study: &Study) -> &dyn Kind {
+    match study {
+        Study::SolverComparison(comparison) => &**comparison,
+        Study::Sweep(sweep) => &**sweep,
+        Study::Stability(stability) => &**stability,
+        Study::Surface(surface) => &**surface,
+        Study::Tune(tune) => &**tune,
+        Study::Validation(validation) => &**validation,
+    }
+}
+
+/// Whether each point that shares are dealt, in the study's order, is of this one.
+///
+/// # Errors
+/// [`StudyError::NoShares`].
+pub fn dealt(study: &Study, chunk: Chunk) -> Result<Vec<bool>, StudyError> {
+    let places = kind_of(study).places();
+    let places = places.ok_or(StudyError::NoShares(Outline::of(study).kind))?;
+    let ranks: Vec<usize> = places.iter().map(|place| place.rank).collect();
+    Ok(chunk.deal(&ranks))
 }
 
 /// Runs a study, or a share of it; `tell` hears of progress, and `stop` ends it after the current frame of a bake, a render or a point, which
@@ -141,38 +167,37 @@ pub fn study(
     for warning in request.study.warnings() {
         tell(Event::Warning(warning));
     }
-    let kind: &dyn Kind = match &request.study {
-        Study::SolverComparison(comparison) => &**comparison,
-        Study::Sweep(sweep) => &**sweep,
-        Study::Stability(stability) => &**stability,
-        Study::Surface(surface) => &**surface,
-        Study::Tune(tune) => &**tune,
-        Study::Validation(validation) => &**validation,
-    };
-    let work = match request.chunk {
-        None => Work::Whole,
+    let kind = kind_of(&request.study);
+    let (work, count) = match request.chunk {
+        None => (Work::Whole, kind.count()),
         Some(chunk) => {
-            let places = kind.places();
-            let places = places.ok_or(StudyError::NoShares(Outline::of(&request.study).kind))?;
-            Work::Share(chunk, chunk.deal(&places))
+            let is_ours = dealt(&request.study, chunk)?;
+            let places = kind.places().into_iter().flatten().zip(&is_ours);
+            let count = places.filter(|(_, is)| **is).map(|(place, _)| place.points);
+            let count = count.sum();
+            (Work::Share(chunk, is_ours), count)
         }
     };
     let devices = Devices::open(&request.gpu, kind.needs())?;
-    claim::take(&request.directory, &request.name)?;
-    let mut bench = Bench::new(request, &devices, stop, tell, (work, kind.count()));
+    claim::take(&request.directory, &request.name, &request.command)?;
+    let mut bench = Bench::new(request, &devices, stop, tell, (work, count));
     let report = match kind.run(&mut bench) {
         Err(StudyError::Stopped) => return Ok(Outcome::default()),
         report => report?,
     };
     if let Some(report) = report {
-        return report.write(request);
+        return report.write(request, bench.told_of_shares());
     }
     let (ran, stood) = (bench.ran.get(), bench.stood.get());
     // Once more over all points, which runs none of them: others have worked meanwhile.
     let mut look = Bench::new(request, &devices, stop, tell, (Work::Look, kind.count()));
     kind.run(&mut look)?;
-    let left = look.left.get();
-    let share = Some(Share { ran, stood, left });
+    let share = Some(Share {
+        ran,
+        stood,
+        left: look.left.get(),
+        is_left_at_most: look.is_left_at_most.get(),
+    });
     Ok(Outcome {
         share,
         ..Outcome::default()

@@ -27,8 +27,12 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// Writes all of it.
-    pub(super) fn write(self, request: &Request) -> Result<Outcome, StudyError> {
+    /// Writes all of it. `shares` is what a reader of times has to know of shares that ran points.
+    pub(super) fn write(
+        self,
+        request: &Request,
+        shares: Option<String>,
+    ) -> Result<Outcome, StudyError> {
         let directory = &request.directory;
         write(&directory.join("results.csv"), csv(&self.table))?;
         let folder = directory.join("curves");
@@ -45,6 +49,7 @@ impl Report {
         let mut curves = self.curves.into_iter().map(|(_, svg)| svg);
         let mut parts = vec![Part::Answer(self.answer)];
         parts.extend(curves.next().map(|first| Part::Curves(vec![first])));
+        parts.extend(shares.map(Part::Text));
         let others: Vec<String> = curves.collect();
         if !others.is_empty() {
             let title = format!("{} more curves", others.len());

@@ -23,7 +23,7 @@ use crate::{
 
 use super::{
     Event, PointStatus, Request, StudyError,
-    engine::{Bench, Kind},
+    engine::{Bench, Kind, Place},
     ledger::Key,
     report::Report,
 };
@@ -64,7 +64,7 @@ impl Kind for SurfaceStudy {
     }
 
     /// All draw frames of one cache.
-    fn places(&self) -> Option<Vec<usize>> {
+    fn places(&self) -> Option<Vec<Place>> {
         None
     }
 

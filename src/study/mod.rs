@@ -4,12 +4,13 @@
 //! files. [`comparison`] sets two solvers side by side; [`stability`] measures what is hard on a solver, [`waves`] what theory and
 //! experiments know the answer to; a sweep finds the [`knee`] and, for the paper's Table 1, the [`convergence_point`]; [`tune`] finds
 //! the cheapest settings that hold an error. [`measure`], [`chart`] and [`page`] serve every kind. What is looked at frame by
-//! frame has a [`player`], a [`sheet`] and an [`apng`].
+//! frame has a [`player`], a [`sheet`] and an [`apng`]. [`folder`] names what a study leaves.
 
 pub mod apng;
 pub mod chart;
 pub mod comparison;
 pub mod convergence_point;
+pub mod folder;
 pub mod knee;
 pub mod measure;
 pub mod page;

@@ -72,8 +72,8 @@ END
     "$swell" study "$room/study.toml" -o "$room/unbroken-study" --progress none
 }
 
-# results_of FOLDER: a study's own ledger without wall clocks.
-results_of() { sed 's/"seconds":\[[^]]*\]//' "$1/results.jsonl"; }
+# results_of FOLDER: a study's own ledger without wall clocks and shares.
+results_of() { sed -e 's/"seconds":\[[^]]*\]//' -e 's/"share":"[^"]*",//' "$1/results.jsonl"; }
 
 # is_unbroken_study FOLDER: the room's FOLDER has the points of unbroken-study, in their order and nothing else, and the same files beside ledgers of shares.
 is_unbroken_study() {

@@ -27,18 +27,27 @@ pub(super) fn find(
     search: &Search,
 ) -> Result<Option<Found>, StudyError> {
     let title = format!("{}, {}", limit.name, search.method.name());
+    let most = most_tries(limit);
     let mut found = Found::default();
     let mut next = Some(limit.passes);
     while let Some(value) = next {
-        let fault = match search.trial(value) {
+        let mut name = format!("{title} = {value}");
+        let (fault, status) = match search.trial(value) {
             // Beyond what a scene can say.
-            Err(error) => Some(error.to_string()),
+            Err(error) => (Some(error.to_string()), PointStatus::Done(0.0, Vec::new())),
             Ok(trial) => {
-                let name = format!("{title} = {value}");
-                let Some((run, _)) = point(bench, ledger, &name, &trial)? else {
+                let Some((run, stood)) = point(bench, ledger, &name, &trial)? else {
+                    // Itself, and what may follow from it.
+                    let rest = most.saturating_sub(found.tries + 1);
+                    bench.left.set(bench.left.get() + rest);
+                    bench.is_left_at_most.set(true);
                     return Ok(None);
                 };
-                missed(&run, &trial)
+                let status = match stood {
+                    true => PointStatus::Stands,
+                    false => PointStatus::Done(1e3 * run.per_frame()[1], Vec::new()),
+                };
+                (missed(&run, &trial), status)
             }
         };
         found.tries += 1;
@@ -47,10 +56,28 @@ pub(super) fn find(
             Some(words) => found.fails = Some((value, words)),
         }
         next = following(limit, &found);
+        if next.is_none() {
+            name = format!("{name}: {}", found.words(&limit.unit));
+            bench.count = (bench.count + found.tries).saturating_sub(most);
+        }
+        bench.told(name, status);
     }
-    let name = format!("{title}: {}", found.words(&limit.unit));
-    bench.told(name, PointStatus::Done(0.0, Vec::new()));
     Ok(Some(found))
+}
+
+/// Runs that a search takes where both ends are as they should be: each halves the ratio that is left, whichever way it comes out.
+pub(super) fn most_tries(limit: &Limit) -> usize {
+    let mut found = Found::default();
+    let mut next = Some(limit.passes);
+    while let Some(value) = next {
+        found.tries += 1;
+        match found.tries {
+            2 => found.fails = Some((value, String::new())),
+            _ => found.passes = Some(value),
+        }
+        next = following(limit, &found);
+    }
+    found.tries
 }
 
 /// The first mark that a run misses, in words.

@@ -20,7 +20,7 @@ use crate::{
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, needs_of},
+    engine::{Bench, Kind, Place, needs_of},
     ledger::Ledger,
     report::Report,
 };
@@ -54,20 +54,26 @@ impl Kind for Stability {
             Held::Refusal { attempts, .. } => attempts.len(),
         };
         let cases = self.cases.iter().map(|case| of_case(&case.held));
-        let limits = self.limits.iter().map(|limit| limit.searches.len());
+        let limits = self.limits.iter();
+        let limits = limits.map(|limit| limit.searches.len() * limit::most_tries(limit));
         cases.chain(limits).sum()
     }
 
     /// Trials, and then searches for limits, which take many runs each. What is to be refused is tried with the whole.
-    fn places(&self) -> Option<Vec<usize>> {
+    fn places(&self) -> Option<Vec<Place>> {
         let trials = |held: &Held| match held {
             Held::Runs(trials) => trials.len(),
             Held::Test(_) | Held::Refusal { .. } => 0,
         };
         let trials: usize = self.cases.iter().map(|case| trials(&case.held)).sum();
-        let searches = self.limits.iter().map(|limit| limit.searches.len()).sum();
-        let mut places = vec![0; trials];
-        places.extend(vec![1; searches]);
+        let mut places = vec![Place::of(0); trials];
+        for limit in &self.limits {
+            let search = Place {
+                rank: 1,
+                points: limit::most_tries(limit),
+            };
+            places.extend(vec![search; limit.searches.len()]);
+        }
         Some(places)
     }
 

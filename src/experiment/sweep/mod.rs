@@ -16,7 +16,7 @@ use crate::{
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, needs_of},
+    engine::{Bench, Kind, Place, needs_of},
     ledger::Key,
     report::Report,
 };
@@ -32,9 +32,9 @@ impl Kind for Sweep {
         self.points().count() + self.lines.iter().flat_map(|line| &line.coarser).count()
     }
 
-    fn places(&self) -> Option<Vec<usize>> {
+    fn places(&self) -> Option<Vec<Place>> {
         let of_line = |line: &Line| 0..line.points.iter().chain(&line.coarser).count();
-        Some(self.lines.iter().flat_map(of_line).collect())
+        Some(self.lines.iter().flat_map(of_line).map(Place::of).collect())
     }
 
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {

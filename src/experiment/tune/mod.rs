@@ -27,7 +27,7 @@ use crate::{
 
 use super::{
     PointStatus, StudyError,
-    engine::{Bench, Kind, needs_of},
+    engine::{Bench, Kind, Place, needs_of},
     ledger::Ledger,
     report::Report,
 };
@@ -98,8 +98,8 @@ impl Kind for Tune {
     }
 
     /// What is known before the first run, the coarsest first; what is proposed is run with the whole.
-    fn places(&self) -> Option<Vec<usize>> {
-        Some((0..self.twins().count()).collect())
+    fn places(&self) -> Option<Vec<Place>> {
+        Some((0..self.twins().count()).map(Place::of).collect())
     }
 
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {

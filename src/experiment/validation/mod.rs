@@ -18,7 +18,7 @@ use crate::{
 
 use super::{
     Devices, PointStatus, StudyError,
-    engine::{Bench, Kind, needs_of, until_done},
+    engine::{Bench, Kind, Place, needs_of, until_done},
     report::Report,
 };
 use record::Record;
@@ -50,9 +50,15 @@ impl Kind for Validation {
             .sum()
     }
 
-    fn places(&self) -> Option<Vec<usize>> {
+    fn places(&self) -> Option<Vec<Place>> {
         let of_benchmark = |benchmark: &Benchmark| 0..benchmark.runs.len();
-        Some(self.benchmarks.iter().flat_map(of_benchmark).collect())
+        Some(
+            self.benchmarks
+                .iter()
+                .flat_map(of_benchmark)
+                .map(Place::of)
+                .collect(),
+        )
     }
 
     fn run(&self, bench: &mut Bench<'_>) -> Result<Option<Report>, StudyError> {

@@ -70,6 +70,15 @@ impl Outline {
         }
     }
 
+    /// Leaves out the points that are not marked, in their order, and parts that have none then.
+    pub fn keep(&mut self, is_kept: &[bool]) {
+        let mut marks = is_kept.iter();
+        for part in &mut self.parts {
+            part.points.retain(|_| marks.next().is_some_and(|is| *is));
+        }
+        self.parts.retain(|part| !part.points.is_empty());
+    }
+
     /// Of all parts.
     pub fn points(&self) -> usize {
         self.parts.iter().map(|part| part.points.len()).sum()

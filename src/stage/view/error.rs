@@ -26,8 +26,13 @@ pub enum ViewError {
     #[error("the cache's scene: {0}")]
     Scene(#[from] SceneError),
     /// A study that has no page.
-    #[error("{} is not there: the study is not finished; `swell study` goes on with it", .0.display())]
-    Unfinished(PathBuf),
+    #[error("{} is not there: {what}", page.display())]
+    Unfinished {
+        /// Where it would be.
+        page: PathBuf,
+        /// Why it is not, and what makes it.
+        what: String,
+    },
     /// The contact sheet.
     #[error(transparent)]
     Sheet(#[from] RasterError),
@@ -97,7 +102,7 @@ impl From<&ViewError> for Blame {
             | ViewError::Picture(_)
             | ViewError::Cache(_)
             | ViewError::Scene(_)
-            | ViewError::Unfinished(_)
+            | ViewError::Unfinished { .. }
             | ViewError::Sheet(_)
             | ViewError::File { .. }
             | ViewError::Encode { .. }

@@ -16,20 +16,51 @@ use super::{
 use crate::{
     scene::look::ViewSpec,
     study::{
+        folder::{CLAIM, Claim, is_ledger, is_share},
         rgb::Rgb,
         sheet::{Cell, sheet},
     },
 };
 
-/// What a study leaves.
-const RESULTS: [&str; 2] = ["results.csv", "results.jsonl"];
+/// What a study leaves, beside its ledgers.
+const RESULTS: &str = "results.csv";
 /// Its page, and the folders of what is seen on it.
 const PAGE: &str = "index.html";
 const FOLDERS: [&str; 2] = ["pictures", "curves"];
 
 /// Whether a folder is that of a study.
 pub(super) fn is_one(folder: &Path) -> bool {
-    RESULTS.iter().any(|name| folder.join(name).is_file())
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.any(|name| name == RESULTS || is_ledger(&name))
+}
+
+/// Why there is no page yet, and what makes it.
+fn unfinished(folder: &Path) -> Result<ViewError, ViewError> {
+    let entries = fs::read_dir(folder).map_err(ViewError::at(folder))?;
+    let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+    let mut names = names
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(ViewError::at(folder))?;
+    names.retain(|name| is_share(name));
+    names.sort();
+    let claim = fs::read(folder.join(CLAIM)).ok();
+    let claim = claim.and_then(|text| serde_json::from_slice::<Claim>(&text).ok());
+    let command = claim.and_then(|claim| claim.command);
+    let command = command.map_or("the command of the study".to_owned(), |it| {
+        format!("`{it}`")
+    });
+    let what = match &names[..] {
+        [] => format!("the study is not finished; {command} goes on with it"),
+        shares => format!(
+            "shares of the study are not joined ({}); {command}, with the shares' other options and without --chunk, joins them",
+            shares.join(", ")
+        ),
+    };
+    Ok(ViewError::Unfinished {
+        page: folder.join(PAGE),
+        what,
+    })
 }
 
 /// Its page, and a sheet of its pictures where one is asked for and there are any.
@@ -40,7 +71,7 @@ pub(super) fn view(
 ) -> Result<Outcome, ViewError> {
     let page = folder.join(PAGE);
     if !page.is_file() {
-        return Err(ViewError::Unfinished(page));
+        return Err(unfinished(folder)?);
     }
     let asked = [
         (request.movie.is_some(), "--movie"),

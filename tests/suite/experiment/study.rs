@@ -103,6 +103,7 @@ impl Job {
         let mut points = Vec::new();
         let outcome = experiment::study(&request, &AtomicBool::new(stop), &mut |event| {
             if let Event::Point(point) = event {
+                assert!(point.number <= point.count, "{point:?}");
                 points.push(point.status);
             }
         })?;

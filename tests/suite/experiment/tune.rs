@@ -195,6 +195,13 @@ fn shares_of_a_tuning_are_joined() {
     let tune = "tune tiny.toml -o out --frames 1-4 --error energy=50%";
     let mut done = 0;
     for k in 1..=2 {
+        // What would be run is the share's.
+        let told = events(&job, 0, &format!("{tune} --chunk {k}/2 --dry-run"));
+        let dry = &named(&told, "dry_run")[0];
+        assert_eq!(
+            (&dry["points"], &dry["chunk"]),
+            (&(8 - k).into(), &format!("{k}/2").into())
+        );
         let told = events(&job, 0, &format!("{tune} --chunk {k}/2"));
         done += named(&told, "point").len();
         assert_eq!(told.last().unwrap()["left"], 13 - done);
@@ -208,6 +215,16 @@ fn shares_of_a_tuning_are_joined() {
         .filter(|point| point["status"] == "stands there");
     assert_eq!(stand.count(), 13);
     assert_eq!(named(&told, "joined").len(), 2);
+    let page = fs::read_to_string(job.path("out/index.html")).unwrap();
+    assert!(
+        page.contains("share 2/2 ran 6") && page.contains("several machines"),
+        "{page}"
+    );
+    let dry = named(&events(&job, 0, &format!("{tune} --dry-run")), "dry_run")[0].clone();
+    assert_eq!(
+        (&dry["points"], &dry["chunk"]),
+        (&13.into(), &serde_json::Value::Null)
+    );
     assert!(job.path("tiny.tuned.toml").exists());
 }
 

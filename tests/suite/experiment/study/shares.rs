@@ -41,12 +41,13 @@ fn pages(job: &Job) -> BTreeMap<String, Vec<u8>> {
     files.filter_map(read).collect()
 }
 
-/// Lines of the study's own ledger, without wall clocks.
+/// Lines of the study's own ledger, without wall clocks and shares.
 fn lines(job: &Job) -> Vec<Value> {
     let text = fs::read_to_string(job.path("out/results.jsonl")).unwrap();
     let line = |line: &str| {
         let mut line: Value = serde_json::from_str(line).unwrap();
         line["run"]["seconds"].take();
+        line.as_object_mut().unwrap().remove("share");
         line
     };
     text.lines().map(line).collect()
@@ -84,6 +85,9 @@ fn shares_that_are_joined_are_the_study_that_one_process_ran() {
         }
     });
     assert!(!shared.path("out/index.html").exists());
+    let files = "results.1-of-3.jsonl, results.2-of-3.jsonl, results.3-of-3.jsonl";
+    let words = format!("are not joined ({files}); `swell study s.toml -o out`, with the shares'");
+    shared.expect_clear(4, "view out", &words);
     // What stands is counted when all are done; it is run by no other cut into shares.
     let told = events(&shared, 0, &share(4, 5));
     assert_eq!(
@@ -103,11 +107,14 @@ fn shares_that_are_joined_are_the_study_that_one_process_ran() {
     let ledgers = [1, 2, 3].map(|k| format!("results.{k}-of-3.jsonl"));
     assert_eq!(joined, ledgers.each_ref().map(|name| (&**name, 2)));
     assert_eq!(lines(&shared), lines(&whole));
-    // Taken over once.
+    // Taken over once, and told again, as to who saw nothing of a joining command that was ended.
+    let ledger = fs::read(shared.path("out/results.jsonl")).unwrap();
     let told = events(&shared, 0, "study s.toml -o out");
-    assert!(named(&told, "joined").is_empty());
+    assert_eq!(named(&told, "joined").len(), 3);
+    assert_eq!(fs::read(shared.path("out/results.jsonl")).unwrap(), ledger);
 
-    // With the same times, all of it has the same bytes: the lines of the one run as shares would have written them.
+    // With the same times, all of it has the same bytes but for what is said of shares: the lines of the one run as shares would
+    // have written them.
     let dealt = job(&text);
     fs::create_dir(dealt.path("out")).unwrap();
     let text = fs::read_to_string(whole.path("out/results.jsonl")).unwrap();
@@ -117,12 +124,32 @@ fn shares_that_are_joined_are_the_study_that_one_process_ran() {
             .rev()
             .skip(k)
             .step_by(3)
+            .map(|line| line.replacen('{', &format!("{{\"share\":\"{}/3\",", k + 1), 1))
             .collect();
         dealt.write(&format!("out/{name}"), &own);
     }
     let told = events(&dealt, 0, "study s.toml -o out");
     assert_eq!(statuses(&told), ["stands there"; 6]);
-    assert_eq!(pages(&dealt), pages(&whole));
+    let (mut ours, mut theirs) = (pages(&dealt), pages(&whole));
+    let page = String::from_utf8(ours.remove("index.html").unwrap()).unwrap();
+    let words = "<p>Of 6 points, share 1/3 ran 2, share 2/3 ran 2, share 3/3 ran 2 (results.jsonl names each point's share). ";
+    let begin = page.find(words).unwrap_or_else(|| panic!("{page}"));
+    let end = begin + page[begin..].find('\n').unwrap() + 1;
+    assert!(
+        page[begin..end].contains("several machines: compare the times"),
+        "{page}"
+    );
+    let rest = page[..begin].to_owned() + &page[end..];
+    assert_eq!(rest.as_bytes(), theirs.remove("index.html").unwrap());
+    for pages in [&mut ours, &mut theirs] {
+        pages.remove("results.jsonl");
+    }
+    assert_eq!(ours, theirs);
+    let mut lines_of_both = [&dealt, &whole].map(lines);
+    for lines in &mut lines_of_both {
+        lines.sort_by_key(|line| line["hash"].to_string());
+    }
+    assert_eq!(lines_of_both[0], lines_of_both[1]);
     // The control: times are in it.
     assert_ne!(pages(&shared)["results.csv"], pages(&whole)["results.csv"]);
 }
@@ -230,9 +257,19 @@ fn a_share_that_is_killed_goes_on() {
 #[test]
 fn other_kinds_have_shares_or_say_that_they_have_none() {
     let shared = job(FALL);
-    for k in 1..=2 {
-        events(&shared, 0, &share(k, 2));
+    // Each has a run of the case; the second also a search, which takes two runs, and is counted so before it is run.
+    for (k, counts, left) in [(1, vec![1], 3), (2, vec![3, 3, 3], 0)] {
+        let told = events(&shared, 0, &share(k, 2));
+        let found: Vec<_> = (named(&told, "point").iter())
+            .map(|point| point["count"].as_u64().unwrap())
+            .collect();
+        assert_eq!(
+            (found, &told.last().unwrap()["left"]),
+            (counts, &left.into())
+        );
     }
+    let said = job(FALL).expect(0, &share(1, 2));
+    assert_has(&said, &["left of the whole study: at most 3"]);
     let told = events(&shared, 0, &share(1, 2));
     assert_eq!(told.last().unwrap()["left"], 0, "limits as well");
     let told = events(&shared, 0, "study s.toml -o out");
@@ -240,6 +277,15 @@ fn other_kinds_have_shares_or_say_that_they_have_none() {
     let whole = job(FALL);
     whole.expect(0, "study s.toml -o out");
     assert_eq!(lines(&shared), lines(&whole));
+
+    // A run that ends a search early takes the others off the count: this one misses its mark at once.
+    let early = FALL
+        .replace("passes = 1.0", "passes = 1e-4")
+        .replace("fails = 1e-4", "fails = 1e-5");
+    let told = events(&job(&early), 0, &share(2, 2));
+    let points = named(&told, "point");
+    let counts = [0, 1].map(|k| points[k]["count"].as_u64().unwrap());
+    assert_eq!((points.len(), counts), (2, [3, 2]));
 
     // More shares than points: some are empty.
     let told = events(&shared, 0, &share(9, 9));
