@@ -18,10 +18,12 @@ pub enum CacheError {
         source: io::Error,
     },
     /// No manifest.
-    #[error("{} holds no cache: it has no manifest.json", dir.display())]
+    #[error("{} {why}", dir.display())]
     NotACache {
         /// The directory.
         dir: PathBuf,
+        /// What is there instead.
+        why: String,
     },
     /// A new bake was sent to a directory with other files in it.
     #[error(

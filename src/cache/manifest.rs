@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::absent;
 use super::error::{AtPath, CacheError};
 use super::frame::Stamp;
 use super::grids::GridRecord;
@@ -215,6 +216,7 @@ impl Manifest {
         if !exists(dir) {
             return Err(CacheError::NotACache {
                 dir: dir.to_owned(),
+                why: absent::why_none(dir, &exists),
             });
         }
         let path = dir.join(FILE);

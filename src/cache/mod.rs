@@ -26,6 +26,7 @@
 //! The chain finds damage and edits. It is no signature, and a ledger cut at the end of a line reads
 //! as a bake that stopped there.
 
+mod absent;
 mod disk;
 mod error;
 pub mod failed;
@@ -44,6 +45,7 @@ pub mod vdb;
 mod window;
 mod writer;
 
+pub use absent::within;
 pub use disk::{directory_hash, free_bytes};
 pub use error::CacheError;
 pub use folder::{around, refuse_occupied};

@@ -155,8 +155,16 @@ fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
             return particles::open(path, request.aspect, request.frames.as_ref());
         }
         let nothing = || {
+            let is_one = |path: &Path| {
+                let has_pictures = || pictures::in_folder(path).is_ok_and(|it| !it.is_empty());
+                cache::exists(path) || study::is_one(path) || has_pictures()
+            };
+            let within = match &cache::within(path, &is_one)[..] {
+                [] => String::new(),
+                found => format!("; within it there are {}", found.join(", ")),
+            };
             ViewError::Asked(format!(
-                "nothing to see in {}: it is no cache and no study, and has no pictures (PNG, EXR)",
+                "nothing to see in {}: it is no cache and no study, and has no pictures (PNG, EXR){within}",
                 path.display()
             ))
         };

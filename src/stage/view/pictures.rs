@@ -42,7 +42,7 @@ fn numbered(path: &Path) -> Option<(String, u32)> {
 }
 
 /// Pictures of a folder, by their names.
-fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
+pub(super) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
     let entries = fs::read_dir(folder).map_err(ViewError::at(folder))?;
     let mut found = Vec::new();
     for entry in entries {

@@ -69,7 +69,7 @@ fn given() -> Job {
         let text = bare.join("\n").replace("[camera]", &camera);
         job.write(&format!("look-{name}.toml"), &text);
     }
-    for name in ["cache", "damaged"] {
+    for name in ["cache", "damaged", "shots/flip", "shots/pbf"] {
         write_cache(&job.path(name), &Made::default());
     }
     let frame = job.path("damaged/frames/small.0000.ply");
@@ -81,7 +81,18 @@ fn given() -> Job {
 }
 
 /// Command, exit code, what the line has to say.
-const FAULTS: [(&str, i32, &str); 18] = [
+const FAULTS: [(&str, i32, &str); 21] = [
+    ("verify gone", 4, "gone is not there"),
+    (
+        "verify look.toml",
+        4,
+        "look.toml is a file, and a cache is a folder",
+    ),
+    (
+        "export shots --npy p.%04d.npy",
+        4,
+        "shots holds no cache itself: name one of shots/flip, shots/pbf",
+    ),
     ("verify damaged", 4, "small.0000.ply is damaged"),
     ("diff cache damaged", 4, "small.0000.ply is damaged"),
     (

@@ -474,6 +474,7 @@ fn faults_are_one_clear_line() {
     let clear = |code, words: &str, part: &str| job.expect_clear(code, words, part);
     fs::create_dir_all(job.path("empty")).unwrap();
     clear(2, "view empty", "nothing to see in empty");
+    clear(2, "view .", "; within it there are ./day");
     clear(4, "view gone", "gone is not there");
     clear(2, "view day/shot.0001.png", "is no folder");
     clear(

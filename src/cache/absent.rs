@@ -1,0 +1,30 @@
+//! What is where something was looked for, and is not.
+
+use std::{fs, path::Path};
+
+/// What stands where a cache was looked for: words that go behind the path.
+pub(super) fn why_none(dir: &Path, is_cache: &dyn Fn(&Path) -> bool) -> String {
+    if !dir.exists() {
+        return "is not there".to_owned();
+    }
+    if !dir.is_dir() {
+        return "is a file, and a cache is a folder".to_owned();
+    }
+    let within = within(dir, is_cache);
+    match &within[..] {
+        [] => "holds no cache: it has no manifest.json".to_owned(),
+        [one] => format!("holds no cache itself: {one} is one"),
+        several => format!("holds no cache itself: name one of {}", several.join(", ")),
+    }
+}
+
+/// Folders of a folder that are what is looked for, by name.
+pub fn within(dir: &Path, is_one: &dyn Fn(&Path) -> bool) -> Vec<String> {
+    let entries = fs::read_dir(dir).into_iter().flatten().flatten();
+    let found = entries
+        .map(|entry| entry.path())
+        .filter(|path| is_one(path));
+    let mut found: Vec<String> = found.map(|path| path.display().to_string()).collect();
+    found.sort();
+    found
+}
