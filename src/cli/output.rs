@@ -19,7 +19,10 @@ use serde_json::{Value, json};
 use super::{log, progress::Progress};
 use crate::{
     domain::solver::PassTime,
-    stage::{device::PassTimes, time::Share},
+    stage::{
+        device::{Ceilings, PassTimes, Reached},
+        time::Share,
+    },
 };
 
 /// The exit code where a file cannot be written; standard output is one.
@@ -51,27 +54,37 @@ pub(super) fn print(text: &str) {
     note(STDOUT, put(&mut io::stdout().lock(), text));
 }
 
-/// Tells what passes took: a line each with milliseconds, runs, seconds in all, bytes a second that they moved at least and which part of the
-/// adapter's that is; behind them what each part took of so many frames.
+/// Tells what passes took: a line each with milliseconds, runs, seconds in all, bytes that they moved at least and operations that they did a
+/// second, which part of the adapter's that is, and what it waits for; behind them what each part took of so many frames.
 pub(super) fn pass_times(progress: &Progress, times: &PassTimes, parts: &[Share], frames: u32) {
-    let PassTimes { passes, bandwidth } = times;
+    let PassTimes { passes, ceilings } = times;
     if passes.is_empty() {
         return;
     }
     if progress.is_json() {
+        let rows = passes.iter().map(|time| pass_json(time, ceilings.as_ref()));
         return progress.tell(json!({
-            "event": "passes", "passes": passes.iter().map(pass_json).collect::<Vec<_>>(), "parts": parts_json(parts),
-            "bandwidth": bandwidth,
+            "event": "passes", "passes": rows.collect::<Vec<_>>(), "parts": parts_json(parts),
+            "bandwidth": ceilings.map(|of| of.bandwidth), "arithmetic": ceilings.map(|of| of.arithmetic),
+            "start": ceilings.map(|of| of.start),
         }));
     }
-    print_pass_times(passes, *bandwidth);
+    print_pass_times(passes, ceilings.as_ref());
     let runs: u64 = passes.iter().map(|time| time.runs).sum();
     let each = runs as f64 / f64::from(frames.max(1));
     print(&format!("\n{runs} runs of passes, {each:.0} a frame"));
-    if let Some(all) = bandwidth {
+    if let Some(Ceilings {
+        bandwidth,
+        arithmetic,
+        start,
+    }) = ceilings
+    {
         print(&format!(
-            "; per cent are of {:.2} GB/s, at which a pass copies a buffer here, and a pass is taken to move what it binds once",
-            1e-9 * all
+            "; per cent are of {:.2} GB/s, at which a pass copies a buffer here, where a pass is taken to move what it binds once, and of {:.1} \
+             Gop/s, which one does that only multiplies and adds; one without work takes {:.3} ms",
+            1e-9 * bandwidth,
+            1e-9 * arithmetic,
+            1e3 * start
         ));
     }
     print("\n");
@@ -80,9 +93,14 @@ pub(super) fn pass_times(progress: &Progress, times: &PassTimes, parts: &[Share]
     }
 }
 
-fn pass_json(time: &PassTime) -> Value {
+fn pass_json(time: &PassTime, ceilings: Option<&Ceilings>) -> Value {
     let bytes = (time.bytes > 0).then_some(time.bytes);
-    json!({ "pass": time.pass, "seconds": time.seconds, "runs": time.runs, "bytes": bytes })
+    let [floats, integers] = [0, 1].map(|kind| time.operations.map(|counted| counted[kind]));
+    let waits_for = ceilings.and_then(|ceilings| Reached::of(time, ceilings).waits_for);
+    json!({
+        "pass": time.pass, "seconds": time.seconds, "runs": time.runs, "bytes": bytes,
+        "float_operations": floats, "integer_operations": integers, "waits_for": waits_for,
+    })
 }
 
 /// What passes and buffers are there for, for programs.
@@ -95,24 +113,33 @@ pub(super) fn parts_json(parts: &[Share]) -> Vec<Value> {
     parts.iter().map(part).collect()
 }
 
-fn print_pass_times(passes: &[PassTime], bandwidth: Option<f64>) {
+fn print_pass_times(passes: &[PassTime], ceilings: Option<&Ceilings>) {
     for time in passes {
         let PassTime {
             pass,
             seconds,
             runs,
-            bytes,
+            ..
         } = time;
         let each = 1e3 * seconds / *runs as f64;
-        let rate = *bytes as f64 / seconds;
-        let moved = match bandwidth {
-            Some(all) if *bytes > 0 => {
-                format!("  {:7.2} GB/s, {:3.0} %", 1e-9 * rate, 100.0 * rate / all)
-            }
-            _ => String::new(),
-        };
+        let of = ceilings.map(|ceilings| (ceilings, Reached::of(time, ceilings)));
+        let reached = of.map_or(String::new(), |(ceilings, reached)| {
+            let part = |part: Option<f64>, ceiling: f64, unit: &str| {
+                let text = |part: f64| {
+                    let rate = 1e-9 * part * ceiling;
+                    format!("  {rate:7.2} {unit}, {:3.0} %", 100.0 * part)
+                };
+                part.map_or(String::new(), text)
+            };
+            let memory = part(reached.memory, ceilings.bandwidth, "GB/s");
+            let arithmetic = part(reached.arithmetic, ceilings.arithmetic, "Gop/s");
+            let waits_for = reached
+                .waits_for
+                .map_or(String::new(), |what| format!("  {what}"));
+            format!("{memory}{arithmetic}{waits_for}")
+        });
         print(&format!(
-            "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s{moved}\n"
+            "{pass:28} {each:9.3} ms × {runs:6} = {seconds:8.3} s{reached}\n"
         ));
     }
 }

@@ -136,17 +136,35 @@ pub struct PassTime {
     /// Bytes that all runs moved if each of what they bind is read and written once, as far as it is read and written at all; 0 where that
     /// is not known.
     pub bytes: u64,
+    /// Operations on floats and on integers of all runs, where they were counted.
+    pub operations: Option<[u64; 2]>,
 }
 
 impl PassTime {
-    /// Of a pass: seconds, runs and bytes of all runs.
-    pub fn new(pass: &'static str, seconds: f64, runs: u64, bytes: u64) -> Self {
+    /// Of a pass: seconds, runs, bytes and operations of all runs.
+    pub fn new(
+        pass: &'static str,
+        seconds: f64,
+        runs: u64,
+        bytes: u64,
+        operations: Option<[u64; 2]>,
+    ) -> Self {
         Self {
             pass,
             seconds,
             runs,
             bytes,
+            operations,
         }
+    }
+
+    /// Adds further runs of the same pass.
+    pub fn add(&mut self, more: &Self) {
+        self.seconds += more.seconds;
+        self.runs += more.runs;
+        self.bytes += more.bytes;
+        let both = self.operations.zip(more.operations);
+        self.operations = both.map(|(sum, more)| [sum[0] + more[0], sum[1] + more[1]]);
     }
 }
 

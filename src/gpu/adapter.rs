@@ -112,6 +112,8 @@ pub struct Context {
     pub has_f64: bool,
     /// What passes are composed from.
     pub shaders: Shaders,
+    /// Whether timers also count operations, by running passes again that do so: for one run in seven, which then takes as long again.
+    pub counts_operations: bool,
     /// A fault put into one pass, so that a comparison can be seen to fail; `None` in every command.
     pub spoil: Option<Spoil>,
     fault: Arc<Mutex<Option<String>>>,
@@ -301,6 +303,7 @@ impl Context {
             has_timestamps,
             has_f64: features.contains(Features::SHADER_F64),
             shaders: Shaders::default(),
+            counts_operations: false,
             spoil: None,
             fault,
         })

@@ -1,9 +1,10 @@
 //! Everything that touches the device and knows nothing of fluids.
 
 pub mod adapter;
-pub mod bandwidth;
 pub mod buffer;
+pub mod ceilings;
 mod edited;
+pub mod operations;
 pub mod program;
 pub mod raster;
 pub mod recording;

@@ -1,6 +1,6 @@
 //! Passes and buffers by name, built on a device.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::OnceLock};
 
 use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
 
@@ -8,6 +8,7 @@ use super::{
     adapter::{Context, GpuError, Spoil},
     buffer::{Buf, Element, Held, Wanted, Windows},
     edited,
+    operations::Counting,
     raster::RasterPass,
     reflect::{Access, Binding, Reflection, Stage, reflect, reflect_at},
     shader::Composed,
@@ -62,6 +63,25 @@ pub struct Pass {
     pub bindings: Vec<Binding>,
     /// Threads a workgroup along each axis.
     pub workgroup_size: [u32; 3],
+    /// As in [`PassSpec`].
+    pub(super) defines: Vec<&'static str>,
+    /// Values of those `override` constants that it declares.
+    pub(super) constants: Vec<(&'static str, f64)>,
+    counting: OnceLock<Option<Counting>>,
+}
+
+impl Pass {
+    /// Its form that counts operations, compiled when it is first asked for; `None` where the adapter binds no buffer more.
+    ///
+    /// # Errors
+    /// [`GpuError::Shader`].
+    pub(super) fn counting(&self, context: &Context) -> Result<Option<&Counting>, GpuError> {
+        if self.counting.get().is_none() {
+            let made = Counting::new(context, self)?;
+            return Ok(self.counting.get_or_init(|| made).as_ref());
+        }
+        Ok(self.counting.get().and_then(Option::as_ref))
+    }
 }
 
 /// Named passes, buffers, textures and samplers on one device.
@@ -313,7 +333,11 @@ fn allocate(context: &Context, spec: &BufferSpec) -> Buffer {
 }
 
 /// WGSL of a pass, with the context's fault where it is one of this pass.
-fn source(context: &Context, name: &str, defines: &[&str]) -> Result<Composed, GpuError> {
+pub(super) fn source(
+    context: &Context,
+    name: &str,
+    defines: &[&str],
+) -> Result<Composed, GpuError> {
     let composed = context.shaders.compose_with_places(name, defines);
     let mut source = composed.map_err(|error| context.shaders.blamed(error))?;
     if let Some(spoil) = context.spoil {
@@ -344,7 +368,7 @@ pub(super) struct Shader {
     pub(super) reflection: Reflection,
 }
 
-fn binding_type(access: Access) -> wgpu::BindingType {
+pub(super) fn binding_type(access: Access) -> wgpu::BindingType {
     let buffer = |ty| wgpu::BindingType::Buffer {
         ty,
         has_dynamic_offset: false,
@@ -427,25 +451,50 @@ pub(super) fn shader(
         Stage::Compute => wgpu::ShaderStages::COMPUTE,
         Stage::Raster { .. } => wgpu::ShaderStages::VERTEX_FRAGMENT,
     };
-    let entries: Vec<wgpu::BindGroupLayoutEntry> = reflection
-        .bindings
-        .iter()
-        .map(|binding| wgpu::BindGroupLayoutEntry {
-            binding: binding.index,
-            visibility,
-            ty: binding_type(binding.access),
-            count: None,
-        })
-        .collect();
+    let entries = entries(&reflection.bindings, visibility);
+    let source = wgpu::ShaderSource::Wgsl(source.text.into());
+    let (module, layout, pipeline_layout) = module(context, name, &entries, source)?;
+    Ok(Shader {
+        module,
+        layout,
+        pipeline_layout,
+        reflection,
+    })
+}
+
+/// Group 0 of a pass with these bindings.
+pub(super) fn entries(
+    bindings: &[Binding],
+    visibility: wgpu::ShaderStages,
+) -> Vec<wgpu::BindGroupLayoutEntry> {
+    let entry = |binding: &Binding| wgpu::BindGroupLayoutEntry {
+        binding: binding.index,
+        visibility,
+        ty: binding_type(binding.access),
+        count: None,
+    };
+    bindings.iter().map(entry).collect()
+}
+
+/// The module of pass `name`, the layout of its group 0, and that of its pipeline.
+///
+/// # Errors
+/// [`GpuError::Shader`].
+pub(super) fn module(
+    context: &Context,
+    name: &str,
+    entries: &[wgpu::BindGroupLayoutEntry],
+    source: wgpu::ShaderSource<'_>,
+) -> Result<(wgpu::ShaderModule, BindGroupLayout, wgpu::PipelineLayout), GpuError> {
     let device = &context.device;
-    let (module, layout, pipeline_layout) = checked(context, name, || {
+    checked(context, name, || {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some(name),
-            entries: &entries,
+            entries,
         });
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(name),
-            source: wgpu::ShaderSource::Wgsl(source.text.into()),
+            source,
         };
         let checks = wgpu::ShaderRuntimeChecks {
             force_loop_bounding: false,
@@ -460,12 +509,27 @@ pub(super) fn shader(
             immediate_size: 0,
         });
         (module, layout, pipeline_layout)
-    })?;
-    Ok(Shader {
+    })
+}
+
+/// The pipeline of a compute pass.
+pub(super) fn pipeline(
+    context: &Context,
+    name: &str,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    constants: &[(&str, f64)],
+) -> ComputePipeline {
+    (context.device).create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(name),
+        layout: Some(layout),
         module,
-        layout,
-        pipeline_layout,
-        reflection,
+        entry_point: None,
+        compilation_options: wgpu::PipelineCompilationOptions {
+            constants,
+            zero_initialize_workgroup_memory: false,
+        },
+        cache: None,
     })
 }
 
@@ -490,17 +554,8 @@ fn compile_own(
     let mut constants = spec.constants.clone();
     constants.extend(shared.iter().filter(|(name, _)| declared(name)));
     let pipeline = checked(context, spec.name, || {
-        (context.device).create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(spec.name),
-            layout: Some(&shader.pipeline_layout),
-            module: &shader.module,
-            entry_point: None,
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &constants,
-                zero_initialize_workgroup_memory: false,
-            },
-            cache: None,
-        })
+        let layout = &shader.pipeline_layout;
+        pipeline(context, spec.name, layout, &shader.module, &constants)
     })?;
     Ok(Pass {
         name: spec.name,
@@ -508,5 +563,8 @@ fn compile_own(
         layout: shader.layout,
         bindings: reflection.bindings,
         workgroup_size: reflection.workgroup_size,
+        defines: spec.defines.clone(),
+        constants,
+        counting: OnceLock::new(),
     })
 }

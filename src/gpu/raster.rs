@@ -166,7 +166,14 @@ impl Drawn {
         let name = draw.raster.name;
         Self {
             draw: draw.clone(),
-            group: bind(program, name, &pass.layout, &pass.bindings, &draw.binds),
+            group: bind(
+                program,
+                name,
+                &pass.layout,
+                &pass.bindings,
+                &draw.binds,
+                &[],
+            ),
         }
     }
 

@@ -1,10 +1,15 @@
 //! Passes recorded as data, and the one executor that runs them.
 
-use wgpu::{BindGroup, BindGroupLayout, BindingResource, CommandEncoder, ComputePass, TextureView};
+use std::cell::Cell;
+
+use wgpu::{
+    BindGroup, BindGroupLayout, BindingResource, Buffer, CommandEncoder, ComputePass, TextureView,
+};
 
 use super::{
     adapter::{Context, GpuError},
     buffer::{Buf, Workgroups},
+    operations::{Operations, count},
     program::Program,
     raster::{self, CopyTexture, Draw, Drawn, Target},
     reflect::{Access, Binding},
@@ -130,6 +135,13 @@ impl Command {
     }
 }
 
+/// A dispatch's operations are counted at its first run and then at one in so many, and taken to be as many in between: a run that is
+/// counted takes as long again.
+const COUNTED_ONE_IN: u32 = 7;
+/// 2³² over the golden ratio: its multiples, as parts of 2³², lie evenly among every second or seventh run too, so that no rhythm of a
+/// solver falls in with the count (Weyl's equidistribution).
+const GOLDEN: u32 = 0x9E37_79B9;
+
 /// A command with its bindings made on a device.
 pub(super) enum Recorded {
     Dispatch {
@@ -139,6 +151,10 @@ pub(super) enum Recorded {
         size: Size,
         /// What it moves at least where all of its bindings are used: [`moved`].
         bytes: u64,
+        /// Operations that it did when they were last counted, where they were.
+        operations: Cell<Option<Operations>>,
+        /// How often it ran while operations were counted.
+        runs: Cell<u32>,
     },
     Draw(Drawn),
     Clear(String),
@@ -264,6 +280,39 @@ pub(super) fn encode(steps: &[Recorded], program: &Program, encoder: &mut Comman
 }
 
 impl Recorded {
+    /// Whether its operations are to be counted before its next run: before the first, and before one in so many after it.
+    pub(super) fn is_due(&self) -> bool {
+        let turn = |runs: &Cell<u32>| runs.get().wrapping_mul(GOLDEN);
+        matches!(self, Self::Dispatch { runs, .. } if turn(runs) < u32::MAX / COUNTED_ONE_IN)
+    }
+
+    /// Counts what its next run does, where it is a dispatch. Waits for the device.
+    pub(super) fn count(&self, program: &Program) -> Result<(), GpuError> {
+        if let Self::Dispatch {
+            pass,
+            binds,
+            size,
+            operations,
+            ..
+        } = self
+        {
+            operations.set(count(program, pass, binds, size)?);
+        }
+        Ok(())
+    }
+
+    /// Operations of a run that was made while operations are counted, as last counted; `None` where that was not possible.
+    pub(super) fn ran(&self) -> Option<Operations> {
+        let Self::Dispatch {
+            operations, runs, ..
+        } = self
+        else {
+            return None;
+        };
+        runs.set(runs.get().wrapping_add(1));
+        operations.get()
+    }
+
     /// What of the device's memory it moves at least; 0 where that is not known.
     pub(super) fn bytes(&self) -> u64 {
         match self {
@@ -307,9 +356,11 @@ fn record(program: &Program, command: &Command) -> Option<Recorded> {
             Some(Recorded::Dispatch {
                 pass: name,
                 binds: binds.clone(),
-                group: bind(program, name, &pass.layout, &pass.bindings, binds),
+                group: bind(program, name, &pass.layout, &pass.bindings, binds, &[]),
                 size,
                 bytes: moved(program, &pass.bindings, binds),
+                operations: Cell::default(),
+                runs: Cell::default(),
             })
         }
     }
@@ -327,10 +378,7 @@ pub fn spread(context: &Context, workgroup_size: u32, threads: u64) -> [u32; 3] 
 /// once where it writes it.
 fn moved(program: &Program, bindings: &[Binding], binds: &[Bind]) -> u64 {
     let bytes = |binding: &Binding| {
-        let bind = binds.iter().find(|bind| bind.variable == binding.name);
-        let name = bind.map_or(binding.name.as_str(), |bind| &bind.buffer);
-        let window = bind.and_then(|bind| bind.window);
-        let length = window.map_or_else(|| program.buffer(name).size(), |(_, length)| length);
+        let (_, _, length) = bound(program, binding, binds);
         length * (u64::from(binding.is_read) + u64::from(binding.is_written))
     };
     let storage = bindings
@@ -339,13 +387,27 @@ fn moved(program: &Program, bindings: &[Binding], binds: &[Bind]) -> u64 {
     storage.map(bytes).sum()
 }
 
-/// The bind group of pass `name`.
+/// The buffer that a variable is bound to, and the bytes of it: where they begin, and how many.
+pub(super) fn bound<'a>(
+    program: &'a Program,
+    binding: &Binding,
+    binds: &[Bind],
+) -> (&'a Buffer, u64, u64) {
+    let bind = binds.iter().find(|bind| bind.variable == binding.name);
+    let buffer = program.buffer(bind.map_or(&binding.name, |bind| &bind.buffer));
+    let window = bind.and_then(|bind| bind.window);
+    let (offset, length) = window.unwrap_or((0, buffer.size()));
+    (buffer, offset, length)
+}
+
+/// The bind group of pass `name`; of bindings in `apart`, by index, with the buffer there in place of the program's.
 pub(super) fn bind(
     program: &Program,
     name: &str,
     layout: &BindGroupLayout,
     bindings: &[Binding],
     binds: &[Bind],
+    apart: &[(u32, Buffer)],
 ) -> BindGroup {
     let found = |binding: &Binding| binds.iter().find(|bind| bind.variable == binding.name);
     let target = |binding: &Binding| match found(binding) {
@@ -366,17 +428,18 @@ pub(super) fn bind(
             BindingResource::Sampler(program.sampler(&target(binding)))
         }
         _ => {
-            let window = found(binding).and_then(|bind| bind.window);
+            let (buffer, offset, length) = bound(program, binding, binds);
             BindingResource::Buffer(wgpu::BufferBinding {
-                buffer: program.buffer(&target(binding)),
-                offset: window.map_or(0, |(offset, _)| offset),
-                size: window.and_then(|(_, size)| std::num::NonZeroU64::new(size)),
+                buffer,
+                offset,
+                size: std::num::NonZeroU64::new(length),
             })
         }
     };
     let entries: Vec<wgpu::BindGroupEntry<'_>> = bindings
         .iter()
         .zip(&views)
+        .filter(|(binding, _)| apart.iter().all(|(index, _)| *index != binding.index))
         .map(|(binding, view)| wgpu::BindGroupEntry {
             binding: binding.index,
             resource: match view {
@@ -384,6 +447,10 @@ pub(super) fn bind(
                 None => resource(binding),
             },
         })
+        .chain(apart.iter().map(|(binding, buffer)| wgpu::BindGroupEntry {
+            binding: *binding,
+            resource: buffer.as_entire_binding(),
+        }))
         .collect();
     let descriptor = wgpu::BindGroupDescriptor {
         label: Some(name),
@@ -402,6 +469,11 @@ pub(super) fn dispatch(program: &Program, compute: &mut ComputePass<'_>, step: &
     };
     compute.set_pipeline(&program.pass(pass).pipeline);
     compute.set_bind_group(0, group, &[]);
+    dispatch_sized(program, compute, size);
+}
+
+/// So many workgroups of the pass that is set.
+pub(super) fn dispatch_sized(program: &Program, compute: &mut ComputePass<'_>, size: &Size) {
     match size {
         Size::Direct([x, y, z]) => compute.dispatch_workgroups(*x, *y, *z),
         Size::Indirect(buffer, offset) => {

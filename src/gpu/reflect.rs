@@ -213,12 +213,12 @@ pub fn reflect(name: &str, wgsl: &str) -> Result<Reflection, GpuError> {
     reflect_at(name, wgsl, &|line| format!("line {line}"))
 }
 
-/// [`reflect`] of a text whose lines stand where `place` says: faults name places, of lines from 1.
-pub(super) fn reflect_at(
+/// A text as naga has it, and what it says of that. Faults name places, of lines from 1, as `place` says.
+pub(super) fn validated(
     name: &str,
     wgsl: &str,
     place: &dyn Fn(usize) -> String,
-) -> Result<Reflection, GpuError> {
+) -> Result<(naga::Module, naga::valid::ModuleInfo), GpuError> {
     let fault = |message: String| GpuError::Shader {
         name: name.to_owned(),
         message,
@@ -256,6 +256,20 @@ pub(super) fn reflect_at(
         let labels = error.spans().cloned().collect();
         located(error.as_inner().to_string(), labels, causes)
     })?;
+    Ok((module, info))
+}
+
+/// [`reflect`] of a text whose lines stand where `place` says: faults name places, of lines from 1.
+pub(super) fn reflect_at(
+    name: &str,
+    wgsl: &str,
+    place: &dyn Fn(usize) -> String,
+) -> Result<Reflection, GpuError> {
+    let (module, info) = validated(name, wgsl, place)?;
+    let fault = |message: String| GpuError::Shader {
+        name: name.to_owned(),
+        message,
+    };
     let stage = stage(&module).ok_or_else(|| {
         let count = module.entry_points.len();
         fault(format!("{count} entry points, which are no pass"))

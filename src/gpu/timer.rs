@@ -6,6 +6,7 @@ use wgpu::{CommandEncoder, QuerySet};
 
 use super::{
     adapter::{Context, GpuError},
+    operations::Operations,
     program::Program,
     recording::{Recorded, Recording, dispatch, encode},
 };
@@ -13,15 +14,18 @@ use super::{
 /// Time per pass, summed over runs.
 pub struct Timer {
     clock: Clock,
+    /// Whether operations are counted as well: [`Context::counts_operations`].
+    counts: bool,
     total: BTreeMap<&'static str, Total>,
 }
 
 /// Of all runs of a pass.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Total {
     seconds: f64,
     runs: u64,
     bytes: u64,
+    operations: Option<Operations>,
 }
 
 enum Clock {
@@ -52,38 +56,59 @@ impl Timer {
         };
         Self {
             clock,
+            counts: context.counts_operations,
             total: BTreeMap::new(),
         }
     }
 
-    /// What `made` makes of each pass, by name: of its seconds, its runs, and the bytes that its runs move if each buffer that it binds is
-    /// read and written once, as far as it reads and writes it; 0 bytes of raster passes.
-    pub fn times<T>(&self, made: impl Fn(&'static str, f64, u64, u64) -> T) -> Vec<T> {
+    /// What `made` makes of each pass, by name: of its seconds and runs; of the bytes that its runs move if each buffer that it binds is read
+    /// and written once, as far as it reads and writes it, 0 of raster passes; and of the operations that its runs do. Each dispatch's are
+    /// counted at its first run and at one in seven after it, and taken to be as many in between; `None` of raster passes, where none
+    /// are counted, and where the adapter binds no buffer more than the pass has.
+    pub fn times<T>(
+        &self,
+        made: impl Fn(&'static str, f64, u64, u64, Option<Operations>) -> T,
+    ) -> Vec<T> {
         let total = self.total.iter();
         total
-            .map(|(pass, of)| made(pass, of.seconds, of.runs, of.bytes))
+            .map(|(pass, of)| made(pass, of.seconds, of.runs, of.bytes, of.operations))
             .collect()
     }
 
     pub(super) fn run(&mut self, recording: &Recording, program: &Program) -> Result<(), GpuError> {
+        let (counts, total) = (self.counts, &mut self.total);
         let mut add = |step: &Recorded, seconds: f64| {
             if let Some(pass) = step.pass() {
-                let total = self.total.entry(pass).or_default();
+                let total = total.entry(pass).or_insert(Total {
+                    seconds: 0.0,
+                    runs: 0,
+                    bytes: 0,
+                    operations: counts.then_some([0; 2]),
+                });
                 total.seconds += seconds;
                 total.runs += 1;
                 total.bytes += step.bytes();
+                if counts {
+                    let both = total.operations.zip(step.ran());
+                    total.operations = both.map(|(sum, more)| [sum[0] + more[0], sum[1] + more[1]]);
+                }
             }
         };
-        match &self.clock {
-            Clock::Device(queries) => recording
-                .steps
-                .chunks(TIMED_AT_ONCE)
-                .try_for_each(|steps| queries.run(steps, program, &mut add)),
-            Clock::Host => recording
-                .steps
-                .iter()
-                .try_for_each(|step| run_alone(step, program, &mut add)),
+        let is_due = |step: &Recorded| counts && step.is_due();
+        for steps in recording.steps.chunk_by(|_, next| !is_due(next)) {
+            if let Some(first) = steps.first().filter(|first| is_due(first)) {
+                first.count(program)?;
+            }
+            match &self.clock {
+                Clock::Device(queries) => steps
+                    .chunks(TIMED_AT_ONCE)
+                    .try_for_each(|steps| queries.run(steps, program, &mut add))?,
+                Clock::Host => steps
+                    .iter()
+                    .try_for_each(|step| run_alone(step, program, &mut add))?,
+            }
         }
+        Ok(())
     }
 }
 

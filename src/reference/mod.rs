@@ -57,7 +57,7 @@ impl Timings {
     /// By pass.
     pub fn rows(&self) -> Vec<PassTime> {
         let rows = self.0.iter();
-        rows.map(|(&pass, &(seconds, runs))| PassTime::new(pass, seconds, runs, 0))
+        rows.map(|(&pass, &(seconds, runs))| PassTime::new(pass, seconds, runs, 0, None))
             .collect()
     }
 }

@@ -234,6 +234,7 @@ pub fn bake(
     } = beginning(request, last)?;
     check_count(scene, &start, parent.as_ref(), last)?;
     let opened = request.device.open(needs(scene))?;
+    let opened = opened.counting(request.time_passes);
     let mut drive = Drive::unloaded(&opened, scene, &start, request.time_passes)?.with_probes();
     let device = opened.identity();
     let (mut writer, mut clock, state) = open_cache(request, &device, &start, clock, &parent)?;

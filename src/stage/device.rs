@@ -13,10 +13,7 @@ use crate::{
         particles::Particles,
         solver::{PassTime, Solver, StepReport, Watch},
     },
-    gpu::{
-        adapter::{Context, GpuError, Needs},
-        bandwidth,
-    },
+    gpu::adapter::{Context, GpuError, Needs},
     reference::{self, ReferenceError},
     scene::{Method, Scene, flip::Precision},
     solve::{
@@ -29,7 +26,10 @@ use crate::{
 
 use super::{Blame, prepare::Start};
 
-pub use crate::gpu::shader::{Shaders, ShadersError};
+pub use crate::gpu::{
+    ceilings::Ceilings,
+    shader::{Shaders, ShadersError},
+};
 
 /// An adapter, and the shaders that run on it.
 #[derive(Clone, Debug, Default)]
@@ -80,25 +80,68 @@ pub enum Opened {
     Cpu,
 }
 
-/// What passes took, and what the device's memory gives.
+/// What passes took, and what the device gives.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PassTimes {
     /// By name; empty unless timed.
     pub passes: Vec<PassTime>,
-    /// Bytes a second that a copying pass reaches ([`bandwidth::measure`]); only of an adapter whose passes were timed.
-    pub bandwidth: Option<f64>,
+    /// Only of an adapter whose passes were timed.
+    pub ceilings: Option<Ceilings>,
 }
 
 impl PassTimes {
-    /// Of passes that were timed on an adapter: measures its bandwidth.
+    /// Of passes that were timed on an adapter: measures what it gives.
     ///
     /// # Errors
-    /// Those of [`bandwidth::measure`].
+    /// Those of [`Ceilings::measure`].
     pub fn on(context: &Context, passes: Vec<PassTime>) -> Result<Self, GpuError> {
         Ok(Self {
             passes,
-            bandwidth: Some(bandwidth::measure(context)?),
+            ceilings: Some(Ceilings::measure(context)?),
         })
+    }
+}
+
+/// Which part of a device's ceilings a pass reaches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reached {
+    /// Of the bandwidth; more than 1 where what is bound stays in a cache.
+    pub memory: Option<f64>,
+    /// Of the arithmetic rate.
+    pub arithmetic: Option<f64>,
+    /// What the device waits for: `memory` or `arithmetic` where the pass reaches half of it or more, and the larger part of both; `start`
+    /// where a run takes at most twice what a pass without work takes; else `latency`, of loads that wait for one another, of branches,
+    /// of lanes without work. `None` where bytes or operations are not known.
+    pub waits_for: Option<&'static str>,
+}
+
+/// The part of a ceiling from which on it is what holds a pass.
+const HELD: f64 = 0.5;
+/// The times that a pass without work takes, up to which its start is what holds a pass.
+const STARTING: f64 = 2.0;
+
+impl Reached {
+    /// By all runs of a pass.
+    pub fn of(time: &PassTime, ceilings: &Ceilings) -> Self {
+        let part = |amount: u64, ceiling: f64| amount as f64 / time.seconds / ceiling;
+        let memory = (time.bytes > 0).then(|| part(time.bytes, ceilings.bandwidth));
+        let arithmetic = time
+            .operations
+            .map(|[floats, integers]| part(floats + integers, ceilings.arithmetic));
+        let each = time.seconds / time.runs as f64;
+        let waits_for = memory.zip(arithmetic).map(|(memory, arithmetic)| {
+            match (memory.max(arithmetic) >= HELD, memory > arithmetic) {
+                (true, true) => "memory",
+                (true, false) => "arithmetic",
+                _ if each <= STARTING * ceilings.start => "start",
+                _ => "latency",
+            }
+        });
+        Self {
+            memory,
+            arithmetic,
+            waits_for,
+        }
     }
 }
 
@@ -201,6 +244,14 @@ pub struct Built {
 }
 
 impl Opened {
+    /// The same; where `counts`, timers count operations as well.
+    pub fn counting(mut self, counts: bool) -> Self {
+        if let Self::Gpu(context) = &mut self {
+            context.counts_operations = counts;
+        }
+        self
+    }
+
     /// For the manifest.
     pub fn identity(&self) -> Identity {
         match self {
@@ -228,7 +279,7 @@ impl Opened {
             Self::Gpu(context) => PassTimes::on(context, passes),
             Self::Cpu => Ok(PassTimes {
                 passes,
-                bandwidth: None,
+                ceilings: None,
             }),
         }
     }
@@ -293,5 +344,43 @@ where
 
     fn timings(&self) -> Vec<PassTime> {
         self.0.timings()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_holds_a_pass_is_the_ceiling_that_it_comes_near() {
+        let ceilings = Ceilings {
+            bandwidth: 1e9,
+            arithmetic: 1e10,
+            start: 0.001,
+        };
+        // Ten runs of 0.1 s move and compute these parts of what the device could.
+        let of = |memory: f64, arithmetic: f64, seconds: f64| {
+            let bytes = (memory * 1e9 * seconds) as u64;
+            let half = (0.5 * arithmetic * 1e10 * seconds) as u64;
+            let time = PassTime::new("some/pass", seconds, 10, bytes, Some([half, half]));
+            Reached::of(&time, &ceilings)
+        };
+        let reached = of(0.75, 0.25, 1.0);
+        assert_eq!(
+            (reached.memory, reached.arithmetic),
+            (Some(0.75), Some(0.25))
+        );
+        assert_eq!(reached.waits_for, Some("memory"));
+        assert_eq!(of(0.5, 0.625, 1.0).waits_for, Some("arithmetic"));
+        assert_eq!(of(0.25, 0.25, 1.0).waits_for, Some("latency"));
+        // 2 ms and less are a start, 2.1 ms are not.
+        assert_eq!(of(0.25, 0.25, 0.02).waits_for, Some("start"));
+        assert_eq!(of(0.25, 0.25, 0.021).waits_for, Some("latency"));
+        assert_eq!(of(0.75, 0.25, 0.02).waits_for, Some("memory"));
+        // Raster passes.
+        let time = PassTime::new("some/pass", 1.0, 10, 0, None);
+        let reached = Reached::of(&time, &ceilings);
+        let none = (reached.memory, reached.arithmetic, reached.waits_for);
+        assert_eq!(none, (None, None, None));
     }
 }

@@ -247,7 +247,8 @@ pub fn render(
         left_out,
     } = Asked::open(request)?;
     let scene = super::baked_scene(&cache, &request.cache)?;
-    let context = request.gpu.open(Needs::default())?;
+    let mut context = request.gpu.open(Needs::default())?;
+    context.counts_operations = request.time_passes;
     let folder = enter(request, &cache, &frames)?;
     let image = &request.look.spec().image;
     let rate = cache.manifest().frames_per_second;
@@ -548,11 +549,8 @@ impl Job<'_> {
             .render_moment(frame, &around.moment(&white))
             .map_err(|error| told(error, look))?;
         for time in renderer.times() {
-            let none = PassTime::new(time.pass, 0.0, 0, 0);
-            let total = self.times.entry(time.pass).or_insert(none);
-            total.seconds += time.seconds;
-            total.runs += time.runs;
-            total.bytes += time.bytes;
+            let total = self.times.entry(time.pass);
+            total.and_modify(|total| total.add(&time)).or_insert(time);
         }
         // Solids that move are drawn where they stand at the frame's time, not blurred over its shutter:
         // a renderer draws its solids once.

@@ -247,6 +247,7 @@ pub fn whitewater(
     let particles = begin.len();
     let boundary = Start::with(&scene, begin)?.boundary;
     let opened = request.device.open(Needs::default())?;
+    let opened = opened.counting(request.time_passes);
     let identity = opened.identity();
     let mut engine = Engine::new(&opened, &scene, &boundary, particles, request.time_passes)?;
     let manifest = manifest(&cache, request, &identity)?;

@@ -56,8 +56,9 @@ mod experiment {
     mod validation;
 }
 mod gpu {
-    mod bandwidth;
+    mod ceilings;
     mod device_faults;
+    mod operations;
     mod raster;
     mod shaders;
     mod sort;

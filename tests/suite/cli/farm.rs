@@ -49,7 +49,14 @@ fn events_end_with_the_totals_of_each_command() {
     let passes = event["passes"].as_array().unwrap();
     let shade = passes.iter().find(|pass| pass["pass"] == "ssfr/shade_aovs");
     assert!(shade.unwrap()["bytes"].as_u64().unwrap() > 0);
-    assert!(event["bandwidth"].as_f64().unwrap() > 0.0);
+    for ceiling in ["bandwidth", "arithmetic", "start"] {
+        assert!(event[ceiling].as_f64().unwrap() > 0.0, "{ceiling}");
+    }
+    for kind in ["float_operations", "integer_operations"] {
+        assert!(shade.unwrap()[kind].as_u64().unwrap() > 0, "{kind}");
+    }
+    let solid = passes.iter().find(|pass| pass["pass"] == "ssfr/solid");
+    assert!(solid.unwrap()["waits_for"].is_null(), "a raster pass");
     let told = events(&job, 0, &format!("{render} --overwrite"));
     let record = fs::metadata(job.path("day/render.json")).unwrap().len();
     assert_eq!(

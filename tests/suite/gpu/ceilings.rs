@@ -2,8 +2,8 @@
 
 use swell::gpu::{
     adapter::Context,
-    bandwidth,
     buffer::Buf,
+    ceilings::Ceilings,
     program::Program,
     recording::{Bind, Command, Recording, Timer},
     reflect::reflect,
@@ -29,8 +29,12 @@ fn told(binds: &[Bind], count: usize) -> (u64, u64) {
         recording.run(&program, Some(&mut timer)).unwrap();
     }
     assert_eq!(program.read(COPY, count).unwrap(), values[..count]);
-    let times = timer.times(|pass, seconds, runs, bytes| {
-        assert_eq!(pass, PASS);
+    let times = timer.times(|pass, seconds, runs, bytes, operations| {
+        assert_eq!(
+            (pass, operations),
+            (PASS, None),
+            "none are counted unless asked for"
+        );
         assert!(seconds > 0.0);
         (bytes, runs)
     });
@@ -67,9 +71,22 @@ fn what_a_shader_reads_and_writes_is_seen() {
     assert_eq!(uses("pbf/assign_cells", "cell_start"), Some((true, true)));
 }
 
-/// Between a slow card's bus and ten times what any device of today gives.
+/// Between a slow card's bus or one slow core and ten times what any device of today gives.
 #[test]
-fn a_device_has_a_bandwidth() {
-    let rate = bandwidth::measure(&Context::open(None).unwrap()).unwrap();
-    assert!((1e7..1e14).contains(&rate), "{rate} bytes a second");
+fn a_device_has_ceilings() {
+    let ceilings = Ceilings::measure(&Context::open(None).unwrap()).unwrap();
+    let Ceilings {
+        bandwidth,
+        arithmetic,
+        start,
+    } = ceilings;
+    assert!(
+        (1e7..1e14).contains(&bandwidth),
+        "{bandwidth} bytes a second"
+    );
+    assert!(
+        (1e8..1e15).contains(&arithmetic),
+        "{arithmetic} operations a second"
+    );
+    assert!((1e-8..0.1).contains(&start), "{start} s");
 }
