@@ -267,7 +267,7 @@ pub fn comments(bytes: &[u8]) -> Vec<String> {
 
 fn parse(bytes: &[u8]) -> Result<Particles, String> {
     let head = read_head(&bytes[..bytes.len().min(HEADER_LIMIT)])?;
-    if head.planes {
+    if head.planes.is_some() {
         return Err("its PLY header is that of a compressed frame".to_owned());
     }
     let rows = &bytes[head.bytes..];
@@ -289,8 +289,8 @@ struct Head {
     origin: DVec3,
     /// Of the attributes, ascending.
     names: Vec<String>,
-    /// Whether byte planes follow, in place of rows.
-    planes: bool,
+    /// Where byte planes follow, in place of rows, what they are of.
+    planes: Option<planes::Content>,
 }
 
 impl Head {
@@ -327,7 +327,7 @@ fn read_head(head: &[u8]) -> Result<Head, String> {
         count,
         origin,
         names,
-        planes: header.comments.iter().any(|it| *it == planes::comment()),
+        planes: planes::Content::told(&header.comments),
     })
 }
 

@@ -174,7 +174,7 @@ fn inspect_knows_studies_frames_meshes_grids_and_pictures() {
     );
     let mut packed = object("packed/frames/small.0001.ply.zst");
     let comments = packed["comments"].as_array_mut().unwrap();
-    assert_eq!(comments.pop(), Some("planes 131072".into()));
+    assert_eq!(comments.pop(), Some("differences 131072".into()));
     assert_eq!(packed, frame);
 
     let mesh = object("m.0001.ply");

@@ -50,3 +50,25 @@ def test_planes_are_turned_to_rows_block_by_block() -> None:
     planes = rows[:2].T.tobytes() + rows[2:4].T.tobytes() + rows[4:].T.tobytes()
     assert _frame._rows_of_planes(memoryview(planes), 3, 2) == rows.tobytes()
     assert _frame._rows_of_planes(memoryview(planes), 3, 5) != rows.tobytes(), "control"
+
+
+@pytest.mark.parametrize("kind", ["f4", "f8"])
+def test_differences_are_added_up_block_by_block(kind: str) -> None:
+    fields = [("x", f"<{kind}"), ("y", f"<{kind}"), ("z", f"<{kind}"), ("id", "<u4")]
+    values = np.array([(1.0, -2.5, 0.0, 1), (1.0000001, 0.0, -0.0, 2), (-0.0, np.inf, 7.0, 5), (3.0, -1e-30, 7.0, 9)], dtype=fields)
+    width = int(kind[1:])
+
+    def differences(column: np.ndarray) -> np.ndarray:
+        whole, top = 1 << 8 * width, 1 << 8 * width - 1
+        ordered = [whole - 1 - bits if bits & top else bits | top for bits in map(int, column.view(f"<u{width}"))]
+        steps = [(this - last + top) % whole - top for last, this in zip([0, *ordered], ordered, strict=False)]
+        return np.array([(2 * step if step >= 0 else -2 * step - 1) for step in steps], dtype=f"<u{width}")
+
+    def planes(block: np.ndarray) -> bytes:
+        columns = [differences(np.ascontiguousarray(block[axis])) for axis in "xyz"] + [np.ascontiguousarray(block["id"])]
+        return b"".join(column.view(np.uint8).reshape(len(block), -1).T.tobytes() for column in columns)
+
+    size = values.dtype.itemsize
+    packed = memoryview(planes(values[:3]) + planes(values[3:]))
+    assert _frame._rows_of_planes(packed, size, 3, width) == values.tobytes()
+    assert _frame._rows_of_planes(packed, size, 3) != values.tobytes(), "control"

@@ -38,6 +38,13 @@ fn packed(stamp: &Stamp<'_>, particles: &Particles) -> Vec<u8> {
     bytes
 }
 
+/// As programs wrote them before.
+fn packed_before(stamp: &Stamp<'_>, particles: &Particles) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    encode_as(Content::Values, &mut bytes, stamp, particles).unwrap();
+    bytes
+}
+
 fn plain(stamp: &Stamp<'_>, particles: &Particles) -> Vec<u8> {
     let mut bytes = Vec::new();
     rows::encode(&mut bytes, stamp, particles).unwrap();
@@ -73,6 +80,8 @@ fn particles_come_back_bit_for_bit() {
             // Compared as the plain file's bytes, in which NaN equals itself and 0 is not -0.
             let expected = plain(&stamp, &particles);
             assert!(plain(&stamp, &back) == expected, "{n} at {}", stamp.origin);
+            let before = decode(&packed_before(&stamp, &particles), Path::new("f")).unwrap();
+            assert!(plain(&stamp, &before) == expected, "{n} of before");
             if let Some(last) = particles.id.last_mut() {
                 *last += 1;
                 assert!(plain(&stamp, &particles) != expected, "control");
@@ -90,6 +99,8 @@ fn it_takes_at_most_six_tenths_of_the_bytes() {
     let (planes, rows) = (share(&packed(&NEAR, &particles)), share(&stream_of(&whole)));
     assert!(planes <= 0.6, "{planes}");
     assert!(rows > planes + 0.1, "control: {rows} to {planes}");
+    let before = share(&packed_before(&NEAR, &particles));
+    assert!(before > planes + 0.01, "{before} to {planes}");
 }
 
 #[test]

@@ -19,6 +19,7 @@ _SCALARS = {"float": "<f4", "double": "<f8", "uint": "<u4"}
 _FIXED = ["x", "y", "z", "vx", "vy", "vz", "id"]
 _PACKED = ".zst"
 _PLANES = "comment planes "
+_DIFFERENCES = "comment differences "
 
 
 class Frame:
@@ -127,14 +128,27 @@ def _decompress(content: Content, path: Path) -> bytes:
         raise Damaged(path, f"Zstandard: {error}") from error
 
 
-def _rows_of_planes(body: memoryview, size: int, block: int) -> bytes:
-    """Rows of `size` bytes from blocks of byte planes, `block` rows each but the last."""
+def _rows_of_planes(body: memoryview, size: int, block: int, width: int = 0) -> bytes:
+    """Rows of `size` bytes from blocks of byte planes, `block` rows each but the last; with a `width`, the first three columns, of so many
+    bytes, are differences."""
     rows = np.empty((len(body) // size, size), dtype=np.uint8)
     for first in range(0, len(rows), block):
         part = rows[first : first + block]
         start = first * size
         part[:] = np.frombuffer(body, np.uint8, part.size, start).reshape(size, len(part)).T
+        for axis in range(3 if width else 0):
+            column = part[:, axis * width : (axis + 1) * width]
+            bits = np.ascontiguousarray(column).view(f"<u{width}")[:, 0]
+            column[:] = _added_up(bits).view(np.uint8).reshape(column.shape)
     return rows.tobytes()
+
+
+def _added_up(bits: NDArray[Any]) -> NDArray[Any]:
+    """Values of a block's column from their differences: 2 d, or -2 d - 1 of negative ones, of integers ordered as floats are."""
+    one = bits.dtype.type(1)
+    top = bits.dtype.type(1 << (8 * bits.dtype.itemsize - 1))
+    ordered = np.cumsum(np.where(bits & one, ~(bits >> one), bits >> one), dtype=bits.dtype)
+    return np.where(ordered & top, ordered ^ top, ~ordered).astype(bits.dtype)
 
 
 def _parse(content: Content, path: Path, is_packed: bool) -> NDArray[np.void]:
@@ -146,7 +160,8 @@ def _parse(content: Content, path: Path, is_packed: bool) -> NDArray[np.void]:
     lines = head[:end].decode("ascii", "replace").splitlines()
     if lines[1:2] != ["format binary_little_endian 1.0"]:
         raise Damaged(path, "not binary little-endian PLY 1.0")
-    planes = [line.removeprefix(_PLANES) for line in lines if line.startswith(_PLANES)]
+    planes = [line.removeprefix(begin) for begin in (_PLANES, _DIFFERENCES) for line in lines if line.startswith(begin)]
+    has_differences = any(line.startswith(_DIFFERENCES) for line in lines)
     if [block.isdecimal() and int(block) > 0 for block in planes] != [True] * is_packed:
         raise Damaged(path, "its PLY header is not one of swell's")
     words = [line.split(" ") for line in lines[2:] if not line.startswith("comment ")]
@@ -162,7 +177,8 @@ def _parse(content: Content, path: Path, is_packed: bool) -> NDArray[np.void]:
     if len(content) - start != count * dtype.itemsize:
         raise Damaged(path, f"its header promises {count} particles of {dtype.itemsize} bytes, and {len(content) - start} bytes follow")
     if is_packed:
-        content, start = _rows_of_planes(memoryview(content)[start:], dtype.itemsize, int(planes[0])), 0
+        width = kinds["x"].itemsize if has_differences else 0
+        content, start = _rows_of_planes(memoryview(content)[start:], dtype.itemsize, int(planes[0]), width), 0
     return np.frombuffer(content, dtype=dtype, count=count, offset=start)
 
 
