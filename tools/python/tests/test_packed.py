@@ -6,10 +6,12 @@ import importlib.util
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import swell
+from numpy.typing import NDArray
 from swell import _frame
 
 HAS_ZSTD = sys.version_info >= (3, 14) or importlib.util.find_spec("zstandard") is not None
@@ -58,13 +60,13 @@ def test_differences_are_added_up_block_by_block(kind: str) -> None:
     values = np.array([(1.0, -2.5, 0.0, 1), (1.0000001, 0.0, -0.0, 2), (-0.0, np.inf, 7.0, 5), (3.0, -1e-30, 7.0, 9)], dtype=fields)
     width = int(kind[1:])
 
-    def differences(column: np.ndarray) -> np.ndarray:
+    def differences(column: NDArray[Any]) -> NDArray[Any]:
         whole, top = 1 << 8 * width, 1 << 8 * width - 1
         ordered = [whole - 1 - bits if bits & top else bits | top for bits in map(int, column.view(f"<u{width}"))]
         steps = [(this - last + top) % whole - top for last, this in zip([0, *ordered], ordered, strict=False)]
         return np.array([(2 * step if step >= 0 else -2 * step - 1) for step in steps], dtype=f"<u{width}")
 
-    def planes(block: np.ndarray) -> bytes:
+    def planes(block: NDArray[Any]) -> bytes:
         columns = [differences(np.ascontiguousarray(block[axis])) for axis in "xyz"] + [np.ascontiguousarray(block["id"])]
         return b"".join(column.view(np.uint8).reshape(len(block), -1).T.tobytes() for column in columns)
 
