@@ -79,7 +79,7 @@ fn main() {
                     let mut timer = Timer::new(&context);
                     rig.set_rhs(&b);
                     rig.project(Some(&mut timer));
-                    timer.times(|name, seconds, runs, _| {
+                    timer.times(|name, seconds, runs, _, _| {
                         println!("      {name:<28} {:>8.3} ms  {runs:>4} runs", 1e3 * seconds);
                     });
                 }
