@@ -1,6 +1,6 @@
 //! A compressed frame, `.ply.zst`: one Zstandard stream (RFC 8878) of the PLY header of [`super`], with one comment more,
 //! and then, in place of rows, blocks of byte planes: byte 0 of the rows of a block one after the other, then byte 1, and so on. In place
-//! of positions stand [`differences`].
+//! of positions stand `differences`.
 //!
 //! Nothing is lost. Neighbours by id are neighbours in space for long, so their high bytes repeat, and in planes of their own they are
 //! found: what remains are the low bytes of the mantissas, which nothing shrinks.
