@@ -16,9 +16,11 @@ struct Material {
 const MOST_TAPS: f32 = 8.0;
 
 // A texel of the row that all pictures and their smaller versions make up, linear.
+// A row of the texture has a power of two of them: adapters that divide lane by lane take longer over that than over all the rest.
 fn solid_texel(index: u32) -> vec3f {
-    let width = textureDimensions(solid_texels).x;
-    return textureLoad(solid_texels, vec2u(index % width, index / width), 0).rgb;
+    let across = textureDimensions(solid_texels).x;
+    let place = vec2u(index & (across - 1u), index >> firstTrailingBit(across));
+    return textureLoad(solid_texels, place, 0).rgb;
 }
 
 // A level between texels, repeated; `at` in pictures, rows from the top.
@@ -26,29 +28,41 @@ fn level_at(first: u32, size: vec2u, at: vec2f) -> vec3f {
     let p = fract(at) * vec2f(size) - 0.5;
     let low = floor(p);
     let part = p - low;
-    let a = vec2u(vec2i(low) + vec2i(size)) % size;
-    let b = (a + 1u) % size;
+    // From -1 on.
+    let a = select(vec2u(low), size - 1u, low < vec2f(0.0));
+    let b = select(a + 1u, vec2u(0u), a + 1u >= size);
     let above = mix(solid_texel(first + a.y * size.x + a.x), solid_texel(first + a.y * size.x + b.x), part.x);
     let below = mix(solid_texel(first + b.y * size.x + a.x), solid_texel(first + b.y * size.x + b.x), part.x);
     return mix(above, below, part.y);
 }
 
-// Between two levels, of texels that are `width` texels of the picture wide (Williams 1983).
-fn picture_at(material: Material, at: vec2f, width: f32) -> vec3f {
-    let last = f32(material.levels - 1u);
-    let level = clamp(log2(max(width, 1.0)), 0.0, last);
+// A level and the one that is half its size: where they begin and their sizes, and how far a width is towards the second one.
+struct Levels {
+    first: u32,
+    size: vec2u,
+    next: u32,
+    next_size: vec2u,
+    part: f32,
+}
+
+// Those of texels that are about `width` texels of the picture wide (Williams 1983).
+fn levels_for(material: Material, width: f32) -> Levels {
+    let level = clamp(log2(max(width, 1.0)), 0.0, f32(material.levels - 1u));
     var first = material.first;
     var size = vec2u(material.size_x, material.size_y);
     for (var k = 0u; k < u32(level); k++) {
         first += size.x * size.y;
         size = max(size / 2u, vec2u(1u));
     }
-    let fine = level_at(first, size, at);
-    let next = first + size.x * size.y;
-    if fract(level) == 0.0 {
+    return Levels(first, size, first + size.x * size.y, max(size / 2u, vec2u(1u)), fract(level));
+}
+
+fn picture_at(levels: Levels, at: vec2f) -> vec3f {
+    let fine = level_at(levels.first, levels.size, at);
+    if levels.part == 0.0 {
         return fine;
     }
-    return mix(fine, level_at(next, max(size / 2u, vec2u(1u)), at), fract(level));
+    return mix(fine, level_at(levels.next, levels.next_size, at), levels.part);
 }
 
 // What a triangle of the set is painted with, from 1 on; 0 has the look's own colour.
@@ -92,9 +106,10 @@ fn painted(triangle: u32, p: vec3f, n: vec3f, view: vec3f, footprint: f32) -> ve
     let length_of = length(long * size);
     let taps = clamp(ceil(length_of / max(length(short * size), 1.0)), 1.0, MOST_TAPS);
     let width = max(length(short * size), length_of / taps);
+    let levels = levels_for(material, width);
     var sum = vec3f(0.0);
     for (var k = 0.0; k < taps; k += 1.0) {
-        sum += picture_at(material, at + long * ((k + 0.5) / taps - 0.5), width);
+        sum += picture_at(levels, at + long * ((k + 0.5) / taps - 0.5));
     }
     return material.colour * sum / taps;
 }

@@ -210,10 +210,9 @@ fn hazed(colour: vec3f, distance: f32, direction: vec3f) -> vec3f {
     return mix(sky_radiance(vec3f(level.x, 0.0, level.z)), colour, kept);
 }
 
-// Light that enters water or foam through a surface of this normal and is scattered, per unit albedo.
-fn diffuse_light(position: vec3f, n: vec3f) -> vec3f {
-    let sun = shading.sun_irradiance * max(dot(n, shading.sun_direction), 0.0)
-        * sunlit(position, vec3f(0.0, 1.0, 0.0));
+// Light that enters water or foam through a surface of this normal and is scattered, per unit albedo; `lit` of the sunlight comes to it.
+fn diffuse_light(n: vec3f, lit: f32) -> vec3f {
+    let sun = shading.sun_irradiance * max(dot(n, shading.sun_direction), 0.0) * lit;
     return (sun + sky_irradiance(n)) / PI;
 }
 

@@ -30,7 +30,8 @@ fn ripple_at(p: vec2f, seconds: f32, wavelength: f32, slope: f32, footprint: f32
         let direction = vec2f(cos(turn), sin(turn));
         let phase = k * dot(direction, p) - sqrt(9.81 * k) * seconds + f * 2.4
             + select(bend.x, bend.y, i > 2);
-        let kept = exp(-0.5 * pow(0.5 * k * footprint, 2.0));
+        let wide = 0.5 * k * footprint;
+        let kept = exp(-0.5 * wide * wide);
         out.slope += direction * (share * 1.41421356 * kept * cos(phase));
         out.lost += share * share * (1.0 - kept * kept);
     }

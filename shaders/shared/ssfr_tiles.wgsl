@@ -13,9 +13,10 @@ fn column_and_row(word: u32) -> vec2u {
     return vec2u(word & 0xffffu, word >> 16u);
 }
 
-// The picture's pixel that a thread stands for, in the tile of that word.
-fn pixel_of_tile(word: u32, thread: vec3u) -> vec2u {
-    return column_and_row(word) * TILE + thread.xy;
+// The pixel that a thread stands for in the tile of that word, counted from where a picture begins in the frame. Tiles begin at multiples of
+// their size in the frame, so that neither a crop nor a band puts a pixel into the other list; pixels before the picture wrap beyond it.
+fn pixel_of_tile(word: u32, thread: vec3u, picture: vec2u) -> vec2u {
+    return column_and_row(word) * TILE + thread.xy - (picture & (TILE - 1u));
 }
 
 // The first of the flow's cells that a thread has.

@@ -1,4 +1,4 @@
-// Which tiles of a part of the frame have water, a thread a tile.
+// Which tiles of a part of the frame have water, a thread a tile; with SPRAY, which have spray.
 #import "shared/camera.wgsl"
 #import "shared/thread.wgsl"
 
@@ -8,14 +8,43 @@ struct TileGrid {
     size: vec2u,
     // Pixels of a tile.
     tile: vec2u,
-    // Pixels of a row of what they stand in.
-    stride: u32,
-    pad0: u32,
+    // What they stand in, pixels.
+    frame: vec2u,
 }
 
 @group(0) @binding(0) var<uniform> grid: TileGrid;
+#ifdef SPRAY
+@group(0) @binding(1) var<storage, read> source: array<u32>;
+#else
 @group(0) @binding(1) var<storage, read> source: array<f32>;
+#endif
 @group(0) @binding(2) var<storage, read_write> tiles: array<atomic<u32>>;
+
+// Whether there is some in the pixels from `first` on and before `after`.
+#ifdef SPRAY
+fn is_there(first: vec2u, after: vec2u) -> bool {
+    // Pixels are between cells of twice their size, also those around the tile.
+    let low = (max(first, vec2u(2u)) - 2u) / 2u;
+    let high = min(after / 2u + 1u, (grid.frame / 2u));
+    var all = 0u;
+    for (var y = low.y; y < high.y; y++) {
+        for (var x = low.x; x < high.x; x++) {
+            all |= source[y * (grid.frame.x / 2u) + x];
+        }
+    }
+    return all > 0u;
+}
+#else
+fn is_there(first: vec2u, after: vec2u) -> bool {
+    var nearest = FAR;
+    for (var y = first.y; y < after.y; y++) {
+        for (var x = first.x; x < after.x; x++) {
+            nearest = min(nearest, source[y * grid.frame.x + x]);
+        }
+    }
+    return nearest < FAR;
+}
+#endif
 
 @compute @workgroup_size(64)
 fn main(
@@ -31,16 +60,9 @@ fn main(
     let tile = vec2u(at % count.x, at / count.x);
     let first = tile * grid.tile;
     let after = min(first + grid.tile, grid.size);
-    var nearest = FAR;
-    for (var y = first.y; y < after.y; y++) {
-        for (var x = first.x; x < after.x; x++) {
-            let pixel = grid.corner + vec2u(x, y);
-            nearest = min(nearest, source[pixel.y * grid.stride + pixel.x]);
-        }
-    }
     let word = tile.x | (tile.y << 16u);
     // In any order: what a pass over the list does at a pixel has nothing to do with the others.
-    if nearest < FAR {
+    if is_there(grid.corner + first, grid.corner + after) {
         let place = atomicAdd(&tiles[0], 1u);
         atomicStore(&tiles[2u + place], word);
     } else {

@@ -1,5 +1,5 @@
-// One sample of the picture: sky, ground and solids, and the water before them. With AOVS, the channels
-// that stand beside the picture instead; with OBJECTS, what is seen first.
+// One sample of the picture: sky, ground and solids, and the water before them, as much of it as spray lets through (shade_spray adds
+// that of the spray). With AOVS, the channels that stand beside the picture instead; with OBJECTS, what is seen first.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_band.wgsl"
 #ifdef LISTED
@@ -278,11 +278,13 @@ struct Water {
     view: vec3f,
     // Mean square slope below the pixel.
     slope_variance: f32,
+    // Part of the sunlight that comes to it.
+    lit: f32,
 }
 
 // That water scatters which lets `clear` of what is behind it through.
-fn body_light(position: vec3f, normal: vec3f, clear: vec3f) -> vec3f {
-    return diffuse_light(position, normal) * deep_albedo() * (1.0 - clear);
+fn body_light(normal: vec3f, lit: f32, clear: vec3f) -> vec3f {
+    return diffuse_light(normal, lit) * deep_albedo() * (1.0 - clear);
 }
 
 // Light of a solid that a mirrored ray meets, through the water and spray that stand before it from `nearest` on, as the picture has them.
@@ -294,7 +296,8 @@ fn behind_splash(light: vec3f, found: Surface, way: vec3f, hit: March, nearest: 
     let z = surface[hit.at];
     let seen = select(0.0, thickness_at(place), z > nearest && z < hit.eye.z);
     let clear = exp(-(shading.absorption + shading.scattering) * seen);
-    var colour = light * clear + body_light(found.position, found.normal, clear);
+    let lit = sunlit(found.position, vec3f(0.0, 1.0, 0.0));
+    var colour = light * clear + body_light(found.normal, lit, clear);
 #ifdef SPRAY
     let mist = spray_at(place);
     if mist.cover > 0.0 && mist.depth > nearest && mist.depth < hit.eye.z {
@@ -365,7 +368,7 @@ fn transmitted(water: Water, seen: f32, backdrop: vec3f) -> Through {
     }
     let extinction = shading.absorption + shading.scattering;
     let clear = exp(-extinction * way);
-    return Through(light * clear, body_light(water.position, water.normal, clear));
+    return Through(light * clear, body_light(water.normal, water.lit, clear));
 }
 
 // Water `z` metres along the optical axis, whose normal is `smooth_normal` but for ripples; `lost` is the mean square slope of waves that
@@ -380,10 +383,11 @@ fn shade_water(
     let facet = facet_at(position, normal, footprint);
     // No facet that is seen faces away.
     normal = normalize(facet.normal + view * max(0.03 - dot(facet.normal, view), 0.0) * 1.5);
-    let water = Water(position, eye, normal, view, facet.variance + lost);
+    let lit = sunlit(position, vec3f(0.0, 1.0, 0.0));
+    let water = Water(position, eye, normal, view, facet.variance + lost, lit);
 
     let reflectance = fresnel(clamp(dot(normal, view), 0.0, 1.0), shading.index);
-    let sun = shading.sun_irradiance * sunlit(position, vec3f(0.0, 1.0, 0.0))
+    let sun = shading.sun_irradiance * lit
         * glitter(normal, view, shading.sun_direction, water.slope_variance, shading.index);
     let mirror = reflectance * mirrored(water);
     let through = transmitted(water, seen, backdrop);
@@ -420,12 +424,12 @@ fn main(
     if place >= tiles[1] {
         return;
     }
-    let id = pixel_of_tile(tiles[1u + tiles[0] + tiles[1] - place], thread);
+    let id = pixel_of_tile(tiles[1u + tiles[0] + tiles[1] - place], thread, camera.margin + vec2u(0u, band.row));
 #else
     if place >= tiles[0] {
         return;
     }
-    let id = pixel_of_tile(tiles[2u + place], thread);
+    let id = pixel_of_tile(tiles[2u + place], thread, camera.margin + vec2u(0u, band.row));
 #endif
 #else
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -487,8 +491,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 #else
     var cover = 0.0;
 #ifdef SPRAY
-    let mist = spray_at(vec2f(pixel) + 0.5);
-    cover = mist.cover;
+    cover = spray_at(vec2f(pixel) + 0.5).cover;
 #endif
 #ifdef OBJECTS
     var object = straight.surface.material;
@@ -546,18 +549,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             alpha = shading.background;
         }
     }
-#ifdef SPRAY
-    if mist.cover > 0.0 {
-        let far = mist.depth * length(ray);
-        let facing = world_direction(camera, spray_normal(vec2f(pixel) + 0.5, mist.depth));
-        let light = spray_radiance(camera.position + direction * far, view, facing, mist.optical_depth);
-        let white = hazed(light, far, direction);
-        colour = mix(colour, white, mist.cover);
-        alpha = mix(alpha, 1.0, mist.cover);
-        dim_parts(1.0 - mist.cover);
-        white_parts(vec2f(pixel) + 0.5, white, mist.cover);
-    }
-#endif
+    let kept = 1.0 - cover;
+    colour *= kept;
+    alpha *= kept;
+    dim_parts(kept);
     store_light(out, vec4f(colour, alpha), camera.weight, camera.sample_index == 0u);
 #endif
 #endif

@@ -41,8 +41,8 @@ const BEND: f32 = 0.6;
 const OFF: f32 = 0.651;
 // Nearer to the eye than this, in splat radii, nothing is drawn; at twice as far all is.
 const NEAREST: f32 = 2.6;
-// Radius in pixels above which a drop is many smaller ones.
-const LARGEST: f32 = 1.0;
+// Radius in pixels above which a drop is many smaller ones, each narrower than the cells of the half resolution.
+const LARGEST: f32 = 1.4;
 
 // A number in 0..1 that belongs to a particle and a channel.
 fn random(index: u32, channel: u32) -> f32 {
@@ -83,6 +83,61 @@ fn strung(thread: Thread, part: f32, id: u32, channel: u32) -> vec3f {
     return LENGTH * s * thread.along + BEND * (s * s - 1.0) * thread.bent + OFF * off;
 }
 
+// Part of what is `wide` metres and stands at depth `z` that is seen at a pixel of the half resolution.
+fn seen_at(pixel: vec2u, z: f32, wide: f32) -> f32 {
+    let at = 2u * (pixel.y * camera.size.x + pixel.x);
+    // The water over a drop takes its white away, half of it two radii of a particle down.
+    let under = 1.0 - smoothstep(camera.radius, 3.0 * camera.radius, z - surface[at]);
+    return before(solid_depth[at], z, wide) * under;
+}
+
+// A puff has so many pixels that the particle's threads share them; `volume` is its part of the particle's.
+fn add_puff(c: vec3f, volume: f32, lane: u32, velocity: vec3f) {
+    let own = PUFF * camera.radius;
+    // At least 0.7 pixels of the half resolution, so that a small one is fainter and never missed: its volume stays.
+    let radius = max(own, 1.4 * c.z / camera.focal);
+    let shrunk = own / radius;
+    let weight = volume * shrunk * shrunk * shrunk * spray_params.scale;
+    let bounds = sphere_bounds(camera, c, radius, 0.5, camera.size / 2u);
+    let width = u32(max(bounds.z - bounds.x + 1, 0));
+    let count = width * u32(max(bounds.w - bounds.y + 1, 0));
+    for (var i = lane; i < count; i += LANES) {
+        let row = row_of(i, width);
+        let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
+        let seen = seen_at(pixel, c.z, radius);
+        if seen > 0.0 {
+            let ray = eye_ray(camera, 2.0 * vec2f(pixel) + 1.0);
+            add_spray(pixel, soft_chord(ray, c, radius) * weight * seen, c.z, velocity);
+        }
+    }
+}
+
+// A drop is narrower than a cell, which is two pixels wide: the four cells about it share its volume as bilinear interpolation would.
+fn add_drop(c: vec3f, own: f32, volume: f32, velocity: vec3f) {
+    let cell = 2.0 * c.z / camera.focal;
+    if c.z < 1.5 * cell {
+        return;
+    }
+    // Over the cell's area as the drop sees it.
+    let aslant = length(c) / c.z;
+    let way = 4.188790 * own * own * own * volume * spray_params.scale / (cell * cell) * aslant;
+    let place = 0.5 * (camera.centre + camera.focal * vec2f(c.x, -c.y) / c.z) - 0.5;
+    let base = floor(place);
+    let part = place - base;
+    let first = vec2i(base) + vec2i(camera.corner * 0.5);
+    for (var k = 0; k < 4; k++) {
+        let step = vec2i(k & 1, k >> 1u);
+        let pixel = first + step;
+        if any(pixel < vec2i(0)) || any(pixel >= vec2i(camera.size / 2u)) {
+            continue;
+        }
+        let share = select(1.0 - part, part, step == vec2i(1));
+        let seen = seen_at(vec2u(pixel), c.z, 0.7 * cell);
+        add_spray(vec2u(pixel), way * share.x * share.y * seen, c.z, velocity);
+    }
+}
+
+// A particle's threads share the pixels of each puff, which has many, and the drops, each of which has few.
 @compute @workgroup_size(LANES, ROWS)
 fn main(
     @builtin(workgroup_id) group: vec3u,
@@ -95,13 +150,18 @@ fn main(
     }
     let index = aired[page.aired_first + place] - page.first;
     let particle = particles[index];
-    let air = air_of(particle);
     let id = particle.tag >> 1u;
-    let half_size = camera.size / 2u;
     let c = eye_from_world(camera, moved(particle, index));
     let near = smoothstep(NEAREST, 2.0 * NEAREST, c.z / camera.radius);
     if near <= 0.0 {
         return;
+    }
+    let air = near * air_of(particle);
+    let thread_of = Thread(turned(id, 0u), turned(id, 2u));
+    let of_puffs = air * MIST / (PUFF * PUFF * PUFF * f32(PUFFS));
+    for (var k = 0u; k < PUFFS; k++) {
+        let off = strung(thread_of, (f32(k) + 0.5) / f32(PUFFS), id, 7u * k + 5u);
+        add_puff(c + WIDE_PUFFS * camera.radius * off, of_puffs, thread.x, particle.velocity);
     }
     // Near the eye more and smaller ones, each as opaque: as many more as their areas are less.
     let finer = max((LEAST_SIZE + SIZES) * camera.radius * camera.focal / (c.z * LARGEST), 1.0);
@@ -113,35 +173,12 @@ fn main(
     let part = 1.0 / f32(drops);
     let cubes = m * m * m + m * m * n + 0.6 * m * n * n + n * n * n / 7.0
         - part * part * (6.0 * m * m * n + 12.0 * m * n * n + 6.0 * n * n * n) / 24.0;
-    let of_drops = (1.0 - MIST) / (cubes * f32(drops)) * finer * finer * finer;
-    let of_puffs = MIST / (PUFF * PUFF * PUFF * f32(PUFFS));
-    let thread_of = Thread(turned(id, 0u), turned(id, 2u));
-    for (var k = thread.x; k < PUFFS + drops; k += LANES) {
-        let is_puff = k < PUFFS;
-        let q = select((f32(k - PUFFS) + 0.5) * part, 0.0, is_puff);
-        let own = camera.radius * select((m + n * q * q) / finer, PUFF, is_puff);
-        let strand = select(random(id, 7u * k + 4u), (f32(k) + 0.5) / f32(PUFFS), is_puff);
-        let wide = select(WIDE, WIDE_PUFFS, is_puff) * camera.radius;
-        let d = c + wide * strung(thread_of, strand, id, 7u * k + 5u);
-        // At least 0.7 pixels of the half resolution, so that a small one is fainter and never missed: its volume stays.
-        let radius = max(own, 1.4 * d.z / camera.focal);
-        let shrunk = own / radius;
-        let volume = near * air * select(of_drops, of_puffs, is_puff);
-        let weight = volume * shrunk * shrunk * shrunk * spray_params.scale;
-        let bounds = sphere_bounds(camera, d, radius, 0.5, half_size);
-        for (var y = bounds.y; y <= bounds.w; y++) {
-            for (var x = bounds.x; x <= bounds.z; x++) {
-                let pixel = vec2u(vec2i(x, y));
-                let at = 2u * (pixel.y * camera.size.x + pixel.x);
-                // The water over a drop takes its white away, half of it two radii of a particle down.
-                let under = 1.0 - smoothstep(camera.radius, 3.0 * camera.radius, d.z - surface[at]);
-                let seen = before(solid_depth[at], d.z, radius) * under;
-                if seen <= 0.0 {
-                    continue;
-                }
-                let ray = eye_ray(camera, 2.0 * vec2f(pixel) + 1.0);
-                add_spray(pixel, soft_chord(ray, d, radius) * weight * seen, d.z, particle.velocity);
-            }
-        }
+    let of_drops = air * (1.0 - MIST) / (cubes * f32(drops)) * finer * finer * finer;
+    for (var j = thread.x; j < drops; j += LANES) {
+        let k = PUFFS + j;
+        let q = (f32(j) + 0.5) * part;
+        let off = strung(thread_of, random(id, 7u * k + 4u), id, 7u * k + 5u);
+        let own = camera.radius * (m + n * q * q) / finer;
+        add_drop(c + WIDE * camera.radius * off, own, of_drops, particle.velocity);
     }
 }

@@ -22,8 +22,8 @@ use crate::{
 /// Materials that solids of a picture have, at most: a uniform of common size has room for so many.
 const MOST_MATERIALS: usize = 256;
 
-/// Texels of a row of the texture that holds all pictures one after the other.
-const ROW: usize = 4096;
+/// Texels of a row of the texture that holds all pictures one after the other: a power of two, so that shaders shift and do not divide.
+const ROW: usize = 1 << 12;
 
 /// What the solids of a scene are painted with.
 #[derive(Clone, Debug, Default)]

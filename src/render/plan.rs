@@ -176,7 +176,10 @@ impl Plan {
 
     /// Sets a condition in a pass.
     pub(super) fn define(&mut self, pass: &'static str, condition: &'static str) {
-        self.defines.entry(pass).or_default().push(condition);
+        let conditions = self.defines.entry(pass).or_default();
+        if !conditions.contains(&condition) {
+            conditions.push(condition);
+        }
     }
 
     /// Sets each of a buffer's first `count` words.

@@ -142,10 +142,10 @@ impl Lists {
         let grid = TileGrid {
             size,
             tile: FLOW_TILE,
-            stride: size[0],
+            frame: size,
             ..TileGrid::default()
         };
-        let (tiles, commands) = Tiles::plan(plan, &format!("flow.{index}"), grid, original);
+        let (tiles, commands) = Tiles::of_water(plan, &format!("flow.{index}"), grid, original);
         self.after.extend(commands);
         (tiles.wet(), tiles.bind())
     }

@@ -1,7 +1,8 @@
-//! Lists of a picture's tiles: those in which there is water, and the others, so that what only water needs is done where there is some.
+//! Lists of a picture's tiles: those in which there is water or spray, and the others, so that what only that needs is done where there is
+//! some.
 
 use super::{
-    buffers::{tile_groups, tiles},
+    buffers::{SPRAY, tile_groups, tiles},
     plan::Plan,
     uniform::TileGrid,
 };
@@ -17,6 +18,9 @@ pub(super) const TILE: [u32; 2] = WORKGROUP;
 /// Cells of a tile of the curvature flow: a thread for two by two.
 pub(super) const FLOW_TILE: [u32; 2] = [2 * WORKGROUP[0], 2 * WORKGROUP[1]];
 
+/// What lists the tiles with spray.
+const LIST_SPRAY: &str = "ssfr/list_spray";
+
 /// A list, and the workgroups of dispatches over it.
 pub(super) struct Tiles {
     list: Buf<u32>,
@@ -24,12 +28,29 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Plans the list of a part of the frame, and gives what makes it from the depths of water in `source`.
-    pub(super) fn plan(
+    /// Plans the list of a part of the frame by water, and gives what makes it from the depths in `source`.
+    pub(super) fn of_water(
         plan: &mut Plan,
         name: &str,
         grid: TileGrid,
         source: &Buf<f32>,
+    ) -> (Self, Vec<Command>) {
+        let source = Bind::whole("source", source);
+        Self::plan(plan, name, grid, ("ssfr/list_tiles", source))
+    }
+
+    /// Plans the list of a part of the frame by spray, and gives what makes it from the sums of splats.
+    pub(super) fn of_spray(plan: &mut Plan, name: &str, grid: TileGrid) -> (Self, Vec<Command>) {
+        plan.define(LIST_SPRAY, "SPRAY");
+        let source = Bind::whole("source", &SPRAY);
+        Self::plan(plan, name, grid, (LIST_SPRAY, source))
+    }
+
+    fn plan(
+        plan: &mut Plan,
+        name: &str,
+        grid: TileGrid,
+        (pass, source): (&'static str, Bind),
     ) -> (Self, Vec<Command>) {
         let count = count(grid.size, grid.tile);
         let made = Self {
@@ -40,11 +61,11 @@ impl Tiles {
         plan.buffer(&made.groups, 2);
         let grids = Windows::named("grid", format!("tile_grid.{name}"));
         plan.windows(&grids, &[grid]);
-        let list = vec![grids.bind(0), Bind::whole("source", source), made.bind()];
+        let list = vec![grids.bind(0), source, made.bind()];
         let spread = vec![made.bind(), Bind::whole("tile_groups", &made.groups)];
         let commands = vec![
             Command::clear(&made.list),
-            Command::with("ssfr/list_tiles", count, list),
+            Command::with(pass, count, list),
             Command::with("ssfr/spread_tiles", 1, spread),
         ];
         (made, commands)
@@ -55,7 +76,7 @@ impl Tiles {
         Bind::whole("tiles", &self.list)
     }
 
-    /// Of a pass over the tiles with water.
+    /// Of a pass over the tiles that have some.
     pub(super) fn wet(&self) -> Groups {
         Groups::at(&self.groups, 0)
     }
@@ -104,6 +125,7 @@ mod tests {
             ("ssfr/flow_prolong", &[]),
             ("ssfr/shade", &["LISTED"]),
             ("ssfr/shade_dry", &["LISTED", "DRY"]),
+            ("ssfr/shade_spray", &[]),
         ];
         for (pass, defines) in passes {
             let found = reflect(pass, &compose(pass, defines).unwrap()).unwrap();

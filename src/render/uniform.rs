@@ -120,8 +120,7 @@ mirror!(
         corner: [u32; 2],
         size: [u32; 2],
         tile: [u32; 2],
-        stride: u32,
-        pad0: u32,
+        frame: [u32; 2],
     }
 );
 

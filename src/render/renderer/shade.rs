@@ -16,6 +16,8 @@ use crate::{
 
 /// What draws the pixels of tiles without water.
 const DRY: &str = "ssfr/shade_dry";
+/// What adds the light of spray.
+const WITH_SPRAY: &str = "ssfr/shade_spray";
 
 /// Shading, band by band.
 pub(super) struct Shade {
@@ -71,15 +73,20 @@ fn plan_bands(
     shade
 }
 
-/// Says to the pass that shades the picture what the look does with what is opaque, and which parts of the light it asks for.
-fn plan_output(plan: &mut Plan, look: &Look, pass: &'static str) {
+/// Says to the pass that shades the picture what the look does with what is opaque, and which parts of the light it asks for; with spray
+/// that is `condition`.
+fn plan_output(plan: &mut Plan, look: &Look, pass: &'static str, condition: &'static str) {
     if draws_spray(look) {
-        let volume = pass == "rays/cast";
-        plan.define(pass, if volume { "VOLUME" } else { "SPRAY" });
+        plan.define(pass, condition);
     }
     if look.spec().output.solids == SolidsOutput::Holdout {
         plan.define(pass, "HOLDOUT");
     }
+    plan_lights(plan, look, pass);
+}
+
+/// Says to a pass which parts of the light the look asks for.
+fn plan_lights(plan: &mut Plan, look: &Look, pass: &'static str) {
     let lights = look.lights();
     if lights.is_empty() {
         return;
@@ -149,8 +156,8 @@ pub(super) fn wants_spray_aovs(look: &Look) -> bool {
 
 /// Plans the shading of what was splatted; `surface` is where the smoothed depth stands.
 pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
-    plan_output(plan, look, "ssfr/shade");
-    plan_output(plan, look, DRY);
+    plan_output(plan, look, "ssfr/shade", "SPRAY");
+    plan_output(plan, look, DRY, "SPRAY");
     plan.define("ssfr/shade_aovs", "AOVS");
     if wants_spray_aovs(look) {
         plan.define("ssfr/shade_aovs", "SPRAY");
@@ -167,8 +174,19 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
     };
     let passes = ["ssfr/shade", "ssfr/shade_aovs"];
     let mut shade = plan_bands(plan, look, passes, [&binds, &binds]);
-    if look.spec().sea.is_none() {
-        shade.picture = by_tiles(plan, surface, shade.picture);
+    let bands: Vec<Command> = std::mem::take(&mut shade.picture);
+    for (index, band) in bands.into_iter().enumerate() {
+        let grid = tile_grid(plan, index);
+        let spray = match draws_spray(look) {
+            true => plan_spray_light(plan, look, index, grid),
+            false => Vec::new(),
+        };
+        match look.spec().sea {
+            None => (shade.picture).extend(by_tiles(plan, surface, (index, grid), band)),
+            // There may be water anywhere.
+            Some(_) => shade.picture.push(band),
+        }
+        shade.picture.extend(spray);
     }
     let seen = || {
         let triangles = Bind::whole("set_triangles", &TRIANGLES);
@@ -179,41 +197,55 @@ pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Sh
     shade
 }
 
-/// The shading of the picture by a pass over tiles with water and one over the others, of a band each. With a sea there may be water
-/// anywhere.
-fn by_tiles(plan: &mut Plan, surface: &Buf<f32>, picture: Vec<Command>) -> Vec<Command> {
-    plan.define("ssfr/shade", "LISTED");
+/// Tiles in which a band of the picture lies: they begin at multiples of their size in the frame, whatever of it is drawn.
+fn tile_grid(plan: &Plan, band: usize) -> TileGrid {
+    let [left, top] = plan.extent.margin;
+    let row: u32 = plan.bands[..band].iter().sum();
+    let first = [left, top + row];
+    let size = [plan.extent.picture[0], plan.bands[band]];
+    let corner = [0, 1].map(|axis| first[axis] - first[axis] % TILE[axis]);
+    TileGrid {
+        corner,
+        size: [0, 1]
+            .map(|axis| (first[axis] + size[axis]).next_multiple_of(TILE[axis]) - corner[axis]),
+        tile: TILE,
+        frame: plan.extent.size,
+    }
+}
+
+/// The shading of a band by a pass over tiles with water and one over the others.
+fn by_tiles(
+    plan: &mut Plan,
+    surface: &Buf<f32>,
+    (index, grid): (usize, TileGrid),
+    shade: Command,
+) -> Vec<Command> {
+    let Command::Dispatch { pass, binds, .. } = shade else {
+        return vec![shade];
+    };
+    plan.define(pass, "LISTED");
     plan.define(DRY, "LISTED");
     plan.define(DRY, "DRY");
-    let mut commands = Vec::new();
-    let mut row = 0;
-    for (band, shade) in picture.into_iter().enumerate() {
-        let Command::Dispatch { pass, binds, .. } = shade else {
-            continue;
-        };
-        let [left, top] = plan.extent.margin;
-        let size = [plan.extent.picture[0], plan.bands[band]];
-        let corner = [left, top + row];
-        row += size[1];
-        let grid = TileGrid {
-            corner,
-            size,
-            tile: TILE,
-            stride: plan.extent.size[0],
-            ..TileGrid::default()
-        };
-        let (tiles, lists) = Tiles::plan(plan, &format!("shade.{band}"), grid, surface);
-        let binds = [binds, vec![tiles.bind()]].concat();
-        commands.extend(lists);
-        commands.push(Command::in_groups(pass, tiles.wet(), binds.clone()));
-        commands.push(Command::in_groups(DRY, tiles.dry(), binds));
-    }
+    let (tiles, mut commands) = Tiles::of_water(plan, &format!("shade.{index}"), grid, surface);
+    let binds = [binds, vec![tiles.bind()]].concat();
+    commands.push(Command::in_groups(pass, tiles.wet(), binds.clone()));
+    commands.push(Command::in_groups(DRY, tiles.dry(), binds));
+    commands
+}
+
+/// What adds the light of spray to a band, in tiles with spray.
+fn plan_spray_light(plan: &mut Plan, look: &Look, index: usize, grid: TileGrid) -> Vec<Command> {
+    plan_lights(plan, look, WITH_SPRAY);
+    let (tiles, mut commands) = Tiles::of_spray(plan, &format!("spray.{index}"), grid);
+    let output = Bind::whole("output", &picture(index));
+    let binds = vec![BANDS.bind(index), output, tiles.bind()];
+    commands.push(Command::in_groups(WITH_SPRAY, tiles.wet(), binds));
     commands
 }
 
 /// Plans the casting of rays.
 pub(super) fn plan_cast(plan: &mut Plan, look: &Look) -> Shade {
-    plan_output(plan, look, "rays/cast");
+    plan_output(plan, look, "rays/cast", "VOLUME");
     if look.wants(AovSpec::Forward) {
         plan.define("rays/aovs", "FORWARD");
     }

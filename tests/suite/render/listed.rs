@@ -1,4 +1,5 @@
-//! Tiles with water and those without are drawn by passes of their own, which is not to be seen.
+//! Tiles with water and those without are drawn by passes of their own, and the light of spray is added where there is some: it is not to
+//! be seen.
 
 use std::path::Path;
 
@@ -50,18 +51,25 @@ fn apart(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
     a.iter().zip(b).filter(differs).count() as f64 / a.len() as f64
 }
 
-const LISTED: &str = "if nearest < FAR {";
+/// What lists tiles, and how it says that there is some.
+const LISTS: [(&str, &str); 2] = [
+    ("ssfr/list_tiles", "return nearest < FAR;"),
+    ("ssfr/list_spray", "return all > 0u;"),
+];
 
 #[test]
 fn lists_of_tiles_do_not_change_the_picture() {
     let water = city_water();
     let picture = last(&context(), &[&water]);
-    let everywhere = spoiled("ssfr/list_tiles", LISTED, "if true {");
-    assert_eq!(apart(&picture, &last(&everywhere, &[&water])), 0.0);
-    // The control: without lists of water there is none, where a quarter of the picture shows some.
-    let nowhere = spoiled("ssfr/list_tiles", LISTED, "if false {");
-    let found = apart(&picture, &last(&nowhere, &[&water]));
-    assert!(found > 0.1, "{found}");
+    for (pass, says) in LISTS {
+        let everywhere = spoiled(pass, says, "return true;");
+        let found = apart(&picture, &last(&everywhere, &[&water]));
+        assert_eq!(found, 0.0, "{pass}");
+        // The control: without lists there is nothing, where a quarter of the picture shows some.
+        let nowhere = spoiled(pass, says, "return false;");
+        let found = apart(&picture, &last(&nowhere, &[&water]));
+        assert!(found > 0.1, "{pass}: {found}");
+    }
 }
 
 /// What stood in a tile that has no water any more is gone.

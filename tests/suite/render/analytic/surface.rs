@@ -199,23 +199,22 @@ fn spray_hides_one_less_exp_of_its_optical_depth() {
     let (area, grey) = spray_sums(&context());
     // A particle of spray stands for 15 % of a particle's water.
     let error = |density: f64| area / (f64::from(CLOUDS) * density * 0.15 * 0.115f64.powi(3)) - 1.0;
-    // A particle is four puffs and some 360 drops here, 6 cm nearer or farther than 50 m, which is twice that of an area, and of either
-    // sign: 4e-4 for all puffs. Radii of drops are 0.7 to 1.25 cells of the sums, which are a twentieth off for a drop and so 0.001 for
-    // all of them.
+    // A particle is four puffs and some 180 drops here, 6 cm nearer or farther than 50 m, which is twice that of an area, and of either
+    // sign: 4e-4 for all puffs. Drops are shared out whole.
     assert!(error(DENSITY).abs() < 5e-3, "{}", error(DENSITY));
     assert!(grey < 1e-4, "{grey}");
     for density in [0.99 * DENSITY, 1.01 * DENSITY] {
         assert!(error(density).abs() > 5e-3, "{}", error(density));
     }
     let linear = spoiled(
-        "ssfr/shade",
+        "ssfr/shade_spray",
         "Spray(optical_depth, 1.0 - exp(-optical_depth), depth)",
         "Spray(optical_depth, clamp(optical_depth, 0.0, 0.99), depth)",
     );
     let (more, _) = spray_sums(&linear);
     assert!(more / area > 1.01, "{more} {area}");
     let dimmer = spoiled(
-        "ssfr/shade",
+        "ssfr/shade_spray",
         "mix(around, sky_irradiance(facing), 1.0 - exp(-optical_depth)) / PI",
         "mix(around, 1.01 * sky_irradiance(facing), 1.0 - exp(-optical_depth)) / PI",
     );
