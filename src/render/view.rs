@@ -245,7 +245,7 @@ mod tests {
         }
         assert!(seen.iter().all(|seen| *seen));
         // Where the encoding goes over from one byte to the next, to the last bit; a number that is none is black.
-        for (byte, least) in (1u8..).zip(*LEAST) {
+        for (byte, least) in (1u8..=255).zip(*LEAST) {
             let of = |x: f64| (srgb_encode(x) * 255.0).round() as u8;
             assert_eq!([of(least), of(least.next_down())], [byte, byte - 1]);
         }
