@@ -2,7 +2,7 @@
 // `camera`.
 #import "shared/rays_trace.wgsl"
 #import "shared/rays_sun.wgsl"
-#import "shared/ssfr_light.wgsl"
+#import "shared/ssfr_opaque.wgsl"
 #import "shared/ssfr_facet.wgsl"
 #import "shared/ssfr_lights.wgsl"
 #import "shared/ssfr_holdout.wgsl"

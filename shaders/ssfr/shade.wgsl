@@ -8,7 +8,7 @@
 #import "shared/ssfr_half.wgsl"
 #import "shared/ssfr_solid.wgsl"
 #import "shared/ssfr_optics.wgsl"
-#import "shared/ssfr_light.wgsl"
+#import "shared/ssfr_opaque.wgsl"
 #import "shared/ssfr_facet.wgsl"
 #ifdef AOVS
 #import "shared/ssfr_aovs.wgsl"

@@ -41,7 +41,7 @@ const BEND: f32 = 0.6;
 const OFF: f32 = 0.651;
 // Nearer to the eye than this, in splat radii, nothing is drawn; at twice as far all is.
 const NEAREST: f32 = 2.6;
-// Radius in pixels above which a drop is many smaller ones, each narrower than the cells of the half resolution.
+// Radius in pixels above which a drop is many smaller ones: 0.7 cells of the half resolution.
 const LARGEST: f32 = 1.4;
 
 // A number in 0..1 that belongs to a particle and a channel.
@@ -112,10 +112,10 @@ fn add_puff(c: vec3f, volume: f32, lane: u32, velocity: vec3f) {
     }
 }
 
-// A drop is narrower than a cell, which is two pixels wide: the four cells about it share its volume as bilinear interpolation would.
+// A drop is at most 1.4 cells of two pixels wide: the four cells about it share its volume as bilinear interpolation would.
 fn add_drop(c: vec3f, own: f32, volume: f32, velocity: vec3f) {
     let cell = 2.0 * c.z / camera.focal;
-    if c.z < 1.5 * cell {
+    if c.z < 1.5 * own {
         return;
     }
     // Over the cell's area as the drop sees it.

@@ -103,7 +103,8 @@ impl Job {
 struct State {
     bar: Option<ProgressBar>,
     job: Job,
-    is_begun: bool,
+    /// Whether the job is one of [`Progress::set_frames`].
+    is_set: bool,
     done: u64,
     skipped: u64,
     failed: u64,
@@ -132,7 +133,7 @@ impl Progress {
             state: RefCell::new(State {
                 bar: None,
                 job: Job::new(0),
-                is_begun: false,
+                is_set: false,
                 done: 0,
                 skipped: 0,
                 failed: 0,
@@ -152,7 +153,7 @@ impl Progress {
         self.finish();
         let mut state = self.state.borrow_mut();
         state.job = Job::new(frames);
-        state.is_begun = true;
+        state.is_set = false;
         state.bar = (self.mode == Mode::Auto).then(|| {
             let style =
                 ProgressStyle::with_template("{bar:40} {pos}/{len} [{elapsed} < {eta}] {msg}")
@@ -161,12 +162,13 @@ impl Progress {
         });
     }
 
-    /// A job has so many frames: it begins where none has, else it has come to have more or fewer.
+    /// A job has so many frames: it begins where none of these has, else it has come to have more or fewer.
     pub(super) fn set_frames(&self, frames: u64) {
-        if !self.state.borrow().is_begun {
-            return self.begin(frames);
+        if !self.state.borrow().is_set {
+            self.begin(frames);
         }
         let mut state = self.state.borrow_mut();
+        state.is_set = true;
         state.job.frames = frames;
         if let Some(bar) = &state.bar {
             bar.set_length(frames);

@@ -133,7 +133,7 @@ fn tell_share(progress: &Progress, request: &Request, chunk: Chunk, share: Share
             count(ran as u64, "point")
         ),
         json!({
-            "chunk": chunk.to_string(), "ran": ran, "stood": stood, "left": left, "directory": output::path(&request.directory),
+            "chunk": chunk.to_string(), "ran": ran, "stood": stood, "left": left, "is_left_at_most": share.is_left_at_most, "directory": output::path(&request.directory),
             "interrupted": false,
         }),
     );

@@ -3,6 +3,7 @@
 
 use std::{
     cell::{Cell, RefCell},
+    collections::BTreeSet,
     fs,
     sync::{
         OnceLock,
@@ -182,6 +183,8 @@ pub(super) struct Bench<'a> {
     pub(super) left: Cell<usize>,
     /// Whether what is left may come to less.
     pub(super) is_left_at_most: Cell<bool>,
+    /// Hashes of points whose results are there: two points of one key have one.
+    there: RefCell<BTreeSet<String>>,
     /// Shares that ran points, with how many; known at the end of a whole study.
     shares: RefCell<Vec<(String, usize)>>,
 }
@@ -207,6 +210,7 @@ impl<'a> Bench<'a> {
             stood: Cell::default(),
             left: Cell::default(),
             is_left_at_most: Cell::default(),
+            there: RefCell::default(),
             shares: RefCell::default(),
         }
     }
@@ -270,6 +274,7 @@ impl<'a> Bench<'a> {
         let warn = &mut |text| self.tell(Event::Warning(text));
         if let Some(run) = ledger.find(name, &key, self.reader(), warn)? {
             add(&self.stood);
+            self.there.borrow_mut().insert(key.hash);
             return Ok(Some((run, true)));
         }
         if matches!(self.work, Work::Look) {
@@ -292,6 +297,7 @@ impl<'a> Bench<'a> {
             Work::Whole | Work::Look => None,
         };
         let name = name.to_owned();
+        self.there.borrow_mut().insert(key.hash.clone());
         let run = ledger.append(Line {
             key,
             name,
@@ -327,7 +333,7 @@ impl<'a> Bench<'a> {
         if theirs == 0 {
             return None;
         }
-        let all = self.ran.get() + self.stood.get();
+        let all = self.there.borrow().len();
         let each = shares
             .iter()
             .map(|(share, points)| format!("share {share} ran {points}"));

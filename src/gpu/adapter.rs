@@ -112,7 +112,8 @@ pub struct Context {
     pub has_f64: bool,
     /// What passes are composed from.
     pub shaders: Shaders,
-    /// Whether timers also count operations, by running passes again that do so: for one run in seven, which then takes as long again.
+    /// Whether timers also count operations, by running passes again that do so: for the first run of a dispatch and one in seven after it, which then
+    /// take as long again.
     pub counts_operations: bool,
     /// A fault put into one pass, so that a comparison can be seen to fail; `None` in every command.
     pub spoil: Option<Spoil>,

@@ -86,7 +86,7 @@ impl Counting {
 }
 
 /// Operations of one run of a pass with these bindings and of this size, from the state that the buffers hold and leave as it is; `None`
-/// where the adapter binds no buffer more. Waits for the device.
+/// where the adapter binds no buffer more, or has no memory for the copies. Waits for the device.
 pub(super) fn count(
     program: &Program,
     pass: &'static str,
@@ -108,14 +108,14 @@ pub(super) fn count(
         })
     };
     let mut encoder = device.create_command_encoder(&Default::default());
+    let scope = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     let written = pass.bindings.iter().filter(|binding| binding.is_written);
-    let mut apart: Vec<(u32, Buffer)> = written
+    let copies: Vec<_> = written
         .map(|binding| {
             let (from, offset, bytes) = bound(program, binding, binds);
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
             let copy = buffer("written while counting", bytes, usage);
-            encoder.copy_buffer_to_buffer(from, offset, &copy, 0, bytes);
-            (binding.index, copy)
+            (binding.index, copy, (from, offset, bytes))
         })
         .collect();
     let bytes = size_of::<[u32; 4]>() as u64;
@@ -129,7 +129,14 @@ pub(super) fn count(
         bytes,
         BufferUsages::COPY_DST | BufferUsages::MAP_READ,
     );
-    apart.push((BINDING, sums.clone()));
+    if pollster::block_on(scope.pop()).is_some() {
+        return Ok(None);
+    }
+    let mut apart = vec![(BINDING, sums.clone())];
+    for (index, copy, (from, offset, bytes)) in copies {
+        encoder.copy_buffer_to_buffer(from, offset, &copy, 0, bytes);
+        apart.push((index, copy));
+    }
     let group = bind(
         program,
         pass.name,
@@ -344,6 +351,8 @@ fn of_function(function: MathFunction, n: u32) -> u32 {
         MathFunction::SmoothStep => 9 * n,
         // e₁ − 2 (e₂ · e₁) e₂.
         MathFunction::Reflect => 4 * n,
+        // With d = e₂ · e₁ and k = 1 − η² (1 − d²): η e₁ − (η d + √k) e₂.
+        MathFunction::Refract => 5 * n + 7,
         MathFunction::Transpose => 0,
         _ => n,
     }

@@ -398,6 +398,25 @@ fn choose<'a>(
     }
 }
 
+/// What moves at the shot's start: between two keys that are rigid alone as a solid goes there, straight and the shorter way.
+fn at_start(moves: &Moves, begin: f64) -> DMat4 {
+    let times = moves.times();
+    let before = times.iter().copied().filter(|time| *time <= begin);
+    let after = times.iter().copied().filter(|time| *time > begin);
+    let around = (before.reduce(f64::max), after.reduce(f64::min));
+    let (true, (Some(before), Some(after))) = (moves.is_of_keys(), around) else {
+        return moves.at(begin);
+    };
+    let [from, to] = [before, after].map(|time| moves.at(time));
+    let part = (begin - before) / (after - before);
+    let turn = DMat3::from_mat4(to) * DMat3::from_mat4(from).inverse();
+    let turn = DQuat::IDENTITY.slerp(DQuat::from_mat3(&turn).normalize(), part);
+    let shape = DMat3::from_quat(turn) * DMat3::from_mat4(from);
+    let mut found = DMat4::from_mat3(shape);
+    found.w_axis = from.w_axis.lerp(to.w_axis, part);
+    found
+}
+
 /// Poses at the keys and at each frame, from where it stands at the shot's start, which is at `begin` in the file, seconds.
 fn sampled(
     moves: &Moves,
@@ -425,12 +444,15 @@ fn sampled(
     if times.len() > MOST_POSES {
         return Err(format!("{} poses; allowed: {MOST_POSES}", times.len()));
     }
-    let start = moves.at(begin);
+    let start = at_start(moves, begin);
     let back = DMat3::from_mat4(start).inverse();
     let mut before = DQuat::IDENTITY;
     let mut poses = Vec::new();
     for time in times {
-        let now: DMat4 = moves.at(begin + time);
+        let now: DMat4 = match time == 0.0 {
+            true => start,
+            false => moves.at(begin + time),
+        };
         let from_start = DMat3::from_mat4(now) * back;
         let strain = from_start.transpose() * from_start - DMat3::IDENTITY;
         let most = strain.to_cols_array().map(f64::abs);

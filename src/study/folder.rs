@@ -15,7 +15,7 @@ pub const LEDGER: &str = "results.jsonl";
 pub struct Claim {
     /// Of the study, as its file is called.
     pub study: String,
-    /// What runs the whole study, as it was typed first; `None` where another version of the program took the folder.
+    /// What runs the whole study, but for options of the device and of what may be read; `None` where another version of the program took the folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<String>,
 }

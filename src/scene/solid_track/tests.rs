@@ -2,7 +2,7 @@
 
 use std::{f64::consts::FRAC_PI_2, path::Path};
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
 
 use crate::scene::{Scene, look::camera_file::tests::glb};
@@ -254,6 +254,24 @@ fn a_solid_s_file_begins_at_its_own_frame() {
             assert!(off < 1e-9, "{rate}, {t}: {off}");
         }
         assert!(scene.lints().is_empty(), "{:?}", scene.lints());
+    }
+    // A shot that begins between two matrices: half a second on, the door has turned by an eighth of a turn, and stands 45° from its start.
+    let scene = load(
+        MATRICES.as_bytes(),
+        &[&of(", start = 3.5"), "shot.frames_per_second=10"],
+    );
+    let scene = scene.unwrap();
+    let begun = 0.5 * FRAC_PI_2;
+    for (t, turned) in [(0.0, 0.0), (0.125, 0.5 * begun), (0.25, begun)] {
+        let pose = scene.moving_solids[0].pose(t);
+        let angle = pose.turn.angle_between(DQuat::IDENTITY);
+        assert!((angle - turned).abs() < 1e-7, "{t}: {angle}");
+        let hinge = DVec3::new(3.5 + 2.0 * t, 0.0, 1.0);
+        assert!(
+            (pose.centre - hinge).length() < 1e-9,
+            "{t}: {}",
+            pose.centre
+        );
     }
     // Frame 10 is at 1 s of the glTF: the shot begins a tenth before, with the hinge at x = 3.9.
     let door = "solid[0].track={ file = \"door.glb\", node = \"door\", start = 10 }";

@@ -132,6 +132,11 @@ fn each_expression_has_the_operations_of_its_formula() {
         ("copy[i] = vec4f(length(copied[i].xyz));", 6, 0),
         ("copy[i] = vec4f(normalize(copied[i].xyz), 0.0);", 9, 0),
         (
+            "copy[i] = vec4f(refract(copied[i].xyz, copied[i].xyz, 1.3), 0.0);",
+            22,
+            0,
+        ),
+        (
             "copy[i] = vec4f(cross(copied[i].xyz, copied[i].wzx), 0.0);",
             9,
             0,
