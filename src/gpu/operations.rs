@@ -9,7 +9,7 @@ use naga::{
     Module, Range, ScalarKind, Span, Statement, Type, TypeInner, UnaryOperator, UniqueArena,
     valid::FunctionInfo,
 };
-use wgpu::{Buffer, BufferUsages};
+use wgpu::BufferUsages;
 
 use super::{
     adapter::{Context, GpuError},
