@@ -3,8 +3,8 @@
 struct Particle {
     // World position.
     position: vec3f,
-    // In 65535ths: below, the part of its volume that whitens; above, the radius of what of it belongs to the surface, over that
-    // of a whole one.
+    // From the lowest bit on: 16 of the part of its volume that whitens; 6 of how much company it has, 0 for one that flies alone; 10 of
+    // the radius of what of it belongs to the surface, over that of a whole one.
     air: u32,
     velocity: vec3f,
     // Twice the particle's id, plus 1 where it belongs to the body of water that rays meet, 0 where it was thrown clear of it.
@@ -15,10 +15,14 @@ fn air_of(particle: Particle) -> f32 {
     return f32(particle.air & 0xffffu) / 65535.0;
 }
 
+fn company_of(particle: Particle) -> f32 {
+    return f32((particle.air >> 16u) & 63u) / 63.0;
+}
+
 // Radius of the sphere that stands for it in the surface, metres.
 fn body_radius(camera: Camera, particle: Particle) -> f32 {
-    let part = particle.air >> 16u;
-    return camera.radius * select(f32(part) / 65535.0, 1.0, part == 65535u);
+    let part = particle.air >> 22u;
+    return camera.radius * select(f32(part) / 1023.0, 1.0, part == 1023u);
 }
 
 // Row of the i-th pixel of a box `width` wide, exact below 2²² pixels; software adapters divide integers

@@ -18,14 +18,16 @@
 @group(0) @binding(6) var<storage, read> paths: array<Path>;
 #endif
 
-// A particle stands for torn water: puffs of mist strung on a bent thread, and drops about it that are seen one by one.
-// Puffs, the radius of each in splat radii, and their part of the volume. By eye: without mist clouds are speckled, without drops
-// they are smoke.
+// A particle stands for torn water: puffs of mist strung on a bent thread, and drops about it that are seen one by one. Where two numbers
+// stand, the first is of one that flies alone, the second of one in company. By eye: without mist clouds are speckled, without drops they
+// are smoke, and a lone puff is cotton.
+// Puffs, the radius of each in splat radii, and their part of the volume.
 const PUFFS: u32 = 4u;
 const PUFF: f32 = 1.1;
-const MIST: f32 = 0.6;
-// Drops of a particle far away.
+const MIST: vec2f = vec2f(0.0, 0.6);
+// Drops of a particle far away, and how much finer they are than those of so many.
 const DROPS: f32 = 5.0;
+const FINER: vec2f = vec2f(2.0, 1.0);
 const MOST_DROPS: u32 = 4096u;
 // The least of them, and what is added to it for the largest, in splat radii.
 const LEAST_SIZE: f32 = 0.14;
@@ -36,9 +38,9 @@ const WIDE: f32 = 0.716;
 const WIDE_PUFFS: f32 = 0.6;
 // Half a thread's length, how far its ends are bent aside, and how far what is strung on it lies off: root mean squares over that of all,
 // √((LENGTH² + 0.8 BEND² + 3 OFF²) / 3) = 1.
-const LENGTH: f32 = 1.2;
+const LENGTH: vec2f = vec2f(1.5, 1.2);
 const BEND: f32 = 0.6;
-const OFF: f32 = 0.651;
+const OFF: vec2f = vec2f(0.392, 0.651);
 // Nearer to the eye than this, in splat radii, nothing is drawn; at twice as far all is.
 const NEAREST: f32 = 2.6;
 // Radius in pixels above which a drop is many smaller ones: 0.7 cells of the half resolution.
@@ -74,13 +76,20 @@ fn tent(id: u32, channel: u32) -> f32 {
 struct Thread {
     along: vec3f,
     bent: vec3f,
+    length: f32,
+    off: f32,
+}
+
+// Of the two numbers, that of a particle in so much company.
+fn between(pair: vec2f, company: f32) -> f32 {
+    return mix(pair.x, pair.y, company);
 }
 
 // What lies at `part` in 0..1 of a thread, from its middle; off the thread as the channels from `channel` on say.
 fn strung(thread: Thread, part: f32, id: u32, channel: u32) -> vec3f {
     let s = 1.732051 * (2.0 * part - 1.0);
     let off = vec3f(tent(id, channel), tent(id, channel + 2u), tent(id, channel + 4u));
-    return LENGTH * s * thread.along + BEND * (s * s - 1.0) * thread.bent + OFF * off;
+    return thread.length * s * thread.along + BEND * (s * s - 1.0) * thread.bent + thread.off * off;
 }
 
 // Part of what is `wide` metres and stands at depth `z` that is seen at a pixel of the half resolution.
@@ -157,14 +166,16 @@ fn main(
         return;
     }
     let air = near * air_of(particle);
-    let thread_of = Thread(turned(id, 0u), turned(id, 2u));
-    let of_puffs = air * MIST / (PUFF * PUFF * PUFF * f32(PUFFS));
-    for (var k = 0u; k < PUFFS; k++) {
+    let company = company_of(particle);
+    let thread_of = Thread(turned(id, 0u), turned(id, 2u), between(LENGTH, company), between(OFF, company));
+    let mist = between(MIST, company);
+    let of_puffs = air * mist / (PUFF * PUFF * PUFF * f32(PUFFS));
+    for (var k = 0u; k < select(0u, PUFFS, mist > 0.0); k++) {
         let off = strung(thread_of, (f32(k) + 0.5) / f32(PUFFS), id, 7u * k + 5u);
         add_puff(c + WIDE_PUFFS * camera.radius * off, of_puffs, thread.x, particle.velocity);
     }
     // Near the eye more and smaller ones, each as opaque: as many more as their areas are less.
-    let finer = max((LEAST_SIZE + SIZES) * camera.radius * camera.focal / (c.z * LARGEST), 1.0);
+    let finer = between(FINER, company) * max((LEAST_SIZE + SIZES) * camera.radius * camera.focal / (c.z * LARGEST), 1.0);
     let drops = min(u32(DROPS * finer * finer), MOST_DROPS);
     // Σ of their cubes: sizes are LEAST + SIZES q² at the middles of as many parts of 0..1, but for terms of 1 over their number
     // squared.
@@ -173,7 +184,7 @@ fn main(
     let part = 1.0 / f32(drops);
     let cubes = m * m * m + m * m * n + 0.6 * m * n * n + n * n * n / 7.0
         - part * part * (6.0 * m * m * n + 12.0 * m * n * n + 6.0 * n * n * n) / 24.0;
-    let of_drops = air * (1.0 - MIST) / (cubes * f32(drops)) * finer * finer * finer;
+    let of_drops = air * (1.0 - mist) / (cubes * f32(drops)) * finer * finer * finer;
     for (var j = thread.x; j < drops; j += LANES) {
         let k = PUFFS + j;
         let q = (f32(j) + 0.5) * part;

@@ -168,7 +168,8 @@ pub(super) fn classify(
             + 0.3 * smoothstep(0.5 * onset, onset, speed) * shred;
         let body = smoothstep(TORN[0], TORN[1], weight);
         let air = body * WHITE * white + (1.0 - body) * THROWN;
-        particle.air = packed(air, body.cbrt());
+        let company = smoothstep(0.0, TORN[0], weight);
+        particle.air = packed(air, company, body.cbrt());
         if !standing.is_body {
             particle.tag &= !1;
         }
@@ -178,10 +179,18 @@ pub(super) fn classify(
 /// Of water without air that is all body.
 pub(super) const CLEAR: u32 = 0xffff_0000;
 
-/// Two parts of 1, of 16 bits each: the lower one is of air.
-fn packed(air: f32, radius: f32) -> u32 {
-    let bits = |part: f32| (part.clamp(0.0, 1.0) * 65535.0).round() as u32;
-    bits(air) | bits(radius) << 16
+/// Of a particle's `air`, the bits that tell its radius in the surface.
+const RADIUS: u32 = 0xffc0_0000;
+
+/// Of the body, and drawn in its full size.
+pub(super) fn is_whole(particle: &Particle) -> bool {
+    particle.tag & 1 == 1 && particle.air & RADIUS == RADIUS
+}
+
+/// Three parts of 1: 16 bits of air, 6 of company, 10 of the radius.
+fn packed(air: f32, company: f32, radius: f32) -> u32 {
+    let bits = |part: f32, most: f32| (part.clamp(0.0, 1.0) * most).round() as u32;
+    bits(air, 65535.0) | bits(company, 63.0) << 16 | bits(radius, 1023.0) << 22
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 //! A particle's kernel is stretched as its neighbours lie: a ball within the water, a flat disc along a surface or a sheet. So calm
 //! water is flat, and a sheet one particle thick holds together. What is not the paper's: lengths follow from the lattice, so that
 //! half a lattice has its surface half a spacing beyond its outermost particles, and a lone particle is a ball of its own volume;
-//! from lone to joined a kernel changes steadily, where the paper switches, so that no particle flickers; half axes go with the
+//! from lone to joined a kernel changes steadily, where the paper switches, so that no particle flickers; in water that is torn to half of
+//! its density particles are balls again, since stretched kernels would nowhere reach the surface's value; half axes go with the
 //! neighbours' standard deviations, where the paper takes variances; and centres stay where particles are: moved towards their
 //! neighbours' mean (the paper's λ), they left a noisy surface as rough, 0.06 spacings for any λ up to 0.5, and with the paper's 0.9
 //! kernels no longer reach a calm surface.
@@ -27,6 +28,8 @@ const FLATTEST: f64 = 4.0;
 pub(super) const REACH: f64 = SUPPORT + NEAR;
 /// Weights of neighbours between which a kernel goes from a lone particle's to a stretched one.
 const JOINED: [f64; 2] = [1.0, 6.0];
+/// Densities over that of water between which it does too. At 0.55 the field of stretched kernels has a calm surface's value.
+const TORN: [f64; 2] = [0.4, 0.8];
 
 /// The kernel of a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,6 +104,8 @@ struct Calibration {
     spacing: f64,
     /// Variance of their places along an axis, m².
     variance: f64,
+    /// Weight of a place with water all around.
+    bulk: f64,
     /// Factor on a lone particle's kernel.
     alone: f64,
     level: f64,
@@ -300,6 +305,12 @@ impl Moments {
     }
 }
 
+/// 0 up to the first of these, 1 from the second on, and steadily between.
+fn rise([from, to]: [f64; 2], x: f64) -> f64 {
+    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
 fn outer(d: DVec3) -> DMat3 {
     DMat3::from_cols(d.x * d, d.y * d, d.z * d)
 }
@@ -318,6 +329,7 @@ impl Calibration {
         let mut found = Self {
             spacing: 1.0,
             variance: bulk.covariance().x_axis.x,
+            bulk: bulk.weight,
             alone: 1.0,
             level: 1.0,
         };
@@ -332,14 +344,14 @@ impl Calibration {
 
     fn kernel(&self, place: DVec3, near: &Moments) -> Ellipsoid {
         // A particle is a neighbour of its own, with a weight of 1.
-        let [from, to] = JOINED;
-        let t = ((near.weight - 1.0 - from) / (to - from)).clamp(0.0, 1.0);
-        let joined = t * t * (3.0 - 2.0 * t);
         let (values, turn) = eigen::symmetric(near.covariance() * (1.0 / self.variance));
         let longest = values.max_element().max(0.0).sqrt();
         let stretch = DVec3::from_array(values.to_array().map(|x| x.max(0.0).sqrt()))
             .max(DVec3::splat(longest / FLATTEST))
             .clamp(DVec3::splat(1.0 / FLATTEST), DVec3::ONE);
+        // Over that of water: neighbours are where the kernel is.
+        let density = near.weight / (self.bulk * stretch.element_product());
+        let joined = rise(JOINED, near.weight - 1.0) * rise(TORN, density);
         let full = SUPPORT * self.spacing;
         let alone = DVec3::splat(ALONE * self.spacing);
         let axes = alone.lerp(full * stretch, joined);

@@ -409,9 +409,9 @@ fn splats_refuse_an_eye_under_water() {
 const SPLAT: f64 = 0.2;
 const SPACING: f64 = 0.25;
 
-/// Of a particle that flies alone, in the mean over particles of twelve ids: mean square distance of its spray from it along an axis of the
-/// picture, m², and the integral of its optical depth over the area, m².
-fn drops(context: &Context) -> [f64; 2] {
+/// Of so many particles that fly at one place, in the mean over twelve times other ids: mean square distance of their spray from it along an
+/// axis of the picture, m², and the integral of a particle's optical depth over the area, m².
+fn drops(context: &Context, count: u32) -> [f64; 2] {
     const DENSITY: f64 = 0.05;
     let eye = eye();
     let setup = Setup {
@@ -427,8 +427,13 @@ fn drops(context: &Context) -> [f64; 2] {
     };
     let (mut all, mut squares) = (0.0, 0.0);
     for id in 0..12 {
-        let mut water = ball(eye.position + AWAY * eye.forward(), DVec3::ZERO);
-        water.id = vec![7 * id];
+        let lone = ball(eye.position + AWAY * eye.forward(), DVec3::ZERO);
+        let water = Particles {
+            position: vec![lone.position[0]; count as usize],
+            velocity: vec![lone.velocity[0]; count as usize],
+            id: (0..count).map(|k| 7 * (count * id + k)).collect(),
+            ..Particles::default()
+        };
         let image = draw(context, &setup, &black_sky, &set, &water, 1);
         for (i, pixel) in image.beauty.iter().enumerate() {
             // A cover of 1 − exp(−τ).
@@ -441,31 +446,36 @@ fn drops(context: &Context) -> [f64; 2] {
     let pixel = AWAY / eye.focal;
     [
         squares / all * pixel * pixel,
-        all / 12.0 / DENSITY * pixel * pixel,
+        all / (12.0 * f64::from(count)) / DENSITY * pixel * pixel,
     ]
 }
 
 #[test]
 fn spray_of_a_particle_is_as_wide_as_its_ball_by_rays_and_holds_its_air() {
-    let [square, volume] = drops(&context());
-    // R² / 5 of a ball of 1.6 radii, of which rays know; the tent over cells of two pixels by which a drop is shared out adds a sixth of their
-    // square for its two fifths of the volume, and as much for all of it that they are read linearly.
-    let pixel = AWAY / 300.0;
-    let own = (0.4 + 1.0) * 2.0 * 2.0 / 6.0 * pixel * pixel;
-    let wanted = (1.6 * SPLAT).powi(2) / 5.0 + own;
-    // What a thread of 1.2 adds to the mean over both axes of the picture goes with 1 − z², where z is evenly in −1..1: its standard
-    // deviation is 1.2² · 0.149. Its bend and four puffs off it add a tenth to that. Three of them, of the mean of twelve threads.
-    let bound = 3.0 * 1.1 * 1.44 * 0.149 / 12f64.sqrt();
-    assert!((square / wanted - 1.0).abs() < bound, "{square} {wanted}");
-    // Three twentieths of a thrown particle are spray; puffs are sampled by few cells.
-    let air = 0.15 * SPACING.powi(3);
-    assert!((volume / air - 1.0).abs() < 0.02, "{volume} {air}");
-    // The controls: threads more than twice as long, and smaller drops that are no more opaque for it.
     let pass = "ssfr/splat_spray";
-    let (from, to) = ("const LENGTH: f32 = 1.2;", "const LENGTH: f32 = 2.6;");
-    let control = drops(&spoiled(pass, from, to))[0] / wanted - 1.0;
-    assert!(control > 5.0 * bound, "{control}");
-    let (from, to) = ("* finer * finer * finer;", "* finer * finer;");
-    let control = drops(&spoiled(pass, from, to))[1] / air - 1.0;
-    assert!(control < -0.1, "{control}");
+    // One that flies alone has drops and no mist; of five, each of which has four neighbours, three fifths are mist.
+    for (count, of_drops, length) in [(1, 1.0, 1.5f64), (5, 0.4, 1.2)] {
+        let [square, volume] = drops(&context(), count);
+        // R² / 5 of a ball of 1.6 radii, of which rays know; the tent over cells of two pixels by which a drop is shared out adds a sixth of
+        // their square for its part of the volume, and as much for all of it that they are read linearly.
+        let pixel = AWAY / 300.0;
+        let own = (of_drops + 1.0) * 2.0 * 2.0 / 6.0 * pixel * pixel;
+        let wanted = (1.6 * SPLAT).powi(2) / 5.0 + own;
+        // What a thread adds to the mean over both axes of the picture goes with 1 − z², where z is evenly in −1..1: its standard
+        // deviation is 0.149 of its length's square. Its bend and four puffs off it add a tenth to that. Three of them, of the mean of
+        // twelve threads.
+        let bound = 3.0 * 1.1 * length.powi(2) * 0.149 / 12f64.sqrt();
+        let off = square / wanted - 1.0;
+        assert!(off.abs() < bound, "{count}: {square} {wanted}");
+        // Three twentieths of a thrown particle are spray; puffs are sampled by few cells.
+        let air = 0.15 * SPACING.powi(3);
+        assert!((volume / air - 1.0).abs() < 0.02, "{count}: {volume} {air}");
+        // The controls: threads more than twice as long, and smaller drops that are no more opaque for it.
+        let (from, to) = ("* s * thread.along", "* 2.2 * s * thread.along");
+        let control = drops(&spoiled(pass, from, to), count)[0] / wanted - 1.0;
+        assert!(control > 3.0 * bound, "{count}: {control}");
+        let (from, to) = ("* finer * finer * finer;", "* finer * finer;");
+        let control = drops(&spoiled(pass, from, to), count)[1] / air - 1.0;
+        assert!(control < -0.1, "{count}: {control}");
+    }
 }
