@@ -13,6 +13,7 @@ use std::{
 use clap::Args;
 
 use crate::{
+    domain::posix,
     scene::{Method, Scene},
     stage::{
         inspect::{
@@ -138,9 +139,10 @@ pub(super) fn run(args: &InspectArgs) -> Result<u8, Failure> {
 
 /// A frame that failed has no plan and no ledger.
 fn broken_off(directory: &Path) -> Failure {
-    let shown = directory.display();
     let what = format!(
-        "{shown} is the frame that a bake broke off at, which no cache lists: `swell check {shown}` computes it again"
+        "{} is the frame that a bake broke off at, which no cache lists: `swell check {}` computes it again",
+        directory.display(),
+        posix::path(directory)
     );
     Failure {
         code: 2,

@@ -33,9 +33,12 @@ use std::{
 use clap::{Args, Parser, Subcommand, ValueEnum, error::ErrorKind};
 
 use self::progress::{Mode, Progress};
-use crate::stage::{
-    Blame,
-    device::{Device, Gpu, Shaders},
+use crate::{
+    domain::posix,
+    stage::{
+        Blame,
+        device::{Device, Gpu, Shaders},
+    },
 };
 
 /// Exit code where something is out of tolerance.
@@ -262,7 +265,9 @@ fn open_log(file: &Path) -> Result<(), Failure> {
         code: 4,
         error: format!("--log {}: {error}", file.display()).into(),
     })?;
-    output::log(&format!("swell {}", arguments().join(" ")));
+    let words = arguments();
+    let words: Vec<_> = words.iter().map(|it| posix::word(it)).collect();
+    output::log(&format!("swell {}", words.join(" ")));
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         before(panic);

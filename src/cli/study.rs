@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use crate::{
-    domain::chunk::Chunk,
+    domain::{chunk::Chunk, posix},
     experiment::{Event, PointEvent, PointStatus, Request, Share, study},
     scene::study::Study,
 };
@@ -49,8 +49,8 @@ pub(super) fn run(args: &StudyArgs, progress: &Progress) -> Result<u8, Failure> 
         study: Study::load_within(&args.study, bake::reach(args.allow_outside))?,
         command: format!(
             "swell study {} -o {}",
-            args.study.display(),
-            directory.display()
+            posix::path(&args.study),
+            posix::path(&directory)
         ),
         directory,
         chunk: args.chunk,

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::{
-    domain::{chunk::Chunk, frame_range::FrameRange},
+    domain::{chunk::Chunk, frame_range::FrameRange, posix},
     experiment::{Request, dealt},
     scene::{
         Method,
@@ -130,7 +130,7 @@ fn request(args: &TuneArgs) -> Result<TuneRequest, Failure> {
 
 /// What makes the same settings again, for the page and the scene.
 fn command(args: &TuneArgs) -> String {
-    let mut words = vec![format!("swell tune {}", args.scene.display())];
+    let mut words = vec![format!("swell tune {}", posix::path(&args.scene))];
     words.extend(args.errors.iter().map(|limit| {
         let text = limit.to_string().replacen(' ', "=", 1);
         format!("--error {}", text.replace(' ', ""))
@@ -144,9 +144,8 @@ fn command(args: &TuneArgs) -> String {
     add("frames", args.frames.as_ref().map(FrameRange::to_string));
     add("reference", Some(args.reference.to_string()));
     add("repeats", Some(args.repeats.to_string()));
-    let path = |path: &PathBuf| path.display().to_string();
-    add("write", args.write.as_ref().map(path));
-    add("output", args.output.as_ref().map(path));
+    add("write", args.write.as_deref().map(posix::path));
+    add("output", args.output.as_deref().map(posix::path));
     words.join(" ")
 }
 

@@ -30,6 +30,7 @@ pub mod period;
 pub mod places;
 pub mod poisson;
 pub mod pose;
+pub mod posix;
 pub mod probe;
 pub mod relaxation;
 pub mod sampling;

@@ -11,7 +11,7 @@ use crate::{
         Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, Parent, failed,
     },
     domain::{
-        budget::Breach, frame_range::FrameRange, keep::Keep, particles::Particles,
+        budget::Breach, frame_range::FrameRange, keep::Keep, particles::Particles, posix,
         signed_distance::SignedDistanceError, solver::StepReport,
     },
     gpu::adapter::GpuError,
@@ -169,7 +169,8 @@ pub enum BakeError {
     },
     /// A budget was broken; what the frame began with is kept.
     #[error(
-        "{failure}; the last good frame is kept, and `swell check {}` computes this one again", .failed.display()
+        "{failure}; the last good frame is kept, and `swell check {}` computes this one again",
+        posix::path(failed)
     )]
     Budget {
         /// What, and where in the frame.

@@ -4,6 +4,7 @@ use std::{io, path::PathBuf};
 
 use crate::{
     cache::CacheError,
+    domain::posix,
     scene::{SceneError, look::LookError},
     stage::Blame,
 };
@@ -32,7 +33,7 @@ pub enum ExportError {
     #[error(transparent)]
     Usdc(#[from] UsdcError),
     /// A stream that is not there.
-    #[error("{} is not there: make it with `swell whitewater {}` (--name {stream})", directory.display(), cache.display())]
+    #[error("{} is not there: make it with `swell whitewater {}` (--name {stream})", directory.display(), posix::path(cache))]
     NoStream {
         /// Its name.
         stream: String,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     cache::{self, CacheError, CacheReader},
-    domain::particles::Particles,
+    domain::{particles::Particles, posix},
     stage::whitewater::{directory, is_of},
 };
 
@@ -14,7 +14,7 @@ pub enum StreamError {
     /// There is none of that name.
     #[error(
         "the look draws whitewater `{stream}`, and {} is not there: make it with `swell whitewater {}` (--name {stream})",
-        directory.display(), cache.display()
+        directory.display(), posix::path(cache)
     )]
     Missing {
         /// Its name.

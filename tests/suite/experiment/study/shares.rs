@@ -254,6 +254,33 @@ fn a_share_that_is_killed_goes_on() {
     assert_eq!(told.last().unwrap()["left"], 16);
 }
 
+#[cfg(unix)]
+#[test]
+fn what_joins_shares_is_a_command_that_a_shell_takes() {
+    let shared = Job::of(&[("tiny.toml", SCENE), ("dt's sweep.toml", &sweep())]);
+    let swell = |words: &[&str]| shared.command("").args(words).output().unwrap();
+    let options = ["-o", "new results", "--chunk", "1/2"];
+    let done = swell(&[&["study", "dt's sweep.toml"], &options[..]].concat());
+    assert!(done.status.success());
+    let said = String::from_utf8(swell(&["view", "new results"]).stderr).unwrap();
+    let command = said.split('`').nth(1).unwrap();
+    assert_eq!(
+        command,
+        r"swell study 'dt'\''s sweep.toml' -o 'new results'"
+    );
+    let joined = Command::new("sh")
+        .args([
+            "-c",
+            &format!("swell() {{ \"$SWELL\" \"$@\"; }}; {command}"),
+        ])
+        .env("SWELL", env!("CARGO_BIN_EXE_swell"))
+        .current_dir(shared.folder.path())
+        .output()
+        .unwrap();
+    assert!(joined.status.success(), "{joined:?}");
+    assert!(shared.path("new results/index.html").is_file());
+}
+
 #[test]
 fn other_kinds_have_shares_or_say_that_they_have_none() {
     let shared = job(FALL);
