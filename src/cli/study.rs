@@ -48,9 +48,13 @@ pub(super) fn run(args: &StudyArgs, progress: &Progress) -> Result<u8, Failure> 
         name: name.to_string_lossy().into_owned(),
         study: Study::load_within(&args.study, bake::reach(args.allow_outside))?,
         command: format!(
-            "swell study {} -o {}",
+            "swell study {} -o {}{}",
             posix::path(&args.study),
-            posix::path(&directory)
+            posix::path(&directory),
+            match args.allow_outside {
+                true => " --allow-outside",
+                false => "",
+            }
         ),
         directory,
         chunk: args.chunk,

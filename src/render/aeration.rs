@@ -275,6 +275,28 @@ mod tests {
         }
     }
 
+    #[test]
+    fn three_parts_share_a_word() {
+        let word = packed(0.25, 1.0 / 3.0, 0.75);
+        assert_eq!(word & 0xffff, 16384);
+        assert_eq!(word >> 16 & 63, 21);
+        assert_eq!(word >> 22, 767);
+        assert_eq!(packed(0.0, 1.0, 1.0), CLEAR);
+        // One with neighbours that weigh two of the four from which on it is in company has half of it.
+        let mut particle = [at([0.0; 3], 0.0)];
+        let standing = [Standing {
+            weight: 0.5 * TORN[0],
+            is_body: false,
+            flight: 0.0,
+        }];
+        let look = SpraySpec {
+            density_per_metre: 1.0,
+            speed_m_per_s: 3.0,
+        };
+        classify(&mut particle, &standing, &look, &still(0.1));
+        assert_eq!(particle[0].air >> 16, 32);
+    }
+
     fn air(particle: &Particle) -> f32 {
         (particle.air & 0xffff) as f32 / 65535.0
     }

@@ -8,8 +8,6 @@ sources() {
     local into=$1 repository=$2 at=$3 from=$4
     shift 4
     [[ $(cat "$into.commit" 2>/dev/null) == "$at" ]] && return
-    rm -rf "$into" "$into.git"
-    mkdir -p "$into"
     if [[ $from ]]; then
         git -C "$from" cat-file -e "$at^{commit}" || {
             echo "$from is no clone of $repository with commit $at" >&2
@@ -17,10 +15,13 @@ sources() {
         }
     else
         from=$into.git
+        rm -rf "$from"
         git init --quiet --bare "$from"
         git -C "$from" fetch --quiet --depth 1 "$repository" "$at" || fail "commit $at of $repository cannot be had"
     fi
+    rm -rf "$into"
+    mkdir -p "$into"
     git -C "$from" archive "$at" -- "$@" | tar -x -C "$into"
-    rm -rf "$into.git"
+    [[ $from != "$into.git" ]] || rm -rf "$from"
     echo "$at" >"$into.commit"
 }

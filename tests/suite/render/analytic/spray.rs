@@ -410,8 +410,9 @@ const SPLAT: f64 = 0.2;
 const SPACING: f64 = 0.25;
 
 /// Of so many particles that fly at one place, in the mean over twelve times other ids: mean square distance of their spray from it along an
-/// axis of the picture, m², and the integral of a particle's optical depth over the area, m².
-fn drops(context: &Context, count: u32) -> [f64; 2] {
+/// axis of the picture, m²; the integral of a particle's optical depth over the area, m²; and mean square difference of a pixel's depth from
+/// those two pixels away, over the mean square depth.
+fn drops(context: &Context, count: u32) -> [f64; 3] {
     const DENSITY: f64 = 0.05;
     let eye = eye();
     let setup = Setup {
@@ -425,7 +426,7 @@ fn drops(context: &Context, count: u32) -> [f64; 2] {
         particle_spacing: SPACING,
         ..scene(1.0, 1.0)
     };
-    let (mut all, mut squares) = (0.0, 0.0);
+    let [mut all, mut squares, mut rough, mut depths] = [0.0; 4];
     for id in 0..12 {
         let lone = ball(eye.position + AWAY * eye.forward(), DVec3::ZERO);
         let water = Particles {
@@ -435,18 +436,24 @@ fn drops(context: &Context, count: u32) -> [f64; 2] {
             ..Particles::default()
         };
         let image = draw(context, &setup, &black_sky, &set, &water, 1);
-        for (i, pixel) in image.beauty.iter().enumerate() {
-            // A cover of 1 − exp(−τ).
-            let depth = -(1.0 - f64::from(pixel[3])).ln();
+        // A cover of 1 − exp(−τ).
+        let depth = |i: usize| -(1.0 - f64::from(image.beauty[i][3])).ln();
+        for i in 0..64 * 64 {
             let [x, y] = [i % 64, i / 64].map(|at| at as f64 + 0.5 - 32.0);
-            all += depth;
-            squares += depth * 0.5 * (x * x + y * y);
+            all += depth(i);
+            squares += depth(i) * 0.5 * (x * x + y * y);
+            if (2..62).contains(&(i % 64)) && (2..62).contains(&(i / 64)) {
+                let beside = [i - 2, i + 2, i - 128, i + 128].map(depth);
+                rough += (depth(i) - 0.25 * beside.iter().sum::<f64>()).powi(2);
+                depths += depth(i).powi(2);
+            }
         }
     }
     let pixel = AWAY / eye.focal;
     [
         squares / all * pixel * pixel,
         all / (12.0 * f64::from(count)) / DENSITY * pixel * pixel,
+        rough / depths,
     ]
 }
 
@@ -455,7 +462,7 @@ fn spray_of_a_particle_is_as_wide_as_its_ball_by_rays_and_holds_its_air() {
     let pass = "ssfr/splat_spray";
     // One that flies alone has drops and no mist; of five, each of which has four neighbours, three fifths are mist.
     for (count, of_drops, length) in [(1, 1.0, 1.5f64), (5, 0.4, 1.2)] {
-        let [square, volume] = drops(&context(), count);
+        let [square, volume, _] = drops(&context(), count);
         // R² / 5 of a ball of 1.6 radii, of which rays know; the tent over cells of two pixels by which a drop is shared out adds a sixth of
         // their square for its part of the volume, and as much for all of it that they are read linearly.
         let pixel = AWAY / 300.0;
@@ -463,8 +470,8 @@ fn spray_of_a_particle_is_as_wide_as_its_ball_by_rays_and_holds_its_air() {
         let wanted = (1.6 * SPLAT).powi(2) / 5.0 + own;
         // What a thread adds to the mean over both axes of the picture goes with 1 − z², where z is evenly in −1..1: its standard
         // deviation is 0.149 of its length's square. Its bend and four puffs off it add a tenth to that. Three of them, of the mean of
-        // twelve threads.
-        let bound = 3.0 * 1.1 * length.powi(2) * 0.149 / 12f64.sqrt();
+        // so many threads.
+        let bound = 3.0 * 1.1 * length.powi(2) * 0.149 / (12.0 * f64::from(count)).sqrt();
         let off = square / wanted - 1.0;
         assert!(off.abs() < bound, "{count}: {square} {wanted}");
         // Three twentieths of a thrown particle are spray; puffs are sampled by few cells.
@@ -478,4 +485,23 @@ fn spray_of_a_particle_is_as_wide_as_its_ball_by_rays_and_holds_its_air() {
         let control = drops(&spoiled(pass, from, to), count)[1] / air - 1.0;
         assert!(control < -0.1, "{count}: {control}");
     }
+}
+
+/// Drops are rough, mist is smooth. The control of each is a particle with mist where it flies alone, and without in company: what
+/// company a particle has then tells the other thing.
+#[test]
+fn spray_that_flies_alone_is_drops_and_spray_in_company_mist() {
+    let (from, to) = (
+        "const MIST: vec2f = vec2f(0.0, 0.6);",
+        "const MIST: vec2f = vec2f(0.6, 0.0);",
+    );
+    let rough = |count: u32| {
+        let [_, _, found] = drops(&context(), count);
+        let [_, _, other] = drops(&spoiled("ssfr/splat_spray", from, to), count);
+        found / other
+    };
+    // With three fifths of it smooth, what is rough is two fifths, and its square less than a quarter of what it was.
+    let (alone, together) = (rough(1), rough(5));
+    assert!(alone > 2.0, "{alone}");
+    assert!(together < 0.5, "{together}");
 }
