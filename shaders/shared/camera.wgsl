@@ -33,7 +33,19 @@ struct Camera {
     corner: vec2f,
     // Depth before which nothing is drawn, metres.
     near: f32,
-    pad0: f32,
+    // So many triangles of the set, the first, belong to closed bodies that the eye is outside of.
+    closed: u32,
+}
+
+// How many samples a pixel has. What a pixel's one sample would take several taps for they share out among them.
+fn sample_count(camera: Camera) -> u32 {
+    return u32(1.0 / camera.weight + 0.5);
+}
+
+// The sample's number in rounds of so many; software adapters divide integers one lane at a time.
+fn sample_in(camera: Camera, round: u32) -> u32 {
+    let index = camera.sample_index;
+    return index - u32((f32(index) + 0.5) / f32(round)) * round;
 }
 
 // Where nothing was hit. Finite, because fast-math drivers may assume that there is no infinity.

@@ -1,4 +1,4 @@
-// Colours and pictures of solids. Needs the bindings `set_triangles`, `materials` and `solid_texels` of whoever imports it.
+// Colours and pictures of solids. Needs the bindings `camera`, `set_triangles`, `materials` and `solid_texels` of whoever imports it.
 
 struct Material {
     colour: vec3f,
@@ -57,12 +57,24 @@ fn levels_for(material: Material, width: f32) -> Levels {
     return Levels(first, size, first + size.x * size.y, max(size / 2u, vec2u(1u)), fract(level));
 }
 
+// Samples from which on each takes one of the two levels, as many the second one as it counts.
+const SHARED: u32 = 4u;
+
 fn picture_at(levels: Levels, at: vec2f) -> vec3f {
-    let fine = level_at(levels.first, levels.size, at);
-    if levels.part == 0.0 {
-        return fine;
+    let samples = sample_count(camera);
+    let share = fract((f32(camera.sample_index) + 0.5) * 0.618034);
+    var sum = vec3f(0.0);
+    for (var k = 0u; k < select(2u, 1u, samples >= SHARED); k++) {
+        var is_next = k == 1u;
+        var part = select(1.0 - levels.part, levels.part, is_next);
+        if samples >= SHARED {
+            is_next = share < levels.part;
+            part = 1.0;
+        }
+        sum += part * level_at(
+            select(levels.first, levels.next, is_next), select(levels.size, levels.next_size, is_next), at);
     }
-    return mix(fine, level_at(levels.next, levels.next_size, at), levels.part);
+    return sum;
 }
 
 // What a triangle of the set is painted with, from 1 on; 0 has the look's own colour.
@@ -76,13 +88,13 @@ fn paint_of(triangle: u32) -> u32 {
 // Reflectance of a painted triangle at `p`. A pixel there is `footprint` wide across the line of sight, and longer on a face that is
 // seen at a slant: that way it is the mean of several places.
 fn painted(triangle: u32, p: vec3f, n: vec3f, view: vec3f, footprint: f32) -> vec3f {
-    let own = set_triangles[triangle];
-    let material = materials[own.paint - 1u];
+    let face = set_triangles[triangle];
+    let material = materials[face.paint - 1u];
     if material.levels == 0u {
         return material.colour;
     }
     // How the picture lies: `a` and `b` are how fast its two coordinates change, `c` is where they are the numbers beside them.
-    let lie = set_triangles[own.place];
+    let lie = set_triangles[face.place];
     let from_c = p - lie.c;
     let at = vec2f(
         bitcast<f32>(lie.material) + dot(lie.a, from_c), bitcast<f32>(lie.paint) + dot(lie.b, from_c));
@@ -107,9 +119,13 @@ fn painted(triangle: u32, p: vec3f, n: vec3f, view: vec3f, footprint: f32) -> ve
     let taps = clamp(ceil(length_of / max(length(short * size), 1.0)), 1.0, MOST_TAPS);
     let width = max(length(short * size), length_of / taps);
     let levels = levels_for(material, width);
+    // Each sample takes its part of them, between those of the others.
+    let samples = f32(sample_count(camera));
+    let own = ceil(taps / samples);
+    let part = (f32(camera.sample_index) + 0.5) / samples;
     var sum = vec3f(0.0);
-    for (var k = 0.0; k < taps; k += 1.0) {
-        sum += picture_at(levels, at + long * ((k + 0.5) / taps - 0.5));
+    for (var k = 0.0; k < own; k += 1.0) {
+        sum += picture_at(levels, at + long * ((k + part) / own - 0.5));
     }
-    return material.colour * sum / taps;
+    return material.colour * sum / own;
 }

@@ -14,3 +14,14 @@ const ROWS: u32 = 8u;
 fn row_of_group(group: vec3u, groups: vec3u, thread: vec3u) -> u32 {
     return (group.x + group.y * groups.x) * ROWS + thread.y;
 }
+
+// The same where near particles, which come first, take longer than far ones. A software adapter gives each of its threads as many groups
+// in a row: the first thread would have all that are near. So the first half has every other one.
+fn row_of_dealt_group(group: vec3u, groups: vec3u, thread: vec3u) -> u32 {
+    var place = group.x + group.y * groups.x;
+#ifdef NARROW
+    let half = (groups.x * groups.y + 1u) / 2u;
+    place = select(2u * (place - half) + 1u, 2u * place, place < half);
+#endif
+    return place * ROWS + thread.y;
+}

@@ -104,9 +104,18 @@ fn unshaded(world: vec3f, n: vec3f) -> f32 {
 
 // Air between the viewer and something at a distance takes it towards the sky's colour at the horizon there.
 fn hazed(colour: vec3f, distance: f32, direction: vec3f) -> vec3f {
-    let kept = exp(-distance / shading.haze);
+    return mix(sky_radiance(at_horizon(direction)), colour, air_between(distance));
+}
+
+// The part of the light that comes so far.
+fn air_between(distance: f32) -> f32 {
+    return exp(-distance / shading.haze);
+}
+
+// The direction at the horizon below or above another.
+fn at_horizon(direction: vec3f) -> vec3f {
     let level = normalize(vec3f(direction.x, 0.0, direction.z) + vec3f(1e-4, 0.0, 0.0));
-    return mix(sky_radiance(vec3f(level.x, 0.0, level.z)), colour, kept);
+    return vec3f(level.x, 0.0, level.z);
 }
 
 // Light that enters water or foam through a surface of this normal and is scattered, per unit albedo; `lit` of the sunlight comes to it.

@@ -23,10 +23,11 @@ fn cloud_phase(cosine: f32, lit: f32, optical_depth: f32) -> f32 {
     return mix(often, drop_phase(-cosine), unmet(CLUMPED * optical_depth));
 }
 
-// Radiance of spray over its cover, at a place, towards `view`; its near side faces `facing`. Under an even sky it is the sky's.
-fn spray_radiance(position: vec3f, view: vec3f, facing: vec3f, optical_depth: f32) -> vec3f {
+// Radiance of spray over its cover towards `view`; its near side faces `facing`, and `lit` of the sunlight comes to it. Under an even sky it
+// is the sky's.
+fn spray_radiance(view: vec3f, facing: vec3f, optical_depth: f32, lit: f32) -> vec3f {
     let phase = cloud_phase(dot(view, shading.sun_direction), dot(facing, shading.sun_direction), optical_depth);
-    let sun = shading.sun_irradiance * sunlit(position, vec3f(0.0, 1.0, 0.0)) * phase;
+    let sun = shading.sun_irradiance * lit * phase;
     // A thin cloud sees the whole sky and what is below it, a thick one what its near side looks at.
     let around = shading.irradiance[0].rgb;
     return sun + mix(around, sky_irradiance(facing), 1.0 - exp(-optical_depth)) / PI;

@@ -1,8 +1,13 @@
-// Lists of a picture's tiles: those in which there is water, and the others. Adapters that run both sides of a branch would do for each
-// pixel what water costs; a pass over one of the lists does it where there is some.
+// Lists of a picture's tiles: those in which there is water, those in which there are only solids, and the others. Adapters that run both
+// sides of a branch would do for each pixel what water costs; a pass over one of the lists does it where there is some.
 //
-// Words of a list: how many tiles have water; how many have none; then those that have, and those that have none, from the last to the first;
-// each as its column in the lower 16 bits and its row in the upper ones.
+// Words: how many tiles each of the three has; then room for all tiles, thrice, each as its column in the lower 16 bits and its row in the
+// upper ones. The first list stands at FIRST_TILE.
+const WET: u32 = 0u;
+const SET_ALONE: u32 = 1u;
+const BARE_TILES: u32 = 2u;
+const LISTS: u32 = 3u;
+const FIRST_TILE: u32 = LISTS;
 
 // Pixels of a tile of the picture, a thread each of a workgroup of the passes over lists; and cells of one of the flow, a thread for two
 // by two.

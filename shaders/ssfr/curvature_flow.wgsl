@@ -92,10 +92,10 @@ fn main(
     @builtin(local_invocation_id) thread: vec3u,
 ) {
     let place = group.x + group.y * groups.x;
-    if place >= tiles[0] {
+    if place >= tiles[WET] {
         return;
     }
-    let id = cells_of_tile(tiles[2u + place], thread);
+    let id = cells_of_tile(tiles[FIRST_TILE + place], thread);
     if any(id >= level.size) {
         return;
     }

@@ -81,10 +81,10 @@ fn main(
     @builtin(local_invocation_id) thread: vec3u,
 ) {
     let place = group.x + group.y * groups.x;
-    if place >= tiles[0] {
+    if place >= tiles[WET] {
         return;
     }
-    let first = cells_of_tile(tiles[2u + place], thread);
+    let first = cells_of_tile(tiles[FIRST_TILE + place], thread);
     let coarse = vec2i(first / 2u);
     let above = coarse_row(coarse + vec2i(0, -1));
     let same = coarse_row(coarse);

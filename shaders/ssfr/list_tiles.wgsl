@@ -1,6 +1,8 @@
-// Which tiles of a part of the frame have water, a thread a tile; with SPRAY, which have spray.
+// Which tiles of a part of the frame have water, a thread a tile, and with SOLIDS which of the others have what is opaque; with SPRAY, which
+// have spray.
 #import "shared/camera.wgsl"
 #import "shared/thread.wgsl"
+#import "shared/ssfr_tiles.wgsl"
 
 struct TileGrid {
     // First pixel of the part, and its size in pixels.
@@ -19,6 +21,9 @@ struct TileGrid {
 @group(0) @binding(1) var<storage, read> source: array<f32>;
 #endif
 @group(0) @binding(2) var<storage, read_write> tiles: array<atomic<u32>>;
+#ifdef SOLIDS
+@group(0) @binding(3) var<storage, read> solid_depth: array<f32>;
+#endif
 
 // Whether there is some in the pixels from `first` on and before `after`.
 #ifdef SPRAY
@@ -46,6 +51,18 @@ fn is_there(first: vec2u, after: vec2u) -> bool {
 }
 #endif
 
+#ifdef SOLIDS
+fn has_solids(first: vec2u, after: vec2u) -> bool {
+    var solid = FAR;
+    for (var y = first.y; y < after.y; y++) {
+        for (var x = first.x; x < after.x; x++) {
+            solid = min(solid, solid_depth[y * grid.frame.x + x]);
+        }
+    }
+    return solid < FAR;
+}
+#endif
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3u,
@@ -61,12 +78,16 @@ fn main(
     let first = tile * grid.tile;
     let after = min(first + grid.tile, grid.size);
     let word = tile.x | (tile.y << 16u);
-    // In any order: what a pass over the list does at a pixel has nothing to do with the others.
+    var kind = BARE_TILES;
     if is_there(grid.corner + first, grid.corner + after) {
-        let place = atomicAdd(&tiles[0], 1u);
-        atomicStore(&tiles[2u + place], word);
-    } else {
-        let place = atomicAdd(&tiles[1], 1u);
-        atomicStore(&tiles[1u + count.x * count.y - place], word);
+        kind = WET;
     }
+#ifdef SOLIDS
+    else if has_solids(grid.corner + first, grid.corner + after) {
+        kind = SET_ALONE;
+    }
+#endif
+    // In any order: what a pass over the list does at a pixel has nothing to do with the others.
+    let place = atomicAdd(&tiles[kind], 1u);
+    atomicStore(&tiles[FIRST_TILE + kind * count.x * count.y + place], word);
 }

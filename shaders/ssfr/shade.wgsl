@@ -7,6 +7,7 @@
 #endif
 #import "shared/ssfr_half.wgsl"
 #import "shared/ssfr_solid.wgsl"
+#import "shared/ssfr_march.wgsl"
 #import "shared/ssfr_optics.wgsl"
 #import "shared/ssfr_opaque.wgsl"
 #import "shared/ssfr_facet.wgsl"
@@ -136,7 +137,8 @@ fn solid_code(at: u32) -> u32 {
 #endif
 }
 
-fn solid_surface(at: u32, eye: vec3f, view: vec3f) -> Surface {
+// Of the solid that is seen at a pixel, at a place in the world.
+fn solid_surface(at: u32, position: vec3f, view: vec3f) -> Surface {
     let word = solid_packed[at];
 #ifdef MATERIALS
     let triangle = set_triangles[word];
@@ -146,8 +148,36 @@ fn solid_surface(at: u32, eye: vec3f, view: vec3f) -> Surface {
     let n = unpack_normal(word);
     let named = NO_TRIANGLE;
 #endif
-    return Surface(
-        world_from_eye(camera, eye), select(n, -n, dot(n, view) < 0.0), material_of(solid_code(at)), named);
+    return Surface(position, select(n, -n, dot(n, view) < 0.0), material_of(solid_code(at)), named);
+}
+
+// In place of a pixel's number: no solid is there, but the ground.
+const NO_SOLID: u32 = 0xffffffffu;
+
+// What is opaque and may have to be lit: the pixel whose solid it is, or NO_SOLID for the ground; where it is in the world, towards whom it
+// is seen, the size of a pixel there, and the metres of water above it.
+struct Seen {
+    at: u32,
+    position: vec3f,
+    view: vec3f,
+    footprint: f32,
+    under: f32,
+}
+
+fn surface_of(seen: Seen) -> Surface {
+    let ground = Surface(seen.position, vec3f(0.0, 1.0, 0.0), 2u, NO_TRIANGLE);
+#ifdef BARE
+    return ground;
+#else
+    if seen.at == NO_SOLID {
+        return ground;
+    }
+    return solid_surface(seen.at, seen.position, seen.view);
+#endif
+}
+
+fn light_of(seen: Seen) -> vec3f {
+    return radiance_of(surface_of(seen), seen.view, seen.footprint, seen.under);
 }
 
 struct Behind {
@@ -155,32 +185,38 @@ struct Behind {
     depth: f32,
     // Metres to the eye.
     far: f32,
-    surface: Surface,
+    seen: Seen,
 }
 
 // What stands at this pixel where there is no water.
 fn behind(pixel: vec2i, ray: vec3f, direction: vec3f) -> Behind {
-    let at = u32(pixel.y) * camera.size.x + u32(pixel.x);
-    let solid = solid_depth[at];
     let along = length(ray);
     let ground = ground_distance(camera.position, direction) / along;
+    var depth = ground;
+    var at = NO_SOLID;
+#ifndef BARE
+    let here = u32(pixel.y) * camera.size.x + u32(pixel.x);
+    let solid = solid_depth[here];
     if solid < min(ground, FAR) {
-        return Behind(solid, solid * along, solid_surface(at, ray * solid, -direction));
+        depth = solid;
+        at = here;
     }
-    if ground < 0.1 * FAR {
-        let far = ground * along;
-        let up = vec3f(0.0, 1.0, 0.0);
-        return Behind(ground, far, Surface(camera.position + direction * far, up, 2u, NO_TRIANGLE));
+#endif
+    if depth >= 0.1 * FAR {
+        return Behind(FAR, FAR, Seen(NO_SOLID, vec3f(0.0), -direction, 0.0, 0.0));
     }
-    return Behind(FAR, FAR, Surface(vec3f(0.0), vec3f(0.0), 3u, NO_TRIANGLE));
+    let far = depth * along;
+    return Behind(depth, far, Seen(at, camera.position + direction * far, -direction, far / camera.focal, 0.0));
 }
 
-fn behind_radiance(found: Behind, direction: vec3f) -> vec3f {
-    if found.depth < 0.1 * FAR {
-        let colour = radiance_of(found.surface, -direction, found.far / camera.focal, 0.0);
-        return hazed(colour, found.far, direction);
+// `light` is what leaves its surface, where it is none of the sky.
+fn behind_radiance(found: Behind, direction: vec3f, light: vec3f) -> vec3f {
+    let is_sky = found.depth >= 0.1 * FAR;
+    let air = sky_radiance(select(at_horizon(direction), direction, is_sky));
+    if is_sky {
+        return (air + disc_radiance(direction)) * shading.background;
     }
-    return (sky_radiance(direction) + disc_radiance(direction)) * shading.background;
+    return mix(air, light, air_between(found.far));
 }
 
 #ifndef DRY
@@ -203,73 +239,10 @@ fn through_sheet(pixel: vec2i, z: f32, straight: Behind) -> vec2i {
 }
 #endif
 
-// The padded pixel that a place in eye space is seen at.
-fn pixel_of(eye: vec3f) -> vec2i {
-    return vec2i(floor(project(camera, eye))) + vec2i(camera.corner);
-}
-
-struct March {
-    // World distance; FAR where nothing was hit.
-    distance: f32,
-    at: u32,
-    eye: vec3f,
-}
-
-// Walks a ray over the depth image of the solids. A hit lies just behind that surface, a few spacings or 1.5 steps, of which each goes
-// `deep` times as far behind it, at most; things nearer to the viewer than `nearest` stand before the water and are no hit. The hit is
-// refined after the walk and not where it is found: adapters that run both sides of a branch would refine at each step.
-fn march(origin: vec3f, direction: vec3f, reach: f32, steps: i32, growth: f32, deep: f32, nearest: f32) -> March {
-    var last = 0.0;
-    // First step of a geometric row of `steps` steps that ends at `reach`.
-    var step = reach / f32(steps);
-    if growth > 1.0 {
-        step = reach * (growth - 1.0) / (pow(growth, f32(steps)) - 1.0);
-    }
-    var next = FAR;
-    for (var i = 0; i < steps; i++) {
-        let t = last + step;
-        let q = origin + direction * t;
-        if q.z < camera.near {
-            break;
-        }
-        let pixel = pixel_of(q);
-        if any(pixel < vec2i(0)) || any(pixel >= vec2i(camera.size)) {
-            break;
-        }
-        let z = solid_depth[u32(pixel.y) * camera.size.x + u32(pixel.x)];
-        let slack = 1.5 * step;
-        if z < q.z && z > nearest - (deep - 1.0) * slack && q.z - z < 3.5 * shading.spacing + deep * slack {
-            next = t;
-            break;
-        }
-        last = t;
-        step *= growth;
-    }
-    return refine(origin, direction, last, next);
-}
-
-// What a ray meets between two distances; nothing where the second is FAR.
-fn refine(origin: vec3f, direction: vec3f, from_t: f32, to_t: f32) -> March {
-    if to_t >= FAR {
-        return March(FAR, 0u, vec3f(0.0));
-    }
-    var low = from_t;
-    var high = to_t;
-    for (var i = 0; i < 5; i++) {
-        let middle = 0.5 * (low + high);
-        let q = origin + direction * middle;
-        let pixel = clamp(pixel_of(q), vec2i(0), vec2i(camera.size) - 1);
-        let z = solid_depth[u32(pixel.y) * camera.size.x + u32(pixel.x)];
-        if z < q.z {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    let q = origin + direction * high;
-    let pixel = clamp(pixel_of(q), vec2i(0), vec2i(camera.size) - 1);
-    return March(high, u32(pixel.y) * camera.size.x + u32(pixel.x), q);
-}
+// What of opaque things a pixel may have to show: what stands behind the water, what lies in it and what it mirrors.
+const BACKDROP: u32 = 1u;
+const INTO: u32 = 2u;
+const MIRROR: u32 = 4u;
 
 struct Water {
     position: vec3f,
@@ -287,54 +260,57 @@ fn body_light(normal: vec3f, lit: f32, clear: vec3f) -> vec3f {
     return diffuse_light(normal, lit) * deep_albedo() * (1.0 - clear);
 }
 
-// Light of a solid that a mirrored ray meets, through the water and spray that stand before it from `nearest` on, as the picture has them.
-fn behind_splash(light: vec3f, found: Surface, way: vec3f, hit: March, nearest: f32) -> vec3f {
-#ifdef DRY
-    return light;
-#else
-    let place = vec2f(vec2u(hit.at % camera.size.x, hit.at / camera.size.x)) + 0.5;
-    let z = surface[hit.at];
-    let seen = select(0.0, thickness_at(place), z > nearest && z < hit.eye.z);
-    let clear = exp(-(shading.absorption + shading.scattering) * seen);
-    let lit = sunlit(found.position, vec3f(0.0, 1.0, 0.0));
-    var colour = light * clear + body_light(found.normal, lit, clear);
-#ifdef SPRAY
-    let mist = spray_at(place);
-    if mist.cover > 0.0 && mist.depth > nearest && mist.depth < hit.eye.z {
-        let facing = world_direction(camera, spray_normal(place, mist.depth));
-        let position = world_from_eye(camera, hit.eye * (mist.depth / hit.eye.z));
-        colour = mix(colour, spray_radiance(position, -way, facing, mist.optical_depth), mist.cover);
-    }
-#endif
-    return colour;
-#endif
+// What a mirrored ray meets.
+struct Mirrored {
+    way: vec3f,
+    hit: March,
+    found: Seen,
 }
 
-fn mirrored(water: Water) -> vec3f {
+fn mirrored(water: Water) -> Mirrored {
     var r = reflect(-water.view, water.normal);
     // A mirrored ray that dips into the water would hit its next wave; it is bent up to the horizon.
     r = normalize(vec3f(r.x, max(r.y, 0.01), r.z));
     let eye_r = vec3f(dot(r, camera.right), dot(r, camera.up), dot(r, camera.forward));
     let start = water.eye + 0.3 * shading.spacing * eye_r;
     let hit = march(start, eye_r, 0.56 * shading.extent, 14, 1.25, 1.0, 0.0);
-    if hit.distance < FAR {
-        let found = solid_surface(hit.at, hit.eye, -r);
-        let light = radiance_of(found, -r, hit.eye.z / camera.focal, 0.0);
-        return behind_splash(light, found, r, hit, water.eye.z);
+    return Mirrored(r, hit, Seen(hit.at, world_from_eye(camera, hit.eye), -r, hit.eye.z / camera.focal, 0.0));
+}
+
+// Light of a mirrored ray; `light` is that of the solid that it meets. Through the water and spray that stand before this from the mirror
+// on, as the picture has them; there spray faces the mirror, and the sun shines as on it.
+fn mirrored_light(met: Mirrored, water: Water, light: vec3f) -> vec3f {
+    if met.hit.distance >= FAR {
+        return sky_radiance(met.way);
     }
-    return sky_radiance(r);
+    let at = met.hit.at;
+    let place = vec2f(vec2u(at % camera.size.x, at / camera.size.x)) + 0.5;
+    let nearest = water.eye.z;
+    let z = surface[at];
+    let seen = select(0.0, thickness_at(place), z > nearest && z < met.hit.eye.z);
+    let clear = exp(-(shading.absorption + shading.scattering) * seen);
+    var colour = light * clear + body_light(vec3f(0.0, 1.0, 0.0), water.lit, clear);
+#ifdef SPRAY
+    let mist = spray_at(place);
+    if mist.depth > nearest && mist.depth < met.hit.eye.z {
+        colour = mix(colour, spray_radiance(-met.way, -met.way, mist.optical_depth, water.lit), mist.cover);
+    }
+#endif
+    return colour;
 }
 
-// Light that comes up through the surface.
-struct Through {
-    // From what stands behind.
-    seen: vec3f,
-    // That the water scattered.
-    scattered: vec3f,
+// What a ray that is bent into the water meets.
+struct Bent {
+    found: Seen,
+    // Metres of water on its way.
+    way: f32,
+    // 1 where it meets what is opaque in the water, 0 where the water ends well before: a sheet or a crest, through which one looks on
+    // almost straight.
+    filled: f32,
 }
 
-// `seen` metres of water lie on the straight line of sight, and behind them the light of `backdrop`.
-fn transmitted(water: Water, seen: f32, backdrop: vec3f) -> Through {
+// `seen` metres of water lie on the straight line of sight.
+fn bent(water: Water, seen: f32) -> Bent {
     let n = shading.index;
     let ci = clamp(dot(water.normal, water.view), 0.0, 1.0);
     let ct = sqrt(max(1.0 - (1.0 - ci * ci) / (n * n), 0.0));
@@ -343,8 +319,7 @@ fn transmitted(water: Water, seen: f32, backdrop: vec3f) -> Through {
     let path = seen * max(ci, 0.3) / ct;
 
     var reach = ground_distance(water.position, t);
-    var floor_point = water.position + t * min(reach, endless());
-    var found = Surface(floor_point, vec3f(0.0, 1.0, 0.0), 2u, NO_TRIANGLE);
+    var at = NO_SOLID;
     let eye_t = vec3f(dot(t, camera.right), dot(t, camera.up), dot(t, camera.forward));
     let far = min(reach, 1.4 * seen + 1.8 * shading.spacing);
     // Below a level ground a step that goes down steeply is as much farther from it along a flat line of sight as that is flatter.
@@ -352,30 +327,18 @@ fn transmitted(water: Water, seen: f32, backdrop: vec3f) -> Through {
     let hit = march(water.eye, eye_t, far, 8, 1.0, deep, water.eye.z - 0.6 * shading.spacing);
     if hit.distance < reach {
         reach = hit.distance;
-        found = solid_surface(hit.at, hit.eye, -t);
+        at = hit.at;
     }
-    // Water that ends well before the ray meets anything: a sheet or a crest, through which one looks on
-    // almost straight.
     let filled = smoothstep(0.2, 0.5, seen / max(reach, 0.006 * shading.spacing));
-    let way = mix(path, min(reach, endless()), filled);
-    var light = vec3f(0.0);
-    if filled < 1.0 {
-        light += backdrop * (1.0 - filled);
-    }
-    if filled > 0.0 {
-        let depth = max(water.position.y - found.position.y, 0.0);
-        light += radiance_of(found, -t, water.eye.z / camera.focal, depth) * filled;
-    }
-    let extinction = shading.absorption + shading.scattering;
-    let clear = exp(-extinction * way);
-    return Through(light * clear, body_light(water.normal, water.lit, clear));
+    let straight = min(reach, endless());
+    let position = water.position + t * straight;
+    let under = max(water.position.y - position.y, 0.0);
+    return Bent(Seen(at, position, -t, water.eye.z / camera.focal, under), mix(path, straight, filled), filled);
 }
 
 // Water `z` metres along the optical axis, whose normal is `smooth_normal` but for ripples; `lost` is the mean square slope of waves that
 // a pixel there cannot hold.
-fn shade_water(
-    z: f32, ray: vec3f, view: vec3f, smooth_normal: vec3f, lost: f32, seen: f32, backdrop: vec3f,
-) -> vec3f {
+fn water_at(z: f32, ray: vec3f, view: vec3f, smooth_normal: vec3f, lost: f32) -> Water {
     let eye = ray * z;
     let position = world_from_eye(camera, eye);
     var normal = smooth_normal;
@@ -384,18 +347,24 @@ fn shade_water(
     // No facet that is seen faces away.
     normal = normalize(facet.normal + view * max(0.03 - dot(facet.normal, view), 0.0) * 1.5);
     let lit = sunlit(position, vec3f(0.0, 1.0, 0.0));
-    let water = Water(position, eye, normal, view, facet.variance + lost, lit);
+    return Water(position, eye, normal, view, facet.variance + lost, lit);
+}
 
-    let reflectance = fresnel(clamp(dot(normal, view), 0.0, 1.0), shading.index);
-    let sun = shading.sun_irradiance * lit
-        * glitter(normal, view, shading.sun_direction, water.slope_variance, shading.index);
-    let mirror = reflectance * mirrored(water);
-    let through = transmitted(water, seen, backdrop);
+// Light of water that mirrors `mirrored`, and through which comes `behind`, dimmed by the water on its way.
+fn water_light(water: Water, mirrored: vec3f, behind: vec3f, way: f32) -> vec3f {
+    let reflectance = fresnel(clamp(dot(water.normal, water.view), 0.0, 1.0), shading.index);
+    let sun = shading.sun_irradiance * water.lit
+        * glitter(water.normal, water.view, shading.sun_direction, water.slope_variance, shading.index);
+    let extinction = shading.absorption + shading.scattering;
+    let clear = exp(-extinction * way);
+    let seen = behind * clear;
+    let scattered = body_light(water.normal, water.lit, clear);
+    let mirror = reflectance * mirrored;
     light_part(REFLECTION, mirror);
-    light_part(REFRACTION, (1.0 - reflectance) * through.seen);
-    light_part(SCATTERING, (1.0 - reflectance) * through.scattered);
+    light_part(REFRACTION, (1.0 - reflectance) * seen);
+    light_part(SCATTERING, (1.0 - reflectance) * scattered);
     light_part(SUN, sun);
-    return mirror + (1.0 - reflectance) * (through.seen + through.scattered) + sun;
+    return mirror + (1.0 - reflectance) * (seen + scattered) + sun;
 }
 
 // The parts of `behind_radiance`, which is `colour`.
@@ -412,6 +381,19 @@ fn behind_parts(found: Behind, direction: vec3f, colour: vec3f) {
 #endif
 }
 
+#ifdef LISTED
+// Which list of tiles is gone through.
+#ifdef BARE
+const LIST: u32 = BARE_TILES;
+#else
+#ifdef DRY
+const LIST: u32 = SET_ALONE;
+#else
+const LIST: u32 = WET;
+#endif
+#endif
+#endif
+
 @compute @workgroup_size(16, 4)
 #ifdef LISTED
 fn main(
@@ -420,17 +402,11 @@ fn main(
     @builtin(local_invocation_id) thread: vec3u,
 ) {
     let place = group.x + group.y * groups.x;
-#ifdef DRY
-    if place >= tiles[1] {
+    if place >= tiles[LIST] {
         return;
     }
-    let id = pixel_of_tile(tiles[1u + tiles[0] + tiles[1] - place], thread, camera.margin + vec2u(0u, band.row));
-#else
-    if place >= tiles[0] {
-        return;
-    }
-    let id = pixel_of_tile(tiles[2u + place], thread, camera.margin + vec2u(0u, band.row));
-#endif
+    let all = tiles[WET] + tiles[SET_ALONE] + tiles[BARE_TILES];
+    let id = pixel_of_tile(tiles[FIRST_TILE + LIST * all + place], thread, camera.margin + vec2u(0u, band.row));
 #else
 fn main(@builtin(global_invocation_id) id: vec3u) {
 #endif
@@ -485,42 +461,49 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let seen = straight.depth < 0.1 * FAR;
-    let next = select(sky_in_next(direction), eye_from_world(next_camera, straight.surface.position), seen);
+    let surface = surface_of(straight.seen);
+    let next = select(sky_in_next(direction), eye_from_world(next_camera, surface.position), seen);
     let motion = motion_to(next, pixel);
-    store_under(over, out, straight.depth, straight.surface.normal, straight.surface.position, motion, through);
+    let normal = select(vec3f(0.0), surface.normal, seen);
+    store_under(over, out, straight.depth, normal, surface.position, motion, through);
 #else
     var cover = 0.0;
 #ifdef SPRAY
     cover = spray_at(vec2f(pixel) + 0.5).cover;
 #endif
 #ifdef OBJECTS
-    var object = straight.surface.material;
 #ifdef SEA
     let has_water = wet || beside;
 #else
     let has_water = wet;
 #endif
+    // The sky, the ground or a solid.
+    var object = 3u;
     if has_water {
         object = 0u;
-    } else if straight.depth < 0.1 * FAR && object != 2u {
-        object = solid_code(at);
+    } else if straight.depth < 0.1 * FAR {
+        object = 2u;
+        if straight.seen.at != NO_SOLID {
+            object = solid_code(at);
+        }
     }
     output[out] = vec2u(object, bitcast<u32>(cover));
 #else
-    var met = straight;
-    var way = direction;
-#ifndef DRY
-    if wet {
-        let bent = through_sheet(pixel, z, straight);
-        let bent_ray = eye_ray(camera, vec2f(bent) + 0.5);
-        way = normalize(world_direction(camera, bent_ray));
-        met = behind(bent, bent_ray, way);
-    }
-#endif
-    // Whatever stands here: an adapter that runs both sides of a branch would come by it twice, through water and without.
-    let backdrop = behind_radiance(met, way);
     var colour: vec3f;
     var alpha = 1.0;
+#ifdef DRY
+    let light = light_of(straight.seen);
+    let is_water = false;
+    let backdrop = behind_radiance(straight, direction, light);
+#else
+    var met = straight;
+    var way = direction;
+    if wet {
+        let aside = through_sheet(pixel, z, straight);
+        let aside_ray = eye_ray(camera, vec2f(aside) + 0.5);
+        way = normalize(world_direction(camera, aside_ray));
+        met = behind(aside, aside_ray, way);
+    }
     var depth = z;
     var is_water = wet;
     var lost = 0.0;
@@ -531,15 +514,56 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         lost = open.variance;
     }
 #endif
+    // What of it is to be lit, a bit each.
+    var wanted = select(0u, BACKDROP, met.depth < 0.1 * FAR);
+    var water: Water;
+    var mirror: Mirrored;
+    var into: Bent;
     if is_water {
         var normal = world_direction(camera, surface_normal(pixel, z));
 #ifdef SEA
         normal = select(normal, open.normal, beside);
 #endif
+        water = water_at(depth, ray, view, normal, lost);
+        mirror = mirrored(water);
+        into = bent(water, through);
+        wanted = select(0u, wanted, into.filled < 1.0) | select(0u, INTO, into.filled > 0.0)
+            | select(0u, MIRROR, mirror.hit.distance < FAR);
+    }
+    // One after the other: adapters that run both sides of a branch leave a loop when none of their pixels has more to do, and most have
+    // one or two of the three.
+    var light_behind = vec3f(0.0);
+    var light_into = vec3f(0.0);
+    var light_mirrored = vec3f(0.0);
+    while wanted != 0u {
+        let which = wanted & (0u - wanted);
+        var seen = met.seen;
+        if which == INTO {
+            seen = into.found;
+        } else if which == MIRROR {
+            seen = mirror.found;
+        }
+        let light = light_of(seen);
+        if which == BACKDROP {
+            light_behind = light;
+        } else if which == INTO {
+            light_into = light;
+        } else {
+            light_mirrored = light;
+        }
+        wanted &= wanted - 1u;
+    }
+    let backdrop = behind_radiance(met, way, light_behind);
+#endif
+    if is_water {
+#ifndef DRY
         let far = depth * length(ray);
-        colour = hazed(shade_water(depth, ray, view, normal, lost, through, backdrop), far, direction);
+        let mirror_light = mirrored_light(mirror, water, light_mirrored);
+        let behind_light = mix(backdrop, light_into, into.filled);
+        colour = hazed(water_light(water, mirror_light, behind_light, into.way), far, direction);
         dim_parts(exp(-far / shading.haze));
         light_part(SKYLIGHT, hazed(vec3f(0.0), far, direction));
+#endif
     } else if HOLDS_OUT && straight.depth < 0.1 * FAR {
         alpha = 0.0;
     } else {

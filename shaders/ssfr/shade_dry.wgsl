@@ -1,2 +1,2 @@
-// Pixels of tiles without water: as for the picture, with DRY.
+// Pixels of tiles with solids and without water: as for the picture, with DRY.
 #import "ssfr/shade.wgsl"

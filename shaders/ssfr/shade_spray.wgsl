@@ -26,10 +26,10 @@ fn main(
     @builtin(local_invocation_id) thread: vec3u,
 ) {
     let place = group.x + group.y * groups.x;
-    if place >= tiles[0] {
+    if place >= tiles[WET] {
         return;
     }
-    let id = pixel_of_tile(tiles[2u + place], thread, camera.margin + vec2u(0u, band.row));
+    let id = pixel_of_tile(tiles[FIRST_TILE + place], thread, camera.margin + vec2u(0u, band.row));
     if id.x >= camera.picture.x || id.y >= band.rows {
         return;
     }
@@ -42,7 +42,8 @@ fn main(
     let direction = normalize(world_direction(camera, ray));
     let far = mist.depth * length(ray);
     let facing = world_direction(camera, spray_normal(pixel, mist.depth));
-    let light = spray_radiance(camera.position + direction * far, -direction, facing, mist.optical_depth);
+    let lit = sunlit(camera.position + direction * far, vec3f(0.0, 1.0, 0.0));
+    let light = spray_radiance(-direction, facing, mist.optical_depth, lit);
     let white = hazed(light, far, direction);
     white_parts(pixel, white, mist.cover);
     store_light(id.y * camera.picture.x + id.x, vec4f(white, 1.0) * mist.cover, camera.weight, false);

@@ -55,6 +55,10 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     } else if out.range.y <= camera.near {
         high = vec2f(0.0);
     }
+    // Of a closed body the sides towards the eye hide the others.
+    if index / 6u < camera.closed && dot(normal, a) > 0.0 {
+        high = low;
+    }
     let k = index % 6u;
     let right = k == 1u || k == 2u || k == 4u;
     let bottom = k == 2u || k == 4u || k == 5u;

@@ -26,7 +26,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) thread: vec3u,
 ) {
-    let index = row_of_group(group, groups, thread);
+    let index = row_of_dealt_group(group, groups, thread);
     if index >= page.count {
         return;
     }

@@ -153,7 +153,7 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_id) thread: vec3u,
 ) {
-    let place = row_of_group(group, groups, thread);
+    let place = row_of_dealt_group(group, groups, thread);
     if place >= page.aired_count {
         return;
     }

@@ -1,4 +1,5 @@
-// Workgroups of the dispatches over a list of tiles: one each for those with water, and for those without.
+// Workgroups of the dispatches over lists of tiles: one for each list.
+#import "shared/ssfr_tiles.wgsl"
 
 @group(0) @binding(0) var<storage, read> tiles: array<u32>;
 @group(0) @binding(1) var<storage, read_write> tile_groups: array<vec4u>;
@@ -8,7 +9,7 @@ const MOST_GROUPS: u32 = 65535u;
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) which: u32) {
-    if which >= 2u {
+    if which >= LISTS {
         return;
     }
     let count = tiles[which];

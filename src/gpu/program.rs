@@ -343,7 +343,10 @@ pub(super) fn source(
     if let Some(spoil) = context.spoil {
         if spoil.pass == name {
             source.text = spoiled(&source.text, &spoil)?;
-        } else if name.strip_suffix("_dry") == Some(spoil.pass) {
+        } else if ["_dry", "_bare"]
+            .map(|end| name.strip_suffix(end))
+            .contains(&Some(spoil.pass))
+        {
             source.text = source.text.replace(spoil.from, spoil.to);
         }
     }

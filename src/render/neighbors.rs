@@ -17,7 +17,8 @@ pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
 
 /// What neighbours of each particle weigh in all, at most [`ENOUGH`].
 pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
-    let [near, reach] = NEAR.map(|part| part * spacing);
+    let span = NEAR.map(|part| part * spacing);
+    let reach = span[1];
     let cell = |p: &[f32; 3]| p.map(|x| (x / reach).floor() as i32);
     // Sorted by cell, with z the fastest: three cells of a column are one contiguous run.
     let mut order: Vec<([i32; 3], u32)> = positions
@@ -30,31 +31,13 @@ pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
         .par_iter()
         .map(|&(_, index)| positions[index as usize])
         .collect();
-    let weight = |place: usize, columns: &[Range<usize>; 9]| {
-        let p = sorted[place];
-        let mut sum = 0.0;
-        for column in columns {
-            for other in column.clone() {
-                let q = sorted[other];
-                let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-                let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                if square < reach * reach && other != place {
-                    sum += 1.0 - smoothstep(near, reach, square.sqrt());
-                    if sum >= ENOUGH {
-                        return ENOUGH;
-                    }
-                }
-            }
-        }
-        sum
-    };
-    // A cell's particles have the same columns about them.
+    // A cell's particles have the same others about them.
     let found: Vec<f32> = order
         .par_chunk_by(|a, b| a.0 == b.0)
-        .flat_map_iter(|cell| {
-            let columns = columns(&order, cell[0].0);
-            let first = order.partition_point(|&(key, _)| key < cell[0].0);
-            (first..first + cell.len()).map(move |place| weight(place, &columns))
+        .flat_map_iter(|own| {
+            let about = About::cell(own[0].0, &order, &sorted, reach);
+            let of = |&(_, index): &([i32; 3], u32)| about.weight(positions[index as usize], span);
+            own.iter().map(of).collect::<Vec<f32>>()
         })
         .collect();
     let mut weights = vec![0.0; positions.len()];
@@ -62,6 +45,57 @@ pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
         weights[*index as usize] = weight;
     }
     weights
+}
+
+/// Places that are worked on at once: as many as processors have room for in two of their registers.
+const LANES: usize = 8;
+
+/// Places of a cell and about it, an axis each, filled up to whole lanes with some that weigh nothing.
+struct About([Vec<f32>; 3]);
+
+impl About {
+    /// Of all that are within `reach` of some place in a cell of that edge.
+    fn cell(cell: [i32; 3], order: &[([i32; 3], u32)], sorted: &[[f32; 3]], reach: f32) -> Self {
+        // A cell's edges are rounded.
+        let far = 1.001 * reach;
+        let low = cell.map(|c| c as f32 * reach);
+        let columns = columns(order, cell);
+        let most = columns.iter().map(Range::len).sum::<usize>() + LANES;
+        let mut about = Self([0; 3].map(|_| Vec::with_capacity(most)));
+        for place in columns.into_iter().flat_map(|run| &sorted[run]) {
+            let beside = [0, 1, 2].map(|axis| {
+                let off = place[axis] - low[axis];
+                (-off).max(off - reach).max(0.0)
+            });
+            if beside.iter().map(|d| d * d).sum::<f32>() < far * far {
+                for (of, x) in about.0.iter_mut().zip(place) {
+                    of.push(*x);
+                }
+            }
+        }
+        let whole = about.0[0].len().next_multiple_of(LANES);
+        for of in &mut about.0 {
+            of.resize(whole, f32::INFINITY);
+        }
+        about
+    }
+
+    /// What those about one of them weigh: 1 up to the first of these distances, and nothing from the second on.
+    fn weight(&self, [px, py, pz]: [f32; 3], [near, reach]: [f32; 2]) -> f32 {
+        let scale = 1.0 / (reach - near);
+        let mut sums = [0.0; LANES];
+        let [xs, ys, zs] = (self.0).each_ref().map(|of| of.as_chunks::<LANES>().0);
+        for ((x, y), z) in xs.iter().zip(ys).zip(zs) {
+            for lane in 0..LANES {
+                let d = [px - x[lane], py - y[lane], pz - z[lane]];
+                let square: f32 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                let t = ((square.sqrt() - near) * scale).clamp(0.0, 1.0);
+                sums[lane] += 1.0 - t * t * (3.0 - 2.0 * t);
+            }
+        }
+        // It is no neighbour of its own.
+        (sums.iter().sum::<f32>() - 1.0).min(ENOUGH)
+    }
 }
 
 /// Where in `order` the particles of the nine columns of three cells about a cell stand.

@@ -216,7 +216,7 @@ fn quays(basin: &BasinSpec, size: DVec3, gap: f64) -> Vec<[DVec3; 2]> {
 }
 
 /// Twelve triangles, counter-clockwise from outside.
-fn box_triangles(low: DVec3, high: DVec3) -> Vec<[DVec3; 3]> {
+pub(super) fn box_triangles(low: DVec3, high: DVec3) -> Vec<[DVec3; 3]> {
     let corner = |i: usize| {
         DVec3::new(
             if i & 1 == 0 { low.x } else { high.x },

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{RenderError, buffers::FILLS, frame::Extent, uniform::Fill};
+use super::{RenderError, buffers::FILLS, closed::Closed, frame::Extent, uniform::Fill};
 use crate::gpu::{
     adapter::Context,
     buffer::{Buf, Element, Windows},
@@ -77,6 +77,7 @@ pub struct Plan {
     pub(super) stride: usize,
     /// Of a splat, metres.
     pub(super) radius: f64,
+    pub(super) closed: Closed,
     pub(super) defines: BTreeMap<&'static str, Vec<&'static str>>,
     pub(super) constants: BTreeMap<&'static str, Vec<(&'static str, f64)>>,
     pub(super) fills: Vec<Fill>,

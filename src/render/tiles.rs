@@ -1,8 +1,8 @@
-//! Lists of a picture's tiles: those in which there is water or spray, and the others, so that what only that needs is done where there is
-//! some.
+//! Lists of a picture's tiles: those in which there is water or spray, those with solids alone, and the others, so that what only that needs
+//! is done where there is some.
 
 use super::{
-    buffers::{SPRAY, tile_groups, tiles},
+    buffers::{SOLID_DEPTH, SPRAY, tile_groups, tiles},
     plan::Plan,
     uniform::TileGrid,
 };
@@ -20,6 +20,10 @@ pub(super) const FLOW_TILE: [u32; 2] = [2 * WORKGROUP[0], 2 * WORKGROUP[1]];
 
 /// What lists the tiles with spray.
 const LIST_SPRAY: &str = "ssfr/list_spray";
+/// What lists the tiles with water, and those of the others that have solids.
+const LIST_PICTURE: &str = "ssfr/list_picture";
+/// Lists of a part of the frame: `LISTS` of shared/ssfr_tiles.wgsl.
+const LISTS: usize = 3;
 
 /// A list, and the workgroups of dispatches over it.
 pub(super) struct Tiles {
@@ -35,14 +39,29 @@ impl Tiles {
         grid: TileGrid,
         source: &Buf<f32>,
     ) -> (Self, Vec<Command>) {
-        let source = Bind::whole("source", source);
+        let source = vec![Bind::whole("source", source)];
         Self::plan(plan, name, grid, ("ssfr/list_tiles", source))
+    }
+
+    /// The same, where tiles of the picture with solids have a list of their own.
+    pub(super) fn of_picture(
+        plan: &mut Plan,
+        name: &str,
+        grid: TileGrid,
+        source: &Buf<f32>,
+    ) -> (Self, Vec<Command>) {
+        plan.define(LIST_PICTURE, "SOLIDS");
+        let binds = vec![
+            Bind::whole("source", source),
+            Bind::whole("solid_depth", &SOLID_DEPTH),
+        ];
+        Self::plan(plan, name, grid, (LIST_PICTURE, binds))
     }
 
     /// Plans the list of a part of the frame by spray, and gives what makes it from the sums of splats.
     pub(super) fn of_spray(plan: &mut Plan, name: &str, grid: TileGrid) -> (Self, Vec<Command>) {
         plan.define(LIST_SPRAY, "SPRAY");
-        let source = Bind::whole("source", &SPRAY);
+        let source = vec![Bind::whole("source", &SPRAY)];
         Self::plan(plan, name, grid, (LIST_SPRAY, source))
     }
 
@@ -50,18 +69,18 @@ impl Tiles {
         plan: &mut Plan,
         name: &str,
         grid: TileGrid,
-        (pass, source): (&'static str, Bind),
+        (pass, sources): (&'static str, Vec<Bind>),
     ) -> (Self, Vec<Command>) {
         let count = count(grid.size, grid.tile);
         let made = Self {
             list: tiles(name),
             groups: tile_groups(name),
         };
-        plan.buffer(&made.list, 2 + count);
-        plan.buffer(&made.groups, 2);
+        plan.buffer(&made.list, LISTS + LISTS * count);
+        plan.buffer(&made.groups, LISTS);
         let grids = Windows::named("grid", format!("tile_grid.{name}"));
         plan.windows(&grids, &[grid]);
-        let list = vec![grids.bind(0), source, made.bind()];
+        let list = [sources, vec![grids.bind(0), made.bind()]].concat();
         let spread = vec![made.bind(), Bind::whole("tile_groups", &made.groups)];
         let commands = vec![
             Command::clear(&made.list),
@@ -81,9 +100,14 @@ impl Tiles {
         Groups::at(&self.groups, 0)
     }
 
-    /// Of a pass over those without.
+    /// Of a pass over those without, that have solids.
     pub(super) fn dry(&self) -> Groups {
         Groups::at(&self.groups, 1)
+    }
+
+    /// Of a pass over those that have neither.
+    pub(super) fn bare(&self) -> Groups {
+        Groups::at(&self.groups, 2)
     }
 }
 
@@ -91,7 +115,7 @@ impl Tiles {
 /// pass over it.
 pub(super) fn every_tile(plan: &mut Plan, name: &str, size: [u32; 2]) -> (Groups, Bind) {
     let [across, down] = counts(size, FLOW_TILE);
-    let mut words = vec![across * down, 0];
+    let mut words = vec![across * down, 0, 0];
     words.extend((0..down).flat_map(|y| (0..across).map(move |x| x | y << 16)));
     let list = tiles(name);
     plan.values(&list, &words);
@@ -125,6 +149,7 @@ mod tests {
             ("ssfr/flow_prolong", &[]),
             ("ssfr/shade", &["LISTED"]),
             ("ssfr/shade_dry", &["LISTED", "DRY"]),
+            ("ssfr/shade_bare", &["LISTED", "DRY", "BARE"]),
             ("ssfr/shade_spray", &[]),
         ];
         for (pass, defines) in passes {
@@ -144,7 +169,7 @@ mod tests {
         assert_eq!(groups, Groups::Threads(16 * 9));
         let words: &[u32] = bytemuck::cast_slice(&plan.contents[0].1);
         let tiles = [0, 1, 2].map(|y| [0, 1, 2].map(|x| x | y << 16));
-        assert_eq!(words[..2], [9, 0]);
-        assert_eq!(words[2..], *tiles.as_flattened());
+        assert_eq!(words[..LISTS], [9, 0, 0]);
+        assert_eq!(words[LISTS..], *tiles.as_flattened());
     }
 }

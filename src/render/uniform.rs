@@ -26,7 +26,7 @@ mirror!(
         frame_seconds: f32,
         corner: [f32; 2],
         near: f32,
-        pad0: f32,
+        closed: u32,
     }
 );
 

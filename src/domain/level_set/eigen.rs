@@ -4,6 +4,8 @@ use glam::{DMat3, DVec3};
 
 /// Sweeps of Jacobi's rotations: they converge quadratically, and five leave less than f64's rounding of any 3 × 3 matrix.
 const SWEEPS: usize = 6;
+/// Part of the diagonal below which what stands beside it changes no value and turns no vector by more than a rounding.
+const NEGLIGIBLE: f64 = 0.1 * f64::EPSILON;
 
 /// Eigenvalues of a symmetric matrix in no order, and the eigenvectors as columns, by Jacobi's rotations (Golub and Van Loan,
 /// Matrix Computations, section 8.5).
@@ -12,7 +14,8 @@ pub fn symmetric(matrix: DMat3) -> (DVec3, DMat3) {
     let mut vectors = DMat3::IDENTITY.to_cols_array_2d();
     for _ in 0..SWEEPS {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
+            // What is left of it is less than the values are rounded by.
+            if a[p][q].abs() <= NEGLIGIBLE * (a[p][p].abs() + a[q][q].abs()) {
                 continue;
             }
             let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);

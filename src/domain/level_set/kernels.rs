@@ -51,12 +51,16 @@ impl Ellipsoid {
         self.peak * (1.0 - q.length_squared()).max(0.0).powi(3)
     }
 
-    /// ∇ of [`Self::value`], 1/m.
-    fn gradient(&self, x: DVec3) -> DVec3 {
+    /// [`Self::value`], and its ∇, 1/m.
+    fn value_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         let q = self.inverse * (x - self.centre);
         let s = (1.0 - q.length_squared()).max(0.0);
+        if s == 0.0 {
+            return (0.0, DVec3::ZERO);
+        }
         // G is symmetric.
-        self.inverse * q * (-6.0 * self.peak * s * s)
+        let gradient = self.inverse * q * (-6.0 * self.peak * s * s);
+        (self.peak * s.powi(3), gradient)
     }
 
     /// Half axes in metres along the columns of `turn`, of a particle of `volume` m³.
@@ -174,8 +178,9 @@ impl Field<'_> {
         let (mut sum, mut slope) = (0.0, DVec3::ZERO);
         let ellipsoids = &self.kernels.ellipsoids;
         self.grid.for_each_near(x, |k| {
-            sum += ellipsoids[k].value(x);
-            slope += ellipsoids[k].gradient(x);
+            let (value, gradient) = ellipsoids[k].value_and_gradient(x);
+            sum += value;
+            slope += gradient;
         });
         let level = self.kernels.level;
         (sum / level - 1.0, slope / level)
@@ -186,7 +191,7 @@ impl Field<'_> {
         let mut sum = DVec3::ZERO;
         let ellipsoids = &self.kernels.ellipsoids;
         self.grid
-            .for_each_near(x, |k| sum += ellipsoids[k].gradient(x));
+            .for_each_near(x, |k| sum += ellipsoids[k].value_and_gradient(x).1);
         sum / self.kernels.level
     }
 }

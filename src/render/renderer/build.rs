@@ -15,6 +15,7 @@ use crate::{
         },
         camera::longest_focal_px,
         caustics::{map_values, plan_caustics},
+        closed::Closed,
         frame::{Extent, bands},
         lighting::{plan_light, shading},
         materials::plan_materials,
@@ -74,6 +75,7 @@ impl Plan {
             plan.buffer(&NEXT_CAMERA, 1);
         }
         let mut opaque = Opaque::new(look, scene)?;
+        plan.closed = Closed::put_first(&mut opaque.triangles);
         let places = opaque.placed();
         let Opaque {
             triangles,
@@ -94,6 +96,7 @@ impl Plan {
             MethodSpec::Ssfr => &[
                 "ssfr/shade",
                 "ssfr/shade_dry",
+                "ssfr/shade_bare",
                 "ssfr/shade_aovs",
                 "ssfr/shade_objects",
             ][..],

@@ -19,11 +19,13 @@ use crate::{
             AIRED, AIRED_GROUPS, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES,
             SPRAY_PARAMS,
         },
-        camera::pose,
+        camera::{camera, pose},
         hidden::hidden,
+        in_frame::in_frame,
         lighting::spray_density,
         paths::{Path, paths},
         plan::per_particle,
+        samples::{Sample, samples_of},
         shapes::shapes,
         uniform::{Page, Particle, SprayParams},
     },
@@ -38,12 +40,29 @@ const FEW: usize = 6;
 const CLOSE: f64 = 2.5;
 
 /// A frame that stands on the device.
+#[derive(Default)]
 pub(super) struct Loaded {
-    /// Its particles.
+    /// Its particles, but for those beside it.
     pub(super) count: u32,
     /// They again, with the mean velocity of their way to the next frame: for the channels beside the picture, where one asks for
     /// motion and there is a next frame.
     pub(super) ahead: Vec<Particle>,
+}
+
+/// What becomes of a particle's splats.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Class {
+    Seen,
+    /// Others hide it: it adds to the thickness alone.
+    Hidden,
+    /// It changes no pixel.
+    Beside,
+}
+
+/// How many of the first particles of a sorted frame may be seen, and how many are in it at all.
+struct Order {
+    seen: usize,
+    in_frame: usize,
 }
 
 impl Renderer {
@@ -85,13 +104,18 @@ impl Renderer {
                 moment.white,
             );
         }
-        let count = packed.len() as u32;
         self.load_spray(frame, moment);
         if !self.program.has(PARTICLES.name()) {
-            let ahead = Vec::new();
-            return Ok(Loaded { count, ahead });
+            return Ok(Loaded::default());
         }
-        let seen = self.sort(frame, &mut packed, &mut ways);
+        let order = self.sort(frame, &mut packed, &mut ways);
+        let shapes = match self.program.has(SHAPES.name()) {
+            true => shapes(&packed, order.seen, &self.scene, self.plan.radius),
+            false => Vec::new(),
+        };
+        packed.truncate(order.in_frame);
+        ways.truncate(order.in_frame);
+        let (count, seen) = (packed.len() as u32, order.seen);
         self.reserve(packed.len())?;
         let aired = self.load_aired(&packed);
         let pages = self.pages();
@@ -109,8 +133,7 @@ impl Renderer {
         }
         self.program.upload(PARTICLES, 0, &packed);
         if self.program.has(SHAPES.name()) {
-            let shapes = shapes(&packed, seen, &self.scene, self.plan.radius);
-            self.program.upload(SHAPES, 0, &shapes);
+            self.program.upload(SHAPES, 0, &shapes[..packed.len()]);
         }
         if self.program.has(PATHS.name()) {
             let packed: Vec<_> = ways.iter().map(Path::packed).collect();
@@ -183,25 +206,35 @@ impl Renderer {
         Ok(packed)
     }
 
-    /// First those that may be seen, and says how many; front to back, so that splats find what hides them already there.
-    fn sort(&self, frame: u32, packed: &mut Vec<Particle>, ways: &mut Vec<Path>) -> usize {
+    /// First those that may be seen, then those that others hide, then those beside the frame; front to back, so that splats find what
+    /// hides them already there.
+    fn sort(&self, frame: u32, packed: &mut Vec<Particle>, ways: &mut Vec<Path>) -> Order {
         let rate = self.scene.frames_per_second;
         let forward = pose(&self.look, frame.into(), rate).forward.as_vec3();
         let depth = |p: &Particle| Vec3::from(p.position).dot(forward);
+        let spacing = self.scene.particle_spacing;
         // Rays may begin under water, where what the water hides from above is seen.
         let hidden = match self.look.spec().renderer.method {
-            MethodSpec::Ssfr => hidden(
-                packed,
-                self.scene.domain.size(),
-                self.scene.particle_spacing,
-            ),
+            MethodSpec::Ssfr => hidden(packed, self.scene.domain.size(), spacing),
             MethodSpec::Ray => vec![false; packed.len()],
         };
-        let mut order: Vec<(bool, f32, u32, u32)> = (0u32..packed.len() as u32)
+        let setting = self.setting(0);
+        let samples = [vec![Sample::STILL], samples_of(&self.look)].concat();
+        let cameras = samples
+            .into_iter()
+            .map(|sample| camera(&self.look, &setting, frame.into(), sample, 0));
+        let cameras: Vec<_> = cameras.collect();
+        let in_frame = in_frame(packed, ways, &cameras, spacing as f32);
+        let class = |index: usize| match (in_frame[index], hidden[index]) {
+            (true, false) => Class::Seen,
+            (true, true) => Class::Hidden,
+            (false, _) => Class::Beside,
+        };
+        let mut order: Vec<(Class, f32, u32, u32)> = (0u32..packed.len() as u32)
             .into_par_iter()
             .map(|index| {
                 let particle = &packed[index as usize];
-                (hidden[index as usize], depth(particle), particle.tag, index)
+                (class(index as usize), depth(particle), particle.tag, index)
             })
             .collect();
         order.par_sort_unstable_by(|a, b| {
@@ -213,7 +246,11 @@ impl Renderer {
             let sorted = order.iter().map(|&(_, _, _, index)| ways[index as usize]);
             *ways = sorted.collect();
         }
-        order.partition_point(|&(is_hidden, ..)| !is_hidden)
+        let before = |class: Class| order.partition_point(|&(it, ..)| it < class);
+        Order {
+            seen: before(Class::Hidden),
+            in_frame: before(Class::Beside),
+        }
     }
 
     /// Makes room for so many particles.

@@ -176,14 +176,7 @@ impl Renderer {
                 self.record();
             }
         }
-        let setting = Setting {
-            origin: self.scene.origin + self.scene.domain.min,
-            extent: self.plan.extent,
-            particle_count: loaded.count,
-            radius: self.plan.radius,
-            near: NEAR * self.scene.particle_spacing,
-            frames_per_second: self.scene.frames_per_second,
-        };
+        let setting = self.setting(loaded.count);
         self.draw_once()?;
         let wants_objects = self.look.spec().output.cryptomatte;
         let mut covers = wants_objects.then(|| Covers::new(self.plan.extent.shaded()));
@@ -209,6 +202,18 @@ impl Renderer {
         });
         self.read_picture(&mut image)?;
         Ok(image)
+    }
+
+    /// What cameras are made of, beside the look and the sample, for so many particles on the device.
+    fn setting(&self, particle_count: u32) -> Setting {
+        Setting {
+            origin: self.scene.origin + self.scene.domain.min,
+            extent: self.plan.extent,
+            particle_count,
+            radius: self.plan.radius,
+            near: NEAR * self.scene.particle_spacing,
+            frames_per_second: self.scene.frames_per_second,
+        }
     }
 
     /// Beauty and the parts of its light.
@@ -293,6 +298,11 @@ impl Renderer {
         if let Some(sea) = &mut self.sea {
             sea.stand_at(camera, &mut self.program, &self.scene);
         }
+        let (eye, near) = (camera.position.into(), camera.near);
+        let camera = &uniform::Camera {
+            closed: self.plan.closed.seen_from(eye, near),
+            ..*camera
+        };
         self.program.upload(CAMERA, 0, &[*camera]);
         if !aovs {
             self.light(camera)?;

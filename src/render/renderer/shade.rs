@@ -14,8 +14,10 @@ use crate::{
     scene::look::{AovSpec, LightSpec, Look, SolidsOutput},
 };
 
-/// What draws the pixels of tiles without water.
+/// What draws the pixels of tiles without water that have solids.
 const DRY: &str = "ssfr/shade_dry";
+/// What draws those of tiles that have neither.
+const BARE: &str = "ssfr/shade_bare";
 /// What adds the light of spray.
 const WITH_SPRAY: &str = "ssfr/shade_spray";
 
@@ -158,6 +160,7 @@ pub(super) fn wants_spray_aovs(look: &Look) -> bool {
 pub(super) fn plan_shade(plan: &mut Plan, look: &Look, surface: &Buf<f32>) -> Shade {
     plan_output(plan, look, "ssfr/shade", "SPRAY");
     plan_output(plan, look, DRY, "SPRAY");
+    plan_output(plan, look, BARE, "SPRAY");
     plan.define("ssfr/shade_aovs", "AOVS");
     if wants_spray_aovs(look) {
         plan.define("ssfr/shade_aovs", "SPRAY");
@@ -213,7 +216,7 @@ fn tile_grid(plan: &Plan, band: usize) -> TileGrid {
     }
 }
 
-/// The shading of a band by a pass over tiles with water and one over the others.
+/// The shading of a band by a pass over tiles with water, one over others with solids, and one over those with neither.
 fn by_tiles(
     plan: &mut Plan,
     surface: &Buf<f32>,
@@ -223,13 +226,18 @@ fn by_tiles(
     let Command::Dispatch { pass, binds, .. } = shade else {
         return vec![shade];
     };
-    plan.define(pass, "LISTED");
-    plan.define(DRY, "LISTED");
-    plan.define(DRY, "DRY");
-    let (tiles, mut commands) = Tiles::of_water(plan, &format!("shade.{index}"), grid, surface);
+    for pass in [pass, DRY, BARE] {
+        plan.define(pass, "LISTED");
+    }
+    for pass in [DRY, BARE] {
+        plan.define(pass, "DRY");
+    }
+    plan.define(BARE, "BARE");
+    let (tiles, mut commands) = Tiles::of_picture(plan, &format!("shade.{index}"), grid, surface);
     let binds = [binds, vec![tiles.bind()]].concat();
     commands.push(Command::in_groups(pass, tiles.wet(), binds.clone()));
-    commands.push(Command::in_groups(DRY, tiles.dry(), binds));
+    commands.push(Command::in_groups(DRY, tiles.dry(), binds.clone()));
+    commands.push(Command::in_groups(BARE, tiles.bare(), binds));
     commands
 }
 

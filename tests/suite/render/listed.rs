@@ -52,8 +52,10 @@ fn apart(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
 }
 
 /// What lists tiles, and how it says that there is some.
-const LISTS: [(&str, &str); 2] = [
+const LISTS: [(&str, &str); 4] = [
     ("ssfr/list_tiles", "return nearest < FAR;"),
+    ("ssfr/list_picture", "return nearest < FAR;"),
+    ("ssfr/list_picture", "return solid < FAR;"),
     ("ssfr/list_spray", "return all > 0u;"),
 ];
 

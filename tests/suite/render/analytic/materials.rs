@@ -149,12 +149,14 @@ struct Shown<'a> {
     solids: &'a str,
     files: &'a [(&'a str, Vec<u8>)],
     scene: &'a RenderScene,
+    samples: u32,
 }
 
 impl Shown<'_> {
     fn look(&self, folder: &Path) -> Look {
         let setup = Setup {
             method: self.method,
+            samples: self.samples,
             ..Setup::new(self.eye)
         };
         write_sky(&folder.join("sky.exr"), &uniform_sky);
@@ -217,6 +219,7 @@ fn a_picture_lies_as_its_coordinates_say() {
             solids: "[[solids.material]]\nname = \"face\"\ntexture = { file = \"a.png\" }",
             files: &files,
             scene: &scene,
+            samples: 1,
         };
         let error = |context: &Context| {
             let all = face.places().map(|p| expected(place(p)));
@@ -251,6 +254,7 @@ fn a_library_scales_and_colours_its_picture() {
             solids: "materials = \"a.mtl\"",
             files: &files,
             scene: &scene,
+            samples: 1,
         };
         let off = worst(&shown.reflectance(&context()), face.places().map(wanted));
         // A texel is half a metre wide along u.
@@ -281,6 +285,7 @@ fn the_narrowest_name_counts_and_the_looks_own_comes_first() {
             [[solids.material]]\nname = \"right\"\ncolour = [0.75, 0.75, 0.75]",
         files: &files,
         scene: &scene,
+        samples: 1,
     };
     let wanted = |p: DVec3| [if p.x < MIDDLE.x { 0.5 } else { 0.75 }; 3];
     let found = shown.reflectance(&context());
@@ -308,6 +313,7 @@ fn a_picture_is_laid_on_along_axes() {
                 solids,
                 files: &files,
                 scene: &scene,
+                samples: 1,
             };
             let error = |context: &Context| {
                 let all = face.places().map(|p| expected(place(p)));
@@ -348,6 +354,7 @@ fn a_picture_is_laid_on_walls() {
                 solids: &solids,
                 files: &files,
                 scene: &scene,
+                samples: 1,
             };
             shown.image(context).unwrap().beauty
         };
@@ -386,6 +393,7 @@ fn a_far_checker_is_its_mean() {
                 solids: "[[solids.material]]\nname = \"face\"\ntexture = { file = \"a.png\", metres = 0.5 }",
                 files: &files,
                 scene: &scene,
+                samples: 1,
             };
             let error = |context: &Context| {
                 let found = shown.reflectance(context);
@@ -401,6 +409,64 @@ fn a_far_checker_is_its_mean() {
             let off = error(&spoiled(pass, whole, "let level = 0.0 * width;"));
             assert!(off > 0.2, "{method}, the control: {off}");
         }
+    }
+}
+
+/// Of four samples and more each takes one of the two levels and its part of the taps: their mean is what each would see alone.
+#[test]
+fn samples_share_what_one_would_look_up() {
+    const SAMPLES: u32 = 16;
+    let files = [("ramp.png", png(64, |_, y| [(4 * y) as u8; 3]))];
+    let face = &FACES[0];
+    let scene = of_text(&face.text());
+    let slanted = Eye::new([2.0, 5.0, 5.6], MIDDLE.to_array(), 64.0);
+    for (method, pass) in METHODS {
+        let picture = |eye, metres: f64, samples, context: &Context| {
+            let texture = format!("texture = {{ file = \"ramp.png\", metres = {metres:?} }}");
+            let shown = Shown {
+                eye,
+                method,
+                solids: &format!("[[solids.material]]\nname = \"face\"\n{texture}"),
+                files: &files,
+                scene: &scene,
+                samples,
+            };
+            let found = shown.reflectance(context).into_iter();
+            found.map(|it| it[0]).collect::<Vec<f64>>()
+        };
+        // The picture's own level is black, and the next one white.
+        let levels = spoiled(
+            pass,
+            "return mix(above, below, part.y);",
+            "return vec3f(f32(size.x == 32u));",
+        );
+        for part in [0.25, 0.5, 0.8f64] {
+            // A pixel in the middle is a sixteenth of a metre, and a texel 2^-part of that.
+            let metres = 64.0 / 16.0 / part.exp2();
+            let seen = |samples| picture(face.eye(), metres, samples, &levels)[32 * 64 + 32];
+            assert!((seen(1) - part).abs() < 1e-3, "{method}: {}", seen(1));
+            let found = seen(SAMPLES);
+            assert!(
+                (found - part).abs() < 1.0 / f64::from(SAMPLES),
+                "{method}: {found}, not {part}"
+            );
+        }
+        // Along a slant the mean of a ramp is its middle.
+        let ramp = |context: &Context| picture(slanted, 4.0, SAMPLES, context);
+        let each = ramp(&spoiled(
+            pass,
+            "let own = ceil(taps / samples);",
+            "let own = taps;",
+        ));
+        let off = |found: &[f64]| {
+            let sum: f64 = found.iter().zip(&each).map(|(a, b)| a - b).sum();
+            (sum / found.len() as f64).abs()
+        };
+        let found = off(&ramp(&context()));
+        assert!(found < 2e-4, "{method}: {found}");
+        let (from, to) = ("(k + part) / own - 0.5", "(k + part) / own");
+        let found = off(&ramp(&spoiled(pass, from, to)));
+        assert!(found > 1e-3, "{method}, the control: {found}");
     }
 }
 
@@ -420,6 +486,7 @@ fn materials_that_nothing_has_are_refused_with_their_key() {
             solids,
             files: &files,
             scene,
+            samples: 1,
         };
         let (error, look) = *shown.image(&context()).err()?;
         let RenderError::Material { index, problem } = error else {

@@ -1,0 +1,184 @@
+//! Which particles may be seen in a frame: those beside it cost a splat as much as those in it.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{
+    paths::Path,
+    uniform::{Camera, Particle},
+};
+
+/// How far from a particle it may change a pixel, in particle spacings or splat radii, whichever are longer. Puffs and drops of spray
+/// lie up to 4.7 radii away. A splat reaches 1.3 spacings, and ends where the field of kernels about it does, which reach 2.5 from 1.3
+/// further on; the rest is for neighbours that go another way.
+const REACH: f32 = 6.0;
+/// Pixels by which what is small is drawn larger.
+const WIDER: f32 = 8.0;
+
+/// What a camera sees: four planes through the eye, and the one in front of it.
+struct View {
+    position: Vec3,
+    /// Unit vectors inward.
+    planes: [Vec3; 5],
+    /// From the frame's instant.
+    seconds: f32,
+}
+
+impl View {
+    /// Of the whole frame, also of what lies about the picture for filters.
+    fn of(camera: &Camera) -> Self {
+        let [right, up, forward] = [camera.right, camera.up, camera.forward].map(Vec3::from);
+        let slope = |axis: usize, pixel: f32| {
+            (pixel - camera.corner[axis] - camera.centre[axis]) / camera.focal
+        };
+        let [width, height] = camera.size.map(|side| side as f32);
+        let (left, top) = (slope(0, -WIDER), slope(1, -WIDER));
+        let (far_right, bottom) = (slope(0, width + WIDER), slope(1, height + WIDER));
+        Self {
+            position: camera.position.into(),
+            planes: [
+                right - left * forward,
+                far_right * forward - right,
+                -up - top * forward,
+                bottom * forward + up,
+                forward,
+            ]
+            .map(Vec3::normalize),
+            seconds: camera.seconds,
+        }
+    }
+
+    /// What is `reach` about a place at most, metres.
+    fn sees(&self, place: Vec3, reach: f32) -> bool {
+        let from_eye = place - self.position;
+        (self.planes.iter()).all(|plane| plane.dot(from_eye) > -reach)
+    }
+}
+
+/// Of each particle, whether one of a frame's cameras may see something of it on its path; without `paths` they stand. `spacing` lies
+/// between neighbours at rest, metres.
+pub(super) fn in_frame(
+    particles: &[Particle],
+    paths: &[Path],
+    cameras: &[Camera],
+    spacing: f32,
+) -> Vec<bool> {
+    let views: Vec<View> = cameras.iter().map(View::of).collect();
+    let longest = cameras.iter().fold(spacing, |most, it| most.max(it.radius));
+    let reach = REACH * longest;
+    (particles.par_iter().enumerate())
+        .map(|(index, particle)| {
+            let place = Vec3::from(particle.position);
+            let way = |seconds: f32| match paths.get(index) {
+                Some(path) => path.way(seconds).as_vec3(),
+                None => Vec3::ZERO,
+            };
+            (views.iter()).any(|view| view.sees(place + way(view.seconds), reach))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+    use std::path::Path as FilePath;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::{
+        render::{
+            camera::{Setting, camera},
+            frame::Extent,
+            samples::Sample,
+        },
+        scene::look::Look,
+    };
+
+    const SPACING: f32 = 0.1;
+
+    /// One that looks along x from a step aside, `instant` frames from the frame itself.
+    fn looks_along_x(instant: f64) -> Camera {
+        let text = "[camera]\nfocal_length_mm = 36.0\nposition = [0.0, 1.0, 0.0]\ntarget = [1.0, 0.9, 0.2]\n\
+                    [image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n";
+        let look = Look::parse(text, FilePath::new("look.toml")).unwrap();
+        let setting = Setting {
+            origin: DVec3::ZERO,
+            extent: Extent::of(&look),
+            particle_count: 0,
+            radius: 0.087,
+            near: 0.01,
+            frames_per_second: 24.0,
+        };
+        let sample = Sample {
+            instant,
+            ..Sample::STILL
+        };
+        camera(&look, &setting, 1.0, sample, 0)
+    }
+
+    fn at(position: Vec3) -> Particle {
+        Particle {
+            position: position.to_array(),
+            ..Particle::default()
+        }
+    }
+
+    /// Whether a place lies in the padded frame, as `project` of camera.wgsl has it.
+    fn is_drawn(camera: &Camera, place: Vec3) -> bool {
+        let d = place - Vec3::from(camera.position);
+        let [x, y, z] = [camera.right, camera.up, camera.forward].map(|axis| d.dot(axis.into()));
+        let pixel = [x, -y].map(|side| camera.focal * side / z);
+        let is_in = |axis: usize| {
+            let pixel = camera.corner[axis] + camera.centre[axis] + pixel[axis];
+            (0.0..camera.size[axis] as f32).contains(&pixel)
+        };
+        z > 0.0 && is_in(0) && is_in(1)
+    }
+
+    /// Nothing that lies in the reach of a particle that was left out is in the frame; and of the particles about it most are left out.
+    #[test]
+    fn what_is_left_out_changes_no_pixel() {
+        let camera = looks_along_x(0.0);
+        let mut seed = 7u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        let particles: Vec<Particle> = (0..4000)
+            .map(|_| at(6.0 * Vec3::new(random(), random(), random())))
+            .collect();
+        let found = in_frame(&particles, &[], &[camera], SPACING);
+        // How many of those left out have a place in the frame, in the ball of so many times the reach about them.
+        let mut wrong = |factor: f32| {
+            let left_out = particles.iter().zip(&found).filter(|(_, is_in)| !**is_in);
+            let reaches = left_out.filter(|(particle, _)| {
+                (0..100).any(|_| {
+                    let way = Vec3::new(random(), random(), random()).normalize();
+                    let off = factor * REACH * SPACING * way;
+                    is_drawn(&camera, Vec3::from(particle.position) + off)
+                })
+            });
+            reaches.count()
+        };
+        assert_eq!(wrong(1.0), 0);
+        // The control: what reaches twice as far would be missed.
+        assert!(wrong(2.0) > 100, "{}", wrong(2.0));
+        let left_out = found.iter().filter(|is_in| !**is_in).count();
+        assert!((2500..3800).contains(&left_out), "{left_out}");
+    }
+
+    /// One that comes into the frame within the shutter's time belongs to it.
+    #[test]
+    fn a_path_into_the_frame_counts() {
+        let cameras = [looks_along_x(0.0), looks_along_x(0.5)];
+        let away = at(Vec3::new(-3.0, 1.0, 0.0));
+        // Ten metres ahead in half a frame.
+        let path = Path::straight(Vec3::X * 10.0 * 48.0);
+        let found = |paths: &[Path], cameras: &[Camera]| in_frame(&[away], paths, cameras, SPACING);
+        assert_eq!(found(&[path], &cameras), [true]);
+        assert_eq!(found(&[path], &cameras[..1]), [false]);
+        assert_eq!(found(&[], &cameras), [false]);
+    }
+}
