@@ -42,12 +42,6 @@ fn sample_count(camera: Camera) -> u32 {
     return u32(1.0 / camera.weight + 0.5);
 }
 
-// The sample's number in rounds of so many; software adapters divide integers one lane at a time.
-fn sample_in(camera: Camera, round: u32) -> u32 {
-    let index = camera.sample_index;
-    return index - u32((f32(index) + 0.5) / f32(round)) * round;
-}
-
 // Where nothing was hit. Finite, because fast-math drivers may assume that there is no infinity.
 const FAR: f32 = 1e30;
 

@@ -21,15 +21,16 @@ pub(super) struct Closed {
 impl Closed {
     /// Puts triangles of closed bodies first, the others behind them, each in their order.
     ///
-    /// A body is what hangs together by corners in the same place. It is closed where each edge is gone along as often one way as the
-    /// other, counter-clockwise seen from outside, which its volume tells.
+    /// A body is what hangs together by edges in the same place. It is closed where each is gone along once one way and once the other,
+    /// counter-clockwise seen from outside, which its volume tells.
     pub(super) fn put_first(triangles: &mut [Triangle]) -> Self {
         let corners = places(triangles);
-        let bodies = bodies(&corners);
+        let edges = edges(&corners);
+        let bodies = bodies(triangles.len(), &edges);
         let mut found = Self::default();
         let mut is_closed = vec![false; triangles.len()];
         for body in bodies {
-            let is_whole = edges_cancel(&corners, &body) && volume(triangles, &body) > 0.0;
+            let is_whole = has_no_rim(&corners, &edges, &body) && volume(triangles, &body) > 0.0;
             if is_whole {
                 found.boxes.push(box_about(triangles, &body));
                 for &k in &body {
@@ -76,9 +77,25 @@ fn places(triangles: &[Triangle]) -> Vec<[usize; 3]> {
         .collect()
 }
 
-/// Triangles that hang together, by their first.
-fn bodies(corners: &[[usize; 3]]) -> Vec<Vec<usize>> {
-    let count = corners.iter().flatten().max().map_or(0, |most| most + 1);
+/// A side of a triangle, from the lesser place to the greater.
+fn side(from: usize, to: usize) -> [usize; 2] {
+    [from.min(to), from.max(to)]
+}
+
+/// Triangles at each edge, and whether they go along it from its lesser place to the greater.
+fn edges(corners: &[[usize; 3]]) -> HashMap<[usize; 2], Vec<(usize, bool)>> {
+    let mut edges: HashMap<[usize; 2], Vec<(usize, bool)>> = HashMap::new();
+    for (k, &[a, b, c]) in corners.iter().enumerate() {
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            let at = edges.entry(side(from, to)).or_default();
+            at.push((k, from < to));
+        }
+    }
+    edges
+}
+
+/// Triangles that hang together by edges, in the order of their first.
+fn bodies(count: usize, edges: &HashMap<[usize; 2], Vec<(usize, bool)>>) -> Vec<Vec<usize>> {
     let mut parent: Vec<usize> = (0..count).collect();
     let root = |parent: &mut Vec<usize>, mut at: usize| {
         while parent[at] != at {
@@ -87,16 +104,16 @@ fn bodies(corners: &[[usize; 3]]) -> Vec<Vec<usize>> {
         }
         at
     };
-    for &[a, b, c] in corners {
-        for other in [b, c] {
-            let (one, other) = (root(&mut parent, a), root(&mut parent, other));
+    for at in edges.values() {
+        for &(other, _) in &at[1..] {
+            let (one, other) = (root(&mut parent, at[0].0), root(&mut parent, other));
             parent[one.max(other)] = one.min(other);
         }
     }
     let mut numbers = HashMap::new();
     let mut bodies: Vec<Vec<usize>> = Vec::new();
-    for (k, &[a, ..]) in corners.iter().enumerate() {
-        let body = *numbers.entry(root(&mut parent, a)).or_insert(bodies.len());
+    for k in 0..count {
+        let body = *numbers.entry(root(&mut parent, k)).or_insert(bodies.len());
         if body == bodies.len() {
             bodies.push(Vec::new());
         }
@@ -105,16 +122,19 @@ fn bodies(corners: &[[usize; 3]]) -> Vec<Vec<usize>> {
     bodies
 }
 
-fn edges_cancel(corners: &[[usize; 3]], body: &[usize]) -> bool {
-    let mut edges: HashMap<[usize; 2], i64> = HashMap::new();
-    for &k in body {
+/// Whether two triangles meet at each edge of a body, and go along it in opposite ways.
+fn has_no_rim(
+    corners: &[[usize; 3]],
+    edges: &HashMap<[usize; 2], Vec<(usize, bool)>>,
+    body: &[usize],
+) -> bool {
+    body.iter().all(|&k| {
         let [a, b, c] = corners[k];
-        for [from, to] in [[a, b], [b, c], [c, a]] {
-            let way = if from < to { 1 } else { -1 };
-            *edges.entry([from.min(to), from.max(to)]).or_default() += way;
-        }
-    }
-    edges.values().all(|count| *count == 0)
+        [[a, b], [b, c], [c, a]].iter().all(|&[from, to]| {
+            let at = edges.get(&side(from, to));
+            at.is_some_and(|at| matches!(at[..], [(_, one), (_, other)] if one != other))
+        })
+    })
 }
 
 /// m³, negative where the normals point inward.
@@ -161,14 +181,14 @@ mod tests {
 
     #[test]
     fn closed_bodies_come_first() {
-        // A lid that is off, then a whole box, one that is inside out, and one that touches the first by a corner.
+        // A lid that is off, then a whole box, and one that is inside out.
         let mut open = cube(2.0);
         open.pop();
         let mut inward = cube(8.0);
         for it in &mut inward {
             std::mem::swap(&mut it.b, &mut it.c);
         }
-        let mut all = [open, cube(5.0), inward].concat();
+        let mut all = [open, cube(5.0), inward.clone()].concat();
         let found = Closed::put_first(&mut all);
         assert_eq!(found.triangles, 12);
         assert_eq!(found.boxes, [[Vec3::splat(5.0), Vec3::splat(6.0)]]);
@@ -176,10 +196,16 @@ mod tests {
         assert_eq!(materials[..12], [5; 12]);
         assert_eq!(materials[12..23], [2; 11]);
         assert_eq!(materials[23..], [8; 12]);
-        // Two that touch are one body, and closed.
+        // Of two that touch at a corner each is a body of its own, also beside one that is inside out.
         let mut two = [cube(5.0), cube(6.0)].concat();
         let found = Closed::put_first(&mut two);
-        assert_eq!((found.triangles, found.boxes.len()), (24, 1));
+        assert_eq!((found.triangles, found.boxes.len()), (24, 2));
+        let mut two = [cube(9.0), inward].concat();
+        let found = Closed::put_first(&mut two);
+        assert_eq!((found.triangles, two[0].material), (12, 9));
+        // Where more than two faces meet at an edge, both sides are drawn.
+        let mut twice = [cube(5.0), cube(5.0)].concat();
+        assert_eq!(Closed::put_first(&mut twice).triangles, 0);
     }
 
     #[test]

@@ -75,7 +75,9 @@ impl Plan {
             plan.buffer(&NEXT_CAMERA, 1);
         }
         let mut opaque = Opaque::new(look, scene)?;
-        plan.closed = Closed::put_first(&mut opaque.triangles);
+        if spec.renderer.method == MethodSpec::Ssfr {
+            plan.closed = Closed::put_first(&mut opaque.triangles);
+        }
         let places = opaque.placed();
         let Opaque {
             triangles,

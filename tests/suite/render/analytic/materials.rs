@@ -435,11 +435,8 @@ fn samples_share_what_one_would_look_up() {
             found.map(|it| it[0]).collect::<Vec<f64>>()
         };
         // The picture's own level is black, and the next one white.
-        let levels = spoiled(
-            pass,
-            "return mix(above, below, part.y);",
-            "return vec3f(f32(size.x == 32u));",
-        );
+        let (from, to) = ("mix(above, below, part.y)", "vec3f(f32(size.x == 32u))");
+        let levels = spoiled(pass, from, to);
         for part in [0.25, 0.5, 0.8f64] {
             // A pixel in the middle is a sixteenth of a metre, and a texel 2^-part of that.
             let metres = 64.0 / 16.0 / part.exp2();
@@ -453,11 +450,7 @@ fn samples_share_what_one_would_look_up() {
         }
         // Along a slant the mean of a ramp is its middle.
         let ramp = |context: &Context| picture(slanted, 4.0, SAMPLES, context);
-        let each = ramp(&spoiled(
-            pass,
-            "let own = ceil(taps / samples);",
-            "let own = taps;",
-        ));
+        let each = ramp(&spoiled(pass, "ceil(taps / samples)", "taps"));
         let off = |found: &[f64]| {
             let sum: f64 = found.iter().zip(&each).map(|(a, b)| a - b).sum();
             (sum / found.len() as f64).abs()
