@@ -6,7 +6,8 @@ use glam::{DVec3, Vec3};
 
 use super::uniform::Triangle;
 
-/// How much farther than its nearest depth an eye must be from a body's box, so that no corner of the picture cuts it open.
+/// How much farther than the nearest depth that is drawn an eye must be from a body's box, so that no corner of the picture cuts it open:
+/// a corner 83° off the axis is 1 / cos 83° of that depth away.
 const ROOM: f32 = 8.0;
 
 /// Boxes about the closed bodies of a set whose triangles stand first.
@@ -203,6 +204,11 @@ mod tests {
         let mut two = [cube(9.0), inward].concat();
         let found = Closed::put_first(&mut two);
         assert_eq!((found.triangles, two[0].material), (12, 9));
+        // A face that is turned among others leaves edges that are gone along twice in one way.
+        let mut turned = cube(5.0);
+        let face = &mut turned[7];
+        std::mem::swap(&mut face.b, &mut face.c);
+        assert_eq!(Closed::put_first(&mut turned).triangles, 0);
         // Where more than two faces meet at an edge, both sides are drawn.
         let mut twice = [cube(5.0), cube(5.0)].concat();
         assert_eq!(Closed::put_first(&mut twice).triangles, 0);

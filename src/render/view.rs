@@ -102,7 +102,7 @@ fn agx(scene: DVec3) -> DVec3 {
     const LEAST: f64 = -12.473_93;
     const MOST: f64 = 4.026_069;
     let bent = (inset * scene).to_array().map(|x| {
-        // 24 bits are enough for 8, and take a third of the time.
+        // The 24 bits of f32 are enough for 8.
         let stops = f64::from((x.max(1e-10) as f32).log2());
         let log = (stops.clamp(LEAST, MOST) - LEAST) / (MOST - LEAST);
         curve(log)

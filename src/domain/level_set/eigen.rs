@@ -4,7 +4,8 @@ use glam::{DMat3, DVec3};
 
 /// Sweeps of Jacobi's rotations: they converge quadratically, and five leave less than f64's rounding of any 3 × 3 matrix.
 const SWEEPS: usize = 6;
-/// Part of the diagonal below which what stands beside it changes no value and turns no vector by more than a rounding.
+/// Part of the diagonal below which what stands beside it changes no value by more than a rounding. Vectors of values that are as near to each
+/// other may be any in their plane.
 const NEGLIGIBLE: f64 = 0.1 * f64::EPSILON;
 
 /// Eigenvalues of a symmetric matrix in no order, and the eigenvectors as columns, by Jacobi's rotations (Golub and Van Loan,

@@ -74,6 +74,24 @@ fn lists_of_tiles_do_not_change_the_picture() {
     }
 }
 
+/// Sides of closed bodies that face away from the eye are hidden by the others. At an edge both have one depth, and either may be kept: those
+/// pixels are fewer than a thousandth.
+#[test]
+fn far_sides_of_closed_bodies_are_in_no_pixel() {
+    let water = city_water();
+    let picture = last(&context(), &[&water]);
+    let (asks, cull) = ("index / 6u < camera.closed", "dot(normal, a) > 0.0");
+    let all = last(&spoiled("ssfr/solid", asks, "index / 6u < 0u"), &[&water]);
+    let found = apart(&picture, &all);
+    assert!(found < 1e-3, "{found}");
+    // The control: without the near sides one looks into the houses.
+    let opened = last(
+        &spoiled("ssfr/solid", cull, "dot(normal, a) < 0.0"),
+        &[&water],
+    );
+    assert!(apart(&opened, &all) > 0.05);
+}
+
 /// What stood in a tile that has no water any more is gone.
 #[test]
 fn a_frame_leaves_nothing_to_the_next() {

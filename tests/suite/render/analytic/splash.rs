@@ -67,6 +67,15 @@ fn mirrored(context: &Context) -> [f64; 2] {
 fn what_spray_hides_is_not_mirrored() {
     let [cloud, bare] = mirrored(&context());
     assert!(cloud > 0.5 && bare < 0.5, "{cloud} {bare}");
+    // A mirror of water shows no spray that is brighter than the sky about it.
+    assert!(cloud < 1.01, "{cloud}");
+    let bright = spoiled(
+        "ssfr/shade",
+        "spray_radiance(-met.way",
+        "2.0 * spray_radiance(-met.way",
+    );
+    let [cloud, _] = mirrored(&bright);
+    assert!(cloud > 1.01, "the control: {cloud}");
     let spoiled = spoiled("ssfr/shade", "mist.depth > nearest", "mist.depth < nearest");
     let [cloud, _] = mirrored(&spoiled);
     assert!(cloud < 0.5, "the control: {cloud}");
