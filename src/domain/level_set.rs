@@ -6,7 +6,9 @@
 
 pub mod edges;
 pub mod eigen;
+mod grid;
 pub mod kernels;
+mod moments;
 pub mod sunlight;
 pub mod velocity;
 

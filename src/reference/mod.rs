@@ -5,7 +5,6 @@
 
 pub mod flip;
 mod hash;
-mod lanes;
 pub mod neighbors;
 pub mod pbf;
 pub mod poisson;

@@ -6,8 +6,7 @@ use glam::DVec3;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::lanes::widely;
-use crate::domain::{period::Period, places};
+use crate::domain::{lanes::widely, period::Period, places};
 
 /// Particles whose neighbours one task lists.
 const BLOCK: usize = 512;

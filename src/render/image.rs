@@ -4,6 +4,7 @@ mod exr_file;
 mod pixels;
 mod png_file;
 
+use std::borrow::Cow;
 use std::io::Write;
 use std::path::Path;
 
@@ -122,7 +123,10 @@ impl Image {
 
 impl Image {
     /// Beauty of each pixel of the image that is shown: black and transparent where it was not rendered.
-    pub fn shown(&self) -> Vec<[f32; 4]> {
+    pub fn shown(&self) -> Cow<'_, [[f32; 4]]> {
+        if self.corner == [0; 2] && self.display == [self.width, self.height] {
+            return Cow::Borrowed(&self.beauty);
+        }
         let [width, height] = self.display.map(|side| side as i32);
         let within = |at: i32, axis: usize, size: u32| {
             let at = at - self.corner[axis];

@@ -105,10 +105,48 @@ impl<'a> Ids<'a> {
     /// Where the particle of an id is.
     pub(super) fn find(&self, id: u32) -> Option<usize> {
         match &self.order {
-            None => self.ids.binary_search(&id).ok(),
+            None => {
+                // Where none was added or lost they are numbers in a row.
+                let first = self.ids.first()?;
+                let place = id.wrapping_sub(*first) as usize;
+                match self.ids.get(place) == Some(&id) {
+                    true => Some(place),
+                    false => self.ids.binary_search(&id).ok(),
+                }
+            }
             Some(order) => {
                 let found = order.binary_search_by_key(&id, |&place| self.ids[place as usize]);
                 found.ok().map(|k| order[k] as usize)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ids in a row, with gaps, and in no order.
+    #[test]
+    fn each_id_is_found_and_no_other() {
+        for ids in [
+            vec![5, 6, 7, 8],
+            vec![5, 6, 9, 12],
+            vec![9, 5, 12, 7],
+            vec![],
+        ] {
+            let particles = Particles {
+                position: vec![[0.0; 3]; ids.len()],
+                id: ids.clone(),
+                ..Particles::default()
+            };
+            let found = Ids::of(&particles);
+            for id in 0..20 {
+                assert_eq!(
+                    found.find(id),
+                    ids.iter().position(|it| *it == id),
+                    "{id} of {ids:?}"
+                );
             }
         }
     }

@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
+
+use crate::domain::lanes::{LANES, widely};
 
 /// Distances, in spacings, over which a neighbour stops counting: half of it is left at two.
 const NEAR: [f32; 2] = [1.5, 2.5];
@@ -27,16 +30,23 @@ pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
         .map(|(position, index)| (cell(position), index))
         .collect();
     order.par_sort_unstable();
-    let sorted: Vec<[f32; 3]> = order
-        .par_iter()
-        .map(|&(_, index)| positions[index as usize])
-        .collect();
+    let sorted = [0, 1, 2].map(|axis| {
+        let of = |&(_, index): &([i32; 3], u32)| positions[index as usize][axis];
+        order.par_iter().map(of).collect::<Vec<f32>>()
+    });
     // A cell's particles have the same others about them.
     let found: Vec<f32> = order
         .par_chunk_by(|a, b| a.0 == b.0)
         .flat_map_iter(|own| {
-            let about = About::cell(own[0].0, &order, &sorted, reach);
-            let of = |&(_, index): &([i32; 3], u32)| about.weight(positions[index as usize], span);
+            let about = About::cell(own[0].0, &order, &sorted);
+            let of = |&(_, index): &([i32; 3], u32)| {
+                let place = positions[index as usize];
+                widely(Weigh {
+                    about: &about,
+                    place,
+                    span,
+                })
+            };
             own.iter().map(of).collect::<Vec<f32>>()
         })
         .collect();
@@ -47,8 +57,6 @@ pub(super) fn weights(positions: &[[f32; 3]], spacing: f32) -> Vec<f32> {
     weights
 }
 
-/// Places that are worked on at once: as many as processors have room for in two of their registers.
-const LANES: usize = 8;
 /// Lanes after which it is asked whether that is enough: about as many as water at rest has about a cell.
 const OFTEN: usize = 64;
 
@@ -56,41 +64,44 @@ const OFTEN: usize = 64;
 struct About([Vec<f32>; 3]);
 
 impl About {
-    /// Of all that are within `reach` of some place in a cell of that edge.
-    fn cell(cell: [i32; 3], order: &[([i32; 3], u32)], sorted: &[[f32; 3]], reach: f32) -> Self {
-        // A cell's edges are rounded.
-        let far = 1.001 * reach;
-        let low = cell.map(|c| c as f32 * reach);
+    /// Of a cell and the 26 about it; `sorted` are in the order of cells.
+    fn cell(cell: [i32; 3], order: &[([i32; 3], u32)], sorted: &[Vec<f32>; 3]) -> Self {
         let columns = columns(order, cell);
-        let most = columns.iter().map(Range::len).sum::<usize>() + LANES;
-        let mut about = Self([0; 3].map(|_| Vec::with_capacity(most)));
-        for place in columns.into_iter().flat_map(|run| &sorted[run]) {
-            let beside = [0, 1, 2].map(|axis| {
-                let off = place[axis] - low[axis];
-                (-off).max(off - reach).max(0.0)
-            });
-            if beside.iter().map(|d| d * d).sum::<f32>() < far * far {
-                for (of, x) in about.0.iter_mut().zip(place) {
-                    of.push(*x);
-                }
+        let count = columns.iter().map(Range::len).sum::<usize>();
+        let whole = count.next_multiple_of(LANES);
+        Self(sorted.each_ref().map(|of| {
+            let mut about = Vec::with_capacity(whole);
+            for run in &columns {
+                about.extend_from_slice(&of[run.clone()]);
             }
-        }
-        let whole = about.0[0].len().next_multiple_of(LANES);
-        for of in &mut about.0 {
-            of.resize(whole, f32::INFINITY);
-        }
-        about
+            about.resize(whole, f32::INFINITY);
+            about
+        }))
     }
+}
 
-    /// What those about one of them weigh: 1 up to the first of these distances, and nothing from the second on.
-    fn weight(&self, [px, py, pz]: [f32; 3], [near, reach]: [f32; 2]) -> f32 {
+/// What those about a place weigh: 1 up to the first distance of the span, and nothing from the second on.
+struct Weigh<'a> {
+    about: &'a About,
+    place: [f32; 3],
+    span: [f32; 2],
+}
+
+impl WithSimd for Weigh<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f32 {
+        let ([px, py, pz], [near, reach]) = (self.place, self.span);
         let scale = 1.0 / (reach - near);
         let mut sums = [0.0; LANES];
         let weight = |sums: &[f32; LANES]| {
             // It is no neighbour of its own.
             (sums.iter().sum::<f32>() - 1.0).min(ENOUGH)
         };
-        let [xs, ys, zs] = (self.0).each_ref().map(|of| of.as_chunks::<LANES>().0);
+        let [xs, ys, zs] = (self.about.0)
+            .each_ref()
+            .map(|of| of.as_chunks::<LANES>().0);
         for (k, ((x, y), z)) in xs.iter().zip(ys).zip(zs).enumerate() {
             for lane in 0..LANES {
                 let d = [px - x[lane], py - y[lane], pz - z[lane]];

@@ -34,7 +34,7 @@ pub(super) fn shapes(
     radius: f64,
 ) -> Vec<Shape> {
     let is_body = |particle: &&Particle| particle.tag & 1 == 1;
-    let places: Vec<DVec3> = (particles.iter().filter(is_body))
+    let places: Vec<DVec3> = (particles.par_iter().filter(is_body))
         .map(|particle| Vec3::from(particle.position).as_dvec3())
         .collect();
     let shaped = particles[..seen].iter().filter(is_body).count();
@@ -43,9 +43,9 @@ pub(super) fn shapes(
     // A ball of d³ over a lone particle's kernel, and the look's radius over that of looks that leave it out.
     let factor = (3.0 / (4.0 * PI)).cbrt() / ALONE * radius / (RADIUS * spacing);
     let thinnest = THINNEST * radius / RADIUS;
-    let all = Kernels::of_fitted(&kernels, scene.domain.size(), spacing);
+    let all = Kernels::of_fitted(kernels, scene.domain.size(), spacing);
     let field = all.field();
-    let fitted: Vec<Shape> = (kernels.par_iter())
+    let fitted: Vec<Shape> = (all.ellipsoids[..shaped].par_iter())
         .map(|kernel| shape(kernel, &field, factor, thinnest))
         .collect();
     let ball = (factor * ALONE * spacing) as f32;

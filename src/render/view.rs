@@ -27,27 +27,51 @@ pub fn apply(view: &ViewSpec, colour: [f32; 3]) -> [f64; 3] {
 
 /// As [`apply`], in whole 255ths.
 pub fn apply_bytes(view: &ViewSpec, colour: [f32; 3]) -> [u8; 3] {
-    let least = &*LEAST;
-    (display(view, colour).to_array()).map(|x| least.partition_point(|&least| least <= x) as u8)
+    let bytes = &*BYTES;
+    display(view, colour).to_array().map(|x| bytes.of(x))
 }
 
-/// The least linear value that sRGB's encoding rounds to 1, to 2, and so on to 255, in 255ths: a search among them instead of a power.
-static LEAST: LazyLock<[f64; 255]> = LazyLock::new(|| {
-    let least = |byte: usize| {
-        let reaches = |x: f64| (srgb_encode(x) * 255.0).round() >= byte as f64;
+/// Steps of linear light, each with fewer than two of the values from which on the encoding rounds to the next byte.
+const STEPS: usize = 4096;
+
+/// sRGB's encoding in whole 255ths: look-ups instead of a power.
+struct Bytes {
+    /// The least linear value that it rounds to 1, to 2, and so on to 255; what none reaches at last.
+    least: [f64; 256],
+    /// What the beginning of each step rounds to.
+    first: [u8; STEPS + 1],
+}
+
+static BYTES: LazyLock<Bytes> = LazyLock::new(|| {
+    let rounded = |x: f64| (srgb_encode(x) * 255.0).round();
+    let least = |byte: f64| {
         // Positive numbers are in the order of their bits.
         let (mut below, mut from) = (0.0f64.to_bits(), 1.0f64.to_bits());
         while below + 1 < from {
             let middle = below + (from - below) / 2;
-            match reaches(f64::from_bits(middle)) {
+            match rounded(f64::from_bits(middle)) >= byte {
                 true => from = middle,
                 false => below = middle,
             }
         }
         f64::from_bits(from)
     };
-    std::array::from_fn(|index| least(index + 1))
+    Bytes {
+        least: std::array::from_fn(|index| match index {
+            255 => f64::INFINITY,
+            _ => least(index as f64 + 1.0),
+        }),
+        first: std::array::from_fn(|step| rounded(step as f64 / STEPS as f64) as u8),
+    }
 });
+
+impl Bytes {
+    fn of(&self, linear: f64) -> u8 {
+        let step = (linear.clamp(0.0, 1.0) * STEPS as f64) as usize;
+        let first = self.first[step];
+        first + u8::from(linear >= self.least[usize::from(first)])
+    }
+}
 
 /// Display-linear Rec. 709; values beyond 0 and 1 are clipped by the encoding.
 fn display(view: &ViewSpec, colour: [f32; 3]) -> DVec3 {
@@ -250,9 +274,11 @@ mod tests {
         }
         assert!(seen.iter().all(|seen| *seen));
         // Where the encoding goes over from one byte to the next, to the last bit; a number that is none is black.
-        for (byte, least) in (1u8..=255).zip(*LEAST) {
+        for (byte, least) in (1u8..=255).zip(BYTES.least) {
             let of = |x: f64| (srgb_encode(x) * 255.0).round() as u8;
-            assert_eq!([of(least), of(least.next_down())], [byte, byte - 1]);
+            for of in [&of as &dyn Fn(f64) -> u8, &|x| BYTES.of(x)] {
+                assert_eq!([of(least), of(least.next_down())], [byte, byte - 1]);
+            }
         }
         assert_eq!(
             apply_bytes(&view(TransformSpec::Srgb), [f32::NAN; 3]),

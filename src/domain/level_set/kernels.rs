@@ -9,12 +9,16 @@
 //! neighbours' mean (the paper's λ), they left a noisy surface as rough, 0.06 spacings for any λ up to 0.5, and with the paper's 0.9
 //! kernels no longer reach a calm surface.
 
-use std::{f64::consts::PI, ops::Range};
+use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::eigen;
+use super::{
+    eigen,
+    grid::{Grid, HALVES},
+    moments::{AT_ONCE, Moments, Near},
+};
 
 /// Reach of a kernel that is not flattened, in particle spacings.
 const SUPPORT: f64 = 2.5;
@@ -40,6 +44,8 @@ pub struct Ellipsoid {
     pub inverse: DMat3,
     /// Half of the box that holds it, metres.
     pub reach: DVec3,
+    /// Longest half axis, metres.
+    pub longest: f64,
     /// Its value at the centre.
     pub peak: f64,
 }
@@ -77,6 +83,7 @@ impl Ellipsoid {
             centre,
             inverse,
             reach,
+            longest: axes.max_element(),
             peak: 315.0 / (64.0 * PI) * volume / axes.element_product(),
         }
     }
@@ -120,11 +127,11 @@ impl Kernels {
     /// `spacing` lies between neighbours at rest, metres.
     pub fn fit(positions: &[DVec3], size: DVec3, spacing: f64) -> Self {
         let fitted = Self::of_first(positions.len(), positions, size, spacing);
-        Self::of_fitted(&fitted, size, spacing)
+        Self::of_fitted(fitted, size, spacing)
     }
 
     /// These kernels, which [`Self::of_first`] fitted, and those that stand in the mirrors of the box's sides.
-    pub fn of_fitted(fitted: &[Ellipsoid], size: DVec3, spacing: f64) -> Self {
+    pub fn of_fitted(fitted: Vec<Ellipsoid>, size: DVec3, spacing: f64) -> Self {
         Self {
             ellipsoids: mirrored(fitted, size, SUPPORT * spacing, &Ellipsoid::mirrored),
             level: Calibration::new(spacing).level,
@@ -139,20 +146,28 @@ impl Kernels {
         spacing: f64,
     ) -> Vec<Ellipsoid> {
         let calibration = Calibration::new(spacing);
-        let all = mirrored(positions, size, NEAR * spacing, &|&p, axis, plane| {
-            reflected(p, axis, plane)
-        });
+        let all = mirrored(
+            positions.to_vec(),
+            size,
+            NEAR * spacing,
+            &|&p, axis, plane| reflected(p, axis, plane),
+        );
         fit(&all, count, &calibration)
     }
 
     /// The field itself, for values at any place.
     pub fn field(&self) -> Field<'_> {
         let reach = |it: &Ellipsoid| it.reach.max_element();
-        let edge = self.ellipsoids.iter().map(reach).fold(0.0, f64::max);
-        let places: Vec<DVec3> = self.ellipsoids.iter().map(|it| it.centre).collect();
+        let edge = (self.ellipsoids.par_iter().map(reach)).reduce(|| 0.0, f64::max);
+        let places: Vec<DVec3> = self.ellipsoids.par_iter().map(|it| it.centre).collect();
+        let grid = Grid::new(&places, edge.max(f64::MIN_POSITIVE) / HALVES as f64);
+        let farthest = self.ellipsoids.iter().map(|it| it.longest);
+        let farthest = farthest.fold(0.0, f64::max);
         Field {
             kernels: self,
-            grid: Grid::new(&places, edge.max(f64::MIN_POSITIVE)),
+            centres: grid.sorted(&places),
+            farthest: farthest * farthest,
+            grid,
         }
     }
 }
@@ -161,24 +176,43 @@ impl Kernels {
 pub struct Field<'a> {
     kernels: &'a Kernels,
     grid: Grid,
+    /// In the grid's order.
+    centres: Vec<DVec3>,
+    /// Square of the distance from which on no kernel reaches a place, m².
+    farthest: f64,
 }
 
 impl Field<'_> {
+    /// Visits the kernels that may reach a place, in the grid's order.
+    fn for_each(&self, x: DVec3, mut visit: impl FnMut(&Ellipsoid)) {
+        let mut near = [0; AT_ONCE];
+        self.grid.for_each_run(x, HALVES, |run| {
+            let centres = self.centres[run.clone()].chunks(AT_ONCE);
+            for (centres, places) in centres.zip(self.grid.order[run].chunks(AT_ONCE)) {
+                // Without a branch that a processor would have to guess.
+                let mut count = 0;
+                for (centre, place) in centres.iter().zip(places) {
+                    near[count] = *place as usize;
+                    count += usize::from(centre.distance_squared(x) < self.farthest);
+                }
+                let near = near[..count].iter();
+                near.for_each(|&k| visit(&self.kernels.ellipsoids[k]));
+            }
+        });
+    }
+
     /// At `x`: positive in water, 0 at its surface, −1 where no particle reaches.
     pub fn value(&self, x: DVec3) -> f64 {
         let mut sum = 0.0;
-        let ellipsoids = &self.kernels.ellipsoids;
-        self.grid
-            .for_each_near(x, |k| sum += ellipsoids[k].value(x));
+        self.for_each(x, |kernel| sum += kernel.value(x));
         sum / self.kernels.level - 1.0
     }
 
     /// [`Self::value`] and [`Self::gradient`] at once.
     pub fn value_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         let (mut sum, mut slope) = (0.0, DVec3::ZERO);
-        let ellipsoids = &self.kernels.ellipsoids;
-        self.grid.for_each_near(x, |k| {
-            let (value, gradient) = ellipsoids[k].value_and_gradient(x);
+        self.for_each(x, |kernel| {
+            let (value, gradient) = kernel.value_and_gradient(x);
             sum += value;
             slope += gradient;
         });
@@ -188,11 +222,7 @@ impl Field<'_> {
 
     /// ∇ at `x`, 1/m.
     pub fn gradient(&self, x: DVec3) -> DVec3 {
-        let mut sum = DVec3::ZERO;
-        let ellipsoids = &self.kernels.ellipsoids;
-        self.grid
-            .for_each_near(x, |k| sum += ellipsoids[k].value_and_gradient(x).1);
-        sum / self.kernels.level
+        self.value_and_gradient(x).1
     }
 }
 
@@ -220,12 +250,11 @@ impl Placed for Ellipsoid {
 
 /// These, and behind them their images at the sides of a box that they are within `near` of.
 fn mirrored<T: Placed>(
-    all: &[T],
+    mut all: Vec<T>,
     size: DVec3,
     near: f64,
     mirror: &dyn Fn(&T, usize, f64) -> T,
 ) -> Vec<T> {
-    let mut all = all.to_vec();
     for axis in 0..3 {
         for k in 0..all.len() {
             let p = all[k].place()[axis];
@@ -245,7 +274,7 @@ fn fit(places: &[DVec3], count: usize, calibration: &Calibration) -> Vec<Ellipso
     let reach = NEAR * calibration.spacing;
     // 27 % of the places in the cells that are looked at are within reach; were cells as long as that, it would be 16 %.
     let grid = Grid::new(places, reach / HALVES as f64);
-    let sorted: Vec<DVec3> = grid.order.iter().map(|&k| places[k as usize]).collect();
+    let sorted = grid.sorted(places);
     (0..count)
         .into_par_iter()
         .map(|k| {
@@ -255,82 +284,24 @@ fn fit(places: &[DVec3], count: usize, calibration: &Calibration) -> Vec<Ellipso
         .collect()
 }
 
-/// Cells in the reach of a kernel's neighbours.
-const HALVES: usize = 2;
-/// Places that are looked at together.
-const AT_ONCE: usize = 64;
-
-/// Weight and moments of neighbours, relative to a place.
-struct Moments {
-    weight: f64,
-    first: DVec3,
-    second: DMat3,
-}
-
-impl Moments {
-    /// Of the places within `reach`, itself included, under the paper's weight 1 − (r / R)³; `sorted` are in the grid's order.
-    fn about(place: DVec3, (grid, sorted): (&Grid, &[DVec3]), reach: f64) -> Self {
-        let mut moments = Self::zero();
-        let mut near = [DVec3::ZERO; AT_ONCE];
-        grid.for_each_run(place, HALVES, |run| {
-            for places in sorted[run].chunks(AT_ONCE) {
-                // Those that are near first, without a branch that a processor would have to guess.
-                let mut count = 0;
-                for other in places {
-                    near[count] = *other - place;
-                    count += usize::from(near[count].length_squared() < reach * reach);
-                }
-                near[..count].iter().for_each(|&d| moments.add(d, reach));
-            }
-        });
-        moments
-    }
-
-    fn zero() -> Self {
-        Self {
-            weight: 0.0,
-            first: DVec3::ZERO,
-            second: DMat3::ZERO,
-        }
-    }
-
-    fn add(&mut self, d: DVec3, reach: f64) {
-        let squared = d.length_squared() / (reach * reach);
-        if squared < 1.0 {
-            let w = 1.0 - squared * squared.sqrt();
-            self.weight += w;
-            self.first += w * d;
-            self.second += outer(d) * w;
-        }
-    }
-
-    /// About their mean.
-    fn covariance(&self) -> DMat3 {
-        self.second * (1.0 / self.weight) - outer(self.first / self.weight)
-    }
-}
-
 /// 0 up to the first of these, 1 from the second on, and steadily between.
 fn rise([from, to]: [f64; 2], x: f64) -> f64 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-fn outer(d: DVec3) -> DMat3 {
-    DMat3::from_cols(d.x * d, d.y * d, d.z * d)
-}
-
 impl Calibration {
     fn new(spacing: f64) -> Self {
         let reach = NEAR.ceil() as i32;
-        let mut bulk = Moments::zero();
+        let mut bulk = Near::new(NEAR);
         for z in -reach..=reach {
             for y in -reach..=reach {
                 for x in -reach..=reach {
-                    bulk.add(DVec3::new(x.into(), y.into(), z.into()), NEAR);
+                    bulk.take(&[DVec3::new(x.into(), y.into(), z.into())], DVec3::ZERO);
                 }
             }
         }
+        let bulk = bulk.moments();
         let mut found = Self {
             spacing: 1.0,
             variance: bulk.covariance().x_axis.x,
@@ -373,15 +344,16 @@ impl Calibration {
         let kernels: Vec<Ellipsoid> = (0..layers)
             .map(|layer| {
                 let place = DVec3::new(0.0, -0.5 - f64::from(layer), 0.0);
-                let mut sums = Moments::zero();
+                let mut near = Near::new(NEAR);
                 for z in -side..=side {
                     for y in -side..=side.min(layer) {
                         for x in -side..=side {
-                            sums.add(DVec3::new(x.into(), y.into(), z.into()), NEAR);
+                            let other = DVec3::new(x.into(), y.into(), z.into());
+                            near.take(&[other], DVec3::ZERO);
                         }
                     }
                 }
-                self.kernel(place, &sums)
+                self.kernel(place, &near.moments())
             })
             .collect();
         let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(SAMPLES);
@@ -402,83 +374,4 @@ fn lone_factor(level: f64) -> f64 {
     let radius = (3.0 / (4.0 * PI)).cbrt();
     let plain = Ellipsoid::new(DVec3::ZERO, DMat3::IDENTITY, DVec3::splat(ALONE), 1.0);
     level / plain.value(DVec3::X * radius)
-}
-
-/// Places by cell, for neighbours within a cell's edge.
-pub(super) struct Grid {
-    edge: f64,
-    min: DVec3,
-    cells: [usize; 3],
-    starts: Vec<u32>,
-    order: Vec<u32>,
-}
-
-impl Grid {
-    pub(super) fn new(places: &[DVec3], edge: f64) -> Self {
-        let least = |a: DVec3, b: &DVec3| a.min(*b);
-        let min = places.iter().fold(DVec3::INFINITY, least);
-        let max = places.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
-        let span = ((max - min) / edge).floor().max(DVec3::ZERO);
-        let cells = match places.is_empty() {
-            true => [1; 3],
-            false => span.to_array().map(|n| n as usize + 1),
-        };
-        let mut grid = Self {
-            edge,
-            min,
-            cells,
-            starts: vec![0; cells.iter().product::<usize>() + 1],
-            order: vec![0; places.len()],
-        };
-        for &p in places {
-            let cell = grid.index(grid.cell(p));
-            grid.starts[cell + 1] += 1;
-        }
-        for cell in 1..grid.starts.len() {
-            grid.starts[cell] += grid.starts[cell - 1];
-        }
-        let mut next = grid.starts.clone();
-        for (k, &p) in places.iter().enumerate() {
-            let at = &mut next[grid.index(grid.cell(p))];
-            grid.order[*at as usize] = k as u32;
-            *at += 1;
-        }
-        grid
-    }
-
-    /// Of a cell, metres: how far neighbours are found.
-    pub(super) fn edge(&self) -> f64 {
-        self.edge
-    }
-
-    fn cell(&self, p: DVec3) -> [usize; 3] {
-        let at = ((p - self.min) / self.edge).to_array();
-        [0, 1, 2].map(|axis| (at[axis].max(0.0) as usize).min(self.cells[axis] - 1))
-    }
-
-    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
-        (z * self.cells[1] + y) * self.cells[0] + x
-    }
-
-    /// Visits those of the 3³ cells about a place, which may lie outside of all, in an order that depends on the places alone.
-    pub(super) fn for_each_near(&self, p: DVec3, mut visit: impl FnMut(usize)) {
-        self.for_each_run(p, 1, |run| {
-            self.order[run].iter().for_each(|&k| visit(k as usize));
-        });
-    }
-
-    /// Visits the rows of those of the cells about a place that are up to `reach` from its own, as ranges of the grid's order.
-    fn for_each_run(&self, p: DVec3, reach: usize, mut visit: impl FnMut(Range<usize>)) {
-        let [x, y, z] = self.cell(p);
-        let range = |c: usize, n: usize| c.saturating_sub(reach)..=(c + reach).min(n - 1);
-        for cz in range(z, self.cells[2]) {
-            for cy in range(y, self.cells[1]) {
-                let xs = range(x, self.cells[0]);
-                let row = self.index([0, cy, cz]);
-                let first = self.starts[row + xs.start()] as usize;
-                let last = self.starts[row + xs.end() + 1] as usize;
-                visit(first..last);
-            }
-        }
-    }
 }

@@ -97,6 +97,7 @@ fn noise_of_particles_is_smoothed_out_of_the_surface() {
         centre,
         inverse: DMat3::from_diagonal(DVec3::splat(0.5 / D)),
         reach: DVec3::splat(2.0 * D),
+        longest: 2.0 * D,
         peak: 315.0 / (64.0 * PI) / 8.0,
     });
     let balls = Kernels {
@@ -242,4 +243,43 @@ fn light_goes_straight_down_through_a_pool() {
     assert!(deep(1.5) < 1e-6, "there is no water above");
     let straight = Sunlight::new(&set, DVec3::Y);
     assert!(straight.path(DVec3::new(1.0, 0.2, 1.2)) < deep(0.2) - 0.02);
+}
+
+/// The field's value and slope are those of all kernels, whichever cells they lie in.
+#[test]
+fn a_field_is_the_sum_of_all_kernels() {
+    let mut seed = 7u32;
+    let mut random = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(seed >> 8) / 16_777_216.0
+    };
+    let size = DVec3::splat(10.0 * D);
+    let mut place = || size * DVec3::new(random(), random(), random());
+    let places: Vec<DVec3> = (0..600).map(|_| place()).collect();
+    let kernels = Kernels::fit(&places, size, D);
+    let field = kernels.field();
+    let all = |x: DVec3| {
+        let sum: f64 = kernels.ellipsoids.iter().map(|it| it.value(x)).sum();
+        sum / kernels.level - 1.0
+    };
+    for _ in 0..300 {
+        let x = 1.2 * place() - 0.1 * size;
+        let (value, slope) = field.value_and_gradient(x);
+        // Some hundred terms of a few.
+        assert!((value - all(x)).abs() < 1e-12, "{value} {}", all(x));
+        assert_eq!((value, slope), (field.value(x), field.gradient(x)));
+        // By central differences, whose remainder is h² times a third derivative.
+        let h = 1e-5 * D;
+        let along = |axis: DVec3| (all(x + h * axis) - all(x - h * axis)) / (2.0 * h);
+        let differences = DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z));
+        assert!(
+            (slope - differences).length() * D < 1e-4,
+            "{slope} {differences}"
+        );
+        // The control: a hundredth of a spacing away.
+        if slope.length() * D > 0.1 {
+            let along = 0.01 * D * slope.normalize();
+            assert!((field.value(x + along) - all(x)).abs() > 1e-4);
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::kernels::Grid;
+use super::grid::Grid;
 
 /// Particles that a velocity is taken from lie within so many particle spacings: a surface lies within 2.5 of one.
 const NEAR: f64 = 3.0;

@@ -4,9 +4,9 @@ use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
 use super::passes::Inputs;
-use crate::{
-    domain::period::Period,
-    reference::lanes::{LANES, positive, sum},
+use crate::domain::{
+    lanes::{LANES, positive, sum},
+    period::Period,
 };
 
 /// Neighbours that are held at once. All are gathered before the first is summed: a vector that is loaded right after its numbers were
@@ -181,10 +181,11 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::domain::lanes::widely;
     use crate::{
         domain::boundary::Boundary,
         reference::{
-            Timings, lanes,
+            Timings,
             pbf::{Model, Sorted, Substep},
         },
         scene::Scene,
@@ -234,9 +235,9 @@ mod tests {
                 lambda: &lambda,
                 artificial: 1e-4,
             };
-            let (wide, plain) = (lanes::widely(row()), row().with_simd(pulp::Scalar));
+            let (wide, plain) = (widely(row()), row().with_simd(pulp::Scalar));
             assert_eq!(wide, plain);
-            let corrected = lanes::widely(correction());
+            let corrected = widely(correction());
             assert_eq!(corrected, correction().with_simd(pulp::Scalar));
             let mut terms = (0.0, DVec3::ZERO, 0.0);
             let mut pushed = DVec3::ZERO;

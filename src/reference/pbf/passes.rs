@@ -9,7 +9,10 @@ use super::{
     Colour, Model, Substep,
     pairs::{CorrectionSum, RowSums},
 };
-use crate::reference::{hash::pair_direction, lanes::widely, neighbors::Neighbors};
+use crate::{
+    domain::lanes::widely,
+    reference::{hash::pair_direction, neighbors::Neighbors},
+};
 
 /// Particles of a task; fewer are not worth the handing out.
 const GRAIN: usize = 256;

@@ -30,6 +30,9 @@ pub fn write_png_with_attributes(
     write(path, image, view, Some(attributes))
 }
 
+/// Pixels that a thread encodes in a row.
+const ROW: usize = 1024;
+
 fn write(
     path: &Path,
     image: &Image,
@@ -43,15 +46,16 @@ fn write(
     let shown = image.shown();
     let opaque = shown.iter().all(|pixel| pixel[3] >= 1.0 - 1e-6);
     let depth = if opaque { 3 } else { 4 };
-    let pixels: Vec<u8> = shown
-        .par_iter()
-        .flat_map_iter(|&[r, g, b, a]| {
+    let mut pixels = vec![0; depth * shown.len()];
+    let places = pixels.par_chunks_mut(depth * ROW);
+    (places.zip(shown.par_chunks(ROW))).for_each(|(places, shown)| {
+        for (place, &[r, g, b, a]) in places.chunks_exact_mut(depth).zip(shown) {
             let clear = if a > 0.0 { 1.0 / a } else { 0.0 };
             let [r, g, b] = view::apply_bytes(view, [r * clear, g * clear, b * clear]);
             let alpha = (f64::from(a).clamp(0.0, 1.0) * 255.0).round() as u8;
-            [r, g, b, alpha].into_iter().take(depth)
-        })
-        .collect();
+            place.copy_from_slice(&[r, g, b, alpha][..depth]);
+        }
+    });
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, image.display[0], image.display[1]);
     encoder.set_color(if opaque {
@@ -60,6 +64,8 @@ fn write(
         png::ColorType::Rgba
     });
     encoder.set_depth(png::BitDepth::Eight);
+    // An eighth of the time.
+    encoder.set_compression(png::Compression::Fast);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     if let Some(attributes) = attributes {
         let frame = attributes.frame.to_string();

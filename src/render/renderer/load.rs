@@ -65,6 +65,21 @@ struct Order {
     in_frame: usize,
 }
 
+/// A word that is in the order of a number, as `f32::total_cmp` has it.
+fn in_order(x: f32) -> u32 {
+    let bits = x.to_bits();
+    match bits >> 31 {
+        0 => bits | 1 << 31,
+        _ => !bits,
+    }
+}
+
+/// Values in an order, whose last entries are their indices.
+fn picked<T: Copy + Send + Sync>(values: &[T], order: &[(Class, u32, u32, u32)]) -> Vec<T> {
+    let of = |&(_, _, _, index): &(Class, u32, u32, u32)| values[index as usize];
+    order.par_iter().map(of).collect()
+}
+
 impl Renderer {
     /// Moves a frame's particles to the device, relative to the domain's least corner.
     pub(super) fn load(&mut self, frame: u32, moment: &Moment<'_>) -> Result<Loaded, RenderError> {
@@ -189,21 +204,24 @@ impl Renderer {
 
     fn pack(&self, frame: u32, particles: &Particles) -> Result<Vec<Particle>, RenderError> {
         let origin = self.scene.domain.min;
-        let mut packed = Vec::with_capacity(particles.len());
-        let places = particles.position.iter().zip(&particles.velocity);
-        for (index, (p, v)) in places.enumerate() {
-            if !p.iter().chain(v).all(|x| x.is_finite()) {
-                return Err(RenderError::NotFinite { index, frame });
-            }
-            let position = [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32);
-            packed.push(Particle {
-                position,
-                air: CLEAR,
-                velocity: *v,
-                tag: particles.id.get(index).map_or(index as u32, |&id| id) << 1 | 1,
-            });
+        let (places, velocities) = (&particles.position, &particles.velocity);
+        let is_finite = |(p, v): (&[f32; 3], &[f32; 3])| p.iter().chain(v).all(|x| x.is_finite());
+        let both = places.par_iter().zip(velocities);
+        if let Some(index) = both.position_first(|it| !is_finite(it)) {
+            return Err(RenderError::NotFinite { index, frame });
         }
-        Ok(packed)
+        let pack = |(index, (p, v)): (usize, (&[f32; 3], &[f32; 3]))| Particle {
+            position: [0, 1, 2].map(|axis| (f64::from(p[axis]) - origin[axis]) as f32),
+            air: CLEAR,
+            velocity: *v,
+            tag: particles.id.get(index).map_or(index as u32, |&id| id) << 1 | 1,
+        };
+        Ok(places
+            .par_iter()
+            .zip(velocities)
+            .enumerate()
+            .map(pack)
+            .collect())
     }
 
     /// First those that may be seen, then those that others hide, then those beside the frame; front to back, so that splats find what
@@ -230,21 +248,18 @@ impl Renderer {
             (true, true) => Class::Hidden,
             (false, _) => Class::Beside,
         };
-        let mut order: Vec<(Class, f32, u32, u32)> = (0u32..packed.len() as u32)
+        let mut order: Vec<(Class, u32, u32, u32)> = (0u32..packed.len() as u32)
             .into_par_iter()
             .map(|index| {
                 let particle = &packed[index as usize];
-                (class(index as usize), depth(particle), particle.tag, index)
+                let key = in_order(depth(particle));
+                (class(index as usize), key, particle.tag, index)
             })
             .collect();
-        order.par_sort_unstable_by(|a, b| {
-            (a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).then((a.2, a.3).cmp(&(b.2, b.3)))
-        });
-        let sorted = order.iter().map(|&(_, _, _, index)| packed[index as usize]);
-        *packed = sorted.collect();
+        order.par_sort_unstable();
+        *packed = picked(packed, &order);
         if !ways.is_empty() {
-            let sorted = order.iter().map(|&(_, _, _, index)| ways[index as usize]);
-            *ways = sorted.collect();
+            *ways = picked(ways, &order);
         }
         let before = |class: Class| order.partition_point(|&(it, ..)| it < class);
         Order {
@@ -322,5 +337,26 @@ impl Renderer {
             .collect();
         let close = near.iter().filter(|p| p.distance(eye) < CLOSE * spacing);
         close.count() >= FEW && Kernels::fit(&near, size, spacing).field().value(eye) > 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_order;
+
+    #[test]
+    fn words_are_in_the_order_of_numbers() {
+        let numbers = [
+            f32::NEG_INFINITY,
+            -2.5,
+            -1e-40,
+            -0.0,
+            0.0,
+            1e-40,
+            1.0,
+            1.5,
+            f32::MAX,
+        ];
+        assert!(numbers.is_sorted_by(|a, b| in_order(*a) < in_order(*b)));
     }
 }

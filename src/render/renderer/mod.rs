@@ -241,7 +241,11 @@ impl Renderer {
         let width = values * self.plan.extent.picture[0] as usize;
         let mut pixels = Vec::new();
         for (band, &rows) in self.plan.bands.iter().enumerate() {
-            pixels.extend(self.program.read(of(band), width * rows as usize)?);
+            let read = self.program.read(of(band), width * rows as usize)?;
+            match pixels.is_empty() {
+                true => pixels = read,
+                false => pixels.extend(read),
+            }
         }
         Ok(pixels)
     }
