@@ -19,7 +19,7 @@ pub mod holes;
 pub mod inside;
 pub mod isosurface;
 pub mod keep;
-pub mod lanes;
+pub(crate) mod lanes;
 pub mod level_set;
 pub mod mesh;
 pub mod mesh_file;

@@ -36,7 +36,7 @@ const STEPS: usize = 4096;
 
 /// sRGB's encoding in whole 255ths: look-ups instead of a power.
 struct Bytes {
-    /// The least linear value that it rounds to 1, to 2, and so on to 255; what none reaches at last.
+    /// The least linear value that it rounds to 1, to 2, and so on to 255; at last what none reaches.
     least: [f64; 256],
     /// What the beginning of each step rounds to.
     first: [u8; STEPS + 1],
@@ -58,7 +58,7 @@ static BYTES: LazyLock<Bytes> = LazyLock::new(|| {
     };
     Bytes {
         least: std::array::from_fn(|index| match index {
-            255 => f64::INFINITY,
+            255 => f64::NAN,
             _ => least(index as f64 + 1.0),
         }),
         first: std::array::from_fn(|step| rounded(step as f64 / STEPS as f64) as u8),
@@ -280,6 +280,7 @@ mod tests {
                 assert_eq!([of(least), of(least.next_down())], [byte, byte - 1]);
             }
         }
+        assert_eq!([BYTES.of(f64::INFINITY), BYTES.of(-1.0)], [255, 0]);
         assert_eq!(
             apply_bytes(&view(TransformSpec::Srgb), [f32::NAN; 3]),
             [0; 3]

@@ -7,9 +7,14 @@ use rayon::prelude::*;
 
 /// Cells within the reach of neighbours, where they are half as long as that: fewer places are looked at than in 3³ cells as long as it.
 pub(super) const HALVES: usize = 2;
-/// Places by cell, for neighbours within a cell's edge.
+/// Cells for each place, at most.
+const SPARSEST: usize = 16;
+
+/// Places by cell.
 pub(super) struct Grid {
+    /// As asked, and of the cells themselves, metres.
     edge: f64,
+    cell: f64,
     min: DVec3,
     cells: [usize; 3],
     starts: Vec<u32>,
@@ -26,13 +31,23 @@ impl Grid {
             .par_iter()
             .copied()
             .reduce(|| DVec3::NEG_INFINITY, DVec3::max);
-        let span = ((max - min) / edge).floor().max(DVec3::ZERO);
-        let cells = match places.is_empty() {
+        let cells_of = |edge: f64| match places.is_empty() {
             true => [1; 3],
-            false => span.to_array().map(|n| n as usize + 1),
+            false => {
+                let span = ((max - min) / edge).floor().max(DVec3::ZERO);
+                span.to_array().map(|n| n as usize + 1)
+            }
         };
+        // Of drops far apart most cells would be empty: longer ones find the same.
+        let most = SPARSEST * (places.len() + 1);
+        let mut cell = edge;
+        while cells_of(cell).iter().map(|&n| n as f64).product::<f64>() > most as f64 {
+            cell *= 2.0;
+        }
+        let cells = cells_of(cell);
         let mut grid = Self {
             edge,
+            cell,
             min,
             cells,
             starts: vec![0; cells.iter().product::<usize>() + 1],
@@ -56,13 +71,13 @@ impl Grid {
         grid
     }
 
-    /// Of a cell, metres: how far neighbours are found.
+    /// How far [`Self::for_each_near`] finds neighbours, metres.
     pub(super) fn edge(&self) -> f64 {
         self.edge
     }
 
     fn cell(&self, p: DVec3) -> [usize; 3] {
-        let at = ((p - self.min) / self.edge).to_array();
+        let at = ((p - self.min) / self.cell).to_array();
         [0, 1, 2].map(|axis| (at[axis].max(0.0) as usize).min(self.cells[axis] - 1))
     }
 
@@ -97,5 +112,32 @@ impl Grid {
                 visit(first..last);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two clumps a million cells apart, and one by itself: all within a cell's edge are met, in no more cells than places warrant.
+    #[test]
+    fn drops_far_apart_take_few_cells() {
+        let clump = |k: usize| DVec3::splat(if k < 50 { 0.0 } else { 1e6 });
+        let place = |k: usize| clump(k) + 0.3 * DVec3::new((k % 5) as f64, (k / 5 % 5) as f64, 0.0);
+        let scattered: Vec<DVec3> = (0..100).map(place).collect();
+        for places in [&scattered[..], &scattered[..50]] {
+            let grid = Grid::new(places, 1.0);
+            assert!(grid.starts.len() <= SPARSEST * (places.len() + 1) + 1);
+            assert_eq!(grid.edge(), 1.0);
+            for &p in places {
+                let mut met = vec![false; places.len()];
+                grid.for_each_near(p, |k| met[k] = true);
+                let near = (places.iter().zip(&met)).filter(|(q, _)| q.distance(p) <= 1.0);
+                assert!(near.clone().count() > 20 && near.clone().all(|(_, met)| *met));
+            }
+        }
+        // The control: those of one clump alone take no longer cells than asked.
+        assert_eq!(Grid::new(&scattered[..50], 1.0).cell, 1.0);
+        assert!(Grid::new(&scattered, 1.0).cell > 1.0);
     }
 }

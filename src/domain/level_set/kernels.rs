@@ -45,7 +45,7 @@ pub struct Ellipsoid {
     /// Half of the box that holds it, metres.
     pub reach: DVec3,
     /// Longest half axis, metres.
-    pub longest: f64,
+    pub(super) longest: f64,
     /// Its value at the centre.
     pub peak: f64,
 }

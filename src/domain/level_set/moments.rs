@@ -74,7 +74,9 @@ impl Near {
     fn sum(&mut self) {
         let whole = self.count.next_multiple_of(LANES);
         for at in self.count..whole {
-            self.ways[0][at] = 2.0 * self.reach;
+            for (of, way) in self.ways.iter_mut().zip([2.0 * self.reach, 0.0, 0.0]) {
+                of[at] = way;
+            }
         }
         let [x, y, z] = (self.ways).each_ref().map(|of| &of[..whole]);
         let inverse = 1.0 / (self.reach * self.reach);

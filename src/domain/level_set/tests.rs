@@ -262,24 +262,27 @@ fn a_field_is_the_sum_of_all_kernels() {
         let sum: f64 = kernels.ellipsoids.iter().map(|it| it.value(x)).sum();
         sum / kernels.level - 1.0
     };
+    let mut controls = 0;
     for _ in 0..300 {
         let x = 1.2 * place() - 0.1 * size;
         let (value, slope) = field.value_and_gradient(x);
         // Some hundred terms of a few.
         assert!((value - all(x)).abs() < 1e-12, "{value} {}", all(x));
-        assert_eq!((value, slope), (field.value(x), field.gradient(x)));
-        // By central differences, whose remainder is h² times a third derivative.
+        assert_eq!(value, field.value(x));
+        // By central differences, whose remainder is h² times a third derivative, 1e-9, and whose roundings are 1e-16 over h.
         let h = 1e-5 * D;
         let along = |axis: DVec3| (all(x + h * axis) - all(x - h * axis)) / (2.0 * h);
         let differences = DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z));
         assert!(
-            (slope - differences).length() * D < 1e-4,
+            (slope - differences).length() * D < 1e-7,
             "{slope} {differences}"
         );
         // The control: a hundredth of a spacing away.
         if slope.length() * D > 0.1 {
             let along = 0.01 * D * slope.normalize();
             assert!((field.value(x + along) - all(x)).abs() > 1e-4);
+            controls += 1;
         }
     }
+    assert!(controls > 100, "{controls}");
 }

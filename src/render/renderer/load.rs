@@ -347,6 +347,7 @@ mod tests {
     #[test]
     fn words_are_in_the_order_of_numbers() {
         let numbers = [
+            -f32::NAN,
             f32::NEG_INFINITY,
             -2.5,
             -1e-40,
@@ -355,8 +356,13 @@ mod tests {
             1e-40,
             1.0,
             1.5,
-            f32::MAX,
         ];
-        assert!(numbers.is_sorted_by(|a, b| in_order(*a) < in_order(*b)));
+        let numbers = [&numbers[..], &[f32::MAX, f32::INFINITY, f32::NAN]].concat();
+        for (a, b) in numbers
+            .iter()
+            .flat_map(|a| numbers.iter().map(move |b| (a, b)))
+        {
+            assert_eq!(in_order(*a).cmp(&in_order(*b)), a.total_cmp(b), "{a} {b}");
+        }
     }
 }

@@ -354,7 +354,7 @@ const MAY_IMPORT: [(&str, &[&str]); 14] = [
 /// Crates that only some rooms name.
 const CRATES: [(&str, &[&str]); 4] = [
     ("faer", &["reference"]),
-    ("pulp", &["reference"]),
+    ("pulp", &["domain", "reference", "render"]),
     ("wgpu", &["gpu", "solve", "render"]),
     ("clap", &["cli", "main"]),
 ];
