@@ -106,7 +106,7 @@ impl<'a> Ids<'a> {
     pub(super) fn find(&self, id: u32) -> Option<usize> {
         match &self.order {
             None => {
-                // Where none was added or lost they are numbers in a row.
+                // Ids are numbers in a row where no particle was added or lost.
                 let first = self.ids.first()?;
                 let place = id.wrapping_sub(*first) as usize;
                 match self.ids.get(place) == Some(&id) {

@@ -31,20 +31,15 @@ impl Grid {
             .par_iter()
             .copied()
             .reduce(|| DVec3::NEG_INFINITY, DVec3::max);
-        let cells_of = |edge: f64| match places.is_empty() {
-            true => [1; 3],
-            false => {
-                let span = ((max - min) / edge).floor().max(DVec3::ZERO);
-                span.to_array().map(|n| n as usize + 1)
-            }
-        };
+        // 1 where there is no place: −∞ then lies between the two.
+        let counts = |cell: f64| ((max - min) / cell).floor().max(DVec3::ZERO) + 1.0;
         // Of drops far apart most cells would be empty: longer ones find the same.
-        let most = SPARSEST * (places.len() + 1);
+        let most = (SPARSEST * (places.len() + 1)) as f64;
         let mut cell = edge;
-        while cells_of(cell).iter().map(|&n| n as f64).product::<f64>() > most as f64 {
+        while counts(cell).element_product() > most {
             cell *= 2.0;
         }
-        let cells = cells_of(cell);
+        let cells = counts(cell).to_array().map(|n| n as usize);
         let mut grid = Self {
             edge,
             cell,
@@ -125,6 +120,10 @@ mod tests {
         let clump = |k: usize| DVec3::splat(if k < 50 { 0.0 } else { 1e6 });
         let place = |k: usize| clump(k) + 0.3 * DVec3::new((k % 5) as f64, (k / 5 % 5) as f64, 0.0);
         let scattered: Vec<DVec3> = (0..100).map(place).collect();
+        // As far as f32 goes, and nowhere.
+        let farther: Vec<DVec3> = scattered.iter().map(|p| 1e31 * *p).collect();
+        assert_eq!(Grid::new(&farther, 1.0).order.len(), farther.len());
+        assert_eq!(Grid::new(&[], 1.0).cells, [1; 3]);
         for places in [&scattered[..], &scattered[..50]] {
             let grid = Grid::new(places, 1.0);
             assert!(grid.starts.len() <= SPARSEST * (places.len() + 1) + 1);

@@ -157,12 +157,10 @@ impl Kernels {
 
     /// The field itself, for values at any place.
     pub fn field(&self) -> Field<'_> {
-        let reach = |it: &Ellipsoid| it.reach.max_element();
-        let edge = (self.ellipsoids.par_iter().map(reach)).reduce(|| 0.0, f64::max);
+        let longest = self.ellipsoids.par_iter().map(|it| it.longest);
+        let farthest = longest.reduce(|| f64::MIN_POSITIVE, f64::max);
         let places: Vec<DVec3> = self.ellipsoids.par_iter().map(|it| it.centre).collect();
-        let grid = Grid::new(&places, edge.max(f64::MIN_POSITIVE) / HALVES as f64);
-        let farthest = self.ellipsoids.iter().map(|it| it.longest);
-        let farthest = farthest.fold(0.0, f64::max);
+        let grid = Grid::new(&places, farthest / HALVES as f64);
         Field {
             kernels: self,
             centres: grid.sorted(&places),

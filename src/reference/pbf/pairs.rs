@@ -181,9 +181,8 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::domain::lanes::widely;
     use crate::{
-        domain::boundary::Boundary,
+        domain::{boundary::Boundary, lanes::widely},
         reference::{
             Timings,
             pbf::{Model, Sorted, Substep},

@@ -64,7 +64,7 @@ fn write(
         png::ColorType::Rgba
     });
     encoder.set_depth(png::BitDepth::Eight);
-    // Sooner than by the default, whose files of rendered frames are larger.
+    // Fast mode takes less time than the default, and its files of rendered frames are smaller.
     encoder.set_compression(png::Compression::Fast);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     if let Some(attributes) = attributes {
