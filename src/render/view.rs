@@ -31,12 +31,13 @@ pub fn apply_bytes(view: &ViewSpec, colour: [f32; 3]) -> [u8; 3] {
     display(view, colour).to_array().map(|x| bytes.of(x))
 }
 
-/// Steps of linear light, each with fewer than two of the values from which on the encoding rounds to the next byte.
+/// Steps of linear light from 0 to 1. The encoding's slope is at most 12.92, so that over a step it rises by at most 0.8 of a 255th, and
+/// rounds to at most two bytes.
 const STEPS: usize = 4096;
 
 /// sRGB's encoding in whole 255ths: look-ups instead of a power.
 struct Bytes {
-    /// The least linear value that it rounds to 1, to 2, and so on to 255; at last what none reaches.
+    /// The least linear value that it rounds to 1, to 2, and so on to 255; at last NaN, which no value reaches.
     least: [f64; 256],
     /// What the beginning of each step rounds to.
     first: [u8; STEPS + 1],

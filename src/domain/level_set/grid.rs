@@ -5,7 +5,8 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Cells within the reach of neighbours, where they are half as long as that: fewer places are looked at than in 3³ cells as long as it.
+/// How many cells make up the reach of neighbours. With cells half as long as the reach a search looks at fewer places than with 3³ cells
+/// as long as it.
 pub(super) const HALVES: usize = 2;
 /// Cells for each place, at most.
 const SPARSEST: usize = 16;
@@ -31,9 +32,9 @@ impl Grid {
             .par_iter()
             .copied()
             .reduce(|| DVec3::NEG_INFINITY, DVec3::max);
-        // 1 where there is no place: −∞ then lies between the two.
+        // Where there is no place, max − min is −∞, and there is one cell.
         let counts = |cell: f64| ((max - min) / cell).floor().max(DVec3::ZERO) + 1.0;
-        // Of drops far apart most cells would be empty: longer ones find the same.
+        // Where drops lie far apart most cells would be empty; longer cells find the same neighbours.
         let most = (SPARSEST * (places.len() + 1)) as f64;
         let mut cell = edge;
         while counts(cell).element_product() > most {
