@@ -72,12 +72,20 @@ def fault_of(root: Path, mutant: Mutant) -> str | None:
         return f"`{mutant.before}` stands {count} times in {mutant.file}, and has to stand there once"
     if mutant.before == mutant.after:
         return "`to` is `from`"
+    if not mutant.is_shader and not (is_expression(mutant.before) and is_expression(mutant.after)):
+        return "a Rust `from` and its `to` are complete expressions"
     if bool(mutant.caught_by) == bool(mutant.reason):
         return "either caught_by or survives"
     for name in mutant.caught_by:
         if not is_test(root, name):
             return f"there is no test {name}; caught_by is TEST_BINARY::test::path"
     return None
+
+
+def is_expression(text: str) -> bool:
+    """Whether a line of Rust may be one: it opens what it closes, and is no statement. What else is wrong the compiler says."""
+    is_balanced = all(text.count(opened) == text.count(closed) for opened, closed in ("()", "[]", "{}"))
+    return is_balanced and not text.rstrip().endswith((";", ",")) and not text.lstrip().startswith(("let ", "const ", "<", ">", "."))
 
 
 def is_test(root: Path, name: str) -> bool:
