@@ -181,6 +181,7 @@ fn ids_frames_and_settings_that_differ_are_told() {
             "frame 1, particles: 1 on one side alone",
         ],
     );
+    assert_has(&job.expect(1, "diff b a"), &["frames in A alone: 4"]);
     // Another setting alone is no fault.
     let made = Made {
         scene: &other,

@@ -249,6 +249,37 @@ fn nothing_ends_within_a_box_faster_than_the_cfl_limit() {
     assert_eq!(state.len(), particles.len());
 }
 
+/// A drop that hangs in a box's way is as far before its face at the end of a substep as one that the box pushed there and that it does
+/// not leave behind: at the distance that particles keep, from where the face is by then. Sampled distances are exact before a flat face.
+#[test]
+fn a_box_takes_a_drop_along_as_far_as_it_goes() {
+    let context = context();
+    let mut scene = scene([16.0; 3]);
+    scene.water.gravity = DVec3::ZERO;
+    let motion = Motion::ConstantVelocity {
+        velocity: 5.0,
+        until: None,
+    };
+    scene.moving_solids = vec![mover(BOX, DVec3::X, motion)];
+    let drop = Particles {
+        position: vec![[0.99, 0.63, 0.79]],
+        velocity: vec![[0.0; 3]],
+        id: vec![0],
+        ..Particles::default()
+    };
+    let mut solver = solver(&context, &scene, &drop);
+    solver.load(0, &drop).unwrap();
+    for frame in 1..=3u32 {
+        let (state, report) = solver.advance().unwrap();
+        assert_eq!(report.substeps, 1);
+        let by = DVec3::X * 0.05 * f64::from(frame);
+        let apart = box_distance(place(&state.position[0]), moved(BOX, by));
+        // A tenth of the particles' spacing; places of up to 2 m are rounded some ten times.
+        let kept = 0.1 * 0.5 * DX;
+        assert!((apart - kept).abs() < 10.0 * 1.2e-7, "{frame}: {apart}");
+    }
+}
+
 /// Mean height of the water's surface over columns at least a cell away from the box, seen from above.
 fn level(state: &Particles, bounds: Bounds, cells: [i32; 3]) -> f64 {
     let raster = Raster {

@@ -94,3 +94,30 @@ fn water_before_a_wall_that_cuts_cells_has_its_density() {
         }
     }
 }
+
+/// Without a density correction nothing is mirrored, and a cell is as full as what walls leave of its hats: of a lattice 7/8 in the cell
+/// before a wall that cuts none, 1/2 in one whose centre is in the wall. Its hats there are 3/4, 3/4 and 1/4 of a particle of two, or 3/4
+/// and 1/4; integrals come to the same.
+#[test]
+fn cells_at_walls_are_full_without_images_too() {
+    for part in [0.0, 0.5] {
+        let (mut scene, mut particles) = rig::tank([8, 8, 8], 6);
+        rig::flip(&mut scene).density_correction = false;
+        scene.wave_makers = vec![WaveMaker {
+            absorption: None,
+            wall: Wall::NAMED[0].1,
+            motion: Motion::ConstantVelocity {
+                velocity: part * DX,
+                until: Some(1.0),
+            },
+        }];
+        for x in &mut particles.position {
+            x[0] += (part * DX) as f32;
+        }
+        let trace = traced(&scene, &particles, 1.0);
+        for x in 0..4 {
+            let density = trace.centers.density[trace.bricks.element([x, 2, 4]) as usize];
+            assert!((density - 1.0).abs() < 2e-5, "{part}, {x}: {density}");
+        }
+    }
+}

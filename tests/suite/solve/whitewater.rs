@@ -121,7 +121,7 @@ fn foam_goes_with_its_water() {
         let off = place(&moved, 0).distance(x + 0.15 * DVec3::X);
         assert!(off < 1e-5, "{off}");
         assert_eq!(kind(&moved, 0), Kind::Foam);
-        // Foam that stood takes on the speed of the water within a frame.
+        // Foam that stood takes on the speed of the water within a frame, in which it goes half of the water's way.
         let moved = one(
             device,
             &pool(2.0, 0.5),
@@ -130,6 +130,8 @@ fn foam_goes_with_its_water() {
             (1, 0.05),
         );
         assert!(velocity(&moved, 0).distance(v) < 1e-5);
+        let off = place(&moved, 0).distance(x + 0.5 * 0.05 * v);
+        assert!(off < 1e-5, "{off}");
     });
 }
 

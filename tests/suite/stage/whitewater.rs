@@ -57,7 +57,9 @@ fn a_stream_is_made_beside_its_bake_and_leaves_it_as_it_was() {
             .all(|k| [0.0, 1.0, 2.0].contains(k))
     );
     // Ids are for ever: some died, and no number came again.
-    let next = reader.entry(8).unwrap().report["next_id"].as_u64().unwrap();
+    let told = |frame: u32, key: &str| reader.entry(frame).unwrap().report[key].as_u64().unwrap();
+    let next = told(8, "next_id");
+    assert_eq!(next, (1..=8).map(|frame| told(frame, "born")).sum::<u64>());
     assert!(last.id.windows(2).all(|w| w[0] < w[1]) && u64::from(*last.id.last().unwrap()) < next);
     assert!((last.id.len() as u64) < next);
     job.expect(0, &format!("verify {STREAM}"));
