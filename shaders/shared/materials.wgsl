@@ -60,19 +60,23 @@ fn levels_for(material: Material, width: f32) -> Levels {
 // Samples from which on each takes one of the two levels, as many the second one as it counts.
 const SHARED: u32 = 4u;
 
+// Loops ask at their end too whether they go on, as in ssfr/shade.
 fn picture_at(levels: Levels, at: vec2f) -> vec3f {
-    let samples = sample_count(camera);
+    let count = select(2u, 1u, sample_count(camera) >= SHARED);
     let share = fract((f32(camera.sample_index) + 0.5) * 0.618034);
     var sum = vec3f(0.0);
-    for (var k = 0u; k < select(2u, 1u, samples >= SHARED); k++) {
+    for (var k = 0u; k < count; k++) {
         var is_next = k == 1u;
         var part = select(1.0 - levels.part, levels.part, is_next);
-        if samples >= SHARED {
+        if count == 1u {
             is_next = share < levels.part;
             part = 1.0;
         }
         sum += part * level_at(
             select(levels.first, levels.next, is_next), select(levels.size, levels.next_size, is_next), at);
+        if k + 1u == count {
+            break;
+        }
     }
     return sum;
 }
@@ -126,6 +130,9 @@ fn painted(triangle: u32, p: vec3f, n: vec3f, view: vec3f, footprint: f32) -> ve
     var sum = vec3f(0.0);
     for (var k = 0.0; k < own; k += 1.0) {
         sum += picture_at(levels, at + long * ((k + part) / own - 0.5));
+        if k + 1.0 >= own {
+            break;
+        }
     }
     return material.colour * sum / own;
 }

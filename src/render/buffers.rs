@@ -1,8 +1,8 @@
 //! Buffers of the renderer, and what each holds.
 
 use super::uniform::{
-    Band, Camera, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Page, Particle, Path,
-    Rays, Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater,
+    Band, Block, Camera, Caustics, Cloud, Fill, Flow, FlowLevel, Material, Narrow, Page, Particle,
+    Path, Rays, Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater,
     WhitewaterParams,
 };
 use crate::gpu::buffer::{Buf, Windows, Workgroups};
@@ -27,28 +27,30 @@ pub(super) const SHADOW_FROM_WORLD: Buf<[[f32; 4]; 4]> = Buf::uniform("shadow_fr
 /// What is opaque.
 pub(super) const TRIANGLES: Buf<Triangle> = Buf::new("triangles");
 /// Corner and size of each tile in which solids are drawn.
-/// Which particles each dispatch over them sees.
-pub(super) const PAGES: Windows<Page> = Windows::new("page", "pages");
 pub(super) const TILES: Windows<Tile> = Windows::new("tile", "tiles");
 /// Depth of the solids, of each pixel of the padded frame.
 pub(super) const SOLID_DEPTH: Buf<f32> = Buf::new("solid_depth");
 /// Their normals and materials.
 pub(super) const SOLID_PACKED: Buf<u32> = Buf::new("solid_packed");
 
-/// Particles of a frame.
+/// Particles of a frame that may be seen.
 pub(super) const PARTICLES: Buf<Particle> = Buf::new("particles");
 /// How each of them goes about the frame's instant.
 pub(super) const PATHS: Buf<Path> = Buf::new("paths");
 /// What each of them is splatted as.
 pub(super) const SHAPES: Buf<Shape> = Buf::new("shapes");
+/// Which of them each dispatch sees.
+pub(super) const PAGES: Windows<Page> = Windows::new("page", "pages");
 /// How many particles hold air, and which: those that spray is splatted of.
 pub(super) const AIRED: Buf<u32> = Buf::new("aired");
 /// Workgroups of a dispatch over those that hold air.
 pub(super) const AIRED_GROUPS: Buf<Workgroups> = Buf::new("aired_groups");
-/// Workgroups of a dispatch over particles that may be seen; these stand first.
-pub(super) const SEEN_GROUPS: Buf<Workgroups> = Buf::new("seen_groups");
 /// Workgroups of a dispatch over all particles.
 pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
+/// Blocks of water that stand for particles that no one sees.
+pub(super) const BLOCKS: Buf<Block> = Buf::new("blocks");
+/// Workgroups of a dispatch over them.
+pub(super) const BLOCK_GROUPS: Buf<Workgroups> = Buf::new("block_groups");
 /// What a particle adds to thickness.
 pub(super) const THICKNESS_PARAMS: Buf<Thickness> = Buf::uniform("thickness_params");
 /// Length of the line of sight in water, at half the resolution on both sides.

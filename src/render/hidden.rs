@@ -1,18 +1,24 @@
-//! Which particles stand behind others wherever the eye is above the water, so that splats of depth leave them out.
+//! Which particles stand behind others wherever the eye is above the water, and the blocks of water that stand for them: splats of depth
+//! leave them out, and the way through them is that through the blocks.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{aeration::is_whole, uniform::Particle};
+use super::{
+    aeration::is_whole,
+    uniform::{Block, Particle},
+};
 
 /// Edge of a cell, particle spacings: at rest 8 particles are in one.
 const CELL: f64 = 2.0;
 /// Particles of the body in a cell from which on it is full.
 const FULL: u8 = 5;
+/// Cells along a side of a block, at most: a longer one would cover many pixels that see nothing of it.
+const LONGEST: usize = 4;
 
 /// Cells over the domain, and how many particles of the body are in each.
 struct Cells {
-    edge: f32,
+    edge: f64,
     counts: [i64; 3],
     particles: Vec<u8>,
 }
@@ -22,7 +28,7 @@ impl Cells {
         let counts = (size / (CELL * spacing)).ceil().max(DVec3::ONE).to_array();
         let counts = counts.map(|n| n as i64);
         let mut cells = Self {
-            edge: (CELL * spacing) as f32,
+            edge: CELL * spacing,
             counts,
             particles: vec![0; counts.iter().product::<i64>() as usize],
         };
@@ -35,7 +41,7 @@ impl Cells {
     }
 
     fn cell(&self, particle: &Particle) -> [i64; 3] {
-        (Vec3::from(particle.position) / self.edge)
+        (Vec3::from(particle.position) / self.edge as f32)
             .floor()
             .to_array()
             .map(|c| c as i64)
@@ -56,23 +62,92 @@ impl Cells {
 
     /// Whether a cell of the domain and the 26 about it are full.
     fn is_deep(&self, [x, y, z]: [i64; 3]) -> bool {
-        if self.index([x, y, z]).is_none() {
-            return false;
-        }
         let mut around = (-1..=1).flat_map(|dz| (-1..=1).map(move |dy| (dy, dz)));
         around.all(|(dy, dz)| (-1..=1).all(|dx| self.is_full([x + dx, y + dy, z + dz])))
     }
+
+    /// Of each cell, whether it is deep.
+    fn deep(&self) -> Vec<bool> {
+        let [width, height, _] = self.counts;
+        (0..self.particles.len() as i64)
+            .into_par_iter()
+            .map(|at| self.is_deep([at % width, at / width % height, at / (width * height)]))
+            .collect()
+    }
+
+    /// Blocks of deep cells, each of which is in one: every cell of `deep` becomes false.
+    fn blocks(&self, deep: &mut [bool], spacing: f64) -> Vec<Block> {
+        let [width, height, depth] = self.counts.map(|n| n as usize);
+        let index = |[x, y, z]: [usize; 3]| (z * height + y) * width + x;
+        let mut blocks = Vec::new();
+        for at in 0..deep.len() {
+            if !deep[at] {
+                continue;
+            }
+            let low = [at % width, at / width % height, at / (width * height)];
+            let mut high = low.map(|c| c + 1);
+            for (axis, side) in [width, height, depth].into_iter().enumerate() {
+                while high[axis] < side.min(low[axis] + LONGEST) {
+                    let (mut first, mut end) = (low, high);
+                    first[axis] = high[axis];
+                    end[axis] += 1;
+                    if !between(first, end).all(|cell| deep[index(cell)]) {
+                        break;
+                    }
+                    high = end;
+                }
+            }
+            let mut count = 0.0;
+            for cell in between(low, high) {
+                count += f64::from(self.particles[index(cell)]);
+                deep[index(cell)] = false;
+            }
+            let cells: usize = (0..3).map(|axis| high[axis] - low[axis]).product();
+            let volume = cells as f64 * self.edge.powi(3);
+            blocks.push(Block {
+                low: low.map(|c| (c as f64 * self.edge) as f32),
+                filled: (count * spacing.powi(3) / volume) as f32,
+                high: high.map(|c| (c as f64 * self.edge) as f32),
+                ..Block::default()
+            });
+        }
+        blocks
+    }
 }
 
-/// Of each particle, whether water hides it: all cells about its own are full of whole particles. Places are metres from the least
-/// corner of a domain of `size`; `spacing` lies between neighbours at rest, metres.
-///
-/// Two spacings of water at least lie between it and the air, and a splat reaches 1.25 spacings at most.
-pub(super) fn hidden(particles: &[Particle], size: DVec3, spacing: f64) -> Vec<bool> {
-    let cells = Cells::of(particles, size, spacing);
-    (particles.par_iter())
-        .map(|particle| is_whole(particle) && cells.is_deep(cells.cell(particle)))
-        .collect()
+/// Cells from `low` on and before `high`.
+fn between(low: [usize; 3], high: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    let rows = (low[2]..high[2]).flat_map(move |z| (low[1]..high[1]).map(move |y| (y, z)));
+    rows.flat_map(move |(y, z)| (low[0]..high[0]).map(move |x| [x, y, z]))
+}
+
+/// What of a frame's water is behind other water.
+#[derive(Default)]
+pub(super) struct Hidden {
+    /// Of each particle, whether water hides it: all cells about its own are full of whole particles.
+    pub(super) particles: Vec<bool>,
+    /// What stands for these, front or back in no order.
+    pub(super) blocks: Vec<Block>,
+}
+
+impl Hidden {
+    /// Places are metres from the least corner of a domain of `size`; `spacing` lies between neighbours at rest, metres.
+    ///
+    /// Two spacings of water at least lie between what is hidden and the air, and a splat reaches 1.25 spacings at most.
+    pub(super) fn of(particles: &[Particle], size: DVec3, spacing: f64) -> Self {
+        let cells = Cells::of(particles, size, spacing);
+        let mut deep = cells.deep();
+        let is_deep =
+            |particle: &Particle| cells.index(cells.cell(particle)).is_some_and(|at| deep[at]);
+        let hidden = particles
+            .par_iter()
+            .map(|particle| is_whole(particle) && is_deep(particle))
+            .collect();
+        Self {
+            particles: hidden,
+            blocks: cells.blocks(&mut deep, spacing),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -119,7 +194,7 @@ mod tests {
     #[test]
     fn what_is_near_air_is_seen() {
         let (particles, size) = block(|_| true);
-        let found = hidden(&particles, size, 1.0);
+        let found = Hidden::of(&particles, size, 1.0).particles;
         let deep = |least: f64| {
             let of =
                 |(p, hidden): (&Particle, &bool)| (depth(p.position) > least).then_some(*hidden);
@@ -141,11 +216,34 @@ mod tests {
         );
     }
 
+    /// Beyond a side of the domain there is air; cells with half of their particles are not full.
+    #[test]
+    fn sides_and_thin_water_hide_nothing() {
+        let (mut particles, size) = block(|_| true);
+        for particle in &mut particles {
+            particle.position[0] -= 8.25;
+        }
+        let found = Hidden::of(&particles, size, 1.0).particles;
+        let at_side = |p: &Particle| p.position[0] < CELL as f32;
+        let beside = particles.iter().zip(&found).filter(|(p, _)| at_side(p));
+        assert!(beside.clone().count() > 1000 && beside.clone().all(|(_, hidden)| !hidden));
+        assert!(found.iter().any(|hidden| *hidden));
+        // Of each cell's eight particles four.
+        let thin = |fewer: bool| {
+            let (particles, size) = block(|p| !fewer || (p.x as i32 + p.y as i32) % 2 == 0);
+            Hidden::of(&particles, size, 1.0)
+                .particles
+                .iter()
+                .any(|hidden| *hidden)
+        };
+        assert!(thin(false) && !thin(true));
+    }
+
     #[test]
     fn a_bubble_and_torn_water_hide_nothing() {
         let middle = DVec3::new(20.0, 10.0, 20.0);
         let (particles, size) = block(|p| p.distance(middle) > 3.0);
-        let found = hidden(&particles, size, 1.0);
+        let found = Hidden::of(&particles, size, 1.0).particles;
         let about = |p: &Particle| Vec3::from(p.position).as_dvec3().distance(middle);
         let walls = particles.iter().zip(&found).filter(|(p, _)| about(p) < 4.0);
         assert!(walls.clone().count() > 100 && walls.clone().all(|(_, hidden)| !hidden));
@@ -153,11 +251,57 @@ mod tests {
         for particle in &mut torn {
             particle.air = 0xffbf_0000;
         }
-        assert!(hidden(&torn, size, 1.0).iter().all(|hidden| !hidden));
+        assert!(
+            Hidden::of(&torn, size, 1.0)
+                .particles
+                .iter()
+                .all(|hidden| !hidden)
+        );
         let (mut thrown, size) = block(|_| true);
         for particle in &mut thrown {
             particle.tag = 0;
         }
-        assert!(hidden(&thrown, size, 1.0).iter().all(|hidden| !hidden));
+        assert!(
+            Hidden::of(&thrown, size, 1.0)
+                .particles
+                .iter()
+                .all(|hidden| !hidden)
+        );
+    }
+
+    /// Blocks hold each hidden particle once, overlap nowhere, and have their volume.
+    #[test]
+    fn blocks_stand_for_what_is_hidden() {
+        let middle = DVec3::new(20.0, 10.0, 20.0);
+        let (particles, size) = block(|p| p.distance(middle) > 3.0);
+        let found = Hidden::of(&particles, size, 1.0);
+        let is_in = |p: [f32; 3], block: &Block| {
+            (0..3).all(|axis| block.low[axis] <= p[axis] && p[axis] < block.high[axis])
+        };
+        let mut held = vec![0; found.blocks.len()];
+        for (particle, hidden) in particles.iter().zip(&found.particles) {
+            let within = (0..held.len()).filter(|&k| is_in(particle.position, &found.blocks[k]));
+            let within: Vec<usize> = within.collect();
+            assert_eq!(
+                within.len(),
+                usize::from(*hidden),
+                "{:?}",
+                particle.position
+            );
+            within.iter().for_each(|&k| held[k] += 1);
+        }
+        for (block, held) in found.blocks.iter().zip(&held) {
+            let sides = (Vec3::from(block.high) - Vec3::from(block.low)).as_dvec3();
+            assert!(sides.max_element() <= CELL * LONGEST as f64);
+            let expected = f64::from(*held) / sides.element_product();
+            assert!((f64::from(block.filled) - expected).abs() < 1e-6 * expected);
+        }
+        // Cells of 8 particles: most are in blocks of many cells.
+        let all: u32 = held.iter().sum();
+        assert!(
+            all > 4000 && held.len() as u32 * 8 * 8 < all,
+            "{all} in {}",
+            held.len()
+        );
     }
 }

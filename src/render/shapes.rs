@@ -25,8 +25,8 @@ pub(super) const RADIUS: f64 = 0.87;
 /// Least half axis, spacings: half of what a sheet of one layer of particles is thick in the kernels' field.
 const THINNEST: f64 = 0.35;
 
-/// Shapes of particles, relative to the domain's least corner, in their order; those that were thrown clear have that of a lone one,
-/// and so have all but the first `seen`. `radius` is the look's, metres.
+/// Shapes of the first `seen` particles of all, relative to the domain's least corner, in their order; those that were thrown clear have
+/// that of a lone one. `radius` is the look's, metres.
 pub(super) fn shapes(
     particles: &[Particle],
     seen: usize,
@@ -58,7 +58,7 @@ pub(super) fn shapes(
         1 => fitted.next().unwrap_or(alone),
         _ => alone,
     };
-    particles.iter().map(of).collect()
+    particles[..seen].iter().map(of).collect()
 }
 
 /// Kernels less flat than this, shortest over longest half axis, are within the water: half a lattice's outermost are 0.63.

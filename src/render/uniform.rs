@@ -202,6 +202,16 @@ mirror!(
 );
 
 mirror!(
+    /// `Block` of ssfr/splat_bulk.wgsl.
+    Block {
+        low: [f32; 3],
+        filled: f32,
+        high: [f32; 3],
+        pad0: f32,
+    }
+);
+
+mirror!(
     /// `Whitewater` of ssfr/splat_whitewater.wgsl.
     Whitewater {
         position: [f32; 3],

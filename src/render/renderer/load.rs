@@ -16,18 +16,18 @@ use crate::{
         Moment, RenderError,
         aeration::{self, CLEAR, Fall},
         buffers::{
-            AIRED, AIRED_GROUPS, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS, SEEN_GROUPS, SHAPES,
-            SPRAY_PARAMS,
+            AIRED, AIRED_GROUPS, BLOCK_GROUPS, BLOCKS, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS,
+            SHAPES, SPRAY_PARAMS,
         },
         camera::{camera, pose},
-        hidden::hidden,
+        hidden::Hidden,
         in_frame::in_frame,
         lighting::spray_density,
         paths::{Path, paths},
         plan::per_particle,
         samples::{Sample, samples_of},
         shapes::shapes,
-        uniform::{Page, Particle, SprayParams},
+        uniform::{Block, Page, Particle, SprayParams},
     },
     scene::look::{AovSpec, MethodSpec},
 };
@@ -42,27 +42,11 @@ const CLOSE: f64 = 2.5;
 /// A frame that stands on the device.
 #[derive(Default)]
 pub(super) struct Loaded {
-    /// Its particles, but for those beside it.
+    /// Its particles that may be seen.
     pub(super) count: u32,
     /// They again, with the mean velocity of their way to the next frame: for the channels beside the picture, where one asks for
     /// motion and there is a next frame.
     pub(super) ahead: Vec<Particle>,
-}
-
-/// What becomes of a particle's splats.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Class {
-    Seen,
-    /// Others hide it: it adds to the thickness alone.
-    Hidden,
-    /// It changes no pixel.
-    Beside,
-}
-
-/// How many of the first particles of a sorted frame may be seen, and how many are in it at all.
-struct Order {
-    seen: usize,
-    in_frame: usize,
 }
 
 /// A word that is in the order of a number, as `f32::total_cmp` has it.
@@ -75,8 +59,8 @@ fn in_order(x: f32) -> u32 {
 }
 
 /// Values in an order, whose last entries are their indices.
-fn picked<T: Copy + Send + Sync>(values: &[T], order: &[(Class, u32, u32, u32)]) -> Vec<T> {
-    let of = |&(_, _, _, index): &(Class, u32, u32, u32)| values[index as usize];
+fn picked<T: Copy + Send + Sync>(values: &[T], order: &[(bool, u32, u32, u32)]) -> Vec<T> {
+    let of = |&(_, _, _, index): &(bool, u32, u32, u32)| values[index as usize];
     order.par_iter().map(of).collect()
 }
 
@@ -123,21 +107,29 @@ impl Renderer {
         if !self.program.has(PARTICLES.name()) {
             return Ok(Loaded::default());
         }
-        let order = self.sort(frame, &mut packed, &mut ways);
+        // Rays may begin under water, where what the water hides from above is seen.
+        let hidden = match self.look.spec().renderer.method {
+            MethodSpec::Ssfr => {
+                let spacing = self.scene.particle_spacing;
+                Hidden::of(&packed, self.scene.domain.size(), spacing)
+            }
+            MethodSpec::Ray => Hidden::default(),
+        };
+        let seen = self.sort(frame, &hidden.particles, &mut packed, &mut ways);
         let shapes = match self.program.has(SHAPES.name()) {
-            true => shapes(&packed, order.seen, &self.scene, self.plan.radius),
+            true => shapes(&packed, seen, &self.scene, self.plan.radius),
             false => Vec::new(),
         };
-        packed.truncate(order.in_frame);
-        ways.truncate(order.in_frame);
-        let (count, seen) = (packed.len() as u32, order.seen);
-        self.reserve(packed.len())?;
+        packed.truncate(seen);
+        ways.truncate(seen);
+        let count = seen as u32;
+        self.reserve(seen)?;
+        self.load_blocks(hidden.blocks)?;
         let aired = self.load_aired(&packed);
         let pages = self.pages();
         let aired = self.load_pages(pages, packed.len(), &aired);
         for (buffer, shares) in [
-            (PARTICLE_GROUPS, pages.shares(packed.len()).collect()),
-            (SEEN_GROUPS, pages.shares(seen).collect()),
+            (PARTICLE_GROUPS, pages.shares(seen).collect()),
             (AIRED_GROUPS, aired),
         ] {
             if self.program.has(buffer.name()) {
@@ -148,7 +140,7 @@ impl Renderer {
         }
         self.program.upload(PARTICLES, 0, &packed);
         if self.program.has(SHAPES.name()) {
-            self.program.upload(SHAPES, 0, &shapes[..packed.len()]);
+            self.program.upload(SHAPES, 0, &shapes);
         }
         if self.program.has(PATHS.name()) {
             let packed: Vec<_> = ways.iter().map(Path::packed).collect();
@@ -224,18 +216,19 @@ impl Renderer {
             .collect())
     }
 
-    /// First those that may be seen, then those that others hide, then those beside the frame; front to back, so that splats find what
-    /// hides them already there.
-    fn sort(&self, frame: u32, packed: &mut Vec<Particle>, ways: &mut Vec<Path>) -> Order {
+    /// First those that may be seen, and how many they are, then those that others hide and those beside the frame; front to back, so
+    /// that splats find what hides them already there. `hidden` is empty where nothing is.
+    fn sort(
+        &self,
+        frame: u32,
+        hidden: &[bool],
+        packed: &mut Vec<Particle>,
+        ways: &mut Vec<Path>,
+    ) -> usize {
         let rate = self.scene.frames_per_second;
         let forward = pose(&self.look, frame.into(), rate).forward.as_vec3();
         let depth = |p: &Particle| Vec3::from(p.position).dot(forward);
         let spacing = self.scene.particle_spacing;
-        // Rays may begin under water, where what the water hides from above is seen.
-        let hidden = match self.look.spec().renderer.method {
-            MethodSpec::Ssfr => hidden(packed, self.scene.domain.size(), spacing),
-            MethodSpec::Ray => vec![false; packed.len()],
-        };
         let setting = self.setting(0);
         let samples = [vec![Sample::STILL], samples_of(&self.look)].concat();
         let cameras = samples
@@ -243,17 +236,13 @@ impl Renderer {
             .map(|sample| camera(&self.look, &setting, frame.into(), sample, 0));
         let cameras: Vec<_> = cameras.collect();
         let in_frame = in_frame(packed, ways, &cameras, spacing as f32);
-        let class = |index: usize| match (in_frame[index], hidden[index]) {
-            (true, false) => Class::Seen,
-            (true, true) => Class::Hidden,
-            (false, _) => Class::Beside,
-        };
-        let mut order: Vec<(Class, u32, u32, u32)> = (0u32..packed.len() as u32)
+        let is_unseen = |index: usize| !in_frame[index] || hidden.get(index) == Some(&true);
+        let mut order: Vec<(bool, u32, u32, u32)> = (0u32..packed.len() as u32)
             .into_par_iter()
             .map(|index| {
                 let particle = &packed[index as usize];
                 let key = in_order(depth(particle));
-                (class(index as usize), key, particle.tag, index)
+                (is_unseen(index as usize), key, particle.tag, index)
             })
             .collect();
         order.par_sort_unstable();
@@ -261,11 +250,25 @@ impl Renderer {
         if !ways.is_empty() {
             *ways = picked(ways, &order);
         }
-        let before = |class: Class| order.partition_point(|&(it, ..)| it < class);
-        Order {
-            seen: before(Class::Hidden),
-            in_frame: before(Class::Beside),
+        order.partition_point(|&(is_unseen, ..)| !is_unseen)
+    }
+
+    /// Tells the device which blocks of water stand for what is hidden; what there is room for beyond them is empty.
+    fn load_blocks(&mut self, mut blocks: Vec<Block>) -> Result<(), RenderError> {
+        if !self.program.has(BLOCKS.name()) {
+            return Ok(());
         }
+        let groups = spread(&self.program.context, ROWS, blocks.len() as u64);
+        if blocks.len() > self.blocks {
+            self.blocks = room(blocks.len());
+            let grown = [BLOCKS.sized(self.blocks)];
+            self.program.refit(&grown, &[])?;
+            self.record();
+        }
+        blocks.resize(self.blocks, Block::default());
+        self.program.upload(BLOCK_GROUPS, 0, &[groups.into()]);
+        self.program.upload(BLOCKS, 0, &blocks);
+        Ok(())
     }
 
     /// Makes room for so many particles.
@@ -286,7 +289,7 @@ impl Renderer {
             per_particle(&SHAPES, capacity, look),
             per_particle(&PATHS, capacity, look),
         ];
-        let groups = [PARTICLE_GROUPS, SEEN_GROUPS, AIRED_GROUPS];
+        let groups = [PARTICLE_GROUPS, AIRED_GROUPS];
         grown.extend(groups.map(|groups| groups.sized(pages.count())));
         grown.retain(|spec| self.program.has(&spec.name));
         self.program.refit(&grown, &[])?;

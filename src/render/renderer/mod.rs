@@ -52,6 +52,8 @@ pub struct Renderer {
     aovs: Recording,
     /// Particles that there is room for.
     capacity: usize,
+    /// Blocks of water that there is room for.
+    blocks: usize,
     /// `None` where the look casts no rays.
     water: Option<RayWater>,
     /// `None` where rays meet neither spray nor whitewater.
@@ -106,6 +108,7 @@ impl Renderer {
             plan,
             program,
             capacity: room(0),
+            blocks: 1,
             water: RayWater::of(look, scene),
             cloud: RayCloud::of(look, scene),
             caustics: Caustics::of(look, scene),

@@ -8,8 +8,8 @@ use crate::{
     },
     render::{
         buffers::{
-            AIRED, AIRED_GROUPS, DEPTHS, OWNER, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS,
-            SEEN_GROUPS, SHAPES, SPRAY, SPRAY_PARAMS, THICKNESS, THICKNESS_PARAMS, WHITEWATER,
+            AIRED, AIRED_GROUPS, BLOCK_GROUPS, BLOCKS, DEPTHS, OWNER, PAGES, PARTICLE_GROUPS,
+            PARTICLES, PATHS, SHAPES, SPRAY, SPRAY_PARAMS, THICKNESS, THICKNESS_PARAMS, WHITEWATER,
             WHITEWATER_GROUPS, WHITEWATER_PARAMS,
         },
         frame::FAR,
@@ -34,10 +34,13 @@ const OVER_PARTICLES: [&str; 5] = [
     "ssfr/splat_spray_aovs",
 ];
 
-/// Tells them how many threads share a particle.
+/// Shares a block's pixels among threads alike.
+const OVER_BLOCKS: &str = "ssfr/splat_bulk";
+
+/// Tells them how many threads share a particle or block.
 pub(super) fn plan_threads(plan: &mut Plan, limits: &Limits) {
     if limits.is_narrow {
-        for pass in OVER_PARTICLES {
+        for pass in OVER_PARTICLES.into_iter().chain([OVER_BLOCKS]) {
             plan.define(pass, "NARROW");
         }
     }
@@ -52,11 +55,6 @@ fn over_page(pass: &'static str, groups: &Buf<Workgroups>, mut binds: Vec<Bind>)
 /// A pass over particles.
 fn over_particles(pass: &'static str, binds: Vec<Bind>) -> Command {
     over_page(pass, &PARTICLE_GROUPS, binds)
-}
-
-/// A pass over those that may be seen.
-fn over_seen(pass: &'static str, binds: Vec<Bind>) -> Command {
-    over_page(pass, &SEEN_GROUPS, binds)
 }
 
 /// A pass over those that hold air.
@@ -183,20 +181,22 @@ pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
     };
     plan.values(&THICKNESS_PARAMS, &[scale]);
     plan.buffer(&THICKNESS, pixels / 4);
-    plan.buffer(&SEEN_GROUPS, 1);
     plan.buffer(&PARTICLE_GROUPS, 1);
+    plan.buffer(&BLOCKS, 1);
+    plan.buffer(&BLOCK_GROUPS, 1);
     let params = Bind::whole("params", &THICKNESS_PARAMS);
     vec![
         plan.fill(&DEPTHS[0], FAR.to_bits(), pixels),
         Command::clear(&THICKNESS),
-        over_seen("ssfr/splat_depth", Vec::new()),
+        over_particles("ssfr/splat_depth", Vec::new()),
         over_particles("ssfr/splat_thickness", vec![params]),
+        Command::in_groups(OVER_BLOCKS, Groups::at(&BLOCK_GROUPS, 0), Vec::new()),
     ]
 }
 
 /// Plans whose sphere is the nearest, while the depth is still that of the spheres.
 pub(super) fn plan_owner(plan: &mut Plan) -> Vec<Command> {
-    let owner = over_seen("ssfr/splat_owner", Vec::new());
+    let owner = over_particles("ssfr/splat_owner", Vec::new());
     vec![plan_owners(plan), owner]
 }
 
@@ -298,8 +298,8 @@ mod tests {
 
     /// What is dispatched is what the shaders take a workgroup for.
     #[test]
-    fn workgroups_hold_as_many_particles_as_the_shaders_say() {
-        for pass in OVER_PARTICLES {
+    fn workgroups_hold_as_many_as_the_shaders_say() {
+        for pass in OVER_PARTICLES.into_iter().chain([OVER_BLOCKS]) {
             for (lanes, defines) in [(32, &[][..]), (8, &["NARROW"])] {
                 let size = reflect(pass, &compose(pass, defines).unwrap()).unwrap();
                 assert_eq!(size.workgroup_size, [lanes, ROWS, 1], "{pass}");

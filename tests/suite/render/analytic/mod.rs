@@ -7,6 +7,7 @@
 mod caustics;
 mod filtered;
 mod geometry;
+mod hidden;
 mod lens;
 mod light;
 mod materials;
