@@ -346,6 +346,7 @@ pub fn mirrors() -> Vec<Layout> {
         Triangle::layout(),
         Material::layout(),
         Thickness::layout(),
+        Block::layout(),
         Whitewater::layout(),
         WhitewaterParams::layout(),
         Tile::layout(),
