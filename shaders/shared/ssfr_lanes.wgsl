@@ -1,4 +1,4 @@
-// Which threads share the pixels of which particle.
+// Which threads share the pixels of which particle, or block of water.
 
 // Threads of one particle: as many as the adapter runs in step. With more, an adapter of eight would compute the particle's bounds
 // again for each further eight threads.

@@ -1,15 +1,18 @@
-// The same for blocks of water in place of the particles within them: the way through each, times how densely they fill it.
+// Length of the line of sight through blocks of water, which stand for the particles within them: added to the thickness of the others.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
 
-// Sides along the world's axes.
+// Sides along the world's axes, at the frame's instant.
 struct Block {
     low: vec3f,
     // Volume that its particles stand for, over its own.
     filled: f32,
     high: vec3f,
     pad0: f32,
+    // Mean of its particles'.
+    velocity: vec3f,
+    pad1: f32,
 }
 
 @group(0) @binding(0) var<uniform> camera: Camera;
@@ -17,35 +20,50 @@ struct Block {
 @group(0) @binding(2) var<storage, read> solid_depth: array<f32>;
 @group(0) @binding(3) var<storage, read_write> thickness: array<atomic<u32>>;
 
-// Pixels of the half resolution that a block may touch: least and greatest, inclusive; all of them where it reaches behind the eye.
-fn block_bounds(block: Block, size: vec2u) -> vec4i {
-    var low = vec2f(FAR);
-    var high = vec2f(-FAR);
-    for (var k = 0u; k < 8u; k++) {
-        let is_high = vec3<bool>((k & 1u) > 0u, (k & 2u) > 0u, (k & 4u) > 0u);
-        let corner = eye_from_world(camera, select(block.low, block.high, is_high));
-        if corner.z < camera.near {
-            return vec4i(vec2i(0), vec2i(size) - 1);
-        }
-        let at = 0.5 * project(camera, corner) - 0.5;
-        low = min(low, at);
-        high = max(high, at);
-    }
-    return pixels_between(camera, low, high, 0.5, size);
+// Balls about its particles would reach beyond a block, those beside it reach into it: along a face there would be a seam. So it is the mean
+// of blocks that stand aside by these and their opposites, in splat radii: along each axis the eight are means of eighths of a ball.
+const PAIRS = 4u;
+
+fn aside(k: u32) -> vec3f {
+    let first = select(vec3f(0.447, -0.700, 0.084), vec3f(0.700, 0.256, -0.447), k == 0u);
+    let last = select(vec3f(0.084, 0.447, -0.256), vec3f(0.256, 0.084, 0.700), k == 2u);
+    return select(last, first, k < 2u) * camera.radius;
 }
 
-// Metres of the line of sight in the block before the depth `end`; `way` is what it goes for each metre of depth, world axes.
-fn way_through(block: Block, way: vec3f, end: f32) -> f32 {
-    let along = select(way, vec3f(1e-12), abs(way) < vec3f(1e-12));
-    let a = (block.low - camera.position) / along;
-    let b = (block.high - camera.position) / along;
+// Pixels of the half resolution that a block may touch: least and greatest, inclusive; all of them where it goes on behind the eye.
+fn block_bounds(low: vec3f, high: vec3f, size: vec2u) -> vec4i {
+    var first = vec2f(FAR);
+    var last = vec2f(-FAR);
+    var behind = 0u;
+    for (var k = 0u; k < 8u; k++) {
+        let is_high = vec3<bool>((k & 1u) > 0u, (k & 2u) > 0u, (k & 4u) > 0u);
+        let corner = eye_from_world(camera, select(low, high, is_high));
+        if corner.z < camera.near {
+            behind++;
+        }
+        let at = 0.5 * project(camera, vec3f(corner.xy, max(corner.z, camera.near))) - 0.5;
+        first = min(first, at);
+        last = max(last, at);
+    }
+    if behind == 8u {
+        return vec4i(0, 0, -1, -1);
+    }
+    if behind > 0u {
+        return vec4i(vec2i(0), vec2i(size) - 1);
+    }
+    return pixels_between(camera, first, last, 0.5, size);
+}
+
+// How far a ray goes between two corners, before the depth `end`; both as depths at which it passes their planes.
+fn between(a: vec3f, b: vec3f, end: f32) -> f32 {
     let first = min(a, b);
     let last = max(a, b);
     let enters = max(max(first.x, first.y), max(first.z, 0.0));
     let leaves = min(min(last.x, last.y), min(last.z, end));
-    return max(leaves - enters, 0.0) * length(way);
+    return max(leaves - enters, 0.0);
 }
 
+// A block has a row of threads, which share the pixels of each row.
 @compute @workgroup_size(LANES, ROWS)
 fn main(
     @builtin(workgroup_id) group: vec3u,
@@ -60,18 +78,35 @@ fn main(
     if block.filled <= 0.0 {
         return;
     }
+    let gone = block.velocity * camera.seconds;
+    let low = block.low + gone;
+    let high = block.high + gone;
     let half_size = camera.size / 2u;
-    let bounds = block_bounds(block, half_size);
-    let width = u32(max(bounds.z - bounds.x + 1, 0));
-    let count = width * u32(max(bounds.w - bounds.y + 1, 0));
-    for (var i = thread.x; i < count; i += LANES) {
-        let row = row_of(i, width);
-        let pixel = vec2u(bounds.xy) + vec2u(i - row * width, row);
-        let way = world_direction(camera, eye_ray(camera, 2.0 * vec2f(pixel) + 1.0));
-        let through = way_through(block, way, solid_depth[2u * (pixel.y * camera.size.x + pixel.x)]);
-        if through > 0.0 {
-            let amount = u32(through * block.filled * THICKNESS_SCALE + 0.5);
-            atomicAdd(&thickness[pixel.y * half_size.x + pixel.x], amount);
+    let bounds = block_bounds(low - camera.radius, high + camera.radius, half_size);
+    // What a sample has of them; one alone has all.
+    let own = max(PAIRS / sample_count(camera), 1u);
+    for (var y = bounds.y; y <= bounds.w; y++) {
+        for (var x = bounds.x + i32(thread.x); x <= bounds.z; x += i32(LANES)) {
+            let pixel = vec2u(vec2i(x, y));
+            // What the line of sight goes for each metre of depth.
+            let way = world_direction(camera, eye_ray(camera, 2.0 * vec2f(pixel) + 1.0));
+            let inverse = 1.0 / select(way, vec3f(1e-12), abs(way) < vec3f(1e-12));
+            let a = (low - camera.position) * inverse;
+            let b = (high - camera.position) * inverse;
+            let end = solid_depth[2u * (pixel.y * camera.size.x + pixel.x)];
+            var sum = 0.0;
+            for (var k = 0u; k < own; k++) {
+                let off = aside((camera.sample_index * own + k) % PAIRS) * inverse;
+                sum += between(a + off, b + off, end) + between(a - off, b - off, end);
+                if k + 1u == own {
+                    break;
+                }
+            }
+            if sum > 0.0 {
+                let through = length(way) * sum / f32(2u * own);
+                let amount = u32(through * block.filled * THICKNESS_SCALE + 0.5);
+                atomicAdd(&thickness[pixel.y * half_size.x + pixel.x], amount);
+            }
         }
     }
 }

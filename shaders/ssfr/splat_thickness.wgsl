@@ -1,4 +1,4 @@
-// Water along the line of sight, in front of what is solid, at half resolution: chords of every sphere,
+// Water along the line of sight, in front of what is solid, at half resolution: chords of spheres but for those in blocks (ssfr/splat_bulk),
 // scaled so that their sum over a bulk lattice is the length of the way.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"

@@ -45,9 +45,9 @@ pub(super) const PAGES: Windows<Page> = Windows::new("page", "pages");
 pub(super) const AIRED: Buf<u32> = Buf::new("aired");
 /// Workgroups of a dispatch over those that hold air.
 pub(super) const AIRED_GROUPS: Buf<Workgroups> = Buf::new("aired_groups");
-/// Workgroups of a dispatch over all particles.
+/// Workgroups of a dispatch over all of these.
 pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
-/// Blocks of water that stand for particles that no one sees.
+/// Blocks of water that stand for particles which other water hides.
 pub(super) const BLOCKS: Buf<Block> = Buf::new("blocks");
 /// Workgroups of a dispatch over them.
 pub(super) const BLOCK_GROUPS: Buf<Workgroups> = Buf::new("block_groups");

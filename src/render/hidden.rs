@@ -1,5 +1,5 @@
-//! Which particles stand behind others wherever the eye is above the water, and the blocks of water that stand for them: splats of depth
-//! leave them out, and the way through them is that through the blocks.
+//! Which particles stand behind others wherever the eye is above the water: splats of depth leave these out, and the way through them is that
+//! through the blocks of water which stand for them.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -14,44 +14,74 @@ const CELL: f64 = 2.0;
 /// Particles of the body in a cell from which on it is full.
 const FULL: u8 = 5;
 /// Cells along a side of a block, at most: a longer one would cover many pixels that see nothing of it.
-const LONGEST: usize = 4;
+const LONGEST: usize = 8;
+/// The block of a cell that is in none.
+const NONE: u32 = u32::MAX;
 
-/// Cells over the domain, and how many particles of the body are in each.
+/// Of the body, in its full size, and without air: as spray a particle may be seen where its surface is not.
+fn is_clear(particle: &Particle) -> bool {
+    is_whole(particle) && particle.air & 0xffff == 0
+}
+
+/// Cells that hold all clear particles of the domain, and how many are in each.
 struct Cells {
     edge: f64,
-    counts: [i64; 3],
+    /// Of the domain, the first of these.
+    first: [i64; 3],
+    counts: [usize; 3],
     particles: Vec<u8>,
 }
 
 impl Cells {
-    fn of(particles: &[Particle], size: DVec3, spacing: f64) -> Self {
-        let counts = (size / (CELL * spacing)).ceil().max(DVec3::ONE).to_array();
-        let counts = counts.map(|n| n as i64);
+    /// `None` where no particle is clear.
+    fn of(particles: &[Particle], size: DVec3, spacing: f64) -> Option<Self> {
+        let edge = CELL * spacing;
+        let most = (size / edge).ceil().max(DVec3::ONE).to_array();
+        let most = most.map(|n| n as i64 - 1);
+        let (mut low, mut high) = (most, [0; 3]);
+        let clear = || particles.iter().filter(|it| is_clear(it));
+        for cell in clear().map(|particle| cell(particle, edge)) {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(cell[axis].clamp(0, most[axis]));
+                high[axis] = high[axis].max(cell[axis].clamp(0, most[axis]));
+            }
+        }
+        clear().next()?;
+        let counts = [0, 1, 2].map(|axis| (high[axis] - low[axis] + 1) as usize);
         let mut cells = Self {
-            edge: CELL * spacing,
+            edge,
+            first: low,
             counts,
-            particles: vec![0; counts.iter().product::<i64>() as usize],
+            particles: vec![0; counts.iter().product()],
         };
-        for particle in particles.iter().filter(|it| is_whole(it)) {
-            if let Some(at) = cells.index(cells.cell(particle)) {
+        for particle in clear() {
+            if let Some(at) = cells.index(cell(particle, edge)) {
                 cells.particles[at] = cells.particles[at].saturating_add(1);
             }
         }
-        cells
-    }
-
-    fn cell(&self, particle: &Particle) -> [i64; 3] {
-        (Vec3::from(particle.position) / self.edge as f32)
-            .floor()
-            .to_array()
-            .map(|c| c as i64)
+        Some(cells)
     }
 
     fn index(&self, cell: [i64; 3]) -> Option<usize> {
-        let is_in = |axis: usize| (0..self.counts[axis]).contains(&cell[axis]);
-        let [x, y, z] = cell;
-        let index = (z * self.counts[1] + y) * self.counts[0] + x;
-        (0..3).all(is_in).then_some(index as usize)
+        let from = |axis: usize| usize::try_from(cell[axis] - self.first[axis]).ok();
+        let [x, y, z] = [from(0)?, from(1)?, from(2)?];
+        let is_in = x < self.counts[0] && y < self.counts[1] && z < self.counts[2];
+        is_in.then(|| self.place([x, y, z]))
+    }
+
+    /// Index of a cell that is counted from the first one.
+    fn place(&self, [x, y, z]: [usize; 3]) -> usize {
+        (z * self.counts[1] + y) * self.counts[0] + x
+    }
+
+    /// From the first one, the cell of an index.
+    fn at(&self, index: usize) -> [usize; 3] {
+        let [width, height, _] = self.counts;
+        [
+            index % width,
+            index / width % height,
+            index / (width * height),
+        ]
     }
 
     /// The ground hides what is below it; beyond the other sides there is air.
@@ -60,59 +90,58 @@ impl Cells {
         count.map_or(cell[1] < 0, |count| count >= FULL)
     }
 
-    /// Whether a cell of the domain and the 26 about it are full.
-    fn is_deep(&self, [x, y, z]: [i64; 3]) -> bool {
-        let mut around = (-1..=1).flat_map(|dz| (-1..=1).map(move |dy| (dy, dz)));
-        around.all(|(dy, dz)| (-1..=1).all(|dx| self.is_full([x + dx, y + dy, z + dz])))
-    }
-
-    /// Of each cell, whether it is deep.
+    /// Of each cell, whether it and the 26 about it are full.
     fn deep(&self) -> Vec<bool> {
-        let [width, height, _] = self.counts;
-        (0..self.particles.len() as i64)
-            .into_par_iter()
-            .map(|at| self.is_deep([at % width, at / width % height, at / (width * height)]))
-            .collect()
+        let is_deep = |index: usize| {
+            let cell = self.at(index);
+            let [x, y, z] = [0, 1, 2].map(|axis| cell[axis] as i64 + self.first[axis]);
+            let mut around = (-1..=1).flat_map(|dz| (-1..=1).map(move |dy| (dy, dz)));
+            self.particles[index] >= FULL
+                && around.all(|(dy, dz)| (-1..=1).all(|dx| self.is_full([x + dx, y + dy, z + dz])))
+        };
+        let all = 0..self.particles.len();
+        all.into_par_iter().map(is_deep).collect()
     }
 
-    /// Blocks of deep cells, each of which is in one: every cell of `deep` becomes false.
-    fn blocks(&self, deep: &mut [bool], spacing: f64) -> Vec<Block> {
-        let [width, height, depth] = self.counts.map(|n| n as usize);
-        let index = |[x, y, z]: [usize; 3]| (z * height + y) * width + x;
-        let mut blocks = Vec::new();
-        for at in 0..deep.len() {
-            if !deep[at] {
+    /// Makes each deep cell part of one block: cells from one on and before another, and of each cell its block.
+    fn blocks(&self, deep: &[bool]) -> (Vec<[[usize; 3]; 2]>, Vec<u32>) {
+        let mut block_of = vec![NONE; deep.len()];
+        let mut blocks: Vec<[[usize; 3]; 2]> = Vec::new();
+        for index in (0..deep.len()).filter(|&index| deep[index]) {
+            if block_of[index] != NONE {
                 continue;
             }
-            let low = [at % width, at / width % height, at / (width * height)];
+            let low = self.at(index);
             let mut high = low.map(|c| c + 1);
-            for (axis, side) in [width, height, depth].into_iter().enumerate() {
-                while high[axis] < side.min(low[axis] + LONGEST) {
+            for axis in 0..3 {
+                while high[axis] < self.counts[axis].min(low[axis] + LONGEST) {
                     let (mut first, mut end) = (low, high);
                     first[axis] = high[axis];
                     end[axis] += 1;
-                    if !between(first, end).all(|cell| deep[index(cell)]) {
+                    let is_free = |at: usize| deep[at] && block_of[at] == NONE;
+                    if !between(first, end).all(|cell| is_free(self.place(cell))) {
                         break;
                     }
                     high = end;
                 }
             }
-            let mut count = 0.0;
             for cell in between(low, high) {
-                count += f64::from(self.particles[index(cell)]);
-                deep[index(cell)] = false;
+                block_of[self.place(cell)] = blocks.len() as u32;
             }
-            let cells: usize = (0..3).map(|axis| high[axis] - low[axis]).product();
-            let volume = cells as f64 * self.edge.powi(3);
-            blocks.push(Block {
-                low: low.map(|c| (c as f64 * self.edge) as f32),
-                filled: (count * spacing.powi(3) / volume) as f32,
-                high: high.map(|c| (c as f64 * self.edge) as f32),
-                ..Block::default()
-            });
+            blocks.push([low, high]);
         }
-        blocks
+        (blocks, block_of)
     }
+
+    /// Metres, of a corner of cells that is counted from the first one.
+    fn corner(&self, cell: [usize; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|axis| ((cell[axis] as i64 + self.first[axis]) as f64 * self.edge) as f32)
+    }
+}
+
+fn cell(particle: &Particle, edge: f64) -> [i64; 3] {
+    let place = Vec3::from(particle.position).as_dvec3() / edge;
+    place.floor().to_array().map(|c| c as i64)
 }
 
 /// Cells from `low` on and before `high`.
@@ -124,9 +153,9 @@ fn between(low: [usize; 3], high: [usize; 3]) -> impl Iterator<Item = [usize; 3]
 /// What of a frame's water is behind other water.
 #[derive(Default)]
 pub(super) struct Hidden {
-    /// Of each particle, whether water hides it: all cells about its own are full of whole particles.
+    /// Of each particle, whether water hides it: all cells about its own are full of particles.
     pub(super) particles: Vec<bool>,
-    /// What stands for these, front or back in no order.
+    /// What stands for these, in no order of depth.
     pub(super) blocks: Vec<Block>,
 }
 
@@ -135,17 +164,41 @@ impl Hidden {
     ///
     /// Two spacings of water at least lie between what is hidden and the air, and a splat reaches 1.25 spacings at most.
     pub(super) fn of(particles: &[Particle], size: DVec3, spacing: f64) -> Self {
-        let cells = Cells::of(particles, size, spacing);
-        let mut deep = cells.deep();
-        let is_deep =
-            |particle: &Particle| cells.index(cells.cell(particle)).is_some_and(|at| deep[at]);
-        let hidden = particles
-            .par_iter()
-            .map(|particle| is_whole(particle) && is_deep(particle))
-            .collect();
+        let Some(cells) = Cells::of(particles, size, spacing) else {
+            return Self {
+                particles: vec![false; particles.len()],
+                blocks: Vec::new(),
+            };
+        };
+        let (spans, block_of) = cells.blocks(&cells.deep());
+        let block = |particle: &Particle| match is_clear(particle) {
+            true => (cells.index(cell(particle, cells.edge))).map_or(NONE, |at| block_of[at]),
+            false => NONE,
+        };
+        let of: Vec<u32> = particles.par_iter().map(block).collect();
+        let mut sums = vec![(0.0, DVec3::ZERO); spans.len()];
+        for (particle, &block) in particles
+            .iter()
+            .zip(&of)
+            .filter(|(_, block)| **block != NONE)
+        {
+            let (count, velocity) = &mut sums[block as usize];
+            *count += 1.0;
+            *velocity += Vec3::from(particle.velocity).as_dvec3();
+        }
+        let stands = |([low, high], (count, velocity)): (&[[usize; 3]; 2], &(f64, DVec3))| {
+            let inside: usize = (0..3).map(|axis| high[axis] - low[axis]).product();
+            Block {
+                low: cells.corner(*low),
+                filled: (count / (inside as f64 * CELL.powi(3))) as f32,
+                high: cells.corner(*high),
+                velocity: (*velocity / *count).as_vec3().to_array(),
+                ..Block::default()
+            }
+        };
         Self {
-            particles: hidden,
-            blocks: cells.blocks(&mut deep, spacing),
+            particles: of.iter().map(|&block| block != NONE).collect(),
+            blocks: spans.iter().zip(&sums).map(stands).collect(),
         }
     }
 }
@@ -269,39 +322,71 @@ mod tests {
         );
     }
 
-    /// Blocks hold each hidden particle once, overlap nowhere, and have their volume.
+    /// Particles with air may be seen as spray.
+    #[test]
+    fn what_holds_air_is_not_hidden() {
+        let (mut particles, size) = block(|_| true);
+        for particle in particles.iter_mut().step_by(5) {
+            particle.air |= 1;
+        }
+        let found = Hidden::of(&particles, size, 1.0).particles;
+        assert!(found.iter().any(|hidden| *hidden));
+        assert!(found.iter().step_by(5).all(|hidden| !hidden));
+    }
+
+    /// Blocks hold each hidden particle once, overlap nowhere, have its volume and go with it.
     #[test]
     fn blocks_stand_for_what_is_hidden() {
-        let middle = DVec3::new(20.0, 10.0, 20.0);
-        let (particles, size) = block(|p| p.distance(middle) > 3.0);
-        let found = Hidden::of(&particles, size, 1.0);
-        let is_in = |p: [f32; 3], block: &Block| {
-            (0..3).all(|axis| block.low[axis] <= p[axis] && p[axis] < block.high[axis])
-        };
-        let mut held = vec![0; found.blocks.len()];
-        for (particle, hidden) in particles.iter().zip(&found.particles) {
-            let within = (0..held.len()).filter(|&k| is_in(particle.position, &found.blocks[k]));
-            let within: Vec<usize> = within.collect();
-            assert_eq!(
-                within.len(),
-                usize::from(*hidden),
-                "{:?}",
-                particle.position
+        for spacing in [1.0, 0.17] {
+            let middle = DVec3::new(20.0, 10.0, 20.0);
+            let (mut particles, size) = block(|p| p.distance(middle) > 3.0);
+            for particle in &mut particles {
+                particle.position = particle.position.map(|x| x * spacing);
+                particle.velocity = [particle.position[1], 3.0, 0.0];
+            }
+            let found = Hidden::of(&particles, f64::from(spacing) * size, spacing.into());
+            let is_in = |p: [f32; 3], block: &Block| {
+                (0..3).all(|axis| block.low[axis] <= p[axis] && p[axis] < block.high[axis])
+            };
+            let mut held = vec![(0, 0.0); found.blocks.len()];
+            for (particle, hidden) in particles.iter().zip(&found.particles) {
+                let within =
+                    (0..held.len()).filter(|&k| is_in(particle.position, &found.blocks[k]));
+                let within: Vec<usize> = within.collect();
+                assert_eq!(
+                    within.len(),
+                    usize::from(*hidden),
+                    "{:?}",
+                    particle.position
+                );
+                for k in within {
+                    held[k].0 += 1;
+                    held[k].1 += f64::from(particle.velocity[0]);
+                }
+            }
+            for (block, (count, speed)) in found.blocks.iter().zip(&held) {
+                let sides = (Vec3::from(block.high) - Vec3::from(block.low)).as_dvec3();
+                let sides = sides / f64::from(spacing);
+                assert!(sides.max_element() < CELL * LONGEST as f64 + 1e-4);
+                let expected = f64::from(*count) / sides.element_product();
+                assert!((f64::from(block.filled) - expected).abs() < 1e-5 * expected);
+                let mean = speed / f64::from(*count);
+                assert!((f64::from(block.velocity[0]) - mean).abs() < 1e-5 * mean);
+                assert_eq!(block.velocity[1..], [3.0, 0.0]);
+            }
+            // Cells of 8 particles: most are in blocks of many cells.
+            let all: u32 = held.iter().map(|(count, _)| count).sum();
+            assert!(
+                all > 4000 && held.len() as u32 * 8 * 8 < all,
+                "{all} in {}",
+                held.len()
             );
-            within.iter().for_each(|&k| held[k] += 1);
         }
-        for (block, held) in found.blocks.iter().zip(&held) {
-            let sides = (Vec3::from(block.high) - Vec3::from(block.low)).as_dvec3();
-            assert!(sides.max_element() <= CELL * LONGEST as f64);
-            let expected = f64::from(*held) / sides.element_product();
-            assert!((f64::from(block.filled) - expected).abs() < 1e-6 * expected);
-        }
-        // Cells of 8 particles: most are in blocks of many cells.
-        let all: u32 = held.iter().sum();
-        assert!(
-            all > 4000 && held.len() as u32 * 8 * 8 < all,
-            "{all} in {}",
-            held.len()
-        );
+    }
+
+    #[test]
+    fn without_water_nothing_is_hidden() {
+        let (particles, size) = block(|_| false);
+        assert!(Hidden::of(&particles, size, 1.0).blocks.is_empty());
     }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     paths::Path,
-    uniform::{Camera, Particle},
+    uniform::{Block, Camera, Particle},
 };
 
 /// How far from a particle it may change a pixel, in particle spacings or splat radii, whichever are longer. Puffs and drops of spray
@@ -76,6 +76,22 @@ pub(super) fn in_frame(
             (views.iter()).any(|view| view.sees(place + way(view.seconds), reach))
         })
         .collect()
+}
+
+/// Those blocks of which one of a frame's cameras may see something.
+pub(super) fn blocks_in_frame(mut blocks: Vec<Block>, cameras: &[Camera]) -> Vec<Block> {
+    let views: Vec<View> = cameras.iter().map(View::of).collect();
+    let radius = cameras
+        .iter()
+        .fold(0.0, |most: f32, it| most.max(it.radius));
+    blocks.retain(|block| {
+        let (low, high) = (Vec3::from(block.low), Vec3::from(block.high));
+        let reach = 0.5 * (high - low).length() + radius;
+        let way = |seconds: f32| seconds * Vec3::from(block.velocity);
+        let is_seen = |view: &View| view.sees(0.5 * (low + high) + way(view.seconds), reach);
+        views.iter().any(is_seen)
+    });
+    blocks
 }
 
 #[cfg(test)]

@@ -208,6 +208,8 @@ mirror!(
         filled: f32,
         high: [f32; 3],
         pad0: f32,
+        velocity: [f32; 3],
+        pad1: f32,
     }
 );
 

@@ -21,13 +21,13 @@ use crate::{
         },
         camera::{camera, pose},
         hidden::Hidden,
-        in_frame::in_frame,
+        in_frame::{blocks_in_frame, in_frame},
         lighting::spray_density,
         paths::{Path, paths},
         plan::per_particle,
         samples::{Sample, samples_of},
         shapes::shapes,
-        uniform::{Block, Page, Particle, SprayParams},
+        uniform::{Block, Camera, Page, Particle, SprayParams},
     },
     scene::look::{AovSpec, MethodSpec},
 };
@@ -58,10 +58,10 @@ fn in_order(x: f32) -> u32 {
     }
 }
 
-/// Values in an order, whose last entries are their indices.
-fn picked<T: Copy + Send + Sync>(values: &[T], order: &[(bool, u32, u32, u32)]) -> Vec<T> {
-    let of = |&(_, _, _, index): &(bool, u32, u32, u32)| values[index as usize];
-    order.par_iter().map(of).collect()
+/// The values that have these indices.
+fn picked<T: Copy + Send + Sync>(values: &[T], indices: &[u32]) -> Vec<T> {
+    let of = |&index: &u32| values[index as usize];
+    indices.par_iter().map(of).collect()
 }
 
 impl Renderer {
@@ -111,20 +111,22 @@ impl Renderer {
         let hidden = match self.look.spec().renderer.method {
             MethodSpec::Ssfr => {
                 let spacing = self.scene.particle_spacing;
-                Hidden::of(&packed, self.scene.domain.size(), spacing)
+                Some(Hidden::of(&packed, self.scene.domain.size(), spacing))
             }
-            MethodSpec::Ray => Hidden::default(),
+            MethodSpec::Ray => None,
         };
-        let seen = self.sort(frame, &hidden.particles, &mut packed, &mut ways);
+        let cameras = self.cameras(frame);
+        let seen = self.sort(frame, &cameras, hidden.as_ref(), &mut packed, &mut ways);
         let shapes = match self.program.has(SHAPES.name()) {
             true => shapes(&packed, seen, &self.scene, self.plan.radius),
             false => Vec::new(),
         };
         packed.truncate(seen);
-        ways.truncate(seen);
         let count = seen as u32;
         self.reserve(seen)?;
-        self.load_blocks(hidden.blocks)?;
+        if let Some(hidden) = hidden {
+            self.load_blocks(blocks_in_frame(hidden.blocks, &cameras))?;
+        }
         let aired = self.load_aired(&packed);
         let pages = self.pages();
         let aired = self.load_pages(pages, packed.len(), &aired);
@@ -216,41 +218,50 @@ impl Renderer {
             .collect())
     }
 
-    /// First those that may be seen, and how many they are, then those that others hide and those beside the frame; front to back, so
-    /// that splats find what hides them already there. `hidden` is empty where nothing is.
+    /// Those of a frame's instant and of its samples.
+    fn cameras(&self, frame: u32) -> Vec<Camera> {
+        let setting = self.setting(0);
+        let samples = [vec![Sample::STILL], samples_of(&self.look)].concat();
+        samples
+            .into_iter()
+            .map(|sample| camera(&self.look, &setting, frame.into(), sample, 0))
+            .collect()
+    }
+
+    /// First those that may be seen, front to back, so that splats find what hides them already there; how many they are. Then those that
+    /// others hide and those beside the frame; of these `ways` keeps none.
     fn sort(
         &self,
         frame: u32,
-        hidden: &[bool],
+        cameras: &[Camera],
+        hidden: Option<&Hidden>,
         packed: &mut Vec<Particle>,
         ways: &mut Vec<Path>,
     ) -> usize {
         let rate = self.scene.frames_per_second;
         let forward = pose(&self.look, frame.into(), rate).forward.as_vec3();
         let depth = |p: &Particle| Vec3::from(p.position).dot(forward);
-        let spacing = self.scene.particle_spacing;
-        let setting = self.setting(0);
-        let samples = [vec![Sample::STILL], samples_of(&self.look)].concat();
-        let cameras = samples
-            .into_iter()
-            .map(|sample| camera(&self.look, &setting, frame.into(), sample, 0));
-        let cameras: Vec<_> = cameras.collect();
-        let in_frame = in_frame(packed, ways, &cameras, spacing as f32);
-        let is_unseen = |index: usize| !in_frame[index] || hidden.get(index) == Some(&true);
-        let mut order: Vec<(bool, u32, u32, u32)> = (0u32..packed.len() as u32)
+        let in_frame = in_frame(packed, ways, cameras, self.scene.particle_spacing as f32);
+        let is_seen =
+            |index: usize| in_frame[index] && !hidden.is_some_and(|it| it.particles[index]);
+        let all = || 0u32..packed.len() as u32;
+        let mut order: Vec<(u32, u32, u32)> = all()
             .into_par_iter()
+            .filter(|&index| is_seen(index as usize))
             .map(|index| {
                 let particle = &packed[index as usize];
-                let key = in_order(depth(particle));
-                (is_unseen(index as usize), key, particle.tag, index)
+                (in_order(depth(particle)), particle.tag, index)
             })
             .collect();
         order.par_sort_unstable();
-        *packed = picked(packed, &order);
+        let seen = order.len();
+        let mut indices: Vec<u32> = order.into_iter().map(|(.., index)| index).collect();
         if !ways.is_empty() {
-            *ways = picked(ways, &order);
+            *ways = picked(ways, &indices);
         }
-        order.partition_point(|&(is_unseen, ..)| !is_unseen)
+        indices.extend(all().filter(|&index| !is_seen(index as usize)));
+        *packed = picked(packed, &indices);
+        seen
     }
 
     /// Tells the device which blocks of water stand for what is hidden; what there is room for beyond them is empty.
@@ -259,10 +270,10 @@ impl Renderer {
             return Ok(());
         }
         let groups = spread(&self.program.context, ROWS, blocks.len() as u64);
-        if blocks.len() > self.blocks {
-            self.blocks = room(blocks.len());
-            let grown = [BLOCKS.sized(self.blocks)];
-            self.program.refit(&grown, &[])?;
+        let room = room(blocks.len());
+        if room > self.blocks {
+            self.program.refit(&[BLOCKS.sized(room)], &[])?;
+            self.blocks = room;
             self.record();
         }
         blocks.resize(self.blocks, Block::default());

@@ -108,7 +108,7 @@ impl Renderer {
             plan,
             program,
             capacity: room(0),
-            blocks: 1,
+            blocks: room(0),
             water: RayWater::of(look, scene),
             cloud: RayCloud::of(look, scene),
             caustics: Caustics::of(look, scene),

@@ -1,6 +1,9 @@
 //! What splats particles into the frame.
 
-use super::shade::{draws_spray, tells_foam, wants_spray_aovs};
+use super::{
+    build::room,
+    shade::{draws_spray, tells_foam, wants_spray_aovs},
+};
 use crate::{
     gpu::{
         buffer::{Buf, Workgroups},
@@ -182,7 +185,7 @@ pub(super) fn plan_body(plan: &mut Plan, spacing: f64) -> Vec<Command> {
     plan.values(&THICKNESS_PARAMS, &[scale]);
     plan.buffer(&THICKNESS, pixels / 4);
     plan.buffer(&PARTICLE_GROUPS, 1);
-    plan.buffer(&BLOCKS, 1);
+    plan.buffer(&BLOCKS, room(0));
     plan.buffer(&BLOCK_GROUPS, 1);
     let params = Bind::whole("params", &THICKNESS_PARAMS);
     vec![
@@ -200,7 +203,7 @@ pub(super) fn plan_owner(plan: &mut Plan) -> Vec<Command> {
     vec![plan_owners(plan), owner]
 }
 
-/// Plans the nearest spheres before the opaque depths of rays, and whose they are: of all particles, since the eye may be among them.
+/// Plans the nearest spheres before the opaque depths of rays, and whose they are.
 pub(super) fn plan_owner_before_rays(plan: &mut Plan) -> Vec<Command> {
     plan.buffer(&PARTICLE_GROUPS, 1);
     let opaque = Bind::whole("solid_depth", &DEPTHS[1]);
