@@ -33,15 +33,12 @@ def copy(root: Path, mutants: list[Mutant]) -> Tree:
             relative = path.relative_to(tree.root).as_posix()
             if path.is_file() and relative not in names and not relative.startswith(("cache/", "renders/")):
                 path.unlink()
-    by_file: dict[str, list[Mutant]] = {}
-    for mutant in mutants:
-        if not mutant.is_shader:
-            by_file.setdefault(mutant.file, []).append(mutant)
+    faulty = by_file(mutants)
     for name in sorted(names):
         source, target = root / name, tree.root / name
         data = source.read_bytes()
-        if name in by_file:
-            data = with_switches(data.decode(), by_file[name]).encode()
+        if name in faulty:
+            data = with_switches(data.decode(), faulty[name]).encode()
         if name == "src/lib.rs":
             # Warnings would be of the switches: parentheses, a unit in both arms.
             data = b"#![allow(warnings)]\n" + data
@@ -50,6 +47,21 @@ def copy(root: Path, mutants: list[Mutant]) -> Tree:
             target.write_bytes(data)
             shutil.copymode(source, target)
     return tree
+
+
+def by_file(mutants: list[Mutant]) -> dict[str, list[Mutant]]:
+    """Rust faults by the file that they are made in."""
+    files: dict[str, list[Mutant]] = {}
+    for mutant in mutants:
+        if not mutant.is_shader:
+            files.setdefault(mutant.file, []).append(mutant)
+    return files
+
+
+def check(root: Path, mutants: list[Mutant]) -> None:
+    """Raises Mistake where faults overlap. Writes nothing, so that it may be asked while a run is at work in the copy."""
+    for name, own in by_file(mutants).items():
+        with_switches((root / name).read_text(), own)
 
 
 def with_switches(text: str, mutants: list[Mutant]) -> str:
