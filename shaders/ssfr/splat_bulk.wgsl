@@ -1,4 +1,5 @@
-// Length of the line of sight through blocks of water, which stand for the particles within them: added to the thickness of the others.
+// Adds to the thickness the way that the line of sight goes through blocks of water. A block stands for the particles within it, which
+// are splatted nowhere.
 #import "shared/camera.wgsl"
 #import "shared/ssfr_splat.wgsl"
 #import "shared/ssfr_lanes.wgsl"
@@ -10,7 +11,7 @@ struct Block {
     filled: f32,
     high: vec3f,
     pad0: f32,
-    // Mean of its particles'.
+    // Mean velocity of its particles, m/s.
     velocity: vec3f,
     pad1: f32,
 }
@@ -20,8 +21,9 @@ struct Block {
 @group(0) @binding(2) var<storage, read> solid_depth: array<f32>;
 @group(0) @binding(3) var<storage, read_write> thickness: array<atomic<u32>>;
 
-// Balls about its particles would reach beyond a block, those beside it reach into it: along a face there would be a seam. So it is the mean
-// of blocks that stand aside by these and their opposites, in splat radii: along each axis the eight are means of eighths of a ball.
+// Balls about a block's particles would reach beyond its faces, and balls of the particles beside it reach into it. A block with sharp faces
+// would leave a seam there. So a block counts as the mean of eight copies of it, moved by these four ways and by their opposites, in splat
+// radii: along each axis the eight ways are the medians of eight equal parts of a ball.
 const PAIRS = 4u;
 
 fn aside(k: u32) -> vec3f {
@@ -83,7 +85,7 @@ fn main(
     let high = block.high + gone;
     let half_size = camera.size / 2u;
     let bounds = block_bounds(low - camera.radius, high + camera.radius, half_size);
-    // What a sample has of them; one alone has all.
+    // Pairs of copies that each sample takes; a picture of one sample takes all four.
     let own = max(PAIRS / sample_count(camera), 1u);
     for (var y = bounds.y; y <= bounds.w; y++) {
         for (var x = bounds.x + i32(thread.x); x <= bounds.z; x += i32(LANES)) {

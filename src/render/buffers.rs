@@ -45,7 +45,7 @@ pub(super) const PAGES: Windows<Page> = Windows::new("page", "pages");
 pub(super) const AIRED: Buf<u32> = Buf::new("aired");
 /// Workgroups of a dispatch over those that hold air.
 pub(super) const AIRED_GROUPS: Buf<Workgroups> = Buf::new("aired_groups");
-/// Workgroups of a dispatch over all of these.
+/// Workgroups of a dispatch over all particles that may be seen.
 pub(super) const PARTICLE_GROUPS: Buf<Workgroups> = Buf::new("particle_groups");
 /// Blocks of water that stand for particles which other water hides.
 pub(super) const BLOCKS: Buf<Block> = Buf::new("blocks");

@@ -1,7 +1,7 @@
 //! Screen-space fluid rendering: particles to a picture.
 //!
 //! A frame is drawn from a [`Moment`]: its particles, and those of the frames around it. A sample of the picture: solids are drawn; particles are splatted as spheres into an eye-space depth
-//! and a thickness, to which blocks of water add that are behind these; the depth is smoothed by curvature flow or the narrow-range filter; normals are
+//! and a thickness, to which the water behind them adds, in blocks; the depth is smoothed by curvature flow or the narrow-range filter; normals are
 //! differences of it; every pixel is shaded from what the water mirrors and what it lets through. Samples
 //! differ in their place in the pixel and in their instant within the shutter; linear radiance is
 //! averaged, depths never are.

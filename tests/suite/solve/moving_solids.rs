@@ -249,8 +249,8 @@ fn nothing_ends_within_a_box_faster_than_the_cfl_limit() {
     assert_eq!(state.len(), particles.len());
 }
 
-/// A drop that hangs in a box's way is as far before its face at the end of a substep as one that the box pushed there and that it does
-/// not leave behind: at the distance that particles keep, from where the face is by then. Sampled distances are exact before a flat face.
+/// A moving box pushes a drop before it. At the end of each substep the drop is before the box's face as the face stands by then, at the
+/// distance that particles keep. Sampled distances are exact before a flat face.
 #[test]
 fn a_box_takes_a_drop_along_as_far_as_it_goes() {
     let context = context();

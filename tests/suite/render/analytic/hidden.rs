@@ -173,8 +173,9 @@ impl View {
 /// Samples of a pixel where the block moves.
 const INSTANTS: u32 = 8;
 
-/// What balls in the place of blocks would differ by: along a ray their sum is off by 0.22 m, and as balls are 0.43 m wide, of a thousand
-/// rays 0.1 m apart some sixty are independent. Twice that, over ways of 4 m.
+/// What balls in the place of blocks would differ by: along a ray their sum is off by 0.22 m, root mean square, as a script of its own summed
+/// these balls (it is not kept). Balls are 0.43 m wide, so that of a thousand rays 0.1 m apart some sixty are independent. Twice that, over
+/// ways of 4 m.
 const MEAN: f64 = 0.015;
 /// Balls at either end reach 0.87 spacings beyond the block or leave as much of it out, and stand up to 0.2 off their lattice.
 const MOST: f64 = 2.0 * (0.87 + 0.2) * D;
