@@ -200,4 +200,43 @@ mod tests {
         assert_eq!(found(&[path], &cameras[..1]), [false]);
         assert_eq!(found(&[], &cameras), [false]);
     }
+
+    /// A block of which any place is in the frame is kept, most others are not; one that comes into it within the shutter's time is.
+    #[test]
+    fn blocks_that_are_left_out_are_in_no_pixel() {
+        let cameras = [looks_along_x(0.0), looks_along_x(0.5)];
+        let steps = || (0..9).map(|step| step as f32 / 8.0);
+        let (mut kept, mut drawn) = (0, 0);
+        let places = || (-7..7).map(|step| 0.9 * step as f32);
+        let all =
+            places().flat_map(|x| places().flat_map(move |y| places().map(move |z| [x, y, z])));
+        for low in all {
+            let block = Block {
+                low,
+                high: low.map(|c| c + 1.6),
+                ..Block::default()
+            };
+            let is_kept = !blocks_in_frame(vec![block], &cameras[..1]).is_empty();
+            let is_at = |x: f32, y: f32, z: f32| {
+                is_drawn(&cameras[0], Vec3::from(low) + 1.6 * Vec3::new(x, y, z))
+            };
+            let is_drawn = steps().any(|x| steps().any(|y| steps().any(|z| is_at(x, y, z))));
+            assert!(is_kept || !is_drawn, "{low:?}");
+            kept += usize::from(is_kept);
+            drawn += usize::from(is_drawn);
+        }
+        // Their diagonal is 2.8 m: about those that are drawn some others are kept.
+        assert!(
+            drawn > 200 && kept < 2 * drawn && kept < 1400,
+            "{drawn} {kept}"
+        );
+        let away = Block {
+            low: [-3.5, 0.5, -0.5],
+            high: [-2.5, 1.5, 0.5],
+            velocity: [10.0 * 48.0, 0.0, 0.0],
+            ..Block::default()
+        };
+        assert!(blocks_in_frame(vec![away], &cameras[..1]).is_empty());
+        assert_eq!(blocks_in_frame(vec![away], &cameras).len(), 1);
+    }
 }
