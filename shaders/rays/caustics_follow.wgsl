@@ -1,6 +1,9 @@
 // From where the sun's rays meet the water to what is opaque below it.
 #import "shared/camera.wgsl"
+#import "shared/ssfr_optics.wgsl"
+#ifdef RIPPLES
 #import "shared/ssfr_ripple.wgsl"
+#endif
 #import "shared/caustics_sides.wgsl"
 #import "shared/caustics_layer.wgsl"
 
@@ -60,9 +63,13 @@ fn smooth_normal(at: vec2i, own: vec4f) -> vec3f {
 
 // Ripples ride on what faces up, as in ssfr_facet.
 fn rippled(p: vec3f, n: vec3f) -> vec3f {
+#ifdef RIPPLES
     let ripple = ripple_at(p.xz, camera.clock, caustics.ripple.x, caustics.ripple.y, caustics.spacing);
     let rides = smoothstep(0.2, 0.8, n.y);
     return normalize(n - vec3f(ripple.slope.x, 0.0, ripple.slope.y) * rides);
+#else
+    return n;
+#endif
 }
 
 struct Bent {

@@ -1,6 +1,8 @@
 // The water's surface within a pixel. Needs the bindings `camera` and `shading` of whoever imports it.
 #import "shared/ssfr_light.wgsl"
+#ifdef RIPPLES
 #import "shared/ssfr_ripple.wgsl"
+#endif
 
 // How ripples turn a normal out of the water, and the mean square slope of those that a pixel cannot hold.
 struct Facet {
@@ -9,9 +11,14 @@ struct Facet {
 }
 
 fn facet_at(p: vec3f, normal: vec3f, footprint: f32) -> Facet {
+    let plain = Facet(normalize(normal), shading.roughness * shading.roughness);
+#ifdef RIPPLES
     let ripple = ripple_at(p.xz, camera.clock, shading.ripple.x, shading.ripple.y, footprint);
     // Ripples ride on what faces up.
     let rides = smoothstep(0.2, 0.8, normal.y);
     let turned = normalize(normal - vec3f(ripple.slope.x, 0.0, ripple.slope.y) * rides);
-    return Facet(turned, shading.roughness * shading.roughness + ripple.lost * rides);
+    return Facet(turned, plain.variance + ripple.lost * rides);
+#else
+    return plain;
+#endif
 }

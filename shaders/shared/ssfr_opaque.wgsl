@@ -14,6 +14,7 @@ struct Surface {
     triangle: u32,
 }
 
+#ifdef WINDOWS
 // A box of width `duty` in each unit cell, filtered over `footprint` cells.
 fn window_edge(x: f32, duty: f32, footprint: f32) -> f32 {
     let w = max(footprint, 1e-3);
@@ -42,7 +43,7 @@ struct Facade {
 }
 
 fn facade(at: Surface, footprint: f32) -> Facade {
-    if shading.windows.x <= 0.0 || !has_windows(at) || abs(at.normal.y) > 0.3 {
+    if !has_windows(at) || abs(at.normal.y) > 0.3 {
         return Facade(0.0, 0.0);
     }
     let along = select(at.position.x, at.position.z, abs(at.normal.x) > abs(at.normal.z));
@@ -55,6 +56,7 @@ fn facade(at: Surface, footprint: f32) -> Facade {
     let lit = hash2(vec2i(floor(cell)) * 7 + vec2i(side, 17 * side));
     return Facade(glass, glass * select(0.0, 0.4 + lit, lit < shading.window_lit));
 }
+#endif
 
 // Radiance that leaves an opaque surface towards the viewer; `view` points to the viewer, `footprint` is
 // the size of a pixel there. `depth` metres of water stand above it.
@@ -91,6 +93,7 @@ fn radiance_under(at: Surface, view: vec3f, footprint: f32, depth: f32, sun: vec
     }
 #endif
     var colour = light * wall * stain;
+#ifdef WINDOWS
     let pane = facade(at, footprint);
     if pane.glass > 0.0 {
         let mirrored = reflect(-view, at.normal);
@@ -99,5 +102,6 @@ fn radiance_under(at: Surface, view: vec3f, footprint: f32, depth: f32, sun: vec
         colour = mix(colour, glass, pane.glass);
         colour += vec3f(1.0, 0.62, 0.28) * (pane.glow * shading.window_radiance);
     }
+#endif
     return colour;
 }

@@ -11,9 +11,6 @@ struct Ripple {
 
 fn ripple_at(p: vec2f, seconds: f32, wavelength: f32, slope: f32, footprint: f32) -> Ripple {
     var out = Ripple(vec2f(0.0), 0.0);
-    if wavelength <= 0.0 {
-        return out;
-    }
     // Slowly varying gusts keep the pattern from repeating.
     let gust = 0.45 + 1.1 * value_noise(p / (5.0 * wavelength));
     let share = slope * gust / sqrt(7.0);

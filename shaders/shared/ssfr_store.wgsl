@@ -9,11 +9,7 @@ override STRIDE: u32;
 #endif
 
 fn put(at: u32, value: vec4f, is_first: bool) {
-    if is_first {
-        output[at] = value;
-    } else {
-        output[at] += value;
-    }
+    output[at] = select(output[at], vec4f(0.0), is_first) + value;
 }
 
 // Adds a sample's picture, and the parts of its light, to the pixel's mean; the first one replaces what was there.

@@ -86,7 +86,7 @@ fn main(
     let half_size = camera.size / 2u;
     let bounds = block_bounds(low - camera.radius, high + camera.radius, half_size);
     // Pairs of copies that each sample takes; a picture of one sample takes all four.
-    let own = max(PAIRS / sample_count(camera), 1u);
+    let pairs = max(PAIRS / sample_count(camera), 1u);
     for (var y = bounds.y; y <= bounds.w; y++) {
         for (var x = bounds.x + i32(thread.x); x <= bounds.z; x += i32(LANES)) {
             let pixel = vec2u(vec2i(x, y));
@@ -96,16 +96,18 @@ fn main(
             let a = (low - camera.position) * inverse;
             let b = (high - camera.position) * inverse;
             let end = solid_depth[2u * (pixel.y * camera.size.x + pixel.x)];
+            // Always `pairs`. Were that told by uniforms alone, lavapipe would compile the pass anew for each sample.
+            let own = select(0u, pairs, end > 0.0);
             var sum = 0.0;
             for (var k = 0u; k < own; k++) {
-                let off = aside((camera.sample_index * own + k) % PAIRS) * inverse;
+                let off = aside((camera.sample_index * pairs + k) % PAIRS) * inverse;
                 sum += between(a + off, b + off, end) + between(a - off, b - off, end);
                 if k + 1u == own {
                     break;
                 }
             }
             if sum > 0.0 {
-                let through = length(way) * sum / f32(2u * own);
+                let through = length(way) * sum / f32(2u * pairs);
                 let amount = u32(through * block.filled * THICKNESS_SCALE + 0.5);
                 atomicAdd(&thickness[pixel.y * half_size.x + pixel.x], amount);
             }

@@ -54,6 +54,19 @@ pub(super) fn shading(
     }
 }
 
+/// Says to the passes that shade which of ripples and windows the look has.
+pub(super) fn plan_details(plan: &mut Plan, look: &Look, passes: &[&'static str]) {
+    let spec = look.spec();
+    for pass in passes {
+        if spec.surface.ripple.is_some() {
+            plan.define(pass, "RIPPLES");
+        }
+        if spec.solids.windows.is_some() {
+            plan.define(pass, "WINDOWS");
+        }
+    }
+}
+
 /// Metres of air after which 63 % of the contrast are gone.
 fn haze(spec: &LookSpec) -> f64 {
     match spec.sky {

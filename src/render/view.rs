@@ -22,13 +22,10 @@ pub fn srgb_encode(linear: f64) -> f64 {
 ///
 /// Exposure, then the look's tone curve, then contrast about middle grey and saturation, then sRGB's encoding.
 pub fn apply(view: &ViewSpec, colour: [f32; 3]) -> [f64; 3] {
-    display(view, colour).to_array().map(srgb_encode)
-}
-
-/// As [`apply`], in whole 255ths.
-pub fn apply_bytes(view: &ViewSpec, colour: [f32; 3]) -> [u8; 3] {
-    let bytes = &*BYTES;
-    display(view, colour).to_array().map(|x| bytes.of(x))
+    Display::of(view)
+        .linear(colour)
+        .to_array()
+        .map(srgb_encode)
 }
 
 /// Steps of linear light from 0 to 1. The encoding's slope is at most 12.92, so that over a step it rises by at most 0.8 of a 255th, and
@@ -74,25 +71,56 @@ impl Bytes {
     }
 }
 
-/// Display-linear Rec. 709; values beyond 0 and 1 are clipped by the encoding.
-fn display(view: &ViewSpec, colour: [f32; 3]) -> DVec3 {
-    let scene = DVec3::from(colour.map(f64::from)).max(DVec3::ZERO) * view.exposure_stops.exp2();
-    let (shown, power) = match view.transform {
-        TransformSpec::Agx => (agx(scene), AGX_POWER),
-        TransformSpec::Aces => (aces::aces(scene), 1.0),
-        TransformSpec::Srgb => (scene.min(DVec3::ONE), 1.0),
-    };
-    // GREY (x / GREY)^contrast, of x that are a power themselves.
-    const GREY: f64 = 0.18;
-    let display = match power * view.contrast {
-        1.0 => shown,
-        power => {
-            let raised = shown.as_vec3().powf(power as f32).as_dvec3();
-            raised * GREY.powf(1.0 - view.contrast)
+/// Middle grey, about which contrast turns.
+const GREY: f64 = 0.18;
+
+/// A view, with what follows from it for every pixel.
+pub(super) struct Display {
+    transform: TransformSpec,
+    /// 2^exposure.
+    gain: f64,
+    /// What is left of `GREY (x / GREY)^contrast` where `x` is a power itself: `scale x^power`.
+    power: f64,
+    scale: f64,
+    saturation: f64,
+}
+
+impl Display {
+    pub(super) fn of(view: &ViewSpec) -> Self {
+        let power = match view.transform {
+            TransformSpec::Agx => AGX_POWER,
+            TransformSpec::Aces | TransformSpec::Srgb => 1.0,
+        };
+        Self {
+            transform: view.transform,
+            gain: view.exposure_stops.exp2(),
+            power: power * view.contrast,
+            scale: GREY.powf(1.0 - view.contrast),
+            saturation: view.saturation,
         }
-    };
-    let grey = DVec3::splat(display.dot(DVec3::new(0.2126, 0.7152, 0.0722)));
-    grey + (display - grey) * view.saturation
+    }
+
+    /// As [`apply`], in whole 255ths.
+    pub(super) fn bytes(&self, colour: [f32; 3]) -> [u8; 3] {
+        let bytes = &*BYTES;
+        self.linear(colour).to_array().map(|x| bytes.of(x))
+    }
+
+    /// Display-linear Rec. 709; values beyond 0 and 1 are clipped by the encoding.
+    fn linear(&self, colour: [f32; 3]) -> DVec3 {
+        let scene = DVec3::from(colour.map(f64::from)).max(DVec3::ZERO) * self.gain;
+        let shown = match self.transform {
+            TransformSpec::Agx => agx(scene),
+            TransformSpec::Aces => aces::aces(scene),
+            TransformSpec::Srgb => scene.min(DVec3::ONE),
+        };
+        let display = match self.power {
+            1.0 => shown,
+            power => shown.as_vec3().powf(power as f32).as_dvec3() * self.scale,
+        };
+        let grey = DVec3::splat(display.dot(DVec3::new(0.2126, 0.7152, 0.0722)));
+        grey + (display - grey) * self.saturation
+    }
 }
 
 /// What AgX's values are to the power of, so that they are linear.
@@ -264,10 +292,11 @@ mod tests {
         let mut seen = [false; 256];
         for transform in [TransformSpec::Agx, TransformSpec::Srgb] {
             let view = view(transform);
+            let display = Display::of(&view);
             for step in 0..20_000u32 {
                 let x = (f64::from(step) / 1000.0 - 15.0).exp2() as f32;
                 let colour = [x, 0.7 * x, 2.0 * x];
-                let found = apply_bytes(&view, colour);
+                let found = display.bytes(colour);
                 let expected = apply(&view, colour).map(|x| (x * 255.0).round() as u8);
                 assert_eq!(found, expected, "{colour:?}");
                 seen[usize::from(found[0])] = true;
@@ -282,10 +311,8 @@ mod tests {
             }
         }
         assert_eq!([BYTES.of(f64::INFINITY), BYTES.of(-1.0)], [255, 0]);
-        assert_eq!(
-            apply_bytes(&view(TransformSpec::Srgb), [f32::NAN; 3]),
-            [0; 3]
-        );
+        let plain = Display::of(&view(TransformSpec::Srgb));
+        assert_eq!(plain.bytes([f32::NAN; 3]), [0; 3]);
     }
 
     #[test]

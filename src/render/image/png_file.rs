@@ -5,7 +5,7 @@ use std::{fs::File, io::BufReader, path::Path};
 use rayon::prelude::*;
 
 use super::super::RenderError;
-use super::super::view;
+use super::super::view::Display;
 use super::{Attributes, Image, write_whole};
 use crate::scene::look::ViewSpec;
 
@@ -46,12 +46,13 @@ fn write(
     let shown = image.shown();
     let opaque = shown.iter().all(|pixel| pixel[3] >= 1.0 - 1e-6);
     let depth = if opaque { 3 } else { 4 };
+    let display = Display::of(view);
     let mut pixels = vec![0; depth * shown.len()];
     let places = pixels.par_chunks_mut(depth * ROW);
     (places.zip(shown.par_chunks(ROW))).for_each(|(places, shown)| {
         for (place, &[r, g, b, a]) in places.chunks_exact_mut(depth).zip(shown) {
             let clear = if a > 0.0 { 1.0 / a } else { 0.0 };
-            let [r, g, b] = view::apply_bytes(view, [r * clear, g * clear, b * clear]);
+            let [r, g, b] = display.bytes([r * clear, g * clear, b * clear]);
             let alpha = (f64::from(a).clamp(0.0, 1.0) * 255.0).round() as u8;
             place.copy_from_slice(&[r, g, b, alpha][..depth]);
         }

@@ -17,7 +17,7 @@ use crate::{
         caustics::{map_values, plan_caustics},
         closed::Closed,
         frame::{Extent, bands},
-        lighting::{plan_light, shading},
+        lighting::{plan_details, plan_light, shading},
         materials::plan_materials,
         opaque::Opaque,
         plan::{Limits, Plan},
@@ -111,6 +111,7 @@ impl Plan {
                 "rays/caustics_follow",
             ],
         };
+        plan_details(&mut plan, look, shaded);
         plan_palette(&mut plan, &palette, shaded);
         let painting = match spec.renderer.method {
             MethodSpec::Ssfr => shaded,

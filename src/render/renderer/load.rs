@@ -39,6 +39,11 @@ const ABOUT_THE_EYE: f64 = 6.0;
 const FEW: usize = 6;
 const CLOSE: f64 = 2.5;
 
+/// Upright strips of the picture, with as many of its particles each, in which these are sorted. A software adapter gives each of its
+/// threads a run of them: threads whose splats are as near, and lie apart, are done at the same time and do not wait for each other's
+/// pixels.
+const STRIPS: usize = 16;
+
 /// A frame that stands on the device.
 #[derive(Default)]
 pub(super) struct Loaded {
@@ -228,8 +233,8 @@ impl Renderer {
             .collect()
     }
 
-    /// First those that may be seen, front to back, so that splats find what hides them already there; how many they are. Then those that
-    /// others hide and those beside the frame; of these `ways` keeps none.
+    /// First those that may be seen, strip by strip, front to back, so that splats find what hides them already there; how many they are.
+    /// Then those that others hide and those beside the frame; of these `ways` keeps none.
     fn sort(
         &self,
         frame: u32,
@@ -239,8 +244,13 @@ impl Renderer {
         ways: &mut Vec<Path>,
     ) -> usize {
         let rate = self.scene.frames_per_second;
-        let forward = pose(&self.look, frame.into(), rate).forward.as_vec3();
-        let depth = |p: &Particle| Vec3::from(p.position).dot(forward);
+        let pose = pose(&self.look, frame.into(), rate);
+        let eye = (pose.position - self.scene.origin - self.scene.domain.min).as_vec3();
+        let (right, forward) = (pose.right.as_vec3(), pose.forward.as_vec3());
+        let depth = |p: &Particle| (Vec3::from(p.position) - eye).dot(forward);
+        let aside = |p: &Particle| {
+            (Vec3::from(p.position) - eye).dot(right) / depth(p).max(f32::MIN_POSITIVE)
+        };
         let in_frame = in_frame(packed, ways, cameras, self.scene.particle_spacing as f32);
         let is_seen =
             |index: usize| in_frame[index] && !hidden.is_some_and(|it| it.particles[index]);
@@ -250,11 +260,18 @@ impl Renderer {
             .filter(|&index| is_seen(index as usize))
             .map(|index| {
                 let particle = &packed[index as usize];
-                (in_order(depth(particle)), particle.tag, index)
+                (in_order(aside(particle)), particle.tag, index)
             })
             .collect();
         order.par_sort_unstable();
         let seen = order.len();
+        let strips = order.par_chunks_mut(seen.div_ceil(STRIPS).max(1));
+        strips.for_each(|strip| {
+            for (key, _, index) in strip.iter_mut() {
+                *key = in_order(depth(&packed[*index as usize]));
+            }
+            strip.sort_unstable();
+        });
         let mut indices: Vec<u32> = order.into_iter().map(|(.., index)| index).collect();
         if !ways.is_empty() {
             *ways = picked(ways, &indices);
