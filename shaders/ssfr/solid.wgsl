@@ -25,7 +25,29 @@ struct Corner {
     @location(5) @interpolate(flat) packed: u32,
 }
 
-// Two triangles over the box that holds the triangle on the screen, or over the tile where it passes the eye.
+// A box on the screen, pixels of the tile.
+struct Box {
+    low: vec2f,
+    high: vec2f,
+}
+
+fn with_point(box: Box, p: vec3f) -> Box {
+    let at = project(camera, p) + camera.corner - tile.corner;
+    return Box(min(box.low, at), max(box.high, at));
+}
+
+// With what is seen of a side: from the plane before which nothing is drawn on.
+fn with_side(box: Box, from_p: vec3f, to_p: vec3f) -> Box {
+    let depths = vec2f(from_p.z, to_p.z) - camera.near;
+    if max(depths.x, depths.y) <= 0.0 {
+        return box;
+    }
+    let cut = mix(from_p, to_p, depths.x / (depths.x - depths.y));
+    let at_plane = vec3f(cut.xy, camera.near);
+    return with_point(with_point(box, select(at_plane, from_p, depths.x > 0.0)), select(at_plane, to_p, depths.y > 0.0));
+}
+
+// Two triangles over the box that holds the triangle on the screen.
 // Which pixels it covers is decided by its sides in the fragment (homogeneous rasterisation, Olano and Greer
 // 1997): the device's own rules snap corners to a grid that starts at the tile, and edges would move with it.
 @vertex
@@ -42,21 +64,12 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     );
     var out: Corner;
     out.range = vec2f(min(a.z, min(b.z, c.z)), max(a.z, max(b.z, c.z)));
-    var low = vec2f(0.0);
-    var high = tile.size;
-    if out.range.x > camera.near {
-        let pa = project(camera, a);
-        let pb = project(camera, b);
-        let pc = project(camera, c);
-        // A pixel wider, for rounding.
-        let corner = tile.corner - camera.corner;
-        low = clamp(min(pa, min(pb, pc)) - corner - 1.0, vec2f(0.0), tile.size);
-        high = clamp(max(pa, max(pb, pc)) - corner + 1.0, vec2f(0.0), tile.size);
-    } else if out.range.y <= camera.near {
-        high = vec2f(0.0);
-    }
-    // Of a closed body the sides towards the eye hide the others.
-    if index / 6u < camera.closed && dot(normal, a) > 0.0 {
+    let box = with_side(with_side(with_side(Box(vec2f(FAR), vec2f(-FAR)), a, b), b, c), c, a);
+    // A pixel wider, for rounding.
+    let low = clamp(box.low - 1.0, vec2f(0.0), tile.size);
+    var high = clamp(box.high + 1.0, vec2f(0.0), tile.size);
+    // Nothing of what is behind the eye. Of a closed body the sides towards the eye hide the others.
+    if out.range.y <= camera.near || (index / 6u < camera.closed && dot(normal, a) > 0.0) {
         high = low;
     }
     let k = index % 6u;
