@@ -22,10 +22,7 @@ pub fn srgb_encode(linear: f64) -> f64 {
 ///
 /// Exposure, then the look's tone curve, then contrast about middle grey and saturation, then sRGB's encoding.
 pub fn apply(view: &ViewSpec, colour: [f32; 3]) -> [f64; 3] {
-    Display::of(view)
-        .linear(colour)
-        .to_array()
-        .map(srgb_encode)
+    Display::of(view).linear(colour).to_array().map(srgb_encode)
 }
 
 /// Steps of linear light from 0 to 1. The encoding's slope is at most 12.92, so that over a step it rises by at most 0.8 of a 255th, and

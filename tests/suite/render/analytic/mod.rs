@@ -12,6 +12,7 @@ mod lens;
 mod light;
 mod materials;
 mod motion;
+mod passing;
 mod rays;
 mod ripples;
 mod sea;
