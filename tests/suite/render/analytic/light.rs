@@ -387,3 +387,56 @@ fn the_horizon_has_no_line() {
     let control = horizon_step(&spoiled("ssfr/shade", from, to));
     assert!(control > 0.02, "{control}");
 }
+
+/// Pixels of a wall with a row of windows that are as dark as glass, and those of which they should be, sharp edges left out.
+fn window_faults(context: &Context, windows: &str) -> [usize; 2] {
+    const WALL: Bounds = Bounds {
+        min: DVec3::new(0.0, 0.0, 8.0),
+        max: DVec3::new(10.0, 9.0, 9.0),
+    };
+    let (storey, bay) = (2.0, 1.6);
+    let eye = Eye::new([5.0, 4.0, 4.0], [5.2, 4.3, 8.0], 40.0);
+    let setup = Setup {
+        more: windows.to_owned(),
+        ..Setup::new(eye)
+    };
+    let scene = RenderScene {
+        solids: vec![box_mesh(WALL)],
+        ..scene(1.0, 1.0)
+    };
+    let image = draw(context, &setup, &uniform_sky, &scene, &dry(), 1);
+    let mut counts = [0; 2];
+    for i in 0..64 * 64 {
+        let along = eye.direction(i);
+        let Some((far, _)) = enter(eye.position, along, WALL) else {
+            continue;
+        };
+        let p = eye.position + far * along;
+        // Less than 0.55 of a bay and 0.6 of a storey from edge to edge.
+        let inside = |x: f64, part: f64| 0.5 * part - (x.rem_euclid(1.0) - 0.5).abs();
+        let inside = [inside(p.x / bay, 0.55), inside(p.y / storey, 0.6)];
+        // A pixel is a fortieth of the distance wide, and smooths an edge by that.
+        let blur = 1.5 * far / eye.focal / bay;
+        if p.y < 1.0 || inside.iter().any(|edge| edge.abs() < blur) {
+            continue;
+        }
+        let is_glass = inside.iter().all(|edge| *edge > 0.0);
+        counts[0] += usize::from((luminance(image.beauty[i]) < 0.5) != is_glass);
+        counts[1] += usize::from(is_glass);
+    }
+    counts
+}
+
+#[test]
+fn windows_stand_in_their_bays_and_storeys() {
+    let windows = "[solids.windows]\nstorey_m = 2.0\nbay_m = 1.6\n";
+    let [faults, glass] = window_faults(&context(), windows);
+    assert!(glass > 400, "{glass}");
+    assert_eq!(faults, 0);
+    // The controls: wider bays, and no windows.
+    let wider = windows.replace("1.6", "1.7");
+    for other in [&wider[..], ""] {
+        let [faults, _] = window_faults(&context(), other);
+        assert!(faults > glass / 4, "{other}: {faults} of {glass}");
+    }
+}
