@@ -21,7 +21,7 @@ struct Caustics {
     width: f32,
     // Metres at the map's edge over which its light goes over into that of flat water; 0 where no water lies beyond.
     fade: f32,
-    // Ripples: longest wavelength (0 = none), root mean square slope.
+    // Ripples, with RIPPLES: longest wavelength, root mean square slope.
     ripple: vec2f,
     // Part of the sun's light that flat water lets in.
     through: f32,

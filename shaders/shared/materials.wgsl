@@ -62,6 +62,8 @@ const SHARED: u32 = 4u;
 
 // Loops ask at their end too whether they go on, as in ssfr/shade.
 fn picture_at(levels: Levels, at: vec2f) -> vec3f {
+    // One level alone needs no second. That this is asked also keeps lavapipe from compiling the pass again for each sample
+    // (docs/performance.md).
     let count = select(2u, 1u, sample_count(camera) >= SHARED || levels.part == 0.0);
     let share = fract((f32(camera.sample_index) + 0.5) * 0.618034);
     var sum = vec3f(0.0);

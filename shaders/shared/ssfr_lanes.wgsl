@@ -15,8 +15,8 @@ fn row_of_group(group: vec3u, groups: vec3u, thread: vec3u) -> u32 {
     return (group.x + group.y * groups.x) * ROWS + thread.y;
 }
 
-// The same where near particles, which come first, take longer than far ones. A software adapter gives each of its threads as many groups
-// in a row: the first thread would have all that are near. So the first half has every other one.
+// The same where some rows take longer than others. A software adapter gives each of its threads as many groups in a row; of two threads
+// each has every other group instead. Where a pass adds to few pixels at a time, as the thickness does, threads then wait for each other.
 fn row_of_dealt_group(group: vec3u, groups: vec3u, thread: vec3u) -> u32 {
     var place = group.x + group.y * groups.x;
 #ifdef NARROW

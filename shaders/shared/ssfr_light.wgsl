@@ -22,9 +22,9 @@ struct Shading {
     ground_variation: f32,
     solid_colour: vec3f,
     haze: f32,
-    // Ripples: longest wavelength (0 = none), root mean square slope.
+    // Ripples, with RIPPLES: longest wavelength, root mean square slope.
     ripple: vec2f,
-    // Windows: storey and bay (0 = none).
+    // Windows, with WINDOWS: storey and bay.
     windows: vec2f,
     // Fraction of the windows that are lit, and their radiance.
     window_lit: f32,

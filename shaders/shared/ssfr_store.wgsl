@@ -9,6 +9,7 @@ override STRIDE: u32;
 #endif
 
 fn put(at: u32, value: vec4f, is_first: bool) {
+    // Not a branch: lavapipe compiles a pass with one that uniforms alone decide again for each sample (docs/performance.md).
     output[at] = select(output[at], vec4f(0.0), is_first) + value;
 }
 

@@ -122,6 +122,7 @@ fn thickness_at(position: vec2f) -> f32 {
 
 // Distance along a world ray to the ground, FAR where there is none; the floor is at y = 0.
 fn ground_distance(origin: vec3f, direction: vec3f) -> f32 {
+    // In one: `||` would be a branch that uniforms alone decide (docs/performance.md).
     if (direction.y > -1e-5) | (origin.y <= 0.0) {
         return FAR;
     }

@@ -36,14 +36,18 @@ fn with_point(box: Box, p: vec3f) -> Box {
     return Box(min(box.low, at), max(box.high, at));
 }
 
-// With what is seen of a side: from the plane before which nothing is drawn on.
+// Nearer than this over `near` a face is not drawn. Between the two it is, at the depth `near`, so that one does not look into a body whose
+// face is close to the eye.
+const CUT: f32 = 0.001;
+
+// With what is seen of a side, from the cut on.
 fn with_side(box: Box, from_p: vec3f, to_p: vec3f) -> Box {
-    let depths = vec2f(from_p.z, to_p.z) - camera.near;
+    let depths = vec2f(from_p.z, to_p.z) - CUT * camera.near;
     if max(depths.x, depths.y) <= 0.0 {
         return box;
     }
     let cut = mix(from_p, to_p, depths.x / (depths.x - depths.y));
-    let at_plane = vec3f(cut.xy, camera.near);
+    let at_plane = vec3f(cut.xy, CUT * camera.near);
     return with_point(with_point(box, select(at_plane, from_p, depths.x > 0.0)), select(at_plane, to_p, depths.y > 0.0));
 }
 
@@ -103,7 +107,7 @@ fn fragment(in: Corner) -> Texel {
     let inside = vec3f(dot(in.side_a, ray), dot(in.side_b, ray), dot(in.side_c, ray));
     let raw = in.plane.w / dot(in.plane.xyz, ray);
     // Sides that two triangles share belong to both; the nearer one is kept.
-    if any(inside < vec3f(0.0)) || !(raw > 0.0) {
+    if any(inside < vec3f(0.0)) || !(raw > CUT * camera.near) {
         discard;
     }
     let depth = clamp(raw, max(in.range.x, camera.near), max(in.range.y, camera.near));

@@ -96,7 +96,8 @@ fn main(
             let a = (low - camera.position) * inverse;
             let b = (high - camera.position) * inverse;
             let end = solid_depth[2u * (pixel.y * camera.size.x + pixel.x)];
-            // Always `pairs`. Were that told by uniforms alone, lavapipe would compile the pass anew for each sample.
+            // `end` is positive, so this is always `pairs`. If uniforms alone decided it, lavapipe would compile the pass again for each
+            // sample (docs/performance.md).
             let own = select(0u, pairs, end > 0.0);
             var sum = 0.0;
             for (var k = 0u; k < own; k++) {

@@ -332,6 +332,32 @@ mod tests {
         buffers.chain(textures).chain(samplers).collect()
     }
 
+    /// Conditions of the passes that draw ripples and windows, by either method.
+    #[test]
+    fn ripples_and_windows_are_drawn_where_the_look_has_them() {
+        const BOTH: &str = "[surface.ripple]\nwavelength_m = 1.0\nslope = 0.1\n\
+            [solids.windows]\nstorey_m = 1.0\nbay_m = 1.0\n[water]\ncaustics = { resolution = 64 }\n";
+        let conditions = |pass: &str, method: &str, more: &str| {
+            let more = format!("[renderer]\nmethod = \"{method}\"\n{more}");
+            let plan = plan("curvature_flow", &more);
+            let of_pass = plan.defines.get(pass).cloned().unwrap_or_default();
+            ["RIPPLES", "WINDOWS"].map(|condition| of_pass.contains(&condition))
+        };
+        for (pass, method) in [
+            ("ssfr/shade", "ssfr"),
+            ("ssfr/shade_dry", "ssfr"),
+            ("rays/cast", "ray"),
+            ("rays/caustics_follow", "ray"),
+        ] {
+            let more = match method {
+                "ray" => BOTH,
+                _ => BOTH.split("[water]").next().unwrap(),
+            };
+            assert_eq!(conditions(pass, method, more), [true; 2], "{pass}");
+            assert_eq!(conditions(pass, method, ""), [false; 2], "{pass}");
+        }
+    }
+
     #[test]
     fn what_is_planned_is_what_commands_use() {
         const ALL: &str = "[output]\nformats = [\"exr\"]\naovs = [\"Z\", \"forward\"]\n[basin]\nheight_m = 0.5\n\

@@ -76,7 +76,7 @@ pub(super) struct Display {
     transform: TransformSpec,
     /// 2^exposure.
     gain: f64,
-    /// What is left of `GREY (x / GREY)^contrast` where `x` is a power itself: `scale x^power`.
+    /// Contrast: `GREY (x / GREY)^contrast` as `scale x^power`, where the power also takes AgX's values to linear ones.
     power: f64,
     scale: f64,
     saturation: f64,
@@ -111,10 +111,11 @@ impl Display {
             TransformSpec::Aces => aces::aces(scene),
             TransformSpec::Srgb => scene.min(DVec3::ONE),
         };
-        let display = match self.power {
+        let raised = match self.power {
             1.0 => shown,
-            power => shown.as_vec3().powf(power as f32).as_dvec3() * self.scale,
+            power => shown.as_vec3().powf(power as f32).as_dvec3(),
         };
+        let display = raised * self.scale;
         let grey = DVec3::splat(display.dot(DVec3::new(0.2126, 0.7152, 0.0722)));
         grey + (display - grey) * self.saturation
     }

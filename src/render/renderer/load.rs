@@ -39,10 +39,10 @@ const ABOUT_THE_EYE: f64 = 6.0;
 const FEW: usize = 6;
 const CLOSE: f64 = 2.5;
 
-/// Upright strips of the picture, with as many of its particles each, in which these are sorted. A software adapter gives each of its
-/// threads a run of them: threads whose splats are as near, and lie apart, are done at the same time and do not wait for each other's
-/// pixels.
-const STRIPS: usize = 16;
+/// Width of the picture's upright strips, pixels, in which particles are sorted. A software adapter gives each thread of a pass that does
+/// not deal its groups out a run of them: with strips both of two threads have near particles, which take longer, and they wait less for
+/// each other's pixels.
+const STRIP: f32 = 64.0;
 
 /// A frame that stands on the device.
 #[derive(Default)]
@@ -248,30 +248,27 @@ impl Renderer {
         let eye = (pose.position - self.scene.origin - self.scene.domain.min).as_vec3();
         let (right, forward) = (pose.right.as_vec3(), pose.forward.as_vec3());
         let depth = |p: &Particle| (Vec3::from(p.position) - eye).dot(forward);
-        let aside = |p: &Particle| {
-            (Vec3::from(p.position) - eye).dot(right) / depth(p).max(f32::MIN_POSITIVE)
+        let focal = cameras.first().map_or(1.0, |camera| camera.focal);
+        // Which strip does not depend on the others, so that the order of two particles is the same with overscan and without.
+        let strip = |p: &Particle| {
+            let aside = (Vec3::from(p.position) - eye).dot(right);
+            (focal * aside / depth(p).max(f32::MIN_POSITIVE) / STRIP).floor() as i32
         };
         let in_frame = in_frame(packed, ways, cameras, self.scene.particle_spacing as f32);
         let is_seen =
             |index: usize| in_frame[index] && !hidden.is_some_and(|it| it.particles[index]);
         let all = || 0u32..packed.len() as u32;
-        let mut order: Vec<(u32, u32, u32)> = all()
+        let mut order: Vec<(i32, u32, u32, u32)> = all()
             .into_par_iter()
             .filter(|&index| is_seen(index as usize))
             .map(|index| {
                 let particle = &packed[index as usize];
-                (in_order(aside(particle)), particle.tag, index)
+                let depth = in_order(depth(particle));
+                (strip(particle), depth, particle.tag, index)
             })
             .collect();
         order.par_sort_unstable();
         let seen = order.len();
-        let strips = order.par_chunks_mut(seen.div_ceil(STRIPS).max(1));
-        strips.for_each(|strip| {
-            for (key, _, index) in strip.iter_mut() {
-                *key = in_order(depth(&packed[*index as usize]));
-            }
-            strip.sort_unstable();
-        });
         let mut indices: Vec<u32> = order.into_iter().map(|(.., index)| index).collect();
         if !ways.is_empty() {
             *ways = picked(ways, &indices);

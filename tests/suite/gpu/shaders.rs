@@ -14,7 +14,7 @@ use swell::{
 };
 
 /// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 60] = [
+const VARIANTS: [&[&str]; 65] = [
     &[],
     &["SOLIDS"],
     &["NEIGHBOR_LIST"],
@@ -73,6 +73,11 @@ const VARIANTS: [&[&str]; 60] = [
     &["FORWARD"],
     &["HOLDOUT"],
     &["LIGHTS"],
+    &["RIPPLES"],
+    &["WINDOWS"],
+    &["WINDOWS", "PALETTE", "MATERIALS"],
+    &["RIPPLES", "WINDOWS", "SEA", "CAUSTICS", "LIGHTS"],
+    &["LISTED", "DRY", "RIPPLES", "WINDOWS"],
     &["LIGHTS", "SPRAY", "HOLDOUT"],
     &["OBJECTS"],
     &["OBJECTS", "SPRAY"],

@@ -3,10 +3,11 @@
 use glam::DVec3;
 use swell::domain::{bounds::Bounds, particles::Particles};
 use swell::gpu::adapter::Context;
-use swell::render::RenderScene;
+use swell::render::{Image, RenderScene, Renderer};
+use swell::scene::look::Look;
 
 use super::geometry::{box_mesh, enter};
-use super::support::{Eye, Setup, context, draw, scene, spoiled, uniform_sky};
+use super::support::{Eye, Setup, context, scene, spoiled, uniform_sky, write_sky};
 
 const EYE: DVec3 = DVec3::new(5.0, 2.0, 5.0);
 
@@ -34,10 +35,22 @@ fn first(along: DVec3) -> Option<(usize, DVec3, f64)> {
     met.chain(ground).min_by(|a, b| a.2.total_cmp(&b.2))
 }
 
+/// A frame without water, in tiles of so many pixels.
+fn drawn(context: &Context, setup: &Setup, scene: &RenderScene, tile: u32) -> Image {
+    let folder = tempfile::tempdir().unwrap();
+    write_sky(&folder.path().join("sky.exr"), &uniform_sky);
+    let look = Look::parse(&setup.text(), &folder.path().join("look.toml")).unwrap();
+    let mut renderer = Renderer::with_tile_limit(context, &look, scene, tile).unwrap();
+    renderer.render(1, &Particles::default()).unwrap()
+}
+
 /// Of the pixels whose neighbours see the same face, how many are not as deep as it is, and how many there are.
-fn lost(context: &Context) -> [usize; 2] {
+/// What is nearer than `near` metres is drawn there.
+fn lost(context: &Context, near: f64, tile: u32) -> [usize; 2] {
     let scene = RenderScene {
         solids: walls().into_iter().map(box_mesh).collect(),
+        // Of which it is 0.12.
+        particle_spacing: near / 0.12,
         ..scene(0.1, 1.0)
     };
     let mut counts = [0; 2];
@@ -50,8 +63,7 @@ fn lost(context: &Context) -> [usize; 2] {
             up: DVec3::new(0.2, 1.0, 0.1),
             ..Eye::new(EYE.to_array(), target.to_array(), 40.0)
         };
-        let water = Particles::default();
-        let image = draw(context, &Setup::new(eye), &uniform_sky, &scene, &water, 1);
+        let image = drawn(context, &Setup::new(eye), &scene, tile);
         let depths = image.aovs.z.as_ref().unwrap();
         let side = eye.size as usize;
         let inner = (0..side * side)
@@ -66,13 +78,13 @@ fn lost(context: &Context) -> [usize; 2] {
                 continue;
             }
             let expected = match seen(i) {
-                Some((.., far)) => far * eye.direction(i).dot(eye.forward()),
+                Some((.., far)) => near.max(far * eye.direction(i).dot(eye.forward())),
                 None => 1e30,
             };
             // A face is 0.3 m off, and its corners 40 m away are in f32: 40 ε over 0.3 m, in some 16 roundings.
             let rounding = 16.0 * 40.0 / 0.3 * f64::from(f32::EPSILON);
-            let is_off = (f64::from(depths[i]) / expected - 1.0).abs() > rounding;
-            counts[0] += usize::from(is_off);
+            let off = (f64::from(depths[i]) / expected - 1.0).abs();
+            counts[0] += usize::from(off > rounding || off.is_nan());
             counts[1] += 1;
         }
     }
@@ -81,15 +93,22 @@ fn lost(context: &Context) -> [usize; 2] {
 
 #[test]
 fn what_is_before_the_eye_of_a_solid_that_passes_it_is_drawn() {
-    let [off, all] = lost(&context());
-    assert!(all > 40_000, "{all}");
-    assert_eq!(off, 0, "of {all}");
-    // The control: a side cut where it ends.
-    let cut = spoiled(
-        "ssfr/solid",
-        "depths.x / (depths.x - depths.y)",
-        "select(0.0, 1.0, depths.x > 0.0)",
-    );
-    let [off, _] = lost(&cut);
-    assert!(off > 1000, "{off}");
+    // The second one: the walls are nearer than what is drawn at its own depth.
+    for (near, tile) in [(0.02, 4096), (0.6, 4096), (0.02, 32), (0.6, 32)] {
+        let [off, all] = lost(&context(), near, tile);
+        assert!(all > 40_000, "{all}");
+        assert_eq!(off, 0, "of {all}, {near} m in tiles of {tile}");
+    }
+    // The controls: a side is cut at its end behind the eye, or only at the depth from which on it is drawn at its own.
+    for (from, to, near) in [
+        (
+            "depths.x / (depths.x - depths.y)",
+            "select(0.0, 1.0, depths.x > 0.0)",
+            0.02,
+        ),
+        ("const CUT: f32 = 0.001", "const CUT: f32 = 1.0", 0.6),
+    ] {
+        let [off, _] = lost(&spoiled("ssfr/solid", from, to), near, 4096);
+        assert!(off > 1000, "{to}: {off}");
+    }
 }
