@@ -505,3 +505,62 @@ fn spray_that_flies_alone_is_drops_and_spray_in_company_mist() {
     assert!(alone > 2.0, "{alone}");
     assert!(together < 0.5, "{together}");
 }
+
+/// Columns and rows over which a particle that flies alone, so many of its radii away, puts spray.
+fn reach(context: &Context, radii: f64, id: u32) -> [usize; 2] {
+    // Straight up, so that no ground is in the picture.
+    let eye = Eye {
+        size: 512,
+        ..Eye::new([5.0, 1.0, 5.0], [5.3, 4.0, 5.2], 300.0)
+    };
+    let setup = Setup {
+        surface: format!("smoothing_width_m = 0.0\nradius_m = {SPLAT:?}\n"),
+        water: "spray = { density_per_metre = 1000.0, speed_m_per_s = 3.0 }\n".to_owned(),
+        background: false,
+        ..Setup::new(eye)
+    };
+    let set = RenderScene {
+        particle_spacing: SPACING,
+        ..scene(1.0, 1.0)
+    };
+    let lone = Particles {
+        id: vec![id],
+        ..ball(eye.position + radii * SPLAT * eye.forward(), DVec3::ZERO)
+    };
+    let image = draw(context, &setup, &black_sky, &set, &lone, 1);
+    let seen = (0..512 * 512).filter(|&i| image.beauty[i][3] > 0.0);
+    let places: Vec<[usize; 2]> = seen.map(|i| [i % 512, i / 512]).collect();
+    [0, 1].map(|axis| {
+        let along = || places.iter().map(|place| place[axis]);
+        along()
+            .max()
+            .map_or(0, |last| last + 1 - along().min().unwrap())
+    })
+}
+
+/// A drop lies in four cells of two pixels, which are read linearly: over six pixels, whatever it stands from the eye.
+#[test]
+fn no_drop_is_wider_than_six_pixels() {
+    // The largest drop alone.
+    let alone = spoiled(
+        "ssfr/splat_spray",
+        "for (var j = thread.x; j < drops; j += LANES)",
+        "for (var j = thread.x + drops - 1u; j < drops; j += LANES)",
+    );
+    for radii in [4.0, 6.0, 10.0, 40.0] {
+        for id in 0..4 {
+            let found = reach(&alone, radii, 7 * id + 1);
+            assert!(
+                found.iter().all(|n| (1..=6).contains(n)),
+                "{radii}: {found:?}"
+            );
+        }
+        // The control: all of its drops, over a ball of 1.6 radii.
+        let ball = 2.0 * eye().focal / radii;
+        let found = reach(&context(), radii, 1);
+        assert!(
+            found.iter().any(|n| *n > 6 && *n as f64 > 0.5 * ball),
+            "{radii}: {found:?}"
+        );
+    }
+}
