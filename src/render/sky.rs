@@ -270,9 +270,9 @@ fn panorama(
     let layer = loaded.layer_data;
     let (mut width, mut texels) = layer.channel_data.pixels;
     let mut height = layer.size.1;
-    if width < 2 || height < 2 {
+    if height < 2 || width != 2 * height {
         return Err(fault(format!(
-            "is {width} × {height} pixels; at least 2 × 2 are needed"
+            "is {width} × {height} pixels; a latitude-longitude picture is twice as wide as high, and at least 4 × 2"
         )));
     }
     if texels.iter().any(|c| !c.is_finite()) {

@@ -3,11 +3,10 @@
 use glam::DVec3;
 use swell::domain::{bounds::Bounds, particles::Particles};
 use swell::gpu::adapter::Context;
-use swell::render::{Image, RenderScene, Renderer};
-use swell::scene::look::Look;
+use swell::render::RenderScene;
 
 use super::geometry::{box_mesh, enter};
-use super::support::{Eye, Setup, context, scene, spoiled, uniform_sky, write_sky};
+use super::support::{Eye, Setup, context, renderer, scene, spoiled, uniform_sky};
 
 const EYE: DVec3 = DVec3::new(5.0, 2.0, 5.0);
 
@@ -35,21 +34,12 @@ fn first(along: DVec3) -> Option<(usize, DVec3, f64)> {
     met.chain(ground).min_by(|a, b| a.2.total_cmp(&b.2))
 }
 
-/// A frame without water, in tiles of so many pixels.
-fn drawn(context: &Context, setup: &Setup, scene: &RenderScene, tile: u32) -> Image {
-    let folder = tempfile::tempdir().unwrap();
-    write_sky(&folder.path().join("sky.exr"), &uniform_sky);
-    let look = Look::parse(&setup.text(), &folder.path().join("look.toml")).unwrap();
-    let mut renderer = Renderer::with_tile_limit(context, &look, scene, tile).unwrap();
-    renderer.render(1, &Particles::default()).unwrap()
-}
-
 /// Of the pixels whose neighbours see the same face, how many are not as deep as it is, and how many there are.
 /// What is nearer than `near` metres is drawn there.
 fn lost(context: &Context, near: f64, tile: u32) -> [usize; 2] {
     let scene = RenderScene {
         solids: walls().into_iter().map(box_mesh).collect(),
-        // Of which it is 0.12.
+        // `near` is 0.12 of it.
         particle_spacing: near / 0.12,
         ..scene(0.1, 1.0)
     };
@@ -63,7 +53,9 @@ fn lost(context: &Context, near: f64, tile: u32) -> [usize; 2] {
             up: DVec3::new(0.2, 1.0, 0.1),
             ..Eye::new(EYE.to_array(), target.to_array(), 40.0)
         };
-        let image = drawn(context, &Setup::new(eye), &scene, tile);
+        let setup = Setup::new(eye);
+        let mut renderer = renderer(context, &setup, &uniform_sky, &scene, tile);
+        let image = renderer.render(1, &Particles::default()).unwrap();
         let depths = image.aovs.z.as_ref().unwrap();
         let side = eye.size as usize;
         let inner = (0..side * side)
@@ -96,6 +88,7 @@ fn what_is_before_the_eye_of_a_solid_that_passes_it_is_drawn() {
     // The second one: the walls are nearer than what is drawn at its own depth.
     for (near, tile) in [(0.02, 4096), (0.6, 4096), (0.02, 32), (0.6, 32)] {
         let [off, all] = lost(&context(), near, tile);
+        // Of 15 views of 62 × 62 pixels; the others are beside an edge.
         assert!(all > 40_000, "{all}");
         assert_eq!(off, 0, "of {all}, {near} m in tiles of {tile}");
     }

@@ -222,11 +222,21 @@ pub(crate) fn draw_moment(
     moment: &Moment<'_>,
     frame: u32,
 ) -> Result<Image, RenderError> {
+    renderer(context, setup, sky, scene, u32::MAX).render_moment(frame, moment)
+}
+
+/// Draws frames in tiles of at most so many pixels.
+pub(super) fn renderer(
+    context: &Context,
+    setup: &Setup,
+    sky: &dyn Fn(DVec3, DVec2) -> [f64; 3],
+    scene: &RenderScene,
+    tile: u32,
+) -> Renderer {
     let folder = tempfile::tempdir().unwrap();
     write_sky(&folder.path().join("sky.exr"), sky);
     let look = Look::parse(&setup.text(), &folder.path().join("look.toml")).unwrap();
-    let mut renderer = Renderer::new(context, &look, scene).unwrap();
-    renderer.render_moment(frame, moment)
+    Renderer::with_tile_limit(context, &look, scene, tile).unwrap()
 }
 
 /// Texels around the horizon; half as many from zenith to nadir. Their (u, v) are exact in half precision.
