@@ -491,20 +491,8 @@ fn a_panorama_is_mirrored_and_a_damaged_one_refused() {
         assert!((g / (2.0 * reflectance) - 1.0).abs() < 0.03, "{g}");
         assert!(r < 1e-4 && a == 1.0);
     }
-    let fault = || Renderer::new(&context(), &parse(), &tank(SPACING)).err();
-    // Not a latitude-longitude picture: a row too few, and a square. One of 32 × 16 was drawn above.
-    for (width, height) in [(32, 15), (16, 16)] {
-        let file = folder.path().join("sky.exr");
-        exr::prelude::write_rgb_file(file, width, height, |_, _| (0.0f32, 1.0f32, 0.0f32)).unwrap();
-        let fault = fault();
-        let size = format!("is {width} × {height} pixels");
-        assert!(
-            matches!(&fault, Some(RenderError::Panorama(told)) if told.contains(&size)),
-            "{fault:?}"
-        );
-    }
     std::fs::write(folder.path().join("sky.exr"), b"nonsense").unwrap();
-    let fault = fault();
+    let fault = Renderer::new(&context(), &parse(), &tank(SPACING)).err();
     assert!(matches!(fault, Some(RenderError::Panorama(_))), "{fault:?}");
 }
 

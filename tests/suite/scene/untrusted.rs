@@ -287,8 +287,11 @@ fn scenes_and_looks_stay_in_their_folders_unless_told() {
     );
     // A look and its sky.
     fs::create_dir(job.path("looks")).unwrap();
-    job.expect(0, "render link --look look.toml -o sky --frames 1");
     let look = fs::read_to_string(job.path("look.toml")).unwrap();
+    // A sky is twice as wide as high.
+    let wide = look.replace("height = 36", "height = 32");
+    fs::write(job.path("wide.toml"), wide).unwrap();
+    job.expect(0, "render link --look wide.toml -o sky --frames 1");
     let sky = "model = \"panorama\"\nfile = \"../sky/small.0001.exr\"";
     fs::write(
         job.path("looks/look.toml"),

@@ -7,7 +7,8 @@ use swell::domain::bounds::Bounds;
 use swell::domain::mesh::TriangleMesh;
 use swell::domain::particles::Particles;
 use swell::gpu::adapter::Context;
-use swell::render::{Image, RenderScene};
+use swell::render::{Image, RenderError, RenderScene, Renderer};
+use swell::scene::look::Look;
 
 use super::geometry::{box_mesh, enter};
 use super::support::{
@@ -48,6 +49,29 @@ fn the_sky_is_where_its_panorama_says() {
         let control = worst(turned);
         assert!(control > 2.0 * RAMP_ERROR, "{turned}: {control}");
     }
+}
+
+/// A sky of 64 × 31 pixels or of 64 × 64 is no latitude-longitude picture; one of 64 × 32, the control, is.
+#[test]
+fn a_panorama_that_is_not_twice_as_wide_as_high_is_refused() {
+    let setup = Setup::new(Eye::new([5.0, 2.0, 5.0], [7.0, 4.5, 8.0], 60.0));
+    let fault = |height: usize| {
+        let folder = tempfile::tempdir().unwrap();
+        let white = (1.0f32, 1.0f32, 1.0f32);
+        let file = folder.path().join("sky.exr");
+        exr::prelude::write_rgb_file(file, 64, height, |_, _| white).unwrap();
+        let look = Look::parse(&setup.text(), &folder.path().join("look.toml")).unwrap();
+        Renderer::new(&context(), &look, &scene(1.0, 1.0)).err()
+    };
+    for height in [31, 64] {
+        let fault = fault(height);
+        let told = format!("is 64 × {height} pixels");
+        assert!(
+            matches!(&fault, Some(RenderError::Panorama(why)) if why.contains(&told)),
+            "{fault:?}"
+        );
+    }
+    assert!(fault(32).is_none());
 }
 
 const CENTRE: DVec3 = DVec3::new(5.0, 5.0, 5.0);
