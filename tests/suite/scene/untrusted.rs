@@ -289,7 +289,10 @@ fn scenes_and_looks_stay_in_their_folders_unless_told() {
     fs::create_dir(job.path("looks")).unwrap();
     let look = fs::read_to_string(job.path("look.toml")).unwrap();
     // A sky is twice as wide as high.
-    let wide = look.replace("height = 36", "height = 32");
+    let wide = look.replace("height = 36", "height = 32").replace(
+        "film_back_mm = [36.0, 20.25]",
+        "film_back_mm = [36.0, 18.0]",
+    );
     fs::write(job.path("wide.toml"), wide).unwrap();
     job.expect(0, "render link --look wide.toml -o sky --frames 1");
     let sky = "model = \"panorama\"\nfile = \"../sky/small.0001.exr\"";
