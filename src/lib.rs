@@ -83,22 +83,17 @@
 //! In the repository: `docs/first-shot.md` for users of the program, `docs/ARCHITECTURE.md` for who may import whom and how to add a pass, an effect,
 //! a format, a stage; `docs/cache.md` for the formats, `docs/keys.md` for every key. Python reads caches by the package in `tools/python`.
 
-// One way to print, which takes care of writes that fail: cli::output.
-#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
-
-pub mod cache;
-pub mod check;
-pub mod cli;
-pub mod compare;
-pub mod domain;
-pub mod experiment;
-pub mod export;
-pub mod gpu;
-#[cfg(feature = "mutants")]
-pub mod mutants;
-pub mod reference;
-pub mod render;
-pub mod scene;
-pub mod solve;
-pub mod stage;
-pub mod study;
+pub use swell_cache as cache;
+pub use swell_check as check;
+pub use swell_cli as cli;
+pub use swell_compare as compare;
+pub use swell_domain as domain;
+pub use swell_experiment as experiment;
+pub use swell_export as export;
+pub use swell_gpu as gpu;
+pub use swell_reference as reference;
+pub use swell_render as render;
+pub use swell_scene as scene;
+pub use swell_solve as solve;
+pub use swell_stage as stage;
+pub use swell_study as study;

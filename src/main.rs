@@ -2,11 +2,24 @@
 
 use std::{env, process::ExitCode};
 
+/// Version, and what this program was built from and for.
+const BUILD: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\ncommit: ",
+    env!("SWELL_COMMIT"),
+    "\ntarget: ",
+    env!("SWELL_TARGET"),
+    "\nprofile: ",
+    env!("SWELL_PROFILE"),
+    "\nfeatures: ",
+    env!("SWELL_FEATURES"),
+);
+
 fn main() -> ExitCode {
     // Without a desktop session Mesa's device-select layer prints two lines that read like our failure.
     if env::var_os("XDG_RUNTIME_DIR").is_none() && env::var_os("NODEVICE_SELECT").is_none() {
         // SAFETY: no other thread runs yet.
         unsafe { env::set_var("NODEVICE_SELECT", "1") };
     }
-    swell::cli::main()
+    swell::cli::main(BUILD)
 }

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::domain::keep::Keep;
+use swell_domain::keep::Keep;
 
 /// Errors of a cache. All but [`CacheError::Io`] mean that the cache is damaged or not the
 /// one that was meant.

@@ -15,7 +15,7 @@ use super::{
     manifest,
     record::FileRecord,
 };
-use crate::domain::{answer::Answers, particles::Particles};
+use swell_domain::{answer::Answers, particles::Particles};
 
 /// The folder.
 pub const FAILED: &str = "failed";

@@ -19,7 +19,7 @@ use ply_rs_bw::ply::{
 };
 
 use super::error::CacheError;
-use crate::domain::particles::Particles;
+use swell_domain::particles::Particles;
 
 /// Columns of every row, in this order, before the attributes; the first three are the position.
 const FIXED: [(&str, ScalarType); 7] = [

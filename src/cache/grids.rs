@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::vdb::Grids;
-use crate::domain::{particles::Particles, sparse_grid::Precision, surface::Raster};
+use swell_domain::{particles::Particles, sparse_grid::Precision, surface::Raster};
 
 /// Grids that each frame has, as the manifest records them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

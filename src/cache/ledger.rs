@@ -14,7 +14,7 @@ use super::manifest::{self, Manifest};
 use super::probes::{ProbeRecord, ProbeValues};
 use super::record::FileRecord;
 use super::stream::{self, STREAMS, Stream};
-use crate::domain::answer::Answers;
+use swell_domain::answer::Answers;
 
 /// File name of the ledger.
 pub(super) const FILE: &str = "frames.jsonl";

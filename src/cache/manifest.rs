@@ -13,7 +13,7 @@ use super::frame::Stamp;
 use super::grids::GridRecord;
 use super::probes::ProbeRecord;
 use super::record::{FileRecord, is_file_stem, is_relative};
-use crate::domain::keep::{Compression, Keep};
+use swell_domain::keep::{Compression, Keep};
 
 /// File name of the manifest.
 pub(super) const FILE: &str = "manifest.json";

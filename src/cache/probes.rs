@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::record::is_file_stem;
-use crate::domain::probe::Rate;
+use swell_domain::probe::Rate;
 
 /// A probe, as the manifest has it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

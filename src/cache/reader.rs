@@ -15,8 +15,8 @@ use super::record::FileRecord;
 use super::stream::{self, OF_PARTICLES};
 use super::tables;
 use super::vdb::{self, Grids};
-use crate::domain::keep::Compression;
-use crate::domain::particles::Particles;
+use swell_domain::keep::Compression;
+use swell_domain::particles::Particles;
 
 /// An open cache: its manifest, its ledger, its scene and the scene's files, all checked; the frames are checked as they
 /// are read. A bake may go on meanwhile: a line that is just being written is not seen.

@@ -19,7 +19,7 @@ use super::record::FileRecord;
 use super::stream::{self, Layout, OF_PARTICLES, Stream};
 use super::tables;
 use super::window::Window;
-use crate::domain::particles::Particles;
+use swell_domain::particles::Particles;
 
 /// Counts of what one writer did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

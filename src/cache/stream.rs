@@ -8,8 +8,8 @@ use super::grids::GridRecord;
 use super::manifest::Manifest;
 use super::probes::ProbeRecord;
 use super::vdb;
-use crate::domain::keep::Compression;
-use crate::domain::particles::Particles;
+use swell_domain::keep::Compression;
+use swell_domain::particles::Particles;
 
 /// Name of the stream that every cache has: a frame's particles, from which a bake goes on.
 pub const PARTICLES: &str = "particles";

@@ -18,7 +18,7 @@ use super::reader::read_frame;
 use super::record::FileRecord;
 use super::sink::{Job, Sink, Summary, check, check_rows, rows_of};
 use super::tables;
-use crate::domain::particles::Particles;
+use swell_domain::particles::Particles;
 
 /// Frames that wait for the disk at most; with the one being written, three are in memory.
 const DEPTH: usize = 2;

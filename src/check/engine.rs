@@ -6,20 +6,18 @@ use std::collections::BTreeMap;
 use bytemuck::Pod;
 use glam::{DVec3, Vec3};
 
-use crate::{
-    gpu::{
-        buffer::{Buf, Windows},
-        recording::Moment,
+use swell_gpu::{
+    buffer::{Buf, Windows},
+    recording::Moment,
+};
+use swell_scene::flip::Precision;
+use swell_solve::{
+    SolveError,
+    pressure::{
+        PressureControl64,
+        buffers::{self as pressure, Real},
     },
-    scene::flip::Precision,
-    solve::{
-        SolveError,
-        pressure::{
-            PressureControl64,
-            buffers::{self as pressure, Real},
-        },
-        trace::Traced,
-    },
+    trace::Traced,
 };
 
 use super::{sort, table::Table};

@@ -2,11 +2,9 @@
 //!
 //! All are taken as a screen shows them, through the look's view.
 
-use crate::{
-    compare::pictures::{Encoding, Picture, compare},
-    render::{Image, view},
-    scene::look::ViewSpec,
-};
+use swell_compare::pictures::{Encoding, Picture, compare};
+use swell_render::{Image, view};
+use swell_scene::look::ViewSpec;
 
 /// A picture as a screen shows it, over black.
 pub fn shown(image: &Image, spec: &ViewSpec) -> Picture {

@@ -3,7 +3,9 @@
 use glam::DVec3;
 
 use super::edges::{Outline, Outlined, Outlines};
-use crate::{domain::eye::Eye, reference::rays::Seen, render::Image};
+use swell_domain::eye::Eye;
+use swell_reference::rays::Seen;
+use swell_render::Image;
 
 /// Water less than so many spacings, and this part of its depth, before what is opaque is left out: which of the two is seen hangs on
 /// rounding there. A depth is a dozen roundings of f32 of lengths up to a hundred times the height that a far ground is met from.

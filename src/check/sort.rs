@@ -2,11 +2,9 @@
 
 use glam::DVec3;
 
-use crate::{
-    compare::{rounding::U, tolerance::bounds},
-    gpu::buffer::{Buf, Windows},
-    solve::buffers,
-};
+use swell_compare::{rounding::U, tolerance::bounds};
+use swell_gpu::buffer::{Buf, Windows};
+use swell_solve::buffers;
 
 use super::{
     engine::{Io, NONE, Outcome, State, Twin, names, twin},

@@ -5,7 +5,7 @@ use std::{fmt, ops::Range};
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
-use crate::compare::{
+use swell_compare::{
     deviation::{Deviation, Value, relative},
     tolerance::{Bound, Text},
 };
@@ -78,20 +78,20 @@ macro_rules! entries {
         $($name:ident = $field:literal, $unit:literal:
             [$($magnitudes:tt)*] $value:expr, $reason:literal $(, tie $tie:ident)?;)+
     })+) => {
-        $($(pub(super) static $name: $crate::check::table::Entry<
-            { $crate::compare::tolerance::count!($($magnitudes)*) }
+        $($(pub(super) static $name: $crate::table::Entry<
+            { swell_compare::tolerance::count!($($magnitudes)*) }
         > = {
-            static TOLERANCE: $crate::compare::tolerance::Bound<
-                { $crate::compare::tolerance::count!($($magnitudes)*) }
-            > = $crate::compare::tolerance::bound!([$($magnitudes)*] $value, $reason);
-            $crate::check::table::Entry {
-                field: $crate::check::table::Field {
+            static TOLERANCE: swell_compare::tolerance::Bound<
+                { swell_compare::tolerance::count!($($magnitudes)*) }
+            > = swell_compare::tolerance::bound!([$($magnitudes)*] $value, $reason);
+            $crate::table::Entry {
+                field: $crate::table::Field {
                     pass: $pass,
                     name: $field,
                     unit: $unit,
-                    derivation: $crate::check::table::Derivation {
+                    derivation: $crate::table::Derivation {
                         tolerance: &TOLERANCE.text,
-                        tie: $crate::compare::tolerance::optional!($(&$tie.text)?),
+                        tie: swell_compare::tolerance::optional!($(&$tie.text)?),
                     },
                 },
                 tolerance: &TOLERANCE,

@@ -3,23 +3,21 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::{
-    compare::{
-        rounding::{GRADIENT, KERNEL, Sums, U, WALL_DENSITY, WALL_GRADIENT, WALL_PLACE},
-        tolerance::bounds,
-    },
-    domain::{
-        boundary::Boundary,
-        particles::Particles,
-        whitewater::{KIND, Kind, OUTWARD, Potentials, SURFACE, Settings},
-    },
-    gpu::adapter::Context,
-    reference::whitewater::{Moved, Neighbor, Surveyed, Water, White},
-    scene::Scene,
-    solve::{
-        SolveError,
-        whitewater::{SHARE, SURFACE_AT, Whitewater},
-    },
+use swell_compare::{
+    rounding::{GRADIENT, KERNEL, Sums, U, WALL_DENSITY, WALL_GRADIENT, WALL_PLACE},
+    tolerance::bounds,
+};
+use swell_domain::{
+    boundary::Boundary,
+    particles::Particles,
+    whitewater::{KIND, Kind, OUTWARD, Potentials, SURFACE, Settings},
+};
+use swell_gpu::adapter::Context;
+use swell_reference::whitewater::{Moved, Neighbor, Surveyed, Water, White};
+use swell_scene::Scene;
+use swell_solve::{
+    SolveError,
+    whitewater::{SHARE, SURFACE_AT, Whitewater},
 };
 
 use super::{

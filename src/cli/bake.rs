@@ -8,13 +8,11 @@ use clap::{
 };
 use serde_json::{Value, json};
 
-use crate::{
-    domain::{frame_range::FrameRange, solver::StepReport},
-    scene::{Method, Reach, Scene, SceneError},
-    stage::{
-        bake::{Event, Request, Room, bake, expected},
-        branch::BranchPoint,
-    },
+use swell_domain::{frame_range::FrameRange, solver::StepReport};
+use swell_scene::{Method, Reach, Scene, SceneError};
+use swell_stage::{
+    bake::{Event, Request, Room, bake, expected},
+    branch::BranchPoint,
 };
 
 use super::{
@@ -402,7 +400,7 @@ fn warnings(frame: u32, report: &StepReport) -> Vec<(String, Value)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::solver::Projection;
+    use swell_domain::solver::Projection;
 
     fn report(projection: Option<Projection>) -> StepReport {
         StepReport {

@@ -5,13 +5,11 @@ use std::{collections::BTreeMap, fmt::Write as _, path::PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use crate::{
-    domain::{frame_range::FrameRange, substep::Which},
-    scene::Method,
-    stage::{
-        check::{Event, FirstOver, Outcome, Request, Row, Source, Table, check},
-        replay::{Replayed, is_failed, replay_failed},
-    },
+use swell_domain::{frame_range::FrameRange, substep::Which};
+use swell_scene::Method;
+use swell_stage::{
+    check::{Event, FirstOver, Outcome, Request, Row, Source, Table, check},
+    replay::{Replayed, is_failed, replay_failed},
 };
 
 use super::{

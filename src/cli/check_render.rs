@@ -5,11 +5,9 @@ use std::{fmt::Write as _, path::PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use crate::{
-    domain::frame_range::FrameRange,
-    scene::look::Look,
-    stage::render::surfaces::{DEPTH, Event, NORMAL, Outcome, Request, check_render},
-};
+use swell_domain::frame_range::FrameRange;
+use swell_scene::look::Look;
+use swell_stage::render::surfaces::{DEPTH, Event, NORMAL, Outcome, Request, check_render};
 
 use super::{
     Failure, GpuArgs, count,

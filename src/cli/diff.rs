@@ -7,13 +7,11 @@ use std::{fmt::Write as _, path::PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use crate::{
-    domain::frame_range::{FrameRange, ranges},
-    scene::tolerance,
-    stage::diff::{
-        AggregatePeak, BaselineDiff, Basis, CacheDiff, Fault, Images, Outcome, PairDiff,
-        PicturesDiff, Request, Written, aggregate_peaks, diff, write_baseline,
-    },
+use swell_domain::frame_range::{FrameRange, ranges};
+use swell_scene::tolerance;
+use swell_stage::diff::{
+    AggregatePeak, BaselineDiff, Basis, CacheDiff, Fault, Images, Outcome, PairDiff, PicturesDiff,
+    Request, Written, aggregate_peaks, diff, write_baseline,
 };
 
 use super::{Failure, OUT_OF_TOLERANCE, output};
@@ -134,7 +132,7 @@ fn show_caches(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
             ranges(&diff.without_particles)
         )?;
     }
-    let lone = |frame: &&crate::stage::diff::FrameDiff| frame.only_a.count + frame.only_b.count > 0;
+    let lone = |frame: &&swell_stage::diff::FrameDiff| frame.only_a.count + frame.only_b.count > 0;
     for frame in diff.frames.iter().filter(lone).take(1) {
         writeln!(
             out,
@@ -191,7 +189,7 @@ fn show_fields(out: &mut String, diff: &CacheDiff) -> std::fmt::Result {
         "\nfield      unit        largest  frame  particle         RMS  frame        99 %  frame  RMS / RMS of B"
     )?;
     for (index, field) in first.fields.iter().enumerate() {
-        let peak = |measure: fn(&crate::stage::diff::FieldDiff) -> f64| {
+        let peak = |measure: fn(&swell_stage::diff::FieldDiff) -> f64| {
             let values = diff.frames.iter().map(|f| (f.frame, &f.fields[index]));
             values
                 .map(|(frame, field)| (measure(field), frame, field))

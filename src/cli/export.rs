@@ -5,11 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use crate::{
-    domain::{chunk::Chunk, frame_range::FrameRange},
-    scene::look::Look,
-    stage::export::{Event, Pattern, Request, Target, UsdWater, VOXELS, expected, export},
-};
+use swell_domain::{chunk::Chunk, frame_range::FrameRange};
+use swell_scene::look::Look;
+use swell_stage::export::{Event, Pattern, Request, Target, UsdWater, VOXELS, expected, export};
 
 use super::{
     Failure, bake, count,

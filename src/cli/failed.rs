@@ -8,7 +8,7 @@ use super::{
     Failure, chain, count,
     progress::{Progress, Status},
 };
-use crate::domain::frame_range::ranges;
+use swell_domain::frame_range::ranges;
 
 /// Tells of a frame that failed.
 pub(super) fn frame_failed(progress: &Progress, frame: u32, error: &dyn Error) {

@@ -12,17 +12,15 @@ use std::{
 
 use clap::Args;
 
-use crate::{
-    domain::posix,
-    scene::{Method, Scene},
-    stage::{
-        inspect::{
-            Adapter, Entry, LIST_BUDGET, MOST_NODES, Manifest, PARTICLES, PROBES, ScenePlan,
-            adapters, cache, plan, plot,
-        },
-        replay::is_failed,
-        time::{Timed, time},
+use swell_domain::posix;
+use swell_scene::{Method, Scene};
+use swell_stage::{
+    inspect::{
+        Adapter, Entry, LIST_BUDGET, MOST_NODES, Manifest, PARTICLES, PROBES, ScenePlan, adapters,
+        cache, plan, plot,
     },
+    replay::is_failed,
+    time::{Timed, time},
 };
 
 use super::{

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use crate::scene::Scene;
+use swell_scene::Scene;
 
 use super::Failure;
 

@@ -17,12 +17,10 @@ use std::{
 use serde_json::{Value, json};
 
 use super::{log, progress::Progress};
-use crate::{
-    domain::solver::PassTime,
-    stage::{
-        device::{Ceilings, PassTimes, Reached},
-        time::Share,
-    },
+use swell_domain::solver::PassTime;
+use swell_stage::{
+    device::{Ceilings, PassTimes, Reached},
+    time::Share,
 };
 
 /// The exit code where a file cannot be written; standard output is one.

@@ -5,11 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use crate::{
-    domain::{chunk::Chunk, frame_range::FrameRange},
-    scene::look::Look,
-    stage::render::{Event, Request, expected, render},
-};
+use swell_domain::{chunk::Chunk, frame_range::FrameRange};
+use swell_scene::look::Look;
+use swell_stage::render::{Event, Request, expected, render};
 
 use super::{
     Failure, GpuArgs, bake, count,
@@ -63,7 +61,7 @@ pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure>
     let directory = match &args.output {
         Some(directory) => directory.clone(),
         None => {
-            let (manifest, _) = crate::stage::inspect::cache(&args.cache)?;
+            let (manifest, _) = swell_stage::inspect::cache(&args.cache)?;
             let look = args.look.file_stem().unwrap_or_default().to_string_lossy();
             PathBuf::from("renders").join(format!("{}-{look}", manifest.shot))
         }

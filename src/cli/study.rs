@@ -5,11 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use crate::{
-    domain::{chunk::Chunk, posix},
-    experiment::{Event, PointEvent, PointStatus, Request, Share, study},
-    scene::study::Study,
-};
+use swell_domain::{chunk::Chunk, posix};
+use swell_experiment::{Event, PointEvent, PointStatus, Request, Share, study};
+use swell_scene::study::Study;
 
 use super::{
     Failure, GpuArgs, OUT_OF_TOLERANCE, bake, count,

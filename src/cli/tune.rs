@@ -5,18 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::{
-    domain::{chunk::Chunk, frame_range::FrameRange, posix},
-    experiment::{Request, dealt},
-    scene::{
-        Method,
-        study::{
-            Study,
-            tune::{Limit, Tune, TuneRequest},
-        },
+use swell_domain::{chunk::Chunk, frame_range::FrameRange, posix};
+use swell_experiment::{Request, dealt};
+use swell_scene::{
+    Method,
+    study::{
+        Study,
+        tune::{Limit, Tune, TuneRequest},
     },
-    stage::inspect::study::Outline,
 };
+use swell_stage::inspect::study::Outline;
 
 use super::{
     Failure, GpuArgs, bake, inspect, output,

@@ -5,10 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{output, size};
-use crate::{
-    domain::frame_range::ranges,
-    stage::verify::{CacheError, VerifyReport, verify},
-};
+use swell_domain::frame_range::ranges;
+use swell_stage::verify::{CacheError, VerifyReport, verify};
 
 /// Look at every checksum of a cache.
 #[derive(Args, Clone, Debug)]
@@ -56,7 +54,7 @@ fn show(report: &VerifyReport) -> String {
 mod tests {
     use super::size;
     use super::*;
-    use crate::stage::verify::Problem;
+    use swell_stage::verify::Problem;
 
     #[test]
     fn one_line_a_problem_or_one_line() {

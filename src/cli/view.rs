@@ -8,11 +8,9 @@ use std::{
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use crate::{
-    domain::frame_range::FrameRange,
-    scene::look::Look,
-    stage::view::{Aspect, Event, Placing, Request, SHEET, view},
-};
+use swell_domain::frame_range::FrameRange;
+use swell_scene::look::Look;
+use swell_stage::view::{Aspect, Event, Placing, Request, SHEET, view};
 
 use super::{
     Failure, bake, count,

@@ -5,11 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use crate::{
-    domain::whitewater::Kind,
-    scene::whitewater::WhitewaterSettings,
-    stage::whitewater::{Event, Request, expected, whitewater},
-};
+use swell_domain::whitewater::Kind;
+use swell_scene::whitewater::WhitewaterSettings;
+use swell_stage::whitewater::{Event, Request, expected, whitewater};
 
 use super::{
     DeviceArgs, Failure, count,

@@ -12,7 +12,7 @@ use super::{
     limits::StatedLimit,
     spread::{self, Spread},
 };
-use crate::domain::{aggregates::Aggregates, particles::Particles, tolerance::Limit};
+use swell_domain::{aggregates::Aggregates, particles::Particles, tolerance::Limit};
 
 /// The format that this program writes and reads.
 pub const FORMAT_VERSION: u32 = 1;

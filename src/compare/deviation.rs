@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::domain::statistics::percentile;
+use swell_domain::statistics::percentile;
 
 /// A type that can be compared: scalars and 3-vectors, f32 or f64.
 pub trait Value: Copy {

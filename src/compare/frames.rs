@@ -6,7 +6,7 @@ use super::{
     Deviation,
     deviation::{first_over, out_of_limits, relative},
 };
-use crate::domain::{
+use swell_domain::{
     aggregates::Aggregates,
     particles::Particles,
     tolerance::{FieldLimits, Limit, Tolerance},

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::aggregates::Aggregates;
+use swell_domain::aggregates::Aggregates;
 
 /// Limits for a scene whose spread was not measured ([`super::spread`]): name, absolute limit (lengths in particle
 /// spacings, all else in its own unit), relative limit, reason. Wide enough for water after an impact with either solver: the

@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 use ssimulacra2::{LinearRgb, compute_frame_ssimulacra2};
 
 use super::deviation::{Value, out_of_limits};
-use crate::domain::{statistics::percentile, tolerance::PictureLimits};
+use swell_domain::{statistics::percentile, tolerance::PictureLimits};
 
 /// How the values of a picture stand for light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

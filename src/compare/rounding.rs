@@ -99,7 +99,7 @@ bounds! {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::sph::half_space_fraction;
+    use swell_domain::sph::half_space_fraction;
 
     #[test]
     fn units_are_half_the_distance_from_1_to_the_next_number() {

@@ -13,7 +13,7 @@
 use std::collections::BTreeMap;
 
 use super::{frames::aggregate_error, limits::StatedLimit};
-use crate::domain::aggregates::Aggregates;
+use swell_domain::aggregates::Aggregates;
 
 /// Multiples of the spread that are allowed. A second adapter is as far from exact arithmetic as the first, so they
 /// may be twice as far from each other as one of them is from f64; the rest is room for chaos, of which the spread is

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 use super::Value;
-use crate::domain::sparse_grid::{Leaf, SparseGrid, VOXELS};
+use swell_domain::sparse_grid::{Leaf, SparseGrid, VOXELS};
 
 /// Differences in one stream of one frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -132,15 +132,17 @@ fn whole_numbers(word: &str) -> String {
 }
 
 /// A [`Bound`]: `[name: "what it is", other: "what it is" ITS_BOUND] expression, "reason"`.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! bound {
     ([$($name:ident: $words:literal $($bound:ident)?),* $(,)?] $value:expr, $reason:literal) => {
-        $crate::compare::tolerance::Bound {
-            text: $crate::compare::tolerance::Text {
+        $crate::tolerance::Bound {
+            text: $crate::tolerance::Text {
                 expression: stringify!($value),
-                magnitudes: &[$($crate::compare::tolerance::Magnitude {
+                magnitudes: &[$($crate::tolerance::Magnitude {
                     name: stringify!($name),
                     words: $words,
-                    bound: $crate::compare::tolerance::optional!($(&$bound.text)?),
+                    bound: $crate::tolerance::optional!($(&$bound.text)?),
                 }),*],
                 reason: $reason,
             },
@@ -148,9 +150,11 @@ macro_rules! bound {
         }
     };
 }
-pub(crate) use bound;
+pub use crate::bound;
 
 /// `Some` of what is there.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! optional {
     () => {
         None
@@ -159,30 +163,34 @@ macro_rules! optional {
         Some($value)
     };
 }
-pub(crate) use optional;
+pub use crate::optional;
 
 /// Declares bounds, one a line: `NAME = [magnitudes] expression, "reason";`.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! bounds {
     ($($(#[$meta:meta])* $visible:vis $name:ident = [$($magnitudes:tt)*] $value:expr, $reason:literal;)+) => {
-        $($(#[$meta])* $visible static $name: $crate::compare::tolerance::Bound<
-            { $crate::compare::tolerance::count!($($magnitudes)*) }
-        > = $crate::compare::tolerance::bound!([$($magnitudes)*] $value, $reason);)+
+        $($(#[$meta])* $visible static $name: $crate::tolerance::Bound<
+            { $crate::tolerance::count!($($magnitudes)*) }
+        > = $crate::tolerance::bound!([$($magnitudes)*] $value, $reason);)+
     };
 }
-pub(crate) use bounds;
+pub use crate::bounds;
 
 /// How many magnitudes are declared.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! count {
     ($($name:ident: $words:literal $($bound:ident)?),* $(,)?) => {
         <[&str]>::len(&[$($words),*])
     };
 }
-pub(crate) use count;
+pub use crate::count;
 
 #[cfg(test)]
 mod tests {
     use super::Text;
-    use crate::compare::rounding::U;
+    use crate::rounding::U;
 
     bounds! {
         INNER = [n: "terms", size: "Σ|t|"] U * (n + 2.0) * size, "a sum";

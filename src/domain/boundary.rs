@@ -20,4 +20,9 @@ impl Boundary {
     pub fn sample_count(&self) -> usize {
         self.samples.len() + self.moving_samples.iter().map(Vec::len).sum::<usize>()
     }
+
+    /// Distances to all solids, the static ones first.
+    pub fn grids(&self) -> impl Iterator<Item = &SignedDistance> {
+        self.distance.iter().chain(&self.moving)
+    }
 }

@@ -49,6 +49,14 @@ impl Bounds {
         cells_over(self.size(), edge).to_array().map(|n| n as u32)
     }
 
+    /// This box moved by `way`, metres.
+    pub fn moved(&self, way: DVec3) -> Self {
+        Self {
+            min: self.min + way,
+            max: self.max + way,
+        }
+    }
+
     /// This box with each face moved outward by `margin` metres.
     pub fn grown(&self, margin: f64) -> Self {
         Self {

@@ -211,7 +211,7 @@ impl Gauge<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::poisson::SOLID;
+    use crate::poisson::SOLID;
 
     /// A box of 8 × 8 × 8 cells with water below cell 6 and air above; `look` sees its gauge.
     fn with_gauge<T>(

@@ -8,23 +8,23 @@
 use pulp::{Arch, WithSimd};
 
 /// Neighbours that are handled at once.
-pub(crate) const LANES: usize = 8;
+pub const LANES: usize = 8;
 
 /// Runs a loop, compiled for what the processor has.
 #[inline]
-pub(crate) fn widely<T: WithSimd>(task: T) -> T::Output {
+pub fn widely<T: WithSimd>(task: T) -> T::Output {
     Arch::new().dispatch(task)
 }
 
 /// The sum of a sum's parts.
 #[inline(always)]
-pub(crate) fn sum(parts: [f64; LANES]) -> f64 {
+pub fn sum(parts: [f64; LANES]) -> f64 {
     let [a, b, c, d, e, f, g, h] = parts;
     ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
 /// `max(x, 0)`; 0 of what is not a number, as `f64::max` has it, in one instruction.
 #[inline(always)]
-pub(crate) fn positive(x: f64) -> f64 {
+pub fn positive(x: f64) -> f64 {
     if x > 0.0 { x } else { 0.0 }
 }

@@ -1,6 +1,6 @@
-//! Triangle meshes: their geometry. Whether one has an inside is looked at in [`crate::domain::inside`].
+//! Triangle meshes: their geometry. Whether one has an inside is looked at in [`crate::inside`].
 //!
-//! Files are read by [`crate::domain::mesh_file`].
+//! Files are read by [`crate::mesh_file`].
 
 use std::collections::BTreeMap;
 

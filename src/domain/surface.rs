@@ -374,7 +374,7 @@ fn extrapolated(voxels: &Voxels, mut values: Vec<Option<f32>>) -> Vec<Option<f32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::sparse_grid::Leaf;
+    use crate::sparse_grid::Leaf;
 
     const D: f64 = 0.1;
 

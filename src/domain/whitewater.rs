@@ -8,7 +8,7 @@ mod ages;
 mod seeds;
 mod thresholds;
 
-use crate::domain::particles::Particles;
+use crate::particles::Particles;
 
 pub use ages::grow_older;
 pub use seeds::{Births, Source};

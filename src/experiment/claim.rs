@@ -6,10 +6,8 @@ use std::{
     path::Path,
 };
 
-use crate::{
-    stage::locked,
-    study::folder::{CLAIM, Claim, is_ledger},
-};
+use swell_stage::locked;
+use swell_study::folder::{CLAIM, Claim, is_ledger};
 
 use super::{StudyError, ledger::names};
 

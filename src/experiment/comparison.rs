@@ -4,23 +4,21 @@ use std::{fs, path::PathBuf};
 
 use rayon::prelude::*;
 
-use crate::{
-    cache::{CacheError, CacheReader, Manifest},
-    domain::{frame_range::FrameRange, solver::StepReport},
-    gpu::adapter::Needs,
-    scene::{Scene, Solid, study::comparison::SolverComparison},
-    stage::{
-        bake,
-        device::{Device, shaders_note},
-        gauge, render,
-    },
-    study::{
-        comparison::{self, Course, Finding, Impact, Row},
-        measure::Gauge,
-        median,
-        page::Part,
-        picture,
-    },
+use swell_cache::{CacheError, CacheReader, Manifest};
+use swell_domain::{frame_range::FrameRange, solver::StepReport};
+use swell_gpu::adapter::Needs;
+use swell_scene::{Scene, Solid, study::comparison::SolverComparison};
+use swell_stage::{
+    bake,
+    device::{Device, shaders_note},
+    gauge, render,
+};
+use swell_study::{
+    comparison::{self, Course, Finding, Impact, Row},
+    measure::Gauge,
+    median,
+    page::Part,
+    picture,
 };
 
 use super::{

@@ -14,16 +14,14 @@ use std::{
 
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::{
-    domain::chunk::Chunk,
-    gpu::adapter::{GpuError, Needs},
-    scene::{Method, Scene, physics_hash, study::RunsOn},
-    stage::{
-        device::{Gpu, Opened, needs},
-        drive::{Drive, End, Step},
-    },
-    study::folder::ledger_of,
+use swell_domain::chunk::Chunk;
+use swell_gpu::adapter::{GpuError, Needs};
+use swell_scene::{Method, Scene, physics_hash, study::RunsOn};
+use swell_stage::{
+    device::{Gpu, Opened, needs},
+    drive::{Drive, End, Step},
 };
+use swell_study::folder::ledger_of;
 
 use super::{
     Event, PointEvent, PointStatus, Request, StudyError,

@@ -2,16 +2,14 @@
 
 use std::path::PathBuf;
 
-use crate::{
-    cache::CacheError,
-    domain::signed_distance::SignedDistanceError,
-    gpu::adapter::GpuError,
-    reference::ReferenceError,
-    scene::SceneError,
-    solve::SolveError,
-    stage::{Blame, bake::BakeError, device::SolverError, render::RenderJobError},
-    study::{picture::PictureError, raster::RasterError},
-};
+use swell_cache::CacheError;
+use swell_domain::signed_distance::SignedDistanceError;
+use swell_gpu::adapter::GpuError;
+use swell_reference::ReferenceError;
+use swell_scene::SceneError;
+use swell_solve::SolveError;
+use swell_stage::{Blame, bake::BakeError, device::SolverError, render::RenderJobError};
+use swell_study::{picture::PictureError, raster::RasterError};
 
 /// Why a study failed.
 #[derive(Debug, thiserror::Error)]

@@ -13,11 +13,9 @@ use std::{
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::{
-    domain::chunk::Chunk,
-    stage::locked::{is_at, is_had},
-    study::folder::{CLAIM, LEDGER, is_ledger, ledger_of},
-};
+use swell_domain::chunk::Chunk;
+use swell_stage::locked::{is_at, is_had};
+use swell_study::folder::{CLAIM, LEDGER, is_ledger, ledger_of};
 
 use super::{StudyError, run::Run};
 

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use crate::study::{
+use swell_study::{
     page::{self, Part},
     raster,
 };

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::study::median;
+use swell_study::median;
 
 /// What a point came to; `M` is what its kind of study measures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

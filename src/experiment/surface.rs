@@ -6,19 +6,17 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    cache::CacheReader,
-    domain::frame_range::FrameRange,
-    gpu::adapter::{Context, Needs},
-    scene::study::{
-        RunsOn,
-        surface::{PictureError, Point, SurfaceStudy},
-    },
-    stage::{
-        bake,
-        device::{Device, Opened},
-        render::gallery::{Gallery, REACH, Summary},
-    },
+use swell_cache::CacheReader;
+use swell_domain::frame_range::FrameRange;
+use swell_gpu::adapter::{Context, Needs};
+use swell_scene::study::{
+    RunsOn,
+    surface::{PictureError, Point, SurfaceStudy},
+};
+use swell_stage::{
+    bake,
+    device::{Device, Opened},
+    render::gallery::{Gallery, REACH, Summary},
 };
 
 use super::{

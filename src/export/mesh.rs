@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use glam::DVec3;
 
 use super::Source;
-use crate::domain::water_mesh::WaterMesh;
+use swell_domain::water_mesh::WaterMesh;
 
 /// A mesh and where it stands.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use glam::DVec3;
 
-use crate::domain::particles::Particles;
+use swell_domain::particles::Particles;
 
 /// World position of a particle, metres; `origin` is the scene's.
 fn world(particles: &Particles, index: usize, origin: DVec3) -> DVec3 {

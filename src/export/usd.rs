@@ -8,7 +8,7 @@ mod text;
 use glam::{DQuat, DVec3, Vec3};
 
 use super::Source;
-use crate::domain::{
+use swell_domain::{
     bounds::Bounds, eye::Eye, mesh::TriangleMesh, particles::Particles, pose::Pose,
     water_mesh::WaterMesh,
 };

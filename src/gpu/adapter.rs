@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use wgpu::{Adapter, AdapterInfo, Backends, Device, Features, Instance, Limits, Queue};
 
-use super::shader::Shaders;
+use super::{program::Compiled, shader::Shaders};
 
 /// What goes wrong between the program and the device.
 #[derive(Debug, thiserror::Error)]
@@ -117,6 +117,8 @@ pub struct Context {
     pub counts_operations: bool,
     /// A fault put into one pass, so that a comparison can be seen to fail; `None` in every command.
     pub spoil: Option<Spoil>,
+    /// Passes that were compiled on this device.
+    pub(super) compiled: Arc<Compiled>,
     fault: Arc<Mutex<Option<String>>>,
 }
 
@@ -306,6 +308,7 @@ impl Context {
             shaders: Shaders::default(),
             counts_operations: false,
             spoil: None,
+            compiled: Arc::default(),
             fault,
         })
     }

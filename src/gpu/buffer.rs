@@ -72,6 +72,8 @@ pub trait Mirror: Element {
 }
 
 /// Declares `repr(C)` structs that mirror WGSL's of the same name, or of the one given after `as`.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! mirror {
     (@name $name:ident) => { stringify!($name) };
     (@name $name:ident $wgsl:literal) => { $wgsl };
@@ -81,14 +83,14 @@ macro_rules! mirror {
         #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
         pub struct $name { $($(#[$field_meta])* pub $field: $ty),+ }
 
-        impl $crate::gpu::buffer::Element for $name {
-            const SCALAR: $crate::gpu::buffer::Scalar = $crate::gpu::buffer::Scalar::Mixed;
+        impl $crate::buffer::Element for $name {
+            const SCALAR: $crate::buffer::Scalar = $crate::buffer::Scalar::Mixed;
         }
 
-        impl $crate::gpu::buffer::Mirror for $name {
-            fn layout() -> $crate::gpu::reflect::Layout {
-                $crate::gpu::reflect::Layout {
-                    name: $crate::gpu::buffer::mirror!(@name $name $($wgsl)?).to_owned(),
+        impl $crate::buffer::Mirror for $name {
+            fn layout() -> $crate::reflect::Layout {
+                $crate::reflect::Layout {
+                    name: $crate::buffer::mirror!(@name $name $($wgsl)?).to_owned(),
                     size: size_of::<$name>() as u32,
                     members: vec![$((stringify!($field).to_owned(), std::mem::offset_of!($name, $field) as u32)),+],
                 }
@@ -97,7 +99,7 @@ macro_rules! mirror {
     };
 }
 
-pub(crate) use mirror;
+pub use crate::mirror;
 
 /// Workgroups of an indirect dispatch, a `vec4u` of the shaders; zeros make it empty.
 #[repr(C)]

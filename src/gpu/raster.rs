@@ -10,7 +10,7 @@ use wgpu::{
 
 use super::{
     adapter::{Context, GpuError},
-    program::{Program, checked, shader},
+    program::{Program, checked, compiled_raster, shader},
     recording::{Bind, bind},
     reflect::{Binding, Stage},
 };
@@ -85,8 +85,8 @@ impl Program {
     /// [`GpuError::Shader`].
     pub fn with_rasters(mut self, specs: &[RasterSpec]) -> Result<Self, GpuError> {
         for spec in specs {
-            self.rasters
-                .insert(spec.name, compile(&self.context, spec)?);
+            let pass = compiled_raster(&self.context, spec, || compile(&self.context, spec))?;
+            self.rasters.insert(spec.name, pass);
         }
         Ok(self)
     }

@@ -12,7 +12,7 @@ use include_dir::{Dir, include_dir};
 
 use super::adapter::GpuError;
 
-static SHADERS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/shaders");
+static SHADERS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../shaders");
 
 /// Every WGSL file that is a pass, as `room/name`, sorted; `shared/` holds imports only.
 pub fn pass_files() -> Vec<String> {
@@ -98,14 +98,8 @@ pub enum ShadersError {
 }
 
 impl Default for Shaders {
-    #[cfg(not(feature = "mutants"))]
     fn default() -> Self {
         Self::SHIPPED
-    }
-
-    #[cfg(feature = "mutants")]
-    fn default() -> Self {
-        crate::mutants::shaders().unwrap_or(Self::SHIPPED)
     }
 }
 
@@ -134,13 +128,6 @@ impl Shaders {
             files: Some(Arc::new(files)),
             hash,
         })
-    }
-
-    /// The same, never told apart from the shipped ones: a fault has to be seen by what it does.
-    #[cfg(feature = "mutants")]
-    pub(crate) fn in_disguise(mut self) -> Self {
-        self.hash = None;
-        self
     }
 
     /// BLAKE3 of all WGSL files, hex, in the order of their paths: of each the lengths of path and text as 8 bytes each,

@@ -6,7 +6,7 @@ use glam::DVec3;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::domain::{lanes::widely, period::Period, places};
+use swell_domain::{lanes::widely, period::Period, places};
 
 /// Particles whose neighbours one task lists.
 const BLOCK: usize = 512;

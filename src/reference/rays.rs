@@ -6,7 +6,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::domain::{
+use swell_domain::{
     bvh::Bvh,
     eye::Eye,
     level_set::{

@@ -3,19 +3,17 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::{
-    domain::{
-        air,
-        boundary::Boundary,
-        bounds::Bounds,
-        budget::Breach,
-        particles::Particles,
-        whitewater::{
-            AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, Kind, OUTWARD, Potentials, SURFACE, Settings,
-        },
+use swell_domain::{
+    air,
+    boundary::Boundary,
+    bounds::Bounds,
+    budget::Breach,
+    particles::Particles,
+    whitewater::{
+        AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, Kind, OUTWARD, Potentials, SURFACE, Settings,
     },
-    scene::Scene,
 };
+use swell_scene::Scene;
 
 use super::{ReferenceError, pbf::Model};
 

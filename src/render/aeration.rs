@@ -13,7 +13,7 @@ use super::{
     neighbors::smoothstep,
     uniform::Particle,
 };
-use crate::scene::look::SpraySpec;
+use swell_scene::look::SpraySpec;
 
 /// Neighbours within two spacings below which a particle is spray (Ihmsen 2012, section 3.3).
 const SPRAY_BELOW: f32 = 6.0;
@@ -196,7 +196,8 @@ fn packed(air: f32, company: f32, radius: f32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{domain::particles::Particles, render::moment::Water};
+    use crate::moment::Water;
+    use swell_domain::particles::Particles;
 
     fn random() -> impl FnMut() -> f32 {
         let mut seed = 7u32;
@@ -402,7 +403,7 @@ mod tests {
     fn water_rests_where_its_box_is_filled_to() {
         let scene = |gravity: DVec3| RenderScene {
             origin: DVec3::ZERO,
-            domain: crate::domain::bounds::Bounds {
+            domain: swell_domain::bounds::Bounds {
                 min: DVec3::new(-1.0, 2.0, 0.0),
                 max: DVec3::new(3.0, 4.0, 5.0),
             },

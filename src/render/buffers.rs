@@ -5,7 +5,7 @@ use super::uniform::{
     Path, Rays, Sea, SetNode, Shading, Shape, SprayParams, Thickness, Tile, Triangle, Whitewater,
     WhitewaterParams,
 };
-use crate::gpu::buffer::{Buf, Windows, Workgroups};
+use swell_gpu::buffer::{Buf, Windows, Workgroups};
 
 /// The camera of the sample that is drawn.
 pub(super) const CAMERA: Buf<Camera> = Buf::uniform("camera");

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::{frame::Extent, samples::Sample, uniform};
-use crate::domain::eye::Eye;
-use crate::scene::look::{CameraSpec, Look};
+use swell_domain::eye::Eye;
+use swell_scene::look::{CameraSpec, Look};
 
 /// A place and a direction in world space, and a focal length in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]

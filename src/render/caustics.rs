@@ -14,14 +14,12 @@ use super::{
     rays::{sun_in_water, voxel},
     uniform,
 };
-use crate::{
-    domain::level_set::sunlight::nodes_over,
-    gpu::{
-        program::Program,
-        recording::{Command, Groups},
-    },
-    scene::look::Look,
+use swell_domain::level_set::sunlight::nodes_over;
+use swell_gpu::{
+    program::Program,
+    recording::{Command, Groups},
 };
+use swell_scene::look::Look;
 
 /// Texels between rays: light between four rays is spread over the quad where they land.
 const TEXELS_A_RAY: f64 = 2.0;

@@ -163,7 +163,7 @@ fn box_about(triangles: &[Triangle], body: &[usize]) -> [Vec3; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::opaque::box_triangles;
+    use crate::opaque::box_triangles;
 
     fn cube(low: f64) -> Vec<Triangle> {
         let box_ = box_triangles(DVec3::splat(low), DVec3::splat(low + 1.0));

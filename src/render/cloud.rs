@@ -9,14 +9,12 @@ use super::{
     paths::Path,
     uniform::{self, Particle},
 };
-use crate::{
-    domain::{
-        cloud::{Cloud, Drop, shade::Shade},
-        particles::Particles,
-        whitewater::RADIUS,
-    },
-    scene::look::Look,
+use swell_domain::{
+    cloud::{Cloud, Drop, shade::Shade},
+    particles::Particles,
+    whitewater::RADIUS,
 };
+use swell_scene::look::Look;
 
 /// Radius of a ball with the mean square distance of what is splatted for a particle, in splat radii: 1.6 of its mist and of the middles
 /// of its drops, which have up to a third of a radius of their own.

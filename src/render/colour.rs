@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::scene::look::ColourSpaceSpec;
+use swell_scene::look::ColourSpaceSpec;
 
 /// CIE 1931 xy of a space's primaries and white.
 #[derive(Clone, Copy, Debug, PartialEq)]

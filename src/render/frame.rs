@@ -5,7 +5,7 @@
 //! tiles, and the picture itself is gathered in bands of rows: those two are what limits apply to.
 
 use super::buffers::{aovs, picture};
-use crate::scene::look::{Look, Window};
+use swell_scene::look::{Look, Window};
 
 /// Sizes in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -206,7 +206,7 @@ impl Hidden {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::aeration::CLEAR;
+    use crate::aeration::CLEAR;
 
     const SIDE: i32 = 24;
 

@@ -11,8 +11,8 @@ use std::path::Path;
 use glam::{DMat4, DVec4};
 
 use super::{RenderError, cryptomatte::Matte};
-use crate::domain::eye::Eye;
-use crate::scene::look::{ColourSpaceSpec, LightSpec, Window};
+use swell_domain::eye::Eye;
+use swell_scene::look::{ColourSpaceSpec, LightSpec, Window};
 
 pub use exr_file::{read_exr_attributes, write_exr};
 pub use pixels::{Pixels, read_exr, read_png, write_rgb_png};

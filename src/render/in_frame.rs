@@ -104,13 +104,11 @@ mod tests {
 
     use super::*;
     use crate::{
-        render::{
-            camera::{Setting, camera},
-            frame::Extent,
-            samples::Sample,
-        },
-        scene::look::Look,
+        camera::{Setting, camera},
+        frame::Extent,
+        samples::Sample,
     };
+    use swell_scene::look::Look;
 
     const SPACING: f32 = 0.1;
     /// What a particle needs: a splat's 1.3 spacings, as far to the end of the field about it, and the 2.5 of a kernel there.

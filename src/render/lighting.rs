@@ -4,8 +4,8 @@ use super::RenderScene;
 use super::plan::Plan;
 use super::sky::{Sky, extinction};
 use super::uniform;
-use crate::gpu::texture::{SamplerSpec, TextureSpec};
-use crate::scene::look::{Look, LookSpec, SkySpec};
+use swell_gpu::texture::{SamplerSpec, TextureSpec};
+use swell_scene::look::{Look, LookSpec, SkySpec};
 
 /// How far off its face a point is whose shadow is looked up, over the domain's longer side on the ground: about three texels of the
 /// shadow map, which holds a little more than the domain.

@@ -13,11 +13,9 @@ use super::{
     plan::{Limits, Plan},
     uniform::{Material, Triangle},
 };
-use crate::{
-    domain::{mesh_file::parts::Places, pose::Pose},
-    gpu::texture::TextureSpec,
-    scene::look::{Look, Material as LookMaterial, Materials, Picture, Texture},
-};
+use swell_domain::{mesh_file::parts::Places, pose::Pose};
+use swell_gpu::texture::TextureSpec;
+use swell_scene::look::{Look, Material as LookMaterial, Materials, Picture, Texture};
 
 /// Materials that solids of a picture have, at most: a uniform of common size has room for so many.
 const MOST_MATERIALS: usize = 256;

@@ -3,10 +3,8 @@
 use std::{borrow::Cow, sync::OnceLock};
 
 use super::neighbors;
-use crate::{
-    domain::particles::Particles,
-    scene::look::{AovSpec, Look},
-};
+use swell_domain::particles::Particles;
+use swell_scene::look::{AovSpec, Look};
 
 /// Frames on either side that the membership of a particle is made steady over.
 pub const REACH: u32 = 2;

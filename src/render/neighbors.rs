@@ -5,7 +5,7 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::domain::lanes::{LANES, widely};
+use swell_domain::lanes::{LANES, widely};
 
 /// Distances, in spacings, over which a neighbour stops counting: half of it is left at two.
 const NEAR: [f32; 2] = [1.5, 2.5];

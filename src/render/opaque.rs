@@ -10,8 +10,8 @@ use super::{
     materials::{Painted, Painter},
     uniform::Triangle,
 };
-use crate::domain::mesh::TriangleMesh;
-use crate::scene::look::{BasinSpec, Look};
+use swell_domain::mesh::TriangleMesh;
+use swell_scene::look::{BasinSpec, Look};
 
 /// Materials of a triangle, as in ssfr_solid.wgsl: a solid of the look's colour, a wall of 1.1 times the ground's; from [`SOLIDS`] on
 /// solids that are told apart, from [`PALETTE`] on those of the palette.

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{moment::Ids, uniform};
-use crate::domain::particles::Particles;
+use swell_domain::particles::Particles;
 
 /// How a particle goes about its frame's instant: x(t) = x + v t + (square + cube t) t², metres and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use super::{RenderError, buffers::FILLS, closed::Closed, frame::Extent, uniform::Fill};
-use crate::gpu::{
+use swell_gpu::{
     adapter::Context,
     buffer::{Buf, Element, Windows},
     program::{BufferSpec, PassSpec, Program},
@@ -13,7 +13,7 @@ use crate::gpu::{
     recording::{Bind, Command},
     texture::{SamplerSpec, TextureSpec},
 };
-use crate::scene::look::Look;
+use swell_scene::look::Look;
 
 /// What of the device decides how a frame is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -222,17 +222,15 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::{
-        domain::bounds::Bounds,
-        gpu::{
-            raster::Draw,
-            recording::Groups,
-            reflect::{Access, reflect},
-            shader::compose,
-        },
-        render::RenderScene,
-        scene::look::Look,
+    use crate::RenderScene;
+    use swell_domain::bounds::Bounds;
+    use swell_gpu::{
+        raster::Draw,
+        recording::Groups,
+        reflect::{Access, reflect},
+        shader::compose,
     };
+    use swell_scene::look::Look;
 
     const LIMITS: Limits = Limits {
         storage: 1 << 27,
@@ -411,7 +409,7 @@ mod tests {
         }
         // Controls: a buffer that nothing uses, and a command whose buffer is not planned.
         let mut spare = plan("narrow_range", "");
-        spare.buffer(&crate::render::buffers::SPRAY, 1);
+        spare.buffer(&crate::buffers::SPRAY, 1);
         assert_ne!(used(&spare), planned(&spare));
         let mut lacking = plan("narrow_range", "");
         lacking.buffers.retain(|buffer| buffer.name != "particles");

@@ -11,13 +11,11 @@ use super::{
     tree::{Tree, tree},
     uniform::Rays,
 };
-use crate::{
-    domain::level_set::{
-        LevelSet, VALUES, VOXELS, bricks_over, kernels::Kernels, sunlight::nodes_over,
-    },
-    gpu::recording::{Bind, Command, Groups},
-    scene::look::Look,
+use swell_domain::level_set::{
+    LevelSet, VALUES, VOXELS, bricks_over, kernels::Kernels, sunlight::nodes_over,
 };
+use swell_gpu::recording::{Bind, Command, Groups};
+use swell_scene::look::Look;
 
 /// Sides of the box at which the look's quay walls stand: those along z.
 const QUAYS: u32 = 0b11_0000;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::scene::look::{CurveSpec, ImageSpec, Look};
+use swell_scene::look::{CurveSpec, ImageSpec, Look};
 
 /// Where in the pixel, in the shutter and on the lens a sample lies.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,18 +9,16 @@ use super::{
     plan::Plan,
     uniform,
 };
-use crate::{
-    domain::{
-        level_set::{
-            VOXELS,
-            edges::{Edges, nodes_along},
-        },
-        motion::Spectrum,
-        open_waves::{LINES, Line, Meeting, OpenSea, OpenWaves},
+use swell_domain::{
+    level_set::{
+        VOXELS,
+        edges::{Edges, nodes_along},
     },
-    gpu::program::Program,
-    scene::look::{Look, SeaSpec, SeaWavesSpec},
+    motion::Spectrum,
+    open_waves::{LINES, Line, Meeting, OpenSea, OpenWaves},
 };
+use swell_gpu::program::Program;
+use swell_scene::look::{Look, SeaSpec, SeaWavesSpec};
 
 /// γ of a sea that still grows (Hasselmann et al. 1973).
 const PEAK_ENHANCEMENT: f64 = 3.3;

@@ -9,7 +9,7 @@ use super::frame::FAR;
 use super::opaque::MOST_COLOURS;
 use super::plan::{Limits, Plan};
 use super::uniform::{Tile, Triangle};
-use crate::gpu::{
+use swell_gpu::{
     raster::{CopyTexture, DEPTH, Draw, RasterSpec, Target},
     recording::Command,
     texture::TextureSpec,

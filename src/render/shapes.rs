@@ -13,7 +13,7 @@ use super::{
     RenderScene,
     uniform::{Particle, Shape},
 };
-use crate::domain::level_set::{
+use swell_domain::level_set::{
     eigen,
     kernels::{ALONE, Ellipsoid, Field, Kernels},
 };
@@ -112,7 +112,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
     use super::*;
-    use crate::domain::bounds::Bounds;
+    use swell_domain::bounds::Bounds;
 
     const D: f64 = 0.1;
 

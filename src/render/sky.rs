@@ -8,7 +8,7 @@ use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
 use rayon::prelude::*;
 
 use super::RenderError;
-use crate::scene::look::{Look, SkySpec};
+use swell_scene::look::{Look, SkySpec};
 
 /// A latitude-longitude image, and integrals over it.
 pub(super) struct Sky {

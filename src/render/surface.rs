@@ -5,7 +5,7 @@ use super::frame::FAR;
 use super::plan::Plan;
 use super::tiles::{FLOW_TILE, Tiles, every_tile};
 use super::uniform::{Flow, FlowLevel, Narrow, TileGrid};
-use crate::gpu::{
+use swell_gpu::{
     buffer::Buf,
     recording::{Bind, Command, Groups},
 };

@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use super::*;
-use crate::gpu::{adapter::Context, recording::Recording};
-use crate::render::{
+use crate::{
     buffers::{CAMERA, SOLID_DEPTH},
     frame::FAR,
     uniform::Camera,
 };
+use swell_gpu::{adapter::Context, recording::Recording};
 
 const SIZE: [u32; 2] = [192, 192];
 const FOCAL: f64 = 300.0;

@@ -6,7 +6,7 @@ use super::{
     plan::Plan,
     uniform::TileGrid,
 };
-use crate::gpu::{
+use swell_gpu::{
     buffer::{Buf, Windows, Workgroups},
     recording::{Bind, Command, Groups},
 };
@@ -140,7 +140,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
     use super::*;
-    use crate::gpu::{reflect::reflect, shader::compose};
+    use swell_gpu::{reflect::reflect, shader::compose};
 
     #[test]
     fn a_workgroup_is_what_a_tile_is_for() {

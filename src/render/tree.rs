@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::uniform::{SetNode, Triangle};
-use crate::domain::{bvh::Bvh, mesh::TriangleMesh};
+use swell_domain::{bvh::Bvh, mesh::TriangleMesh};
 
 /// Bit from which on a child says how many triangles it is, as in `shared/rays_set.wgsl`.
 const LEAF_SHIFT: u32 = 28;

@@ -1,6 +1,6 @@
 //! `repr(C)` mirrors of the shaders' uniforms; field meanings stand beside the WGSL.
 
-use crate::gpu::{
+use swell_gpu::{
     buffer::{Mirror, mirror},
     reflect::Layout,
 };

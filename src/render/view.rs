@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use glam::{DMat3, DVec3};
 
-use crate::scene::look::{TransformSpec, ViewSpec};
+use swell_scene::look::{TransformSpec, ViewSpec};
 
 /// sRGB's encoding of one linear channel, 0 to 1.
 pub fn srgb_encode(linear: f64) -> f64 {

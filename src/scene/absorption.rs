@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{
     Scene, WaveMaker, document::Document, error::SceneError, spec::AbsorptionSpec, words::shown,
 };
-use crate::domain::{
+use swell_domain::{
     absorption::{Absorption, Asked, MOST_GAIN, level_along},
     answer::{Answer, Answers, MOST},
     bounds::Bounds,

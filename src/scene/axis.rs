@@ -1,6 +1,6 @@
 //! Axes by their names.
 
-use super::key::read_by_name;
+use swell_domain::named::read_by_name;
 
 /// An axis of the domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

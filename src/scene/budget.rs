@@ -3,7 +3,7 @@
 use serde::{Deserialize, Deserializer};
 
 use super::{Method, Scene, Shot, Solver, document::Document, error::SceneError, words::shown};
-use crate::domain::{
+use swell_domain::{
     budget::{Breach, Watched},
     solver::StepReport,
 };

@@ -18,7 +18,7 @@ use super::{
     wave_maker,
     words::{chain, extent, shown, shown_all},
 };
-use crate::domain::{
+use swell_domain::{
     answer::Answers,
     bounds::Bounds,
     mesh::TriangleMesh,

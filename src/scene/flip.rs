@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::key::read_by_name;
-use crate::domain::flip::{APART, LEAST_APART, apart};
+use swell_domain::flip::{APART, LEAST_APART, apart};
+use swell_domain::named::read_by_name;
 
 /// Attributes that APIC declares: C of v(x) = v + C (x − x_p), 1/s, `affine_xy` = ∂v_x/∂y. A state without them
 /// starts from zeros.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{Scene, Wall, probe::Bearer};
-use crate::domain::{
+use swell_domain::{
     mesh::TriangleMesh,
     pose::Pose,
     probe::{Patch, patches},

@@ -20,7 +20,7 @@ const MOST_KEYS: usize = 10_000_000;
 const MOST_NODES: usize = 1000;
 
 /// Reads a file that a glTF names, or says in words why not.
-pub(in crate::scene) type Beside<'a> = &'a dyn Fn(&str) -> std::result::Result<Vec<u8>, String>;
+pub(crate) type Beside<'a> = &'a dyn Fn(&str) -> std::result::Result<Vec<u8>, String>;
 
 /// Why a node's motion cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -50,7 +50,7 @@ type Result<T> = std::result::Result<T, NodeError>;
 
 /// A node, with all that moves it.
 #[derive(Clone, Debug)]
-pub(in crate::scene) struct Nodes {
+pub(crate) struct Nodes {
     /// From the node up to the root.
     nodes: Vec<Hung>,
     hash: blake3::Hash,
@@ -58,7 +58,7 @@ pub(in crate::scene) struct Nodes {
 
 impl Nodes {
     /// Of a node of the file with these bytes, which errors call so.
-    pub(in crate::scene) fn read(
+    pub(crate) fn read(
         bytes: &[u8],
         (document, blob): (&Document, Option<Vec<u8>>),
         node: &Node<'_>,
@@ -79,28 +79,28 @@ impl Nodes {
     }
 
     /// BLAKE3 over the file, and over the buffers that the node is animated by.
-    pub(in crate::scene) fn hash(&self) -> blake3::Hash {
+    pub(crate) fn hash(&self) -> blake3::Hash {
         self.hash
     }
 
     /// From the node to the world.
-    pub(in crate::scene) fn at(&self, seconds: f64) -> DMat4 {
+    pub(crate) fn at(&self, seconds: f64) -> DMat4 {
         let up = self.nodes.iter();
         up.fold(DMat4::IDENTITY, |below, node| node.at(seconds) * below)
     }
 
     /// Of all keys, in no order.
-    pub(in crate::scene) fn times(&self) -> impl Iterator<Item = f64> + '_ {
+    pub(crate) fn times(&self) -> impl Iterator<Item = f64> + '_ {
         self.nodes.iter().flat_map(Hung::times)
     }
 
     /// The same of what moves.
-    pub(in crate::scene) fn times_moved(&self) -> impl Iterator<Item = f64> + '_ {
+    pub(crate) fn times_moved(&self) -> impl Iterator<Item = f64> + '_ {
         self.nodes.iter().flat_map(Hung::times_moved)
     }
 
     /// Whether something jumps from key to key.
-    pub(in crate::scene) fn jumps(&self) -> bool {
+    pub(crate) fn jumps(&self) -> bool {
         self.nodes.iter().any(Hung::jumps)
     }
 }
@@ -178,7 +178,7 @@ impl Hung {
 }
 
 /// What a node is called.
-pub(in crate::scene) fn named(node: &Node<'_>) -> String {
+pub(crate) fn named(node: &Node<'_>) -> String {
     let name = node.name();
     name.map_or_else(|| format!("node {}", node.index()), str::to_owned)
 }

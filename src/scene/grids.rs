@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Method, Solver, document::Document, error::SceneError, words::shown};
-use crate::domain::{
+use swell_domain::{
     bounds::Bounds,
     sparse_grid::{EDGE, Precision},
     surface::{MAX_BRICKS, Raster},

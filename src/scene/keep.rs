@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::{document::Document, error::SceneError};
-use crate::domain::keep::{Compression, Keep};
+use swell_domain::keep::{Compression, Keep};
 
 /// Names of `compression`.
 pub(super) const COMPRESSIONS: [&str; 2] = ["none", "zstd"];

@@ -244,28 +244,6 @@ pub(super) const fn words<T, const N: usize>(named: &[(&'static str, T); N]) -> 
     words
 }
 
-/// Reads a value by the name that it has in its `NAMED`, and writes it so.
-macro_rules! read_by_name {
-    ($type:ty) => {
-        impl<'de> serde::Deserialize<'de> for $type {
-            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                let word = String::deserialize(deserializer)?;
-                let mut named = Self::NAMED.iter();
-                let found = named.find(|(name, _)| *name == word);
-                let unknown = || serde::de::Error::custom(format!("{word:?} is no name here"));
-                found.map(|(_, value)| *value).ok_or_else(unknown)
-            }
-        }
-
-        impl serde::Serialize for $type {
-            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                serializer.serialize_str(self.name())
-            }
-        }
-    };
-}
-pub(super) use read_by_name;
-
 /// The key at a dotted path, whose indices do not matter, and the tables that lead there, from the outermost on; fewer
 /// than the path has parts where there is no such key.
 pub(super) fn along(keys: &'static [Key], path: &str) -> Vec<&'static Key> {

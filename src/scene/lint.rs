@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{Method, Scene, Wall, WaveMaker, words::shown};
-use crate::domain::{
+use swell_domain::{
     bounds::Bounds,
     motion::{Motion, Phases, piston_height_ratio, wave_number},
     sources::Window,
@@ -578,7 +578,7 @@ particle_spacing = 0.04
     /// Those of the studies by theory as well.
     #[test]
     fn what_ships_is_meant() {
-        let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+        let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
         let mut read = 0;
         for folder in [scenes.clone(), scenes.join("validation")] {
             for entry in std::fs::read_dir(folder).expect("a folder") {

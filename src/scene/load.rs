@@ -63,7 +63,7 @@ impl Scene {
     ///
     /// # Errors
     /// Those of [`Self::load`].
-    pub(crate) fn parse_within(
+    pub fn parse_within(
         text: &str,
         file: &Path,
         base_dir: &Path,

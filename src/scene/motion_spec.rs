@@ -2,10 +2,8 @@
 
 use serde::Deserialize;
 
-use super::{key::read_by_name, words::shown};
-use crate::domain::motion::Spectrum;
-
-read_by_name!(Spectrum);
+use super::words::shown;
+use swell_domain::motion::Spectrum;
 
 /// A motion with the keys of its kind.
 #[derive(Deserialize)]

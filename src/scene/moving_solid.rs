@@ -12,7 +12,7 @@ use super::{
     wave_maker::{self, ANGLES},
     words::{extent, shown},
 };
-use crate::domain::{
+use swell_domain::{
     boundary::Boundary,
     bounds::Bounds,
     mesh::TriangleMesh,

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::{PlacedMesh, Scene, probe::ProbeKind};
-use crate::domain::bounds::Bounds;
+use swell_domain::bounds::Bounds;
 
 /// A domain that lies within this many of its own edge lengths of the world's origin keeps the world's coordinates.
 const NEAR: f64 = 2.0;
@@ -23,16 +23,6 @@ pub(super) fn of(domain: &Bounds) -> DVec3 {
         let quantum = edge.log2().floor().exp2();
         ((min[axis] / quantum).floor() - 1.0) * quantum
     }))
-}
-
-impl Bounds {
-    /// This box moved by `way`, metres.
-    pub(super) fn moved(&self, way: DVec3) -> Self {
-        Self {
-            min: self.min + way,
-            max: self.max + way,
-        }
-    }
 }
 
 impl Scene {

@@ -13,7 +13,7 @@ use super::{
     projection::PROJECTION_CELL,
     words::{shown, shown_all},
 };
-use crate::domain::{bounds::Bounds, bricks::EDGE, mesh::TriangleMesh, period::Period};
+use swell_domain::{bounds::Bounds, bricks::EDGE, mesh::TriangleMesh, period::Period};
 
 /// The key that names the axes.
 const KEY: &str = "domain.periodic";

@@ -7,7 +7,7 @@ use super::{
     Iteration, Method, PlacedMesh, Scene, Shot, Solver, Wall, document::Document,
     error::SceneError, words::extent,
 };
-use crate::domain::{bounds::Bounds, probe::Rate, sparse_grid::EDGE, surface::MAX_BRICKS};
+use swell_domain::{bounds::Bounds, probe::Rate, sparse_grid::EDGE, surface::MAX_BRICKS};
 
 /// A gauge that has a CSV of its own in the cache.
 #[derive(Clone, Debug, PartialEq)]

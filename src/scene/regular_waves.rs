@@ -7,7 +7,7 @@ use super::{
     seas::{RAMP, check_spacings, check_steepness},
     words::shown,
 };
-use crate::domain::motion::{
+use swell_domain::motion::{
     Cnoidal, LEAST_CNOIDAL_LENGTH, MADSEN_LIMIT, Motion, NoCnoidal, RegularWaves, Stokes,
 };
 

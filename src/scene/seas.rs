@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{document::Document, error::SceneError, motion_spec::check_speed, words::shown};
-use crate::domain::motion::{
+use swell_domain::motion::{
     Asked, DEEPEST, MADSEN_LIMIT, Motion, Phases, Sea, Spectrum, wave_number,
 };
 

@@ -15,7 +15,7 @@ use super::{
     usda::Prim,
     words::shown,
 };
-use crate::domain::{mesh::TriangleMesh, pose::Pose};
+use swell_domain::{mesh::TriangleMesh, pose::Pose};
 
 /// By how much lengths may change before a solid counts as one that changes its size.
 const RIGID: f64 = 1e-3;

@@ -10,7 +10,7 @@ use super::{
     spec::{BoxSpec, DrainSpec, EmitterSpec, MeshSpec},
     words::{extent, shown},
 };
-use crate::domain::{
+use swell_domain::{
     bounds::Bounds,
     bvh::Bvh,
     mesh::TriangleMesh,

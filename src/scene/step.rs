@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::Scene;
-use crate::domain::{
+use swell_domain::{
     answer::Answers,
     bounds::{Bounds, FAR},
     budget::{Breach, Watched},

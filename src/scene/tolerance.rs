@@ -10,7 +10,7 @@ use super::{
     error::SceneError,
     key::{ANY, Interval, Key},
 };
-use crate::domain::{
+use swell_domain::{
     aggregates::Aggregates,
     tolerance::{FieldLimits, Limit, PictureLimits, Tolerance},
 };

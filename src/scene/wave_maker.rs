@@ -13,7 +13,7 @@ use super::{
     spec::WaveMakerSpec,
     words::{chain, shown, shown_all},
 };
-use crate::domain::{
+use swell_domain::{
     bounds::Bounds,
     motion::{Asked, Motion, Phases},
 };

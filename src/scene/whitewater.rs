@@ -11,7 +11,7 @@ use super::{
     error::SceneError,
     key::{Interval, Key},
 };
-use crate::domain::whitewater::{SUPPORT, Settings, Thresholds};
+use swell_domain::whitewater::{SUPPORT, Settings, Thresholds};
 
 /// Of spray, metres, from mist to a bucket.
 const RADIUS: Interval = 1e-6..=10.0;

@@ -1,6 +1,6 @@
 //! Numbers, types and boxes in messages, as a user would write them.
 
-use crate::domain::bounds::Bounds;
+use swell_domain::bounds::Bounds;
 
 /// A number in few digits: `1e308` has 309 when it is written out.
 pub(super) fn shown(value: f64) -> String {

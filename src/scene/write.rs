@@ -15,7 +15,7 @@ use super::{
     probe::{Probe, ProbeKind},
     sources::Written,
 };
-use crate::domain::{
+use swell_domain::{
     bounds::Bounds,
     motion::{Asked, Motion, Phases, RegularWaves, Spectrum},
     probe::Rate,

@@ -1,6 +1,6 @@
 //! What shaders/shared/air.wgsl is told.
 
-use crate::domain::air::{DENSITY, VISCOSITY};
+use swell_domain::air::{DENSITY, VISCOSITY};
 
 /// Of drops of that radius, metres, in such a wind, m/s.
 pub(super) fn constants(drop_radius: f64, wind: [f64; 3]) -> Vec<(&'static str, f64)> {

@@ -4,13 +4,11 @@
 
 use glam::{DQuat, DVec3};
 
-use crate::{
-    domain::{
-        boundary::Boundary, pose::Passage, signed_distance::SignedDistance, sph::Calibration,
-    },
-    gpu::program::Program,
-    scene::Scene,
+use swell_domain::{
+    boundary::Boundary, pose::Passage, signed_distance::SignedDistance, sph::Calibration,
 };
+use swell_gpu::program::Program;
+use swell_scene::Scene;
 
 use super::{
     buffers::{SOLID_DISTANCE, SOLID_GRID},
@@ -23,100 +21,95 @@ use super::{
     plan::{Counts, Plan},
 };
 
-impl Boundary {
-    /// Samples and grid nodes; no particles.
-    pub fn counts(&self) -> Counts {
-        Counts {
+impl Counts {
+    /// Samples and grid nodes of solids; no particles.
+    pub fn of_solids(boundary: &Boundary) -> Self {
+        Self {
             particles: 0,
-            boundary_samples: self.sample_count(),
-            solid_grid: self.distance.as_ref().map_or([0; 3], |grid| grid.dims),
-            moving_nodes: self.moving.iter().map(|grid| grid.values.len()).sum(),
-            ..Counts::default()
+            boundary_samples: boundary.sample_count(),
+            solid_grid: boundary.distance.as_ref().map_or([0; 3], |grid| grid.dims),
+            moving_nodes: boundary.moving.iter().map(|grid| grid.values.len()).sum(),
+            ..Self::default()
         }
     }
+}
 
-    /// Fills the buffers that the plan has for solids. Those of solids that move are filled anew for each substep.
-    pub(super) fn upload(
-        &self,
-        program: &Program,
-        scene: &Scene,
-        plan: &Plan,
-        calibration: &Calibration,
-    ) {
-        if self.distance.is_none() && self.moving.is_empty() {
-            return;
-        }
-        self.upload_samples(program, scene, plan, calibration, (0.0, 0.0));
-        self.upload_distance(program, scene);
+/// Fills the buffers that the plan has for solids. Those of solids that move are filled anew for each substep.
+pub(super) fn upload(
+    boundary: &Boundary,
+    program: &Program,
+    scene: &Scene,
+    plan: &Plan,
+    calibration: &Calibration,
+) {
+    if boundary.distance.is_none() && boundary.moving.is_empty() {
+        return;
     }
+    upload_samples(boundary, program, scene, plan, calibration, (0.0, 0.0));
+    upload_distance(boundary, program, scene);
+}
 
-    /// Fills in the samples as they stand at a time, moving as what took them there within so many seconds: behind the
-    /// particles of `predicted`, sorted by cell; their weights are particles' worth of mass.
-    pub(super) fn upload_samples(
-        &self,
-        program: &Program,
-        scene: &Scene,
-        plan: &Plan,
-        calibration: &Calibration,
-        (time, step): (f64, f64),
-    ) {
-        let samples = scene.solid_samples(self, time, step);
-        let dims = plan.grid_dims.map(|n| n as usize);
-        let spacing = scene.particle_spacing();
-        let support = calibration.support_radius;
-        let edges = scene.period().edges(plan.grid_dims, support);
-        let cell = |p: DVec3| {
-            let c = (p / edges).floor().max(DVec3::ZERO).as_uvec3().to_array();
-            let c: [usize; 3] = std::array::from_fn(|k| (c[k] as usize).min(dims[k] - 1));
-            (c[2] * dims[1] + c[1]) * dims[0] + c[0]
+/// Fills in the samples as they stand at a time, moving as what took them there within so many seconds: behind the
+/// particles of `predicted`, sorted by cell; their weights are particles' worth of mass.
+pub(super) fn upload_samples(
+    boundary: &Boundary,
+    program: &Program,
+    scene: &Scene,
+    plan: &Plan,
+    calibration: &Calibration,
+    (time, step): (f64, f64),
+) {
+    let samples = scene.solid_samples(boundary, time, step);
+    let dims = plan.grid_dims.map(|n| n as usize);
+    let spacing = scene.particle_spacing();
+    let support = calibration.support_radius;
+    let edges = scene.period().edges(plan.grid_dims, support);
+    let cell = |p: DVec3| {
+        let c = (p / edges).floor().max(DVec3::ZERO).as_uvec3().to_array();
+        let c: [usize; 3] = std::array::from_fn(|k| (c[k] as usize).min(dims[k] - 1));
+        (c[2] * dims[1] + c[1]) * dims[0] + c[0]
+    };
+    let mut order: Vec<(usize, usize)> = samples
+        .iter()
+        .enumerate()
+        .map(|(k, sample)| (cell(sample.position), k))
+        .collect();
+    order.sort_unstable();
+    let mut start = vec![0u32; dims.iter().product::<usize>() + 1];
+    for &(cell, _) in &order {
+        start[cell + 1] += 1;
+    }
+    for k in 1..start.len() {
+        start[k] += start[k - 1];
+    }
+    if !order.is_empty() {
+        let weight = |area: f64| calibration.sample_weight * area / (spacing * spacing);
+        let place = |&(_, k): &(usize, usize)| {
+            let [x, y, z] = three(samples[k].position);
+            [x, y, z, weight(samples[k].area) as f32]
         };
-        let mut order: Vec<(usize, usize)> = samples
+        let places: Vec<[f32; 4]> = order.iter().map(place).collect();
+        upload_places(program, plan.page, plan.counts.particles, &places);
+    }
+    program.upload(BOUNDARY_CELL_START, 0, &start);
+    if plan.has_sample_velocities() {
+        let velocities: Vec<[f32; 3]> = order
             .iter()
-            .enumerate()
-            .map(|(k, sample)| (cell(sample.position), k))
+            .map(|&(_, k)| three(samples[k].velocity))
             .collect();
-        order.sort_unstable();
-        let mut start = vec![0u32; dims.iter().product::<usize>() + 1];
-        for &(cell, _) in &order {
-            start[cell + 1] += 1;
-        }
-        for k in 1..start.len() {
-            start[k] += start[k - 1];
-        }
-        if !order.is_empty() {
-            let weight = |area: f64| calibration.sample_weight * area / (spacing * spacing);
-            let place = |&(_, k): &(usize, usize)| {
-                let [x, y, z] = three(samples[k].position);
-                [x, y, z, weight(samples[k].area) as f32]
-            };
-            let places: Vec<[f32; 4]> = order.iter().map(place).collect();
-            upload_places(program, plan.page, plan.counts.particles, &places);
-        }
-        program.upload(BOUNDARY_CELL_START, 0, &start);
-        if plan.has_sample_velocities() {
-            let velocities: Vec<[f32; 3]> = order
-                .iter()
-                .map(|&(_, k)| three(samples[k].velocity))
-                .collect();
-            program.upload(SAMPLE_VELOCITY, 0, &velocities);
-        }
+        program.upload(SAMPLE_VELOCITY, 0, &velocities);
     }
+}
 
-    /// Fills the signed distance that the plan has for solids.
-    pub(super) fn upload_distance(&self, program: &Program, scene: &Scene) {
-        let mut first = 0;
-        for grid in self.grids() {
-            program.upload(SOLID_DISTANCE, first, &grid.values);
-            first += grid.values.len();
-        }
-        if let (Some(grid), []) = (&self.distance, &self.moving[..]) {
-            program.upload(SOLID_GRID, 0, &[solid_grid(grid, scene.domain.min, 0)]);
-        }
+/// Fills the signed distance that the plan has for solids.
+pub(super) fn upload_distance(boundary: &Boundary, program: &Program, scene: &Scene) {
+    let mut first = 0;
+    for grid in boundary.grids() {
+        program.upload(SOLID_DISTANCE, first, &grid.values);
+        first += grid.values.len();
     }
-
-    /// In the order in which their nodes stand on the device.
-    fn grids(&self) -> impl Iterator<Item = &SignedDistance> {
-        self.distance.iter().chain(&self.moving)
+    if let (Some(grid), []) = (&boundary.distance, &boundary.moving[..]) {
+        program.upload(SOLID_GRID, 0, &[solid_grid(grid, scene.domain.min, 0)]);
     }
 }
 

@@ -1,8 +1,8 @@
 //! Buffers that both solvers have. Positions are metres from the domain's least corner, velocities m/s.
 
-use crate::gpu::buffer::Buf;
+use swell_gpu::buffer::Buf;
 
-pub use crate::gpu::sort::{CELL_OF, CELL_START, ELEMENT_COUNT, ID, ORDER, PLACED, SLOT_IN_CELL};
+pub use swell_gpu::sort::{CELL_OF, CELL_START, ELEMENT_COUNT, ID, ORDER, PLACED, SLOT_IN_CELL};
 
 use super::params::{Counters, SolidGrid};
 

@@ -1,14 +1,12 @@
 //! Rust mirrors of the uniforms, which a test holds against naga's layout of the WGSL structs, and of the words that
 //! passes count in.
 
-use crate::{
-    domain::bricks::Brick,
-    gpu::{
-        buffer::{Element, Mirror, Scalar, Workgroups, mirror},
-        reflect::Layout,
-    },
-    scene::{moving_solid::MAX_MOVING_SOLIDS, sources::MAX_INLETS},
+use swell_domain::bricks::Brick;
+use swell_gpu::{
+    buffer::{Element, Mirror, Scalar, Workgroups, mirror},
+    reflect::Layout,
 };
+use swell_scene::{moving_solid::MAX_MOVING_SOLIDS, sources::MAX_INLETS};
 
 mirror!(
     /// `Params` of shared/pbf_params.wgsl; lengths in metres, positions relative to the domain's least corner.
@@ -238,22 +236,27 @@ mirror!(
     }
 );
 
-impl Element for Brick {
+/// A [`Brick`] in the device's memory.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct DeviceBrick(pub Brick);
+
+impl Element for DeviceBrick {
     const SCALAR: Scalar = Scalar::Mixed;
 }
 
-impl Mirror for Brick {
+impl Mirror for DeviceBrick {
     fn layout() -> Layout {
         let member = |name: &str, offset: usize| (name.to_owned(), offset as u32);
         Layout {
             name: "Brick".to_owned(),
             size: size_of::<Self>() as u32,
             members: vec![
-                member("coordinate", std::mem::offset_of!(Self, coordinate)),
-                member("level", std::mem::offset_of!(Self, level)),
-                member("neighbors", std::mem::offset_of!(Self, neighbors)),
-                member("parent", std::mem::offset_of!(Self, parent)),
-                member("children", std::mem::offset_of!(Self, children)),
+                member("coordinate", std::mem::offset_of!(Brick, coordinate)),
+                member("level", std::mem::offset_of!(Brick, level)),
+                member("neighbors", std::mem::offset_of!(Brick, neighbors)),
+                member("parent", std::mem::offset_of!(Brick, parent)),
+                member("children", std::mem::offset_of!(Brick, children)),
             ],
         }
     }

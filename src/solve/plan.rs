@@ -3,15 +3,13 @@
 //! Passes are those of the commands that a solver records, in the order in which they first run; each room declares its
 //! buffers once, and a test holds those declared against those that the commands bind.
 
-use crate::{
-    domain::{places, solver::PassTime},
-    gpu::{
-        adapter::Context,
-        program::{BufferSpec, PassSpec},
-        recording::Command,
-    },
-    scene::{Method, Scene},
+use swell_domain::{places, solver::PassTime};
+use swell_gpu::{
+    adapter::Context,
+    program::{BufferSpec, PassSpec},
+    recording::Command,
 };
+use swell_scene::{Method, Scene};
 
 use super::{effects::Addition, flip, pbf, pbf::buffers::SAMPLE_VELOCITY};
 

@@ -2,14 +2,12 @@
 
 use glam::Vec3;
 
-use crate::{
-    domain::{
-        budget::{Breach, Watched},
-        particles::Particles,
-    },
-    gpu::program::Program,
-    scene::Scene,
+use swell_domain::{
+    budget::{Breach, Watched},
+    particles::Particles,
 };
+use swell_gpu::program::Program;
+use swell_scene::Scene;
 
 use super::{
     SolveError,

@@ -1,15 +1,13 @@
 //! A substep run dispatch by dispatch, for whoever holds each pass against its f64 twin.
 
-use crate::{
-    domain::{solver::Solver, substep::Which},
-    gpu::{
-        buffer::{Buf, Scalar, Windows},
-        program::Program,
-        recording::{Bind, Moment, Recording},
-        reflect::{Access, Binding},
-    },
-    scene::flip::Precision,
+use swell_domain::{solver::Solver, substep::Which};
+use swell_gpu::{
+    buffer::{Buf, Scalar, Windows},
+    program::Program,
+    recording::{Bind, Moment, Recording},
+    reflect::{Access, Binding},
 };
+use swell_scene::flip::Precision;
 
 use super::{
     SolveError,

@@ -3,32 +3,30 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::{
-    domain::{
-        boundary::Boundary,
-        budget::Breach,
-        particles::Particles,
-        solver::PassTime,
-        sph::Calibration,
-        whitewater::{
-            AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE, Settings,
-            WATER_ABOVE,
-        },
+use crate::air;
+use swell_domain::{
+    boundary::Boundary,
+    budget::Breach,
+    particles::Particles,
+    solver::PassTime,
+    sph::Calibration,
+    whitewater::{
+        AIR_BELOW, FLIGHT_STEPS, HALVINGS, KIND, OUTWARD, Potentials, SURFACE, Settings,
+        WATER_ABOVE,
     },
-    gpu::{
-        adapter::Context,
-        buffer::Buf,
-        program::{PassSpec, Program},
-        recording::{Command, Recording, Timer},
-        sort,
-    },
-    scene::Scene,
-    solve::air,
 };
+use swell_gpu::{
+    adapter::Context,
+    buffer::Buf,
+    program::{PassSpec, Program},
+    recording::{Command, Recording, Timer},
+    sort,
+};
+use swell_scene::Scene;
 
 use super::{
     SolveError,
-    boundary::Movers,
+    boundary::{self, Movers},
     flip::buffers::SOLID_GRIDS,
     pbf::{buffers::*, params, plan::cell_count, record::sorting},
     plan::{Counts, Plan, Table, in_order},
@@ -75,7 +73,7 @@ fn plan(scene: &Scene, boundary: &Boundary, water: usize, white: usize) -> Plan 
     let support = Calibration::new(pbf.particle_spacing, pbf.support_ratio).support_radius;
     let counts = Counts {
         particles: water,
-        ..boundary.counts()
+        ..Counts::of_solids(boundary)
     };
     let mut plan = Plan::bare(counts, scene.period().cells(scene.domain.size(), support));
     let cells = cell_count(&plan);
@@ -166,7 +164,7 @@ fn set_up(
     sort::upload_lengths(program, &CELL_START, cell_count(plan));
     let water = plan.counts.particles as u32;
     program.upload(ELEMENT_COUNT, 0, &[[water, 0, 0, 0]]);
-    boundary.upload(program, scene, plan, calibration);
+    boundary::upload(boundary, program, scene, plan, calibration);
     Recording::new(program, &survey_commands(plan))
 }
 
@@ -279,7 +277,7 @@ impl Whitewater {
             let (program, scene) = (&self.program, &self.scene);
             movers.upload(program, scene, time - seconds, seconds);
             let now = (time, seconds);
-            boundary.upload_samples(program, scene, &self.plan, &self.calibration, now);
+            boundary::upload_samples(boundary, program, scene, &self.plan, &self.calibration, now);
         }
         self.survey.run(&self.program, self.timer.as_mut())?;
         let (potential, order) = (self.program).download((POTENTIAL.first(n), ORDER.first(n)))?;

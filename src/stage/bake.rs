@@ -6,17 +6,15 @@ use std::{fs, path::PathBuf, sync::atomic::AtomicBool, time::Instant};
 
 use serde_json::{Value, json};
 
-use crate::{
-    cache::{
-        Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, Parent, failed,
-    },
-    domain::{
-        budget::Breach, frame_range::FrameRange, keep::Keep, particles::Particles, posix,
-        signed_distance::SignedDistanceError, solver::StepReport,
-    },
-    gpu::adapter::GpuError,
-    scene::{self, Held, Scene, SceneError, grids::Grids},
+use swell_cache::{
+    Asset, CacheError, CacheReader, CacheWriter, Clock, GridRecord, Manifest, Parent, failed,
 };
+use swell_domain::{
+    budget::Breach, frame_range::FrameRange, keep::Keep, particles::Particles, posix,
+    signed_distance::SignedDistanceError, solver::StepReport,
+};
+use swell_gpu::adapter::GpuError;
+use swell_scene::{Held, Scene, SceneError, grids::Grids};
 
 use super::{
     Blame,
@@ -412,7 +410,7 @@ struct Beginning {
 /// The scene's own start, the frame that the request names, or what a cache that is gone on with began from.
 fn beginning(request: &Request, last: u32) -> Result<Beginning, BakeError> {
     let (scene, directory) = (&request.scene, &request.directory);
-    let stands = request.resume && crate::cache::exists(directory);
+    let stands = request.resume && swell_cache::exists(directory);
     let open = |from| Branch::open(from, scene);
     let branch = match request.from.as_ref().map(open).transpose()? {
         Some(branch) if !stands => return branched(request, last, branch),
@@ -474,14 +472,14 @@ fn open_cache(
     parent: &Option<Parent>,
 ) -> Result<(CacheWriter, Clock, Particles), BakeError> {
     let scene = &request.scene;
-    let text = scene.to_toml(&scene::asset_path);
+    let text = scene.to_toml(&swell_scene::asset_path);
     let manifest = Manifest {
         format_version: Manifest::FORMAT_VERSION,
-        program: env!("CARGO_PKG_NAME").into(),
-        program_version: env!("CARGO_PKG_VERSION").into(),
+        program: swell_domain::PROGRAM.into(),
+        program_version: swell_domain::VERSION.into(),
         shaders: device.shaders.clone(),
         shot: scene.shot.name.clone(),
-        scene_hash: scene::physics_hash(scene),
+        scene_hash: swell_scene::physics_hash(scene),
         solver: scene.solver.method.name().into(),
         device: device.name.clone(),
         driver: device.driver.clone(),
@@ -501,9 +499,9 @@ fn open_cache(
         files: Vec::new(),
     };
     let directory = &request.directory;
-    if crate::cache::exists(directory) && request.resume {
+    if swell_cache::exists(directory) && request.resume {
         let cached = CacheReader::open(directory)?;
-        if let Some(difference) = scene::physics_difference(cached.scene_toml(), &text)? {
+        if let Some(difference) = swell_scene::physics_difference(cached.scene_toml(), &text)? {
             return Err(BakeError::OtherPhysics {
                 directory: directory.clone(),
                 difference,
@@ -544,7 +542,7 @@ fn assets(scene: &Scene) -> Result<Vec<Asset>, BakeError> {
         if blake3::hash(&bytes).to_hex().as_str() != hash {
             return Err(fault("changed since the scene was loaded".into()));
         }
-        let path = scene::asset_path(&file, &hash);
+        let path = swell_scene::asset_path(&file, &hash);
         Ok(Asset {
             name: path.trim_start_matches("assets/").to_owned(),
             bytes,

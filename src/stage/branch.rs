@@ -8,13 +8,11 @@ use std::{
 
 use glam::Vec3;
 
-use crate::{
-    cache::{CacheError, CacheReader, Clock, Parent},
-    domain::{
-        answer::Answers, boundary::Boundary, bounds::Bounds, particles::Particles, pose::Pose,
-    },
-    scene::{self, Scene, SceneError},
+use swell_cache::{CacheError, CacheReader, Clock, Parent};
+use swell_domain::{
+    answer::Answers, boundary::Boundary, bounds::Bounds, particles::Particles, pose::Pose,
 };
+use swell_scene::{Scene, SceneError};
 
 /// A frame of a cache, written `CACHE:120`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -166,8 +164,8 @@ impl Branch {
                 "positions are rounded about another origin: the domain is another".to_owned(),
             );
         }
-        let text = scene.to_toml(&scene::asset_path);
-        let physics = scene::physics_difference(cache.scene_toml(), &text);
+        let text = scene.to_toml(&swell_scene::asset_path);
+        let physics = swell_scene::physics_difference(cache.scene_toml(), &text);
         notes.extend(physics.map_err(|source| BranchError::Scene {
             file: from.directory.clone(),
             source,
@@ -208,8 +206,8 @@ fn check_keys(from: &BranchPoint, cache: &CacheReader, scene: &Scene) -> Result<
     let quoted = |name: &str| format!("{name:?}");
     let number = |value: f64| format!("{value:?}");
     let spacing = match scene.solver.method {
-        scene::Method::Pbf => "solver.pbf.particle_spacing",
-        scene::Method::Flip => {
+        swell_scene::Method::Pbf => "solver.pbf.particle_spacing",
+        swell_scene::Method::Flip => {
             "the particle spacing of solver.flip (cell_size, particles_per_cell)"
         }
     };

@@ -6,17 +6,15 @@ use std::{
     time::Instant,
 };
 
-use crate::{
-    cache::{CacheError, CacheReader, Manifest},
-    check::{flip, pbf},
-    domain::{
-        frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
-        substep::Which,
-    },
-    gpu::adapter::{Context, GpuError, Needs},
-    scene::{Method, Scene, SceneError},
-    solve::{SolveError, plan::device_limits},
+use swell_cache::{CacheError, CacheReader, Manifest};
+use swell_check::{flip, pbf};
+use swell_domain::{
+    frame_range::FrameRange, particles::Particles, signed_distance::SignedDistanceError,
+    substep::Which,
 };
+use swell_gpu::adapter::{Context, GpuError, Needs};
+use swell_scene::{Method, Scene, SceneError};
+use swell_solve::{SolveError, plan::device_limits};
 
 use super::{
     Blame,
@@ -25,7 +23,7 @@ use super::{
     whitewater::{Stream, WhitewaterError},
 };
 
-pub use crate::check::{Checked, Row, Table};
+pub use swell_check::{Checked, Row, Table};
 
 /// Where the inputs of the step come from.
 #[derive(Clone, Debug)]

@@ -7,26 +7,24 @@ use std::{
 
 use glam::DVec3;
 
-use crate::{
-    domain::{
-        budget::Breach,
-        particles::Particles,
-        solver::{PassTime, Solver, StepReport, Watch},
-    },
-    gpu::adapter::{Context, GpuError, Needs},
-    reference::{self, ReferenceError},
-    scene::{Method, Scene, flip::Precision},
-    solve::{
-        SolveError,
-        flip::Flip,
-        pbf::Pbf,
-        plan::{Plan, device_limits},
-    },
+use swell_domain::{
+    budget::Breach,
+    particles::Particles,
+    solver::{PassTime, Solver, StepReport, Watch},
+};
+use swell_gpu::adapter::{Context, GpuError, Needs};
+use swell_reference::ReferenceError;
+use swell_scene::{Method, Scene, flip::Precision};
+use swell_solve::{
+    SolveError,
+    flip::Flip,
+    pbf::Pbf,
+    plan::{Plan, device_limits},
 };
 
 use super::{Blame, prepare::Start};
 
-pub use crate::gpu::{
+pub use swell_gpu::{
     ceilings::Ceilings,
     shader::{Shaders, ShadersError},
 };
@@ -298,8 +296,10 @@ impl Opened {
         let method = scene.solver.method;
         let Self::Gpu(context) = self else {
             let solver: Box<dyn Solver<Error = SolverError>> = match method {
-                Method::Pbf => Box::new(Unified(reference::pbf::Pbf::new(scene, boundary))),
-                Method::Flip => Box::new(Unified(reference::flip::Flip::new(scene, boundary))),
+                Method::Pbf => Box::new(Unified(swell_reference::pbf::Pbf::new(scene, boundary))),
+                Method::Flip => {
+                    Box::new(Unified(swell_reference::flip::Flip::new(scene, boundary)))
+                }
             };
             return Ok(Built { solver, plan: None });
         };

@@ -13,29 +13,27 @@ use std::{
 use serde::Serialize;
 
 use super::{Blame, gauge::of_caches};
-use crate::{
-    cache::{self, CacheError, CacheReader, Manifest},
-    compare::baseline::Baseline,
-    domain::{
-        aggregates::Aggregates,
-        frame_range::FrameRange,
-        particles::Particles,
-        solver::StepReport,
-        tolerance::{PictureLimits, Tolerance},
-    },
-    render::RenderError,
-    scene::{Scene, SceneError, physics_difference},
-    study::measure::Gauge,
+use swell_cache::{CacheError, CacheReader, Manifest};
+use swell_compare::baseline::Baseline;
+use swell_domain::{
+    aggregates::Aggregates,
+    frame_range::FrameRange,
+    particles::Particles,
+    solver::StepReport,
+    tolerance::{PictureLimits, Tolerance},
 };
+use swell_render::RenderError;
+use swell_scene::{Scene, SceneError, physics_difference};
+use swell_study::measure::Gauge;
 
-pub use crate::compare::{
+pub use against_baseline::{Written, write_baseline};
+pub use swell_compare::{
     baseline::{BaselineDiff, BaselineFault, Basis, FramePair},
     caches::CacheDiff,
     frames::{AggregatePeak, Fault, FieldDiff, FrameDiff, Parting, aggregate_peaks},
     pictures::{PairDiff, PicturesDiff},
     streams::{Difference, GridDiff, StreamDiff},
 };
-pub use against_baseline::{Written, write_baseline};
 
 /// What to compare with what.
 #[derive(Clone, Debug)]
@@ -166,7 +164,7 @@ enum Subject {
 impl Subject {
     fn of(path: &Path) -> Result<Self, DiffError> {
         let is_folder = fs::metadata(path).map_err(DiffError::at(path))?.is_dir();
-        if is_folder && cache::exists(path) {
+        if is_folder && swell_cache::exists(path) {
             return Ok(Self::Cache(Box::new(CacheReader::open(path)?)));
         }
         if is_folder && pictures::in_folder(path, None)?.is_empty() {

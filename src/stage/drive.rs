@@ -8,18 +8,16 @@ use std::{
 
 use glam::DVec3;
 
-use crate::{
-    cache::ProbeValues,
-    domain::{
-        answer::Answers,
-        particles::Particles,
-        signed_distance::SignedDistance,
-        solver::{PassTime, Solver, StepReport},
-        sources::{Exchange, Sources},
-    },
-    scene::Scene,
-    solve::plan::{Plan, Share},
+use swell_cache::ProbeValues;
+use swell_domain::{
+    answer::Answers,
+    particles::Particles,
+    signed_distance::SignedDistance,
+    solver::{PassTime, Solver, StepReport},
+    sources::{Exchange, Sources},
 };
+use swell_scene::Scene;
+use swell_solve::plan::{Plan, Share};
 
 use super::{
     device::{Built, Opened, SolverError},

@@ -24,18 +24,16 @@ use std::{
 
 use glam::DVec3;
 
-use crate::{
-    cache::{self, CacheError, CacheReader, GridRecord, frame::Stamp, vdb},
-    domain::{
-        chunk::{Chunk, share},
-        frame_range::FrameRange,
-        particles::Particles,
-        sparse_grid::Precision,
-        water_mesh::{Body, VOLUME, WaterMesh},
-    },
-    export::{Source, mesh, mesh::Placed, table, usd},
-    scene::{Scene, look::Look},
+use swell_cache::{CacheError, CacheReader, GridRecord, frame::Stamp, vdb};
+use swell_domain::{
+    chunk::{Chunk, share},
+    frame_range::FrameRange,
+    particles::Particles,
+    sparse_grid::Precision,
+    water_mesh::{Body, VOLUME, WaterMesh},
 };
+use swell_export::{Source, mesh, mesh::Placed, table, usd};
+use swell_scene::{Scene, look::Look};
 
 use super::{
     baked_scene,
@@ -54,7 +52,7 @@ pub use self::{
 };
 
 /// Voxels of the mesh's grid a particle spacing, where nothing else is asked for: those of the renderer.
-pub const VOXELS: f64 = crate::domain::level_set::VOXELS;
+pub const VOXELS: f64 = swell_domain::level_set::VOXELS;
 
 /// How a USD shot has its water.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -326,7 +324,7 @@ impl<'a> Job<'a> {
             scene,
             frames,
             python,
-            software: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
+            software: format!("{} {}", swell_domain::PROGRAM, swell_domain::VERSION),
         })
     }
 
@@ -398,7 +396,7 @@ impl<'a> Job<'a> {
     }
 
     fn check(&self, wanted: &Wanted) -> Result<(), ExportError> {
-        if let Some(cache) = cache::around(&wanted.file) {
+        if let Some(cache) = swell_cache::around(&wanted.file) {
             return Err(ExportError::IntoCache {
                 file: wanted.file.clone(),
                 cache,
@@ -568,7 +566,7 @@ fn is_binary(file: &Path) -> bool {
 
 fn open_stream(request: &Request, stream: &str) -> Result<CacheReader, ExportError> {
     let directory = directory(&request.cache, stream);
-    if !cache::exists(&directory) {
+    if !swell_cache::exists(&directory) {
         return Err(ExportError::NoStream {
             stream: stream.to_owned(),
             directory,

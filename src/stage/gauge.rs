@@ -1,10 +1,8 @@
 //! How a scene's wave is measured: which way it runs, and where the water stands still.
 
-use crate::{
-    cache::{CacheError, CacheReader},
-    scene::Scene,
-    study::measure::{Direction, Gauge},
-};
+use swell_cache::{CacheError, CacheReader};
+use swell_scene::Scene;
+use swell_study::measure::{Direction, Gauge};
 
 /// The wave runs away from the first wave maker; towards greater x where there is none.
 pub fn direction(scene: &Scene) -> Direction {

@@ -8,23 +8,21 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{
-    cache::{CacheError, CacheReader, stream::Stream},
-    domain::signed_distance::SignedDistanceError,
-    gpu::{
-        adapter::{Context, GpuError, enumerate},
-        program::check_sizes,
-    },
-    scene::{Scene, SceneError},
-    solve::plan::{DeviceLimits, Plan, device_limits},
+use swell_cache::{CacheError, CacheReader, stream::Stream};
+use swell_domain::signed_distance::SignedDistanceError;
+use swell_gpu::{
+    adapter::{Context, GpuError, enumerate},
+    program::check_sizes,
 };
+use swell_scene::{Scene, SceneError};
+use swell_solve::plan::{DeviceLimits, Plan, device_limits};
 
 use super::{Blame, device::needs, prepare::Start, probes, whitewater};
 
 pub use super::prepare::MOST_NODES;
-pub use crate::solve::plan::LIST_BUDGET;
+pub use swell_solve::plan::LIST_BUDGET;
 
-pub use crate::cache::{
+pub use swell_cache::{
     Entry, Manifest,
     stream::{PARTICLES, PROBES},
 };
@@ -82,8 +80,8 @@ pub fn adapters() -> Result<Vec<Adapter>, GpuError> {
                         limits.max_texture_dimension_2d.into(),
                     ),
                 ],
-                has_timestamps: crate::gpu::adapter::has_timestamps(adapter),
-                has_f64: crate::gpu::adapter::has_f64(adapter),
+                has_timestamps: swell_gpu::adapter::has_timestamps(adapter),
+                has_f64: swell_gpu::adapter::has_f64(adapter),
             }
         })
         .collect();
@@ -274,7 +272,7 @@ fn whitewater_folders(cache: &Path) -> Result<Vec<PathBuf>, SizesError> {
         paths.collect::<io::Result<Vec<_>>>()
     });
     let mut streams = paths.map_err(|source| unread(&folder, source))?;
-    streams.retain(|it| crate::cache::exists(it));
+    streams.retain(|it| swell_cache::exists(it));
     streams.sort();
     Ok(streams)
 }

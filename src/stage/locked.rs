@@ -7,14 +7,14 @@ use std::{
 };
 
 /// Opens a lock file, which is made where it is missing.
-pub(crate) fn open(file: &Path) -> io::Result<File> {
+pub fn open(file: &Path) -> io::Result<File> {
     let mut options = File::options();
     options.read(true).write(true).create(true).truncate(false);
     options.open(file)
 }
 
 /// Whether a lock was had, by what trying gave.
-pub(crate) fn is_had(tried: Result<(), TryLockError>) -> io::Result<bool> {
+pub fn is_had(tried: Result<(), TryLockError>) -> io::Result<bool> {
     match tried {
         Ok(()) => Ok(true),
         Err(TryLockError::WouldBlock) => Ok(false),
@@ -24,7 +24,7 @@ pub(crate) fn is_had(tried: Result<(), TryLockError>) -> io::Result<bool> {
 
 /// Whether an open file is the one of this name: its last holder may have taken it away.
 #[cfg(unix)]
-pub(crate) fn is_at(file: &File, path: &Path) -> bool {
+pub fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
     let identity = |meta: io::Result<std::fs::Metadata>| meta.map(|m| (m.dev(), m.ino())).ok();
     identity(file.metadata()) == identity(path.metadata())
@@ -32,6 +32,6 @@ pub(crate) fn is_at(file: &File, path: &Path) -> bool {
 
 /// Elsewhere an open file cannot be taken away.
 #[cfg(not(unix))]
-pub(crate) fn is_at(_: &File, _: &Path) -> bool {
+pub fn is_at(_: &File, _: &Path) -> bool {
     true
 }

@@ -2,24 +2,22 @@
 
 use std::borrow::Cow;
 
-use crate::{
-    cache::{CacheError, CacheReader},
-    domain::{
-        boundary::Boundary,
-        bounds::Bounds,
-        flip as flip_domain,
-        mesh::TriangleMesh,
-        particles::Particles,
-        pbf,
-        sampling::{BoundarySample, boundary_samples, fill_water},
-        signed_distance::{SignedDistance, SignedDistanceError, fitting_spacing},
-        sources::Sources,
-    },
-    scene::{Method, Scene},
-    solve::{
-        flip,
-        plan::{Capacity, Counts, DeviceLimits, Plan},
-    },
+use swell_cache::{CacheError, CacheReader};
+use swell_domain::{
+    boundary::Boundary,
+    bounds::Bounds,
+    flip as flip_domain,
+    mesh::TriangleMesh,
+    particles::Particles,
+    pbf,
+    sampling::{BoundarySample, boundary_samples, fill_water},
+    signed_distance::{SignedDistance, SignedDistanceError, fitting_spacing},
+    sources::Sources,
+};
+use swell_scene::{Method, Scene};
+use swell_solve::{
+    flip,
+    plan::{Capacity, Counts, DeviceLimits, Plan},
 };
 
 /// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
@@ -150,7 +148,7 @@ impl Start {
         let counts = Counts {
             particles: particles.len(),
             bricks,
-            ..self.boundary.counts()
+            ..Counts::of_solids(&self.boundary)
         };
         Plan::new(scene, counts, limits)
     }

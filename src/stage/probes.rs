@@ -1,18 +1,16 @@
 //! What a scene's probes see of a frame.
 
-use crate::{
-    cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES},
-    domain::{
-        particles::Particles,
-        probe::{Patch, Rate, elevation, energies, flux, front, load, run_up, volume},
-        solver::{Seen, Span, Wanted, Watch},
-    },
-    scene::{
-        Scene,
-        probe::{Probe, ProbeKind},
-    },
-    study::chart::{Chart, Series},
+use swell_cache::{Entry, ProbeRecord, ProbeValues, stream::PROBES};
+use swell_domain::{
+    particles::Particles,
+    probe::{Patch, Rate, elevation, energies, flux, front, load, run_up, volume},
+    solver::{Seen, Span, Wanted, Watch},
 };
+use swell_scene::{
+    Scene,
+    probe::{Probe, ProbeKind},
+};
+use swell_study::chart::{Chart, Series};
 
 /// The scene's probes as the cache keeps them.
 pub(super) fn records(scene: &Scene) -> Vec<ProbeRecord> {

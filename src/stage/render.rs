@@ -23,22 +23,20 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{
-    cache::{self, CacheError, CacheReader},
-    domain::{
-        chunk::{Chunk, share},
-        frame_range::FrameRange,
-        mesh_file::MeshError,
-        particles::Particles,
-        signed_distance::SignedDistanceError,
-        solver::PassTime,
-    },
-    gpu::adapter::{Context, GpuError, Needs},
-    render::{Image, RenderError, Renderer},
-    scene::{
-        Scene, SceneError,
-        look::{FormatSpec, Look, LookError},
-    },
+use swell_cache::{CacheError, CacheReader};
+use swell_domain::{
+    chunk::{Chunk, share},
+    frame_range::FrameRange,
+    mesh_file::MeshError,
+    particles::Particles,
+    signed_distance::SignedDistanceError,
+    solver::PassTime,
+};
+use swell_gpu::adapter::{Context, GpuError, Needs};
+use swell_render::{Image, RenderError, Renderer};
+use swell_scene::{
+    Scene, SceneError,
+    look::{FormatSpec, Look, LookError},
 };
 
 use self::folder::{Folder, Owner, Wanted};
@@ -299,7 +297,7 @@ struct Asked {
 impl Asked {
     fn open(request: &Request) -> Result<Self, RenderJobError> {
         let cache = CacheReader::open(&request.cache)?;
-        if let Some(cache) = cache::around(&request.directory) {
+        if let Some(cache) = swell_cache::around(&request.directory) {
             return Err(RenderJobError::IntoCache {
                 directory: request.directory.clone(),
                 cache,

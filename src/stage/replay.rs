@@ -5,33 +5,31 @@ use std::{fmt, path::Path};
 use glam::{DVec3, Vec3};
 use serde_json::json;
 
-use crate::{
-    cache::{
-        CacheError, CacheReader,
-        failed::{self, Failed},
-        frame::Stamp,
-    },
-    domain::{
-        bricks::CELLS,
-        budget::{Breach, Watched},
-        particles::Particles,
-        poisson::FLUID,
-        signed_distance::SignedDistanceError,
-        solver::StepReport,
-    },
-    gpu::{
-        adapter::{GpuError, check_request},
-        recording::Moment,
-    },
-    scene::{self, Method, Scene, SceneError},
-    solve::{
-        SolveError,
-        flip::{Flip, buffers::*},
-        pbf::Pbf,
-        plan::device_limits,
-        pressure::{self, DONE},
-        trace::{Begun, Span, TraceFrame, Traced},
-    },
+use swell_cache::{
+    CacheError, CacheReader,
+    failed::{self, Failed},
+    frame::Stamp,
+};
+use swell_domain::{
+    bricks::CELLS,
+    budget::{Breach, Watched},
+    particles::Particles,
+    poisson::FLUID,
+    signed_distance::SignedDistanceError,
+    solver::StepReport,
+};
+use swell_gpu::{
+    adapter::{GpuError, check_request},
+    recording::Moment,
+};
+use swell_scene::{Method, Scene, SceneError};
+use swell_solve::{
+    SolveError,
+    flip::{Flip, buffers::*},
+    pbf::Pbf,
+    plan::device_limits,
+    pressure::{self, DONE},
+    trace::{Begun, Span, TraceFrame, Traced},
 };
 
 use super::{
@@ -357,8 +355,8 @@ pub(super) fn keep(
         },
     };
     let stamp = Stamp {
-        program: env!("CARGO_PKG_NAME"),
-        program_version: env!("CARGO_PKG_VERSION"),
+        program: swell_domain::PROGRAM,
+        program_version: swell_domain::VERSION,
         shot: &scene.shot.name,
         origin: scene.origin,
         frame: last,
@@ -379,7 +377,7 @@ pub(super) fn keep(
         "pass": place.map(|p| json!({ "name": p.pass, "substep": p.substep, "buffer": p.buffer })),
     });
     let failed = Failed {
-        scene_toml: scene.to_toml(&scene::asset_path),
+        scene_toml: scene.to_toml(&swell_scene::asset_path),
         start: state,
         last_frame: last,
         report,

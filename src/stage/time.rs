@@ -1,12 +1,10 @@
 //! How long frames of a scene take: its first ones, computed and not kept.
 
-use crate::{
-    domain::{signed_distance::SignedDistanceError, statistics::median},
-    gpu::adapter::GpuError,
-    scene::Scene,
-};
+use swell_domain::{signed_distance::SignedDistanceError, statistics::median};
+use swell_gpu::adapter::GpuError;
+use swell_scene::Scene;
 
-pub use crate::solve::plan::Share;
+pub use swell_solve::plan::Share;
 
 use super::{
     Blame,

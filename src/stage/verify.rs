@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-pub use crate::cache::{CacheError, Problem, VerifyReport};
+pub use swell_cache::{CacheError, Problem, VerifyReport};
 
 /// Looks at every checksum of the cache in `dir`. Damage stands in the report; `into_result` makes an
 /// error of it.
@@ -10,5 +10,5 @@ pub use crate::cache::{CacheError, Problem, VerifyReport};
 /// # Errors
 /// [`CacheError`] where `dir` holds no cache that this program reads, or cannot be read at all.
 pub fn verify(dir: &Path) -> Result<VerifyReport, CacheError> {
-    crate::cache::survey(dir)
+    swell_cache::survey(dir)
 }

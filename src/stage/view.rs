@@ -15,11 +15,9 @@ use std::{
     sync::atomic::AtomicBool,
 };
 
-use crate::{
-    cache::{self, CacheReader},
-    domain::frame_range::FrameRange,
-    scene::look::Look,
-};
+use swell_cache::CacheReader;
+use swell_domain::frame_range::FrameRange;
+use swell_scene::look::Look;
 
 use self::{
     curves::Curves,
@@ -31,7 +29,7 @@ pub use self::{
     error::ViewError,
     store::{MOST, Placing},
 };
-pub use crate::study::points::Aspect;
+pub use swell_study::points::Aspect;
 
 /// What to look at, and by what.
 #[derive(Clone, Debug)]
@@ -151,15 +149,15 @@ fn open(request: &Request) -> Result<Vec<Strip>, ViewError> {
                 path.display()
             )));
         }
-        if cache::exists(path) {
+        if swell_cache::exists(path) {
             return particles::open(path, request.aspect, request.frames.as_ref());
         }
         let nothing = || {
             let is_one = |path: &Path| {
                 let has_pictures = || pictures::in_folder(path).is_ok_and(|it| !it.is_empty());
-                cache::exists(path) || study::is_one(path) || has_pictures()
+                swell_cache::exists(path) || study::is_one(path) || has_pictures()
             };
-            let within = match &cache::within(path, &is_one)[..] {
+            let within = match &swell_cache::within(path, &is_one)[..] {
                 [] => String::new(),
                 found => format!("; within it there are {}", found.join(", ")),
             };
@@ -239,7 +237,7 @@ fn chosen(
 
 /// Nothing goes into a cache.
 fn check_place(file: &Path) -> Result<(), ViewError> {
-    match cache::around(file) {
+    match swell_cache::around(file) {
         None => Ok(()),
         Some(cache) => Err(ViewError::IntoCache {
             file: file.to_owned(),

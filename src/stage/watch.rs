@@ -2,15 +2,13 @@
 
 use glam::Vec3;
 
-use crate::{
-    domain::{
-        budget::{Breach, Watched},
-        particles::Particles,
-        probe::volume,
-        solver::StepReport,
-    },
-    scene::{Scene, budget::Before},
+use swell_domain::{
+    budget::{Breach, Watched},
+    particles::Particles,
+    probe::volume,
+    solver::StepReport,
 };
+use swell_scene::{Scene, budget::Before};
 
 /// Roundings of a coordinate by which a particle may lie beyond a face of the domain.
 const ROUNDINGS: f64 = 4.0;

@@ -17,19 +17,17 @@ use std::{
 
 use serde_json::{Value, json};
 
-use crate::{
-    cache::{self, Asset, CacheError, CacheReader, CacheWriter, Clock, Entry, Manifest},
-    domain::{
-        bounds::Bounds,
-        particles::Particles,
-        signed_distance::SignedDistanceError,
-        whitewater::{self, Births, Settings, Source, Thresholds},
-    },
-    gpu::adapter::{GpuError, Needs},
-    scene::{
-        Scene, SceneError,
-        whitewater::{WhitewaterSettings, written_out},
-    },
+use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, Entry, Manifest};
+use swell_domain::{
+    bounds::Bounds,
+    particles::Particles,
+    signed_distance::SignedDistanceError,
+    whitewater::{self, Births, Settings, Source, Thresholds},
+};
+use swell_gpu::adapter::{GpuError, Needs};
+use swell_scene::{
+    Scene, SceneError,
+    whitewater::{WhitewaterSettings, written_out},
 };
 
 use super::{
@@ -492,7 +490,7 @@ fn standing(
     directory: &Path,
     manifest: &Manifest,
 ) -> Result<Option<CacheReader>, WhitewaterError> {
-    if !cache::exists(directory) {
+    if !swell_cache::exists(directory) {
         return Ok(None);
     }
     let stream = CacheReader::open(directory)?;
@@ -578,8 +576,8 @@ fn manifest(
     let baked = cache.manifest();
     Ok(Manifest {
         format_version: Manifest::FORMAT_VERSION,
-        program: env!("CARGO_PKG_NAME").into(),
-        program_version: env!("CARGO_PKG_VERSION").into(),
+        program: swell_domain::PROGRAM.into(),
+        program_version: swell_domain::VERSION.into(),
         shaders: identity.shaders.clone(),
         scene_hash: hash(cache, request)?,
         solver: Manifest::WHITEWATER.to_owned(),

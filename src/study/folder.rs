@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::chunk::Chunk;
+use swell_domain::chunk::Chunk;
 
 /// The file that holds a [`Claim`].
 pub const CLAIM: &str = "study.json";

@@ -10,9 +10,7 @@
 use rayon::prelude::*;
 
 use super::{median, percentile};
-use crate::domain::{
-    aggregates::Aggregates, bounds::Bounds, particles::Particles, probe::energies,
-};
+use swell_domain::{aggregates::Aggregates, bounds::Bounds, particles::Particles, probe::energies};
 
 /// Most cubes; a larger domain is measured with larger ones.
 const MAX_CUBES: f64 = (1u64 << 27) as f64;

@@ -6,7 +6,7 @@
 use glam::{DVec2, DVec3};
 
 use super::rgb::Rgb;
-use crate::domain::{bounds::Bounds, mesh::TriangleMesh, particles::Particles};
+use swell_domain::{bounds::Bounds, mesh::TriangleMesh, particles::Particles};
 
 /// From where particles are looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

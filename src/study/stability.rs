@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
-use crate::domain::bounds::Bounds;
+use swell_domain::bounds::Bounds;
 
 /// Spacings within which the nearest particle is looked for.
 const REACH: f64 = 2.0;

@@ -41,6 +41,43 @@ fn every_path_that_a_document_names_is_there() {
     assert_eq!(missing(root, said), ["src/no_such_room"]);
 }
 
+/// Crates of the workspace that a manifest depends on, tests aside.
+fn depends_on(manifest: &str) -> Vec<&str> {
+    let needed = manifest.split("[dev-dependencies]").next().unwrap();
+    let lines = needed.lines();
+    lines
+        .filter_map(|line| line.strip_prefix("swell-")?.strip_suffix(".workspace = true"))
+        .collect()
+}
+
+/// Crate and dependencies of a row of the map's table.
+fn row(line: &str) -> Option<(&str, Vec<&str>)> {
+    let cells: Vec<&str> = line.strip_prefix("| `")?.split(" | ").collect();
+    let [name, _, needed] = cells[..] else {
+        return None;
+    };
+    let names = needed.split('`').skip(1).step_by(2);
+    Some((name.strip_suffix('`')?, names.collect()))
+}
+
+#[test]
+fn crates_depend_as_the_map_says() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = fs::read_to_string(root.join("docs/ARCHITECTURE.md")).unwrap();
+    let listed: Vec<_> = page.lines().filter_map(row).collect();
+    let workspace = fs::read_to_string(root.join("Cargo.toml")).unwrap();
+    let members = workspace.matches("\n    \"src/").count();
+    assert_eq!(listed.len(), members, "{listed:?}");
+    for (name, needed) in listed {
+        let manifest = root.join(format!("src/{name}/Cargo.toml"));
+        let manifest = fs::read_to_string(manifest).unwrap();
+        assert_eq!(depends_on(&manifest), needed, "{name}");
+        // Negative control: one more.
+        let more = format!("swell-cli.workspace = true\n{manifest}");
+        assert_ne!(depends_on(&more), needed, "{name}");
+    }
+}
+
 /// Lines of a source file at most.
 const LONGEST: usize = 600;
 

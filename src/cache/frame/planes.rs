@@ -14,8 +14,8 @@ use super::{
     Counted, HEADER_LIMIT, Head, Stamp, Unpacked, Written, header, header_bytes, pack, read_head,
     row_size,
 };
-use crate::cache::error::CacheError;
-use crate::domain::particles::Particles;
+use crate::error::CacheError;
+use swell_domain::particles::Particles;
 
 /// Rows of a block, the last one's fewer: a plane is then one block of Zstandard, which are of 128 KiB at most.
 const ROWS: usize = 1 << 17;

@@ -14,7 +14,7 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::frame::{Stamp, Written};
-use crate::domain::sparse_grid::{Precision, SparseGrid};
+use swell_domain::sparse_grid::{Precision, SparseGrid};
 use value::Value;
 
 /// "VDB " and four zero bytes.

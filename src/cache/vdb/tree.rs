@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::put_u32;
 use super::value::{self, Value};
-use crate::domain::sparse_grid::{Leaf, SparseGrid};
+use swell_domain::sparse_grid::{Leaf, SparseGrid};
 
 /// Bits of a coordinate below a leaf, and below each kind of inner node.
 const LEAF_BITS: u32 = 3;

@@ -3,15 +3,13 @@
 use glam::DVec3;
 
 use crate::{
-    check::{
-        engine::{Io, Outcome, Twin, names, twin},
-        flip::FlipState,
-        pbf::PbfState,
-        table::entries,
-    },
-    compare::rounding::U,
-    solve::{flip, pbf},
+    engine::{Io, Outcome, Twin, names, twin},
+    flip::FlipState,
+    pbf::PbfState,
+    table::entries,
 };
+use swell_compare::rounding::U;
+use swell_solve::{flip, pbf};
 
 use super::zone::{self, PART};
 

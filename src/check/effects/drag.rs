@@ -3,22 +3,22 @@
 use glam::DVec3;
 
 use crate::{
-    check::{
-        engine::{Io, Outcome, State, Twin, names, twin},
-        flip::FlipState,
-        pbf::{PbfState, bounds::Bounds},
-        table::{entries, pair},
-    },
-    compare::{rounding::U, tolerance::bounds},
-    domain::air::{self, exposure},
-    domain::{flip::PLANE_SHARE as OF_CELLS, pbf::PLANE_SHARE as OF_DENSITY},
-    reference::{
-        flip::effects::drag::{drag_by_cells, share},
-        pbf::{effects::drag::drag_by_density, passes::measure_density},
-    },
-    scene::effects::drag::Settings,
-    solve::{flip, pbf},
+    engine::{Io, Outcome, State, Twin, names, twin},
+    flip::FlipState,
+    pbf::{PbfState, bounds::Bounds},
+    table::{entries, pair},
 };
+use swell_compare::{rounding::U, tolerance::bounds};
+use swell_domain::{
+    air::{self, exposure},
+    {flip::PLANE_SHARE as OF_CELLS, pbf::PLANE_SHARE as OF_DENSITY},
+};
+use swell_reference::{
+    flip::effects::drag::{drag_by_cells, share},
+    pbf::{effects::drag::drag_by_density, passes::measure_density},
+};
+use swell_scene::effects::drag::Settings;
+use swell_solve::{flip, pbf};
 
 bounds! {
     // (w + g Δt) / (1 + x) with x = e Δt r(w): of x the exposure errs, and the power in r, of an exponent below 18, by what WGSL allows

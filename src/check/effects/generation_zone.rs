@@ -5,16 +5,14 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use crate::{
-    check::{
-        engine::{Io, Outcome, Twin, names, twin},
-        flip::FlipState,
-        pbf::PbfState,
-        table::entries,
-    },
-    compare::{rounding::U, tolerance::bounds},
-    domain::open_waves::OpenWaves,
-    solve::{flip, pbf},
+    engine::{Io, Outcome, Twin, names, twin},
+    flip::FlipState,
+    pbf::PbfState,
+    table::entries,
 };
+use swell_compare::{rounding::U, tolerance::bounds};
+use swell_domain::open_waves::OpenWaves;
+use swell_solve::{flip, pbf};
 
 use super::zone::{self, PART};
 
@@ -51,7 +49,7 @@ pub(super) const FLIP: &[Twin<FlipState>] = &[twin(
 /// The greatest part of the way in a step of so many seconds, [`WAVE`], and Σ|u|, m/s.
 fn sizes(waves: &OpenWaves, rate: f64, size: DVec3, step: f64) -> [f64; 3] {
     let speed = waves.most_speed();
-    let turns = |line: &crate::domain::open_waves::Line| line.number.length() / TAU;
+    let turns = |line: &swell_domain::open_waves::Line| line.number.length() / TAU;
     let most = waves.lines.iter().map(turns).fold(0.0, f64::max);
     let wave = WAVE.of([speed, most * size.length(), waves.lines.len() as f64]);
     [rate * step / (1.0 + rate * step), wave, speed]

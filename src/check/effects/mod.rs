@@ -1,6 +1,6 @@
 //! Effects' passes against their twins: a file an effect, for both solvers.
 
-use crate::scene::effects::with_effects;
+use swell_scene::effects::with_effects;
 
 use super::{engine::Twin, flip::FlipState, pbf::PbfState};
 

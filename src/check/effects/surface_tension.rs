@@ -3,21 +3,19 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    check::{
-        engine::{Io, NONE, Outcome, Twin, names, twin},
-        flip::FlipState,
-        pbf::PbfState,
-        table::{Entry, each, entries, pair},
-    },
-    compare::{rounding::U, tolerance::bounds},
-    domain::poisson::Cells,
-    gpu::buffer::Buf,
-    reference::flip::effects::surface_tension as twins,
-    scene::flip::Surface,
-    solve::{
-        effects::surface_tension::{BETWEEN, CURVATURE, SHARE},
-        flip,
-    },
+    engine::{Io, NONE, Outcome, Twin, names, twin},
+    flip::FlipState,
+    pbf::PbfState,
+    table::{Entry, each, entries, pair},
+};
+use swell_compare::{rounding::U, tolerance::bounds};
+use swell_domain::poisson::Cells;
+use swell_gpu::buffer::Buf;
+use swell_reference::flip::effects::surface_tension as twins;
+use swell_scene::flip::Surface;
+use swell_solve::{
+    effects::surface_tension::{BETWEEN, CURVATURE, SHARE},
+    flip,
 };
 
 bounds! {

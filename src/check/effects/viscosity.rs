@@ -2,34 +2,30 @@
 //! from the grid, and no pass.
 
 use crate::{
-    check::{
-        engine::{Io, NONE, Outcome, State, Twin, names, twin},
-        flip::FlipState,
-        pbf::{
-            PbfState,
-            bounds::{Bounds, relative_speed},
-        },
-        table::{each, entries, pair},
+    engine::{Io, NONE, Outcome, State, Twin, names, twin},
+    flip::FlipState,
+    pbf::{
+        PbfState,
+        bounds::{Bounds, relative_speed},
     },
-    compare::{
-        rounding::{KERNEL, U},
-        tolerance::bounds,
+    table::{each, entries, pair},
+};
+use swell_compare::{
+    rounding::{KERNEL, U},
+    tolerance::bounds,
+};
+use swell_reference::{
+    flip::Centers,
+    flip::effects::{
+        Water,
+        viscosity::{Cell, viscosity_relax, viscosity_weigh},
     },
-    reference::{
-        flip::Centers,
-        flip::effects::{
-            Water,
-            viscosity::{Cell, viscosity_relax, viscosity_weigh},
-        },
-        pbf::effects::viscosity::{viscosity_apply, viscosity_gather},
-    },
-    solve::{
-        effects::viscosity::{
-            CHANGE as VISCOSITY_CHANGE, EARLIER, FROM, GAINS, START, STEP, TO, WORD,
-        },
-        flip, pbf,
-        pressure::buffers as pressure,
-    },
+    pbf::effects::viscosity::{viscosity_apply, viscosity_gather},
+};
+use swell_solve::{
+    effects::viscosity::{CHANGE as VISCOSITY_CHANGE, EARLIER, FROM, GAINS, START, STEP, TO, WORD},
+    flip, pbf,
+    pressure::buffers as pressure,
 };
 
 bounds! {

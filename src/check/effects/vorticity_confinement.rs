@@ -3,27 +3,25 @@
 use glam::DVec3;
 
 use crate::{
-    check::{
-        engine::{Io, NONE, Outcome, State, Twin, names, twin},
-        flip::FlipState,
-        pbf::{
-            PbfState,
-            bounds::{Bounds, relative_speed},
-        },
-        table::{each, entries, pair},
+    engine::{Io, NONE, Outcome, State, Twin, names, twin},
+    flip::FlipState,
+    pbf::{
+        PbfState,
+        bounds::{Bounds, relative_speed},
     },
-    compare::{
-        rounding::{GRADIENT, U},
-        tolerance::bounds,
-    },
-    reference::{
-        flip::{grid_confinement, grid_curl},
-        pbf::effects::vorticity_confinement::{vorticity_curl, vorticity_force},
-    },
-    solve::{
-        effects::vorticity_confinement::{VORTICITY, VORTICITY_LENGTH},
-        flip, pbf,
-    },
+    table::{each, entries, pair},
+};
+use swell_compare::{
+    rounding::{GRADIENT, U},
+    tolerance::bounds,
+};
+use swell_reference::{
+    flip::{grid_confinement, grid_curl},
+    pbf::effects::vorticity_confinement::{vorticity_curl, vorticity_force},
+};
+use swell_solve::{
+    effects::vorticity_confinement::{VORTICITY, VORTICITY_LENGTH},
+    flip, pbf,
 };
 
 bounds! {

@@ -3,23 +3,21 @@
 use glam::DVec3;
 
 use crate::{
-    check::{
-        engine::{Io, Outcome, State},
-        flip::FlipState,
-        pbf::PbfState,
-        table::{Entry, pair},
-    },
-    compare::{rounding::U, tolerance::bounds},
-    reference::{
-        flip::{
-            Centers,
-            effects::{Water, led_faces},
-        },
-        pbf::effects::led_particles,
-    },
-    scene::effects::zone::Zone,
-    solve::{flip, pbf},
+    engine::{Io, Outcome, State},
+    flip::FlipState,
+    pbf::PbfState,
+    table::{Entry, pair},
 };
+use swell_compare::{rounding::U, tolerance::bounds};
+use swell_reference::{
+    flip::{
+        Centers,
+        effects::{Water, led_faces},
+    },
+    pbf::effects::led_particles,
+};
+use swell_scene::effects::zone::Zone;
+use swell_solve::{flip, pbf};
 
 bounds! {
     // r Δt w² changes by 2 r Δt w of the way w's own change. Of the part x / (1 + x) that is 2 √(r Δt) √x / (1 + x)², whose

@@ -3,18 +3,16 @@
 use std::ops::Range;
 
 use crate::{
-    check::{
-        engine::{Io, NONE, Outcome, Twin, twin},
-        table::{Entry, each, pair},
-    },
-    domain::bricks::CELLS,
-    reference::poisson::multigrid::{
-        About, Brick, Levels, MOST_AIR, Rounding, above_offset, place,
-    },
-    solve::{
-        SolveError,
-        pressure::{PressureBrick, PressurePhase, buffers as solved},
-    },
+    engine::{Io, NONE, Outcome, Twin, twin},
+    table::{Entry, each, pair},
+};
+use swell_domain::bricks::CELLS;
+use swell_reference::poisson::multigrid::{
+    About, Brick, Levels, MOST_AIR, Rounding, above_offset, place,
+};
+use swell_solve::{
+    SolveError,
+    pressure::{PressureBrick, PressurePhase, buffers as solved},
 };
 
 use super::{FlipState, rows::*};

@@ -4,14 +4,12 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::{
-    check::engine::{View, names},
-    domain::bricks::{Bricks, CELLS},
-    gpu::buffer::Buf,
-    reference::flip::Faces,
-    scene::step::Substep,
-    solve::{SolveError, flip::buffers},
-};
+use crate::engine::{View, names};
+use swell_domain::bricks::{Bricks, CELLS};
+use swell_gpu::buffer::Buf;
+use swell_reference::flip::Faces;
+use swell_scene::step::Substep;
+use swell_solve::{SolveError, flip::buffers};
 
 /// What [`Elements::faces`] reads.
 pub(super) fn faces_kept() -> Vec<String> {
@@ -23,11 +21,11 @@ pub(super) fn faces_kept() -> Vec<String> {
 }
 
 /// Where the elements of a substep lie.
-pub(in crate::check) struct Elements {
+pub(crate) struct Elements {
     pub(super) substep: Substep,
-    pub(in crate::check) bricks: Bricks,
+    pub(crate) bricks: Bricks,
     /// Elements of the active bricks, slot 0 included.
-    pub(in crate::check) cells: usize,
+    pub(crate) cells: usize,
     /// Between planes of the device's arrays.
     pub(super) stride: usize,
 }
@@ -39,7 +37,7 @@ pub(super) fn neighborhood() -> impl Iterator<Item = [i32; 3]> {
 
 impl Elements {
     /// Elements of the active bricks.
-    pub(in crate::check) fn active(&self) -> Range<usize> {
+    pub(crate) fn active(&self) -> Range<usize> {
         CELLS as usize..self.cells
     }
 
@@ -49,13 +47,13 @@ impl Elements {
     }
 
     /// The largest over a cell and the 26 about it.
-    pub(in crate::check) fn largest_about(&self, element: usize, of: impl Fn(usize) -> f64) -> f64 {
+    pub(crate) fn largest_about(&self, element: usize, of: impl Fn(usize) -> f64) -> f64 {
         let near = |offset| of(self.bricks.near(element as u32, offset) as usize);
         neighborhood().map(near).fold(0.0, f64::max)
     }
 
     /// An array of cells.
-    pub(in crate::check) fn scalars(
+    pub(crate) fn scalars(
         &self,
         view: &View<'_>,
         buffer: Buf<f32>,
@@ -64,7 +62,7 @@ impl Elements {
     }
 
     /// Three planes as one vector a cell.
-    pub(in crate::check) fn planes(
+    pub(crate) fn planes(
         &self,
         view: &View<'_>,
         buffer: Buf<f32>,

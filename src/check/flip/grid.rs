@@ -3,22 +3,20 @@
 use glam::DVec3;
 
 use crate::{
-    check::{
-        engine::{Io, Outcome},
-        pbf::{GRID, TURNED},
-        table::{each, pair},
-    },
-    domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance},
-    reference::flip::{
-        Model, Room, Solid, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
-        find_change as twin_find_change, find_depth, find_excess as twin_find_excess,
-        find_water as twin_find_water, friction_rates, gather_centers as twin_gather_centers,
-        gather_faces as twin_gather_faces, is_near_half, let_in as twin_let_in,
-        wall_friction as twin_wall_friction,
-    },
-    scene::flip::Surface,
-    solve::flip::buffers,
+    engine::{Io, Outcome},
+    pbf::{GRID, TURNED},
+    table::{each, pair},
 };
+use swell_domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance};
+use swell_reference::flip::{
+    Model, Room, Solid, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
+    find_change as twin_find_change, find_depth, find_excess as twin_find_excess,
+    find_water as twin_find_water, friction_rates, gather_centers as twin_gather_centers,
+    gather_faces as twin_gather_faces, is_near_half, let_in as twin_let_in,
+    wall_friction as twin_wall_friction,
+};
+use swell_scene::flip::Surface;
+use swell_solve::flip::buffers;
 
 use super::{FlipState, elements::neighborhood, rows::*};
 
@@ -414,7 +412,7 @@ fn surface_moved(distance: f64, error: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{OF_HALF, surface_moved};
-    use crate::compare::rounding::U;
+    use swell_compare::rounding::U;
 
     /// `flip/find_water`'s own steps, in f32.
     fn device(density: f32) -> f64 {

@@ -1,23 +1,21 @@
 //! The iteration of a solve: preconditioners, direction, step and scalars; bodies of water that no air touches.
 
 use crate::{
-    check::{
-        engine::{Io, NONE, Outcome, Twin, names, twin},
-        table::pair,
-    },
-    domain::{bricks::CELLS, poisson::remove_means},
-    gpu::buffer::Buf,
-    reference::poisson::iteration::{
-        Decision, Limits, Progress, SolveState, Sum, differences, ipp_lower as twin_ipp_lower,
-        ipp_upper as twin_ipp_upper, products, verify as twin_verify,
-    },
-    scene::flip::Preconditioner,
-    solve::{
-        SolveError,
-        pressure::{
-            DONE, ITERATING, PressureControl64, ReduceStep, VERIFYING, WANTS_POCKETS, blocked,
-            buffers::{self as solved, Real},
-        },
+    engine::{Io, NONE, Outcome, Twin, names, twin},
+    table::pair,
+};
+use swell_domain::{bricks::CELLS, poisson::remove_means};
+use swell_gpu::buffer::Buf;
+use swell_reference::poisson::iteration::{
+    Decision, Limits, Progress, SolveState, Sum, differences, ipp_lower as twin_ipp_lower,
+    ipp_upper as twin_ipp_upper, products, verify as twin_verify,
+};
+use swell_scene::flip::Preconditioner;
+use swell_solve::{
+    SolveError,
+    pressure::{
+        DONE, ITERATING, PressureControl64, ReduceStep, VERIFYING, WANTS_POCKETS, blocked,
+        buffers::{self as solved, Real},
     },
 };
 
@@ -81,7 +79,7 @@ const _: () = assert!(
 
 impl FlipState {
     /// Counts a run of a pass on a level; true for the first few.
-    pub(in crate::check) fn is_due(&mut self, io: &Io<'_>, level: u32) -> bool {
+    pub(crate) fn is_due(&mut self, io: &Io<'_>, level: u32) -> bool {
         let runs = self.runs.entry((io.pass, level)).or_default();
         *runs += 1;
         *runs <= PRODUCTS

@@ -13,23 +13,21 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use crate::{
-    domain::{
-        boundary::Boundary, particles::Particles, poisson::FLUID, solver::Solver, substep::Which,
-    },
-    gpu::adapter::Context,
-    reference::{
-        flip::{Given, Model, Room, Sorted, Step},
-        poisson::iteration::Sum,
-    },
-    scene::{Scene, step::Substep},
-    solve::{
-        SolveError,
-        flip::{Flip, buffers},
-        plan::Plan,
-        pressure::buffers as solved,
-        trace::{Begun, Span, TraceFrame},
-    },
+use swell_domain::{
+    boundary::Boundary, particles::Particles, poisson::FLUID, solver::Solver, substep::Which,
+};
+use swell_gpu::adapter::Context;
+use swell_reference::{
+    flip::{Given, Model, Room, Sorted, Step},
+    poisson::iteration::Sum,
+};
+use swell_scene::{Scene, step::Substep};
+use swell_solve::{
+    SolveError,
+    flip::{Flip, buffers},
+    plan::Plan,
+    pressure::buffers as solved,
+    trace::{Begun, Span, TraceFrame},
 };
 
 use super::{
@@ -109,7 +107,7 @@ pub fn check(
 }
 
 /// What the twins know of the substep.
-pub(in crate::check) struct FlipState {
+pub(crate) struct FlipState {
     pub(super) scene: Scene,
     boundary: Boundary,
     pub(super) model: Model,

@@ -4,17 +4,15 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    check::{
-        engine::{Io, Outcome},
-        table::pair,
-    },
-    domain::bricks::Bricks,
-    reference::flip::{
-        Given, Moved, Solid, advect as twin_advect, aim as twin_aim,
-        grid_to_particle as twin_grid_to_particle, push_apart as twin_push_apart,
-    },
-    solve::{SolveError, flip::buffers, pressure::buffers as solved},
+    engine::{Io, Outcome},
+    table::pair,
 };
+use swell_domain::bricks::Bricks;
+use swell_reference::flip::{
+    Given, Moved, Solid, advect as twin_advect, aim as twin_aim,
+    grid_to_particle as twin_grid_to_particle, push_apart as twin_push_apart,
+};
+use swell_solve::{SolveError, flip::buffers, pressure::buffers as solved};
 
 use super::{FlipState, elements::neighborhood, rows::*};
 

@@ -3,32 +3,30 @@
 use glam::DVec3;
 
 use crate::{
-    check::{
-        engine::{Io, NONE, Outcome, Twin, View, names, twin},
-        table::{Entry, Table, pair},
+    engine::{Io, NONE, Outcome, Twin, View, names, twin},
+    table::{Entry, Table, pair},
+};
+use swell_compare::{
+    deviation::relative,
+    rounding::{U, U64},
+};
+use swell_domain::poisson::{System, remove_means};
+use swell_gpu::buffer::Buf;
+use swell_reference::{
+    flip::{Centers, Waters, density_source as twin_density_source},
+    poisson::{
+        BUDGET, Solver,
+        gradients::norm,
+        iteration::{differences, least_eigenvalue, products},
     },
-    compare::{
-        deviation::relative,
-        rounding::{U, U64},
-    },
-    domain::poisson::{System, remove_means},
-    gpu::buffer::Buf,
-    reference::{
-        flip::{Centers, Waters, density_source as twin_density_source},
-        poisson::{
-            BUDGET, Solver,
-            gradients::norm,
-            iteration::{differences, least_eigenvalue, products},
-        },
-    },
-    scene::flip::{Precision, Preconditioner, Surface},
-    solve::{
-        SolveError,
-        flip::buffers,
-        pressure::{
-            CORRECTION_TOLERANCE, DONE, blocked,
-            buffers::{self as solved, Real},
-        },
+};
+use swell_scene::flip::{Precision, Preconditioner, Surface};
+use swell_solve::{
+    SolveError,
+    flip::buffers,
+    pressure::{
+        CORRECTION_TOLERANCE, DONE, blocked,
+        buffers::{self as solved, Real},
     },
 };
 

@@ -2,10 +2,8 @@
 //! where the scene asks for that, has `unit` = 2⁻⁵³ in place of U: the system, its right-hand side, products, differences of
 //! the solution, the residual. Velocities, displacements and pascals stay f32.
 
-use crate::{
-    check::{pbf::GRID, sort::NEAR_FACE, table::entries},
-    compare::{deviation::relative, rounding::U, tolerance::bounds},
-};
+use crate::{pbf::GRID, sort::NEAR_FACE, table::entries};
+use swell_compare::{deviation::relative, rounding::U, tolerance::bounds};
 
 bounds! {
     pub(super) PLACE = [cells: "cells along the domain's longest side"] U * cells, "";

@@ -3,17 +3,15 @@
 use glam::{DMat3, DVec3};
 
 use crate::{
-    check::{
-        engine::{Io, Outcome, View},
-        sort::{check_cells, check_slots},
-        table::pair,
-    },
-    domain::bricks::CELLS,
-    gpu::buffer::Buf,
-    reference::flip::{Cloud, Sorted, assign_cells as twin_cells, survey as twin_survey},
-    scene::flip::Transfer,
-    solve::{SolveError, flip::buffers, trace::Begun},
+    engine::{Io, Outcome, View},
+    sort::{check_cells, check_slots},
+    table::pair,
 };
+use swell_domain::bricks::CELLS;
+use swell_gpu::buffer::Buf;
+use swell_reference::flip::{Cloud, Sorted, assign_cells as twin_cells, survey as twin_survey};
+use swell_scene::flip::Transfer;
+use swell_solve::{SolveError, flip::buffers, trace::Begun};
 
 use super::{Elements, FlipState, rows::*};
 

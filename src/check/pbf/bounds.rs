@@ -2,37 +2,35 @@
 
 use glam::{DQuat, DVec3};
 
-use crate::{
-    compare::rounding::{
-        DENSITY, GRADIENT_SQUARES, LAMBDA, OTHER_GRADIENTS, OWN_GRADIENT, Sums, U, WALL_DENSITY,
-        WALL_GRADIENT, WALL_PLACE,
-    },
-    domain::{bounds::FAR, pbf::CONTACT, pose::Pose},
-    reference::pbf::passes::{Inputs, Row},
+use swell_compare::rounding::{
+    DENSITY, GRADIENT_SQUARES, LAMBDA, OTHER_GRADIENTS, OWN_GRADIENT, Sums, U, WALL_DENSITY,
+    WALL_GRADIENT, WALL_PLACE,
 };
+use swell_domain::{bounds::FAR, pbf::CONTACT, pose::Pose};
+use swell_reference::pbf::passes::{Inputs, Row};
 
 use super::rows::{DELTA, GRID, OF_SOLIDS, PUSHED, REACH, REPULSION, TURNED};
 
 /// What the bounds of a pass depend on.
-pub(in crate::check) struct Bounds<'a>(pub(in crate::check) Inputs<'a>);
+pub(crate) struct Bounds<'a>(pub(crate) Inputs<'a>);
 
 /// Bounds on a position behind walls and solids.
-pub(in crate::check) struct Confined {
+pub(crate) struct Confined {
     /// Magnitudes of its tolerance.
-    pub(in crate::check) magnitudes: [f64; 4],
+    pub(crate) magnitudes: [f64; 4],
     /// [`PUSHED`]: of what the walls alone added to it, metres.
-    pub(in crate::check) push_error: f64,
+    pub(crate) push_error: f64,
     /// [`OF_SOLIDS`]: of the work of solids that move, over m / Δt².
-    pub(in crate::check) work_error: f64,
+    pub(crate) work_error: f64,
     /// Whether they pushed, or may have by rounding alone.
-    pub(in crate::check) is_touched: bool,
+    pub(crate) is_touched: bool,
     /// By how much the place errs where it is looked up in the solids' grid, metres.
-    pub(in crate::check) reach: f64,
+    pub(crate) reach: f64,
 }
 
 impl Bounds<'_> {
     /// Sums over the neighbours of particle `i`, each term weighted.
-    pub(in crate::check) fn sums(&self, i: usize, weight: impl Fn(usize) -> f64) -> Sums {
+    pub(crate) fn sums(&self, i: usize, weight: impl Fn(usize) -> f64) -> Sums {
         let h = self.0.model.calibration.support_radius;
         let mut sums = Sums::default();
         for j in self.0.neighbors.all(i) {
@@ -73,7 +71,7 @@ impl Bounds<'_> {
     }
 
     /// [`DENSITY`].
-    pub(in crate::check) fn density(&self, i: usize, density: f64) -> f64 {
+    pub(crate) fn density(&self, i: usize, density: f64) -> f64 {
         let sums = self.sums(i, |j| self.mass(j));
         let [walls, _] = self.walls(self.0.points[i]);
         let scale = self.0.model.calibration.density_scale;
@@ -201,6 +199,6 @@ impl Bounds<'_> {
 }
 
 /// Speed between a particle and its neighbour, of which samples have none.
-pub(in crate::check) fn relative_speed(velocity: &[DVec3], i: usize) -> impl Fn(usize) -> f64 + '_ {
+pub(crate) fn relative_speed(velocity: &[DVec3], i: usize) -> impl Fn(usize) -> f64 + '_ {
     move |j| velocity.get(j).map_or(0.0, |v| v.distance(velocity[i]))
 }

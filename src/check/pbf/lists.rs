@@ -6,17 +6,15 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    check::{
-        engine::{Io, Outcome},
-        table::pair,
-    },
-    domain::places::{SKIN, are_near},
-    reference::neighbors::{Crowd, Neighbors},
-    solve::{
-        SolveError,
-        pbf::buffers,
-        plan::{LIST_CAPACITY, Plan},
-    },
+    engine::{Io, Outcome},
+    table::pair,
+};
+use swell_domain::places::{SKIN, are_near};
+use swell_reference::neighbors::{Crowd, Neighbors};
+use swell_solve::{
+    SolveError,
+    pbf::buffers,
+    plan::{LIST_CAPACITY, Plan},
 };
 
 use super::{
@@ -117,7 +115,7 @@ impl PbfState {
     }
 
     /// Whom a pass visits from `points`: the list, or the cells about where there is none.
-    pub(in crate::check) fn visited(
+    pub(crate) fn visited(
         &mut self,
         io: &Io<'_>,
         points: &[DVec3],

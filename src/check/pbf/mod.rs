@@ -12,22 +12,20 @@ pub(super) use rows::{GRID, TURNED};
 
 use glam::DVec3;
 
-use crate::{
-    domain::{boundary::Boundary, particles::Particles, solver::Solver, substep::Which},
-    gpu::adapter::Context,
-    reference::{
-        neighbors::Neighbors,
-        pbf::{Model, Substep, passes::Inputs},
-    },
-    scene::{Scene, Stop, step::projected_substep},
-    solve::{
-        SolveError,
-        flip::buffers::BRICKS,
-        params::IterationControl,
-        pbf::{Pbf, buffers},
-        plan::Plan,
-        trace::{Span, TraceFrame},
-    },
+use swell_domain::{boundary::Boundary, particles::Particles, solver::Solver, substep::Which};
+use swell_gpu::adapter::Context;
+use swell_reference::{
+    neighbors::Neighbors,
+    pbf::{Model, Substep, passes::Inputs},
+};
+use swell_scene::{Scene, Stop, step::projected_substep};
+use swell_solve::{
+    SolveError,
+    flip::buffers::BRICKS,
+    params::IterationControl,
+    pbf::{Pbf, buffers},
+    plan::Plan,
+    trace::{Span, TraceFrame},
 };
 
 use super::{

@@ -3,22 +3,20 @@
 use glam::DVec3;
 
 use crate::{
-    check::{
-        engine::{Io, Outcome},
-        sort::{check_cells, check_slots},
-        table::{each, pair},
-    },
-    domain::places::word,
-    reference::{
-        neighbors::Neighbors,
-        pbf::{
-            Colour,
-            passes::{self, Momentum},
-        },
-    },
-    scene::Iteration,
-    solve::{params::Phase, pbf::buffers},
+    engine::{Io, Outcome},
+    sort::{check_cells, check_slots},
+    table::{each, pair},
 };
+use swell_domain::places::word;
+use swell_reference::{
+    neighbors::Neighbors,
+    pbf::{
+        Colour,
+        passes::{self, Momentum},
+    },
+};
+use swell_scene::Iteration;
+use swell_solve::{params::Phase, pbf::buffers};
 
 use super::{PbfState, State, bounds::Bounds, rows::*};
 

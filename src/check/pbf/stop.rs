@@ -1,13 +1,11 @@
 //! The stop at a density error.
 
 use crate::{
-    check::{
-        engine::{Io, Outcome},
-        table::pair,
-    },
-    scene::Stop,
-    solve::{params::IterationControl, pbf::buffers},
+    engine::{Io, Outcome},
+    table::pair,
 };
+use swell_scene::Stop;
+use swell_solve::{params::IterationControl, pbf::buffers};
 
 use super::{
     PbfState, State,

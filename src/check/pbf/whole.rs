@@ -3,15 +3,13 @@
 
 use glam::DVec3;
 
-use crate::{
-    check::table::{Table, pair},
-    compare::deviation::Deviation,
-    domain::boundary::Boundary,
-    reference::{
-        Timings,
-        neighbors::Neighbors,
-        pbf::{Colour, Model, Sorted, iterate_among, passes},
-    },
+use crate::table::{Table, pair};
+use swell_compare::deviation::Deviation;
+use swell_domain::boundary::Boundary;
+use swell_reference::{
+    Timings,
+    neighbors::Neighbors,
+    pbf::{Colour, Model, Sorted, iterate_among, passes},
 };
 
 use super::{

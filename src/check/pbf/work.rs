@@ -1,12 +1,10 @@
 //! What moving walls do on the particles, over m / Δt².
 
 use crate::{
-    check::{
-        engine::{Io, Outcome},
-        table::pair,
-    },
-    solve::pbf::buffers,
+    engine::{Io, Outcome},
+    table::pair,
 };
+use swell_solve::pbf::buffers;
 
 use super::{PbfState, State, rows::WORK};
 

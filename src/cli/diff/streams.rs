@@ -2,10 +2,8 @@
 
 use std::fmt::Write as _;
 
-use crate::{
-    domain::frame_range::ranges,
-    stage::diff::{CacheDiff, Difference, GridDiff, StreamDiff},
-};
+use swell_domain::frame_range::ranges;
+use swell_stage::diff::{CacheDiff, Difference, GridDiff, StreamDiff};
 
 use super::number;
 

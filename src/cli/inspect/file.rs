@@ -8,12 +8,10 @@ use std::{
 use serde_json::{Value, json};
 
 use super::{InspectArgs, refuse_options};
-use crate::{
-    cli::{Failure, count},
-    domain::bounds::Bounds,
-    stage::inspect::file::{
-        FileContents, FrameFile, GridFile, MeshFile, PictureFile, Rig, describe, is_known,
-    },
+use crate::{Failure, count};
+use swell_domain::bounds::Bounds;
+use swell_stage::inspect::file::{
+    FileContents, FrameFile, GridFile, MeshFile, PictureFile, Rig, describe, is_known,
 };
 
 /// Whether a name is that of a frame, mesh, VDB, picture, USD or glTF.

@@ -7,15 +7,13 @@ use serde_json::{Map, Value, json};
 use super::{
     CACHE, InspectArgs, broken_off, file, look, refuse_frames_beyond, refuse_options, study,
 };
-use crate::{
-    cli::{Failure, bake, is_cache, named_adapter, output},
-    scene::Scene,
-    stage::{
-        bake::shot_bytes,
-        inspect::{Adapter, Entry, Manifest, PARTICLES, ScenePlan, adapters, cache, plan, sizes},
-        replay::is_failed,
-        time::{Timed, time},
-    },
+use crate::{Failure, bake, is_cache, named_adapter, output};
+use swell_scene::Scene;
+use swell_stage::{
+    bake::shot_bytes,
+    inspect::{Adapter, Entry, Manifest, PARTICLES, ScenePlan, adapters, cache, plan, sizes},
+    replay::is_failed,
+    time::{Timed, time},
 };
 
 /// Prints the object.

@@ -7,11 +7,9 @@ use std::{
 };
 
 use super::{InspectArgs, misplaced};
-use crate::{
-    cli::{Failure, bake, count, is_cache, named_adapter, size},
-    scene::look::{AovSpec, FormatSpec, Look, MethodSpec},
-    stage::render::{LookPlan, Subject, plan},
-};
+use crate::{Failure, bake, count, is_cache, named_adapter, size};
+use swell_scene::look::{AovSpec, FormatSpec, Look, MethodSpec};
+use swell_stage::render::{LookPlan, Subject, plan};
 
 /// Tables that a look has and a scene has not.
 const TABLES: [&str; 4] = ["[camera]", "[image]", "[sun]", "[output]"];

@@ -9,11 +9,9 @@ use std::{
 use serde_json::{Value, json};
 
 use super::{InspectArgs, refuse_options};
-use crate::{
-    cli::{Failure, bake, count},
-    scene::study::Study,
-    stage::inspect::study::Outline,
-};
+use crate::{Failure, bake, count};
+use swell_scene::study::Study;
+use swell_stage::inspect::study::Outline;
 
 /// Whether a file is a study: it says of what `kind`, before its first table. What cannot be read is none.
 pub(super) fn is_study(file: &Path) -> bool {
@@ -40,7 +38,7 @@ pub(super) fn show(out: &mut String, args: &InspectArgs, file: &Path) -> Result<
 }
 
 /// What runs, in words; `file` is the study's, or the scene's that a command line asks for.
-pub(in crate::cli) fn told(outline: &Outline, file: &Path) -> String {
+pub(crate) fn told(outline: &Outline, file: &Path) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
     let _ = show_outline(&mut out, outline, file);
@@ -73,7 +71,7 @@ pub(super) fn object(args: &InspectArgs, file: &Path) -> Result<Value, Failure> 
     Ok(outline_object(&outline(args, file)?))
 }
 
-pub(in crate::cli) fn outline_object(outline: &Outline) -> Value {
+pub(crate) fn outline_object(outline: &Outline) -> Value {
     let parts = outline.parts.iter();
     let parts =
         parts.map(|part| json!({ "name": part.name, "key": part.key, "points": part.points }));

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Cloud;
-use crate::domain::level_set::sunlight::between;
+use crate::level_set::sunlight::between;
 
 /// Voxels between the lattice's nodes, where there are not too many.
 const PITCH: f64 = 2.0;

@@ -9,7 +9,7 @@ use super::{
     cell::{EDGES, Loops, fan},
     corner,
 };
-use crate::domain::mesh::TriangleMesh;
+use crate::mesh::TriangleMesh;
 
 /// Values of a narrow band at whole places, negative inside.
 pub type Band = HashMap<[i32; 3], f32>;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::domain::level_set::kernels::Kernels;
+use crate::level_set::kernels::Kernels;
 
 const D: f64 = 0.1;
 

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use pulp::{Simd, WithSimd};
 
 use super::grid::{Grid, HALVES};
-use crate::domain::lanes::{positive, widely};
+use crate::lanes::{positive, widely};
 
 /// Places that are looked at together.
 pub(super) const AT_ONCE: usize = 64;
@@ -167,7 +167,7 @@ fn outer(d: DVec3) -> DMat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::sampling::uniform;
+    use crate::sampling::uniform;
 
     /// Of more places than are gathered at once, and of numbers of them that fill no whole lanes, against each by itself.
     #[test]

@@ -100,7 +100,7 @@ fn is_within(p: DVec3, size: DVec3) -> bool {
 }
 
 /// Bilinear in a plane of nodes; light comes in from beyond its sides without a way through anything.
-pub(in crate::domain) fn between(plane: &[f32], [nx, nz]: [usize; 2], x: f64, z: f64) -> f64 {
+pub(crate) fn between(plane: &[f32], [nx, nz]: [usize; 2], x: f64, z: f64) -> f64 {
     let last = |n: usize| (n - 1) as f64;
     if !(x >= 0.0 && z >= 0.0 && x <= last(nx) && z <= last(nz)) {
         return 0.0;

@@ -20,7 +20,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Those of the mesh that [`crate::domain::mesh::TriangleMesh::from_bytes`] reads from the same bytes.
+    /// Those of the mesh that [`crate::mesh::TriangleMesh::from_bytes`] reads from the same bytes.
     ///
     /// # Errors
     /// As there; and a texture coordinate (`vt`) that is no number, or a corner that names one that is not there.
@@ -207,7 +207,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
     use super::*;
-    use crate::domain::mesh::TriangleMesh;
+    use crate::mesh::TriangleMesh;
 
     const FILE: &str = "mtllib a.mtl\no hut\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n\
         vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wall\nf 1/1 2/2 3/3 4/4\nf 1 1 2\ng front left\nusemtl roof\nf 1//1 2//1 5/\n";

@@ -16,7 +16,7 @@ use vdb_rs::{Grid, Map, MetadataValue, VdbLevel, VdbReader};
 use half::with_lengths;
 
 use super::Raw;
-use crate::domain::isosurface::sparse::{Band, around};
+use crate::isosurface::sparse::{Band, around};
 
 /// The level set that is read where a file has several: Houdini, Blender and swell call it so.
 const USUAL: &str = "surface";

@@ -11,7 +11,7 @@ use super::{
     sines::{Sine, Sines},
     wave_number,
 };
-use crate::domain::sampling::uniform;
+use crate::sampling::uniform;
 
 /// Frequencies within the peak's own: the sea comes again after so many peak periods.
 const LINES: u32 = 200;

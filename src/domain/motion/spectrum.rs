@@ -13,6 +13,8 @@ pub enum Spectrum {
     Tma,
 }
 
+crate::read_by_name!(Spectrum);
+
 impl Spectrum {
     /// Each by its name.
     pub const NAMED: [(&'static str, Self); 3] = [
@@ -31,7 +33,7 @@ impl Spectrum {
 
     /// Density at a frequency over that of the peak, up to a factor that is the same for all frequencies. The peak is of
     /// `peak` Hz, raised `enhancement` times (γ), in water of `depth` metres under `gravity`, m/s².
-    pub(in crate::domain) fn density(
+    pub(crate) fn density(
         self,
         frequency: f64,
         peak: f64,

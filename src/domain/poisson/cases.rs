@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{AIR, Cells, FLUID, SOLID, System};
-use crate::domain::bricks::{Bricks, CELLS, EDGE, table_dims};
+use crate::bricks::{Bricks, CELLS, EDGE, table_dims};
 
 /// Place where pressure is taken as zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

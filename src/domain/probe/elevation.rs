@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use super::SUPPORT;
-use crate::domain::{bounds::Bounds, particles::Particles, surface::calm_radius};
+use crate::{bounds::Bounds, particles::Particles, surface::calm_radius};
 
 /// Heights at which a column is looked at, a particle spacing.
 const SAMPLES: f64 = 8.0;

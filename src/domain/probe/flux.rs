@@ -1,7 +1,7 @@
 //! Volume that crosses a plane.
 
 use super::SUPPORT;
-use crate::domain::particles::Particles;
+use crate::particles::Particles;
 
 /// Volume a second that crosses the plane where the coordinate along `axis` is `at`, towards larger ones, m³/s.
 ///

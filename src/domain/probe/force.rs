@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::domain::{mesh::TriangleMesh, pose::Pose};
+use crate::{mesh::TriangleMesh, pose::Pose};
 
 /// A piece of a surface that water may press on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,7 +71,7 @@ pub fn load(patches: &[Patch], pressures: &[f64], about: DVec3) -> [DVec3; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::{bounds::Bounds, mesh::tests::box_mesh};
+    use crate::{bounds::Bounds, mesh::tests::box_mesh};
 
     fn bounds() -> Bounds {
         Bounds {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::SUPPORT;
-use crate::domain::particles::Particles;
+use crate::particles::Particles;
 
 /// Coordinate along `axis` (0, 1, 2 for x, y, z) behind which the part `quantile` of the water lies, metres: for
 /// `sign` 1 the rest lies at larger coordinates, for −1 at smaller ones. `None` without water.

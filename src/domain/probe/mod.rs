@@ -23,7 +23,7 @@ pub use rate::Rate;
 pub use volume::{enclosed_volume, volume};
 
 /// R of the surface's kernel in particle spacings (Zhu and Bridson 2005).
-pub(in crate::domain) const SUPPORT: f64 = 2.0;
+pub(crate) const SUPPORT: f64 = 2.0;
 
 /// Kinetic and potential energy of particles of `mass` kg, joule; the latter against `lowest`.
 pub fn energies(particles: &Particles, mass: f64, gravity: DVec3, lowest: DVec3) -> (f64, f64) {

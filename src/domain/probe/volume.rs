@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::SUPPORT;
-use crate::domain::{
+use crate::{
     bounds::Bounds,
     bricks::CELLS,
     particles::Particles,
@@ -148,7 +148,7 @@ mod tests {
 
     use super::super::tests::{block, domain};
     use super::*;
-    use crate::domain::sparse_grid::{Leaf, VOXELS};
+    use crate::sparse_grid::{Leaf, VOXELS};
 
     /// A number from 0 to 1 that follows from `k`.
     fn chance(k: usize) -> f64 {

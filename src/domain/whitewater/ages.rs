@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{AGE, KIND, Kind, LIFE, Settings};
-use crate::domain::particles::Particles;
+use crate::particles::Particles;
 
 /// Lets `seconds` pass: all grow older, foam loses life, by as many times more as its cube of one spacing holds more foam than
 /// `settings.crowd`; those that have none left are taken out. How many went.

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{AGE, KIND, Kind, LIFE, Potentials, RADIUS, Settings, random, thresholds::grown};
-use crate::domain::{bounds::Bounds, particles::Particles, period::Period};
+use crate::{bounds::Bounds, particles::Particles, period::Period};
 
 /// Random numbers of a birth, from which on those of the next begin.
 const CHANNELS: u32 = 8;

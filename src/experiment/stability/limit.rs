@@ -1,6 +1,6 @@
 //! How far a setting goes before a mark is missed, by bisection.
 
-use crate::scene::study::stability::{Limit, Search, Trial};
+use swell_scene::study::stability::{Limit, Search, Trial};
 
 use super::{
     super::{PointStatus, StudyError, engine::Bench, ledger::Ledger},

@@ -7,14 +7,12 @@ mod verdict;
 mod view;
 mod watch;
 
-use crate::{
-    gpu::adapter::Needs,
-    scene::{
-        Scene,
-        study::{
-            RunsOn,
-            stability::{Bound, Held, Stability, Trial},
-        },
+use swell_gpu::adapter::Needs;
+use swell_scene::{
+    Scene,
+    study::{
+        RunsOn,
+        stability::{Bound, Held, Stability, Trial},
     },
 };
 

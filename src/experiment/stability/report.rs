@@ -1,17 +1,15 @@
 //! The table and the page of a stability study.
 
-use crate::{
-    scene::{
-        Method,
-        study::{
-            RunsOn,
-            stability::{Bound, Case, Held, Limit, Mark, Quantity, Search, Stability},
-        },
-    },
+use swell_scene::{
+    Method,
     study::{
-        chart::{self, Chart, Series},
-        page::{Part, Tone},
+        RunsOn,
+        stability::{Bound, Case, Held, Limit, Mark, Quantity, Search, Stability},
     },
+};
+use swell_study::{
+    chart::{self, Chart, Series},
+    page::{Part, Tone},
 };
 
 use super::{
@@ -359,8 +357,8 @@ impl Results<'_> {
             "{gpu}CPU: {}. By {} {}. Limits are those of the GPU's solvers. Particles, frames and seconds of each run stand in \
              results.csv.",
             self.devices.cpu.identity(),
-            env!("CARGO_PKG_NAME"),
-            env!("CARGO_PKG_VERSION")
+            swell_domain::PROGRAM,
+            swell_domain::VERSION
         )
     }
 }

@@ -2,13 +2,11 @@
 
 use std::{sync::atomic::AtomicBool, time::Instant};
 
-use crate::{
-    scene::study::{
-        RunsOn,
-        stability::{Attempt, Trial},
-    },
-    stage::{device::SolverError, drive::Drive},
+use swell_scene::study::{
+    RunsOn,
+    stability::{Attempt, Trial},
 };
+use swell_stage::{device::SolverError, drive::Drive};
 
 use super::{
     super::{Devices, StudyError, engine::until_done},

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::scene::study::stability::{Mark, Trial};
+use swell_scene::study::stability::{Mark, Trial};
 
 use super::{super::PointStatus, report};
 

@@ -2,14 +2,12 @@
 
 use glam::DVec3;
 
-use crate::{
-    domain::{
-        bounds::Bounds, particles::Particles, probe::elevation,
-        signed_distance::SignedDistanceError, solver::StepReport,
-    },
-    scene::{Method, Scene, probe::ProbeKind},
-    stage::{drive::Step, prepare::Start},
+use swell_domain::{
+    bounds::Bounds, particles::Particles, probe::elevation, signed_distance::SignedDistanceError,
+    solver::StepReport,
 };
+use swell_scene::{Method, Scene, probe::ProbeKind};
+use swell_stage::{drive::Step, prepare::Start};
 
 /// A scene and where its run stands.
 pub(super) struct View<'a> {
@@ -73,11 +71,11 @@ impl<'a> View<'a> {
         match self.scene.solver.method {
             Method::Pbf => {
                 let pbf = self.scene.solver.pbf();
-                crate::domain::pbf::CAP * pbf.cfl * pbf.particle_spacing
+                swell_domain::pbf::CAP * pbf.cfl * pbf.particle_spacing
             }
             Method::Flip => {
                 let flip = self.scene.solver.flip();
-                crate::domain::flip::CAP * flip.cfl * flip.cell_size
+                swell_domain::flip::CAP * flip.cfl * flip.cell_size
             }
         }
     }

@@ -2,18 +2,16 @@
 
 use glam::DVec3;
 
-use crate::{
-    domain::{
-        bounds::Bounds,
-        probe::{enclosed_volume, energies},
-        solver::StepReport,
-    },
-    scene::{
-        Scene,
-        study::stability::{Mark, Other, Over, Quantity},
-    },
-    study::stability::{Flight, filled_volume, least_spacing, matched, outside, point},
+use swell_domain::{
+    bounds::Bounds,
+    probe::{enclosed_volume, energies},
+    solver::StepReport,
 };
+use swell_scene::{
+    Scene,
+    study::stability::{Mark, Other, Over, Quantity},
+};
+use swell_study::stability::{Flight, filled_volume, least_spacing, matched, outside, point};
 
 use super::view::View;
 

@@ -1,15 +1,13 @@
 //! Table, curves and page of a study of the drawn surface.
 
-use crate::{
-    scene::study::{
-        RunsOn,
-        surface::{PictureError, SurfaceStudy},
-    },
-    study::{
-        chart::{Chart, Dot, Series},
-        knee,
-        page::Part,
-    },
+use swell_scene::study::{
+    RunsOn,
+    surface::{PictureError, SurfaceStudy},
+};
+use swell_study::{
+    chart::{Chart, Dot, Series},
+    knee,
+    page::Part,
 };
 
 use super::{
@@ -205,8 +203,8 @@ impl Results<'_> {
         run.push(Part::Text(format!(
             "On {}. By {} {}.",
             self.device,
-            env!("CARGO_PKG_NAME"),
-            env!("CARGO_PKG_VERSION"),
+            swell_domain::PROGRAM,
+            swell_domain::VERSION,
         )));
         parts.push(Part::Folded("What was run".into(), run));
         let measured = vec![Part::Text(MEASURED.into())];

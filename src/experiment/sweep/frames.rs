@@ -2,24 +2,22 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::{
-    domain::particles::Particles,
-    reference::{
-        neighbors::{Cells, Crowd, Neighbors},
-        pbf::constraint::distance_to_converged,
-    },
-    scene::{
-        Method, Scene,
-        flip::Preconditioner,
-        study::sweep::{ErrorMeasure, Measure, Point, SAMPLES, Sweep},
-    },
-    stage::{
-        device::Opened,
-        drive::{Drive, Step},
-        prepare::Start,
-    },
-    study::measure::Gauge,
+use swell_domain::particles::Particles;
+use swell_reference::{
+    neighbors::{Cells, Crowd, Neighbors},
+    pbf::constraint::distance_to_converged,
 };
+use swell_scene::{
+    Method, Scene,
+    flip::Preconditioner,
+    study::sweep::{ErrorMeasure, Measure, Point, SAMPLES, Sweep},
+};
+use swell_stage::{
+    device::Opened,
+    drive::{Drive, Step},
+    prepare::Start,
+};
+use swell_study::measure::Gauge;
 
 use super::{
     super::{

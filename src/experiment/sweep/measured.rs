@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::scene::study::sweep::ErrorMeasure;
+use swell_scene::study::sweep::ErrorMeasure;
 
 /// What a point of a sweep came to.
 pub(super) type Run = super::super::Run<Measured>;

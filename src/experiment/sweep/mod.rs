@@ -7,12 +7,10 @@ mod projection;
 mod report;
 mod words;
 
-use crate::{
-    gpu::adapter::Needs,
-    scene::study::sweep::{ErrorMeasure, Line, Measure, Point, Sweep},
-    stage::{gauge, prepare::Start},
-    study::measure::Gauge,
-};
+use swell_gpu::adapter::Needs;
+use swell_scene::study::sweep::{ErrorMeasure, Line, Measure, Point, Sweep};
+use swell_stage::{gauge, prepare::Start};
+use swell_study::measure::Gauge;
 
 use super::{
     PointStatus, StudyError,

@@ -2,30 +2,28 @@
 
 use std::{collections::BTreeMap, time::Instant};
 
-use crate::{
-    domain::{
-        bricks::CELLS,
-        budget::Breach,
-        particles::Particles,
-        poisson::{Cells, System},
-        solver::Solver,
-    },
-    gpu::adapter::Context,
-    reference::{
-        ReferenceError,
-        poisson::{self, gradients::norm},
-    },
-    scene::{flip::Surface, study::sweep::Point},
-    solve::{
-        SolveError,
-        flip::{
-            Flip,
-            buffers::{CELL_KIND, FACE_OPEN, FACE_VELOCITY, LIQUID_DISTANCE, SOLID_FLUX},
-        },
-        plan::device_limits,
-    },
-    stage::{device::Opened, drive::Drive, prepare::Start},
+use swell_domain::{
+    bricks::CELLS,
+    budget::Breach,
+    particles::Particles,
+    poisson::{Cells, System},
+    solver::Solver,
 };
+use swell_gpu::adapter::Context;
+use swell_reference::{
+    ReferenceError,
+    poisson::{self, gradients::norm},
+};
+use swell_scene::{flip::Surface, study::sweep::Point};
+use swell_solve::{
+    SolveError,
+    flip::{
+        Flip,
+        buffers::{CELL_KIND, FACE_OPEN, FACE_VELOCITY, LIQUID_DISTANCE, SOLID_FLUX},
+    },
+    plan::device_limits,
+};
+use swell_stage::{device::Opened, drive::Drive, prepare::Start};
 
 use super::{
     super::{

@@ -2,17 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use crate::{
-    scene::{
-        Iteration, Method, Scene, Stop, asset_path,
-        study::sweep::{ErrorMeasure, Line, Measure, Point, Sweep},
-    },
-    study::{
-        chart::{Chart, Dot, Mark, Series},
-        convergence_point::{Reading, TABLE_1, convergence_point},
-        knee::{self, BEST_THAT_WAS_RUN, Knee, OF_NO_ACCOUNT, TOO_FEW},
-        page::Part,
-    },
+use swell_scene::{
+    Iteration, Method, Scene, Stop, asset_path,
+    study::sweep::{ErrorMeasure, Line, Measure, Point, Sweep},
+};
+use swell_study::{
+    chart::{Chart, Dot, Mark, Series},
+    convergence_point::{Reading, TABLE_1, convergence_point},
+    knee::{self, BEST_THAT_WAS_RUN, Knee, OF_NO_ACCOUNT, TOO_FEW},
+    page::Part,
 };
 
 use super::{
@@ -470,8 +468,8 @@ impl Results<'_> {
         run.push(Part::Text(format!(
             "{} By {} {}. {}",
             self.where_run(),
-            env!("CARGO_PKG_NAME"),
-            env!("CARGO_PKG_VERSION"),
+            swell_domain::PROGRAM,
+            swell_domain::VERSION,
             self.policy()
         )));
         if let Some(point) = self.sweep.points().next() {

@@ -1,6 +1,6 @@
 //! How a sweep was measured, in words.
 
-use crate::scene::study::sweep::{FRAME_RATE, Measure, SAMPLES};
+use swell_scene::study::sweep::{FRAME_RATE, Measure, SAMPLES};
 
 use super::report::Results;
 

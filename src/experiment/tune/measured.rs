@@ -3,21 +3,19 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    domain::probe::run_up,
-    scene::{
-        Scene,
-        study::{
-            RunsOn,
-            tune::{Quantity, Tune, Twin},
-        },
+use swell_domain::probe::run_up;
+use swell_scene::{
+    Scene,
+    study::{
+        RunsOn,
+        tune::{Quantity, Tune, Twin},
     },
-    stage::{
-        drive::{Drive, Step},
-        prepare::Start,
-    },
-    study::measure::Gauge,
 };
+use swell_stage::{
+    drive::{Drive, Step},
+    prepare::Start,
+};
+use swell_study::measure::Gauge;
 
 use super::super::{
     StudyError,

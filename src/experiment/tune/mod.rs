@@ -9,20 +9,18 @@ mod write;
 
 use std::borrow::Cow;
 
-use crate::{
-    gpu::adapter::Needs,
-    scene::{
-        physics_hash,
-        study::{
-            RunsOn,
-            tune::{Bound, Knob, Limit, Setting, Tune, Twin},
-        },
-    },
-    stage::{gauge, prepare::Start},
+use swell_gpu::adapter::Needs;
+use swell_scene::{
+    physics_hash,
     study::{
-        measure::Gauge,
-        tune::{Candidate, Choice, Limits, Proposal, choose},
+        RunsOn,
+        tune::{Bound, Knob, Limit, Setting, Tune, Twin},
     },
+};
+use swell_stage::{gauge, prepare::Start};
+use swell_study::{
+    measure::Gauge,
+    tune::{Candidate, Choice, Limits, Proposal, choose},
 };
 
 use super::{

@@ -1,9 +1,7 @@
 //! Laws fitted to the twins of a shot.
 
-use crate::{
-    scene::study::tune::{Knob, Quantity, Setting, Tune},
-    study::tune::{Effect, Law, Model, Proposal},
-};
+use swell_scene::study::tune::{Knob, Quantity, Setting, Tune};
+use swell_study::tune::{Effect, Law, Model, Proposal};
 
 use super::{Role, Trial, measured::Run};
 
@@ -184,14 +182,30 @@ impl Fitted<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::borrow::Cow;
+    use std::{borrow::Cow, path::Path};
 
-    use crate::scene::study::tune::{Twin, tests::request};
+    use swell_scene::{
+        Reach,
+        study::tune::{TuneRequest, Twin},
+    };
 
     use super::{super::measured::Measured, *};
 
     fn tune() -> Tune {
-        Tune::load(request("dam-break.toml", &["density=1%"])).expect("a shot")
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        let request = TuneRequest {
+            scene: folder.join("dam-break.toml"),
+            solver: None,
+            limits: vec!["density=1%".parse().expect("a limit")],
+            per_frame: None,
+            seconds: None,
+            frames: None,
+            reference: 0.8,
+            repeats: 1,
+            target: folder.join("tuned.toml"),
+            reach: Reach::Folder,
+        };
+        Tune::load(request).expect("a shot")
     }
 
     fn trial(role: Role, twin: &Twin, density: f64, seconds: f64) -> Trial<'_> {

@@ -2,15 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::{
-    scene::study::{
-        RunsOn,
-        tune::{Bound, Limit, Quantity, Setting},
-    },
-    study::{
-        chart::{Chart, Dot, Mark, Series},
-        page::{Part, Tone},
-    },
+use swell_scene::study::{
+    RunsOn,
+    tune::{Bound, Limit, Quantity, Setting},
+};
+use swell_study::{
+    chart::{Chart, Dot, Mark, Series},
+    page::{Part, Tone},
 };
 
 use super::{
@@ -193,8 +191,8 @@ impl Results<'_> {
         run.push(Part::Text(format!(
             "On {device}, by {} {}. Times are wall clock, in the program, without files: the median of {} of each twin, of \
              three at least at the coarsest spacing, after one frame that does not count.",
-            env!("CARGO_PKG_NAME"),
-            env!("CARGO_PKG_VERSION"),
+            swell_domain::PROGRAM,
+            swell_domain::VERSION,
             self.tune.request.repeats
         )));
         parts.push(Part::Folded("What was run".into(), run));

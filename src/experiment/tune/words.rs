@@ -1,9 +1,7 @@
 //! Numbers and settings of a tuned shot, in words.
 
-use crate::{
-    scene::study::tune::{Bound, Limit, Quantity},
-    study::tune::Law,
-};
+use swell_scene::study::tune::{Bound, Limit, Quantity};
+use swell_study::tune::Law;
 
 use super::{super::sweep::digits::significant, Results, Trial, model::floor};
 

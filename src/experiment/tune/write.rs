@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::scene::{
+use swell_scene::{
     Scene,
     edit::{Setting, with_settings},
     physics_hash,

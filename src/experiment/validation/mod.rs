@@ -10,11 +10,9 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    gpu::adapter::Needs,
-    scene::study::validation::{Benchmark, Trial, Validation},
-    stage::{drive::Drive, prepare::Start},
-};
+use swell_gpu::adapter::Needs;
+use swell_scene::study::validation::{Benchmark, Trial, Validation};
+use swell_stage::{drive::Drive, prepare::Start};
 
 use super::{
     Devices, PointStatus, StudyError,
@@ -31,9 +29,9 @@ pub type Run = super::Run<Measured>;
 /// What a benchmark's measure gives of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// By the names of [`Measure::numbers`](crate::scene::study::validation::Measure::numbers); one that cannot be had is left out.
+    /// By the names of [`Measure::numbers`](swell_scene::study::validation::Measure::numbers); one that cannot be had is left out.
     pub numbers: BTreeMap<String, f64>,
-    /// By the names of [`Measure::curves`](crate::scene::study::validation::Measure::curves).
+    /// By the names of [`Measure::curves`](swell_scene::study::validation::Measure::curves).
     pub curves: BTreeMap<String, Vec<(f64, f64)>>,
 }
 

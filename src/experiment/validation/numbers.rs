@@ -4,11 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
-use crate::{
-    domain::motion::{Motion, wave_number},
-    scene::{Method, Scene, WaveMaker, study::validation::Measure},
-    study::waves,
-};
+use swell_domain::motion::{Motion, wave_number};
+use swell_scene::{Method, Scene, WaveMaker, study::validation::Measure};
+use swell_study::waves;
 
 use super::{
     Measured,

@@ -2,19 +2,17 @@
 
 use glam::{DVec2, Vec3};
 
-use crate::{
-    cache::ProbeValues,
-    domain::{
-        particles::Particles,
-        probe::{elevation, front, volume as volume_of},
-    },
-    scene::{
-        Scene,
-        probe::ProbeKind,
-        study::validation::{Benchmark, Measure},
-    },
-    stage::drive::Step,
+use swell_cache::ProbeValues;
+use swell_domain::{
+    particles::Particles,
+    probe::{elevation, front, volume as volume_of},
 };
+use swell_scene::{
+    Scene,
+    probe::ProbeKind,
+    study::validation::{Benchmark, Measure},
+};
+use swell_stage::drive::Step;
 
 /// Part of the water that a front leaves behind: single particles that run ahead are none.
 const FRONT: f64 = 0.995;

@@ -1,15 +1,13 @@
 //! The table and the page of a validation study.
 
-use crate::{
-    scene::study::{
-        RunsOn,
-        validation::{Benchmark, Bound, Gate, Trial, Validation},
-    },
-    study::{
-        chart::{Chart, Series},
-        page::{Part, Tone},
-        waves,
-    },
+use swell_scene::study::{
+    RunsOn,
+    validation::{Benchmark, Bound, Gate, Trial, Validation},
+};
+use swell_study::{
+    chart::{Chart, Series},
+    page::{Part, Tone},
+    waves,
 };
 
 use super::{
@@ -392,7 +390,7 @@ fn where_run(bench: &Bench<'_>) -> String {
     let gpu = bench.devices.gpu.as_ref();
     let gpu = gpu.map_or(String::new(), |gpu| format!("GPU: {}. ", gpu.identity()));
     let cpu = bench.devices.of(RunsOn::Cpu).identity();
-    let (name, version) = (env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"));
+    let (name, version) = (swell_domain::PROGRAM, swell_domain::VERSION);
     format!(
         "{gpu}CPU: {cpu}. By {name} {version}. Particles, frames and seconds of each run stand in results.csv."
     )

@@ -4,12 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
 
-use crate::{
-    domain::particles::Particles,
-    scene::{
-        Scene,
-        study::validation::{Benchmark, Measure},
-    },
+use swell_domain::particles::Particles;
+use swell_scene::{
+    Scene,
+    study::validation::{Benchmark, Measure},
 };
 
 /// Moves the scene's particles to where the benchmark starts, and gives them its velocities.

@@ -1,9 +1,7 @@
 //! How a benchmark's gates come out.
 
-use crate::{
-    scene::study::validation::{Benchmark, Bound, Gate, Trial},
-    study::waves,
-};
+use swell_scene::study::validation::{Benchmark, Bound, Gate, Trial};
+use swell_study::waves;
 
 use super::{super::stability::Verdict, Run};
 
@@ -97,10 +95,11 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::{experiment::validation::Measured, scene::study::Study};
+    use crate::validation::Measured;
+    use swell_scene::study::Study;
 
     fn benchmark(name: &str) -> Benchmark {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/studies");
         let Ok(Study::Validation(study)) = Study::load(&folder.join("validation.toml")) else {
             panic!("the study that ships");
         };

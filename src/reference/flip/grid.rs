@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::domain::bricks::{Bricks, CELLS};
+use swell_domain::bricks::{Bricks, CELLS};
 
 /// One value a cell of every active brick, in the order of the elements; zero in slot 0.
 pub(super) fn per_cell<T: Clone + Default + Send>(

@@ -3,24 +3,22 @@
 use glam::{BVec3, DVec3};
 
 use super::solids::Solid;
-pub(super) use crate::domain::flip::ON_FACE;
-use crate::domain::flip::open_extent;
-use crate::{
-    domain::{
-        boundary::Boundary,
-        bounds::Bounds,
-        bricks::{Bricks, EDGE, table_dims},
-        flip::{CAP, CONTACT, layers, stored_cells},
-        period::Period,
-        pose::{Passage, Pose},
-        shores::Shores,
-        signed_distance::SignedDistance,
-    },
-    scene::{
-        Scene,
-        flip::{Flip, Surface},
-        step::Substep,
-    },
+pub(super) use swell_domain::flip::ON_FACE;
+use swell_domain::flip::open_extent;
+use swell_domain::{
+    boundary::Boundary,
+    bounds::Bounds,
+    bricks::{Bricks, EDGE, table_dims},
+    flip::{CAP, CONTACT, layers, stored_cells},
+    period::Period,
+    pose::{Passage, Pose},
+    shores::Shores,
+    signed_distance::SignedDistance,
+};
+use swell_scene::{
+    Scene,
+    flip::{Flip, Surface},
+    step::Substep,
 };
 
 /// The scene, its grid and its solids; positions are relative to the domain's least corner.

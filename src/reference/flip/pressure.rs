@@ -6,7 +6,7 @@ use super::{
     Centers, Model, Room,
     grid::{along, per_cell, planes},
 };
-use crate::domain::{
+use swell_domain::{
     bricks::Bricks,
     poisson::{AIR, Cells, FLUID, System},
 };

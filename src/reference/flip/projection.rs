@@ -4,12 +4,10 @@ use glam::DVec3;
 
 use super::{Centers, Faces, Model, Waters, density_source};
 use crate::{
-    domain::{poisson::System, solver::Projection},
-    reference::{
-        ReferenceError, Timings,
-        poisson::{self, gradients::Solution},
-    },
+    ReferenceError, Timings,
+    poisson::{self, gradients::Solution},
 };
+use swell_domain::{poisson::System, solver::Projection};
 
 /// What the pressure of a substep did.
 #[derive(Clone, Debug, PartialEq)]

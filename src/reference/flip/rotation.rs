@@ -6,7 +6,7 @@ use super::{
     Model, Room, Step,
     grid::{along, per_cell},
 };
-use crate::domain::{bricks::Bricks, poisson::FLUID};
+use swell_domain::{bricks::Bricks, poisson::FLUID};
 
 fn is_water(room: &Room, element: u32) -> bool {
     room.kind[element as usize] == FLUID

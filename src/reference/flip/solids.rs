@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::Model;
-use crate::domain::{
+use swell_domain::{
     pose::{Passage, Pose},
     signed_distance::SignedDistance,
 };

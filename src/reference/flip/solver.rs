@@ -11,22 +11,20 @@ use super::{
     projection::{Projected, project},
     push_apart, reorder, survey, wall_friction,
 };
-use crate::{
-    domain::{
-        boundary::Boundary,
-        bricks::Bricks,
-        budget::Breach,
-        gauge::Gauge,
-        particles::Particles,
-        poisson::FLUID,
-        solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
-    },
-    reference::{ReferenceError, Timings},
-    scene::{
-        Scene,
-        flip::{AFFINE, Transfer},
-        step::Substep,
-    },
+use crate::{ReferenceError, Timings};
+use swell_domain::{
+    boundary::Boundary,
+    bricks::Bricks,
+    budget::Breach,
+    gauge::Gauge,
+    particles::Particles,
+    poisson::FLUID,
+    solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
+};
+use swell_scene::{
+    Scene,
+    flip::{AFFINE, Transfer},
+    step::Substep,
 };
 
 /// FLIP in f64. Frames are rounded to f32 as they are written, and the next one starts from what was written.
@@ -111,7 +109,7 @@ impl Flip {
         }
     }
 
-    /// Solves by sparse Cholesky factors of up to so many bytes from now on; see [`crate::reference::poisson::BUDGET`].
+    /// Solves by sparse Cholesky factors of up to so many bytes from now on; see [`crate::poisson::BUDGET`].
     pub fn set_factor_budget(&mut self, bytes: u64) {
         self.factor_budget = bytes;
     }

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::Model;
-use crate::domain::bricks::{Bricks, CELLS};
+use swell_domain::bricks::{Bricks, CELLS};
 
 /// Particles in any order; positions relative to the domain's least corner.
 #[derive(Clone, Debug, Default, PartialEq)]

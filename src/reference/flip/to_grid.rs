@@ -9,7 +9,7 @@ use super::{
     model::ON_FACE,
     solids::{cut, face_sums},
 };
-use crate::domain::{
+use swell_domain::{
     bricks::Bricks,
     poisson::{AIR, SOLID},
 };
@@ -21,7 +21,7 @@ const LEAST_WEIGHT: f64 = 2.4e-7;
 /// The room that there is for water.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Room {
-    /// [`AIR`], [`FLUID`](crate::domain::poisson::FLUID) or [`SOLID`]. Shape (elements), as of every array here.
+    /// [`AIR`], [`FLUID`](swell_domain::poisson::FLUID) or [`SOLID`]. Shape (elements), as of every array here.
     pub kind: Vec<u32>,
     /// Open fractions of the lower faces, 0..1.
     pub open: Vec<DVec3>,

@@ -8,12 +8,10 @@ use super::{
     grid::{along, neighborhood, per_cell},
     solids,
 };
-use crate::{
-    domain::{
-        bricks::{Bricks, CELLS},
-        poisson::{FLUID, SOLID},
-    },
-    reference::hash::pair_direction,
+use crate::hash::pair_direction;
+use swell_domain::{
+    bricks::{Bricks, CELLS},
+    poisson::{FLUID, SOLID},
 };
 
 /// Bits of a component's layer, and whether particles gave it a velocity.

@@ -6,7 +6,7 @@ use super::{
     Faces, Model, Room, Step,
     grid::{corner, per_cell},
 };
-use crate::domain::{bricks::Bricks, flip::VON_KARMAN};
+use swell_domain::{bricks::Bricks, flip::VON_KARMAN};
 
 /// Particles gave a component a velocity.
 const KNOWN: u32 = 0x80;

@@ -8,14 +8,12 @@ use super::{
     grid::{along, corner, neighborhood, per_cell},
     to_grid::hats,
 };
-use crate::{
-    domain::{
-        bricks::{Bricks, CELLS},
-        flip::{HALF, part_of_solids},
-        poisson::{AIR, FLUID, SOLID},
-    },
-    scene::sources::Inlet,
+use swell_domain::{
+    bricks::{Bricks, CELLS},
+    flip::{HALF, part_of_solids},
+    poisson::{AIR, FLUID, SOLID},
 };
+use swell_scene::sources::Inlet;
 
 /// Of a cell's excess a substep corrects at most this much either way.
 const MOST_EXCESS: f64 = 0.5;

@@ -18,11 +18,9 @@ use super::{
     Model, Sorted, Substep, local,
     passes::{Inputs, Row, measure_density, row},
 };
-use crate::{
-    domain::{boundary::Boundary, particles::Particles},
-    reference::{ReferenceError, Timings},
-    scene::Scene,
-};
+use crate::{ReferenceError, Timings};
+use swell_domain::{boundary::Boundary, particles::Particles};
+use swell_scene::Scene;
 
 /// Newton steps after which the nonlinear solve gives up.
 const MAX_STEPS: usize = 100;

@@ -2,19 +2,17 @@
 
 use glam::DVec3;
 
-use crate::{
-    domain::{
-        boundary::Boundary,
-        bounds::Bounds,
-        pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
-        period::Period,
-        pose::{Passage, Posed},
-        signed_distance::SignedDistance,
-        sph::{Calibration, half_space_fraction},
-    },
-    reference::neighbors::Cells,
-    scene::{self, Scene},
+use crate::neighbors::Cells;
+use swell_domain::{
+    boundary::Boundary,
+    bounds::Bounds,
+    pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
+    period::Period,
+    pose::{Passage, Posed},
+    signed_distance::SignedDistance,
+    sph::{Calibration, half_space_fraction},
 };
+use swell_scene::Scene;
 
 /// Which particles a pass handles: the parity of their sorted index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +42,7 @@ pub struct Model {
     /// Kernels.
     pub calibration: Calibration,
     /// Solver settings.
-    pub settings: scene::Pbf,
+    pub settings: swell_scene::Pbf,
     /// m/s².
     pub gravity: DVec3,
     /// Edges of the domain, metres.
@@ -231,7 +229,7 @@ impl Model {
     }
 
     /// Least distance from walls and solids, metres.
-    pub(in crate::reference) fn contact_distance(&self) -> f64 {
+    pub(crate) fn contact_distance(&self) -> f64 {
         CONTACT * self.settings.particle_spacing
     }
 

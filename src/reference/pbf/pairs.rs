@@ -4,7 +4,7 @@ use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
 use super::passes::Inputs;
-use crate::domain::{
+use swell_domain::{
     lanes::{LANES, positive, sum},
     period::Period,
 };
@@ -182,13 +182,11 @@ mod tests {
 
     use super::*;
     use crate::{
-        domain::{boundary::Boundary, lanes::widely},
-        reference::{
-            Timings,
-            pbf::{Model, Sorted, Substep},
-        },
-        scene::Scene,
+        Timings,
+        pbf::{Model, Sorted, Substep},
     };
+    use swell_domain::{boundary::Boundary, lanes::widely};
+    use swell_scene::Scene;
 
     /// Roundings of a term: of a way and its length, of the kernel's argument, of powers and products.
     const OF_A_TERM: f64 = 20.0;

@@ -9,10 +9,8 @@ use super::{
     Colour, Model, Substep,
     pairs::{CorrectionSum, RowSums},
 };
-use crate::{
-    domain::lanes::widely,
-    reference::{hash::pair_direction, neighbors::Neighbors},
-};
+use crate::{hash::pair_direction, neighbors::Neighbors};
+use swell_domain::lanes::widely;
 
 /// Particles of a task; fewer are not worth the handing out.
 const GRAIN: usize = 256;

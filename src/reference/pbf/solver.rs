@@ -8,21 +8,19 @@ use super::{
     passes::{self, Inputs, Momentum},
 };
 use crate::{
-    domain::{
-        boundary::Boundary,
-        budget::Breach,
-        particles::Particles,
-        pbf::chebyshev_factors,
-        probe::fitted,
-        solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
-    },
-    reference::{
-        ReferenceError, Timings,
-        flip::{Cloud, Flip},
-        neighbors::{Crowd, Neighbors},
-    },
-    scene::{Iteration, Scene, Stop, step::projected_substep},
+    ReferenceError, Timings,
+    flip::{Cloud, Flip},
+    neighbors::{Crowd, Neighbors},
 };
+use swell_domain::{
+    boundary::Boundary,
+    budget::Breach,
+    particles::Particles,
+    pbf::chebyshev_factors,
+    probe::fitted,
+    solver::{PassTime, Projection, Seen, Solver, Span, StepReport, Watch},
+};
+use swell_scene::{Iteration, Scene, Stop, step::projected_substep};
 
 /// PBF in f64. Frames are rounded to f32 as they are written, and the next one starts from what was written.
 pub struct Pbf {
@@ -453,7 +451,7 @@ impl Solver for Pbf {
         Ok((self.state.clone(), report))
     }
 
-    /// As [`pressure_scale`](crate::domain::sph::Calibration::pressure_scale) has it from Σ λ.
+    /// As [`pressure_scale`](swell_domain::sph::Calibration::pressure_scale) has it from Σ λ.
     fn pressures(&self, points: &[DVec3]) -> Result<Vec<Option<f64>>, ReferenceError> {
         if let Some(grid) = &self.grid {
             return grid.pressures(points);

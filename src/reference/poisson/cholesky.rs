@@ -13,10 +13,8 @@ use faer::{
     },
 };
 
-use crate::{
-    domain::poisson::{NONE, System},
-    reference::ReferenceError,
-};
+use crate::ReferenceError;
+use swell_domain::poisson::{NONE, System};
 
 /// A = L Lᵀ of a system whose pockets are pinned.
 pub(super) struct Factor {

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::domain::poisson::{NONE, System, remove_means};
+use swell_domain::poisson::{NONE, System, remove_means};
 
 /// Terms of a sum that one task adds up, so that sums are the same for any number of threads.
 const CHUNK: usize = 8192;
@@ -177,7 +177,7 @@ pub fn norm(a: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::poisson::cases::{Surface, tank, tank_rhs};
+    use swell_domain::poisson::cases::{Surface, tank, tank_rhs};
 
     /// Iterations to 1e-6 with none, Jacobi, scaled IPP and MIC(0), as counted by another program, in f64, on a tank known
     /// here by its description alone: 60 % full, with a sphere. Hence 10 %. The plain counts with a ghost-fluid surface

@@ -1,6 +1,6 @@
 //! Twins of the passes of an iteration, row by row, and the magnitudes that their rounding is measured by.
 
-use crate::domain::poisson::{NONE, System};
+use swell_domain::poisson::{NONE, System};
 
 use super::{Solver, gradients::norm};
 
@@ -216,10 +216,8 @@ pub fn least_eigenvalue(solver: &Solver<'_>, rows: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        domain::poisson::cases::{Surface, tank, white_noise},
-        reference::poisson::BUDGET,
-    };
+    use crate::poisson::BUDGET;
+    use swell_domain::poisson::cases::{Surface, tank, white_noise};
 
     /// A large term that comes and goes between small ones, which a plain sum loses.
     #[test]

@@ -6,10 +6,8 @@ pub mod gradients;
 pub mod iteration;
 pub mod multigrid;
 
-use crate::{
-    domain::poisson::{System, remove_means},
-    reference::ReferenceError,
-};
+use crate::ReferenceError;
+use swell_domain::poisson::{System, remove_means};
 
 use cholesky::Factor;
 use gradients::{Precondition, Solution, residual};
@@ -97,7 +95,7 @@ pub fn solve(system: &System, b: &[f64]) -> Result<Solution, ReferenceError> {
 #[cfg(test)]
 mod tests {
     use super::{gradients::norm, *};
-    use crate::domain::poisson::{
+    use swell_domain::poisson::{
         AIR, FLUID, SOLID,
         cases::{Case, Surface, manufactured, tank, tank_rhs, white_noise},
     };

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::domain::bricks::CELLS;
+use swell_domain::bricks::CELLS;
 
 /// Least pivot of a block, as a part of its diagonal, that is not a closed pair's rounding; twice the shader's.
 const LEAST_PIVOT: f64 = 2e-5;

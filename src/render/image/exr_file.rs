@@ -16,7 +16,7 @@ use super::super::{
     sky::white_luminance,
 };
 use super::{Attributes, Image, write_whole};
-use crate::scene::look::{ColourSpaceSpec, LightSpec};
+use swell_scene::look::{ColourSpaceSpec, LightSpec};
 
 fn text(value: &str) -> Text {
     Text::new_or_none(value).unwrap_or_else(|| Text::from("?"))

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::super::RenderError;
 use super::super::view::Display;
 use super::{Attributes, Image, write_whole};
-use crate::scene::look::ViewSpec;
+use swell_scene::look::ViewSpec;
 
 /// Writes an 8-bit RGBA PNG of the image that is shown, encoded sRGB, alpha not premultiplied.
 ///

@@ -2,17 +2,15 @@
 
 use super::Renderer;
 use crate::{
-    render::{
-        RenderError,
-        buffers::{NEXT_CAMERA, PARTICLES, aovs},
-        camera::{Setting, camera},
-        frame::FAR,
-        image::Aovs,
-        samples::{Sample, samples_of},
-        uniform::Particle,
-    },
-    scene::look::{AovFilterSpec, AovSpec},
+    RenderError,
+    buffers::{NEXT_CAMERA, PARTICLES, aovs},
+    camera::{Setting, camera},
+    frame::FAR,
+    image::Aovs,
+    samples::{Sample, samples_of},
+    uniform::Particle,
 };
+use swell_scene::look::{AovFilterSpec, AovSpec};
 
 /// What a pixel has of each channel: Z, N, P, forward, thickness.
 const VALUES: usize = 10;

@@ -8,28 +8,24 @@ use super::{
     },
 };
 use crate::{
-    render::{
-        RenderError, RenderScene,
-        buffers::{
-            CAMERA, CLOUD, CLOUD_WORDS, DEPTHS, FIRST_DEPTH, NEXT_CAMERA, SHADING, SOLID_DEPTH,
-        },
-        camera::longest_focal_px,
-        caustics::{map_values, plan_caustics},
-        closed::Closed,
-        frame::{Extent, bands},
-        lighting::{plan_details, plan_light, shading},
-        materials::plan_materials,
-        opaque::Opaque,
-        plan::{Limits, Plan},
-        rays::{first, plan_rays},
-        sea::plan_sea,
-        set::{Set, plan_palette, plan_shadow, plan_solids, shadow_from_world},
-        shapes::RADIUS,
-        sky::Sky,
-        surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
-    },
-    scene::look::{AovSpec, FilterSpec, Look, MethodSpec, SplatSpec},
+    RenderError, RenderScene,
+    buffers::{CAMERA, CLOUD, CLOUD_WORDS, DEPTHS, FIRST_DEPTH, NEXT_CAMERA, SHADING, SOLID_DEPTH},
+    camera::longest_focal_px,
+    caustics::{map_values, plan_caustics},
+    closed::Closed,
+    frame::{Extent, bands},
+    lighting::{plan_details, plan_light, shading},
+    materials::plan_materials,
+    opaque::Opaque,
+    plan::{Limits, Plan},
+    rays::{first, plan_rays},
+    sea::plan_sea,
+    set::{Set, plan_palette, plan_shadow, plan_solids, shadow_from_world},
+    shapes::RADIUS,
+    sky::Sky,
+    surface::{FlowSettings, Smoothing, curvature_flow, narrow_range},
 };
+use swell_scene::look::{AovSpec, FilterSpec, Look, MethodSpec, SplatSpec};
 
 /// Pixels that rays are cast for in one dispatch, so that none runs long enough to lose a device.
 const CAST: u32 = 1 << 17;

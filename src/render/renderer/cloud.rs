@@ -4,18 +4,16 @@ use glam::DVec3;
 
 use super::{room, shade::draws_spray, whitewater::is_bubble};
 use crate::{
-    domain::{cloud::Drop, particles::Particles},
-    gpu::program::Program,
-    render::{
-        RenderError, RenderScene,
-        buffers::{CLOUD, CLOUD_WORDS},
-        cloud::{drops_of, grid, white_of},
-        paths::Path,
-        rays::voxel,
-        uniform::Particle,
-    },
-    scene::look::{Look, MethodSpec},
+    RenderError, RenderScene,
+    buffers::{CLOUD, CLOUD_WORDS},
+    cloud::{drops_of, grid, white_of},
+    paths::Path,
+    rays::voxel,
+    uniform::Particle,
 };
+use swell_domain::{cloud::Drop, particles::Particles};
+use swell_gpu::program::Program;
+use swell_scene::look::{Look, MethodSpec};
 
 /// A frame's drops and bubbles, and the grid of them that the device holds.
 pub(super) struct RayCloud {

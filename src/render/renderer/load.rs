@@ -10,27 +10,25 @@ use super::{
     splats::{Pages, ROWS, filled},
 };
 use crate::{
-    domain::{level_set::kernels::Kernels, particles::Particles},
-    gpu::{buffer::Workgroups, recording::spread},
-    render::{
-        Moment, RenderError,
-        aeration::{self, CLEAR, Fall},
-        buffers::{
-            AIRED, AIRED_GROUPS, BLOCK_GROUPS, BLOCKS, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS,
-            SHAPES, SPRAY_PARAMS,
-        },
-        camera::{camera, pose},
-        hidden::Hidden,
-        in_frame::{blocks_in_frame, in_frame},
-        lighting::spray_density,
-        paths::{Path, paths},
-        plan::per_particle,
-        samples::{Sample, samples_of},
-        shapes::shapes,
-        uniform::{Block, Camera, Page, Particle, SprayParams},
+    Moment, RenderError,
+    aeration::{self, CLEAR, Fall},
+    buffers::{
+        AIRED, AIRED_GROUPS, BLOCK_GROUPS, BLOCKS, PAGES, PARTICLE_GROUPS, PARTICLES, PATHS,
+        SHAPES, SPRAY_PARAMS,
     },
-    scene::look::{AovSpec, MethodSpec},
+    camera::{camera, pose},
+    hidden::Hidden,
+    in_frame::{blocks_in_frame, in_frame},
+    lighting::spray_density,
+    paths::{Path, paths},
+    plan::per_particle,
+    samples::{Sample, samples_of},
+    shapes::shapes,
+    uniform::{Block, Camera, Page, Particle, SprayParams},
 };
+use swell_domain::{level_set::kernels::Kernels, particles::Particles};
+use swell_gpu::{buffer::Workgroups, recording::spread};
+use swell_scene::look::{AovSpec, MethodSpec};
 
 /// Particle spacings within which a particle has a part in the field at the eye: a kernel's reach and that of the neighbours that
 /// shape it.

@@ -20,18 +20,18 @@ use super::image::{Image, View};
 use super::plan::{Limits, Plan};
 use super::samples::samples_of;
 use super::{Moment, RenderError, RenderScene, Water, sea::Sea, uniform};
-use crate::domain::{particles::Particles, solver::PassTime};
-use crate::gpu::{
+use build::room;
+use cloud::RayCloud;
+use shade::draws_spray;
+use splats::Pages;
+use swell_domain::{particles::Particles, solver::PassTime};
+use swell_gpu::{
     adapter::Context,
     buffer::Buf,
     program::Program,
     recording::{Command, Recording, Timer},
 };
-use crate::scene::look::Look;
-use build::room;
-use cloud::RayCloud;
-use shade::draws_spray;
-use splats::Pages;
+use swell_scene::look::Look;
 use water::RayWater;
 use whitewater::Whitewater;
 

@@ -1,18 +1,16 @@
 //! What shades the picture, and the channels beside it.
 
 use crate::{
-    gpu::{
-        buffer::Buf,
-        recording::{Bind, Command, Groups},
-    },
-    render::{
-        buffers::{BANDS, OWNER, THICKNESS, TRIANGLES, aovs, objects, picture},
-        plan::Plan,
-        tiles::{TILE, Tiles},
-        uniform::{Band, TileGrid},
-    },
-    scene::look::{AovSpec, LightSpec, Look, SolidsOutput},
+    buffers::{BANDS, OWNER, THICKNESS, TRIANGLES, aovs, objects, picture},
+    plan::Plan,
+    tiles::{TILE, Tiles},
+    uniform::{Band, TileGrid},
 };
+use swell_gpu::{
+    buffer::Buf,
+    recording::{Bind, Command, Groups},
+};
+use swell_scene::look::{AovSpec, LightSpec, Look, SolidsOutput};
 
 /// What draws the pixels of tiles without water that have solids.
 const DRY: &str = "ssfr/shade_dry";

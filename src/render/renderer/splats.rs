@@ -5,22 +5,20 @@ use super::{
     shade::{draws_spray, tells_foam, wants_spray_aovs},
 };
 use crate::{
-    gpu::{
-        buffer::{Buf, Workgroups},
-        recording::{Bind, Command, Groups},
+    buffers::{
+        AIRED, AIRED_GROUPS, BLOCK_GROUPS, BLOCKS, DEPTHS, OWNER, PAGES, PARTICLE_GROUPS,
+        PARTICLES, PATHS, SHAPES, SPRAY, SPRAY_PARAMS, THICKNESS, THICKNESS_PARAMS, WHITEWATER,
+        WHITEWATER_GROUPS, WHITEWATER_PARAMS,
     },
-    render::{
-        buffers::{
-            AIRED, AIRED_GROUPS, BLOCK_GROUPS, BLOCKS, DEPTHS, OWNER, PAGES, PARTICLE_GROUPS,
-            PARTICLES, PATHS, SHAPES, SPRAY, SPRAY_PARAMS, THICKNESS, THICKNESS_PARAMS, WHITEWATER,
-            WHITEWATER_GROUPS, WHITEWATER_PARAMS,
-        },
-        frame::FAR,
-        plan::{Limits, Plan},
-        uniform::{Page, Particle, Path, Shape, Thickness},
-    },
-    scene::look::Look,
+    frame::FAR,
+    plan::{Limits, Plan},
+    uniform::{Page, Particle, Path, Shape, Thickness},
 };
+use swell_gpu::{
+    buffer::{Buf, Workgroups},
+    recording::{Bind, Command, Groups},
+};
+use swell_scene::look::Look;
 
 /// Particles of which every per-particle array begins at a multiple of 256 bytes.
 const STEP: usize = 8;
@@ -297,7 +295,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
     use super::*;
-    use crate::gpu::{reflect::reflect, shader::compose};
+    use swell_gpu::{reflect::reflect, shader::compose};
 
     /// What is dispatched is what the shaders take a workgroup for.
     #[test]

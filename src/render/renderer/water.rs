@@ -3,17 +3,15 @@
 use glam::{DVec3, Vec3};
 
 use crate::{
-    domain::level_set::sunlight::Sunlight,
-    gpu::program::Program,
-    render::{
-        RenderError, RenderScene,
-        buffers::{LEVEL_TABLE, LEVEL_VALUES, SUN_PATHS},
-        paths::{Path, body_of},
-        rays::{level_set, sun_in_water, voxel},
-        uniform::Particle,
-    },
-    scene::look::{Look, MethodSpec},
+    RenderError, RenderScene,
+    buffers::{LEVEL_TABLE, LEVEL_VALUES, SUN_PATHS},
+    paths::{Path, body_of},
+    rays::{level_set, sun_in_water, voxel},
+    uniform::Particle,
 };
+use swell_domain::level_set::sunlight::Sunlight;
+use swell_gpu::program::Program;
+use swell_scene::look::{Look, MethodSpec};
 
 /// A frame's particles, and the level set of them that the device holds.
 pub(super) struct RayWater {

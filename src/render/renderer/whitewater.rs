@@ -1,19 +1,17 @@
 //! Whitewater of a frame on its way to the device.
 
 use crate::{
-    domain::{
-        particles::Particles,
-        whitewater::{KIND, Kind, RADIUS},
-    },
-    gpu::{program::Program, recording::spread},
-    render::{
-        RenderError, RenderScene,
-        buffers::{WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS},
-        lighting::spray_density,
-        uniform,
-    },
-    scene::look::{Look, MethodSpec},
+    RenderError, RenderScene,
+    buffers::{WHITEWATER, WHITEWATER_GROUPS, WHITEWATER_PARAMS},
+    lighting::spray_density,
+    uniform,
 };
+use swell_domain::{
+    particles::Particles,
+    whitewater::{KIND, Kind, RADIUS},
+};
+use swell_gpu::{program::Program, recording::spread};
+use swell_scene::look::{Look, MethodSpec};
 
 use super::room;
 

@@ -210,7 +210,7 @@ fn output_tone() -> Tone<9> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::view::srgb_encode;
+    use crate::view::srgb_encode;
 
     /// Linear Rec. 709 and what OpenColorIO 2 shows of it, encoded: built-in configuration cg-config-v1.0.0_aces-v1.3, display
     /// "sRGB - Display", view "ACES 1.0 - SDR Video", clamped to 0 to 1.

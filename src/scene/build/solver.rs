@@ -11,7 +11,7 @@ use super::{
     },
     Lattice, Result,
 };
-use crate::domain::bounds::{Bounds, cells_over};
+use swell_domain::bounds::{Bounds, cells_over};
 
 /// Most cells of PBF's neighbour grid; their indices are 32 bits.
 const MAX_CELLS: f64 = 2_147_483_647.0;

@@ -9,7 +9,7 @@ use super::{
     super::{key::Key, words::shown},
     Effect, Grain, Push,
 };
-use crate::domain::air;
+use swell_domain::air;
 
 /// `drag = { drop_radius = 0.001, wind = [8.0, 0.0, 0.0] }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

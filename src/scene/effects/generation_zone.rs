@@ -20,7 +20,7 @@ use super::{
     Absorbs, Effect, Surroundings,
     zone::Zone,
 };
-use crate::domain::{
+use swell_domain::{
     motion::{RegularWaves, Spectrum, wave_number},
     open_waves::{Meeting, OpenSea, OpenWaves},
 };

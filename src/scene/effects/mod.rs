@@ -8,7 +8,7 @@ pub mod zone;
 use glam::DVec3;
 
 use super::{WaveMaker, document::Document, error::SceneError, key::Key, lint::Made};
-use crate::domain::{bounds::Bounds, open_waves::OpenWaves};
+use swell_domain::{bounds::Bounds, open_waves::OpenWaves};
 use zone::Zone;
 
 /// What of a scene an effect has to fit into.
@@ -134,12 +134,14 @@ pub(super) struct Absorbs<'a> {
 }
 
 /// Gives the list of effects, in the order in which they act, to a macro.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! with_effects {
     ($callback:ident) => {
         $callback! { viscosity, vorticity_confinement, drag, absorbing_zone, generation_zone, surface_tension }
     };
 }
-pub(crate) use with_effects;
+pub use crate::with_effects;
 
 macro_rules! effects {
     ($($name:ident),+ $(,)?) => {

@@ -6,7 +6,7 @@ use super::{
     super::{document::Document, error::SceneError, key::Key, words::shown},
     Effect, Grain, Surroundings,
 };
-use crate::domain::relaxation::Relaxation;
+use swell_domain::relaxation::Relaxation;
 
 /// Reynolds number √(g Δx) Δx / ν of a cell above which nothing of a viscosity ν is seen: that of the way to the grid and back is of 36 with
 /// PBF's projection, whose viscosity is 0.028 √(g Δx³), and about 50 with FLIP's `pic_blend` of 0.05, cells of 0.1 m and 24 frames a second.

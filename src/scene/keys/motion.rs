@@ -1,7 +1,7 @@
 //! Keys of motions: of walls that make waves, and of solids.
 
 use super::super::key::{Interval, Key, words};
-use crate::domain::motion::Spectrum;
+use swell_domain::motion::Spectrum;
 
 /// Metres: a stroke, a wave's height, the water's depth. The domain is the upper bound.
 const LENGTH: Interval = 1e-9..=1e6;

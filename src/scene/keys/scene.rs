@@ -15,7 +15,7 @@ use super::super::{
     probe::{self, ProbeKind},
 };
 use super::motion::{SOLID_MOTION, SOLID_TRACK, SOLID_TURN, WALL_MOTION};
-use crate::domain::sparse_grid;
+use swell_domain::sparse_grid;
 
 pub(in super::super) const KEYS: &[Key] = &[
     Key::table("shot", SHOT)

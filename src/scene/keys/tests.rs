@@ -249,7 +249,7 @@ fn the_tables_are_whole() {
 /// Caches say by these hashes which scene they are of, and rendered pictures of which look.
 #[test]
 fn hashes_of_what_ships_are_those_of_the_caches_that_there_are() {
-    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     for (name, method, hash) in SHIPPED {
         let set = [format!("solver.method={method}")];
         let scene = Scene::load(&scenes.join(name).with_extension("toml"), &set).expect(name);
@@ -335,7 +335,7 @@ const SHIPPED: [(&str, &str, &str); 8] = [
 /// The page is what `swell keys` prints: `target/release/swell keys > docs/keys.md`.
 #[test]
 fn the_page_of_keys_is_the_one_that_is_tracked() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/keys.md");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/keys.md");
     let tracked = std::fs::read_to_string(file).expect("docs/keys.md");
     let now = page(&File::NAMED.map(|(_, file)| file));
     let differs = tracked

@@ -10,7 +10,7 @@ use super::super::{
     physics_difference, physics_hash,
 };
 use super::*;
-use crate::domain::{motion::Motion, sampling, signed_distance::SignedDistance};
+use swell_domain::{motion::Motion, sampling, signed_distance::SignedDistance};
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
@@ -404,7 +404,7 @@ fn physics_is_compared_by_key() {
 
 #[test]
 fn the_scenes_that_ship_fit_together() {
-    let scenes = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let scenes = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     for (name, in_blocks, has_solid) in [
         ("quickstart", 41_712, true),
         ("wave-city", 201_000, true),

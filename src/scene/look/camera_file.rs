@@ -311,4 +311,4 @@ fn choose<'a>(document: &'a Document, name: Option<&str>) -> Result<Node<'a>> {
 }
 
 #[cfg(test)]
-pub(in crate::scene) mod tests;
+pub(crate) mod tests;

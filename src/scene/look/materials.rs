@@ -11,7 +11,7 @@ use super::{
     mtl::{self, Entry},
     spec::{LookSpec, MaterialSpec, TextureSpec},
 };
-use crate::scene::{Fault, document::Document, error::SceneError};
+use crate::{Fault, document::Document, error::SceneError};
 
 /// Key of the library.
 const LIBRARY: &str = "solids.materials";

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-use crate::scene::Wall;
+use crate::Wall;
 
 /// A look file.
 #[derive(Clone, Debug, Deserialize)]

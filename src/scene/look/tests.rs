@@ -574,7 +574,8 @@ fn a_camera_from_a_file() {
 #[test]
 fn shipped_looks_parse() {
     for name in ["day", "dusk"] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/looks/{name}.toml"));
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../scenes/looks/{name}.toml"));
         Look::load(&path).unwrap();
     }
 }

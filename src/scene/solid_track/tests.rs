@@ -5,7 +5,7 @@ use std::{f64::consts::FRAC_PI_2, path::Path};
 use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
 
-use crate::scene::{Scene, look::camera_file::tests::glb};
+use crate::{Scene, look::camera_file::tests::glb};
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";

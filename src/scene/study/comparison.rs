@@ -14,7 +14,7 @@ use super::{
     },
     SceneFile, StudyFileError, load_with,
 };
-use crate::domain::frame_range::FrameRange;
+use swell_domain::frame_range::FrameRange;
 
 /// Two solvers on one scene, side by side.
 #[derive(Clone, Debug)]

@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn the_studies_that_ship_fit_their_scenes() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/studies");
         let (mut comparisons, mut sweeps, mut stabilities, mut validations) = (0, 0, 0, 0);
         let mut surfaces = 0;
         for entry in fs::read_dir(folder).expect("studies") {

@@ -29,7 +29,7 @@ use super::{
     },
     SceneFile, StudyFileError, load_with,
 };
-use crate::domain::frame_range::FrameRange;
+use swell_domain::frame_range::FrameRange;
 
 /// Keys of a look that change how water is drawn, and nothing of what is true of it.
 const SWEPT: [&str; 7] = [

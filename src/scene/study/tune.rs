@@ -10,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::domain::{bounds::Bounds, sampling::block_dims};
+use swell_domain::{bounds::Bounds, sampling::block_dims};
 
 use super::super::{
     Iteration, Method, Reach, Scene, SceneError, Stop, flip::Preconditioner, physics_hash,
@@ -552,4 +552,4 @@ fn others(method: Method) -> impl Iterator<Item = &'static str> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

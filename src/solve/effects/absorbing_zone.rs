@@ -1,6 +1,6 @@
 //! Absorbing zones on the device: PBF's particles lose velocity at a step's end, FLIP's faces before the projection.
 
-use crate::scene::{Scene, effects::absorbing_zone::Settings};
+use swell_scene::{Scene, effects::absorbing_zone::Settings};
 
 use super::{Addition, OnDevice, pass, zone::constants};
 

@@ -1,10 +1,8 @@
 //! Drag of air on the device: on PBF's particles at a step's end, on FLIP's before the grid is given their velocities.
 
-use crate::{
-    domain::{flip, pbf},
-    scene::{Scene, effects::drag::Settings},
-    solve::air,
-};
+use crate::air;
+use swell_domain::{flip, pbf};
+use swell_scene::{Scene, effects::drag::Settings};
 
 use super::{Addition, OnDevice, pass};
 

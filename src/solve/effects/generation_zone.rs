@@ -2,11 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::{
-    domain::open_waves::Line,
-    gpu::{buffer::Buf, program::Program},
-    scene::{Scene, effects::generation_zone::Settings},
-};
+use swell_domain::open_waves::Line;
+use swell_gpu::{buffer::Buf, program::Program};
+use swell_scene::{Scene, effects::generation_zone::Settings};
 
 use super::{Addition, OnDevice, pass, zone::constants};
 

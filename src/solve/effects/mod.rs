@@ -5,13 +5,11 @@
 
 mod zone;
 
-use crate::{
-    gpu::{
-        program::{BufferSpec, PassSpec, Program},
-        recording::Command,
-    },
-    scene::{Scene, effects::with_effects},
+use swell_gpu::{
+    program::{BufferSpec, PassSpec, Program},
+    recording::Command,
 };
+use swell_scene::{Scene, effects::with_effects};
 
 /// What an effect adds to a solver.
 #[derive(Clone, Debug, Default, PartialEq)]

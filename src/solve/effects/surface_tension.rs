@@ -1,9 +1,7 @@
 //! Surface tension on the device: on the grid before the projection, of FLIP's scene or of PBF's.
 
-use crate::{
-    gpu::buffer::Buf,
-    scene::{Scene, effects::surface_tension::Settings},
-};
+use swell_gpu::buffer::Buf;
+use swell_scene::{Scene, effects::surface_tension::Settings};
 
 use super::{Addition, OnDevice, pass};
 

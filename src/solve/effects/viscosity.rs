@@ -1,15 +1,13 @@
 //! Viscosity on the device: of so many Pa s on FLIP's grid, or XSPH's on PBF's particles.
 
-use crate::{
-    domain::relaxation::Relaxation,
-    gpu::{
-        buffer::{Buf, Windows},
-        program::Program,
-        recording::{Bind, Command},
-    },
-    scene::{Method, Scene, effects::viscosity::Settings},
-    solve::flip::{buffers::FACE_VELOCITY, over_cells},
+use crate::flip::{buffers::FACE_VELOCITY, over_cells};
+use swell_domain::relaxation::Relaxation;
+use swell_gpu::{
+    buffer::{Buf, Windows},
+    program::Program,
+    recording::{Bind, Command},
 };
+use swell_scene::{Method, Scene, effects::viscosity::Settings};
 
 use super::{Addition, Between, OnDevice, Turns, pass};
 

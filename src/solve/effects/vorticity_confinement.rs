@@ -1,9 +1,7 @@
 //! Vorticity confinement on the device.
 
-use crate::{
-    gpu::buffer::Buf,
-    scene::{Scene, effects::vorticity_confinement::Settings},
-};
+use swell_gpu::buffer::Buf;
+use swell_scene::{Scene, effects::vorticity_confinement::Settings};
 
 use super::{Addition, OnDevice, pass};
 

@@ -1,6 +1,6 @@
 //! Zones on the device.
 
-use crate::scene::{Scene, effects::zone::Zone};
+use swell_scene::{Scene, effects::zone::Zone};
 
 /// What shared/zone.wgsl is told.
 pub(super) fn constants(zone: Zone<'_>, scene: &Scene) -> Vec<(&'static str, f64)> {

@@ -3,13 +3,10 @@
 //! "Cells" are arrays of 512 values a brick slot, slot 0 zeros; "planes" are three such arrays one after the other, a
 //! component each, of the cells' lower faces.
 
-use crate::{
-    domain::bricks::Brick,
-    gpu::buffer::{Buf, Windows, Workgroups},
-    solve::params::{FlipParams, Inlets, SolidGrids, SurveyHead},
-};
+use crate::params::{DeviceBrick, FlipParams, Inlets, SolidGrids, SurveyHead};
+use swell_gpu::buffer::{Buf, Windows, Workgroups};
 
-pub use crate::solve::buffers::*;
+pub use crate::buffers::*;
 
 /// What a substep's passes know.
 pub const PARAMS: Buf<FlipParams> = Buf::uniform("params");
@@ -24,7 +21,7 @@ pub const SURVEY: Buf<SurveyHead> = Buf::new("survey");
 /// Whether a brick of the domain holds water, behind [`SURVEY`].
 pub const SURVEY_IS_WET: Buf<u32> = Buf::behind::<SurveyHead>("survey");
 /// Records of the bricks, one a slot.
-pub const BRICKS: Buf<Brick> = Buf::new("bricks");
+pub const BRICKS: Buf<DeviceBrick> = Buf::new("bricks");
 /// Slot of each brick of the domain, 0 where there is none.
 pub const BRICK_SLOT: Buf<u32> = Buf::new("brick_slot");
 

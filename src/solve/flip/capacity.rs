@@ -1,18 +1,16 @@
 //! Which bricks a state takes, and room for other counts.
 
 use crate::{
-    domain::{
-        bricks::{Bricks, EDGE, table_dims},
-        flip::{layers, stored_cells},
-        particles::Particles,
-    },
-    scene::{Scene, step::Substep},
-    solve::{
-        SolveError,
-        plan::{Capacity, Counts},
-        pressure::LEVELS,
-    },
+    SolveError,
+    plan::{Capacity, Counts},
+    pressure::LEVELS,
 };
+use swell_domain::{
+    bricks::{Bricks, EDGE, table_dims},
+    flip::{layers, stored_cells},
+    particles::Particles,
+};
+use swell_scene::{Scene, step::Substep};
 
 use super::{Flip, PARAMS, plan, pressure_solver, recordings, step, upload_constants};
 

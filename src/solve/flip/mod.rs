@@ -15,32 +15,30 @@ mod watch;
 
 use glam::DVec3;
 
-use crate::{
-    domain::{
-        boundary::Boundary,
-        bounds::Bounds,
-        bricks::{Bricks, CELLS, table_dims},
-        budget::Breach,
-        flip::{layers, stored_cells},
-        particles::Particles,
-        poisson::FLUID,
-        shores::Shores,
-        solver::{PassTime, Solver, StepReport, Watch},
-        substep::Which,
-    },
-    gpu::{
-        adapter::Context,
-        buffer::Buf,
-        program::Program,
-        recording::{Recording, Timer},
-        sort,
-    },
-    scene::{Scene, moving_solid::MovingSolid, step::Substep},
+use swell_domain::{
+    boundary::Boundary,
+    bounds::Bounds,
+    bricks::{Bricks, CELLS, table_dims},
+    budget::Breach,
+    flip::{layers, stored_cells},
+    particles::Particles,
+    poisson::FLUID,
+    shores::Shores,
+    solver::{PassTime, Solver, StepReport, Watch},
+    substep::Which,
 };
+use swell_gpu::{
+    adapter::Context,
+    buffer::Buf,
+    program::Program,
+    recording::{Recording, Timer},
+    sort,
+};
+use swell_scene::{Scene, moving_solid::MovingSolid, step::Substep};
 
 use super::{
     SolveError,
-    boundary::Movers,
+    boundary::{Movers, upload_distance},
     effects,
     params::Counters,
     plan::{Counts, Plan},
@@ -97,7 +95,7 @@ impl Flip {
     ) -> Result<Self, SolveError> {
         let (buffers, passes) = (plan.buffer_specs(), plan.pass_specs());
         let program = Program::new(context, &buffers, &passes, &[])?;
-        boundary.upload_distance(&program, scene);
+        upload_distance(boundary, &program, scene);
         upload_constants(&program, &plan, scene);
         let bricks = bricks(scene, plan.grid_dims, &no_water(scene, plan.grid_dims), 0);
         let frame = whole_frame(scene);
@@ -224,7 +222,7 @@ impl Flip {
         self.cut = step::cut(&self.scene, substep);
         self.step = substep.length;
         self.program.upload(PARAMS, 0, &[params]);
-        self.program.upload(BRICKS, 0, &bricks.records);
+        (self.program).upload(BRICKS, 0, bytemuck::cast_slice(&bricks.records));
         self.program.upload(BRICK_SLOT, 0, &bricks.table);
         self.program.upload(GROUPS, 0, &groups);
         if let Some(movers) = &self.movers {
@@ -379,7 +377,7 @@ impl Flip {
     }
 
     /// Takes over where walls that absorb stand after a state.
-    pub(in crate::solve) fn take_answers(&mut self, state: &Particles) {
+    pub(crate) fn take_answers(&mut self, state: &Particles) {
         self.scene.take_answers(state);
     }
 

@@ -1,20 +1,18 @@
 //! What FLIP needs on the device.
 
 use crate::{
-    domain::{
-        bricks::{CELLS, table_dims},
-        flip::{layers, stored_cells},
-    },
-    gpu::{program::PassSpec, recording::Command, sort},
-    scene::{
-        Scene,
-        flip::{Surface, Transfer},
-    },
-    solve::{
-        effects,
-        plan::{Counts, Plan, Table, in_order},
-        pressure,
-    },
+    effects,
+    plan::{Counts, Plan, Table, in_order},
+    pressure,
+};
+use swell_domain::{
+    bricks::{CELLS, table_dims},
+    flip::{layers, stored_cells},
+};
+use swell_gpu::{program::PassSpec, recording::Command, sort};
+use swell_scene::{
+    Scene,
+    flip::{Surface, Transfer},
 };
 
 use super::{
@@ -26,7 +24,7 @@ use super::{
 const FACES: usize = 9;
 
 /// Lays out FLIP with its projection for `scene`; `moves` says whether it moves particles.
-pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan {
+pub(crate) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan {
     let flip = scene.solver.flip();
     let mut plan = Plan::bare(counts, scene.domain.cells(flip.cell_size));
     plan.moves = moves;
@@ -66,7 +64,7 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, moves: bool) -> Plan
 }
 
 /// Every command of a substep, of projections of any shape among them.
-pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
+pub(crate) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
     let flip = scene.solver.flip();
     let effects = effects::of_flip(scene, CELLS as usize * plan.counts.bricks.slots);
     let commands = Commands::new(plan, scene, &effects);

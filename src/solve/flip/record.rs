@@ -1,22 +1,20 @@
 //! A substep's passes, recorded.
 
 use crate::{
-    domain::{bricks::CELLS, flip::layers},
-    gpu::{
-        buffer::Workgroups,
-        program::Program,
-        recording::{Bind, Command, Groups, Recording, spread},
-        sort,
-    },
-    scene::Scene,
-    solve::{
-        SolveError,
-        effects::Addition,
-        params::FlipParams,
-        plan::{Plan, PlannedBuffer},
-        trace::Run,
-    },
+    SolveError,
+    effects::Addition,
+    params::FlipParams,
+    plan::{Plan, PlannedBuffer},
+    trace::Run,
 };
+use swell_domain::{bricks::CELLS, flip::layers};
+use swell_gpu::{
+    buffer::Workgroups,
+    program::Program,
+    recording::{Bind, Command, Groups, Recording, spread},
+    sort,
+};
+use swell_scene::Scene;
 
 use super::{buffers::*, plan::pushes};
 
@@ -166,7 +164,7 @@ fn over(pass: &'static str, size: usize) -> Command {
 }
 
 /// A pass over cells within reach.
-pub(in crate::solve) fn over_cells(pass: &'static str, binds: Vec<Bind>) -> Command {
+pub(crate) fn over_cells(pass: &'static str, binds: Vec<Bind>) -> Command {
     bound(pass, ACTIVE, binds)
 }
 

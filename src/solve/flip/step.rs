@@ -1,17 +1,15 @@
 //! What a substep's passes know.
 
 use crate::{
-    domain::{
-        bounds::Bounds,
-        bricks::{Bricks, CELLS, table_dims},
-        flip::{CAP, CONTACT, stored_cells},
-    },
-    scene::{Scene, step::Substep},
-    solve::{
-        params::{FlipParams, Inlets},
-        plan::Plan,
-    },
+    params::{FlipParams, Inlets},
+    plan::Plan,
 };
+use swell_domain::{
+    bounds::Bounds,
+    bricks::{Bricks, CELLS, table_dims},
+    flip::{CAP, CONTACT, stored_cells},
+};
+use swell_scene::{Scene, step::Substep};
 
 /// The walls that cut a substep's cells, in cells.
 pub(super) fn cut(scene: &Scene, step: &Substep) -> Bounds {

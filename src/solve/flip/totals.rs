@@ -1,15 +1,16 @@
 //! What the substeps of a frame add up to.
 
-use crate::{domain::solver::Projection, solve::pressure};
+use crate::pressure;
+use swell_domain::solver::Projection;
 
 /// What a frame's substeps did, added up.
 #[derive(Default)]
-pub(in crate::solve) struct FrameTotals {
+pub(crate) struct FrameTotals {
     pub(super) substeps: u32,
     pub(super) iterations: u64,
-    pub(in crate::solve) projection: Projection,
+    pub(crate) projection: Projection,
     /// Joule.
-    pub(in crate::solve) work: f64,
+    pub(crate) work: f64,
     /// Of the frame, seconds.
     pub(super) elapsed: f64,
 }

@@ -5,14 +5,14 @@ use super::{
     Flip, FrameTotals,
     buffers::*,
 };
-use crate::{
-    domain::budget::Breach, gpu::program::Program, scene::step::projected_substep,
-    solve::params::Counters,
-};
+use crate::params::Counters;
+use swell_domain::budget::Breach;
+use swell_gpu::program::Program;
+use swell_scene::step::projected_substep;
 
 impl Flip {
     /// Zeroes what is counted over the frame after `frame`.
-    pub(in crate::solve) fn begin_frame(&mut self, frame: u32) {
+    pub(crate) fn begin_frame(&mut self, frame: u32) {
         self.frame = frame;
         self.program.upload(COUNTERS, 0, &[Counters::default()]);
     }
@@ -22,7 +22,7 @@ impl Flip {
     ///
     /// # Errors
     /// The device, what is not finite, and a projection over the budget.
-    pub(in crate::solve) fn project_velocities(
+    pub(crate) fn project_velocities(
         &mut self,
         program: &Program,
         (start, length): (f64, f64),

@@ -6,7 +6,7 @@ use super::{
     super::{SolveError, pressure, state::look, trace::Run},
     CELL_KIND, FACE_CHANGE, Flip, FrameTotals, OPEN_VOLUME,
 };
-use crate::domain::{
+use swell_domain::{
     bricks::CELLS,
     flip::{HALF, open_extent, part_of_solids},
     gauge::Gauge,

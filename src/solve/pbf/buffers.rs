@@ -1,18 +1,16 @@
 //! Buffers that PBF alone has.
 
-use crate::{
-    gpu::buffer::{Buf, Windows},
-    solve::params::{IterationControl, Params, Phase},
-};
+use crate::params::{IterationControl, Params, Phase};
+use swell_gpu::buffer::{Buf, Windows};
 
-pub use crate::solve::buffers::*;
+pub use crate::buffers::*;
 
 /// What a substep's passes know.
 pub const PARAMS: Buf<Params> = Buf::uniform("params");
 /// Which particles a dispatch handles, and where their neighbours stand.
 pub const PHASES: Windows<Phase> = Windows::new("phase", "phases");
 /// Positions in sorted order with λ in w, m²; then boundary samples with their weight in w, by cell; then a particle that is far
-/// from everything. Where one binding does not hold them all, those from [`Plan::page`](crate::solve::plan::Plan::page) on stand in
+/// from everything. Where one binding does not hold them all, those from [`Plan::page`](crate::plan::Plan::page) on stand in
 /// [`PREDICTED_HIGH`].
 pub const PREDICTED: Buf<[f32; 4]> = Buf::new("predicted");
 /// See [`PREDICTED`].

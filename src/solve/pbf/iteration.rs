@@ -24,14 +24,12 @@
 use std::mem::offset_of;
 
 use crate::{
-    domain::pbf::chebyshev_factors,
-    gpu::recording::{Bind, Command, Groups},
-    scene::{Iteration, Pbf, Stop},
-    solve::{
-        params::{IterationControl, Phase},
-        plan::{Chunk, Plan},
-    },
+    params::{IterationControl, Phase},
+    plan::{Chunk, Plan},
 };
+use swell_domain::pbf::chebyshev_factors;
+use swell_gpu::recording::{Bind, Command, Groups};
+use swell_scene::{Iteration, Pbf, Stop};
 
 use super::buffers::{CONTROL, PHASES, list_of};
 

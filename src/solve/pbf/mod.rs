@@ -8,31 +8,29 @@ pub(super) mod record;
 
 use glam::{DVec3, Vec3};
 
-use crate::{
-    domain::{
-        boundary::Boundary,
-        budget::Breach,
-        particles::Particles,
-        pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
-        period::Period,
-        probe::fitted,
-        solver::{PassTime, Seen, Solver, Span as Substep, StepReport, Wanted, Watch},
-        sph::Calibration,
-        substep::Which,
-    },
-    gpu::{
-        adapter::Context,
-        buffer::Buf,
-        program::Program,
-        recording::{Recording, Timer, spread},
-        sort,
-    },
-    scene::{Scene, Stop},
+use swell_domain::{
+    boundary::Boundary,
+    budget::Breach,
+    particles::Particles,
+    pbf::{CAP, CONTACT, MAX_CORRECTION, REGULARIZATION},
+    period::Period,
+    probe::fitted,
+    solver::{PassTime, Seen, Solver, Span as Substep, StepReport, Wanted, Watch},
+    sph::Calibration,
+    substep::Which,
 };
+use swell_gpu::{
+    adapter::Context,
+    buffer::Buf,
+    program::Program,
+    recording::{Recording, Timer, spread},
+    sort,
+};
+use swell_scene::{Scene, Stop};
 
 use super::{
     SolveError,
-    boundary::Movers,
+    boundary::{self, Movers},
     effects,
     params::{Counters, IterationControl, Params},
     plan::{Counts, Plan, device_limits},
@@ -140,7 +138,7 @@ fn set_up(
     sort::upload_lengths(program, &CELL_START, cell_count(plan));
     program.upload(ELEMENT_COUNT, 0, &[[particles as u32, 0, 0, 0]]);
     upload_places(program, plan.page, places(plan) - 1, &[NOBODY]);
-    boundary.upload(program, scene, plan, calibration);
+    boundary::upload(boundary, program, scene, plan, calibration);
     [&commands.substep, &commands.measure].map(|commands| Recording::new(program, commands))
 }
 
@@ -278,7 +276,14 @@ impl Pbf {
         if let (Some(movers), Some(boundary)) = (&self.movers, &self.boundary) {
             let (program, scene) = (&self.program, &self.scene);
             movers.upload(program, scene, time - step, step);
-            boundary.upload_samples(program, scene, &self.plan, &self.calibration, (time, step));
+            boundary::upload_samples(
+                boundary,
+                program,
+                scene,
+                &self.plan,
+                &self.calibration,
+                (time, step),
+            );
         }
         effects::upload(&self.program, &self.scene, (time, step));
         if let Stop::DensityError { .. } = self.scene.solver.pbf().stop {

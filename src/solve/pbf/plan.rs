@@ -1,21 +1,19 @@
 //! What PBF needs on the device.
 
 use crate::{
-    domain::sph::Calibration,
-    gpu::{
-        program::{BufferSpec, PassSpec},
-        recording::Command,
-        sort,
-    },
-    scene::{Iteration, Scene, Stop},
-    solve::{
-        effects, flip,
-        plan::{Chunk, Counts, DeviceLimits, Plan, Table, in_order},
-    },
+    effects, flip,
+    plan::{Chunk, Counts, DeviceLimits, Plan, Table, in_order},
 };
+use swell_domain::sph::Calibration;
+use swell_gpu::{
+    program::{BufferSpec, PassSpec},
+    recording::Command,
+    sort,
+};
+use swell_scene::{Iteration, Scene, Stop};
 
 use super::{buffers::*, record::Commands};
-use crate::solve::flip::buffers::SOLID_GRIDS;
+use crate::flip::buffers::SOLID_GRIDS;
 
 /// Constants for every pass that declares them.
 pub fn shared_constants(plan: &Plan) -> Vec<(&'static str, f64)> {
@@ -38,7 +36,7 @@ const LIST_BLOCK: usize = 512;
 const LIST_FOURS: usize = LIST_CAPACITY as usize / 4;
 
 /// Lays out PBF for `scene`.
-pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
+pub(crate) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits) -> Plan {
     let pbf = scene.solver.pbf();
     let calibration = Calibration::new(pbf.particle_spacing, pbf.support_ratio);
     let (size, support) = (scene.domain.size(), calibration.support_radius);
@@ -65,7 +63,7 @@ pub(in crate::solve) fn plan(scene: &Scene, counts: Counts, limits: DeviceLimits
 }
 
 /// Every command of a substep and of a frame's end.
-pub(in crate::solve) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
+pub(crate) fn commands(plan: &Plan, scene: &Scene) -> Vec<Command> {
     let effects = effects::of_pbf(scene, plan.counts.particles);
     let commands = Commands::new(plan, scene, &effects);
     [commands.substep, commands.measure].concat()
@@ -241,6 +239,6 @@ fn buffers(plan: &Plan, scene: &Scene, phases: usize) -> Table {
 }
 
 /// Cells that particles are sorted by.
-pub(in crate::solve) fn cell_count(plan: &Plan) -> usize {
+pub(crate) fn cell_count(plan: &Plan) -> usize {
     plan.grid_dims.iter().map(|&n| n as usize).product()
 }

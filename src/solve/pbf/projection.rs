@@ -3,20 +3,18 @@
 use glam::DVec3;
 
 use crate::{
-    domain::{
-        boundary::Boundary,
-        particles::Particles,
-        solver::{Projection, Solver},
-    },
-    gpu::{adapter::Context, program::Program},
-    scene::Scene,
-    solve::{
-        SolveError,
-        flip::{Flip, FrameTotals},
-        plan::Plan,
-        trace::Run,
-    },
+    SolveError,
+    flip::{Flip, FrameTotals},
+    plan::Plan,
+    trace::Run,
 };
+use swell_domain::{
+    boundary::Boundary,
+    particles::Particles,
+    solver::{Projection, Solver},
+};
+use swell_gpu::{adapter::Context, program::Program};
+use swell_scene::Scene;
 
 /// FLIP up to what it gives to particles.
 pub(super) struct Grid {

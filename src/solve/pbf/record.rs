@@ -1,10 +1,8 @@
 //! What a substep runs, and what a frame's end does, as commands.
 
-use crate::{
-    gpu::{recording::Command, sort},
-    scene::Scene,
-    solve::{effects::Addition, params::Phase, plan::Plan},
-};
+use crate::{effects::Addition, params::Phase, plan::Plan};
+use swell_gpu::{recording::Command, sort};
+use swell_scene::Scene;
 
 use super::{buffers::*, iteration::Builder, plan::cell_count};
 
@@ -31,7 +29,7 @@ impl Commands {
 }
 
 /// Particles by cell, and within a cell by id.
-pub(in crate::solve) fn sorting(plan: &Plan) -> Vec<Command> {
+pub(crate) fn sorting(plan: &Plan) -> Vec<Command> {
     let n = plan.counts.particles;
     let mut commands = vec![
         Command::clear(&CELL_START),

@@ -3,7 +3,7 @@
 //! "Cells" and "planes" as in FLIP's; "blocked" cells stand by block of 2³ ([`super::blocked`]). A [`Real`] is what
 //! `solver.flip.pressure.precision` says that the solve computes in.
 
-use crate::gpu::{
+use swell_gpu::{
     buffer::{Buf, Windows, Workgroups},
     program::Program,
 };

@@ -42,19 +42,16 @@ mod stages;
 
 use std::collections::BTreeMap;
 
-use crate::{
-    domain::bricks::{Bricks, CELLS, Level},
-    gpu::{
-        buffer::Workgroups,
-        program::Program,
-        recording::{Recording, Timer, spread},
-    },
-    scene::flip::{Precision, Preconditioner, Pressure},
+use swell_domain::bricks::{Bricks, CELLS, Level};
+use swell_gpu::{
+    buffer::Workgroups,
+    program::Program,
+    recording::{Recording, Timer, spread},
 };
+use swell_scene::flip::{Precision, Preconditioner, Pressure};
 
 use super::{SolveError, trace::Run};
 
-pub use crate::domain::poisson::{AIR, FLUID, SOLID};
 use buffers::{PHASES, SIZES, read_control, read_reals};
 pub use params::{
     PressureBrick, PressureControl, PressureControl64, PressurePhase, PressureStats, ReduceStep,
@@ -63,6 +60,7 @@ use plan::{PHASE_COUNT, Phase, SIZE_COUNT, Size};
 pub use plan::{passes, planned};
 pub(super) use stages::all_commands;
 use stages::{SINGLE, Shape, Stages};
+pub use swell_domain::poisson::{AIR, FLUID, SOLID};
 
 /// Levels of bricks that the multigrid uses at most: pass it to [`Bricks::new`] as depth.
 pub const LEVELS: usize = 8;
@@ -408,7 +406,7 @@ fn solved(control: &PressureControl64, tolerance: f64) -> Solved {
 
 /// The room's own records: face neighbours, and the way up to the next level, of the first `levels` levels.
 fn brick_records(bricks: &Bricks, levels: usize) -> Vec<PressureBrick> {
-    let record = |brick: &crate::domain::bricks::Brick| {
+    let record = |brick: &swell_domain::bricks::Brick| {
         let octant = brick.coordinate.map(|c| c & 1);
         let has_parent = brick.parent != 0 && (brick.level as usize) + 1 < levels;
         PressureBrick {

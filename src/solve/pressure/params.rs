@@ -1,6 +1,6 @@
 //! Mirrors of the room's WGSL structs.
 
-use crate::gpu::buffer::mirror;
+use swell_gpu::buffer::mirror;
 
 mirror!(
     /// `PressurePhase` of shared/pressure_phase.wgsl.

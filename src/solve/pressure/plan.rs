@@ -1,15 +1,13 @@
 //! Buffers, passes and dispatch sizes of the room.
 
-use crate::{
-    domain::bricks::CELLS,
-    gpu::{
-        buffer::Buf,
-        program::PassSpec,
-        recording::{Bind, Command, Groups},
-    },
-    scene::flip::{Precision, Preconditioner, Pressure, Surface},
-    solve::plan::{Table, in_order},
+use crate::plan::{Table, in_order};
+use swell_domain::bricks::CELLS;
+use swell_gpu::{
+    buffer::Buf,
+    program::PassSpec,
+    recording::{Bind, Command, Groups},
 };
+use swell_scene::flip::{Precision, Preconditioner, Pressure, Surface};
 
 use super::{
     DONE, ITERATING, LEVELS, VERIFYING,

@@ -1,13 +1,11 @@
 //! The room's command lists: starting a solve, one iteration, its verification, and what follows.
 
-use crate::{
-    gpu::{
-        buffer::Buf,
-        program::Program,
-        recording::{Command, Recording},
-    },
-    scene::flip::Preconditioner,
+use swell_gpu::{
+    buffer::Buf,
+    program::Program,
+    recording::{Command, Recording},
 };
+use swell_scene::flip::Preconditioner;
 
 use super::{
     LEVELS,
@@ -88,10 +86,7 @@ impl Stages<Vec<Command>> {
 }
 
 /// What solves of every shape run.
-pub(in crate::solve) fn all_commands(
-    preconditioner: Preconditioner,
-    has_correction: bool,
-) -> Vec<Command> {
+pub(crate) fn all_commands(preconditioner: Preconditioner, has_correction: bool) -> Vec<Command> {
     let mut all = Vec::new();
     for levels in (1..=LEVELS).rev() {
         for dispatched in 1..levels.max(2) {

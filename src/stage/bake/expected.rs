@@ -5,12 +5,10 @@ use std::io;
 use super::{
     BakeError, Beginning, Request, beginning, check_count, check_first, grid_record, last_frame,
 };
-use crate::{
-    cache::{self, CacheError, CacheReader, Parent, frame, refuse_occupied, vdb},
-    domain::{keep::Keep, particles::Particles},
-    scene::{self, Scene},
-    stage::prepare::Start,
-};
+use crate::prepare::Start;
+use swell_cache::{CacheError, CacheReader, Parent, frame, refuse_occupied, vdb};
+use swell_domain::{keep::Keep, particles::Particles};
+use swell_scene::Scene;
 
 /// What frames that are not there yet will take on the disk, against what it has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +32,7 @@ impl Room {
         Ok(Self {
             bytes: bytes_of(&request.scene, start, first, last)?,
             is_compressed: request.scene.compression.is_some(),
-            free: cache::free_bytes(&request.directory),
+            free: swell_cache::free_bytes(&request.directory),
         })
     }
 
@@ -80,11 +78,11 @@ pub fn expected(request: &Request) -> Result<Expected, BakeError> {
     } = beginning(request, last)?;
     check_count(scene, &start, parent.as_ref(), last)?;
     let directory = &request.directory;
-    let stands = request.resume && cache::exists(directory);
+    let stands = request.resume && swell_cache::exists(directory);
     let (first, standing) = if stands {
         let cached = CacheReader::open(directory)?;
-        let text = scene.to_toml(&scene::asset_path);
-        if let Some(difference) = scene::physics_difference(cached.scene_toml(), &text)? {
+        let text = scene.to_toml(&swell_scene::asset_path);
+        if let Some(difference) = swell_scene::physics_difference(cached.scene_toml(), &text)? {
             return Err(BakeError::OtherPhysics {
                 directory: directory.clone(),
                 difference,
@@ -135,8 +133,8 @@ fn bytes_of(scene: &Scene, start: &Particles, first: u32, last: u32) -> Result<u
 /// Bytes of the files of a frame with these particles: its own, and the grids' where the scene asks for them.
 fn frame_bytes(scene: &Scene, particles: &Particles) -> Result<[u64; 2], CacheError> {
     let stamp = frame::Stamp {
-        program: env!("CARGO_PKG_NAME"),
-        program_version: env!("CARGO_PKG_VERSION"),
+        program: swell_domain::PROGRAM,
+        program_version: swell_domain::VERSION,
         shot: &scene.shot.name,
         frame: 0,
         time: 0.0,

@@ -10,16 +10,14 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{DiffError, Request, adapter_of, aggregates, bake_of, of_caches, physics, scene_of};
-use crate::{
-    cache::{CacheError, CacheReader},
-    compare::{
-        baseline::{
-            Baseline, BaselineDiff, BaselineFrame, FORMAT_VERSION, Lost, Measured, particles_hash,
-        },
-        limits::default_tolerances,
+use swell_cache::{CacheError, CacheReader};
+use swell_compare::{
+    baseline::{
+        Baseline, BaselineDiff, BaselineFrame, FORMAT_VERSION, Lost, Measured, particles_hash,
     },
-    domain::frame_range::{FrameRange, ranges},
+    limits::default_tolerances,
 };
+use swell_domain::frame_range::{FrameRange, ranges};
 
 /// What became of a baseline that was written.
 #[derive(Clone, Debug, Serialize)]

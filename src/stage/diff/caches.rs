@@ -5,15 +5,13 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use super::{DiffError, Request, aggregates, bake_of, of_caches, physics, scene_of, streams};
-use crate::{
-    cache::{CacheError, CacheReader},
-    compare::{
-        caches::CacheDiff,
-        frames::{self, FrameDiff},
-        streams::StreamDiff,
-    },
-    domain::{particles::Particles, tolerance::Tolerance},
+use swell_cache::{CacheError, CacheReader};
+use swell_compare::{
+    caches::CacheDiff,
+    frames::{self, FrameDiff},
+    streams::StreamDiff,
 };
+use swell_domain::{particles::Particles, tolerance::Tolerance};
 
 /// A tolerance that judges nothing here would pass anything.
 fn check_tolerance(tolerance: &Tolerance, caches: [&CacheReader; 2]) -> Result<(), DiffError> {

@@ -9,13 +9,11 @@ use std::{
 use rayon::prelude::*;
 
 use super::{DiffError, Images, Request};
-use crate::{
-    compare::pictures::{self, Encoding, PairDiff, Picture, PicturesDiff, difference_image},
-    domain::{frame_range::FrameRange, tolerance::PictureLimits},
-    render::{
-        RenderError,
-        image::{read_exr, read_png, write_rgb_png},
-    },
+use swell_compare::pictures::{self, Encoding, PairDiff, Picture, PicturesDiff, difference_image};
+use swell_domain::{frame_range::FrameRange, tolerance::PictureLimits};
+use swell_render::{
+    RenderError,
+    image::{read_exr, read_png, write_rgb_png},
 };
 
 fn encoding(path: &Path) -> Option<Encoding> {

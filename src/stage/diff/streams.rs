@@ -3,15 +3,13 @@
 use glam::DVec3;
 use serde_json::{Value as Json, json};
 
-use crate::{
-    cache::{
-        CacheError, CacheReader, Entry, GridRecord, Look, ProbeRecord,
-        stream::{Content, PARTICLES, STREAMS, Stream},
-        vdb,
-    },
-    compare::streams::{self, Difference, Row, StreamDiff},
-    domain::{particles::Particles, probe::Rate},
+use swell_cache::{
+    CacheError, CacheReader, Entry, GridRecord, Look, ProbeRecord,
+    stream::{Content, PARTICLES, STREAMS, Stream},
+    vdb,
 };
+use swell_compare::streams::{self, Difference, Row, StreamDiff};
+use swell_domain::{particles::Particles, probe::Rate};
 
 /// A frame of one of the two caches; its particles are as they were read.
 #[derive(Clone, Copy)]

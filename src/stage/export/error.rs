@@ -2,12 +2,10 @@
 
 use std::{io, path::PathBuf};
 
-use crate::{
-    cache::CacheError,
-    domain::posix,
-    scene::{SceneError, look::LookError},
-    stage::Blame,
-};
+use crate::Blame;
+use swell_cache::CacheError;
+use swell_domain::posix;
+use swell_scene::{SceneError, look::LookError};
 
 use super::{FolderError, UsdcError};
 

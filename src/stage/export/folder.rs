@@ -19,7 +19,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::stage::locked::{is_at, is_had, open};
+use crate::locked::{is_at, is_had, open};
 
 /// Folder of records and drafts.
 const ROOM: &str = ".swell-export";

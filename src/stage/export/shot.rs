@@ -8,13 +8,10 @@ use std::{
 use glam::DVec3;
 
 use super::{Job, Target, UsdWater, Wanted, beside};
-use crate::{
-    cache::CacheError,
-    domain::particles::Particles,
-    export::usd::{self, Root, Solid, View, WaveMaker},
-    render,
-    scene::{Scene, Wall},
-};
+use swell_cache::CacheError;
+use swell_domain::particles::Particles;
+use swell_export::usd::{self, Root, Solid, View, WaveMaker};
+use swell_scene::{Scene, Wall};
 
 /// What a layer of a shot is called beside its frames'.
 const MANIFEST: &str = "manifest";
@@ -155,9 +152,9 @@ impl Job<'_> {
         let per_second = self.scene.shot.frames_per_second;
         let view = |&frame: &u32| View {
             frame,
-            eye: render::eye(look, self.scene.origin, frame.into(), per_second),
+            eye: swell_render::eye(look, self.scene.origin, frame.into(), per_second),
             film_width_mm: look.spec().camera.film_back_mm[0],
-            lens: render::lens(look, frame.into(), per_second),
+            lens: swell_render::lens(look, frame.into(), per_second),
         };
         self.frames.iter().map(view).collect()
     }

@@ -11,22 +11,21 @@ use exr::meta::{
 };
 use glam::Vec3;
 
-use crate::{
-    cache::{CacheError, frame},
-    domain::{
-        bounds::Bounds,
-        mesh::TriangleMesh,
-        mesh_file::{MeshError, MeshFormat, read_bytes, vdb},
-        particles::Particles,
-    },
-    render::{
-        RenderError,
-        image::{Attributes, png_header, read_exr_attributes, read_png_attributes},
-    },
-    stage::Blame,
+use crate::Blame;
+use swell_cache::{CacheError, frame};
+use swell_domain::{
+    bounds::Bounds,
+    mesh::TriangleMesh,
+    mesh_file::{MeshError, MeshFormat, read_bytes, vdb},
+    particles::Particles,
+};
+use swell_render::{
+    RenderError,
+    image::{Attributes, png_header, read_exr_attributes, read_png_attributes},
 };
 
-pub use crate::{domain::mesh_file::vdb::GridFile, scene::rig::Rig};
+pub use swell_domain::mesh_file::vdb::GridFile;
+pub use swell_scene::rig::Rig;
 
 /// A file that `inspect` knows by its ending.
 #[derive(Debug)]

@@ -21,10 +21,8 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    render::{Attributes, image::read_header},
-    stage::locked::{is_at, is_had, open},
-};
+use crate::locked::{is_at, is_had, open};
+use swell_render::{Attributes, image::read_header};
 
 /// Whose pictures they are; its lock is held while a process comes or goes.
 const RECORD: &str = "render.json";

@@ -11,25 +11,24 @@ use super::{
     surfaces::{FINER, Set, truth},
     told,
 };
-use crate::{
-    cache::CacheReader,
-    check::{
-        pictures::{score, shown},
-        render::Surfaces,
-    },
-    compare::pictures::Picture,
-    domain::{eye::Eye, frame_range::FrameRange, particles::Particles},
-    gpu::adapter::Context,
-    reference::rays::Seen,
-    render::{RenderScene, Renderer, eye},
-    scene::{
-        Scene,
-        look::{Look, MethodSpec},
-    },
-    stage::baked_scene,
+use crate::baked_scene;
+use swell_cache::CacheReader;
+use swell_check::{
+    pictures::{score, shown},
+    render::Surfaces,
+};
+use swell_compare::pictures::Picture;
+use swell_domain::{eye::Eye, frame_range::FrameRange, particles::Particles};
+use swell_gpu::adapter::Context;
+use swell_reference::rays::Seen;
+use swell_render::{RenderScene, Renderer, eye};
+use swell_scene::{
+    Scene,
+    look::{Look, MethodSpec},
 };
 
-pub use crate::{check::render::Summary, render::REACH};
+pub use swell_check::render::Summary;
+pub use swell_render::REACH;
 
 /// Frames of a cache, and what rays in f64 and, where pictures are scored, finer rays see with one look.
 pub struct Gallery<'a> {

@@ -3,12 +3,10 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use super::pictures::others;
-use crate::{
-    cache::{CacheError, CacheReader},
-    domain::particles::Particles,
-    render::{Moment, REACH, Water, frames_around},
-    scene::look::Look,
-};
+use swell_cache::{CacheError, CacheReader};
+use swell_domain::particles::Particles;
+use swell_render::{Moment, REACH, Water, frames_around};
+use swell_scene::look::Look;
 
 /// Frames that were read last: in a row of frames each is read once.
 #[derive(Default)]

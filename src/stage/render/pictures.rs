@@ -3,15 +3,13 @@
 use std::path::Path;
 
 use super::{Request, whitewater::Whitewater};
-use crate::{
-    cache::{CacheError, CacheReader, Manifest},
-    render::{
-        Attributes, Image, REACH, RenderError, frames_around,
-        image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
-    },
-    scene::look::{FormatSpec, Look},
-    stage::device::shaders_note,
+use crate::device::shaders_note;
+use swell_cache::{CacheError, CacheReader, Manifest};
+use swell_render::{
+    Attributes, Image, REACH, RenderError, frames_around,
+    image::{read_exr_attributes, read_png_attributes, write_exr, write_png_with_attributes},
 };
+use swell_scene::look::{FormatSpec, Look};
 
 /// All of it: what stands in the header of a frame's pictures.
 pub(super) fn whole_attributes(
@@ -66,8 +64,8 @@ pub(super) fn attributes(
         shot: manifest.shot.clone(),
         software: format!(
             "{} {}{}{}",
-            env!("CARGO_PKG_NAME"),
-            env!("CARGO_PKG_VERSION"),
+            swell_domain::PROGRAM,
+            swell_domain::VERSION,
             shaders_note(request.gpu.shaders.edited()),
             baked_note(manifest)
         ),

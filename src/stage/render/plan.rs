@@ -5,17 +5,15 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use super::{RenderJobError, render_scene, told};
-use crate::{
-    cache::CacheReader,
-    domain::{bounds::Bounds, particles::Particles},
-    gpu::{
-        adapter::{Context, GpuError},
-        program::check_sizes,
-    },
-    render::{Limits, Plan, RenderScene, Runs},
-    scene::{Scene, look::Look},
-    stage::{baked_scene, prepare::Start},
+use crate::{baked_scene, prepare::Start};
+use swell_cache::CacheReader;
+use swell_domain::{bounds::Bounds, particles::Particles};
+use swell_gpu::{
+    adapter::{Context, GpuError},
+    program::check_sizes,
 };
+use swell_render::{Limits, Plan, RenderScene, Runs};
+use swell_scene::{Scene, look::Look};
 
 /// What is planned to stand before the camera.
 #[derive(Debug)]

@@ -1,16 +1,14 @@
 //! What of a scene stands in a picture of a frame.
 
 use super::RenderJobError;
-use crate::{
-    domain::{
-        bounds::Bounds,
-        mesh_file::{MeshError, MeshFormat, parts::Parts, read_bytes},
-        particles::Particles,
-        pose::Pose,
-    },
-    render::{RenderScene, SolidParts},
-    scene::{PlacedMesh, Scene, Wall, look::Look},
+use swell_domain::{
+    bounds::Bounds,
+    mesh_file::{MeshError, MeshFormat, parts::Parts, read_bytes},
+    particles::Particles,
+    pose::Pose,
 };
+use swell_render::{RenderScene, SolidParts};
+use swell_scene::{PlacedMesh, Scene, Wall, look::Look};
 
 /// A scene as it stands at a frame, with what the look takes of it.
 ///

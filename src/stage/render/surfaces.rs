@@ -10,27 +10,23 @@ use std::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{
-    cache::CacheReader,
-    check::{
-        pictures::{Residual, score, shown},
-        render::{Summary, Surfaces},
-    },
-    compare::pictures::Picture,
-    domain::{
-        eye::Eye, frame_range::FrameRange, level_set::kernels::Kernels, particles::Particles,
-    },
-    gpu::adapter::{Context, Needs},
-    reference::rays::{Seen, cast},
-    render::{RenderError, RenderScene, Renderer, eye, opaque},
-    scene::look::{Look, MethodSpec},
+use swell_cache::CacheReader;
+use swell_check::{
+    pictures::{Residual, score, shown},
+    render::{Summary, Surfaces},
 };
+use swell_compare::pictures::Picture;
+use swell_domain::{
+    eye::Eye, frame_range::FrameRange, level_set::kernels::Kernels, particles::Particles,
+};
+use swell_gpu::adapter::{Context, Needs};
+use swell_reference::rays::{Seen, cast};
+use swell_render::{RenderError, RenderScene, Renderer, eye, opaque};
+use swell_scene::look::{Look, MethodSpec};
 
 use super::{RenderJobError, near::Near, render_scene, told};
-use crate::{
-    scene::Scene,
-    stage::{baked_scene, device::Gpu},
-};
+use crate::{baked_scene, device::Gpu};
+use swell_scene::Scene;
 
 /// What rays may be off by: the 95th percentile of their depths, spacings. Half a voxel, a quarter of a spacing: a surface between
 /// two corners of a voxel is where trilinear values put it.

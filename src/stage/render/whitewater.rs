@@ -2,11 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{
-    cache::{self, CacheError, CacheReader},
-    domain::{particles::Particles, posix},
-    stage::whitewater::{directory, is_of},
-};
+use crate::whitewater::{directory, is_of};
+use swell_cache::{CacheError, CacheReader};
+use swell_domain::{particles::Particles, posix};
 
 /// Why a stream cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -53,7 +51,7 @@ impl Whitewater {
         frames: &[u32],
     ) -> Result<Self, StreamError> {
         let directory = directory(cache, stream);
-        if !cache::exists(&directory) {
+        if !swell_cache::exists(&directory) {
             return Err(StreamError::Missing {
                 stream: stream.to_owned(),
                 directory,

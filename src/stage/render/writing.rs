@@ -8,10 +8,8 @@ use std::{
 };
 
 use super::{RenderJobError, Request, folder::Folder, pictures::write};
-use crate::{
-    render::{Attributes, Image},
-    scene::look::FormatSpec,
-};
+use swell_render::{Attributes, Image};
+use swell_scene::look::FormatSpec;
 
 /// A frame that is drawn and not yet written.
 pub(super) struct Drawn {

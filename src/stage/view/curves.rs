@@ -6,12 +6,10 @@ use super::{
     ViewError, reader,
     strip::{Label, Strip},
 };
-use crate::{
-    cache::{CacheReader, Entry},
-    domain::solver::StepReport,
-    stage::probes,
-    study::chart::{Chart, Series},
-};
+use crate::probes;
+use swell_cache::{CacheReader, Entry};
+use swell_domain::solver::StepReport;
+use swell_study::chart::{Chart, Series};
 
 /// Times and curves of a cache; none of either where none is named.
 #[derive(Default)]

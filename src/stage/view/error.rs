@@ -2,10 +2,11 @@
 
 use std::{io, path::PathBuf};
 
-use crate::{
-    cache::CacheError, render::RenderError, scene::SceneError, stage::Blame,
-    study::raster::RasterError,
-};
+use crate::Blame;
+use swell_cache::CacheError;
+use swell_render::RenderError;
+use swell_scene::SceneError;
+use swell_study::raster::RasterError;
 
 /// Why there is nothing to look at.
 #[derive(Debug, thiserror::Error)]

@@ -8,7 +8,7 @@ use std::{
 };
 
 use super::ViewError;
-use crate::study::{apng::Apng, rgb::Rgb};
+use swell_study::{apng::Apng, rgb::Rgb};
 
 /// What names of movies end in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

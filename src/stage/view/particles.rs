@@ -8,17 +8,15 @@ use super::{
     ViewError, reader,
     strip::{Label, Source, Strip},
 };
-use crate::{
-    cache::CacheReader,
-    domain::{
-        bounds::Bounds, frame_range::FrameRange, particles::Particles, statistics::percentile,
-    },
-    scene::Scene,
-    stage::baked_scene,
-    study::{
-        points::{Around, Aspect, Projection},
-        rgb::Rgb,
-    },
+use crate::baked_scene;
+use swell_cache::CacheReader;
+use swell_domain::{
+    bounds::Bounds, frame_range::FrameRange, particles::Particles, statistics::percentile,
+};
+use swell_scene::Scene;
+use swell_study::{
+    points::{Around, Aspect, Projection},
+    rgb::Rgb,
 };
 
 /// Pixels that a picture is wide.

@@ -14,16 +14,14 @@ use super::{
     ViewError,
     strip::{Label, Source, Strip, name_of},
 };
-use crate::{
-    render::{
-        Attributes, RenderError,
-        colour::{REC_709, Space},
-        image::{read_exr, read_header, read_png},
-        view::apply,
-    },
-    scene::look::ViewSpec,
-    study::rgb::Rgb,
+use swell_render::{
+    Attributes, RenderError,
+    colour::{REC_709, Space},
+    image::{read_exr, read_header, read_png},
+    view::apply,
 };
+use swell_scene::look::ViewSpec;
+use swell_study::rgb::Rgb;
 
 /// PNG before EXR: of a frame that has both, the PNG is what its look shows.
 const ENDINGS: [&str; 2] = ["png", "exr"];
@@ -281,7 +279,7 @@ mod tests {
     #[test]
     fn light_of_other_primaries_is_shown_alike() {
         let view = ViewSpec::default();
-        let space = crate::render::colour::ACES_CG;
+        let space = swell_render::colour::ACES_CG;
         assert!(is_other(&space) && !is_other(&REC_709));
         let light = DVec3::new(0.4, 0.2, 0.1);
         let as_aces = (REC_709.to(space) * light).as_vec3().to_array();

@@ -15,7 +15,7 @@ use super::{
     store::{Store, write},
     strip::{Label, Strip},
 };
-use crate::study::{
+use swell_study::{
     player::{Player, Set},
     rgb::Rgb,
     sheet::{Cell, sheet},

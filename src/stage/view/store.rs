@@ -8,7 +8,7 @@ use std::{
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 
 use super::ViewError;
-use crate::study::player::MARK;
+use swell_study::player::MARK;
 
 /// Where pictures of a page stand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

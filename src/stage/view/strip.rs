@@ -7,7 +7,9 @@ use std::{
 };
 
 use super::{ViewError, particles::Balls, pictures};
-use crate::{render::Attributes, scene::look::ViewSpec, study::rgb::Rgb};
+use swell_render::Attributes;
+use swell_scene::look::ViewSpec;
+use swell_study::rgb::Rgb;
 
 /// What a picture is told by.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -13,13 +13,11 @@ use super::{
     store::write,
     strip::name_of,
 };
-use crate::{
-    scene::look::ViewSpec,
-    study::{
-        folder::{CLAIM, Claim, is_ledger, is_share},
-        rgb::Rgb,
-        sheet::{Cell, sheet},
-    },
+use swell_scene::look::ViewSpec;
+use swell_study::{
+    folder::{CLAIM, Claim, is_ledger, is_share},
+    rgb::Rgb,
+    sheet::{Cell, sheet},
 };
 
 /// What a study leaves, beside its ledgers.

@@ -2,14 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{
-    cache::CacheReader,
-    check::{self, Table},
-    domain::{boundary::Boundary, whitewater::Settings},
-    gpu::adapter::Context,
-    scene::Scene,
-    stage::{baked_scene, device::SolverError, prepare::Start},
-};
+use crate::{baked_scene, device::SolverError, prepare::Start};
+use swell_cache::CacheReader;
+use swell_check::Table;
+use swell_domain::{boundary::Boundary, whitewater::Settings};
+use swell_gpu::adapter::Context;
+use swell_scene::Scene;
 
 use super::{WhitewaterError, is_of, recorded, water::Water};
 
@@ -84,7 +82,7 @@ impl Stream {
         let water = Water::of(&self.cache, self.scene.period()).at(frame)?;
         let time = self.cache.entry(frame)?.clock.time;
         let white = self.stream.read(frame - 1)?;
-        let one = check::whitewater::Frame {
+        let one = swell_check::whitewater::Frame {
             scene: &self.scene,
             boundary: &self.boundary,
             settings: &self.settings,
@@ -93,6 +91,6 @@ impl Stream {
             time,
             seconds: time - self.cache.entry(frame - 1)?.clock.time,
         };
-        Ok(check::whitewater::check(context, one).map_err(SolverError::from)?)
+        Ok(swell_check::whitewater::check(context, one).map_err(SolverError::from)?)
     }
 }

@@ -1,21 +1,17 @@
 //! Whitewater's passes on what was asked for: an adapter, or the CPU with the f64 reference.
 
-use crate::{
-    domain::{
-        boundary::Boundary,
-        particles::Particles,
-        solver::PassTime,
-        whitewater::{Potentials, Settings},
-    },
-    reference,
-    scene::Scene,
-    solve,
-    stage::device::{Opened, SolverError},
+use crate::device::{Opened, SolverError};
+use swell_domain::{
+    boundary::Boundary,
+    particles::Particles,
+    solver::PassTime,
+    whitewater::{Potentials, Settings},
 };
+use swell_scene::Scene;
 
 pub(super) enum Engine {
-    Gpu(Box<solve::whitewater::Whitewater>),
-    Cpu(Box<reference::whitewater::Whitewater>),
+    Gpu(Box<swell_solve::whitewater::Whitewater>),
+    Cpu(Box<swell_reference::whitewater::Whitewater>),
 }
 
 impl Engine {
@@ -28,10 +24,10 @@ impl Engine {
         is_timed: bool,
     ) -> Result<Self, SolverError> {
         Ok(match opened {
-            Opened::Gpu(context) => Self::Gpu(Box::new(solve::whitewater::Whitewater::new(
+            Opened::Gpu(context) => Self::Gpu(Box::new(swell_solve::whitewater::Whitewater::new(
                 context, scene, boundary, water, is_timed,
             )?)),
-            Opened::Cpu => Self::Cpu(Box::new(reference::whitewater::Whitewater::new(
+            Opened::Cpu => Self::Cpu(Box::new(swell_reference::whitewater::Whitewater::new(
                 scene, boundary,
             ))),
         })

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Request, WhitewaterError, asked, hash, other};
-use crate::cache::{self, CacheReader, stream::PARTICLES};
+use swell_cache::{CacheReader, stream::PARTICLES};
 
 /// What a job would make.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ pub fn expected(request: &Request) -> Result<Expected, WhitewaterError> {
         bytes: None,
         directory,
     };
-    if cache::exists(&found.directory) && !request.overwrite {
+    if swell_cache::exists(&found.directory) && !request.overwrite {
         let stream = CacheReader::open(&found.directory)?;
         if let Some(how) = other(&stream, &hash(&cache, request)?) {
             return Err(WhitewaterError::Other {

@@ -2,10 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::{
-    cache::{CacheError, CacheReader},
-    domain::{particles::Particles, period::Period},
-};
+use swell_cache::{CacheError, CacheReader};
+use swell_domain::{particles::Particles, period::Period};
 
 /// Reads frames in order, and makes those between two that were kept.
 pub(super) struct Water<'a> {

@@ -48,8 +48,7 @@ fn the_version_is_short_or_says_what_was_built() {
     assert!(is_hash || hash == "unknown", "{commit}");
     assert_has(value("target"), &[std::env::consts::ARCH]);
     assert!(matches!(value("profile"), "release" | "debug"), "{long}");
-    let mutants = cfg!(feature = "mutants");
-    assert_eq!(value("features"), if mutants { "mutants" } else { "none" });
+    assert_eq!(value("features"), "none");
 }
 
 fn git(folder: &Path, words: &str) -> String {

@@ -5,6 +5,7 @@ use std::{
     sync::{LazyLock, atomic::AtomicBool},
 };
 
+use crate::support::context;
 use swell::{
     experiment::{
         Devices,
@@ -27,19 +28,15 @@ fn load(file: &str) -> Stability {
     }
 }
 
-static CONTEXT: LazyLock<Context> = LazyLock::new(|| {
-    Context::open(None).expect("tests need a Vulkan adapter; tools/test installs one")
-});
-
-fn devices() -> Devices {
+fn devices(context: &Context) -> Devices {
     Devices {
-        gpu: Some(Opened::Gpu(Box::new(CONTEXT.clone()))),
+        gpu: Some(Opened::Gpu(Box::new(context.clone()))),
         cpu: Opened::Cpu,
     }
 }
 
 fn run(trial: &Trial) -> Run {
-    run_trial(&devices(), trial, &AtomicBool::new(false)).unwrap()
+    run_trial(&devices(&context()), trial, &AtomicBool::new(false)).unwrap()
 }
 
 /// What does not come out as the study says: marks that are missed, known failures that hold, and what is not refused.
@@ -49,7 +46,7 @@ fn wrong(case: &Case) -> Vec<String> {
         Held::Test(_) => {}
         Held::Refusal { attempts, words } => {
             for attempt in attempts {
-                let said = refusal(&devices(), attempt).unwrap().unwrap_or_default();
+                let said = refusal(&devices(&context()), attempt).unwrap().unwrap_or_default();
                 if !words.iter().all(|word| said.contains(word)) {
                     wrong.push(format!("{}, {:?}: {said:?}", case.name, attempt.method));
                 }
@@ -214,7 +211,7 @@ fn every_measure_is_missed_by_water_that_is_spoiled() {
     }
 }
 
-/// Whether the test that a command of the study names is there: `--test suite MODULES::NAME`, or `--lib NAME`.
+/// Whether the test that a command of the study names is there: `--test suite MODULES::NAME`, or `--workspace --lib NAME`.
 fn is_there(command: &str) -> bool {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let words: Vec<&str> = command.split(' ').collect();
@@ -229,7 +226,7 @@ fn is_there(command: &str) -> bool {
                 name,
             )
         }
-        ["cargo", "test", "--release", "--lib", name] => (sources(&root.join("src")), name),
+        ["cargo", "test", "--release", "--workspace", "--lib", name] => (sources(&root.join("src")), name),
         _ => return false,
     };
     let head = format!("fn {name}() {{");

@@ -1,7 +1,6 @@
 //! What a pass moves, and what the device's memory gives.
 
 use swell::gpu::{
-    adapter::Context,
     buffer::Buf,
     ceilings::Ceilings,
     program::Program,
@@ -18,7 +17,7 @@ const COUNT: usize = 1 << 12;
 
 /// Bytes and runs that a timer tells of the copying pass, run twice with these bindings.
 fn told(binds: &[Bind], count: usize) -> (u64, u64) {
-    let context = Context::open(None).unwrap();
+    let context = crate::support::context();
     let buffers = [COPIED.sized(COUNT), COPY.sized(COUNT)];
     let program = Program::new(&context, &buffers, &[plain_pass(PASS)], &[]).unwrap();
     let values: Vec<[f32; 4]> = (0..COUNT).map(|k| [k as f32; 4]).collect();
@@ -74,7 +73,7 @@ fn what_a_shader_reads_and_writes_is_seen() {
 /// Between a slow card's bus or one slow core and ten times what any device of today gives.
 #[test]
 fn a_device_has_ceilings() {
-    let ceilings = Ceilings::measure(&Context::open(None).unwrap()).unwrap();
+    let ceilings = Ceilings::measure(&crate::support::context()).unwrap();
     let Ceilings {
         bandwidth,
         arithmetic,

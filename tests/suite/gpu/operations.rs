@@ -1,13 +1,15 @@
 //! What passes count of their own operations.
 
 use swell::gpu::{
-    adapter::{Context, Spoil},
+    adapter::Spoil,
     buffer::Buf,
     operations::Operations,
     program::Program,
     recording::{Command, Recording, Timer},
     sort::plain_pass,
 };
+
+use crate::support::{context, device::Lent};
 
 const COMPUTING: &str = "measure/arithmetic";
 const ESCAPED: Buf<[f32; 4]> = Buf::new("escaped");
@@ -21,8 +23,8 @@ const INDEX: u64 = 4;
 /// And one comparison, whether there is an element of that index.
 const GUARD: u64 = 1;
 
-fn counting(spoil: Option<Spoil>) -> Context {
-    let mut context = Context::open(None).unwrap();
+fn counting(spoil: Option<Spoil>) -> Lent {
+    let mut context = context();
     context.counts_operations = true;
     context.spoil = spoil;
     context

@@ -1,7 +1,7 @@
 //! Triangles drawn into textures, and textures copied into buffers.
 
 use swell::gpu::{
-    adapter::{Context, GpuError},
+    adapter::GpuError,
     buffer::Buf,
     program::Program,
     raster::{CopyTexture, DEPTH, Draw, RasterSpec, Target},
@@ -24,7 +24,7 @@ const SHADOW: RasterSpec = RasterSpec {
 
 /// Depths of the picture after a triangle over its lower left half was drawn at depth 0.25 before a far 0.5.
 fn drawn(raster: RasterSpec) -> Vec<f32> {
-    let context = Context::open(None).unwrap();
+    let context = crate::support::context();
     let pixels = (SIZE[0] * SIZE[1]) as usize;
     let buffers = [MATRIX.sized(1), TRIANGLE.sized(3), COPY.sized(pixels)];
     let map = TextureSpec {
@@ -85,7 +85,7 @@ fn a_triangle_hides_what_is_farther() {
 
 #[test]
 fn a_pass_without_fragments_draws_no_colour() {
-    let context = Context::open(None).unwrap();
+    let context = crate::support::context();
     let coloured = RasterSpec {
         colours: &[wgpu::TextureFormat::R32Float],
         ..SHADOW

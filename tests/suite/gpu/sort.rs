@@ -7,6 +7,8 @@ use swell::gpu::{
     sort::{self, CELL_OF, CELL_START, ELEMENT_COUNT, ID, ORDER, PLACED, SLOT_IN_CELL},
 };
 
+use crate::support::context;
+
 /// Deterministic and well mixed (splitmix64).
 fn random(seed: u64) -> impl FnMut() -> u32 {
     let mut state = seed;
@@ -17,10 +19,6 @@ fn random(seed: u64) -> impl FnMut() -> u32 {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         (z ^ (z >> 31)) as u32
     }
-}
-
-fn context() -> Context {
-    Context::open(None).expect("tests need a Vulkan adapter; tools/test installs one")
 }
 
 fn gpu_scan(context: &Context, values: &[u32]) -> Vec<u32> {

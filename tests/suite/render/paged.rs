@@ -28,7 +28,7 @@ fn lowered() -> Context {
 
 #[test]
 fn a_frame_of_particles_in_pages_is_the_frame_drawn_whole() {
-    let whole = picture(&Context::open(None).unwrap());
+    let whole = picture(&crate::support::context());
     assert!(picture(&lowered()) == whole);
     // Controls: without the later pages each pass draws less.
     for (pass, from, to) in [

@@ -6,18 +6,16 @@ use glam::DVec3;
 use swell::domain::bounds::Bounds;
 use swell::domain::mesh::TriangleMesh;
 use swell::domain::particles::Particles;
-use swell::gpu::adapter::Context;
 use swell::render::image::{
     read_exr_attributes, read_png_attributes, write_exr, write_png, write_png_with_attributes,
 };
 use swell::render::{Attributes, Image, RenderError, RenderScene, Renderer, view};
 use swell::scene::look::Look;
 
+use crate::support::context;
+
 use super::scenes::{box_mesh, city_scene, city_water, slab};
 
-fn context() -> Context {
-    Context::open(None).unwrap()
-}
 
 fn look(text: &str) -> Look {
     Look::parse(text, Path::new("test.toml")).unwrap()

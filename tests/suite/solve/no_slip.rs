@@ -9,13 +9,18 @@ use swell::{
         solver::{Solver, StepReport},
         statistics::percentile,
     },
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::Context,
     reference,
     scene::{Scene, Wall},
     solve::plan::{Capacity, Counts, DeviceLimits, LIST_BUDGET, Plan},
 };
 
-use crate::support::{context, flip::*, lattice, noise};
+use crate::support::{
+    context,
+    device::{self, Lent},
+    flip::*,
+    lattice, noise,
+};
 
 fn wall(name: &str) -> Wall {
     Wall::NAMED
@@ -42,11 +47,8 @@ fn both(context: &Context, scene: &Scene, particles: &Particles) -> [(Particles,
     ]
 }
 
-fn spoiled(from: &'static str, to: &'static str) -> Context {
-    let mut context = context();
-    let pass = "flip/wall_friction";
-    context.spoil = Some(Spoil { pass, from, to });
-    context
+fn spoiled(from: &'static str, to: &'static str) -> Lent {
+    device::spoiled("flip/wall_friction", from, to)
 }
 
 /// Speed of the water along x and along z, m/s: 1 together.

@@ -3,7 +3,10 @@ mod bodies;
 mod precision;
 mod stops;
 
-use crate::support::pressure::{Rig, settings};
+use crate::support::{
+    context,
+    pressure::{Rig, settings},
+};
 use swell::{
     domain::{
         bricks::CELLS,
@@ -26,10 +29,6 @@ use swell::{
 };
 
 const SURFACES: [Surface; 2] = [Surface::Voxel, Surface::GhostFluid];
-
-fn context() -> Context {
-    Context::open(None).expect("tests need a Vulkan adapter; tools/test installs one")
-}
 
 fn rig(context: &Context, case: Case, preconditioner: Preconditioner, tolerance: f64) -> Rig {
     Rig::new(context, case, &settings(preconditioner, tolerance))

@@ -101,7 +101,7 @@ fn gpu(context: &Context, scene: &Scene, boundary: &Boundary, particles: &Partic
     let counts = Counts {
         particles: particles.len(),
         bricks: capacity(scene, particles),
-        ..boundary.counts()
+        ..Counts::of_solids(&boundary)
     };
     let plan = Plan::new(scene, counts, device_limits(context));
     Flip::new(context, scene, plan, boundary, false).unwrap()
@@ -173,7 +173,7 @@ fn a_drum_of_pbf_takes_its_water_along() {
     boundary.moving_samples = vec![rim(spacing)];
     let counts = Counts {
         particles: particles.len(),
-        ..boundary.counts()
+        ..Counts::of_solids(&boundary)
     };
     let plan = Plan::new(&scene, counts, device_limits(&context));
     let mut solver = Pbf::new(&context, &scene, plan, &boundary, false).unwrap();

@@ -109,7 +109,7 @@ const SOLVERS: [&str; 2] = ["solver.method=pbf", "solver.method=flip"];
 /// What holds by default, and each limit broken where it is set too low, on the GPU and on the CPU.
 #[test]
 fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
-    let gpu = opened(&Context::open(None).unwrap());
+    let gpu = opened(&crate::support::context());
     let both = [
         ("speed=0.01", Watched::Speed),
         ("speed_jump=1e-3", Watched::SpeedJump),
@@ -166,7 +166,7 @@ fn each_budget_holds_by_default_and_breaks_where_it_is_too_low() {
 /// Particles that are slowed to the cap count, here all of them by a fault in who is.
 #[test]
 fn too_many_slowed_particles_end_a_bake() {
-    let context = Context::open(None).unwrap();
+    let context = crate::support::context();
     for (method, pass) in [
         (SOLVERS[0], "pbf/update_velocity"),
         (SOLVERS[1], "flip/advect"),
@@ -191,7 +191,7 @@ fn too_many_slowed_particles_end_a_bake() {
 /// little larger, the budget breaks.
 #[test]
 fn energy_rises_by_the_work_of_the_walls_alone() {
-    let context = Context::open(None).unwrap();
+    let context = crate::support::context();
     let gpu = opened(&context);
     for (method, projection, lost, grown) in [
         (
@@ -254,7 +254,7 @@ fn energy_rises_by_the_work_of_the_walls_alone() {
 /// Both solvers tell the same work to the f64 reference's.
 #[test]
 fn the_work_of_walls_is_that_of_the_reference() {
-    let gpu = opened(&Context::open(None).unwrap());
+    let gpu = opened(&crate::support::context());
     for method in SOLVERS {
         let scene = load("24-leaving", &[method]);
         let work = |opened: &Device| -> f64 {
@@ -275,7 +275,7 @@ fn the_work_of_walls_is_that_of_the_reference() {
 /// tell from water.
 #[test]
 fn a_lid_on_sealed_water_is_reported_as_incompatible() {
-    let gpu = opened(&Context::open(None).unwrap());
+    let gpu = opened(&crate::support::context());
     for device in [&gpu, &Device::Cpu] {
         let scene = load("14-sealed", &["budget.volume=false"]);
         let pressed = whole(device, &scene);
@@ -303,7 +303,7 @@ fn a_lid_on_sealed_water_is_reported_as_incompatible() {
 /// Hard case 15.
 #[test]
 fn water_in_a_solid_is_left_out_and_counted() {
-    let gpu = opened(&Context::open(None).unwrap());
+    let gpu = opened(&crate::support::context());
     for method in SOLVERS {
         let scene = load("15-solid-over-all", &[method]);
         let none = whole(&gpu, &scene);
@@ -322,7 +322,7 @@ fn water_in_a_solid_is_left_out_and_counted() {
 /// Hard case 23.
 #[test]
 fn one_particle_at_extreme_speed_asks_for_substeps_and_is_told() {
-    let gpu = opened(&Context::open(None).unwrap());
+    let gpu = opened(&crate::support::context());
     for method in SOLVERS {
         let scene = load("23-extreme-particle", &[method]);
         let fallen = whole(&gpu, &scene);
@@ -357,7 +357,7 @@ fn one_particle_at_extreme_speed_asks_for_substeps_and_is_told() {
 /// Hard case 24, and the ledger of particles.
 #[test]
 fn nothing_leaves_the_domain_and_a_ledger_that_does_not_close_ends_the_bake() {
-    let context = Context::open(None).unwrap();
+    let context = crate::support::context();
     let gpu = opened(&context);
     for (method, out, twice) in [
         (

@@ -65,7 +65,7 @@ pub fn solver_with(
     let counts = Counts {
         particles: particles.len(),
         bricks,
-        ..boundary.counts()
+        ..Counts::of_solids(boundary)
     };
     let plan = Plan::new(scene, counts, device_limits(context));
     let mut solver = Flip::new(context, scene, plan, boundary, false).unwrap();

@@ -1,6 +1,7 @@
 //! Scenes, waters, caches and folders that tests of several rooms begin from.
 
 pub mod cache;
+pub mod device;
 pub mod events;
 pub mod flip;
 pub mod job;
@@ -12,6 +13,8 @@ pub mod solvers;
 #[cfg(target_os = "linux")]
 pub mod tmpfs;
 pub mod whitewater;
+
+pub use device::context;
 
 use glam::DVec3;
 use swell::{
@@ -29,10 +32,6 @@ use swell::{
 };
 
 pub const D: f64 = 0.1;
-
-pub fn context() -> Context {
-    Context::open(None).expect("tests need a Vulkan adapter; tools/test installs one")
-}
 
 /// A box with water settings that tests change where they need.
 pub fn scene(size: [f64; 3]) -> Scene {
@@ -125,7 +124,7 @@ pub fn jitter(particles: &mut Particles, amount: f64) {
 pub fn plan(context: &Context, scene: &Scene, particles: usize, boundary: &Boundary) -> Plan {
     let counts = Counts {
         particles,
-        ..boundary.counts()
+        ..Counts::of_solids(boundary)
     };
     Plan::new(scene, counts, device_limits(context))
 }

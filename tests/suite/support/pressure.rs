@@ -70,7 +70,8 @@ impl Rig {
 
     pub fn upload_case(&mut self) {
         let case = &self.case;
-        self.program.upload(BRICKS, 0, &case.bricks.records);
+        let records = bytemuck::cast_slice(&case.bricks.records);
+        self.program.upload(BRICKS, 0, records);
         self.program.upload(CELL_KIND, 0, &case.kind);
         self.program.upload(LIQUID_DISTANCE, 0, &case.distance);
         self.upload_planes(FACE_OPEN, &case.open);

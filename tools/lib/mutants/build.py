@@ -10,6 +10,37 @@ from pathlib import Path
 from .lists import Mistake, Mutant
 
 
+# Switches of a crate's faults, one of which an environment variable sets.
+SWITCH = """
+#[doc(hidden)]
+pub mod mutants {
+    static ON: std::sync::LazyLock<Option<u32>> = std::sync::LazyLock::new(|| {
+        let text = std::env::var("SWELL_MUTANT").ok()?;
+        Some(text.parse().expect("SWELL_MUTANT is a number"))
+    });
+
+    pub fn on(number: u32) -> bool {
+        *ON == Some(number)
+    }
+}
+"""
+# The shaders that the program has where none are named: those of a folder, never told apart from the shipped ones.
+SHIPPED = """    fn default() -> Self {
+        Self::SHIPPED
+    }
+"""
+FROM_FOLDER = """    fn default() -> Self {
+        static FOLDER: std::sync::LazyLock<Option<Shaders>> = std::sync::LazyLock::new(|| {
+            let folder = std::env::var_os("SWELL_SHADERS")?;
+            let mut read = Shaders::read(Path::new(&folder)).expect("the whole of shaders/");
+            read.hash = None;
+            Some(read)
+        });
+        FOLDER.clone().unwrap_or(Self::SHIPPED)
+    }
+"""
+
+
 @dataclass(frozen=True)
 class Tree:
     """The copy: `root` holds sources with the Rust faults in them, `shaders` plain ones, `target` the build."""
@@ -39,9 +70,13 @@ def copy(root: Path, mutants: list[Mutant]) -> Tree:
         data = source.read_bytes()
         if name in faulty:
             data = with_switches(data.decode(), faulty[name]).encode()
-        if name == "src/lib.rs":
+        if name.startswith("src/") and name.endswith("/lib.rs"):
             # Warnings would be of the switches: parentheses, a unit in both arms.
-            data = b"#![allow(warnings)]\n" + data
+            data = b"#![allow(warnings)]\n" + data + SWITCH.encode()
+        if name == "src/gpu/shader.rs":
+            if data.count(SHIPPED.encode()) != 1:
+                raise Mistake(f"{name} has no such default of Shaders any more")
+            data = data.replace(SHIPPED.encode(), FROM_FOLDER.encode())
         if not target.exists() or target.read_bytes() != data:
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)
@@ -79,12 +114,19 @@ def with_switches(text: str, mutants: list[Mutant]) -> str:
     return text
 
 
+def binary_of(test: str) -> str:
+    """What a test's name begins with: `suite`, or `lib::` and the crate whose own test it is."""
+    first, second, *_ = test.split("::")
+    return f"lib::{second}" if first == "lib" else first
+
+
 def compile(tree: Tree, tests: set[str]) -> dict[str, Path]:
-    """Test binary of each name that `tests` begin with."""
-    binaries = sorted({name.split("::")[0] for name in tests} | {"suite"})
-    targets = [word for name in binaries for word in (["--lib"] if name == "lib" else ["--test", name])]
-    command = ["cargo", "test", "--release", "--locked", "--features", "mutants", "--no-run"]
-    command += ["--message-format=json-render-diagnostics", *targets]
+    """Test binary of each name that `tests` begin with: `suite`, or `lib::` and a crate."""
+    binaries = sorted({binary_of(name) for name in tests} | {"suite"})
+    crates = [name.removeprefix("lib::") for name in binaries if name != "suite"]
+    packages = [word for crate in crates for word in ("-p", f"swell-{crate}")]
+    command = ["cargo", "test", "--release", "--locked", "--no-run", "--message-format=json-render-diagnostics"]
+    command += ["-p", "swell", *packages, "--lib", "--test", "suite"]
     print(f"compiling {len(binaries)} test binaries with every fault in them", flush=True)
     environment = os.environ | {"CARGO_TARGET_DIR": str(tree.target)}
     done = subprocess.run(command, cwd=tree.root, env=environment, stdout=subprocess.PIPE, text=True)
@@ -95,7 +137,8 @@ def compile(tree: Tree, tests: set[str]) -> dict[str, Path]:
         message = json.loads(line)
         if message.get("reason") == "compiler-artifact" and message["profile"]["test"] and message["executable"]:
             is_unit = "lib" in message["target"]["kind"]
-            found["lib" if is_unit else message["target"]["name"]] = Path(message["executable"])
+            name = message["target"]["name"]
+            found[f"lib::{name.removeprefix('swell_')}" if is_unit else name] = Path(message["executable"])
     missing = [name for name in binaries if name not in found]
     if missing:
         raise Mistake(f"no test binary {', '.join(missing)}")

@@ -94,7 +94,7 @@ def is_test(root: Path, name: str) -> bool:
     folder = root / ("src" if binary == "lib" else f"tests/{binary}")
     for depth in range(len(modules), 0, -1):
         module = folder.joinpath(*modules[:depth])
-        for file in (module.with_suffix(".rs"), module / "mod.rs"):
+        for file in (module.with_suffix(".rs"), module / "mod.rs", module / "lib.rs"):
             if file.is_file():
                 return f"fn {function}(" in file.read_text()
     return False

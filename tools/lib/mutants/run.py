@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from .build import Tree
+from .build import Tree, binary_of
 from .lists import Mistake, Mutant
 
 # Every shader has to parse and validate with the fault in it: what does not compile is caught by anything.
@@ -36,7 +36,8 @@ class Result:
 
 def passes(tree: Tree, binaries: dict[str, Path], test: str, fault: dict[str, str]) -> bool:
     """Runs one test alone. Raises Mistake where there is no such test."""
-    binary, name = test.split("::", 1)
+    binary = binary_of(test)
+    name = test.removeprefix(f"{binary}::")
     command = [str(binaries[binary]), name, "--exact", "--include-ignored"]
     environment = os.environ | {"CARGO_MANIFEST_DIR": str(tree.root), "RUST_BACKTRACE": "0"} | fault
     try:

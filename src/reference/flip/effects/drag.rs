@@ -7,16 +7,14 @@ use super::{
     super::{Model, Sorted, Step, grid::neighborhood},
     Acts, Flying,
 };
-use crate::{
-    domain::{
-        air::{blown, exposure},
-        bricks::{Bricks, CELLS},
-        flip::PLANE_SHARE,
-        poisson::SOLID,
-    },
-    reference::Timings,
-    scene::effects::drag::Settings,
+use crate::Timings;
+use swell_domain::{
+    air::{blown, exposure},
+    bricks::{Bricks, CELLS},
+    flip::PLANE_SHARE,
+    poisson::SOLID,
 };
+use swell_scene::effects::drag::Settings;
 
 /// Water about a particle of a cell, over what the open cells of 27 hold: 0 of one alone, 1 deep in the water. `kind` says what cells
 /// are; walls and solids are left out.

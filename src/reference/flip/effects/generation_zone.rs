@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::{Acts, Water, led_faces};
-use crate::{reference::Timings, scene::effects::generation_zone::Settings};
+use crate::Timings;
+use swell_scene::effects::generation_zone::Settings;
 
 impl Acts for Settings {
     fn on_faces(&self, water: Water<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {

@@ -6,11 +6,9 @@ use super::{
     Centers, Model, Room, Sorted, Step,
     grid::{corner, per_cell},
 };
-use crate::{
-    domain::bricks::Bricks,
-    reference::Timings,
-    scene::effects::{Effects, with_effects, zone::Zone},
-};
+use crate::Timings;
+use swell_domain::bricks::Bricks;
+use swell_scene::effects::{Effects, with_effects, zone::Zone};
 
 /// What an effect knows beside the velocities.
 #[derive(Clone, Copy)]

@@ -9,14 +9,12 @@ use super::{
     },
     Acts, Water,
 };
-use crate::{
-    domain::{
-        bricks::{Bricks, CELLS},
-        poisson::{AIR, Cells, FLUID, SOLID},
-    },
-    reference::Timings,
-    scene::effects::surface_tension::Settings,
+use crate::Timings;
+use swell_domain::{
+    bricks::{Bricks, CELLS},
+    poisson::{AIR, Cells, FLUID, SOLID},
 };
+use swell_scene::effects::surface_tension::Settings;
 
 /// Slopes of the share, a cell, below which there is no direction.
 pub const LEAST_SLOPE: f64 = 1e-3;

@@ -1,7 +1,7 @@
 //! Viscosity on the grid (Batty and Bridson 2008). XSPH's is a further part of the velocity that is taken from the grid, which
 //! [`Scene::substep_pic_blend`] counts in: on the grid itself nothing of it is left to do.
 //!
-//! [`Scene::substep_pic_blend`]: crate::scene::Scene::substep_pic_blend
+//! [`Scene::substep_pic_blend`]: swell_scene::Scene::substep_pic_blend
 
 use glam::{DVec2, DVec3};
 
@@ -9,14 +9,12 @@ use super::{
     super::grid::{along, corner, per_cell},
     Acts, Water,
 };
-use crate::{
-    domain::{
-        bricks::{Bricks, CELLS},
-        poisson::FLUID,
-    },
-    reference::Timings,
-    scene::effects::viscosity::Settings,
+use crate::Timings;
+use swell_domain::{
+    bricks::{Bricks, CELLS},
+    poisson::FLUID,
 };
+use swell_scene::effects::viscosity::Settings;
 
 /// A face so far behind a wall is in its plane, cells.
 const BESIDE: f64 = 0.01;

@@ -4,12 +4,10 @@ use glam::DVec3;
 
 use super::{Acts, Water};
 use crate::{
-    reference::{
-        Timings,
-        flip::{grid_confinement, grid_curl},
-    },
-    scene::effects::vorticity_confinement::Settings,
+    Timings,
+    flip::{grid_confinement, grid_curl},
 };
+use swell_scene::effects::vorticity_confinement::Settings;
 
 impl Acts for Settings {
     fn on_faces(&self, water: Water<'_>, velocity: &mut Vec<DVec3>, timings: &mut Timings) {

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::{Inputs, led_particles};
-use crate::{reference::Timings, scene::effects::absorbing_zone::Settings};
+use crate::Timings;
+use swell_scene::effects::absorbing_zone::Settings;
 
 pub(super) fn apply(
     settings: &Settings,

@@ -3,14 +3,12 @@
 use glam::DVec3;
 
 use super::{super::passes::measure_density, Inputs};
-use crate::{
-    domain::{
-        air::{blown, exposure},
-        pbf::PLANE_SHARE,
-    },
-    reference::Timings,
-    scene::effects::drag::Settings,
+use crate::Timings;
+use swell_domain::{
+    air::{blown, exposure},
+    pbf::PLANE_SHARE,
 };
+use swell_scene::effects::drag::Settings;
 
 /// Share of water about each particle: 0 of one alone, 1 deep in the water. Shape (particles).
 pub fn shares(inputs: Inputs<'_>) -> Vec<f64> {

@@ -4,10 +4,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::passes::Inputs;
-use crate::{
-    reference::Timings,
-    scene::effects::{Effects, with_effects, zone::Zone},
-};
+use crate::Timings;
+use swell_scene::effects::{Effects, with_effects, zone::Zone};
 
 macro_rules! twins {
     ($($name:ident),+ $(,)?) => {

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::Inputs;
-use crate::{reference::Timings, scene::effects::surface_tension::Settings};
+use crate::Timings;
+use swell_scene::effects::surface_tension::Settings;
 
 pub(super) fn apply(
     _: &Settings,

@@ -4,7 +4,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{Inputs, fluid_sums};
-use crate::{reference::Timings, scene::effects::viscosity::Settings};
+use crate::Timings;
+use swell_scene::effects::viscosity::Settings;
 
 /// c Σ_j m/ρ (v_j − v_i) W of each particle, m/s (effects/viscosity_gather).
 pub fn viscosity_gather(inputs: Inputs<'_>, xsph: f64, velocity: &[DVec3]) -> Vec<DVec3> {

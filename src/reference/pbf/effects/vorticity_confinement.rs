@@ -4,7 +4,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{Inputs, fluid_sums, slope};
-use crate::{reference::Timings, scene::effects::vorticity_confinement::Settings};
+use crate::Timings;
+use swell_scene::effects::vorticity_confinement::Settings;
 
 /// ω_i = Σ_j m/ρ (v_j − v_i) × ∇_j W, 1/s (effects/vorticity_curl).
 pub fn vorticity_curl(inputs: Inputs<'_>, velocity: &[DVec3]) -> Vec<DVec3> {

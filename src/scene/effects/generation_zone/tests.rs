@@ -58,7 +58,7 @@ fn waves_fit_into_a_period_or_are_refused() {
              periodic = [\"z\"]\n[solver]\nmethod = \"flip\"\n[solver.flip]\ncell_size = 0.1\n[effects]\n\
              generation_zone = {{ walls = [\"-x\"], length = 5.0, waves = {{ {waves}, depth = 1.0 }} }}\n"
         );
-        let said = crate::scene::Scene::parse(&text, "s.toml".as_ref(), "".as_ref(), &[]);
+        let said = crate::Scene::parse(&text, "s.toml".as_ref(), "".as_ref(), &[]);
         said.map(|_| ()).map_err(|error| error.to_string())
     };
     let stokes = "kind = \"stokes\", height = 0.1, period = 2.0";

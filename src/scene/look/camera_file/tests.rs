@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::*;
 
 /// A binary glTF file (version 2, section 4.4) with these numbers in its binary chunk.
-pub(in crate::scene) fn glb(document: &Value, numbers: &[f32]) -> Vec<u8> {
+pub(crate) fn glb(document: &Value, numbers: &[f32]) -> Vec<u8> {
     let mut text = document.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let data: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();

@@ -49,7 +49,7 @@ use super::{
     super::{Method, Scene, error::SceneError},
     RunsOn,
 };
-use crate::domain::bounds::Bounds;
+use swell_domain::bounds::Bounds;
 
 pub use quantity::{About, Over, Quantity};
 pub(super) use spec::parse;

@@ -13,7 +13,7 @@ use super::{
     },
     Attempt, Bound, Case, Held, Limit, Mark, Other, Quantity, Search, Stability, Trial,
 };
-use crate::domain::bounds::Bounds;
+use swell_domain::bounds::Bounds;
 
 type Result<T> = std::result::Result<T, SceneError>;
 

@@ -3,10 +3,8 @@
 use toml::Spanned;
 
 use super::{ErrorMeasure, Line, Measure, Point, SAMPLES, SweepSpec, errors};
-use crate::{
-    domain::sampling::fill_water,
-    scene::{Method, Scene, document::Document, error::SceneError, physics_hash},
-};
+use crate::{Method, Scene, document::Document, error::SceneError, physics_hash};
+use swell_domain::sampling::fill_water;
 
 /// Most particles whose distance to where their constraints hold is measured. With 8 000 a factor takes about 1 s, and
 /// Newton's method some 20 of them; both grow faster than the particles do.

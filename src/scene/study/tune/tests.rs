@@ -1,8 +1,8 @@
 use super::*;
 
 /// Of a shipped scene.
-pub(crate) fn request(scene: &str, limits: &[&str]) -> TuneRequest {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+fn request(scene: &str, limits: &[&str]) -> TuneRequest {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     TuneRequest {
         scene: folder.join(scene),
         solver: None,

@@ -43,7 +43,7 @@ use super::{
     RunsOn, SceneFile, StudyFileError, load_with,
 };
 
-pub use crate::scene::measure::Measure;
+pub use crate::measure::Measure;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
@@ -492,7 +492,7 @@ impl Gate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::study::Study;
+    use crate::study::Study;
 
     const TEXT: &str = "kind = \"validation\"
 [[benchmark]]
@@ -516,7 +516,7 @@ at = [[0.0, 0.2]]
 ";
 
     fn read(text: &str) -> std::result::Result<Study, String> {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/studies");
         Study::parse(text, Path::new("s.toml"), &folder).map_err(|error| error.to_string())
     }
 

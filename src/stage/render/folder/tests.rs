@@ -1,10 +1,8 @@
 use std::fs::TryLockError;
 
 use super::*;
-use crate::{
-    render::{Image, image::write_png_with_attributes},
-    scene::look::Look,
-};
+use swell_render::{Image, image::write_png_with_attributes};
+use swell_scene::look::Look;
 
 const LOOK: &str = r#"
 [camera]

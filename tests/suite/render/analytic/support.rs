@@ -1,28 +1,16 @@
 //! Cameras, skies and waters that are known, and the renderer's pictures of them.
 
 use std::path::Path;
-use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3};
 use swell::domain::bounds::Bounds;
 use swell::domain::particles::Particles;
-use swell::gpu::adapter::{Context, Spoil};
+use swell::gpu::adapter::Context;
 use swell::render::{Image, Moment, RenderError, RenderScene, Renderer, Water};
 use swell::scene::look::Look;
 use wgpu::util::DeviceExt;
 
-/// One device for all tests of this binary.
-pub(crate) fn context() -> Context {
-    static CONTEXT: OnceLock<Context> = OnceLock::new();
-    CONTEXT.get_or_init(|| Context::open(None).unwrap()).clone()
-}
-
-/// A context whose pass `pass` has `to` for `from`: the negative controls.
-pub(crate) fn spoiled(pass: &'static str, from: &'static str, to: &'static str) -> Context {
-    let mut context = context();
-    context.spoil = Some(Spoil { pass, from, to });
-    context
-}
+pub(crate) use crate::support::device::{context, spoiled};
 
 /// Width of the film, mm.
 pub(crate) const FILM: f64 = 9.0;

@@ -12,7 +12,7 @@ use swell::{
         signed_distance::SignedDistance,
         solver::{Solver, StepReport},
     },
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::Context,
     reference,
     scene::{
         Scene, effects,
@@ -21,7 +21,7 @@ use swell::{
     solve::flip::capacity,
 };
 
-use crate::support::{context, flip::*, lattice, mover, noise};
+use crate::support::{context, device::spoiled, flip::*, lattice, mover, noise};
 
 const EPSILON: f64 = f32::EPSILON as f64;
 
@@ -52,12 +52,6 @@ fn both(
         ("reference", run(cpu, particles, frames)),
     ]
     .map(|(name, (state, report))| (name, state, report))
-}
-
-fn spoiled(pass: &'static str, from: &'static str, to: &'static str) -> Context {
-    let mut context = context();
-    context.spoil = Some(Spoil { pass, from, to });
-    context
 }
 
 /// ∂u_i/∂x_j of a flow without divergence, 1/s.

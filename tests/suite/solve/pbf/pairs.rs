@@ -9,7 +9,7 @@ use swell::{
         solver::Solver,
         sph::Calibration,
     },
-    gpu::adapter::{Context, Spoil},
+    gpu::adapter::Context,
     reference::{
         self, Timings,
         pbf::{Model, Sorted, Substep, iterate, local},
@@ -25,7 +25,9 @@ use swell::{
 };
 
 use super::{Naive, ONE_ITERATION_TOLERANCE};
-use crate::support::{D, context, jitter, lattice, noise, run, scene as box_scene, solver};
+use crate::support::{
+    D, context, device::spoiled, jitter, lattice, noise, run, scene as box_scene, solver,
+};
 
 /// One or more Jacobi iterations, without gravity.
 fn scene(size: [f64; 3], iterations: u32) -> Scene {
@@ -39,12 +41,6 @@ fn scene(size: [f64; 3], iterations: u32) -> Scene {
 
 fn place(particles: &Particles, k: usize) -> DVec3 {
     Vec3::from_array(particles.position[k]).as_dvec3()
-}
-
-fn spoiled(pass: &'static str, from: &'static str, to: &'static str) -> Context {
-    let mut context = context();
-    context.spoil = Some(Spoil { pass, from, to });
-    context
 }
 
 /// A cloud far too dense, counted pair by pair: particles that have more neighbours than a list holds, who are less than 258

@@ -11,7 +11,7 @@ use swell::{
     solve::pressure::{blocked, buffers::LABEL},
 };
 
-use super::context;
+use crate::support::context;
 use crate::support::pressure::{Rig, settings};
 
 /// Cells of a box by their coordinates, x fastest.

@@ -21,7 +21,8 @@ use swell::{
     stage::Blame,
 };
 
-use super::{context, difference, pockets};
+use super::{difference, pockets};
+use crate::support::context;
 use crate::support::pressure::{Rig, settings};
 
 fn in_precision(precision: Precision, tolerance: f64) -> Pressure {

@@ -6,7 +6,7 @@ use swell::{
     scene::flip::{Preconditioner, Pressure},
 };
 
-use super::context;
+use crate::support::context;
 use crate::support::pressure::{Rig, settings};
 
 /// Parts by which the tolerance is put above and below a residual. On the device that leaves the recursion's residual

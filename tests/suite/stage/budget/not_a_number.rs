@@ -100,7 +100,7 @@ fn bake_copy(sound: &Path) -> Baked {
 /// Hard case 34 with PBF.
 #[test]
 fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_pbf() {
-    let context = Context::open(None).unwrap();
+    let context = crate::support::context();
     let scene = load("34-not-a-number", &[SOLVERS[0]]);
     let sound = bake(&opened(&context), &scene, "1-2");
     for spoil in [
@@ -155,7 +155,7 @@ fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_pbf() {
 /// Hard case 34 with FLIP.
 #[test]
 fn what_is_no_number_is_caught_within_the_frame_and_its_pass_named_flip() {
-    let context = Context::open(None).unwrap();
+    let context = crate::support::context();
     let scene = load("34-not-a-number", &[SOLVERS[1]]);
     let sound = bake(&opened(&context), &scene, "1-2");
     for spoil in [

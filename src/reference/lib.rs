@@ -13,7 +13,7 @@ pub mod whitewater;
 
 use std::{collections::BTreeMap, time::Instant};
 
-use crate::domain::{budget::Breach, solver::PassTime};
+use swell_domain::{budget::Breach, solver::PassTime};
 
 /// What stops the reference.
 #[derive(Debug, thiserror::Error)]

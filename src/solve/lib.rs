@@ -13,10 +13,8 @@ mod state;
 pub mod trace;
 pub mod whitewater;
 
-use crate::{
-    domain::{bricks::Brick, budget::Breach},
-    gpu::{adapter::GpuError, buffer::Mirror, reflect::Layout},
-};
+use swell_domain::budget::Breach;
+use swell_gpu::{adapter::GpuError, buffer::Mirror, reflect::Layout};
 
 use params::{
     Counters, FlipParams, Inlets, IterationControl, Params, Phase, SolidGrid, SolidGrids,
@@ -36,7 +34,7 @@ pub fn mirrors() -> Vec<Layout> {
         Counters::layout(),
         IterationControl::layout(),
         SurveyHead::layout(),
-        Brick::layout(),
+        params::DeviceBrick::layout(),
         PressurePhase::layout(),
         PressureControl::layout(),
         PressureControl64::layout(),

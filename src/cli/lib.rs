@@ -30,15 +30,13 @@ use std::{
     process::ExitCode,
 };
 
-use clap::{Args, Parser, Subcommand, ValueEnum, error::ErrorKind};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum, error::ErrorKind};
 
 use self::progress::{Mode, Progress};
-use crate::{
-    domain::posix,
-    stage::{
-        Blame,
-        device::{Device, Gpu, Shaders},
-    },
+use swell_domain::posix;
+use swell_stage::{
+    Blame,
+    device::{Device, Gpu, Shaders},
 };
 
 /// Exit code where something is out of tolerance.
@@ -49,22 +47,9 @@ const AFTER: &str = "Exit codes: 0 done; 1 a comparison is out of tolerance; 2 u
     written, standard output included (a closed pipe, as of `| head`, is no fault); 5 the numbers failed, last good frame kept; \
     130 ended by a signal, resumable.";
 
-/// Version, and what this program was built from and for.
-const BUILD: &str = concat!(
-    env!("CARGO_PKG_VERSION"),
-    "\ncommit: ",
-    env!("SWELL_COMMIT"),
-    "\ntarget: ",
-    env!("SWELL_TARGET"),
-    "\nprofile: ",
-    env!("SWELL_PROFILE"),
-    "\nfeatures: ",
-    env!("SWELL_FEATURES"),
-);
-
 /// Offline, film-quality fluid pipeline for ocean-wave shots.
 #[derive(Parser, Debug)]
-#[command(name = "swell", version, long_version = BUILD, after_help = AFTER)]
+#[command(name = "swell", version, after_help = AFTER)]
 struct Cli {
     /// Add what goes to standard error, and progress, to the end of this file too, each line with its time.
     #[arg(long, global = true, value_name = "FILE")]
@@ -203,9 +188,11 @@ impl DeviceArgs {
     }
 }
 
-/// Parses the command line, runs the command, prints what went wrong with all its causes.
-pub fn main() -> ExitCode {
-    let code = match Cli::try_parse() {
+/// Parses the command line, runs the command, prints what went wrong with all its causes. `build` is what `--version` prints
+/// after the program's name: the version, and what the program was built from and for.
+pub fn main(build: &'static str) -> ExitCode {
+    let matches = Cli::command().long_version(build).try_get_matches();
+    let code = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => start(cli),
         Err(told) => tell(&told),
     };

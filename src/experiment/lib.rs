@@ -5,7 +5,7 @@
 //! solver against their marks, [`validation`] against theory and experiments, `comparison` bakes and renders a scene with two solvers,
 //! `surface` draws one with one setting of the look changed at a time, `tune` looks for the cheapest settings of a shot.
 //!
-//! A further kind is one file here that implements `engine::Kind`, its parser in [`scene::study`](crate::scene::study), and
+//! A further kind is one file here that implements `engine::Kind`, its parser in [`scene::study`](swell_scene::study), and
 //! a line in [`study`].
 
 mod claim;
@@ -23,12 +23,10 @@ pub mod validation;
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
-use crate::{
-    domain::chunk::Chunk,
-    gpu::adapter,
-    scene::study::Study,
-    stage::{bake, device::Gpu, inspect::study::Outline, render},
-};
+use swell_domain::chunk::Chunk;
+use swell_gpu::adapter;
+use swell_scene::study::Study;
+use swell_stage::{bake, device::Gpu, inspect::study::Outline, render};
 
 use engine::{Bench, Kind, Work};
 

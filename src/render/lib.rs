@@ -35,7 +35,6 @@ mod sky;
 mod surface;
 mod tiles;
 mod tree;
-#[expect(unreachable_pub, reason = "mirrors are declared public")]
 mod uniform;
 pub mod view;
 
@@ -43,11 +42,11 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use crate::domain::{
+use swell_domain::{
     bounds::Bounds, mesh::TriangleMesh, mesh_file::parts::Parts, open_waves::OpenWaves, pose::Pose,
 };
-use crate::gpu::adapter::GpuError;
-use crate::scene::Wall;
+use swell_gpu::adapter::GpuError;
+use swell_scene::Wall;
 
 pub use camera::{eye, lens};
 pub use image::{Attributes, Image};

@@ -9,7 +9,7 @@ pub mod drive;
 pub mod export;
 pub mod gauge;
 pub mod inspect;
-pub(crate) mod locked;
+pub mod locked;
 pub mod prepare;
 mod probes;
 pub mod render;
@@ -22,18 +22,16 @@ pub mod whitewater;
 
 use std::path::Path;
 
-use crate::{
-    cache::{CacheError, CacheReader},
-    domain::{frame_range::FrameRange, signed_distance::SignedDistanceError},
-    gpu::{adapter::GpuError, shader::ShadersError},
-    reference::ReferenceError,
-    scene::{
-        Scene, SceneError,
-        look::LookError,
-        study::{StudyFileError, tune::TuneError},
-    },
-    solve::SolveError,
+use swell_cache::{CacheError, CacheReader};
+use swell_domain::{frame_range::FrameRange, signed_distance::SignedDistanceError};
+use swell_gpu::{adapter::GpuError, shader::ShadersError};
+use swell_reference::ReferenceError;
+use swell_scene::{
+    Scene, SceneError,
+    look::LookError,
+    study::{StudyFileError, tune::TuneError},
 };
+use swell_solve::SolveError;
 
 /// The cache's own copy of its scene: what was baked, wherever the cache has been moved to.
 fn baked_scene(cache: &CacheReader, directory: &Path) -> Result<Scene, SceneError> {

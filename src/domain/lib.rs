@@ -1,5 +1,10 @@
 //! What every stage speaks: particles, meshes, signed distance, sampling, wave-maker motion.
 
+/// The program's name, as manifests and pictures record it.
+pub const PROGRAM: &str = "swell";
+/// The program's version, likewise: all crates of the workspace share it.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 pub mod absorption;
 pub mod aggregates;
 pub mod air;
@@ -19,11 +24,12 @@ pub mod holes;
 pub mod inside;
 pub mod isosurface;
 pub mod keep;
-pub(crate) mod lanes;
+pub mod lanes;
 pub mod level_set;
 pub mod mesh;
 pub mod mesh_file;
 pub mod motion;
+pub mod named;
 pub mod open_waves;
 pub mod particles;
 pub mod pbf;

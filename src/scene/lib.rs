@@ -51,7 +51,7 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DQuat, DVec3};
 
-use crate::domain::{
+use swell_domain::{
     absorption::Absorption,
     answer::Answers,
     bounds::Bounds,
@@ -62,7 +62,7 @@ use crate::domain::{
     sources::{Drain, Emitter},
 };
 
-use key::read_by_name;
+use swell_domain::named::read_by_name;
 
 pub use absorption::Held;
 pub use budget::Budget;

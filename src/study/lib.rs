@@ -24,4 +24,4 @@ pub mod stability;
 pub mod tune;
 pub mod waves;
 
-pub use crate::domain::statistics::{median, percentile};
+pub use swell_domain::statistics::{median, percentile};
