@@ -200,7 +200,11 @@ impl Progress {
         let event = self.count(status, event);
         let bar = self.state.borrow().bar.clone();
         let Some(bar) = bar else {
-            return self.say(text, event);
+            let left = self.state.borrow().job.seconds_left();
+            // A bar tells it itself.
+            let left = left.filter(|left| *left >= 1.0);
+            let left = left.map_or(String::new(), |left| format!(", {left:.0} s left"));
+            return self.say(&format!("{text}{left}"), event);
         };
         match status {
             Status::Failed => self.say(text, event),

@@ -13,3 +13,4 @@ pub mod shader;
 pub mod sort;
 pub mod texture;
 mod timer;
+pub mod variants;

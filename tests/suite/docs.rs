@@ -46,7 +46,10 @@ fn depends_on(manifest: &str) -> Vec<&str> {
     let needed = manifest.split("[dev-dependencies]").next().unwrap();
     let lines = needed.lines();
     lines
-        .filter_map(|line| line.strip_prefix("swell-")?.strip_suffix(".workspace = true"))
+        .filter_map(|line| {
+            line.strip_prefix("swell-")?
+                .strip_suffix(".workspace = true")
+        })
         .collect()
 }
 

@@ -42,3 +42,26 @@ require_rust() {
         exit 2
     fi
 }
+
+# beside NAME FILE LABEL:COMMAND...: starts stages in the background, one after the other; `rejoin NAME` waits for them, shows what
+# they printed, and ends the script where one failed.
+beside() {
+    local name=$1 file=$2
+    shift 2
+    printf '\n== %s, beside what follows: %s\n' "$name" "${*%%:*}"
+    (
+        stage_times=""
+        for entry in "$@"; do stage "${entry%%:*}" "${entry#*:}"; done
+        printf '%s' "$stage_times" >"$file.times"
+    ) >"$file.log" 2>&1 &
+    printf -v "beside_$name" '%s %s' "$!" "$file"
+}
+
+rejoin() {
+    local variable=beside_$1 process file code=0
+    read -r process file <<<"${!variable}"
+    wait "$process" || code=$?
+    cat "$file.log"
+    [[ $code -eq 0 ]] || exit "$code"
+    stage_times+=$(cat "$file.times")$'\n'
+}

@@ -28,6 +28,12 @@ const BAKE: &str = "bake small.toml --device cpu";
 fn watched() -> Job {
     let job = Job::new();
     job.edit("small.toml", "[effects]", WATCHED);
+    for (fine, coarse) in [
+        ("particle_spacing = 0.1", "particle_spacing = 0.2"),
+        ("cell_size = 0.2", "cell_size = 0.25"),
+    ] {
+        job.edit("small.toml", fine, coarse);
+    }
     job
 }
 

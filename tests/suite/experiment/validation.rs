@@ -11,7 +11,7 @@ use swell::{
     experiment::{
         Devices,
         stability::Verdict,
-        validation::{judge, run_benchmark},
+        validation::{Run, judge, run_benchmark},
     },
     gpu::adapter::Context,
     scene::{
@@ -39,8 +39,7 @@ fn parsed(text: &str) -> Validation {
     }
 }
 
-/// Gates of a benchmark that its runs miss on `context`.
-fn missed(context: &Context, benchmark: &Benchmark) -> Vec<String> {
+fn runs(context: &Context, benchmark: &Benchmark) -> Vec<Run> {
     let devices = Devices {
         gpu: Some(Opened::Gpu(Box::new(context.clone()))),
         cpu: Opened::Cpu,
@@ -53,8 +52,18 @@ fn missed(context: &Context, benchmark: &Benchmark) -> Vec<String> {
             benchmark.name, run.ended, run.measured.numbers
         );
     }
+    runs
+}
+
+/// Gates of a benchmark that its runs miss on `context`.
+fn missed(context: &Context, benchmark: &Benchmark) -> Vec<String> {
+    missed_by(benchmark, &runs(context, benchmark))
+}
+
+/// Gates of a benchmark that these runs miss.
+fn missed_by(benchmark: &Benchmark, runs: &[Run]) -> Vec<String> {
     let mut missed = Vec::new();
-    for judged in judge(benchmark, &runs) {
+    for judged in judge(benchmark, runs) {
         if !matches!(judged.verdict, Verdict::Passes | Verdict::KnownFailure) {
             let (of, is) = (&judged.gate.of, judged.measured);
             missed.push(format!("{of} is {is:?}: {:?}", judged.verdict));
@@ -73,16 +82,42 @@ fn hold(name: &str) {
     assert!(missed.is_empty(), "{name}: {}", missed.join("\n"));
 }
 
+/// [`hold`], and a negative control of the same runs: waves that were lower by this factor miss the gate. In linear theory that is a
+/// wall, or a flap, that goes less far by the factor.
+fn hold_height(name: &str, lower: f64) {
+    let mut benchmark = benchmark(&COARSE, name);
+    let runs = runs(&crate::support::context(), &benchmark);
+    let missed = missed_by(&benchmark, &runs);
+    assert!(missed.is_empty(), "{name}: {}", missed.join("\n"));
+    let mut gates = benchmark.gates.iter_mut();
+    let gate = gates.find(|gate| gate.of == "height_ratio").unwrap();
+    gate.published = gate.published.map(|published| published / lower);
+    let missed = missed_by(&benchmark, &runs);
+    assert_eq!(missed.len(), 1, "{name}: {missed:?}");
+    assert!(missed[0].starts_with("height_ratio"), "{missed:?}");
+}
+
+#[test]
+fn a_piston_makes_the_waves_of_linear_theory() {
+    hold_height("piston, kh = 1", 0.95);
+}
+
+#[test]
+fn a_flap_makes_the_waves_of_biesels_theory() {
+    hold_height("flap, kh = 1.8", 2.0 / 3.0);
+}
+
 macro_rules! benchmarks {
-    ($($test:ident: $name:literal,)*) => {
+    ($($(#[$long:meta])? $test:ident: $name:literal,)*) => {
         $(#[test]
+        $(#[$long])?
         fn $test() {
             hold($name);
         })*
 
         #[test]
         fn every_benchmark_has_its_test() {
-            let listed = [$($name),*];
+            let listed = ["piston, kh = 1", "flap, kh = 1.8", $($name),*];
             for benchmark in &parsed(&COARSE).benchmarks {
                 assert!(listed.contains(&benchmark.name.as_str()), "{}", benchmark.name);
             }
@@ -91,10 +126,9 @@ macro_rules! benchmarks {
 }
 
 benchmarks! {
-    a_piston_makes_the_waves_of_linear_theory: "piston, kh = 1",
-    a_flap_makes_the_waves_of_biesels_theory: "flap, kh = 1.8",
     a_zone_absorbs_the_waves_of_a_piston: "absorbing zone, kh = 2",
     waves_come_in_from_a_zone_as_theory_has_them: "generation zone, kh = 2",
+    #[ignore = "two minutes: tools/test --all"]
     a_packet_meets_where_and_when_it_was_asked_to: "focused packet",
     a_solitary_wave_keeps_its_height_and_celerity: "solitary wave",
     a_column_collapses_as_in_the_experiment: "dam break of a column",
@@ -124,25 +158,9 @@ fn gravity_that_is_off_by_a_hundredth_fails_a_benchmark() {
     }
 }
 
-/// Negative control: a flap that swings by a third less makes lower waves; a fifth less is told by 0.85 of the height, which the gate still takes.
-#[test]
-fn a_flap_that_swings_less_fails_its_benchmark() {
-    let text = spoiled(
-        "scene = \"../validation/flap.toml\"",
-        "scene = \"../validation/flap.toml\"\nset = [\"solid.0.turn.swing_degrees=3.82\"]",
-    );
-    let missed = missed(
-        &crate::support::context(),
-        &benchmark(&text, "flap, kh = 1.8"),
-    );
-    assert!(
-        missed.iter().any(|it| it.starts_with("height_ratio")),
-        "{missed:?}"
-    );
-}
-
 /// Negative control: a wall in place of the zone turns a wave back, most of it.
 #[test]
+#[ignore = "a minute: tools/test --all; reflections are measured in swell-study's own tests"]
 fn a_flume_without_its_zone_fails_a_benchmark() {
     let mut zone = benchmark(&COARSE, "absorbing zone, kh = 2");
     zone.runs[0].scene.effects = Default::default();
@@ -167,6 +185,7 @@ fn a_jet_that_is_slower_by_a_twentieth_fails_a_benchmark() {
 
 /// Negative control: in a zone of a fifth of a wave length the wall at its end undoes what it does.
 #[test]
+#[ignore = "a minute: tools/test --all"]
 fn waves_from_too_short_a_zone_fail_a_benchmark() {
     let mut zone = benchmark(&COARSE, "generation zone, kh = 2");
     let settings = &mut zone.runs[0].scene.effects.generation_zone;
@@ -210,19 +229,6 @@ fn reflections_are_measured_when_they_would_be_there() {
         }
     }
     assert_eq!(held, 11);
-}
-
-/// Negative control: a paddle that goes a twentieth less far than the study says.
-#[test]
-fn a_stroke_that_is_off_by_a_twentieth_fails_a_benchmark() {
-    let mut piston = benchmark(&COARSE, "piston, kh = 1");
-    let maker = &mut piston.runs[0].scene.wave_makers[0].motion;
-    match maker {
-        Motion::Sine { stroke, .. } => *stroke *= 0.95,
-        other => panic!("{other:?}"),
-    }
-    let missed = missed(&crate::support::context(), &piston);
-    assert!(missed[0].starts_with("height_ratio"), "{missed:?}");
 }
 
 /// Negative control: a surface whose θ is 1 wherever it is, a whole cell from the centre of the last cell of water; the

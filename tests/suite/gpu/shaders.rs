@@ -5,6 +5,7 @@ use swell::{
     gpu::{
         reflect::{Access, Layout, Stage, reflect},
         shader,
+        variants::forms,
     },
     render,
     solve::{
@@ -12,157 +13,6 @@ use swell::{
         pressure::{DONE, ITERATING, ReduceStep, VERIFYING, WANTS_POCKETS},
     },
 };
-
-/// Conditions that a plan can set; every pass must compose under each.
-const VARIANTS: [&[&str]; 65] = [
-    &[],
-    &["SOLIDS"],
-    &["NEIGHBOR_LIST"],
-    &["NEIGHBOR_LIST", "PLACES"],
-    &[
-        "NEIGHBOR_LIST",
-        "PLACES",
-        "SOLIDS",
-        "DENSITY",
-        "ADAPTIVE",
-        "ARTIFICIAL_PRESSURE",
-    ],
-    &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
-    &["NEIGHBOR_LIST", "SOLIDS", "PRESSURE"],
-    &["PROJECTED", "SOLIDS"],
-    &["PAGED"],
-    &["NEIGHBOR_EFFECTS"],
-    &["NEIGHBOR_EFFECTS", "PAGED", "PROJECTED"],
-    &["PAGED", "PROJECTED", "NEIGHBOR_LIST", "PLACES", "SOLIDS"],
-    &["PAGED", "CHEBYSHEV", "NEIGHBOR_LIST"],
-    &["CORRECTION", "PUSHED", "GHOST_FLUID"],
-    &["CORRECTION", "PUSHED", "GHOST_FLUID", "PLACES"],
-    &["SOLIDS", "CORRECTION", "PUSHED", "GHOST_FLUID", "APIC"],
-    &[
-        "SOLIDS",
-        "MOVING_SOLIDS",
-        "CORRECTION",
-        "PUSHED",
-        "GHOST_FLUID",
-    ],
-    &["GHOST_FLUID", "DIAGONAL"],
-    &["GHOST_FLUID", "DIAGONAL", "TWO_WORDS"],
-    &["TWO_WORDS"],
-    &["GHOST_FLUID", "DIAGONAL", "F64"],
-    &["F64"],
-    &["PERIODIC"],
-    &[
-        "PERIODIC",
-        "SOLIDS",
-        "NEIGHBOR_LIST",
-        "CORRECTION",
-        "PUSHED",
-        "GHOST_FLUID",
-    ],
-    &[
-        "PERIODIC",
-        "SOLIDS",
-        "MOVING_SOLIDS",
-        "CORRECTION",
-        "PUSHED",
-        "APIC",
-    ],
-    &["PERIODIC", "F64"],
-    &["SPRAY"],
-    &["AOVS"],
-    &["FORWARD"],
-    &["HOLDOUT"],
-    &["LIGHTS"],
-    &["RIPPLES"],
-    &["WINDOWS"],
-    &["WINDOWS", "PALETTE", "MATERIALS"],
-    &["RIPPLES", "WINDOWS", "SEA", "CAUSTICS", "LIGHTS"],
-    &["LISTED", "DRY", "RIPPLES", "WINDOWS"],
-    &["LIGHTS", "SPRAY", "HOLDOUT"],
-    &["OBJECTS"],
-    &["OBJECTS", "SPRAY"],
-    &["SEA"],
-    &["SEA", "AOVS", "FORWARD"],
-    &["SEA", "PALETTE", "SPRAY", "LIGHTS"],
-    &["SEA", "PALETTE", "SPRAY", "OBJECTS"],
-    &["PALETTE"],
-    &["PATHS"],
-    &["PATHS", "MOTION"],
-    &["AOVS", "SPRAY"],
-    &["FORWARD", "SPRAY"],
-    &["ELLIPSOIDS"],
-    &["MATERIALS"],
-    &["MATERIALS", "PALETTE", "SEA", "SPRAY", "LIGHTS"],
-    &["MATERIALS", "SEA", "SPRAY", "OBJECTS"],
-    &["MATERIALS", "SEA", "SPRAY", "AOVS", "FORWARD"],
-    &["VOLUME"],
-    &["VOLUME", "LIGHTS", "HOLDOUT"],
-    &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS"],
-    &["FOAM"],
-    &["LIGHTS", "SPRAY", "FOAM"],
-    &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS", "FOAM"],
-    &["CAUSTICS", "LIGHTS"],
-    &["CAUSTICS", "SEA", "PALETTE", "SPRAY", "LIGHTS"],
-    &["LISTED"],
-    &["LISTED", "DRY"],
-    &["LISTED", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
-    &["LISTED", "DRY", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
-];
-
-/// `neighbor_list` holds lists, so build_neighbors has no form without them; and rays alone go through a volume.
-fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
-    let has_lists = pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST");
-    has_lists && (pass.starts_with("rays/") || !defines.contains(&"VOLUME"))
-}
-
-#[test]
-fn every_pass_validates_in_every_variant() {
-    let passes = shader::pass_files();
-    assert!(passes.len() >= 30, "{passes:?}");
-    for pass in &passes {
-        for defines in VARIANTS
-            .iter()
-            .filter(|defines| is_meaningful(pass, defines))
-        {
-            let text = shader::compose(pass, defines).unwrap();
-            let reflection =
-                reflect(pass, &text).unwrap_or_else(|error| panic!("{pass} {defines:?}: {error}"));
-            // Nothing but the projection may ask an adapter for f64, and that only where it is told to.
-            let is_wide = pass.starts_with("pressure/") && defines.contains(&"F64");
-            assert!(is_wide || !reflection.has_f64, "{pass} {defines:?}");
-            let size = reflection.workgroup_size;
-            let is_drawing = pass.starts_with("ssfr/") || pass.starts_with("rays/");
-            let is_known = match (is_drawing, reflection.stage) {
-                (true, Stage::Raster { .. }) => true,
-                (true, Stage::Compute) => [[64, 1, 1], [32, 8, 1], [16, 4, 1]].contains(&size),
-                (false, stage) => {
-                    stage == Stage::Compute && [[64, 1, 1], [256, 1, 1]].contains(&size)
-                }
-            };
-            assert!(is_known, "{pass}: {size:?}");
-            let storage = reflection
-                .bindings
-                .iter()
-                .filter(|binding| binding.access.is_storage())
-                .count();
-            assert!(
-                storage <= 12,
-                "{pass}: {storage} storage buffers, and lavapipe, the least that was tried, has 32"
-            );
-            let mut indices: Vec<u32> = reflection
-                .bindings
-                .iter()
-                .map(|binding| binding.index)
-                .collect();
-            indices.dedup();
-            assert_eq!(
-                indices.len(),
-                reflection.bindings.len(),
-                "{pass}: a binding index twice"
-            );
-        }
-    }
-}
 
 #[test]
 fn reflection_refuses_what_no_pass_binds() {
@@ -216,26 +66,22 @@ fn check(found: &Layout, mirrors: &[Layout]) -> Result<(), String> {
 fn mirrors_match_naga() {
     let mirrors = [solve::mirrors(), render::mirrors()].concat();
     let mut seen = vec![false; mirrors.len()];
-    for pass in &shader::pass_files() {
-        for defines in VARIANTS
-            .iter()
-            .filter(|defines| is_meaningful(pass, defines))
-        {
-            let reflection = reflect(pass, &shader::compose(pass, defines).unwrap()).unwrap();
-            for found in &reflection.layouts {
-                check(found, &mirrors).unwrap_or_else(|message| panic!("{pass}: {message}"));
-                for (seen, mirror) in seen.iter_mut().zip(&mirrors) {
-                    *seen |= mirror == found;
-                }
+    for form in forms().unwrap() {
+        let pass = &form.pass;
+        let reflection = reflect(pass, &form.text).unwrap();
+        for found in &reflection.layouts {
+            check(found, &mirrors).unwrap_or_else(|message| panic!("{pass}: {message}"));
+            for (seen, mirror) in seen.iter_mut().zip(&mirrors) {
+                *seen |= mirror == found;
             }
-            for binding in reflection.bindings {
-                let name = binding.element.name;
-                let is_mirrored = |name: &String| mirrors.iter().any(|m| m.name == *name);
-                assert!(
-                    name.iter().all(is_mirrored),
-                    "{pass}: {name:?} has no mirror"
-                );
-            }
+        }
+        for binding in reflection.bindings {
+            let name = binding.element.name;
+            let is_mirrored = |name: &String| mirrors.iter().any(|m| m.name == *name);
+            assert!(
+                name.iter().all(is_mirrored),
+                "{pass}: {name:?} has no mirror"
+            );
         }
     }
     let unseen = mirrors.iter().zip(&seen).filter(|(_, seen)| !**seen);

@@ -16,7 +16,6 @@ use crate::support::context;
 
 use super::scenes::{box_mesh, city_scene, city_water, slab};
 
-
 fn look(text: &str) -> Look {
     Look::parse(text, Path::new("test.toml")).unwrap()
 }

@@ -14,7 +14,7 @@ from .build import Tree, binary_of
 from .lists import Mistake, Mutant
 
 # Every shader has to parse and validate with the fault in it: what does not compile is caught by anything.
-VALIDATES = "suite::gpu::shaders::every_pass_validates_in_every_variant"
+VALIDATES = "lib::gpu::variants::tests::every_pass_validates_in_every_variant"
 # How `gpu::program` refuses a spoil whose text a shader lacks.
 NOT_THERE = "which is to be replaced, is not in it"
 # A fault that turns a loop endless is caught as well; no test of the suite takes a tenth of it.

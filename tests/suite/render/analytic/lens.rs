@@ -35,7 +35,7 @@ fn spread(image: &Image) -> ([f64; 2], f64) {
 /// pinhole: points spread evenly over a disc c across have a variance of c²/16 along an axis.
 fn circle(method: &'static str, depth: f64, focus: f64) -> f64 {
     let eye = Eye {
-        size: 96,
+        size: 64,
         ..Eye::new([5.0, 1.0, 1.0], [5.0, 6.0, 8.0], FOCAL)
     };
     let shot = |lens: bool| {
@@ -45,7 +45,7 @@ fn circle(method: &'static str, depth: f64, focus: f64) -> f64 {
                 true => format!("lens = {{ f_stop = {f_stop:?}, focus_distance_m = {focus:?} }}\n"),
                 false => String::new(),
             },
-            samples: SAMPLES,
+            samples: if lens { SAMPLES } else { SAMPLES / 4 },
             method,
             surface: "smoothing_width_m = 0.0\n".to_owned(),
             background: false,

@@ -1,0 +1,196 @@
+//! Every form in which a pass that ships can be composed, for tests of all of them.
+
+use std::collections::BTreeSet;
+
+use super::{adapter::GpuError, shader};
+
+/// Conditions that a plan can set; every pass must compose under each.
+const VARIANTS: [&[&str]; 65] = [
+    &[],
+    &["SOLIDS"],
+    &["NEIGHBOR_LIST"],
+    &["NEIGHBOR_LIST", "PLACES"],
+    &[
+        "NEIGHBOR_LIST",
+        "PLACES",
+        "SOLIDS",
+        "DENSITY",
+        "ADAPTIVE",
+        "ARTIFICIAL_PRESSURE",
+    ],
+    &["SOLIDS", "DENSITY", "ADAPTIVE", "ARTIFICIAL_PRESSURE"],
+    &["NEIGHBOR_LIST", "SOLIDS", "PRESSURE"],
+    &["PROJECTED", "SOLIDS"],
+    &["PAGED"],
+    &["NEIGHBOR_EFFECTS"],
+    &["NEIGHBOR_EFFECTS", "PAGED", "PROJECTED"],
+    &["PAGED", "PROJECTED", "NEIGHBOR_LIST", "PLACES", "SOLIDS"],
+    &["PAGED", "CHEBYSHEV", "NEIGHBOR_LIST"],
+    &["CORRECTION", "PUSHED", "GHOST_FLUID"],
+    &["CORRECTION", "PUSHED", "GHOST_FLUID", "PLACES"],
+    &["SOLIDS", "CORRECTION", "PUSHED", "GHOST_FLUID", "APIC"],
+    &[
+        "SOLIDS",
+        "MOVING_SOLIDS",
+        "CORRECTION",
+        "PUSHED",
+        "GHOST_FLUID",
+    ],
+    &["GHOST_FLUID", "DIAGONAL"],
+    &["GHOST_FLUID", "DIAGONAL", "TWO_WORDS"],
+    &["TWO_WORDS"],
+    &["GHOST_FLUID", "DIAGONAL", "F64"],
+    &["F64"],
+    &["PERIODIC"],
+    &[
+        "PERIODIC",
+        "SOLIDS",
+        "NEIGHBOR_LIST",
+        "CORRECTION",
+        "PUSHED",
+        "GHOST_FLUID",
+    ],
+    &[
+        "PERIODIC",
+        "SOLIDS",
+        "MOVING_SOLIDS",
+        "CORRECTION",
+        "PUSHED",
+        "APIC",
+    ],
+    &["PERIODIC", "F64"],
+    &["SPRAY"],
+    &["AOVS"],
+    &["FORWARD"],
+    &["HOLDOUT"],
+    &["LIGHTS"],
+    &["RIPPLES"],
+    &["WINDOWS"],
+    &["WINDOWS", "PALETTE", "MATERIALS"],
+    &["RIPPLES", "WINDOWS", "SEA", "CAUSTICS", "LIGHTS"],
+    &["LISTED", "DRY", "RIPPLES", "WINDOWS"],
+    &["LIGHTS", "SPRAY", "HOLDOUT"],
+    &["OBJECTS"],
+    &["OBJECTS", "SPRAY"],
+    &["SEA"],
+    &["SEA", "AOVS", "FORWARD"],
+    &["SEA", "PALETTE", "SPRAY", "LIGHTS"],
+    &["SEA", "PALETTE", "SPRAY", "OBJECTS"],
+    &["PALETTE"],
+    &["PATHS"],
+    &["PATHS", "MOTION"],
+    &["AOVS", "SPRAY"],
+    &["FORWARD", "SPRAY"],
+    &["ELLIPSOIDS"],
+    &["MATERIALS"],
+    &["MATERIALS", "PALETTE", "SEA", "SPRAY", "LIGHTS"],
+    &["MATERIALS", "SEA", "SPRAY", "OBJECTS"],
+    &["MATERIALS", "SEA", "SPRAY", "AOVS", "FORWARD"],
+    &["VOLUME"],
+    &["VOLUME", "LIGHTS", "HOLDOUT"],
+    &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS"],
+    &["FOAM"],
+    &["LIGHTS", "SPRAY", "FOAM"],
+    &["MATERIALS", "SEA", "PALETTE", "VOLUME", "LIGHTS", "FOAM"],
+    &["CAUSTICS", "LIGHTS"],
+    &["CAUSTICS", "SEA", "PALETTE", "SPRAY", "LIGHTS"],
+    &["LISTED"],
+    &["LISTED", "DRY"],
+    &["LISTED", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
+    &["LISTED", "DRY", "MATERIALS", "PALETTE", "SPRAY", "LIGHTS"],
+];
+
+/// `neighbor_list` holds lists, so build_neighbors has no form without them; and rays alone go through a volume.
+fn is_meaningful(pass: &str, defines: &[&str]) -> bool {
+    let has_lists = pass != "pbf/build_neighbors" || defines.contains(&"NEIGHBOR_LIST");
+    has_lists && (pass.starts_with("rays/") || !defines.contains(&"VOLUME"))
+}
+
+/// A pass under conditions that change its text.
+#[derive(Clone, Debug)]
+pub struct Form {
+    /// Pass name.
+    pub pass: String,
+    /// Conditions.
+    pub defines: &'static [&'static str],
+    /// WGSL.
+    pub text: String,
+}
+
+/// All forms of all passes, each text once.
+///
+/// # Errors
+/// [`GpuError::Shader`] for a shader that does not compose.
+pub fn forms() -> Result<Vec<Form>, GpuError> {
+    let mut forms = Vec::new();
+    for pass in shader::pass_files() {
+        let mut seen = BTreeSet::new();
+        for defines in VARIANTS.into_iter().filter(|it| is_meaningful(&pass, it)) {
+            let text = shader::compose(&pass, defines)?;
+            if seen.insert(text.clone()) {
+                let pass = pass.clone();
+                forms.push(Form {
+                    pass,
+                    defines,
+                    text,
+                });
+            }
+        }
+    }
+    Ok(forms)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::reflect::{Stage, reflect},
+        *,
+    };
+
+    #[test]
+    fn every_pass_validates_in_every_variant() {
+        let passes = shader::pass_files().len();
+        let forms = forms().expect("they compose");
+        assert!(passes >= 30 && forms.len() > 2 * passes, "{}", forms.len());
+        for Form {
+            pass,
+            defines,
+            text,
+        } in &forms
+        {
+            let reflection =
+                reflect(pass, text).unwrap_or_else(|error| panic!("{pass} {defines:?}: {error}"));
+            // Nothing but the projection may ask an adapter for f64, and that only where it is told to.
+            let is_wide = pass.starts_with("pressure/") && defines.contains(&"F64");
+            assert!(is_wide || !reflection.has_f64, "{pass} {defines:?}");
+            let size = reflection.workgroup_size;
+            let is_drawing = pass.starts_with("ssfr/") || pass.starts_with("rays/");
+            let is_known = match (is_drawing, reflection.stage) {
+                (true, Stage::Raster { .. }) => true,
+                (true, Stage::Compute) => [[64, 1, 1], [32, 8, 1], [16, 4, 1]].contains(&size),
+                (false, stage) => {
+                    stage == Stage::Compute && [[64, 1, 1], [256, 1, 1]].contains(&size)
+                }
+            };
+            assert!(is_known, "{pass}: {size:?}");
+            let bindings = &reflection.bindings;
+            let storage = bindings.iter().filter(|it| it.access.is_storage()).count();
+            assert!(
+                storage <= 12,
+                "{pass}: {storage} storage buffers, and lavapipe, the least that was tried, has 32"
+            );
+            let mut indices: Vec<u32> = bindings.iter().map(|it| it.index).collect();
+            indices.dedup();
+            assert_eq!(
+                indices.len(),
+                bindings.len(),
+                "{pass}: a binding index twice"
+            );
+        }
+        // Negative control: a type that is not declared.
+        let text = shader::compose("pbf/predict", &[]).expect("it composes");
+        assert!(reflect("pbf/predict", &text).is_ok());
+        let spoiled = format!("{text}\nfn spoiled(x: Nothing) {{}}\n");
+        assert!(reflect("pbf/predict", &spoiled).is_err());
+    }
+}
