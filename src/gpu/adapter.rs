@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use wgpu::{Adapter, AdapterInfo, Backends, Device, Features, Instance, Limits, Queue};
 
-use super::{program::Compiled, shader::Shaders};
+use super::{compiled::Compiled, shader::Shaders};
 
 /// What goes wrong between the program and the device.
 #[derive(Debug, thiserror::Error)]

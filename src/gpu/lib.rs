@@ -3,6 +3,7 @@
 pub mod adapter;
 pub mod buffer;
 pub mod ceilings;
+mod compiled;
 mod edited;
 pub mod operations;
 pub mod program;

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex, OnceLock, PoisonError},
+    sync::{Arc, OnceLock},
 };
 
 use wgpu::{BindGroupLayout, Buffer, BufferUsages, ComputePipeline};
@@ -12,7 +12,7 @@ use super::{
     buffer::{Buf, Element, Held, Wanted, Windows},
     edited,
     operations::Counting,
-    raster::{RasterPass, RasterSpec},
+    raster::RasterPass,
     reflect::{Access, Binding, Reflection, Stage, reflect, reflect_at},
     shader::Composed,
 };
@@ -85,54 +85,6 @@ impl Pass {
         }
         Ok(self.counting.get().and_then(Option::as_ref))
     }
-}
-
-/// Passes that were compiled on one device, so that a program whose passes another has compiles none again. Passes of edited
-/// shaders are compiled for each program: they are checked against its buffers.
-#[derive(Debug, Default)]
-pub(super) struct Compiled {
-    passes: Mutex<BTreeMap<PassKey, Arc<Pass>>>,
-    rasters: Mutex<BTreeMap<(RasterKey, String), Arc<RasterPass>>>,
-}
-
-/// Name, bits of the constants, and text of a pass.
-type PassKey = (&'static str, Vec<(&'static str, u64)>, String);
-
-/// What a raster pass is made of, beside the text of its shader.
-type RasterKey = (&'static str, String);
-
-impl Compiled {
-    /// The pass of that key; made where there is none.
-    fn get<K: Ord, P>(
-        passes: &Mutex<BTreeMap<K, Arc<P>>>,
-        key: K,
-        make: impl FnOnce() -> Result<P, GpuError>,
-    ) -> Result<Arc<P>, GpuError> {
-        let locked = || passes.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(pass) = locked().get(&key) {
-            return Ok(Arc::clone(pass));
-        }
-        // Not under the lock: two threads may compile at once.
-        let pass = Arc::new(make()?);
-        Ok(Arc::clone(locked().entry(key).or_insert(pass)))
-    }
-}
-
-/// Compiles a raster pass, or takes it from those that were compiled on the device.
-///
-/// # Errors
-/// Those of `make`, and of composing its shader.
-pub(super) fn compiled_raster(
-    context: &Context,
-    spec: &RasterSpec,
-    make: impl FnOnce() -> Result<RasterPass, GpuError>,
-) -> Result<Arc<RasterPass>, GpuError> {
-    if context.shaders.edited().is_some() {
-        return Ok(Arc::new(make()?));
-    }
-    let text = source(context, spec.name, spec.defines)?.text;
-    let key = (spec.name, format!("{:?} {:?}", spec.colours, spec.compare));
-    Compiled::get(&context.compiled.rasters, (key, text), make)
 }
 
 /// Named passes, buffers, textures and samplers on one device.
@@ -599,11 +551,8 @@ fn compile(
             return Ok(Arc::new(own()?));
         }
         let text = source(context, spec.name, &spec.defines)?.text;
-        let named = |(name, _): &&(&'static str, f64)| text.contains(name);
-        let constants = spec.constants.iter().chain(shared.iter().filter(named));
-        let constants = constants.map(|&(name, value)| (name, value.to_bits()));
-        let key = (spec.name, constants.collect(), text.clone());
-        Compiled::get(&context.compiled.passes, key, own)
+        let constants = spec.constants.iter().chain(shared);
+        context.compiled.pass(spec.name, constants, text, own)
     };
     compiled().map_err(|error| context.shaders.blamed(error))
 }

@@ -10,7 +10,8 @@ use wgpu::{
 
 use super::{
     adapter::{Context, GpuError},
-    program::{Program, checked, compiled_raster, shader},
+    compiled::compiled_raster,
+    program::{Program, checked, shader},
     recording::{Bind, bind},
     reflect::{Binding, Stage},
 };

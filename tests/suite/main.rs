@@ -57,6 +57,7 @@ mod experiment {
 }
 mod gpu {
     mod ceilings;
+    mod compiled;
     mod device_faults;
     mod operations;
     mod raster;

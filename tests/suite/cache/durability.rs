@@ -112,7 +112,7 @@ fn has_temporary(cache: &Path) -> bool {
 
 impl Case {
     fn new(solver: &str, device: &str, more: &str, seed: u64) -> Self {
-        let job = Job::new();
+        let job = Job::on_disk();
         for (from, to) in [
             ("frames = 8", format!("frames = {FRAMES}").as_str()),
             ("particle_spacing = 0.1", "particle_spacing = 0.2"),

@@ -95,6 +95,19 @@ impl Job {
         ])
     }
 
+    /// The same on the disk of the build, where writing takes time: temporary folders may be in memory.
+    pub fn on_disk() -> Self {
+        let disk = Self {
+            folder: TempDir::new_in(env!("CARGO_TARGET_TMPDIR")).unwrap(),
+        };
+        let new = Self::new();
+        for entry in fs::read_dir(new.folder.path()).unwrap() {
+            let entry = entry.unwrap();
+            fs::copy(entry.path(), disk.folder.path().join(entry.file_name())).unwrap();
+        }
+        disk
+    }
+
     /// A folder with these files, each a name and a text.
     pub fn of(files: &[(&str, &str)]) -> Self {
         let job = Self {
