@@ -5,6 +5,11 @@
 //! 128×77×64 cells of 0.1 m where left out, and 36×49×64 of them hold 903 168 particles, already under way. Frames
 //! are a sixtieth of a second. The first two warm up; medians of the rest. `--set` adds to `[solver.flip]`, and
 //! `--twice` doubles the height of the box twice, and compares. `--json` prints one line, for programs, and leaves the passes out.
+#![allow(
+    clippy::print_stderr,
+    clippy::print_stdout,
+    reason = "a benchmark prints what it measured"
+)]
 #![allow(missing_docs, reason = "a program")]
 
 use std::{path::Path, time::Instant};

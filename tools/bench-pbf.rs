@@ -5,6 +5,11 @@
 //! a line for each count, for programs, and leaves the passes out. A step is all in: projection on the grid (`--alone`: without), sort, neighbour lists,
 //! 4 red/black iterations, and the frame's share of measuring density and reading the state back. h = 2d, no effects, no solids. The first two frames warm up; medians of
 //! the rest.
+#![allow(
+    clippy::print_stderr,
+    clippy::print_stdout,
+    reason = "a benchmark prints what it measured"
+)]
 #![allow(missing_docs, reason = "a program")]
 
 use std::{path::Path, time::Instant};

@@ -5,6 +5,11 @@
 //! solve on the CPU, by a factor where `reference::poisson::BUDGET` holds it and by conjugate gradients, alone. A time is one `project`, all in:
 //! system, solve, gradient, waiting for the device; the median of the repeats after one that warms up. `--passes`
 //! adds each pass's time by the device's clock.
+#![allow(
+    clippy::print_stderr,
+    clippy::print_stdout,
+    reason = "a benchmark prints what it measured"
+)]
 #![allow(missing_docs, clippy::unwrap_used, reason = "a program")]
 
 #[path = "../tests/suite/support/pressure.rs"]

@@ -3,9 +3,11 @@
 //! One crate, so that all of them are linked once. No test sets what its process shares: whatever needs an environment,
 //! a signal or a limit of its own runs `swell` as a process.
 #![allow(
+    clippy::print_stderr,
+    clippy::print_stdout,
     clippy::unwrap_used,
     unreachable_pub,
-    reason = "a failed unwrap is a failed test"
+    reason = "a failed unwrap is a failed test, and what a test prints is shown where it fails"
 )]
 
 mod support;

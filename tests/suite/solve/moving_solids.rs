@@ -374,7 +374,7 @@ fn scenes_without_moving_solids_have_nothing_for_them() {
         let counts = Counts {
             particles: particles.len(),
             bricks: capacity(scene, &particles),
-            ..Counts::of_solids(&boundary)
+            ..Counts::of_solids(boundary)
         };
         let plan = Plan::new(scene, counts, device_limits(&context));
         let is_moving = plan

@@ -101,7 +101,7 @@ fn gpu(context: &Context, scene: &Scene, boundary: &Boundary, particles: &Partic
     let counts = Counts {
         particles: particles.len(),
         bricks: capacity(scene, particles),
-        ..Counts::of_solids(&boundary)
+        ..Counts::of_solids(boundary)
     };
     let plan = Plan::new(scene, counts, device_limits(context));
     Flip::new(context, scene, plan, boundary, false).unwrap()
