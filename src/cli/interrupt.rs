@@ -130,7 +130,7 @@ mod tests {
             .args(["-c", "trap '' HUP; exec \"$@\"", "sh"])
             .arg(this)
             .args(["--ignored", "--exact", "--nocapture"])
-            .arg("cli::interrupt::tests::child")
+            .arg("interrupt::tests::child")
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -165,7 +165,7 @@ mod tests {
             let mut command = Command::new(std::env::current_exe().unwrap());
             command
                 .args(["--ignored", "--exact", "--nocapture"])
-                .arg("cli::interrupt::tests::child")
+                .arg("interrupt::tests::child")
                 .stdout(Stdio::piped())
                 .stderr(Stdio::null());
             // SAFETY: `hear_all` allocates nothing and takes no lock.
