@@ -26,6 +26,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -292,19 +293,25 @@ def run_pages(pages: list[list[Block]], program: Path, room: Path, as_written: b
         if code:
             raise Fault(f"tools/lib/docs_run.py: `{GIVEN}` ends with {code}:\n{said}")
         print(f"  {time.monotonic() - start:5.1f} s  what pages take as given", flush=True)
-    faults = []
-    for number, blocks in enumerate(pages):
+
+    def one(number: int, blocks: list[Block]) -> str | None:
         if not any(block.mark == "run" for block in blocks):
-            continue
+            return None
         folder = room / f"page-{number}"
         shutil.copytree(given, folder, symlinks=True)
+        fault = None
         try:
             run_page(blocks, Page(folder, room / f"page-state-{number}", programs / "swell", limit_s))
-        except Fault as fault:
-            print(f"FAILED: {fault}", file=sys.stderr, flush=True)
-            faults.append(str(fault).splitlines()[0])
+        except Fault as found:
+            print(f"FAILED: {found}", file=sys.stderr, flush=True)
+            fault = str(found).splitlines()[0]
         if not as_written:
             shutil.rmtree(folder)
+        return fault
+
+    # Pages share nothing but what they take as given. A reader runs one at a time.
+    with ThreadPoolExecutor(1 if as_written else os.cpu_count()) as pool:
+        faults = [fault for fault in pool.map(one, range(len(pages)), pages) if fault]
     if faults:
         raise Fault("\n".join(faults))
 
