@@ -1,9 +1,14 @@
 //! A run as its marks see it after each frame.
 
+use std::cell::OnceCell;
+
 use glam::DVec3;
 
 use swell_domain::{
-    bounds::Bounds, particles::Particles, probe::elevation, signed_distance::SignedDistanceError,
+    bounds::Bounds,
+    particles::Particles,
+    probe::{elevation, enclosed_volume},
+    signed_distance::SignedDistanceError,
     solver::StepReport,
 };
 use swell_scene::{Method, Scene, probe::ProbeKind};
@@ -22,6 +27,8 @@ pub(super) struct View<'a> {
     pub(super) pressures: Vec<Option<f64>>,
     /// At the probes of elevation, metres above the domain's floor.
     pub(super) elevations: Vec<Option<f64>>,
+    /// What the water's surface encloses now, m³; several marks ask for it.
+    volume: OnceCell<f64>,
 }
 
 impl<'a> View<'a> {
@@ -35,6 +42,7 @@ impl<'a> View<'a> {
             report: None,
             pressures: Vec::new(),
             elevations: Vec::new(),
+            volume: OnceCell::new(),
         })
     }
 
@@ -49,8 +57,15 @@ impl<'a> View<'a> {
         self.elevations = levels.map(|level| Some(level? - domain.min.y)).collect();
         self.pressures = step.pressures;
         self.state = step.particles;
+        self.volume = OnceCell::new();
         self.report = Some(step.report);
         self.frame = step.frame;
+    }
+
+    /// What the water's surface encloses, m³.
+    pub(super) fn volume(&self) -> f64 {
+        let (domain, spacing) = (&self.scene.domain, self.scene.particle_spacing());
+        *(self.volume).get_or_init(|| enclosed_volume(&self.state, spacing, domain))
     }
 
     /// Seconds of the shot that are over.

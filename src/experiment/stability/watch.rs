@@ -2,11 +2,7 @@
 
 use glam::DVec3;
 
-use swell_domain::{
-    bounds::Bounds,
-    probe::{enclosed_volume, energies},
-    solver::StepReport,
-};
+use swell_domain::{bounds::Bounds, probe::energies, solver::StepReport};
 use swell_scene::{
     Scene,
     study::stability::{Mark, Other, Over, Quantity},
@@ -174,7 +170,7 @@ impl<'a> Watch<'a> {
             }
             Quantity::VolumeDrift => {
                 let held = now.len() as f64 * spacing.powi(3);
-                (self.drift(enclosed_volume(now, spacing, &scene.domain) / held) - 1.0).abs()
+                (self.drift(run.volume() / held) - 1.0).abs()
             }
             Quantity::FilledVolume => {
                 let filled = filled_volume(&now.position, spacing, &scene.domain);

@@ -36,16 +36,20 @@ fn devices(context: &Context) -> Devices {
     }
 }
 
-/// Frames at which the suite ends a trial on the GPU.
-const LONGEST: u32 = 600;
+/// Frames that the suite runs of any trial on the GPU.
+const LONG: u32 = 240;
 
 /// A trial as the suite runs it. What a minute does to the scheme the reference shows, which takes all of it here; the GPU takes
-/// its first 600 frames. The study, and `tools/test --all` by SWELL_ALL, take all of it on both.
+/// a quarter more than the time from which the last of its marks counts. The study, and `tools/test --all` by SWELL_ALL, take
+/// all of it on both.
 fn in_suite(trial: &Trial) -> Trial {
     let mut trial = trial.clone();
     let is_whole = std::env::var_os("SWELL_ALL").is_some();
-    if !is_whole && trial.device == RunsOn::Gpu {
-        trial.frames = trial.frames.min(LONGEST);
+    if !is_whole && trial.device == RunsOn::Gpu && trial.frames > LONG {
+        let from = |mark: &Mark| mark.after.max(mark.since.unwrap_or(0.0));
+        let last = trial.marks.iter().map(from).fold(0.0, f64::max);
+        let frames = (1.25 * last / trial.scene.shot.frame_seconds()) as u32;
+        trial.frames = trial.frames.min(frames.max(LONG));
     }
     trial
 }
