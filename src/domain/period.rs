@@ -11,6 +11,7 @@ pub struct Period(pub DVec3);
 
 impl Period {
     /// The place in the box, up to its rounding, of which `x` is an image.
+    #[inline]
     pub fn wrap(self, x: DVec3) -> DVec3 {
         if self.0 == DVec3::ZERO {
             return x;
@@ -29,6 +30,7 @@ impl Period {
 
     /// Whether what went from `before` to `after` was carried to the other end, or stands so near to an end that
     /// rounding decides at which.
+    #[inline]
     pub fn is_at_joint(self, before: DVec3, after: DVec3) -> bool {
         let is_carried = (after - before).abs().cmpgt(0.5 * self.0);
         let is_near = after.cmplt(1e-5 * self.0) | after.cmpgt((1.0 - 1e-5) * self.0);
@@ -37,6 +39,7 @@ impl Period {
 
     /// A place that was found, or its image that is nearer to what was expected where rounding alone took the one to the
     /// other end of the box: what was found has to lie in the box.
+    #[inline]
     pub fn image_by_rounding(self, found: DVec3, expected: DVec3) -> DVec3 {
         let slack = 1e-6 * self.0;
         let is_within = found.cmpge(-slack) & found.cmple(self.0 + slack);

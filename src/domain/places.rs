@@ -19,6 +19,7 @@ pub fn are_told(mut dims: impl Iterator<Item = usize>, is_periodic: bool) -> boo
 pub const SKIN: f64 = (REACH as f64 + 1.949) / STEPS as f64 - 1.0;
 
 /// The word of a place, metres; `inverse` is 1/h as the device has it. Products are rounded as there, so that words are equal.
+#[inline]
 pub fn word(place: [f32; 3], inverse: f32) -> u32 {
     let step = |axis: usize| (place[axis] * inverse * STEPS).floor() as i32 as u32 % ROUND;
     step(0) | step(1) << 10 | step(2) << 20

@@ -152,6 +152,7 @@ impl SignedDistance {
 
     /// Trilinear interpolation at `p`, metres. Beyond the grid: the value at the nearest point of
     /// the grid plus the way there.
+    #[inline]
     pub fn sample(&self, p: DVec3) -> f64 {
         let (cell, u, beyond) = self.locate(p);
         let c = self.corners(cell);
@@ -165,6 +166,7 @@ impl SignedDistance {
 
     /// Gradient of the trilinear interpolation, pointing away from the solid; its length is one
     /// up to the grid's error, less at edges of the medial axis. Constant beyond the grid.
+    #[inline]
     pub fn gradient(&self, p: DVec3) -> DVec3 {
         let (cell, u, _) = self.locate(p);
         let c = self.corners(cell);

@@ -26,6 +26,7 @@ pub struct Calibration {
 
 /// Fraction of the bulk density that a half-space of continuous fluid gives at distance q h outside it:
 /// 315/256 ∫_q^1 (1 − t²)⁴ dt.
+#[inline]
 pub fn half_space_fraction(q: f64) -> f64 {
     let q = q.clamp(0.0, 1.0);
     let q2 = q * q;
@@ -78,6 +79,7 @@ impl Calibration {
     /// a particle as the pressure force −Σ_j m (p_i/ρ0² + p_j/ρ0²) ∇W does in Δt², but that on the lattice the sum gives
     /// κ of a pressure's gradient ([`Self::linear_gradient`]). What a correction's bound cuts off counts as if it were
     /// not cut. λ in m², ρ0 in kg/m³; the result in Pa/m².
+    #[inline]
     pub fn pressure_scale(&self, rest_density: f64, relaxation: f64, time_step: f64) -> f64 {
         -rest_density * relaxation * self.linear_gradient / (time_step * time_step)
     }
