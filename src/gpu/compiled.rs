@@ -1,4 +1,4 @@
-//! Passes that were compiled on a device, kept for the next program that has them.
+//! A cache of the passes compiled on a device.
 
 use std::{
     collections::BTreeMap,
@@ -11,22 +11,23 @@ use super::{
     raster::{RasterPass, RasterSpec},
 };
 
-/// Passes that were compiled on one device, so that a program whose passes another has compiles none again. Passes of edited
-/// shaders are compiled for each program: they are checked against its buffers.
+/// Compiled passes of one device. A program reuses every pass that an earlier program on the device compiled. Edited shaders are
+/// not cached, because each program checks them against its own buffers.
 #[derive(Debug, Default)]
 pub(super) struct Compiled {
     passes: Mutex<BTreeMap<PassKey, Arc<Pass>>>,
     rasters: Mutex<BTreeMap<(RasterKey, String), Arc<RasterPass>>>,
 }
 
-/// Name, bits of the constants, and text of a pass.
+/// Name, bits of the override constants, and WGSL text of a compute pass.
 type PassKey = (&'static str, Vec<(&'static str, u64)>, String);
 
-/// What a raster pass is made of, beside the text of its shader.
+/// Name, and formats and depth test, of a raster pass.
 type RasterKey = (&'static str, String);
 
 impl Compiled {
-    /// The compute pass of that name and text; made where there is none. Of the constants those count that the text names.
+    /// Returns the compute pass with this name, text and constants, and compiles it by `make` if there is none. Constants that the
+    /// text does not name are ignored.
     pub(super) fn pass<'a>(
         &self,
         name: &'static str,
@@ -40,7 +41,7 @@ impl Compiled {
         Self::get(&self.passes, key, make)
     }
 
-    /// The pass of that key; made where there is none.
+    /// Returns the pass with this key, and compiles it by `make` if there is none.
     fn get<K: Ord, P>(
         passes: &Mutex<BTreeMap<K, Arc<P>>>,
         key: K,
@@ -50,13 +51,13 @@ impl Compiled {
         if let Some(pass) = locked().get(&key) {
             return Ok(Arc::clone(pass));
         }
-        // Not under the lock: two threads may compile at once.
+        // The lock is released while compiling, so two threads can compile at once.
         let pass = Arc::new(make()?);
         Ok(Arc::clone(locked().entry(key).or_insert(pass)))
     }
 }
 
-/// Compiles a raster pass, or takes it from those that were compiled on the device.
+/// Returns the raster pass of `spec`, and compiles it by `make` if the device has none.
 ///
 /// # Errors
 /// Those of `make`, and of composing its shader.

@@ -36,12 +36,12 @@ fn devices(context: &Context) -> Devices {
     }
 }
 
-/// Frames that the suite runs of any trial on the GPU.
+/// Trials of more frames than this are cut short on the GPU.
 const LONG: u32 = 240;
 
-/// A trial as the suite runs it. What a minute does to the scheme the reference shows, which takes all of it here; the GPU takes
-/// a quarter more than the time from which the last of its marks counts. The study, and `tools/test --all` by SWELL_ALL, take
-/// all of it on both.
+/// Cuts a long trial short on the GPU: it ends a quarter later than the last of its marks begins to count. The f64 reference runs
+/// every trial at full length, so the scheme itself is tested over the whole minute. The study runs all of it on both devices,
+/// and so does `tools/test --all`, which sets SWELL_ALL.
 fn in_suite(trial: &Trial) -> Trial {
     let mut trial = trial.clone();
     let is_whole = std::env::var_os("SWELL_ALL").is_some();
@@ -75,7 +75,7 @@ fn wrong(case: &Case) -> Vec<String> {
         }
         Held::Runs(trials) => {
             let trials: Vec<Trial> = trials.iter().map(in_suite).collect();
-            // Side by side: the longest of them bounds the time of the whole suite.
+            // In parallel, because the longest case bounds the time of the whole suite.
             let runs: Vec<Run> = thread::scope(|scope| {
                 let begun: Vec<_> = (trials.iter())
                     .map(|trial| scope.spawn(|| run(trial)))

@@ -82,8 +82,8 @@ fn hold(name: &str) {
     assert!(missed.is_empty(), "{name}: {}", missed.join("\n"));
 }
 
-/// [`hold`], and a negative control of the same runs: waves that were lower by this factor miss the gate. In linear theory that is a
-/// wall, or a flap, that goes less far by the factor.
+/// Like [`hold`], with a negative control on the same runs: waves lower by the factor `lower` miss the gate. In linear theory, those are the
+/// waves of a wall or flap with a stroke shorter by that factor.
 fn hold_height(name: &str, lower: f64) {
     let mut benchmark = benchmark(&COARSE, name);
     let runs = runs(&crate::support::context(), &benchmark);

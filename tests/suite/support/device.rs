@@ -1,4 +1,4 @@
-//! Devices that tests use one after the other.
+//! A pool of GPU devices that tests share.
 
 use std::{
     ops::{Deref, DerefMut},
@@ -8,15 +8,15 @@ use std::{
 
 use swell::gpu::adapter::{Context, Spoil};
 
-/// Devices that no test uses at the moment. A device keeps the passes that it has compiled, so that a test begins with those
-/// that another one needed as well; and each test has a device of its own, so that tests do not wait for each other.
+/// Idle devices. A device keeps its compiled passes, so a test reuses those that an earlier test compiled. No two tests use a
+/// device at once, so they never wait for each other's work.
 static FREE: Mutex<Vec<Context>> = Mutex::new(Vec::new());
 
-/// A device on loan; goes back when dropped.
+/// A device taken from the pool. Dropping it returns the device.
 #[derive(Debug)]
 pub struct Lent {
     context: Context,
-    /// The same device, as it goes back whatever was set in `context`.
+    /// The same device without the changes made to `context`; this is what returns to the pool.
     clean: Context,
 }
 
@@ -36,7 +36,7 @@ impl DerefMut for Lent {
 
 impl Drop for Lent {
     fn drop(&mut self) {
-        // A device that reported an error, or whose test failed, is not used again.
+        // A device that reported an error, or whose test failed, is dropped.
         if !thread::panicking() && self.clean.check().is_ok() {
             let mut free = FREE.lock().unwrap_or_else(PoisonError::into_inner);
             free.push(self.clean.clone());
@@ -44,7 +44,7 @@ impl Drop for Lent {
     }
 }
 
-/// The best adapter's device, opened as every command opens it.
+/// A device on the best adapter, opened as every command opens it.
 pub fn context() -> Lent {
     let free = FREE.lock().unwrap_or_else(PoisonError::into_inner).pop();
     let clean = free.unwrap_or_else(|| {
@@ -56,7 +56,7 @@ pub fn context() -> Lent {
     }
 }
 
-/// A device whose pass `pass` has `to` for `from`: for negative controls.
+/// A device whose pass `pass` has `from` replaced by `to`: for negative controls.
 pub fn spoiled(pass: &'static str, from: &'static str, to: &'static str) -> Lent {
     let mut context = context();
     context.spoil = Some(Spoil { pass, from, to });
