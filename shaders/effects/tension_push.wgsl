@@ -20,15 +20,16 @@ const AIR = 0u;
 const FLUID = 1u;
 // As in the projection.
 const LEAST_THETA = 0.01;
+const MOST_THETA = 100.0;
 // Where the share of water is flatter than this on both sides, nothing is known of κ.
 const LEAST_WEIGHT = 1e-6;
 
 fn theta_of(water: u32, air: u32) -> f32 {
 #ifdef GHOST_FLUID
     let inside = max(-liquid_distance[water], 0.0);
-    let outside = max(liquid_distance[air], 0.0);
-    let theta = select(1.0, inside / (inside + outside), inside + outside > 0.0);
-    return clamp(theta, LEAST_THETA, 1.0);
+    let outside = liquid_distance[air];
+    let theta = select(MOST_THETA, inside / (inside + outside), inside + outside > 0.0);
+    return clamp(theta, LEAST_THETA, MOST_THETA);
 #else
     return 1.0;
 #endif
@@ -40,7 +41,8 @@ fn jump(water: u32, air: u32) -> f32 {
     let inside = tension_curvature[water];
     let outside = tension_curvature[air];
     // By how steep the share is too: in the middle of a thin sheet it is flat, and says nothing of the surface.
-    let weights = vec2f((1.0 - theta) * inside.y, theta * outside.y);
+    let part = min(theta, 1.0);
+    let weights = vec2f((1.0 - part) * inside.y, part * outside.y);
     let sum = weights.x * inside.x + weights.y * outside.x;
     return sum / max(weights.x + weights.y, LEAST_WEIGHT) / theta;
 }

@@ -5,8 +5,8 @@
 #import "shared/flip_cell.wgsl"
 #import "shared/flip_walls.wgsl"
 #ifdef SOLIDS
-#import "shared/flip_solid.wgsl"
 #import "shared/flip_cut.wgsl"
+#import "shared/flip_hats.wgsl"
 #endif
 
 @group(0) @binding(3) var<storage, read_write> cell_kind: array<u32>;
@@ -14,6 +14,7 @@
 @group(0) @binding(5) var<storage, read_write> solid_flux: array<f32>;
 #ifdef SOLIDS
 @group(0) @binding(6) var<storage, read_write> open_volume: array<f32>;
+@group(0) @binding(10) var<storage, read_write> open_hats: array<f32>;
 #endif
 #ifdef MOVING_SOLIDS
 // What the lower faces have where they are closed, m/s.
@@ -23,6 +24,13 @@
 // Which of the cells with room are water is found later, by the density at their centres.
 const AIR = 0u;
 const SOLID = 2u;
+
+#ifdef SOLIDS
+// A face of which solids leave less is closed. About edges and corners such faces drove jets in water at rest; through larger ones
+// particles are not driven, as flip/grid_to_particle counts faces by what is open of them. At 0.1 the velocities beside a cylinder in
+// potential flow would be twice as far off, at 0.3 they would not converge.
+const LEAST_OPEN = 0.05;
+#endif
 
 @compute @workgroup_size(64)
 fn main(
@@ -43,7 +51,9 @@ fn main(
     var volume = extent.x * across.x;
 #ifdef SOLIDS
     var corners = Corners(vec4f(1e15), vec4f(1e15));
-    var is_cut = false;
+    // A bit for each solid that may cut it.
+    var solids = 0u;
+    var hats = 1.0;
 #ifdef MOVING_SOLIDS
     let lower_of_walls = lower;
     let upper_of_walls = upper;
@@ -61,17 +71,17 @@ fn main(
             lower_velocity = select(lower_velocity, pushing, is_nearer_low);
             upper_velocity = select(upper_velocity, pushing, is_nearer_high);
             corners = Corners(min(corners.near, found.near), min(corners.far, found.far));
-            is_cut = true;
+            solids |= 1u << k;
         }
     }
 #else
     // Entered only where a solid may cut the cell.
     for (var once = 0; once < select(0, 1, may_cut(cell)); once++) {
         corners = corner_distances(cell);
-        is_cut = true;
+        solids = 1u;
     }
 #endif
-    for (var once = 0; once < select(0, 1, is_cut); once++) {
+    for (var once = 0; once < select(0, 1, solids != 0u); once++) {
         let near = corners.near;
         let far = corners.far;
         lower *= vec3f(
@@ -90,11 +100,16 @@ fn main(
             dot(far - near, vec4f(0.25)),
         ));
         let center = dot(near + far, vec4f(0.125));
-        volume *= clamp(0.5 + center / max(slopes.x + slopes.y + slopes.z, 1e-20), 0.0, 1.0);
+        let rise = slopes.x + slopes.y + slopes.z;
+        volume *= clamp(0.5 + center / max(rise, 1e-20), 0.0, 1.0);
+        hats = open_part_of_hat(cell, rise, solids);
+        lower = select(lower, vec3f(0.0), lower < LEAST_OPEN * across);
+        upper = select(upper, vec3f(0.0), upper < LEAST_OPEN * across);
     }
     lower = select(lower, vec3f(0.0), lower < vec3f(ON_FACE));
     upper = select(upper, vec3f(0.0), upper < vec3f(ON_FACE));
     open_volume[element] = volume;
+    open_hats[element] = hats;
 #endif
     let is_open = volume >= ON_FACE * ON_FACE || any(lower + upper > vec3f(0.0));
     cell_kind[element] = select(SOLID, AIR, is_open);

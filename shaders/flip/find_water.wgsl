@@ -3,11 +3,9 @@
 // beside a wall that comes or goes, and were it air, all of the water's pressure would leak there; and drops in the air
 // have no pressure.
 //
-// A cell whose centre lies within a wall or a solid is what the water before it is. With a density correction a cell that a
-// solid cuts is more than that where it holds more itself, and all of it where the solid reaches just to its centre: of water
-// that runs up a slope the edge lies in such cells, and below the centres of those before them. Were it air, nothing would
-// hold it up or apart, and it gathered there to five times what there was room for. PBF's projection goes without, as in
-// flip/spread_centers.
+// A cell whose centre lies within a wall is what the water before it is. One that solids cut goes by what they leave of it, and a
+// film on a floor that passes above the centre is water as well: of water that runs up a slope, and of water at rest on it, the edge
+// lies in cells whose centres are in the slope. Were they air, nothing would hold it up or apart.
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
 #import "shared/flip_buried.wgsl"
@@ -18,6 +16,10 @@
 #ifdef GHOST_FLUID
 // Metres, negative in water.
 @group(0) @binding(5) var<storage, read_write> liquid_distance: array<f32>;
+#endif
+
+#ifdef SOLIDS
+@group(0) @binding(6) var<storage, read> open_hats: array<f32>;
 #endif
 
 const AIR = 0u;
@@ -53,6 +55,55 @@ fn density_before(element: u32, cell: vec3f) -> f32 {
     return select(density[element], sum / weights, weights > 0.0);
 }
 
+#ifdef SOLIDS
+// Part of the hats below which a cell counts as having room for that part.
+const LEAST_ROOM = 0.02;
+
+// Part of its room that a film fills at least.
+const LEAST_FILM = 0.1;
+
+// What of the room at a centre is water. Where the centre is in a solid, what little room there is may hold no particle for a
+// while, or one too many: there it is water if that and what lies beyond its faces are, together.
+fn share_of_room(element: u32) -> f32 {
+    let room = open_hats[element];
+    var water = density[element] * max(room, params.particle_share);
+    var rooms = max(room, LEAST_ROOM);
+    let own = water / rooms;
+    for (var k = 0u; k < select(0u, 6u, room < 0.5); k++) {
+        let axis = k >> 1u;
+        var step = vec3i(0);
+        step[axis] = 2 * i32(k & 1u) - 1;
+        let other = element_at(step);
+        let face = axis * params.stride + select(element, other, (k & 1u) == 1u);
+        let open = select(0.0, face_open[face], other >= CELLS);
+        water += open * density[other] * max(open_hats[other], params.particle_share);
+        rooms += open * open_hats[other];
+    }
+    return max(own, water / rooms);
+}
+
+// Part of the hat about the centre that lies below the surface, that within solids included: `of_room` is it of what they leave.
+// The surface is taken to be level. What lies in a solid counts as below it as far as the solid does: all of it where a floor
+// stands under the water, none where a ceiling hangs over it, and as much as of the room beside a wall. Were it as of the room
+// everywhere, water over a slope had the surface too deep, the more so the nearer to its edge, and climbed.
+fn below_surface(element: u32, of_room: f32) -> f32 {
+    let room = open_hats[element];
+    var to_open = vec3f(0.0);
+    for (var axis = 0u; axis < 3u; axis++) {
+        var step = vec3i(0);
+        step[axis] = 1;
+        let after = element_at(step);
+        let before = element_at(-step);
+        to_open[axis] = select(open_hats[after], room, after < CELLS) - select(open_hats[before], room, before < CELLS);
+    }
+    let up = -params.velocity_step;
+    let lengths = sqrt(dot(to_open, to_open) * dot(up, up));
+    let upright = dot(to_open, up) / max(lengths, 1e-20);
+    let of_solid = mix(of_room, select(0.0, 1.0, upright > 0.0), abs(upright));
+    return select(of_room, mix(of_solid, of_room, room), room > LEAST_ROOM);
+}
+#endif
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,
@@ -65,23 +116,29 @@ fn main(
     }
     let element = thread + CELLS;
     let cell = vec3f(own_cell(element));
-    var relative = density[element];
-    for (var once = 0; once < select(0, 1, is_buried(element, cell)); once++) {
+    var share = density[element];
+    for (var once = 0; once < select(0, 1, any(open_extent(cell) < vec3f(HALF))); once++) {
         open_neighborhood(element);
-        relative = density_before(element, cell);
-#ifdef SOLIDS
-#ifdef CORRECTION
-        relative += min(2.0 * open_volume[element], 1.0) * max(density[element] - relative, 0.0);
-#endif
-#endif
+        share = density_before(element, cell);
     }
+    var below = clamp(share, 0.0, 1.0);
+    var is_film = false;
+#ifdef SOLIDS
+    for (var once = 0; once < select(0, 1, open_hats[element] < 1.0); once++) {
+        open_neighborhood(element);
+        share = share_of_room(element);
+        below = below_surface(element, clamp(share, 0.0, 1.0));
+        is_film = share > LEAST_FILM && below >= 0.5;
+    }
+#endif
     // Water lies in bricks that hold particles, or a wall beside them.
-    let is_water = relative >= 0.5 && thread < params.wet_cells;
+    let is_water = (share >= 0.5 || is_film) && thread < params.wet_cells;
     let is_open = cell_kind[element] != SOLID;
     cell_kind[element] = select(SOLID, select(AIR, FLUID, is_water), is_open);
 #ifdef GHOST_FLUID
-    // Across a flat surface the density is 1/2 at it, and falls as s - s²/2 with the distance s in cells.
-    let off = clamp(relative, 0.0, 1.0) - 0.5;
+    // Across a flat surface the density is 1/2 at it, and falls as s - s²/2 with the distance s in cells. Where a dry floor passes
+    // above the centre of a cell of air, the surface is there: negative, as in water.
+    let off = below - 0.5;
     let inside = sign(off) * (1.0 - sqrt(max(1.0 - 2.0 * abs(off), 0.0)));
     let depth = select(inside, max(inside, LEAST_DEPTH), is_water);
     liquid_distance[element] = -depth * params.cell_size;

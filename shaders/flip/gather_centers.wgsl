@@ -3,7 +3,6 @@
 #import "shared/thread.wgsl"
 #import "shared/flip_params.wgsl"
 #import "shared/flip_neighborhood.wgsl"
-#import "shared/flip_walls.wgsl"
 
 // As flip/spread_centers has them.
 @group(0) @binding(2) var<storage, read> weight_before: array<f32>;
@@ -11,7 +10,7 @@
 @group(0) @binding(5) var<storage, read> momentum_before: array<f32>;
 @group(0) @binding(3) var<storage, read_write> density: array<f32>;
 #ifdef SOLIDS
-@group(0) @binding(9) var<storage, read> open_volume: array<f32>;
+@group(0) @binding(9) var<storage, read> open_hats: array<f32>;
 #endif
 
 // Integral of the hat from minus infinity to t.
@@ -22,18 +21,6 @@ fn hat_below(t: vec3f) -> vec3f {
 
 // Part of the hats below which a cell counts as that part full.
 const LEAST_ROOM = 0.02;
-
-// Mean of a hat over the cell of its centre, and over the ones beside it.
-const OWN_SHARE = 0.75;
-const OTHER_SHARE = 0.125;
-
-#ifdef SOLIDS
-// Of the hat that stands in the k-th cell of a layer, x fastest; `of_layer` is the layer's.
-fn share_of(k: i32, of_layer: f32) -> f32 {
-    let share = select(vec2f(OTHER_SHARE), vec2f(OWN_SHARE), vec2i(k % 3, k / 3) == vec2i(1));
-    return share.x * share.y * of_layer;
-}
-#endif
 
 @compute @workgroup_size(64)
 fn main(
@@ -52,32 +39,21 @@ fn main(
     let last_wet = params.wet_cells / CELLS;
     let holds_water = (slots_near - 1u < vec4u(last_wet)) | (slots_far - 1u < vec4u(last_wet));
     var sum = 0.0;
-    var room = 0.0;
     // Layer by layer: what lies before gave to the layer after its own.
     for (var k = 0; k < select(0, 9, any(holds_water)); k++) {
         let found = element_at(vec3i(k % 3, k / 3, 0) - 1);
         sum += momentum_before[u32(8 - k) * stride + select(0u, found, found < wet_end)];
-#ifdef SOLIDS
-        room += share_of(k, OTHER_SHARE) * open_volume[found];
-#endif
     }
     for (var k = 0; k < select(0, 9, any(holds_water)); k++) {
         let found = element_at(vec3i(k % 3, k / 3, 1) - 1);
         sum += weight_after[u32(8 - k) * stride + select(0u, found, found < wet_end)];
-#ifdef SOLIDS
-        room += share_of(k, OWN_SHARE) * open_volume[found];
-#endif
     }
     for (var k = 0; k < select(0, 9, any(holds_water)); k++) {
         let found = element_at(vec3i(k % 3, k / 3, 2) - 1);
         sum += weight_before[u32(8 - k) * stride + select(0u, found, found < wet_end)];
-#ifdef SOLIDS
-        room += share_of(k, OTHER_SHARE) * open_volume[found];
-#endif
     }
-    // What the walls leave of the hats, exactly; meshes take their part of it cell by cell.
-    let cell = vec3f(own_cell(element));
-    let center = cell + 0.5;
+    // What the walls leave of the hats, exactly, and what solids do of that.
+    let center = vec3f(own_cell(element)) + 0.5;
     let along = hat_below(params.cut_max - center) - hat_below(params.cut_min - center);
 #ifdef CORRECTION
     let is_open = (center >= params.cut_min) & (center <= params.cut_max);
@@ -85,12 +61,10 @@ fn main(
 #else
     let parts = along;
 #endif
-    let of_walls = parts.x * parts.y * parts.z;
+    var room = max(parts.x * parts.y * parts.z, LEAST_ROOM);
 #ifdef SOLIDS
-    let cells = OWN_SHARE * open_extent(cell) + OTHER_SHARE * (open_extent(cell - 1.0) + open_extent(cell + 1.0));
-    room *= of_walls / max(cells.x * cells.y * cells.z, 1e-6);
-#else
-    room = of_walls;
+    // What has room for less than a particle counts as having it for one.
+    room *= max(open_hats[element], params.particle_share);
 #endif
-    density[element] = sum * params.particle_share / max(room, LEAST_ROOM);
+    density[element] = sum * params.particle_share / room;
 }

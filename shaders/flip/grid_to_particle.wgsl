@@ -1,5 +1,9 @@
 // Particles take the grid's velocity and its change: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its
-// slope (APIC, Jiang et al. 2015). A cell's particles share its 18 faces, which are read once. What lies beyond the
+// slope (APIC, Jiang et al. 2015). v stays near what the faces about it have, or differences of particles from the flow that
+// carries them would grow, the more the smaller the step: nothing on the grid sees them. A cell's particles share its 18 faces, which
+// are read once. Faces that solids leave open in part count by that part: the projection weighs them so, and gives those
+// that are open by little several times their neighbours' velocities.
+// What lies beyond the
 // domain's faces along b and c is what lies before them, so that water slides along walls.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
@@ -14,6 +18,9 @@
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
 // Three floats a particle, as `sorted_velocity`, `carried` and `pushed` have.
 @group(0) @binding(5) var<storage, read_write> velocity: array<f32>;
+#ifdef SOLIDS
+@group(0) @binding(15) var<storage, read> face_open: array<f32>;
+#endif
 @group(0) @binding(9) var<storage, read> sorted_velocity: array<f32>;
 #ifdef APIC
 @group(0) @binding(6) var<storage, read_write> affine: array<f32>;
@@ -57,11 +64,50 @@ fn displacements(faces: vec3u) -> vec3f {
 }
 #endif
 
+#ifdef SOLIDS
+// What counts of each: closed ones have the velocity of what closes them.
+fn parts(faces: vec3u) -> vec3f {
+    let open = vec3f(face_open[faces.x], face_open[faces.y], face_open[faces.z]);
+    return select(open, vec3f(1.0), open <= vec3f(0.0));
+}
+
+fn product(a: mat3x3f, b: mat3x3f) -> mat3x3f {
+    return mat3x3f(a[0] * b[0], a[1] * b[1], a[2] * b[2]);
+}
+
+fn sum_of(a: mat3x3f) -> f32 {
+    return dot(a[0] + a[1] + a[2], vec3f(1.0));
+}
+
+// Each value by its part, and the mean of all by the rest.
+fn settled(values: Values, part: Values) -> Values {
+    let lower = product(values.lower, part.lower);
+    let upper = product(values.upper, part.upper);
+    let mean = (sum_of(lower) + sum_of(upper)) / max(sum_of(part.lower) + sum_of(part.upper), 1e-6);
+    let ones = mat3x3f(vec3f(1.0), vec3f(1.0), vec3f(1.0));
+    return Values(lower + mean * (ones - part.lower), upper + mean * (ones - part.upper));
+}
+
+#endif
+#ifndef APIC
+// Of the range of the faces' velocities, by which a particle's may lie beyond it.
+const SLACK = 0.25;
+
+fn least(values: Values) -> f32 {
+    let lower = min(min(values.lower[0], values.lower[1]), values.lower[2]);
+    let upper = min(min(values.upper[0], values.upper[1]), values.upper[2]);
+    let both = min(lower, upper);
+    return min(both.x, min(both.y, both.z));
+}
+
+#endif
 // What the faces of one component hold.
 struct Component {
     speeds: Values,
 #ifndef APIC
     change: Values,
+    // From the least velocity that a particle may have to the greatest.
+    range: vec2f,
 #endif
 #ifdef CORRECTION
     shift: Values,
@@ -79,6 +125,9 @@ struct Steps {
 
 fn read_component(axis: u32, steps: Steps) -> Component {
     var read: Component;
+#ifdef SOLIDS
+    var part: Values;
+#endif
     let plane = vec3u(axis * params.stride);
     for (var side = 0; side < 2; side++) {
         let start = side * steps.a;
@@ -97,6 +146,10 @@ fn read_component(axis: u32, steps: Steps) -> Component {
             element_at(start + steps.c_after),
             element_at(start + steps.b_after + steps.c_after),
         );
+#ifdef SOLIDS
+        part.lower = part.upper;
+        part.upper = mat3x3f(parts(before), parts(own), parts(after));
+#endif
         read.speeds.lower = read.speeds.upper;
         read.speeds.upper = mat3x3f(velocities(before), velocities(own), velocities(after));
 #ifndef APIC
@@ -108,6 +161,20 @@ fn read_component(axis: u32, steps: Steps) -> Component {
         read.shift.upper = mat3x3f(displacements(before), displacements(own), displacements(after));
 #endif
     }
+#ifdef SOLIDS
+    read.speeds = settled(read.speeds, part);
+#ifndef APIC
+    read.change = settled(read.change, part);
+#endif
+#ifdef CORRECTION
+    read.shift = settled(read.shift, part);
+#endif
+#endif
+#ifndef APIC
+    let low = least(read.speeds);
+    let high = -least(Values(-1.0 * read.speeds.lower, -1.0 * read.speeds.upper));
+    read.range = vec2f(low, high) + SLACK * (high - low) * vec2f(-1.0, 1.0);
+#endif
     return read;
 }
 
@@ -148,7 +215,8 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool) {
     affine[row + (axis + 2u) % 3u] = scale * value_at(faces.speeds, a, b, of_c);
 #else
     let advanced = sorted_velocity[k] + value_at(faces.change, a, b, c);
-    velocity[k] = select(advanced + params.pic_blend * (u - advanced), falling, falls);
+    let kept = clamp(advanced + params.pic_blend * (u - advanced), faces.range.x, faces.range.y);
+    velocity[k] = select(kept, falling, falls);
 #endif
 #ifdef CORRECTION
     pushed[k] = value_at(faces.shift, a, b, c);

@@ -51,8 +51,10 @@ fn main(
     let own = sorted_id[i];
     let apart = params.apart;
     let of_walls = params.apart_from_walls;
-    var push = max(of_walls - 2.0 * (x - params.wall_min), vec3f(0.0))
-        - max(of_walls - 2.0 * (params.wall_max - x), vec3f(0.0));
+    // As the walls stand where the particles do, at the substep's start: pushed off where they will be, water beside a wall that comes
+    // left a gap before it.
+    var push = max(of_walls - 2.0 * (x - params.cut_min * params.cell_size), vec3f(0.0))
+        - max(of_walls - 2.0 * (params.cut_max * params.cell_size - x), vec3f(0.0));
     // A drop lies at a wall as near as it may: lifted off it, it would fall again in each step.
     push = select(push, vec3f(0.0), is_drop[i] > 0u);
 #ifdef PERIODIC

@@ -21,6 +21,8 @@ const AIR = 0u;
 const FLUID = 1u;
 // Least part of the way to air at which the surface may lie.
 const LEAST_THETA = 0.01;
+// The same where it lies beyond the cell of air, over a floor that passes above that cell's centre.
+const MOST_THETA = 100.0;
 
 struct Row {
     dirichlet: real,
@@ -51,9 +53,9 @@ fn neighbors_of(s: Site, c: u32) -> array<u32, 6> {
 fn inverse_theta(water: u32, air: u32) -> real {
 #ifdef GHOST_FLUID
     let inside = max(-real(liquid_distance[water]), 0.0);
-    let outside = max(real(liquid_distance[air]), 0.0);
-    let theta = select(1.0, inside / (inside + outside), inside + outside > 0.0);
-    return 1.0 / clamp(theta, LEAST_THETA, 1.0);
+    let outside = real(liquid_distance[air]);
+    let theta = select(MOST_THETA, inside / (inside + outside), inside + outside > 0.0);
+    return 1.0 / clamp(theta, LEAST_THETA, MOST_THETA);
 #else
     return 1.0;
 #endif

@@ -11,6 +11,7 @@
 const AIR = 0u;
 const FLUID = 1u;
 const LEAST_THETA = 0.01;
+const MOST_THETA = 100.0;
 
 // Slots that hold water; further ones have no q.
 fn is_wet(slot: u32) -> bool {
@@ -55,9 +56,9 @@ fn face_at(s: Site, c: u32, axis: u32) -> Face {
     let phi = vec2<real>(vec2f(liquid_distance[own], liquid_distance[before]));
     let ordered = select(phi.yx, phi, kind == FLUID);
     let inside = max(-ordered.x, 0.0);
-    let outside = max(ordered.y, 0.0);
-    let theta = select(1.0, inside / (inside + outside), inside + outside > 0.0);
-    difference *= select(1.0, 1.0 / clamp(theta, LEAST_THETA, 1.0), kind != kind_before);
+    let outside = ordered.y;
+    let theta = select(MOST_THETA, inside / (inside + outside), inside + outside > 0.0);
+    difference *= select(1.0, 1.0 / clamp(theta, LEAST_THETA, MOST_THETA), kind != kind_before);
 #endif
     let element = axis * phase.stride + own;
     return Face(element, is_open && face_open[element] > 0.0, difference);

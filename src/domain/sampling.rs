@@ -2,8 +2,11 @@
 //!
 //! Everything here is a function of its arguments alone: random numbers are hashed from indices.
 
+mod displace;
+
 use glam::DVec3;
 
+use self::displace::displace;
 use super::{
     bounds::Bounds,
     mesh::TriangleMesh,
@@ -14,10 +17,6 @@ use super::{
 /// Centres nearer than this many spacings to water that is there already are left out where
 /// regions of water overlap.
 const OVERLAP_SPACINGS: f64 = 0.75;
-
-/// So much nearer to a solid than half a spacing, in spacings, still stays. A lattice that fits beside a face stands at just half a
-/// spacing from it, and rounding of distances took some of it and left the rest: water shot up in the gaps.
-const ON_FACE: f64 = 1e-3;
 
 /// Least distance of boundary samples in spacings, chosen so that there is one sample a spacing
 /// squared within a few per cent. (0.835 would do if random sequential packing saturated; with
@@ -48,8 +47,8 @@ pub struct Fill {
     pub removed: usize,
 }
 
-/// Fills blocks and meshes with particles on lattices of `spacing` metres and removes those less
-/// than half a spacing from `solid`, rounding aside.
+/// Fills blocks and meshes with particles on lattices of `spacing` metres, and makes way for `solid`: as many particles
+/// stay as there is room for, each a quarter of a spacing or more from it.
 ///
 /// # Errors
 /// A water mesh without inside, or too large a grid for it.
@@ -64,9 +63,7 @@ pub fn fill_water<'a>(
     for mesh in meshes {
         fill_mesh(&mut positions, mesh, domain, spacing)?;
     }
-    let removed = solid.map_or(0, |solid| {
-        remove_inside(&mut positions, solid, (0.5 - ON_FACE) * spacing)
-    });
+    let removed = solid.map_or(0, |solid| displace(&mut positions, solid, domain, spacing));
     let particles = Particles {
         position: positions.iter().map(|p| p.as_vec3().to_array()).collect(),
         velocity: vec![[0.0; 3]; positions.len()],
@@ -160,13 +157,6 @@ pub fn fill_mesh(
         .collect();
     positions.extend(found);
     Ok(())
-}
-
-/// Removes what is less than `clearance` metres outside of `solid`, or inside; returns how many.
-pub fn remove_inside(positions: &mut Vec<DVec3>, solid: &SignedDistance, clearance: f64) -> usize {
-    let before = positions.len();
-    positions.retain(|p| solid.sample(*p) >= clearance);
-    before - positions.len()
 }
 
 struct Lattice {

@@ -9,11 +9,11 @@ use crate::{
 };
 use swell_domain::{boundary::Boundary, flip::VON_KARMAN, signed_distance::SignedDistance};
 use swell_reference::flip::{
-    Model, Room, Solid, cut_cells as twin_cut_cells, extrapolate as twin_extrapolate,
-    find_change as twin_find_change, find_depth, find_excess as twin_find_excess,
-    find_water as twin_find_water, friction_rates, gather_centers as twin_gather_centers,
-    gather_faces as twin_gather_faces, is_near_half, let_in as twin_let_in,
-    wall_friction as twin_wall_friction,
+    Depth, LEAST_FILM, Model, Room, Solid, cut_cells as twin_cut_cells,
+    extrapolate as twin_extrapolate, find_change as twin_find_change, find_depth,
+    find_excess as twin_find_excess, find_water as twin_find_water, friction_rates,
+    gather_centers as twin_gather_centers, gather_faces as twin_gather_faces, is_near_half,
+    let_in as twin_let_in, wall_friction as twin_wall_friction,
 };
 use swell_scene::flip::Surface;
 use swell_solve::flip::buffers;
@@ -118,6 +118,10 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             true => elements.scalars(&io.after, buffers::OPEN_VOLUME)?,
             false => twin.volume.clone(),
         },
+        hats: match has_solids {
+            true => elements.scalars(&io.after, buffers::OPEN_HATS)?,
+            false => twin.hats.clone(),
+        },
         closed_velocity: match has_moving {
             true => elements.planes(&io.after, buffers::CLOSED_VELOCITY)?,
             false => twin.closed_velocity.clone(),
@@ -149,6 +153,10 @@ pub(super) fn cut_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         io.table.each(&VOLUME, elements.active(), |e| {
             let moved = moved(&|other| (other.volume[e] - twin.volume[e]).abs());
             pair(e, room.volume[e], twin.volume[e], [cut, moved])
+        });
+        io.table.each(&HATS, elements.active(), |e| {
+            let moved = moved(&|other| (other.hats[e] - twin.hats[e]).abs());
+            pair(e, room.hats[e], twin.hats[e], [cut, moved])
         });
     }
     if has_moving {
@@ -227,7 +235,7 @@ pub(super) fn gather_centers(state: &mut FlipState, io: &mut Io<'_>) -> Outcome 
                 offset.into_iter().map(part).product::<f64>() * volume
             })
             .sum();
-        let least = (0.5 * open).max(0.02);
+        let least = (0.5 * open.min(room.hats[e])).max(0.02);
         let relative = (count * share / least).min(twin[e].max(1.0));
         OF_CENTER.of([share, place, count, least, relative])
     };
@@ -253,14 +261,24 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     // A cell's own density, where nothing is averaged, decides the same on both sides.
     let looked = each(active.clone(), |e| {
         let about = neighborhood().map(|offset| density[bricks.near(e as u32, offset) as usize]);
-        let mean = OF_MEAN.of([about.fold(0.0, f64::max)]);
+        let mean = OF_MEAN.of([about.fold(depth[e].share, f64::max)]);
         let is_tie = is_near_half(&step, bricks, room, e as u32, NEAR_HALF.of([cut, mean]));
         (mean, is_tie)
     });
     let looked = |e: usize| looked[e - active.start];
     let size = state.model.cell_size();
-    let moved = |e: usize| surface_moved(depth[e], OF_HALF.of([looked(e).0]));
-    let is_tie = |e: usize| looked(e).1 || (depth[e].abs() <= moved(e) && density[e] != 0.5);
+    let of_half = |e: usize| OF_HALF.of([looked(e).0]);
+    let moved = |e: usize| {
+        let Depth { cells, lean, .. } = depth[e];
+        surface_moved(cells, OF_SHARE.of([of_half(e), OF_SOLID.of([lean])]))
+    };
+    let is_averaged = |e: usize| depth[e].share != density[e];
+    let is_near = |e: usize| {
+        let Depth { share, cells, .. } = depth[e];
+        let is_near_film = (share - LEAST_FILM).abs() <= of_half(e) || cells.abs() <= moved(e);
+        (share - 0.5).abs() <= of_half(e) || (room.hats[e] < 1.0 && is_near_film)
+    };
+    let is_tie = |e: usize| looked(e).1 || (is_averaged(e) && is_near(e));
     let kind = io.after.get(buffers::CELL_KIND, elements.cells)?;
     io.table.each(&WATER, active.clone(), |e| {
         (!is_tie(e)).then(|| pair(e, kind[e], f64::from(twin[e]), []))

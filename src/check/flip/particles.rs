@@ -42,7 +42,7 @@ pub(super) fn grid_to_particle(state: &mut FlipState, io: &mut Io<'_>) -> Outcom
         bricks,
         sorted,
         &faces,
-        &state.room().kind,
+        state.room(),
         shift.as_deref(),
     );
     let given = given(state, io, twin.is_drop.clone())?;

@@ -13,15 +13,18 @@ bounds! {
         range: "of their velocities", most: "their largest |v|"]
         (12.0 * place * count / weight).min(1.0) * range + U * (count + 20.0) * most, "along each axis";
     pub(super) OF_CENTER = [share: "1 / particles of a full cell", place: "" PLACE, count: "particles about",
-        least: "half of the open volume about, at least 0.02", part: "share × count / least, or the density where it is less"]
+        least: "half of the open volume about or of the hat, at least 0.02", part: "share × count / least, or the density where it is less"]
         share * place * 48.0 * count / least + part * (U * (count + 40.0) + 16.0 * place),
         "along three axes a place and twice a wall's, times two weights of 2 at most, as images double them";
     pub(super) OF_MEAN = [density: "the largest about"] 20.0 * U * density, "a mean over six faces, and the cell's own with a part";
     pub(super) OF_HALF = [mean: "" OF_MEAN] mean + 0.25 * U, "a density's difference from a half, which is half of 1 at most";
+    pub(super) OF_SOLID = [lean: "1 − what solids leave, times 1 / the difference of what they leave beside the cell plus 1 / that of densities"]
+        (16.0 * U * lean).min(1.0), "differences and lengths of three components";
+    pub(super) OF_SHARE = [half: "" OF_HALF, solid: "" OF_SOLID] half + solid, "";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
         "a half, of the density or of what is open of a cell about";
     pub(super) OF_FACES = [place: "" PLACE, range: "of the faces' values about the cell", most: "the largest of them"]
-        9.0 * place * range + 32.0 * U * most, "along each axis";
+        9.0 * place * range + 96.0 * U * most, "along each axis, and the mean of 18 faces";
     pub(super) START = [x: "|x|", step: "Δt", fastest: "|v| at any face", grid: "with solids " GRID]
         U * (8.0 * x + 30.0 * step * fastest) + grid, "";
 
@@ -73,6 +76,8 @@ entries! {
             moved: "what it changes by as solids' distances move by " GRID] 6.0 * cut * speed + (cut + 3.0 * moved), "6 faces";
         VOLUME = "open volume", "": [cut: "" CUT, moved: "what it changes by as solids' distances move by " GRID]
             cut + 3.0 * moved, "";
+        HATS = "open part of the hat", "": [cut: "" CUT, moved: "what it changes by as solids' distances move by " GRID]
+            8.0 * cut + 3.0 * moved, "64 parts";
         CLOSED = "velocity of closed faces", "m/s": [v: "|v|", far: "the largest of solids' |spin| (|x| + |its point of rest|)"]
             2.0 * U * v + 6.0 * U * far, "a solid's, unless another is nearest", tie TURN;
     }
@@ -87,7 +92,7 @@ entries! {
     }
     "flip/find_water" {
         WATER = "kind of cell", "": [] 0.0, "a whole number", tie NEAR_HALF;
-        DISTANCE = "distance of the surface", "m": [moved: "in cells, what it answers when s − s²/2 moves by " OF_HALF,
+        DISTANCE = "distance of the surface", "m": [moved: "in cells, what it answers when s − s²/2 moves by " OF_SHARE,
             size: "Δx"] (moved + 24.0 * U) * size, "", tie NEAR_HALF;
     }
     "flip/find_excess" {

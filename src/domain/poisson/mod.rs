@@ -21,6 +21,10 @@ pub const SOLID: u32 = 2;
 /// for a pressure that is ever nearer 0.
 pub const LEAST_THETA: f64 = 0.01;
 
+/// The same where it lies beyond the cell of air, over a floor that passes above that cell's centre: its pressure there is nearly that
+/// of the water.
+pub const MOST_THETA: f64 = 100.0;
+
 /// No row.
 pub const NONE: u32 = u32::MAX;
 
@@ -83,11 +87,11 @@ impl<T: Copy + Into<f64>> Cells<'_, T> {
             return 1.0;
         };
         let inside = (-distance[water as usize].into()).max(0.0);
-        let outside = distance[air as usize].into().max(0.0);
+        let outside = distance[air as usize].into();
         if inside + outside > 0.0 {
-            (inside / (inside + outside)).clamp(LEAST_THETA, 1.0)
+            (inside / (inside + outside)).clamp(LEAST_THETA, MOST_THETA)
         } else {
-            1.0
+            MOST_THETA
         }
     }
 }

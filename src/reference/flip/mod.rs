@@ -33,5 +33,6 @@ pub use to_particles::{
 };
 pub use wall_friction::{friction_rates, wall_friction};
 pub use water::{
-    Centers, find_buried, find_depth, find_excess, find_water, gather_centers, is_near_half, let_in,
+    Centers, Depth, LEAST_FILM, find_buried, find_depth, find_excess, find_water, gather_centers,
+    is_near_half, let_in,
 };

@@ -1,12 +1,16 @@
 //! Solids by their signed distance: how they cut cells, and how they push particles back.
 
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 
 use super::Model;
 use swell_domain::{
+    bounds::Bounds,
     pose::{Passage, Pose},
     signed_distance::SignedDistance,
 };
+
+/// Nearer than this to a solid, in cells, counts as inside.
+const SKIN: f64 = 1e-4;
 
 /// A solid at one moment.
 #[derive(Clone, Copy, Debug)]
@@ -99,8 +103,7 @@ impl<'a> Solid<'a> {
         if self.near(middle) >= 2.0 * (cell_size + self.grid.spacing) {
             return None;
         }
-        // On a face counts as inside.
-        let skin = 1e-4 * cell_size;
+        let skin = SKIN * cell_size;
         Some(std::array::from_fn(|k| {
             let step = [k & 1, k >> 1 & 1, k >> 2].map(|s| s as f64);
             self.distance((cell + DVec3::from_array(step)) * cell_size) - skin
@@ -156,6 +159,43 @@ pub(super) fn cut(corners: &[f64; 8]) -> Cut {
         faces,
         volume: volume.clamp(0.0, 1.0),
     }
+}
+
+/// Half cells along an axis of the hat about a cell's centre: from where each begins, in cells from the cell's least corner, and the
+/// hat's mean over it.
+const HALVES: [(f64, f64); 4] = [(-0.5, 0.25), (0.0, 0.75), (0.5, 0.75), (1.0, 0.25)];
+
+/// Part of the hat about a cell's centre that solids leave of what the walls at `walls` do (in cells), half a cell along each axis
+/// at a time, each by a plane; `corners` are the distances at the cell's. Where water is mirrored at walls, solids are.
+pub(super) fn open_part_of_hat(
+    solids: &[&Solid<'_>],
+    walls: &Bounds,
+    is_mirrored: bool,
+    cell: DVec3,
+    cell_size: f64,
+    corners: &[f64; 8],
+) -> f64 {
+    let rise = ((face_sums(corners, 1) - face_sums(corners, 0)) / 4.0).abs();
+    let width = (0.5 * rise.element_sum()).max(1e-20);
+    let is_within = (cell + 0.5).cmpge(walls.min) & (cell + 0.5).cmple(walls.max);
+    let mirrors = is_within & BVec3::splat(is_mirrored);
+    let (mut open, mut all) = (0.0, 0.0);
+    for k in 0..64 {
+        let halves = [k & 3, k >> 2 & 3, k >> 4].map(|half| HALVES[half]);
+        let low = cell + DVec3::from_array(halves.map(|(from, _)| from));
+        let size = ((low + 0.5).min(walls.max) - low.max(walls.min)).max(DVec3::ZERO);
+        let size = DVec3::select(mirrors, DVec3::splat(0.5), size);
+        let hat = DVec3::from_array(halves.map(|(_, mean)| mean)) * size;
+        let middle = low + 0.25;
+        let image = middle.max(2.0 * walls.min - middle);
+        let image = image.min(2.0 * walls.max - image);
+        let place = cell_size * DVec3::select(mirrors, image, middle);
+        let distances = solids.iter().map(|solid| solid.distance(place));
+        let distance = distances.fold(1e15, f64::min) - SKIN * cell_size;
+        all += hat.element_product();
+        open += hat.element_product() * (0.5 + distance / width).clamp(0.0, 1.0);
+    }
+    if all > 0.0 { open / all } else { 1.0 }
 }
 
 /// Open part of a square from the distances at its corners (0,0), (1,0), (0,1), (1,1).

@@ -182,12 +182,8 @@ impl Flip {
             gather_centers(model, &step, &bricks, &sorted, &room)
         });
         let (kind, distance) = timings.time("flip/find_water", || {
-            find_water(
-                model,
-                &bricks,
-                &room,
-                &find_depth(model, &step, &bricks, &room, &density),
-            )
+            let depth = find_depth(model, &step, &bricks, &room, &density);
+            find_water(model, &bricks, &room, &depth)
         });
         room.kind = kind;
         let mut excess = match model.settings().density_correction {
@@ -248,15 +244,7 @@ impl Flip {
         });
         let mut given = timings.time("flip/grid_to_particle", || {
             let displacement = displacement.as_deref();
-            grid_to_particle(
-                model,
-                &step,
-                &bricks,
-                &sorted,
-                &faces,
-                &room.kind,
-                displacement,
-            )
+            grid_to_particle(model, &step, &bricks, &sorted, &faces, &room, displacement)
         });
         if displacement.is_some() {
             let pushed = timings.time("flip/push_apart", || {

@@ -7,7 +7,7 @@ use super::{
     Model, Sorted, Step,
     grid::{corner, neighborhood, per_cell},
     model::ON_FACE,
-    solids::{cut, face_sums},
+    solids::{cut, face_sums, open_part_of_hat},
 };
 use swell_domain::{
     bricks::Bricks,
@@ -17,6 +17,9 @@ use swell_domain::{
 /// What each hat has beyond itself, so that a face that no particle of its two cells touches takes the velocity of
 /// the particles nearby.
 const LEAST_WEIGHT: f64 = 2.4e-7;
+
+/// A face of which solids leave less is closed. About edges and corners such faces drove jets in water at rest.
+const LEAST_OPEN: f64 = 0.05;
 
 /// The room that there is for water.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +32,8 @@ pub struct Room {
     pub solid_flux: Vec<f64>,
     /// Open part of the cell, 0..1.
     pub volume: Vec<f64>,
+    /// Part of the hat about the cell's centre that solids leave of what walls do, 0..1.
+    pub hats: Vec<f64>,
     /// What the lower faces have where they are closed, m/s.
     pub closed_velocity: Vec<DVec3>,
 }
@@ -115,8 +120,10 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
         open: DVec3,
         flux: f64,
         volume: f64,
+        hats: f64,
         closed_velocity: DVec3,
     }
+    let is_mirrored = model.settings().density_correction;
     let of_cell = |element: u32| {
         let cell = corner(bricks, element);
         let extent = step.open_extent(cell);
@@ -129,13 +136,15 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
         let of_walls =
             planes.map(|plane| DVec3::select(step.is_plane_open(plane), across, DVec3::ZERO));
         let (mut open, mut volume) = (of_walls, extent.element_product());
-        let mut nearest: Option<[f64; 8]> = None;
+        let (mut nearest, mut hats): (Option<[f64; 8]>, f64) = (None, 1.0);
+        let mut near = Vec::new();
         // Of what is nearest to each face, along that face's axis.
         let mut velocity = [DVec3::ZERO; 2];
         for solid in &step.solids {
             let Some(found) = solid.corners(cell, model.cell_size()) else {
                 continue;
             };
+            near.push(solid);
             velocity = [0, 1].map(|side| {
                 let sums = nearest.map_or(DVec3::MAX, |nearest| face_sums(&nearest, side));
                 let is_nearer = face_sums(&found, side).cmplt(sums);
@@ -151,6 +160,16 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
             let cut = cut(&corners);
             open = [open[0] * cut.faces[0], open[1] * cut.faces[1]];
             volume *= cut.volume;
+            let least = LEAST_OPEN * across;
+            open = open.map(|open| DVec3::select(open.cmplt(least), DVec3::ZERO, open));
+            hats = open_part_of_hat(
+                &near,
+                &step.cut,
+                is_mirrored,
+                cell,
+                model.cell_size(),
+                &corners,
+            );
         }
         if !step.solids.is_empty() {
             let on_face = DVec3::splat(ON_FACE);
@@ -166,6 +185,7 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
             open: open[0],
             flux: (high - low).element_sum(),
             volume,
+            hats,
             closed_velocity: DVec3::select(
                 step.is_plane_open(cell),
                 velocity[0],
@@ -179,6 +199,7 @@ pub fn cut_cells(model: &Model, step: &Step<'_>, bricks: &Bricks) -> Room {
         open: cells.iter().map(|cell| cell.open).collect(),
         solid_flux: cells.iter().map(|cell| cell.flux).collect(),
         volume: cells.iter().map(|cell| cell.volume).collect(),
+        hats: cells.iter().map(|cell| cell.hats).collect(),
         closed_velocity: cells.iter().map(|cell| cell.closed_velocity).collect(),
     }
 }

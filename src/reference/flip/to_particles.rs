@@ -170,28 +170,61 @@ fn weighted(values: &[f64; 18], a: [f64; 2], b: [f64; 3], c: [f64; 3]) -> f64 {
     (0..18).map(of).sum()
 }
 
+/// Of the range of the faces' velocities, by which a particle's may lie beyond it.
+const SLACK: f64 = 0.25;
+
+/// Values at the faces of a stencil by the parts that count of each, and the mean of all by the rest.
+fn settled(values: [f64; 18], parts: &[f64; 18]) -> [f64; 18] {
+    let sum: f64 = values
+        .iter()
+        .zip(parts)
+        .map(|(value, part)| value * part)
+        .sum();
+    let mean = sum / parts.iter().sum::<f64>().max(1e-6);
+    std::array::from_fn(|k| values[k] * parts[k] + mean * (1.0 - parts[k]))
+}
+
+/// From the least velocity that a particle may have among faces of these, to the greatest.
+fn range_of(values: &[f64; 18]) -> [f64; 2] {
+    let low = values.iter().fold(f64::INFINITY, |low, &v| low.min(v));
+    let high = values
+        .iter()
+        .fold(f64::NEG_INFINITY, |high, &v| high.max(v));
+    let slack = SLACK * (high - low);
+    [low - slack, high + slack]
+}
+
 /// Velocities from the grid: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its slope (APIC, Jiang et
-/// al. 2015), of drops v + g Δt; and the displacements of the density correction, where there is one.
+/// al. 2015), of drops v + g Δt; and the displacements of the density correction, where there is one. Faces that solids leave open in
+/// part count by that part, as in the projection, and v stays within the range of the faces' velocities or near it.
 pub fn grid_to_particle(
     model: &Model,
     step: &Step<'_>,
     bricks: &Bricks,
     sorted: &Sorted,
     faces: &Faces,
-    kind: &[u32],
+    room: &Room,
     displacement: Option<&[DVec3]>,
 ) -> Given {
     let is_apic = !sorted.cloud.affine.is_empty();
     let size = model.cell_size();
     let of_cell = |element: u32| {
         let stencils = [0, 1, 2].map(|axis| stencil(model, bricks, element, axis));
+        // What counts of each: closed ones have the velocity of what closes them.
+        let parts = [0, 1, 2].map(|axis| {
+            stencils[axis].map(|e| match room.open[e][axis] {
+                open if open > 0.0 && !step.solids.is_empty() => open,
+                _ => 1.0,
+            })
+        });
         let values = |of: &[DVec3]| -> [[f64; 18]; 3] {
-            [0, 1, 2].map(|axis| stencils[axis].map(|e| of[e][axis]))
+            [0, 1, 2].map(|axis| settled(stencils[axis].map(|e| of[e][axis]), &parts[axis]))
         };
         let (velocity, change) = (values(&faces.velocity), values(&faces.change));
         let shift = displacement.map(values);
+        let ranges = velocity.each_ref().map(range_of);
         let cell = super::grid::corner(bricks, element);
-        let is_water = |offset| kind[bricks.near(element, offset) as usize] == FLUID;
+        let is_water = |offset| room.kind[bricks.near(element, offset) as usize] == FLUID;
         let is_drop = !neighborhood().any(is_water);
         let of_particle = move |i: usize| {
             let place = sorted.cloud.position[i] / size - cell;
@@ -211,7 +244,8 @@ pub fn grid_to_particle(
                 given.0[axis] = if is_drop || is_apic {
                     u
                 } else {
-                    advanced + step.pic_blend * (u - advanced)
+                    let [low, high] = ranges[axis];
+                    (advanced + step.pic_blend * (u - advanced)).clamp(low, high)
                 };
                 given.2[axis] = u;
                 given.3[axis] = shift.map_or(0.0, |shift| weighted(&shift[axis], a, b, c));
@@ -342,7 +376,9 @@ pub fn push_apart(
         // The distance is below half a cell: whoever is nearer lies in one of eight.
         let side = place.to_array().map(|f| if f < 0.5 { -1 } else { 1 });
         let lacks = |way: DVec3| (from_walls - 2.0 * way).max(DVec3::ZERO);
-        let of_walls = lacks(x - step.walls.min) - lacks(step.walls.max - x);
+        // As the walls stand where the particles do, at the substep's start.
+        let [low, high] = [step.cut.min, step.cut.max].map(|wall| wall * model.cell_size());
+        let of_walls = lacks(x - low) - lacks(high - x);
         let of_walls = if is_drop[i] { DVec3::ZERO } else { of_walls };
         let mut push = DVec3::select(period.0.cmpgt(DVec3::ZERO), DVec3::ZERO, of_walls);
         for k in 0..8 {

@@ -18,12 +18,11 @@ use swell_scene::sources::Inlet;
 /// Of a cell's excess a substep corrects at most this much either way.
 const MOST_EXCESS: f64 = 0.5;
 
-/// Part of the hats below which a cell counts as that part full.
+/// Part of the hats below which a cell counts as having room for that part.
 const LEAST_ROOM: f64 = 0.02;
 
-/// Mean of a hat over the cell of its centre, and over the ones beside it.
-const OWN_SHARE: f64 = 0.75;
-const OTHER_SHARE: f64 = 0.125;
+/// Part of its room that a film fills at least.
+pub const LEAST_FILM: f64 = 0.1;
 
 /// Least distance of the surface from the centre of a cell of water, in cells: every way to the air from there knows of the
 /// same one, as the pressure there does.
@@ -50,14 +49,8 @@ fn hat_below(t: f64) -> f64 {
     }
 }
 
-/// Part of the hats about a cell's centre that solids leave, and walls where nothing is mirrored in them: behind them, or at all.
-fn room_of_hats(
-    is_mirrored: bool,
-    step: &Step<'_>,
-    bricks: &Bricks,
-    room: &Room,
-    element: u32,
-) -> f64 {
+/// Part of the hats about a cell's centre that walls leave, where nothing is mirrored in them: behind them, or at all.
+fn room_of_hats(is_mirrored: bool, step: &Step<'_>, bricks: &Bricks, element: u32) -> f64 {
     let cell = corner(bricks, element);
     let along_axis = |axis: usize| {
         let center = cell[axis] + 0.5;
@@ -68,20 +61,7 @@ fn room_of_hats(
             false => hat_below(high - center) - hat_below(low - center),
         }
     };
-    let of_walls = along_axis(0) * along_axis(1) * along_axis(2);
-    if step.solids.is_empty() {
-        return of_walls;
-    }
-    let share = |step: i32| if step == 0 { OWN_SHARE } else { OTHER_SHARE };
-    let of_cells: f64 = neighborhood()
-        .map(|offset| {
-            let part: f64 = offset.into_iter().map(share).product();
-            part * room.volume[bricks.near(element, offset) as usize]
-        })
-        .sum();
-    let beside = step.open_extent(cell - 1.0) + step.open_extent(cell + 1.0);
-    let whole = OWN_SHARE * step.open_extent(cell) + OTHER_SHARE * beside;
-    of_cells * of_walls / whole.element_product().max(1e-6)
+    along_axis(0) * along_axis(1) * along_axis(2)
 }
 
 /// Weight at the centre of the cell from which the place's own lies `offset` away.
@@ -118,8 +98,13 @@ pub fn gather_centers(
                 .sum::<f64>()
         });
         let sum: f64 = given.sum();
-        sum * particle_share
-            / room_of_hats(is_mirrored, step, bricks, room, element).max(LEAST_ROOM)
+        // What has room for less than a particle counts as having it for one.
+        let of_solids = match step.solids.is_empty() {
+            true => 1.0,
+            false => room.hats[element as usize].max(particle_share),
+        };
+        let of_walls = room_of_hats(is_mirrored, step, bricks, element).max(LEAST_ROOM);
+        sum * particle_share / (of_walls * of_solids)
     })
 }
 
@@ -226,33 +211,115 @@ fn density_before(
     }
 }
 
-/// How deep below the surface cell centres are, in cells, up to one either way. Where a centre lies within a wall or a solid
-/// it is that of the water before it; with a density correction more, where a cell that a solid cuts holds more itself.
-/// Shapes (elements).
+/// What a cell's centre says of the water about it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Depth {
+    /// What of the room there is water.
+    pub share: f64,
+    /// Whether it is a film on a floor that passes above the centre.
+    pub is_film: bool,
+    /// How deep it is below the surface, up to a cell either way.
+    pub cells: f64,
+    /// By how much rounding of the rooms beside it moves what lies below the surface, over that rounding; infinite where they are all
+    /// alike.
+    pub lean: f64,
+}
+
+/// What of the room at a centre is water. Where the centre is in a solid, what little room there is may hold no particle for a
+/// while, or one too many: there it is water if that and what lies beyond its faces are, together.
+fn share_of_room(
+    bricks: &Bricks,
+    room: &Room,
+    density: &[f64],
+    particle_share: f64,
+    element: u32,
+) -> f64 {
+    let water = |e: u32| density[e as usize] * room.hats[e as usize].max(particle_share);
+    let own = room.hats[element as usize];
+    let (mut sum, mut rooms) = (water(element), own.max(LEAST_ROOM));
+    let alone = sum / rooms;
+    if own < 0.5 {
+        for (axis, side) in (0..3).flat_map(|axis| [(axis, -1), (axis, 1)]) {
+            let other = bricks.near(element, along(axis, side));
+            if other >= CELLS {
+                let face = if side < 0 { element } else { other };
+                let open = room.open[face as usize][axis];
+                sum += open * water(other);
+                rooms += open * room.hats[other as usize];
+            }
+        }
+    }
+    alone.max(sum / rooms)
+}
+
+/// Part of the hat about a centre that lies below the surface, that within solids included, from what `of_room` is of what they
+/// leave; and the lean, see [`Depth`]. The surface is taken to be level. What lies in a solid counts as below it as far as the solid
+/// does: all of it where a floor stands under the water, none where a ceiling hangs over it, and as much as of the room beside a
+/// wall.
+fn below_surface(
+    step: &Step<'_>,
+    bricks: &Bricks,
+    room: &Room,
+    element: u32,
+    of_room: f64,
+) -> (f64, f64) {
+    let own = room.hats[element as usize];
+    if own <= LEAST_ROOM {
+        return (of_room, 0.0);
+    }
+    let to_open = DVec3::from_array([0, 1, 2].map(|axis| {
+        let [before, after] = [-1, 1].map(|side| {
+            let other = bricks.near(element, along(axis, side));
+            if other >= CELLS {
+                room.hats[other as usize]
+            } else {
+                own
+            }
+        });
+        after - before
+    }));
+    let up = -step.velocity_step;
+    let lengths = to_open.length() * up.length();
+    let upright = to_open.dot(up) / lengths.max(1e-20);
+    let side = if upright > 0.0 { 1.0 } else { 0.0 };
+    let of_solid = of_room + (side - of_room) * upright.abs();
+    let lean = (1.0 - own) / to_open.length();
+    (of_solid + (of_room - of_solid) * own, lean)
+}
+
+/// What the densities say of the water about each cell's centre. Shape (elements).
 pub fn find_depth(
     model: &Model,
     step: &Step<'_>,
     bricks: &Bricks,
     room: &Room,
     density: &[f64],
-) -> Vec<f64> {
-    let counts_own = model.settings().density_correction && !step.solids.is_empty();
+) -> Vec<Depth> {
+    let particle_share = 1.0 / f64::from(model.settings().particles_per_cell);
     per_cell(bricks, |element| {
-        let own = density[element as usize];
-        let relative = if is_buried(step, bricks, room, element) {
-            let before = density_before(step, bricks, room, density, element);
-            let part = match counts_own {
-                true => (2.0 * room.volume[element as usize]).min(1.0),
-                false => 0.0,
-            };
-            before + part * (own - before).max(0.0)
+        let extent = step.open_extent(corner(bricks, element));
+        let is_cut = room.hats[element as usize] < 1.0;
+        let share = if is_cut {
+            share_of_room(bricks, room, density, particle_share, element)
+        } else if extent.cmplt(DVec3::splat(HALF)).any() {
+            density_before(step, bricks, room, density, element)
         } else {
-            own
+            density[element as usize]
+        };
+        let of_room = share.clamp(0.0, 1.0);
+        let (below, lean) = match is_cut {
+            true => below_surface(step, bricks, room, element, of_room),
+            false => (of_room, 0.0),
         };
         // Across a flat surface the density is 1/2 at it, and falls as s − s²/2 with the distance s in cells.
-        let off = relative.clamp(0.0, 1.0) - 0.5;
+        let off = below - 0.5;
         let way = 1.0 - (1.0 - 2.0 * off.abs()).max(0.0).sqrt();
-        if off == 0.0 { 0.0 } else { way * off.signum() }
+        Depth {
+            share,
+            is_film: is_cut && share > LEAST_FILM && off >= 0.0,
+            cells: if off == 0.0 { 0.0 } else { way * off.signum() },
+            lean,
+        }
     })
 }
 
@@ -262,20 +329,25 @@ pub fn find_water(
     model: &Model,
     bricks: &Bricks,
     room: &Room,
-    depth: &[f64],
+    depth: &[Depth],
 ) -> (Vec<u32>, Vec<f64>) {
     let cells = per_cell(bricks, |element| {
-        let depth = depth[element as usize];
-        let is_water = depth >= 0.0 && element < CELLS * (bricks.wet + 1);
+        let Depth {
+            share,
+            is_film,
+            cells,
+            ..
+        } = depth[element as usize];
+        let is_water = (share >= 0.5 || is_film) && element < CELLS * (bricks.wet + 1);
         let kind = match room.kind[element as usize] {
             SOLID => SOLID,
             _ if is_water => FLUID,
             _ => AIR,
         };
         let kept = if is_water {
-            depth.max(LEAST_DEPTH)
+            cells.max(LEAST_DEPTH)
         } else {
-            depth
+            cells
         };
         (kind, -kept * model.cell_size())
     });

@@ -64,6 +64,8 @@ pub const DENSITY_EXCESS: Buf<f32> = Buf::new("density_excess");
 pub const LIQUID_DISTANCE: Buf<f32> = Buf::new("liquid_distance");
 /// Cells: open fraction of the volume; with solids alone.
 pub const OPEN_VOLUME: Buf<f32> = Buf::new("open_volume");
+/// Cells: part of the hat about the centre that solids leave of what walls do; with solids alone.
+pub const OPEN_HATS: Buf<f32> = Buf::new("open_hats");
 /// Planes: velocity of what closes a face, m/s; with solids that move alone.
 pub const CLOSED_VELOCITY: Buf<f32> = Buf::new("closed_velocity");
 /// Rooms in which water enters; with emitters that have a velocity alone.

@@ -174,6 +174,7 @@ fn bricks(plan: &Plan, scene: &Scene, table: &mut Table) {
     }
     if plan.has_solids() {
         table.watch("solids", OPEN_VOLUME.sized(all));
+        table.watch("solids", OPEN_HATS.sized(all));
         let nodes = plan.counts.solid_grid.iter().product::<usize>() + plan.counts.moving_nodes;
         table.add("solids", SOLID_DISTANCE.sized(nodes));
         if plan.counts.moving_nodes > 0 {

@@ -150,7 +150,8 @@ pub fn curvature(model: &Model, bricks: &Bricks, kind: &[u32], share: &[f64]) ->
 /// κ Δx at the surface between a cell of water and one of air, and what its two parts weigh in all.
 pub fn between(curvature: &[DVec2], theta: f64, water: u32, air: u32) -> (f64, f64) {
     let (inside, outside) = (curvature[water as usize], curvature[air as usize]);
-    let weights = [(1.0 - theta) * inside.y, theta * outside.y];
+    let part = theta.min(1.0);
+    let weights = [(1.0 - part) * inside.y, part * outside.y];
     let sum = weights[0] * inside.x + weights[1] * outside.x;
     let weight = weights[0] + weights[1];
     (sum / weight.max(LEAST_WEIGHT), weight)

@@ -1,0 +1,45 @@
+// What solids leave of the hat about a cell's centre.
+#import "shared/flip_solid.wgsl"
+
+// Metres from the nearest of the solids whose bits are set.
+fn nearest_distance(x: vec3f, solids: u32) -> f32 {
+#ifdef MOVING_SOLIDS
+    var least = 1e15;
+    for (var left = solids; left != 0u; left &= left - 1u) {
+        look_at_solid(firstTrailingBit(left), 0.0);
+        least = min(least, solid_distance_at(x));
+    }
+    return least;
+#else
+    return solid_distance_at(x);
+#endif
+}
+
+// Part of the hat that solids leave of what walls do, half a cell along each axis at a time, each by a plane. Where water is
+// mirrored at walls, solids are. `rise` is what the distance grows by over a cell along x, y and z in all, metres; `solids` has a
+// bit for each that comes near enough.
+fn open_part_of_hat(cell: vec3f, rise: f32, solids: u32) -> f32 {
+    let width = max(0.5 * rise, 1e-20);
+    let skin = 1e-4 * params.cell_size;
+#ifdef CORRECTION
+    let is_mirrored = (cell + 0.5 >= params.cut_min) & (cell + 0.5 <= params.cut_max);
+#endif
+    var open = 0.0;
+    var all = 0.0;
+    for (var k = 0u; k < 64u; k++) {
+        let way = 0.5 * vec3f(vec3u(k & 3u, (k >> 2u) & 3u, k >> 4u));
+        var size = max(min(cell + way, params.cut_max) - max(cell - 0.5 + way, params.cut_min), vec3f(0.0));
+        var place = cell - 0.25 + way;
+#ifdef CORRECTION
+        size = select(size, vec3f(0.5), is_mirrored);
+        place = select(place, max(place, 2.0 * params.cut_min - place), is_mirrored);
+        place = select(place, min(place, 2.0 * params.cut_max - place), is_mirrored);
+#endif
+        let hat = (1.0 - abs(way - 0.75)) * size;
+        let weight = hat.x * hat.y * hat.z;
+        let distance = nearest_distance(place * params.cell_size, solids) - skin;
+        all += weight;
+        open += weight * clamp(0.5 + distance / width, 0.0, 1.0);
+    }
+    return select(1.0, open / all, all > 0.0);
+}

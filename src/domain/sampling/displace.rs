@@ -1,0 +1,118 @@
+//! Water of the start that gives way to solids.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{
+    super::{bounds::Bounds, signed_distance::SignedDistance},
+    uniform,
+};
+
+/// Particles stand at least so far from solids, in spacings: as far as PBF holds them, and farther than FLIP does.
+const CLEARANCE: f64 = 0.25;
+
+/// Parts along each axis in which a particle's cube is looked at.
+const PARTS: usize = 4;
+
+/// Edge of the blocks within which the count is made right, in spacings.
+const BLOCK: f64 = 4.0;
+
+/// What chance adds to a part, so that among places that are alike those that are left out lie scattered.
+const SCATTER: f64 = 0.02;
+
+/// Passes over particles that lie between a solid and a wall, or between two solids.
+const ROUNDS: usize = 8;
+
+/// Removes particles in `solid` and moves those that are too near to it outward; returns how many it removed. What stays counts the
+/// room that the solid leaves of the particles' cubes, to half a particle in all: a layer of a lattice that a face of the solid
+/// cuts stays in part.
+pub(super) fn displace(
+    positions: &mut Vec<DVec3>,
+    solid: &SignedDistance,
+    domain: &Bounds,
+    spacing: f64,
+) -> usize {
+    let open: Vec<f64> = positions
+        .par_iter()
+        .map(|p| open_part(solid, *p, spacing))
+        .collect();
+    let kept = balanced(positions, &open, spacing);
+    let before = positions.len();
+    let mut kept = kept.into_iter();
+    positions.retain(|_| kept.next() == Some(true));
+    let clearance = CLEARANCE * spacing;
+    let room = domain.grown(-clearance);
+    positions
+        .par_iter_mut()
+        .for_each(|p| *p = moved_out(*p, solid, &room, clearance));
+    before - positions.len()
+}
+
+/// Part of the cube of edge `spacing` about `p` that lies outside of `solid`, 0..1, by planes through small cubes.
+fn open_part(solid: &SignedDistance, p: DVec3, spacing: f64) -> f64 {
+    let distance = solid.sample(p);
+    // Half of a cube's diagonal, and interpolation's error at edges.
+    if distance.abs() > spacing {
+        return if distance > 0.0 { 1.0 } else { 0.0 };
+    }
+    let normal = solid.gradient(p).normalize_or(DVec3::Y).abs();
+    let width = spacing / PARTS as f64 * normal.element_sum();
+    let part = |k: usize| {
+        let at = [k % PARTS, k / PARTS % PARTS, k / (PARTS * PARTS)];
+        let at = DVec3::from_array(at.map(|i| (i as f64 + 0.5) / PARTS as f64 - 0.5));
+        (0.5 + solid.sample(p + spacing * at) / width).clamp(0.0, 1.0)
+    };
+    let parts = PARTS.pow(3);
+    (0..parts).map(part).sum::<f64>() / parts as f64
+}
+
+/// Which particles stay: those of whose cubes at least half is open, less or more of them block by block until the count is
+/// that of the open parts. What is left of a block is the next one's.
+fn balanced(positions: &[DVec3], open: &[f64], spacing: f64) -> Vec<bool> {
+    let mut kept: Vec<bool> = open.iter().map(|part| *part >= 0.5).collect();
+    let mut blocks = BTreeMap::<[i64; 3], Vec<usize>>::new();
+    for (i, p) in positions.iter().enumerate() {
+        if 0.0 < open[i] && open[i] < 1.0 {
+            let block = (*p / (BLOCK * spacing)).floor();
+            let block = block.to_array().map(|c| c as i64);
+            blocks.entry(block).or_default().push(i);
+        }
+    }
+    let mut lacking = 0.0;
+    for cut in blocks.values_mut() {
+        let held = |i: &usize| if kept[*i] { 1.0 } else { 0.0 };
+        lacking += cut.iter().map(|i| open[*i] - held(i)).sum::<f64>();
+        let wanted = lacking.round();
+        // Towards the solid where some are to be added, away from it where some are to go.
+        let rank = |i: &usize| {
+            let rank = open[*i] + SCATTER * uniform(*i as u64);
+            if wanted > 0.0 { -rank } else { rank }
+        };
+        let mut others: Vec<usize> = (cut.iter().copied())
+            .filter(|i| kept[*i] == (wanted < 0.0))
+            .collect();
+        others.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+        others.truncate(wanted.abs() as usize);
+        lacking -= wanted.signum() * others.len() as f64;
+        for i in others {
+            kept[i] = !kept[i];
+        }
+    }
+    kept
+}
+
+/// `p` at least `clearance` from the solid and within `room`.
+fn moved_out(p: DVec3, solid: &SignedDistance, room: &Bounds, clearance: f64) -> DVec3 {
+    let mut p = p;
+    for _ in 0..ROUNDS {
+        let distance = solid.sample(p);
+        if distance >= clearance {
+            break;
+        }
+        let out = solid.gradient(p).normalize_or_zero();
+        p = (p + out * (clearance - distance)).clamp(room.min, room.max);
+    }
+    p
+}
