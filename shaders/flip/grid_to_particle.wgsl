@@ -79,18 +79,21 @@ fn sum_of(a: mat3x3f) -> f32 {
     return dot(a[0] + a[1] + a[2], vec3f(1.0));
 }
 
-// Each value by its part, and the mean of all by the rest.
+// Each by its part, and the mean of all by the rest.
 fn settled(values: Values, part: Values) -> Values {
-    let lower = product(values.lower, part.lower);
-    let upper = product(values.upper, part.upper);
-    let mean = (sum_of(lower) + sum_of(upper)) / max(sum_of(part.lower) + sum_of(part.upper), 1e-6);
+    let all = weighed(values, part);
+    let mean = (sum_of(all.lower) + sum_of(all.upper)) / max(sum_of(part.lower) + sum_of(part.upper), 1e-6);
     let ones = mat3x3f(vec3f(1.0), vec3f(1.0), vec3f(1.0));
-    return Values(lower + mean * (ones - part.lower), upper + mean * (ones - part.upper));
+    return Values(all.lower + mean * (ones - part.lower), all.upper + mean * (ones - part.upper));
+}
+
+fn weighed(values: Values, part: Values) -> Values {
+    return Values(product(values.lower, part.lower), product(values.upper, part.upper));
 }
 
 #endif
 #ifndef APIC
-// Of the range of the faces' velocities, by which a particle's may lie beyond it.
+// Of the range of the faces' velocities, by which a particle's may lie beyond it, besides params.slack.
 const SLACK = 0.25;
 
 fn least(values: Values) -> f32 {
@@ -104,6 +107,10 @@ fn least(values: Values) -> f32 {
 // What the faces of one component hold.
 struct Component {
     speeds: Values,
+#ifdef SOLIDS
+    // Where solids leave faces open in part, what counts of each; the values are multiplied by it.
+    part: Values,
+#endif
 #ifndef APIC
     change: Values,
     // From the least velocity that a particle may have to the greatest.
@@ -161,19 +168,26 @@ fn read_component(axis: u32, steps: Steps) -> Component {
         read.shift.upper = mat3x3f(displacements(before), displacements(own), displacements(after));
 #endif
     }
-#ifdef SOLIDS
-    read.speeds = settled(read.speeds, part);
 #ifndef APIC
-    read.change = settled(read.change, part);
+#ifdef SOLIDS
+    let about = settled(read.speeds, part);
+#else
+    let about = read.speeds;
+#endif
+    let low = least(about);
+    let high = -least(Values(-1.0 * about.lower, -1.0 * about.upper));
+    let slack = SLACK * (high - low) + params.slack;
+    read.range = vec2f(low - slack, high + slack);
+#endif
+#ifdef SOLIDS
+    read.speeds = weighed(read.speeds, part);
+#ifndef APIC
+    read.change = weighed(read.change, part);
 #endif
 #ifdef CORRECTION
-    read.shift = settled(read.shift, part);
+    read.shift = weighed(read.shift, part);
 #endif
-#endif
-#ifndef APIC
-    let low = least(read.speeds);
-    let high = -least(Values(-1.0 * read.speeds.lower, -1.0 * read.speeds.upper));
-    read.range = vec2f(low, high) + SLACK * (high - low) * vec2f(-1.0, 1.0);
+    read.part = part;
 #endif
     return read;
 }
@@ -193,6 +207,17 @@ fn center_hats(f: f32) -> vec3f {
     return vec3f(max(0.5 - f, 0.0), 1.0 - abs(f - 0.5), max(f - 0.5, 0.0));
 }
 
+#ifdef APIC
+// Of the interpolation where it is `u`, times what its weights add up to; along the axis whose weights are slopes.
+fn slope_of(faces: Component, u: f32, a: vec2f, b: vec3f, c: vec3f) -> f32 {
+#ifdef SOLIDS
+    return value_at(faces.speeds, a, b, c) - u * value_at(faces.part, a, b, c);
+#else
+    return value_at(faces.speeds, a, b, c);
+#endif
+}
+#endif
+
 // `f` is the place in the cell, along a, b and c. A drop falls freely: about it nothing is projected, and closed faces, which
 // have the wall's velocity, would stop it a cell away from the wall, or hold it under a ceiling.
 fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool) {
@@ -201,25 +226,30 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool) {
     let c = center_hats(f.z);
     let k = 3u * i + axis;
     let falling = sorted_velocity[k] + params.velocity_step[axis];
-    let u = select(value_at(faces.speeds, a, b, c), falling, falls);
+#ifdef SOLIDS
+    let per_whole = 1.0 / max(value_at(faces.part, a, b, c), 1e-6);
+#else
+    let per_whole = 1.0;
+#endif
+    let u = select(per_whole * value_at(faces.speeds, a, b, c), falling, falls);
     carried[k] = u;
 #ifdef APIC
     velocity[k] = u;
     // Slopes of the hats, 1 over a cell.
     let of_b = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.y < 0.5);
     let of_c = select(vec3f(0.0, -1.0, 1.0), vec3f(-1.0, 1.0, 0.0), f.z < 0.5);
-    let scale = params.inverse_cell_size;
+    let scale = params.inverse_cell_size * per_whole;
     let row = 9u * i + 3u * axis;
-    affine[row + axis] = scale * value_at(faces.speeds, vec2f(-1.0, 1.0), b, c);
-    affine[row + (axis + 1u) % 3u] = scale * value_at(faces.speeds, a, of_b, c);
-    affine[row + (axis + 2u) % 3u] = scale * value_at(faces.speeds, a, b, of_c);
+    affine[row + axis] = scale * slope_of(faces, u, vec2f(-1.0, 1.0), b, c);
+    affine[row + (axis + 1u) % 3u] = scale * slope_of(faces, u, a, of_b, c);
+    affine[row + (axis + 2u) % 3u] = scale * slope_of(faces, u, a, b, of_c);
 #else
-    let advanced = sorted_velocity[k] + value_at(faces.change, a, b, c);
+    let advanced = sorted_velocity[k] + per_whole * value_at(faces.change, a, b, c);
     let kept = clamp(advanced + params.pic_blend * (u - advanced), faces.range.x, faces.range.y);
     velocity[k] = select(kept, falling, falls);
 #endif
 #ifdef CORRECTION
-    pushed[k] = value_at(faces.shift, a, b, c);
+    pushed[k] = per_whole * value_at(faces.shift, a, b, c);
 #else
 #ifdef PUSHED
     pushed[k] = 0.0;

@@ -1,10 +1,7 @@
-// Displacements of the density correction at the faces, metres. Through faces that are open by little none goes: they would be
-// several times their neighbours', and press water into cells that have no room for it.
+// Displacements of the density correction at the faces, metres.
 #import "shared/pressure_gradient.wgsl"
 
 @group(0) @binding(6) var<storage, read_write> face_displacement: array<f32>;
-
-const LEAST_OPEN = 0.3;
 
 @compute @workgroup_size(64)
 fn main(
@@ -21,7 +18,7 @@ fn main(
     for (var c = 0u; c < 8u; c++) {
         for (var axis = 0u; axis < 3u; axis++) {
             let face = face_at(s, c, axis);
-            face_displacement[face.element] = f32(select(0.0, -face.difference, face.is_open && face_open[face.element] >= LEAST_OPEN));
+            face_displacement[face.element] = f32(select(0.0, -face.difference, face.is_open));
         }
     }
 }

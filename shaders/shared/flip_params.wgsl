@@ -38,7 +38,9 @@ struct FlipParams {
     periodic: u32,
     // Water is pushed off walls that are nearer than half of this.
     apart_from_walls: f32,
-    padding: vec2u,
+    // By so much a particle's velocity may lie beyond those of the faces about it, m/s, and by a part of their range.
+    slack: f32,
+    padding: u32,
 }
 @group(0) @binding(0) var<uniform> params: FlipParams;
 

@@ -10,7 +10,7 @@ use swell_compare::{
     deviation::relative,
     rounding::{U, U64},
 };
-use swell_domain::poisson::{System, remove_means};
+use swell_domain::poisson::{AIR, System, remove_means};
 use swell_gpu::buffer::Buf;
 use swell_reference::{
     flip::{Centers, Waters, density_source as twin_density_source},
@@ -60,6 +60,8 @@ pub(super) const TWINS: &[Twin<FlipState>] = &[
 pub(super) struct Assembled {
     pub(super) system: System,
     centers: Centers,
+    /// The same with the surface nowhere beyond a cell of air: where θ is beyond 1, 1/θ has the rounding of 1.
+    near: Centers,
 }
 
 fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
@@ -131,7 +133,8 @@ impl FlipState {
 
     /// [`OF_DIFFERENCE`] of all terms, by element.
     fn difference_errors(&self, terms: &[Vec<f64>]) -> Vec<f64> {
-        let waters = self.waters();
+        let near = &self.assembled().near;
+        let waters = Waters::new(&self.model, &self.elements().bricks, self.room(), near);
         let mut errors = vec![0.0; self.elements().cells];
         for term in terms {
             let differences = waters.displace(&waters.by_element(self.system(), term));
@@ -218,7 +221,20 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         settings.pressure.preconditioner,
         Preconditioner::Jacobi | Preconditioner::Ipp
     );
-    let system = Waters::new(&state.model, &elements.bricks, state.room(), &centers).system();
+    let kinds = &state.room().kind;
+    let outside = centers.distance.iter().zip(kinds);
+    let near = Centers {
+        distance: outside
+            .map(|(distance, kind)| match *kind {
+                AIR => distance.max(0.0),
+                _ => *distance,
+            })
+            .collect(),
+        ..centers.clone()
+    };
+    let system_of =
+        |centers| Waters::new(&state.model, &elements.bricks, state.room(), centers).system();
+    let (system, sizes) = (system_of(&centers), system_of(&near).dirichlet);
     let coefficient = io
         .after
         .get(solved::COEFFICIENT, 2 * elements.stride + cells)?;
@@ -232,12 +248,16 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     for &element in &system.cell {
         expected[element as usize - wet.start] = 1;
     }
-    state.assembled = Some(Assembled { system, centers });
+    state.assembled = Some(Assembled {
+        system,
+        centers,
+        near,
+    });
     let (system, unit) = (state.system(), state.unit());
     let dirichlet = state.by_row(&io.after, solved::DIRICHLET)?;
     state.add_rows(io.table, &DIRICHLET, |row| {
         let exact = system.dirichlet[row];
-        (dirichlet[row], exact, [unit, exact])
+        (dirichlet[row], exact, [unit, sizes[row]])
     });
     io.table.each(&COEFFICIENT, 0..system.cell.len(), |row| {
         let element = system.cell[row];
@@ -255,7 +275,8 @@ fn build_system(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         let inverse = state.by_row(&io.after, solved::INVERSE_DIAGONAL)?;
         state.add_rows(io.table, &INVERSE, |row| {
             let exact = 1.0 / system.diagonal[row];
-            (inverse[row], exact, [unit, exact])
+            let air = sizes[row] - system.dirichlet[row];
+            (inverse[row], exact, [unit, exact + air * exact * exact])
         });
     }
     Ok(())

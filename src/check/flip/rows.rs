@@ -28,7 +28,7 @@ bounds! {
     pub(super) START = [x: "|x|", step: "Δt", fastest: "|v| at any face", grid: "with solids " GRID]
         U * (8.0 * x + 30.0 * step * fastest) + grid, "";
 
-    pub(super) OF_DIFFERENCE = [unit: "U, or 2⁻⁵³ with f64", difference: "|Δq| / θ of a word of the solution"]
+    pub(super) OF_DIFFERENCE = [unit: "U, or 2⁻⁵³ with f64", difference: "|Δq| / min(θ, 1) of a word of the solution"]
         24.0 * unit * difference, "";
     pub(super) OF_BLOCK = [unit: "U, or 2⁻⁵³ with f64", row: "|A| |z|", size: "the sum of magnitudes of b"]
         40.0 * unit * (row + size), "Higham 2002, theorem 9.3; the inverse has no negative entry, so that bounds take the same steps";
@@ -109,11 +109,11 @@ entries! {
             slowed: "Δt times the rate", v: "|v|"] (2.0 * place * moved + U * (16.0 * slowed + 4.0)) * v, "";
     }
     "pressure/build_system" {
-        DIRICHLET = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64", air: "Σ f / θ"] 24.0 * unit * air,
+        DIRICHLET = "what air adds to the diagonal", "": [unit: "U, or 2⁻⁵³ with f64", air: "Σ f / min(θ, 1)"] 24.0 * unit * air,
             "16 u of each quotient, 6 sums";
         COEFFICIENT = "coefficients", "": [] 0.0, "copies";
         ROWS = "rows", "": [] 0.0, "flags";
-        INVERSE = "inverse diagonal", "": [unit: "U, or 2⁻⁵³ with f64", inverse: "its own value"] 36.0 * unit * inverse,
+        INVERSE = "inverse diagonal", "": [unit: "U, or 2⁻⁵³ with f64", inverse: "its own value, and its square times Σ f (1 / min(θ, 1) − 1 / θ)"] 36.0 * unit * inverse,
             "what air adds, 6 sums, a quotient";
     }
     "pressure/coarsen" {

@@ -11,9 +11,6 @@ use swell_domain::{
     poisson::{AIR, Cells, FLUID, System},
 };
 
-/// A face that is open by less passes no displacement.
-const LEAST_OPEN: f64 = 0.3;
-
 /// What the linear system is built from, and what its solution is taken to the faces by.
 #[derive(Clone, Debug)]
 pub struct Waters<'a> {
@@ -92,15 +89,11 @@ impl<'a> Waters<'a> {
         }
     }
 
-    /// `pressure/displace`: displacements at the lower faces, metres, of the density correction's q, by element. Through
-    /// faces that are open by little none goes: they would be several times their neighbours'.
+    /// `pressure/displace`: displacements at the lower faces, metres, of the density correction's q, by element.
     pub fn displace(&self, q: &[f64]) -> Vec<DVec3> {
-        let faces = self.differences(q).into_iter().zip(&self.room.open);
-        faces
-            .map(|(difference, open)| {
-                let is_open = open.cmpge(DVec3::splat(LEAST_OPEN));
-                DVec3::select(is_open, -difference, DVec3::ZERO)
-            })
+        self.differences(q)
+            .into_iter()
+            .map(|difference| -difference)
             .collect()
     }
 }

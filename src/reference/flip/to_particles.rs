@@ -170,7 +170,7 @@ fn weighted(values: &[f64; 18], a: [f64; 2], b: [f64; 3], c: [f64; 3]) -> f64 {
     (0..18).map(of).sum()
 }
 
-/// Of the range of the faces' velocities, by which a particle's may lie beyond it.
+/// Of the range of the faces' velocities, by which a particle's may lie beyond it, besides [`Step::slack`].
 const SLACK: f64 = 0.25;
 
 /// Values at the faces of a stencil by the parts that count of each, and the mean of all by the rest.
@@ -185,12 +185,12 @@ fn settled(values: [f64; 18], parts: &[f64; 18]) -> [f64; 18] {
 }
 
 /// From the least velocity that a particle may have among faces of these, to the greatest.
-fn range_of(values: &[f64; 18]) -> [f64; 2] {
+fn range_of(step: &Step<'_>, values: &[f64; 18]) -> [f64; 2] {
     let low = values.iter().fold(f64::INFINITY, |low, &v| low.min(v));
     let high = values
         .iter()
         .fold(f64::NEG_INFINITY, |high, &v| high.max(v));
-    let slack = SLACK * (high - low);
+    let slack = SLACK * (high - low) + step.slack;
     [low - slack, high + slack]
 }
 
@@ -218,11 +218,15 @@ pub fn grid_to_particle(
             })
         });
         let values = |of: &[DVec3]| -> [[f64; 18]; 3] {
-            [0, 1, 2].map(|axis| settled(stencils[axis].map(|e| of[e][axis]), &parts[axis]))
+            [0, 1, 2].map(|axis| stencils[axis].map(|e| of[e][axis]))
         };
-        let (velocity, change) = (values(&faces.velocity), values(&faces.change));
-        let shift = displacement.map(values);
-        let ranges = velocity.each_ref().map(range_of);
+        let raw = values(&faces.velocity);
+        let by_parts = |of: [[f64; 18]; 3]| -> [[f64; 18]; 3] {
+            [0, 1, 2].map(|axis| std::array::from_fn(|k| parts[axis][k] * of[axis][k]))
+        };
+        let (velocity, change) = (by_parts(raw), by_parts(values(&faces.change)));
+        let shift = displacement.map(|of| by_parts(values(of)));
+        let ranges = [0, 1, 2].map(|axis| range_of(step, &settled(raw[axis], &parts[axis])));
         let cell = super::grid::corner(bricks, element);
         let is_water = |offset| room.kind[bricks.near(element, offset) as usize] == FLUID;
         let is_drop = !neighborhood().any(is_water);
@@ -236,10 +240,14 @@ pub fn grid_to_particle(
                 let (a, b, c) = ([1.0 - f, f], center_hats(g), center_hats(h));
                 // A drop falls freely: about it nothing is projected, and closed faces have the wall's velocity.
                 let falling = v[axis] + step.velocity_step[axis];
-                let advanced = v[axis] + weighted(&change[axis], a, b, c);
+                let whole = match step.solids.is_empty() {
+                    true => 1.0,
+                    false => weighted(&parts[axis], a, b, c).max(1e-6),
+                };
+                let advanced = v[axis] + weighted(&change[axis], a, b, c) / whole;
                 let u = match is_drop {
                     true => falling,
-                    false => weighted(&velocity[axis], a, b, c),
+                    false => weighted(&velocity[axis], a, b, c) / whole,
                 };
                 given.0[axis] = if is_drop || is_apic {
                     u
@@ -248,15 +256,20 @@ pub fn grid_to_particle(
                     (advanced + step.pic_blend * (u - advanced)).clamp(low, high)
                 };
                 given.2[axis] = u;
-                given.3[axis] = shift.map_or(0.0, |shift| weighted(&shift[axis], a, b, c));
+                given.3[axis] = shift.map_or(0.0, |shift| weighted(&shift[axis], a, b, c) / whole);
                 if is_apic {
-                    let slopes = [
-                        weighted(&velocity[axis], [-1.0, 1.0], b, c),
-                        weighted(&velocity[axis], a, center_slopes(g), c),
-                        weighted(&velocity[axis], a, b, center_slopes(h)),
+                    let along = [
+                        ([-1.0, 1.0], b, c),
+                        (a, center_slopes(g), c),
+                        (a, b, center_slopes(h)),
                     ];
-                    for (turn, slope) in slopes.into_iter().enumerate() {
-                        rows[axis][(axis + turn) % 3] = slope / size;
+                    for (turn, (a, b, c)) in along.into_iter().enumerate() {
+                        let of_parts = match step.solids.is_empty() {
+                            true => 0.0,
+                            false => weighted(&parts[axis], a, b, c),
+                        };
+                        let slope = weighted(&velocity[axis], a, b, c) - u * of_parts;
+                        rows[axis][(axis + turn) % 3] = slope / (whole * size);
                     }
                 }
             }

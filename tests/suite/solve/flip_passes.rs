@@ -264,8 +264,8 @@ fn face_fractions_of_a_plane_are_exact() {
                 let found = open.at(component, cell);
                 let expected = clipped_area(corners, n, d / DX + 1e-4);
                 cut += u32::from(expected > 0.0 && expected < 1.0);
-                // What is left of a face below this counts as closed.
-                if expected > 2e-3 {
+                // What is left of a face below a twentieth counts as closed.
+                if expected > 0.051 {
                     worst = worst.max((found - expected).abs());
                     control = control.max((found - clipped_area(corners, n, d / DX + 0.01)).abs());
                 }

@@ -404,7 +404,7 @@ fn what_is_watched_is_written() {
             watched.insert(row.spec.name.clone());
         }
     }
-    assert_eq!(watched.len(), 14, "{watched:?}");
+    assert_eq!(watched.len(), 15, "{watched:?}");
     // Negative controls: a buffer of numbers, and one that no pass writes.
     let case = Case::new(grid(|_| {})).with_solids();
     let plan = case.plan();

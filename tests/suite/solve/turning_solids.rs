@@ -136,8 +136,9 @@ fn an_elliptic_drum_moves_ideal_water_as_lamb_says() {
     let middle = angle + 0.005;
     let found = off(&particles, &state, 1.0, middle);
     println!("off by {found}");
-    // A cell is a sixth of the lesser semi-axis: planes in cells, and velocities between faces, are off by a few percent.
-    assert!(found < 0.08, "{found}");
+    // A cell is a sixth of the lesser semi-axis: planes in cells, and velocities between faces, are off by a few percent, and by
+    // more beside the wall, where faces count by what is open of them.
+    assert!(found < 0.1, "{found}");
     // Controls: the other way round, and as if it had not turned yet.
     assert!(off(&particles, &state, -1.0, middle) > 1.9);
     assert!(off(&particles, &state, 1.0, 0.0) > 0.5);

@@ -1,12 +1,14 @@
 //! What walls do to the density on FLIP's grid.
 
 use crate::support::{
+    context,
     flip::{self as rig, DX},
     jitter,
 };
 use glam::DVec3;
 use swell::{
     domain::{boundary::Boundary, motion::Motion, particles::Particles, solver::Solver},
+    gpu::adapter::Spoil,
     reference::flip::{Flip, Trace, survey},
     scene::{Scene, Wall, WaveMaker, step},
 };
@@ -119,4 +121,55 @@ fn cells_at_walls_are_full_without_images_too() {
             assert!((density - 1.0).abs() < DENSITY, "{part}, {x}: {density}");
         }
     }
+}
+
+/// How far the water stands off a wall that comes by 0.7 cells in a substep, mean over a second half of its way, in cells: from the wall
+/// to the nearest particle.
+fn gap<S: Solver>(mut solver: S) -> f64
+where
+    S::Error: std::fmt::Debug,
+{
+    let (mut sum, frames) = (0.0, 12);
+    for frame in 1..=frames {
+        let (state, report) = solver.advance().unwrap();
+        assert_eq!(report.substeps, 1);
+        let nearest = state.position.iter().map(|x| f64::from(x[0]));
+        let nearest = nearest.fold(f64::INFINITY, f64::min);
+        if frame > frames / 2 {
+            sum += nearest / DX - 0.7 * f64::from(frame);
+        }
+    }
+    sum / f64::from(frames / 2)
+}
+
+/// Particles are pushed off walls as far as half of the lattice's spacing, a quarter of a cell, from where the walls are and not from
+/// where they will be.
+#[test]
+fn water_before_a_wall_that_comes_leaves_no_gap() {
+    let context = context();
+    let (mut scene, particles) = rig::tank([24, 10, 4], 5);
+    scene.shot.frames_per_second = 24.0;
+    scene.wave_makers = vec![WaveMaker {
+        absorption: None,
+        wall: Wall::NAMED[0].1,
+        motion: Motion::ConstantVelocity {
+            velocity: 0.7 * DX * 24.0,
+            until: None,
+        },
+    }];
+    let mut twin = Flip::new(&scene, &Boundary::default());
+    twin.load(0, &particles).unwrap();
+    let found = [gap(rig::solver(&context, &scene, &particles)), gap(twin)];
+    println!("{found:?}");
+    assert!(found.iter().all(|gap| *gap < 0.15), "{found:?}");
+    // Negative control.
+    let mut spoiled = context.clone();
+    spoiled.spoil = Some(Spoil {
+        pass: "flip/push_apart",
+        from: "x - params.cut_min * params.cell_size",
+        to: "x - params.wall_min",
+    });
+    let gap = gap(rig::solver(&spoiled, &scene, &particles));
+    println!("{gap}");
+    assert!(gap > 0.3, "{gap}");
 }

@@ -81,6 +81,13 @@ pub const FLIP: &[Control] = &[
         &["open volume"],
     ),
     control(
+        "flip/cut_cells",
+        "open_hats[element] = hats",
+        "open_hats[element] = hats * 0.999",
+        "flip/cut_cells",
+        &["open part of the hat"],
+    ),
+    control(
         "flip/spread_faces",
         "lower_momentum += both",
         "lower_momentum -= both",
@@ -110,8 +117,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/find_water",
-        "relative >= 0.5",
-        "relative >= 0.6",
+        "share >= 0.5",
+        "share >= 0.6",
         "flip/find_water",
         &["kind of cell"],
     ),
@@ -445,8 +452,8 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/grid_to_particle",
-        "= value_at(faces.shift, a, b, c)",
-        "= -value_at(faces.shift, a, b, c)",
+        "= per_whole * value_at(faces.shift, a, b, c)",
+        "= -per_whole * value_at(faces.shift, a, b, c)",
         "flip/grid_to_particle",
         &["displacement"],
     ),

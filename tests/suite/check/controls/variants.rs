@@ -155,8 +155,8 @@ pub const VARIANTS: &[Variant] = &[
             ),
             control(
                 "flip/grid_to_particle",
-                "= scale * value_at(faces.speeds, a, b, of_c)",
-                "= -scale * value_at(faces.speeds, a, b, of_c)",
+                "= scale * slope_of(faces, u, a, b, of_c)",
+                "= -scale * slope_of(faces, u, a, b, of_c)",
                 "flip/grid_to_particle",
                 &["affine rows"],
             ),
