@@ -85,7 +85,7 @@ fn share_of_room(element: u32) -> f32 {
 // Part of the hat about the centre that lies below the surface, that within solids included: `of_room` is it of what they leave.
 // The surface is taken to be level. What lies in a solid counts as below it as far as the solid does: all of it where a floor
 // stands under the water, none where a ceiling hangs over it, and as much as of the room beside a wall. Were it as of the room
-// everywhere, water over a slope had the surface too deep, the more so the nearer to its edge, and climbed.
+// everywhere, water over a slope had the surface too low, the more so the nearer to its edge, and climbed.
 fn below_surface(element: u32, of_room: f32) -> f32 {
     let room = open_hats[element];
     var to_open = vec3f(0.0);

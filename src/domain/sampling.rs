@@ -48,7 +48,7 @@ pub struct Fill {
 }
 
 /// Fills blocks and meshes with particles on lattices of `spacing` metres, and makes way for `solid`: as many particles
-/// stay as there is room for, each a quarter of a spacing or more from it.
+/// stay as there is room for, each 0.3 spacings or more from it.
 ///
 /// # Errors
 /// A water mesh without inside, or too large a grid for it.

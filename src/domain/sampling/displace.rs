@@ -10,8 +10,9 @@ use super::{
     uniform,
 };
 
-/// Particles stand at least so far from solids, in spacings: as far as PBF holds them, and farther than FLIP does.
-const CLEARANCE: f64 = 0.25;
+/// Particles stand at least so far from solids, in spacings: a little farther than PBF holds them (0.25) and FLIP does (0.1), so that
+/// none is pushed in the first step.
+const CLEARANCE: f64 = 0.3;
 
 /// Parts along each axis in which a particle's cube is looked at.
 const PARTS: usize = 4;
@@ -50,15 +51,15 @@ pub(super) fn displace(
     before - positions.len()
 }
 
-/// Part of the cube of edge `spacing` about `p` that lies outside of `solid`, 0..1, by planes through small cubes.
+/// Part of the cube of edge `spacing` about `p` that lies outside of `solid`, 0..1, by what does of small cubes.
 fn open_part(solid: &SignedDistance, p: DVec3, spacing: f64) -> f64 {
     let distance = solid.sample(p);
     // Half of a cube's diagonal, and interpolation's error at edges.
     if distance.abs() > spacing {
         return if distance > 0.0 { 1.0 } else { 0.0 };
     }
-    let normal = solid.gradient(p).normalize_or(DVec3::Y).abs();
-    let width = spacing / PARTS as f64 * normal.element_sum();
+    // Exact where a face is parallel to the cubes'; of other planes what one place gets too much another gets too little.
+    let width = spacing / PARTS as f64;
     let part = |k: usize| {
         let at = [k % PARTS, k / PARTS % PARTS, k / (PARTS * PARTS)];
         let at = DVec3::from_array(at.map(|i| (i as f64 + 0.5) / PARTS as f64 - 0.5));

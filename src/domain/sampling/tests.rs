@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use super::super::mesh::tests::{box_mesh, sphere};
 use super::*;
 
@@ -70,11 +72,25 @@ fn water_beside_a_solid_that_fits_is_whole() {
     let pier_mesh = box_mesh(pier);
     let solid = SignedDistance::from_mesh(&pier_mesh, &domain, 0.25).expect("closed");
     let fill = fill_water(&[water], [], Some(&solid), &domain, 0.25).expect("no mesh");
-    // 24 by 8 by 6 cells of the lattice are the pier's.
-    assert_eq!(fill.removed, 24 * 8 * 6);
+    // 24 by 8 by 6 cells of the lattice are the pier's; interpolation rounds its four upright edges, by less than a quarter of a cell
+    // in each layer.
+    let removed = 24 * 8 * 6;
+    assert!(
+        fill.removed <= removed && fill.removed >= removed - 8,
+        "{}",
+        fill.removed
+    );
+    let key = |p: &[f32; 3]| p.map(f32::to_bits);
     let lattice = fill_blocks(&[water], &domain, 0.25);
-    let is_kept = |p: &[f32; 3]| lattice.iter().any(|q| q.as_vec3().to_array() == *p);
-    assert!(fill.particles.position.iter().step_by(97).all(is_kept));
+    let lattice: BTreeSet<_> = lattice
+        .iter()
+        .map(|p| key(&p.as_vec3().to_array()))
+        .collect();
+    let moved = |fill: &Fill| {
+        let places = fill.particles.position.iter();
+        places.filter(|p| !lattice.contains(&key(p))).count()
+    };
+    assert!(moved(&fill) <= 8, "{}", moved(&fill));
     // The control: beside a pier a tenth of a spacing off, some of it is moved.
     let off = TriangleMesh {
         vertices: (pier_mesh.vertices.iter())
@@ -83,8 +99,8 @@ fn water_beside_a_solid_that_fits_is_whole() {
         ..pier_mesh.clone()
     };
     let solid = SignedDistance::from_mesh(&off, &domain, 0.25).expect("closed");
-    let moved = fill_water(&[water], [], Some(&solid), &domain, 0.25).expect("no mesh");
-    assert!(!moved.particles.position.iter().all(is_kept));
+    let fill = fill_water(&[water], [], Some(&solid), &domain, 0.25).expect("no mesh");
+    assert!(moved(&fill) > 100, "{}", moved(&fill));
 }
 
 #[test]
@@ -102,14 +118,19 @@ fn a_water_mesh_is_filled_and_a_solid_displaces() {
     let solid = SignedDistance::from_mesh(&drop, &domain, 0.1).expect("closed");
     let wet = fill_water(&[block], [], Some(&solid), &domain, 0.1).expect("no mesh");
     assert_eq!(wet.particles.len() + wet.removed, 8000);
-    // As many as the solid's room holds, to half a particle and the interpolation's error at its surface.
-    assert!((wet.removed as f64 * 1e-3 / exact - 1.0).abs() < 0.005);
+    // As many as the solid's room holds: interpolation takes 3/8 · spacing² / R off its radius, three times as much in parts of
+    // its volume, and there is half a particle.
+    let removed = wet.removed as f64 * 1e-3;
+    assert!(
+        removed < exact && removed > 0.97 * exact,
+        "{removed} {exact}"
+    );
     let nearest = wet
         .particles
         .position
         .iter()
         .map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into()).length() - 0.8);
-    // A quarter of a spacing, less the mesh's sagitta and the interpolation's error.
+    // 0.3 spacings, less the mesh's sagitta and the interpolation's error.
     assert!(nearest.fold(f64::INFINITY, f64::min) > 0.02);
     assert_eq!(
         wet.particles.id,

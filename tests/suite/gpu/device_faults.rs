@@ -257,7 +257,7 @@ fn an_adapter_that_binds_few_buffers_is_refused_by_figures() {
     assert!(!said.contains('\n'), "{said}");
     assert_eq!(Blame::from(&error), Blame::Device, "exit code 3");
     // The control: as many as any pass of ours binds (`gpu::shaders`) are enough.
-    run(&request(&job, "pbf", "enough", &opened(11))).unwrap();
+    run(&request(&job, "pbf", "enough", &opened(13))).unwrap();
 }
 
 /// Destroys the device once the second frame is computed.

@@ -75,17 +75,10 @@ pub const FLIP: &[Control] = &[
     ),
     control(
         "flip/cut_cells",
-        "open_volume[element] = volume",
-        "open_volume[element] = volume * 0.999",
+        "open_volume[element] = volume;\n    open_hats[element] = hats",
+        "open_volume[element] = volume * 0.999;\n    open_hats[element] = hats * 0.999",
         "flip/cut_cells",
-        &["open volume"],
-    ),
-    control(
-        "flip/cut_cells",
-        "open_hats[element] = hats",
-        "open_hats[element] = hats * 0.999",
-        "flip/cut_cells",
-        &["open part of the hat"],
+        &["open volume", "open part of the hat"],
     ),
     control(
         "flip/spread_faces",
