@@ -32,8 +32,8 @@ suite_in_turn() {
 # print_dearest COUNT: the tests that took longest, while others ran beside them.
 print_dearest() {
     printf '\nthe %s longest tests, seconds each, several at a time:\n' "$1"
-    sed -n 's/^test \([a-z0-9_:]*\) .*ok <\([0-9.]*\)s>$/\2 \1/p' "$suite_log" | sort -rn | head -n "$1" |
-        awk '{ printf "  %7.1f  %s\n", $1, $2 }'
+    sed -n 's/^test \([a-z0-9_:]*\) .*ok <\([0-9.]*\)s>$/\2 \1/p' "$suite_log" | sort -rn |
+        awk -v count="$1" 'NR <= count { printf "  %7.1f  %s\n", $1, $2 }'
     rm -f "$suite_log"
 }
 
