@@ -62,8 +62,8 @@ const LEAST_ROOM = 0.02;
 // Part of its room that a film fills at least.
 const LEAST_FILM = 0.1;
 
-// What of the room at a centre is water. Where the centre is in a solid, what little room there is may hold no particle for a
-// while, or one too many: there it is water if that and what lies beyond its faces are, together.
+// Water at a centre over the room there. Where the centre is in a solid, the little room that is left may hold no particle for a
+// while, or one too many, so that the cells beyond the open faces count as well.
 fn share_of_room(element: u32) -> f32 {
     let room = open_hats[element];
     var water = density[element] * max(room, params.particle_share);
@@ -82,10 +82,9 @@ fn share_of_room(element: u32) -> f32 {
     return max(own, water / rooms);
 }
 
-// Part of the hat about the centre that lies below the surface, that within solids included: `of_room` is it of what they leave.
-// The surface is taken to be level. What lies in a solid counts as below it as far as the solid does: all of it where a floor
-// stands under the water, none where a ceiling hangs over it, and as much as of the room beside a wall. Were it as of the room
-// everywhere, water over a slope had the surface too low, the more so the nearer to its edge, and climbed.
+// Part of the hat at the centre that lies below a level surface, solids included; `of_room` is that part of the open hat. A solid
+// counts as below the surface where it is a floor, as above it where it is a ceiling, and as the open hat does where it is a wall.
+// If it counted as the open hat does everywhere, water on a slope would have its surface too low near the waterline, and climb.
 fn below_surface(element: u32, of_room: f32) -> f32 {
     let room = open_hats[element];
     var to_open = vec3f(0.0);
@@ -117,7 +116,8 @@ fn main(
     let element = thread + CELLS;
     let cell = vec3f(own_cell(element));
     var share = density[element];
-    for (var once = 0; once < select(0, 1, any(open_extent(cell) < vec3f(HALF))); once++) {
+    let is_in_wall = any(open_extent(cell) < vec3f(HALF));
+    for (var once = 0; once < select(0, 1, is_in_wall); once++) {
         open_neighborhood(element);
         share = density_before(element, cell);
     }
@@ -126,7 +126,7 @@ fn main(
 #ifdef SOLIDS
     for (var once = 0; once < select(0, 1, open_hats[element] < 1.0); once++) {
         open_neighborhood(element);
-        share = share_of_room(element);
+        share = select(share_of_room(element), share, is_in_wall);
         below = below_surface(element, clamp(share, 0.0, 1.0));
         is_film = share > LEAST_FILM && below >= 0.5;
     }

@@ -1,10 +1,9 @@
 // Particles take the grid's velocity and its change: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its
-// slope (APIC, Jiang et al. 2015). v stays near what the faces about it have, or differences of particles from the flow that
-// carries them would grow, the more the smaller the step: nothing on the grid sees them. A cell's particles share its 18 faces, which
-// are read once. Faces that solids leave open in part count by that part: the projection weighs them so, and gives those
-// that are open by little several times their neighbours' velocities.
-// What lies beyond the
-// domain's faces along b and c is what lies before them, so that water slides along walls.
+// slope (APIC, Jiang et al. 2015). At the surface v is clamped to the range of the 18 faces about it: the grid does not see how a
+// particle differs from the flow, and there no pressure of neighbours bounds such differences, which grow the more the smaller the
+// step. A cell's particles share its faces, which are read once. Weights are multiplied by the faces' open fractions and normalized: the projection gives faces that
+// are open by little several times their neighbours' velocities.
+// Faces beyond the domain's along b and c have the values of those before them, so that water slides along walls.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
 #import "shared/flip_params.wgsl"
@@ -93,8 +92,8 @@ fn weighed(values: Values, part: Values) -> Values {
 
 #endif
 #ifndef APIC
-// Of the range of the faces' velocities, by which a particle's may lie beyond it, besides params.slack.
-const SLACK = 0.25;
+// No velocity, m/s.
+const FAR = 1e30;
 
 fn least(values: Values) -> f32 {
     let lower = min(min(values.lower[0], values.lower[1]), values.lower[2]);
@@ -113,12 +112,35 @@ struct Component {
 #endif
 #ifndef APIC
     change: Values,
-    // From the least velocity that a particle may have to the greatest.
+    // Least and greatest velocity that a particle may have.
     range: vec2f,
 #endif
 #ifdef CORRECTION
     shift: Values,
 #endif
+}
+
+const AIR = 0u;
+const FLUID = 1u;
+
+// What the 27 cells about one are, as far as the domain goes.
+struct About {
+    // None is water.
+    is_dry: bool,
+    // One is air.
+    is_surface: bool,
+}
+
+fn look_about(to_before: vec3i, to_after: vec3i) -> About {
+    var water = 0u;
+    var air = 0u;
+    for (var k = 0; k < 27; k++) {
+        let offset = clamp(vec3i(k % 3, k / 3 % 3, k / 9) - 1, -to_before, to_after);
+        let kind = cell_kind[element_at(offset)];
+        water += u32(kind == FLUID);
+        air += u32(kind == AIR);
+    }
+    return About(water == 0u, air > 0u);
 }
 
 // Steps along b and c to the cells before and after; none where the domain ends.
@@ -130,7 +152,7 @@ struct Steps {
     c_after: vec3i,
 }
 
-fn read_component(axis: u32, steps: Steps) -> Component {
+fn read_component(axis: u32, steps: Steps, about: About) -> Component {
     var read: Component;
 #ifdef SOLIDS
     var part: Values;
@@ -170,14 +192,12 @@ fn read_component(axis: u32, steps: Steps) -> Component {
     }
 #ifndef APIC
 #ifdef SOLIDS
-    let about = settled(read.speeds, part);
+    let speeds = settled(read.speeds, part);
 #else
-    let about = read.speeds;
+    let speeds = read.speeds;
 #endif
-    let low = least(about);
-    let high = -least(Values(-1.0 * about.lower, -1.0 * about.upper));
-    let slack = SLACK * (high - low) + params.slack;
-    read.range = vec2f(low - slack, high + slack);
+    let range = vec2f(least(speeds), -least(Values(-1.0 * speeds.lower, -1.0 * speeds.upper)));
+    read.range = select(vec2f(-FAR, FAR), range, about.is_surface);
 #endif
 #ifdef SOLIDS
     read.speeds = weighed(read.speeds, part);
@@ -190,17 +210,6 @@ fn read_component(axis: u32, steps: Steps) -> Component {
     read.part = part;
 #endif
     return read;
-}
-
-const FLUID = 1u;
-
-// Whether none of the 27 cells about one is water.
-fn is_dry() -> bool {
-    var water = 0u;
-    for (var k = 0; k < 27; k++) {
-        water += u32(cell_kind[element_at(vec3i(k % 3, k / 3 % 3, k / 9) - 1)] == FLUID);
-    }
-    return water == 0u;
 }
 
 fn center_hats(f: f32) -> vec3f {
@@ -274,13 +283,10 @@ fn main(
     var of_y: Component;
     var of_z: Component;
     var corner = vec3f(0.0);
-    var falls = false;
+    var about: About;
     // Entered only by cells with particles.
     for (var once = 0; once < select(0, 1, end > first); once++) {
         open_neighborhood(element);
-        for (var once = 0; once < select(0, 1, cell_kind[element] != FLUID); once++) {
-            falls = is_dry();
-        }
         let cell = own_cell(element);
         corner = vec3f(cell);
         var to_before = select(vec3i(1), vec3i(0), cell == vec3u(0u));
@@ -289,18 +295,19 @@ fn main(
         to_before = select(to_before, vec3i(1), is_periodic());
         to_after = select(to_after, vec3i(1), is_periodic());
 #endif
+        about = look_about(to_before, to_after);
         let x = vec3i(1, 0, 0);
         let y = vec3i(0, 1, 0);
         let z = vec3i(0, 0, 1);
-        of_x = read_component(0u, Steps(x, y * to_before, y * to_after, z * to_before, z * to_after));
-        of_y = read_component(1u, Steps(y, z * to_before, z * to_after, x * to_before, x * to_after));
-        of_z = read_component(2u, Steps(z, x * to_before, x * to_after, y * to_before, y * to_after));
+        of_x = read_component(0u, Steps(x, y * to_before, y * to_after, z * to_before, z * to_after), about);
+        of_y = read_component(1u, Steps(y, z * to_before, z * to_after, x * to_before, x * to_after), about);
+        of_z = read_component(2u, Steps(z, x * to_before, x * to_after, y * to_before, y * to_after), about);
     }
     for (var i = first; i < end; i++) {
         let f = three(sorted_position[i]) * params.inverse_cell_size - corner;
-        give(i, 0u, f, of_x, falls);
-        give(i, 1u, f.yzx, of_y, falls);
-        give(i, 2u, f.zxy, of_z, falls);
-        is_drop[i] = u32(falls);
+        give(i, 0u, f, of_x, about.is_dry);
+        give(i, 1u, f.yzx, of_y, about.is_dry);
+        give(i, 2u, f.zxy, of_z, about.is_dry);
+        is_drop[i] = u32(about.is_dry);
     }
 }

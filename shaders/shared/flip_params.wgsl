@@ -38,9 +38,7 @@ struct FlipParams {
     periodic: u32,
     // Water is pushed off walls that are nearer than half of this.
     apart_from_walls: f32,
-    // By so much a particle's velocity may lie beyond those of the faces about it, m/s, and by a part of their range.
-    slack: f32,
-    padding: u32,
+    padding: vec2u,
 }
 @group(0) @binding(0) var<uniform> params: FlipParams;
 

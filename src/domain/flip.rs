@@ -49,10 +49,6 @@ pub fn apart(wanted: f64) -> f64 {
     wanted.min(0.49)
 }
 
-/// Particles go with the faces about them, or by a part of a cell in a frame beside: their velocities differ from those by as much,
-/// and by a part of the range of these.
-pub const SLACK: f64 = 0.1;
-
 /// κ of the law of the wall.
 pub const VON_KARMAN: f64 = 0.41;
 

@@ -7,7 +7,6 @@ use swell_domain::{
     answer::Answers,
     bounds::{Bounds, FAR},
     budget::{Breach, Watched},
-    flip::SLACK,
     particles::Particles,
     probe::energies,
     solver::StepReport,
@@ -199,13 +198,6 @@ impl Scene {
         let kept: f64 = blends.map(|blend| 1.0 - blend).product();
         let kept = (1.0 - self.solver.flip().pic_blend) * kept;
         1.0 - kept.powf(length / self.shot.frame_seconds())
-    }
-
-    /// By so much a FLIP particle's velocity may lie beyond those of the faces about it, m/s, and by a part of their range.
-    /// Differences from the flow that carries a particle are not seen on the grid; unbounded they grow, the more the smaller
-    /// the step, and in turn ask for smaller ones.
-    pub fn flip_slack(&self) -> f64 {
-        SLACK * self.solver.flip().cell_size / self.shot.frame_seconds()
     }
 
     /// Energies of a state, and the errors of relative densities; sums run in order. What the steps did is left at 0.

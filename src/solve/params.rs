@@ -114,10 +114,8 @@ mirror!(
         periodic: u32,
         /// Water is pushed off walls that are nearer than half of this.
         apart_from_walls: f32,
-        /// By so much a particle's velocity may lie beyond those of the faces about it, m/s, and by a part of their range.
-        slack: f32,
         /// Unused.
-        padding: u32,
+        padding: [u32; 2],
     }
 );
 

@@ -18,13 +18,13 @@ bounds! {
         "along three axes a place and twice a wall's, times two weights of 2 at most, as images double them";
     pub(super) OF_MEAN = [density: "the largest about"] 20.0 * U * density, "a mean over six faces, and the cell's own with a part";
     pub(super) OF_HALF = [mean: "" OF_MEAN] mean + 0.25 * U, "a density's difference from a half, which is half of 1 at most";
-    pub(super) OF_SOLID = [lean: "1 − what solids leave, times 1 / the difference of what they leave beside the cell plus 1 / that of densities"]
+    pub(super) OF_SOLID = [lean: "1 − the open part of the hat, over the length of its differences beside the cell"]
         (16.0 * U * lean).min(1.0), "differences and lengths of three components";
     pub(super) OF_SHARE = [half: "" OF_HALF, solid: "" OF_SOLID] half + solid, "";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
         "a half, of the density or of what is open of a cell about";
     pub(super) OF_FACES = [place: "" PLACE, range: "of the faces' values about the cell", most: "the largest of them"]
-        9.0 * place * range + 96.0 * U * most, "along each axis, and the mean of 18 faces";
+        9.0 * place * range + 96.0 * U * most, "along each axis; three sums over 18 faces, and their quotient";
     pub(super) START = [x: "|x|", step: "Δt", fastest: "|v| at any face", grid: "with solids " GRID]
         U * (8.0 * x + 30.0 * step * fastest) + grid, "";
 

@@ -14,21 +14,20 @@ use super::{
 /// none is pushed in the first step.
 const CLEARANCE: f64 = 0.3;
 
-/// Parts along each axis in which a particle's cube is looked at.
+/// Small cubes along each edge of a particle's cube.
 const PARTS: usize = 4;
 
-/// Edge of the blocks within which the count is made right, in spacings.
+/// Edge of the blocks within which the count is balanced, in spacings.
 const BLOCK: f64 = 4.0;
 
-/// What chance adds to a part, so that among places that are alike those that are left out lie scattered.
+/// Random addition to an open part, so that the particles that are left out of equal places lie scattered.
 const SCATTER: f64 = 0.02;
 
 /// Passes over particles that lie between a solid and a wall, or between two solids.
 const ROUNDS: usize = 8;
 
-/// Removes particles in `solid` and moves those that are too near to it outward; returns how many it removed. What stays counts the
-/// room that the solid leaves of the particles' cubes, to half a particle in all: a layer of a lattice that a face of the solid
-/// cuts stays in part.
+/// Removes particles in `solid` and moves those that are too near to it outward; returns how many it removed. As many stay as the
+/// open volume of the particles' cubes holds, to half a particle, except where there is no place outside of the solid.
 pub(super) fn displace(
     positions: &mut Vec<DVec3>,
     solid: &SignedDistance,
@@ -48,22 +47,36 @@ pub(super) fn displace(
     positions
         .par_iter_mut()
         .for_each(|p| *p = moved_out(*p, solid, &room, clearance));
+    // Between a solid and a wall, or between two solids, there may be no place.
+    positions.retain(|p| solid.sample(*p) > 0.0);
     before - positions.len()
 }
 
-/// Part of the cube of edge `spacing` about `p` that lies outside of `solid`, 0..1, by what does of small cubes.
+/// Part of the cube of edge `spacing` about `p` that lies outside of `solid`, 0..1, summed over small cubes.
 fn open_part(solid: &SignedDistance, p: DVec3, spacing: f64) -> f64 {
     let distance = solid.sample(p);
     // Half of a cube's diagonal, and interpolation's error at edges.
     if distance.abs() > spacing {
         return if distance > 0.0 { 1.0 } else { 0.0 };
     }
-    // Exact where a face is parallel to the cubes'; of other planes what one place gets too much another gets too little.
-    let width = spacing / PARTS as f64;
+    const NODES: usize = PARTS + 1;
+    let index = |at: [usize; 3]| at[0] + NODES * (at[1] + NODES * at[2]);
+    let cell = |k: usize, edge: usize| [k % edge, k / edge % edge, k / (edge * edge)];
+    let nodes: [f64; NODES.pow(3)] = std::array::from_fn(|k| {
+        let at = DVec3::from_array(cell(k, NODES).map(|i| i as f64 / PARTS as f64 - 0.5));
+        solid.sample(p + spacing * at)
+    });
+    // Of the eight distances at a small cube's corners the positive ones over all: exact for a face parallel to the cube's,
+    // for one that it fits too.
     let part = |k: usize| {
-        let at = [k % PARTS, k / PARTS % PARTS, k / (PARTS * PARTS)];
-        let at = DVec3::from_array(at.map(|i| (i as f64 + 0.5) / PARTS as f64 - 0.5));
-        (0.5 + solid.sample(p + spacing * at) / width).clamp(0.0, 1.0)
+        let at = cell(k, PARTS);
+        let (mut open, mut all) = (0.0, 0.0);
+        for corner in 0..8 {
+            let distance = nodes[index([0, 1, 2].map(|axis| at[axis] + (corner >> axis & 1)))];
+            open += distance.max(0.0);
+            all += distance.abs();
+        }
+        if all > 0.0 { open / all } else { 0.5 }
     };
     let parts = PARTS.pow(3);
     (0..parts).map(part).sum::<f64>() / parts as f64

@@ -53,8 +53,6 @@ pub struct Step<'a> {
     pub wall_velocity: [DVec3; 2],
     /// α of this substep.
     pub pic_blend: f64,
-    /// By so much a particle's velocity may lie beyond those of the faces about it, m/s, and by a part of their range.
-    pub slack: f64,
     /// Layers of faces that get a velocity.
     pub layers: usize,
     /// Solids as they stand at the start.
@@ -160,7 +158,6 @@ impl Model {
                 (after.max - before.max) / length,
             ],
             pic_blend: self.scene.substep_pic_blend(length),
-            slack: self.scene.flip_slack(),
             layers: layers(substep.displacement),
             solids: self.solids_at(start, length),
         }

@@ -18,8 +18,8 @@ use swell_domain::{
 /// the particles nearby.
 const LEAST_WEIGHT: f64 = 2.4e-7;
 
-/// A face of which solids leave less is closed. About edges and corners such faces drove jets in water at rest.
-const LEAST_OPEN: f64 = 0.05;
+/// A face with a smaller open fraction is closed: such faces drive jets at edges and corners in water at rest.
+const LEAST_OPEN: f64 = 0.02;
 
 /// The room that there is for water.
 #[derive(Clone, Debug, PartialEq)]

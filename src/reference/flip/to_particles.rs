@@ -11,7 +11,7 @@ use super::{
 use crate::hash::pair_direction;
 use swell_domain::{
     bricks::{Bricks, CELLS},
-    poisson::{FLUID, SOLID},
+    poisson::{AIR, FLUID, SOLID},
 };
 
 /// Bits of a component's layer, and whether particles gave it a velocity.
@@ -129,20 +129,24 @@ pub fn extrapolate(step: &Step<'_>, bricks: &Bricks, layer: u32, faces: &mut Fac
 /// Elements of the 2 × 3 × 3 faces of component `axis` about a cell: a fastest, then b, then c, where (a, b, c) are
 /// the axes turned so that the component's own is first. Beyond the domain the cell's own row or column counts.
 fn stencil(model: &Model, bricks: &Bricks, element: u32, axis: usize) -> [usize; 18] {
-    let cell = bricks.cell(element);
-    let goes_on = model.scene.periodic;
     std::array::from_fn(|k| {
         let mut offset = [0; 3];
+        offset[(axis + 1) % 3] = (k / 2 % 3) as i32 - 1;
+        offset[(axis + 2) % 3] = (k / 6) as i32 - 1;
+        let mut offset = within(model, bricks, element, offset);
         offset[axis] = (k % 2) as i32;
-        for (turn, step) in [(1, k / 2 % 3), (2, k / 6)] {
-            let across = (axis + turn) % 3;
-            offset[across] = match step {
-                0 if cell[across] > 0 || goes_on[across] => -1,
-                2 if cell[across] + 1 < model.cells[across] || goes_on[across] => 1,
-                _ => 0,
-            };
-        }
         bricks.near(element, offset) as usize
+    })
+}
+
+/// `offset` from a cell, as far as the domain goes.
+fn within(model: &Model, bricks: &Bricks, element: u32, offset: [i32; 3]) -> [i32; 3] {
+    let cell = bricks.cell(element);
+    std::array::from_fn(|axis| {
+        let goes_on = model.scene.periodic[axis];
+        let before = goes_on || cell[axis] > 0;
+        let after = goes_on || cell[axis] + 1 < model.cells[axis];
+        offset[axis].clamp(-i32::from(before), i32::from(after))
     })
 }
 
@@ -170,9 +174,6 @@ fn weighted(values: &[f64; 18], a: [f64; 2], b: [f64; 3], c: [f64; 3]) -> f64 {
     (0..18).map(of).sum()
 }
 
-/// Of the range of the faces' velocities, by which a particle's may lie beyond it, besides [`Step::slack`].
-const SLACK: f64 = 0.25;
-
 /// Values at the faces of a stencil by the parts that count of each, and the mean of all by the rest.
 fn settled(values: [f64; 18], parts: &[f64; 18]) -> [f64; 18] {
     let sum: f64 = values
@@ -185,18 +186,17 @@ fn settled(values: [f64; 18], parts: &[f64; 18]) -> [f64; 18] {
 }
 
 /// From the least velocity that a particle may have among faces of these, to the greatest.
-fn range_of(step: &Step<'_>, values: &[f64; 18]) -> [f64; 2] {
+fn range_of(values: &[f64; 18]) -> [f64; 2] {
     let low = values.iter().fold(f64::INFINITY, |low, &v| low.min(v));
     let high = values
         .iter()
         .fold(f64::NEG_INFINITY, |high, &v| high.max(v));
-    let slack = SLACK * (high - low) + step.slack;
-    [low - slack, high + slack]
+    [low, high]
 }
 
 /// Velocities from the grid: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its slope (APIC, Jiang et
 /// al. 2015), of drops v + g Δt; and the displacements of the density correction, where there is one. Faces that solids leave open in
-/// part count by that part, as in the projection, and v stays within the range of the faces' velocities or near it.
+/// part count by that part, as in the projection, and at the surface v is clamped to the range of the faces' velocities.
 pub fn grid_to_particle(
     model: &Model,
     step: &Step<'_>,
@@ -226,10 +226,17 @@ pub fn grid_to_particle(
         };
         let (velocity, change) = (by_parts(raw), by_parts(values(&faces.change)));
         let shift = displacement.map(|of| by_parts(values(of)));
-        let ranges = [0, 1, 2].map(|axis| range_of(step, &settled(raw[axis], &parts[axis])));
         let cell = super::grid::corner(bricks, element);
-        let is_water = |offset| room.kind[bricks.near(element, offset) as usize] == FLUID;
-        let is_drop = !neighborhood().any(is_water);
+        let is_near = |kind| {
+            let of = |offset| room.kind[bricks.near(element, offset) as usize];
+            neighborhood().any(|offset| of(within(model, bricks, element, offset)) == kind)
+        };
+        let is_drop = !is_near(FLUID);
+        let is_surface = is_near(AIR);
+        let ranges = [0, 1, 2].map(|axis| match is_surface {
+            true => range_of(&settled(raw[axis], &parts[axis])),
+            false => [f64::NEG_INFINITY, f64::INFINITY],
+        });
         let of_particle = move |i: usize| {
             let place = sorted.cloud.position[i] / size - cell;
             let v = sorted.cloud.velocity[i];

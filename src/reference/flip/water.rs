@@ -225,8 +225,8 @@ pub struct Depth {
     pub lean: f64,
 }
 
-/// What of the room at a centre is water. Where the centre is in a solid, what little room there is may hold no particle for a
-/// while, or one too many: there it is water if that and what lies beyond its faces are, together.
+/// Water at a centre over the room there. Where the centre is in a solid, the little room that is left may hold no particle for
+/// a while, or one too many, so that the cells beyond the open faces count as well.
 fn share_of_room(
     bricks: &Bricks,
     room: &Room,
@@ -252,10 +252,9 @@ fn share_of_room(
     alone.max(sum / rooms)
 }
 
-/// Part of the hat about a centre that lies below the surface, that within solids included, from what `of_room` is of what they
-/// leave; and the lean, see [`Depth`]. The surface is taken to be level. What lies in a solid counts as below it as far as the solid
-/// does: all of it where a floor stands under the water, none where a ceiling hangs over it, and as much as of the room beside a
-/// wall.
+/// Part of the hat at a centre that lies below a level surface, solids included, and the lean (see [`Depth`]); `of_room` is that
+/// part of the open hat. A solid counts as below the surface where it is a floor, as above it where it is a ceiling, and as the
+/// open hat does where it is a wall.
 fn below_surface(
     step: &Step<'_>,
     bricks: &Bricks,
@@ -299,10 +298,10 @@ pub fn find_depth(
     per_cell(bricks, |element| {
         let extent = step.open_extent(corner(bricks, element));
         let is_cut = room.hats[element as usize] < 1.0;
-        let share = if is_cut {
-            share_of_room(bricks, room, density, particle_share, element)
-        } else if extent.cmplt(DVec3::splat(HALF)).any() {
+        let share = if extent.cmplt(DVec3::splat(HALF)).any() {
             density_before(step, bricks, room, density, element)
+        } else if is_cut {
+            share_of_room(bricks, room, density, particle_share, element)
         } else {
             density[element as usize]
         };

@@ -52,8 +52,7 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
             .map(|axis| u32::from(scene.periodic[axis]) << axis)
             .sum(),
         apart_from_walls: flip.apart_from_walls() as f32,
-        slack: scene.flip_slack() as f32,
-        padding: 0,
+        padding: [0; 2],
     }
 }
 

@@ -258,10 +258,10 @@ fn rows_of_motion(case: &Case, pair: &Pair, trace: &Trace) -> Vec<Row> {
     // Means of what the faces have, √3 for three components; hats are off by a place's rounding each, over faces that
     // differ by up to 1 m/s.
     let given = 3f64.sqrt() * faces + 8.0 * PLACE;
-    // Beside solids faces count by what is open of them, which is off by 100 u (as `face_open`), in a sum and in what it is over; of
-    // these parts there is a tenth at least, over faces that differ by up to 1 m/s.
+    // Beside solids weights are multiplied by open fractions, which are off by 100 u (as `face_open`), above and below a quotient;
+    // they are a fiftieth at least, and faces differ by up to 1 m/s.
     let is_cut = case.boundary.distance.is_some() || !case.boundary.moving.is_empty();
-    let given = given + if is_cut { 2.0 * 100.0 * U / 0.1 } else { 0.0 };
+    let given = given + if is_cut { 2.0 * 100.0 * U / 0.02 } else { 0.0 };
     let (mut x, mut v, mut touching) = (0.0f64, 0.0f64, 0.0f64);
     for (k, &id) in trace.after.id.iter().enumerate() {
         let own = trace.after.velocity[k];

@@ -16,8 +16,8 @@ use swell::{
 /// The cells that a solid cuts are air whatever they hold.
 const SPOIL: Spoil = Spoil {
     pass: "flip/find_water",
-    from: "share = share_of_room(element)",
-    to: "share = 0.0",
+    from: "select(share_of_room(element), share, is_in_wall)",
+    to: "0.0",
 };
 
 fn spoiled(context: &Context) -> Context {

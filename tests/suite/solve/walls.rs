@@ -2,12 +2,18 @@
 
 use crate::support::{
     context,
-    flip::{self as rig, DX},
+    flip::{self as rig, DX, half_space},
     jitter,
 };
 use glam::DVec3;
 use swell::{
-    domain::{boundary::Boundary, motion::Motion, particles::Particles, solver::Solver},
+    domain::{
+        boundary::Boundary,
+        motion::Motion,
+        particles::Particles,
+        poisson::{AIR, FLUID},
+        solver::Solver,
+    },
     gpu::adapter::Spoil,
     reference::flip::{Flip, Trace, survey},
     scene::{Scene, Wall, WaveMaker, step},
@@ -17,6 +23,10 @@ use swell::{
 fn traced(scene: &Scene, particles: &Particles, start: f64) -> Trace {
     let mut reference = Flip::new(scene, &Boundary::default());
     reference.load(0, particles).unwrap();
+    one_substep(&mut reference, start)
+}
+
+fn one_substep(reference: &mut Flip, start: f64) -> Trace {
     let cloud = reference.cloud();
     let found = survey(reference.model(), &cloud);
     let step = step::Substep {
@@ -172,4 +182,33 @@ fn water_before_a_wall_that_comes_leaves_no_gap() {
     let gap = gap(rig::solver(&spoiled, &scene, &particles));
     println!("{gap}");
     assert!(gap > 0.3, "{gap}");
+}
+
+/// A cell whose centre lies in a wall is what the water before it is, beside a solid as well: at the wall of [`cut`] that takes 0.7 of
+/// a cell, with a floor of mesh that fits the grid under the water. Before that wall the sliver holds no particle.
+#[test]
+fn the_sliver_at_a_wall_is_water_beside_a_solid_too() {
+    let (mut scene, mut particles) = cut(0.7);
+    let floor = half_space(DVec3::Y, 2.0 * DX);
+    particles
+        .position
+        .retain(|x| x[0] > (1.4 * DX) as f32 && x[0] < 0.75);
+    let count = particles.position.len();
+    particles.velocity.truncate(count);
+    particles.id.truncate(count);
+    for x in &mut particles.position {
+        x[1] += (2.0 * DX) as f32;
+    }
+    scene.domain.max.y += 2.0 * DX;
+    for boundary in [Boundary::default(), floor] {
+        let mut reference = Flip::new(&scene, &boundary);
+        reference.load(0, &particles).unwrap();
+        let trace = one_substep(&mut reference, 1.0);
+        let kind = |x: i64, y: i64| trace.room.kind[trace.bricks.element([x, y, 4]) as usize];
+        for y in 2..6 {
+            assert_eq!((kind(0, y), kind(1, y)), (FLUID, FLUID), "{y}");
+        }
+        // Control: above the water both are air.
+        assert_eq!((kind(0, 8), kind(1, 8)), (AIR, AIR));
+    }
 }
