@@ -1,13 +1,15 @@
 // Work that walls and solids which move do on the water in a substep, over Δx² Δt: −p times what they push out through
-// the closed parts of a cell's faces, each workgroup's share of it. It is what the projection's energy gains by them.
+// the closed parts of a cell's faces, each workgroup's share of it. It is what the projection's energy gains by them. The flux of gaps
+// that close (flip/close_gaps) is no work.
 #import "shared/thread.wgsl"
-#import "shared/flip_params.wgsl"
-#import "shared/bricks.wgsl"
+#import "shared/flip_cell.wgsl"
+#import "shared/flip_buried.wgsl"
 
-@group(0) @binding(1) var<storage, read> cell_kind: array<u32>;
+@group(0) @binding(5) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(2) var<storage, read> solid_flux: array<f32>;
 @group(0) @binding(3) var<storage, read> pressure: array<f32>;
 @group(0) @binding(4) var<storage, read_write> boundary_work: array<f32>;
+@group(0) @binding(6) var<storage, read> density: array<f32>;
 
 var<workgroup> terms: array<f32, 64>;
 
@@ -20,7 +22,8 @@ fn main(
     let thread = thread_index(workgroup, workgroups, local, 64u);
     let is_inside = thread < params.wet_cells;
     let element = select(0u, thread + CELLS, is_inside);
-    let is_water = cell_kind[element] == 1u;
+    let is_thin = density[element] < 0.5 && !is_buried(element, vec3f(own_cell(element)));
+    let is_water = cell_kind[element] == 1u && !is_thin;
     terms[local] = select(0.0, -pressure[element] * solid_flux[element], is_water && is_inside);
     workgroupBarrier();
     if local == 0u && is_inside {

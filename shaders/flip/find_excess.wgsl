@@ -2,15 +2,11 @@
 // away (Kugelstadt et al. 2019).
 #import "shared/thread.wgsl"
 #import "shared/flip_neighborhood.wgsl"
-#import "shared/flip_params.wgsl"
-#import "shared/flip_walls.wgsl"
+#import "shared/flip_buried.wgsl"
 
 @group(0) @binding(2) var<storage, read> cell_kind: array<u32>;
 @group(0) @binding(3) var<storage, read> density: array<f32>;
 @group(0) @binding(4) var<storage, read_write> density_excess: array<f32>;
-#ifdef SOLIDS
-@group(0) @binding(9) var<storage, read> open_volume: array<f32>;
-#endif
 
 const AIR = 0u;
 const FLUID = 1u;
@@ -29,20 +25,23 @@ fn main(
         return;
     }
     let element = thread + CELLS;
+    let own = vec3f(own_cell(element));
     let is_water = cell_kind[element] == FLUID;
     var touches_air = false;
     for (var once = 0; once < select(0, 1, is_water); once++) {
         open_neighborhood(element);
         for (var k = 0; k < 27; k++) {
-            let found = element_at(vec3i(k % 3, k / 3 % 3, k / 9) - 1);
-            // Beyond the domain there is no cell and no air.
-            touches_air |= cell_kind[found] == AIR && found >= CELLS;
+            let offset = vec3i(k % 3, k / 3 % 3, k / 9) - 1;
+            let found = element_at(offset);
+            // Beyond the domain there is no cell and no air. Water that fills a gap is air still.
+            let is_air = cell_kind[found] == AIR || (density[found] < 0.5 && !is_buried(found, own + vec3f(offset)));
+            touches_air |= is_air && found >= CELLS;
         }
     }
 #ifdef SOLIDS
     let volume = open_volume[element];
 #else
-    let extent = open_extent(vec3f(own_cell(element)));
+    let extent = open_extent(own);
     let volume = extent.x * extent.y * extent.z;
 #endif
     let least = select(-MOST_EXCESS, 0.0, touches_air);

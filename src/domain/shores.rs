@@ -1,4 +1,5 @@
-//! Bricks of water that hold no particle: walls and solids leave too little of their cells for one.
+//! Bricks of water that hold no particle: walls and solids leave too little of their cells for one, or water is about to close a gap
+//! before a wall.
 //!
 //! Were such cells air, the water beside them would lose its pressure there.
 
@@ -9,6 +10,9 @@ use glam::{DMat3, DVec3};
 use super::{
     boundary::Boundary, bounds::Bounds, bricks::EDGE, pose::Pose, signed_distance::SignedDistance,
 };
+
+/// Cells that a gap before a wall has at most (flip/close_gaps).
+const MOST_GAP: f64 = 4.0;
 
 /// Nearer than this to a cell's face, in cells, a wall counts as on it.
 const ON_FACE: f64 = 1e-3;
@@ -88,7 +92,7 @@ impl Shores {
     }
 
     /// Marks what lies beside bricks that hold particles: bricks that solids cut, which stand at `poses`, in cells from the
-    /// domain's least corner, and layers of cells that the walls at `cut` cut, where these are the first or the last of a brick. `is_wet` is one
+    /// domain's least corner, and those of which the walls at `cut` leave no more than [`MOST_GAP`] cells. `is_wet` is one
     /// flag a brick, `dims` bricks along each axis, x fastest; lengths are in cells.
     pub fn mark(
         &self,
@@ -105,14 +109,15 @@ impl Shores {
             }
         }
         for axis in 0..3 {
-            let low = (cut.min[axis] + ON_FACE).floor();
-            let high = (cut.max[axis] - ON_FACE).ceil() - 1.0;
             let edge = f64::from(EDGE);
-            if low >= 0.0 && cut.min[axis] - low > ON_FACE && (low + 1.0) % edge == 0.0 {
-                spread(is_wet, dims, axis, (low / edge) as u32, 1);
+            let (low, high) = (cut.min[axis], cut.max[axis]);
+            let first = ((low + ON_FACE) / edge).floor();
+            let last = ((high - ON_FACE) / edge).ceil() - 1.0;
+            if first >= 0.0 && edge * (first + 1.0) - low <= MOST_GAP {
+                spread(is_wet, dims, axis, first as u32, 1);
             }
-            if high >= edge && high + 1.0 - cut.max[axis] > ON_FACE && high % edge == 0.0 {
-                spread(is_wet, dims, axis, (high / edge) as u32, -1);
+            if last >= 1.0 && high - edge * last <= MOST_GAP {
+                spread(is_wet, dims, axis, last as u32, -1);
             }
         }
     }
@@ -184,21 +189,21 @@ mod tests {
     }
 
     #[test]
-    fn walls_that_cut_the_outermost_layer_of_a_brick_make_it_water() {
+    fn bricks_of_which_walls_leave_few_layers_are_water() {
         let none = Shores::default();
         let last = [32.0, 24.0, 16.0];
-        // A wall within the cell 7: the brick of it has no particles.
+        // A wall within the first brick, which has no particles.
         for (x, expected) in [
             (7.6, vec![[0, 0, 0], [1, 0, 0]]),
-            (7.0, vec![[1, 0, 0]]),
-            (6.6, vec![[1, 0, 0]]),
+            (4.1, vec![[0, 0, 0], [1, 0, 0]]),
+            (3.9, vec![[1, 0, 0]]),
             (8.0, vec![[1, 0, 0]]),
         ] {
             let found = marked(&none, &[[1, 0, 0]], cut([x, 0.0, 0.0], last), DVec3::ZERO);
             assert_eq!(found, sorted(&expected), "{x}");
         }
         // Two walls meet: the brick in the corner too.
-        let walls = cut([0.0; 3], [16.4, 8.3, 16.0]);
+        let walls = cut([0.0; 3], [19.9, 8.3, 16.0]);
         let found = marked(&none, &[[1, 0, 0], [3, 2, 1]], walls, DVec3::ZERO);
         let corner = [[1, 0, 0], [2, 0, 0], [1, 1, 0], [2, 1, 0], [3, 2, 1]];
         assert_eq!(found, sorted(&corner));

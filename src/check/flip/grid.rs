@@ -299,7 +299,7 @@ pub(super) fn find_water(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
 
 pub(super) fn find_excess(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let (elements, density) = (state.elements(), state.density());
-    let twin = twin_find_excess(&elements.bricks, state.room(), density);
+    let twin = twin_find_excess(&state.step(), &elements.bricks, state.room(), density);
     let excess = elements.scalars(&io.after, buffers::DENSITY_EXCESS)?;
     let cut = CUT.of([state.place()]);
     io.table.each(&EXCESS, elements.active(), |e| {

@@ -2,6 +2,7 @@
 
 mod cycle;
 mod elements;
+mod gaps;
 mod grid;
 mod iteration;
 mod particles;
@@ -18,7 +19,7 @@ use swell_domain::{
 };
 use swell_gpu::adapter::Context;
 use swell_reference::{
-    flip::{Given, Model, Room, Sorted, Step},
+    flip::{Given, Model, Room, Sorted, Step, is_filling},
     poisson::iteration::Sum,
 };
 use swell_scene::{Scene, step::Substep};
@@ -48,6 +49,11 @@ const TWINS: &[Twin<FlipState>] = &[
     twin("flip/gather_faces", NONE, grid::gather_faces),
     twin("flip/gather_centers", NONE, grid::gather_centers),
     twin("flip/find_water", NONE, grid::find_water),
+    twin(
+        "flip/close_gaps",
+        || names![buffers::LIQUID_DISTANCE],
+        gaps::close_gaps,
+    ),
     twin("flip/find_excess", NONE, grid::find_excess),
     twin(
         "flip/let_in",
@@ -220,10 +226,13 @@ fn boundary_work(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
     let flux = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
     let kind = io.before.get(buffers::CELL_KIND, elements.cells)?;
+    let (step, bricks, room) = (state.step(), &elements.bricks, state.room());
+    let density = elements.scalars(&io.before, buffers::DENSITY)?;
+    let is_filling = |e: usize| is_filling(&step, bricks, room, &density, e as u32);
     let wet = elements.wet();
     let sums = io.after.get(buffers::BOUNDARY_WORK, wet.len() / 64)?;
     let term = |e: usize| match kind[e] {
-        FLUID => -pressure[e] * flux[e],
+        FLUID if !is_filling(e) => -pressure[e] * flux[e],
         _ => 0.0,
     };
     io.table.each(&WORK, 0..sums.len(), |group| {

@@ -23,6 +23,8 @@ bounds! {
     pub(super) OF_SHARE = [half: "" OF_HALF, solid: "" OF_SOLID] half + solid, "";
     pub(super) NEAR_HALF = [cut: "" CUT, mean: "" OF_MEAN] cut + mean,
         "a half, of the density or of what is open of a cell about";
+    pub(super) OF_GAP = [cut: "" CUT] 9.0 * (cut + 8.0 * U) + 64.0 * U,
+        "what at most 9 cells lack, and a difference of velocities by which ends come at most 8 cells nearer";
     pub(super) OF_FACES = [place: "" PLACE, range: "of the faces' values about the cell", most: "the largest of them"]
         9.0 * place * range + 96.0 * U * most, "along each axis; three sums over 18 faces, and their quotient";
     pub(super) START = [x: "|x|", step: "Δt", fastest: "|v| at any face", grid: "with solids " GRID]
@@ -94,6 +96,12 @@ entries! {
         WATER = "kind of cell", "": [] 0.0, "a whole number", tie NEAR_HALF;
         DISTANCE = "distance of the surface", "m": [moved: "in cells, what it answers when s − s²/2 moves by " OF_SHARE,
             size: "Δx"] (moved + 24.0 * U) * size, "", tie NEAR_HALF;
+    }
+    "flip/close_gaps" {
+        FILLING = "kind of cell", "": [] 0.0, "a whole number", tie OF_GAP;
+        FILLED = "flux with what fills gaps", "m/s": [gap: "" OF_GAP, rate: "Δx / Δt", flux: "its own value"]
+            16.0 * gap * rate + 2.0 * U * flux, "what 3 cells lack, times a part whose gap is a quarter of a cell at least", tie OF_GAP;
+        FULL = "distance of the surface", "m": [size: "its own value"] U * size, "a cell, or a copy", tie OF_GAP;
     }
     "flip/find_excess" {
         EXCESS = "density excess", "": [excess: "|ρ − 1| with ρ", cut: "" CUT] 4.0 * U * excess + cut * excess,

@@ -6,6 +6,7 @@
 //! frames.
 
 pub mod effects;
+mod gaps;
 mod grid;
 mod model;
 mod pressure;
@@ -19,6 +20,7 @@ mod to_particles;
 mod wall_friction;
 mod water;
 
+pub use gaps::{Gaps, close_gaps};
 pub use grid::planes;
 pub use model::{Model, Step};
 pub use pressure::{Waters, density_source};
@@ -34,5 +36,5 @@ pub use to_particles::{
 pub use wall_friction::{friction_rates, wall_friction};
 pub use water::{
     Centers, Depth, LEAST_FILM, find_buried, find_depth, find_excess, find_water, gather_centers,
-    is_near_half, let_in,
+    is_filling, is_near_half, let_in,
 };

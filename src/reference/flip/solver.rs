@@ -3,11 +3,11 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{
-    Centers, Cloud, Faces, Given, Model, Room, Sorted, Waters, advect, aim, assign_cells,
-    cut_cells,
+    Centers, Cloud, Faces, Gaps, Given, Model, Room, Sorted, Step, Waters, advect, aim,
+    assign_cells, close_gaps, cut_cells,
     effects::{self, Flying, Water},
     extrapolate, find_buried, find_change, find_depth, find_excess, find_water, gather_centers,
-    gather_faces, grid_to_particle, let_in,
+    gather_faces, grid_to_particle, is_filling, let_in,
     projection::{Projected, project},
     push_apart, reorder, survey, wall_friction,
 };
@@ -181,13 +181,26 @@ impl Flip {
         let density = timings.time("flip/gather_centers", || {
             gather_centers(model, &step, &bricks, &sorted, &room)
         });
-        let (kind, distance) = timings.time("flip/find_water", || {
+        let (kind, mut distance) = timings.time("flip/find_water", || {
             let depth = find_depth(model, &step, &bricks, &room, &density);
             find_water(model, &bricks, &room, &depth)
         });
         room.kind = kind;
+        room = timings.time("flip/close_gaps", || {
+            let gaps = Gaps {
+                model,
+                step: &step,
+                bricks: &bricks,
+                room: &room,
+                density: &density,
+                velocity: &faces.velocity,
+            };
+            close_gaps(&gaps, &mut distance)
+        });
         let mut excess = match model.settings().density_correction {
-            true => timings.time("flip/find_excess", || find_excess(&bricks, &room, &density)),
+            true => timings.time("flip/find_excess", || {
+                find_excess(&step, &bricks, &room, &density)
+            }),
             false => Vec::new(),
         };
         if model.scene.has_inlets() {
@@ -341,9 +354,9 @@ impl Flip {
         }
         let mut trace = self.judged_substep((frame, number), cloud, &surveyed.is_wet, substep)?;
         trace.add_to(all);
-        let work = self.model.boundary_work(&trace, substep.length);
-        let order = by_id(&trace.sorted.cloud);
         let step = self.model.step(substep);
+        let work = self.model.boundary_work(&step, &trace);
+        let order = by_id(&trace.sorted.cloud);
         let is_drop = &trace.given.is_drop;
         let pushed = push_apart(&self.model, &step, &trace.bricks, &trace.sorted, is_drop);
         trace.given.displacement = pushed;
@@ -386,7 +399,7 @@ impl Flip {
             report.substeps += 1;
             let number = (frame, report.substeps);
             let trace = self.judged_substep(number, cloud, &surveyed.is_wet, &substep)?;
-            report.boundary_work += self.model.boundary_work(&trace, substep.length);
+            report.boundary_work += (self.model).boundary_work(&self.model.step(&substep), &trace);
             for projected in trace.projections() {
                 report.iterations += u64::from(projected.solution.iterations);
             }
@@ -481,11 +494,18 @@ impl Flip {
 }
 
 impl Model {
-    /// Done on the water by what moves in a substep of `length` seconds, joule (flip/boundary_work).
-    fn boundary_work(&self, trace: &Trace, length: f64) -> f64 {
-        let cells = trace.pressure.iter().zip(&trace.room.solid_flux);
-        let sum: f64 = cells.map(|(pressure, flux)| -pressure * flux).sum();
-        self.cell_size().powi(2) * length * sum
+    /// Done on the water by what moves in a substep, joule (flip/boundary_work).
+    fn boundary_work(&self, step: &Step<'_>, trace: &Trace) -> f64 {
+        let Trace { bricks, room, .. } = trace;
+        let terms = (0..room.kind.len()).map(|e| {
+            let is_filling = is_filling(step, bricks, room, &trace.centers.density, e as u32);
+            match is_filling {
+                true => 0.0,
+                false => -trace.pressure[e] * room.solid_flux[e],
+            }
+        });
+        let sum: f64 = terms.sum();
+        self.cell_size().powi(2) * step.length * sum
     }
 }
 

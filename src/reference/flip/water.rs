@@ -109,7 +109,7 @@ pub fn gather_centers(
 }
 
 /// What walls leave of a cell along each axis, and what solids leave of that.
-fn open_parts(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> [f64; 4] {
+pub(super) fn open_parts(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> [f64; 4] {
     let extent = step.open_extent(corner(bricks, element));
     let part = match step.solids.is_empty() {
         true => 1.0,
@@ -122,6 +122,17 @@ fn open_parts(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> [f
 fn is_buried(step: &Step<'_>, bricks: &Bricks, room: &Room, element: u32) -> bool {
     let parts = open_parts(step, bricks, room, element);
     parts.into_iter().any(|part| part < HALF)
+}
+
+/// Whether a cell, if it is water, lacks most of it: as in gaps that close (flip/close_gaps).
+pub fn is_filling(
+    step: &Step<'_>,
+    bricks: &Bricks,
+    room: &Room,
+    density: &[f64],
+    element: u32,
+) -> bool {
+    density[element as usize] < 0.5 && !is_buried(step, bricks, room, element)
 }
 
 /// Which cells have their centre within a wall or a solid. Shape (elements).
@@ -355,14 +366,18 @@ pub fn find_water(
 
 /// What of the density is too much, or too little within the water, in parts of a cell (Kugelstadt et al. 2019): what the
 /// density correction takes away. Shape (elements).
-pub fn find_excess(bricks: &Bricks, room: &Room, density: &[f64]) -> Vec<f64> {
+pub fn find_excess(step: &Step<'_>, bricks: &Bricks, room: &Room, density: &[f64]) -> Vec<f64> {
     per_cell(bricks, |element| {
         let e = element as usize;
         if room.kind[e] != FLUID {
             return 0.0;
         }
-        // Beyond the domain there is no cell and no air.
-        let is_air = |other: u32| other >= CELLS && room.kind[other as usize] == AIR;
+        // Beyond the domain there is no cell and no air. Water that fills a gap is air still.
+        let is_air = |other: u32| {
+            let kind = room.kind[other as usize];
+            let is_filling = || is_filling(step, bricks, room, density, other);
+            other >= CELLS && (kind == AIR || is_filling())
+        };
         let touches_air = neighborhood().any(|offset| is_air(bricks.near(element, offset)));
         let least = if touches_air { 0.0 } else { -MOST_EXCESS };
         (density[e] - 1.0).clamp(least, MOST_EXCESS) * room.volume[e]

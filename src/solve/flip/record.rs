@@ -209,6 +209,7 @@ fn to_grid(plan: &Plan, scene: &Scene, effects: &[(&'static str, Addition)]) -> 
     commands.push(along("flip/spread_centers", WET, 0));
     commands.push(over("flip/gather_centers", ACTIVE));
     commands.push(over("flip/find_water", ACTIVE));
+    commands.push(over("flip/close_gaps", WET));
     if scene.solver.flip().density_correction {
         commands.push(over("flip/find_excess", ACTIVE));
     }

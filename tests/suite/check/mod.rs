@@ -2,6 +2,7 @@
 mod controls;
 mod drops;
 mod frames;
+mod gaps;
 mod periodic;
 mod viscous;
 mod whitewater;
@@ -229,7 +230,9 @@ fn hold(context: &Context, scene: &Scene, start: &Start, controls: &[Control], e
         let field = row.field;
         let is_of =
             |control: &Control| control.pass == field.pass && control.fields.contains(&field.name);
-        controls.iter().any(is_of) || elsewhere.contains(&field.pass)
+        // No gap closes in these cases: see `gaps`.
+        let is_of_gaps = field.pass == "flip/close_gaps";
+        controls.iter().any(is_of) || elsewhere.contains(&field.pass) || is_of_gaps
     };
     for row in clean.rows.iter().filter(|row| !covered(row)) {
         faults += &format!("no control: {} {}\n", row.field.pass, row.field.name);

@@ -1,5 +1,6 @@
 //! FLIP's passes against naive f64 twins and against analysis.
 mod exact;
+mod gaps;
 
 use crate::support::flip::*;
 use crate::support::{context, jitter, lattice, noise};

@@ -26,7 +26,7 @@ use crate::support::{context, device::spoiled, flip::*, lattice, mover, noise};
 const EPSILON: f64 = f32::EPSILON as f64;
 
 /// State and report after so many frames, of the GPU and of the reference.
-fn both(
+pub(super) fn both(
     context: &Context,
     scene: &Scene,
     particles: &Particles,

@@ -1,0 +1,128 @@
+// Gaps that close within the substep, as under a slab of water that falls on a floor. Air has no pressure: water would run into what
+// stands beyond the gap and be squeezed there, by as much as it goes in a substep, and the density correction would lift it again. The
+// cells of such a gap count as water whose divergence is what fills them, so that the projection stops the water at the gap's end.
+#import "shared/thread.wgsl"
+#import "shared/flip_neighborhood.wgsl"
+#import "shared/flip_buried.wgsl"
+
+@group(0) @binding(2) var<storage, read> density: array<f32>;
+@group(0) @binding(3) var<storage, read> face_open: array<f32>;
+@group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
+@group(0) @binding(5) var<storage, read_write> cell_kind: array<u32>;
+@group(0) @binding(6) var<storage, read_write> solid_flux: array<f32>;
+#ifdef GHOST_FLUID
+@group(0) @binding(7) var<storage, read_write> liquid_distance: array<f32>;
+#endif
+
+const AIR = 0u;
+const FLUID = 1u;
+
+// Cells each way that a gap is followed.
+const MOST_GAP = 4;
+
+// A gap closes where its ends meet by more than this part of it.
+const CLOSES = 0.75;
+
+// And by more than this part of a cell: what is less the density correction takes away.
+const LEAST_CLOSING = 0.25;
+
+// A face that is open by less ends a gap: it would have to let through all that the gap takes.
+const LEAST_WAY = 0.5;
+
+const OPEN = 0u;
+const WATER = 1u;
+const CLOSED = 2u;
+const UNKNOWN = 3u;
+
+struct End {
+    kind: u32,
+    // m/s, along the axis.
+    velocity: f32,
+    // What the cells up to the end lack, in cells.
+    gap: f32,
+    // Of that, what water beside the cell lacks.
+    beside: f32,
+}
+
+// What a cell lacks along an axis, in cells.
+fn lack_of(element: u32, cell: vec3f, axis: u32) -> f32 {
+    let extent = open_extent(cell);
+    var room = extent[axis];
+#ifdef SOLIDS
+    room = min(open_volume[element] * room / max(extent.x * extent.y * extent.z, 1e-6), 1.0);
+#endif
+    return room * clamp(1.0 - density[element], 0.0, 1.0);
+}
+
+// What walls leave of a cell's faces across an axis.
+fn across(cell: vec3f, axis: u32) -> f32 {
+    let extent = open_extent(cell);
+    return extent[(axis + 1u) % 3u] * extent[(axis + 2u) % 3u];
+}
+
+fn end_of(cell: vec3f, axis: u32, side: i32) -> End {
+    var end = End(OPEN, 0.0, 0.0, 0.0);
+    var step = vec3i(0);
+    step[axis] = side;
+    for (var k = 0; k < MOST_GAP && end.kind == OPEN; k++) {
+        let here = element_at(k * step);
+        let there = element_at((k + 1) * step);
+        let is_there = there >= CELLS;
+        let face = axis * params.stride + select(here, there, side > 0);
+        let open = face_open[face];
+        let is_closed = (side < 0 || is_there) && open < LEAST_WAY * across(cell + vec3f(k * step), axis);
+        let is_water = density[there] >= 0.5;
+        let lack = lack_of(there, cell + vec3f((k + 1) * step), axis);
+        end.kind = select(select(select(OPEN, WATER, is_water), UNKNOWN, !is_there), CLOSED, is_closed);
+        // Of a face that is closed in part the velocity is the water's.
+        end.velocity = select(face_velocity[face], 0.0, is_closed && open > 0.0);
+        end.gap += select(lack, 0.0, is_closed);
+        end.beside = select(end.beside, lack, is_water && !is_closed && k == 0);
+    }
+    return end;
+}
+
+// What of a cell is filled in this substep because the ends of a gap meet, in cells, times the area across; negative where none do.
+fn filled(element: u32, cell: vec3f) -> f32 {
+    var most = -1.0;
+    for (var axis = 0u; axis < 3u; axis++) {
+        let own = lack_of(element, cell, axis);
+        let low = end_of(cell, axis, -1);
+        for (var once = 0; once < select(0, 1, low.kind == WATER || low.kind == CLOSED); once++) {
+            let high = end_of(cell, axis, 1);
+            let gap = own + low.gap + high.gap;
+            let closing = (low.velocity - high.velocity) * params.time_step * params.inverse_cell_size;
+            let is_held = high.kind == WATER || (high.kind == CLOSED && low.kind == WATER);
+            let closes = is_held && closing > max(CLOSES * gap, LEAST_CLOSING);
+            let part = clamp(closing / max(gap, 1e-6), 0.0, 1.0);
+            let lack = across(cell, axis) * (own + low.beside + high.beside);
+            most = select(most, max(most, lack * part), closes);
+        }
+    }
+    return most;
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let thread = thread_index(workgroup, workgroups, local, 64u);
+    if thread >= params.wet_cells {
+        return;
+    }
+    let element = thread + CELLS;
+    var most = -1.0;
+    for (var once = 0; once < select(0, 1, cell_kind[element] == AIR); once++) {
+        open_neighborhood(element);
+        most = filled(element, vec3f(own_cell(element)));
+    }
+    if most >= 0.0 {
+        cell_kind[element] = FLUID;
+        solid_flux[element] += most * params.cell_size / params.time_step;
+#ifdef GHOST_FLUID
+        liquid_distance[element] = -params.cell_size;
+#endif
+    }
+}

@@ -1,0 +1,62 @@
+//! Gaps that close within the substep.
+
+use swell_reference::flip::{Gaps, Room, close_gaps as twin_close_gaps};
+use swell_scene::flip::Surface;
+use swell_solve::flip::buffers;
+
+use super::{FlipState, rows::*};
+use crate::{
+    engine::{Io, Outcome},
+    table::{each, pair},
+};
+
+/// From the kinds, densities, velocities and fluxes that the device has.
+pub(super) fn close_gaps(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
+    let (elements, step, room) = (state.elements(), state.step(), state.room());
+    let faces = elements.faces(&io.before)?;
+    let gaps = Gaps {
+        model: &state.model,
+        step: &step,
+        bricks: &elements.bricks,
+        room,
+        density: state.density(),
+        velocity: &faces.velocity,
+    };
+    let has_distance = state.model.settings().surface == Surface::GhostFluid;
+    let mut distance = match has_distance {
+        true => elements.scalars(&io.before, buffers::LIQUID_DISTANCE)?,
+        false => vec![0.0; elements.cells],
+    };
+    let twin = twin_close_gaps(&gaps, &mut distance);
+    let error = OF_GAP.of([CUT.of([state.place()])]);
+    let active = elements.active();
+    // What rounding decides comes out otherwise where all that is decided is moved by as much.
+    let ties = each(active.clone(), |e| {
+        let closes = |lean: f64| gaps.filled(e as u32, lean).is_some();
+        let own = closes(0.0);
+        closes(error) != own || closes(-error) != own
+    });
+    let is_tie = |e: usize| ties[e - active.start];
+    let kind = io.after.get(buffers::CELL_KIND, elements.cells)?;
+    let flux = elements.scalars(&io.after, buffers::SOLID_FLUX)?;
+    io.table.each(&FILLING, active.clone(), |e| {
+        (!is_tie(e)).then(|| pair(e, kind[e], f64::from(twin.kind[e]), []))
+    });
+    let rate = state.model.cell_size() / step.length;
+    io.table.each(&FILLED, active.clone(), |e| {
+        let sizes = [error, rate, twin.solid_flux[e].abs()];
+        (!is_tie(e)).then(|| pair(e, flux[e], twin.solid_flux[e], sizes))
+    });
+    if has_distance {
+        let found = elements.scalars(&io.after, buffers::LIQUID_DISTANCE)?;
+        io.table.each(&FULL, active.clone(), |e| {
+            (!is_tie(e)).then(|| pair(e, found[e], distance[e], [distance[e].abs()]))
+        });
+    }
+    state.room = Some(Room {
+        kind,
+        solid_flux: flux,
+        ..twin
+    });
+    Ok(())
+}

@@ -1,0 +1,97 @@
+//! Water that lands within the substep: gaps that close before a floor that fits the cells, and before a solid that cuts them.
+
+use glam::DVec3;
+use swell::{
+    domain::{boundary::Boundary, motion::Motion, particles::Particles},
+    scene::{Method, Scene, Wall, WaveMaker},
+    stage::{check::check_frame, prepare::Start},
+};
+
+use super::{Control, control, faults};
+use crate::support::{context, flip as rig, jitter, noise};
+
+const CONTROLS: &[Control] = &[
+    control(
+        "flip/close_gaps",
+        "CLOSES = 0.75",
+        "CLOSES = 7.5",
+        "flip/close_gaps",
+        &[
+            "kind of cell",
+            "flux with what fills gaps",
+            "distance of the surface",
+        ],
+    ),
+    control(
+        "flip/close_gaps",
+        "most * params.cell_size",
+        "0.99 * most * params.cell_size",
+        "flip/close_gaps",
+        &["flux with what fills gaps"],
+    ),
+    control(
+        "flip/find_excess",
+        "density[found] < 0.5",
+        "density[found] < -0.5",
+        "flip/find_excess",
+        &["density excess"],
+    ),
+    control(
+        "flip/boundary_work",
+        " && !is_thin",
+        "",
+        "flip/boundary_work",
+        &["shares of the work"],
+    ),
+];
+
+/// Water from wall to wall, a little more than a cell over a floor that it passes in the substep; a wall moves.
+fn landing(floor: &Boundary, height: f64) -> (Scene, Start) {
+    let mut scene = rig::scene([16.0, 24.0, 8.0]);
+    scene.solver.method = Method::Flip;
+    scene.shot.frames_per_second = 50.0;
+    rig::flip(&mut scene).cfl = 2.0;
+    scene.wave_makers.push(WaveMaker {
+        wall: Wall::NAMED[0].1,
+        motion: Motion::ConstantVelocity {
+            velocity: 0.5,
+            until: None,
+        },
+        absorption: None,
+    });
+    let mut particles = rig::block([0, 1, 0], [16, 5, 8]);
+    for x in &mut particles.position {
+        x[1] += height as f32;
+    }
+    jitter(&mut particles, 0.005);
+    particles.velocity = (0..particles.position.len() as u64)
+        .map(|k| {
+            [0, 1, 2].map(|axis| {
+                let fall = if axis == 1 { 1.4 * rig::DX * 50.0 } else { 0.0 };
+                (0.2 * noise(3 * k + axis) - fall) as f32
+            })
+        })
+        .collect();
+    let start = Start {
+        particles,
+        removed: 0,
+        sources: Default::default(),
+        boundary: floor.clone(),
+    };
+    (scene, start)
+}
+
+#[test]
+fn gaps_that_close_are_within_tolerance_and_each_row_fails_where_it_should() {
+    let mut all = String::new();
+    for (floor, height) in [
+        (Boundary::default(), 0.0),
+        (rig::half_space(DVec3::Y, 1.3 * rig::DX), 1.3 * rig::DX),
+    ] {
+        let (scene, start) = landing(&floor, height);
+        let state: &Particles = &start.particles;
+        let checked = |context: &_| check_frame(context, &scene, &start, 0, state);
+        all += &faults(&context(), &checked, CONTROLS).1;
+    }
+    assert!(all.is_empty(), "{all}");
+}
