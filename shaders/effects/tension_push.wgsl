@@ -58,7 +58,7 @@ fn main(
         return;
     }
     let element = thread + CELLS;
-    let scale = params.time_step * TENSION * params.inverse_cell_size * params.inverse_cell_size;
+    let scale = params.kick * TENSION * params.inverse_cell_size * params.inverse_cell_size;
     let kind = cell_kind[element];
     open_neighborhood(element);
     for (var component = 0u; component < 3u; component++) {

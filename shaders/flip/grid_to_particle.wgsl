@@ -1,7 +1,8 @@
 // Particles take the grid's velocity and its change: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its
-// slope (APIC, Jiang et al. 2015). At the surface v is clamped to the range of the 18 faces about it: the grid does not see how a
-// particle differs from the flow, and there no pressure of neighbours bounds such differences, which grow the more the smaller the
-// step. A cell's particles share its faces, which are read once. Weights are multiplied by the faces' open fractions and normalized: the projection gives faces that
+// slope (APIC, Jiang et al. 2015). At the surface v is clamped to the range of the 18 faces about it, and by what
+// the fastest of them goes in the step over a cell beyond it, at most as fast as that one: the grid does not see how a particle differs
+// from the flow, and there no pressure of neighbours bounds such differences, which grow the more the smaller the step. Impacts keep
+// theirs: a jet that meets a wall would press 1.3 times as hard without. A cell's particles share its faces, which are read once. Weights are multiplied by the faces' open fractions and normalized: the projection gives faces that
 // are open by little several times their neighbours' velocities.
 // Faces beyond the domain's along b and c have the values of those before them, so that water slides along walls.
 #import "shared/thread.wgsl"
@@ -112,7 +113,7 @@ struct Component {
 #endif
 #ifndef APIC
     change: Values,
-    // Least and greatest velocity that a particle may have.
+    // Least and greatest velocity of the faces.
     range: vec2f,
 #endif
 #ifdef CORRECTION
@@ -152,7 +153,7 @@ struct Steps {
     c_after: vec3i,
 }
 
-fn read_component(axis: u32, steps: Steps, about: About) -> Component {
+fn read_component(axis: u32, steps: Steps) -> Component {
     var read: Component;
 #ifdef SOLIDS
     var part: Values;
@@ -197,7 +198,7 @@ fn read_component(axis: u32, steps: Steps, about: About) -> Component {
     let speeds = read.speeds;
 #endif
     let range = vec2f(least(speeds), -least(Values(-1.0 * speeds.lower, -1.0 * speeds.upper)));
-    read.range = select(vec2f(-FAR, FAR), range, about.is_surface);
+    read.range = range;
 #endif
 #ifdef SOLIDS
     read.speeds = weighed(read.speeds, part);
@@ -229,7 +230,7 @@ fn slope_of(faces: Component, u: f32, a: vec2f, b: vec3f, c: vec3f) -> f32 {
 
 // `f` is the place in the cell, along a, b and c. A drop falls freely: about it nothing is projected, and closed faces, which
 // have the wall's velocity, would stop it a cell away from the wall, or hold it under a ceiling.
-fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool) {
+fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool, beyond: f32) {
     let a = vec2f(1.0 - f.x, f.x);
     let b = center_hats(f.y);
     let c = center_hats(f.z);
@@ -254,7 +255,7 @@ fn give(i: u32, axis: u32, f: vec3f, faces: Component, falls: bool) {
     affine[row + (axis + 2u) % 3u] = scale * slope_of(faces, u, a, b, of_c);
 #else
     let advanced = sorted_velocity[k] + per_whole * value_at(faces.change, a, b, c);
-    let kept = clamp(advanced + params.pic_blend * (u - advanced), faces.range.x, faces.range.y);
+    let kept = clamp(advanced + params.pic_blend * (u - advanced), faces.range.x - beyond, faces.range.y + beyond);
     velocity[k] = select(kept, falling, falls);
 #endif
 #ifdef CORRECTION
@@ -299,15 +300,23 @@ fn main(
         let x = vec3i(1, 0, 0);
         let y = vec3i(0, 1, 0);
         let z = vec3i(0, 0, 1);
-        of_x = read_component(0u, Steps(x, y * to_before, y * to_after, z * to_before, z * to_after), about);
-        of_y = read_component(1u, Steps(y, z * to_before, z * to_after, x * to_before, x * to_after), about);
-        of_z = read_component(2u, Steps(z, x * to_before, x * to_after, y * to_before, y * to_after), about);
+        of_x = read_component(0u, Steps(x, y * to_before, y * to_after, z * to_before, z * to_after));
+        of_y = read_component(1u, Steps(y, z * to_before, z * to_after, x * to_before, x * to_after));
+        of_z = read_component(2u, Steps(z, x * to_before, x * to_after, y * to_before, y * to_after));
     }
+#ifdef APIC
+    let beyond = 0.0;
+#else
+    let ranges = max(max(abs(of_x.range), abs(of_y.range)), abs(of_z.range));
+    let fastest = max(ranges.x, ranges.y);
+    let way = fastest * params.time_step * params.inverse_cell_size;
+    let beyond = select(FAR, fastest * min(way, 1.0), about.is_surface);
+#endif
     for (var i = first; i < end; i++) {
         let f = three(sorted_position[i]) * params.inverse_cell_size - corner;
-        give(i, 0u, f, of_x, about.is_dry);
-        give(i, 1u, f.yzx, of_y, about.is_dry);
-        give(i, 2u, f.zxy, of_z, about.is_dry);
+        give(i, 0u, f, of_x, about.is_dry, beyond);
+        give(i, 1u, f.yzx, of_y, about.is_dry, beyond);
+        give(i, 2u, f.zxy, of_z, about.is_dry, beyond);
         is_drop[i] = u32(about.is_dry);
     }
 }

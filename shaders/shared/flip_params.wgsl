@@ -38,7 +38,9 @@ struct FlipParams {
     periodic: u32,
     // Water is pushed off walls that are nearer than half of this.
     apart_from_walls: f32,
-    padding: vec2u,
+    // Seconds for which forces act: half of the substep before and half of this one.
+    kick: f32,
+    padding: u32,
 }
 @group(0) @binding(0) var<uniform> params: FlipParams;
 

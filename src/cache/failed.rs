@@ -28,6 +28,9 @@ const CHECKSUM: &str = "blake3";
 /// Key of the report: what walls that absorb do after the state; only where there are some.
 const WALLS: &str = "walls";
 
+/// Key of the report: length of the substep that ended in the state, seconds.
+const SUBSTEP: &str = "substep";
+
 /// A frame that could not be computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failed {
@@ -70,6 +73,7 @@ pub fn write(cache: &Path, failed: &Failed, stamp: &Stamp<'_>) -> Result<(), Cac
     if failed.start.walls != Answers::default() {
         fields.insert(WALLS.to_owned(), json!(failed.start.walls));
     }
+    fields.insert(SUBSTEP.to_owned(), json!(failed.start.substep));
     let checksum = checksum(fields);
     fields.insert(CHECKSUM.to_owned(), checksum.into());
     // Last: it is what makes the folder one to replay.
@@ -120,8 +124,10 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
         Some(walls) => Answers::deserialize(walls).map_err(|error| damaged(&error.to_string()))?,
         None => Answers::default(),
     };
+    let substep = fields.remove(SUBSTEP);
     let start = Particles {
         walls,
+        substep: substep.and_then(|seconds| seconds.as_f64()).unwrap_or(0.0),
         ..frame::decode(&start.read(dir)?, &dir.join(START))?
     };
     Ok(Failed {

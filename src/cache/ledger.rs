@@ -40,6 +40,13 @@ pub struct Clock {
     /// What walls that absorb do from then on; only where there are some.
     #[serde(default, skip_serializing_if = "is_none")]
     pub walls: Answers,
+    /// Length of the substep that ended in the frame, seconds; 0 where none did.
+    #[serde(default, skip_serializing_if = "is_no_time")]
+    pub substep: f64,
+}
+
+fn is_no_time(seconds: &f64) -> bool {
+    *seconds == 0.0
 }
 
 fn is_none(walls: &Answers) -> bool {

@@ -402,6 +402,7 @@ pub(super) fn read_frame(
         None => frame::decode(&bytes, &path)?,
     };
     particles.walls = entry.clock.walls;
+    particles.substep = entry.clock.substep;
     if particles.len() as u64 != entry.particles {
         return Err(CacheError::damaged(
             path,

@@ -21,6 +21,8 @@ pub struct Particles {
     pub attributes: BTreeMap<String, Vec<f32>>,
     /// What walls that absorb do from then on; a cache has it in its ledger.
     pub walls: Answers,
+    /// Length of the substep that ended in this state, seconds; 0 where none did. A cache has it in its ledger.
+    pub substep: f64,
 }
 
 impl Particles {

@@ -20,6 +20,9 @@ pub struct Substep {
     pub start: f64,
     /// Seconds.
     pub length: f64,
+    /// For how long forces act, seconds: half of the substep before and half of this one, so that velocities stand in the middle
+    /// of substeps of whatever lengths (leapfrog).
+    pub kick: f64,
     /// Most cells that a particle moves, as its speed, gravity, walls and solids have it.
     pub displacement: f64,
 }
@@ -27,11 +30,23 @@ pub struct Substep {
 /// Displacement, in cells, that faces around the water are filled for where particles ask for none beyond their own cells.
 const WITHIN_CELLS: f64 = 1.0;
 
-/// The substep of a projection whose velocities alone are asked for; times in seconds.
-pub fn projected_substep(start: f64, length: f64) -> Substep {
+/// For how long forces act between a substep of `before` seconds, 0 where there was none, and one of `length`. Velocities stand in the
+/// middle of substeps and places at their ends (leapfrog; Hairer, Lubich and Wanner 2006, §I.1.4): it is half of each. With the
+/// substep's own length, waves whose speed decides on substeps lose ω Δt / 4 of their amplitude in each swing.
+fn kick(before: f64, length: f64) -> f64 {
+    if before > 0.0 {
+        0.5 * (before + length)
+    } else {
+        length
+    }
+}
+
+/// The substep of a projection whose velocities alone are asked for, after one of `before` seconds; times in seconds.
+pub fn projected_substep(start: f64, length: f64, before: f64) -> Substep {
     Substep {
         start,
         length,
+        kick: kick(before, length),
         displacement: WITHIN_CELLS,
     }
 }
@@ -129,7 +144,8 @@ impl Scene {
     }
 
     /// How many equal substeps FLIP's CFL number asks of the `remaining` seconds from `start` on, where the fastest
-    /// particle has `speed`, m/s, and the first of them; `done` substeps of `frame` are over.
+    /// particle has `speed`, m/s, and the first of them; `done` substeps of `frame` are over, and the last one, of whichever frame,
+    /// had `before` seconds.
     ///
     /// # Errors
     /// Where the frame's are more than `max_substeps`.
@@ -139,7 +155,7 @@ impl Scene {
         start: f64,
         remaining: f64,
         speed: f64,
-        done: u32,
+        (done, before): (u32, f64),
     ) -> Result<(f64, Substep), Breach> {
         let flip = self.solver.flip();
         let fastest = speed.max(self.peak_boundary_speed(start, start + remaining));
@@ -175,6 +191,7 @@ impl Scene {
         let substep = Substep {
             start,
             length,
+            kick: kick(before, length),
             displacement,
         };
         Ok((wanted, substep))
@@ -229,7 +246,7 @@ impl Scene {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
+    use std::{f64::consts::PI, path::Path};
 
     use super::*;
 
@@ -264,6 +281,30 @@ viscosity = { xsph = 0.2 }
         Scene::parse(SCENE, Path::new("s.toml"), Path::new(""), &set).expect("valid")
     }
 
+    /// An oscillator whose fast half takes half as long a step as its slow one, ω Δt = 0.2: a hundred swings of it keep their height.
+    #[test]
+    fn a_swing_that_decides_on_its_steps_keeps_its_height() {
+        let left = |kick: &dyn Fn(f64, f64) -> f64| {
+            let (mut x, mut v, mut before, mut elapsed) = (1.0f64, 0.0f64, 0.0, 0.0);
+            let mut highest = 0.0f64;
+            while elapsed < 100.0 * PI {
+                let length = if v.abs() > 0.7 { 0.1 } else { 0.2 };
+                v -= kick(before, length) * x;
+                x += length * v;
+                (before, elapsed) = (length, elapsed + length);
+                if elapsed > 98.0 * PI {
+                    highest = highest.max(x.abs());
+                }
+            }
+            highest
+        };
+        // A step is decided on at its start, which is off the middle by the third order: (ω Δt)³ / 8 of each swing.
+        assert!((left(&kick) - 1.0).abs() < 0.1, "{}", left(&kick));
+        // Control: forces that act for the substep's own length take ω Δt / 4 of each swing, until none is fast any more.
+        let found = left(&|_, length| length);
+        assert!(found < 0.75, "{found}");
+    }
+
     #[test]
     fn pbf_takes_as_many_substeps_as_the_way_has_cfl_lengths() {
         // In a frame of 0.2 s gravity adds 2 m/s. The way is (v + 2 m/s) 0.2 s, a substep's is cfl × 0.1 m.
@@ -294,7 +335,7 @@ viscosity = { xsph = 0.2 }
         // 9 t + g t² = 0.6 m.
         let longest = (-9.0 + f64::sqrt(81.0 + 24.0)) / 20.0;
         let substep = flip
-            .flip_substep(1, 0.0, 0.2, 0.0, 0)
+            .flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0))
             .expect("few enough")
             .1;
         assert!(
@@ -316,7 +357,7 @@ viscosity = { xsph = 0.2 }
         assert_eq!(of(&[still]).pbf_substeps(0, 0.0).ok(), Some(4));
         let flip = |more: &str| {
             let scene = of(&["solver.method=flip", more]);
-            let substep = scene.flip_substep(1, 0.0, 0.2, 0.0, 0);
+            let substep = scene.flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0));
             substep.expect("few enough").1.length
         };
         // g t² = 3 × 0.2 m: 0.245 s with gravity alone, 0.081 s in the wind; of 0.2 s one step, or three.
@@ -338,11 +379,11 @@ viscosity = { xsph = 0.2 }
         let fine = of(&["solver.pbf.particle_spacing=0.05"]);
         assert_eq!(fine.pbf_substeps(0, 0.0).ok(), Some(10));
         let flip = of(&["solver.method=flip"]);
-        let substep = flip.flip_substep(1, 0.0, 0.2, 0.0, 0);
+        let substep = flip.flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0));
         assert!((substep.expect("few enough").1.length - 0.05).abs() < 1e-12);
         let few = of(&["solver.method=flip", "solver.flip.max_substeps=3"]);
         let breach = few
-            .flip_substep(1, 0.0, 0.2, 0.0, 0)
+            .flip_substep(1, 0.0, 0.2, 0.0, (0, 0.0))
             .expect_err("4 are asked");
         let said = breach.to_string();
         assert!(
@@ -390,7 +431,7 @@ viscosity = { xsph = 0.2 }
         for (part, count) in [(0.9995, 4.0), (1.0005, 5.0)] {
             let remaining = 4.0 * longest * part;
             let (wanted, substep) = scene
-                .flip_substep(1, 0.3, remaining, 4.0, 0)
+                .flip_substep(1, 0.3, remaining, 4.0, (0, 0.0))
                 .expect("few enough");
             assert_eq!(wanted, count, "{part}");
             // Equal parts, of which this is the first.
@@ -406,12 +447,12 @@ viscosity = { xsph = 0.2 }
     fn flip_counts_the_substeps_that_are_over_and_walls() {
         let scene = scene(&["solver.method=flip", "water.gravity=[0, 0, 0]", WALL]);
         // 3.99 m/s for 0.3 s are 5.985 cells, two substeps of at most 3.
-        let count = |speed, done| scene.flip_substep(1, 1.0, 0.3, speed, done);
+        let count = |speed, done| scene.flip_substep(1, 1.0, 0.3, speed, (done, 0.0));
         assert_eq!(count(3.99, 0).ok().map(|found| found.0), Some(2.0));
         assert_eq!(count(3.99, 3).ok().map(|found| found.0), Some(2.0));
         assert!(count(3.99, 4).is_err(), "six, and five may be");
         // Before a second is over the wall is faster than the water: 3 m/s for 0.41 s are 6.15 cells.
-        let beside = |start| scene.flip_substep(1, start, 0.41, 0.0, 0).ok();
+        let beside = |start| scene.flip_substep(1, start, 0.41, 0.0, (0, 0.0)).ok();
         assert_eq!(beside(0.5).map(|found| found.0), Some(3.0));
         assert_eq!(beside(1.0).map(|found| found.0), Some(1.0));
     }

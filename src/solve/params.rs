@@ -114,8 +114,10 @@ mirror!(
         periodic: u32,
         /// Water is pushed off walls that are nearer than half of this.
         apart_from_walls: f32,
+        /// Seconds for which forces act: half of the substep before and half of this one.
+        kick: f32,
         /// Unused.
-        padding: [u32; 2],
+        padding: u32,
     }
 );
 

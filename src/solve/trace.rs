@@ -210,6 +210,8 @@ pub struct Begun {
     pub number: u32,
     /// Seconds of the frame that were over when it began.
     pub elapsed: f64,
+    /// Length of the substep before, seconds; 0 where there was none.
+    pub before: f64,
 }
 
 /// What a trace tells.

@@ -272,6 +272,7 @@ pub fn bake(
         } = step;
         clock.next_id = next_id;
         clock.walls = particles.walls;
+        clock.substep = particles.substep;
         held.add(scene, &particles);
         clock.frame = frame;
         clock.time = time;

@@ -156,7 +156,7 @@ fn push(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let before = elements.planes(&io.before, flip::buffers::FACE_VELOCITY)?;
     let found = elements.planes(&io.after, flip::buffers::FACE_VELOCITY)?;
     let tension = settings.coefficient / state.scene.water.rest_density;
-    let given = (model, tension, step.length);
+    let given = (model, tension, step.kick);
     let twin = twins::push(
         given,
         bricks,
@@ -171,7 +171,7 @@ fn push(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         open: &[],
         distance: distance.as_deref(),
     };
-    let over = step.length * tension / model.cell_size().powi(2);
+    let over = step.kick * tension / model.cell_size().powi(2);
     io.table.each(&PUSHED, elements.active(), |e| {
         let (mut kappa, mut scale) = (0.0f64, 0.0f64);
         for [water, air] in (0..3).filter_map(|axis| twins::sides(bricks, room, e as u32, axis)) {

@@ -342,7 +342,7 @@ fn project(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         pair(e, velocity[e], twin[e], [errors[e], twin[e].length()])
     });
     let pressure = elements.scalars(&io.after, solved::PRESSURE)?;
-    let scale = state.scene.water.rest_density * state.model.cell_size() / elements.substep.length;
+    let scale = state.scene.water.rest_density * state.model.cell_size() / elements.substep.kick;
     state.add_rows(io.table, &PRESSURE, |row| {
         let exact = scale * x[row];
         let found = pressure[state.system().cell[row] as usize];

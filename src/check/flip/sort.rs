@@ -58,7 +58,11 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
     let is_wet: Vec<u32> = twin.is_wet.iter().map(|&wet| u32::from(wet)).collect();
     io.table.add_exact(&WET, &found, &is_wet);
     // What the device found is what its substep follows.
-    let Begun { number, elapsed } = state.begun;
+    let Begun {
+        number,
+        elapsed,
+        before,
+    } = state.begun;
     let length = state.scene.shot.frame_seconds();
     let start = f64::from(state.frame) * length + elapsed;
     let (frame, remaining, speed) = (state.frame + 1, length - elapsed, fastest.sqrt());
@@ -67,7 +71,7 @@ pub(super) fn survey(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         None => {
             (state
                 .scene
-                .flip_substep(frame, start, remaining, speed, number - 1)?)
+                .flip_substep(frame, start, remaining, speed, (number - 1, before))?)
             .1
         }
     };

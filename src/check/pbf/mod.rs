@@ -128,7 +128,12 @@ pub fn check(
     });
     let mut of_grid = scene.of_projection().map(|grid| {
         let mut state = FlipState::new(&grid, boundary, (frame, particles.len()));
-        state.given_substep = Some(projected_substep(end - time_step, time_step));
+        let before = if number > 1 {
+            time_step
+        } else {
+            particles.substep
+        };
+        state.given_substep = Some(projected_substep(end - time_step, time_step, before));
         Engine::new(state)
     });
     let traced = solver.trace_frame(Span::Only(which), &mut |_, traced| match &mut of_grid {

@@ -43,6 +43,8 @@ pub struct Step<'a> {
     pub start: f64,
     /// Δt, seconds.
     pub length: f64,
+    /// See [`Substep::kick`], seconds.
+    pub kick: f64,
     /// Gravity times Δt, m/s.
     pub velocity_step: DVec3,
     /// Faces of the box at the end, metres: where particles are kept.
@@ -142,12 +144,18 @@ impl Model {
 
     /// What `substep` knows.
     pub fn step(&self, substep: &Substep) -> Step<'_> {
-        let Substep { start, length, .. } = *substep;
+        let Substep {
+            start,
+            length,
+            kick,
+            ..
+        } = *substep;
         let (before, after) = (self.scene.walls(start), self.scene.walls(start + length));
         Step {
             start,
             length,
-            velocity_step: self.scene.water.gravity * length,
+            velocity_step: self.scene.water.gravity * kick,
+            kick,
             walls: after,
             cut: Bounds {
                 min: before.min / self.cell_size(),

@@ -271,7 +271,7 @@ impl Flip {
             let position = &sorted.cloud.position;
             advect(model, &step, &bricks, position, &faces.velocity, &given)
         });
-        let scale = model.scene.water.rest_density * model.cell_size() / step.length;
+        let scale = model.scene.water.rest_density * model.cell_size() / step.kick;
         let mut pressure = waters.by_element(&projected.system, &projected.solution.x);
         if let Some(earlier) = &earlier {
             let before = waters.by_element(&earlier.system, &earlier.solution.x);
@@ -319,7 +319,7 @@ impl Flip {
             )?;
         }
         let step = self.model.step(substep);
-        let taken = |change: &DVec3| (-*change / substep.length).as_vec3().to_array();
+        let taken = |change: &DVec3| (-*change / substep.kick).as_vec3().to_array();
         self.field = Some(Field {
             is_buried: find_buried(&step, &trace.bricks, &trace.room),
             bricks: trace.bricks.clone(),
@@ -394,7 +394,7 @@ impl Flip {
                 start + elapsed,
                 length - elapsed,
                 surveyed.speed,
-                report.substeps,
+                (report.substeps, self.state.substep),
             )?;
             report.substeps += 1;
             let number = (frame, report.substeps);
@@ -411,6 +411,7 @@ impl Flip {
                 is_last: wanted <= 1.0,
             };
             elapsed += substep.length;
+            self.state.substep = substep.length;
             let density = trace.centers.density;
             *cloud = trace.after;
             self.show(span, cloud, watch)?;
@@ -505,7 +506,7 @@ impl Model {
             }
         });
         let sum: f64 = terms.sum();
-        self.cell_size().powi(2) * step.length * sum
+        self.cell_size().powi(2) * step.kick * sum
     }
 }
 

@@ -196,7 +196,7 @@ fn range_of(values: &[f64; 18]) -> [f64; 2] {
 
 /// Velocities from the grid: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its slope (APIC, Jiang et
 /// al. 2015), of drops v + g Δt; and the displacements of the density correction, where there is one. Faces that solids leave open in
-/// part count by that part, as in the projection, and at the surface v is clamped to the range of the faces' velocities.
+/// part count by that part, as in the projection, and at the surface v is clamped to the range of the faces' velocities and a little beyond it.
 pub fn grid_to_particle(
     model: &Model,
     step: &Step<'_>,
@@ -233,10 +233,15 @@ pub fn grid_to_particle(
         };
         let is_drop = !is_near(FLUID);
         let is_surface = is_near(AIR);
-        let ranges = [0, 1, 2].map(|axis| match is_surface {
-            true => range_of(&settled(raw[axis], &parts[axis])),
-            false => [f64::NEG_INFINITY, f64::INFINITY],
-        });
+        let ranges = [0, 1, 2].map(|axis| range_of(&settled(raw[axis], &parts[axis])));
+        let fastest = ranges
+            .iter()
+            .flatten()
+            .fold(0.0, |most: f64, v| most.max(v.abs()));
+        let beyond = match is_surface {
+            true => fastest * (fastest * step.length / size).min(1.0),
+            false => f64::INFINITY,
+        };
         let of_particle = move |i: usize| {
             let place = sorted.cloud.position[i] / size - cell;
             let v = sorted.cloud.velocity[i];
@@ -260,7 +265,7 @@ pub fn grid_to_particle(
                     u
                 } else {
                     let [low, high] = ranges[axis];
-                    (advanced + step.pic_blend * (u - advanced)).clamp(low, high)
+                    (advanced + step.pic_blend * (u - advanced)).clamp(low - beyond, high + beyond)
                 };
                 given.2[axis] = u;
                 given.3[axis] = shift.map_or(0.0, |shift| weighted(&shift[axis], a, b, c) / whole);

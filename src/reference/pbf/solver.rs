@@ -265,7 +265,7 @@ impl Pbf {
             id: self.state.id.clone(),
         };
         let numbers = (self.frame + 1, number);
-        let substep = projected_substep(start, step);
+        let substep = projected_substep(start, step, self.state.substep);
         let (is_drop, work) = grid.project_velocities(numbers, &mut cloud, &substep, all)?;
         self.is_drop = is_drop;
         (*position, *velocity) = (cloud.position, cloud.velocity);
@@ -419,6 +419,7 @@ impl Solver for Pbf {
             let begin = start + f64::from(k - 1) * step;
             boundary_work +=
                 self.project((k, begin), step, &mut position, &mut velocity, &mut all)?;
+            self.state.substep = step;
             let substep = Substep::new(&self.scene, start + f64::from(k) * step, step);
             let (some, slowed, work) = self.step(&substep, &mut position, &mut velocity);
             iterations += u64::from(some);

@@ -54,6 +54,7 @@ pub(super) fn whole_frame(scene: &Scene) -> Substep {
     Substep {
         start: 0.0,
         length: scene.shot.frame_seconds(),
+        kick: scene.shot.frame_seconds(),
         displacement: 0.0,
     }
 }

@@ -22,7 +22,6 @@ use swell_domain::{
     budget::Breach,
     flip::{layers, stored_cells},
     particles::Particles,
-    poisson::FLUID,
     shores::Shores,
     solver::{PassTime, Solver, StepReport, Watch},
     substep::Which,
@@ -69,8 +68,8 @@ pub struct Flip {
     bricks: Bricks,
     /// The walls that cut its cells, in cells.
     cut: Bounds,
-    /// Its length, s.
-    step: f64,
+    /// See [`Substep::kick`], s.
+    kick: f64,
 }
 
 /// What `flip/survey` found.
@@ -106,7 +105,7 @@ impl Flip {
             timer: is_timed.then(|| Timer::new(context)),
             bricks,
             cut: step::cut(scene, &frame),
-            step: frame.length,
+            kick: frame.kick,
             program,
             plan,
             scene: scene.clone(),
@@ -185,7 +184,13 @@ impl Flip {
             return Err(breach.in_substep(done.max(1)).into());
         }
         let frame = self.frame + 1;
-        let chosen = (self.scene).flip_substep(frame, start, remaining, survey.speed, done)?;
+        let chosen = (self.scene).flip_substep(
+            frame,
+            start,
+            remaining,
+            survey.speed,
+            (done, self.state.substep),
+        )?;
         Ok(chosen)
     }
 
@@ -220,7 +225,7 @@ impl Flip {
         let params = step::params(&self.scene, &self.plan, bricks, substep);
         let groups = groups(&self.program, &self.scene, &params, layers);
         self.cut = step::cut(&self.scene, substep);
-        self.step = substep.length;
+        self.kick = substep.kick;
         self.program.upload(PARAMS, 0, &[params]);
         (self.program).upload(BRICKS, 0, bytemuck::cast_slice(&bricks.records));
         self.program.upload(BRICK_SLOT, 0, &bricks.table);
@@ -301,7 +306,7 @@ impl Flip {
         run: &mut Run<'_>,
     ) -> Result<pressure::Projected, SolveError> {
         let scale = pressure::Scale {
-            time_step: substep.length,
+            kick: substep.kick,
             rest_density: self.scene.water.rest_density,
         };
         let cell_size = self.scene.solver.flip().cell_size;
@@ -353,7 +358,8 @@ impl Flip {
         )?;
         let work = self.watched(totals.substeps)?;
         let face = self.scene.solver.flip().cell_size.powi(2);
-        totals.work += face * substep.length * work;
+        totals.work += face * substep.kick * work;
+        self.state.substep = substep.length;
         Ok(())
     }
 
@@ -451,16 +457,6 @@ impl Flip {
     fn elements(&self) -> usize {
         (self.bricks.active as usize + 1) * CELLS as usize
     }
-
-    /// Relative densities in cells of water, as the last substep found them.
-    fn densities(&self) -> Result<Vec<f32>, SolveError> {
-        let cells = (self.bricks.wet as usize + 1) * CELLS as usize;
-        let wanted = (DENSITY.first(cells), CELL_KIND.first(cells));
-        let (density, kind) = self.program.download(wanted)?;
-        let of_cells = density.into_iter().zip(kind);
-        let in_water = of_cells.filter(|&(_, kind)| kind == FLUID);
-        Ok(in_water.map(|(density, _)| density).collect())
-    }
 }
 
 impl Solver for Flip {
@@ -539,6 +535,7 @@ impl TraceFrame for Flip {
             let begun = Begun {
                 number: totals.substeps + 1,
                 elapsed: totals.elapsed,
+                before: self.state.substep,
             };
             let is_traced = match span {
                 Span::From(first) => begun.number >= first,

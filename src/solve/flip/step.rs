@@ -38,7 +38,7 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
         partial_stride: plan.counts.bricks.wet as u32 * CELLS,
         wall_velocity_max: speed.max.as_vec3().to_array(),
         time_step: step.length as f32,
-        velocity_step: (scene.water.gravity * step.length).as_vec3().to_array(),
+        velocity_step: (scene.water.gravity * step.kick).as_vec3().to_array(),
         cell_size: flip.cell_size as f32,
         cells: plan.grid_dims,
         inverse_cell_size: (1.0 / flip.cell_size) as f32,
@@ -52,7 +52,8 @@ pub(super) fn params(scene: &Scene, plan: &Plan, bricks: &Bricks, step: &Substep
             .map(|axis| u32::from(scene.periodic[axis]) << axis)
             .sum(),
         apart_from_walls: flip.apart_from_walls() as f32,
-        padding: [0; 2],
+        kick: step.kick as f32,
+        padding: 0,
     }
 }
 

@@ -40,7 +40,7 @@ impl Flip {
             let breach = Breach::not_finite(self.frame + 1, survey.not_finite.into(), None);
             return Err(breach.in_substep(totals.substeps).into());
         }
-        let substep = projected_substep(start, length);
+        let substep = projected_substep(start, length, self.state.substep);
         self.run_substep(&survey.is_wet, &substep, totals, run)?;
         let own = &self.program;
         program.copy(&POSITION, own, &SORTED_POSITION, n);

@@ -4,12 +4,13 @@ use glam::DVec3;
 
 use super::{
     super::{SolveError, pressure, state::look, trace::Run},
-    CELL_KIND, FACE_CHANGE, Flip, FrameTotals, OPEN_VOLUME,
+    CELL_KIND, DENSITY, FACE_CHANGE, Flip, FrameTotals, OPEN_VOLUME,
 };
 use swell_domain::{
     bricks::CELLS,
     flip::{HALF, open_extent, part_of_solids},
     gauge::Gauge,
+    poisson::FLUID,
     probe::Patch,
     solver::{Seen, Span, Wanted, Watch},
 };
@@ -89,12 +90,22 @@ impl Flip {
             .collect())
     }
 
+    /// Relative densities in cells of water, as the last substep found them.
+    pub(super) fn densities(&self) -> Result<Vec<f32>, SolveError> {
+        let cells = (self.bricks.wet as usize + 1) * CELLS as usize;
+        let wanted = (DENSITY.first(cells), CELL_KIND.first(cells));
+        let (density, kind) = self.program.download(wanted)?;
+        let of_cells = density.into_iter().zip(kind);
+        let in_water = of_cells.filter(|&(_, kind)| kind == FLUID);
+        Ok(in_water.map(|(density, _)| density).collect())
+    }
+
     /// See [`Gauge::taken`].
     fn taken(&self) -> Result<Vec<[f32; 3]>, SolveError> {
         let stride = self.plan.counts.bricks.slots * CELLS as usize;
         let change: Vec<f32> = self.field(FACE_CHANGE, 3 * stride)?;
-        let step = self.step as f32;
-        let of = |element: usize| [0, 1, 2].map(|axis| -change[axis * stride + element] / step);
+        let kick = self.kick as f32;
+        let of = |element: usize| [0, 1, 2].map(|axis| -change[axis * stride + element] / kick);
         Ok((0..self.elements()).map(of).collect())
     }
 

@@ -441,6 +441,7 @@ impl Solver for Pbf {
         }
         check_finite(self.frame, &self.state, Some(&density))?;
         self.scene.answer(&mut self.state, self.frame);
+        self.state.substep = length / f64::from(substeps);
         if let Some(grid) = &mut self.grid {
             grid.take_answers(&self.state);
         }
@@ -512,7 +513,11 @@ impl TraceFrame for Pbf {
         for number in first..=last {
             let (time, step) = self.substep_of(count, number);
             let elapsed = f64::from(number - 1) * step;
-            let begun = Begun { number, elapsed };
+            let begun = Begun {
+                number,
+                elapsed,
+                before: self.state.substep,
+            };
             let mut tell = |traced: Traced<'_>| observe(begun, traced);
             self.prepare_substep(time, step, &mut |program, recordings| {
                 trace(recordings, program, &mut tell)

@@ -80,11 +80,11 @@ pub const WANTS_POCKETS: u32 = 3;
 /// Iterations submitted at once at most: a device that is done skips the rest, but not for nothing.
 const MOST_AT_ONCE: u32 = 64;
 
-/// What q of a substep stands for: pressure is q ρ Δx / Δt.
+/// What q of a substep stands for: pressure is q ρ Δx over the time for which it acts.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
-    /// Δt, seconds.
-    pub time_step: f64,
+    /// For how long it acts, seconds: Δt where substeps are equal.
+    pub kick: f64,
     /// ρ, kg/m³.
     pub rest_density: f64,
 }
@@ -240,7 +240,7 @@ impl PressureSolver {
         scale: Scale,
         run: &mut Run<'_>,
     ) -> Result<Projected, SolveError> {
-        let pressure = scale.rest_density * f64::from(self.phase.cell_size) / scale.time_step;
+        let pressure = scale.rest_density * f64::from(self.phase.cell_size) / scale.kick;
         self.phase.pressure_scale = pressure as f32;
         // Each substep looks for pockets anew.
         self.phase.has_pockets = 0;

@@ -71,7 +71,13 @@ fn trace_with(case: &Case, mut reference: Reference) -> Trace {
     let length = case.scene.shot.frame_seconds();
     let (wanted, substep) = case
         .scene
-        .flip_substep(FRAME + 1, f64::from(FRAME) * length, length, found.speed, 0)
+        .flip_substep(
+            FRAME + 1,
+            f64::from(FRAME) * length,
+            length,
+            found.speed,
+            (0, 0.0),
+        )
         .unwrap();
     assert_eq!(wanted, 1.0, "{}", case.name);
     reference.substep(&cloud, &found.is_wet, &substep).unwrap()

@@ -33,7 +33,7 @@ impl Grid {
         let length = case.scene.shot.frame_seconds();
         let start = f64::from(FRAME) * length;
         let (_, substep) = (case.scene)
-            .flip_substep(FRAME + 1, start, length, found.speed, 0)
+            .flip_substep(FRAME + 1, start, length, found.speed, (0, 0.0))
             .unwrap();
         let trace = reference.substep(&cloud, &found.is_wet, &substep).unwrap();
         Self {

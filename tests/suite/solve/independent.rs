@@ -303,6 +303,7 @@ fn step_of(length: f64, displacement: f64) -> step::Substep {
     step::Substep {
         start: 0.0,
         length,
+        kick: length,
         displacement,
     }
 }

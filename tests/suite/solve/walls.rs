@@ -32,6 +32,7 @@ fn one_substep(reference: &mut Flip, start: f64) -> Trace {
     let step = step::Substep {
         start,
         length: 1e-3,
+        kick: 1e-3,
         displacement: 1.0,
     };
     reference.substep(&cloud, &found.is_wet, &step).unwrap()

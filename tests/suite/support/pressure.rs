@@ -113,7 +113,7 @@ impl Rig {
 
     pub fn project(&mut self, timer: Option<&mut Timer>) -> Projected {
         let scale = Scale {
-            time_step: 1.0,
+            kick: 1.0,
             rest_density: 1.0 / self.case.cell_size,
         };
         self.solver.project(&self.program, scale, timer).unwrap()

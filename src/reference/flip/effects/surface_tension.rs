@@ -223,7 +223,7 @@ impl Acts for Settings {
         *velocity = timings.time("effects/tension_push", || {
             let tension = self.coefficient / model.scene.water.rest_density;
             let distance = model.has_ghost_fluid().then_some(&centers.distance[..]);
-            let step = (model, tension, step.length);
+            let step = (model, tension, step.kick);
             push(step, bricks, room, distance, &curvature, velocity)
         });
     }
