@@ -10,6 +10,9 @@
 @group(0) @binding(4) var<storage, read> face_velocity: array<f32>;
 @group(0) @binding(5) var<storage, read_write> cell_kind: array<u32>;
 @group(0) @binding(6) var<storage, read_write> solid_flux: array<f32>;
+#ifdef MOVING_SOLIDS
+@group(0) @binding(8) var<storage, read> closed_velocity: array<f32>;
+#endif
 #ifdef GHOST_FLUID
 @group(0) @binding(7) var<storage, read_write> liquid_distance: array<f32>;
 #endif
@@ -17,7 +20,7 @@
 const AIR = 0u;
 const FLUID = 1u;
 
-// Cells each way that a gap is followed.
+// Cells of a gap, at most: elements are known so far off.
 const MOST_GAP = 4;
 
 // A gap closes where its ends meet by more than this part of it.
@@ -38,7 +41,8 @@ struct End {
     kind: u32,
     // m/s, along the axis.
     velocity: f32,
-    // What the cells up to the end lack, in cells.
+    // Cells of air up to the end, and what all up to there lack, in cells.
+    cells: i32,
     gap: f32,
     // Of that, what water beside the cell lacks.
     beside: f32,
@@ -61,7 +65,7 @@ fn across(cell: vec3f, axis: u32) -> f32 {
 }
 
 fn end_of(cell: vec3f, axis: u32, side: i32) -> End {
-    var end = End(OPEN, 0.0, 0.0, 0.0);
+    var end = End(OPEN, 0.0, 0, 0.0, 0.0);
     var step = vec3i(0);
     step[axis] = side;
     for (var k = 0; k < MOST_GAP && end.kind == OPEN; k++) {
@@ -75,7 +79,13 @@ fn end_of(cell: vec3f, axis: u32, side: i32) -> End {
         let lack = lack_of(there, cell + vec3f((k + 1) * step), axis);
         end.kind = select(select(select(OPEN, WATER, is_water), UNKNOWN, !is_there), CLOSED, is_closed);
         // Of a face that is closed in part the velocity is the water's.
-        end.velocity = select(face_velocity[face], 0.0, is_closed && open > 0.0);
+#ifdef MOVING_SOLIDS
+        let of_solid = closed_velocity[face];
+#else
+        let of_solid = 0.0;
+#endif
+        end.velocity = select(face_velocity[face], of_solid, is_closed && open > 0.0);
+        end.cells += select(1, 0, is_closed || is_water);
         end.gap += select(lack, 0.0, is_closed);
         end.beside = select(end.beside, lack, is_water && !is_closed && k == 0);
     }
@@ -93,7 +103,8 @@ fn filled(element: u32, cell: vec3f) -> f32 {
             let gap = own + low.gap + high.gap;
             let closing = (low.velocity - high.velocity) * params.time_step * params.inverse_cell_size;
             let is_held = high.kind == WATER || (high.kind == CLOSED && low.kind == WATER);
-            let closes = is_held && closing > max(CLOSES * gap, LEAST_CLOSING);
+            let is_near = low.cells + high.cells < MOST_GAP;
+            let closes = is_held && is_near && closing > max(CLOSES * gap, LEAST_CLOSING);
             let part = clamp(closing / max(gap, 1e-6), 0.0, 1.0);
             let lack = across(cell, axis) * (own + low.beside + high.beside);
             most = select(most, max(most, lack * part), closes);

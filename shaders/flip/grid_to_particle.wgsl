@@ -2,7 +2,7 @@
 // slope (APIC, Jiang et al. 2015). At the surface v is clamped to the range of the 18 faces about it, and by what
 // the fastest of them goes in the step over a cell beyond it, at most as fast as that one: the grid does not see how a particle differs
 // from the flow, and there no pressure of neighbours bounds such differences, which grow the more the smaller the step. Impacts keep
-// theirs: a jet that meets a wall would press 1.3 times as hard without. A cell's particles share its faces, which are read once. Weights are multiplied by the faces' open fractions and normalized: the projection gives faces that
+// theirs: within the range alone a jet presses on a wall with 1.35 of its momentum. A cell's particles share its faces, which are read once. Weights are multiplied by the faces' open fractions and normalized: the projection gives faces that
 // are open by little several times their neighbours' velocities.
 // Faces beyond the domain's along b and c have the values of those before them, so that water slides along walls.
 #import "shared/thread.wgsl"

@@ -11,7 +11,7 @@ use super::{
     boundary::Boundary, bounds::Bounds, bricks::EDGE, pose::Pose, signed_distance::SignedDistance,
 };
 
-/// Cells that a gap before a wall has at most (flip/close_gaps).
+/// Cells of a gap, at most (flip/close_gaps).
 const MOST_GAP: f64 = 4.0;
 
 /// Nearer than this to a cell's face, in cells, a wall counts as on it.
@@ -92,7 +92,7 @@ impl Shores {
     }
 
     /// Marks what lies beside bricks that hold particles: bricks that solids cut, which stand at `poses`, in cells from the
-    /// domain's least corner, and those of which the walls at `cut` leave no more than [`MOST_GAP`] cells. `is_wet` is one
+    /// domain's least corner, and those of which the walls at `cut` leave no more than four cells, as many as a gap has (flip/close_gaps). `is_wet` is one
     /// flag a brick, `dims` bricks along each axis, x fastest; lengths are in cells.
     pub fn mark(
         &self,

@@ -20,7 +20,7 @@ pub struct Substep {
     pub start: f64,
     /// Seconds.
     pub length: f64,
-    /// For how long forces act, seconds: half of the substep before and half of this one, so that velocities stand in the middle
+    /// For how long gravity, pressure and surface tension act, seconds: half of the substep before and half of this one, so that velocities stand in the middle
     /// of substeps of whatever lengths (leapfrog).
     pub kick: f64,
     /// Most cells that a particle moves, as its speed, gravity, walls and solids have it.
@@ -30,9 +30,10 @@ pub struct Substep {
 /// Displacement, in cells, that faces around the water are filled for where particles ask for none beyond their own cells.
 const WITHIN_CELLS: f64 = 1.0;
 
-/// For how long forces act between a substep of `before` seconds, 0 where there was none, and one of `length`. Velocities stand in the
+/// For how long gravity, pressure and surface tension act between a substep of `before` seconds, 0 where there was none, and one of `length`. Velocities stand in the
 /// middle of substeps and places at their ends (leapfrog; Hairer, Lubich and Wanner 2006, §I.1.4): it is half of each. With the
-/// substep's own length, waves whose speed decides on substeps lose ω Δt / 4 of their amplitude in each swing.
+/// substep's own length, waves whose speed decides on substeps lose ω Δt / 4 of their amplitude in each swing. A start counts as the end of a
+/// substep as long as the first.
 fn kick(before: f64, length: f64) -> f64 {
     if before > 0.0 {
         0.5 * (before + length)
@@ -173,7 +174,7 @@ impl Scene {
             1.0
         };
         let length = remaining / wanted;
-        let reached = fastest + (gravity * length + push.gained(length));
+        let reached = fastest + (gravity * kick(before, length) + push.gained(length));
         if f64::from(done) + wanted > f64::from(flip.max_substeps) {
             let detail = format!(
                 "up to {reached:.3} m/s, particles {speed:.3}, with gravity, effects, wave makers and moving solids, at \

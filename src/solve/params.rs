@@ -90,7 +90,7 @@ mirror!(
         wall_velocity_max: [f32; 3],
         /// Seconds.
         time_step: f32,
-        /// Gravity times time step, m/s.
+        /// Gravity times `kick`, m/s.
         velocity_step: [f32; 3],
         /// Δx.
         cell_size: f32,
@@ -114,7 +114,7 @@ mirror!(
         periodic: u32,
         /// Water is pushed off walls that are nearer than half of this.
         apart_from_walls: f32,
-        /// Seconds for which forces act: half of the substep before and half of this one.
+        /// Seconds for which gravity, pressure and surface tension act: half of the substep before and half of this one.
         kick: f32,
         /// Unused.
         padding: u32,

@@ -11,7 +11,7 @@ use super::{
     water::open_parts,
 };
 
-/// Cells each way that a gap is followed.
+/// Cells of a gap, at most.
 const MOST_GAP: i32 = 4;
 
 /// A gap closes where its ends meet by more than this part of it.
@@ -30,7 +30,9 @@ struct End {
     is_water: bool,
     /// m/s, along the axis.
     velocity: f64,
-    /// What the cells up to the end lack, in cells.
+    /// Cells of air up to the end.
+    cells: i32,
+    /// What all cells up to the end lack, in cells.
     gap: f64,
     /// Of that, what water beside the cell lacks.
     beside: f64,
@@ -77,10 +79,11 @@ impl Gaps<'_> {
             let least = (LEAST_WAY + lean) * self.across(here, axis);
             if (side < 0 || there >= CELLS) && open < least {
                 // Of a face that is closed in part the velocity is the water's.
-                end.velocity = if open > 0.0 {
-                    0.0
-                } else {
-                    self.velocity[face][axis]
+                let moves = !self.model.scene.moving_solids.is_empty();
+                end.velocity = match open > 0.0 {
+                    true if moves => self.room.closed_velocity[face][axis],
+                    true => 0.0,
+                    false => self.velocity[face][axis],
                 };
                 return Some(end);
             }
@@ -95,6 +98,7 @@ impl Gaps<'_> {
                 end.beside = if k == 0 { lack } else { 0.0 };
                 return Some(end);
             }
+            end.cells += 1;
         }
         None
     }
@@ -112,7 +116,8 @@ impl Gaps<'_> {
             let closing =
                 (low.velocity - high.velocity) * self.step.length / self.model.cell_size();
             let closes = closing > (CLOSES * gap).max(LEAST_CLOSING) + lean;
-            if !closes || !(low.is_water || high.is_water) {
+            let is_near = low.cells + high.cells < MOST_GAP;
+            if !closes || !is_near || !(low.is_water || high.is_water) {
                 return None;
             }
             let lack = self.across(element, axis) * (own + low.beside + high.beside);

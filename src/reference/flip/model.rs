@@ -45,7 +45,7 @@ pub struct Step<'a> {
     pub length: f64,
     /// See [`Substep::kick`], seconds.
     pub kick: f64,
-    /// Gravity times Δt, m/s.
+    /// Gravity times `kick`, m/s.
     pub velocity_step: DVec3,
     /// Faces of the box at the end, metres: where particles are kept.
     pub walls: Bounds,

@@ -185,7 +185,7 @@ fn settled(values: [f64; 18], parts: &[f64; 18]) -> [f64; 18] {
     std::array::from_fn(|k| values[k] * parts[k] + mean * (1.0 - parts[k]))
 }
 
-/// From the least velocity that a particle may have among faces of these, to the greatest.
+/// Least and greatest velocity among faces.
 fn range_of(values: &[f64; 18]) -> [f64; 2] {
     let low = values.iter().fold(f64::INFINITY, |low, &v| low.min(v));
     let high = values

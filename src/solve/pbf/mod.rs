@@ -516,7 +516,7 @@ impl TraceFrame for Pbf {
             let begun = Begun {
                 number,
                 elapsed,
-                before: self.state.substep,
+                before: if number > 1 { step } else { self.state.substep },
             };
             let mut tell = |traced: Traced<'_>| observe(begun, traced);
             self.prepare_substep(time, step, &mut |program, recordings| {
