@@ -453,6 +453,7 @@ impl Flip {
             seen.particles.id.clone_from(&self.state.id);
             seen.particles.position.clone_from(&self.state.position);
             seen.particles.velocity.clone_from(&self.state.velocity);
+            seen.particles.substep = self.state.substep;
             self.round(cloud, &by_id(cloud), &mut seen.particles);
         }
         if wanted.pressures {

@@ -348,6 +348,7 @@ impl Pbf {
             seen.particles.id.clone_from(&self.state.id);
             let [positions, velocities] = self.rounded(position, velocity);
             (seen.particles.position, seen.particles.velocity) = (positions, velocities);
+            seen.particles.substep = step;
         }
         if wanted.pressures {
             (self.position, self.step) = (position.to_vec(), step);

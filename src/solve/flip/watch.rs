@@ -46,6 +46,7 @@ impl Flip {
         let mut seen = Seen::default();
         if wanted.particles {
             seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
+            seen.particles.substep = self.state.substep;
         }
         if wanted.pressures {
             seen.pressures = self.pressures_at(&self.scene.pressure_points())?;

@@ -354,6 +354,7 @@ impl Pbf {
         let mut seen = Seen::default();
         if wanted.particles {
             seen.particles = look(&self.program, &self.scene, &self.state, self.frame + 1)?;
+            seen.particles.substep = step;
         }
         if wanted.pressures {
             if self.grid.is_none() {
