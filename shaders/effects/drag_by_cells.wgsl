@@ -59,7 +59,7 @@ fn main(
     for (var i = first; i < end; i++) {
         let before = three(sorted_velocity[i]);
         // What gravity adds follows on the grid.
-        let after = blown(before, params.velocity_step, share, params.time_step) - params.velocity_step;
+        let after = blown(before, params.velocity_step, share, params.kick) - params.velocity_step;
         sorted_velocity[i] = packed(select(before, after, is_exposed(share)));
     }
 }

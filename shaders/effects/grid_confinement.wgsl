@@ -54,7 +54,7 @@ fn main(
     let element = thread + CELLS;
     for (var once = 0; once < select(0, 1, cell_kind[element] == FLUID); once++) {
         open_neighborhood(element);
-        let push = params.time_step * STRENGTH * params.cell_size * vec3f(
+        let push = params.kick * STRENGTH * params.cell_size * vec3f(
             confinement(vec3i(1, 0, 0)).x,
             confinement(vec3i(0, 1, 0)).y,
             confinement(vec3i(0, 0, 1)).z,

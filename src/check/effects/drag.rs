@@ -124,7 +124,7 @@ fn by_cells(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
             i,
             found[i],
             twin[i],
-            [blown(&settings, step.length, [error, exposure], both)],
+            [blown(&settings, step.kick, [error, exposure], both)],
         )
     });
     state.carry_velocities(found);

@@ -213,7 +213,7 @@ fn confine_on_grid(state: &mut FlipState, io: &mut Io<'_>) -> Outcome {
         omega.iter().enumerate().map(by).collect()
     };
     let others = [1.0, -1.0].map(|sign| twin(&grown(sign)));
-    let scale = step.length * strength * model.cell_size();
+    let scale = step.kick * strength * model.cell_size();
     io.table.each(&GRID_VELOCITY, elements.active(), |e| {
         let force = scale * elements.largest_about(e, |e| omega[e].length());
         let moved = others.iter().map(|other| other[e].distance(exact[e]));

@@ -90,6 +90,6 @@ pub fn grid_confinement(
             }
         };
         let push = DVec3::new(pushed(0), pushed(1), pushed(2));
-        velocity[e] + step.length * strength * model.cell_size() * push
+        velocity[e] + step.kick * strength * model.cell_size() * push
     })
 }

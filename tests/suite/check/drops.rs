@@ -15,14 +15,19 @@ use crate::support::{context, flip as of_flip};
 fn drops_at_round_places_are_within_tolerance_and_a_fault_in_drag_is_seen() {
     let context = context();
     for method in [Method::Flip, Method::Pbf] {
-        let (pass, row) = match method {
+        let (pass, row, [from, to]) = match method {
             Method::Flip => (
                 "effects/drag_by_cells",
                 ("effects/drag_by_cells", "velocity"),
+                ["share, params.kick)", "share, 0.99 * params.kick)"],
             ),
             Method::Pbf => (
                 "effects/drag_by_density",
                 ("effects/drag_by_density", "velocity"),
+                [
+                    "share, params.time_step)",
+                    "share, 0.99 * params.time_step)",
+                ],
             ),
         };
         for (drop_radius, wind) in [
@@ -62,11 +67,7 @@ fn drops_at_round_places_are_within_tolerance_and_a_fault_in_drag_is_seen() {
             );
             // Negative control: a hundredth less of the time that drag has.
             let mut spoiled = context.clone();
-            spoiled.spoil = Some(Spoil {
-                pass,
-                from: "share, params.time_step)",
-                to: "share, 0.99 * params.time_step)",
-            });
+            spoiled.spoil = Some(Spoil { pass, from, to });
             let found = checked(&spoiled);
             assert!(
                 over(&found).contains(&row),

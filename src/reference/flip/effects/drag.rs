@@ -56,7 +56,7 @@ pub fn drag_by_cells(
                 0.0 => v,
                 part => {
                     let both = [v, step.velocity_step];
-                    let seconds = part * step.length;
+                    let seconds = part * step.kick;
                     blown(both, settings.wind(), settings.drop_radius, seconds) - step.velocity_step
                 }
             })
