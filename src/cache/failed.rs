@@ -124,10 +124,13 @@ pub fn read(dir: &Path) -> Result<Failed, CacheError> {
         Some(walls) => Answers::deserialize(walls).map_err(|error| damaged(&error.to_string()))?,
         None => Answers::default(),
     };
-    let substep = fields.remove(SUBSTEP);
+    let substep = match fields.remove(SUBSTEP) {
+        Some(seconds) => f64::deserialize(seconds).map_err(|error| damaged(&error.to_string()))?,
+        None => 0.0,
+    };
     let start = Particles {
         walls,
-        substep: substep.and_then(|seconds| seconds.as_f64()).unwrap_or(0.0),
+        substep,
         ..frame::decode(&start.read(dir)?, &dir.join(START))?
     };
     Ok(Failed {

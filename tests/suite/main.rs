@@ -121,5 +121,6 @@ mod stage {
     mod drive;
     mod far_origin;
     mod sources;
+    mod substeps;
     mod whitewater;
 }

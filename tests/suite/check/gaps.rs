@@ -2,13 +2,13 @@
 
 use glam::DVec3;
 use swell::{
-    domain::{boundary::Boundary, motion::Motion, particles::Particles},
+    domain::{boundary::Boundary, bounds::Bounds, motion::Motion, particles::Particles},
     scene::{Method, Scene, Wall, WaveMaker},
     stage::{check::check_frame, prepare::Start},
 };
 
 use super::{Control, control, faults};
-use crate::support::{context, flip as rig, jitter, noise};
+use crate::support::{context, flip as rig, jitter, mover, noise};
 
 const CONTROLS: &[Control] = &[
     control(
@@ -45,7 +45,7 @@ const CONTROLS: &[Control] = &[
     ),
 ];
 
-/// Water from wall to wall, a little more than a cell over a floor that it passes in the substep; a wall moves.
+/// Water from wall to wall, a little more than a cell over a floor that it passes in the substep; a wall moves, and a floor of its own.
 fn landing(floor: &Boundary, height: f64) -> (Scene, Start) {
     let mut scene = rig::scene([16.0, 24.0, 8.0]);
     scene.solver.method = Method::Flip;
@@ -59,6 +59,17 @@ fn landing(floor: &Boundary, height: f64) -> (Scene, Start) {
         },
         absorption: None,
     });
+    if !floor.moving.is_empty() {
+        let bounds = Bounds {
+            min: DVec3::splat(-1.0),
+            max: DVec3::ONE,
+        };
+        let motion = Motion::ConstantVelocity {
+            velocity: 1.0,
+            until: None,
+        };
+        scene.moving_solids.push(mover(bounds, DVec3::Y, motion));
+    }
     let mut particles = rig::block([0, 1, 0], [16, 5, 8]);
     for x in &mut particles.position {
         x[1] += height as f32;
@@ -81,12 +92,24 @@ fn landing(floor: &Boundary, height: f64) -> (Scene, Start) {
     (scene, start)
 }
 
+/// The same as a solid that moves.
+fn rising(solid: Boundary) -> Boundary {
+    Boundary {
+        moving: solid.distance.into_iter().collect(),
+        ..Boundary::default()
+    }
+}
+
 #[test]
 fn gaps_that_close_are_within_tolerance_and_each_row_fails_where_it_should() {
     let mut all = String::new();
+    let slope = DVec3::new(0.2, 1.0, 0.0).normalize();
+    let solid = rig::half_space(slope, 1.3 * rig::DX);
     for (floor, height) in [
         (Boundary::default(), 0.0),
         (rig::half_space(DVec3::Y, 1.3 * rig::DX), 1.3 * rig::DX),
+        (solid.clone(), 1.3 * rig::DX),
+        (rising(solid), 1.3 * rig::DX),
     ] {
         let (scene, start) = landing(&floor, height);
         let state: &Particles = &start.particles;

@@ -112,6 +112,24 @@ fn tanks_of_any_depth_stand_still_and_weigh_what_water_weighs() {
     assert!(late > 10.0 * STILL, "{late} m/s");
 }
 
+/// Pressure is what the projection takes over the time for which it acts, which is half of the substep before as well.
+#[test]
+fn pressures_are_those_of_the_weight_after_a_substep_of_any_length() {
+    let (scene, mut particles) = tank(10);
+    for before in [0.25, 1.0, 4.0] {
+        particles.substep = before * scene.shot.frame_seconds();
+        for (name, found) in [
+            ("GPU", at_rest(on_gpu(&scene, &particles), 10, 1, 1).2),
+            ("f64", at_rest(in_f64(&scene, &particles), 10, 1, 1).2),
+        ] {
+            assert_eq!(found.len(), 5);
+            for ratio in found {
+                assert!((ratio - 1.0).abs() < PRESSURE, "{name}, {before}: {ratio}");
+            }
+        }
+    }
+}
+
 /// Water 20 layers deep with the velocities of a standing wave of half a length in the box, ω² = g k tanh kh.
 fn wave() -> (Scene, Particles, f64) {
     let (length, depth) = (4.0, 2.0);
