@@ -1,9 +1,10 @@
 // Particles take the grid's velocity and its change: v = α u + (1 − α)(v + Δu) (Zhu and Bridson 2005), or u and its
 // slope (APIC, Jiang et al. 2015). At the surface v is clamped to the range of the 18 faces about it, and by what
 // the fastest of them goes in the step over a cell beyond it, at most as fast as that one: the grid does not see how a particle differs
-// from the flow, and there no pressure of neighbours bounds such differences, which grow the more the smaller the step. Impacts keep
-// theirs: within the range alone a jet presses on a wall with 1.35 of its momentum. A cell's particles share its faces, which are read once. Weights are multiplied by the faces' open fractions and normalized: the projection gives faces that
-// are open by little several times their neighbours' velocities.
+// from the flow, and there no pressure of neighbours bounds such differences, which grow the more the smaller the step. Without that margin
+// a jet presses on a wall with more than its momentum. A cell's particles share its faces, which are read once. Weights are multiplied
+// by the faces' open fractions and normalized: the projection gives faces that are open by little several times their neighbours'
+// velocities.
 // Faces beyond the domain's along b and c have the values of those before them, so that water slides along walls.
 #import "shared/thread.wgsl"
 #import "shared/vector.wgsl"
@@ -93,7 +94,7 @@ fn weighed(values: Values, part: Values) -> Values {
 
 #endif
 #ifndef APIC
-// No velocity, m/s.
+// Above any velocity, m/s.
 const FAR = 1e30;
 
 fn least(values: Values) -> f32 {
@@ -296,7 +297,14 @@ fn main(
         to_before = select(to_before, vec3i(1), is_periodic());
         to_after = select(to_after, vec3i(1), is_periodic());
 #endif
-        about = look_about(to_before, to_after);
+#ifdef APIC
+        let is_looked_about = cell_kind[element] != FLUID;
+#else
+        let is_looked_about = true;
+#endif
+        for (var once = 0; once < select(0, 1, is_looked_about); once++) {
+            about = look_about(to_before, to_after);
+        }
         let x = vec3i(1, 0, 0);
         let y = vec3i(0, 1, 0);
         let z = vec3i(0, 0, 1);

@@ -20,8 +20,8 @@ pub struct Substep {
     pub start: f64,
     /// Seconds.
     pub length: f64,
-    /// For how long gravity, pressure and surface tension act, seconds: half of the substep before and half of this one, so that velocities stand in the middle
-    /// of substeps of whatever lengths (leapfrog).
+    /// For how long forces act, seconds: half of the substep before and half of this one, so that
+    /// velocities are at mid-substep whatever the lengths (leapfrog).
     pub kick: f64,
     /// Most cells that a particle moves, as its speed, gravity, walls and solids have it.
     pub displacement: f64,
@@ -30,10 +30,10 @@ pub struct Substep {
 /// Displacement, in cells, that faces around the water are filled for where particles ask for none beyond their own cells.
 const WITHIN_CELLS: f64 = 1.0;
 
-/// For how long gravity, pressure and surface tension act between a substep of `before` seconds, 0 where there was none, and one of `length`. Velocities stand in the
-/// middle of substeps and places at their ends (leapfrog; Hairer, Lubich and Wanner 2006, §I.1.4): it is half of each. With the
-/// substep's own length, waves whose speed decides on substeps lose ω Δt / 4 of their amplitude in each swing. A start counts as the end of a
-/// substep as long as the first.
+/// For how long forces act between a substep of `before` seconds, 0 where there was none, and one of
+/// `length`: half of each. Velocities are at mid-substep, positions at substep ends (leapfrog; Hairer, Lubich and Wanner 2006,
+/// §I.1.4). With the substep's own length instead, waves whose speed determines the substeps lose ω Δt / 4 of their amplitude in each
+/// swing. The start counts as the end of a substep as long as the first.
 fn kick(before: f64, length: f64) -> f64 {
     if before > 0.0 {
         0.5 * (before + length)
