@@ -50,6 +50,7 @@ pub mod sph;
 pub mod statistics;
 pub mod substep;
 pub mod surface;
+pub mod thin;
 pub mod tolerance;
 mod voxels;
 pub mod water_mesh;

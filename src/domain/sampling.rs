@@ -256,7 +256,7 @@ fn looks_out(domain: &Bounds, p: DVec3, normal: DVec3, tolerance: f64) -> bool {
 
 /// The `c`-th point of a low-discrepancy sequence (Roberts 2018, R2) over a triangle, shifted by
 /// a hash of the triangle's index.
-fn candidate([a, b, c]: &[DVec3; 3], triangle: u64, index: u64) -> DVec3 {
+pub(crate) fn candidate([a, b, c]: &[DVec3; 3], triangle: u64, index: u64) -> DVec3 {
     const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     let coordinate = |axis: u64| {
         let shift = uniform(2 * triangle + axis);

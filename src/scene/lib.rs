@@ -29,6 +29,7 @@ mod error;
 mod keep;
 mod key;
 mod lint;
+mod lint_solids;
 mod load;
 mod origin;
 mod overrides;
@@ -37,6 +38,7 @@ mod reach;
 mod regular_waves;
 mod seas;
 mod settle;
+pub mod solid_grid;
 pub mod solid_track;
 pub mod sources;
 mod spec;
@@ -226,7 +228,7 @@ pub struct PlacedMesh {
 impl PlacedMesh {
     /// That it is open, with its holes; `None` for a closed mesh.
     fn warning(&self) -> Option<String> {
-        let name = self.file.file_name().unwrap_or_default().to_string_lossy();
+        let name = self.name();
         (!self.holes.0.is_empty()).then(|| {
             format!(
                 "{name} is open and taken as closed: {}; inside is where its winding number is above one half, about \

@@ -19,7 +19,7 @@ use swell_solve::plan::{DeviceLimits, Plan, device_limits};
 
 use super::{Blame, device::needs, prepare::Start, probes, whitewater};
 
-pub use super::prepare::MOST_NODES;
+pub use swell_scene::solid_grid::MOST_NODES;
 pub use swell_solve::plan::LIST_BUDGET;
 
 pub use swell_cache::{

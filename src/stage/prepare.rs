@@ -1,17 +1,13 @@
 //! From a scene to what a solver starts from: particles, boundary, plan.
 
-use std::borrow::Cow;
-
 use swell_cache::{CacheError, CacheReader};
 use swell_domain::{
     boundary::Boundary,
     bounds::Bounds,
-    flip as flip_domain,
     mesh::TriangleMesh,
     particles::Particles,
-    pbf,
     sampling::{BoundarySample, boundary_samples, fill_water},
-    signed_distance::{SignedDistance, SignedDistanceError, fitting_spacing},
+    signed_distance::{SignedDistance, SignedDistanceError},
     sources::Sources,
 };
 use swell_scene::{Method, Scene};
@@ -19,14 +15,6 @@ use swell_solve::{
     flip,
     plan::{Capacity, Counts, DeviceLimits, Plan},
 };
-
-/// Spacings that the signed distance reaches beyond the solids: more than the contact distance and the cells
-/// that a substep crosses.
-const MARGIN: f64 = 4.0;
-
-/// Nodes of the grid of solids that do not move: as many values as a binding of 128 MiB holds, which every adapter has. Where that
-/// does for less than one a particle spacing, they stand farther apart, whatever the adapter.
-pub const MOST_NODES: usize = 1 << 25;
 
 /// A scene's start.
 #[derive(Clone, Debug)]
@@ -187,7 +175,7 @@ fn samples(
     distance: Option<&SignedDistance>,
 ) -> Vec<BoundarySample> {
     let (images, spacing) = (
-        scene.with_images(mesh, margin(scene)),
+        scene.with_images(mesh, scene.solid_margin()),
         scene.particle_spacing(),
     );
     let mut samples: Vec<_> = (images.iter())
@@ -217,33 +205,17 @@ fn all_samples(scene: &Scene, mesh: &TriangleMesh) -> Vec<BoundarySample> {
     })
 }
 
-/// Metres that a signed distance reaches beyond the solids: where the domain joins its own end, as far as a particle may
-/// come beyond it in a substep as well.
-fn margin(scene: &Scene) -> f64 {
-    let way = match scene.solver.method {
-        Method::Pbf => pbf::CAP * scene.solver.pbf().cfl * scene.particle_spacing(),
-        Method::Flip => {
-            let flip = scene.solver.flip();
-            flip_domain::CAP * flip.cfl * flip.cell_size
-        }
-    };
-    let beyond = if scene.is_periodic() { way } else { 0.0 };
-    MARGIN * scene.particle_spacing() + beyond
-}
-
 /// Of the union of meshes, as far as water can come to them.
 fn distance<'a>(
     scene: &Scene,
     meshes: impl Iterator<Item = &'a TriangleMesh>,
 ) -> Result<Option<SignedDistance>, SignedDistanceError> {
     let meshes: Vec<_> = meshes
-        .flat_map(|mesh| scene.with_images(mesh, margin(scene)))
+        .flat_map(|mesh| scene.with_images(mesh, scene.solid_margin()))
         .collect();
-    match solid_bounds(scene, &meshes) {
-        Some(bounds) => {
-            let meshes = meshes.iter().map(AsRef::as_ref);
-            let spacing = fitting_spacing(&bounds, scene.particle_spacing(), MOST_NODES);
-            SignedDistance::from_meshes(meshes, &bounds, spacing)
+    match scene.solid_grid(&meshes) {
+        Some((bounds, spacing)) => {
+            SignedDistance::from_meshes(meshes.iter().map(AsRef::as_ref), &bounds, spacing)
         }
         None => Ok(None),
     }
@@ -257,40 +229,18 @@ fn moving_distances(scene: &Scene) -> Result<Vec<SignedDistance>, SignedDistance
         solids.filter_map(|solid| Some((&solid.placed.mesh, solid.placed.mesh.bounds()?)));
     bounded
         .map(|(mesh, bounds)| {
-            let mut bounds = bounds.grown(margin(scene));
+            let mut bounds = bounds.grown(scene.solid_margin());
             if !scene.is_periodic() {
                 return SignedDistance::from_mesh(mesh, &bounds, spacing);
             }
-            let reach = scene.domain.grown(margin(scene));
+            let reach = scene.domain.grown(scene.solid_margin());
             for axis in (0..3).filter(|&axis| scene.periodic[axis]) {
                 (bounds.min[axis], bounds.max[axis]) = (reach.min[axis], reach.max[axis]);
             }
-            let images = scene.with_images(mesh, margin(scene));
+            let images = scene.with_images(mesh, scene.solid_margin());
             let images = images.iter().map(AsRef::as_ref);
             let distance = SignedDistance::from_meshes(images, &bounds, spacing)?;
             Ok(distance.expect("the mesh itself is among its images"))
         })
         .collect()
-}
-
-/// Where meshes are, with room about them, as far as water can come.
-fn solid_bounds(scene: &Scene, meshes: &[Cow<'_, TriangleMesh>]) -> Option<Bounds> {
-    let margin = margin(scene);
-    let reach = scene.domain.grown(margin);
-    let mut all: Option<Bounds> = None;
-    for bounds in meshes.iter().filter_map(|mesh| mesh.bounds()) {
-        all = Some(match all {
-            None => bounds,
-            Some(other) => Bounds {
-                min: other.min.min(bounds.min),
-                max: other.max.max(bounds.max),
-            },
-        });
-    }
-    let grown = all?.grown(margin);
-    let clipped = Bounds {
-        min: grown.min.max(reach.min),
-        max: grown.max.min(reach.max),
-    };
-    clipped.min.cmplt(clipped.max).all().then_some(clipped)
 }

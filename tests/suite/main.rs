@@ -106,10 +106,12 @@ mod solve {
     mod projected;
     mod sources;
     mod tension;
+    mod thin;
     mod thin_water;
     mod turning_solids;
     mod viscous;
     mod walls;
+    mod wave_wall;
     mod whitewater;
     mod zones;
 }

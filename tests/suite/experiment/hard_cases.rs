@@ -162,6 +162,7 @@ cases! {
     case_36_at_rest_beside_solids: 36,
     case_37_short_steps: 37,
     case_38_falling_slab: 38,
+    case_39_onto_a_roof: 39,
 }
 
 /// Negative control of the engine: whatever a mark measures, one beyond that is missed, and so is one of a run that ends

@@ -1,0 +1,96 @@
+//! Water before a wall that makes a wave has the wave's depth, whatever part of a cell the wall goes in a step.
+
+use swell::cache::CacheReader;
+
+use crate::support::job::Job;
+
+const SCENE: &str = r#"
+[shot]
+name = "solitary"
+frames = 23
+frames_per_second = 6
+[domain]
+min = [0.0, 0.0, 0.0]
+max = [1.5, 0.5, 0.075]
+[[water.block]]
+min = [0.0, 0.0, 0.0]
+max = [1.5, 0.25, 0.075]
+[[wave_maker]]
+wall = "-x"
+motion = { kind = "solitary", height = 0.025, depth = 0.25 }
+[solver]
+[solver.flip]
+cell_size = 0.025
+[solver.pbf]
+particle_spacing = 0.0125
+"#;
+const HEIGHT: f64 = 0.025;
+const DEPTH: f64 = 0.25;
+const SPACING: f64 = 0.0125;
+/// When the domain's other end is not reached yet, and the crest has passed the wall; seconds.
+const UNTIL: f64 = 3.8;
+
+/// Of the depth, between frames and theory.
+const TOLERANCE: f64 = 0.02;
+
+/// Goring 1978: where the wall is, and the depth before it, at a time.
+fn goring(t: f64) -> (f64, f64) {
+    let k = (0.75 * HEIGHT / DEPTH).sqrt();
+    let celerity = (9.81 * (DEPTH + HEIGHT)).sqrt();
+    // The crest starts at χ = −6.
+    let phase = |x: f64| k / DEPTH * (celerity * t - x) - 6.0;
+    let (mut low, mut high) = (0.0, 2.0 * HEIGHT / k);
+    for _ in 0..60 {
+        let x = 0.5 * (low + high);
+        if x < HEIGHT / k * (phase(x).tanh() + 6.0_f64.tanh()) {
+            low = x;
+        } else {
+            high = x;
+        }
+    }
+    (low, DEPTH + HEIGHT / phase(low).cosh().powi(2))
+}
+
+/// Largest deviation of the depth in two cells before the wall from theory's, and from still water's, parts of these.
+fn deviations(job: &Job, name: &str, rate: u32) -> [f64; 2] {
+    let reader = CacheReader::open(&job.path(name)).unwrap();
+    let mut most = [0.0f64; 2];
+    for frame in 1..=reader.last_frame() {
+        let (wall, depth) = goring(f64::from(frame) / f64::from(rate));
+        let state = reader.read(frame).unwrap();
+        let near = state.position.iter().map(|x| x.map(f64::from));
+        let near = near.filter(|x| x[0] < wall + 4.0 * SPACING);
+        let top = near.map(|x| x[1]).fold(f64::NEG_INFINITY, f64::max) + 0.5 * SPACING;
+        for (most, truth) in most.iter_mut().zip([depth, DEPTH]) {
+            *most = most.max((top / truth - 1.0).abs());
+        }
+    }
+    most
+}
+
+/// At 6 frames a second the wall goes 1.0 cell in a frame, at 96 less than 0.07. Control: water that stays as it was.
+#[test]
+fn water_before_a_wall_that_makes_a_wave_has_the_waves_depth_at_any_frame_rate() {
+    let job = Job::of(&[("solitary.toml", SCENE)]);
+    let rates: [(&str, &[u32]); 2] = [("gpu", &[6, 24, 96]), ("cpu", &[12])];
+    for (device, rates) in rates {
+        for &rate in rates {
+            for solver in ["flip", "pbf"] {
+                let (name, frames) = (
+                    format!("{solver}-{device}-{rate}"),
+                    (UNTIL * f64::from(rate)).floor(),
+                );
+                job.expect(
+                    0,
+                    &format!(
+                        "bake solitary.toml --solver {solver} --device {device} -o {name} --set shot.frames_per_second={rate} --set shot.frames={frames}"
+                    ),
+                );
+                let [off, still] = deviations(&job, &name, rate);
+                println!("{name}: {off:.4}");
+                assert!(off < TOLERANCE, "{name}: {off}");
+                assert!(still > 3.0 * TOLERANCE, "{name}: {still}");
+            }
+        }
+    }
+}
