@@ -23,10 +23,10 @@ use super::{
 pub(super) struct ExportArgs {
     /// Cache directory.
     cache: PathBuf,
-    /// The water's surface, closed, with velocities: a file a frame, such as m.%04d.ply (.obj, .usda, .usdc).
+    /// The water's surface, closed, with velocities: a file a frame, such as m.%04d.ply (.obj, .usda, .usd, .usdc).
     #[arg(long, value_name = "FILES")]
     mesh: Option<Pattern>,
-    /// A shot for USD, such as shot.usda (.usdc): water, solids and wave makers, with a layer a frame beside it.
+    /// A shot for USD, such as shot.usda (.usd, which is text too, .usdc): water, solids and wave makers, with a layer a frame beside it.
     #[arg(long, value_name = "FILE")]
     usd: Option<PathBuf>,
     /// How the shot has its water.
@@ -206,7 +206,11 @@ fn places(request: &Request) -> Vec<String> {
 
 fn tell(progress: &Progress, event: Event) {
     match event {
-        Event::Ready { frames, files } => {
+        Event::Ready {
+            frames,
+            files,
+            warnings,
+        } => {
             progress.begin(frames as u64);
             progress.say(
                 &format!(
@@ -216,6 +220,12 @@ fn tell(progress: &Progress, event: Event) {
                 ),
                 json!({ "event": "ready", "frames": frames, "files": files }),
             );
+            for warning in &warnings {
+                progress.say(
+                    &format!("warning: {warning}"),
+                    json!({ "event": "warning", "what": "look", "text": warning }),
+                );
+            }
         }
         Event::Warning(text) => {
             progress.say(

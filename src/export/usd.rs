@@ -13,7 +13,7 @@ use swell_domain::{
     water_mesh::WaterMesh,
 };
 
-use text::{Text, name, quoted};
+use text::{Text, asset, name, quoted};
 
 /// What all layers of a shot have in common.
 #[derive(Clone, Copy, Debug)]
@@ -84,7 +84,7 @@ pub struct Root<'a> {
     pub kind: Kind,
     /// Attributes of the particles, by name; of points alone.
     pub attributes: Vec<String>,
-    /// The layers of the frames, beside the root.
+    /// The layers of the frames, files beside the root; names without line ends.
     pub layers: Vec<(u32, String)>,
     /// The layer that says which attributes the frames' layers have.
     pub manifest: String,
@@ -232,11 +232,11 @@ pub fn root(root: &Root<'_>) -> Vec<u8> {
         .map(|(k, (frame, _))| format!("({frame}, {k})"));
     let active = active.collect::<Vec<_>>().join(", ");
     text.line(&format!("            double2[] active = [{active}]"));
-    let layers = listed(&|(_, file)| format!("@./{file}@"));
+    let layers = listed(&|(_, file)| asset(file));
     text.line(&format!("            asset[] assetPaths = [{layers}]"));
     text.line(&format!(
-        "            asset manifestAssetPath = @./{}@",
-        root.manifest
+        "            asset manifestAssetPath = {}",
+        asset(&root.manifest)
     ));
     text.line(&format!(
         "            string primPath = \"/{name_of_shot}\""

@@ -207,7 +207,9 @@ impl Look {
         match start {
             None => frame / frames_per_second,
             Some((file, start)) => {
-                let rate = file.rate().unwrap_or(frames_per_second);
+                let rate = file
+                    .rate()
+                    .map_or(frames_per_second, |it| it.codes_per_second);
                 start / rate + (frame - 1.0) / frames_per_second
             }
         }

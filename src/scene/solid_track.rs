@@ -11,7 +11,7 @@ use super::{
     error::SceneError,
     gltf_nodes::{Beside, Nodes, named},
     spec::TrackSpec,
-    usd_nodes::{self, UsdNodes},
+    usd_nodes::{self, Rate, UsdNodes},
     usda::Prim,
     words::shown,
 };
@@ -32,7 +32,7 @@ const MOST_POSES: usize = 1_000_000;
 type Result<T> = std::result::Result<T, SceneError>;
 
 /// Where a solid stands at some times: between them it goes straight and turns the shorter way, evenly.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Track {
     /// Seconds, ascending from 0 on, with where the point of rest is, metres about the scene's origin, and how the solid is
     /// turned; the first is not.
@@ -41,6 +41,15 @@ pub struct Track {
     reach: f64,
     /// Of a file that moves the solid before or after the shot alone.
     missed: Option<Missed>,
+    /// That the file counts other frames than the shot does.
+    other_rate: Option<String>,
+}
+
+/// By where it goes: what a file was hardly meant to do is no part of that, and not in a scene that is written out.
+impl PartialEq for Track {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.poses, self.reach) == (&other.poses, other.reach)
+    }
 }
 
 /// When a file moves what stands still over the whole shot, in the file's frames.
@@ -90,6 +99,7 @@ impl Track {
             reach: away.fold(0.0, f64::max),
             poses,
             missed: None,
+            other_rate: None,
         })
     }
 
@@ -177,13 +187,18 @@ pub(super) fn build(
         };
         fault(&key, problem)
     })?;
-    let rate = moves.rate().unwrap_or(shot.frames_per_second);
+    let per_second = shot.frames_per_second;
+    let rate = moves.rate().map_or(per_second, |it| it.codes_per_second);
     let begin = spec.start.map_or(0.0, |start| start / rate - shot.time(1));
     let poses = sampled(&moves, begin, shot)
         .map_err(|problem| fault(&file_key, format!("{called}: {problem}")))?;
     let track = Track::new(poses, mesh).map_err(|problem| fault(&file_key, problem))?;
+    let moved = moves.times_moved();
+    let other_rate = (moves.rate().filter(|_| !moved.is_empty()))
+        .and_then(|rate| rate.lint("solid.track.file", per_second));
     Ok(Track {
-        missed: missed(&moves.times_moved(), [begin, begin + shot.duration()], rate),
+        missed: missed(&moved, [begin, begin + shot.duration()], rate),
+        other_rate,
         ..track
     })
 }
@@ -201,18 +216,18 @@ fn missed(moved: &[f64], shot: [f64; 2], rate: f64) -> Option<Missed> {
 }
 
 impl Scene {
-    /// Solids that a file moves before or after the shot alone.
+    /// Solids that a file moves before or after the shot alone, or by other frames than the shot's.
     pub(super) fn lint_tracks(&self) -> Vec<String> {
-        let solids = self.moving_solids.iter();
-        let tracks = solids.filter_map(|it| it.track.as_ref()?.missed);
-        let told = tracks.map(|Missed { moves, shot }| {
+        let tracks = || self.moving_solids.iter().filter_map(|it| it.track.as_ref());
+        let rates = tracks().filter_map(|track| track.other_rate.clone());
+        let told = tracks().filter_map(|track| track.missed).map(|Missed { moves, shot }| {
             let ([begin, end], [from, to]) = (moves.map(shown), shot.map(shown));
             format!(
                 "solid.track.start: the file moves a solid over frames {begin} to {end}, and the shot has frames {from} to {to} of it, so that \
                  the solid stands still; start = {begin} makes the first of its frames frame 1"
             )
         });
-        told.collect()
+        rates.chain(told).collect()
     }
 }
 
@@ -281,11 +296,11 @@ impl Moves {
         }
     }
 
-    /// Frames a second of the file's own count; `None` where it counts seconds alone.
-    fn rate(&self) -> Option<f64> {
+    /// Time codes a second of the file's own count; `None` where it counts seconds alone.
+    fn rate(&self) -> Option<Rate> {
         match self {
             Self::Gltf(_) => None,
-            Self::Usd(nodes) => Some(nodes.codes_per_second()),
+            Self::Usd(nodes) => Some(nodes.rate()),
         }
     }
 

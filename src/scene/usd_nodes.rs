@@ -5,7 +5,10 @@
 
 use glam::{DMat4, DQuat, DVec3, DVec4};
 
-use super::usda::{Layer, Prim, Value};
+use super::{
+    usda::{Layer, Prim, Value},
+    words::shown,
+};
 
 /// What a binary file begins with, and a package of files.
 const BINARY: &[u8] = b"PXR-USDC";
@@ -20,6 +23,9 @@ const ARCS: [&str; 5] = [
     "variantSets",
 ];
 
+/// By which part two rates may differ and be one: 23.976 stands for 24000/1001.
+const SAME_RATE: f64 = 1e-5;
+
 /// Words for why nothing can be read.
 type Result<T> = std::result::Result<T, String>;
 
@@ -28,7 +34,7 @@ type Result<T> = std::result::Result<T, String>;
 pub(super) struct UsdNodes {
     /// From the prim up to the root, each with its operations in the order that a point meets them.
     steps: Vec<Vec<Operation>>,
-    codes_per_second: f64,
+    rate: Rate,
     /// From the layer's units and up axis to metres with y up.
     world: DMat4,
     metres_per_unit: f64,
@@ -50,7 +56,7 @@ impl UsdNodes {
         let metres_per_unit = number(layer, "metersPerUnit", 0.01)?;
         Ok(Self {
             steps,
-            codes_per_second: number(layer, "timeCodesPerSecond", 24.0)?,
+            rate: Rate::of(layer)?,
             world: up(layer)? * DMat4::from_scale(DVec3::splat(metres_per_unit)),
             metres_per_unit,
         })
@@ -58,12 +64,12 @@ impl UsdNodes {
 
     /// The time code at a time, seconds.
     pub(super) fn code(&self, seconds: f64) -> f64 {
-        seconds * self.codes_per_second
+        seconds * self.rate.codes_per_second
     }
 
     /// Time codes a second.
-    pub(super) fn codes_per_second(&self) -> f64 {
-        self.codes_per_second
+    pub(super) fn rate(&self) -> Rate {
+        self.rate
     }
 
     /// Metres that the layer's unit of length has.
@@ -97,7 +103,7 @@ impl UsdNodes {
         beside: impl Iterator<Item = &'a Curve> + 'a,
     ) -> impl Iterator<Item = f64> + 'a {
         let codes = self.curves(beside).flat_map(Curve::codes);
-        codes.map(|code| code / self.codes_per_second)
+        codes.map(|code| code / self.rate.codes_per_second)
     }
 
     /// The same of those that move.
@@ -107,7 +113,7 @@ impl UsdNodes {
     ) -> impl Iterator<Item = f64> + 'a {
         let moved = self.curves(beside).filter(|curve| curve.moves());
         let codes = moved.flat_map(Curve::codes);
-        codes.map(|code| code / self.codes_per_second)
+        codes.map(|code| code / self.rate.codes_per_second)
     }
 
     fn curves<'a>(
@@ -116,6 +122,44 @@ impl UsdNodes {
     ) -> impl Iterator<Item = &'a Curve> + 'a {
         let operations = self.steps.iter().flatten().map(|it| &it.curve);
         operations.chain(beside)
+    }
+}
+
+/// How many time codes of a layer a second has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Rate {
+    pub(super) codes_per_second: f64,
+    /// The key of the layer's metadata that says so; `None` of a layer that says nothing.
+    said: Option<&'static str>,
+}
+
+impl Rate {
+    /// As `SdfLayer::GetTimeCodesPerSecond` finds it: `timeCodesPerSecond`, else `framesPerSecond`, else 24.
+    fn of(layer: &Layer) -> Result<Self> {
+        let keys = ["timeCodesPerSecond", "framesPerSecond"];
+        let said = (keys.into_iter()).find(|key| layer.metadata.contains_key(*key));
+        Ok(Self {
+            codes_per_second: said.map_or(Ok(24.0), |key| number(layer, key, 24.0))?,
+            said,
+        })
+    }
+
+    /// That the file at `key` counts other frames than a shot of `frames_per_second` does; `None` where both count the same.
+    pub(super) fn lint(self, key: &str, frames_per_second: f64) -> Option<String> {
+        let rate = self.codes_per_second;
+        if (rate / frames_per_second - 1.0).abs() <= SAME_RATE {
+            return None;
+        }
+        let by = match self.said {
+            Some(said) => format!("by its {said}"),
+            None => "as every layer that does not say its timeCodesPerSecond".to_owned(),
+        };
+        Some(format!(
+            "{key}: the file has {} time codes a second, {by}, and the shot has {} frames; a second of the file is one of the shot, \
+             and its time codes are not the shot's frames",
+            shown(rate),
+            shown(frames_per_second)
+        ))
     }
 }
 
@@ -387,7 +431,10 @@ fn operations(prim: &Prim) -> Result<(Vec<Operation>, bool)> {
 fn number(layer: &Layer, key: &str, left_out: f64) -> Result<f64> {
     match layer.metadata.get(key) {
         None => Ok(left_out),
-        Some(Value::Numbers(numbers)) if numbers.len() == 1 && numbers[0] > 0.0 => Ok(numbers[0]),
+        Some(Value::Numbers(numbers)) => match numbers[..] {
+            [number] if number > 0.0 && number.is_finite() => Ok(number),
+            _ => Err(format!("{key} is no positive number")),
+        },
         Some(_) => Err(format!("{key} is no positive number")),
     }
 }

@@ -163,14 +163,8 @@ impl<'a> Tokens<'a> {
         };
         match first {
             '"' | '\'' => self.quoted(first).map(Some),
-            '@' => {
-                let mark = if self.rest().starts_with("@@@") {
-                    "@@@"
-                } else {
-                    "@"
-                };
-                self.until(mark, mark).map(Some)
-            }
+            '@' if self.rest().starts_with("@@@") => self.long_asset().map(Some),
+            '@' => self.until("@", "@").map(Some),
             '<' => self.until("<", ">").map(Some),
             '(' | ')' | '[' | ']' | '{' | '}' | '=' | ',' | ';' | ':' => {
                 self.step(1);
@@ -214,6 +208,28 @@ impl<'a> Tokens<'a> {
         let text = self.step(length).to_owned();
         self.step(end.len());
         Ok(Token::Text(text))
+    }
+
+    /// An asset's name between `@@@`: it may hold `@`, `\@@@` stands for `@@@`, and of more than three at its end the last three end it.
+    fn long_asset(&mut self) -> Result<Token, String> {
+        const MARK: &str = "@@@";
+        self.step(MARK.len());
+        let mut name = String::new();
+        loop {
+            let Some(length) = self.rest().find(MARK) else {
+                return Err(self.fault(&format!("{MARK} has no {MARK}")));
+            };
+            name.push_str(self.step(length));
+            self.step(MARK.len());
+            if name.ends_with('\\') {
+                name.pop();
+                name.push_str(MARK);
+                continue;
+            }
+            let more = self.rest().chars().take_while(|&c| c == '@').count().min(2);
+            name.push_str(self.step(more));
+            return Ok(Token::Text(name));
+        }
     }
 
     fn word(&mut self, first: char) -> Result<Token, String> {
@@ -465,5 +481,32 @@ impl Reader<'_> {
         }
         samples.sort_by(|a: &(f64, Vec<f64>), b| a.0.total_cmp(&b.0));
         Ok(Some(Value::Samples(samples)))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+
+    /// Names of assets as OpenUSD 26.11 reads them.
+    #[test]
+    fn assets_are_named_between_one_mark_or_three() {
+        for (text, name) in [
+            ("@./a.usda@", "./a.usda"),
+            ("@@@./a@b.usda@@@", "./a@b.usda"),
+            ("@@@./a\\@@@b.usda@@@", "./a@@@b.usda"),
+            ("@@@./a@@@@@", "./a@@"),
+            ("@@@@a@@@", "@a"),
+        ] {
+            let layer = Layer::read(&format!("#usda 1.0\n(\n    subLayers = [{text}]\n)\n"));
+            let found = layer.unwrap().metadata.remove("subLayers");
+            assert_eq!(found, Some(Value::Words(vec![name.to_owned()])), "{text}");
+        }
+        // The control: nothing ends it.
+        for text in ["@./a", "@@@./a@@", "@@@./a\\@@@"] {
+            let read = Layer::read(&format!("#usda 1.0\n(\n    subLayers = [{text}]\n)\n"));
+            assert!(read.is_err(), "{text}");
+        }
     }
 }

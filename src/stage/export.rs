@@ -115,6 +115,8 @@ pub enum Event {
         frames: usize,
         /// Files a frame.
         files: usize,
+        /// What of the look's camera is hardly meant.
+        warnings: Vec<String>,
     },
     /// What is odd about a frame.
     Warning(String),
@@ -174,6 +176,7 @@ pub fn export(
     tell(Event::Ready {
         frames: share.len(),
         files: request.targets.len(),
+        warnings: job.lints(),
     });
     let mut outcome = Outcome::default();
     for (wanted, bytes) in shots {
@@ -325,6 +328,20 @@ impl<'a> Job<'a> {
             frames,
             python,
             software: format!("{} {}", swell_domain::PROGRAM, swell_domain::VERSION),
+        })
+    }
+
+    /// What of the look's camera is hardly meant at the frames of all processes.
+    fn lints(&self) -> Vec<String> {
+        let ends = self
+            .frames
+            .first()
+            .copied()
+            .zip(self.frames.last().copied());
+        let look = self.request.look.as_ref().zip(ends);
+        let rate = self.scene.shot.frames_per_second;
+        look.map_or(Vec::new(), |(look, (first, last))| {
+            look.lint_camera([first, last], rate)
         })
     }
 

@@ -250,7 +250,7 @@ pub fn render(
     let folder = enter(request, &cache, &frames)?;
     let image = &request.look.spec().image;
     let rate = cache.manifest().frames_per_second;
-    let still = ends.and_then(|ends| request.look.lint_camera(ends, rate));
+    let camera = ends.map(|ends| request.look.lint_camera(ends, rate));
     tell(Event::Ready {
         device: format!(
             "{}{}{}",
@@ -261,7 +261,7 @@ pub fn render(
         size: [image.width, image.height],
         frames: frames.len(),
         left_out,
-        warnings: request.look.lints().into_iter().chain(still).collect(),
+        warnings: [request.look.lints(), camera.unwrap_or_default()].concat(),
     });
     let mut job = Job {
         request,

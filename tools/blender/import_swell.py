@@ -390,6 +390,12 @@ def import_solids(cache: swell.Cache) -> list[Any]:
     return made
 
 
+def asset_names(text: str) -> list[str]:
+    """The files beside a layer that a value of it names; a name with an @ stands between three, and @@@ in it behind a backslash."""
+    found = re.findall(r"@@@\./((?:\\@@@|@{0,2}(?!@).)*?)@@@|@\./([^@]*)@", text)
+    return [long.replace("\\@@@", "@@@") or short for long, short in found]
+
+
 def usd_prims(path: Path) -> dict[str, dict[str, Any]]:
     """Prims of a layer that `swell export --usd` wrote as text, by path. Attributes are text, and where they have samples, text by frame."""
     lines = iter(path.read_text(encoding="utf-8").splitlines())
@@ -415,7 +421,7 @@ def usd_prims(path: Path) -> dict[str, dict[str, Any]]:
         if line == "(" or line.endswith(" ("):
             # Metadata: which layers are played when, and how attributes are interpolated.
             metadata = iter(lambda: next(lines).strip(), ")")
-            layers = [re.findall(r"@\./(.*?)@", each) for each in metadata if each.startswith("asset[] assetPaths")]
+            layers = [asset_names(each) for each in metadata if each.startswith("asset[] assetPaths")]
             prims.setdefault("", {"layers": []})["layers"] += [name for found in layers for name in found]
     return prims
 

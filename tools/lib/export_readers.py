@@ -272,7 +272,7 @@ def main(swell):
             *("export", "cache", "--npy", "p.%04d.npy", "--csv", "p.%04d.csv", "--mesh", "m.%04d.ply"),
             *("--usd", "shot.usda", "--look", "look.toml"),
         )
-        run("export", "cache", "--mesh", "m.%04d.obj", "--usd", "mesh.usda", "--usd-water", "mesh")
+        run("export", "cache", "--mesh", "m.%04d.obj", "--usd", "mesh@@@2@.usd", "--usd-water", "mesh")
         run("export", "cache", "--usd", "binary.usdc", "--look", "look.toml", "--python", sys.executable)
         write_rig(room / "rig.usda")
         (room / "rig.toml").write_text(RIG)
@@ -286,10 +286,10 @@ def main(swell):
             check_points(stage, room)
             check_set(stage)
             check_camera(stage)
-        stage = Usd.Stage.Open(str(room / "mesh.usda"))
-        must(messages(stage) == [], f"mesh.usda: OpenUSD says {messages(stage)}")
+        stage = Usd.Stage.Open(str(room / "mesh@@@2@.usd"))
+        must(messages(stage) == [], f"mesh@@@2@.usd: OpenUSD says {messages(stage)}")
         check_mesh_shot(stage, room)
-        for name in ("shot.0002.usda", "shot.manifest.usda", "mesh.0003.usda", "binary.0001.usdc"):
+        for name in ("shot.0002.usda", "shot.manifest.usda", "mesh@@@2@.0003.usd", "binary.0001.usdc"):
             stage = Usd.Stage.Open(str(room / name))
             must(messages(stage) == [], f"{name}: OpenUSD says {messages(stage)}")
         must(Sdf.Layer.FindOrOpen(str(room / "binary.0001.usdc")).GetFileFormat().formatId == "usdc", "binary USD is text")

@@ -101,6 +101,27 @@ fn a_root_plays_the_frames_that_it_is_given() {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert!(!text.contains("Camera") && !text.contains("wave_makers"));
+    // Of USD's grammar: a name with an @ stands between three, and @@@ in it behind a backslash.
+    let told = |file: &str| {
+        let named = Root {
+            layers: vec![(7, file.to_owned())],
+            manifest: file.to_owned(),
+            ..root_of.clone()
+        };
+        String::from_utf8(root(&named)).unwrap()
+    };
+    for (file, wanted) in [
+        ("s@1.0007.usd", "@@@./s@1.0007.usd@@@"),
+        ("s@@@@.0007.usda", "@@@./s\\@@@@.0007.usda@@@"),
+    ] {
+        let text = told(file);
+        for part in [
+            format!("assetPaths = [{wanted}]\n"),
+            format!("manifestAssetPath = {wanted}\n"),
+        ] {
+            assert!(text.contains(&part), "{part}: {text}");
+        }
+    }
     assert!(
         String::from_utf8(manifest(&root_of))
             .unwrap()

@@ -108,6 +108,14 @@ pub(super) fn name(text: &str) -> String {
     }
 }
 
+/// The name of a file beside the layer, as an asset's. It has no line ends: USD has no way to write them.
+pub(super) fn asset(file: &str) -> String {
+    match file.contains('@') {
+        true => format!("@@@./{}@@@", file.replace("@@@", "\\@@@")),
+        false => format!("@./{file}@"),
+    }
+}
+
 /// In quotes. What is quoted here has no line ends.
 pub(super) fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))

@@ -10,7 +10,7 @@ use gltf::{Document, Gltf, Node, camera::Projection};
 use super::{
     super::{
         gltf_nodes::{Beside, NodeError, Nodes},
-        usd_nodes::is_usd,
+        usd_nodes::{Rate, is_usd},
     },
     usd_camera::UsdCamera,
 };
@@ -201,11 +201,11 @@ impl CameraFile {
         self.times().map(at).fold(at(0.0), f64::max)
     }
 
-    /// Frames a second of the file's own count; `None` where it counts seconds alone.
-    pub(super) fn rate(&self) -> Option<f64> {
+    /// Time codes a second of the file's own count; `None` where it counts seconds alone.
+    pub(super) fn rate(&self) -> Option<Rate> {
         match &self.body {
             Body::Gltf { .. } => None,
-            Body::Usd(camera) => Some(camera.codes_per_second()),
+            Body::Usd(camera) => Some(camera.rate()),
         }
     }
 

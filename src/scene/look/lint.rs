@@ -14,9 +14,19 @@ impl Look {
         lens.chain(self.lint_library()).collect()
     }
 
-    /// Whether a camera from a file, which moves, stands still over all of these frames, first and last: its keys lie elsewhere, as
-    /// those of a shot that is counted from 1001.
-    pub fn lint_camera(&self, [first, last]: [u32; 2], frames_per_second: f64) -> Option<String> {
+    /// What of a camera from a file, which moves, is hardly meant where these frames are drawn, first and last: that it counts
+    /// other frames than the shot does, or stands still over all of them, as its keys lie elsewhere: those of a shot that is
+    /// counted from 1001.
+    pub fn lint_camera(&self, frames: [u32; 2], frames_per_second: f64) -> Vec<String> {
+        let rate = (self.camera_file()).and_then(|file| {
+            file.moves()?;
+            file.rate()?.lint("camera.file", frames_per_second)
+        });
+        let still = self.lint_still_camera(frames, frames_per_second);
+        rate.into_iter().chain(still).collect()
+    }
+
+    fn lint_still_camera(&self, [first, last]: [u32; 2], frames_per_second: f64) -> Option<String> {
         let file = self.camera_file()?;
         let [begins, ends] = file.moves()?;
         let [from, to] =
@@ -24,7 +34,9 @@ impl Look {
         if begins <= to + ROUNDING && ends >= from - ROUNDING {
             return None;
         }
-        let rate = file.rate().unwrap_or(frames_per_second);
+        let rate = file
+            .rate()
+            .map_or(frames_per_second, |it| it.codes_per_second);
         let [begin, end, from, to] =
             [begins, ends, from, to].map(|seconds| shown((seconds * rate * 1e3).round() / 1e3));
         let start = self.spec.camera.start.map_or(String::new(), shown);

@@ -7,7 +7,7 @@ use glam::DMat4;
 
 use super::{
     super::{
-        usd_nodes::{Curve, UsdNodes, chains, elsewhere, layer, path_of},
+        usd_nodes::{Curve, Rate, UsdNodes, chains, elsewhere, layer, path_of},
         usda::{Layer, Prim, Value},
     },
     camera_file::CameraFileError,
@@ -89,8 +89,8 @@ impl UsdCamera {
     }
 
     /// Time codes a second.
-    pub(super) fn codes_per_second(&self) -> f64 {
-        self.nodes.codes_per_second()
+    pub(super) fn rate(&self) -> Rate {
+        self.nodes.rate()
     }
 
     /// When something has a sample, seconds.

@@ -214,6 +214,58 @@ const MATRICES: &str = "#usda 1.0\n(\n    metersPerUnit = 0.01\n    timeCodesPer
     5: ( (0, 0, -1, 0), (0, 1, 0, 0), (1, 0, 0, 0), (400, 0, 100, 1) ),\n    }\n    \
     uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}\n";
 
+/// A layer's rate as `Usd.Stage.GetTimeCodesPerSecond` of usd-core 26.11 has it, with the lint that names where it comes from.
+#[test]
+fn a_layer_without_time_codes_a_second_has_its_frames_a_second() {
+    let any = "solid[0].track={ file = \"door.usda\" }";
+    for (said, rate, words) in [
+        ("timeCodesPerSecond = 10", 10.0, ""),
+        ("framesPerSecond = 10", 10.0, ""),
+        (
+            "framesPerSecond = 12\n    timeCodesPerSecond = 10",
+            10.0,
+            "",
+        ),
+        (
+            "framesPerSecond = 12",
+            12.0,
+            "the file has 12 time codes a second, by its framesPerSecond, and the shot has 10",
+        ),
+        (
+            "framesPerSecond = 10\n    timeCodesPerSecond = 25",
+            25.0,
+            "the file has 25 time codes a second, by its timeCodesPerSecond, and the shot has 10",
+        ),
+        (
+            "startTimeCode = 0",
+            24.0,
+            "the file has 24 time codes a second, as every layer that does not say its timeCodesPerSecond, and the shot has 10",
+        ),
+    ] {
+        let text = MATRICES.replace("timeCodesPerSecond = 10", said);
+        let scene = load(text.as_bytes(), &[any]).unwrap();
+        // The quarter turn ends at time code 5.
+        let turned = |t: f64| {
+            let turn = scene.moving_solids[0].pose(t).turn;
+            turn.angle_between(DQuat::IDENTITY)
+        };
+        let end = 5.0 / rate;
+        assert!((turned(end) - FRAC_PI_2).abs() < 1e-7, "{said}");
+        assert!((turned(0.5 * end) - 0.5 * FRAC_PI_2).abs() < 1e-7, "{said}");
+        match (scene.lints().as_slice(), words) {
+            ([], "") => {}
+            ([lint], words) if !words.is_empty() => assert!(lint.contains(words), "{said}: {lint}"),
+            (lints, _) => panic!("{said}: {lints:?}"),
+        }
+    }
+    let none = MATRICES.replace("timeCodesPerSecond = 10", "framesPerSecond = 0");
+    let error = load(none.as_bytes(), &[any]).unwrap_err();
+    assert!(
+        error.contains("framesPerSecond is no positive number"),
+        "{error}"
+    );
+}
+
 #[test]
 fn between_matrices_a_solid_turns_and_keeps_its_shape() {
     let any = "solid[0].track={ file = \"door.usda\" }";
@@ -253,7 +305,13 @@ fn a_solid_s_file_begins_at_its_own_frame() {
             let off = (at(&scene, t) - expected).length();
             assert!(off < 1e-9, "{rate}, {t}: {off}");
         }
-        assert!(scene.lints().is_empty(), "{:?}", scene.lints());
+        // Where the shot counts other frames than the file, that is said.
+        let lints = scene.lints();
+        let is_said = |lint: &String| {
+            lint.starts_with("solid.track.file: the file has 10 time codes a second, by its timeCodesPerSecond, and the shot has 20")
+        };
+        assert_eq!(lints.iter().filter(|it| is_said(it)).count(), lints.len());
+        assert_eq!(lints.len(), usize::from(rate.ends_with("=20")), "{lints:?}");
     }
     // A shot that begins between two matrices: half a second on, the door has turned by an eighth of a turn, and stands 45° from its start.
     let scene = load(

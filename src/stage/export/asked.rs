@@ -26,7 +26,7 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
                 "--mesh",
                 files.ending(),
                 files.file(1),
-                &["ply", "obj", "usda", "usdc"],
+                &["ply", "obj", "usda", "usd", "usdc"],
             ),
             Target::Npy(files) => ("--npy", files.ending(), files.file(1), &["npy"]),
             Target::Csv(files) => ("--csv", files.ending(), files.file(1), &["csv"]),
@@ -38,7 +38,7 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
                     "--usd",
                     ending.to_lowercase(),
                     beside(file, "0001"),
-                    &["usda", "usdc"],
+                    &["usda", "usd", "usdc"],
                 )
             }
         };
@@ -47,6 +47,16 @@ pub(super) fn check(request: &Request) -> Result<(), ExportError> {
             return asked(format!(
                 "{flag} writes .{allowed}, and the name ends in `{ending}`"
             ));
+        }
+        if let Target::Usd(file, _) = target {
+            // The root names its layers, and USD's text has no place for these.
+            let name = file.file_name().unwrap_or_default();
+            if name.to_str().is_none_or(|it| it.contains(char::is_control)) {
+                return asked(format!(
+                    "{flag}: {name:?} has a line end, another control character or bytes that are no UTF-8, and USD's text cannot \
+                     name layers so"
+                ));
+            }
         }
         let is_water = match target {
             Target::Mesh(_) | Target::Vdb(_) => true,

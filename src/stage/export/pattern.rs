@@ -1,11 +1,11 @@
 //! Names of files that have a frame's number in them.
 
 use std::{
-    path::{Path, PathBuf},
+    path::{Path, PathBuf, is_separator},
     str::FromStr,
 };
 
-/// A file name with a place for the frame's number: `out/m.%04d.ply`, or `out/m.####.ply`.
+/// A file name with a place for the frame's number: `out/m.%04d.ply`, or `out/m.####.ply`. Folders are called as they are written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
     before: String,
@@ -17,7 +17,9 @@ pub struct Pattern {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PatternError {
     /// It has no place for the number, or two.
-    #[error("`{0}` has to hold one place for the frame's number: write %04d or ####")]
+    #[error(
+        "the file's name in `{0}` has to hold one place for the frame's number: write %04d or ####"
+    )]
     Place(String),
 }
 
@@ -47,6 +49,7 @@ impl FromStr for Pattern {
 
     fn from_str(text: &str) -> Result<Self, PatternError> {
         let fault = || PatternError::Place(text.to_owned());
+        let (folder, text) = text.split_at(text.rfind(is_separator).map_or(0, |at| at + 1));
         // The first sign of a place, how long it is, and its digits.
         let percent = text.find('%').map(|at| {
             let inner = text[at + 1..]
@@ -67,11 +70,11 @@ impl FromStr for Pattern {
             _ => return Err(fault()),
         };
         let after = &text[at + length..];
-        if after.contains(['%', '#', '/']) {
+        if after.contains(['%', '#']) {
             return Err(fault());
         }
         Ok(Self {
-            before: text[..at].to_owned(),
+            before: format!("{folder}{}", &text[..at]),
             digits: digits.ok_or_else(fault)?,
             after: after.to_owned(),
         })
@@ -93,6 +96,12 @@ mod tests {
         assert_eq!(file("m.###.OBJ", 12345), named("m.12345.OBJ", "obj"));
         assert_eq!(file("m%d.npy", 7), named("m7.npy", "npy"));
         assert_eq!(file("m%d.tar.npy", 7).1, "npy");
+        // Folders are called as they are written.
+        for folder in ["100%", "take #2", "%04d", "####"] {
+            let found = file(&format!("{folder}/m.%04d.ply"), 7);
+            assert_eq!(found, named(&format!("{folder}/m.0007.ply"), "ply"));
+            assert!(format!("{folder}/m.ply").parse::<Pattern>().is_err());
+        }
         for text in [
             "m.ply",
             "m.%04d.%d.ply",

@@ -224,6 +224,51 @@ fn a_shot_names_its_layers_and_its_camera() {
     assert!(layer.contains("faceVertexIndices.timeSamples") && !layer.contains("ids"));
 }
 
+/// Folders are called as they are written, and a root that anyone can read names its layers whatever they are called.
+#[test]
+fn names_hold_what_file_systems_take() {
+    let job = made();
+    fs::create_dir(job.path("100%#1")).unwrap();
+    job.expect(
+        0,
+        "export cache --frames 1-2 --mesh 100%#1/m.%04d.usd --npy 100%#1/p.##.npy --usd 100%#1/take@2.usd --look look.toml",
+    );
+    let made = files(&job.path("100%#1"));
+    let names: Vec<_> = made.keys().map(String::as_str).collect();
+    assert_eq!(
+        names,
+        [
+            "m.0001.usd",
+            "m.0002.usd",
+            "p.01.npy",
+            "p.02.npy",
+            "take@2.0001.usd",
+            "take@2.0002.usd",
+            "take@2.manifest.usd",
+            "take@2.usd",
+        ]
+    );
+    let root = String::from_utf8(made["take@2.usd"].clone()).unwrap();
+    let layers = "[@@@./take@2.0001.usd@@@, @@@./take@2.0002.usd@@@]";
+    assert!(root.contains(layers), "{root}");
+    // A reader finds what stands behind the names.
+    let text =
+        crate::support::job::LOOK.replace("focal_length_mm = 35.0", "file = \"100%#1/take@2.usd\"");
+    let is_of_camera = |line: &&str| !line.starts_with("position") && !line.starts_with("target");
+    let lines: Vec<_> = text.lines().filter(is_of_camera).collect();
+    job.write("again.toml", &lines.join("\n"));
+    job.expect(0, "inspect again.toml");
+    // The controls: a folder's place for a number is none, and what USD cannot name is refused.
+    job.expect_clear(2, "export cache --npy %04d/p.npy", "the file's name in");
+    let words = ["export", "cache", "--usd", "two\nlines.usda"];
+    let output = job.command("").args(words).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.code() == Some(2) && said.contains("has a line end"),
+        "{said}"
+    );
+}
+
 #[test]
 fn what_stands_whole_is_not_made_again() {
     let job = made();
@@ -290,7 +335,7 @@ fn faults_are_one_clear_line() {
     clear(
         2,
         "export cache --mesh m.%04d.abc",
-        "--mesh writes .ply, .obj, .usda, .usdc",
+        "--mesh writes .ply, .obj, .usda, .usd, .usdc",
     );
     clear(2, "export cache --usd s.usda --look gone.toml", "gone.toml");
     clear(
