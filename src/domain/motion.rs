@@ -29,6 +29,7 @@ use solitary::Goring;
 pub use spectrum::Spectrum;
 pub use stokes::{MADSEN_LIMIT, Stokes};
 use table::Segment;
+pub use table::abrupt_end;
 
 /// Displacement of a wave-maker over time.
 #[derive(Clone, Debug, PartialEq)]

@@ -29,7 +29,6 @@ mod error;
 mod keep;
 mod key;
 mod lint;
-mod lint_solids;
 mod load;
 mod origin;
 mod overrides;

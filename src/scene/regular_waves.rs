@@ -12,7 +12,7 @@ use swell_domain::motion::{
 };
 
 /// Highest that a wave on shallow water can be, in depths (McCowan 1894).
-const HIGHEST: f64 = 0.78;
+pub(super) const HIGHEST: f64 = 0.78;
 
 type Result<T> = std::result::Result<T, SceneError>;
 

@@ -24,7 +24,7 @@ pub(super) const RAMP: f64 = 2.0;
 const LEAST_WAVE: f64 = 10.0;
 
 /// Steepest that a wave of one height can be, H / (λ tanh kh) (Miche 1944).
-const STEEPEST: f64 = 0.142;
+pub(super) const STEEPEST: f64 = 0.142;
 
 type Result<T> = std::result::Result<T, SceneError>;
 

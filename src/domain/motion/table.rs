@@ -62,6 +62,45 @@ fn slope(points: &[[f64; 2]], index: usize) -> f64 {
     (w_before + w_after) / (w_before / chord_before + w_after / chord_after)
 }
 
+/// By how much more than anywhere else within a table its motion slows down to its end before it counts as a stop.
+const STOP: f64 = 2.0;
+
+/// How much greater than the bend of the last two chords a velocity has to be to be told from none: points that lie so far apart
+/// do not say it.
+const COARSE: f64 = 1.2;
+
+/// How fast a motion through `points` was when its points ended, in their unit a second, where it does not come to rest there: the
+/// velocity that its last three points lead to is over a tenth of its fastest chord, and its last segment slows down more than twice
+/// as hard as any but the first speeds up or slows down. `None` of two points, which are joined from rest to rest.
+pub fn abrupt_end(points: &[[f64; 2]]) -> Option<f64> {
+    let [.., before, last] = points else {
+        return None;
+    };
+    let chords: Vec<[f64; 2]> = points
+        .windows(2)
+        .map(|pair| [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]])
+        .collect();
+    let speeds: Vec<f64> = chords.iter().map(|[time, way]| way / time).collect();
+    let [.., previous, ended] = speeds[..] else {
+        return None;
+    };
+    let [time_before, time] = [chords[chords.len() - 2][0], last[0] - before[0]];
+    // From the middle of the last chord on to its end, as from that of the one before to it.
+    let bend = (ended - previous) * time / (time_before + time);
+    let leads_to = ended + bend;
+    let fastest = speeds.iter().map(|speed| speed.abs()).fold(0.0, f64::max);
+    if leads_to * ended <= 0.0 || leads_to.abs() <= (COARSE * bend.abs()).max(0.1 * fastest) {
+        return None;
+    }
+    let slopes: Vec<f64> = (0..points.len())
+        .map(|index| slope(points, index))
+        .collect();
+    let harder = |index: usize| (slopes[index + 1] - slopes[index]).abs() / chords[index][0];
+    let end = chords.len() - 1;
+    let elsewhere = (1..end).map(harder).fold(0.0, f64::max);
+    (harder(end) > STOP * elsewhere).then_some(leads_to)
+}
+
 /// Displacement and velocity: at rest before the first point and after the last.
 pub(super) fn state(points: &[[f64; 2]], t: f64) -> (f64, f64) {
     let next = points.partition_point(|p| p[0] <= t);
@@ -76,7 +115,9 @@ pub(super) fn state(points: &[[f64; 2]], t: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Motion;
+    use std::f64::consts::{PI, TAU};
+
+    use super::{super::Motion, abrupt_end};
 
     /// Fritsch and Butland 1984: chords of 1 and ½ m/s over 1 and 2 s have the weighted harmonic mean 9/13 m/s.
     #[test]
@@ -90,6 +131,37 @@ mod tests {
         // Half-way a cubic of slopes 0 and m has come to ½ − m/8.
         let half = 0.5 - 9.0 / 13.0 / 8.0;
         assert!((motion.displacement(0.5) - half).abs() < 1e-15);
+    }
+
+    /// Samples of motions that are known: one that comes to rest is none, however coarse; one that is cut off is.
+    #[test]
+    fn a_motion_that_is_cut_off_is_told_from_one_that_comes_to_rest() {
+        let sampled = |count: u32, end: f64, x: &dyn Fn(f64) -> f64| -> Vec<[f64; 2]> {
+            let time = |k: u32| end * f64::from(k) / f64::from(count);
+            (0..=count).map(|k| [time(k), x(time(k))]).collect()
+        };
+        // Half a period takes π s, and the fastest is half a metre a second.
+        let cosine = |t: f64| 0.5 * (1.0 - t.cos());
+        for halves in 1..4u32 {
+            for count in [3, 4, 5, 8, 20, 200] {
+                let points = sampled(halves * count, f64::from(halves) * PI, &cosine);
+                assert_eq!(abrupt_end(&points), None, "{halves}, {count}");
+            }
+        }
+        for count in [40, 200] {
+            for end in [0.3 * TAU, 0.7 * TAU, 1.25 * TAU] {
+                let found = abrupt_end(&sampled(count, end, &cosine));
+                let error = (found.unwrap_or(0.0) - 0.5 * end.sin()).abs();
+                // A parabola through three points is off by dt² / 3 of the third derivative at their end, which is at most a half;
+                // a tenth of that for the orders above.
+                let bound = 1.1 * (end / f64::from(count)).powi(2) / 6.0;
+                assert!(error < bound, "{count}, {end}: {found:?}");
+            }
+        }
+        // A steady motion, and one that rests at last; two points are joined from rest to rest.
+        assert_eq!(abrupt_end(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]), Some(1.0));
+        assert_eq!(abrupt_end(&[[0.0, 0.0], [1.0, 1.0], [2.0, 1.0]]), None);
+        assert_eq!(abrupt_end(&[[0.0, 0.0], [1.0, 1.0]]), None);
     }
 
     #[test]

@@ -4,11 +4,11 @@ use std::borrow::Cow;
 
 use swell_domain::{mesh::TriangleMesh, thin::thin_parts};
 
-use super::{PlacedMesh, Scene};
+use crate::{PlacedMesh, Scene};
 
 /// Particle spacings below which water passes through a solid: distances are known at points one spacing apart, so that a thinner one can
 /// stand between two of them. A quarter is for solids that stand aslant, or move.
-pub(super) const LEAST_THICKNESS: f64 = 1.25;
+const LEAST_THICKNESS: f64 = 1.25;
 
 impl Scene {
     /// Solids that are thinner somewhere, with water or air on both sides.

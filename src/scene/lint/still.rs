@@ -1,0 +1,143 @@
+//! How deep the water stands at rest: by its boxes and meshes, above the floor and the solids that lie on it.
+
+use glam::DVec3;
+
+use super::super::{Scene, WaveMaker};
+use swell_domain::mesh::TriangleMesh;
+
+/// Columns of water that are looked at along a wall.
+const COLUMNS: usize = 9;
+
+/// Water at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Still {
+    /// Metres.
+    pub(super) depth: f64,
+    /// How high the solids that it stands on are above the domain's floor, metres.
+    pub(super) floor: f64,
+}
+
+impl Still {
+    /// Water so deep on the domain's own floor, metres.
+    pub(super) fn on_the_floor(depth: f64) -> Self {
+        Self { depth, floor: 0.0 }
+    }
+}
+
+impl Scene {
+    /// How deep the scene's water stands above the floor at the start, metres, where it is deepest; `None` where none stands there,
+    /// or where gravity does not go along -y.
+    pub(super) fn still_depth(&self) -> Option<f64> {
+        let floor = self.domain.min.y;
+        let meshes = self.water.meshes.iter();
+        let boxes = meshes.filter_map(|placed| placed.mesh.bounds());
+        let all = self.water.blocks.iter().copied().chain(boxes);
+        let standing = all.filter(|it| it.min.y <= floor + self.particle_spacing());
+        let top = standing.map(|it| it.max.y - floor);
+        let deepest = top.fold(0.0, f64::max).min(self.domain.size().y);
+        (self.is_down() && deepest > 0.0).then_some(deepest)
+    }
+
+    /// The water beside a wall at its rest, the middle one of some columns along it; `None` where no water stands there, where
+    /// the wall is a floor or a ceiling, or where gravity does not go along -y.
+    pub(super) fn still_beside(&self, maker: &WaveMaker) -> Option<Still> {
+        let wall = maker.wall;
+        if wall.axis == 1 || !self.is_down() {
+            return None;
+        }
+        let (min, size) = (self.domain.min, self.domain.size());
+        // Off the planes on which faces and edges of boxes lie.
+        let away = maker.room() + 0.613 * self.particle_spacing();
+        let column = |k: usize| {
+            let part = (k as f64 + 0.437) / COLUMNS as f64;
+            let mut at = min + part * size;
+            at[wall.axis] = match wall.is_max {
+                true => self.domain.max[wall.axis] - away,
+                false => min[wall.axis] + away,
+            };
+            self.column(at)
+        };
+        let mut found: Vec<Still> = (0..COLUMNS).filter_map(column).collect();
+        found.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+        found.get(found.len() / 2).copied()
+    }
+
+    fn is_down(&self) -> bool {
+        let gravity = self.water.gravity;
+        gravity.x == 0.0 && gravity.z == 0.0 && gravity.y < 0.0
+    }
+
+    /// The water over a place: what stands on the solids at rest that lie on the floor there.
+    fn column(&self, at: DVec3) -> Option<Still> {
+        let bottom = self.domain.min.y;
+        let near = self.particle_spacing();
+        let solids = self.solids.iter();
+        let solids = solids.flat_map(|solid| stretches(&solid.mesh, at));
+        let floor = topmost(bottom, near, solids.collect());
+        let blocks = self.water.blocks.iter().filter(|block| {
+            let is_over = |axis: usize| (block.min[axis]..block.max[axis]).contains(&at[axis]);
+            is_over(0) && is_over(2)
+        });
+        let blocks = blocks.map(|block| [block.min.y, block.max.y]);
+        let meshes = self.water.meshes.iter();
+        let meshes = meshes.flat_map(|placed| stretches(&placed.mesh, at));
+        let top = topmost(floor, near, blocks.chain(meshes).collect()).min(self.domain.max.y);
+        let found = Still {
+            depth: top - floor,
+            floor: floor - bottom,
+        };
+        (found.depth > near).then_some(found)
+    }
+}
+
+/// How high stretches that stand on one another come, of which the lowest begins at `from` or less than `near` above.
+fn topmost(from: f64, near: f64, mut stretches: Vec<[f64; 2]>) -> f64 {
+    stretches.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let onto = |top: f64, [low, high]: [f64; 2]| match low <= top + near {
+        true => top.max(high),
+        false => top,
+    };
+    stretches.into_iter().fold(from, onto)
+}
+
+/// Where the vertical through `at` is within a mesh, bottom and top of each stretch, metres. What lies below a surface without a
+/// bottom is within.
+fn stretches(mesh: &TriangleMesh, at: DVec3) -> Vec<[f64; 2]> {
+    let outward = mesh.signed_volume().signum();
+    let mut crossings: Vec<(f64, i32)> = (0..mesh.triangles.len())
+        .filter_map(|index| crossing(mesh.corners(index), at))
+        .map(|(y, side)| (y, if side * outward < 0.0 { 1 } else { -1 }))
+        .collect();
+    crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // How many shells the lowest point is within.
+    let sums = crossings.iter().scan(0, |sum, (_, step)| {
+        *sum += step;
+        Some(*sum)
+    });
+    let mut within = -sums.min().unwrap_or(0).min(0);
+    let mut begun = (within > 0).then_some(f64::NEG_INFINITY);
+    let mut found = Vec::new();
+    for (y, step) in crossings {
+        within += step;
+        match begun {
+            None if within > 0 => begun = Some(y),
+            Some(low) if within == 0 => {
+                found.push([low, y]);
+                begun = None;
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+/// Height at which the vertical through `at` meets a triangle, and a number of the sign that the triangle's normal has along y.
+fn crossing(corners: [DVec3; 3], at: DVec3) -> Option<(f64, f64)> {
+    let [a, b, c] = corners;
+    let side = |p: DVec3, q: DVec3| (q.z - p.z) * (at.x - p.x) - (q.x - p.x) * (at.z - p.z);
+    let [of_c, of_a, of_b] = [side(a, b), side(b, c), side(c, a)];
+    let is_in =
+        (of_a > 0.0 && of_b > 0.0 && of_c > 0.0) || (of_a < 0.0 && of_b < 0.0 && of_c < 0.0);
+    let all = of_a + of_b + of_c;
+    is_in.then(|| ((of_a * a.y + of_b * b.y + of_c * c.y) / all, all))
+}
