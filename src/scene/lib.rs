@@ -12,6 +12,7 @@ pub mod keys;
 pub mod look;
 pub mod measure;
 mod motion_spec;
+mod motion_table;
 pub mod moving_solid;
 pub mod no_slip;
 pub mod periodic;

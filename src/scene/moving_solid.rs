@@ -7,9 +7,10 @@ use super::{
     document::Document,
     error::SceneError,
     motion_spec::{MotionSpec, TurnSpec, check_speed},
+    motion_table::{self, ANGLES},
     solid_track::{self, Track},
     spec::MeshSpec,
-    wave_maker::{self, ANGLES},
+    wave_maker,
     words::{extent, shown},
 };
 use swell_domain::{
@@ -276,7 +277,7 @@ fn turn_motion(
         TurnSpec::Table {
             ref file,
             ref points,
-        } => wave_maker::table(doc, place, around.base_dir, (file, points), ANGLES),
+        } => motion_table::table(doc, place, around.base_dir, (file, points), ANGLES),
     }
 }
 

@@ -1,6 +1,6 @@
-//! Wave-makers: how a motion is read, its table, and whether the walls stay apart.
+//! Wave-makers: how a motion is read, and whether the walls stay apart.
 
-use std::{f64::consts::PI, fs::File, io::Read as _, path::Path};
+use std::{f64::consts::PI, path::Path};
 
 use glam::DVec3;
 
@@ -9,17 +9,15 @@ use super::{
     document::Document,
     error::SceneError,
     motion_spec::{MotionSpec, check_speed},
+    motion_table::{WAYS, table},
     regular_waves, seas,
     spec::WaveMakerSpec,
-    words::{chain, shown, shown_all},
+    words::shown,
 };
 use swell_domain::{
     bounds::Bounds,
     motion::{Asked, Motion, Phases},
 };
-
-/// Largest motion table read, bytes: ten hours at 60 points a second.
-const MAX_TABLE_BYTES: u64 = 64 << 20;
 
 type Result<T> = std::result::Result<T, SceneError>;
 
@@ -247,112 +245,4 @@ pub(super) fn motion(
             ref points,
         } => table(doc, path, base_dir, (file, points), WAYS),
     }
-}
-
-/// What a table of points may hold.
-#[derive(Clone, Copy)]
-pub(super) struct Allowed {
-    /// Of what is moved by.
-    least: f64,
-    /// How fast.
-    check_speed: fn(f64) -> std::result::Result<(), String>,
-}
-
-/// Displacements, metres, of what does not go back behind its start.
-const WAYS: Allowed = Allowed {
-    least: 0.0,
-    check_speed,
-};
-
-/// Angles, degrees; how fast a solid's points are depends on the solid.
-pub(super) const ANGLES: Allowed = Allowed {
-    least: -1e9,
-    check_speed: |_| Ok(()),
-};
-
-/// The motion through the points of the table at `path`, in place or from a file.
-pub(super) fn table(
-    doc: &Document<'_>,
-    path: &str,
-    base_dir: &Path,
-    (file, points): (&Option<String>, &Option<Vec<[f64; 2]>>),
-    allowed: Allowed,
-) -> Result<Motion> {
-    let file_key = format!("{path}.file");
-    let (points, key) = match file {
-        Some(file) => {
-            let file = doc.find(base_dir, &file_key, file)?;
-            let points = read_table(&file).map_err(|problem| {
-                doc.fault_of(&file_key, format!("{}: {problem}", file.display()))
-            })?;
-            (points, file_key)
-        }
-        None => (points.clone().unwrap_or_default(), format!("{path}.points")),
-    };
-    check_points(&points, allowed).map_err(|problem| doc.fault_of(&key, problem))?;
-    Ok(Motion::Table { points })
-}
-
-fn check_points(points: &[[f64; 2]], allowed: Allowed) -> std::result::Result<(), String> {
-    if points.len() < 2 {
-        return Err(format!("{} points are too few", points.len()));
-    }
-    for (i, [t, x]) in points.iter().enumerate() {
-        // 1e9 keeps sums and products of them finite.
-        if !((0.0..=1e9).contains(t) && (allowed.least..=1e9).contains(x)) {
-            return Err(format!(
-                "point {i}, {}, is out of range",
-                shown_all(&[*t, *x])
-            ));
-        }
-    }
-    if points[0][1] != 0.0 {
-        return Err(format!("the first displacement is {}", shown(points[0][1])));
-    }
-    for (i, pair) in points.windows(2).enumerate() {
-        if pair[1][0] - pair[0][0] < 1e-6 {
-            return Err(format!(
-                "the time of point {}, {} s, is not a microsecond after {} s",
-                i + 1,
-                shown(pair[1][0]),
-                shown(pair[0][0])
-            ));
-        }
-        (allowed.check_speed)((pair[1][1] - pair[0][1]).abs() / (pair[1][0] - pair[0][0]))
-            .map_err(|problem| format!("up to point {}, {problem}", i + 1))?;
-    }
-    Ok(())
-}
-
-/// `time,displacement` a line; empty lines, those that start with `#`, and one line of titles are
-/// skipped.
-fn read_table(path: &Path) -> std::result::Result<Vec<[f64; 2]>, String> {
-    let mut text = String::new();
-    File::open(path)
-        .and_then(|file| file.take(MAX_TABLE_BYTES + 1).read_to_string(&mut text))
-        .map_err(|e| chain(&e))?;
-    if text.len() as u64 > MAX_TABLE_BYTES {
-        return Err(format!("larger than {} MiB", MAX_TABLE_BYTES >> 20));
-    }
-    let mut points = Vec::new();
-    let mut is_first = true;
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let values: Vec<Option<f64>> = line.split(',').map(|v| v.trim().parse().ok()).collect();
-        match values[..] {
-            [Some(t), Some(x)] => points.push([t, x]),
-            [None, None] if is_first => {}
-            _ => {
-                return Err(format!(
-                    "line {}: {line:?} is not time,displacement",
-                    number + 1
-                ));
-            }
-        }
-        is_first = false;
-    }
-    Ok(points)
 }

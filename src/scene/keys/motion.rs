@@ -37,15 +37,15 @@ const RAMP: Key = Key::number_or_zero("ramp", PERIOD)
     .about("how long the motion takes to reach its full stroke; 0: it begins with it");
 const FILE: Key = Key::text(
     "file",
-    "a CSV of time,displacement (seconds, metres), relative to the scene file",
+    "a table of time and displacement (seconds, metres), two numbers a line, relative to the scene file",
 )
 .absent()
 .only("kind", &["table"])
-.about("displacements from a file; the written-out scene has them as points");
+.about("displacements from a file, a comma, a semicolon, a tab or spaces between the two; the written-out scene has them as points");
 const POINTS: Key = Key::points(
     "points",
     2,
-    "at least two [seconds, metres], times rising from 0 on, displacements from 0, the first 0, all up to 1e9, no faster \
+    "at least two [seconds, metres], times rising from 0 on, displacements from 0 on, inward or along direction, the first 0, all up to 1e9, no faster \
      than 100000 m/s",
 )
 .only("kind", &["table"])
@@ -83,11 +83,11 @@ pub(super) const SOLID_TURN: &[Key] = &[
     RAMP,
     Key::text(
         "file",
-        "a CSV of time,angle (seconds, degrees), relative to the scene file",
+        "a table of time and angle (seconds, degrees), two numbers a line, relative to the scene file",
     )
     .absent()
     .only("kind", &["table"])
-    .about("angles from a file; the written-out scene has them as points"),
+    .about("angles from a file, a comma, a semicolon, a tab or spaces between the two; the written-out scene has them as points"),
     Key::points(
         "points",
         2,

@@ -522,13 +522,22 @@ pub const VALUE_FAULTS: &[Fault] = &[
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
         "kind = \"table\", file = \"push.csv\"",
         24,
-        &["motion.file", "line 2: \"1,one\" is not time,displacement"],
+        &[
+            "motion.file",
+            "line 2: \"1,one\" is not time and displacement",
+        ],
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
         "kind = \"table\", file = \"back.csv\"",
         24,
-        &["the time of point 2, 0.5 s"],
+        &["the time of line 3, 0.5 s"],
+    ),
+    (
+        "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
+        "kind = \"table\", points = [[0, 0], [1, 0.5], [2, -0.5], [3, 0]]",
+        24,
+        &["point 2, [2, -0.5], lies outward", "from 0 on, inward"],
     ),
     (
         "kind = \"sine\", stroke = 1.5, period = 3.0, ramp = 1.0",
