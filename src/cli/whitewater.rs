@@ -7,7 +7,7 @@ use serde_json::json;
 
 use swell_domain::whitewater::Kind;
 use swell_scene::whitewater::WhitewaterSettings;
-use swell_stage::whitewater::{Event, Request, expected, whitewater};
+use swell_stage::whitewater::{Crowding, Event, Request, expected, whitewater};
 
 use super::{
     DeviceArgs, Failure, count,
@@ -190,6 +190,25 @@ fn tell(progress: &Progress, event: Event) {
                 json!({
                     "event": "frame", "frame": frame, "spray": spray, "foam": foam, "bubbles": bubbles, "born": born,
                     "seconds": seconds,
+                }),
+            );
+        }
+        Event::Crowding(Crowding {
+            frame,
+            at_end,
+            end,
+            over,
+            allowed,
+        }) => {
+            let text = format!(
+                "frame {frame} will have more whitewater particles than max_particles, {allowed}, and end the job, if they grow as in these \
+                 {over} frames, and frame {end} about {at_end}: raise max_particles, or lower emission.trapped_air_rate and \
+                 emission.wave_crest_rate"
+            );
+            progress.say(
+                &format!("warning: {text}"),
+                json!({
+                    "event": "warning", "what": "max_particles", "text": text, "frame": frame, "at_end": at_end,
                 }),
             );
         }

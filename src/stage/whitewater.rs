@@ -5,7 +5,9 @@
 
 mod checked;
 mod engine;
+mod error;
 mod expected;
+mod forecast;
 mod water;
 
 use std::{
@@ -21,26 +23,26 @@ use swell_cache::{Asset, CacheError, CacheReader, CacheWriter, Clock, Entry, Man
 use swell_domain::{
     bounds::Bounds,
     particles::Particles,
-    signed_distance::SignedDistanceError,
     whitewater::{self, Births, Settings, Source, Thresholds},
 };
-use swell_gpu::adapter::{GpuError, Needs};
+use swell_gpu::adapter::Needs;
 use swell_scene::{
-    Scene, SceneError,
+    Scene,
     whitewater::{WhitewaterSettings, written_out},
 };
 
 use super::{
-    Blame,
-    device::{Device, Identity, PassTimes, SolverError},
+    device::{Device, Identity, PassTimes},
     prepare::Start,
 };
 
-use self::{engine::Engine, water::Water};
+use self::{engine::Engine, forecast::Forecast, water::Water};
 
 pub use self::{
     checked::Stream,
+    error::WhitewaterError,
     expected::{Expected, expected},
+    forecast::Crowding,
 };
 
 /// Folder of the streams in a cache.
@@ -100,6 +102,8 @@ pub enum Event {
         /// Wall clock for it.
         seconds: f64,
     },
+    /// There will be more particles than the settings allow, if they go on growing as they did; told once at most.
+    Crowding(Crowding),
     /// The frames computed now are on the disk; also told where the next one failed.
     Written {
         /// Bytes of them.
@@ -122,98 +126,6 @@ pub struct Outcome {
     pub interrupted: bool,
     /// Pass, seconds, runs, by name; nothing unless that was asked for.
     pub passes: PassTimes,
-}
-
-/// Why whitewater could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum WhitewaterError {
-    /// The bake's cache, or the stream's.
-    #[error(transparent)]
-    Cache(#[from] CacheError),
-    /// The scene in the cache, or the stream's own settings.
-    #[error("the cache's scene: {0}")]
-    Scene(#[from] SceneError),
-    /// Its solids.
-    #[error(transparent)]
-    Solid(#[from] SignedDistanceError),
-    /// The device.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    /// The passes.
-    #[error(transparent)]
-    Solver(#[from] SolverError),
-    /// A stream of whitewater is no water.
-    #[error("{} is a stream of whitewater; give the cache that it was made from", .0.display())]
-    IsWhitewater(PathBuf),
-    /// A stream without the bake that it was made from.
-    #[error("{} was made from a bake in {}, which is not there or another now: frame {frame}", stream.display(), cache.display())]
-    NoBake {
-        /// Of the stream.
-        stream: PathBuf,
-        /// Where the bake should be.
-        cache: PathBuf,
-        /// Of the stream.
-        frame: u32,
-    },
-    /// The bake does not go so far.
-    #[error("frame {asked} was asked for, and the bake has frames {first} to {last}")]
-    NoFrame {
-        /// The frame.
-        asked: u32,
-        /// First of the bake.
-        first: u32,
-        /// Last of the bake.
-        last: u32,
-    },
-    /// The stream that stands there was made otherwise.
-    #[error(
-        "{} was made {how}; choose another --name, or --overwrite it",
-        directory.display()
-    )]
-    Other {
-        /// Of the stream.
-        directory: PathBuf,
-        /// What differs, in words.
-        how: &'static str,
-    },
-    /// More than the settings allow.
-    #[error(
-        "frame {frame} has {count} whitewater particles, and max_particles is {allowed}: raise it, or lower \
-         emission.trapped_air_rate and emission.wave_crest_rate; the frames before it stand"
-    )]
-    TooMany {
-        /// The frame.
-        frame: u32,
-        /// So many.
-        count: usize,
-        /// `max_particles`.
-        allowed: u32,
-    },
-    /// A stream cannot be removed.
-    #[error("cannot remove {}: {source}", directory.display())]
-    Remove {
-        /// Of the stream.
-        directory: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-}
-
-impl From<&WhitewaterError> for Blame {
-    fn from(error: &WhitewaterError) -> Self {
-        match error {
-            WhitewaterError::Cache(error) => error.into(),
-            WhitewaterError::Scene(_)
-            | WhitewaterError::NoBake { .. }
-            | WhitewaterError::Other { .. }
-            | WhitewaterError::Remove { .. } => Self::Files,
-            WhitewaterError::Solid(error) => error.into(),
-            WhitewaterError::Gpu(error) => error.into(),
-            WhitewaterError::Solver(error) => error.into(),
-            WhitewaterError::IsWhitewater(_) | WhitewaterError::NoFrame { .. } => Self::Input,
-            WhitewaterError::TooMany { .. } => Self::Numbers,
-        }
-    }
 }
 
 /// Whether a stream's frame was made from the frame of this number that stands in `cache`; the first is always empty.
@@ -269,6 +181,8 @@ pub fn whitewater(
         last,
     });
     let mut interrupted = false;
+    let end = cache.last_frame();
+    let mut forecast = Forecast::new(settings.max_particles, end, stream.white.len());
     while stream.clock.frame < last {
         interrupted = stop.load(Ordering::Relaxed);
         if interrupted {
@@ -281,12 +195,18 @@ pub fn whitewater(
             cache: &cache,
         };
         match step.run(&mut stream, &mut engine, &mut water) {
-            Ok(born) => tell(Event::Frame {
-                frame: stream.clock.frame,
-                census: whitewater::census(&stream.white),
-                born,
-                seconds: began.elapsed().as_secs_f64(),
-            }),
+            Ok(born) => {
+                let frame = stream.clock.frame;
+                tell(Event::Frame {
+                    frame,
+                    census: whitewater::census(&stream.white),
+                    born,
+                    seconds: began.elapsed().as_secs_f64(),
+                });
+                if let Some(crowding) = forecast.see(frame, stream.white.len()) {
+                    tell(Event::Crowding(crowding));
+                }
+            }
             Err(error) => {
                 // What was computed before is kept.
                 let bytes = stream.writer.finish()?.bytes;

@@ -157,6 +157,44 @@ fn the_reference_makes_a_stream_without_a_device() {
     );
 }
 
+/// A limit that the bake would pass is told of before it is met.
+#[test]
+fn a_limit_is_foretold_from_the_first_frames() {
+    let job = baked();
+    let warnings = |words: &str, code: i32| {
+        let said = job.expect(code, &format!("{words} --progress json"));
+        let events = said
+            .lines()
+            .filter_map(|line| serde_json::from_str(line).ok());
+        let events: Vec<serde_json::Value> = events.collect();
+        let is_warning = |event: &&serde_json::Value| event["what"] == "max_particles";
+        let at = events.iter().position(|event| is_warning(&event));
+        let told = events.iter().filter(is_warning).cloned();
+        let before = events[..at.unwrap_or(0)].iter();
+        let frames = before.filter(|event| event["event"] == "frame").count();
+        (told.collect::<Vec<_>>(), frames as u64)
+    };
+    // The control: the default allows as many as there come to be.
+    assert_eq!(warnings(MAKE, 0).0, [] as [serde_json::Value; 0]);
+    let counts = census(&job, STREAM);
+    assert!(counts[2] > 0, "{counts:?}");
+    // What frame 7 would have at the growth of the frames up to 6.
+    let allowed = counts[6] + (counts[6] - counts[2]) / 4 - 1;
+    let met = counts.iter().position(|&count| count > allowed).unwrap() as u64;
+    job.write(
+        "few.toml",
+        &format!("max_particles = {allowed}\n{SETTINGS}"),
+    );
+    let (told, after) = warnings("whitewater cache/small/pbf --settings few.toml", 5);
+    let [only] = &told[..] else {
+        panic!("{told:?}")
+    };
+    let foretold = only["frame"].as_u64().unwrap();
+    assert!(foretold.abs_diff(met) <= 1, "{foretold}, {met}: {counts:?}");
+    assert!(after < met, "told after {after} of {met} frames");
+    assert!(only["at_end"].as_u64().unwrap() > allowed as u64);
+}
+
 #[test]
 fn what_cannot_be_is_refused() {
     let job = baked();

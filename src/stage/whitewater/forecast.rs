@@ -1,0 +1,120 @@
+//! When there will be more whitewater than its settings allow, foretold from how its number grows.
+
+use std::collections::VecDeque;
+
+/// Frames over which growth is measured: births less deaths, from the first frame with whitewater on.
+pub(super) const OVER: usize = 4;
+
+/// More whitewater than is allowed, if it goes on growing as it did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crowding {
+    /// First frame that would have more than `max_particles`.
+    pub frame: u32,
+    /// So many there would be at the bake's last frame.
+    pub at_end: u64,
+    /// The bake's last frame.
+    pub end: u32,
+    /// Frames that growth was measured over.
+    pub over: usize,
+    /// `max_particles`.
+    pub allowed: u32,
+}
+
+/// Counts of a stream that grows.
+pub(super) struct Forecast {
+    allowed: u32,
+    end: u32,
+    /// Of consecutive frames, the newest last; before the first whitewater one frame without.
+    counts: VecDeque<usize>,
+    is_told: bool,
+}
+
+impl Forecast {
+    /// Of a stream that has `count` particles, and whose bake ends with frame `end`.
+    pub(super) fn new(allowed: u32, end: u32, count: usize) -> Self {
+        Self {
+            allowed,
+            end,
+            counts: [count].into(),
+            is_told: false,
+        }
+    }
+
+    /// Takes the number of particles of the next frame. Once, where a line through it and the one [`OVER`] frames before passes what
+    /// is allowed within the bake: when.
+    pub(super) fn see(&mut self, frame: u32, count: usize) -> Option<Crowding> {
+        if count == 0 || self.counts.len() > OVER {
+            self.counts.pop_front();
+        }
+        self.counts.push_back(count);
+        let first = self.counts.front().copied()?;
+        if self.is_told || self.counts.len() <= OVER || count <= first {
+            return None;
+        }
+        let growth = (count - first) as f64 / OVER as f64;
+        let room = f64::from(self.allowed) - count as f64;
+        let until = (room / growth).floor() + 1.0;
+        let left = f64::from(self.end.saturating_sub(frame));
+        self.is_told = until <= left;
+        self.is_told.then(|| Crowding {
+            frame: frame + until as u32,
+            at_end: (count as f64 + growth * left) as u64,
+            end: self.end,
+            over: OVER,
+            allowed: self.allowed,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said, and after which frame, of counts from frame 1 on.
+    fn said(allowed: u32, end: u32, counts: &[usize]) -> Option<(u32, Crowding)> {
+        let mut forecast = Forecast::new(allowed, end, 0);
+        let mut all = (1u32..).zip(counts).filter_map(|(frame, &count)| {
+            let found = forecast.see(frame, count);
+            found.map(|found| (frame, found))
+        });
+        let first = all.next();
+        assert_eq!(all.next(), None, "told twice");
+        first
+    }
+
+    #[test]
+    fn steady_growth_is_foretold_to_the_frame() {
+        // From frame 11 on 30 a frame: frame k has 30 (k − 10), which passes 1000 at frame 44.
+        let steady: Vec<usize> = (1usize..=43).map(|k| 30 * k.saturating_sub(10)).collect();
+        let (when, found) = said(1000, 60, &steady).unwrap_or_else(|| panic!("nothing said"));
+        assert_eq!(when, 14);
+        assert_eq!(
+            found,
+            Crowding {
+                frame: 44,
+                at_end: 1500,
+                end: 60,
+                over: OVER,
+                allowed: 1000
+            }
+        );
+        // The controls: room enough, a bake that ends before, growth that ended, none at all.
+        assert_eq!(said(1500, 60, &steady), None);
+        assert_eq!(said(1000, 43, &steady), None);
+        let level: Vec<usize> = (1..=40).map(|k| 100 * k.min(3)).collect();
+        assert_eq!(said(1000, 40, &level[..3]), None);
+        assert_eq!(said(3100, 40, &level), None);
+        assert_eq!(said(10, 60, &[0; 40]), None);
+    }
+
+    /// Growth that begins late is seen when it does.
+    #[test]
+    fn a_later_burst_is_foretold_too() {
+        let burst: Vec<usize> = (1..=40usize)
+            .map(|k| k + 100 * k.saturating_sub(30))
+            .collect();
+        let (when, found) = said(1500, 60, &burst).unwrap_or_else(|| panic!("nothing said"));
+        assert!((31..=34).contains(&when), "{when}");
+        assert!(found.frame > 40 && found.frame <= 60, "{found:?}");
+    }
+}
