@@ -56,6 +56,10 @@ pub(super) struct ExportArgs {
     /// Share of the frames, such as 1/4 for the first of four: several machines may fill one folder.
     #[arg(long, value_name = "I/N")]
     chunk: Option<Chunk>,
+    /// Number of the first of the frames in the names of files, such as 1001; the others follow by their distance. The cache's own
+    /// where left out.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=1_000_000_000))]
+    number_from: Option<u32>,
     /// A stream of whitewater in place of the water, as particles.
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
@@ -131,6 +135,7 @@ pub(super) fn run(args: &ExportArgs, progress: &Progress) -> Result<u8, Failure>
         voxels: args.voxels,
         look,
         python: args.python.clone(),
+        number_from: args.number_from,
         overwrite: args.overwrite,
         keep_going: args.keep_going,
     };

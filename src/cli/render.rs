@@ -34,6 +34,10 @@ pub(super) struct RenderArgs {
     /// Share of the frames, such as 1/4 for the first of four: several processes may fill one folder.
     #[arg(long, value_name = "I/N")]
     chunk: Option<Chunk>,
+    /// Number of the first of the frames in the names of files, such as 1001; the others follow by their distance. The cache's own
+    /// where left out.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=1_000_000_000))]
+    number_from: Option<u32>,
     #[command(flatten)]
     gpu: GpuArgs,
     /// Take a panorama or a camera that lies outside of the look's folder.
@@ -73,6 +77,7 @@ pub(super) fn run(args: &RenderArgs, progress: &Progress) -> Result<u8, Failure>
         frames: args.frames.clone(),
         chunk: args.chunk,
         gpu: args.gpu.read()?,
+        number_from: args.number_from,
         overwrite: args.overwrite,
         keep_going: args.keep_going,
         time_passes: args.time_passes,

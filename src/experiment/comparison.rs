@@ -97,6 +97,7 @@ fn bake_and_render(
         frames: Some(comparison.pictures.clone()),
         chunk: None,
         gpu: request.gpu.clone(),
+        number_from: None,
         overwrite: false,
         keep_going: false,
         time_passes: false,

@@ -5,6 +5,7 @@
 //! not made again.
 
 mod asked;
+mod content;
 mod error;
 mod expected;
 mod folder;
@@ -13,7 +14,6 @@ mod shot;
 mod usdc;
 
 use std::{
-    cell::OnceCell,
     path::{Path, PathBuf},
     sync::{
         Arc,
@@ -28,20 +28,23 @@ use swell_cache::{CacheError, CacheReader, GridRecord, frame::Stamp, vdb};
 use swell_domain::{
     chunk::{Chunk, share},
     frame_range::FrameRange,
-    particles::Particles,
     sparse_grid::Precision,
-    water_mesh::{Body, VOLUME, WaterMesh},
+    water_mesh::VOLUME,
 };
 use swell_export::{Source, mesh, mesh::Placed, table, usd};
 use swell_scene::{Scene, look::Look};
 
 use super::{
     baked_scene,
+    numbering::Numbering,
     whitewater::{directory, is_of},
 };
 
-use self::folder::{Owner, Wanted};
-use self::usdc::Python;
+use self::{
+    content::Content,
+    folder::{Owner, Wanted},
+    usdc::Python,
+};
 
 pub use self::{
     error::ExportError,
@@ -94,6 +97,9 @@ pub struct Request {
     pub frames: Option<FrameRange>,
     /// This process's share of them; all where `None`.
     pub chunk: Option<Chunk>,
+    /// Number that the first of the frames has in names of files and as a time code of USD, the others by their distance; the
+    /// cache's own where `None`.
+    pub number_from: Option<u32>,
     /// Voxels of the mesh's grid a particle spacing.
     pub voxels: f64,
     /// Whose camera a USD shot has.
@@ -227,50 +233,6 @@ fn warning(frame: u32, volume: f64) -> Option<String> {
     })
 }
 
-/// A frame's content, each part read or made when it is first asked for.
-struct Content<'a> {
-    job: &'a Job<'a>,
-    frame: u32,
-    particles: OnceCell<Particles>,
-    mesh: OnceCell<WaterMesh>,
-}
-
-impl<'a> Content<'a> {
-    fn new(job: &'a Job<'a>, frame: u32) -> Self {
-        Self {
-            job,
-            frame,
-            particles: OnceCell::new(),
-            mesh: OnceCell::new(),
-        }
-    }
-
-    fn particles(&self) -> Result<&Particles, CacheError> {
-        if self.particles.get().is_none() {
-            let particles = self.job.source().read(self.frame)?;
-            // The cell is empty, and no other thread sees it.
-            let _ = self.particles.set(particles);
-        }
-        Ok(self.particles.get_or_init(Particles::default))
-    }
-
-    fn mesh(&self) -> Result<&WaterMesh, CacheError> {
-        let particles = self.particles()?;
-        let scene = &self.job.scene;
-        Ok(self.mesh.get_or_init(|| {
-            let place = |p: &[f32; 3]| DVec3::from(p.map(f64::from)) - scene.domain.min;
-            let places: Vec<DVec3> = particles.position.iter().map(place).collect();
-            WaterMesh::new(&Body {
-                places: &places,
-                velocities: &particles.velocity,
-                size: scene.domain.size(),
-                spacing: scene.particle_spacing(),
-                voxels: self.job.request.voxels,
-            })
-        }))
-    }
-}
-
 /// An export under way.
 struct Job<'a> {
     request: &'a Request,
@@ -280,6 +242,7 @@ struct Job<'a> {
     scene: Scene,
     /// All that are wanted, of every process.
     frames: Vec<u32>,
+    numbering: Numbering,
     /// Where a name needs it.
     python: Option<Python>,
     software: String,
@@ -325,6 +288,7 @@ impl<'a> Job<'a> {
             cache,
             stream,
             scene,
+            numbering: Numbering::new(&frames, request.number_from),
             frames,
             python,
             software: format!("{} {}", swell_domain::PROGRAM, swell_domain::VERSION),
@@ -352,8 +316,10 @@ impl<'a> Job<'a> {
 
     /// Digits of frame numbers in the names of a shot's layers.
     fn layer(&self, shot: &Path, frame: u32) -> PathBuf {
-        let digits = self.cache.last_frame().to_string().len().max(4);
-        beside(shot, &format!("{frame:0digits$}"))
+        let last = self.numbering.of(self.cache.last_frame());
+        let digits = last.to_string().len().max(4);
+        let number = self.numbering.of(frame);
+        beside(shot, &format!("{number:0digits$}"))
     }
 
     fn owner(&self, settings: String) -> Result<Owner, CacheError> {
@@ -368,15 +334,16 @@ impl<'a> Job<'a> {
 
     fn wanted(&self, target: &Target, frame: u32) -> Result<Wanted, CacheError> {
         let voxels = self.request.voxels;
+        let number = self.numbering.of(frame);
         let (file, settings) = match target {
             Target::Mesh(files) => (
-                files.file(frame),
+                files.file(number),
                 format!("mesh as {}, {voxels} voxels a spacing", files.ending()),
             ),
-            Target::Npy(files) => (files.file(frame), "particles as npy".to_owned()),
-            Target::Csv(files) => (files.file(frame), "particles as csv".to_owned()),
-            Target::Bgeo(files) => (files.file(frame), "particles as bgeo".to_owned()),
-            Target::Vdb(files) => (files.file(frame), "grids as vdb".to_owned()),
+            Target::Npy(files) => (files.file(number), "particles as npy".to_owned()),
+            Target::Csv(files) => (files.file(number), "particles as csv".to_owned()),
+            Target::Bgeo(files) => (files.file(number), "particles as bgeo".to_owned()),
+            Target::Vdb(files) => (files.file(number), "grids as vdb".to_owned()),
             Target::Usd(file, water) => {
                 let layer = self.layer(file, frame);
                 let water = match water {
@@ -552,19 +519,18 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// A shot's time codes are the numbers in the names of its layers.
     fn shot(&self, frame: u32) -> usd::Shot<'_> {
+        let number = |frame: Option<&u32>| frame.map_or(0, |&frame| self.numbering.of(frame));
         usd::Shot {
             source: Source {
                 software: &self.software,
                 shot: &self.source().manifest().shot,
-                frame,
+                frame: self.numbering.of(frame),
             },
             water: self.request.stream.as_deref().unwrap_or("water"),
             frames_per_second: self.scene.shot.frames_per_second,
-            frames: [
-                self.frames.first().copied().unwrap_or(0),
-                self.frames.last().copied().unwrap_or(0),
-            ],
+            frames: [self.frames.first(), self.frames.last()].map(number),
             origin: self.scene.origin,
         }
     }

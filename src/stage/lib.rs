@@ -10,6 +10,7 @@ pub mod export;
 pub mod gauge;
 pub mod inspect;
 pub mod locked;
+mod numbering;
 pub mod prepare;
 mod probes;
 pub mod render;

@@ -48,6 +48,7 @@ use self::writing::{Drawn, Writing};
 use super::{
     Blame,
     device::{Gpu, PassTimes, shaders_note},
+    numbering::Numbering,
 };
 
 pub use self::{
@@ -76,6 +77,9 @@ pub struct Request {
     pub chunk: Option<Chunk>,
     /// What to render on.
     pub gpu: Gpu,
+    /// Number that the first of the frames has in the names of its pictures, the others by their distance; the cache's own where
+    /// `None`.
+    pub number_from: Option<u32>,
     /// Whether frames that stand there already are made again, also those of another look or cache.
     pub overwrite: bool,
     /// Whether the other frames are rendered where one of the cache is damaged.
@@ -243,11 +247,12 @@ pub fn render(
         frames,
         ends,
         left_out,
+        numbering,
     } = Asked::open(request)?;
     let scene = super::baked_scene(&cache, &request.cache)?;
     let mut context = request.gpu.open(Needs::default())?;
     context.counts_operations = request.time_passes;
-    let folder = enter(request, &cache, &frames)?;
+    let folder = enter(request, &cache, &frames, numbering)?;
     let image = &request.look.spec().image;
     let rate = cache.manifest().frames_per_second;
     let camera = ends.map(|ends| request.look.lint_camera(ends, rate));
@@ -271,6 +276,7 @@ pub fn render(
         whitewater,
         scene,
         context,
+        numbering,
         near: Near::default(),
         kept: None,
         times: BTreeMap::new(),
@@ -292,6 +298,7 @@ struct Asked {
     /// The first and the last of all shares' frames.
     ends: Option<[u32; 2]>,
     left_out: usize,
+    numbering: Numbering,
 }
 
 impl Asked {
@@ -331,6 +338,7 @@ impl Asked {
             frames,
             ends: all.first().zip(all.last()).map(|(&a, &b)| [a, b]),
             left_out,
+            numbering: Numbering::new(&all, request.number_from),
         })
     }
 }
@@ -347,9 +355,14 @@ fn told(error: RenderError, look: &Look) -> RenderJobError {
 }
 
 /// Takes this process's place in the output folder.
-fn enter(request: &Request, cache: &CacheReader, frames: &[u32]) -> Result<Folder, RenderJobError> {
+fn enter(
+    request: &Request,
+    cache: &CacheReader,
+    frames: &[u32],
+    numbering: Numbering,
+) -> Result<Folder, RenderJobError> {
     let of_frame = |frame| cache.frame_hash(frame).ok().map(str::to_owned);
-    let wanted = wanted(request, cache, frames, &of_frame)?;
+    let wanted = wanted(request, cache, (frames, numbering), &of_frame)?;
     Ok(Folder::enter(&request.directory, &wanted)?)
 }
 
@@ -357,13 +370,13 @@ fn enter(request: &Request, cache: &CacheReader, frames: &[u32]) -> Result<Folde
 fn wanted<'a>(
     request: &Request,
     cache: &CacheReader,
-    frames: &[u32],
+    (frames, numbering): (&[u32], Numbering),
     of_frame: &'a dyn Fn(u32) -> Option<String>,
 ) -> Result<Wanted<'a>, RenderJobError> {
     let first = attributes(cache, request, cache.first_frame())?;
     let mut names = Vec::new();
     for &frame in frames {
-        names.extend(pictures(cache, &request.look, frame));
+        names.extend(pictures(cache, &request.look, frame, numbering));
     }
     Ok(Wanted {
         owner: Owner {
@@ -372,6 +385,7 @@ fn wanted<'a>(
             shot: first.shot,
             scene_hash: first.scene_hash,
             look_hash: first.look_hash,
+            numbering: numbering.offset,
         },
         names: names.into_iter().map(|(name, _)| name).collect(),
         overwrite: request.overwrite,
@@ -399,6 +413,7 @@ struct Job<'a> {
     whitewater: Option<Whitewater>,
     scene: Scene,
     context: Context,
+    numbering: Numbering,
     /// Frames about the last one that was drawn, so that each is read once in a row of them.
     near: Near,
     /// Of the frame before, where it can draw another.
@@ -496,7 +511,7 @@ impl Job<'_> {
         let begin = Instant::now();
         let request = self.request;
         let attributes = whole_attributes(&self.cache, request, self.whitewater.as_ref(), frame)?;
-        let pictures = pictures(&self.cache, &request.look, frame);
+        let pictures = pictures(&self.cache, &request.look, frame, self.numbering);
         let stands = || {
             let is_there = |(name, format): &(String, FormatSpec)| {
                 is_current(&request.directory.join(name), *format, &attributes)
@@ -506,7 +521,8 @@ impl Job<'_> {
         if stands() {
             return Ok(Done::Stands);
         }
-        let number = name(&attributes.shot, frame, self.cache.last_frame());
+        let last = self.cache.last_frame();
+        let number = name(&attributes.shot, frame, last, self.numbering);
         let Some(claim) = self.folder.claim(&number)? else {
             return Ok(Done::Elsewhere);
         };

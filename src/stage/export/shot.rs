@@ -101,7 +101,10 @@ impl Job<'_> {
             path.file_name()
                 .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
         };
-        let layer = |&frame: &u32| (frame, named(self.layer(file, frame)));
+        let layer = |&frame: &u32| {
+            let number = self.numbering.of(frame);
+            (number, named(self.layer(file, frame)))
+        };
         let scene = &self.scene;
         let attributes = match water {
             UsdWater::Points => self.source().manifest().attributes.clone(),
@@ -138,7 +141,10 @@ impl Job<'_> {
             way: self
                 .frames
                 .iter()
-                .map(|&frame| (frame, solid.pose(scene.shot.time(frame))))
+                .map(|&frame| {
+                    let pose = solid.pose(scene.shot.time(frame));
+                    (self.numbering.of(frame), pose)
+                })
                 .collect(),
         });
         still.chain(moving).collect()
@@ -151,7 +157,7 @@ impl Job<'_> {
         };
         let per_second = self.scene.shot.frames_per_second;
         let view = |&frame: &u32| View {
-            frame,
+            frame: self.numbering.of(frame),
             eye: swell_render::eye(look, self.scene.origin, frame.into(), per_second),
             film_width_mm: look.spec().camera.film_back_mm[0],
             lens: swell_render::lens(look, frame.into(), per_second),

@@ -40,12 +40,13 @@ pub fn expected(request: &Request) -> Result<Expected, RenderJobError> {
         cache,
         whitewater,
         frames,
+        numbering,
         ..
     } = Asked::open(request)?;
     let of_frame = |frame| cache.frame_hash(frame).ok().map(str::to_owned);
     Folder::look(
         &request.directory,
-        &wanted(request, &cache, &frames, &of_frame)?,
+        &wanted(request, &cache, (&frames, numbering), &of_frame)?,
     )?;
     let mut found = Expected::default();
     let mut bytes = 0;
@@ -53,7 +54,7 @@ pub fn expected(request: &Request) -> Result<Expected, RenderJobError> {
         let attributes = whole_attributes(&cache, request, whitewater.as_ref(), frame)?;
         let mut stands = true;
         let mut size = 0;
-        for (name, format) in pictures(&cache, &request.look, frame) {
+        for (name, format) in pictures(&cache, &request.look, frame, numbering) {
             let file = request.directory.join(name);
             stands &= is_current(&file, format, &attributes);
             size += fs::metadata(&file).map_or(0, |meta| meta.len());

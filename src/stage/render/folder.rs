@@ -21,7 +21,10 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::locked::{is_at, is_had, open};
+use crate::{
+    locked::{is_at, is_had, open},
+    numbering::Numbering,
+};
 use swell_render::{Attributes, image::read_header};
 
 /// Whose pictures they are; its lock is held while a process comes or goes.
@@ -45,6 +48,9 @@ pub(super) struct Owner {
     pub(super) cache: String,
     /// Hash of the look.
     pub(super) look_hash: String,
+    /// What is added to the cache's numbers of frames in the pictures' names.
+    #[serde(default)]
+    pub(super) numbering: i64,
 }
 
 impl Owner {
@@ -55,6 +61,10 @@ impl Owner {
             ("scene", self.scene_hash == other.scene_hash),
             ("cache", self.cache == other.cache),
             ("look", self.look_hash == other.look_hash),
+            (
+                "numbering (--number-from)",
+                self.numbering == other.numbering,
+            ),
             (
                 "version of the program",
                 version_of(&self.software) == version_of(&other.software),
@@ -368,7 +378,10 @@ fn stranger(file: &Path, is_wanted: bool, wanted: &Wanted<'_>) -> Option<String>
         Err(_) => return is_wanted.then(|| "no picture that can be read".to_owned()),
     };
     let cache = (wanted.frame_hash)(found.frame);
-    let mut found = owner_of(found);
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let numbering = Numbering::in_name(&name, &found.shot, found.frame);
+    let numbering = numbering.map_or(wanted.owner.numbering, |it| it.offset);
+    let mut found = owner_of(found, numbering);
     if let Some(frame) = &cache {
         // Behind its frame's hash stand those of what else it was drawn from: other ones are drawn anew, not refused.
         let rest = found.cache.strip_prefix(frame.as_str());
@@ -385,13 +398,14 @@ fn stranger(file: &Path, is_wanted: bool, wanted: &Wanted<'_>) -> Option<String>
 }
 
 /// Of one picture: its frame stands for the cache.
-fn owner_of(picture: Attributes) -> Owner {
+fn owner_of(picture: Attributes, numbering: i64) -> Owner {
     Owner {
         software: picture.software,
         shot: picture.shot,
         scene_hash: picture.scene_hash,
         cache: picture.cache_hash,
         look_hash: picture.look_hash,
+        numbering,
     }
 }
 

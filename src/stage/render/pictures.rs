@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Request, whitewater::Whitewater};
-use crate::device::shaders_note;
+use crate::{device::shaders_note, numbering::Numbering};
 use swell_cache::{CacheError, CacheReader, Manifest};
 use swell_render::{
     Attributes, Image, REACH, RenderError, frames_around,
@@ -85,9 +85,10 @@ pub(super) fn baked_note(manifest: &Manifest) -> String {
 }
 
 /// `SHOT.0001`, with as many digits as the last cached frame needs, at least four.
-pub(super) fn name(shot: &str, frame: u32, last_frame: u32) -> String {
-    let digits = last_frame.to_string().len().max(4);
-    format!("{shot}.{frame:0digits$}")
+pub(super) fn name(shot: &str, frame: u32, last_frame: u32, numbering: Numbering) -> String {
+    let digits = numbering.of(last_frame).to_string().len().max(4);
+    let number = numbering.of(frame);
+    format!("{shot}.{number:0digits$}")
 }
 
 fn ending(format: FormatSpec) -> &'static str {
@@ -98,17 +99,23 @@ fn ending(format: FormatSpec) -> &'static str {
 }
 
 /// Names of a frame's pictures, and in which format each.
-pub(super) fn pictures(cache: &CacheReader, look: &Look, frame: u32) -> Vec<(String, FormatSpec)> {
-    let name = name(&cache.manifest().shot, frame, cache.last_frame());
+pub(super) fn pictures(
+    cache: &CacheReader,
+    look: &Look,
+    frame: u32,
+    numbering: Numbering,
+) -> Vec<(String, FormatSpec)> {
+    let name = name(&cache.manifest().shot, frame, cache.last_frame(), numbering);
     let formats = look.spec().output.formats.iter();
     formats
         .map(|&format| (format!("{name}.{}", ending(format)), format))
         .collect()
 }
 
-/// Name of the PNG of a frame of a cache.
+/// Name of the PNG of a frame of a cache, by the cache's own numbers.
 pub fn picture_name(cache: &CacheReader, frame: u32) -> String {
-    let name = name(&cache.manifest().shot, frame, cache.last_frame());
+    let shot = &cache.manifest().shot;
+    let name = name(shot, frame, cache.last_frame(), Numbering::default());
     format!("{name}.{}", ending(FormatSpec::Png))
 }
 

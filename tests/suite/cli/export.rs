@@ -269,6 +269,82 @@ fn names_hold_what_file_systems_take() {
     );
 }
 
+/// The first of the frames has the number that is asked for, in names and in USD; what is in the files is what it was.
+#[test]
+fn files_are_numbered_from_another_frame() {
+    let job = made();
+    for folder in ["plain", "moved", "shared"] {
+        fs::create_dir(job.path(folder)).unwrap();
+    }
+    let words = |folder: &str, more: &str| {
+        format!(
+            "export cache --frames 2-4x2 --npy {folder}/p.%04d.npy --usd {folder}/s.usda --look look.toml {more}"
+        )
+    };
+    job.expect(0, &words("plain", ""));
+    job.expect(0, &words("moved", "--number-from 1001"));
+    let moved = files(&job.path("moved"));
+    let names: Vec<_> = moved.keys().map(String::as_str).collect();
+    assert_eq!(
+        names,
+        [
+            "p.1001.npy",
+            "p.1003.npy",
+            "s.1001.usda",
+            "s.1003.usda",
+            "s.manifest.usda",
+            "s.usda"
+        ]
+    );
+    let plain = files(&job.path("plain"));
+    assert_eq!(moved["p.1003.npy"], plain["p.0004.npy"]);
+    assert_ne!(moved["p.1001.npy"], moved["p.1003.npy"]);
+    let [root, layer, own] = [&moved["s.usda"], &moved["s.1003.usda"], &plain["s.usda"]]
+        .map(|bytes| String::from_utf8(bytes.clone()).unwrap());
+    for part in [
+        "startTimeCode = 1001",
+        "endTimeCode = 1003",
+        "active = [(1001, 0), (1003, 1)]",
+        "assetPaths = [@./s.1001.usda@, @./s.1003.usda@]",
+        "times = [(1001, 1001), (1003, 1003)]",
+    ] {
+        assert!(root.contains(part), "{part}: {root}");
+    }
+    assert!(
+        layer.contains("startTimeCode = 1003") && layer.contains("    1003: ["),
+        "{layer}"
+    );
+    // What the set does at a frame, the camera here, it does at its number.
+    let at = |text: &str, number: u32| {
+        let before = format!("{number}: ( (");
+        let line = text.lines().find(|line| line.trim().starts_with(&before));
+        line.unwrap().trim().trim_start_matches(&before).to_owned()
+    };
+    assert_eq!(at(&root, 1003), at(&own, 4));
+    // Shares have the numbers of the whole range.
+    for k in 1..=2 {
+        job.expect(
+            0,
+            &words("shared", &format!("--number-from 1001 --chunk {k}/2")),
+        );
+    }
+    assert_eq!(files(&job.path("shared")), moved);
+    // It goes on, and what stands there and is another frame is refused and stays.
+    let said = job.expect(0, &words("moved", "--number-from 1001"));
+    assert!(said.contains("0 files made"), "{said}");
+    job.expect(
+        4,
+        "export cache --npy moved/p.%04d.npy --frames 1-4 --number-from 1001",
+    );
+    assert_eq!(files(&job.path("moved")), moved);
+    job.expect(
+        0,
+        "export cache --npy moved/p.%04d.npy --frames 4 --number-from 1001 --overwrite",
+    );
+    assert_eq!(files(&job.path("moved"))["p.1001.npy"], plain["p.0004.npy"]);
+    job.expect_clear(2, &words("moved", "--number-from x"), "--number-from");
+}
+
 #[test]
 fn what_stands_whole_is_not_made_again() {
     let job = made();

@@ -53,6 +53,49 @@ fn until(child: &mut Child, done: &dyn Fn() -> bool) {
     }
 }
 
+/// One folder has one numbering, by which pictures are skipped, and made again, as by the cache's own.
+#[test]
+fn pictures_are_numbered_from_another_frame() {
+    let job = job(4);
+    let render = "render cache --look look.toml --frames 2-4x2 -o";
+    job.expect(0, &format!("{render} plain"));
+    job.expect(0, &format!("{render} moved --number-from 1001"));
+    let picture = |folder: &str, name: &str| fs::read(job.path(folder).join(name)).unwrap();
+    for (number, frame) in [(1001, 2), (1003, 4)] {
+        for ending in ["png", "exr"] {
+            let moved = picture("moved", &format!("small.{number}.{ending}"));
+            assert_eq!(
+                moved,
+                picture("plain", &format!("small.{frame:04}.{ending}"))
+            );
+        }
+    }
+    assert_eq!(pictures(&job.path("moved")).len(), 4);
+    assert_ne!(
+        picture("moved", "small.1001.png"),
+        picture("moved", "small.1003.png")
+    );
+    // The whole range decides, as of shares; what stands there is skipped.
+    let share = format!("{render} moved --number-from 1001 --chunk 2/2");
+    assert_has(&job.expect(0, &share), &["0 frames rendered, 1 stood"]);
+    let rest = "render cache --look look.toml --frames 3 --number-from 1002 -o moved";
+    assert_has(&job.expect(0, rest), &["1 frame rendered"]);
+    let before = pictures(&job.path("moved"));
+    assert_eq!(before.len(), 6);
+    // Another numbering: refused with nothing written, with a dry run too, and where it would leave others beside.
+    let other = "render cache --look look.toml --frames 2-4 -o moved";
+    for more in ["", " --dry-run", " --number-from 1002", " --overwrite"] {
+        job.expect_clear(4, &format!("{other}{more}"), "numbering");
+    }
+    assert_eq!(pictures(&job.path("moved")), before);
+    // All of them anew is what was asked for.
+    job.expect(
+        0,
+        "render cache --look look.toml --frames 2-4 --number-from 1001 -o moved --overwrite",
+    );
+    assert_eq!(pictures(&job.path("moved")), before);
+}
+
 #[test]
 fn processes_share_a_range_and_make_up_for_a_killed_one() {
     let rounds = std::env::var("SWELL_ROUNDS").map_or(2, |text| text.parse().unwrap());

@@ -27,6 +27,7 @@ fn owner(look: &str) -> Owner {
         scene_hash: "5ce".to_owned(),
         cache: "first line".to_owned(),
         look_hash: look.to_owned(),
+        numbering: 0,
     }
 }
 
