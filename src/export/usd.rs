@@ -69,7 +69,7 @@ pub struct View {
     pub frame: u32,
     /// About the scene's zero.
     pub eye: Eye,
-    /// Width of the film, mm.
+    /// Width of the picture on the film, mm.
     pub film_width_mm: f64,
     /// The lens's f-number and the distance that is sharp, metres; `None` of a pinhole.
     pub lens: Option<[f64; 2]>,

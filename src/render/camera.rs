@@ -53,7 +53,8 @@ pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
     };
     if let Some(file) = look.camera_file() {
         let stand = file.at(seconds);
-        let focal_length_mm = file.focal_length_mm(look.film_height_mm(), seconds);
+        let framing = look.framing_of_file();
+        let focal_length_mm = file.focal_length_mm(&framing, look.film_mm()[1], seconds);
         let [right, up] = upright(stand.forward, stand.up);
         return Pose {
             position: stand.position,
@@ -61,7 +62,7 @@ pub(super) fn pose(look: &Look, frame: f64, frames_per_second: f64) -> Pose {
             up,
             forward: stand.forward,
             focal_length_mm,
-            shift: file.shift(seconds),
+            shift: file.shift(&framing, seconds),
             lens: lens(focal_length_mm, None),
         };
     }
@@ -157,15 +158,9 @@ fn keyed(camera: &CameraSpec, frame: f64) -> Keyed {
     }
 }
 
-/// Focal length in pixels of the picture.
-pub(super) fn focal_px(look: &Look, focal_length_mm: f64) -> f64 {
-    let spec = look.spec();
-    focal_length_mm / spec.camera.film_back_mm[0] * f64::from(spec.image.width)
-}
-
 /// Longest focal length of the shot, pixels.
 pub(super) fn longest_focal_px(look: &Look) -> f64 {
-    focal_px(look, look.longest_focal_length_mm())
+    look.focal_px(look.longest_focal_length_mm())
 }
 
 /// What of the camera's uniform does not come from the pose.
@@ -199,7 +194,7 @@ fn of_pose(look: &Look, pose: &Pose, origin: DVec3) -> Eye {
         right: pose.right,
         up: pose.up,
         forward: pose.forward,
-        focal: focal_px(look, pose.focal_length_mm),
+        focal: look.focal_px(pose.focal_length_mm),
         // Where the picture's middle is right of the axis, the axis is left of it.
         axis: [-right, up],
         size: [image.width, image.height],
@@ -275,6 +270,46 @@ mod tests {
             "{camera}\n[image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n"
         );
         Look::parse(&text, Path::new("look.toml")).unwrap()
+    }
+
+    /// A file's film of 36 × 24 mm with a focal length of 35 mm, moved 1.8 mm to the right and 1.2 mm down, under an image of 160 × 90:
+    /// a millimetre on that film is as many pixels as the fit says, along both sides.
+    #[test]
+    fn the_film_of_a_file_is_fitted_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let plate = include_str!("../scene/look/usd_camera/plate.usda")
+            .replace("1025: 50", "1025: 35")
+            .replace(
+                "verticalAperture = 20.25",
+                "verticalAperture = 24\n    float horizontalApertureOffset = 1.8\n    float verticalApertureOffset = -1.2",
+            );
+        std::fs::write(folder.path().join("plate.usda"), plate).unwrap();
+        let look = |fit: &str, film: &str| {
+            let text = format!(
+                "[camera]\nfile = \"plate.usda\"\n{fit}{film}[image]\nwidth = 160\nheight = 90\n[sky]\nmodel = \"hosek_wilkie\"\n"
+            );
+            Look::parse(&text, &folder.path().join("look.toml"))
+        };
+        let (by_width, by_height) = (160.0 / 36.0, 90.0 / 24.0);
+        // Of the look's own film, which decides no more than a lens's aperture, none changes where anything is.
+        for film in ["", "film_back_mm = [36.0, 24.0]\n"] {
+            for (fit, pixels) in [
+                ("width", by_width),
+                ("height", by_height),
+                ("fill", by_width),
+                ("overscan", by_height),
+            ] {
+                let look = look(&format!("fit = \"{fit}\"\n"), film).unwrap();
+                let found = eye(&look, DVec3::ZERO, 1.0, 24.0);
+                let [across, down] = found.axis;
+                for (found, mm) in [(found.focal, 35.0), (across, -1.8), (down, -1.2)] {
+                    assert!((found - mm * pixels).abs() < 1e-5, "{fit}: {found}");
+                }
+                assert!((longest_focal_px(&look) - 35.0 * pixels).abs() < 1e-5);
+            }
+        }
+        let refused = look("", "").unwrap_err().to_string();
+        assert!(refused.contains("camera.fit"), "{refused}");
     }
 
     /// A shot that is counted from 1001, against what usd-core 26.11 has at time code 1001 + (frame − 1) · 24 / rate: place, direction,
@@ -387,7 +422,7 @@ mod tests {
         assert!((slope(11.0 - 1e-4) - slope(11.0 + 1e-4)).abs() < 1e-3);
         assert!(slope(1.0 + 1e-4).abs() < 1e-3 && slope(31.0 - 1e-4).abs() < 1e-3);
         // Halfway along a film back of 36 mm at 36 mm, 160 pixels: the focal length is the width.
-        assert!((focal_px(&look(&text), 36.0) - 160.0).abs() < 1e-12);
+        assert!((look(&text).focal_px(36.0) - 160.0).abs() < 1e-12);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 pub mod camera_file;
 pub mod spec;
 
+mod film;
 mod keys;
 mod lens;
 mod lint;
@@ -19,15 +20,16 @@ use serde::{Deserialize as _, de::DeserializeOwned};
 use super::{Fault, Reach, document::Document, error::SceneError, key::Key};
 
 use camera_file::CameraFile;
+pub use film::Framing;
 pub(super) use keys::KEYS;
 use keys::{MOST_SAMPLES, MOST_VOXELS};
 pub use materials::{Material, Materials, Picture, Texture};
 pub use spec::{
     AovFilterSpec, AovSpec, BasinSpec, CameraSpec, CausticsSpec, ColourSpaceSpec, CurveSpec,
-    FilterSpec, FormatSpec, ImageSpec, KeyframeSpec, LensSpec, LightSpec, LookSpec, MaterialSpec,
-    MethodSpec, OutputSpec, RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec, SolidsOutput,
-    SplatSpec, SpraySpec, SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec, WaterSpec,
-    WaveMakersSpec, WhitewaterLook, WindowsSpec,
+    FilterSpec, FitSpec, FormatSpec, ImageSpec, KeyframeSpec, LensSpec, LightSpec, LookSpec,
+    MaterialSpec, MethodSpec, OutputSpec, RendererSpec, RippleSpec, SeaSpec, SeaWavesSpec, SkySpec,
+    SolidsOutput, SplatSpec, SpraySpec, SunSpec, SurfaceSpec, TextureSpec, TransformSpec, ViewSpec,
+    WaterSpec, WaveMakersSpec, WhitewaterLook, WindowsSpec,
 };
 
 /// Pixels of a picture, counted from the upper left one of the look's image.
@@ -54,7 +56,7 @@ const METHOD: &str = "renderer.method";
 const CAMERA_FILE: &str = "camera.file";
 const CAMERA_NAME: &str = "camera.name";
 
-/// Part by which the shape of film or of a file's camera may be off that of the image.
+/// Part by which the shape of a file's camera may be off that of the image where the look does not say how it is fitted.
 const SHAPE: f64 = 0.005;
 
 /// A validated look: every value in its range, every file that it names read.
@@ -167,12 +169,6 @@ impl Look {
     /// The camera of the file that the look names; `None` where it names none.
     pub fn camera_file(&self) -> Option<&CameraFile> {
         self.camera.as_deref()
-    }
-
-    /// Height of the film that the image is on, whose width is `film_back_mm`'s.
-    pub fn film_height_mm(&self) -> f64 {
-        let image = &self.spec.image;
-        self.spec.camera.film_back_mm[0] * f64::from(image.height) / f64::from(image.width)
     }
 
     /// That its panorama is no picture that can be used, in the words of who tried; `None` where it has none.
@@ -345,7 +341,7 @@ fn plain(spec: &mut LookSpec) {
 
 /// What the text of a look has for each newer key that it does without: left out of its hash, so that the look keeps the hash
 /// that it had before there was such a key.
-const NEWER: [&str; 21] = [
+const NEWER: [&str; 22] = [
     "whitewater: None, ",
     "renderer: RendererSpec { method: Ssfr }, ",
     "overscan: 0, ",
@@ -359,6 +355,7 @@ const NEWER: [&str; 21] = [
     "voxels_per_spacing: 2.0, ",
     "splat: Ellipsoid, ",
     "start: None, ",
+    "fit: None, ",
     "lens: None, file: None, name: None, ",
     ", focus_distance_m: None",
     ", shutter_curve: Box, shutter_ramps: None",
@@ -425,16 +422,7 @@ fn panorama(doc: &Document<'_>, file: &Path, name: &Path) -> Result<Panorama, Sc
 }
 
 fn check_camera(doc: &Document<'_>, spec: &LookSpec) -> Result<(), SceneError> {
-    let (camera, image) = (&spec.camera, &spec.image);
-    let [width, height] = camera.film_back_mm;
-    let wanted = width * f64::from(image.height) / f64::from(image.width);
-    if (wanted / height - 1.0).abs() > SHAPE {
-        let message = format!(
-            "is not the shape of a {} × {} image; allowed is [{width}, {wanted:.4}]",
-            image.width, image.height
-        );
-        return Err(doc.fault_of_plain("camera.film_back_mm", message));
-    }
+    let camera = &spec.camera;
     if camera.file.is_some() {
         return Ok(());
     }
@@ -537,10 +525,13 @@ fn file_camera(
                 false => fault(error.to_string()),
             },
         )?;
+    if spec.camera.fit.is_some() {
+        return Ok(camera);
+    }
     let shape = f64::from(spec.image.width) / f64::from(spec.image.height);
     match camera.aspect_ratio() {
         Some(aspect) if (aspect / shape - 1.0).abs() > SHAPE => Err(fault(format!(
-            "its camera has an aspect ratio of {aspect:.4}, a {} × {} image has {shape:.4}; make them the same",
+            "its camera has an aspect ratio of {aspect:.4}, a {} × {} image has {shape:.4}; make them the same, or set camera.fit",
             spec.image.width, spec.image.height
         ))),
         _ => Ok(camera),

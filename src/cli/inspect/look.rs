@@ -8,7 +8,7 @@ use std::{
 
 use super::{InspectArgs, misplaced};
 use crate::{Failure, bake, count, is_cache, named_adapter, size};
-use swell_scene::look::{AovSpec, FormatSpec, Look, MethodSpec};
+use swell_scene::look::{AovSpec, FitSpec, FormatSpec, Look, MethodSpec};
 use swell_stage::render::{LookPlan, Subject, plan};
 
 /// Tables that a look has and a scene has not.
@@ -44,12 +44,23 @@ pub(super) fn camera(look: &Look) -> String {
                 .start
                 .map(|start| format!(", whose frame {start} is frame 1"));
             let start = start.unwrap_or_default();
-            return format!("from {}{start}, {lens}", file.display());
+            let words = FitSpec::NAMED.iter();
+            let fit = words
+                .filter(|(_, fit)| camera.fit == Some(*fit))
+                .map(|(word, _)| format!(", fitted by {word}"));
+            let fitted: String = fit.collect();
+            return format!("from {}{start}{fitted}, {lens}", file.display());
         }
         (None, 0) => "still".to_owned(),
         (None, keyframes) => count(keyframes, "keyframe"),
     };
-    format!("of {} mm, {lens}, {moves}", camera.focal_length_mm)
+    let (film, shown) = (camera.film_back_mm, look.film_mm());
+    let [[w, h], [x, y]] = [film, shown].map(|sides| sides.map(|mm| (100.0 * mm).round() / 100.0));
+    let on = match [w, h] == [x, y] {
+        true => String::new(),
+        false => format!(" on film of {w} × {h} mm, where the image takes {x} × {y}"),
+    };
+    format!("of {} mm{on}, {lens}, {moves}", camera.focal_length_mm)
 }
 
 /// Files of a picture.

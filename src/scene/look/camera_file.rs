@@ -12,6 +12,7 @@ use super::{
         gltf_nodes::{Beside, NodeError, Nodes},
         usd_nodes::{Rate, is_usd},
     },
+    Framing,
     usd_camera::UsdCamera,
 };
 
@@ -170,20 +171,35 @@ impl CameraFile {
         }
     }
 
-    /// Of a film of this height: its half over the tangent of half the field of view.
-    pub fn focal_length_mm(&self, film_height_mm: f64, seconds: f64) -> f64 {
-        match &self.body {
-            Body::Gltf { yfov, .. } => 0.5 * film_height_mm / (0.5 * yfov).tan(),
-            Body::Usd(camera) => film_height_mm / camera.height_ratio(seconds),
-        }
+    /// Where the picture is so many millimetres high: that over the picture's height in focal lengths, which `framing` decides.
+    pub fn focal_length_mm(&self, framing: &Framing, picture_height_mm: f64, seconds: f64) -> f64 {
+        picture_height_mm / framing.shown(self.film(framing, seconds))[1]
     }
 
     /// How far the picture's middle stands off the optical axis, to its right and to its top, in heights of the picture.
-    pub fn shift(&self, seconds: f64) -> [f64; 2] {
+    pub fn shift(&self, framing: &Framing, seconds: f64) -> [f64; 2] {
         match &self.body {
             // glTF's perspective cameras have none.
             Body::Gltf { .. } => [0.0; 2],
-            Body::Usd(camera) => camera.shift(seconds),
+            Body::Usd(camera) => {
+                let film = self.film(framing, seconds);
+                let heights = film[1] / framing.shown(film)[1];
+                camera.shift(seconds).map(|of_film| of_film * heights)
+            }
+        }
+    }
+
+    /// Width and height of the film, in focal lengths; of the image's shape where the file has no width.
+    fn film(&self, framing: &Framing, seconds: f64) -> [f64; 2] {
+        match &self.body {
+            Body::Gltf {
+                yfov, aspect_ratio, ..
+            } => {
+                let height = 2.0 * (0.5 * yfov).tan();
+                let shape = aspect_ratio.unwrap_or_else(|| framing.shape());
+                [shape * height, height]
+            }
+            Body::Usd(camera) => camera.film(seconds),
         }
     }
 
@@ -196,8 +212,8 @@ impl CameraFile {
     }
 
     /// The longest of the shot, mm.
-    pub fn longest_focal_length_mm(&self, film_height_mm: f64) -> f64 {
-        let at = |seconds| self.focal_length_mm(film_height_mm, seconds);
+    pub fn longest_focal_length_mm(&self, framing: &Framing, picture_height_mm: f64) -> f64 {
+        let at = |seconds| self.focal_length_mm(framing, picture_height_mm, seconds);
         self.times().map(at).fold(at(0.0), f64::max)
     }
 

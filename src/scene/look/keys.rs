@@ -1,6 +1,7 @@
 //! Keys of a look.
 
-use super::super::key::{Interval, Key};
+use super::super::key::{Interval, Key, words};
+use super::FitSpec;
 
 pub(in super::super) const KEYS: &[Key] = &[
     Key::table("camera", CAMERA).about(
@@ -68,6 +69,8 @@ const PER_METRE: Interval = 0.0..=1e4;
 
 const DEGREES: Interval = -360.0..=360.0;
 
+const FITS: &[&str] = &words(&FitSpec::NAMED);
+
 const CAMERA: &[Key] = &[
     Key::number("focal_length_mm", FOCAL_LENGTH)
         .unit("mm")
@@ -76,8 +79,12 @@ const CAMERA: &[Key] = &[
     Key::vector("film_back_mm", 2, 1.0..=500.0)
         .unit("mm")
         .default("[36.0, 20.25]")
-        .also(", of the image's shape")
         .about("width and height of the exposed film"),
+    Key::choice("fit", FITS)
+        .computed(|| "the film's width; a `file`'s camera must be of the image's shape".to_owned())
+        .about(
+            "how the image lies on a film of another shape: as wide or as high as the film, as large as fits on it, or as small as holds all of it",
+        ),
     Key::vector("position", 3, PLACE)
         .unit("metres")
         .absent()

@@ -16,7 +16,7 @@ impl Look {
     pub fn longest_focal_length_mm(&self) -> f64 {
         let camera = &self.spec.camera;
         let own = (self.camera_file()).map_or(camera.focal_length_mm, |file| {
-            file.longest_focal_length_mm(self.film_height_mm())
+            file.longest_focal_length_mm(&self.framing_of_file(), self.film_mm()[1])
         });
         let keys = camera.keyframes.iter();
         keys.filter_map(|key| key.focal_length_mm)
@@ -26,7 +26,7 @@ impl Look {
     /// Pixels across the disc that a point at infinity is drawn as, at its widest in the shot; a point at half of the focus
     /// distance is as wide. `None` of a pinhole.
     pub fn widest_blur_px(&self) -> Option<f64> {
-        let (camera, image) = (&self.spec.camera, &self.spec.image);
+        let camera = &self.spec.camera;
         let times = self.camera_file().into_iter().flat_map(CameraFile::times);
         let lenses = times.chain([0.0]).map(|seconds| self.lens(seconds));
         // Of the lens at its widest and its nearest, which need not be at one time.
@@ -37,7 +37,7 @@ impl Look {
             .filter_map(|key| key.focus_distance_m)
             .fold(own, f64::min);
         let focal = self.longest_focal_length_mm();
-        let pixels = focal / camera.film_back_mm[0] * f64::from(image.width);
+        let pixels = self.focal_px(focal);
         Some(pixels * 1e-3 * focal / f_stop / focus)
     }
 }

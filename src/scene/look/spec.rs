@@ -49,8 +49,11 @@ pub struct CameraSpec {
     /// mm; 0 of a camera from a file, which has its own.
     #[serde(default)]
     pub focal_length_mm: f64,
-    /// Width and height of the exposed film, mm; its shape must be the image's.
+    /// Width and height of the exposed film, mm.
     pub film_back_mm: [f64; 2],
+    /// How the image lies on the film, where their shapes differ; where left out, on all of the film's width, and a file's camera is of
+    /// the image's shape.
+    pub fit: Option<FitSpec>,
     /// World metres; with `target`, instead of keyframes.
     pub position: Option<[f64; 3]>,
     /// World metres.
@@ -69,6 +72,30 @@ pub struct CameraSpec {
     /// Poses at frames, in ascending order.
     #[serde(default, rename = "keyframe")]
     pub keyframes: Vec<KeyframeSpec>,
+}
+
+/// How an image lies on a film of another shape.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum FitSpec {
+    /// As wide as the film: Maya's Horizontal, USD's `adjustApertureHeight`.
+    Width,
+    /// As high as the film: Maya's Vertical, USD's `adjustApertureWidth`.
+    Height,
+    /// As large as fits on the film: Maya's Fill, USD's `cropAperture`.
+    Fill,
+    /// As small as holds all of the film: Maya's Overscan, USD's `expandAperture`.
+    Overscan,
+}
+
+impl FitSpec {
+    /// All of them, by the words of looks.
+    pub const NAMED: [(&'static str, Self); 4] = [
+        ("width", Self::Width),
+        ("height", Self::Height),
+        ("fill", Self::Fill),
+        ("overscan", Self::Overscan),
+    ];
 }
 
 /// A thin lens.

@@ -109,10 +109,10 @@ impl UsdCamera {
         [&self.focal_length].into_iter().chain(film).chain(lens)
     }
 
-    /// Height of the film over the focal length: twice the tangent of half the vertical field of view.
-    pub(super) fn height_ratio(&self, seconds: f64) -> f64 {
+    /// Width and height of the film over the focal length: twice the tangents of half the fields of view.
+    pub(super) fn film(&self, seconds: f64) -> [f64; 2] {
         let code = self.nodes.code(seconds);
-        self.aperture[1].at(code)[0] / self.focal_length.at(code)[0]
+        [0, 1].map(|axis| self.aperture[axis].at(code)[0] / self.focal_length.at(code)[0])
     }
 
     /// How far the film's middle stands off the optical axis to the picture's right and to its top, in heights of the film.

@@ -159,7 +159,7 @@ impl Job<'_> {
         let view = |&frame: &u32| View {
             frame: self.numbering.of(frame),
             eye: swell_render::eye(look, self.scene.origin, frame.into(), per_second),
-            film_width_mm: look.spec().camera.film_back_mm[0],
+            film_width_mm: look.film_mm()[0],
             lens: swell_render::lens(look, frame.into(), per_second),
         };
         self.frames.iter().map(view).collect()

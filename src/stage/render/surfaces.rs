@@ -286,7 +286,7 @@ impl<'a> Pictures<'a> {
         if !(*colour || *flicker) {
             return Ok(());
         }
-        let film = look.spec().camera.film_back_mm[0];
+        let film = look.film_mm()[0];
         let focal_length_mm = eye.focal * film / f64::from(eye.size[0]);
         let still = look.standing(eye.position, eye.position + eye.forward, focal_length_mm);
         let frames = around(frame, *flicker);

@@ -455,6 +455,32 @@ fn faults_are_one_clear_line() {
     clear(2, "export cache --usd s.usda --look look.toml", "gone.glb");
 }
 
+/// Film of 36 × 24 mm under an image of 16 : 9, at 35 mm: the camera of the file has the image's own part of it, in tenths of a metre.
+#[test]
+fn a_camera_s_fitted_film_is_exported() {
+    let job = made();
+    job.edit("look.toml", "[36.0, 20.25]", "[36.0, 24.0]");
+    let lengths = |out: &str| {
+        job.expect(0, &format!("export cache --usd {out} --look look.toml"));
+        let text = fs::read_to_string(job.path(out)).unwrap();
+        ["focalLength", "horizontalAperture", "verticalAperture"].map(|key| {
+            let line = text.lines().find(|line| line.contains(key));
+            let line = line.unwrap_or_else(|| panic!("no {key} in {text}"));
+            line.rsplit(" = ").next().unwrap().parse::<f64>().unwrap()
+        })
+    };
+    let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
+    let by_width = lengths("width.usda");
+    assert!(near(by_width, [0.35, 0.36, 0.2025]), "{by_width:?}");
+    job.edit("look.toml", "[camera]\n", "[camera]\nfit = \"height\"\n");
+    let by_height = lengths("height.usda");
+    assert!(near(by_height, [0.35, 1.28 / 3.0, 0.24]), "{by_height:?}");
+    assert!(!near(by_height, by_width));
+    let said = job.expect(0, "inspect look.toml");
+    let words = "camera of 35 mm on film of 36 × 24 mm, where the image takes 42.67 × 24, ";
+    assert!(said.contains(words), "{said}");
+}
+
 #[test]
 fn a_damaged_frame_ends_an_export_with_whole_files() {
     let job = made();

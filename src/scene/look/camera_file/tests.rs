@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use serde_json::{Value, json};
 
-use super::*;
+use super::{super::FitSpec, *};
 
 /// A binary glTF file (version 2, section 4.4) with these numbers in its binary chunk.
 pub(crate) fn glb(document: &Value, numbers: &[f32]) -> Vec<u8> {
@@ -114,7 +114,8 @@ fn a_camera_hangs_in_its_hierarchy() {
     // The control: the other way round.
     assert!(!near(stand.up, DVec3::new(0.0, up.y, -up.z)));
     // Half of a film 20.25 mm high over tan of half of 0.5 radians.
-    let focal = camera.focal_length_mm(20.25, 0.0);
+    let framing = Framing::new(FitSpec::Height, [16, 9]);
+    let focal = camera.focal_length_mm(&framing, 20.25, 0.0);
     assert!((focal - 10.125 / 0.25f64.tan()).abs() < 1e-4, "{focal}");
     assert!((camera.aspect_ratio().unwrap() - 16.0 / 9.0).abs() < 1e-6);
 }

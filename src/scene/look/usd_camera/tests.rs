@@ -4,7 +4,10 @@
 
 use glam::DVec3;
 
-use super::super::camera_file::{CameraFile, CameraFileError};
+use super::super::{
+    FitSpec, Framing,
+    camera_file::{CameraFile, CameraFileError},
+};
 
 /// As Blender 4.5.15 writes a camera under an empty, less what it says of itself.
 const BLENDER: &str = include_str!("blender.usda");
@@ -50,6 +53,11 @@ def Xform "a"
     }
 }
 "#;
+
+/// Of images as high as the film.
+fn framing() -> Framing {
+    Framing::new(FitSpec::Height, [16, 9])
+}
 
 fn camera(text: &str, name: Option<&str>) -> Result<CameraFile, CameraFileError> {
     CameraFile::read(text.as_bytes(), name, &|_| {
@@ -126,11 +134,11 @@ fn a_camera_of_blender_stands_where_usd_says() {
         (2.5, 37.3125, 30.364_011_8),
         (5.0, 40.0, 28.409_271_2f64),
     ] {
-        let found = camera.focal_length_mm(20.25, code / 24.0);
+        let found = camera.focal_length_mm(&framing(), 20.25, code / 24.0);
         assert!((found - focal).abs() < 1e-4, "{code}: {found}");
         assert!((found - 10.125 / (0.5 * yfov.to_radians()).tan()).abs() < 1e-4);
     }
-    assert!((camera.longest_focal_length_mm(20.25) - 40.0).abs() < 1e-4);
+    assert!((camera.longest_focal_length_mm(&framing(), 20.25) - 40.0).abs() < 1e-4);
     assert!((camera.aspect_ratio().unwrap() - 16.0 / 9.0).abs() < 1e-6);
     // Control: the same with y up stands elsewhere.
     let other = CameraFile::read(
@@ -182,8 +190,8 @@ fn a_lens_and_a_shift_of_blender_are_read() {
         let away = DVec3::new(point[0], point[2], -point[1]) - stand.position;
         let right = stand.forward.cross(stand.up);
         // Heights of the picture.
-        let focal = camera.focal_length_mm(1.0, code / 24.0);
-        let [x, y] = camera.shift(code / 24.0);
+        let focal = camera.focal_length_mm(&framing(), 1.0, code / 24.0);
+        let [x, y] = camera.shift(&framing(), code / 24.0);
         let part = |axis: DVec3| focal * away.dot(axis) / away.dot(stand.forward);
         let [across, up] = [part(right) - x, part(stand.up) - y];
         [0.5 + across * 9.0 / 16.0, 0.5 + up]
@@ -208,10 +216,11 @@ fn a_lens_and_a_shift_of_blender_are_read() {
     let small = self::camera(&small, None).unwrap();
     let [f_stop, focus] = small.lens(1.0 / 24.0).unwrap();
     assert!(f_stop == 4.0 && (focus - 0.065).abs() < 1e-9, "{focus}");
-    assert_eq!(small.shift(0.0), camera.shift(0.0));
+    let shift = |camera: &CameraFile| camera.shift(&framing(), 0.0);
+    assert_eq!(shift(&small), shift(&camera));
     // A camera that says nothing of it is a pinhole, in the middle of its film.
     let plain = self::camera(BLENDER, None).unwrap();
-    assert!(plain.lens(0.0).is_none() && plain.shift(0.0) == [0.0; 2]);
+    assert!(plain.lens(0.0).is_none() && shift(&plain) == [0.0; 2]);
 }
 
 /// What other layers may say of a camera is not read, so that such a file gives none.

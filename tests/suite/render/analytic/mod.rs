@@ -6,6 +6,7 @@
 
 mod caustics;
 mod filtered;
+mod fit;
 mod geometry;
 mod hidden;
 mod lens;

@@ -1,0 +1,103 @@
+//! The part of the film that the image shows: which side of it the image takes, where their shapes differ.
+//!
+//! The names are those of Maya's film fit; USD's `aspectRatioConformPolicy` has the same four, and Houdini's cameras always take the
+//! width. As there, the image stays about the middle of the film.
+
+use super::{FitSpec, Look};
+
+/// How an image lies on films of any shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Framing {
+    fit: FitSpec,
+    /// Columns and rows of the image.
+    image: [f64; 2],
+}
+
+impl Framing {
+    /// Of an image of so many columns and rows.
+    pub fn new(fit: FitSpec, image: [u32; 2]) -> Self {
+        Self {
+            fit,
+            image: image.map(f64::from),
+        }
+    }
+
+    /// Width over height of the image.
+    pub(super) fn shape(&self) -> f64 {
+        self.image[0] / self.image[1]
+    }
+
+    /// Width and height of the image on a film of this width and height, in their unit.
+    pub fn shown(&self, [width, height]: [f64; 2]) -> [f64; 2] {
+        let [columns, rows] = self.image;
+        let is_film_wider = width * rows > height * columns;
+        let is_by_width = match self.fit {
+            FitSpec::Width => true,
+            FitSpec::Height => false,
+            FitSpec::Fill => !is_film_wider,
+            FitSpec::Overscan => is_film_wider,
+        };
+        match is_by_width {
+            true => [width, width * rows / columns],
+            false => [height * columns / rows, height],
+        }
+    }
+}
+
+impl Look {
+    /// Width and height of the image on the film, mm.
+    pub fn film_mm(&self) -> [f64; 2] {
+        let framing = self.framing(FitSpec::Width);
+        framing.shown(self.spec.camera.film_back_mm)
+    }
+
+    /// How the image lies on the film of a camera from a file: where the look does not say it, both have the same shape, and the
+    /// file's vertical field of view decides.
+    pub fn framing_of_file(&self) -> Framing {
+        self.framing(FitSpec::Height)
+    }
+
+    /// A focal length in pixels of the image.
+    pub fn focal_px(&self, focal_length_mm: f64) -> f64 {
+        focal_length_mm / self.film_mm()[0] * f64::from(self.spec.image.width)
+    }
+
+    fn framing(&self, left_out: FitSpec) -> Framing {
+        let image = &self.spec.image;
+        let fit = self.spec.camera.fit.unwrap_or(left_out);
+        Framing::new(fit, [image.width, image.height])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 36 × 24 mm, and film twice as wide as high, under an image of 16 : 9, against the table of `docs/look.md`.
+    #[test]
+    fn an_image_lies_on_film_as_the_fit_says() {
+        let near = |a: [f64; 2], b: [f64; 2]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+        let narrow = [36.0, 24.0];
+        let wide = [36.0, 18.0];
+        for (fit, on_narrow, on_wide) in [
+            (FitSpec::Width, [36.0, 20.25], [36.0, 20.25]),
+            (FitSpec::Height, [128.0 / 3.0, 24.0], [32.0, 18.0]),
+            (FitSpec::Fill, [36.0, 20.25], [32.0, 18.0]),
+            (FitSpec::Overscan, [128.0 / 3.0, 24.0], [36.0, 20.25]),
+        ] {
+            let framing = Framing::new(fit, [1920, 1080]);
+            for (film, expected) in [(narrow, on_narrow), (wide, on_wide)] {
+                let found = framing.shown(film);
+                assert!(near(found, expected), "{fit:?} {film:?}: {found:?}");
+                // The image is within the film, or holds it: both of film of its own shape alone.
+                let is_within = found[0] <= film[0] + 1e-12 && found[1] <= film[1] + 1e-12;
+                let holds = found[0] >= film[0] - 1e-12 && found[1] >= film[1] - 1e-12;
+                assert!(fit != FitSpec::Fill || (is_within && !holds), "{film:?}");
+                assert!(
+                    fit != FitSpec::Overscan || (holds && !is_within),
+                    "{film:?}"
+                );
+            }
+        }
+    }
+}
