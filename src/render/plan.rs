@@ -144,6 +144,21 @@ impl Plan {
         Ok(program)
     }
 
+    /// Whether it has a buffer of that name.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.buffers.iter().any(|buffer| buffer.name == name)
+    }
+
+    /// Makes a buffer, where it has one of that name, as large as this.
+    pub(super) fn grow(&mut self, to: BufferSpec) {
+        let found = self.buffers.iter_mut().find(|it| it.name == to.name);
+        if let Some(buffer) = found
+            && buffer.bytes < to.bytes
+        {
+            *buffer = to;
+        }
+    }
+
     /// A buffer that holds `count` values, of zeros.
     pub(super) fn buffer<T: Element>(&mut self, buffer: &Buf<T>, count: usize) {
         self.buffers.push(buffer.sized(count));
@@ -264,7 +279,7 @@ mod tests {
             wave_makers: Vec::new(),
             waves: None,
         };
-        Plan::new(&look, &scene, 9, &LIMITS).unwrap()
+        Plan::new(&look, &scene, &LIMITS).unwrap()
     }
 
     /// Names of buffers, textures and samplers that commands use.

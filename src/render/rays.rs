@@ -12,7 +12,7 @@ use super::{
     uniform::Rays,
 };
 use swell_domain::level_set::{
-    LevelSet, VALUES, VOXELS, bricks_over, kernels::Kernels, sunlight::nodes_over,
+    LevelSet, VALUES, bricks_over, kernels::Kernels, sunlight::nodes_over,
 };
 use swell_gpu::recording::{Bind, Command, Groups};
 use swell_scene::look::Look;
@@ -24,17 +24,13 @@ const QUAYS: u32 = 0b11_0000;
 /// spacing off it.
 const GAP: f64 = 0.5;
 
-/// Particles for each brick that is planned for, of two voxels a spacing. The quickstart has one for 83 of them at its start and for 27 in its splash; a
-/// frame that has more makes room for them.
-const PARTICLES_A_BRICK: usize = 24;
-
-/// Plans the level set of `particles` particles, the light in it with room for `behind` values behind it, and the tree over what is
-/// opaque.
+/// Plans the level set, for which a frame makes the room that it needs, the light in it with room for `behind` values behind it, and the
+/// tree over what is opaque.
 pub(super) fn plan_rays(
     plan: &mut Plan,
     look: &Look,
     scene: &RenderScene,
-    (set, particles): (&Set<'_>, usize),
+    set: &Set<'_>,
     behind: usize,
 ) {
     let size = scene.domain.size();
@@ -63,10 +59,7 @@ pub(super) fn plan_rays(
     let count = |n: [u32; 3]| n.iter().map(|&n| n as usize).product();
     plan.values(&RAYS, &[rays]);
     plan.buffer(&LEVEL_TABLE, count(bricks));
-    // Bricks lie along a surface: their number goes with the square of how fine they are.
-    let finer = (look.spec().surface.voxels_per_spacing / VOXELS).powi(2);
-    let bricks = (finer * (particles / PARTICLES_A_BRICK) as f64).ceil();
-    plan.buffer(&LEVEL_VALUES, (bricks as usize).max(1) * VALUES);
+    plan.buffer(&LEVEL_VALUES, VALUES);
     plan.buffer(&SUN_PATHS, count(nodes) + behind);
     sorted.extend(set.places);
     plan.values(&SET_NODES, &boxes);

@@ -80,6 +80,7 @@ mod render {
     mod outlines;
     mod paged;
     mod pictures;
+    mod planned;
     mod scaled;
     mod scenes;
 }

@@ -152,9 +152,12 @@ fn show_plan(
         )?,
         Subject::Cache(cache) => {
             let particles = planned.particles;
+            let frame = planned.frame.map_or(String::new(), |frame| {
+                format!("; buffers are those of frame {frame}")
+            });
             writeln!(
                 out,
-                "for {}: {particles} particles at most",
+                "for {}: {particles} particles at most{frame}",
                 cache.display()
             )?;
         }

@@ -39,16 +39,11 @@ const fn smoothing_of(splat: SplatSpec) -> f64 {
 }
 
 impl Plan {
-    /// Plans what the look calls for and nothing more, with room for `particles` particles.
+    /// Plans what the look calls for and nothing more, before it has room for any particles.
     ///
     /// # Errors
     /// A damaged panorama, a domain or spacing that is none, a mesh that names vertices it lacks.
-    pub fn new(
-        look: &Look,
-        scene: &RenderScene,
-        particles: usize,
-        limits: &Limits,
-    ) -> Result<Self, RenderError> {
+    pub fn new(look: &Look, scene: &RenderScene, limits: &Limits) -> Result<Self, RenderError> {
         check(scene)?;
         let spec = look.spec();
         let has_aovs = !spec.output.aovs.is_empty();
@@ -117,10 +112,9 @@ impl Plan {
         plan_sea(&mut plan, look, scene, shaded);
         let shadow = plan_shadow(&mut plan, &set, &matrix, limits);
         plan.once.push(shadow);
-        let particles = room(particles);
         match spec.renderer.method {
-            MethodSpec::Ssfr => plan_ssfr(&mut plan, look, scene, (&set, particles), limits),
-            MethodSpec::Ray => plan_ray(&mut plan, look, scene, (&set, particles)),
+            MethodSpec::Ssfr => plan_ssfr(&mut plan, look, scene, &set, limits),
+            MethodSpec::Ray => plan_ray(&mut plan, look, scene, &set),
         }
         plan_threads(&mut plan, limits);
         plan.end_fills();
@@ -129,13 +123,7 @@ impl Plan {
 }
 
 /// Plans pictures of splats.
-fn plan_ssfr(
-    plan: &mut Plan,
-    look: &Look,
-    scene: &RenderScene,
-    (set, particles): (&Set<'_>, usize),
-    limits: &Limits,
-) {
+fn plan_ssfr(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>, limits: &Limits) {
     for depth in &DEPTHS {
         plan.buffer(depth, plan.extent.pixels());
     }
@@ -144,9 +132,9 @@ fn plan_ssfr(
     if look.spec().water.spray.is_some() {
         moving.push("ssfr/splat_spray");
     }
-    plan_particles(plan, look, particles, &moving);
+    plan_particles(plan, look, &moving);
     if look.spec().surface.splat == SplatSpec::Ellipsoid {
-        plan_shapes(plan, look, particles);
+        plan_shapes(plan, look);
     }
     let body = plan_body(plan, scene.particle_spacing);
     let owner = match look.wants(AovSpec::Forward) {
@@ -164,15 +152,10 @@ fn plan_ssfr(
 }
 
 /// Plans pictures by rays.
-fn plan_ray(
-    plan: &mut Plan,
-    look: &Look,
-    scene: &RenderScene,
-    (set, particles): (&Set<'_>, usize),
-) {
+fn plan_ray(plan: &mut Plan, look: &Look, scene: &RenderScene, set: &Set<'_>) {
     // The map of caustics stands behind the lattice of light: a pass has no room for a buffer more.
     let behind = map_values(look, scene);
-    plan_rays(plan, look, scene, (set, particles), behind);
+    plan_rays(plan, look, scene, set, behind);
     plan.water = plan_caustics(plan, look, scene);
     let has_drops = look.spec().water.spray.is_some();
     let has_spray = has_drops || look.spec().whitewater.is_some();
@@ -188,7 +171,7 @@ fn plan_ray(
         } else {
             &[]
         };
-        plan_particles(plan, look, particles, moving);
+        plan_particles(plan, look, moving);
     }
     if has_spray {
         plan.buffer(&CLOUD, 1);

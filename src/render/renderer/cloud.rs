@@ -8,8 +8,9 @@ use crate::{
     buffers::{CLOUD, CLOUD_WORDS},
     cloud::{drops_of, grid, white_of},
     paths::Path,
+    plan::Limits,
     rays::voxel,
-    uniform::Particle,
+    uniform::{self, Particle},
 };
 use swell_domain::{cloud::Drop, particles::Particles};
 use swell_gpu::program::Program;
@@ -67,19 +68,29 @@ impl RayCloud {
         if self.seconds == Some(seconds) {
             return Ok(false);
         }
-        let (about, words) = grid(&self.drops, seconds, scene, (self.voxel, self.sun));
+        let (about, words) = self.grid(seconds, scene);
         let grew = words.len() > self.capacity;
         if grew {
-            self.capacity = room(words.len());
-            let most = program.context.limits.max_storage_buffer_binding_size / 4;
-            if self.capacity as u64 > most {
-                self.capacity = words.len();
-            }
+            self.capacity = room_of(words.len(), Limits::of(&program.context).storage);
             program.refit(&[CLOUD_WORDS.sized(self.capacity)], &[])?;
         }
         program.upload(CLOUD, 0, &[about]);
         program.upload(CLOUD_WORDS, 0, &words);
         self.seconds = Some(seconds);
         Ok(grew)
+    }
+
+    /// What the grid is about, and its words, of so many seconds from the frame.
+    pub(super) fn grid(&self, seconds: f32, scene: &RenderScene) -> (uniform::Cloud, Vec<u32>) {
+        grid(&self.drops, seconds, scene, (self.voxel, self.sun))
+    }
+}
+
+/// How many words there is room for where so many are asked for, of which one binding holds `storage` bytes.
+pub(super) fn room_of(words: usize, storage: u64) -> usize {
+    let room = room(words);
+    match room as u64 > storage / 4 {
+        true => words,
+        false => room,
     }
 }

@@ -4,8 +4,10 @@ mod aovs;
 mod build;
 mod cloud;
 mod load;
+mod measured;
 mod shade;
 mod splats;
+mod taken;
 mod water;
 mod whitewater;
 
@@ -95,7 +97,7 @@ impl Renderer {
             tile: tile_limit.clamp(16, whole.texture),
             ..whole
         };
-        let plan = Plan::new(look, scene, 0, &limits)?;
+        let plan = Plan::new(look, scene, &limits)?;
         let program = plan.program(context)?;
         let record = |commands| Recording::new(&program, commands);
         let renderer = Self {
@@ -209,14 +211,7 @@ impl Renderer {
 
     /// What cameras are made of, beside the look and the sample, for so many particles on the device.
     fn setting(&self, particle_count: u32) -> Setting {
-        Setting {
-            origin: self.scene.origin + self.scene.domain.min,
-            extent: self.plan.extent,
-            particle_count,
-            radius: self.plan.radius,
-            near: NEAR * self.scene.particle_spacing,
-            frames_per_second: self.scene.frames_per_second,
-        }
+        setting(&self.plan, &self.scene, particle_count)
     }
 
     /// Beauty and the parts of its light.
@@ -318,5 +313,16 @@ impl Renderer {
         recording.run(&self.program, self.timer.as_mut())?;
         self.program.context.wait()?;
         Ok(())
+    }
+}
+
+fn setting(plan: &Plan, scene: &RenderScene, particle_count: u32) -> Setting {
+    Setting {
+        origin: scene.origin + scene.domain.min,
+        extent: plan.extent,
+        particle_count,
+        radius: plan.radius,
+        near: NEAR * scene.particle_spacing,
+        frames_per_second: scene.frames_per_second,
     }
 }

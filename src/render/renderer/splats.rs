@@ -139,13 +139,9 @@ impl Pages {
     }
 }
 
-/// Plans `particles` particles. Where the shutter is open `moving` passes, which draw samples, take them along their paths.
-pub(super) fn plan_particles(
-    plan: &mut Plan,
-    look: &Look,
-    particles: usize,
-    moving: &[&'static str],
-) {
+/// Plans particles. Where the shutter is open `moving` passes, which draw samples, take them along their paths.
+pub(super) fn plan_particles(plan: &mut Plan, look: &Look, moving: &[&'static str]) {
+    let particles = room(0);
     plan.per_particle(&PARTICLES, particles, look);
     plan.windows(&PAGES, &[Page::default()]);
     if look.spec().water.spray.is_some() {
@@ -160,9 +156,9 @@ pub(super) fn plan_particles(
     }
 }
 
-/// Plans a shape of its own for each of `particles` particles.
-pub(super) fn plan_shapes(plan: &mut Plan, look: &Look, particles: usize) {
-    plan.per_particle(&SHAPES, particles, look);
+/// Plans a shape of its own for each particle.
+pub(super) fn plan_shapes(plan: &mut Plan, look: &Look) {
+    plan.per_particle(&SHAPES, room(0), look);
     for pass in ["ssfr/splat_depth", "ssfr/splat_owner"] {
         plan.define(pass, "ELLIPSOIDS");
     }

@@ -9,7 +9,7 @@ use crate::{
     rays::{level_set, sun_in_water, voxel},
     uniform::Particle,
 };
-use swell_domain::level_set::sunlight::Sunlight;
+use swell_domain::level_set::{LevelSet, sunlight::Sunlight};
 use swell_gpu::program::Program;
 use swell_scene::look::{Look, MethodSpec};
 
@@ -57,7 +57,7 @@ impl RayWater {
         if self.seconds == Some(seconds) {
             return Ok(false);
         }
-        let level = level_set(scene, self.voxel, &self.places, seconds);
+        let level = self.level(seconds, scene);
         let light = Sunlight::new(&level, self.sun);
         let grew = level.values.len() > self.capacity;
         if grew {
@@ -70,6 +70,11 @@ impl RayWater {
         self.seconds = Some(seconds);
         self.top = level.top();
         Ok(grew)
+    }
+
+    /// The level set of so many seconds from the frame.
+    pub(super) fn level(&self, seconds: f32, scene: &RenderScene) -> LevelSet {
+        level_set(scene, self.voxel, &self.places, seconds)
     }
 
     /// Height below which the water on the device lies, metres.

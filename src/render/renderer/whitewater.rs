@@ -51,6 +51,27 @@ impl Whitewater {
         frame: u32,
         white: &Particles,
     ) -> Result<bool, RenderError> {
+        let packed = self.packed(scene, frame, white)?;
+        let grew = packed.len() > self.capacity;
+        if grew {
+            self.capacity = room(packed.len());
+            program.refit(&[WHITEWATER.sized(self.capacity)], &[])?;
+        }
+        self.params.count = packed.len() as u32;
+        let groups = spread(&program.context, 64, packed.len() as u64);
+        program.upload(WHITEWATER_GROUPS, 0, &[groups.into()]);
+        program.upload(WHITEWATER_PARAMS, 0, &[self.params]);
+        program.upload(WHITEWATER, 0, &packed);
+        Ok(grew)
+    }
+
+    /// What of a frame's whitewater is drawn as splats.
+    pub(super) fn packed(
+        &self,
+        scene: &RenderScene,
+        frame: u32,
+        white: &Particles,
+    ) -> Result<Vec<uniform::Whitewater>, RenderError> {
         let origin = scene.domain.min;
         let radii = white.attributes.get(RADIUS).map_or(&[][..], Vec::as_slice);
         let mut packed = Vec::with_capacity(white.len());
@@ -69,17 +90,7 @@ impl Whitewater {
                 foam: if is_foam(white, index) { 1.0 } else { 0.0 },
             });
         }
-        let grew = packed.len() > self.capacity;
-        if grew {
-            self.capacity = room(packed.len());
-            program.refit(&[WHITEWATER.sized(self.capacity)], &[])?;
-        }
-        self.params.count = packed.len() as u32;
-        let groups = spread(&program.context, 64, packed.len() as u64);
-        program.upload(WHITEWATER_GROUPS, 0, &[groups.into()]);
-        program.upload(WHITEWATER_PARAMS, 0, &[self.params]);
-        program.upload(WHITEWATER, 0, &packed);
-        Ok(grew)
+        Ok(packed)
     }
 }
 

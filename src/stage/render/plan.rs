@@ -4,15 +4,15 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{RenderJobError, render_scene, told};
+use super::{RenderJobError, Whitewater, near::Near, render_scene, told};
 use crate::{baked_scene, prepare::Start};
-use swell_cache::CacheReader;
+use swell_cache::{CacheReader, Entry};
 use swell_domain::{bounds::Bounds, particles::Particles};
 use swell_gpu::{
     adapter::{Context, GpuError},
     program::check_sizes,
 };
-use swell_render::{Limits, Plan, RenderScene, Runs};
+use swell_render::{Limits, Moment, Plan, RenderScene, Runs, Water};
 use swell_scene::{Scene, look::Look};
 
 /// What is planned to stand before the camera.
@@ -39,6 +39,8 @@ pub struct LookPlan {
     pub bytes: u64,
     /// Particles of the frame with the most; 0 without water.
     pub particles: usize,
+    /// The frame whose water decides the sizes; `None` without water.
+    pub frame: Option<u32>,
     /// The adapter whose limits were used; `None` where the machine has none.
     pub adapter: Option<String>,
     /// Why that adapter could not render it.
@@ -68,28 +70,11 @@ pub fn plan(
         Err(error) => return Err(error.into()),
     };
     let limits = context.as_ref().map_or(COMMON_LIMITS, Limits::of);
-    let (scene, particles) = match subject {
-        Subject::Nothing => (empty(), 0),
-        Subject::Scene(scene) => {
-            let start = Start::of(scene)?;
-            (
-                render_scene(scene, look, 0, &start.particles)?,
-                start.particles.len(),
-            )
-        }
-        Subject::Cache(directory) => {
-            let cache = CacheReader::open(directory)?;
-            let most = cache.entries().iter().map(|entry| entry.particles).max();
-            let scene = baked_scene(&cache, directory)?;
-            let first = cache.first_frame();
-            let still = Particles::default();
-            (
-                render_scene(&scene, look, first, &still)?,
-                most.unwrap_or(0) as usize,
-            )
-        }
-    };
-    let plan = Plan::new(look, &scene, particles, &limits).map_err(|error| told(error, look))?;
+    let Planned {
+        plan,
+        particles,
+        frame,
+    } = Planned::of(look, subject, &limits)?;
     let misfit = context
         .as_ref()
         .and_then(|context| check_sizes(context, &plan.buffers).err());
@@ -106,9 +91,84 @@ pub fn plan(
             .collect(),
         bytes: plan.bytes(),
         particles,
+        frame,
         adapter: context.map(|context| context.info.name),
         misfit,
     })
+}
+
+/// A plan, and what it is for.
+struct Planned {
+    plan: Plan,
+    particles: usize,
+    frame: Option<u32>,
+}
+
+impl Planned {
+    fn of(look: &Look, subject: &Subject, limits: &Limits) -> Result<Self, RenderJobError> {
+        match subject {
+            Subject::Nothing => {
+                let plan = Plan::new(look, &empty(), limits).map_err(|error| told(error, look))?;
+                Ok(Self {
+                    plan,
+                    particles: 0,
+                    frame: None,
+                })
+            }
+            Subject::Scene(scene) => {
+                let start = Start::of(scene)?;
+                let set = render_scene(scene, look, 0, &start.particles)?;
+                let (water, white) = (Water::new(start.particles), Particles::default());
+                let moment = Moment::alone(&water, &white);
+                Self::of_frame(look, &set, (0, &moment), limits)
+            }
+            Subject::Cache(directory) => {
+                let cache = CacheReader::open(directory)?;
+                let frame = fullest(&cache);
+                let scene = baked_scene(&cache, directory)?;
+                let around = Near::default().around(&cache, look, frame)?;
+                let white = match &look.spec().whitewater {
+                    Some(of) => {
+                        Whitewater::open(directory, &of.stream, &cache, &[frame])?.read(frame)?
+                    }
+                    None => Particles::default(),
+                };
+                let set = render_scene(&scene, look, frame, &around.water.particles)?;
+                let most = cache.entries().iter().map(|entry| entry.particles).max();
+                Ok(Self {
+                    particles: most.unwrap_or(0) as usize,
+                    ..Self::of_frame(look, &set, (frame, &around.moment(&white)), limits)?
+                })
+            }
+        }
+    }
+
+    fn of_frame(
+        look: &Look,
+        set: &RenderScene,
+        (frame, moment): (u32, &Moment<'_>),
+        limits: &Limits,
+    ) -> Result<Self, RenderJobError> {
+        let plan = Plan::of_frame(look, set, frame, moment, limits);
+        Ok(Self {
+            plan: plan.map_err(|error| told(error, look))?,
+            particles: moment.water.particles.len(),
+            frame: Some(frame),
+        })
+    }
+}
+
+/// Of the frames whose particles are kept the one with the most of them, and of equals the fastest, whose surface is mostly the
+/// largest; the last one where none is kept.
+fn fullest(cache: &CacheReader) -> u32 {
+    let speed = |entry: &Entry| entry.report["max_speed"].as_f64().unwrap_or(0.0);
+    let kept = cache.entries().iter();
+    let kept = kept.filter(|entry| cache.has_particles(entry.frame));
+    let fullest = kept.max_by(|a, b| {
+        let by_speed = speed(a).total_cmp(&speed(b));
+        a.particles.cmp(&b.particles).then(by_speed)
+    });
+    fullest.map_or(cache.last_frame(), |entry| entry.frame)
 }
 
 /// A scene of nothing. Its size and spacing decide no pass and no size of a buffer.

@@ -20,7 +20,7 @@ fn look(text: &str) -> Look {
     Look::parse(text, Path::new("test.toml")).unwrap()
 }
 
-const TOP_DOWN: &str = "[camera]
+pub(super) const TOP_DOWN: &str = "[camera]
 focal_length_mm = 36.0
 film_back_mm = [36.0, 27.0]
 position = [2.0, 6.0, 1.5]
@@ -44,7 +44,7 @@ const ALL_AOVS: &str =
     "[output]\nformats = [\"exr\"]\naovs = [\"Z\", \"N\", \"P\", \"forward\", \"thickness\"]\n";
 
 /// A tank of 8 × 4 × 6 m; the slab reaches past what the camera sees on all sides.
-fn tank(spacing: f64) -> RenderScene {
+pub(super) fn tank(spacing: f64) -> RenderScene {
     RenderScene {
         origin: DVec3::ZERO,
         domain: Bounds {

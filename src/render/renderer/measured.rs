@@ -1,0 +1,75 @@
+//! The plan of a frame whose particles are known, without a device.
+
+use super::{
+    build::room,
+    cloud::{RayCloud, room_of},
+    load::of_particles,
+    setting,
+    splats::Pages,
+    taken::{Taken, cameras, hidden, sort},
+    water::RayWater,
+    whitewater::Whitewater,
+};
+use crate::{
+    Moment, RenderError, RenderScene,
+    buffers::{BLOCKS, CLOUD_WORDS, LEVEL_VALUES, PARTICLES, WHITEWATER},
+    in_frame::blocks_in_frame,
+    plan::{Limits, Plan},
+};
+use swell_scene::look::Look;
+
+impl Plan {
+    /// [`Plan::new`] with the room that the renderer makes as it draws this frame. With an open shutter level set and drops are those of
+    /// the frame's instant, where each of its samples has its own.
+    ///
+    /// # Errors
+    /// As [`Plan::new`]; [`RenderError::NotFinite`] for a damaged particle.
+    pub fn of_frame(
+        look: &Look,
+        scene: &RenderScene,
+        frame: u32,
+        moment: &Moment<'_>,
+        limits: &Limits,
+    ) -> Result<Self, RenderError> {
+        let mut plan = Self::new(look, scene, limits)?;
+        let Taken {
+            mut packed,
+            mut ways,
+        } = Taken::of(look, scene, frame, moment)?;
+        if let Some(mut water) = RayWater::of(look, scene) {
+            water.take(&packed, &ways);
+            let values = water.level(0.0, scene).values.len();
+            plan.grow(LEVEL_VALUES.sized(values));
+        }
+        if let Some(mut cloud) = RayCloud::of(look, scene) {
+            let water = (&packed[..], &ways[..]);
+            cloud.take(look, scene, plan.radius, water, moment.white);
+            let (_, words) = cloud.grid(0.0, scene);
+            plan.grow(CLOUD_WORDS.sized(room_of(words.len(), limits.storage)));
+        }
+        if let Some(whitewater) = Whitewater::of(look, scene) {
+            let drawn = whitewater.packed(scene, frame, moment.white)?;
+            plan.grow(WHITEWATER.sized(room(drawn.len())));
+        }
+        if !plan.has(PARTICLES.name()) {
+            return Ok(plan);
+        }
+        let cameras = cameras(look, &setting(&plan, scene, 0), frame);
+        let hidden = hidden(look, scene, &packed);
+        let seen = sort(
+            (look, scene),
+            (frame, &cameras),
+            hidden.as_ref(),
+            &mut packed,
+            &mut ways,
+        );
+        for buffer in of_particles(look, Pages::new(room(seen), limits.storage)) {
+            plan.grow(buffer);
+        }
+        if let Some(hidden) = hidden {
+            let blocks = blocks_in_frame(hidden.blocks, &cameras);
+            plan.grow(BLOCKS.sized(room(blocks.len())));
+        }
+        Ok(plan)
+    }
+}

@@ -1,0 +1,75 @@
+//! What is refused before a frame is drawn, and what while it is: the same, for the same reason.
+
+use glam::DVec3;
+use swell::{
+    gpu::{
+        adapter::{Context, Needs},
+        program::check_sizes,
+    },
+    render::{Limits, Moment, Plan, Renderer, Water},
+    scene::look::Look,
+};
+
+use super::pictures::{TOP_DOWN, tank};
+use super::scenes::slab;
+
+const SPACING: f64 = 0.16;
+
+fn lowered(storage: u64) -> Context {
+    Context::open_lowered(None, Needs::default(), |limits| {
+        limits.max_storage_buffer_binding_size = storage;
+    })
+    .unwrap()
+}
+
+/// Deep water, whose surface is in few bricks: a binding that just holds the level set of its frame is enough to plan and to draw it,
+/// and with four bytes less both are refused in the same words. So it is with particles that channels beside the picture bind whole.
+#[test]
+fn what_is_planned_for_a_frame_is_refused_where_drawing_it_is() {
+    let scene = tank(SPACING);
+    let particles = slab(scene.domain.min, DVec3::new(8.0, 3.2, 6.0), SPACING);
+    let count = particles.len();
+    let (water, white) = (Water::new(particles), Default::default());
+    let moment = Moment::alone(&water, &white);
+    for (more, names) in [
+        ("[renderer]\nmethod = \"ray\"\n", &["level_values"][..]),
+        (
+            "[output]\nformats = [\"exr\"]\naovs = [\"forward\"]\n",
+            &["particles", "shapes", "paths"],
+        ),
+    ] {
+        let look = Look::parse(
+            &format!("{TOP_DOWN}{more}"),
+            std::path::Path::new("look.toml"),
+        )
+        .unwrap();
+        let plan = |context: &Context| {
+            Plan::of_frame(&look, &scene, 1, &moment, &Limits::of(context)).unwrap()
+        };
+        let whole = plan(&crate::support::context());
+        let stored = whole.buffers.iter().filter(|buffer| !buffer.is_uniform);
+        let largest = stored.max_by_key(|buffer| buffer.bytes).unwrap();
+        assert!(names.contains(&&*largest.name), "{}", largest.name);
+        let refused = |storage: u64| {
+            let context = lowered(storage);
+            let planned = check_sizes(&context, &plan(&context).buffers).err();
+            let renderer = Renderer::new(&context, &look, &scene);
+            let drawn = renderer.and_then(|mut it| it.render_moment(1, &moment));
+            (
+                planned.map(|error| error.to_string()),
+                drawn.err().map(|error| error.to_string()),
+            )
+        };
+        assert_eq!(refused(largest.bytes), (None, None), "{more}");
+        let (planned, drawn) = refused(largest.bytes - 4);
+        assert!(
+            drawn
+                .as_deref()
+                .is_some_and(|said| said.contains(&largest.name))
+        );
+        assert_eq!(planned, drawn);
+        // The control: what the number of particles alone lets expect, a brick for 24 of them, is beyond that binding.
+        let bricks = count.next_power_of_two() / 24;
+        assert!(names.len() > 1 || bricks as u64 * 4 * 11 * 11 * 11 > 2 * largest.bytes);
+    }
+}
